@@ -1,0 +1,41 @@
+option(ISOBRICK_BUILD_TOOLS "Build the isobrick program" ${PROJECT_IS_TOP_LEVEL})
+option(ISOBRICK_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
+option(ISOBRICK_BUILD_BENCH "Build the benchmarks" OFF)
+option(ISOBRICK_WERROR "Warnings are errors" OFF)
+set(ISOBRICK_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize takes them (address,undefined or thread)")
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+
+# Every library and program of ours: warnings, and floating point exactly as
+# written (no contraction into fma), so that every machine makes the same mesh.
+add_library(isobrick_flags INTERFACE)
+target_compile_options(isobrick_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow -ffp-contract=off
+  $<$<BOOL:${ISOBRICK_WERROR}>:-Werror>)
+if(ISOBRICK_SANITIZE)
+  target_compile_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE})
+endif()
+
+# isobrick_library(name SOURCES … LINK … PRIVATE …): one folder, one target
+# isobrick::name. LINK is public: it is the folder's row in the dependency table.
+function(isobrick_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK;PRIVATE" ${ARGN})
+  add_library(isobrick_${name} STATIC ${arg_SOURCES})
+  add_library(isobrick::${name} ALIAS isobrick_${name})
+  set_target_properties(isobrick_${name} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(isobrick_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(isobrick_${name} PUBLIC cxx_std_20)
+  target_link_libraries(isobrick_${name} PUBLIC ${arg_LINK}
+    PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:isobrick_flags>)
+endfunction()

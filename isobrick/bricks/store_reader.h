@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/core/range.h"
+#include "isobrick/core/transform.h"
+
+namespace isobrick {
+
+/// One resolution of a store, 0 the finest.
+struct LevelInfo {
+  Lattice lattice;
+  Int3 shard;           ///< samples of a shard
+  Transform transform;  ///< index space of this level to world space
+};
+
+/// What a store's metadata says.
+struct StoreInfo {
+  std::filesystem::path path;
+  std::vector<LevelInfo> levels;
+  ScalarType type = ScalarType::u8;
+  double fill_value = 0;        ///< of absent bricks; exact for every type
+  std::string codec;            ///< "zstd:3" or "none"
+  /// Whether level 0 may hold NaN (always false for integers).
+  bool may_have_nan = false;
+};
+
+/// Where a brick lies on disk.
+struct BrickLocation {
+  std::filesystem::path file;
+  std::uint64_t offset = 0, size = 0;
+};
+
+/// Ranges of an aligned box of 16³ blocks (or of bricks), C order [z, y, x]
+/// over `box`, as doubles: exact for all types but 64-bit ones that we don't have.
+struct RangeTable {
+  Box3 box;
+  std::vector<ValueRange<double>> ranges;
+  const ValueRange<double>& at(Int3 p) const {
+    return ranges[static_cast<std::size_t>(linear_index(p - box.lo, box.extent()))];
+  }
+};
+
+/// Reads a store. Thread-safe after construction; keeps shard indices cached
+/// in bounded memory, never samples.
+class StoreReader {
+ public:
+  /// Throws Error when `path` is no store, is one of an unknown version, or
+  /// lacks what is needed; DamageError when its metadata is broken.
+  explicit StoreReader(const std::filesystem::path& path);
+  ~StoreReader();
+
+  const StoreInfo& info() const;
+
+  /// Where brick `b` is, or nothing when it is absent (all fill value).
+  std::optional<BrickLocation> locate(int level, Int3 b) const;
+
+  /// Reads, checks and decodes brick `b` into `out` (lattice.brick_bytes(),
+  /// native byte order). False when the brick is absent; `out` is untouched then.
+  /// Throws DamageError naming level, brick, file and offset.
+  bool read_brick(int level, Int3 b, std::byte* out) const;
+
+  /// Bytes read from disk so far (bricks, indices, ranges).
+  std::uint64_t bytes_read() const;
+
+  /// Edge, in blocks, of the chunks in which block ranges are stored: reading
+  /// an aligned cube of them touches one file.
+  static constexpr Index kRangeChunk = 32;
+
+  /// Ranges of the bricks in `box` (in bricks) and of the 16³ blocks in `box`
+  /// (in blocks). Throws Error when the store has no ranges yet.
+  RangeTable brick_ranges(int level, Box3 box) const;
+  RangeTable block_ranges(int level, Box3 box) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,12 @@
+#include "isobrick/core/error.h"
+
+#include <system_error>
+
+namespace isobrick {
+
+Error system_error(const std::string& what, const std::string& path, int errno_value) {
+  return Error("cannot " + what + " '" + path + "': " +
+               std::generic_category().message(errno_value));
+}
+
+}  // namespace isobrick

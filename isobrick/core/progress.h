@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace isobrick {
+
+/// Where long operations report to. Calls come from one thread at a time.
+class Progress {
+ public:
+  virtual ~Progress() = default;
+  /// A stage of `total` bytes (or 0 when unknown) begins.
+  virtual void begin(std::string_view stage, std::uint64_t total) = 0;
+  /// `done` more bytes of the stage are finished.
+  virtual void advance(std::uint64_t done) = 0;
+  virtual void end() = 0;
+};
+
+/// Swallows everything.
+class NoProgress final : public Progress {
+ public:
+  void begin(std::string_view, std::uint64_t) override {}
+  void advance(std::uint64_t) override {}
+  void end() override {}
+};
+
+}  // namespace isobrick

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+namespace isobrick {
+
+/// The eight sample types of a store.
+enum class ScalarType : std::uint8_t { u8, i8, u16, i16, u32, i32, f32, f64 };
+
+inline constexpr ScalarType kScalarTypes[] = {ScalarType::u8,  ScalarType::i8,  ScalarType::u16,
+                                              ScalarType::i16, ScalarType::u32, ScalarType::i32,
+                                              ScalarType::f32, ScalarType::f64};
+
+template <class T>
+inline constexpr ScalarType scalar_type_of = [] {
+  if constexpr (std::is_same_v<T, std::uint8_t>) return ScalarType::u8;
+  else if constexpr (std::is_same_v<T, std::int8_t>) return ScalarType::i8;
+  else if constexpr (std::is_same_v<T, std::uint16_t>) return ScalarType::u16;
+  else if constexpr (std::is_same_v<T, std::int16_t>) return ScalarType::i16;
+  else if constexpr (std::is_same_v<T, std::uint32_t>) return ScalarType::u32;
+  else if constexpr (std::is_same_v<T, std::int32_t>) return ScalarType::i32;
+  else if constexpr (std::is_same_v<T, float>) return ScalarType::f32;
+  else {
+    static_assert(std::is_same_v<T, double>, "not a sample type");
+    return ScalarType::f64;
+  }
+}();
+
+template <class T>
+struct TypeTag {
+  using type = T;
+};
+
+/// Calls f(TypeTag<T>{}) with the C++ type of `type`; every branch returns the same type.
+template <class F>
+constexpr decltype(auto) visit_scalar(ScalarType type, F&& f) {
+  switch (type) {
+    case ScalarType::u8: return std::forward<F>(f)(TypeTag<std::uint8_t>{});
+    case ScalarType::i8: return std::forward<F>(f)(TypeTag<std::int8_t>{});
+    case ScalarType::u16: return std::forward<F>(f)(TypeTag<std::uint16_t>{});
+    case ScalarType::i16: return std::forward<F>(f)(TypeTag<std::int16_t>{});
+    case ScalarType::u32: return std::forward<F>(f)(TypeTag<std::uint32_t>{});
+    case ScalarType::i32: return std::forward<F>(f)(TypeTag<std::int32_t>{});
+    case ScalarType::f32: return std::forward<F>(f)(TypeTag<float>{});
+    case ScalarType::f64: break;
+  }
+  return std::forward<F>(f)(TypeTag<double>{});
+}
+
+constexpr std::size_t size_of(ScalarType type) {
+  return visit_scalar(type, [](auto tag) { return sizeof(typename decltype(tag)::type); });
+}
+
+constexpr bool is_floating(ScalarType type) {
+  return type == ScalarType::f32 || type == ScalarType::f64;
+}
+
+/// "u8", "i16", "f32", …: the names of the command line.
+constexpr std::string_view short_name(ScalarType type) {
+  constexpr std::string_view names[] = {"u8", "i8", "u16", "i16", "u32", "i32", "f32", "f64"};
+  return names[static_cast<int>(type)];
+}
+
+/// "uint8", "int16", "float32", …: the names of Zarr and of NumPy.
+constexpr std::string_view zarr_name(ScalarType type) {
+  constexpr std::string_view names[] = {"uint8",  "int8",  "uint16",  "int16",
+                                        "uint32", "int32", "float32", "float64"};
+  return names[static_cast<int>(type)];
+}
+
+/// The type with this short or Zarr name.
+constexpr std::optional<ScalarType> parse_scalar_type(std::string_view name) {
+  for (ScalarType type : kScalarTypes)
+    if (name == short_name(type) || name == zarr_name(type)) return type;
+  return std::nullopt;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "isobrick/core/vec.h"
+
+namespace isobrick {
+
+/// From index space to world space:
+/// world = origin + direction · (spacing ∘ index).
+/// `direction` is row-major; its columns are the world directions of the index
+/// axes x, y, z and are orthonormal up to rounding.
+struct Transform {
+  Vec3d spacing{1, 1, 1};
+  Vec3d origin{0, 0, 0};
+  std::array<double, 9> direction{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  std::string unit;  ///< of the world coordinates, as OME-Zarr writes it ("micrometer"), or empty
+
+  friend bool operator==(const Transform&, const Transform&) = default;
+
+  bool axis_aligned() const { return direction == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}; }
+
+  Vec3d apply(Vec3d p) const {
+    const Vec3d s = spacing * p;
+    return {origin.x + direction[0] * s.x + direction[1] * s.y + direction[2] * s.z,
+            origin.y + direction[3] * s.x + direction[4] * s.y + direction[5] * s.z,
+            origin.z + direction[6] * s.x + direction[7] * s.y + direction[8] * s.z};
+  }
+};
+
+}  // namespace isobrick

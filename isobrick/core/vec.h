@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstdint>
+
+namespace isobrick {
+
+/// Signed 64-bit lattice arithmetic: extents, coordinates and offsets all fit,
+/// and a negative intermediate result is a bug that shows.
+using Index = std::int64_t;
+
+/// Three components in the order x, y, z (x fastest in memory).
+template <class T>
+struct Vec3 {
+  T x{}, y{}, z{};
+
+  friend constexpr bool operator==(const Vec3&, const Vec3&) = default;
+  constexpr T& operator[](int axis) { return axis == 0 ? x : axis == 1 ? y : z; }
+  constexpr const T& operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+
+  friend constexpr Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend constexpr Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  /// Componentwise product.
+  friend constexpr Vec3 operator*(Vec3 a, Vec3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+  friend constexpr Vec3 operator*(Vec3 a, T s) { return {a.x * s, a.y * s, a.z * s}; }
+};
+
+using Int3 = Vec3<Index>;
+using Vec3f = Vec3<float>;
+using Vec3d = Vec3<double>;
+
+/// Componentwise ⌈a / b⌉ for a >= 0, b > 0.
+constexpr Int3 ceil_div(Int3 a, Int3 b) {
+  return {(a.x + b.x - 1) / b.x, (a.y + b.y - 1) / b.y, (a.z + b.z - 1) / b.z};
+}
+constexpr Index ceil_div(Index a, Index b) { return (a + b - 1) / b; }
+
+constexpr Int3 min(Int3 a, Int3 b) {
+  return {a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z};
+}
+constexpr Int3 max(Int3 a, Int3 b) {
+  return {a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z};
+}
+
+/// Product of the components. The caller knows that it fits (see checked_volume).
+constexpr Index volume(Int3 e) { return e.x * e.y * e.z; }
+
+/// Offset of `p` in a C-ordered array [z, y, x] of `extent`.
+constexpr Index linear_index(Int3 p, Int3 extent) {
+  return (p.z * extent.y + p.y) * extent.x + p.x;
+}
+
+/// Half-open box of lattice points [lo, hi).
+struct Box3 {
+  Int3 lo, hi;
+
+  friend constexpr bool operator==(const Box3&, const Box3&) = default;
+  constexpr Int3 extent() const { return hi - lo; }
+  constexpr bool empty() const { return hi.x <= lo.x || hi.y <= lo.y || hi.z <= lo.z; }
+  constexpr bool contains(Int3 p) const {
+    return p.x >= lo.x && p.y >= lo.y && p.z >= lo.z && p.x < hi.x && p.y < hi.y && p.z < hi.z;
+  }
+};
+
+constexpr Box3 intersect(Box3 a, Box3 b) { return {max(a.lo, b.lo), min(a.hi, b.hi)}; }
+
+/// Calls f(p) for every point of the box, x fastest.
+template <class F>
+constexpr void for_each_point(Box3 box, F&& f) {
+  for (Index z = box.lo.z; z < box.hi.z; ++z)
+    for (Index y = box.lo.y; y < box.hi.y; ++y)
+      for (Index x = box.lo.x; x < box.hi.x; ++x) f(Int3{x, y, z});
+}
+
+}  // namespace isobrick

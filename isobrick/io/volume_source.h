@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/core/transform.h"
+#include "isobrick/core/vec.h"
+
+namespace isobrick {
+
+/// What a file says about its volume before any sample is read.
+struct VolumeInfo {
+  Int3 extent;  ///< samples along x, y, z
+  ScalarType type = ScalarType::u8;
+  Transform transform;
+  std::string name;  ///< for messages and metadata: the path, "standard input", "gyroid"
+};
+
+/// A volume that can be read piece by piece. Never holds the whole of it.
+class VolumeSource {
+ public:
+  virtual ~VolumeSource() = default;
+
+  virtual const VolumeInfo& info() const = 0;
+
+  /// True when boxes may be read in any order and from several threads at
+  /// once. Otherwise only whole planes [0,X)×[0,Y)×[z0,z1) with increasing z
+  /// may be asked for, each once, from one thread.
+  virtual bool random_access() const = 0;
+
+  /// Copies the samples of `box` to `out`, C order [z, y, x], native byte
+  /// order. `box` lies inside the extent; `out` has room for it.
+  /// Throws Error naming the file and the offset on a short or failed read.
+  virtual void read(Box3 box, std::byte* out) = 0;
+
+  /// Hints that `box` is read soon; may start the disk. Does nothing by default.
+  virtual void will_need(Box3) {}
+};
+
+}  // namespace isobrick

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "isobrick/core/progress.h"
+#include "isobrick/io/volume_source.h"
+
+namespace isobrick {
+
+/// How a store is written.
+struct ConvertOptions {
+  Index brick = 64;             ///< samples along each edge of a brick, 16 … 256
+  Index shard = 512;            ///< samples along each edge of a shard, a multiple of `brick`
+  std::optional<int> zstd_level = 3;  ///< nothing: bricks are stored as they are
+  std::optional<int> levels;    ///< nothing: until one brick holds the coarsest
+  std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
+  int threads = 0;              ///< 0: all cores
+  bool resume = false;          ///< go on with an interrupted conversion of the same input
+  bool force = false;           ///< replace a store that exists (only when the new one is whole)
+};
+
+/// What a conversion did.
+struct ConvertReport {
+  std::uint64_t bytes_in = 0, bytes_out = 0;
+  std::uint64_t bricks = 0, bricks_absent = 0, bricks_kept = 0;  ///< all levels; kept: by resume
+  int levels = 0;
+  double seconds = 0;
+};
+
+/// Writes `source` as a store at `out`: works in `out` + ".partial" and renames
+/// at the end. Reads each input sample once. Throws UsageError when the budget
+/// is too small for one row of bricks (naming the least that does).
+ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
+                      const ConvertOptions& options, Progress& progress);
+
+}  // namespace isobrick

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/progress.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// Which surface, from which part of a store, and with what means.
+struct ExtractOptions {
+  double isovalue = 0;
+  int level = 0;
+  std::optional<Box3> roi;   ///< samples of that level; nothing: the whole volume
+  bool normals = false;      ///< gradient normals
+  std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
+  int threads = 0;           ///< 0: all cores
+};
+
+/// What an extraction will need, from the ranges alone.
+struct ExtractEstimate {
+  std::uint64_t bricks = 0, active_bricks = 0, active_blocks = 0;
+  std::uint64_t triangles = 0, vertices = 0;  ///< predictions
+  std::uint64_t memory = 0;                   ///< bytes that the extraction will hold, within the budget
+};
+
+/// What an extraction did.
+struct ExtractReport {
+  std::uint64_t triangles = 0, vertices = 0;
+  std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
+  std::uint64_t bytes_read = 0;
+  double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, sink_seconds = 0;
+};
+
+ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options);
+
+/// Streams the isosurface of one level into `sink` (begin … finish).
+/// Throws UsageError for a level, ROI or isovalue that makes no sense or a
+/// budget too small for one tile with its neighbours.
+ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
+                      Progress& progress);
+
+}  // namespace isobrick

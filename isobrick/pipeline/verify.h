@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "isobrick/core/progress.h"
+
+namespace isobrick {
+
+struct VerifyReport {
+  std::uint64_t bricks = 0, bytes = 0;
+  std::vector<std::string> damages;  ///< one line each: level, brick, file, offset, what; at most 1000 kept
+  std::uint64_t damage_count = 0;
+};
+
+/// Reads all of a store: metadata, shard indices, every brick's checksum and
+/// size, and the ranges against the samples. Only an unreadable root throws.
+VerifyReport verify(const std::filesystem::path& store, int threads, Progress& progress);
+
+}  // namespace isobrick

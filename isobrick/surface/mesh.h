@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "isobrick/core/vec.h"
+
+namespace isobrick {
+
+/// Three vertex numbers, counter-clockwise seen from the side of the smaller
+/// samples (outside).
+using Triangle = std::array<std::uint32_t, 3>;
+
+/// How triangles name their vertices.
+enum class Indexing : std::uint8_t {
+  /// One vertex per crossing lattice edge in the whole mesh; numbers count
+  /// from the mesh's first vertex and may point into earlier chunks.
+  welded,
+  /// Every chunk stands alone: numbers count from the chunk's first vertex,
+  /// vertices on the faces between tiles are repeated. For formats without
+  /// vertex sharing (STL) and for renderers.
+  chunk_local,
+};
+
+/// A piece of a mesh, in world space. A view: valid until the call returns.
+struct MeshChunk {
+  std::uint64_t first_vertex = 0;      ///< number of vertices in the chunks before
+  std::span<const Vec3f> positions;
+  std::span<const Vec3f> normals;      ///< unit length, outward; empty or one a position
+  std::span<const Triangle> triangles;
+};
+
+/// What is known before the first chunk.
+struct MeshHeader {
+  bool has_normals = false;
+  Vec3d world_lo, world_hi;  ///< bounds of the volume (not of the mesh) in world space
+};
+
+/// Takes a mesh chunk by chunk. Calls come from one thread at a time, in order.
+class MeshSink {
+ public:
+  virtual ~MeshSink() = default;
+
+  virtual Indexing indexing() const = 0;
+  virtual void begin(const MeshHeader& header) = 0;
+  virtual void write(const MeshChunk& chunk) = 0;
+  /// The mesh is whole: only now may it appear under its final name.
+  /// Not called after a failure; the destructor then removes what was written.
+  virtual void finish() = 0;
+  /// Bytes written so far.
+  virtual std::uint64_t bytes() const = 0;
+};
+
+}  // namespace isobrick
