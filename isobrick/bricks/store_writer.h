@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+
+namespace isobrick {
+
+/// Everything that the metadata of a store will say. All levels share type and codec.
+struct StoreLayout {
+  std::vector<LevelInfo> levels;
+  std::optional<int> zstd_level = 3;
+  double fill_value = 0;
+  bool may_have_nan = false;
+  std::string name;
+};
+
+/// Writes a store into a directory: bricks into shard files under temporary
+/// names, metadata last. Bricks are given encoded, so encoding runs on any
+/// number of threads; the bytes depend only on the order of `put` within a shard.
+class StoreWriter {
+ public:
+  /// Creates `dir` or, with `resume`, goes on in it: shards that are whole are
+  /// kept. Throws Error when `dir` was begun with another layout.
+  StoreWriter(const std::filesystem::path& dir, const StoreLayout& layout, bool resume);
+  /// Leaves what is finished for a resume; removes temporary files.
+  ~StoreWriter();
+
+  /// Whether shard `s` (in shards) of `level` was already whole when resuming.
+  bool shard_is_whole(int level, Int3 s) const;
+
+  /// Appends an encoded brick (see encode_brick) to its shard; nothing for an
+  /// absent one. Thread-safe between shards.
+  void put(int level, Int3 brick, std::span<const std::byte> encoded);
+
+  /// All bricks of the shard were put: index, sync, rename.
+  void finish_shard(int level, Int3 s);
+
+  /// Ranges of an aligned box of bricks or of 16³ blocks, as pairs (lo, hi) of
+  /// the level's type, C order [z, y, x, 2] over `box`. Kept in memory only for
+  /// one layer of range chunks along z, so calls come in order of increasing z.
+  void put_brick_ranges(int level, Box3 box, std::span<const std::byte> pairs);
+  void put_block_ranges(int level, Box3 box, std::span<const std::byte> pairs);
+
+  /// Metadata, the group's last of all; then everything is on disk.
+  /// `may_have_nan` replaces the layout's, known only now.
+  void finish(bool may_have_nan);
+
+  /// Bytes written so far, all files.
+  std::uint64_t bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick
