@@ -1,0 +1,154 @@
+#include "isobrick/io/output_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+void check_target(const std::string& path, bool force) {
+  if (path.empty()) throw UsageError("the output has no name");
+  struct stat status {};
+  if (::lstat(path.c_str(), &status) != 0) return;  // whatever is wrong shows when it is created
+  if (S_ISDIR(status.st_mode)) throw UsageError(fmt::format("'{}' is a directory", path));
+  // Renaming over a device or a pipe would replace it by a file.
+  if (!S_ISREG(status.st_mode) && !S_ISLNK(status.st_mode))
+    throw UsageError(fmt::format("'{}' is not a regular file", path));
+  if (!force) throw UsageError(fmt::format("'{}' exists already; say --force to replace it", path));
+}
+
+struct Temporary {
+  UniqueFd fd;
+  std::string path;
+};
+
+Temporary create_beside(const std::string& path) {
+  static std::atomic<unsigned> counter{0};
+  for (int attempt = 0;; ++attempt) {
+    std::string name = fmt::format("{}.partial-{}-{}", path, ::getpid(), counter++);
+    // O_EXCL: never through a link that somebody else put there.
+    const int fd = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0) return {UniqueFd(fd), std::move(name)};
+    if (errno != EEXIST || attempt == 100) throw system_error("create", path, errno);
+  }
+}
+
+}  // namespace
+
+FileWriter::FileWriter(UniqueFd fd, std::string path)
+    : fd_(std::move(fd)),
+      path_(std::move(path)),
+      buffer_(std::make_unique_for_overwrite<std::byte[]>(kBuffer)) {}
+
+std::byte* FileWriter::reserve(std::size_t size) {
+  if (used_ + size > kBuffer) flush();
+  return buffer_.get() + used_;
+}
+
+void FileWriter::append(std::span<const std::byte> bytes) {
+  if (bytes.size() > kBuffer) {
+    flush();
+    write_all(bytes.data(), bytes.size());
+  } else if (!bytes.empty()) {
+    std::memcpy(reserve(bytes.size()), bytes.data(), bytes.size());
+    commit(bytes.size());
+  }
+}
+
+void FileWriter::flush() { write_all(buffer_.get(), std::exchange(used_, 0)); }
+
+void FileWriter::write_all(const std::byte* bytes, std::size_t size) {
+  while (size > 0) {
+    const ssize_t put = ::write(fd_.get(), bytes, std::min(size, std::size_t{1} << 30));
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) fail(errno);
+    written_ += static_cast<std::uint64_t>(put);
+    bytes += put;
+    size -= static_cast<std::size_t>(put);
+  }
+}
+
+void FileWriter::fail(int errno_value) const {
+  throw system_error(fmt::format("write after {} bytes to", written_), path_, errno_value);
+}
+
+void FileWriter::append_file(FileWriter& other) {
+  flush();
+  other.flush();
+  off_t from = 0;
+  const auto end = static_cast<off_t>(other.written_);
+  while (from < end) {
+    const ssize_t moved =
+        ::copy_file_range(other.fd_.get(), &from, fd_.get(), nullptr,
+                          std::min<std::size_t>(static_cast<std::size_t>(end - from), 1u << 30), 0);
+    if (moved > 0) {
+      written_ += static_cast<std::uint64_t>(moved);
+      continue;
+    }
+    if (moved < 0 && errno == EINTR) continue;
+    if (moved < 0 && (errno == ENOSPC || errno == EFBIG || errno == EIO || errno == EDQUOT))
+      fail(errno);
+    break;  // not on this file system
+  }
+  while (from < end) {
+    const std::size_t piece = std::min(static_cast<std::size_t>(end - from), kBuffer);
+    read_at(other.fd_.get(), other.path_, static_cast<std::uint64_t>(from), buffer_.get(), piece);
+    write_all(buffer_.get(), piece);
+    from += static_cast<off_t>(piece);
+  }
+}
+
+void FileWriter::patch(std::uint64_t offset, std::string_view bytes) {
+  flush();
+  while (!bytes.empty()) {
+    const ssize_t put = ::pwrite(fd_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) fail(errno);
+    offset += static_cast<std::uint64_t>(put);
+    bytes.remove_prefix(static_cast<std::size_t>(put));
+  }
+}
+
+OutputFile::OutputFile(std::string path, bool force)
+    : path_(std::move(path)), force_(force), writer_([this] {
+        check_target(path_, force_);
+        Temporary temporary = create_beside(path_);
+        temporary_ = std::move(temporary.path);
+        return FileWriter(std::move(temporary.fd), path_);
+      }()) {}
+
+OutputFile::~OutputFile() {
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void OutputFile::publish() {
+  writer_.flush();
+  int result = ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(),
+                           force_ ? 0 : RENAME_NOREPLACE);
+  if (result != 0 && !force_ && (errno == EINVAL || errno == ENOSYS)) {
+    // The file system cannot refuse to replace by itself.
+    check_target(path_, force_);
+    result = ::rename(temporary_.c_str(), path_.c_str());
+  }
+  if (result != 0 && errno == EEXIST) check_target(path_, force_);
+  if (result != 0) throw system_error("rename the finished file to", path_, errno);
+  temporary_.clear();
+}
+
+FileWriter open_scratch_beside(const std::string& path) {
+  Temporary temporary = create_beside(path);
+  ::unlink(temporary.path.c_str());
+  return FileWriter(std::move(temporary.fd), path);
+}
+
+}  // namespace isobrick

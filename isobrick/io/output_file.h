@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "isobrick/io/file.h"
+
+namespace isobrick {
+
+/// Appends to a file through a large buffer.
+class FileWriter {
+ public:
+  /// `path` is for messages.
+  FileWriter(UniqueFd fd, std::string path);
+
+  /// Room for `size` <= kBuffer bytes, to be filled in place and then committed.
+  std::byte* reserve(std::size_t size);
+  void commit(std::size_t size) { used_ += size; }
+
+  void append(std::span<const std::byte> bytes);
+  void append(std::string_view text) { append(std::as_bytes(std::span(text))); }
+  /// Appends all that `other` has taken so far, moved by the kernel where it can.
+  void append_file(FileWriter& other);
+
+  /// Replaces bytes that were appended before.
+  void patch(std::uint64_t offset, std::string_view bytes);
+  void flush();
+
+  /// Bytes appended so far.
+  std::uint64_t size() const { return written_ + used_; }
+
+  static constexpr std::size_t kBuffer = std::size_t{1} << 20;
+
+ private:
+  void write_all(const std::byte* bytes, std::size_t size);
+  [[noreturn]] void fail(int errno_value) const;
+
+  UniqueFd fd_;
+  std::string path_;
+  std::unique_ptr<std::byte[]> buffer_;
+  std::size_t used_ = 0;
+  std::uint64_t written_ = 0;
+};
+
+/// A file that appears under its name only when it is whole: it is written
+/// beside it under a temporary name, which the destructor removes unless
+/// `publish` was called.
+///
+/// Nothing is synced: a mesh or a picture lost in a power cut is made again,
+/// and a sync would cost more than the writing.
+class OutputFile {
+ public:
+  /// Throws UsageError when `path` exists and `force` is not set (or when it
+  /// is not a regular file), Error when its folder cannot be written to.
+  OutputFile(std::string path, bool force);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  FileWriter& writer() { return writer_; }
+  const FileWriter& writer() const { return writer_; }
+  const std::string& path() const { return path_; }
+
+  /// Flushes and renames. Replaces a file that appeared in the meantime only with `force`.
+  void publish();
+
+ private:
+  std::string path_;
+  bool force_;
+  std::string temporary_;  ///< empty once published
+  FileWriter writer_;
+};
+
+/// A nameless file in the folder of `path`: gone when it is closed, whatever happens.
+FileWriter open_scratch_beside(const std::string& path);
+
+}  // namespace isobrick

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "isobrick/io/output_file.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// Writes a welded mesh as binary little-endian PLY: float x y z [nx ny nz],
+/// faces as `list uchar uint vertex_indices`. The vertex numbers are uint, not
+/// int, because a mesh may have up to 2³² − 1 vertices.
+class PlySink final : public MeshSink {
+ public:
+  /// See OutputFile for what `path` and `force` may throw.
+  PlySink(std::string path, bool force);
+
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader& header) override;
+  /// Throws Error when the mesh has more vertices than PLY's numbers can name.
+  void write(const MeshChunk& chunk) override;
+  void finish() override;
+  std::uint64_t bytes() const override { return out_.writer().size() + faces_.size(); }
+
+ private:
+  std::string header_text() const;
+
+  OutputFile out_;    ///< header and vertices; the faces at the end
+  FileWriter faces_;  ///< waits until all vertices are known
+  bool has_normals_ = false;
+  std::uint64_t vertices_ = 0, triangles_ = 0;
+};
+
+}  // namespace isobrick
