@@ -1,0 +1,269 @@
+#include "isobrick/pipeline/range_scan.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+
+namespace isobrick {
+namespace {
+
+/// Bytes of a row that are reduced at a time: the two accumulators and a few
+/// rows stay in the first-level cache.
+constexpr std::size_t kRowBytes = 4096;
+
+/// Smallest and largest sample of each column of a bundle of rows, NaN left out.
+template <class T>
+class ColumnRanges {
+ public:
+  explicit ColumnRanges(std::size_t width) : lo_(width), hi_(width) {}
+
+  void reset(std::size_t width) {
+    width_ = width;
+    std::fill_n(lo_.begin(), width, ValueRange<T>::kHighest);
+    std::fill_n(hi_.begin(), width, ValueRange<T>::kLowest);
+  }
+
+  /// Merges `count` rows that lie `stride` samples apart. Four at a time: the
+  /// accumulators are then loaded and stored once for four rows.
+  void add(const T* rows, Index stride, Index count) {
+    for (; count >= 4; count -= 4, rows += 4 * stride)
+      merge(rows, rows + stride, rows + 2 * stride, rows + 3 * stride);
+    for (; count > 0; --count, rows += stride) merge(rows, rows, rows, rows);
+  }
+
+  ValueRange<T> over(std::size_t begin, std::size_t end) const {
+    ValueRange<T> r;
+    for (std::size_t x = begin; x < end; ++x) r.include(ValueRange<T>{lo_[x], hi_[x]});
+    return r;
+  }
+
+ private:
+  // A comparison with NaN is false, so NaN is never taken.
+  static T lower(T a, T b) { return b < a ? b : a; }
+  static T upper(T a, T b) { return b > a ? b : a; }
+
+  void merge(const T* __restrict a, const T* __restrict b, const T* __restrict c,
+             const T* __restrict d) {
+    T* __restrict lo = lo_.data();
+    T* __restrict hi = hi_.data();
+    for (std::size_t x = 0; x < width_; ++x) {
+      lo[x] = lower(lower(lower(lower(lo[x], a[x]), b[x]), c[x]), d[x]);
+      hi[x] = upper(upper(upper(upper(hi[x], a[x]), b[x]), c[x]), d[x]);
+    }
+  }
+
+  std::vector<T> lo_, hi_;
+  std::size_t width_ = 0;
+};
+
+template <class T>
+bool holds_nan(const T* samples, std::size_t count) {
+  if constexpr (std::numeric_limits<T>::has_quiet_NaN) {
+    // Lanes as wide as the samples, so that the loop vectorises.
+    using Lane = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
+    Lane found = 0;
+    for (std::size_t i = 0; i < count; ++i) found |= samples[i] != samples[i] ? Lane{1} : Lane{0};
+    return found != 0;
+  } else {
+    static_cast<void>(samples);
+    static_cast<void>(count);
+    return false;
+  }
+}
+
+/// Items along one axis whose ranges see some sample in [lo, hi): a sample on
+/// the border of two items belongs to both.
+struct Span {
+  Index first, last;
+};
+Span items_seeing(Index lo, Index hi, Index edge) {
+  return {lo > 0 ? (lo - 1) / edge : 0, (hi - 1) / edge};
+}
+/// The samples in [lo, hi) that item `i` sees.
+Span samples_seen(Index i, Index lo, Index hi, Index edge) {
+  return {std::max(lo, i * edge), std::min(hi, i * edge + edge + 1)};
+}
+
+/// A dense box of samples.
+template <class T>
+struct Samples {
+  Box3 box;
+  const T* data;
+  Index row_stride() const { return box.hi.x - box.lo.x; }
+  Index plane_stride() const { return row_stride() * (box.hi.y - box.lo.y); }
+  const T* at(Int3 p) const { return data + linear_index(p - box.lo, box.extent()); }
+};
+
+/// Merges the samples with y in `ys` and z in `zs` into one row of items.
+template <class T>
+void merge_item_row(const Samples<T>& in, Span ys, Span zs, Index edge, ValueRange<T>* row) {
+  const Index items_at_once =
+      std::max<Index>(1, static_cast<Index>(kRowBytes / sizeof(T)) / edge);
+  ColumnRanges<T> columns(static_cast<std::size_t>(
+      std::min(items_at_once * edge + 1, in.box.hi.x - in.box.lo.x)));
+  const Span all = items_seeing(in.box.lo.x, in.box.hi.x, edge);
+  for (Index first = all.first; first <= all.last; first += items_at_once) {
+    const Index last = std::min(first + items_at_once - 1, all.last);
+    const Index x0 = samples_seen(first, in.box.lo.x, in.box.hi.x, edge).first;
+    const Index x1 = samples_seen(last, in.box.lo.x, in.box.hi.x, edge).last;
+    columns.reset(static_cast<std::size_t>(x1 - x0));
+    for (Index z = zs.first; z < zs.last; ++z)
+      columns.add(in.at({x0, ys.first, z}), in.row_stride(), ys.last - ys.first);
+    for (Index i = first; i <= last; ++i) {
+      const Span xs = samples_seen(i, in.box.lo.x, in.box.hi.x, edge);
+      row[i].include(columns.over(static_cast<std::size_t>(xs.first - x0),
+                                  static_cast<std::size_t>(xs.last - x0)));
+    }
+  }
+}
+
+/// Which zero a minimum over -0 and +0 finds depends on the order of the scan;
+/// stored ranges must not.
+template <class T>
+void canonicalise_zeros(std::vector<ValueRange<T>>& ranges) {
+  if constexpr (std::numeric_limits<T>::has_quiet_NaN)
+    for (ValueRange<T>& r : ranges) {
+      r.lo += T{0};
+      r.hi += T{0};
+    }
+}
+
+}  // namespace
+
+template <class T>
+RangeScanner<T>::RangeScanner(Int3 extent, Index edge)
+    : extent_(extent), items_(ceil_div(extent, {edge, edge, edge})), edge_(edge) {}
+
+template <class T>
+typename RangeScanner<T>::Layer& RangeScanner<T>::layer(Index z) {
+  while (first_open_ + static_cast<Index>(open_.size()) <= z)
+    open_.emplace_back(static_cast<std::size_t>(items_.x * items_.y));
+  return open_[static_cast<std::size_t>(z - first_open_)];
+}
+
+template <class T>
+void RangeScanner<T>::add(Box3 box, const T* samples) {
+  const Samples<T> in{box, samples};
+  const Span rows = items_seeing(box.lo.y, box.hi.y, edge_);
+  Span layers = items_seeing(box.lo.z, box.hi.z, edge_);
+  layer(layers.last);  // all exist before the threads start
+  const Index row_count = rows.last - rows.first + 1;
+  const Index layer_count = layers.last - layers.first + 1;
+  tbb::parallel_for(Index{0}, row_count * layer_count, [&](Index task) {
+    const Index j = rows.first + task % row_count, k = layers.first + task / row_count;
+    Layer& out = open_[static_cast<std::size_t>(k - first_open_)];
+    merge_item_row(in, samples_seen(j, box.lo.y, box.hi.y, edge_),
+                   samples_seen(k, box.lo.z, box.hi.z, edge_), edge_,
+                   out.data() + j * items_.x);
+  });
+  if (std::numeric_limits<T>::has_quiet_NaN && !has_nan_) {
+    std::atomic<bool> found = false;
+    const auto plane = static_cast<std::size_t>(in.plane_stride());
+    tbb::parallel_for(box.lo.z, box.hi.z, [&](Index z) {
+      if (holds_nan(in.at({box.lo.x, box.lo.y, z}), plane)) found = true;
+    });
+    has_nan_ = found;
+  }
+}
+
+template <class T>
+void RangeScanner<T>::close(Index z1, const RangeEmit& emit) {
+  const bool all = z1 >= extent_.z;
+  // A layer is complete once the first plane of the next one has been merged.
+  while (first_open_ < items_.z && (all || (first_open_ + 1) * edge_ < z1)) {
+    Layer& done = layer(first_open_);
+    canonicalise_zeros(done);
+    emit({{0, 0, first_open_}, {items_.x, items_.y, first_open_ + 1}}, std::as_bytes(std::span(done)));
+    open_.pop_front();
+    ++first_open_;
+  }
+}
+
+template class RangeScanner<std::uint8_t>;
+template class RangeScanner<std::int8_t>;
+template class RangeScanner<std::uint16_t>;
+template class RangeScanner<std::int16_t>;
+template class RangeScanner<std::uint32_t>;
+template class RangeScanner<std::int32_t>;
+template class RangeScanner<float>;
+template class RangeScanner<double>;
+
+namespace {
+
+/// Layers of bricks as the union of the blocks in them: the cells of a brick
+/// are the cells of its blocks when the edge is a whole number of blocks.
+template <class T>
+class BricksFromBlocks {
+ public:
+  explicit BricksFromBlocks(const Lattice& lattice)
+      : blocks_(lattice.blocks()), bricks_(lattice.bricks()), ratio_(lattice.brick.x / kBlockEdge) {}
+
+  void add(Index block_z, std::span<const std::byte> pairs, const RangeEmit& emit) {
+    if (layer_.empty()) layer_.resize(static_cast<std::size_t>(bricks_.x * bricks_.y));
+    const auto* block = reinterpret_cast<const ValueRange<T>*>(pairs.data());
+    for (Index y = 0; y < blocks_.y; ++y) {
+      ValueRange<T>* row = layer_.data() + y / ratio_ * bricks_.x;
+      for (Index x = 0; x < blocks_.x; ++x) row[x / ratio_].include(*block++);
+    }
+    if ((block_z + 1) % ratio_ != 0 && block_z + 1 != blocks_.z) return;
+    const Index z = block_z / ratio_;
+    emit({{0, 0, z}, {bricks_.x, bricks_.y, z + 1}}, std::as_bytes(std::span(layer_)));
+    layer_.clear();
+  }
+
+ private:
+  Int3 blocks_, bricks_;
+  Index ratio_;
+  std::vector<ValueRange<T>> layer_;
+};
+
+template <class T>
+class TypedLevelRanges final : public LevelRanges {
+ public:
+  explicit TypedLevelRanges(const Lattice& lattice)
+      : blocks_(lattice.extent, kBlockEdge), from_blocks_(lattice) {
+    if (lattice.brick.x % kBlockEdge != 0)
+      bricks_ = std::make_unique<RangeScanner<T>>(lattice.extent, lattice.brick.x);
+  }
+
+  void add(Box3 box, const std::byte* samples) override {
+    const T* typed = reinterpret_cast<const T*>(samples);
+    blocks_.add(box, typed);
+    if (bricks_) bricks_->add(box, typed);
+  }
+
+  void close(Index z1, const RangeEmit& blocks, const RangeEmit& bricks) override {
+    blocks_.close(z1, [&](Box3 items, std::span<const std::byte> pairs) {
+      blocks(items, pairs);
+      if (!bricks_) from_blocks_.add(items.lo.z, pairs, bricks);
+    });
+    if (bricks_) bricks_->close(z1, bricks);
+  }
+
+  bool has_nan() const override { return blocks_.has_nan(); }
+
+ private:
+  RangeScanner<T> blocks_;
+  BricksFromBlocks<T> from_blocks_;
+  std::unique_ptr<RangeScanner<T>> bricks_;
+};
+
+}  // namespace
+
+std::unique_ptr<LevelRanges> make_level_ranges(const Lattice& lattice) {
+  return visit_scalar(lattice.type, [&](auto tag) -> std::unique_ptr<LevelRanges> {
+    return std::make_unique<TypedLevelRanges<typename decltype(tag)::type>>(lattice);
+  });
+}
+
+std::size_t level_ranges_bytes(const Lattice& lattice, Index planes) {
+  const Int3 blocks = lattice.blocks(), bricks = lattice.bricks();
+  const Index open_blocks = std::min(blocks.z, planes / kBlockEdge + 2);
+  const Index open_bricks = std::min(bricks.z, planes / lattice.brick.z + 2);
+  const Index items = blocks.x * blocks.y * open_blocks + bricks.x * bricks.y * open_bricks;
+  return static_cast<std::size_t>(items) * 2 * lattice.sample_bytes();
+}
+
+}  // namespace isobrick

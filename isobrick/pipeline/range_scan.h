@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/core/range.h"
+
+namespace isobrick {
+
+/// Takes a finished layer of ranges: the items it covers and their pairs
+/// (lo, hi) of the sample type, C order [z, y, x, 2].
+using RangeEmit = std::function<void(Box3 items, std::span<const std::byte> pairs)>;
+
+/// Ranges of all cubic items of `edge` cells of a lattice, fed with boxes of
+/// samples. An item's range covers its own samples and the first layer of its
+/// +x, +y and +z neighbours: all that its cells touch.
+///
+/// Boxes may come in any order as long as no sample lies below the last
+/// `close`; only the layers of items still open are held in memory.
+template <class T>
+class RangeScanner {
+ public:
+  RangeScanner(Int3 extent, Index edge);
+
+  /// Merges the samples of `box`, dense in C order. Parallel inside.
+  void add(Box3 box, const T* samples);
+
+  /// Promises that every sample below z1 was added. Emits the layers of items
+  /// that this completes, in order of z.
+  void close(Index z1, const RangeEmit& emit);
+
+  /// Whether any sample so far was NaN.
+  bool has_nan() const { return has_nan_; }
+
+ private:
+  using Layer = std::vector<ValueRange<T>>;
+
+  Layer& layer(Index z);
+
+  Int3 extent_, items_;
+  Index edge_;
+  Index first_open_ = 0;
+  std::deque<Layer> open_;
+  bool has_nan_ = false;
+};
+
+/// Both kinds of range that a store keeps for a level, whatever its type.
+class LevelRanges {
+ public:
+  virtual ~LevelRanges() = default;
+  virtual void add(Box3 box, const std::byte* samples) = 0;
+  virtual void close(Index z1, const RangeEmit& blocks, const RangeEmit& bricks) = 0;
+  virtual bool has_nan() const = 0;
+};
+
+/// Bricks must be cubes.
+std::unique_ptr<LevelRanges> make_level_ranges(const Lattice& lattice);
+
+/// Bytes that the LevelRanges of a level hold while slabs of `planes` pass.
+std::size_t level_ranges_bytes(const Lattice& lattice, Index planes);
+
+}  // namespace isobrick
