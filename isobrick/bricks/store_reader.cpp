@@ -1,1 +1,259 @@
-// In the making.
+#include "isobrick/bricks/store_reader.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <atomic>
+#include <mutex>
+
+#include "isobrick/bricks/array_metadata.h"
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/image_metadata.h"
+#include "isobrick/bricks/lru_cache.h"
+#include "isobrick/bricks/range_array.h"
+#include "isobrick/bricks/shard_index.h"
+#include "isobrick/bricks/store_file.h"
+#include "isobrick/bricks/store_names.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::uint64_t kMaxOpenFiles = 128;
+constexpr std::uint64_t kIndexCacheBytes = std::uint64_t{64} << 20;
+constexpr Index kMaxShards = Index{1} << 56;  // so that a shard and its level make one key
+
+Int3 xyz(std::span<const Index> zyx) { return {zyx[2], zyx[1], zyx[0]}; }
+
+// No encoder makes a brick much larger than it is; a length beyond is damage,
+// and must not make us ask for that much memory.
+std::uint64_t largest_encoded(std::uint64_t decoded) { return decoded + decoded / 8 + (64 << 10); }
+
+}  // namespace
+
+struct StoreReader::Impl {
+  struct Level {
+    ArrayMetadata metadata;
+    std::filesystem::path folder;
+    Int3 shards, bricks_per_shard;
+    std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // once needed
+  };
+  struct Place {
+    std::shared_ptr<const StoreFile> file;
+    std::uint64_t offset = 0, size = 0;
+  };
+
+  void open(const std::filesystem::path& path);
+  void open_level(const ImageMetadata::Level& described);
+  void check_brick(int level, Int3 b) const;
+  [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
+  std::filesystem::path shard_path(int level, Int3 s) const;
+  std::shared_ptr<const StoreFile> shard_file(int level, Int3 s);
+  std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
+  std::optional<Place> find(int level, Int3 b);
+  RangeTable ranges(int level, Box3 box, bool blocks);
+  std::uint64_t key(int level, Int3 s) const {
+    return static_cast<std::uint64_t>(linear_index(s, levels[static_cast<std::size_t>(level)].shards)) *
+               64 + static_cast<std::uint64_t>(level);
+  }
+  const Level& at(int level) const { return levels[static_cast<std::size_t>(level)]; }
+  const Lattice& lattice(int level) const {
+    return info.levels[static_cast<std::size_t>(level)].lattice;
+  }
+
+  StoreInfo info;
+  std::vector<Level> levels;
+  std::atomic<std::uint64_t> bytes_read = 0;
+  LruCache<StoreFile> files{kMaxOpenFiles};
+  LruCache<ShardIndex> indices{kIndexCacheBytes};
+  std::mutex range_mutex;
+};
+
+void StoreReader::Impl::open(const std::filesystem::path& path) {
+  info.path = path;
+  const std::filesystem::path file = path / "zarr.json";
+  if (!std::filesystem::is_directory(path))
+    throw Error(fmt::format("'{}' is no store: not a directory", path.string()));
+  bool exists = false;
+  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  if (!exists) {
+    if (std::filesystem::exists(path / kLayoutMarker))
+      throw Error(fmt::format("'{}' is unfinished: its conversion was interrupted; resume it",
+                              path.string()));
+    if (std::filesystem::exists(path / ".zgroup") || std::filesystem::exists(path / ".zarray"))
+      throw Error(fmt::format("'{}' is Zarr version 2; only OME-Zarr 0.5 (Zarr version 3) is supported",
+                              path.string()));
+    throw Error(fmt::format("'{}' is no store: it has no zarr.json", path.string()));
+  }
+  const ImageMetadata image = parse_image_metadata(text, "'" + file.string() + "'");
+  for (const ImageMetadata::Level& level : image.levels) open_level(level);
+  info.type = info.levels[0].lattice.type;
+  info.fill_value = levels[0].metadata.fill_value;
+  info.codec = levels[0].metadata.codecs.name();
+  info.may_have_nan = is_floating(info.type) && image.may_have_nan.value_or(true);
+}
+
+void StoreReader::Impl::open_level(const ImageMetadata::Level& described) {
+  Level level;
+  level.folder = info.path / described.path;
+  const std::filesystem::path file = level.folder / "zarr.json";
+  const std::string where = "'" + file.string() + "'";
+  bool exists = false;
+  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  if (!exists) throw DamageError(where + " is missing");
+  level.metadata = parse_array_metadata(text, where);
+  const ArrayMetadata& array = level.metadata;
+  if (array.shape.size() != 3)
+    throw Error(fmt::format("{}: arrays of {} dimensions are not supported, only z, y, x", where,
+                            array.shape.size()));
+  LevelInfo out;
+  out.lattice.extent = xyz(array.shape);
+  out.lattice.brick = xyz(array.sharding ? array.sharding->brick : array.chunk);
+  out.lattice.type = array.type;
+  out.shard = xyz(array.chunk);
+  out.transform = described.transform;
+  if (!checked_volume(out.lattice.extent))
+    throw DamageError(where + ": the shape is out of bounds");
+  level.shards = ceil_div(out.lattice.extent, out.shard);
+  level.bricks_per_shard = ceil_div(out.shard, out.lattice.brick);
+  if (volume(level.shards) > kMaxShards) throw Error(where + ": too many shards");
+  if (!levels.empty()) {
+    const ArrayMetadata& finest = levels[0].metadata;
+    if (array.type != finest.type ||
+        fill_bits(array.type, array.fill_value) != fill_bits(finest.type, finest.fill_value))
+      throw Error(where + ": levels of different types or fill values are not supported");
+  }
+  info.levels.push_back(std::move(out));
+  levels.push_back(std::move(level));
+}
+
+void StoreReader::Impl::check_brick(int level, Int3 b) const {
+  if (level < 0 || static_cast<std::size_t>(level) >= levels.size())
+    throw UsageError(fmt::format("'{}' has no level {}", info.path.string(), level));
+  if (!Box3{{0, 0, 0}, lattice(level).bricks()}.contains(b))
+    throw UsageError(fmt::format("level {} has no brick ({}, {}, {})", level, b.x, b.y, b.z));
+}
+
+void StoreReader::Impl::damaged(int level, Int3 b, const Place& place,
+                                const std::string& what) const {
+  throw DamageError(fmt::format("level {}, brick ({}, {}, {}): '{}' at {} + {}: {}", level, b.x,
+                                b.y, b.z, place.file->path().string(), place.offset, place.size,
+                                what));
+}
+
+std::filesystem::path StoreReader::Impl::shard_path(int level, Int3 s) const {
+  return at(level).folder / at(level).metadata.chunk_key(std::array<Index, 3>{s.z, s.y, s.x});
+}
+
+std::shared_ptr<const StoreFile> StoreReader::Impl::shard_file(int level, Int3 s) {
+  return files.get(key(level, s), [&] {
+    auto file = std::make_shared<const StoreFile>(StoreFile::open_if_exists(shard_path(level, s)));
+    return std::pair(std::move(file), std::uint64_t{1});
+  });
+}
+
+std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3 s) {
+  return indices.get(key(level, s), [&] {
+    const auto bricks = static_cast<std::uint64_t>(volume(at(level).bricks_per_shard));
+    const auto file = shard_file(level, s);
+    // A shard without a file has only absent bricks.
+    if (!*file) return std::pair(std::make_shared<const ShardIndex>(0), std::uint64_t{64});
+    const ArrayMetadata::Sharding& sharding = *at(level).metadata.sharding;
+    const std::uint64_t size = file->size();
+    const std::uint64_t index_size = ShardIndex::encoded_size(bricks, sharding.index_has_crc);
+    try {
+      if (size < index_size)
+        throw DamageError(fmt::format("{} bytes are too few for the index of {} bricks", size, bricks));
+      std::vector<std::byte> bytes(index_size);
+      file->read_at(sharding.index_at_end ? size - index_size : 0, bytes);
+      bytes_read += index_size;
+      return std::pair(std::make_shared<const ShardIndex>(
+                           ShardIndex::decode(bytes, sharding.index_has_crc, size)),
+                       64 + index_size);
+    } catch (const DamageError& e) {
+      throw DamageError(fmt::format("level {}, shard ({}, {}, {}): '{}': {}", level, s.x, s.y, s.z,
+                                    file->path().string(), e.what()));
+    }
+  });
+}
+
+std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 b) {
+  check_brick(level, b);
+  if (!at(level).metadata.sharding) {
+    const auto file = shard_file(level, b);
+    if (!*file) return std::nullopt;
+    return Place{file, 0, file->size()};
+  }
+  const Int3 n = at(level).bricks_per_shard;
+  const Int3 s{b.x / n.x, b.y / n.y, b.z / n.z};
+  const auto index = shard_index(level, s);
+  if (index->size() == 0) return std::nullopt;
+  const ShardIndex::Entry entry = (*index)[static_cast<std::size_t>(linear_index(b - s * n, n))];
+  if (entry.absent()) return std::nullopt;
+  return Place{shard_file(level, s), entry.offset, entry.size};
+}
+
+RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
+  check_brick(level, {0, 0, 0});
+  std::shared_ptr<const RangeArrayReader> reader;
+  {
+    const std::lock_guard lock(range_mutex);
+    Level& l = levels[static_cast<std::size_t>(level)];
+    auto& cached = blocks ? l.block_ranges : l.brick_ranges;
+    if (!cached) {
+      const Lattice& samples = lattice(level);
+      cached = std::make_shared<const RangeArrayReader>(
+          blocks ? block_range_folder(info.path, level) : brick_range_folder(info.path, level),
+          blocks ? samples.blocks() : samples.bricks(), samples.type);
+    }
+    reader = cached;
+  }
+  return reader->read(box, bytes_read);
+}
+
+StoreReader::StoreReader(const std::filesystem::path& path) : impl_(std::make_unique<Impl>()) {
+  impl_->open(path);
+}
+
+StoreReader::~StoreReader() = default;
+
+const StoreInfo& StoreReader::info() const { return impl_->info; }
+
+std::optional<BrickLocation> StoreReader::locate(int level, Int3 b) const {
+  const auto place = impl_->find(level, b);
+  if (!place) return std::nullopt;
+  return BrickLocation{place->file->path(), place->offset, place->size};
+}
+
+bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
+  const auto place = impl_->find(level, b);
+  if (!place) return false;
+  const Lattice& lattice = impl_->lattice(level);
+  const std::size_t decoded = lattice.brick_bytes();
+  if (place->size > largest_encoded(decoded))
+    impl_->damaged(level, b, *place, fmt::format("too long for {} bytes of samples", decoded));
+  thread_local std::vector<std::byte> buffer;
+  if (buffer.size() < place->size) buffer.resize(static_cast<std::size_t>(place->size));
+  const auto encoded = std::span(buffer).first(static_cast<std::size_t>(place->size));
+  try {
+    place->file->read_at(place->offset, encoded);
+    impl_->bytes_read += place->size;
+    decode_bytes(impl_->at(level).metadata.codecs, lattice.sample_bytes(), encoded,
+                 {out, decoded});
+  } catch (const DamageError& e) {
+    impl_->damaged(level, b, *place, e.what());
+  }
+  return true;
+}
+
+std::uint64_t StoreReader::bytes_read() const { return impl_->bytes_read; }
+
+RangeTable StoreReader::brick_ranges(int level, Box3 box) const {
+  return impl_->ranges(level, box, false);
+}
+
+RangeTable StoreReader::block_ranges(int level, Box3 box) const {
+  return impl_->ranges(level, box, true);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,230 @@
+#include "isobrick/bricks/codec.h"
+
+#include <fmt/format.h>
+#include <isa-l/crc.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "samples are copied as they are");
+
+constexpr std::size_t kCrcBytes = 4;
+
+struct FreeContext {
+  void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+  void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
+};
+
+// A context costs a megabyte and its creation more than a small brick, so each
+// thread keeps one.
+ZSTD_CCtx* compression_context() {
+  thread_local const std::unique_ptr<ZSTD_CCtx, FreeContext> context(ZSTD_createCCtx());
+  if (!context) throw std::bad_alloc();
+  return context.get();
+}
+
+ZSTD_DCtx* decompression_context() {
+  thread_local const std::unique_ptr<ZSTD_DCtx, FreeContext> context(ZSTD_createDCtx());
+  if (!context) throw std::bad_alloc();
+  return context.get();
+}
+
+void append_crc(std::vector<std::byte>& bytes) {
+  const std::uint32_t crc = crc32c(bytes);
+  const std::size_t size = bytes.size();
+  bytes.resize(size + kCrcBytes);
+  std::memcpy(bytes.data() + size, &crc, kCrcBytes);
+}
+
+// Compresses into a buffer of the thread first: what is handed out is then
+// exactly as large as what it holds, and the bound is not allocated each time.
+std::vector<std::byte> compress(std::span<const std::byte> bytes, int level, std::size_t reserve) {
+  thread_local std::vector<std::byte> buffer;
+  const std::size_t bound = ZSTD_compressBound(bytes.size());
+  if (buffer.size() < bound) buffer.resize(bound);
+  const std::size_t size = ZSTD_compressCCtx(compression_context(), buffer.data(), buffer.size(),
+                                             bytes.data(), bytes.size(), level);
+  if (ZSTD_isError(size))
+    throw Error(fmt::format("zstd cannot compress: {}", ZSTD_getErrorName(size)));
+  std::vector<std::byte> result;
+  result.reserve(size + reserve);
+  result.insert(result.end(), buffer.data(), buffer.data() + size);
+  return result;
+}
+
+std::size_t decompress(std::span<const std::byte> encoded, std::span<std::byte> out) {
+  const std::size_t size = ZSTD_decompressDCtx(decompression_context(), out.data(), out.size(),
+                                               encoded.data(), encoded.size());
+  if (ZSTD_isError(size))
+    throw DamageError(fmt::format("zstd cannot decompress: {}", ZSTD_getErrorName(size)));
+  return size;
+}
+
+std::span<const std::byte> check_crc(std::span<const std::byte> encoded) {
+  if (encoded.size() < kCrcBytes) throw DamageError("too short for a checksum");
+  const auto body = encoded.first(encoded.size() - kCrcBytes);
+  std::uint32_t stored;
+  std::memcpy(&stored, encoded.data() + body.size(), kCrcBytes);
+  if (const std::uint32_t crc = crc32c(body); crc != stored)
+    throw DamageError(fmt::format("checksum is {:08x}, must be {:08x}", crc, stored));
+  return body;
+}
+
+void swap_bytes(std::span<std::byte> samples, std::size_t sample_bytes) {
+  if (sample_bytes == 1) return;
+  for (std::size_t i = 0; i + sample_bytes <= samples.size(); i += sample_bytes)
+    std::reverse(samples.data() + i, samples.data() + i + sample_bytes);
+}
+
+}  // namespace
+
+CodecChain CodecChain::ours(std::optional<int> zstd_level) {
+  CodecChain chain;
+  if (zstd_level) {
+    chain.steps.push_back(ByteCodec::zstd);
+    chain.zstd_level = *zstd_level;
+  }
+  chain.steps.push_back(ByteCodec::crc32c);
+  return chain;
+}
+
+std::string CodecChain::name() const {
+  const bool compressed = std::find(steps.begin(), steps.end(), ByteCodec::zstd) != steps.end();
+  return compressed ? fmt::format("zstd:{}", zstd_level) : "none";
+}
+
+std::uint32_t crc32c(std::span<const std::byte> bytes) {
+  // ISA-L takes the length as an int and neither inverts its argument nor its result.
+  constexpr std::size_t kStep = std::size_t{1} << 30;
+  std::uint32_t state = ~std::uint32_t{0};
+  for (std::size_t done = 0; done < bytes.size(); done += kStep) {
+    const auto part = bytes.subspan(done, std::min(kStep, bytes.size() - done));
+    auto* data = const_cast<unsigned char*>(reinterpret_cast<const unsigned char*>(part.data()));
+    state = crc32_iscsi(data, static_cast<int>(part.size()), state);
+  }
+  return ~state;
+}
+
+std::uint64_t fill_bits(ScalarType type, double fill_value) {
+  return visit_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    T value{};
+    if constexpr (std::numeric_limits<T>::is_integer) {
+      // Not a value of the type: metadata is checked before, so this is a caller's slip.
+      if (!(fill_value >= static_cast<double>(std::numeric_limits<T>::lowest()) &&
+            fill_value <= static_cast<double>(std::numeric_limits<T>::max())) ||
+          std::trunc(fill_value) != fill_value)
+        throw Error(fmt::format("fill value {} is no {}", fill_value, zarr_name(type)));
+      value = static_cast<T>(fill_value);
+    } else if (std::isnan(fill_value)) {
+      value = std::numeric_limits<T>::quiet_NaN();
+    } else {
+      value = static_cast<T>(fill_value);
+    }
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &value, sizeof value);
+    return bits;
+  });
+}
+
+bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_value) {
+  const std::size_t size = size_of(type);
+  if (samples.size() < size) return samples.empty();
+  const std::uint64_t bits = fill_bits(type, fill_value);
+  // The first sample is the fill value and each equals the one before it: one
+  // memcmp of the brick with itself, which mostly ends at once.
+  return std::memcmp(samples.data(), &bits, size) == 0 &&
+         std::memcmp(samples.data(), samples.data() + size, samples.size() - size) == 0;
+}
+
+void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* brick) {
+  const Int3 held = lattice.brick_box(b).extent();
+  const Int3 full = lattice.brick;
+  if (held == full) return;
+  visit_scalar(lattice.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    const std::uint64_t bits = fill_bits(lattice.type, fill_value);
+    T fill;
+    std::memcpy(&fill, &bits, sizeof fill);
+    T* const samples = reinterpret_cast<T*>(brick);
+    for (Index z = 0; z < full.z; ++z)
+      for (Index y = 0; y < full.y; ++y) {
+        T* const row = samples + (z * full.y + y) * full.x;
+        const Index first = z < held.z && y < held.y ? held.x : 0;
+        std::fill(row + first, row + full.x, fill);
+      }
+  });
+}
+
+std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes) {
+  std::vector<std::byte> result;
+  bool first = true;
+  for (const ByteCodec step : chain.steps) {
+    if (step == ByteCodec::zstd)
+      result = compress(first ? bytes : std::span<const std::byte>(result), chain.zstd_level,
+                        kCrcBytes);
+    else {
+      if (first) {
+        result.reserve(bytes.size() + kCrcBytes);
+        result.assign(bytes.begin(), bytes.end());
+      }
+      append_crc(result);
+    }
+    first = false;
+  }
+  if (first) result.assign(bytes.begin(), bytes.end());
+  return result;
+}
+
+std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
+                                                   std::span<const std::byte> samples,
+                                                   double fill_value,
+                                                   std::optional<int> zstd_level) {
+  if (all_fill(type, samples, fill_value)) return std::nullopt;
+  return encode_bytes(CodecChain::ours(zstd_level), samples);
+}
+
+void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
+                  std::span<const std::byte> encoded, std::span<std::byte> out) {
+  // Two buffers for the rare chain that compresses more than once.
+  std::vector<std::byte> storage, next;
+  std::span<const std::byte> current = encoded;
+  bool in_place = false;
+  for (std::size_t i = chain.steps.size(); i-- > 0;) {
+    if (chain.steps[i] == ByteCodec::crc32c) {
+      current = check_crc(current);
+      continue;
+    }
+    if (i == 0) {
+      // The fast path: straight to where the samples are wanted.
+      const std::size_t size = decompress(current, out);
+      if (size != out.size())
+        throw DamageError(fmt::format("decodes to {} bytes, must be {}", size, out.size()));
+      in_place = true;
+    } else {
+      // What an inner step leaves is at most the samples and a few checksums or frames.
+      next.resize(ZSTD_compressBound(out.size()) + kCrcBytes * chain.steps.size());
+      next.resize(decompress(current, next));
+      storage.swap(next);
+      current = storage;
+    }
+  }
+  if (!in_place) {
+    if (current.size() != out.size())
+      throw DamageError(fmt::format("decodes to {} bytes, must be {}", current.size(), out.size()));
+    std::copy(current.begin(), current.end(), out.begin());
+  }
+  if (chain.big_endian) swap_bytes(out, sample_bytes);
+}
+
+}  // namespace isobrick

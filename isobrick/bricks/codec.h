@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+
+namespace isobrick {
+
+/// A step of a Zarr codec chain that turns bytes into bytes.
+enum class ByteCodec : std::uint8_t { zstd, crc32c };
+
+/// How the samples of a chunk become bytes: little or big endian, then the
+/// steps in the order of encoding.
+struct CodecChain {
+  bool big_endian = false;
+  std::vector<ByteCodec> steps;
+  int zstd_level = 0;  ///< of the zstd step, if there is one
+
+  friend bool operator==(const CodecChain&, const CodecChain&) = default;
+
+  /// What we write: bytes → zstd → crc32c, or bytes → crc32c.
+  static CodecChain ours(std::optional<int> zstd_level);
+  /// "zstd:3" or "none": how StoreInfo names a chain.
+  std::string name() const;
+};
+
+/// CRC-32C (Castagnoli) as Zarr stores it.
+std::uint32_t crc32c(std::span<const std::byte> bytes);
+
+/// A decoded chunk may not be larger than this; larger ones are refused, so that
+/// broken metadata cannot ask for all the memory.
+inline constexpr std::uint64_t kMaxBrickBytes = std::uint64_t{1} << 31;
+
+/// The bytes of the fill value as a sample of `type`, native order; the first
+/// size_of(type) of the eight count. A NaN becomes the canonical quiet one.
+std::uint64_t fill_bits(ScalarType type, double fill_value);
+
+/// True when every sample equals the fill value, bit for bit.
+bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_value);
+
+/// Sets the samples of brick `b` that lie outside the volume to the fill value:
+/// what bricks at the border are padded with before they are encoded.
+void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* brick);
+
+/// Encodes a full brick (native byte order, already padded) as our stores keep
+/// it; nothing when all samples equal the fill value. Thread-safe.
+std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
+                                                   std::span<const std::byte> samples,
+                                                   double fill_value,
+                                                   std::optional<int> zstd_level);
+
+/// Encodes bytes by a chain of our own making. Thread-safe.
+std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes);
+
+/// Decodes into exactly `out`, native byte order. Throws DamageError saying what
+/// is wrong, not where. Thread-safe.
+void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
+                  std::span<const std::byte> encoded, std::span<std::byte> out);
+
+}  // namespace isobrick

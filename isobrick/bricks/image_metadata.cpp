@@ -1,0 +1,179 @@
+#include "isobrick/bricks/image_metadata.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMaxLevels = 64;
+
+Json zyx(Vec3d v) { return {v.z, v.y, v.x}; }
+
+Vec3d parse_zyx(const CheckedJson& json) {
+  if (json.array_size() != 3) json.damaged("must have 3 numbers");
+  return {json.at(2).number(), json.at(1).number(), json.at(std::size_t{0}).number()};
+}
+
+// world = translation + scale ∘ index, from a list of OME-Zarr's transformations.
+struct ScaleAndTranslation {
+  Vec3d scale{1, 1, 1}, translation{0, 0, 0};
+};
+
+ScaleAndTranslation parse_transformations(const CheckedJson& list) {
+  ScaleAndTranslation result;
+  for (std::size_t i = 0; i < list.array_size(); ++i) {
+    const CheckedJson item = list.at(i);
+    const std::string type = item.string_at("type");
+    if (type == "scale") {
+      const Vec3d scale = parse_zyx(item.at("scale"));
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(scale[axis] > 0)) item.damaged("scale must be positive");
+      result.scale = result.scale * scale;
+      result.translation = result.translation * scale;
+    } else if (type == "translation") {
+      result.translation = result.translation + parse_zyx(item.at("translation"));
+    } else if (type != "identity") {
+      item.unsupported(fmt::format("transformation '{}' is not supported", type));
+    }
+  }
+  return result;
+}
+
+std::string parse_unit(const CheckedJson& axes) {
+  if (axes.array_size() != 3)
+    axes.unsupported(fmt::format("images of {} dimensions are not supported, only z, y, x",
+                                 axes.array_size()));
+  std::string unit;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const CheckedJson axis = axes.at(i);
+    const std::string name = axis.string_at("name");
+    if (name != std::string(1, "zyx"[i]) ||
+        (axis.has("type") && axis.string_at("type") != "space"))
+      axis.unsupported(fmt::format("axis '{}' is not supported, only z, y, x in this order", name));
+    const std::string own = axis.has("unit") ? axis.string_at("unit") : "";
+    if (i == 0) unit = own;
+    else if (own != unit) axis.unsupported("axes with different units are not supported");
+  }
+  return unit;
+}
+
+void check_path(const CheckedJson& json, const std::string& path) {
+  // Array paths come from a file: they must not lead out of the store.
+  bool bad = path.empty() || path.front() == '/' || path.find('\0') != std::string::npos;
+  for (std::size_t begin = 0; begin <= path.size();) {
+    const std::size_t end = std::min(path.find('/', begin), path.size());
+    bad = bad || path.substr(begin, end - begin) == "..";
+    begin = end + 1;
+  }
+  if (bad) json.damaged(fmt::format("'{}' is no path inside the store", path));
+}
+
+void parse_multiscales(const CheckedJson& multiscales, ImageMetadata& image) {
+  if (multiscales.array_size() == 0) multiscales.damaged("is empty");
+  const CheckedJson first = multiscales.at(std::size_t{0});
+  if (first.has("name") && first.raw()["name"].is_string()) image.name = first.string_at("name");
+  const std::string unit = parse_unit(first.at("axes"));
+  ScaleAndTranslation common;
+  if (first.has("coordinateTransformations"))
+    common = parse_transformations(first.at("coordinateTransformations"));
+  const CheckedJson datasets = first.at("datasets");
+  const std::size_t count = datasets.array_size();
+  if (count == 0 || count > kMaxLevels) datasets.damaged(fmt::format("{} levels", count));
+  for (std::size_t i = 0; i < count; ++i) {
+    const CheckedJson dataset = datasets.at(i);
+    ImageMetadata::Level level;
+    level.path = dataset.string_at("path");
+    check_path(dataset, level.path);
+    const auto own = parse_transformations(dataset.at("coordinateTransformations"));
+    level.transform.spacing = common.scale * own.scale;
+    level.transform.origin = common.scale * own.translation + common.translation;
+    level.transform.unit = unit;
+    image.levels.push_back(std::move(level));
+  }
+}
+
+void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
+  if (const Index version = ours.at("version").integer(); version != kStoreVersion)
+    ours.unsupported(fmt::format(
+        "store version {} is not known to this program, which knows {}; use a newer one", version,
+        kStoreVersion));
+  if (ours.has("may_have_nan")) image.may_have_nan = ours.at("may_have_nan").boolean();
+  if (ours.has("direction")) {
+    const CheckedJson direction = ours.at("direction");
+    if (direction.array_size() != 9) direction.damaged("must have 9 numbers");
+    for (ImageMetadata::Level& level : image.levels)
+      for (std::size_t i = 0; i < 9; ++i)
+        level.transform.direction[i] = direction.at(i).number();
+  }
+}
+
+}  // namespace
+
+std::string to_json(const ImageMetadata& image) {
+  const Transform& finest = image.levels.at(0).transform;
+  Json axes = Json::array();
+  for (const char* name : {"z", "y", "x"}) {
+    Json axis = {{"name", name}, {"type", "space"}};
+    if (!finest.unit.empty()) axis["unit"] = finest.unit;
+    axes.push_back(std::move(axis));
+  }
+  Json datasets = Json::array();
+  for (const ImageMetadata::Level& level : image.levels) {
+    Json dataset;
+    dataset["path"] = level.path;
+    dataset["coordinateTransformations"] = Json::array();
+    dataset["coordinateTransformations"].push_back(
+        {{"type", "scale"}, {"scale", zyx(level.transform.spacing)}});
+    dataset["coordinateTransformations"].push_back(
+        {{"type", "translation"}, {"translation", zyx(level.transform.origin)}});
+    datasets.push_back(std::move(dataset));
+  }
+  Json multiscale;
+  multiscale["name"] = image.name;
+  multiscale["axes"] = std::move(axes);
+  multiscale["datasets"] = std::move(datasets);
+
+  Json ours;
+  ours["version"] = kStoreVersion;
+  if (!finest.axis_aligned()) ours["direction"] = finest.direction;
+  if (image.may_have_nan) ours["may_have_nan"] = *image.may_have_nan;
+
+  Json attributes;
+  attributes["ome"]["version"] = "0.5";
+  attributes["ome"]["multiscales"] = Json::array({std::move(multiscale)});
+  if (image.ours) attributes["isobrick"] = std::move(ours);
+  Json json;
+  json["zarr_format"] = 3;
+  json["node_type"] = "group";
+  json["attributes"] = std::move(attributes);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+ImageMetadata parse_image_metadata(std::string_view text, const std::string& where) {
+  const nlohmann::json parsed = parse_json(text, where);
+  const CheckedJson json(parsed, where);
+  if (json.at("zarr_format").integer() != 3) json.unsupported("only Zarr version 3 is supported");
+  if (json.string_at("node_type") != "group")
+    json.unsupported("is an array; only OME-Zarr images (groups) are supported");
+  const CheckedJson attributes = json.at("attributes");
+  if (!attributes.has("ome")) json.unsupported("is no OME-Zarr 0.5 image: attributes.ome is missing");
+  const CheckedJson ome = attributes.at("ome");
+  if (const std::string version = ome.string_at("version"); version != "0.5")
+    ome.unsupported(fmt::format("OME-Zarr {} is not supported, only 0.5", version));
+  if (!ome.has("multiscales")) ome.unsupported("is no multiscale image");
+
+  ImageMetadata image;
+  parse_multiscales(ome.at("multiscales"), image);
+  image.ours = attributes.has("isobrick");
+  if (image.ours) parse_ours(attributes.at("isobrick"), image);
+  return image;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,169 @@
+#include "isobrick/bricks/range_array.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+constexpr Index kEdge = StoreReader::kRangeChunk;
+constexpr Int3 kChunk{kEdge, kEdge, kEdge};
+constexpr int kRangeZstdLevel = 3;
+
+std::filesystem::path chunk_path(const std::filesystem::path& folder, const ArrayMetadata& metadata,
+                                 Int3 c) {
+  return folder / metadata.chunk_key(std::array<Index, 4>{c.z, c.y, c.x, 0});
+}
+
+std::size_t chunk_bytes(ScalarType type) {
+  return static_cast<std::size_t>(volume(kChunk)) * 2 * size_of(type);
+}
+
+void check_box(Box3 box, Int3 items) {
+  if (box.empty() || intersect(box, {{0, 0, 0}, items}) != box)
+    throw UsageError("ranges were asked for or given outside of the volume");
+}
+
+// Calls f(chunk coordinates, the part of the box in that chunk).
+template <class F>
+void for_each_chunk(Box3 box, F&& f) {
+  const Int3 first{box.lo.x / kEdge, box.lo.y / kEdge, box.lo.z / kEdge};
+  for_each_point({first, ceil_div(box.hi, kChunk)}, [&](Int3 c) {
+    f(c, intersect(box, {c * kChunk, (c + Int3{1, 1, 1}) * kChunk}));
+  });
+}
+
+}  // namespace
+
+std::filesystem::path brick_range_folder(const std::filesystem::path& store, int level) {
+  return store / "isobrick" / std::to_string(level) / "range";
+}
+
+std::filesystem::path block_range_folder(const std::filesystem::path& store, int level) {
+  return store / "isobrick" / std::to_string(level) / "block_range";
+}
+
+ArrayMetadata range_array_metadata(Int3 items, ScalarType type) {
+  ArrayMetadata metadata;
+  metadata.shape = {items.z, items.y, items.x, 2};
+  metadata.chunk = {kEdge, kEdge, kEdge, 2};
+  metadata.type = type;
+  metadata.codecs = CodecChain::ours(kRangeZstdLevel);
+  metadata.dimension_names = {"z", "y", "x", "bound"};
+  return metadata;
+}
+
+RangeArrayWriter::RangeArrayWriter(std::filesystem::path folder, Int3 items, ScalarType type,
+                                   Publisher& publisher)
+    : folder_(std::move(folder)),
+      items_(items),
+      metadata_(range_array_metadata(items, type)),
+      publisher_(publisher) {}
+
+void RangeArrayWriter::put(Box3 box, std::span<const std::byte> pairs) {
+  check_box(box, items_);
+  const std::size_t pair = 2 * size_of(metadata_.type);
+  if (pairs.size() != static_cast<std::size_t>(volume(box.extent())) * pair)
+    throw UsageError("ranges of the wrong size were given");
+  for_each_chunk(box, [&](Int3 c, Box3 part) {
+    const Box3 whole = intersect({c * kChunk, (c + Int3{1, 1, 1}) * kChunk}, {{0, 0, 0}, items_});
+    const auto key = std::tuple(c.z, c.y, c.x);
+    Chunk complete;
+    {
+      const std::lock_guard lock(mutex_);
+      Chunk& chunk = chunks_[key];
+      if (chunk.bytes.empty()) {
+        chunk.bytes.resize(chunk_bytes(metadata_.type));
+        chunk.missing = volume(whole.extent());
+      }
+      const std::size_t row = static_cast<std::size_t>(part.extent().x) * pair;
+      for (Index z = part.lo.z; z < part.hi.z; ++z)
+        for (Index y = part.lo.y; y < part.hi.y; ++y) {
+          const Int3 p{part.lo.x, y, z};
+          const auto to = static_cast<std::size_t>(linear_index(p - c * kChunk, kChunk)) * pair;
+          const auto from = static_cast<std::size_t>(linear_index(p - box.lo, box.extent())) * pair;
+          std::memcpy(chunk.bytes.data() + to, pairs.data() + from, row);
+        }
+      chunk.missing -= volume(part.extent());
+      if (chunk.missing > 0) return;
+      complete = std::move(chunk);
+      chunks_.erase(key);
+      ++written_;
+    }
+    write_chunk(c, complete);
+  });
+}
+
+void RangeArrayWriter::write_chunk(Int3 c, const Chunk& chunk) {
+  publisher_.write(chunk_path(folder_, metadata_, c), encode_bytes(metadata_.codecs, chunk.bytes));
+}
+
+void RangeArrayWriter::finish() {
+  const std::lock_guard lock(mutex_);
+  if (written_ == 0 && chunks_.empty()) return;
+  if (!chunks_.empty() || written_ != volume(ceil_div(items_, kChunk)))
+    throw Error(fmt::format("'{}': only some of the ranges were given", folder_.string()));
+  publisher_.write(folder_ / "zarr.json", to_json(metadata_));
+}
+
+RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, ScalarType type)
+    : folder_(std::move(folder)), items_(items) {
+  const std::filesystem::path file = folder_ / "zarr.json";
+  bool exists = false;
+  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  if (!exists)
+    throw Error(fmt::format("the store has no ranges: there is no '{}'", file.string()));
+  const std::string where = "'" + file.string() + "'";
+  metadata_ = parse_array_metadata(text, where);
+  const ArrayMetadata expected = range_array_metadata(items, type);
+  if (metadata_.shape != expected.shape || metadata_.chunk != expected.chunk ||
+      metadata_.type != expected.type || metadata_.sharding)
+    throw DamageError(where + ": shape, chunks or type are not those of this level's ranges");
+}
+
+RangeTable RangeArrayReader::read(Box3 box, std::atomic<std::uint64_t>& bytes_read) const {
+  check_box(box, items_);
+  RangeTable table{box, {}};
+  table.ranges.resize(static_cast<std::size_t>(volume(box.extent())));
+  const std::size_t size = chunk_bytes(metadata_.type);
+  std::vector<std::byte> decoded(size);
+  for_each_chunk(box, [&](Int3 c, Box3 part) {
+    const std::filesystem::path path = chunk_path(folder_, metadata_, c);
+    bool exists = false;
+    const std::string encoded = read_small_file(path, 2 * size + 1024, &exists);
+    // Chunks are written even where all ranges are alike, so none may be missing.
+    if (!exists) throw DamageError(fmt::format("'{}' is missing", path.string()));
+    bytes_read += encoded.size();
+    try {
+      decode_bytes(metadata_.codecs, size_of(metadata_.type), std::as_bytes(std::span(encoded)),
+                   decoded);
+    } catch (const DamageError& e) {
+      throw DamageError(fmt::format("'{}': {}", path.string(), e.what()));
+    }
+    visit_scalar(metadata_.type, [&](auto tag) {
+      using T = typename decltype(tag)::type;
+      for (Index z = part.lo.z; z < part.hi.z; ++z)
+        for (Index y = part.lo.y; y < part.hi.y; ++y) {
+          const Int3 p{part.lo.x, y, z};
+          const std::byte* from =
+              decoded.data() +
+              static_cast<std::size_t>(linear_index(p - c * kChunk, kChunk)) * 2 * sizeof(T);
+          auto* to = table.ranges.data() + linear_index(p - box.lo, box.extent());
+          for (Index x = 0; x < part.extent().x; ++x, ++to, from += 2 * sizeof(T)) {
+            T pair[2];
+            std::memcpy(pair, from, sizeof pair);
+            *to = {static_cast<double>(pair[0]), static_cast<double>(pair[1])};
+          }
+        }
+    });
+  });
+  return table;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,56 @@
+#include "isobrick/bricks/shard_index.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "isobrick/bricks/codec.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+
+static_assert(sizeof(ShardIndex::Entry) == ShardIndex::kEntryBytes);
+
+std::vector<std::byte> ShardIndex::encode() const {
+  std::vector<std::byte> bytes(encoded_size(entries_.size(), true));
+  const std::size_t body = entries_.size() * kEntryBytes;
+  std::memcpy(bytes.data(), entries_.data(), body);
+  const std::uint32_t crc = crc32c(std::span(bytes).first(body));
+  std::memcpy(bytes.data() + body, &crc, kCrcBytes);
+  return bytes;
+}
+
+ShardIndex ShardIndex::decode(std::span<const std::byte> bytes, bool with_crc,
+                              std::uint64_t file_size) {
+  const std::size_t tail = with_crc ? kCrcBytes : 0;
+  if (bytes.size() < tail || (bytes.size() - tail) % kEntryBytes != 0)
+    throw DamageError(fmt::format("a shard index cannot have {} bytes", bytes.size()));
+  const auto body = bytes.first(bytes.size() - tail);
+  if (with_crc) {
+    std::uint32_t stored;
+    std::memcpy(&stored, bytes.data() + body.size(), kCrcBytes);
+    if (const std::uint32_t crc = crc32c(body); crc != stored)
+      throw DamageError(
+          fmt::format("checksum of the shard index is {:08x}, must be {:08x}", crc, stored));
+  }
+  ShardIndex index(body.size() / kEntryBytes);
+  std::memcpy(index.entries_.data(), body.data(), body.size());
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    const Entry entry = index[i];
+    if (!entry.absent() && (entry.offset > file_size || entry.size > file_size - entry.offset))
+      throw DamageError(
+          fmt::format("shard index: brick {} at {} + {} does not lie within the file's {} bytes", i,
+                      entry.offset, entry.size, file_size));
+  }
+  return index;
+}
+
+std::uint64_t ShardIndex::brick_bytes() const {
+  // Overlapping entries of a foreign shard could wrap the sum; nobody is hurt by that.
+  std::uint64_t sum = 0;
+  for (const Entry& entry : entries_)
+    if (!entry.absent()) sum += entry.size;
+  return sum;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,145 @@
+#include "isobrick/bricks/store_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <limits>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::string_view kTemporarySuffix = ".tmp";
+
+off_t checked_offset(std::uint64_t offset, std::size_t size, const std::filesystem::path& path) {
+  constexpr auto limit = static_cast<std::uint64_t>(std::numeric_limits<off_t>::max());
+  if (offset > limit || size > limit - offset)
+    throw DamageError(fmt::format("'{}': offset {} is out of bounds", path.string(), offset));
+  return static_cast<off_t>(offset);
+}
+
+}  // namespace
+
+StoreFile::~StoreFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+StoreFile StoreFile::open_if_exists(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    if (errno == ENOENT) return {};
+    throw system_error("open", path.string(), errno);
+  }
+  StoreFile file(descriptor, path);
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0) throw system_error("examine", path.string(), errno);
+  if (!S_ISREG(status.st_mode)) throw Error(fmt::format("'{}' is not a file", path.string()));
+  return file;
+}
+
+StoreFile StoreFile::create(const std::filesystem::path& path) {
+  constexpr int flags = O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC;
+  int descriptor = ::open(path.c_str(), flags, 0666);
+  if (descriptor < 0 && errno == ENOENT) {
+    // Folders are made only when missing: most files have theirs already.
+    std::error_code failure;
+    std::filesystem::create_directories(path.parent_path(), failure);
+    if (failure)
+      throw system_error("create directory", path.parent_path().string(), failure.value());
+    descriptor = ::open(path.c_str(), flags, 0666);
+  }
+  if (descriptor < 0) throw system_error("create", path.string(), errno);
+  return {descriptor, path};
+}
+
+StoreFile StoreFile::open_for_writing(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+  if (descriptor < 0) throw system_error("open", path.string(), errno);
+  return {descriptor, path};
+}
+
+std::uint64_t StoreFile::size() const {
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0) throw system_error("examine", path_.string(), errno);
+  return static_cast<std::uint64_t>(status.st_size);
+}
+
+void StoreFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const {
+  checked_offset(offset, bytes.size(), path_);
+  while (!bytes.empty()) {
+    const ssize_t count =
+        ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (count < 0) {
+      if (errno == EINTR) continue;
+      throw system_error(fmt::format("read {} bytes at {} of", bytes.size(), offset),
+                         path_.string(), errno);
+    }
+    if (count == 0)
+      throw DamageError(fmt::format("'{}' ends at {}, {} bytes too early", path_.string(), offset,
+                                    bytes.size()));
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+    offset += static_cast<std::uint64_t>(count);
+  }
+}
+
+void StoreFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
+  checked_offset(offset, bytes.size(), path_);
+  while (!bytes.empty()) {
+    const ssize_t count =
+        ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (count < 0) {
+      if (errno == EINTR) continue;
+      throw system_error("write", path_.string(), errno);
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+    offset += static_cast<std::uint64_t>(count);
+  }
+}
+
+void StoreFile::sync() {
+  if (::fsync(descriptor_) != 0) throw system_error("sync", path_.string(), errno);
+}
+
+std::string read_small_file(const std::filesystem::path& path, std::uint64_t limit, bool* exists) {
+  const StoreFile file = StoreFile::open_if_exists(path);
+  *exists = static_cast<bool>(file);
+  if (!file) return {};
+  const std::uint64_t size = file.size();
+  if (size > limit)
+    throw DamageError(fmt::format("'{}' has {} bytes, more than the {} that make sense",
+                                  path.string(), size, limit));
+  std::string content(static_cast<std::size_t>(size), '\0');
+  file.read_at(0, std::as_writable_bytes(std::span(content)));
+  return content;
+}
+
+std::filesystem::path temporary_name(const std::filesystem::path& path) {
+  std::filesystem::path result = path;
+  result += kTemporarySuffix;
+  return result;
+}
+
+bool is_temporary_name(const std::filesystem::path& path) {
+  return path.extension() == kTemporarySuffix;
+}
+
+void publish_file(StoreFile temporary, const std::filesystem::path& path) {
+  temporary.sync();
+  if (::rename(temporary.path().c_str(), path.c_str()) != 0)
+    throw system_error("rename a finished file to", path.string(), errno);
+}
+
+void sync_directory(const std::filesystem::path& directory) {
+  const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) throw system_error("open", directory.string(), errno);
+  StoreFile file(descriptor, directory);
+  // Some file systems cannot sync a directory and say EINVAL; there is nothing more to do then.
+  if (::fsync(descriptor) != 0 && errno != EINVAL)
+    throw system_error("sync", directory.string(), errno);
+}
+
+}  // namespace isobrick
