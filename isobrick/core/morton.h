@@ -35,4 +35,29 @@ constexpr Int3 morton_decode(std::uint64_t code) {
   return {compact(code), compact(code >> 1), compact(code >> 2)};
 }
 
+namespace morton_detail {
+
+template <class F>
+void visit(Int3 origin, Index edge, Int3 grid, F& f) {
+  if (origin.x >= grid.x || origin.y >= grid.y || origin.z >= grid.z) return;
+  if (edge == 1) {
+    f(origin);
+    return;
+  }
+  const Index half = edge / 2;
+  for (int child = 0; child < 8; ++child)
+    visit(origin + Int3{child & 1, child >> 1 & 1, child >> 2} * half, half, grid, f);
+}
+
+}  // namespace morton_detail
+
+/// Calls f(p) for all points of [0, grid) in Z-order. Octants outside are
+/// passed over whole, so skewed grids cost no more than their points.
+template <class F>
+void for_each_morton(Int3 grid, F&& f) {
+  Index edge = 1;
+  while (edge < grid.x || edge < grid.y || edge < grid.z) edge *= 2;
+  morton_detail::visit(Int3{0, 0, 0}, edge, grid, f);
+}
+
 }  // namespace isobrick

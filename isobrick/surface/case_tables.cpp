@@ -1,1 +1,7 @@
-// In the making.
+#include "isobrick/surface/case_tables.h"
+
+namespace isobrick {
+
+constinit const CaseTables kCaseTables = make_case_tables();
+
+}  // namespace isobrick

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+
+#include "isobrick/core/lattice.h"
+
+namespace isobrick {
+
+/// A tile that the isovalue touches, and what the ranges say of its 2×2×2
+/// blocks of 16³ cells (bit = x + 2·y + 4·z).
+struct TileWork {
+  Int3 tile;                    ///< position in units of kTileEdge
+  std::uint8_t active_blocks = 0;
+  /// Of the blocks that are not active: whether all their samples are inside.
+  std::uint8_t inside_blocks = 0;
+};
+
+/// The samples that `active_blocks` of a tile need: their cells' corners and
+/// `reach` layers more on every side, cut at the volume's border. Calls f(Box3)
+/// for up to four boxes of rows that cover them.
+template <class F>
+void for_each_needed_box(const Lattice& lattice, const TileWork& work, Index reach, F&& f) {
+  const Int3 origin = work.tile * kTileEdge;
+  const auto emit = [&](int blocks_x, Index y0, Index y1, Index z0, Index z1) {
+    const Index x0 = blocks_x & 1 ? 0 : kBlockEdge;
+    const Index x1 = blocks_x & 2 ? kTileEdge : kBlockEdge;
+    const Box3 box{origin + Int3{x0 - reach, y0 - reach, z0 - reach},
+                   origin + Int3{x1 + 1 + reach, y1 + 1 + reach, z1 + 1 + reach}};
+    f(intersect(box, lattice.box()));
+  };
+  const int pairs[4] = {work.active_blocks & 3, work.active_blocks >> 2 & 3,
+                        work.active_blocks >> 4 & 3, work.active_blocks >> 6 & 3};
+  if (pairs[0] && pairs[0] == pairs[1] && pairs[0] == pairs[2] && pairs[0] == pairs[3]) {
+    emit(pairs[0], 0, kTileEdge, 0, kTileEdge);
+    return;
+  }
+  for (int i = 0; i < 4; ++i)
+    if (pairs[i]) {
+      const Index y = (i & 1) * kBlockEdge, z = (i >> 1) * kBlockEdge;
+      emit(pairs[i], y, y + kBlockEdge, z, z + kBlockEdge);
+    }
+}
+
+}  // namespace isobrick

@@ -1,0 +1,141 @@
+#include "isobrick/surface/boundary_map.h"
+
+#include <bit>
+
+#include "isobrick/core/morton.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kLast = kTileSamples - 1;
+
+void shift(EdgeRow& row, std::uint32_t base) {
+  row.x_base += base;
+  row.y_base += base;
+  row.z_base += base;
+  row.y_at_0 += base;
+  row.z_at_0 += base;
+}
+
+void adopt_x(EdgeRow& row, const EdgeRow& from, std::uint32_t base) {
+  row.x = from.x;
+  row.x_base = from.x_base + base;
+}
+
+void adopt_y(EdgeRow& row, const EdgeRow& from, std::uint32_t base) {
+  row.y = from.y;
+  row.y_base = from.y_base + base;
+  row.y_at_0 = from.y_at_0 + base;
+}
+
+void adopt_z(EdgeRow& row, const EdgeRow& from, std::uint32_t base) {
+  row.z = from.z;
+  row.z_base = from.z_base + base;
+  row.z_at_0 = from.z_at_0 + base;
+}
+
+/// Edges at sample 0 of the rows (y, z) from the x face of a tile before; `dy`
+/// and `dz` say whether that tile also lies before along y and z, where its
+/// last row is our first.
+template <bool AlongY>
+void adopt_x_face(TileState& tile, const TileBoundary& from, bool dy, bool dz) {
+  for (const FaceVertex& v : AlongY ? from.x_face_y : from.x_face_z) {
+    int y = v.row % kTileSamples, z = v.row / kTileSamples;
+    if ((dy && y != kLast) || (dz && z != kLast)) continue;
+    if (dy) y = 0;
+    if (dz) z = 0;
+    EdgeRow& row = tile.rows[row_index(y, z)];
+    (AlongY ? row.y_at_0 : row.z_at_0) = from.base + v.number;
+  }
+}
+
+}  // namespace
+
+TileBoundary* BoundaryMap::add(Int3 tile) {
+  const std::uint64_t key = morton_encode(tile);
+  std::unique_ptr<TileBoundary> boundary;
+  if (spare_.empty()) {
+    boundary = std::make_unique<TileBoundary>();
+  } else {
+    boundary = std::move(spare_.back());
+    spare_.pop_back();
+  }
+  expiries_.push({morton_encode(tile + Int3{1, 1, 1}), key});
+  return (map_[key] = std::move(boundary)).get();
+}
+
+const TileBoundary* BoundaryMap::find(Int3 tile) const {
+  const auto found = map_.find(morton_encode(tile));
+  return found == map_.end() ? nullptr : found->second.get();
+}
+
+void BoundaryMap::forget_before(Int3 next) {
+  const std::uint64_t now = morton_encode(next);
+  while (!expiries_.empty() && expiries_.top().last_asker < now) {
+    const auto found = map_.find(expiries_.top().key);
+    // Pages of tiles with much on their faces go back rather than to the pool.
+    if (spare_.size() < 4096) spare_.push_back(std::move(found->second));
+    map_.erase(found);
+    expiries_.pop();
+  }
+}
+
+void BoundaryMap::clear() {
+  map_.clear();
+  expiries_ = {};
+}
+
+void publish_boundary(TileState& tile) {
+  TileBoundary& boundary = *tile.boundary;
+  for (int i = 0; i < kTileSamples; ++i) {
+    boundary.y_face[static_cast<std::size_t>(i)] = tile.rows[row_index(kLast, i)];
+    boundary.z_face[static_cast<std::size_t>(i)] = tile.rows[row_index(i, kLast)];
+  }
+  boundary.x_face_y.clear();
+  boundary.x_face_z.clear();
+  const auto append = [](PodBuffer<FaceVertex>& to, int r, std::uint32_t base, std::uint32_t word) {
+    // Sample 32 is the last bit, so its vertex is the last of the word.
+    if (!(word >> 31)) return;
+    to.resize(to.size() + 1);
+    to[to.size() - 1] = {static_cast<std::uint16_t>(r),
+                         base + static_cast<std::uint32_t>(std::popcount(word)) - 1};
+  };
+  for (int r = 0; r < kTileRows; ++r) {
+    append(boundary.x_face_y, r, tile.rows[r].y_base, tile.rows[r].y);
+    append(boundary.x_face_z, r, tile.rows[r].z_base, tile.rows[r].z);
+  }
+}
+
+void adopt_boundaries(TileState& tile, const BoundaryMap& map, std::uint32_t base) {
+  if (base != 0)
+    for (EdgeRow& row : tile.rows) shift(row, base);
+  const bool* first = tile.shape.first;
+  const auto before = [&](bool x, bool y, bool z) -> const TileBoundary* {
+    if ((x && first[0]) || (y && first[1]) || (z && first[2])) return nullptr;
+    return map.find(tile.work.tile - Int3{x, y, z});
+  };
+  if (const TileBoundary* b = before(false, true, false))
+    for (int z = first[2] ? 0 : 1; z < kTileSamples; ++z) {
+      adopt_x(tile.rows[row_index(0, z)], b->y_face[static_cast<std::size_t>(z)], b->base);
+      adopt_z(tile.rows[row_index(0, z)], b->y_face[static_cast<std::size_t>(z)], b->base);
+    }
+  if (const TileBoundary* b = before(false, true, false); b && !first[2])
+    adopt_z(tile.rows[row_index(0, 0)], b->y_face[0], b->base);
+  if (const TileBoundary* b = before(false, false, true)) {
+    for (int y = first[1] ? 0 : 1; y < kTileSamples; ++y) {
+      adopt_x(tile.rows[row_index(y, 0)], b->z_face[static_cast<std::size_t>(y)], b->base);
+      adopt_y(tile.rows[row_index(y, 0)], b->z_face[static_cast<std::size_t>(y)], b->base);
+    }
+    if (!first[1]) adopt_y(tile.rows[row_index(0, 0)], b->z_face[0], b->base);
+  }
+  if (const TileBoundary* b = before(false, true, true))
+    adopt_x(tile.rows[row_index(0, 0)], b->y_face[kLast], b->base);
+  if (const TileBoundary* b = before(true, false, false)) {
+    adopt_x_face<true>(tile, *b, false, false);
+    adopt_x_face<false>(tile, *b, false, false);
+  }
+  if (const TileBoundary* b = before(true, true, false)) adopt_x_face<false>(tile, *b, true, false);
+  if (const TileBoundary* b = before(true, false, true)) adopt_x_face<true>(tile, *b, false, true);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "isobrick/core/tile.h"
+#include "isobrick/surface/surface_options.h"
+
+namespace isobrick {
+
+/// How many layers of samples around its cells a tile needs: one for gradients
+/// and for looking at the neighbours of NaN, none otherwise.
+Index sample_reach(const SurfaceOptions& options);
+
+/// Marching cubes on the CPU: tiles in, indexed welded mesh out.
+///
+/// Two passes over a batch of tiles, each in parallel over its tiles: the first
+/// gathers samples and makes inside bits, counts and numbers (count); a prefix
+/// sum gives every tile its place; the second writes vertices and triangles
+/// where they belong (emit). The mesh is a pure function of samples and
+/// options, in Morton order of tiles.
+class CpuExtractor {
+ public:
+  /// Throws UsageError when the isovalue is not a number or the roi is empty.
+  CpuExtractor(const Lattice& lattice, const SurfaceOptions& options);
+  ~CpuExtractor();
+
+  /// Appends the surface in `tiles` to `out`. Over all calls, tiles come in
+  /// Morton order, none twice; `bricks` holds what for_each_needed_box says.
+  /// Runs in the caller's TBB arena. Throws Error when a welded mesh gets more
+  /// vertices than 32 bits number.
+  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out);
+
+  /// Forgets all that was extracted: the next tile may be any again.
+  void restart();
+
+  /// Vertices and triangles made so far.
+  std::uint64_t vertices() const;
+  std::uint64_t triangles() const;
+
+  /// Bytes of work space for a number of threads.
+  static std::uint64_t workspace_bytes(ScalarType type, int threads);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick

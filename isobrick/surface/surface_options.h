@@ -1,0 +1,40 @@
+#pragma once
+
+#include <span>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/core/pod_buffer.h"
+#include "isobrick/core/transform.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// Which surface of a lattice to extract, and what of it.
+struct SurfaceOptions {
+  double isovalue = 0;
+  bool normals = false;
+  Indexing indexing = Indexing::welded;
+  /// Samples between which cells are looked at.
+  Box3 roi;
+  Transform transform;
+  double fill_value = 0;
+  /// Whether samples may be NaN: costs a look at every sample's neighbours.
+  bool may_have_nan = false;
+};
+
+/// A mesh, or the piece of one that is being made. Reused, it allocates nothing.
+struct MeshBuffer {
+  PodBuffer<Vec3f> positions, normals;
+  PodBuffer<Triangle> triangles;
+
+  void clear() {
+    positions.clear();
+    normals.clear();
+    triangles.clear();
+  }
+  MeshChunk chunk(std::uint64_t first_vertex) const {
+    return {first_vertex, positions.span(), normals.span(), triangles.span()};
+  }
+};
+
+}  // namespace isobrick

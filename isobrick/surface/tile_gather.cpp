@@ -1,0 +1,69 @@
+#include "isobrick/surface/tile_gather.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace isobrick {
+namespace {
+
+/// Rows are mostly one of a few lengths: a copy of known length is a move or two.
+template <class T>
+inline void copy_run(T* to, const T* from, Index n) {
+  switch (n) {
+    case 1: *to = *from; return;
+    case 16: std::memcpy(to, from, 16 * sizeof(T)); return;
+    case 17: std::memcpy(to, from, 17 * sizeof(T)); return;
+    case 32: std::memcpy(to, from, 32 * sizeof(T)); return;
+    case 33: std::memcpy(to, from, 33 * sizeof(T)); return;
+    case 34: std::memcpy(to, from, 34 * sizeof(T)); return;
+    default: std::memcpy(to, from, static_cast<std::size_t>(n) * sizeof(T)); return;
+  }
+}
+
+template <class T>
+void copy_part(const T* from, Int3 from_extent, T* to, Int3 n) {
+  for (Index z = 0; z < n.z; ++z) {
+    const T* row = from + z * from_extent.x * from_extent.y;
+    T* out = to + z * TileLayout::kPlane;
+    for (Index y = 0; y < n.y; ++y, row += from_extent.x, out += TileLayout::kRow)
+      copy_run(out, row, n.x);
+  }
+}
+
+template <class T>
+void gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
+            TileState& tile) {
+  tile.samples.resize(TileLayout::kSize * sizeof(T));
+  T* samples = reinterpret_cast<T*>(tile.samples.data());
+  const Int3 origin = tile.work.tile * kTileEdge;
+  for_each_needed_box(lattice, tile.work, reach, [&](Box3 box) {
+    const Box3 cover{{box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y,
+                      box.lo.z / lattice.brick.z},
+                     ceil_div(box.hi, lattice.brick)};
+    for_each_point(cover, [&](Int3 b) {
+      const Int3 corner = b * lattice.brick;
+      const Box3 part = intersect(box, {corner, corner + lattice.brick});
+      const Int3 local = part.lo - origin, inner = part.lo - corner, n = part.extent();
+      T* to = samples + TileLayout::offset(static_cast<int>(local.x), static_cast<int>(local.y),
+                                           static_cast<int>(local.z));
+      if (const auto* from = reinterpret_cast<const T*>(bricks.find(b)))
+        copy_part(from + linear_index(inner, lattice.brick), lattice.brick, to, n);
+      else
+        for (Index z = 0; z < n.z; ++z)
+          for (Index y = 0; y < n.y; ++y)
+            std::fill_n(to + z * TileLayout::kPlane + y * TileLayout::kRow, n.x,
+                        static_cast<T>(fill));
+    });
+  });
+}
+
+}  // namespace
+
+void gather_tile(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
+                 TileState& tile) {
+  visit_scalar(lattice.type, [&](auto tag) {
+    gather<typename decltype(tag)::type>(lattice, bricks, fill, reach, tile);
+  });
+}
+
+}  // namespace isobrick

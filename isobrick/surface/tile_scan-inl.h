@@ -1,0 +1,227 @@
+// The first pass over a tile; included once for every SIMD target.
+
+#if defined(ISOBRICK_TILE_SCAN_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef ISOBRICK_TILE_SCAN_INL_H_
+#undef ISOBRICK_TILE_SCAN_INL_H_
+#else
+#define ISOBRICK_TILE_SCAN_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <bit>
+#include <cstring>
+
+#include "isobrick/surface/case_tables.h"
+#include "isobrick/surface/tile_kernels.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace isobrick {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Bits lo … hi.
+inline std::uint64_t bit_span(int lo, int hi) {
+  return (std::uint64_t{2} << hi) - (std::uint64_t{1} << lo);
+}
+
+/// Bit x: samples[x] >= threshold, for the 33 samples of a row.
+template <class T>
+HWY_INLINE std::uint64_t inside_bits(const T* samples, T threshold) {
+  const hn::CappedTag<T, 32> d;
+  const auto limit = hn::Set(d, threshold);
+  std::uint64_t bits = 0;
+  for (std::size_t x = 0; x < 32; x += hn::Lanes(d)) {
+    std::uint8_t mask[8] = {};
+    const auto v = hn::LoadU(d, samples + x);
+    if constexpr (std::is_floating_point_v<T>)
+      hn::StoreMaskBits(d, hn::Ge(v, limit), mask);
+    else
+      hn::StoreMaskBits(d, hn::Not(hn::Lt(v, limit)), mask);
+    std::uint64_t word;
+    std::memcpy(&word, mask, 8);
+    bits |= word << x;
+  }
+  return bits | static_cast<std::uint64_t>(samples[32] >= threshold) << 32;
+}
+
+/// Bit x + 1: samples[x] is not a number, for x = −1 … 33.
+template <class T>
+inline std::uint64_t nan_bits(const T* samples) {
+  std::uint64_t bits = 0;
+  for (int x = -1; x <= kTileSamples; ++x)
+    bits |= static_cast<std::uint64_t>(samples[x] != samples[x]) << (x + 1);
+  return bits;
+}
+
+/// Inside bits of all rows; where a block is not active its samples were not
+/// gathered, and its range says what they are.
+template <class T>
+void classify(const KernelContext& context, TileState& tile) {
+  const T threshold = Threshold<T>(context.isovalue).value;
+  const T* samples = reinterpret_cast<const T*>(tile.samples.data());
+  constexpr std::uint64_t low = 0xffff, high = 0x1ffff0000;
+  for (int z = tile.shape.lo[2]; z <= tile.shape.hi[2]; ++z)
+    for (int y = tile.shape.lo[1]; y <= tile.shape.hi[1]; ++y) {
+      const int pair = (y >= 16 ? 2 : 0) + (z >= 16 ? 4 : 0);
+      const int active = tile.work.active_blocks >> pair & 3;
+      const int inside = tile.work.inside_blocks >> pair & 3;
+      const std::uint64_t gathered = (active & 1 ? low : 0) | (active & 2 ? high : 0);
+      const std::uint64_t known = (inside & 1 ? low : 0) | (inside & 2 ? high : 0);
+      std::uint64_t bits = known & ~gathered;
+      if (gathered)
+        bits |= gathered & inside_bits(samples + TileLayout::offset(0, y, z), threshold);
+      tile.inside[row_index(y, z)] = bits;
+    }
+}
+
+/// Cells without a NaN corner around the tile, as rows of bits: row (y, z) and
+/// bit x + 1 for cell (x, y, z), each in −1 … 32. Cells outside the region of
+/// interest count as bad.
+struct GoodCells {
+  static constexpr int kEdge = kTileSamples + 1;
+  std::uint64_t rows[kEdge * kEdge];
+  std::uint64_t at(int y, int z) const { return rows[(z + 1) * kEdge + y + 1]; }
+};
+
+template <class T>
+void find_good_cells(const KernelContext& context, const TileState& tile, GoodCells& good) {
+  constexpr int edge = kTileSamples + 2;  // samples −1 … 33
+  const T* samples = reinterpret_cast<const T*>(tile.samples.data());
+  std::uint64_t nan[edge * edge];
+  const auto exists = [&](int axis, int i) {
+    const Index p = tile.shape.origin[axis] + i;
+    return p >= context.roi.lo[axis] && p < context.roi.hi[axis];
+  };
+  std::uint64_t columns = 0;
+  for (int x = -1; x <= kTileSamples; ++x)
+    columns |= static_cast<std::uint64_t>(exists(0, x)) << (x + 1);
+  for (int z = -1; z <= kTileSamples; ++z)
+    for (int y = -1; y <= kTileSamples; ++y)
+      nan[(z + 1) * edge + y + 1] =
+          exists(1, y) && exists(2, z)
+              ? nan_bits(samples + TileLayout::offset(0, y, z)) | ~columns
+              : ~std::uint64_t{0};
+  for (int z = 0; z < GoodCells::kEdge; ++z)
+    for (int y = 0; y < GoodCells::kEdge; ++y) {
+      const std::uint64_t any = nan[z * edge + y] | nan[z * edge + y + 1] |
+                                nan[(z + 1) * edge + y] | nan[(z + 1) * edge + y + 1];
+      good.rows[z * GoodCells::kEdge + y] = ~(any | any >> 1);
+    }
+}
+
+/// The crossing edges that start in a row, and the cells that do.
+struct RowBits {
+  std::uint64_t x, y, z, cells;
+};
+
+inline RowBits row_bits(const TileState& tile, int y, int z) {
+  const TileShape& s = tile.shape;
+  const std::uint64_t cell_mask = bit_span(s.lo[0], s.hi[0] - 1);
+  const std::uint64_t sample_mask = bit_span(s.lo[0], s.hi[0]);
+  const std::uint64_t* inside = tile.inside + row_index(y, z);
+  const bool up_y = y < s.hi[1], up_z = z < s.hi[2];
+  const std::uint64_t here = inside[0];
+  const std::uint64_t above = up_y ? inside[1] : here;
+  const std::uint64_t behind = up_z ? inside[kTileSamples] : here;
+  const std::uint64_t both = up_y && up_z ? inside[kTileSamples + 1] : here;
+  const std::uint64_t any = here | above | behind | both;
+  const std::uint64_t all = here & above & behind & both;
+  const std::uint64_t mixed = (any | any >> 1) & ~(all & all >> 1) & cell_mask;
+  return {(here ^ here >> 1) & cell_mask, (here ^ above) & sample_mask,
+          (here ^ behind) & sample_mask, up_y && up_z ? mixed : 0};
+}
+
+/// Leaves out what touches NaN: cells with such a corner, and edges with no
+/// other cell around them.
+inline void leave_out_nan(const GoodCells& good, int y, int z, RowBits& bits) {
+  const std::uint64_t g00 = good.at(y - 1, z - 1), g10 = good.at(y, z - 1);
+  const std::uint64_t g01 = good.at(y - 1, z), g11 = good.at(y, z);
+  bits.x &= (g00 | g10 | g01 | g11) >> 1;
+  bits.y &= (g10 | g11) >> 1 | (g10 | g11);
+  bits.z &= (g01 | g11) >> 1 | (g01 | g11);
+  bits.cells &= g11 >> 1;
+}
+
+/// Lists the active cells of a row with their cases.
+inline void list_cells(TileState& tile, int y, int z, std::uint64_t cells) {
+  const std::uint64_t* inside = tile.inside + row_index(y, z);
+  const std::uint64_t w0 = inside[0], w1 = inside[1];
+  const std::uint64_t w2 = inside[kTileSamples], w3 = inside[kTileSamples + 1];
+  const auto place = static_cast<ActiveCell>(y << 5 | z << 10);
+  ActiveCell* out = tile.cells.end();
+  std::uint32_t triangles = 0;
+  for (; cells; cells &= cells - 1, ++out) {
+    const int x = std::countr_zero(cells);
+    const auto index = static_cast<std::uint32_t>((w0 >> x & 3) | (w1 >> x & 3) << 2 |
+                                                  (w2 >> x & 3) << 4 | (w3 >> x & 3) << 6);
+    triangles += kCaseTables.triangles[index];
+    *out = place | static_cast<ActiveCell>(x) | index << 16;
+  }
+  tile.triangles += triangles;
+  tile.cells.resize(static_cast<std::size_t>(out - tile.cells.begin()));
+}
+
+/// Numbers the tile's own vertices of a row, counting on from `number`.
+inline std::uint32_t number_row(TileState& tile, int y, int z, const RowBits& bits,
+                                std::uint32_t number) {
+  const TileShape& s = tile.shape;
+  const bool own_y = y > 0 || s.first[1], own_z = z > 0 || s.first[2];
+  EdgeRow& row = tile.rows[row_index(y, z)];
+  const auto count = [](std::uint32_t word) { return static_cast<std::uint32_t>(std::popcount(word)); };
+  std::uint8_t at_0 = 0;
+  if (own_y && own_z) {
+    row.x = static_cast<std::uint32_t>(bits.x);
+    row.x_base = number;
+    number += count(row.x);
+  }
+  if (own_z) {
+    row.y = static_cast<std::uint32_t>(bits.y >> 1);
+    const std::uint32_t own = static_cast<std::uint32_t>(bits.y) & s.first[0];
+    row.y_at_0 = number;
+    row.y_base = number + own;
+    number = row.y_base + count(row.y);
+    at_0 = static_cast<std::uint8_t>(own);
+  }
+  if (own_y) {
+    row.z = static_cast<std::uint32_t>(bits.z >> 1);
+    const std::uint32_t own = static_cast<std::uint32_t>(bits.z) & s.first[0];
+    row.z_at_0 = number;
+    row.z_base = number + own;
+    number = row.z_base + count(row.z);
+    at_0 = static_cast<std::uint8_t>(at_0 | own << 1);
+  }
+  tile.own_at_0[row_index(y, z)] = at_0;
+  return number;
+}
+
+template <class T>
+void scan_samples(const KernelContext& context, TileState& tile) {
+  classify<T>(context, tile);
+  GoodCells good;
+  const bool look_for_nan = std::is_floating_point_v<T> && context.may_have_nan;
+  if (look_for_nan) find_good_cells<T>(context, tile, good);
+
+  std::memset(static_cast<void*>(tile.rows), 0, sizeof tile.rows);
+  std::memset(tile.own_at_0, 0, sizeof tile.own_at_0);
+  tile.cells.clear();
+  tile.cells.reserve(static_cast<std::size_t>(kTileEdge * kTileEdge * kTileEdge));
+  tile.triangles = 0;
+  std::uint32_t number = 0;
+  const TileShape& s = tile.shape;
+  for (int z = s.lo[2]; z <= s.hi[2]; ++z)
+    for (int y = s.lo[1]; y <= s.hi[1]; ++y) {
+      RowBits bits = row_bits(tile, y, z);
+      if (!(bits.x | bits.y | bits.z | bits.cells)) continue;
+      if (look_for_nan) leave_out_nan(good, y, z, bits);
+      number = number_row(tile, y, z, bits, number);
+      if (bits.cells) list_cells(tile, y, z, bits.cells);
+    }
+  tile.vertices = number;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace isobrick
+HWY_AFTER_NAMESPACE();
+
+#endif

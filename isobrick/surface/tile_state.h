@@ -1,0 +1,83 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "isobrick/core/pod_buffer.h"
+#include "isobrick/core/tile.h"
+#include "isobrick/surface/cell_math.h"
+
+namespace isobrick {
+
+/// Samples along a tile's edge: those of its cells' corners.
+inline constexpr int kTileSamples = static_cast<int>(kTileEdge) + 1;
+/// Rows (y, z) of a tile's samples.
+inline constexpr int kTileRows = kTileSamples * kTileSamples;
+
+constexpr int row_index(int y, int z) { return z * kTileSamples + y; }
+
+/// Where a tile's sample (x, y, z), each in −1 … 33, lies in the gathered
+/// block: one layer before the tile and one after, for gradients and for NaN.
+struct TileLayout {
+  static constexpr int kRow = 40;
+  static constexpr int kPlane = kRow * (kTileSamples + 2);
+  static constexpr int kOrigin = kPlane + kRow + 1;
+  /// With room for vector loads that run past the last row.
+  static constexpr int kSize = kPlane * (kTileSamples + 2) + 64;
+  static constexpr int offset(int x, int y, int z) { return kOrigin + z * kPlane + y * kRow + x; }
+};
+
+/// A tile cut to the volume or the region of interest, in its own coordinates.
+struct TileShape {
+  Int3 origin;         ///< of the tile, in samples
+  int lo[3], hi[3];    ///< cells lo … hi − 1, samples lo … hi along x, y, z
+  bool first[3];       ///< nothing lies before the tile along this axis: it owns its low plane
+};
+
+/// The vertices on the lattice edges of one row of samples. An edge lies in the
+/// closed tiles around it and belongs to the lowest of them, so a tile owns its
+/// upper planes, and its lower ones only at the border. Within a row vertices
+/// are numbered along x, first those on edges along x, then y, then z.
+/// Bit i of `x` is the edge i → i+1; bit i of `y` and `z` the edge that starts
+/// at sample i + 1. The one at sample 0 has a number of its own, because it
+/// mostly belongs to another tile than the rest of the row.
+struct EdgeRow {
+  std::uint32_t x = 0, y = 0, z = 0;
+  std::uint32_t x_base = 0, y_base = 0, z_base = 0;
+  std::uint32_t y_at_0 = 0, z_at_0 = 0;
+};
+
+/// A cell that the surface passes: x | y << 5 | z << 10 | case << 16.
+using ActiveCell = std::uint32_t;
+
+/// A vertex on the upper x face: row (y, z) and number within the tile.
+struct FaceVertex {
+  std::uint16_t row;
+  std::uint32_t number;
+};
+
+/// What later tiles need of a finished one: the vertices on its upper planes.
+struct TileBoundary {
+  std::uint32_t base = 0;  ///< number of the tile's first vertex in the mesh
+  /// Rows with y = 32 (by z) and rows with z = 32 (by y); numbers count from `base`.
+  std::array<EdgeRow, kTileSamples> y_face, z_face;
+  PodBuffer<FaceVertex> x_face_y, x_face_z;  ///< edges along y and along z at x = 32
+};
+
+/// Work space for one tile between counting and emission.
+struct TileState {
+  TileWork work;
+  TileShape shape;
+  PodBuffer<std::byte> samples;                   ///< TileLayout, of the sample type
+  alignas(64) std::uint64_t inside[kTileRows];    ///< bit x: sample x is inside
+  alignas(64) EdgeRow rows[kTileRows];
+  /// Own edges at sample 0 of a row: bit 0 along y, bit 1 along z.
+  std::uint8_t own_at_0[kTileRows];
+  PodBuffer<ActiveCell> cells;
+  std::uint32_t vertices = 0, triangles = 0;
+  std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
+  TileBoundary* boundary = nullptr;                  ///< of this tile, when later tiles need it
+};
+
+}  // namespace isobrick

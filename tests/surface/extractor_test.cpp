@@ -1,0 +1,326 @@
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include <numbers>
+
+#include "isobrick/core/error.h"
+#include "isobrick/surface/case_tables.h"
+#include "tests/surface/field.h"
+
+namespace isobrick::testing {
+namespace {
+
+template <class T>
+class EveryType : public ::testing::Test {};
+using Types = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                               std::uint32_t, std::int32_t, float, double>;
+TYPED_TEST_SUITE(EveryType, Types);
+
+TYPED_TEST(EveryType, EqualsPlainMarchingCubesOnNoise) {
+  using T = TypeParam;
+  for (const Int3 extent : {Int3{2, 2, 2}, Int3{3, 2, 2}, Int3{33, 34, 35}, Int3{32, 31, 33},
+                            Int3{65, 37, 41}, Int3{1, 20, 20}, Int3{70, 2, 66}}) {
+    const double lo = std::is_signed_v<T> ? -100 : 10;
+    const auto field = padded_noise<T>(extent, lo, 110, static_cast<T>(lo), 7);
+    const double iso = 49.5;  // no sample equals it, so that vertices tell their edges
+    const Mesh mesh = extract(field, {.isovalue = iso});
+    EXPECT_EQ(edge_triangles(mesh), reference_triangles(field, iso))
+        << extent.x << " " << extent.y << " " << extent.z;
+    std::set<EdgeKey> edges;
+    for (const Vec3f& p : mesh.positions) edges.insert(edge_of(p));
+    EXPECT_EQ(edges.size(), mesh.positions.size()) << "two vertices on one lattice edge";
+  }
+}
+
+TYPED_TEST(EveryType, NoisePaddedByOutsideIsClosedAndOriented) {
+  using T = TypeParam;
+  const double lo = std::is_signed_v<T> ? -100 : 0;
+  const auto field = padded_noise<T>({67, 45, 38}, lo, 100, static_cast<T>(lo), 3);
+  for (const double iso : {lo + 20, 50.0, 99.0}) {
+    const Mesh mesh = extract(field, {.isovalue = iso, .brick = {16, 16, 16}});
+    ASSERT_GT(mesh.triangles.size(), 100u);
+    EXPECT_GT(closed_sides(mesh), 0) << "isovalue " << iso;
+  }
+}
+
+TYPED_TEST(EveryType, BrickSizeBatchesAndThreadsNeverShow) {
+  using T = TypeParam;
+  const double lo = std::is_signed_v<T> ? -50 : 0;
+  auto field = padded_noise<T>({150, 97, 70}, lo, 100, static_cast<T>(lo), 11);
+  // A calm half, so that some blocks are not active.
+  for_each_point({{0, 0, 0}, {80, 97, 70}}, [&](Int3 p) { field.at(p) = static_cast<T>(p.z < 30 ? 0 : 90); });
+  for (const bool normals : {false, true}) {
+    const Mesh expected = extract(field, {.isovalue = 42, .normals = normals});
+    ASSERT_GT(expected.triangles.size(), 10000u);
+    for (const Int3 brick : {Int3{16, 16, 16}, Int3{32, 32, 32}, Int3{128, 128, 128},
+                             Int3{17, 40, 23}, Int3{256, 1, 100}})
+      EXPECT_EQ(extract(field, {.isovalue = 42, .brick = brick, .normals = normals}), expected);
+    for (const int threads : {1, 2, 8})
+      tbb::task_arena(threads).execute([&] {
+        EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals}), expected);
+      });
+    for (const std::size_t batch : {1u, 3u, 40u})
+      EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals, .batch = batch}), expected);
+  }
+}
+
+TYPED_TEST(EveryType, ChunkLocalMeshHasTheSameTriangles) {
+  using T = TypeParam;
+  const auto field = padded_noise<T>({70, 40, 37}, 0, 100, T{0}, 5);
+  const auto soup = [](const Mesh& mesh) {
+    std::multiset<std::array<float, 9>> triangles;
+    for (const Triangle& t : mesh.triangles) {
+      std::array<float, 9> corners{};
+      for (std::size_t i = 0; i < 9; ++i)
+        corners[i] = mesh.positions[t[i / 3]][static_cast<int>(i % 3)];
+      triangles.insert(corners);
+    }
+    return triangles;
+  };
+  const Mesh local = extract(field, {.isovalue = 42, .indexing = Indexing::chunk_local});
+  EXPECT_EQ(soup(local), soup(extract(field, {.isovalue = 42})));
+}
+
+TEST(Extractor, IsovaluesAtAndBeyondTheRange) {
+  const auto field = padded_noise<std::uint8_t>({20, 21, 22}, 10, 201, 10, 1);
+  EXPECT_TRUE(extract(field, {.isovalue = 10}).triangles.empty());   // all inside
+  EXPECT_TRUE(extract(field, {.isovalue = -1e30}).triangles.empty());
+  EXPECT_TRUE(extract(field, {.isovalue = 201}).triangles.empty());  // none inside
+  EXPECT_TRUE(extract(field, {.isovalue = 256}).triangles.empty());
+  EXPECT_TRUE(extract(field, {.isovalue = INFINITY}).triangles.empty());
+  EXPECT_GT(closed_sides(extract(field, {.isovalue = 200})), 0);
+  EXPECT_GT(closed_sides(extract(field, {.isovalue = 10.0001})), 0);
+  EXPECT_THROW(extract(field, {.isovalue = NAN}), UsageError);
+}
+
+TEST(Extractor, ConstantVolumesAreEmpty) {
+  Field<float> field({40, 40, 40});
+  for (const double iso : {-1.0, 0.0, 1.0})
+    EXPECT_TRUE(extract(field, {.isovalue = iso}).triangles.empty());
+}
+
+// Few values, so that samples equal the isovalue everywhere.
+TEST(Extractor, SamplesThatEqualTheIsovalueKeepItClosed) {
+  const auto field = padded_noise<std::uint8_t>({50, 40, 36}, 0, 4, 0, 9);
+  for (const double iso : {1.0, 2.0, 3.0}) {
+    const Mesh mesh = extract(field, {.isovalue = iso});
+    ASSERT_FALSE(mesh.triangles.empty());
+    EXPECT_GT(closed_sides(mesh), 0);
+    std::set<std::array<std::uint32_t, 3>> faces;
+    for (Triangle t : mesh.triangles) {
+      std::sort(t.begin(), t.end());
+      EXPECT_TRUE(faces.insert(t).second) << "a face twice";
+    }
+  }
+}
+
+// All 2¹² ways to put {outside, at, inside} bits on 3×2×2 samples, one cell
+// beside the other; the border stays open, but the shared face must not tear.
+TEST(Extractor, AllPairsOfCellsAgreeWithPlainMarchingCubes) {
+  for (int bits = 0; bits < 4096; ++bits) {
+    Field<float> field({3, 2, 2});
+    for (std::size_t i = 0; i < 12; ++i) field.samples[i] = (bits >> i & 1) ? 1.0f : -1.0f;
+    ASSERT_EQ(edge_triangles(extract(field, {.isovalue = 0})), reference_triangles(field, 0)) << bits;
+  }
+}
+
+TEST(Extractor, CellsWithNaNAreLeftOutAndNoVertexIsIdle) {
+  auto field = padded_noise<float>({70, 50, 40}, 0, 100, 0.0f, 21);
+  std::mt19937 random(2);
+  for (float& v : field.samples)
+    if (random() % 20 == 0) v = NAN;
+  for_each_point({{30, 0, 0}, {34, 50, 40}}, [&](Int3 p) { field.at(p) = NAN; });
+  const double iso = 42.42;
+  const Mesh mesh = extract(field, {.isovalue = iso});
+  EXPECT_EQ(edge_triangles(mesh), reference_triangles(field, iso));
+  std::vector<bool> used(mesh.positions.size());
+  for (const Triangle& t : mesh.triangles)
+    for (const auto v : t) used[v] = true;
+  EXPECT_EQ(std::count(used.begin(), used.end(), false), 0);
+  for (const Int3 brick : {Int3{16, 16, 16}, Int3{128, 128, 128}})
+    EXPECT_EQ(extract(field, {.isovalue = iso, .brick = brick}), mesh);
+  EXPECT_EQ(extract(field, {.isovalue = iso, .normals = true}).triangles, mesh.triangles);
+}
+
+TEST(Extractor, InfiniteAndHugeSamplesGiveFinitePositionsOnTheirEdges) {
+  auto field = padded_noise<float>({40, 30, 20}, -1, 1, -1.0f, 4);
+  std::mt19937 random(5);
+  for_each_point({{1, 1, 1}, {39, 29, 19}}, [&](Int3 p) {
+    switch (random() % 8) {
+      case 0: field.at(p) = INFINITY; break;
+      case 1: field.at(p) = -INFINITY; break;
+      case 2: field.at(p) = 3e38f; break;
+      case 3: field.at(p) = -3e38f; break;
+      default: break;
+    }
+  });
+  const Mesh mesh = extract(field, {.isovalue = 0.25, .normals = true});
+  EXPECT_GT(closed_sides(mesh), 0);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3f p = mesh.positions[i], n = mesh.normals[i];
+    int off_lattice = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      ASSERT_TRUE(p[axis] >= 0 && p[axis] <= static_cast<float>(field.extent[axis] - 1));
+      off_lattice += p[axis] != std::floor(p[axis]);
+    }
+    ASSERT_LE(off_lattice, 1);
+    ASSERT_NEAR(n.x * n.x + n.y * n.y + n.z * n.z, 1, 1e-4);
+  }
+}
+
+struct Measures {
+  double area = 0, volume = 0;
+  std::ptrdiff_t euler = 0;
+  double worst_radius = 0, worst_normal = 0;
+};
+
+Measures measure(const Mesh& mesh, Vec3d centre, double radius) {
+  Measures m;
+  const auto at = [&](std::uint32_t i) -> Vec3d {
+    const Vec3f p = mesh.positions[i];
+    return Vec3d{p.x, p.y, p.z} - centre;
+  };
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3d a = at(t[0]), u = at(t[1]) - a, v = at(t[2]) - a;
+    const Vec3d c{u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
+    m.area += std::sqrt(c.x * c.x + c.y * c.y + c.z * c.z) / 2;
+    m.volume += (a.x * c.x + a.y * c.y + a.z * c.z) / 6;
+  }
+  for (std::uint32_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3d p = at(i);
+    const double r = std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
+    m.worst_radius = std::max(m.worst_radius, std::abs(r - radius));
+    if (!mesh.normals.empty()) {
+      const Vec3f n = mesh.normals[i];
+      m.worst_normal = std::max(m.worst_normal, 1 - (n.x * p.x + n.y * p.y + n.z * p.z) / r);
+    }
+  }
+  m.euler = static_cast<std::ptrdiff_t>(mesh.positions.size()) - closed_sides(mesh) +
+            static_cast<std::ptrdiff_t>(mesh.triangles.size());
+  return m;
+}
+
+// The distance field is not linear along edges, so positions, area and volume
+// converge with the square of the sample distance.
+TEST(Extractor, SphereConvergesAtSecondOrder) {
+  Measures coarse;
+  for (const Index n : {17, 33, 65, 129}) {
+    const double h = 2.0 / static_cast<double>(n - 1), radius = 0.7;
+    const Field<float> field({n, n, n}, [&](Int3 p) {
+      const Vec3d q{static_cast<double>(p.x) * h - 1, static_cast<double>(p.y) * h - 1, static_cast<double>(p.z) * h - 1};
+      return radius - std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z);
+    });
+    Transform world;
+    world.spacing = {h, h, h};
+    world.origin = {-1, -1, -1};
+    const Mesh mesh = extract(field, {.isovalue = 0, .normals = true, .transform = world});
+    const Measures m = measure(mesh, {0, 0, 0}, radius);
+    EXPECT_EQ(m.euler, 2);
+    const double area = 4 * std::numbers::pi * radius * radius, volume = area * radius / 3;
+    const Measures error{std::abs(m.area - area), std::abs(m.volume - volume), 0, m.worst_radius,
+                         m.worst_normal};
+    EXPECT_GT(m.volume, 0) << "normals must point to the outside";
+    if (n > 17) {
+      EXPECT_LT(error.area, coarse.area / 3.2);
+      EXPECT_LT(error.volume, coarse.volume / 3.2);
+      EXPECT_LT(error.worst_radius, coarse.worst_radius / 2.5);
+      // Below this it is the rounding of float.
+      EXPECT_LT(error.worst_normal, std::max(coarse.worst_normal / 2.5, 1e-6));
+    }
+    coarse = error;
+  }
+  EXPECT_LT(coarse.worst_normal, 1e-4);
+}
+
+TEST(Extractor, TorusHasEulerNumberZeroAndItsVolume) {
+  const double big = 20, small = 8;
+  const Field<float> field({63, 63, 30}, [&](Int3 p) {
+    const double x = static_cast<double>(p.x) - 31.2, y = static_cast<double>(p.y) - 30.9, z = static_cast<double>(p.z) - 14.6;
+    const double ring = std::sqrt(x * x + y * y) - big;
+    return small - std::sqrt(ring * ring + z * z);
+  });
+  const Measures m = measure(extract(field, {.isovalue = 0}), {31.2, 30.9, 14.6}, 0);
+  EXPECT_EQ(m.euler, 0);
+  const double volume = 2 * std::numbers::pi * std::numbers::pi * big * small * small;
+  EXPECT_NEAR(m.volume / volume, 1, 0.01);
+}
+
+// A plane is exact in every cell, whatever the spacing and the direction.
+TEST(Extractor, AnisotropicAndTurnedVolumesEndInWorldCoordinates) {
+  Transform world;
+  world.spacing = {0.5, 2, 3};
+  world.origin = {10, -20, 30};
+  const double c = 0.6, s = 0.8;
+  world.direction = {c, -s, 0, s, c, 0, 0, 0, 1};
+  // f falls along the world direction (1, 2, 3)/√14; the surface is where f = 0.
+  const Vec3d n{1 / std::sqrt(14.0), 2 / std::sqrt(14.0), 3 / std::sqrt(14.0)};
+  const Vec3d centre = world.apply({20, 15, 12});
+  const Field<float> field({41, 33, 29}, [&](Int3 p) {
+    const Vec3d q = world.apply({static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)}) - centre;
+    return -(q.x * n.x + q.y * n.y + q.z * n.z);
+  });
+  const Mesh mesh = extract(field, {.isovalue = 0, .normals = true, .transform = world});
+  ASSERT_GT(mesh.positions.size(), 500u);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3f p = mesh.positions[i], m = mesh.normals[i];
+    EXPECT_NEAR((p.x - centre.x) * n.x + (p.y - centre.y) * n.y + (p.z - centre.z) * n.z, 0, 2e-5);
+    EXPECT_NEAR(m.x * n.x + m.y * n.y + m.z * n.z, 1, 1e-5);
+  }
+}
+
+TEST(Extractor, NormalsByDefinitionEverywhere) {
+  const auto field = padded_noise<float>({66, 35, 34}, -1, 1, -1.0f, 8);
+  const Mesh mesh = extract(field, {.isovalue = 0.1, .brick = {32, 32, 32}, .normals = true});
+  const auto gradient = [&](Int3 p) {
+    Vec3f g;
+    for (int axis = 0; axis < 3; ++axis) {
+      Int3 lo = p, hi = p;
+      if (p[axis] > 0) --lo[axis];
+      if (p[axis] < field.extent[axis] - 1) ++hi[axis];
+      const float d = field.at(hi) - field.at(lo);
+      g[axis] = hi[axis] - lo[axis] == 2 ? d * 0.5f : d;
+    }
+    return g;
+  };
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const EdgeKey e = edge_of(mesh.positions[i]);
+    if (e[3] < 0) continue;
+    const Int3 a{e[0], e[1], e[2]};
+    Int3 b = a;
+    ++b[static_cast<int>(e[3])];
+    const float va = field.at(a), vb = field.at(b), t = (0.1f - va) / (vb - va);
+    const Vec3f ga = gradient(a), gb = gradient(b);
+    const Vec3f g{ga.x + t * (gb.x - ga.x), ga.y + t * (gb.y - ga.y), ga.z + t * (gb.z - ga.z)};
+    const float length = std::sqrt(g.x * g.x + g.y * g.y + g.z * g.z);
+    ASSERT_NEAR(mesh.normals[i].x, -g.x / length, 1e-5);
+    ASSERT_NEAR(mesh.normals[i].y, -g.y / length, 1e-5);
+    ASSERT_NEAR(mesh.normals[i].z, -g.z / length, 1e-5);
+  }
+}
+
+TEST(Extractor, ARegionOfInterestIsThatPartOfTheMesh) {
+  const auto field = padded_noise<std::uint16_t>({100, 90, 80}, 0, 1000, 0, 6);
+  const double iso = 300.5;
+  for (const Box3 roi : {Box3{{5, 40, 33}, {70, 89, 66}}, Box3{{32, 32, 32}, {64, 64, 64}},
+                         Box3{{31, 33, 0}, {33, 34, 80}}, Box3{{7, 7, 7}, {8, 80, 80}}}) {
+    const Mesh mesh = extract(field, {.isovalue = iso, .roi = roi});
+    Field<std::uint16_t> part(roi.extent());
+    for_each_point(part.box(), [&](Int3 p) { part.at(p) = field.at(p + roi.lo); });
+    EdgeTriangles expected;
+    for (auto t : reference_triangles(part, iso)) {
+      for (EdgeKey& e : t)
+        for (int axis = 0; axis < 3; ++axis) e[static_cast<std::size_t>(axis)] += roi.lo[axis];
+      expected.insert(t);
+    }
+    EXPECT_EQ(edge_triangles(mesh), expected);
+    std::set<EdgeKey> edges;
+    for (const Vec3f& p : mesh.positions) edges.insert(edge_of(p));
+    EXPECT_EQ(edges.size(), mesh.positions.size());
+    std::set<std::uint32_t> used;
+    for (const Triangle& t : mesh.triangles) used.insert(t.begin(), t.end());
+    EXPECT_EQ(used.size(), mesh.positions.size());
+  }
+}
+
+}  // namespace
+}  // namespace isobrick::testing
