@@ -72,7 +72,8 @@ double parse_fill_value(const CheckedJson& json, ScalarType type) {
   if (type == ScalarType::f64) return value;
   return visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    if (std::trunc(value) != value || value < static_cast<double>(std::numeric_limits<T>::lowest()) ||
+    if (std::trunc(value) != value ||
+        value < static_cast<double>(std::numeric_limits<T>::lowest()) ||
         value > static_cast<double>(std::numeric_limits<T>::max()))
       json.damaged(fmt::format("{} is no {}", value, zarr_name(type)));
     return value;
@@ -92,7 +93,8 @@ void check_bytes(const CheckedJson& json, std::span<const Index> extents, std::u
   std::uint64_t bytes = unit;
   for (const Index extent : extents) {
     if (static_cast<std::uint64_t>(extent) > kMaxBrickBytes / bytes)
-      json.unsupported(fmt::format("more than {} bytes at a time are not supported", kMaxBrickBytes));
+      json.unsupported(
+          fmt::format("more than {} bytes at a time are not supported", kMaxBrickBytes));
     bytes *= static_cast<std::uint64_t>(extent);
   }
 }
@@ -177,13 +179,14 @@ void parse_key_encoding(const CheckedJson& json, ArrayMetadata& array) {
 // Members that we do not know must not be ignored unless they say that they may be.
 void check_members(const CheckedJson& json) {
   static constexpr std::string_view known[] = {
-      "zarr_format", "node_type", "shape",      "data_type",       "chunk_grid",          "attributes",
-      "fill_value",  "codecs",    "dimension_names", "chunk_key_encoding", "storage_transformers"};
+      "zarr_format",         "node_type",  "shape",  "data_type",       "chunk_grid",
+      "attributes",          "fill_value", "codecs", "dimension_names", "chunk_key_encoding",
+      "storage_transformers"};
   for (const auto& [key, value] : json.raw().items()) {
     bool is_known = false;
     for (const std::string_view name : known) is_known = is_known || key == name;
-    const bool ignorable = value.is_object() && value.contains("must_understand") &&
-                           value["must_understand"] == false;
+    const bool ignorable =
+        value.is_object() && value.contains("must_understand") && value["must_understand"] == false;
     if (!is_known && !ignorable) json.unsupported(fmt::format("'{}' is not supported", key));
   }
   if (json.has("storage_transformers") && json.at("storage_transformers").array_size() != 0)
@@ -218,8 +221,8 @@ std::string to_json(const ArrayMetadata& array) {
   json["shape"] = array.shape;
   json["data_type"] = zarr_name(array.type);
   json["chunk_grid"] = named("regular", {{"chunk_shape", array.chunk}});
-  json["chunk_key_encoding"] = named(array.key_prefix ? "default" : "v2",
-                                     {{"separator", std::string(1, array.separator)}});
+  json["chunk_key_encoding"] =
+      named(array.key_prefix ? "default" : "v2", {{"separator", std::string(1, array.separator)}});
   json["fill_value"] = fill_value_json(array.type, array.fill_value);
   json["codecs"] = std::move(codecs);
   json["attributes"] = Json::object();

@@ -17,7 +17,7 @@ namespace isobrick {
 struct ArrayMetadata {
   /// The sharding_indexed codec. Without it a chunk is a file.
   struct Sharding {
-    std::vector<Index> brick;     ///< the inner chunk
+    std::vector<Index> brick;  ///< the inner chunk
     bool index_at_end = true;
     bool index_has_crc = true;
     friend bool operator==(const Sharding&, const Sharding&) = default;

@@ -18,7 +18,7 @@ class CheckedJson {
   CheckedJson(const Json& value, std::string where) : value_(&value), where_(std::move(where)) {}
 
   const std::string& where() const { return where_; }
-  [[noreturn]] void damaged(const std::string& what) const;    ///< throws DamageError
+  [[noreturn]] void damaged(const std::string& what) const;      ///< throws DamageError
   [[noreturn]] void unsupported(const std::string& what) const;  ///< throws Error
 
   bool has(const char* key) const { return value_->is_object() && value_->contains(key); }

@@ -171,8 +171,8 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
   bool first = true;
   for (const ByteCodec step : chain.steps) {
     if (step == ByteCodec::zstd)
-      result = compress(first ? bytes : std::span<const std::byte>(result), chain.zstd_level,
-                        kCrcBytes);
+      result =
+          compress(first ? bytes : std::span<const std::byte>(result), chain.zstd_level, kCrcBytes);
     else {
       if (first) {
         result.reserve(bytes.size() + kCrcBytes);

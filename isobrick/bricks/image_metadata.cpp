@@ -48,18 +48,19 @@ ScaleAndTranslation parse_transformations(const CheckedJson& list) {
 
 std::string parse_unit(const CheckedJson& axes) {
   if (axes.array_size() != 3)
-    axes.unsupported(fmt::format("images of {} dimensions are not supported, only z, y, x",
-                                 axes.array_size()));
+    axes.unsupported(
+        fmt::format("images of {} dimensions are not supported, only z, y, x", axes.array_size()));
   std::string unit;
   for (std::size_t i = 0; i < 3; ++i) {
     const CheckedJson axis = axes.at(i);
     const std::string name = axis.string_at("name");
-    if (name != std::string(1, "zyx"[i]) ||
-        (axis.has("type") && axis.string_at("type") != "space"))
+    if (name != std::string(1, "zyx"[i]) || (axis.has("type") && axis.string_at("type") != "space"))
       axis.unsupported(fmt::format("axis '{}' is not supported, only z, y, x in this order", name));
     const std::string own = axis.has("unit") ? axis.string_at("unit") : "";
-    if (i == 0) unit = own;
-    else if (own != unit) axis.unsupported("axes with different units are not supported");
+    if (i == 0)
+      unit = own;
+    else if (own != unit)
+      axis.unsupported("axes with different units are not supported");
   }
   return unit;
 }
@@ -109,8 +110,7 @@ void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
     const CheckedJson direction = ours.at("direction");
     if (direction.array_size() != 9) direction.damaged("must have 9 numbers");
     for (ImageMetadata::Level& level : image.levels)
-      for (std::size_t i = 0; i < 9; ++i)
-        level.transform.direction[i] = direction.at(i).number();
+      for (std::size_t i = 0; i < 9; ++i) level.transform.direction[i] = direction.at(i).number();
   }
 }
 
@@ -163,7 +163,8 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
   if (json.string_at("node_type") != "group")
     json.unsupported("is an array; only OME-Zarr images (groups) are supported");
   const CheckedJson attributes = json.at("attributes");
-  if (!attributes.has("ome")) json.unsupported("is no OME-Zarr 0.5 image: attributes.ome is missing");
+  if (!attributes.has("ome"))
+    json.unsupported("is no OME-Zarr 0.5 image: attributes.ome is missing");
   const CheckedJson ome = attributes.at("ome");
   if (const std::string version = ome.string_at("version"); version != "0.5")
     ome.unsupported(fmt::format("OME-Zarr {} is not supported, only 0.5", version));

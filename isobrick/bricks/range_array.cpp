@@ -117,9 +117,8 @@ RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, Sca
   const std::filesystem::path file = folder_ / "zarr.json";
   bool exists = false;
   const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-  if (!exists)
-    throw Error(fmt::format("the store has no ranges: there is no '{}'", file.string()));
-  const std::string where = "'" + file.string() + "'";
+  if (!exists) throw Error(fmt::format("the store has no ranges: there is no '{}'", file.string()));
+  const std::string where = quoted(file);
   metadata_ = parse_array_metadata(text, where);
   const ArrayMetadata expected = range_array_metadata(items, type);
   if (metadata_.shape != expected.shape || metadata_.chunk != expected.chunk ||

@@ -79,8 +79,8 @@ void StoreFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const 
                          path_.string(), errno);
     }
     if (count == 0)
-      throw DamageError(fmt::format("'{}' ends at {}, {} bytes too early", path_.string(), offset,
-                                    bytes.size()));
+      throw DamageError(
+          fmt::format("'{}' ends at {}, {} bytes too early", path_.string(), offset, bytes.size()));
     bytes = bytes.subspan(static_cast<std::size_t>(count));
     offset += static_cast<std::uint64_t>(count);
   }
@@ -103,6 +103,8 @@ void StoreFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes)
 void StoreFile::sync() {
   if (::fsync(descriptor_) != 0) throw system_error("sync", path_.string(), errno);
 }
+
+std::string quoted(const std::filesystem::path& path) { return fmt::format("'{}'", path.string()); }
 
 std::string read_small_file(const std::filesystem::path& path, std::uint64_t limit, bool* exists) {
   const StoreFile file = StoreFile::open_if_exists(path);

@@ -45,6 +45,9 @@ class StoreFile {
   std::filesystem::path path_;
 };
 
+/// How messages name a file: in quotes.
+std::string quoted(const std::filesystem::path& path);
+
 /// The whole content; DamageError when the file is larger than `limit`. Says
 /// through `exists` whether there is a file at all.
 std::string read_small_file(const std::filesystem::path& path, std::uint64_t limit, bool* exists);

@@ -53,8 +53,10 @@ struct StoreReader::Impl {
   std::optional<Place> find(int level, Int3 b);
   RangeTable ranges(int level, Box3 box, bool blocks);
   std::uint64_t key(int level, Int3 s) const {
-    return static_cast<std::uint64_t>(linear_index(s, levels[static_cast<std::size_t>(level)].shards)) *
-               64 + static_cast<std::uint64_t>(level);
+    return static_cast<std::uint64_t>(
+               linear_index(s, levels[static_cast<std::size_t>(level)].shards)) *
+               64 +
+           static_cast<std::uint64_t>(level);
   }
   const Level& at(int level) const { return levels[static_cast<std::size_t>(level)]; }
   const Lattice& lattice(int level) const {
@@ -81,11 +83,12 @@ void StoreReader::Impl::open(const std::filesystem::path& path) {
       throw Error(fmt::format("'{}' is unfinished: its conversion was interrupted; resume it",
                               path.string()));
     if (std::filesystem::exists(path / ".zgroup") || std::filesystem::exists(path / ".zarray"))
-      throw Error(fmt::format("'{}' is Zarr version 2; only OME-Zarr 0.5 (Zarr version 3) is supported",
-                              path.string()));
+      throw Error(
+          fmt::format("'{}' is Zarr version 2; only OME-Zarr 0.5 (Zarr version 3) is supported",
+                      path.string()));
     throw Error(fmt::format("'{}' is no store: it has no zarr.json", path.string()));
   }
-  const ImageMetadata image = parse_image_metadata(text, "'" + file.string() + "'");
+  const ImageMetadata image = parse_image_metadata(text, quoted(file));
   for (const ImageMetadata::Level& level : image.levels) open_level(level);
   info.type = info.levels[0].lattice.type;
   info.fill_value = levels[0].metadata.fill_value;
@@ -97,7 +100,7 @@ void StoreReader::Impl::open_level(const ImageMetadata::Level& described) {
   Level level;
   level.folder = info.path / described.path;
   const std::filesystem::path file = level.folder / "zarr.json";
-  const std::string where = "'" + file.string() + "'";
+  const std::string where = quoted(file);
   bool exists = false;
   const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
   if (!exists) throw DamageError(where + " is missing");
@@ -163,7 +166,8 @@ std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3
     const std::uint64_t index_size = ShardIndex::encoded_size(bricks, sharding.index_has_crc);
     try {
       if (size < index_size)
-        throw DamageError(fmt::format("{} bytes are too few for the index of {} bricks", size, bricks));
+        throw DamageError(
+            fmt::format("{} bytes are too few for the index of {} bricks", size, bricks));
       std::vector<std::byte> bytes(index_size);
       file->read_at(sharding.index_at_end ? size - index_size : 0, bytes);
       bytes_read += index_size;
@@ -238,8 +242,7 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   try {
     place->file->read_at(place->offset, encoded);
     impl_->bytes_read += place->size;
-    decode_bytes(impl_->at(level).metadata.codecs, lattice.sample_bytes(), encoded,
-                 {out, decoded});
+    decode_bytes(impl_->at(level).metadata.codecs, lattice.sample_bytes(), encoded, {out, decoded});
   } catch (const DamageError& e) {
     impl_->damaged(level, b, *place, e.what());
   }

@@ -126,12 +126,13 @@ void StoreWriter::Impl::check_resume() {
   const std::string text = read_small_file(marker_path, kMaxMetadataBytes, &exists);
   if (!exists)
     throw Error(fmt::format("'{}' is no store whose conversion was interrupted", dir.string()));
-  const nlohmann::json begun = parse_json(text, "'" + marker_path.string() + "'");
+  const nlohmann::json begun = parse_json(text, quoted(marker_path));
   const nlohmann::json wanted = layout_marker(layout);
   if (begun == wanted) return;
   const nlohmann::json differences = nlohmann::json::diff(begun, wanted);
-  throw Error(fmt::format("'{}' was begun with another layout ({} differs); resume with the same one",
-                          dir.string(), differences.at(0).at("path").get<std::string>()));
+  throw Error(
+      fmt::format("'{}' was begun with another layout ({} differs); resume with the same one",
+                  dir.string(), differences.at(0).at("path").get<std::string>()));
 }
 
 void StoreWriter::Impl::begin() {
@@ -235,8 +236,8 @@ bool StoreWriter::shard_is_whole(int level, Int3 s) const {
 void StoreWriter::put(int level, Int3 brick, std::span<const std::byte> encoded) {
   Impl::Level& l = impl_->level(level);
   if (!Box3{{0, 0, 0}, l.lattice.bricks()}.contains(brick))
-    throw UsageError(fmt::format("level {} has no brick ({}, {}, {})", level, brick.x, brick.y,
-                                 brick.z));
+    throw UsageError(
+        fmt::format("level {} has no brick ({}, {}, {})", level, brick.x, brick.y, brick.z));
   if (encoded.empty()) return;
   const Int3 n = l.bricks_per_shard;
   const Int3 s{brick.x / n.x, brick.y / n.y, brick.z / n.z};
@@ -265,8 +266,7 @@ void StoreWriter::finish_shard(int level, Int3 s) {
     // All absent: no file. An earlier run may have left a damaged one.
     std::error_code failure;
     if (impl_->resume) std::filesystem::remove(impl_->shard_path(l, s), failure);
-    if (failure)
-      throw system_error("remove", impl_->shard_path(l, s).string(), failure.value());
+    if (failure) throw system_error("remove", impl_->shard_path(l, s).string(), failure.value());
     return;
   }
   const std::lock_guard lock(shard->mutex);
@@ -291,8 +291,8 @@ void StoreWriter::finish(bool may_have_nan) {
   {
     const std::lock_guard lock(impl_->mutex);
     if (!impl_->open_shards.empty())
-      throw Error(fmt::format("'{}' was not finished",
-                              impl_->open_shards.begin()->second->path.string()));
+      throw Error(
+          fmt::format("'{}' was not finished", impl_->open_shards.begin()->second->path.string()));
   }
   publisher.write(impl_->dir / "isobrick" / "zarr.json", group_json());
   for (std::size_t i = 0; i < impl_->levels.size(); ++i) {
@@ -310,8 +310,7 @@ void StoreWriter::finish(bool may_have_nan) {
   publisher.wait();
   std::error_code failure;
   std::filesystem::remove(impl_->dir / kLayoutMarker, failure);
-  if (failure)
-    throw system_error("remove", (impl_->dir / kLayoutMarker).string(), failure.value());
+  if (failure) throw system_error("remove", (impl_->dir / kLayoutMarker).string(), failure.value());
   sync_directory(impl_->dir);
 }
 

@@ -71,13 +71,18 @@ inline Level make_level(ScalarType type, Int3 extent, Index brick, Index shard, 
       T value = static_cast<T>(static_cast<std::int32_t>(random()));
       if constexpr (std::numeric_limits<T>::has_infinity) {
         const auto special = random() % 50;
-        if (special == 0) value = std::numeric_limits<T>::quiet_NaN();
-        else if (special == 1) value = -std::numeric_limits<T>::infinity();
-        else value /= T{1024};
+        if (special == 0)
+          value = std::numeric_limits<T>::quiet_NaN();
+        else if (special == 1)
+          value = -std::numeric_limits<T>::infinity();
+        else
+          value /= T{1024};
       }
       const bool absent = with_absent && (p.x / brick + p.y / brick + p.z / brick) % 2 == 1;
-      if (absent) std::memcpy(to, &bits, sizeof value);
-      else std::memcpy(to, &value, sizeof value);
+      if (absent)
+        std::memcpy(to, &bits, sizeof value);
+      else
+        std::memcpy(to, &value, sizeof value);
       to += sizeof value;
     });
   });
@@ -119,13 +124,14 @@ inline std::vector<std::byte> make_ranges(const Level& level, Int3 edge) {
     std::byte* to = pairs.data();
     for_each_point({{0, 0, 0}, items}, [&](Int3 i) {
       ValueRange<T> range;
-      const Box3 touched = intersect({i * edge, (i + Int3{1, 1, 1}) * edge + Int3{1, 1, 1}}, l.box());
+      const Box3 touched =
+          intersect({i * edge, (i + Int3{1, 1, 1}) * edge + Int3{1, 1, 1}}, l.box());
       for_each_point(touched, [&](Int3 p) {
         T value;
-        std::memcpy(&value,
-                    level.samples.data() +
-                        static_cast<std::size_t>(linear_index(p, l.extent)) * sizeof(T),
-                    sizeof value);
+        std::memcpy(
+            &value,
+            level.samples.data() + static_cast<std::size_t>(linear_index(p, l.extent)) * sizeof(T),
+            sizeof value);
         range.include(value);
       });
       std::memcpy(to, &range.lo, sizeof(T));
@@ -145,8 +151,8 @@ inline void write_shard(StoreWriter& writer, const std::vector<Level>& levels, i
   const Int3 n = ceil_div(level.shard, level.lattice.brick);
   for_each_point(intersect({s * n, (s + Int3{1, 1, 1}) * n}, {{0, 0, 0}, level.lattice.bricks()}),
                  [&](Int3 b) {
-                   const auto encoded = encode_brick(
-                       level.lattice.type, cut_brick(level, b, fill), fill, zstd_level);
+                   const auto encoded = encode_brick(level.lattice.type, cut_brick(level, b, fill),
+                                                     fill, zstd_level);
                    writer.put(number, b, encoded ? *encoded : std::vector<std::byte>());
                  });
   writer.finish_shard(number, s);
@@ -166,9 +172,8 @@ inline void write_store(const std::filesystem::path& path, const std::vector<Lev
                         std::optional<int> zstd_level, double fill) {
   StoreWriter writer(path, make_layout(levels, zstd_level, fill), false);
   for (int i = 0; i < static_cast<int>(levels.size()); ++i)
-    for_each_point({{0, 0, 0}, shards_of(levels[static_cast<std::size_t>(i)])}, [&](Int3 s) {
-      write_shard(writer, levels, i, s, zstd_level, fill);
-    });
+    for_each_point({{0, 0, 0}, shards_of(levels[static_cast<std::size_t>(i)])},
+                   [&](Int3 s) { write_shard(writer, levels, i, s, zstd_level, fill); });
   write_ranges(writer, levels);
   writer.finish(is_floating(levels[0].lattice.type));
 }
@@ -186,8 +191,10 @@ inline std::vector<std::byte> read_level(const StoreReader& store, int number) {
     for_each_point(box, [&](Int3 p) {
       const auto from = static_cast<std::size_t>(linear_index(p - box.lo, l.brick)) * size;
       const auto to = static_cast<std::size_t>(linear_index(p, l.extent)) * size;
-      if (present) std::memcpy(samples.data() + to, brick.data() + from, size);
-      else std::memcpy(samples.data() + to, &bits, size);
+      if (present)
+        std::memcpy(samples.data() + to, brick.data() + from, size);
+      else
+        std::memcpy(samples.data() + to, &bits, size);
     });
   });
   return samples;

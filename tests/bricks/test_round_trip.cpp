@@ -66,8 +66,8 @@ TEST(RoundTrip, BrickSizes) {
 
 TEST(RoundTrip, FloatFillValues) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  for (const double fill : {0.0, -0.0, 0.1, infinity, -infinity,
-                            std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double fill :
+       {0.0, -0.0, 0.1, infinity, -infinity, std::numeric_limits<double>::quiet_NaN()}) {
     expect_round_trip({make_level(ScalarType::f64, {40, 20, 20}, 16, 16, fill, true)}, 3, fill);
     const double nearest = static_cast<double>(static_cast<float>(fill));
     expect_round_trip({make_level(ScalarType::f32, {40, 20, 20}, 16, 16, nearest, true)}, 3,
@@ -78,8 +78,8 @@ TEST(RoundTrip, FloatFillValues) {
 TEST(RoundTrip, LevelsAndTransform) {
   std::vector<Level> levels = {make_level(ScalarType::i16, {50, 60, 70}, 32, 64, -5, true),
                                make_level(ScalarType::i16, {25, 30, 35}, 16, 16, -5, false)};
-  levels[0].transform = {{0.1, 1.0 / 3, 1e-9}, {-3.5, 1e12, 0.7}, {0, 1, 0, 0, 0, 1, 1, 0, 0},
-                         "micrometer"};
+  levels[0].transform = {
+      {0.1, 1.0 / 3, 1e-9}, {-3.5, 1e12, 0.7}, {0, 1, 0, 0, 0, 1, 1, 0, 0}, "micrometer"};
   levels[1].transform = levels[0].transform;
   levels[1].transform.spacing = levels[0].transform.spacing * 2;
   expect_round_trip(levels, 3, -5);
