@@ -26,8 +26,9 @@ Vec3f facet_normal(Vec3f a, Vec3f b, Vec3f c) {
   const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
   const double length = std::sqrt(nx * nx + ny * ny + nz * nz);
   if (!(length > 0) || !std::isfinite(length)) return {0, 0, 0};
-  return {static_cast<float>(nx / length), static_cast<float>(ny / length),
-          static_cast<float>(nz / length)};
+  const double scale = 1 / length;
+  return {static_cast<float>(nx * scale), static_cast<float>(ny * scale),
+          static_cast<float>(nz * scale)};
 }
 
 }  // namespace

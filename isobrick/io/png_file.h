@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "isobrick/io/output_file.h"
+
+namespace isobrick {
+
+/// Writes `width` × `height` pixels, rows from the top, 3 bytes (sRGB) each, to
+/// `out` and publishes it.
+void write_png(OutputFile& out, int width, int height, std::span<const std::uint8_t> rgb);
+
+/// The same to a file of its own; see OutputFile for what `path` and `force` may throw.
+void write_png(const std::string& path, int width, int height, std::span<const std::uint8_t> rgb,
+               bool force);
+
+}  // namespace isobrick

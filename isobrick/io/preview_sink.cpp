@@ -1,0 +1,41 @@
+#include "isobrick/io/preview_sink.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/png_file.h"
+#include "isobrick/io/preview_shading.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kLeast = 16, kMost = 16384;
+
+const PreviewOptions& checked(const PreviewOptions& options) {
+  for (const int edge : {options.width, options.height})
+    if (edge < kLeast || edge > kMost)
+      throw UsageError(fmt::format("a picture of {}x{} pixels: each edge must be {} to {}",
+                                   options.width, options.height, kLeast, kMost));
+  return options;
+}
+
+}  // namespace
+
+PreviewSink::PreviewSink(std::string path, bool force, const PreviewOptions& options)
+    : options_(checked(options)),
+      out_(std::move(path), force),
+      raster_(2 * options.width, 2 * options.height) {}
+
+void PreviewSink::begin(const MeshHeader& header) {
+  camera_.emplace(header.world_lo, header.world_hi, options_.towards_eye, options_.up,
+                  raster_.width(), raster_.height());
+}
+
+void PreviewSink::write(const MeshChunk& chunk) { raster_.draw(*camera_, chunk); }
+
+void PreviewSink::finish() {
+  write_png(out_, options_.width, options_.height,
+            shade_preview(raster_, camera_->pixel(), options_.colour));
+}
+
+}  // namespace isobrick
