@@ -1,0 +1,42 @@
+# Static libraries, headers, the program with its man page and completions, and
+# a package: find_package(isobrick) then isobrick::pipeline, isobrick::surface, ….
+include(CMakePackageConfigHelpers)
+
+set(isobrick_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/isobrick)
+
+# The libraries are those that the folders below isobrick/ define.
+get_property(folders DIRECTORY isobrick PROPERTY SUBDIRECTORIES)
+set(libraries)
+foreach(folder IN LISTS folders)
+  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  foreach(target IN LISTS targets)
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL STATIC_LIBRARY)
+      list(APPEND libraries ${target})
+    endif()
+  endforeach()
+endforeach()
+
+install(TARGETS ${libraries} EXPORT isobrick_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(DIRECTORY isobrick/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/isobrick
+  FILES_MATCHING PATTERN "*.h")
+install(EXPORT isobrick_targets NAMESPACE isobrick:: DESTINATION ${isobrick_package_dir})
+
+configure_package_config_file(cmake/isobrick-config.cmake.in
+  ${PROJECT_BINARY_DIR}/isobrick-config.cmake INSTALL_DESTINATION ${isobrick_package_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/isobrick-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/isobrick-config.cmake
+  ${PROJECT_BINARY_DIR}/isobrick-config-version.cmake DESTINATION ${isobrick_package_dir})
+
+if(ISOBRICK_BUILD_TOOLS)
+  install(TARGETS isobrick RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(FILES ${PROJECT_BINARY_DIR}/share/isobrick.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+  install(FILES ${PROJECT_BINARY_DIR}/share/isobrick.bash RENAME isobrick
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+  install(FILES ${PROJECT_BINARY_DIR}/share/_isobrick
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+  install(FILES ${PROJECT_BINARY_DIR}/share/isobrick.fish
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
+endif()
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -41,3 +41,8 @@ function(isobrick_library name)
   target_link_libraries(isobrick_${name} PUBLIC ${arg_LINK}
     PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:isobrick_flags>)
 endfunction()
+
+option(ISOBRICK_CUDA "Build the CUDA backend" OFF)
+if(ISOBRICK_CUDA)
+  message(WARNING "isobrick has no CUDA sources yet; ISOBRICK_CUDA changes nothing")
+endif()

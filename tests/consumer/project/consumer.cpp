@@ -1,0 +1,42 @@
+// Makes a volume, converts it, extracts its surface: everything through the
+// installed headers and libraries.
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+
+#include <isobrick/bricks/store_reader.h>
+#include <isobrick/core/progress.h>
+#include <isobrick/io/ply_sink.h>
+#include <isobrick/io/synth_source.h>
+#include <isobrick/pipeline/convert.h>
+#include <isobrick/pipeline/extract.h>
+
+namespace {
+
+int run(const std::filesystem::path& folder) {
+  isobrick::NoProgress progress;
+  const auto source =
+      isobrick::make_synth({.kind = isobrick::SynthKind::sphere, .extent = {48, 40, 33}});
+  isobrick::ConvertOptions convert_options;
+  convert_options.force = true;
+  isobrick::convert(*source, folder / "sphere.zarr", convert_options, progress);
+
+  const isobrick::StoreReader store(folder / "sphere.zarr");
+  isobrick::ExtractOptions options;
+  options.isovalue = isobrick::default_isovalue(store.info().type);
+  isobrick::PlySink sink((folder / "sphere.ply").string(), true);
+  const isobrick::ExtractReport report = isobrick::extract(store, options, sink, progress);
+  std::printf("%llu triangles\n", static_cast<unsigned long long>(report.triangles));
+  return report.triangles > 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc > 1 ? argv[1] : ".");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,140 @@
+#include "tools/console.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isobrick/core/error.h"
+#include "tools/format.h"
+
+namespace isobrick::tools {
+namespace {
+
+volatile std::sig_atomic_t g_signal = 0;
+
+void throw_if_interrupted() {
+  if (g_signal != 0) throw Interrupted(g_signal);
+}
+
+int terminal_columns() {
+  winsize size{};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+void put(std::FILE* file, std::string_view text) {
+  errno = 0;
+  const bool whole = std::fwrite(text.data(), 1, text.size(), file) == text.size();
+  if (!whole || std::fflush(file) != 0) throw system_error("write to", "standard output", errno);
+}
+
+}  // namespace
+
+void catch_interrupts() {
+  struct sigaction action {};
+  action.sa_handler = [](int signal) { g_signal = signal; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+std::string progress_line(std::string_view stage, std::uint64_t done, std::uint64_t total,
+                          double seconds, int columns) {
+  const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0;
+  std::string line(stage);
+  if (total > 0) {
+    constexpr int width = 24;
+    const double part = std::min(1.0, static_cast<double>(done) / static_cast<double>(total));
+    const int full = static_cast<int>(part * width);
+    line += fmt::format(" {:3.0f}% [{:#<{}}{:.<{}}]", part * 100, "", full, "", width - full);
+  } else {
+    line += fmt::format(" {}", human_bytes(done));
+  }
+  line += fmt::format(" {}/s", human_bytes(rate));
+  if (total > done && rate > 0)
+    line += fmt::format(", {:.0f} s left", static_cast<double>(total - done) / rate);
+  if (columns > 1 && line.size() >= static_cast<std::size_t>(columns))
+    line.resize(static_cast<std::size_t>(columns) - 1);
+  return line;
+}
+
+void TerminalProgress::begin(std::string_view stage, std::uint64_t total) {
+  throw_if_interrupted();
+  stage_ = stage;
+  total_ = total;
+  done_ = 0;
+  start_ = last_ = Clock::now();
+}
+
+void TerminalProgress::advance(std::uint64_t done) {
+  throw_if_interrupted();
+  done_ += done;
+  if (!draw_) return;
+  const auto now = Clock::now();
+  if (now - last_ >= std::chrono::milliseconds(100)) redraw(now);
+}
+
+void TerminalProgress::end() {
+  erase();
+  throw_if_interrupted();
+}
+
+void TerminalProgress::redraw(Clock::time_point now) {
+  last_ = now;
+  drawn_ = true;
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  fmt::print(stderr, "\r{}\x1b[K",
+             progress_line(stage_, done_, total_, seconds, terminal_columns()));
+}
+
+void TerminalProgress::erase() {
+  if (drawn_) std::fputs("\r\x1b[K", stderr);
+  drawn_ = false;
+}
+
+Console::Console(Speech speech)
+    : speech_(speech), progress_(!speech.quiet && isatty(STDERR_FILENO) == 1) {}
+
+void Console::result(const nlohmann::ordered_json& object, std::string_view text) const {
+  using nlohmann::ordered_json;
+  if (speech_.json)
+    put(stdout, object.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + '\n');
+  else if (!speech_.quiet)
+    put(stdout, text);
+}
+
+void Console::result_text(std::string_view command, std::string_view text) const {
+  result({{"command", command}, {"text", text}}, text);
+}
+
+void Console::note(std::string_view text) const {
+  if (!speech_.quiet) fmt::print(stderr, "{}\n", text);
+}
+
+void print_error(std::string_view command, std::string_view what) {
+  std::string line = command.empty() ? "isobrick: " : fmt::format("isobrick {}: ", command);
+  line += what;
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  fmt::print(stderr, "{}\n", line);
+}
+
+nlohmann::ordered_json to_json(Int3 v) { return {v.x, v.y, v.z}; }
+nlohmann::ordered_json to_json(Vec3d v) { return {v.x, v.y, v.z}; }
+
+std::uint64_t peak_resident_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:"))
+      return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
+  return 0;
+}
+
+}  // namespace isobrick::tools

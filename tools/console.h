@@ -1,0 +1,92 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "isobrick/core/progress.h"
+#include "isobrick/core/vec.h"
+
+namespace isobrick::tools {
+
+/// How the program was told to speak.
+struct Speech {
+  bool json = false;
+  bool quiet = false;
+};
+
+/// Thrown out of the progress calls after SIGINT or SIGTERM, so that everything
+/// on the way out removes its temporary files.
+class Interrupted : public std::exception {
+ public:
+  explicit Interrupted(int signal) : signal_(signal) {}
+  int signal() const { return signal_; }
+  const char* what() const noexcept override { return "interrupted"; }
+
+ private:
+  int signal_;
+};
+
+/// From now on the first SIGINT or SIGTERM is thrown by the progress calls; a
+/// second one kills at once.
+void catch_interrupts();
+
+/// A bar with rate and time left on standard error when that is a terminal.
+class TerminalProgress final : public Progress {
+ public:
+  explicit TerminalProgress(bool draw) : draw_(draw) {}
+  ~TerminalProgress() override { erase(); }
+
+  void begin(std::string_view stage, std::uint64_t total) override;
+  void advance(std::uint64_t done) override;
+  void end() override;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void redraw(Clock::time_point now);
+  void erase();
+
+  bool draw_;
+  bool drawn_ = false;
+  std::string stage_;
+  std::uint64_t total_ = 0, done_ = 0;
+  Clock::time_point start_, last_;
+};
+
+/// The line of a bar: "stage  42% [#####....] 1.2 GiB/s, 12 s left", cut to `columns`.
+std::string progress_line(std::string_view stage, std::uint64_t done, std::uint64_t total,
+                          double seconds, int columns);
+
+/// Where a command's words go: its result to standard output, as text or as
+/// one JSON object; everything else to standard error.
+class Console {
+ public:
+  explicit Console(Speech speech);
+
+  /// The command's result, once. Throws Error when it cannot be written.
+  void result(const nlohmann::ordered_json& object, std::string_view text) const;
+  /// A result that is a text: {"command": …, "text": …}.
+  void result_text(std::string_view command, std::string_view text) const;
+  /// A remark beside the result.
+  void note(std::string_view text) const;
+  Progress& progress() { return progress_; }
+
+ private:
+  Speech speech_;
+  TerminalProgress progress_;
+};
+
+/// One line on standard error: "isobrick COMMAND: what".
+void print_error(std::string_view command, std::string_view what);
+
+nlohmann::ordered_json to_json(Int3 v);
+nlohmann::ordered_json to_json(Vec3d v);
+
+/// The most memory that this process ever held (VmHWM), 0 when unknown.
+std::uint64_t peak_resident_bytes();
+
+}  // namespace isobrick::tools

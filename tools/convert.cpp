@@ -1,0 +1,56 @@
+#include "isobrick/pipeline/convert.h"
+
+#include <memory>
+
+#include "isobrick/io/open_source.h"
+#include "tools/options.h"
+
+namespace isobrick::tools {
+namespace {
+
+struct Arguments {
+  std::string in, out;
+  RawDescription raw;
+  StoreArguments store;
+};
+
+void add_raw_options(CLI::App* app, RawDescription& raw) {
+  add_dims(app, raw.extent);
+  add_type(app, raw.type);
+  add_parsed(app, raw.order, parse_byte_order,
+             {"--endian", "little|big", "Byte order of the samples", "little"});
+  add_parsed(app, raw.offset, parse_offset,
+             {"--offset", "BYTES", "Bytes before the first sample", "0"});
+  add_parsed(app, raw.spacing, parse_vector,
+             {"--spacing", "X,Y,Z", "World distance between samples", "1,1,1"});
+  add_parsed(app, raw.origin, parse_vector,
+             {"--origin", "X,Y,Z", "World position of the first sample", "0,0,0"});
+  add_parsed(app, raw.unit, [](const std::string& text) { return text; },
+             {"--unit", "NAME", "Unit of world space, such as micrometer"});
+}
+
+int run(const Arguments& arguments, Console& console) {
+  const auto source = open_source(arguments.in, arguments.raw);
+  const ConvertReport report =
+      convert(*source, arguments.out, convert_options(arguments.store), console.progress());
+  report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
+  return 0;
+}
+
+}  // namespace
+
+void add_convert(Program& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* app = add_subcommand(
+      program, "convert", "Turn a volume into a store, within a memory budget.",
+      "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5");
+  add_path(app, "IN", arguments->in,
+           "Raw file, .nhdr or .mhd header; - reads standard input. Extent and type may stand in "
+           "the name: head_64x64x93_int16.raw");
+  add_path(app, "OUT", arguments->out, "Store to write, such as OUT.zarr");
+  add_raw_options(app, arguments->raw);
+  add_store_options(app, arguments->store);
+  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+}
+
+}  // namespace isobrick::tools

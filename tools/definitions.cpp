@@ -1,0 +1,57 @@
+#include "tools/definitions.h"
+
+#include <CLI/CLI.hpp>
+
+namespace isobrick::tools {
+namespace {
+
+/// "a|b|c" → {"a", "b", "c"}; words in capitals stand for something to fill in
+/// and are no choices.
+std::vector<std::string> choices_in(const std::string& type) {
+  std::vector<std::string> choices;
+  if (type.find('|') == std::string::npos) return choices;
+  for (const std::string& word : CLI::detail::split(type, '|'))
+    if (word.find_first_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == std::string::npos)
+      choices.push_back(word);
+  return choices;
+}
+
+OptionView view_of(const CLI::Option& option) {
+  OptionView view;
+  for (const std::string& name : option.get_snames()) view.names.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) view.names.push_back("--" + name);
+  if (option.get_positional()) view.names = {option.get_name(true)};
+  if (option.get_type_size() != 0) view.value = option.get_type_name();
+  view.choices = choices_in(option.get_type_name());
+  view.help = option.get_description();
+  view.fallback = option.get_default_str();
+  view.required = option.get_required();
+  return view;
+}
+
+std::vector<OptionView> views_of(const CLI::App& app, bool positional) {
+  std::vector<OptionView> views;
+  for (const CLI::Option* option : app.get_options())
+    if (option->get_positional() == positional) views.push_back(view_of(*option));
+  return views;
+}
+
+}  // namespace
+
+CommandView view_of(const CLI::App& app) {
+  const std::string footer = app.get_footer();  // "Example:" and a line
+  return {app.get_name(),
+          app.get_description(),
+          CLI::detail::trim_copy(footer.substr(footer.find('\n') + 1)),
+          views_of(app, false),
+          views_of(app, true)};
+}
+
+std::vector<CommandView> subcommands_of(const CLI::App& app) {
+  std::vector<CommandView> views;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    views.push_back(view_of(*command));
+  return views;
+}
+
+}  // namespace isobrick::tools

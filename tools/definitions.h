@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/options.h"
+
+// Reads the program's definitions back, for the completions and the man page.
+namespace isobrick::tools {
+
+/// An option or a positional argument as it can be typed.
+struct OptionView {
+  std::vector<std::string> names;    ///< {"-o", "--output"}, or {"OUT"} for a positional
+  std::string value;                 ///< what its value is called; empty for a flag
+  std::vector<std::string> choices;  ///< the values it takes, when they are few
+  std::string help;
+  std::string fallback;              ///< what holds when it is left out
+  bool required = false;
+};
+
+/// The program or one of its subcommands.
+struct CommandView {
+  std::string name, description, example;
+  std::vector<OptionView> options, positionals;
+};
+
+CommandView view_of(const CLI::App& app);
+
+/// The subcommands in the order of their definition.
+std::vector<CommandView> subcommands_of(const CLI::App& app);
+
+}  // namespace isobrick::tools

@@ -1,0 +1,273 @@
+#include "isobrick/pipeline/extract.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isobrick/io/preview_sink.h"
+#include "tools/format.h"
+#include "tools/mesh_output.h"
+#include "tools/options.h"
+#include "tools/store_region.h"
+
+namespace isobrick::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+struct Arguments {
+  std::string store;
+  std::vector<double> isovalues;
+  std::string output, preview;
+  int level = 0;
+  std::optional<RoiText> roi;
+  bool normals = false;
+  std::uint64_t memory = std::uint64_t{1} << 30;
+  int threads = 0;
+  bool estimate = false, force = false, no_space_check = false;
+};
+
+/// One isosurface to make and where it goes (empty: nowhere).
+struct Surface {
+  ExtractOptions options;
+  fs::path output, preview;
+  ExtractEstimate estimate;
+};
+
+/// `path`, told apart by isovalue when there are several.
+fs::path named(const std::string& path, const Arguments& arguments, double isovalue) {
+  if (path.empty() || arguments.isovalues.size() == 1) return path;
+  return with_isovalue(path, isovalue);
+}
+
+MeshFormat format_of(const Surface& surface) {
+  return surface.output.empty() ? MeshFormat::ply : mesh_format(surface.output);
+}
+
+MeshBytes bytes_of(const Surface& surface) {
+  return predict_bytes(format_of(surface), surface.options.normals, surface.estimate);
+}
+
+void check(const Arguments& arguments) {
+  if (arguments.output.empty() && arguments.preview.empty() && !arguments.estimate)
+    throw UsageError("nothing to do: give -o MESH, --preview PNG or --estimate");
+  if (!arguments.output.empty()) mesh_format(arguments.output);
+  std::vector<double> sorted = arguments.isovalues;
+  std::sort(sorted.begin(), sorted.end());
+  const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
+  if (twice != sorted.end()) throw UsageError(fmt::format("isovalue {} is given twice", *twice));
+}
+
+std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) {
+  ExtractOptions options;
+  options.level = arguments.level;
+  options.roi = store_region(store, arguments.level, arguments.roi);
+  options.normals = arguments.normals;
+  options.memory = arguments.memory;
+  options.threads = arguments.threads;
+  std::vector<Surface> surfaces;
+  for (const double isovalue : arguments.isovalues) {
+    options.isovalue = isovalue;
+    surfaces.push_back({options, named(arguments.output, arguments, isovalue),
+                        named(arguments.preview, arguments, isovalue), estimate(store, options)});
+  }
+  return surfaces;
+}
+
+/// Refuses meshes that cannot fit their disk, before anything is written.
+void check_space(const std::vector<Surface>& surfaces) {
+  std::uint64_t finished = 0;
+  for (const Surface& surface : surfaces) {
+    if (surface.output.empty()) continue;
+    const MeshBytes bytes = bytes_of(surface);
+    const std::uint64_t free = free_space(surface.output);
+    if (finished + bytes.needed > free)
+      throw Error(fmt::format(
+          "'{}' would have about {} triangles and need {}, but its disk has {} free; choose "
+          "another disk, a coarser --level or an --roi (or --no-space-check, should the estimate "
+          "be wrong)",
+          surface.output.string(), human_count(surface.estimate.triangles),
+          human_bytes(finished + bytes.needed), human_bytes(free)));
+    finished += bytes.file;
+  }
+}
+
+ordered_json estimate_json(const Surface& surface) {
+  const ExtractEstimate& e = surface.estimate;
+  return {{"isovalue", surface.options.isovalue},
+          {"bricks", {{"total", e.bricks}, {"active", e.active_bricks}}},
+          {"active_blocks", e.active_blocks},
+          {"triangles", e.triangles},
+          {"vertices", e.vertices},
+          {"file_bytes", bytes_of(surface).file},
+          {"memory_bytes", e.memory}};
+}
+
+std::string estimate_text(const Surface& surface) {
+  const ExtractEstimate& e = surface.estimate;
+  const char* format = format_of(surface) == MeshFormat::ply ? "PLY" : "STL";
+  return fmt::format("isovalue {}: about {} triangles and {} vertices, {} as {}; {} of {} bricks "
+                     "active, {} of memory\n",
+                     surface.options.isovalue, human_count(e.triangles), human_count(e.vertices),
+                     human_bytes(bytes_of(surface).file), format, human_count(e.active_bricks),
+                     human_count(e.bricks), human_bytes(e.memory));
+}
+
+ordered_json report_json(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
+  ordered_json object{{"isovalue", surface.options.isovalue},
+                      {"output", nullptr},
+                      {"preview", nullptr},
+                      {"output_bytes", bytes},
+                      {"triangles", r.triangles},
+                      {"vertices", r.vertices},
+                      {"bricks",
+                       {{"total", r.bricks}, {"active", r.active_bricks}, {"read", r.bricks_read}}},
+                      {"brick_reads", r.brick_reads},
+                      {"bytes_read", r.bytes_read},
+                      {"seconds",
+                       {{"total", r.seconds},
+                        {"plan", r.plan_seconds},
+                        {"decode", r.decode_seconds},
+                        {"surface", r.surface_seconds},
+                        {"sink", r.sink_seconds}}}};
+  if (!surface.output.empty()) object["output"] = surface.output.string();
+  if (!surface.preview.empty()) object["preview"] = surface.preview.string();
+  return object;
+}
+
+std::string report_text(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
+  std::string text = fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
+                                 surface.options.isovalue, human_count(r.triangles),
+                                 human_count(r.vertices), human_count(r.bricks_read),
+                                 human_count(r.bricks), human_seconds(r.seconds));
+  if (!surface.output.empty())
+    text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
+  if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());
+  return text;
+}
+
+/// The files of one surface; null where none was asked for.
+struct Sinks {
+  std::unique_ptr<MeshSink> mesh, preview;
+};
+
+/// Opens every output before the first extraction, so that one that exists or
+/// cannot be written stops the command at once.
+std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, bool force) {
+  std::vector<Sinks> sinks;
+  for (const Surface& surface : surfaces) {
+    Sinks& of_surface = sinks.emplace_back();
+    if (!surface.output.empty()) of_surface.mesh = open_mesh(surface.output, force);
+    if (!surface.preview.empty())
+      of_surface.preview = std::make_unique<PreviewSink>(surface.preview.string(), force);
+  }
+  return sinks;
+}
+
+ExtractReport make(const Surface& surface, const Sinks& sinks, const StoreReader& store,
+                   Console& console) {
+  ExtractReport report;
+  if (sinks.mesh) report = extract(store, surface.options, *sinks.mesh, console.progress());
+  if (sinks.preview) {
+    ExtractOptions shaded = surface.options;
+    shaded.normals = true;
+    const ExtractReport drawn = extract(store, shaded, *sinks.preview, console.progress());
+    if (!sinks.mesh) report = drawn;
+  }
+  if (report.triangles == 0)
+    console.note(fmt::format("isovalue {}: no cell is active, the surface is empty",
+                             surface.options.isovalue));
+  return report;
+}
+
+/// What there is to say of each surface.
+struct Said {
+  ordered_json objects = ordered_json::array();
+  std::string text;
+};
+
+Said estimate_all(const std::vector<Surface>& surfaces) {
+  Said said;
+  for (const Surface& surface : surfaces) {
+    said.objects.push_back(estimate_json(surface));
+    said.text += estimate_text(surface);
+  }
+  return said;
+}
+
+Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
+              const StoreReader& store, Console& console) {
+  if (!arguments.no_space_check) check_space(surfaces);
+  std::vector<Sinks> sinks = open_sinks(surfaces, arguments.force);
+  Said said;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const ExtractReport report = make(surfaces[i], sinks[i], store, console);
+    const std::uint64_t bytes = sinks[i].mesh ? sinks[i].mesh->bytes() : 0;
+    said.objects.push_back(report_json(surfaces[i], report, bytes));
+    said.text += report_text(surfaces[i], report, bytes);
+    sinks[i] = {};
+  }
+  return said;
+}
+
+int run(const Arguments& arguments, Console& console) {
+  check(arguments);
+  const StoreReader store(arguments.store);
+  const std::vector<Surface> surfaces = plan(arguments, store);
+  const Said said = arguments.estimate ? estimate_all(surfaces)
+                                       : make_all(arguments, surfaces, store, console);
+  console.result({{"command", "extract"},
+                  {"store", arguments.store},
+                  {"level", arguments.level},
+                  {"estimate", arguments.estimate},
+                  {"surfaces", said.objects},
+                  {"peak_resident_bytes", peak_resident_bytes()}},
+                 said.text);
+  return 0;
+}
+
+bool parse_normals(const std::string& text) {
+  if (text == "gradient") return true;
+  if (text == "none") return false;
+  throw UsageError(fmt::format("'{}' is no kind of normals; it is gradient or none", text));
+}
+
+}  // namespace
+
+void add_extract(Program& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* app = add_subcommand(
+      program, "extract", "Write isosurfaces of a store as welded triangle meshes.",
+      "isobrick extract head.zarr --isovalue 500 --isovalue 1150 -o head.ply");
+  add_path(app, "STORE", arguments->store, "Store to read");
+  add_repeated(app,
+               {"--isovalue", "V", "Value that the surface passes through; may be repeated", "",
+                true},
+               [&isovalues = arguments->isovalues](const std::string& text) {
+                 isovalues.push_back(parse_number(text));
+               });
+  add_text(app,
+           {"-o,--output", "MESH",
+            "Mesh to write, .ply or .stl; several isovalues make head_500.ply and so on"},
+           [&output = arguments->output](const std::string& text) { output = text; });
+  add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface"},
+           [&preview = arguments->preview](const std::string& text) { preview = text; });
+  add_flag(app, "--estimate", arguments->estimate,
+           "Write nothing; predict triangles, vertices, bytes and memory");
+  add_level(app, arguments->level);
+  add_roi(app, arguments->roi);
+  add_parsed(app, arguments->normals, parse_normals,
+             {"--normals", "gradient|none", "Normals at the vertices", "none"});
+  add_memory(app, arguments->memory);
+  add_threads(app, arguments->threads);
+  add_force(app, arguments->force);
+  add_flag(app, "--no-space-check", arguments->no_space_check,
+           "Begin even if the estimate says that the disk is too small");
+  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+}
+
+}  // namespace isobrick::tools

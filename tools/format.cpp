@@ -1,0 +1,38 @@
+#include "tools/format.h"
+
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace isobrick::tools {
+
+std::string human_bytes(double bytes) {
+  constexpr std::array<const char*, 6> units{"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
+  std::size_t unit = 0;
+  while (bytes >= 1000 && unit + 1 < units.size()) {
+    bytes /= 1024;
+    ++unit;
+  }
+  return unit == 0 ? fmt::format("{:.0f} B", bytes)
+                   : fmt::format("{:.{}f} {}", bytes, bytes < 10 ? 2 : 1, units[unit]);
+}
+
+std::string human_count(std::uint64_t count) {
+  std::string digits = fmt::format("{}", count);
+  for (std::size_t at = digits.size(); at > 3; at -= 3) digits.insert(at - 3, ",");
+  return digits;
+}
+
+std::string human_seconds(double seconds) {
+  if (seconds < 1) return fmt::format("{:.3f} s", seconds);
+  if (seconds < 60) return fmt::format("{:.1f} s", seconds);
+  const auto whole = static_cast<std::uint64_t>(seconds);
+  return fmt::format("{}:{:02} min", whole / 60, whole % 60);
+}
+
+std::string human_extent(Int3 extent) {
+  return fmt::format("{} x {} x {}", extent.x, extent.y, extent.z);
+}
+
+}  // namespace isobrick::tools

@@ -1,0 +1,184 @@
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isobrick/bricks/store_reader.h"
+#include "tools/format.h"
+#include "tools/histogram.h"
+#include "tools/options.h"
+
+namespace isobrick::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+std::uint64_t directory_bytes(const fs::path& path) {
+  std::uint64_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(path))
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  return bytes;
+}
+
+/// Bricks of a level that are stored, counted shard by shard.
+std::uint64_t stored_bricks(const StoreReader& store, int level) {
+  const LevelInfo& info = store.info().levels[static_cast<std::size_t>(level)];
+  const Box3 all{{0, 0, 0}, info.lattice.bricks()};
+  const Int3 shard = ceil_div(info.shard, info.lattice.brick);
+  std::uint64_t stored = 0;
+  for_each_point({{0, 0, 0}, ceil_div(all.hi, shard)}, [&](Int3 s) {
+    for_each_point(intersect({s * shard, (s + Int3{1, 1, 1}) * shard}, all),
+                   [&](Int3 b) { stored += store.locate(level, b).has_value() ? 1 : 0; });
+  });
+  return stored;
+}
+
+/// Range of level 0 from the bricks' ranges, one layer of them at a time.
+ValueRange<double> value_range(const StoreReader& store) {
+  const Int3 bricks = store.info().levels.front().lattice.bricks();
+  ValueRange<double> range;
+  for (Index z = 0; z < bricks.z; z += StoreReader::kRangeChunk) {
+    const Box3 layer{{0, 0, z},
+                     {bricks.x, bricks.y, std::min(bricks.z, z + StoreReader::kRangeChunk)}};
+    for (const auto& of_brick : store.brick_ranges(0, layer).ranges) range.include(of_brick);
+  }
+  return range;
+}
+
+std::vector<std::string> index_kinds(const fs::path& store) {
+  std::vector<std::string> kinds;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(store / "isobrick" / "0" / "index", none))
+    kinds.push_back(entry.path().filename().string());
+  std::sort(kinds.begin(), kinds.end());
+  return kinds;
+}
+
+/// All that `info` tells, gathered before anything is said.
+struct Facts {
+  std::uint64_t bytes = 0, raw_bytes = 0;
+  std::vector<std::uint64_t> stored;  ///< bricks, a level
+  ValueRange<double> range;
+  Histogram histogram;
+  std::vector<std::string> kinds;
+
+  double ratio() const { return static_cast<double>(raw_bytes) / static_cast<double>(bytes); }
+};
+
+Facts gather(const StoreReader& store, Progress& progress) {
+  const StoreInfo& info = store.info();
+  const Lattice& finest = info.levels.front().lattice;
+  Facts facts;
+  facts.bytes = directory_bytes(info.path);
+  facts.raw_bytes = static_cast<std::uint64_t>(volume(finest.extent)) * finest.sample_bytes();
+  for (int level = 0; level < static_cast<int>(info.levels.size()); ++level)
+    facts.stored.push_back(stored_bricks(store, level));
+  facts.range = value_range(store);
+  facts.histogram = histogram(store, progress);
+  facts.kinds = index_kinds(info.path);
+  return facts;
+}
+
+ordered_json levels_json(const StoreInfo& info, const Facts& facts) {
+  ordered_json levels = ordered_json::array();
+  for (std::size_t i = 0; i < info.levels.size(); ++i) {
+    const LevelInfo& level = info.levels[i];
+    levels.push_back({{"extent", to_json(level.lattice.extent)},
+                      {"spacing", to_json(level.transform.spacing)},
+                      {"brick", to_json(level.lattice.brick)},
+                      {"shard", to_json(level.shard)},
+                      {"bricks", volume(level.lattice.bricks())},
+                      {"bricks_stored", facts.stored[i]}});
+  }
+  return levels;
+}
+
+ordered_json histogram_json(const Histogram& h) {
+  return {{"level", h.level},         {"lo", h.lo},
+          {"hi", h.hi},               {"bin_width", h.bin_width},
+          {"counts", h.counts},       {"not_a_number", h.not_a_number},
+          {"infinite", h.infinite}};
+}
+
+ordered_json json_of(const StoreInfo& info, const Facts& facts) {
+  const LevelInfo& finest = info.levels.front();
+  ordered_json object{{"command", "info"},
+                      {"store", info.path.string()},
+                      {"extent", to_json(finest.lattice.extent)},
+                      {"type", zarr_name(info.type)},
+                      {"spacing", to_json(finest.transform.spacing)},
+                      {"origin", to_json(finest.transform.origin)},
+                      {"direction", finest.transform.direction},
+                      {"unit", finest.transform.unit},
+                      {"codec", info.codec},
+                      {"fill_value", info.fill_value},
+                      {"levels", levels_json(info, facts)},
+                      {"bytes", facts.bytes},
+                      {"raw_bytes", facts.raw_bytes},
+                      {"ratio", facts.ratio()},
+                      {"value_range", nullptr},
+                      {"histogram", histogram_json(facts.histogram)},
+                      {"index_kinds", facts.kinds}};
+  if (!facts.range.empty()) object["value_range"] = {facts.range.lo, facts.range.hi};
+  return object;
+}
+
+std::string levels_text(const StoreInfo& info, const Facts& facts) {
+  std::string text;
+  for (std::size_t i = 0; i < info.levels.size(); ++i) {
+    const Lattice& lattice = info.levels[i].lattice;
+    const auto bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
+    text += fmt::format("level {:<6} {}, {} bricks of {}, {} absent\n", i,
+                        human_extent(lattice.extent), human_count(bricks),
+                        human_extent(lattice.brick), human_count(bricks - facts.stored[i]));
+  }
+  return text;
+}
+
+std::string text_of(const StoreInfo& info, const Facts& facts) {
+  const Transform& transform = info.levels.front().transform;
+  const Vec3d spacing = transform.spacing, origin = transform.origin;
+  const Histogram& h = facts.histogram;
+  std::string text = fmt::format("store        {}\n", info.path.string());
+  text += fmt::format("extent       {} samples of {}\n",
+                      human_extent(info.levels.front().lattice.extent), zarr_name(info.type));
+  text += fmt::format("spacing      {:g} x {:g} x {:g} {}\n", spacing.x, spacing.y, spacing.z,
+                      transform.unit.empty() ? "(no unit)" : transform.unit);
+  text += fmt::format("origin       {:g}, {:g}, {:g}\n", origin.x, origin.y, origin.z);
+  text += levels_text(info, facts);
+  text += fmt::format("codec        {}\n", info.codec);
+  text += fmt::format("bytes        {} for {} of samples ({:.2f} to 1)\n",
+                      human_bytes(facts.bytes), human_bytes(facts.raw_bytes), facts.ratio());
+  text += facts.range.empty()
+              ? "value range  none\n"
+              : fmt::format("value range  {:g} to {:g}\n", facts.range.lo, facts.range.hi);
+  text += fmt::format("index kinds  {}\n",
+                      facts.kinds.empty() ? "none" : fmt::format("{}", fmt::join(facts.kinds, ", ")));
+  text += fmt::format("histogram    of level {}, logarithmic\n{}", h.level, draw(h, 6));
+  if (h.not_a_number + h.infinite > 0)
+    text += fmt::format("  left out: {} NaN, {} infinite\n", human_count(h.not_a_number),
+                        human_count(h.infinite));
+  return text;
+}
+
+}  // namespace
+
+void add_info(Program& program) {
+  auto path = std::make_shared<std::string>();
+  CLI::App* app = add_subcommand(program, "info",
+                                 "Show what a store holds: extents, levels, bricks, histogram.",
+                                 "isobrick info head.zarr");
+  add_path(app, "STORE", *path, "Store to look at");
+  program.commands.push_back({app, [path](Console& console) {
+                                const StoreReader store(*path);
+                                const Facts facts = gather(store, console.progress());
+                                console.result(json_of(store.info(), facts),
+                                               text_of(store.info(), facts));
+                                return 0;
+                              }});
+}
+
+}  // namespace isobrick::tools

@@ -1,0 +1,165 @@
+#include "tools/options.h"
+
+#include <algorithm>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "tools/format.h"
+
+namespace isobrick::tools {
+
+namespace {
+
+/// Complaints about a value begin with the option's name.
+void take_named(const std::string& name, const std::function<void(const std::string&)>& take,
+                const std::string& text) {
+  try {
+    take(text);
+  } catch (const UsageError& error) {
+    throw UsageError(name + ": " + error.what());
+  }
+}
+
+void describe(CLI::Option* option, const OptionText& text) {
+  option->type_name(text.value)->required(text.required);
+  if (!text.fallback.empty()) option->default_str(text.fallback);
+}
+
+}  // namespace
+
+CLI::App* add_subcommand(Program& program, const std::string& name, const std::string& description,
+                         const std::string& example) {
+  CLI::App* app = program.app.add_subcommand(name, description);
+  app->footer("Example:\n  " + example);
+  add_flag(app, "--json", program.speech.json, "Write the result as one JSON object");
+  add_flag(app, "--quiet", program.speech.quiet, "Say nothing but errors (and the JSON)");
+  return app;
+}
+
+void add_text(CLI::App* app, const OptionText& option,
+              std::function<void(const std::string&)> take) {
+  const std::string name = option.name;
+  describe(app->add_option_function<std::string>(
+               name, [name, take](const std::string& text) { take_named(name, take, text); },
+               option.help),
+           option);
+}
+
+void add_repeated(CLI::App* app, const OptionText& option,
+                  std::function<void(const std::string&)> take) {
+  const std::string name = option.name;
+  const auto take_all = [name, take](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) take_named(name, take, text);
+  };
+  CLI::Option* added =
+      app->add_option_function<std::vector<std::string>>(name, take_all, option.help);
+  describe(added->allow_extra_args(false), option);
+}
+
+void add_flag(CLI::App* app, const std::string& name, bool& flag, const std::string& help) {
+  app->add_flag(name, flag, help);
+}
+
+void add_path(CLI::App* app, const std::string& name, std::string& target,
+              const std::string& help) {
+  add_text(app, {name, "", help, "", true}, [&target](const std::string& text) { target = text; });
+}
+
+void add_dims(CLI::App* app, std::optional<Int3>& dims) {
+  add_parsed(app, dims, parse_dims, {"--dims", "X,Y,Z", "Samples along x, y and z"});
+}
+
+void add_type(CLI::App* app, std::optional<ScalarType>& type) {
+  add_parsed(app, type, parse_type,
+             {"--type", "u8|i8|u16|i16|u32|i32|f32|f64", "Type of a sample"});
+}
+
+void add_level(CLI::App* app, int& level) {
+  add_parsed(app, level, [](const std::string& text) { return parse_int(text, 0, 64); },
+             {"--level", "L", "Level of the pyramid, 0 the finest", "0"});
+}
+
+void add_roi(CLI::App* app, std::optional<RoiText>& roi) {
+  add_parsed(app, roi, parse_roi,
+             {"--roi", "X0:X1,Y0:Y1,Z0:Z1",
+              "Only these samples of the level, half-open; parts may be left out"});
+}
+
+void add_memory(CLI::App* app, std::uint64_t& memory) {
+  add_parsed(app, memory, parse_bytes,
+             {"--memory", "BYTES", "Budget of memory, such as 512M or 1.5G", "1G"});
+}
+
+void add_threads(CLI::App* app, int& threads) {
+  add_parsed(app, threads, [](const std::string& text) { return parse_int(text, 1, 4096); },
+             {"--threads", "N", "Worker threads", "all cores"});
+}
+
+void add_force(CLI::App* app, bool& force) {
+  add_flag(app, "--force", force, "Replace an output that exists, once the new one is whole");
+}
+
+void add_store_options(CLI::App* app, StoreArguments& arguments) {
+  ConvertOptions& options = arguments.options;
+  add_parsed(app, options.brick, [](const std::string& text) { return parse_whole(text, 16, 256); },
+             {"--brick", "N", "Samples along each edge of a brick, 16 to 256", "64"});
+  add_parsed(app, arguments.shard,
+             [](const std::string& text) { return parse_whole(text, 16, 1 << 20); },
+             {"--shard", "N", "Samples along each edge of a shard, a multiple of the brick",
+              "about 512"});
+  add_parsed(app, options.zstd_level, parse_codec,
+             {"--codec", "zstd:LEVEL|none", "Compression of bricks", "zstd:3"});
+  add_parsed(app, options.levels, parse_levels,
+             {"--levels", "auto|N", "Levels of the pyramid; auto: until one brick holds the last",
+              "auto"});
+  add_memory(app, options.memory);
+  add_threads(app, options.threads);
+  add_flag(app, "--resume", options.resume, "Go on with an interrupted conversion of this input");
+  add_force(app, options.force);
+}
+
+ConvertOptions convert_options(const StoreArguments& arguments) {
+  ConvertOptions options = arguments.options;
+  options.shard =
+      arguments.shard.value_or(options.brick * std::max<Index>(1, 512 / options.brick));
+  return options;
+}
+
+void report_conversion(Console& console, const std::string& command, const std::string& input,
+                       const std::string& output, const VolumeInfo& volume,
+                       const ConvertReport& report) {
+  const double ratio =
+      report.bytes_out == 0
+          ? 0
+          : static_cast<double>(report.bytes_in) / static_cast<double>(report.bytes_out);
+  const double rate =
+      report.seconds > 0 ? static_cast<double>(report.bytes_in) / report.seconds : 0;
+  const nlohmann::ordered_json object{
+      {"command", command},
+      {"input", input},
+      {"output", output},
+      {"extent", to_json(volume.extent)},
+      {"type", zarr_name(volume.type)},
+      {"levels", report.levels},
+      {"bricks",
+       {{"total", report.bricks}, {"absent", report.bricks_absent}, {"kept", report.bricks_kept}}},
+      {"bytes_in", report.bytes_in},
+      {"bytes_out", report.bytes_out},
+      {"ratio", ratio},
+      {"seconds", report.seconds},
+      {"peak_resident_bytes", peak_resident_bytes()}};
+  std::string text = fmt::format("{}: {} samples of {}", output, human_extent(volume.extent),
+                                 zarr_name(volume.type));
+  if (report.levels > 0)  // a store and no raw file
+    text += fmt::format(", {} level{}, {} bricks ({} absent, {} kept)", report.levels,
+                        report.levels == 1 ? "" : "s", human_count(report.bricks),
+                        human_count(report.bricks_absent), human_count(report.bricks_kept));
+  text += fmt::format("\n{} in, {} out ({:.2f} to 1) in {}, {}/s\n", human_bytes(report.bytes_in),
+                      human_bytes(report.bytes_out), ratio, human_seconds(report.seconds),
+                      human_bytes(rate));
+  console.result(object, text);
+}
+
+}  // namespace isobrick::tools

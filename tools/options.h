@@ -1,0 +1,96 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/convert.h"
+#include "tools/console.h"
+#include "tools/parse.h"
+
+namespace CLI {
+class App;  // CLI11 is slow to compile, so few files see it
+}
+
+namespace isobrick::tools {
+
+/// A subcommand: its definition and what it does.
+struct Command {
+  CLI::App* app;
+  std::function<int(Console&)> run;
+};
+
+/// The program: from its definitions come parsing, help, completions and the
+/// man page.
+struct Program {
+  CLI::App& app;
+  Speech speech;
+  std::vector<Command> commands;
+};
+
+// One a file of this folder.
+void add_convert(Program& program);
+void add_info(Program& program);
+void add_verify(Program& program);
+void add_extract(Program& program);
+void add_export(Program& program);
+void add_synth(Program& program);
+void add_completion(Program& program);
+void add_man(Program& program);
+
+/// A new subcommand with what all of them have: --json, --quiet, an example.
+CLI::App* add_subcommand(Program& program, const std::string& name, const std::string& description,
+                         const std::string& example);
+
+/// How an option is called and explained.
+struct OptionText {
+  std::string name;           ///< "--dims", "-o,--output", or "OUT" for a positional
+  std::string value;          ///< what its value is called; "a|b|c" lists the choices
+  std::string help;
+  std::string fallback = {};  ///< what holds when it is left out
+  bool required = false;
+};
+
+/// An option that hands the text of its value to `take`.
+void add_text(CLI::App* app, const OptionText& option,
+              std::function<void(const std::string&)> take);
+/// One that may be given several times: `take` is called for each.
+void add_repeated(CLI::App* app, const OptionText& option,
+                  std::function<void(const std::string&)> take);
+void add_flag(CLI::App* app, const std::string& name, bool& flag, const std::string& help);
+
+/// An option whose text goes through `parse` (text → value) into `target`.
+template <class T, class Parse>
+void add_parsed(CLI::App* app, T& target, Parse parse, const OptionText& option) {
+  add_text(app, option, [&target, parse](const std::string& text) { target = parse(text); });
+}
+
+/// A required positional path.
+void add_path(CLI::App* app, const std::string& name, std::string& target,
+              const std::string& help);
+
+void add_dims(CLI::App* app, std::optional<Int3>& dims);
+void add_type(CLI::App* app, std::optional<ScalarType>& type);
+void add_level(CLI::App* app, int& level);
+void add_roi(CLI::App* app, std::optional<RoiText>& roi);
+void add_memory(CLI::App* app, std::uint64_t& memory);
+void add_threads(CLI::App* app, int& threads);
+void add_force(CLI::App* app, bool& force);
+
+/// How a store is written: what `convert` and `synth` share.
+struct StoreArguments {
+  ConvertOptions options;
+  std::optional<Index> shard;
+};
+void add_store_options(CLI::App* app, StoreArguments& arguments);
+/// With a shard of about 512 samples, a multiple of the brick, unless one was named.
+ConvertOptions convert_options(const StoreArguments& arguments);
+
+/// Says what a conversion by `command` did.
+void report_conversion(Console& console, const std::string& command, const std::string& input,
+                       const std::string& output, const VolumeInfo& volume,
+                       const ConvertReport& report);
+
+}  // namespace isobrick::tools

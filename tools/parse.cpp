@@ -1,0 +1,155 @@
+#include "tools/parse.h"
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+#include "isobrick/core/lattice.h"
+
+namespace isobrick::tools {
+namespace {
+
+template <class T>
+std::optional<T> whole_text(std::string_view text) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+/// Cuts "a,b,c" at its commas; nothing unless there are exactly three parts.
+std::optional<std::array<std::string_view, 3>> split3(std::string_view text) {
+  const auto first = text.find(',');
+  if (first == std::string_view::npos) return std::nullopt;
+  const auto second = text.find(',', first + 1);
+  if (second == std::string_view::npos || text.find(',', second + 1) != std::string_view::npos)
+    return std::nullopt;
+  return {{text.substr(0, first), text.substr(first + 1, second - first - 1),
+           text.substr(second + 1)}};
+}
+
+/// The power of two that a unit stands for, or nothing: "", K, M, G, T with "B" or "iB".
+std::optional<int> unit_shift(std::string_view unit) {
+  if (unit.empty() || unit == "B") return 0;
+  constexpr std::string_view letters = "KMGT";
+  const auto at = letters.find(unit[0] >= 'a' ? static_cast<char>(unit[0] - 'a' + 'A') : unit[0]);
+  const std::string_view rest = unit.substr(1);
+  if (at == std::string_view::npos || !(rest.empty() || rest == "B" || rest == "iB"))
+    return std::nullopt;
+  return 10 * (static_cast<int>(at) + 1);
+}
+
+}  // namespace
+
+std::uint64_t parse_bytes(std::string_view text) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
+  const auto shift = unit_shift(unit);
+  if (error != std::errc{} || !shift || !(number > 0))
+    throw UsageError(fmt::format("'{}' is no size; write it like 100000, 512M or 1.5G", text));
+  const double bytes = std::floor(std::ldexp(number, *shift));
+  if (bytes < 1 || bytes >= std::ldexp(1.0, 63))
+    throw UsageError(fmt::format("the size '{}' is out of range", text));
+  return static_cast<std::uint64_t>(bytes);
+}
+
+Index parse_whole(std::string_view text, Index least, Index most) {
+  const auto value = whole_text<Index>(text);
+  if (value && *value >= least && *value <= most) return *value;
+  if (most == std::numeric_limits<Index>::max())
+    throw UsageError(fmt::format("'{}' is not a whole number of at least {}", text, least));
+  throw UsageError(fmt::format("'{}' is not a whole number from {} to {}", text, least, most));
+}
+
+std::uint64_t parse_offset(std::string_view text) {
+  return static_cast<std::uint64_t>(parse_whole(text, 0, std::numeric_limits<Index>::max()));
+}
+
+double parse_number(std::string_view text) {
+  const bool plus = !text.empty() && text[0] == '+';
+  const auto value = whole_text<double>(text.substr(plus ? 1 : 0));
+  if (!value || !std::isfinite(*value))
+    throw UsageError(fmt::format("'{}' is not a finite number", text));
+  return *value;
+}
+
+Int3 parse_dims(std::string_view text) {
+  const auto parts = split3(text);
+  if (!parts) throw UsageError(fmt::format("'{}' is not of the form X,Y,Z", text));
+  Int3 dims;
+  for (int axis = 0; axis < 3; ++axis)
+    dims[axis] = parse_whole((*parts)[static_cast<std::size_t>(axis)], 1,
+                             std::numeric_limits<Index>::max());
+  if (!checked_volume(dims))
+    throw UsageError(fmt::format("a volume of {} samples is too large to address", text));
+  return dims;
+}
+
+Vec3d parse_vector(std::string_view text) {
+  const auto parts = split3(text);
+  if (!parts) throw UsageError(fmt::format("'{}' is not of the form X,Y,Z", text));
+  return {parse_number((*parts)[0]), parse_number((*parts)[1]), parse_number((*parts)[2])};
+}
+
+ScalarType parse_type(std::string_view text) {
+  if (const auto type = parse_scalar_type(text)) return *type;
+  throw UsageError(
+      fmt::format("unknown type '{}'; the types are u8, i8, u16, i16, u32, i32, f32, f64", text));
+}
+
+ByteOrder parse_byte_order(std::string_view text) {
+  if (text == "little") return ByteOrder::little;
+  if (text == "big") return ByteOrder::big;
+  throw UsageError(fmt::format("'{}' is no byte order; it is little or big", text));
+}
+
+std::optional<int> parse_codec(std::string_view text) {
+  constexpr std::string_view zstd = "zstd";
+  if (text == "none") return std::nullopt;
+  if (text == zstd) return 3;
+  if (!text.starts_with("zstd:"))
+    throw UsageError(fmt::format("unknown codec '{}'; it is zstd:LEVEL or none", text));
+  return parse_int(text.substr(zstd.size() + 1), 1, 22);
+}
+
+std::optional<int> parse_levels(std::string_view text) {
+  if (text == "auto") return std::nullopt;
+  return parse_int(text, 1, 64);
+}
+
+RoiText parse_roi(std::string_view text) {
+  const auto parts = split3(text);
+  if (!parts) throw UsageError(fmt::format("'{}' is not of the form X0:X1,Y0:Y1,Z0:Z1", text));
+  constexpr Index most = std::numeric_limits<Index>::max();
+  RoiText roi;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::string_view part = (*parts)[axis];
+    if (part.empty()) continue;
+    const auto colon = part.find(':');
+    if (colon == std::string_view::npos)
+      throw UsageError(fmt::format("'{}' in '{}' is not of the form FROM:TO", part, text));
+    if (colon > 0) roi.lo[axis] = parse_whole(part.substr(0, colon), 0, most);
+    if (colon + 1 < part.size()) roi.hi[axis] = parse_whole(part.substr(colon + 1), 0, most);
+  }
+  return roi;
+}
+
+Box3 resolve_roi(const RoiText& roi, Int3 extent) {
+  Box3 box{{0, 0, 0}, extent};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    box.lo[axis] = roi.lo[i].value_or(0);
+    box.hi[axis] = roi.hi[i].value_or(extent[axis]);
+    if (box.lo[axis] >= box.hi[axis] || box.hi[axis] > extent[axis])
+      throw UsageError(fmt::format("the region {}:{} along {} is empty or leaves the volume, which "
+                                   "has samples 0:{} there",
+                                   box.lo[axis], box.hi[axis], "xyz"[axis], extent[axis]));
+  }
+  return box;
+}
+
+}  // namespace isobrick::tools

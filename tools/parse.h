@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/core/vec.h"
+#include "isobrick/io/open_source.h"
+
+// The values of the command line: text to meaning. Every function throws
+// UsageError with a line that says what was given and what would do.
+namespace isobrick::tools {
+
+/// "100000", "64K", "512M", "1.5G", "2T", "1GiB": binary units.
+std::uint64_t parse_bytes(std::string_view text);
+
+/// A whole number in [least, most].
+Index parse_whole(std::string_view text, Index least, Index most);
+
+/// The same for an int.
+inline int parse_int(std::string_view text, int least, int most) {
+  return static_cast<int>(parse_whole(text, least, most));
+}
+
+/// A position in a file.
+std::uint64_t parse_offset(std::string_view text);
+
+/// A finite number.
+double parse_number(std::string_view text);
+
+/// "X,Y,Z", every part at least 1.
+Int3 parse_dims(std::string_view text);
+
+/// "X,Y,Z", finite numbers.
+Vec3d parse_vector(std::string_view text);
+
+/// "u8" or "uint8", ….
+ScalarType parse_type(std::string_view text);
+
+/// "little" or "big".
+ByteOrder parse_byte_order(std::string_view text);
+
+/// "none" (nothing), "zstd" or "zstd:LEVEL".
+std::optional<int> parse_codec(std::string_view text);
+
+/// "auto" (nothing) or a number of levels.
+std::optional<int> parse_levels(std::string_view text);
+
+/// A region as it was typed: what is left out reaches to the border.
+struct RoiText {
+  std::array<std::optional<Index>, 3> lo, hi;
+};
+
+/// "X0:X1,Y0:Y1,Z0:Z1", half-open; any number, or a whole part, may be left out.
+RoiText parse_roi(std::string_view text);
+
+/// The box that `roi` means in a volume of `extent` samples.
+Box3 resolve_roi(const RoiText& roi, Int3 extent);
+
+}  // namespace isobrick::tools

@@ -1,0 +1,125 @@
+#include "isobrick/io/synth_source.h"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "isobrick/io/output_file.h"
+#include "tools/options.h"
+
+namespace isobrick::tools {
+namespace {
+
+struct Arguments {
+  SynthOptions synth;
+  std::optional<Int3> dims;
+  std::optional<ScalarType> type;
+  std::string out;
+  StoreArguments store;
+};
+
+SynthKind parse_kind(const std::string& text) {
+  if (const auto kind = parse_synth_kind(text)) return *kind;
+  throw UsageError(fmt::format(
+      "unknown kind '{}'; the kinds are sphere, gyroid, marschner-lobb and mixing", text));
+}
+
+/// Computes `box` into `out`, a few rows a task.
+void compute(VolumeSource& source, Box3 box, std::byte* out) {
+  constexpr Index rows_per_task = 16;
+  const Int3 extent = box.extent();
+  const std::size_t row_bytes =
+      static_cast<std::size_t>(extent.x) * size_of(source.info().type);
+  const Index groups = ceil_div(extent.y, rows_per_task);
+  tbb::parallel_for(Index{0}, groups * extent.z, [&](Index task) {
+    const Index y = task % groups * rows_per_task, z = task / groups;
+    Box3 rows = box;
+    rows.lo = box.lo + Int3{0, y, z};
+    rows.hi.y = std::min(box.hi.y, rows.lo.y + rows_per_task);
+    rows.hi.z = rows.lo.z + 1;
+    source.read(rows, out + static_cast<std::size_t>(z * extent.y + y) * row_bytes);
+  });
+}
+
+/// Rows of one plane, or whole planes, that fit `bytes`; at least one row.
+Int3 piece_extent(Int3 extent, std::size_t sample_bytes, std::uint64_t bytes) {
+  const auto budget = static_cast<Index>(bytes / sample_bytes);
+  const Index rows = std::clamp<Index>(budget / extent.x, 1, extent.y);
+  const Index planes =
+      rows < extent.y ? 1 : std::clamp<Index>(budget / (extent.x * extent.y), 1, extent.z);
+  return {extent.x, rows, planes};
+}
+
+ConvertReport write_raw(VolumeSource& source, const std::string& path,
+                        const ConvertOptions& options, Progress& progress) {
+  if (options.resume) throw UsageError("--resume is for stores; a raw file is written anew");
+  const Int3 extent = source.info().extent;
+  const std::size_t sample_bytes = size_of(source.info().type);
+  const Int3 piece = piece_extent(extent, sample_bytes,
+                                  std::min<std::uint64_t>(options.memory, std::uint64_t{1} << 26));
+  std::vector<std::byte> samples(static_cast<std::size_t>(volume(piece)) * sample_bytes);
+  OutputFile out(path, options.force);
+  const auto start = std::chrono::steady_clock::now();
+  progress.begin("write", static_cast<std::uint64_t>(volume(extent)) * sample_bytes);
+  tbb::task_arena arena(options.threads > 0 ? options.threads : tbb::task_arena::automatic);
+  for_each_point({{0, 0, 0}, ceil_div(extent, piece)}, [&](Int3 p) {
+    const Box3 box = intersect({p * piece, (p + Int3{1, 1, 1}) * piece}, {{0, 0, 0}, extent});
+    const std::size_t bytes = static_cast<std::size_t>(volume(box.extent())) * sample_bytes;
+    arena.execute([&] { compute(source, box, samples.data()); });
+    out.writer().append(std::span(samples).first(bytes));
+    progress.advance(bytes);
+  });
+  progress.end();
+  out.publish();
+  ConvertReport report;
+  report.bytes_in = report.bytes_out = out.writer().size();
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+int run(const Arguments& arguments, Console& console) {
+  if (!arguments.dims || !arguments.type) throw UsageError("--dims and --type are needed");
+  SynthOptions synth = arguments.synth;
+  synth.extent = *arguments.dims;
+  synth.type = *arguments.type;
+  const auto source = make_synth(synth);
+  const ConvertOptions options = convert_options(arguments.store);
+  const bool raw = std::filesystem::path(arguments.out).extension() == ".raw";
+  const ConvertReport report = raw ? write_raw(*source, arguments.out, options, console.progress())
+                                   : convert(*source, arguments.out, options, console.progress());
+  report_conversion(console, "synth", std::string(name_of(synth.kind)), arguments.out,
+                    source->info(), report);
+  return 0;
+}
+
+}  // namespace
+
+void add_synth(Program& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* app = add_subcommand(
+      program, "synth", "Make a procedural volume of any size, the same on every machine.",
+      "isobrick synth gyroid gyroid.zarr --dims 512,512,512 --type u8");
+  add_text(app,
+           {"KIND", "sphere|gyroid|marschner-lobb|mixing", "Which field", "", true},
+           [&kind = arguments->synth.kind](const std::string& text) { kind = parse_kind(text); });
+  add_path(app, "OUT", arguments->out, "Store to write, or a raw file if it ends in .raw");
+  add_dims(app, arguments->dims);
+  add_type(app, arguments->type);
+  add_parsed(app, arguments->synth.seed, parse_offset,
+             {"--seed", "N", "Of the random numbers", "1"});
+  add_parsed(app, arguments->synth.frequency, parse_number,
+             {"--frequency", "F", "Periods or largest eddies along the longest edge",
+              "2 of gyroid, 6 of mixing"});
+  add_parsed(app, arguments->synth.noise, parse_number,
+             {"--noise", "A", "Amplitude of the gyroid's noise, as a part of the field's", "0.01"});
+  add_store_options(app, arguments->store);
+  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+}
+
+}  // namespace isobrick::tools

@@ -1,0 +1,58 @@
+#include "isobrick/pipeline/verify.h"
+
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "tools/format.h"
+#include "tools/options.h"
+
+namespace isobrick::tools {
+namespace {
+
+struct Arguments {
+  std::string store;
+  int threads = 0;
+};
+
+std::string text_of(const std::string& store, const VerifyReport& report) {
+  std::string text;
+  for (const std::string& damage : report.damages) text += damage + '\n';
+  if (report.damage_count > report.damages.size())
+    text += fmt::format("… and {} more\n", human_count(report.damage_count - report.damages.size()));
+  if (report.damage_count == 0)
+    text += fmt::format("{} is whole: {} bricks, {} read\n", store, human_count(report.bricks),
+                        human_bytes(report.bytes));
+  return text;
+}
+
+int run(const Arguments& arguments, Console& console) {
+  const VerifyReport report = verify(arguments.store, arguments.threads, console.progress());
+  const nlohmann::ordered_json object{{"command", "verify"},
+                                      {"store", arguments.store},
+                                      {"whole", report.damage_count == 0},
+                                      {"bricks", report.bricks},
+                                      {"bytes_read", report.bytes},
+                                      {"damage_count", report.damage_count},
+                                      {"damages", report.damages}};
+  console.result(object, text_of(arguments.store, report));
+  if (report.damage_count == 0) return 0;
+  throw DamageError(fmt::format("'{}' is damaged in {} place{}", arguments.store,
+                                human_count(report.damage_count),
+                                report.damage_count == 1 ? "" : "s"));
+}
+
+}  // namespace
+
+void add_verify(Program& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* app = add_subcommand(
+      program, "verify", "Read all of a store; check every checksum, range and size.",
+      "isobrick verify head.zarr");
+  add_path(app, "STORE", arguments->store, "Store to check");
+  add_threads(app, arguments->threads);
+  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+}
+
+}  // namespace isobrick::tools
