@@ -1,1 +1,179 @@
-// In the making.
+#include "isobrick/pipeline/convert.h"
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "isobrick/bricks/store_writer.h"
+#include "isobrick/pipeline/convert_cascade.h"
+#include "isobrick/pipeline/convert_journal.h"
+#include "isobrick/pipeline/convert_level.h"
+#include "isobrick/pipeline/convert_plan.h"
+#include "isobrick/pipeline/convert_staging.h"
+#include "isobrick/pipeline/downsample.h"
+#include "isobrick/pipeline/slab_file.h"
+
+namespace isobrick {
+namespace {
+
+std::size_t bytes_of(Int3 extent, ScalarType type) {
+  return static_cast<std::size_t>(volume(extent)) * size_of(type);
+}
+
+/// One conversion into a staging directory.
+class Conversion {
+ public:
+  Conversion(VolumeSource& source, const StoreLayout& layout, const ConvertPlan& plan,
+             const ConvertStaging& staging, Progress& progress)
+      : source_(source),
+        layout_(layout),
+        plan_(plan),
+        staging_(staging),
+        progress_(progress),
+        store_(staging.path(), layout, staging.resumed()),
+        journal_(staging.path(), layout.levels.front().lattice, staging.resumed()) {
+    for (int level = 0; level < level_count(); ++level)
+      writers_.push_back(std::make_unique<LevelWriter>(store_, layout, level,
+                                                       plan.bricks_in_flight(),
+                                                       level == 0 ? &journal_ : nullptr));
+  }
+
+  ConvertReport run();
+
+ private:
+  int level_count() const { return static_cast<int>(layout_.levels.size()); }
+
+  void write_levels();
+  void write_cascade(int first_level, VolumeSource& source);
+  std::unique_ptr<SpooledVolume> write_in_pieces(int level, VolumeSource& source);
+  std::unique_ptr<SpooledVolume> spool_stream();
+
+  VolumeSource& source_;
+  const StoreLayout& layout_;
+  const ConvertPlan& plan_;
+  const ConvertStaging& staging_;
+  Progress& progress_;
+  StoreWriter store_;
+  ConvertJournal journal_;
+  std::vector<std::unique_ptr<LevelWriter>> writers_;
+};
+
+ConvertReport Conversion::run() {
+  write_levels();
+  journal_.remove();
+  ConvertReport report;
+  bool has_nan = false;
+  for (const auto& writer : writers_) {
+    report.bricks += writer->counts().bricks;
+    report.bricks_absent += writer->counts().absent;
+    report.bricks_kept += writer->counts().kept;
+    // Infinities of both signs make a NaN that only a coarser level has.
+    has_nan |= writer->has_nan();
+  }
+  store_.finish(has_nan);
+  report.bytes_in = bytes_of(source_.info().extent, source_.info().type);
+  report.bytes_out = store_.bytes();
+  report.levels = level_count();
+  return report;
+}
+
+void Conversion::write_levels() {
+  std::unique_ptr<SpooledVolume> spooled;
+  if (!source_.random_access() && !plan_.cascade_fits(0)) spooled = spool_stream();
+  progress_.begin("convert", bytes_of(source_.info().extent, source_.info().type));
+  for (int level = 0; level < level_count(); ++level) {
+    VolumeSource& source = spooled ? static_cast<VolumeSource&>(*spooled) : source_;
+    if (plan_.cascade_fits(level)) {
+      write_cascade(level, source);
+      break;
+    }
+    spooled = write_in_pieces(level, source);
+  }
+  progress_.end();
+}
+
+void Conversion::write_cascade(int first_level, VolumeSource& source) {
+  std::vector<LevelWriter*> writers;
+  for (int level = first_level; level < level_count(); ++level)
+    writers.push_back(writers_[static_cast<std::size_t>(level)].get());
+  NoProgress none;  // coarser levels are no input
+  Cascade(plan_, layout_, first_level, writers).run(source, first_level == 0 ? progress_ : none);
+}
+
+/// Writes a level whose slabs do not fit and leaves the next one in a temporary
+/// file; nothing when this is the coarsest.
+std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSource& source) {
+  const Lattice& lattice = layout_.levels[static_cast<std::size_t>(level)].lattice;
+  LevelWriter& writer = *writers_[static_cast<std::size_t>(level)];
+  std::unique_ptr<SpooledVolume> next;
+  if (level + 1 < level_count()) {
+    VolumeInfo info = source.info();
+    info.extent = half_extent(lattice.extent);
+    next = std::make_unique<SpooledVolume>(staging_.path(), info);
+  }
+  const Int3 piece = plan_.piece(level);
+  const Int3 pieces = ceil_div(lattice.extent, piece);
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
+      bytes_of(min(piece, lattice.extent), lattice.type));
+  const auto half = std::make_unique_for_overwrite<std::byte[]>(
+      bytes_of(half_extent(min(piece, lattice.extent)), lattice.type));
+  const auto box_of = [&](Int3 p) {
+    return intersect({p * piece, (p + Int3{1, 1, 1}) * piece}, lattice.box());
+  };
+  for_each_point({{0, 0, 0}, pieces}, [&](Int3 p) {
+    const Box3 box = box_of(p);
+    read_box(source, box, buffer.get());
+    writer.write(box, buffer.get());
+    if (next) {
+      downsample(lattice.type, box.extent(), buffer.get(), half.get());
+      next->write({half_extent(box.lo), half_extent(box.hi)}, half.get());
+    }
+    if (p.x + 1 == pieces.x && p.y + 1 == pieces.y) writer.close(box.hi.z);
+    if (level == 0) progress_.advance(bytes_of(box.extent(), lattice.type));
+  });
+  return next;
+}
+
+std::unique_ptr<SpooledVolume> Conversion::spool_stream() {
+  const VolumeInfo& info = source_.info();
+  auto spooled = std::make_unique<SpooledVolume>(staging_.path(), info);
+  const Index planes = std::min(plan_.spool_planes(), info.extent.z);
+  Box3 box{{0, 0, 0}, {info.extent.x, info.extent.y, 0}};
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
+      bytes_of({info.extent.x, info.extent.y, planes}, info.type));
+  progress_.begin("spool", bytes_of(info.extent, info.type));
+  for (; box.lo.z < info.extent.z; box.lo.z = box.hi.z) {
+    box.hi.z = std::min(box.lo.z + planes, info.extent.z);
+    source_.read(box, buffer.get());
+    spooled->write(box, buffer.get());
+    progress_.advance(bytes_of(box.extent(), info.type));
+  }
+  progress_.end();
+  return spooled;
+}
+
+}  // namespace
+
+ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
+                      const ConvertOptions& options, Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const StoreLayout layout = plan_layout(source.info(), options);
+  const int threads = options.threads > 0
+                          ? options.threads
+                          : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const ConvertPlan plan(layout, options.memory, threads, source.random_access());
+  ConvertStaging staging(out, options.resume, options.force);
+  tbb::task_arena arena(threads);
+  ConvertReport report = arena.execute(
+      [&] { return Conversion(source, layout, plan, staging, progress).run(); });
+  staging.publish();
+  report.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+}  // namespace isobrick

@@ -1,1 +1,136 @@
-// In the making.
+#include "isobrick/pipeline/export.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/slab_file.h"
+#include "isobrick/pipeline/slab_piece.h"
+#include "isobrick/pipeline/slab_reader.h"
+
+namespace isobrick {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "raw files are written as they are");
+
+constexpr std::size_t kMiB = std::size_t{1} << 20;
+/// Program, libraries and the reader's caches.
+constexpr std::size_t kProgramBytes = 40 * kMiB;
+/// Larger pieces are no faster.
+constexpr std::size_t kPieceBytes = 256 * kMiB;
+
+/// The file that is written, gone again unless it is published.
+class TemporaryFile {
+ public:
+  TemporaryFile(const std::filesystem::path& out, bool force) : out_(out), name_(out), force_(force) {
+    const auto status = std::filesystem::symlink_status(out);
+    if (std::filesystem::exists(status) && !force)
+      throw UsageError(fmt::format("'{}' exists; --force replaces it", out.string()));
+    if (std::filesystem::is_directory(status))
+      throw UsageError(fmt::format("'{}' is a directory", out.string()));
+    name_ += ".partial";
+  }
+  ~TemporaryFile() {
+    if (created_) ::unlink(name_.c_str());
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  UniqueFd open() {
+    UniqueFd fd(::open(name_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    if (fd.get() < 0) throw system_error("cannot create", name_.string(), errno);
+    created_ = true;
+    return fd;
+  }
+
+  void publish() {
+    const unsigned flags = force_ ? 0 : RENAME_NOREPLACE;
+    int result = ::renameat2(AT_FDCWD, name_.c_str(), AT_FDCWD, out_.c_str(), flags);
+    // Not every file system knows the flag.
+    if (result != 0 && errno == EINVAL) result = ::rename(name_.c_str(), out_.c_str());
+    if (result != 0) throw system_error("cannot create", out_.string(), errno);
+    created_ = false;
+  }
+
+  std::string name() const { return name_.string(); }
+
+ private:
+  std::filesystem::path out_, name_;
+  bool force_;
+  bool created_ = false;
+};
+
+Box3 region(const StoreReader& store, int level, const std::optional<Box3>& roi) {
+  const StoreInfo& info = store.info();
+  if (level < 0 || level >= static_cast<int>(info.levels.size()))
+    throw UsageError(fmt::format("there is no level {}: '{}' has {}", level, info.path.string(),
+                                 info.levels.size()));
+  const Box3 all = info.levels[static_cast<std::size_t>(level)].lattice.box();
+  if (!roi) return all;
+  if (roi->empty() || intersect(*roi, all) != *roi)
+    throw UsageError(fmt::format(
+        "the region [{}, {}) × [{}, {}) × [{}, {}) does not lie in the level's {} × {} × {} samples",
+        roi->lo.x, roi->hi.x, roi->lo.y, roi->hi.y, roi->lo.z, roi->hi.z, all.hi.x, all.hi.y,
+        all.hi.z));
+  return *roi;
+}
+
+/// The box of bricks to hold at a time.
+Int3 piece_within(const Lattice& lattice, Int3 extent, std::uint64_t memory, int threads) {
+  const std::size_t fixed =
+      kProgramBytes + static_cast<std::size_t>(threads) * 2 * lattice.brick_bytes();
+  const std::size_t least = fixed + lattice.brick_bytes();
+  if (memory < least)
+    throw UsageError(fmt::format("a memory budget of {} MiB is too small: {} MiB are needed at least",
+                                 memory / kMiB, least / kMiB + 1));
+  const std::size_t room = std::min(static_cast<std::size_t>(memory) - fixed, kPieceBytes);
+  return largest_piece(extent, lattice.brick, room / lattice.sample_bytes());
+}
+
+/// Bricks of `piece` samples over `box`, aligned to the lattice of bricks.
+template <class F>
+void for_each_piece(Box3 box, Int3 brick, Int3 piece, F&& f) {
+  const Int3 start{box.lo.x / brick.x * brick.x, box.lo.y / brick.y * brick.y,
+                   box.lo.z / brick.z * brick.z};
+  for_each_point({{0, 0, 0}, ceil_div(box.hi - start, piece)}, [&](Int3 p) {
+    const Int3 lo = start + p * piece;
+    f(intersect({lo, lo + piece}, box));
+  });
+}
+
+}  // namespace
+
+std::uint64_t export_raw(const StoreReader& store, int level, std::optional<Box3> roi,
+                         const std::filesystem::path& out, bool force, std::uint64_t memory,
+                         int threads, Progress& progress) {
+  const Box3 box = region(store, level, roi);
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
+  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const Int3 piece = piece_within(lattice, box.extent(), memory, threads);
+  TemporaryFile temporary(out, force);
+  const SlabFile file(temporary.open(), temporary.name(), box.extent(), lattice.sample_bytes());
+  file.reserve();
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
+      static_cast<std::size_t>(volume(min(piece, box.extent()))) * lattice.sample_bytes());
+  tbb::task_arena arena(threads);
+  progress.begin("export", file.bytes());
+  for_each_piece(box, lattice.brick, piece, [&](Box3 part) {
+    arena.execute([&] { read_slab(store, level, part, buffer.get()); });
+    file.write({part.lo - box.lo, part.hi - box.lo}, buffer.get());
+    progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
+  });
+  progress.end();
+  temporary.publish();
+  return file.bytes();
+}
+
+}  // namespace isobrick

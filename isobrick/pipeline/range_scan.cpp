@@ -133,8 +133,8 @@ void canonicalise_zeros(std::vector<ValueRange<T>>& ranges) {
 }  // namespace
 
 template <class T>
-RangeScanner<T>::RangeScanner(Int3 extent, Index edge)
-    : extent_(extent), items_(ceil_div(extent, {edge, edge, edge})), edge_(edge) {}
+RangeScanner<T>::RangeScanner(Int3 extent, Int3 edge)
+    : extent_(extent), edge_(edge), items_(ceil_div(extent, edge)) {}
 
 template <class T>
 typename RangeScanner<T>::Layer& RangeScanner<T>::layer(Index z) {
@@ -146,16 +146,16 @@ typename RangeScanner<T>::Layer& RangeScanner<T>::layer(Index z) {
 template <class T>
 void RangeScanner<T>::add(Box3 box, const T* samples) {
   const Samples<T> in{box, samples};
-  const Span rows = items_seeing(box.lo.y, box.hi.y, edge_);
-  Span layers = items_seeing(box.lo.z, box.hi.z, edge_);
+  const Span rows = items_seeing(box.lo.y, box.hi.y, edge_.y);
+  const Span layers = items_seeing(box.lo.z, box.hi.z, edge_.z);
   layer(layers.last);  // all exist before the threads start
   const Index row_count = rows.last - rows.first + 1;
   const Index layer_count = layers.last - layers.first + 1;
   tbb::parallel_for(Index{0}, row_count * layer_count, [&](Index task) {
     const Index j = rows.first + task % row_count, k = layers.first + task / row_count;
     Layer& out = open_[static_cast<std::size_t>(k - first_open_)];
-    merge_item_row(in, samples_seen(j, box.lo.y, box.hi.y, edge_),
-                   samples_seen(k, box.lo.z, box.hi.z, edge_), edge_,
+    merge_item_row(in, samples_seen(j, box.lo.y, box.hi.y, edge_.y),
+                   samples_seen(k, box.lo.z, box.hi.z, edge_.z), edge_.x,
                    out.data() + j * items_.x);
   });
   if (std::numeric_limits<T>::has_quiet_NaN && !has_nan_) {
@@ -172,7 +172,7 @@ template <class T>
 void RangeScanner<T>::close(Index z1, const RangeEmit& emit) {
   const bool all = z1 >= extent_.z;
   // A layer is complete once the first plane of the next one has been merged.
-  while (first_open_ < items_.z && (all || (first_open_ + 1) * edge_ < z1)) {
+  while (first_open_ < items_.z && (all || (first_open_ + 1) * edge_.z < z1)) {
     Layer& done = layer(first_open_);
     canonicalise_zeros(done);
     emit({{0, 0, first_open_}, {items_.x, items_.y, first_open_ + 1}}, std::as_bytes(std::span(done)));
@@ -192,30 +192,39 @@ template class RangeScanner<double>;
 
 namespace {
 
+constexpr Int3 kBlock{kBlockEdge, kBlockEdge, kBlockEdge};
+
+bool whole_blocks(Int3 brick) {
+  return brick.x % kBlockEdge == 0 && brick.y % kBlockEdge == 0 && brick.z % kBlockEdge == 0;
+}
+
 /// Layers of bricks as the union of the blocks in them: the cells of a brick
-/// are the cells of its blocks when the edge is a whole number of blocks.
+/// are the cells of its blocks when its edges are whole numbers of blocks.
 template <class T>
 class BricksFromBlocks {
  public:
   explicit BricksFromBlocks(const Lattice& lattice)
-      : blocks_(lattice.blocks()), bricks_(lattice.bricks()), ratio_(lattice.brick.x / kBlockEdge) {}
+      : blocks_(lattice.blocks()),
+        bricks_(lattice.bricks()),
+        // Not used when a brick is smaller than a block.
+        ratio_(max(Int3{1, 1, 1}, {lattice.brick.x / kBlockEdge, lattice.brick.y / kBlockEdge,
+                                   lattice.brick.z / kBlockEdge})) {}
 
   void add(Index block_z, std::span<const std::byte> pairs, const RangeEmit& emit) {
     if (layer_.empty()) layer_.resize(static_cast<std::size_t>(bricks_.x * bricks_.y));
     const auto* block = reinterpret_cast<const ValueRange<T>*>(pairs.data());
     for (Index y = 0; y < blocks_.y; ++y) {
-      ValueRange<T>* row = layer_.data() + y / ratio_ * bricks_.x;
-      for (Index x = 0; x < blocks_.x; ++x) row[x / ratio_].include(*block++);
+      ValueRange<T>* row = layer_.data() + y / ratio_.y * bricks_.x;
+      for (Index x = 0; x < blocks_.x; ++x) row[x / ratio_.x].include(*block++);
     }
-    if ((block_z + 1) % ratio_ != 0 && block_z + 1 != blocks_.z) return;
-    const Index z = block_z / ratio_;
+    if ((block_z + 1) % ratio_.z != 0 && block_z + 1 != blocks_.z) return;
+    const Index z = block_z / ratio_.z;
     emit({{0, 0, z}, {bricks_.x, bricks_.y, z + 1}}, std::as_bytes(std::span(layer_)));
     layer_.clear();
   }
 
  private:
-  Int3 blocks_, bricks_;
-  Index ratio_;
+  Int3 blocks_, bricks_, ratio_;
   std::vector<ValueRange<T>> layer_;
 };
 
@@ -223,9 +232,9 @@ template <class T>
 class TypedLevelRanges final : public LevelRanges {
  public:
   explicit TypedLevelRanges(const Lattice& lattice)
-      : blocks_(lattice.extent, kBlockEdge), from_blocks_(lattice) {
-    if (lattice.brick.x % kBlockEdge != 0)
-      bricks_ = std::make_unique<RangeScanner<T>>(lattice.extent, lattice.brick.x);
+      : blocks_(lattice.extent, kBlock), from_blocks_(lattice) {
+    if (!whole_blocks(lattice.brick))
+      bricks_ = std::make_unique<RangeScanner<T>>(lattice.extent, lattice.brick);
   }
 
   void add(Box3 box, const std::byte* samples) override {

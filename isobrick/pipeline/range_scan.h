@@ -16,8 +16,8 @@ namespace isobrick {
 /// (lo, hi) of the sample type, C order [z, y, x, 2].
 using RangeEmit = std::function<void(Box3 items, std::span<const std::byte> pairs)>;
 
-/// Ranges of all cubic items of `edge` cells of a lattice, fed with boxes of
-/// samples. An item's range covers its own samples and the first layer of its
+/// Ranges of all items of a lattice, each a box of `edge` cells, fed with boxes
+/// of samples. An item's range covers its own samples and the first layer of its
 /// +x, +y and +z neighbours: all that its cells touch.
 ///
 /// Boxes may come in any order as long as no sample lies below the last
@@ -25,7 +25,7 @@ using RangeEmit = std::function<void(Box3 items, std::span<const std::byte> pair
 template <class T>
 class RangeScanner {
  public:
-  RangeScanner(Int3 extent, Index edge);
+  RangeScanner(Int3 extent, Int3 edge);
 
   /// Merges the samples of `box`, dense in C order. Parallel inside.
   void add(Box3 box, const T* samples);
@@ -42,8 +42,7 @@ class RangeScanner {
 
   Layer& layer(Index z);
 
-  Int3 extent_, items_;
-  Index edge_;
+  Int3 extent_, edge_, items_;
   Index first_open_ = 0;
   std::deque<Layer> open_;
   bool has_nan_ = false;
@@ -58,7 +57,6 @@ class LevelRanges {
   virtual bool has_nan() const = 0;
 };
 
-/// Bricks must be cubes.
 std::unique_ptr<LevelRanges> make_level_ranges(const Lattice& lattice);
 
 /// Bytes that the LevelRanges of a level hold while slabs of `planes` pass.

@@ -1,1 +1,171 @@
-// In the making.
+#include "isobrick/pipeline/verify.h"
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/range_scan.h"
+#include "isobrick/pipeline/slab_piece.h"
+#include "isobrick/pipeline/slab_reader.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::size_t kMaxDamages = 1000;
+/// Samples in memory at a time.
+constexpr std::size_t kPieceBytes = std::size_t{128} << 20;
+
+/// Collects damages. A broken shard index says the same for each of its
+/// bricks: that is one damage. Thread-safe.
+class DamageList {
+ public:
+  void add(const std::string& line) {
+    const std::lock_guard lock(mutex_);
+    if (seen_.count(line) != 0) return;
+    ++report_.damage_count;
+    if (report_.damages.size() == kMaxDamages) return;
+    seen_.insert(line);
+    report_.damages.push_back(line);
+  }
+  VerifyReport& report() { return report_; }
+
+ private:
+  std::mutex mutex_;
+  std::set<std::string> seen_;
+  VerifyReport report_;
+};
+
+/// Checks the bricks of one level, and its ranges against them.
+class LevelCheck {
+ public:
+  LevelCheck(const StoreReader& store, int level, DamageList& damages)
+      : store_(store),
+        level_(level),
+        lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
+        damages_(damages),
+        unreadable_(static_cast<std::size_t>(volume(lattice_.bricks()))) {}
+
+  void run(Progress& progress);
+
+ private:
+  void fail(Int3 brick, const std::string& what);
+  void compare(bool blocks, Box3 items, std::span<const std::byte> pairs);
+  bool sees_unreadable(Int3 item, Int3 edge) const;
+
+  const StoreReader& store_;
+  int level_;
+  const Lattice& lattice_;
+  DamageList& damages_;
+  std::mutex mutex_;
+  std::vector<bool> unreadable_;  ///< bricks
+  bool any_unreadable_ = false;
+};
+
+void LevelCheck::fail(Int3 brick, const std::string& what) {
+  damages_.add(what);
+  const std::lock_guard lock(mutex_);
+  unreadable_[static_cast<std::size_t>(linear_index(brick, lattice_.bricks()))] = true;
+  any_unreadable_ = true;
+}
+
+/// Whether the item's cells touch a sample of a brick that could not be read.
+bool LevelCheck::sees_unreadable(Int3 item, Int3 edge) const {
+  if (!any_unreadable_) return false;
+  const Box3 seen = intersect({item * edge, (item + Int3{1, 1, 1}) * edge + Int3{1, 1, 1}},
+                              lattice_.box());
+  const Int3 b = lattice_.brick;
+  bool found = false;
+  for_each_point({{seen.lo.x / b.x, seen.lo.y / b.y, seen.lo.z / b.z}, ceil_div(seen.hi, b)},
+                 [&](Int3 brick) {
+                   found |= unreadable_[static_cast<std::size_t>(
+                       linear_index(brick, lattice_.bricks()))];
+                 });
+  return found;
+}
+
+void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pairs) {
+  const Int3 edge = blocks ? Int3{kBlockEdge, kBlockEdge, kBlockEdge} : lattice_.brick;
+  const std::string_view what = blocks ? "block" : "brick";
+  RangeTable stored;
+  try {
+    stored = blocks ? store_.block_ranges(level_, items) : store_.brick_ranges(level_, items);
+  } catch (const Error& e) {
+    return damages_.add(fmt::format("level {}: {}", level_, e.what()));
+  }
+  visit_scalar(lattice_.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    const auto* found = reinterpret_cast<const ValueRange<T>*>(pairs.data());
+    for_each_point(items, [&](Int3 p) {
+      const ValueRange<T> range = *found++;
+      const ValueRange<double> samples =
+          range.empty() ? ValueRange<double>{}
+                        : ValueRange<double>{static_cast<double>(range.lo), static_cast<double>(range.hi)};
+      const ValueRange<double>& said = stored.at(p);
+      if (said == samples || (said.empty() && samples.empty()) || sees_unreadable(p, edge)) return;
+      damages_.add(fmt::format("level {}, {} ({}, {}, {}): its range says [{}, {}], its samples [{}, {}]",
+                               level_, what, p.x, p.y, p.z, said.lo, said.hi, samples.lo,
+                               samples.hi));
+    });
+  });
+}
+
+void LevelCheck::run(Progress& progress) {
+  const auto ranges = make_level_ranges(lattice_);
+  const Int3 piece =
+      largest_piece(lattice_.extent, lattice_.brick, kPieceBytes / lattice_.sample_bytes());
+  const Int3 pieces = ceil_div(lattice_.extent, piece);
+  const auto bytes_of = [&](Int3 e) {
+    return static_cast<std::size_t>(volume(e)) * lattice_.sample_bytes();
+  };
+  // Zeroed once, so that what a damaged brick leaves is never uninitialised.
+  const auto buffer = std::make_unique<std::byte[]>(bytes_of(min(piece, lattice_.extent)));
+  for_each_point({{0, 0, 0}, pieces}, [&](Int3 p) {
+    const Box3 box = intersect({p * piece, (p + Int3{1, 1, 1}) * piece}, lattice_.box());
+    read_slab(store_, level_, box, buffer.get(),
+              [&](Int3 brick, const std::string& what) { fail(brick, what); });
+    ranges->add(box, buffer.get());
+    if (p.x + 1 == pieces.x && p.y + 1 == pieces.y)
+      ranges->close(
+          box.hi.z,
+          [&](Box3 items, std::span<const std::byte> pairs) { compare(true, items, pairs); },
+          [&](Box3 items, std::span<const std::byte> pairs) { compare(false, items, pairs); });
+    progress.advance(bytes_of(box.extent()));
+  });
+}
+
+}  // namespace
+
+VerifyReport verify(const std::filesystem::path& path, int threads, Progress& progress) {
+  DamageList damages;
+  std::unique_ptr<StoreReader> store;
+  try {
+    store = std::make_unique<StoreReader>(path);
+  } catch (const DamageError& e) {
+    damages.add(e.what());
+    return damages.report();
+  }
+  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const std::vector<LevelInfo>& levels = store->info().levels;
+  std::uint64_t bytes = 0;
+  for (const LevelInfo& level : levels) {
+    damages.report().bricks += static_cast<std::uint64_t>(volume(level.lattice.bricks()));
+    bytes += static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
+  }
+  progress.begin("verify", bytes);
+  tbb::task_arena arena(threads);
+  for (std::size_t level = 0; level < levels.size(); ++level)
+    arena.execute(
+        [&] { LevelCheck(*store, static_cast<int>(level), damages).run(progress); });
+  progress.end();
+  damages.report().bytes = store->bytes_read();
+  return damages.report();
+}
+
+}  // namespace isobrick

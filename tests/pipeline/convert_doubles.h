@@ -31,6 +31,8 @@ inline void copy_box(const std::byte* from, Int3 extent, std::size_t sample, Box
 /// and can fail after so many bytes.
 class MemorySource final : public VolumeSource {
  public:
+  MemorySource(const MemorySource& other)
+      : info_(other.info_), samples_(other.samples_), random_access_(other.random_access_) {}
   MemorySource(Int3 extent, ScalarType type, std::vector<std::byte> samples, bool random_access = true)
       : samples_(std::move(samples)), random_access_(random_access) {
     info_.extent = extent;

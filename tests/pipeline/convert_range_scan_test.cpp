@@ -74,7 +74,7 @@ TEST(RangeScanFloats, NothingButNanIsEmpty) {
 
 TEST(RangeScanFloats, ZerosHaveOneSign) {
   std::vector<float> samples(16 * 16 * 16, -0.0f);
-  RangeScanner<float> scanner({16, 16, 16}, 16);
+  RangeScanner<float> scanner({16, 16, 16}, {16, 16, 16});
   scanner.add({{0, 0, 0}, {16, 16, 16}}, samples.data());
   scanner.close(16, [](Box3, std::span<const std::byte> pairs) {
     for (const std::byte b : pairs) EXPECT_EQ(b, std::byte{0});

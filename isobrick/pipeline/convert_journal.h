@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/io/file.h"
+
+namespace isobrick {
+
+/// Remembers, beside the unfinished store, what the input looked like: one
+/// checksum for each layer of bricks. A resumed conversion reads the input
+/// again and finds out here when it is not the one that the finished shards
+/// were made of.
+class ConvertJournal {
+ public:
+  /// With `resume` the layers that an earlier run recorded are compared.
+  ConvertJournal(const std::filesystem::path& store, const Lattice& lattice, bool resume);
+
+  /// The checksum of one brick's samples; bricks in any order.
+  void add(Int3 brick, std::uint32_t crc);
+  /// All bricks that lie below z1 were added. Throws Error when they differ
+  /// from what is on record.
+  void close(Index z1);
+  /// The store is about to become whole: the record goes.
+  void remove();
+
+ private:
+  void record(Index layer, std::uint64_t sum);
+
+  std::filesystem::path path_;
+  Lattice lattice_;
+  UniqueFd fd_;
+  std::vector<std::uint64_t> earlier_;
+  std::map<Index, std::uint64_t> open_;  ///< layers not closed yet
+  Index next_ = 0;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "isobrick/bricks/store_writer.h"
+#include "isobrick/pipeline/convert_journal.h"
+#include "isobrick/pipeline/range_scan.h"
+
+namespace isobrick {
+
+/// Writes one level of a store: bricks, encoded in parallel, and ranges.
+class LevelWriter {
+ public:
+  struct Counts {
+    std::uint64_t bricks = 0, absent = 0, kept = 0;
+  };
+
+  /// `journal`, if there is one, sees every brick.
+  LevelWriter(StoreWriter& store, const StoreLayout& layout, int level, int bricks_in_flight,
+              ConvertJournal* journal);
+
+  /// Writes the bricks of `box`, which is aligned to them; `samples` is dense.
+  /// Bricks reach their shard in the order z, y, x of the calls and in each box,
+  /// whatever the threads, so a shard's bytes are always the same.
+  void write(Box3 box, const std::byte* samples);
+
+  /// All samples below z1 were written: finishes the shards and ranges that
+  /// this completes.
+  void close(Index z1);
+
+  bool has_nan() const { return ranges_->has_nan(); }
+  const Counts& counts() const { return counts_; }
+
+ private:
+  /// A brick on its way to its shard.
+  struct Parcel {
+    Int3 brick;
+    bool kept = false;       ///< its shard was whole already
+    std::uint32_t crc = 0;   ///< of the samples, for the journal
+    std::optional<std::vector<std::byte>> encoded;
+  };
+
+  bool is_kept(Int3 shard) const { return kept_[static_cast<std::size_t>(linear_index(shard, shards_))]; }
+  Parcel pack(Int3 brick, Box3 box, const std::byte* samples) const;
+  void deliver(const Parcel& parcel);
+  void finish_shards(Index z1);
+
+  StoreWriter& store_;
+  const StoreLayout& layout_;
+  const LevelInfo& info_;
+  int level_;
+  std::size_t bricks_in_flight_;
+  Int3 shards_, bricks_per_shard_;
+  std::vector<bool> kept_;  ///< shards that an interrupted run finished
+  ConvertJournal* journal_;
+  std::unique_ptr<LevelRanges> ranges_;
+  Index next_shard_z_ = 0;
+  Counts counts_;
+};
+
+}  // namespace isobrick

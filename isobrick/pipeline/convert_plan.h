@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "isobrick/bricks/store_writer.h"
+#include "isobrick/io/volume_source.h"
+#include "isobrick/pipeline/convert.h"
+
+namespace isobrick {
+
+/// What the store of `volume` will look like. Throws UsageError for options
+/// that make no sense.
+StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options);
+
+/// How a conversion keeps to its budget.
+///
+/// A level is worked through in slabs: as many planes as a brick has, or twice
+/// as many when that is odd, so that a slab's planes pair up for the next level.
+/// While slabs of a level and of all coarser ones fit together, each sample
+/// passes through memory once (a cascade). Otherwise the level goes through in
+/// smaller pieces and the next one through a temporary file.
+class ConvertPlan {
+ public:
+  /// Throws UsageError naming the least budget when not even one piece fits.
+  ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads, bool random_access);
+
+  int threads() const { return threads_; }
+  /// Bricks being encoded or waiting for their turn to be written.
+  int bricks_in_flight() const { return 2 * threads_ + 2; }
+
+  Index slab_planes() const { return slab_planes_; }
+  /// Whether slabs of `level` and of all coarser levels fit together.
+  bool cascade_fits(int level) const { return cascade_bytes(level) <= room_; }
+  /// Whether a second slab of level 0 fits beside the cascade, to be filled meanwhile.
+  bool second_slab_fits() const;
+  /// The box of samples to read at a time where a cascade does not fit.
+  Int3 piece(int level) const;
+  /// Planes of a stream to copy at a time when it is spooled.
+  Index spool_planes() const;
+
+ private:
+  std::size_t slab_bytes(int level) const;
+  std::size_t cascade_bytes(int level) const;
+  std::size_t ranges_bytes(int level) const;
+  std::size_t least_room(bool random_access) const;
+
+  const StoreLayout& layout_;
+  int threads_;
+  Index slab_planes_;
+  std::size_t room_ = 0;  ///< what the program itself and the encoders leave
+};
+
+}  // namespace isobrick

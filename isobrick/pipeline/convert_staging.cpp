@@ -1,0 +1,116 @@
+#include "isobrick/pipeline/convert_staging.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+
+#include "isobrick/bricks/store_file.h"
+#include "isobrick/bricks/store_names.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path parent_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+bool is_there(const fs::path& path) { return fs::symlink_status(path).type() != fs::file_type::not_found; }
+
+/// A Zarr group (or an empty folder): something that is ours to replace.
+bool is_store(const fs::path& path) {
+  return fs::is_directory(path) && (fs::is_empty(path) || fs::exists(path / "zarr.json"));
+}
+
+/// Whether a conversion stopped before it wrote anything, or was stopped after
+/// the last file was whole (and cannot be told from one with other options).
+bool nothing_to_resume(const fs::path& staging) {
+  if (fs::exists(staging / "zarr.json")) return true;
+  for (const fs::directory_entry& entry : fs::directory_iterator(staging))
+    if (!is_temporary_name(entry.path())) return false;
+  return true;
+}
+
+void rename_or_throw(const fs::path& from, const fs::path& to) {
+  if (::rename(from.c_str(), to.c_str()) != 0)
+    throw system_error(fmt::format("cannot rename '{}' to", from.string()), to.string(), errno);
+}
+
+void sync_folder(const fs::path& folder) {
+  const UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() < 0 || ::fsync(fd.get()) != 0)
+    throw system_error("cannot sync", folder.string(), errno);
+}
+
+}  // namespace
+
+ConvertStaging::ConvertStaging(fs::path out, bool resume, bool force)
+    : out_(std::move(out)), force_(force) {
+  if (!out_.has_filename()) out_ = out_.parent_path();  // a slash at the end
+  if (out_.empty() || out_.filename() == "." || out_.filename() == "..")
+    throw UsageError(fmt::format("'{}' is no name for a store", out_.string()));
+  staging_ = out_;
+  staging_ += ".partial";
+  check_out(force);
+  prepare(resume, force);
+}
+
+void ConvertStaging::check_out(bool force) const {
+  if (!is_there(out_)) return;
+  if (!force) throw UsageError(fmt::format("'{}' exists; --force replaces it", out_.string()));
+  if (!is_store(out_))
+    throw UsageError(fmt::format("'{}' is no store: it is not replaced", out_.string()));
+}
+
+void ConvertStaging::prepare(bool resume, bool force) {
+  std::error_code failure;
+  if (fs::create_directory(staging_, failure)) {
+    lock();
+    return;
+  }
+  if (failure) throw system_error("cannot create", staging_.string(), failure.value());
+  if (!fs::is_directory(staging_))
+    throw UsageError(fmt::format("'{}' is in the way", staging_.string()));
+  lock();
+  resumed_ = resume && is_there(staging_ / kLayoutMarker);
+  if (resumed_ || fs::is_empty(staging_)) return;
+  if (resume ? !nothing_to_resume(staging_) : !force)
+    throw UsageError(fmt::format("an interrupted conversion is in '{}'; --resume goes on with it, "
+                                 "--force starts anew",
+                                 staging_.string()));
+  for (const fs::directory_entry& entry : fs::directory_iterator(staging_))
+    fs::remove_all(entry.path());
+}
+
+void ConvertStaging::lock() {
+  lock_ = UniqueFd(::open(staging_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (lock_.get() < 0) throw system_error("cannot open", staging_.string(), errno);
+  if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw Error(fmt::format("another conversion is writing '{}'", staging_.string()));
+}
+
+void ConvertStaging::publish() {
+  if (is_there(out_)) {
+    check_out(force_);  // it may have appeared since
+    if (::renameat2(AT_FDCWD, staging_.c_str(), AT_FDCWD, out_.c_str(), RENAME_EXCHANGE) != 0) {
+      fs::path aside = out_;
+      aside += ".replaced";
+      rename_or_throw(out_, aside);
+      rename_or_throw(staging_, out_);
+      staging_ = aside;
+    }
+    sync_folder(parent_of(out_));
+    fs::remove_all(staging_);
+  } else {
+    rename_or_throw(staging_, out_);
+  }
+  sync_folder(parent_of(out_));
+}
+
+}  // namespace isobrick

@@ -1,0 +1,91 @@
+#include "isobrick/pipeline/slab_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+/// Calls f(offset in the file, offset in the box, bytes) for each contiguous
+/// run that `box` has in common with the array.
+template <class F>
+void for_each_run(Box3 box, Int3 extent, std::size_t sample_bytes, F&& f) {
+  const Int3 e = box.extent();
+  const bool whole_rows = e.x == extent.x;
+  const bool whole_planes = whole_rows && e.y == extent.y;
+  const Int3 run{e.x, whole_rows ? e.y : 1, whole_planes ? e.z : 1};
+  const std::size_t bytes = static_cast<std::size_t>(volume(run)) * sample_bytes;
+  std::size_t inside = 0;
+  for (Index z = box.lo.z; z < box.hi.z; z += run.z)
+    for (Index y = box.lo.y; y < box.hi.y; y += run.y, inside += bytes)
+      f(static_cast<std::uint64_t>(linear_index({box.lo.x, y, z}, extent)) * sample_bytes, inside,
+        bytes);
+}
+
+void write_at(int fd, const std::string& path, std::uint64_t offset, const std::byte* bytes,
+              std::size_t size) {
+  while (size > 0) {
+    const ssize_t n = ::pwrite(fd, bytes, size, static_cast<off_t>(offset));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw system_error("cannot write", path, errno);
+    bytes += n;
+    offset += static_cast<std::uint64_t>(n);
+    size -= static_cast<std::size_t>(n);
+  }
+}
+
+UniqueFd open_nameless(const std::filesystem::path& beside) {
+  const std::filesystem::path parent = beside.parent_path();
+  const std::string folder = parent.empty() ? "." : parent.string();
+  UniqueFd fd(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
+  if (fd.get() >= 0) return fd;
+  // Not every file system has nameless files.
+  std::string name = beside.string() + ".spool-XXXXXX";
+  UniqueFd named(::mkostemp(name.data(), O_CLOEXEC));
+  if (named.get() < 0) throw system_error("cannot create a temporary file in", folder, errno);
+  ::unlink(name.c_str());
+  return named;
+}
+
+}  // namespace
+
+SlabFile::SlabFile(UniqueFd fd, std::string path, Int3 extent, std::size_t sample_bytes)
+    : fd_(std::move(fd)), path_(std::move(path)), extent_(extent), sample_bytes_(sample_bytes) {}
+
+std::uint64_t SlabFile::bytes() const {
+  return static_cast<std::uint64_t>(volume(extent_)) * sample_bytes_;
+}
+
+void SlabFile::reserve() const {
+  const int failure = ::posix_fallocate(fd_.get(), 0, static_cast<off_t>(bytes()));
+  // A file system that cannot reserve shows a full disk when it is written to.
+  if (failure != 0 && failure != EOPNOTSUPP && failure != EINVAL)
+    throw system_error(fmt::format("cannot make room for {} bytes for", bytes()), path_, failure);
+}
+
+void SlabFile::write(Box3 box, const std::byte* samples) const {
+  for_each_run(box, extent_, sample_bytes_,
+               [&](std::uint64_t offset, std::size_t inside, std::size_t bytes) {
+                 write_at(fd_.get(), path_, offset, samples + inside, bytes);
+               });
+}
+
+void SlabFile::read(Box3 box, std::byte* samples) const {
+  for_each_run(box, extent_, sample_bytes_,
+               [&](std::uint64_t offset, std::size_t inside, std::size_t bytes) {
+                 read_at(fd_.get(), path_, offset, samples + inside, bytes);
+               });
+}
+
+SpooledVolume::SpooledVolume(const std::filesystem::path& beside, VolumeInfo info)
+    : info_(std::move(info)),
+      file_(open_nameless(beside), "a temporary file beside '" + beside.string() + "'",
+            info_.extent, size_of(info_.type)) {}
+
+}  // namespace isobrick

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+
+#include "isobrick/bricks/store_reader.h"
+
+namespace isobrick {
+
+/// Told of a brick that cannot be read and why; called from any thread.
+using BrickFailure = std::function<void(Int3 brick, const std::string& what)>;
+
+/// Decodes the samples of `box` of a level into `out`, dense in C order, on all
+/// threads of the current arena. Without `failure` the first brick that cannot
+/// be read ends it; otherwise such a brick's samples are left as they are.
+void read_slab(const StoreReader& store, int level, Box3 box, std::byte* out,
+               const BrickFailure& failure = nullptr);
+
+}  // namespace isobrick

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/pipeline/convert.h"
+#include "isobrick/pipeline/slab_reader.h"
+#include "tests/pipeline/convert_doubles.h"
+
+namespace isobrick::test {
+
+/// A folder for one test, gone afterwards.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "isobrick-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::filesystem::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline std::string content_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Every file below `root` with its bytes.
+inline std::map<std::string, std::string> tree_of(const std::filesystem::path& root) {
+  std::map<std::string, std::string> tree;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(root))
+    if (entry.is_regular_file())
+      tree[std::filesystem::relative(entry.path(), root).string()] = content_of(entry.path());
+  return tree;
+}
+
+/// All samples of a level.
+inline std::vector<std::byte> samples_of(const StoreReader& store, int level) {
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
+  std::vector<std::byte> samples(bytes_of(lattice.extent, lattice.type));
+  read_slab(store, level, lattice.box(), samples.data());
+  return samples;
+}
+
+template <class T>
+MemorySource make_source(Int3 extent, unsigned seed, bool odd = false, bool random_access = true) {
+  return {extent, scalar_type_of<T>, as_bytes(make_samples<T>(extent, seed, odd)), random_access};
+}
+
+inline ConvertReport convert_quietly(VolumeSource& source, const std::filesystem::path& out,
+                                     const ConvertOptions& options) {
+  NoProgress progress;
+  return convert(source, out, options, progress);
+}
+
+}  // namespace isobrick::test

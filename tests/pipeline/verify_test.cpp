@@ -1,0 +1,96 @@
+#include <gtest/gtest.h>
+
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/verify.h"
+#include "tests/pipeline/convert_store.h"
+
+namespace isobrick {
+namespace {
+
+using namespace test;
+
+class Verify : public testing::Test {
+ protected:
+  void SetUp() override {
+    MemorySource source = make_source<std::uint16_t>({90, 70, 66}, 2);
+    ConvertOptions options;
+    options.brick = 16;
+    options.shard = 48;
+    convert_quietly(source, folder_ / "a", options);
+  }
+
+  VerifyReport check(int threads = 2) {
+    NoProgress progress;
+    return verify(folder_ / "a", threads, progress);
+  }
+
+  void flip(const std::filesystem::path& file, std::uint64_t offset) {
+    std::fstream f(file, std::ios::binary | std::ios::in | std::ios::out);
+    f.seekg(static_cast<std::streamoff>(offset));
+    const int byte = f.get();
+    f.seekp(static_cast<std::streamoff>(offset));
+    f.put(static_cast<char>(byte ^ 0x10));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Verify, NamesADamagedBrickAndNothingElse) {
+  const auto place = *StoreReader(folder_ / "a").locate(0, {1, 2, 1});
+  flip(place.file, place.offset + place.size / 2);
+  const VerifyReport report = check();
+  ASSERT_EQ(report.damage_count, 1u);
+  EXPECT_NE(report.damages[0].find("level 0"), std::string::npos);
+  EXPECT_NE(report.damages[0].find("(1, 2, 1)"), std::string::npos);
+  EXPECT_NE(report.damages[0].find(place.file.string()), std::string::npos);
+  EXPECT_NE(report.damages[0].find(std::to_string(place.offset)), std::string::npos);
+}
+
+TEST_F(Verify, FindsEveryDamagedBrick) {
+  const StoreReader store(folder_ / "a");
+  for (const Int3 b : {Int3{0, 0, 0}, Int3{4, 3, 2}, Int3{2, 2, 4}}) {
+    const auto place = *store.locate(0, b);
+    flip(place.file, place.offset);
+  }
+  EXPECT_EQ(check(1).damage_count, 3u);
+  EXPECT_EQ(check(4).damage_count, 3u);
+}
+
+TEST_F(Verify, CountsABrokenShardIndexOnce) {
+  const auto file = StoreReader(folder_ / "a").locate(0, {0, 0, 0})->file;
+  flip(file, std::filesystem::file_size(file) - 20);
+  EXPECT_EQ(check().damage_count, 1u);
+}
+
+TEST_F(Verify, NoticesAMissingShardByItsRanges) {
+  std::filesystem::remove(StoreReader(folder_ / "a").locate(0, {0, 0, 0})->file);
+  EXPECT_GT(check().damage_count, 0u);
+}
+
+TEST_F(Verify, ComparesRangesWithSamples) {
+  // The same volume but for one sample: its bricks under the old ranges.
+  std::vector<std::byte> samples = make_source<std::uint16_t>({90, 70, 66}, 2).samples();
+  std::memset(samples.data() + 2 * linear_index({40, 33, 20}, {90, 70, 66}), 0xff, 2);
+  MemorySource changed({90, 70, 66}, ScalarType::u16, samples);
+  ConvertOptions options;
+  options.brick = 16;
+  options.shard = 48;
+  options.levels = 1;
+  options.force = true;
+  convert_quietly(changed, folder_ / "b", options);
+  std::filesystem::remove_all(folder_ / "a/0");
+  std::filesystem::rename(folder_ / "b/0", folder_ / "a/0");
+  const VerifyReport report = check();
+  // The brick and the block that own the sample; it lies on no lower border.
+  EXPECT_EQ(report.damage_count, 2u);
+}
+
+TEST_F(Verify, ReportsBrokenMetadataAndThrowsWithoutAStore) {
+  std::ofstream(folder_ / "a" / "1" / "zarr.json") << "{";
+  EXPECT_EQ(check().damage_count, 1u);
+  NoProgress progress;
+  EXPECT_THROW(verify(folder_ / "nothing", 1, progress), Error);
+}
+
+}  // namespace
+}  // namespace isobrick
