@@ -36,6 +36,8 @@ void Publisher::run() {
       publish_file(std::move(job.file), job.path);
     } catch (...) {
       failure = std::current_exception();
+      std::error_code ignored;
+      std::filesystem::remove(temporary_name(job.path), ignored);
     }
     lock.lock();
     busy_ = false;
