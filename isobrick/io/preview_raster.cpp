@@ -14,9 +14,10 @@ std::uint32_t pack_component(float v) {
 std::uint32_t pack_normal(Vec3f n) {
   const float length2 = n.x * n.x + n.y * n.y + n.z * n.z;
   // Towards the eye: both sides are lit alike.
-  float scale = n.z > 0 ? -1.0f : 1.0f;
-  if (length2 > 0) scale /= std::sqrt(length2);
-  n = n * scale;
+  if (length2 > 0 && std::isfinite(length2))
+    n = n * ((n.z > 0 ? -1.0f : 1.0f) / std::sqrt(length2));
+  else
+    n = {0, 0, -1};
   return pack_component(n.x) | pack_component(n.y) << 10 | pack_component(n.z) << 20;
 }
 

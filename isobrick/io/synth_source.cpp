@@ -105,11 +105,13 @@ std::unique_ptr<VolumeSource> make_synth(const SynthOptions& options) {
   if (!checked_volume(options.extent))
     throw UsageError(fmt::format("an extent of {}x{}x{} samples is not positive or too large",
                                  options.extent.x, options.extent.y, options.extent.z));
-  SynthOptions complete = options;
-  if (!complete.frequency) complete.frequency = options.kind == SynthKind::mixing ? 6.0 : 2.0;
   const Int3 e = options.extent;
-  if (!(*complete.frequency > 0 &&
-        *complete.frequency <= std::max(2.0, static_cast<double>(std::max({e.x, e.y, e.z})))))
+  // Finer structure than this is not structure any more.
+  const double finest = std::max(2.0, static_cast<double>(std::max({e.x, e.y, e.z})));
+  SynthOptions complete = options;
+  if (!complete.frequency)
+    complete.frequency = std::min(options.kind == SynthKind::mixing ? 6.0 : 2.0, finest);
+  if (!(*complete.frequency > 0 && *complete.frequency <= finest))
     throw UsageError(fmt::format("a frequency of {} is not between 0 and the longest edge",
                                  *complete.frequency));
   if (!std::isfinite(options.noise) || options.noise < 0)

@@ -1,0 +1,140 @@
+#include "isobrick/io/output_file.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+#include "isobrick/io/ply_sink.h"
+#include "isobrick/io/stl_sink.h"
+#include "temp_dir.h"
+#include "test_meshes.h"
+
+namespace isobrick {
+namespace {
+
+using Names = std::vector<std::string>;
+
+TEST(OutputFile, AppearsOnlyWhenPublished) {
+  const TempDir dir;
+  {
+    OutputFile out(dir / "a", false);
+    out.writer().append("hello");
+    EXPECT_EQ(dir.list().size(), 1u);
+    EXPECT_NE(dir.list()[0], "a");
+    out.publish();
+    EXPECT_EQ(dir.list(), Names{"a"});
+  }
+  EXPECT_EQ(dir.read("a"), "hello");
+}
+
+TEST(OutputFile, LeavesNothingWhenGivenUp) {
+  const TempDir dir;
+  { OutputFile(dir / "a", false).writer().append(std::string(3 << 20, 'x')); }
+  EXPECT_EQ(dir.list(), Names{});
+}
+
+TEST(OutputFile, KeepsWhatExistsUnlessForced) {
+  const TempDir dir;
+  dir.write("a", "old");
+  EXPECT_TRUE(contains(message_of([&] { OutputFile(dir / "a", false); }), "exists"));
+  {
+    OutputFile out(dir / "a", true);
+    out.writer().append("new");
+    EXPECT_EQ(dir.read("a"), "old");
+    out.publish();
+  }
+  EXPECT_EQ(dir.read("a"), "new");
+  EXPECT_EQ(dir.list(), Names{"a"});
+}
+
+TEST(OutputFile, KeepsWhatAppearedInTheMeantime) {
+  const TempDir dir;
+  {
+    OutputFile out(dir / "a", false);
+    dir.write("a", "somebody else's");
+    EXPECT_TRUE(contains(message_of([&] { out.publish(); }), "exists"));
+  }
+  EXPECT_EQ(dir.read("a"), "somebody else's");
+  EXPECT_EQ(dir.list(), Names{"a"});
+}
+
+TEST(OutputFile, RefusesPlacesThatCannotBeWritten) {
+  const TempDir dir;
+  message_of<Error>([&] { OutputFile(dir / "missing/a", false); });
+  message_of([&] { OutputFile(dir / ".", true); });
+  message_of([] { OutputFile("/dev/null", true); });
+  message_of([] { OutputFile("", false); });
+  if (::geteuid() == 0) return;  // for whom permissions mean nothing
+  ::chmod((dir / ".").c_str(), 0500);
+  message_of<Error>([&] { OutputFile(dir / "a", false); });
+  ::chmod((dir / ".").c_str(), 0700);
+}
+
+TEST(OutputFile, AppendsAndPatches) {
+  const TempDir dir;
+  std::string expected;
+  OutputFile out(dir / "a", false);
+  FileWriter scratch = open_scratch_beside(out.path());
+  for (int i = 0; i < 3000; ++i) {
+    const std::string piece(static_cast<std::size_t>(i), static_cast<char>('a' + i % 26));
+    (i % 2 ? scratch : out.writer()).append(piece);
+    if (i % 2 == 0) expected += piece;
+  }
+  for (int i = 1; i < 3000; i += 2)
+    expected += std::string(static_cast<std::size_t>(i), static_cast<char>('a' + i % 26));
+  const std::string big(FileWriter::kBuffer + 1, 'z');
+  out.writer().append_file(scratch);
+  out.writer().append(big);
+  out.writer().patch(10, "PATCH");
+  out.writer().append("end");
+  EXPECT_EQ(out.writer().size(), expected.size() + big.size() + 3);
+  out.publish();
+  expected.replace(10, 5, "PATCH");
+  EXPECT_TRUE(dir.read("a") == expected + big + "end");
+  EXPECT_EQ(dir.list(), Names{"a"});
+}
+
+/// Runs `f` in a child whose files may not grow beyond 2 MiB; its exit status.
+template <class F>
+int with_full_disk(F&& f) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{2 << 20, 2 << 20};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    ::_exit(f());
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+template <class Sink>
+int write_until_full(const std::string& path, int chunks) {
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 50);
+  try {
+    Sink sink(path, false);
+    sink.begin({true, {-1, -1, -1}, {1, 1, 1}});
+    for (int i = 0; i < chunks; ++i)
+      sink.write(ball.chunk(static_cast<std::uint64_t>(i) * ball.positions.size()));
+    sink.finish();
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    return contains(message, path) && contains(message, "bytes") ? 0 : 1;
+  }
+  return 2;
+}
+
+TEST(OutputFile, AFullDiskIsReportedAndLeavesNothing) {
+  const TempDir dir;
+  EXPECT_EQ(with_full_disk([&] { return write_until_full<PlySink>(dir / "a.ply", 100); }), 0);
+  EXPECT_EQ(with_full_disk([&] { return write_until_full<StlSink>(dir / "a.stl", 100); }), 0);
+  // Vertices and faces fit, but not both: fails while they are joined.
+  EXPECT_EQ(with_full_disk([&] { return write_until_full<PlySink>(dir / "b.ply", 9); }), 0);
+  EXPECT_EQ(dir.list(), Names{});
+}
+
+}  // namespace
+}  // namespace isobrick
