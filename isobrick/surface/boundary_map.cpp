@@ -106,9 +106,9 @@ void publish_boundary(TileState& tile) {
   }
 }
 
-void adopt_boundaries(TileState& tile, const BoundaryMap& map, std::uint32_t base) {
-  if (base != 0)
-    for (EdgeRow& row : tile.rows) shift(row, base);
+void adopt_boundaries(TileState& tile, const BoundaryMap& map) {
+  if (tile.number_base != 0)
+    for (EdgeRow& row : tile.rows) shift(row, tile.number_base);
   const bool* first = tile.shape.first;
   const auto before = [&](bool x, bool y, bool z) -> const TileBoundary* {
     if ((x && first[0]) || (y && first[1]) || (z && first[2])) return nullptr;

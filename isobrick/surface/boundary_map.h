@@ -37,8 +37,8 @@ class BoundaryMap {
 /// Copies the tile's own vertices on its upper planes to its boundary.
 void publish_boundary(TileState& tile);
 
-/// Completes the tile's rows: own numbers get the tile's base, rows and edges
+/// Completes the tile's rows: own numbers count from the tile's base, rows and edges
 /// on its lower planes the numbers that the tiles before gave them.
-void adopt_boundaries(TileState& tile, const BoundaryMap& map, std::uint32_t base);
+void adopt_boundaries(TileState& tile, const BoundaryMap& map);
 
 }  // namespace isobrick

@@ -1,16 +1,15 @@
 #include "isobrick/surface/cpu_extractor.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/surface/boundary_map.h"
+#include "isobrick/surface/case_rule.h"
 #include "isobrick/surface/tile_gather.h"
 #include "isobrick/surface/tile_kernels.h"
 
@@ -43,14 +42,15 @@ Index sample_reach(const SurfaceOptions& options) {
 struct CpuExtractor::Impl {
   Lattice lattice;
   SurfaceOptions options;
+  ExtractorLimits limits;
   KernelContext context;
   Int3 first_tile;
   BoundaryMap boundaries;
   std::vector<std::unique_ptr<TileState>> states;
   std::uint64_t vertices = 0, triangles = 0;
 
-  Impl(const Lattice& l, const SurfaceOptions& o)
-      : lattice(l), options(o) {
+  Impl(const Lattice& l, const SurfaceOptions& o, ExtractorLimits bounds)
+      : lattice(l), options(o), limits(bounds) {
     options.roi = intersect(o.roi, l.box());
     if (std::isnan(o.isovalue)) throw UsageError("the isovalue is not a number");
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
@@ -92,73 +92,94 @@ struct CpuExtractor::Impl {
     if (welded()) publish_boundary(state);
   }
 
-  /// Gives every tile of a batch its place behind what is there; the totals.
-  std::pair<std::uint64_t, std::uint64_t> place(std::size_t batch) {
-    std::uint64_t v = 0, t = 0;
-    for (std::size_t i = 0; i < batch; ++i) {
+  template <class F>
+  static void for_each_tile(std::size_t begin, std::size_t end, const F& f) {
+    if (end - begin <= kTilesPerThread)
+      for (std::size_t i = begin; i < end; ++i) f(i);
+    else
+      tbb::parallel_for(begin, end, f);
+  }
+
+  std::uint64_t output_bytes(std::uint64_t v, std::uint64_t t) const {
+    return v * sizeof(Vec3f) * (options.normals ? 2 : 1) + t * sizeof(Triangle);
+  }
+
+  /// Gives the counted tiles from `begin` on their places in `out`, as many as
+  /// the limits allow; the first that did not fit.
+  std::size_t place(std::size_t begin, std::size_t count, const MeshBuffer& out, bool bounded) {
+    std::uint64_t v = out.positions.size(), t = out.triangles.size();
+    std::size_t i = begin;
+    for (; i < count; ++i) {
       TileState& state = *states[i];
+      if (bounded && v > 0 && output_bytes(v + state.vertices, t + state.triangles) > limits.output_bytes)
+        break;
       state.vertex_base = v;
       state.triangle_base = t;
+      state.number_base = static_cast<std::uint32_t>(welded() ? vertices : v);
+      if (state.boundary) state.boundary->base = state.number_base;
       v += state.vertices;
       t += state.triangles;
-      if (state.boundary) state.boundary->base = static_cast<std::uint32_t>(vertices + state.vertex_base);
+      vertices += state.vertices;
+      triangles += state.triangles;
     }
-    if (welded() && vertices + v > std::numeric_limits<std::uint32_t>::max())
+    if (welded() && vertices > std::numeric_limits<std::uint32_t>::max())
       throw Error("the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
                   "cannot number; extract it in parts with --roi, or as STL");
-    return {v, t};
+    return i;
   }
 
-  template <class F>
-  static void for_each_tile(std::size_t batch, bool parallel, const F& f) {
-    if (!parallel) {
-      for (std::size_t i = 0; i < batch; ++i) f(i);
-      return;
-    }
-    tbb::parallel_for(std::size_t{0}, batch, f);
+  void emit(TileState& state, MeshBuffer& out) const {
+    if (state.vertices == 0 && state.triangles == 0) return;
+    adopt_boundaries(state, boundaries);
+    emit_tile(lattice.type, context, state, out.positions.data() + state.vertex_base,
+              options.normals ? out.normals.data() + state.vertex_base : nullptr,
+              out.triangles.data() + state.triangle_base);
   }
 
-  void extract_batch(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out) {
+  void resize_for(MeshBuffer& out, const TileState& last) const {
+    out.positions.resize(last.vertex_base + last.vertices);
+    if (options.normals) out.normals.resize(last.vertex_base + last.vertices);
+    out.triangles.resize(last.triangle_base + last.triangles);
+  }
+
+  void extract_batch(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out,
+                     const TakeMesh& take) {
     const std::size_t n = tiles.size();
     while (states.size() < n) states.push_back(std::make_unique<TileState>());
     for (std::size_t i = 0; i < n; ++i)
       states[i]->boundary = welded() ? boundaries.add(tiles[i].tile) : nullptr;
-    const bool parallel = n > kTilesPerThread;
-    for_each_tile(n, parallel, [&](std::size_t i) { count(*states[i], tiles[i], bricks); });
-    const auto [v, t] = place(n);
-    const std::size_t old_vertices = out.positions.size(), old_triangles = out.triangles.size();
-    out.positions.resize(old_vertices + v);
-    if (options.normals) out.normals.resize(old_vertices + v);
-    out.triangles.resize(old_triangles + t);
-    const std::uint64_t first_number = welded() ? vertices : old_vertices;
-    for_each_tile(n, parallel, [&](std::size_t i) {
-      TileState& state = *states[i];
-      if (state.vertices == 0 && state.triangles == 0) return;
-      adopt_boundaries(state, boundaries,
-                       static_cast<std::uint32_t>(first_number + state.vertex_base));
-      const std::size_t at = old_vertices + state.vertex_base;
-      emit_tile(lattice.type, context, state, out.positions.data() + at,
-                options.normals ? out.normals.data() + at : nullptr,
-                out.triangles.data() + old_triangles + state.triangle_base);
-    });
-    vertices += v;
-    triangles += t;
+    for_each_tile(0, n, [&](std::size_t i) { count(*states[i], tiles[i], bricks); });
+    for (std::size_t begin = 0; begin < n;) {
+      const std::size_t end = place(begin, n, out, static_cast<bool>(take));
+      if (end > begin) {
+        resize_for(out, *states[end - 1]);
+        for_each_tile(begin, end, [&](std::size_t i) { emit(*states[i], out); });
+      }
+      begin = end;
+      if (begin < n) hand_on(out, take);
+    }
     if (welded()) boundaries.forget_before(tiles.back().tile);
+  }
+
+  void hand_on(MeshBuffer& out, const TakeMesh& take) const {
+    const std::uint64_t first = vertices - out.positions.size();
+    if (out.positions.size() + out.triangles.size() > 0) take(out, first);
   }
 };
 
-CpuExtractor::CpuExtractor(const Lattice& lattice, const SurfaceOptions& options)
-    : impl_(std::make_unique<Impl>(lattice, options)) {}
+CpuExtractor::CpuExtractor(const Lattice& lattice, const SurfaceOptions& options,
+                           ExtractorLimits limits)
+    : impl_(std::make_unique<Impl>(lattice, options, limits)) {}
 CpuExtractor::~CpuExtractor() = default;
 
 void CpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
-                           MeshBuffer& out) {
-  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+                           MeshBuffer& out, const TakeMesh& take) {
   while (!tiles.empty()) {
-    const std::size_t batch = std::min(tiles.size(), kTilesPerThread * threads);
-    impl_->extract_batch(tiles.first(batch), bricks, out);
+    const std::size_t batch = std::min(tiles.size(), impl_->limits.tiles);
+    impl_->extract_batch(tiles.first(batch), bricks, out, take);
     tiles = tiles.subspan(batch);
   }
+  if (take) impl_->hand_on(out, take);
 }
 
 void CpuExtractor::restart() {
@@ -169,10 +190,18 @@ void CpuExtractor::restart() {
 std::uint64_t CpuExtractor::vertices() const { return impl_->vertices; }
 std::uint64_t CpuExtractor::triangles() const { return impl_->triangles; }
 
-std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, int threads) {
-  return static_cast<std::uint64_t>(threads) * kTilesPerThread *
-         (sizeof(TileState) + TileLayout::kSize * size_of(type) +
-          kTileEdge * kTileEdge * kTileEdge * sizeof(ActiveCell));
+std::size_t CpuExtractor::good_batch(int threads) {
+  return kTilesPerThread * static_cast<std::size_t>(threads);
+}
+
+std::uint64_t CpuExtractor::workspace_bytes(ScalarType type) {
+  return sizeof(TileState) + TileLayout::kSize * size_of(type) +
+         kTileEdge * kTileEdge * kTileEdge * sizeof(ActiveCell);
+}
+
+std::uint64_t CpuExtractor::max_tile_output(bool normals) {
+  return std::uint64_t{3} * kTileRows * kTileSamples * sizeof(Vec3f) * (normals ? 2 : 1) +
+         std::uint64_t{kMaxCaseTriangles} * kTileEdge * kTileEdge * kTileEdge * sizeof(Triangle);
 }
 
 }  // namespace isobrick

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -13,6 +14,18 @@ namespace isobrick {
 /// and for looking at the neighbours of NaN, none otherwise.
 Index sample_reach(const SurfaceOptions& options);
 
+/// What bounds an extractor's memory. Never shows in the mesh.
+struct ExtractorLimits {
+  /// Tiles between two hand-offs: a work space each.
+  std::size_t tiles = 64;
+  /// Bytes of mesh after which it is handed on; one tile may exceed them.
+  std::uint64_t output_bytes = ~std::uint64_t{0};
+};
+
+/// Takes what was extracted so far and leaves the buffer empty (or another
+/// empty one in its place). The chunk's first vertex comes along.
+using TakeMesh = std::function<void(MeshBuffer& mesh, std::uint64_t first_vertex)>;
+
 /// Marching cubes on the CPU: tiles in, indexed welded mesh out.
 ///
 /// Two passes over a batch of tiles, each in parallel over its tiles: the first
@@ -23,14 +36,16 @@ Index sample_reach(const SurfaceOptions& options);
 class CpuExtractor {
  public:
   /// Throws UsageError when the isovalue is not a number or the roi is empty.
-  CpuExtractor(const Lattice& lattice, const SurfaceOptions& options);
+  CpuExtractor(const Lattice& lattice, const SurfaceOptions& options, ExtractorLimits limits);
   ~CpuExtractor();
 
-  /// Appends the surface in `tiles` to `out`. Over all calls, tiles come in
+  /// Appends the surface in `tiles` to `out`, or hands it to `take` whenever the
+  /// limits say so and at the end. Over all calls, tiles come in
   /// Morton order, none twice; `bricks` holds what for_each_needed_box says.
   /// Runs in the caller's TBB arena. Throws Error when a welded mesh gets more
   /// vertices than 32 bits number.
-  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out);
+  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out,
+               const TakeMesh& take = {});
 
   /// Forgets all that was extracted: the next tile may be any again.
   void restart();
@@ -39,8 +54,12 @@ class CpuExtractor {
   std::uint64_t vertices() const;
   std::uint64_t triangles() const;
 
-  /// Bytes of work space for a number of threads.
-  static std::uint64_t workspace_bytes(ScalarType type, int threads);
+  /// Tiles between two hand-offs that keep `threads` busy and their caches warm.
+  static std::size_t good_batch(int threads);
+  /// Bytes of work space for one tile.
+  static std::uint64_t workspace_bytes(ScalarType type);
+  /// Bytes of output that one tile can make at most.
+  static std::uint64_t max_tile_output(bool normals);
 
  private:
   struct Impl;

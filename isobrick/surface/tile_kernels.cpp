@@ -1,6 +1,7 @@
 #include "isobrick/surface/tile_kernels.h"
 
 // Highway compiles what lies in HWY_NAMESPACE once for every target below.
+#define HWY_WANT_AVX3_DL  // vpopcntd
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "isobrick/surface/tile_kernels.cpp"

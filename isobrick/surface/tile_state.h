@@ -77,6 +77,7 @@ struct TileState {
   PodBuffer<ActiveCell> cells;
   std::uint32_t vertices = 0, triangles = 0;
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
+  std::uint32_t number_base = 0;                     ///< what its vertices are numbered from
   TileBoundary* boundary = nullptr;                  ///< of this tile, when later tiles need it
 };
 

@@ -60,7 +60,8 @@ TYPED_TEST(EveryType, BrickSizeBatchesAndThreadsNeverShow) {
         EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals}), expected);
       });
     for (const std::size_t batch : {1u, 3u, 40u})
-      EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals, .batch = batch}), expected);
+      EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals, .batch = batch,
+                                .workspaces = batch + 1}), expected);
   }
 }
 

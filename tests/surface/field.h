@@ -74,6 +74,7 @@ struct Request {
   std::optional<Box3> roi;
   Transform transform;
   std::size_t batch = ~std::size_t{0};  ///< tiles a call
+  std::size_t workspaces = 64;
 };
 
 /// Our mesh of a field, through bricks, ranges and the CPU extractor.
@@ -92,7 +93,7 @@ Mesh extract(const Field<T>& field, const Request& request) {
   std::vector<TileWork> tiles;
   const auto ranges = block_ranges(field);
   append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, ranges, request.isovalue, tiles);
-  CpuExtractor extractor(lattice, options);
+  CpuExtractor extractor(lattice, options, {.tiles = request.workspaces});
   MeshBuffer out;
   for (std::size_t i = 0; i < tiles.size(); i += std::min(request.batch, tiles.size()))
     extractor.extract(std::span(tiles).subspan(i, std::min(request.batch, tiles.size() - i)), bricks, out);
