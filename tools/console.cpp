@@ -38,12 +38,14 @@ void put(std::FILE* file, std::string_view text) {
 
 }  // namespace
 
-void catch_interrupts() {
+void set_up_signals() {
   struct sigaction action {};
   action.sa_handler = [](int signal) { g_signal = signal; };
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  // A file that outgrows its limit is an error with a line, not a death.
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 std::string progress_line(std::string_view stage, std::uint64_t done, std::uint64_t total,

@@ -32,8 +32,8 @@ class Interrupted : public std::exception {
 };
 
 /// From now on the first SIGINT or SIGTERM is thrown by the progress calls; a
-/// second one kills at once.
-void catch_interrupts();
+/// second one kills at once. A file size limit becomes an ordinary write error.
+void set_up_signals();
 
 /// A bar with rate and time left on standard error when that is a terminal.
 class TerminalProgress final : public Progress {

@@ -63,7 +63,7 @@ int die_of(int signal) {
 int run(Program& program, int argc, char** argv) {
   try {
     program.app.parse(argc, argv);
-    catch_interrupts();
+    set_up_signals();
     Console console(program.speech);
     return parsed(program)->run(console);
   } catch (const CLI::ParseError& error) {

@@ -104,14 +104,4 @@ TEST(Includes, TheTableRefusesWhatItShould) {
   EXPECT_TRUE(allowed("io", "surface/mesh.h"));
 }
 
-TEST(Includes, EveryHeaderHasAGuard) {
-  for (const auto& entry : fs::recursive_directory_iterator(library())) {
-    if (entry.path().extension() != ".h") continue;
-    std::ifstream file(entry.path());
-    std::string first;
-    std::getline(file, first);
-    EXPECT_EQ(first, "#pragma once") << entry.path();
-  }
-}
-
 }  // namespace

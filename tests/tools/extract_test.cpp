@@ -1,0 +1,128 @@
+#include <csignal>
+
+#include "tests/tools/program.h"
+
+namespace isobrick::test {
+namespace {
+
+using Extract = ProgramTest;
+
+TEST_F(Extract, ReportsWhatItDid) {
+  const std::string store = make_store("a");
+  const nlohmann::json json =
+      run_json({"extract", store, "--isovalue", "127.5", "-o", path("a.ply")});
+  EXPECT_EQ(json["command"], "extract");
+  EXPECT_GT(json["peak_resident_bytes"].get<std::uint64_t>(), 0u);
+  ASSERT_EQ(json["surfaces"].size(), 1u);
+  const nlohmann::json& surface = json["surfaces"][0];
+  EXPECT_GT(surface["triangles"].get<int>(), 100);
+  EXPECT_GT(surface["vertices"].get<int>(), 50);
+  EXPECT_EQ(surface["bricks"]["total"], 27);
+  EXPECT_GT(surface["bricks"]["active"].get<int>(), 0);
+  EXPECT_GT(surface["bricks"]["read"].get<int>(), 0);
+  EXPECT_GT(surface["bytes_read"].get<int>(), 0);
+  for (const char* stage : {"total", "plan", "decode", "surface", "sink"})
+    EXPECT_TRUE(surface["seconds"][stage].is_number()) << stage;
+  const std::string mesh = read_file(path("a.ply"));
+  EXPECT_EQ(surface["output_bytes"], mesh.size());
+  EXPECT_NE(mesh.find("element face " + surface["triangles"].dump()), std::string::npos);
+  EXPECT_NE(mesh.find("element vertex " + surface["vertices"].dump()), std::string::npos);
+}
+
+TEST_F(Extract, WritesStl) {
+  const std::string store = make_store("a");
+  const nlohmann::json json =
+      run_json({"extract", store, "--isovalue", "127.5", "-o", path("a.stl")});
+  EXPECT_EQ(read_file(path("a.stl")).size(),
+            84 + 50 * json["surfaces"][0]["triangles"].get<std::size_t>());
+}
+
+TEST_F(Extract, NormalsEnlargeTheVertices) {
+  const std::string store = make_store("a");
+  const nlohmann::json json = run_json({"extract", store, "--isovalue", "127.5", "--normals",
+                                        "gradient", "-o", path("a.ply")});
+  const std::string mesh = read_file(path("a.ply"));
+  EXPECT_NE(mesh.find("property float nx"), std::string::npos);
+  EXPECT_GT(mesh.size(), 24 * json["surfaces"][0]["vertices"].get<std::size_t>() +
+                             13 * json["surfaces"][0]["triangles"].get<std::size_t>());
+}
+
+TEST_F(Extract, SeveralIsovaluesGetNamesOfTheirOwn) {
+  const std::string store = make_store("a");
+  const nlohmann::json json = run_json({"extract", store, "--isovalue", "100", "--isovalue", "127.5",
+                                        "-o", path("m.ply"), "--preview", path("m.png")});
+  EXPECT_EQ(json["surfaces"].size(), 2u);
+  EXPECT_EQ(files(), (Arguments{"a.zarr", "m_100.ply", "m_100.png", "m_127.5.ply", "m_127.5.png"}));
+}
+
+TEST_F(Extract, DrawsAPicture) {
+  const std::string store = make_store("a");
+  run_json({"extract", store, "--isovalue", "127.5", "--preview", path("a.png")});
+  EXPECT_TRUE(read_file(path("a.png")).starts_with("\x89PNG\r\n"));
+  EXPECT_EQ(files(), (Arguments{"a.png", "a.zarr"}));
+}
+
+TEST_F(Extract, IsTheSameFromRunToRun) {
+  const std::string store = make_store("a");
+  for (const char* threads : {"1", "2", "5"})
+    EXPECT_EQ(run({"extract", store, "--isovalue", "127.5", "--threads", threads, "-o",
+                   path(std::string("t") + threads + ".ply")})
+                  .exit_code,
+              0);
+  EXPECT_TRUE(read_file(path("t1.ply")) == read_file(path("t2.ply")));
+  EXPECT_TRUE(read_file(path("t1.ply")) == read_file(path("t5.ply")));
+}
+
+TEST_F(Extract, EstimateWritesNothingAndIsNear) {
+  const std::string store = make_store("a");
+  const std::vector<std::string> names = files();
+  const nlohmann::json estimate =
+      run_json({"extract", store, "--isovalue", "127.5", "--estimate", "-o", path("a.ply")});
+  EXPECT_EQ(files(), names);
+  const nlohmann::json made = run_json({"extract", store, "--isovalue", "127.5", "-o", path("a.ply")});
+  const nlohmann::json &predicted = estimate["surfaces"][0], &real = made["surfaces"][0];
+  EXPECT_EQ(predicted["bricks"]["active"], real["bricks"]["active"]);
+  for (const char* key : {"triangles", "vertices"}) {
+    EXPECT_LT(predicted[key].get<double>(), 4 * real[key].get<double>()) << key;
+    EXPECT_GT(predicted[key].get<double>(), real[key].get<double>() / 4) << key;
+  }
+  EXPECT_GT(predicted["file_bytes"].get<std::uint64_t>(), 0u);
+  EXPECT_GT(predicted["memory_bytes"].get<std::uint64_t>(), 0u);
+  EXPECT_GT(predicted["active_blocks"].get<std::uint64_t>(), 0u);
+}
+
+TEST_F(Extract, AnEmptySurfaceIsAMesh) {
+  const std::string store = make_store("a");
+  const Outcome outcome = run({"extract", store, "--isovalue", "1000", "-o", path("a.ply")});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.err.find("empty"), std::string::npos);
+  EXPECT_NE(read_file(path("a.ply")).find("element face 0"), std::string::npos);
+}
+
+TEST_F(Extract, LevelsAndRegionsShrinkTheMesh) {
+  const std::string store = make_store("a");
+  const auto triangles = [&](const Arguments& more) {
+    Arguments arguments{"extract", store, "--isovalue", "127.5", "-o", path("a.ply"), "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_json(arguments)["surfaces"][0]["triangles"].get<int>();
+  };
+  const int all = triangles({});
+  EXPECT_LT(triangles({"--level", "1"}), all / 2);
+  const int half = triangles({"--roi", ":20,,"});
+  EXPECT_LT(half, all);
+  EXPECT_GT(half, 0);
+  // Cells are cut in two at a plane of samples: nothing is lost or made twice.
+  EXPECT_EQ(half + triangles({"--roi", "19:,,"}), all);
+}
+
+// The program of the signal's default: the shell must see that it was SIGINT.
+TEST_F(Extract, AnInterruptLeavesNothingBehind) {
+  const Outcome outcome = run({"synth", "mixing", path("big.raw"), "--dims", "2000,2000,2000",
+                               "--type", "f32", "--threads", "1"},
+                              {.interrupt_after = 0.4});
+  EXPECT_EQ(outcome.signal, SIGINT);
+  EXPECT_TRUE(files().empty());
+}
+
+}  // namespace
+}  // namespace isobrick::test

@@ -1,0 +1,160 @@
+#include <array>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "tests/tools/program.h"
+
+namespace isobrick::test {
+namespace {
+
+using Speech = ProgramTest;
+
+constexpr std::array kCommands{"convert", "info",  "verify",     "extract",
+                               "export",  "synth", "completion", "man"};
+
+bool available(const std::string& program) {
+  return run_process({"/bin/sh", "-c", "command -v " + program}).exit_code == 0;
+}
+
+TEST_F(Speech, Version) {
+  const Outcome outcome = run({"--version"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.out, "isobrick " ISOBRICK_VERSION "\n");
+}
+
+TEST_F(Speech, EverySubcommandHasHelpWithAnExample) {
+  const Outcome all = run({"--help"});
+  EXPECT_EQ(all.exit_code, 0);
+  for (const std::string command : kCommands) {
+    EXPECT_NE(all.out.find("  " + command), std::string::npos) << command;
+    const Outcome outcome = run({command, "--help"});
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_EQ(outcome.err, "");
+    for (const char* part : {"Example:\n", "--json", "--quiet", "--help"})
+      EXPECT_NE(outcome.out.find(part), std::string::npos) << command << " " << part;
+  }
+}
+
+TEST_F(Speech, InfoShowsTheStore) {
+  const std::string store = make_store("a");
+  const Outcome outcome = run({"info", store});
+  EXPECT_EQ(outcome.err, "");
+  for (const char* part : {"40 x 36 x 33", "uint8", "spacing", "level 0", "level 1", "value range",
+                           "index kinds  none", "histogram", "█"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << "\n" << outcome.out;
+  const nlohmann::json json = run_json({"info", store});
+  for (const char* key :
+       {"command", "store", "extent", "type", "spacing", "origin", "direction", "unit", "codec",
+        "fill_value", "levels", "bytes", "raw_bytes", "ratio", "value_range", "histogram",
+        "index_kinds"})
+    EXPECT_TRUE(json.contains(key)) << key;
+  std::uint64_t counted = 0;
+  for (const auto& count : json["histogram"]["counts"]) counted += count.get<std::uint64_t>();
+  EXPECT_EQ(counted, 40u * 36 * 33);
+  EXPECT_EQ(json["levels"][0]["bricks"], 27);
+}
+
+TEST_F(Speech, InfoOfOddVolumes) {
+  const float special[] = {std::numeric_limits<float>::quiet_NaN(),
+                           std::numeric_limits<float>::infinity(), 1, 2};
+  write_file(path("a_2x2x1_float32.raw"),
+             std::string(reinterpret_cast<const char*>(special), sizeof special));
+  ASSERT_EQ(run({"convert", path("a_2x2x1_float32.raw"), path("a.zarr")}).exit_code, 0);
+  const nlohmann::json json = run_json({"info", path("a.zarr")})["histogram"];
+  EXPECT_EQ(json["not_a_number"], 1);
+  EXPECT_EQ(json["infinite"], 1);
+  EXPECT_EQ(json["lo"], 1.0);
+  EXPECT_EQ(json["hi"], 2.0);
+  write_file(path("b_3x1x1_uint8.raw"), "aaa");
+  ASSERT_EQ(run({"convert", path("b_3x1x1_uint8.raw"), path("b.zarr")}).exit_code, 0);
+  EXPECT_EQ(run_json({"info", path("b.zarr")})["histogram"]["counts"], nlohmann::json({3}));
+}
+
+TEST_F(Speech, JsonOfConversions) {
+  write_file(path("in_20x20x20_uint8.raw"), noise(8000));
+  for (const Arguments& arguments :
+       {Arguments{"convert", path("in_20x20x20_uint8.raw"), path("a.zarr")},
+        Arguments{"synth", "sphere", path("b.zarr"), "--dims", "20,20,20", "--type", "u8"},
+        Arguments{"synth", "sphere", path("b.raw"), "--dims", "20,20,20", "--type", "u8"}}) {
+    const nlohmann::json json = run_json(arguments);
+    EXPECT_EQ(json["command"], arguments[0]);
+    EXPECT_EQ(json["bytes_in"], 8000);
+    for (const char* key : {"input", "output", "extent", "type", "levels", "bricks", "bytes_out",
+                            "ratio", "seconds", "peak_resident_bytes"})
+      EXPECT_TRUE(json.contains(key)) << key;
+  }
+}
+
+TEST_F(Speech, QuietSaysNothing) {
+  const std::string store = make_store("a");
+  for (const Arguments& arguments :
+       {Arguments{"info", store}, Arguments{"verify", store},
+        Arguments{"export", store, path("a.raw")},
+        Arguments{"extract", store, "--isovalue", "1000", "-o", path("a.ply")},
+        Arguments{"synth", "sphere", path("b.zarr"), "--dims", "9,9,9", "--type", "u8"}}) {
+    Arguments quiet = arguments;
+    quiet.push_back("--quiet");
+    const Outcome outcome = run(quiet, {.terminal = true});
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_EQ(outcome.out + outcome.err, "") << arguments[0];
+  }
+}
+
+TEST_F(Speech, ABarOnATerminalAndNoneInAPipe) {
+  const Arguments arguments{"synth",  "mixing", path("a.raw"), "--dims", "256,256,256",
+                            "--type", "f32",    "--threads",   "1",      "--force"};
+  const Outcome terminal = run(arguments, {.terminal = true});
+  EXPECT_EQ(terminal.exit_code, 0);
+  EXPECT_NE(terminal.err.find("% ["), std::string::npos) << terminal.err;
+  EXPECT_NE(terminal.err.find("/s"), std::string::npos);
+  EXPECT_TRUE(terminal.err.ends_with("\r\x1b[K")) << "the bar is wiped at the end";
+  EXPECT_EQ(run(arguments).err, "");
+}
+
+TEST_F(Speech, CompletionsAreScripts) {
+  for (const std::string shell : {"bash", "zsh", "fish"}) {
+    const Outcome outcome = run({"completion", shell});
+    EXPECT_EQ(outcome.exit_code, 0);
+    for (const std::string command : kCommands)
+      EXPECT_NE(outcome.out.find(command), std::string::npos) << shell << " " << command;
+    EXPECT_NE(outcome.out.find("isovalue"), std::string::npos) << shell;
+    if (!available(shell)) continue;
+    write_file(path(shell), outcome.out);
+    const Outcome checked = run_process({shell, "-n", path(shell)});
+    EXPECT_EQ(checked.exit_code, 0) << checked.err;
+  }
+}
+
+TEST_F(Speech, BashCompletes) {
+  if (!available("bash")) GTEST_SKIP() << "no bash";
+  write_file(path("script"), run({"completion", "bash"}).out);
+  const auto completed = [&](const std::string& words, int at) {
+    return run_process({"bash", "-c",
+                        fmt::format("source {}; COMP_WORDS=({}); COMP_CWORD={}; _isobrick; "
+                                    "echo \"${{COMPREPLY[@]}}\"",
+                                    path("script"), words, at)})
+        .out;
+  };
+  EXPECT_EQ(completed("isobrick ex", 1), "extract export\n");
+  EXPECT_EQ(completed("isobrick convert --type f", 3), "f32 f64\n");
+  EXPECT_EQ(completed("isobrick extract --iso", 2), "--isovalue\n");
+  EXPECT_EQ(completed("isobrick synth gy", 2), "gyroid\n");
+}
+
+TEST_F(Speech, TheManPageIsWellFormed) {
+  const Outcome page = run({"man"});
+  EXPECT_EQ(page.exit_code, 0);
+  for (const std::string command : kCommands)
+    EXPECT_NE(page.out.find(".SS " + command + "\n"), std::string::npos) << command;
+  if (!available("man")) GTEST_SKIP() << "no man";
+  write_file(path("isobrick.1"), page.out);
+  const Outcome shown = run_process(
+      {"/bin/sh", "-c", "MANROFFOPT=-ww MANWIDTH=100 man --warnings -l " + path("isobrick.1")});
+  EXPECT_EQ(shown.exit_code, 0);
+  EXPECT_EQ(shown.err, "");
+  EXPECT_NE(shown.out.find("--isovalue"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace isobrick::test

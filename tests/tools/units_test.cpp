@@ -1,0 +1,96 @@
+#include <gtest/gtest.h>
+
+#include "isobrick/core/error.h"
+#include "tools/console.h"
+#include "tools/format.h"
+#include "tools/parse.h"
+
+namespace isobrick::tools {
+namespace {
+
+TEST(Parse, Bytes) {
+  EXPECT_EQ(parse_bytes("100000"), 100000u);
+  EXPECT_EQ(parse_bytes("64K"), 65536u);
+  EXPECT_EQ(parse_bytes("512M"), 536870912u);
+  EXPECT_EQ(parse_bytes("1g"), 1073741824u);
+  EXPECT_EQ(parse_bytes("1.5G"), 1610612736u);
+  EXPECT_EQ(parse_bytes("2GiB"), 2147483648u);
+  EXPECT_EQ(parse_bytes("2GB"), 2147483648u);
+  EXPECT_EQ(parse_bytes("1T"), 1099511627776u);
+  for (const char* text : {"", "G", "-1", "0", "1X", "1 G", "1Gi", "nan", "inf", "9999999T", "0.1"})
+    EXPECT_THROW(parse_bytes(text), UsageError) << text;
+}
+
+TEST(Parse, Dims) {
+  EXPECT_EQ(parse_dims("1,2,3"), (Int3{1, 2, 3}));
+  for (const char* text : {"", "1,2", "1,2,3,4", "0,1,1", "-1,1,1", "1,,1", "a,1,1", "1.5,1,1",
+                           "1, 2,3", "9223372036854775807,2,2", "99999999999999999999,1,1",
+                           "3000000,3000000,3000000"})
+    EXPECT_THROW(parse_dims(text), UsageError) << text;
+}
+
+TEST(Parse, Vector) {
+  EXPECT_EQ(parse_vector("0.5,-1,+1e3"), (Vec3d{0.5, -1, 1000}));
+  for (const char* text : {"1,2", "1,nan,1", "inf,1,1", "1,1,x"})
+    EXPECT_THROW(parse_vector(text), UsageError) << text;
+}
+
+TEST(Parse, Types) {
+  EXPECT_EQ(parse_type("i16"), ScalarType::i16);
+  EXPECT_EQ(parse_type("float64"), ScalarType::f64);
+  EXPECT_THROW(parse_type("i64"), UsageError);
+  EXPECT_EQ(parse_byte_order("big"), ByteOrder::big);
+  EXPECT_THROW(parse_byte_order("middle"), UsageError);
+}
+
+TEST(Parse, CodecAndLevels) {
+  EXPECT_EQ(parse_codec("none"), std::nullopt);
+  EXPECT_EQ(parse_codec("zstd"), 3);
+  EXPECT_EQ(parse_codec("zstd:19"), 19);
+  for (const char* text : {"", "gzip", "zstd:", "zstd:0", "zstd:23", "zstd3"})
+    EXPECT_THROW(parse_codec(text), UsageError) << text;
+  EXPECT_EQ(parse_levels("auto"), std::nullopt);
+  EXPECT_EQ(parse_levels("4"), 4);
+  EXPECT_THROW(parse_levels("0"), UsageError);
+}
+
+TEST(Parse, Roi) {
+  const Int3 extent{10, 20, 30};
+  const auto box = [&](const char* text) { return resolve_roi(parse_roi(text), extent); };
+  EXPECT_EQ(box("1:2,3:4,5:6"), (Box3{{1, 3, 5}, {2, 4, 6}}));
+  EXPECT_EQ(box(":5,,"), (Box3{{0, 0, 0}, {5, 20, 30}}));
+  EXPECT_EQ(box(":,7:,:30"), (Box3{{0, 7, 0}, {10, 20, 30}}));
+  for (const char* text : {"", ":", "1,2,3", ":,:", "a:b,,", "-1:2,,", "1:2:3,,", ",,,"})
+    EXPECT_THROW(parse_roi(text), UsageError) << text;
+  for (const char* text : {"0:11,,", "5:5,,", "6:5,,", ",20:,", ",,30:31"})
+    EXPECT_THROW(box(text), UsageError) << text;
+}
+
+TEST(Format, Figures) {
+  EXPECT_EQ(human_bytes(std::uint64_t{999}), "999 B");
+  EXPECT_EQ(human_bytes(std::uint64_t{1536}), "1.50 KiB");
+  EXPECT_EQ(human_bytes(std::uint64_t{8} << 30), "8.00 GiB");
+  EXPECT_EQ(human_count(0), "0");
+  EXPECT_EQ(human_count(999), "999");
+  EXPECT_EQ(human_count(1234567), "1,234,567");
+  EXPECT_EQ(human_seconds(0.0123), "0.012 s");
+  EXPECT_EQ(human_seconds(125), "2:05 min");
+}
+
+TEST(Progress, LineHasRateAndTimeLeft) {
+  EXPECT_EQ(progress_line("convert", 50 << 20, 100 << 20, 2, 80),
+            "convert  50% [############............] 25.0 MiB/s, 2 s left");
+  EXPECT_EQ(progress_line("convert", 100, 100, 1, 80),
+            "convert 100% [########################] 100 B/s");
+}
+
+TEST(Progress, UnknownTotalShowsWhatIsDone) {
+  EXPECT_EQ(progress_line("read", 2048, 0, 1, 80), "read 2.00 KiB 2.00 KiB/s");
+}
+
+TEST(Progress, LineIsCutToTheTerminal) {
+  EXPECT_EQ(progress_line("convert", 50, 100, 1, 20).size(), 19u);
+}
+
+}  // namespace
+}  // namespace isobrick::tools
