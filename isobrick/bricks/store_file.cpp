@@ -137,8 +137,10 @@ void publish_file(StoreFile temporary, const std::filesystem::path& path) {
 
 void sync_directory(const std::filesystem::path& directory) {
   const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  // Entries may be made in a directory that one may not read; others sync it then.
+  if (descriptor < 0 && errno == EACCES) return;
   if (descriptor < 0) throw system_error("open", directory.string(), errno);
-  StoreFile file(descriptor, directory);
+  const StoreFile file(descriptor, directory);
   // Some file systems cannot sync a directory and say EINVAL; there is nothing more to do then.
   if (::fsync(descriptor) != 0 && errno != EINVAL)
     throw system_error("sync", directory.string(), errno);

@@ -108,7 +108,6 @@ struct StoreWriter::Impl {
   }
   std::shared_ptr<OpenShard> open_shard(int i, Int3 s);
   void write(OpenShard& shard, std::span<const std::byte> bytes);
-  void close(OpenShard& shard);
 
   std::filesystem::path dir;
   StoreLayout layout;
@@ -197,11 +196,6 @@ void StoreWriter::Impl::write(OpenShard& shard, std::span<const std::byte> bytes
   if (!shard.counted) shard.file = StoreFile();
 }
 
-void StoreWriter::Impl::close(OpenShard& shard) {
-  if (shard.counted) --open_files;
-  shard.counted = false;
-}
-
 StoreWriter::StoreWriter(const std::filesystem::path& dir, const StoreLayout& layout, bool resume)
     : impl_(std::make_unique<Impl>(dir, layout, resume)) {
   impl_->begin();
@@ -272,7 +266,7 @@ void StoreWriter::finish_shard(int level, Int3 s) {
   const std::lock_guard lock(shard->mutex);
   impl_->write(*shard, shard->index.encode());
   if (!shard->file) shard->file = StoreFile::open_for_writing(temporary_name(shard->path));
-  impl_->close(*shard);
+  if (shard->counted) --impl_->open_files;
   impl_->publisher->publish(std::move(shard->file), shard->path);
   const std::lock_guard map_lock(impl_->mutex);
   impl_->open_shards.erase({level, linear_index(s, l.shards)});
@@ -312,6 +306,7 @@ void StoreWriter::finish(bool may_have_nan) {
   std::filesystem::remove(impl_->dir / kLayoutMarker, failure);
   if (failure) throw system_error("remove", (impl_->dir / kLayoutMarker).string(), failure.value());
   sync_directory(impl_->dir);
+  sync_directory(impl_->dir / "..");  // may be new there itself
 }
 
 std::uint64_t StoreWriter::bytes() const { return impl_->publisher->bytes(); }

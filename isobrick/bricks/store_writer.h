@@ -34,18 +34,23 @@ class StoreWriter {
   ~StoreWriter();
 
   /// Whether shard `s` (in shards) of `level` was already whole when resuming.
+  /// Looks at its index and size, not at its bricks. Its bricks need not be put.
   bool shard_is_whole(int level, Int3 s) const;
 
   /// Appends an encoded brick (see encode_brick) to its shard; nothing for an
-  /// absent one. Thread-safe between shards.
+  /// absent one. Thread-safe.
   void put(int level, Int3 brick, std::span<const std::byte> encoded);
 
-  /// All bricks of the shard were put: index, sync, rename.
+  /// All bricks of the shard were put: index, sync, rename, the latter two on a
+  /// thread of the writer's own. A failure there comes out of a later call, at
+  /// the latest of finish().
   void finish_shard(int level, Int3 s);
 
   /// Ranges of an aligned box of bricks or of 16³ blocks, as pairs (lo, hi) of
-  /// the level's type, C order [z, y, x, 2] over `box`. Kept in memory only for
-  /// one layer of range chunks along z, so calls come in order of increasing z.
+  /// the level's type, C order [z, y, x, 2] over `box`; each item exactly once.
+  /// A chunk of ranges is kept in memory until all its items are known, so calls
+  /// come in order of increasing z. A level without any is written without
+  /// ranges. Thread-safe.
   void put_brick_ranges(int level, Box3 box, std::span<const std::byte> pairs);
   void put_block_ranges(int level, Box3 box, std::span<const std::byte> pairs);
 
