@@ -15,6 +15,8 @@ namespace {
 constexpr Index kEdge = StoreReader::kRangeChunk;
 constexpr Int3 kChunk{kEdge, kEdge, kEdge};
 constexpr int kRangeZstdLevel = 3;
+// Four gigabytes of ranges: a store that claims to have more must be read in parts.
+constexpr Index kMaxItemsAtOnce = Index{1} << 28;
 
 std::filesystem::path chunk_path(const std::filesystem::path& folder, const ArrayMetadata& metadata,
                                  Int3 c) {
@@ -128,6 +130,9 @@ RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, Sca
 
 RangeTable RangeArrayReader::read(Box3 box, std::atomic<std::uint64_t>& bytes_read) const {
   check_box(box, items_);
+  if (volume(box.extent()) > kMaxItemsAtOnce)
+    throw Error(fmt::format("'{}': {} ranges are too many at once", folder_.string(),
+                            volume(box.extent())));
   RangeTable table{box, {}};
   table.ranges.resize(static_cast<std::size_t>(volume(box.extent())));
   const std::size_t size = chunk_bytes(metadata_.type);
