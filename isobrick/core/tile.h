@@ -26,7 +26,8 @@ void for_each_needed_box(const Lattice& lattice, const TileWork& work, Index rea
     const Index x1 = blocks_x & 2 ? kTileEdge : kBlockEdge;
     const Box3 box{origin + Int3{x0 - reach, y0 - reach, z0 - reach},
                    origin + Int3{x1 + 1 + reach, y1 + 1 + reach, z1 + 1 + reach}};
-    f(intersect(box, lattice.box()));
+    const Box3 inside = intersect(box, lattice.box());
+    if (!inside.empty()) f(inside);
   };
   const int pairs[4] = {work.active_blocks & 3, work.active_blocks >> 2 & 3,
                         work.active_blocks >> 4 & 3, work.active_blocks >> 6 & 3};

@@ -1,1 +1,143 @@
-// In the making.
+#include "isobrick/pipeline/extract.h"
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <unordered_set>
+
+#include "isobrick/pipeline/chunk_writer.h"
+#include "isobrick/pipeline/extract_plan.h"
+#include "isobrick/stream/brick_cache.h"
+#include "isobrick/stream/tile_stream.h"
+
+namespace isobrick {
+namespace {
+
+/// Adds the time it lives to a sum of seconds.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& sum) : sum_(sum) {}
+  ~Stopwatch() {
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start_;
+    sum_ += took.count();
+  }
+
+ private:
+  double& sum_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// World-space corners of a level's sample box.
+MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface) {
+  MeshHeader header;
+  header.has_normals = surface.normals;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Int3 last = level.lattice.extent - Int3{1, 1, 1};
+    const Vec3d p = level.transform.apply({corner & 1 ? static_cast<double>(last.x) : 0.0,
+                                           corner & 2 ? static_cast<double>(last.y) : 0.0,
+                                           corner & 4 ? static_cast<double>(last.z) : 0.0});
+    for (int axis = 0; axis < 3; ++axis) {
+      header.world_lo[axis] = corner ? std::fmin(header.world_lo[axis], p[axis]) : p[axis];
+      header.world_hi[axis] = corner ? std::fmax(header.world_hi[axis], p[axis]) : p[axis];
+    }
+  }
+  return header;
+}
+
+/// Triangles that an active block of 16³ cells is expected to hold: the mean
+/// over real volumes and noise-free fields, see docs/extraction.md.
+constexpr double kTrianglesPerBlock = 520;
+
+}  // namespace
+
+ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options) {
+  const ExtractRequest request = check_request(store, options, Indexing::welded);
+  const Lattice& lattice = request.level->lattice;
+  ExtractEstimate result;
+  result.bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
+  TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
+  std::unordered_set<Index> active;
+  while (const auto work = tiles.next()) {
+    for (int i = 0; i < 8; ++i) {
+      if (!(work->active_blocks >> i & 1)) continue;
+      ++result.active_blocks;
+      const Int3 corner = work->tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
+      const Int3 brick{corner.x / lattice.brick.x, corner.y / lattice.brick.y,
+                       corner.z / lattice.brick.z};
+      active.insert(linear_index(brick, lattice.bricks()));
+    }
+  }
+  result.active_bricks = active.size();
+  result.triangles = static_cast<std::uint64_t>(kTrianglesPerBlock * static_cast<double>(result.active_blocks));
+  result.vertices = result.triangles / 2;
+  result.memory = plan_memory(request, options.memory, result.active_bricks).bytes;
+  return result;
+}
+
+ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
+                      Progress& progress) {
+  ExtractReport report;
+  const std::uint64_t bytes_before = store.bytes_read();
+  {
+    Stopwatch whole(report.seconds);
+    const ExtractRequest request = check_request(store, options, sink.indexing());
+    const Lattice& lattice = request.level->lattice;
+    const Index reach = sample_reach(request.surface);
+
+    ExtractEstimate expected;
+    {
+      Stopwatch watch(report.plan_seconds);
+      expected = estimate(store, options);
+    }
+    report.bricks = expected.bricks;
+    report.active_bricks = expected.active_bricks;
+    const ExtractPlan plan = plan_memory(request, options.memory, expected.active_bricks);
+
+    sink.begin(header_of(*request.level, request.surface));
+    TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
+    BatchPlanner batches(tiles, lattice, reach, request.surface.may_have_nan, plan.limits.tiles,
+                         plan.cache_bricks);
+    BrickCache cache(store, options.level, plan.cache_bricks);
+    CpuExtractor extractor(lattice, request.surface, plan.limits);
+    ChunkWriter writer(sink);
+    MeshBuffer mesh;
+    TileBatch batch;
+    progress.begin("extracting", expected.active_bricks * lattice.brick_bytes());
+    const double bytes_per_block = static_cast<double>(expected.active_bricks) *
+                                   static_cast<double>(lattice.brick_bytes()) /
+                                   std::max(1.0, static_cast<double>(expected.active_blocks));
+    tbb::task_arena arena(request.threads);
+    arena.execute([&] {
+      while (batches.next(batch)) {
+        {
+          Stopwatch watch(report.decode_seconds);
+          cache.require(batch.bricks);
+        }
+        {
+          Stopwatch watch(report.surface_seconds);
+          extractor.extract(batch.tiles, cache, mesh,
+                            [&](MeshBuffer& m, std::uint64_t first) { writer.write(m, first); });
+        }
+        double blocks = 0;
+        for (const TileWork& work : batch.tiles)
+          blocks += static_cast<double>(std::popcount(work.active_blocks));
+        progress.advance(static_cast<std::uint64_t>(blocks * bytes_per_block));
+      }
+    });
+    writer.finish();
+    sink.finish();
+    progress.end();
+    report.sink_seconds = writer.seconds();
+    report.triangles = extractor.triangles();
+    report.vertices = extractor.vertices();
+    report.bricks_read = cache.bricks_read();
+    report.brick_reads = cache.reads();
+  }
+  report.bytes_read = store.bytes_read() - bytes_before;
+  return report;
+}
+
+}  // namespace isobrick

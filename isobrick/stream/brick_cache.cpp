@@ -1,1 +1,77 @@
-// In the making.
+#include "isobrick/stream/brick_cache.h"
+
+#include <tbb/parallel_for_each.h>
+
+#include <cassert>
+
+namespace isobrick {
+
+BrickCache::BrickCache(const StoreReader& store, int level, std::size_t capacity)
+    : store_(store),
+      level_(level),
+      lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
+      capacity_(capacity),
+      seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {}
+
+std::uint64_t BrickCache::key(Int3 brick) const {
+  return static_cast<std::uint64_t>(linear_index(brick, lattice_.bricks()));
+}
+
+BrickCache::Samples BrickCache::take_buffer() {
+  if (!spare_.empty()) {
+    Samples buffer = std::move(spare_.back());
+    spare_.pop_back();
+    return buffer;
+  }
+  if (buffers_ < capacity_) {
+    ++buffers_;
+    return Samples(new std::byte[lattice_.brick_bytes()]);
+  }
+  // What is required now was moved to the front, so the back is free to go.
+  for (;;) {
+    Samples buffer = std::move(order_.back().samples);
+    entries_.erase(order_.back().key);
+    order_.pop_back();
+    if (buffer) return buffer;
+  }
+}
+
+void BrickCache::require(std::span<const Int3> bricks) {
+  assert(bricks.size() <= capacity_);
+  std::vector<Int3> missing;
+  for (const Int3 b : bricks) {
+    const auto found = entries_.find(key(b));
+    if (found == entries_.end())
+      missing.push_back(b);
+    else
+      order_.splice(order_.begin(), order_, found->second);
+  }
+  struct Load {
+    Int3 brick;
+    Samples samples;
+    bool present = false;
+  };
+  std::vector<Load> loads;
+  for (const Int3 b : missing) loads.push_back({b, take_buffer()});
+  tbb::parallel_for_each(loads, [&](Load& load) {
+    load.present = store_.read_brick(level_, load.brick, load.samples.get());
+  });
+  for (Load& load : loads) {
+    if (!load.present) spare_.push_back(std::move(load.samples));
+    if (load.present) {
+      ++reads_;
+      bricks_read_ += !seen_[key(load.brick)];
+      seen_[key(load.brick)] = true;
+    }
+    order_.push_front({key(load.brick), std::move(load.samples)});
+    entries_[key(load.brick)] = order_.begin();
+  }
+}
+
+const std::byte* BrickCache::find(Int3 brick) const {
+  const auto found = entries_.find(key(brick));
+  assert(found != entries_.end());
+  return found->second->samples.get();
+}
+
+}  // namespace isobrick

@@ -1,0 +1,65 @@
+#include "isobrick/pipeline/chunk_writer.h"
+
+#include <chrono>
+
+namespace isobrick {
+
+ChunkWriter::ChunkWriter(MeshSink& sink) : sink_(sink) {
+  free_.push(std::make_shared<MeshBuffer>());
+  thread_ = std::thread([this] { run(); });
+}
+
+ChunkWriter::~ChunkWriter() {
+  if (!thread_.joinable()) return;
+  failed_ = true;
+  auto stop = std::make_shared<Job>();
+  stop->last = true;
+  jobs_.push(std::move(stop));
+  thread_.join();
+}
+
+void ChunkWriter::run() {
+  for (;;) {
+    std::shared_ptr<Job> job;
+    jobs_.pop(job);
+    if (job->last) return;
+    if (!failed_) try {
+        const auto start = std::chrono::steady_clock::now();
+        sink_.write(job->mesh.chunk(job->first_vertex));
+        const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+        seconds_ = seconds_ + took.count();
+      } catch (...) {
+        error_ = std::current_exception();
+        failed_ = true;
+      }
+    // The buffer comes back whatever happened, or the producer would wait for ever.
+    job->mesh.clear();
+    free_.push(std::make_shared<MeshBuffer>(std::move(job->mesh)));
+  }
+}
+
+MeshBuffer ChunkWriter::take_free() {
+  std::shared_ptr<MeshBuffer> buffer;
+  free_.pop(buffer);
+  if (failed_ && error_) std::rethrow_exception(error_);
+  return std::move(*buffer);
+}
+
+void ChunkWriter::write(MeshBuffer& mesh, std::uint64_t first_vertex) {
+  MeshBuffer next = take_free();
+  auto job = std::make_shared<Job>();
+  job->mesh = std::move(mesh);
+  job->first_vertex = first_vertex;
+  mesh = std::move(next);
+  jobs_.push(std::move(job));
+}
+
+void ChunkWriter::finish() {
+  auto last = std::make_shared<Job>();
+  last->last = true;
+  jobs_.push(std::move(last));
+  thread_.join();
+  if (error_) std::rethrow_exception(error_);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,91 @@
+#include "isobrick/pipeline/extract_plan.h"
+
+#include <fmt/format.h>
+#include <tbb/info.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "isobrick/core/error.h"
+#include "isobrick/stream/tile_stream.h"
+
+namespace isobrick {
+namespace {
+
+/// The program, its libraries, shard indices and one range chunk.
+constexpr std::uint64_t kBase = std::uint64_t{48} << 20;
+/// A brick being read: its encoded bytes, in the worst case a little more than
+/// the decoded ones, and the codec's own window, once a thread.
+constexpr std::uint64_t kDecoder = std::uint64_t{2} << 20;
+
+/// The boundaries that wait between finished and unfinished tiles: in Morton
+/// order at most about the largest face of the tile grid, twice.
+std::uint64_t boundary_bytes(const Lattice& lattice) {
+  const Int3 t = lattice.tiles();
+  const auto face = static_cast<std::uint64_t>(std::max({t.x * t.y, t.y * t.z, t.x * t.z}));
+  return 2 * face * 3072;
+}
+
+}  // namespace
+
+ExtractRequest check_request(const StoreReader& store, const ExtractOptions& options,
+                             Indexing indexing) {
+  const StoreInfo& info = store.info();
+  const auto levels = static_cast<int>(info.levels.size());
+  if (options.level < 0 || options.level >= levels)
+    throw UsageError(fmt::format("level {} does not exist: '{}' has levels 0 to {}", options.level,
+                                 info.path.string(), levels - 1));
+  if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
+  ExtractRequest request;
+  request.level = &info.levels[static_cast<std::size_t>(options.level)];
+  const Box3 box = request.level->lattice.box();
+  const Box3 roi = options.roi.value_or(box);
+  if (roi.empty() || intersect(roi, box) != roi)
+    throw UsageError(fmt::format(
+        "the region {}:{},{}:{},{}:{} is empty or leaves the level's {}×{}×{} samples", roi.lo.x,
+        roi.hi.x, roi.lo.y, roi.hi.y, roi.lo.z, roi.hi.z, box.hi.x, box.hi.y, box.hi.z));
+  request.surface = {.isovalue = options.isovalue,
+                     .normals = options.normals,
+                     .indexing = indexing,
+                     .roi = roi,
+                     .transform = request.level->transform,
+                     .fill_value = info.fill_value,
+                     .may_have_nan = info.may_have_nan && is_floating(info.type)};
+  request.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
+  return request;
+}
+
+ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
+                        std::uint64_t active_bricks) {
+  const Lattice& lattice = request.level->lattice;
+  const auto threads = static_cast<std::uint64_t>(request.threads);
+  const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type);
+  const std::uint64_t tile_output = CpuExtractor::max_tile_output(request.surface.normals);
+  const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
+  const std::uint64_t brick_bytes = lattice.brick_bytes();
+
+  const std::uint64_t fixed =
+      kBase + threads * (kDecoder + brick_bytes) + boundary_bytes(lattice);
+  const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
+  if (budget < least)
+    throw UsageError(fmt::format(
+        "a memory budget of {} bytes is too small: this needs at least {} bytes (--memory {}M)",
+        budget, least, (least >> 20) + 1));
+
+  ExtractPlan plan;
+  const std::uint64_t spare = budget - least;
+  plan.limits.tiles = std::clamp<std::size_t>(
+      1 + spare / 6 / workspace, 1, CpuExtractor::good_batch(request.threads));
+  // One piece of mesh is written while the next is made.
+  plan.limits.output_bytes = std::clamp<std::uint64_t>(tile_output + spare / 12, tile_output,
+                                                       std::max(tile_output, std::uint64_t{32} << 20));
+  const std::uint64_t used = fixed + plan.limits.tiles * workspace + 2 * plan.limits.output_bytes;
+  // Neighbours come on top of the active bricks.
+  plan.cache_bricks = static_cast<std::size_t>(std::clamp<std::uint64_t>(
+      (budget - used) / brick_bytes, tile_bricks,
+      std::max<std::uint64_t>(tile_bricks, 8 * active_bricks)));
+  plan.bytes = used + plan.cache_bricks * brick_bytes;
+  return plan;
+}
+
+}  // namespace isobrick

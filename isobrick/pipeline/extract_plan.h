@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+
+#include "isobrick/pipeline/extract.h"
+#include "isobrick/surface/cpu_extractor.h"
+
+namespace isobrick {
+
+/// How an extraction divides its memory budget.
+struct ExtractPlan {
+  ExtractorLimits limits;
+  std::size_t cache_bricks = 0;
+  std::uint64_t bytes = 0;  ///< all of it, the program itself included
+};
+
+/// What the options say of the store's level, checked.
+struct ExtractRequest {
+  const LevelInfo* level = nullptr;
+  SurfaceOptions surface;
+  int threads = 1;
+};
+
+/// Throws UsageError for a level, region or isovalue that makes no sense.
+ExtractRequest check_request(const StoreReader& store, const ExtractOptions& options,
+                             Indexing indexing);
+
+/// `active_bricks` bounds what a cache can use. Throws UsageError naming the
+/// least budget that works when this one does not.
+ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
+                        std::uint64_t active_bricks);
+
+}  // namespace isobrick

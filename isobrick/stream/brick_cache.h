@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+
+namespace isobrick {
+
+/// Decoded bricks of one level, the least recently needed of them dropped when
+/// more than `capacity` would be held.
+class BrickCache final : public BrickLookup {
+ public:
+  BrickCache(const StoreReader& store, int level, std::size_t capacity);
+
+  /// Makes these bricks (no more than the capacity, none twice) resident,
+  /// reading and decoding in parallel in the caller's TBB arena. Pointers from
+  /// find() to them stay valid until the next call.
+  void require(std::span<const Int3> bricks);
+
+  const std::byte* find(Int3 brick) const override;
+
+  std::size_t capacity() const { return capacity_; }
+  /// Bricks read and decoded so far, and how many different ones.
+  std::uint64_t reads() const { return reads_; }
+  std::uint64_t bricks_read() const { return bricks_read_; }
+
+ private:
+  using Samples = std::unique_ptr<std::byte[]>;
+  struct Entry {
+    std::uint64_t key = 0;
+    Samples samples;  ///< none: the brick is absent
+  };
+  using Order = std::list<Entry>;
+
+  std::uint64_t key(Int3 brick) const;
+  Samples take_buffer();
+
+  const StoreReader& store_;
+  int level_;
+  Lattice lattice_;
+  std::size_t capacity_;
+  std::size_t buffers_ = 0;  ///< allocated, in entries or spare
+  Order order_;              ///< most recently needed first
+  std::unordered_map<std::uint64_t, Order::iterator> entries_;
+  std::vector<Samples> spare_;
+  std::vector<bool> seen_;
+  std::uint64_t reads_ = 0, bricks_read_ = 0;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,98 @@
+#include "isobrick/stream/tile_stream.h"
+
+#include <algorithm>
+
+#include "isobrick/core/morton.h"
+#include "isobrick/index/active_tiles.h"
+
+namespace isobrick {
+namespace {
+
+constexpr Index kTileBlocks = kTileEdge / kBlockEdge;
+constexpr Index kChunkTiles = StoreReader::kRangeChunk / kTileBlocks;
+
+void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index reach,
+                          std::vector<Int3>& bricks) {
+  for_each_needed_box(lattice, work, reach, [&](Box3 box) {
+    const Box3 cover{{box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y,
+                      box.lo.z / lattice.brick.z},
+                     ceil_div(box.hi, lattice.brick)};
+    for_each_point(cover, [&](Int3 b) {
+      if (std::find(bricks.begin(), bricks.end(), b) == bricks.end()) bricks.push_back(b);
+    });
+  });
+}
+
+}  // namespace
+
+TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box3 roi)
+    : store_(store), level_(level), isovalue_(isovalue) {
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
+  const Box3 samples = intersect(roi, lattice.box());
+  // The last sample along an axis begins no cell.
+  const Int3 cells_end = max(samples.hi - Int3{1, 1, 1}, samples.lo);
+  roi_tiles_ = {{samples.lo.x / kTileEdge, samples.lo.y / kTileEdge, samples.lo.z / kTileEdge},
+                ceil_div(cells_end, {kTileEdge, kTileEdge, kTileEdge})};
+  const Int3 chunk{kChunkTiles, kChunkTiles, kChunkTiles};
+  for_each_morton(ceil_div(lattice.tiles(), chunk), [&](Int3 c) {
+    if (!intersect({c * chunk, (c + Int3{1, 1, 1}) * chunk}, roi_tiles_).empty()) chunks_.push_back(c);
+  });
+}
+
+bool TileStream::load_next_chunk() {
+  if (next_chunk_ == chunks_.size()) return false;
+  const Lattice& lattice = store_.info().levels[static_cast<std::size_t>(level_)].lattice;
+  constexpr Int3 edge{StoreReader::kRangeChunk, StoreReader::kRangeChunk, StoreReader::kRangeChunk};
+  const Int3 c = chunks_[next_chunk_++];
+  const RangeTable table = store_.block_ranges(
+      level_, intersect({c * edge, (c + Int3{1, 1, 1}) * edge}, {{0, 0, 0}, lattice.blocks()}));
+  tiles_.clear();
+  next_tile_ = 0;
+  append_active_tiles<double>(table.box, table.ranges, isovalue_, tiles_);
+  std::erase_if(tiles_, [&](const TileWork& work) { return !roi_tiles_.contains(work.tile); });
+  return true;
+}
+
+std::optional<TileWork> TileStream::next() {
+  while (next_tile_ == tiles_.size())
+    if (!load_next_chunk()) return std::nullopt;
+  return tiles_[next_tile_++];
+}
+
+bool BatchPlanner::next(TileBatch& batch) {
+  batch.tiles.clear();
+  batch.bricks.clear();
+  std::unordered_set<std::uint64_t> needed;
+  std::vector<Int3> of_tile;
+  while (batch.tiles.size() < max_tiles_) {
+    if (!held_) held_ = stream_.next();
+    if (!held_) break;
+    if (whole_tiles_) held_->active_blocks = 0xff;
+    of_tile.clear();
+    append_needed_bricks(lattice_, *held_, reach_, of_tile);
+    const auto key = [&](Int3 b) {
+      return static_cast<std::uint64_t>(linear_index(b, lattice_.bricks()));
+    };
+    std::erase_if(of_tile, [&](Int3 b) { return needed.count(key(b)) > 0; });
+    if (!batch.tiles.empty() && batch.bricks.size() + of_tile.size() > max_bricks_) break;
+    for (const Int3 b : of_tile) {
+      needed.insert(key(b));
+      batch.bricks.push_back(b);
+    }
+    batch.tiles.push_back(*held_);
+    held_.reset();
+  }
+  return !batch.tiles.empty();
+}
+
+std::size_t max_bricks_of_tile(const Lattice& lattice, Index reach) {
+  Index bricks = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index samples = std::min(kTileEdge + 1 + 2 * reach, lattice.extent[axis]);
+    bricks *= std::min((samples - 2 + lattice.brick[axis]) / lattice.brick[axis] + 1,
+                       lattice.bricks()[axis]);
+  }
+  return static_cast<std::size_t>(bricks);
+}
+
+}  // namespace isobrick

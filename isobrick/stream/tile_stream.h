@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <unordered_set>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/tile.h"
+
+namespace isobrick {
+
+/// The active tiles of a level in Morton order, found range chunk by range
+/// chunk: memory does not grow with the volume.
+class TileStream {
+ public:
+  /// Tiles without a cell in `roi` (samples) are left out.
+  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi);
+
+  /// The next tile, or nothing at the end.
+  std::optional<TileWork> next();
+
+ private:
+  bool load_next_chunk();
+
+  const StoreReader& store_;
+  int level_;
+  double isovalue_;
+  Box3 roi_tiles_;
+  std::vector<Int3> chunks_;  ///< range chunks in Morton order
+  std::size_t next_chunk_ = 0;
+  std::vector<TileWork> tiles_;
+  std::size_t next_tile_ = 0;
+};
+
+/// Tiles that are extracted together, and the bricks that must be resident for it.
+struct TileBatch {
+  std::vector<TileWork> tiles;
+  std::vector<Int3> bricks;
+};
+
+/// Cuts a tile stream into batches of at most `max_tiles` tiles that need at
+/// most `max_bricks` bricks, which must be enough for any single tile
+/// (max_bricks_of_tile). With `whole_tiles` all blocks of a tile count as
+/// active: ranges say nothing of NaN, so where there may be some every sample is
+/// looked at.
+class BatchPlanner {
+ public:
+  BatchPlanner(TileStream& tiles, const Lattice& lattice, Index reach, bool whole_tiles,
+               std::size_t max_tiles, std::size_t max_bricks)
+      : stream_(tiles),
+        lattice_(lattice),
+        reach_(reach),
+        whole_tiles_(whole_tiles),
+        max_tiles_(max_tiles),
+        max_bricks_(max_bricks) {}
+
+  /// False at the end.
+  bool next(TileBatch& batch);
+
+ private:
+  TileStream& stream_;
+  Lattice lattice_;
+  Index reach_;
+  bool whole_tiles_;
+  std::size_t max_tiles_, max_bricks_;
+  std::optional<TileWork> held_;  ///< did not fit the batch before
+};
+
+/// Bricks that the samples of one tile, with `reach` layers around, can lie in.
+std::size_t max_bricks_of_tile(const Lattice& lattice, Index reach);
+
+}  // namespace isobrick
