@@ -106,8 +106,8 @@ std::uint64_t least_budget(VolumeSource& source, ConvertOptions options, const T
 }
 
 TEST(ConvertBudget, SlowerPathsWriteTheSameBytes) {
-  // Slabs of 16 planes of 2.25 million doubles do not fit in the least budget.
-  const Int3 extent{1500, 1500, 36};
+  // A slab has 15 MiB more than the least budget leaves for samples.
+  const Int3 extent{400, 300, 36};
   TemporaryFolder folder;
   ConvertOptions options;
   options.brick = 16;
@@ -126,7 +126,7 @@ TEST(ConvertBudget, SlowerPathsWriteTheSameBytes) {
   convert_quietly(again, folder / "least", options);
   EXPECT_EQ(again.bytes_read(), source.samples().size());
   EXPECT_EQ(tree_of(folder / "least"), fast);
-  options.memory += std::uint64_t{30} << 20;  // rows, or a cascade from level 1 on
+  options.memory += std::uint64_t{6} << 20;  // whole rows, then a cascade from level 1 on
   convert_quietly(source, folder / "more", options);
   EXPECT_EQ(tree_of(folder / "more"), fast);
 
@@ -137,7 +137,7 @@ TEST(ConvertBudget, SlowerPathsWriteTheSameBytes) {
 }
 
 TEST(ConvertBudget, OddBricksKeepSamplesAndRangesInPieces) {
-  const Int3 extent{700, 600, 100};
+  const Int3 extent{150, 140, 100};
   TemporaryFolder folder;
   ConvertOptions options;
   options.brick = 33;
