@@ -11,7 +11,7 @@ namespace {
 struct Arguments {
   std::string in, out;
   RawDescription raw;
-  StoreArguments store;
+  ConvertOptions store;
 };
 
 void add_raw_options(CLI::App* app, RawDescription& raw) {
@@ -32,7 +32,7 @@ void add_raw_options(CLI::App* app, RawDescription& raw) {
 int run(const Arguments& arguments, Console& console) {
   const auto source = open_source(arguments.in, arguments.raw);
   const ConvertReport report =
-      convert(*source, arguments.out, convert_options(arguments.store), console.progress());
+      convert(*source, arguments.out, arguments.store, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
   return 0;
 }
@@ -43,10 +43,10 @@ void add_convert(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
       program, "convert", "Turn a volume into a store, within a memory budget.",
-      "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5");
+      "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
+      "  isobrick convert engine_256x256x128_uint8.raw engine.zarr   # the name says it all");
   add_path(app, "IN", arguments->in,
-           "Raw file, .nhdr or .mhd header; - reads standard input. Extent and type may stand in "
-           "the name: head_64x64x93_int16.raw");
+           "Raw file, .nhdr or .mhd header, or - for standard input");
   add_path(app, "OUT", arguments->out, "Store to write, such as OUT.zarr");
   add_raw_options(app, arguments->raw);
   add_store_options(app, arguments->store);

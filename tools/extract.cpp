@@ -23,6 +23,7 @@ struct Arguments {
   std::string store;
   std::vector<double> isovalues;
   std::string output, preview;
+  PreviewOptions picture;
   int level = 0;
   std::optional<RoiText> roi;
   bool normals = false;
@@ -157,13 +158,15 @@ struct Sinks {
 
 /// Opens every output before the first extraction, so that one that exists or
 /// cannot be written stops the command at once.
-std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, bool force) {
+std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Arguments& arguments) {
+  const bool force = arguments.force;
   std::vector<Sinks> sinks;
   for (const Surface& surface : surfaces) {
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty()) of_surface.mesh = open_mesh(surface.output, force);
     if (!surface.preview.empty())
-      of_surface.preview = std::make_unique<PreviewSink>(surface.preview.string(), force);
+      of_surface.preview = std::make_unique<PreviewSink>(surface.preview.string(), force,
+                                                         arguments.picture);
   }
   return sinks;
 }
@@ -202,11 +205,11 @@ Said estimate_all(const std::vector<Surface>& surfaces) {
 Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
               const StoreReader& store, Console& console) {
   if (!arguments.no_space_check) check_space(surfaces);
-  std::vector<Sinks> sinks = open_sinks(surfaces, arguments.force);
+  std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
   Said said;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ExtractReport report = make(surfaces[i], sinks[i], store, console);
-    const std::uint64_t bytes = sinks[i].mesh ? sinks[i].mesh->bytes() : 0;
+    const std::uint64_t bytes = sinks[i].mesh ? fs::file_size(surfaces[i].output) : 0;
     said.objects.push_back(report_json(surfaces[i], report, bytes));
     said.text += report_text(surfaces[i], report, bytes);
     sinks[i] = {};
@@ -236,6 +239,22 @@ bool parse_normals(const std::string& text) {
   throw UsageError(fmt::format("'{}' is no kind of normals; it is gradient or none", text));
 }
 
+void add_preview_options(CLI::App* app, Arguments& arguments) {
+  PreviewOptions& picture = arguments.picture;
+  add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface"},
+           [&preview = arguments.preview](const std::string& text) { preview = text; });
+  add_text(app, {"--preview-size", "W,H", "Size of the picture, pixels", "1280,960"},
+           [&picture](const std::string& text) {
+             const PictureSize size = parse_picture_size(text);
+             picture.width = size.width;
+             picture.height = size.height;
+           });
+  add_parsed(app, picture.towards_eye, parse_vector,
+             {"--preview-eye", "X,Y,Z", "From the volume's centre towards the eye", "0.55,-1,0.5"});
+  add_parsed(app, picture.up, parse_vector,
+             {"--preview-up", "X,Y,Z", "What is up in the picture", "0,0,1"});
+}
+
 }  // namespace
 
 void add_extract(Program& program) {
@@ -254,8 +273,7 @@ void add_extract(Program& program) {
            {"-o,--output", "MESH",
             "Mesh to write, .ply or .stl; several isovalues make head_500.ply and so on"},
            [&output = arguments->output](const std::string& text) { output = text; });
-  add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface"},
-           [&preview = arguments->preview](const std::string& text) { preview = text; });
+  add_preview_options(app, *arguments);
   add_flag(app, "--estimate", arguments->estimate,
            "Write nothing; predict triangles, vertices, bytes and memory");
   add_level(app, arguments->level);

@@ -76,7 +76,7 @@ std::size_t bin_of(const Histogram& h, double value) {
 /// Height of a column in eighths of a character.
 int height_of(std::uint64_t count, std::uint64_t most, int rows) {
   if (count == 0) return 0;
-  const double part = std::log1p(static_cast<double>(count)) / std::log1p(static_cast<double>(most));
+  const double part = std::sqrt(static_cast<double>(count) / static_cast<double>(most));
   return std::max(1, static_cast<int>(std::lround(part * rows * 8)));
 }
 

@@ -22,8 +22,8 @@ struct Histogram {
 /// coarsest), read brick by brick.
 Histogram histogram(const StoreReader& store, Progress& progress);
 
-/// The counts as columns of block characters, `rows` lines high, on a
-/// logarithmic scale, with the values below.
+/// The counts as columns of block characters, `rows` lines high, with the values
+/// below. Heights are square roots, so that a background does not hide the rest.
 std::string draw(const Histogram& histogram, int rows);
 
 }  // namespace isobrick::tools

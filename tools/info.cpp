@@ -131,9 +131,9 @@ std::string levels_text(const StoreInfo& info, const Facts& facts) {
   for (std::size_t i = 0; i < info.levels.size(); ++i) {
     const Lattice& lattice = info.levels[i].lattice;
     const auto bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
-    text += fmt::format("level {:<6} {}, {} bricks of {}, {} absent\n", i,
-                        human_extent(lattice.extent), human_count(bricks),
-                        human_extent(lattice.brick), human_count(bricks - facts.stored[i]));
+    text += fmt::format("level {:<6} {}; bricks of {}: {}, {} absent\n", i,
+                        human_extent(lattice.extent), human_extent(lattice.brick),
+                        human_count(bricks), human_count(bricks - facts.stored[i]));
   }
   return text;
 }
@@ -157,7 +157,7 @@ std::string text_of(const StoreInfo& info, const Facts& facts) {
               : fmt::format("value range  {:g} to {:g}\n", facts.range.lo, facts.range.hi);
   text += fmt::format("index kinds  {}\n",
                       facts.kinds.empty() ? "none" : fmt::format("{}", fmt::join(facts.kinds, ", ")));
-  text += fmt::format("histogram    of level {}, logarithmic\n{}", h.level, draw(h, 6));
+  text += fmt::format("histogram    of level {}, square-root scale\n{}", h.level, draw(h, 6));
   if (h.not_a_number + h.infinite > 0)
     text += fmt::format("  left out: {} NaN, {} infinite\n", human_count(h.not_a_number),
                         human_count(h.infinite));

@@ -4,6 +4,7 @@
 #include <new>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
 #include "isobrick/core/error.h"
 #include "tools/console.h"
@@ -53,6 +54,13 @@ const Command* parsed(const Program& program) {
 
 std::string name_of(const Command* command) { return command ? command->app->get_name() : ""; }
 
+/// What is wrong with a command line. A word that nobody knows comes first:
+/// CLI11 would rather complain about what is missing.
+std::string complaint(const Program& program, const CLI::ParseError& error) {
+  const std::vector<std::string> unknown = program.app.remaining(true);
+  return unknown.empty() ? error.what() : fmt::format("unknown argument '{}'", unknown.front());
+}
+
 /// Ends as the signal would have ended the process, so that shells see it.
 int die_of(int signal) {
   std::signal(signal, SIG_DFL);
@@ -69,7 +77,7 @@ int run(Program& program, int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     // --help and --version come this way too.
     if (error.get_exit_code() == 0) return program.app.exit(error);
-    print_error(name_of(parsed(program)), error.what());
+    print_error(name_of(parsed(program)), complaint(program, error));
     return 2;
   } catch (const Interrupted& interrupted) {
     return die_of(interrupted.signal());

@@ -1,7 +1,5 @@
 #include "tools/options.h"
 
-#include <algorithm>
-
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -101,14 +99,13 @@ void add_force(CLI::App* app, bool& force) {
   add_flag(app, "--force", force, "Replace an output that exists, once the new one is whole");
 }
 
-void add_store_options(CLI::App* app, StoreArguments& arguments) {
-  ConvertOptions& options = arguments.options;
+void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_parsed(app, options.brick, [](const std::string& text) { return parse_whole(text, 16, 256); },
              {"--brick", "N", "Samples along each edge of a brick, 16 to 256", "64"});
-  add_parsed(app, arguments.shard,
+  add_parsed(app, options.shard,
              [](const std::string& text) { return parse_whole(text, 16, 1 << 20); },
-             {"--shard", "N", "Samples along each edge of a shard, a multiple of the brick",
-              "about 512"});
+             {"--shard", "N", "Samples along each edge of a shard, cut to a multiple of the brick",
+              "512"});
   add_parsed(app, options.zstd_level, parse_codec,
              {"--codec", "zstd:LEVEL|none", "Compression of bricks", "zstd:3"});
   add_parsed(app, options.levels, parse_levels,
@@ -118,13 +115,6 @@ void add_store_options(CLI::App* app, StoreArguments& arguments) {
   add_threads(app, options.threads);
   add_flag(app, "--resume", options.resume, "Go on with an interrupted conversion of this input");
   add_force(app, options.force);
-}
-
-ConvertOptions convert_options(const StoreArguments& arguments) {
-  ConvertOptions options = arguments.options;
-  options.shard =
-      arguments.shard.value_or(options.brick * std::max<Index>(1, 512 / options.brick));
-  return options;
 }
 
 void report_conversion(Console& console, const std::string& command, const std::string& input,
@@ -153,9 +143,10 @@ void report_conversion(Console& console, const std::string& command, const std::
   std::string text = fmt::format("{}: {} samples of {}", output, human_extent(volume.extent),
                                  zarr_name(volume.type));
   if (report.levels > 0)  // a store and no raw file
-    text += fmt::format(", {} level{}, {} bricks ({} absent, {} kept)", report.levels,
+    text += fmt::format(", {} level{}, {} brick{} ({} absent, {} kept)", report.levels,
                         report.levels == 1 ? "" : "s", human_count(report.bricks),
-                        human_count(report.bricks_absent), human_count(report.bricks_kept));
+                        report.bricks == 1 ? "" : "s", human_count(report.bricks_absent),
+                        human_count(report.bricks_kept));
   text += fmt::format("\n{} in, {} out ({:.2f} to 1) in {}, {}/s\n", human_bytes(report.bytes_in),
                       human_bytes(report.bytes_out), ratio, human_seconds(report.seconds),
                       human_bytes(rate));

@@ -80,13 +80,7 @@ void add_threads(CLI::App* app, int& threads);
 void add_force(CLI::App* app, bool& force);
 
 /// How a store is written: what `convert` and `synth` share.
-struct StoreArguments {
-  ConvertOptions options;
-  std::optional<Index> shard;
-};
-void add_store_options(CLI::App* app, StoreArguments& arguments);
-/// With a shard of about 512 samples, a multiple of the brick, unless one was named.
-ConvertOptions convert_options(const StoreArguments& arguments);
+void add_store_options(CLI::App* app, ConvertOptions& options);
 
 /// Says what a conversion by `command` did.
 void report_conversion(Console& console, const std::string& command, const std::string& input,

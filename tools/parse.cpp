@@ -95,6 +95,13 @@ Vec3d parse_vector(std::string_view text) {
   return {parse_number((*parts)[0]), parse_number((*parts)[1]), parse_number((*parts)[2])};
 }
 
+PictureSize parse_picture_size(std::string_view text) {
+  const auto comma = text.find(',');
+  if (comma == std::string_view::npos)
+    throw UsageError(fmt::format("'{}' is not of the form WIDTH,HEIGHT", text));
+  return {parse_int(text.substr(0, comma), 16, 16384), parse_int(text.substr(comma + 1), 16, 16384)};
+}
+
 ScalarType parse_type(std::string_view text) {
   if (const auto type = parse_scalar_type(text)) return *type;
   throw UsageError(

@@ -21,7 +21,7 @@ struct Arguments {
   std::optional<Int3> dims;
   std::optional<ScalarType> type;
   std::string out;
-  StoreArguments store;
+  ConvertOptions store;
 };
 
 SynthKind parse_kind(const std::string& text) {
@@ -89,7 +89,7 @@ int run(const Arguments& arguments, Console& console) {
   synth.extent = *arguments.dims;
   synth.type = *arguments.type;
   const auto source = make_synth(synth);
-  const ConvertOptions options = convert_options(arguments.store);
+  const ConvertOptions& options = arguments.store;
   const bool raw = std::filesystem::path(arguments.out).extension() == ".raw";
   const ConvertReport report = raw ? write_raw(*source, arguments.out, options, console.progress())
                                    : convert(*source, arguments.out, options, console.progress());
