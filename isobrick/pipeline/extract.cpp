@@ -1,7 +1,5 @@
 #include "isobrick/pipeline/extract.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <bit>
 #include <chrono>
@@ -10,6 +8,7 @@
 
 #include "isobrick/pipeline/chunk_writer.h"
 #include "isobrick/pipeline/extract_plan.h"
+#include "isobrick/pipeline/workers.h"
 #include "isobrick/stream/brick_cache.h"
 #include "isobrick/stream/tile_stream.h"
 
@@ -109,8 +108,8 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     const double bytes_per_block = static_cast<double>(expected.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /
                                    std::max(1.0, static_cast<double>(expected.active_blocks));
-    tbb::task_arena arena(request.threads);
-    arena.execute([&] {
+    Workers workers(request.threads);
+    workers.execute([&] {
       while (batches.next(batch)) {
         {
           Stopwatch watch(report.decode_seconds);

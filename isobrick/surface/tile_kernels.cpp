@@ -9,8 +9,9 @@
 //
 #include <hwy/highway.h>
 
-#include "isobrick/surface/tile_emit-inl.h"
 #include "isobrick/surface/tile_scan-inl.h"
+#include "isobrick/surface/tile_triangles-inl.h"
+#include "isobrick/surface/tile_vertices-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {
@@ -20,8 +21,9 @@ void Scan(ScalarType type, const KernelContext& context, TileState& tile) {
   visit_scalar(type, [&](auto tag) { scan_samples<typename decltype(tag)::type>(context, tile); });
 }
 
-void Emit(ScalarType type, const KernelContext& context, const TileState& tile, Vec3f* positions,
+void Emit(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
           Vec3f* normals, Triangle* triangles) {
+  list_edges(tile);
   visit_scalar(type, [&](auto tag) {
     emit_vertices<typename decltype(tag)::type>(context, tile, positions, normals);
   });
@@ -42,8 +44,8 @@ void scan_tile(ScalarType type, const KernelContext& context, TileState& tile) {
   HWY_DYNAMIC_DISPATCH(Scan)(type, context, tile);
 }
 
-void emit_tile(ScalarType type, const KernelContext& context, const TileState& tile,
-               Vec3f* positions, Vec3f* normals, Triangle* triangles) {
+void emit_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
+               Vec3f* normals, Triangle* triangles) {
   HWY_DYNAMIC_DISPATCH(Emit)(type, context, tile, positions, normals, triangles);
 }
 

@@ -24,7 +24,7 @@ void scan_tile(ScalarType type, const KernelContext& context, TileState& tile);
 
 /// With all edge rows complete, foreign ones included: writes the tile's
 /// vertices to `positions` (and `normals`, unless null) and its triangles.
-void emit_tile(ScalarType type, const KernelContext& context, const TileState& tile,
-               Vec3f* positions, Vec3f* normals, Triangle* triangles);
+void emit_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
+               Vec3f* normals, Triangle* triangles);
 
 }  // namespace isobrick

@@ -75,6 +75,7 @@ struct TileState {
   /// Own edges at sample 0 of a row: bit 0 along y, bit 1 along z.
   std::uint8_t own_at_0[kTileRows];
   PodBuffer<ActiveCell> cells;
+  PodBuffer<std::uint32_t> edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
   std::uint32_t vertices = 0, triangles = 0;
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
   std::uint32_t number_base = 0;                     ///< what its vertices are numbered from
