@@ -167,7 +167,7 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                           : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   const ConvertPlan plan(layout, options.memory, threads, source.random_access());
   ConvertStaging staging(out, options.resume, options.force);
-  tbb::task_arena arena(threads);
+  tbb::task_arena arena(plan.threads());
   ConvertReport report = arena.execute(
       [&] { return Conversion(source, layout, plan, staging, progress).run(); });
   staging.publish();

@@ -82,21 +82,29 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
 
 ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads,
                          bool random_access)
-    : layout_(layout), threads_(threads) {
+    : layout_(layout), threads_(threads), bricks_in_flight_(2 * threads + 2) {
   const Lattice& lattice = layout.levels.front().lattice;
   slab_planes_ = lattice.brick.z % 2 == 0 ? lattice.brick.z : 2 * lattice.brick.z;
-  const std::size_t brick = lattice.brick_bytes();
-  const auto workers = static_cast<std::size_t>(threads_);
-  const std::size_t fixed = kProgramBytes +
-                            workers * (2 * brick + encoder_bytes(layout.zstd_level, brick)) +
-                            static_cast<std::size_t>(bricks_in_flight()) * brick;
-  const std::size_t least = fixed + least_room(random_access);
+  const std::size_t samples = least_room(random_access);
+  // Large bricks in a small budget: rather fewer at a time than none at all.
+  while (bricks_in_flight_ > 1 && encoding_bytes() + samples > memory) {
+    --bricks_in_flight_;
+    threads_ = std::min(threads_, bricks_in_flight_);
+  }
+  const std::size_t least = encoding_bytes() + samples;
   if (memory < least)
     throw UsageError(
-        fmt::format("a memory budget of {} MiB is too small: bricks of {}³ samples on {} threads "
-                    "need {} MiB at least",
-                    memory / kMiB, lattice.brick.x, threads_, least / kMiB + 1));
-  room_ = static_cast<std::size_t>(memory) - fixed;
+        fmt::format("a memory budget of {} MiB is too small: bricks of {}³ samples need {} MiB at "
+                    "least",
+                    memory / kMiB, lattice.brick.x, least / kMiB + 1));
+  room_ = static_cast<std::size_t>(memory) - encoding_bytes();
+}
+
+std::size_t ConvertPlan::encoding_bytes() const {
+  const std::size_t brick = layout_.levels.front().lattice.brick_bytes();
+  return kProgramBytes +
+         static_cast<std::size_t>(threads_) * (2 * brick + encoder_bytes(layout_.zstd_level, brick)) +
+         static_cast<std::size_t>(bricks_in_flight_) * brick;
 }
 
 std::size_t ConvertPlan::slab_bytes(int level) const {

@@ -25,9 +25,10 @@ class ConvertPlan {
   /// Throws UsageError naming the least budget when not even one piece fits.
   ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads, bool random_access);
 
+  /// As many as asked for, or fewer where the budget is small for the bricks.
   int threads() const { return threads_; }
   /// Bricks being encoded or waiting for their turn to be written.
-  int bricks_in_flight() const { return 2 * threads_ + 2; }
+  int bricks_in_flight() const { return bricks_in_flight_; }
 
   Index slab_planes() const { return slab_planes_; }
   /// Whether slabs of `level` and of all coarser levels fit together.
@@ -40,13 +41,14 @@ class ConvertPlan {
   Index spool_planes() const;
 
  private:
+  std::size_t encoding_bytes() const;
   std::size_t slab_bytes(int level) const;
   std::size_t cascade_bytes(int level) const;
   std::size_t ranges_bytes(int level) const;
   std::size_t least_room(bool random_access) const;
 
   const StoreLayout& layout_;
-  int threads_;
+  int threads_, bricks_in_flight_;
   Index slab_planes_;
   std::size_t room_ = 0;  ///< what the program itself and the encoders leave
 };
