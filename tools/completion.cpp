@@ -53,8 +53,8 @@ std::string bash_choices(const CommandView& command) {
   for (const OptionView& option : command.options)
     for (const std::string& name : option.names)
       if (!option.choices.empty())
-        branches += fmt::format("    '{} {}') words='{}'; options=$words ;;\n", command.name,
-                                name, joined(option.choices));
+        branches += fmt::format("    '{} {}') words='{}'; options=$words ;;\n", command.name, name,
+                                joined(option.choices));
   return branches;
 }
 
@@ -101,16 +101,16 @@ std::string zsh_message(const std::string& text) {
 std::string zsh_value(const OptionView& option) {
   if (!option.choices.empty())
     return fmt::format(":{}:({})", zsh_message(option.value), joined(option.choices));
-  return fmt::format(":{}:_files", zsh_message(option.value.empty() ? option.names[0] : option.value));
+  return fmt::format(":{}:_files",
+                     zsh_message(option.value.empty() ? option.names[0] : option.value));
 }
 
 std::string zsh_arguments(const CommandView& command) {
   std::string specs;
   for (const OptionView& option : command.options)
     for (const std::string& name : option.names)
-      specs += " \\\n        " +
-               quoted(fmt::format("*{}[{}]{}", name, zsh_message(option.help),
-                                  option.value.empty() ? "" : zsh_value(option)));
+      specs += " \\\n        " + quoted(fmt::format("*{}[{}]{}", name, zsh_message(option.help),
+                                                    option.value.empty() ? "" : zsh_value(option)));
   for (const OptionView& positional : command.positionals)
     specs += " \\\n        " + quoted(zsh_value(positional));
   return specs;
@@ -120,8 +120,8 @@ std::string zsh_completion(const CLI::App& program) {
   std::string list, cases;
   for (const CommandView& command : subcommands_of(program)) {
     list += "    " + quoted(command.name + ":" + zsh_message(command.description)) + "\n";
-    cases += fmt::format("      {})\n        _arguments{} ;;\n", command.name,
-                         zsh_arguments(command));
+    cases +=
+        fmt::format("      {})\n        _arguments{} ;;\n", command.name, zsh_arguments(command));
   }
   return fmt::format(R"(#compdef isobrick
 _isobrick() {{
@@ -170,8 +170,8 @@ std::string fish_completion(const CLI::App& program) {
   const std::string first = "__fish_use_subcommand";
   for (const OptionView& option : view_of(program).options) text += fish_option(first, option);
   for (const CommandView& command : subcommands_of(program)) {
-    text += fmt::format("complete -c isobrick -f -n {} -a {} -d {}\n", quoted(first),
-                        command.name, quoted(command.description));
+    text += fmt::format("complete -c isobrick -f -n {} -a {} -d {}\n", quoted(first), command.name,
+                        quoted(command.description));
     const std::string inside = "__fish_seen_subcommand_from " + command.name;
     for (const OptionView& option : command.options) text += fish_option(inside, option);
     const std::string words = positional_words(command);
@@ -185,7 +185,8 @@ std::string completion_for(const std::string& shell, const CLI::App& program) {
   if (shell == "bash") return bash_completion(program);
   if (shell == "zsh") return zsh_completion(program);
   if (shell == "fish") return fish_completion(program);
-  throw UsageError(fmt::format("no completion for '{}'; there is one for bash, zsh and fish", shell));
+  throw UsageError(
+      fmt::format("no completion for '{}'; there is one for bash, zsh and fish", shell));
 }
 
 }  // namespace

@@ -31,8 +31,7 @@ void add_raw_options(CLI::App* app, RawDescription& raw) {
 
 int run(const Arguments& arguments, Console& console) {
   const auto source = open_source(arguments.in, arguments.raw);
-  const ConvertReport report =
-      convert(*source, arguments.out, arguments.store, console.progress());
+  const ConvertReport report = convert(*source, arguments.out, arguments.store, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
   return 0;
 }
@@ -45,12 +44,12 @@ void add_convert(Program& program) {
       program, "convert", "Turn a volume into a store, within a memory budget.",
       "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
       "  isobrick convert engine_256x256x128_uint8.raw engine.zarr   # the name says it all");
-  add_path(app, "IN", arguments->in,
-           "Raw file, .nhdr or .mhd header, or - for standard input");
+  add_path(app, "IN", arguments->in, "Raw file, .nhdr or .mhd header, or - for standard input");
   add_path(app, "OUT", arguments->out, "Store to write, such as OUT.zarr");
   add_raw_options(app, arguments->raw);
   add_store_options(app, arguments->store);
-  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+  program.commands.push_back(
+      {app, [arguments](Console& console) { return run(*arguments, console); }});
 }
 
 }  // namespace isobrick::tools

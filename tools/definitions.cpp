@@ -40,12 +40,10 @@ std::vector<OptionView> views_of(const CLI::App& app, bool positional) {
 
 CommandView view_of(const CLI::App& app) {
   const std::string footer = app.get_footer();  // "Example:" and a line
-  return {app.get_name(),
-          app.get_description(),
-          CLI::detail::trim_copy(CLI::detail::find_and_replace(
-              footer.substr(footer.find('\n') + 1), "\n  ", "\n")),
-          views_of(app, false),
-          views_of(app, true)};
+  return {app.get_name(), app.get_description(),
+          CLI::detail::trim_copy(
+              CLI::detail::find_and_replace(footer.substr(footer.find('\n') + 1), "\n  ", "\n")),
+          views_of(app, false), views_of(app, true)};
 }
 
 std::vector<CommandView> subcommands_of(const CLI::App& app) {

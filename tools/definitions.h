@@ -14,7 +14,7 @@ struct OptionView {
   std::string value;                 ///< what its value is called; empty for a flag
   std::vector<std::string> choices;  ///< the values it takes, when they are few
   std::string help;
-  std::string fallback;              ///< what holds when it is left out
+  std::string fallback;  ///< what holds when it is left out
   bool required = false;
 };
 

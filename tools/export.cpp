@@ -36,9 +36,9 @@ int run(const Arguments& arguments, Console& console) {
                                       {"type", zarr_name(type)},
                                       {"bytes_out", bytes},
                                       {"peak_resident_bytes", peak_resident_bytes()}};
-  console.result(object, fmt::format("{}: {} samples of {}, little endian, {}\n", arguments.out,
-                                     human_extent(box.extent()), zarr_name(type),
-                                     human_bytes(bytes)));
+  console.result(object,
+                 fmt::format("{}: {} samples of {}, little endian, {}\n", arguments.out,
+                             human_extent(box.extent()), zarr_name(type), human_bytes(bytes)));
   return 0;
 }
 
@@ -46,9 +46,9 @@ int run(const Arguments& arguments, Console& console) {
 
 void add_export(Program& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* app = add_subcommand(
-      program, "export", "Write the samples of a store as a raw file, bit for bit.",
-      "isobrick export head.zarr jaw.raw --roi :,:,0:40");
+  CLI::App* app =
+      add_subcommand(program, "export", "Write the samples of a store as a raw file, bit for bit.",
+                     "isobrick export head.zarr jaw.raw --roi :,:,0:40");
   add_path(app, "STORE", arguments->store, "Store to read");
   add_path(app, "OUT", arguments->out, "Raw file to write: C order [z, y, x], little endian");
   add_level(app, arguments->level);
@@ -56,7 +56,8 @@ void add_export(Program& program) {
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_force(app, arguments->force);
-  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+  program.commands.push_back(
+      {app, [arguments](Console& console) { return run(*arguments, console); }});
 }
 
 }  // namespace isobrick::tools

@@ -111,40 +111,41 @@ ordered_json estimate_json(const Surface& surface) {
 std::string estimate_text(const Surface& surface) {
   const ExtractEstimate& e = surface.estimate;
   const char* format = format_of(surface) == MeshFormat::ply ? "PLY" : "STL";
-  return fmt::format("isovalue {}: about {} triangles and {} vertices, {} as {}; {} of {} bricks "
-                     "active, {} of memory\n",
-                     surface.options.isovalue, human_count(e.triangles), human_count(e.vertices),
-                     human_bytes(bytes_of(surface).file), format, human_count(e.active_bricks),
-                     human_count(e.bricks), human_bytes(e.memory));
+  return fmt::format(
+      "isovalue {}: about {} triangles and {} vertices, {} as {}; {} of {} bricks "
+      "active, {} of memory\n",
+      surface.options.isovalue, human_count(e.triangles), human_count(e.vertices),
+      human_bytes(bytes_of(surface).file), format, human_count(e.active_bricks),
+      human_count(e.bricks), human_bytes(e.memory));
 }
 
 ordered_json report_json(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
-  ordered_json object{{"isovalue", surface.options.isovalue},
-                      {"output", nullptr},
-                      {"preview", nullptr},
-                      {"output_bytes", bytes},
-                      {"triangles", r.triangles},
-                      {"vertices", r.vertices},
-                      {"bricks",
-                       {{"total", r.bricks}, {"active", r.active_bricks}, {"read", r.bricks_read}}},
-                      {"brick_reads", r.brick_reads},
-                      {"bytes_read", r.bytes_read},
-                      {"seconds",
-                       {{"total", r.seconds},
-                        {"plan", r.plan_seconds},
-                        {"decode", r.decode_seconds},
-                        {"surface", r.surface_seconds},
-                        {"sink", r.sink_seconds}}}};
+  ordered_json object{
+      {"isovalue", surface.options.isovalue},
+      {"output", nullptr},
+      {"preview", nullptr},
+      {"output_bytes", bytes},
+      {"triangles", r.triangles},
+      {"vertices", r.vertices},
+      {"bricks", {{"total", r.bricks}, {"active", r.active_bricks}, {"read", r.bricks_read}}},
+      {"brick_reads", r.brick_reads},
+      {"bytes_read", r.bytes_read},
+      {"seconds",
+       {{"total", r.seconds},
+        {"plan", r.plan_seconds},
+        {"decode", r.decode_seconds},
+        {"surface", r.surface_seconds},
+        {"sink", r.sink_seconds}}}};
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();
   return object;
 }
 
 std::string report_text(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
-  std::string text = fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
-                                 surface.options.isovalue, human_count(r.triangles),
-                                 human_count(r.vertices), human_count(r.bricks_read),
-                                 human_count(r.bricks), human_seconds(r.seconds));
+  std::string text =
+      fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
+                  surface.options.isovalue, human_count(r.triangles), human_count(r.vertices),
+                  human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
   if (!surface.output.empty())
     text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
   if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());
@@ -165,8 +166,8 @@ std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Argume
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty()) of_surface.mesh = open_mesh(surface.output, force);
     if (!surface.preview.empty())
-      of_surface.preview = std::make_unique<PreviewSink>(surface.preview.string(), force,
-                                                         arguments.picture);
+      of_surface.preview =
+          std::make_unique<PreviewSink>(surface.preview.string(), force, arguments.picture);
   }
   return sinks;
 }
@@ -221,8 +222,8 @@ int run(const Arguments& arguments, Console& console) {
   check(arguments);
   const StoreReader store(arguments.store);
   const std::vector<Surface> surfaces = plan(arguments, store);
-  const Said said = arguments.estimate ? estimate_all(surfaces)
-                                       : make_all(arguments, surfaces, store, console);
+  const Said said =
+      arguments.estimate ? estimate_all(surfaces) : make_all(arguments, surfaces, store, console);
   console.result({{"command", "extract"},
                   {"store", arguments.store},
                   {"level", arguments.level},
@@ -259,16 +260,15 @@ void add_preview_options(CLI::App* app, Arguments& arguments) {
 
 void add_extract(Program& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* app = add_subcommand(
-      program, "extract", "Write isosurfaces of a store as welded triangle meshes.",
-      "isobrick extract head.zarr --isovalue 500 --isovalue 1150 -o head.ply");
+  CLI::App* app =
+      add_subcommand(program, "extract", "Write isosurfaces of a store as welded triangle meshes.",
+                     "isobrick extract head.zarr --isovalue 500 --isovalue 1150 -o head.ply");
   add_path(app, "STORE", arguments->store, "Store to read");
-  add_repeated(app,
-               {"--isovalue", "V", "Value that the surface passes through; may be repeated", "",
-                true},
-               [&isovalues = arguments->isovalues](const std::string& text) {
-                 isovalues.push_back(parse_number(text));
-               });
+  add_repeated(
+      app, {"--isovalue", "V", "Value that the surface passes through; may be repeated", "", true},
+      [&isovalues = arguments->isovalues](const std::string& text) {
+        isovalues.push_back(parse_number(text));
+      });
   add_text(app,
            {"-o,--output", "MESH",
             "Mesh to write, .ply or .stl; several isovalues make head_500.ply and so on"},
@@ -285,7 +285,8 @@ void add_extract(Program& program) {
   add_force(app, arguments->force);
   add_flag(app, "--no-space-check", arguments->no_space_check,
            "Begin even if the estimate says that the disk is too small");
-  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+  program.commands.push_back(
+      {app, [arguments](Console& console) { return run(*arguments, console); }});
 }
 
 }  // namespace isobrick::tools

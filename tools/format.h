@@ -10,7 +10,9 @@ namespace isobrick::tools {
 
 /// "512 B", "1.4 MiB".
 std::string human_bytes(double bytes);
-inline std::string human_bytes(std::uint64_t bytes) { return human_bytes(static_cast<double>(bytes)); }
+inline std::string human_bytes(std::uint64_t bytes) {
+  return human_bytes(static_cast<double>(bytes));
+}
 
 /// "1,234,567".
 std::string human_count(std::uint64_t count);

@@ -41,10 +41,10 @@ void for_each_sample(const StoreReader& store, int level, Progress& progress, F&
         using T = typename decltype(tag)::type;
         for_each_point({{0, 0, 0}, extent}, [&](Int3 p) {
           T value;
-          std::memcpy(&value,
-                      samples.data() +
-                          static_cast<std::size_t>(linear_index(p, lattice.brick)) * sizeof(T),
-                      sizeof(T));
+          std::memcpy(
+              &value,
+              samples.data() + static_cast<std::size_t>(linear_index(p, lattice.brick)) * sizeof(T),
+              sizeof(T));
           f(static_cast<double>(value), std::uint64_t{1});
         });
       });
@@ -87,8 +87,10 @@ Histogram histogram(const StoreReader& store, Progress& progress) {
   h.level = choose_level(store.info());
   ValueRange<double> range;
   for_each_sample(store, h.level, progress, [&](double value, std::uint64_t times) {
-    if (std::isfinite(value)) range.include(value);
-    else (std::isnan(value) ? h.not_a_number : h.infinite) += times;
+    if (std::isfinite(value))
+      range.include(value);
+    else
+      (std::isnan(value) ? h.not_a_number : h.infinite) += times;
   });
   h.lo = range.lo;
   h.hi = range.hi;

@@ -97,9 +97,8 @@ ordered_json levels_json(const StoreInfo& info, const Facts& facts) {
 }
 
 ordered_json histogram_json(const Histogram& h) {
-  return {{"level", h.level},         {"lo", h.lo},
-          {"hi", h.hi},               {"bin_width", h.bin_width},
-          {"counts", h.counts},       {"not_a_number", h.not_a_number},
+  return {{"level", h.level},         {"lo", h.lo},         {"hi", h.hi},
+          {"bin_width", h.bin_width}, {"counts", h.counts}, {"not_a_number", h.not_a_number},
           {"infinite", h.infinite}};
 }
 
@@ -150,13 +149,14 @@ std::string text_of(const StoreInfo& info, const Facts& facts) {
   text += fmt::format("origin       {:g}, {:g}, {:g}\n", origin.x, origin.y, origin.z);
   text += levels_text(info, facts);
   text += fmt::format("codec        {}\n", info.codec);
-  text += fmt::format("bytes        {} for {} of samples ({:.2f} to 1)\n",
-                      human_bytes(facts.bytes), human_bytes(facts.raw_bytes), facts.ratio());
+  text += fmt::format("bytes        {} for {} of samples ({:.2f} to 1)\n", human_bytes(facts.bytes),
+                      human_bytes(facts.raw_bytes), facts.ratio());
   text += facts.range.empty()
               ? "value range  none\n"
               : fmt::format("value range  {:g} to {:g}\n", facts.range.lo, facts.range.hi);
-  text += fmt::format("index kinds  {}\n",
-                      facts.kinds.empty() ? "none" : fmt::format("{}", fmt::join(facts.kinds, ", ")));
+  text +=
+      fmt::format("index kinds  {}\n",
+                  facts.kinds.empty() ? "none" : fmt::format("{}", fmt::join(facts.kinds, ", ")));
   text += fmt::format("histogram    of level {}, square-root scale\n{}", h.level, draw(h, 6));
   if (h.not_a_number + h.infinite > 0)
     text += fmt::format("  left out: {} NaN, {} infinite\n", human_count(h.not_a_number),

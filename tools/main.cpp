@@ -3,8 +3,8 @@
 #include <memory>
 #include <new>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include "isobrick/core/error.h"
 #include "tools/console.h"

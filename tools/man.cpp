@@ -10,9 +10,12 @@ namespace {
 std::string roff(const std::string& text) {
   std::string escaped;
   for (const char c : text) {
-    if (c == '\\') escaped += "\\e";
-    else if (c == '-') escaped += "\\-";
-    else escaped += c;
+    if (c == '\\')
+      escaped += "\\e";
+    else if (c == '-')
+      escaped += "\\-";
+    else
+      escaped += c;
   }
   if (escaped.starts_with('.') || escaped.starts_with('\'')) escaped.insert(0, "\\&");
   return escaped;
@@ -40,7 +43,8 @@ std::string synopsis(const CommandView& command) {
   for (const OptionView& positional : command.positionals)
     line += fmt::format(" {}", italic(positional.names[0]));
   for (const OptionView& option : command.options)
-    if (option.required) line += fmt::format(" {} {}", bold(option.names.back()), italic(option.value));
+    if (option.required)
+      line += fmt::format(" {} {}", bold(option.names.back()), italic(option.value));
   return fmt::format("{} [{}]", line, italic("options"));
 }
 
@@ -55,15 +59,20 @@ std::string command_section(const CommandView& command) {
 }
 
 std::string man_page(const CLI::App& program) {
-  std::string text = fmt::format(".TH ISOBRICK 1 \"\" \"isobrick {}\" \"User Commands\"\n",
-                                 ISOBRICK_VERSION);
+  std::string text =
+      fmt::format(".TH ISOBRICK 1 \"\" \"isobrick {}\" \"User Commands\"\n", ISOBRICK_VERSION);
   text += ".SH NAME\nisobrick \\- isosurfaces of volumes larger than memory\n.SH SYNOPSIS\n";
   for (const CommandView& command : subcommands_of(program)) text += synopsis(command) + "\n.br\n";
-  text += ".SH DESCRIPTION\n" + roff(
-      "isobrick cuts a volume into bricks, keeps them in a store (an OME-Zarr 0.5 image) with the "
-      "range of every brick, and extracts isosurfaces as watertight triangle meshes while reading "
-      "only the bricks that the surface touches. Memory stays within a budget, whatever the "
-      "volume's size.") + "\n";
+  text +=
+      ".SH DESCRIPTION\n" +
+      roff(
+          "isobrick cuts a volume into bricks, keeps them in a store (an OME-Zarr 0.5 image) with "
+          "the "
+          "range of every brick, and extracts isosurfaces as watertight triangle meshes while "
+          "reading "
+          "only the bricks that the surface touches. Memory stays within a budget, whatever the "
+          "volume's size.") +
+      "\n";
   text += ".SH OPTIONS\n";
   for (const OptionView& option : view_of(program).options) text += option_entry(option);
   text += ".SH COMMANDS\n";

@@ -1,7 +1,7 @@
 #include "tools/options.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "tools/format.h"
@@ -120,10 +120,9 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
 void report_conversion(Console& console, const std::string& command, const std::string& input,
                        const std::string& output, const VolumeInfo& volume,
                        const ConvertReport& report) {
-  const double ratio =
-      report.bytes_out == 0
-          ? 0
-          : static_cast<double>(report.bytes_in) / static_cast<double>(report.bytes_out);
+  const double ratio = report.bytes_out == 0 ? 0
+                                             : static_cast<double>(report.bytes_in) /
+                                                   static_cast<double>(report.bytes_out);
   const double rate =
       report.seconds > 0 ? static_cast<double>(report.bytes_in) / report.seconds : 0;
   const nlohmann::ordered_json object{

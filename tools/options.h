@@ -46,8 +46,8 @@ CLI::App* add_subcommand(Program& program, const std::string& name, const std::s
 
 /// How an option is called and explained.
 struct OptionText {
-  std::string name;           ///< "--dims", "-o,--output", or "OUT" for a positional
-  std::string value;          ///< what its value is called; "a|b|c" lists the choices
+  std::string name;   ///< "--dims", "-o,--output", or "OUT" for a positional
+  std::string value;  ///< what its value is called; "a|b|c" lists the choices
   std::string help;
   std::string fallback = {};  ///< what holds when it is left out
   bool required = false;
@@ -68,8 +68,7 @@ void add_parsed(CLI::App* app, T& target, Parse parse, const OptionText& option)
 }
 
 /// A required positional path.
-void add_path(CLI::App* app, const std::string& name, std::string& target,
-              const std::string& help);
+void add_path(CLI::App* app, const std::string& name, std::string& target, const std::string& help);
 
 void add_dims(CLI::App* app, std::optional<Int3>& dims);
 void add_type(CLI::App* app, std::optional<ScalarType>& type);

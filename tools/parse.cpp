@@ -27,8 +27,8 @@ std::optional<std::array<std::string_view, 3>> split3(std::string_view text) {
   const auto second = text.find(',', first + 1);
   if (second == std::string_view::npos || text.find(',', second + 1) != std::string_view::npos)
     return std::nullopt;
-  return {{text.substr(0, first), text.substr(first + 1, second - first - 1),
-           text.substr(second + 1)}};
+  return {
+      {text.substr(0, first), text.substr(first + 1, second - first - 1), text.substr(second + 1)}};
 }
 
 /// The power of two that a unit stands for, or nothing: "", K, M, G, T with "B" or "iB".
@@ -82,8 +82,8 @@ Int3 parse_dims(std::string_view text) {
   if (!parts) throw UsageError(fmt::format("'{}' is not of the form X,Y,Z", text));
   Int3 dims;
   for (int axis = 0; axis < 3; ++axis)
-    dims[axis] = parse_whole((*parts)[static_cast<std::size_t>(axis)], 1,
-                             std::numeric_limits<Index>::max());
+    dims[axis] =
+        parse_whole((*parts)[static_cast<std::size_t>(axis)], 1, std::numeric_limits<Index>::max());
   if (!checked_volume(dims))
     throw UsageError(fmt::format("a volume of {} samples is too large to address", text));
   return dims;
@@ -99,7 +99,8 @@ PictureSize parse_picture_size(std::string_view text) {
   const auto comma = text.find(',');
   if (comma == std::string_view::npos)
     throw UsageError(fmt::format("'{}' is not of the form WIDTH,HEIGHT", text));
-  return {parse_int(text.substr(0, comma), 16, 16384), parse_int(text.substr(comma + 1), 16, 16384)};
+  return {parse_int(text.substr(0, comma), 16, 16384),
+          parse_int(text.substr(comma + 1), 16, 16384)};
 }
 
 ScalarType parse_type(std::string_view text) {
@@ -152,9 +153,10 @@ Box3 resolve_roi(const RoiText& roi, Int3 extent) {
     box.lo[axis] = roi.lo[i].value_or(0);
     box.hi[axis] = roi.hi[i].value_or(extent[axis]);
     if (box.lo[axis] >= box.hi[axis] || box.hi[axis] > extent[axis])
-      throw UsageError(fmt::format("the region {}:{} along {} is empty or leaves the volume, which "
-                                   "has samples 0:{} there",
-                                   box.lo[axis], box.hi[axis], "xyz"[axis], extent[axis]));
+      throw UsageError(
+          fmt::format("the region {}:{} along {} is empty or leaves the volume, which "
+                      "has samples 0:{} there",
+                      box.lo[axis], box.hi[axis], "xyz"[axis], extent[axis]));
   }
   return box;
 }

@@ -34,8 +34,7 @@ SynthKind parse_kind(const std::string& text) {
 void compute(VolumeSource& source, Box3 box, std::byte* out) {
   constexpr Index rows_per_task = 16;
   const Int3 extent = box.extent();
-  const std::size_t row_bytes =
-      static_cast<std::size_t>(extent.x) * size_of(source.info().type);
+  const std::size_t row_bytes = static_cast<std::size_t>(extent.x) * size_of(source.info().type);
   const Index groups = ceil_div(extent.y, rows_per_task);
   tbb::parallel_for(Index{0}, groups * extent.z, [&](Index task) {
     const Index y = task % groups * rows_per_task, z = task / groups;
@@ -102,11 +101,10 @@ int run(const Arguments& arguments, Console& console) {
 
 void add_synth(Program& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* app = add_subcommand(
-      program, "synth", "Make a procedural volume of any size, the same on every machine.",
-      "isobrick synth gyroid gyroid.zarr --dims 512,512,512 --type u8");
-  add_text(app,
-           {"KIND", "sphere|gyroid|marschner-lobb|mixing", "Which field", "", true},
+  CLI::App* app = add_subcommand(program, "synth",
+                                 "Make a procedural volume of any size, the same on every machine.",
+                                 "isobrick synth gyroid gyroid.zarr --dims 512,512,512 --type u8");
+  add_text(app, {"KIND", "sphere|gyroid|marschner-lobb|mixing", "Which field", "", true},
            [&kind = arguments->synth.kind](const std::string& text) { kind = parse_kind(text); });
   add_path(app, "OUT", arguments->out, "Store to write, or a raw file if it ends in .raw");
   add_dims(app, arguments->dims);
@@ -119,7 +117,8 @@ void add_synth(Program& program) {
   add_parsed(app, arguments->synth.noise, parse_number,
              {"--noise", "A", "Amplitude of the gyroid's noise, as a part of the field's", "0.01"});
   add_store_options(app, arguments->store);
-  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+  program.commands.push_back(
+      {app, [arguments](Console& console) { return run(*arguments, console); }});
 }
 
 }  // namespace isobrick::tools

@@ -20,7 +20,8 @@ std::string text_of(const std::string& store, const VerifyReport& report) {
   std::string text;
   for (const std::string& damage : report.damages) text += damage + '\n';
   if (report.damage_count > report.damages.size())
-    text += fmt::format("… and {} more\n", human_count(report.damage_count - report.damages.size()));
+    text +=
+        fmt::format("… and {} more\n", human_count(report.damage_count - report.damages.size()));
   if (report.damage_count == 0)
     text += fmt::format("{} is whole: {} bricks, {} read\n", store, human_count(report.bricks),
                         human_bytes(report.bytes));
@@ -47,12 +48,13 @@ int run(const Arguments& arguments, Console& console) {
 
 void add_verify(Program& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* app = add_subcommand(
-      program, "verify", "Read all of a store; check every checksum, range and size.",
-      "isobrick verify head.zarr");
+  CLI::App* app = add_subcommand(program, "verify",
+                                 "Read all of a store; check every checksum, range and size.",
+                                 "isobrick verify head.zarr");
   add_path(app, "STORE", arguments->store, "Store to check");
   add_threads(app, arguments->threads);
-  program.commands.push_back({app, [arguments](Console& console) { return run(*arguments, console); }});
+  program.commands.push_back(
+      {app, [arguments](Console& console) { return run(*arguments, console); }});
 }
 
 }  // namespace isobrick::tools

@@ -84,9 +84,9 @@ TEST_F(BadInput, ShortStandardInput) {
 }
 
 TEST_F(BadInput, MissingAndUnreadableInput) {
-  expect_refused(run({"convert", path("none.raw"), path("out.zarr"), "--dims", "1,1,1", "--type",
-                      "u8"}),
-                 1, {"none.raw"});
+  expect_refused(
+      run({"convert", path("none.raw"), path("out.zarr"), "--dims", "1,1,1", "--type", "u8"}), 1,
+      {"none.raw"});
   expect_refused(run({"info", path("none.zarr")}), 1, {"none.zarr"});
   expect_refused(run({"verify", path("none.zarr")}), 1, {"none.zarr"});
   expect_refused(run({"extract", path("none.zarr"), "--isovalue", "1", "-o", path("a.ply")}), 1,
@@ -128,14 +128,14 @@ TEST_F(BadInput, ExistingOutputsStayAsTheyAre) {
 
 TEST_F(BadInput, ForceReplaces) {
   const std::string store = make_store("a");
-  EXPECT_EQ(run({"synth", "sphere", store, "--dims", "20,20,20", "--type", "u8", "--force"})
-                .exit_code,
-            0);
+  EXPECT_EQ(
+      run({"synth", "sphere", store, "--dims", "20,20,20", "--type", "u8", "--force"}).exit_code,
+      0);
   EXPECT_EQ(run_json({"info", store})["extent"], nlohmann::json({20, 20, 20}));
   write_file(path("mesh.ply"), "mine");
-  EXPECT_EQ(run({"extract", store, "--isovalue", "127.5", "-o", path("mesh.ply"), "--force"})
-                .exit_code,
-            0);
+  EXPECT_EQ(
+      run({"extract", store, "--isovalue", "127.5", "-o", path("mesh.ply"), "--force"}).exit_code,
+      0);
   EXPECT_TRUE(read_file(path("mesh.ply")).starts_with("ply\n"));
   EXPECT_EQ(files(), (Arguments{"a.zarr", "mesh.ply"}));
 }
@@ -146,9 +146,9 @@ TEST_F(BadInput, AFolderThatCannotBeWrittenTo) {
   write_file(path("file"), "");
   write_file(path("in.raw"), noise(1000));
   const std::string below = path("file") + "/out";
-  expect_refused(run({"convert", path("in.raw"), below + ".zarr", "--dims", "10,10,10", "--type",
-                      "u8"}),
-                 1, {"file"});
+  expect_refused(
+      run({"convert", path("in.raw"), below + ".zarr", "--dims", "10,10,10", "--type", "u8"}), 1,
+      {"file"});
   expect_refused(run({"extract", store, "--isovalue", "127.5", "-o", below + ".ply"}), 1, {"file"});
   expect_refused(run({"extract", store, "--isovalue", "127.5", "--preview", below + ".png"}), 1,
                  {"file"});
@@ -168,9 +168,9 @@ TEST_F(BadInput, AFullDisk) {
   expect_refused(run({"extract", store, "--isovalue", "127.5", "-o", path("a.stl")}, full), 1,
                  {"a.stl", "File too large"});
   expect_refused(run({"export", store, path("a.raw")}, full), 1, {"a.raw", "File too large"});
-  expect_refused(run({"synth", "sphere", path("b.raw"), "--dims", "64,64,64", "--type", "u8"},
-                     full),
-                 1, {"b.raw", "File too large"});
+  expect_refused(
+      run({"synth", "sphere", path("b.raw"), "--dims", "64,64,64", "--type", "u8"}, full), 1,
+      {"b.raw", "File too large"});
   EXPECT_EQ(files(), names);
   expect_refused(run({"convert", path("in_64x64x64_uint8.raw"), path("c.zarr")}, full), 1,
                  {"File too large"});
@@ -184,8 +184,8 @@ TEST_F(BadInput, AFullStandardOutput) {
 
 TEST_F(BadInput, ABudgetTooSmallNamesTheLeastThatDoes) {
   write_file(path("in_64x64x64_uint8.raw"), noise(64 * 64 * 64));
-  expect_refused(
-      run({"convert", path("in_64x64x64_uint8.raw"), path("c.zarr"), "--memory", "1K"}), 2, {});
+  expect_refused(run({"convert", path("in_64x64x64_uint8.raw"), path("c.zarr"), "--memory", "1K"}),
+                 2, {});
   EXPECT_FALSE(std::filesystem::exists(path("c.zarr")));
   const std::string store = make_store("a");
   expect_refused(

@@ -84,9 +84,9 @@ TEST_F(Damage, ExtractAndExportStopAtDamagedBricks) {
   with_each_damaged([](std::string& bytes) { bytes[bytes.size() / 3] ^= 4; },
                     [&](const fs::path& part) {
                       if (!is_shard(part)) return;
-                      expect_refused(run({"extract", store_, "--isovalue", "127.5", "-o",
-                                          path("a.ply")}),
-                                     1, {"c/"});
+                      expect_refused(
+                          run({"extract", store_, "--isovalue", "127.5", "-o", path("a.ply")}), 1,
+                          {"c/"});
                       expect_refused(run({"export", store_, path("a.raw")}), 1, {"c/"});
                     });
   EXPECT_EQ(files(), names);

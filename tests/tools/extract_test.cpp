@@ -39,8 +39,8 @@ TEST_F(Extract, WritesStl) {
 
 TEST_F(Extract, NormalsEnlargeTheVertices) {
   const std::string store = make_store("a");
-  const nlohmann::json json = run_json({"extract", store, "--isovalue", "127.5", "--normals",
-                                        "gradient", "-o", path("a.ply")});
+  const nlohmann::json json = run_json(
+      {"extract", store, "--isovalue", "127.5", "--normals", "gradient", "-o", path("a.ply")});
   const std::string mesh = read_file(path("a.ply"));
   EXPECT_NE(mesh.find("property float nx"), std::string::npos);
   EXPECT_GT(mesh.size(), 24 * json["surfaces"][0]["vertices"].get<std::size_t>() +
@@ -49,8 +49,8 @@ TEST_F(Extract, NormalsEnlargeTheVertices) {
 
 TEST_F(Extract, SeveralIsovaluesGetNamesOfTheirOwn) {
   const std::string store = make_store("a");
-  const nlohmann::json json = run_json({"extract", store, "--isovalue", "100", "--isovalue", "127.5",
-                                        "-o", path("m.ply"), "--preview", path("m.png")});
+  const nlohmann::json json = run_json({"extract", store, "--isovalue", "100", "--isovalue",
+                                        "127.5", "-o", path("m.ply"), "--preview", path("m.png")});
   EXPECT_EQ(json["surfaces"].size(), 2u);
   EXPECT_EQ(files(), (Arguments{"a.zarr", "m_100.ply", "m_100.png", "m_127.5.ply", "m_127.5.png"}));
 }
@@ -79,7 +79,8 @@ TEST_F(Extract, EstimateWritesNothingAndIsNear) {
   const nlohmann::json estimate =
       run_json({"extract", store, "--isovalue", "127.5", "--estimate", "-o", path("a.ply")});
   EXPECT_EQ(files(), names);
-  const nlohmann::json made = run_json({"extract", store, "--isovalue", "127.5", "-o", path("a.ply")});
+  const nlohmann::json made =
+      run_json({"extract", store, "--isovalue", "127.5", "-o", path("a.ply")});
   const nlohmann::json &predicted = estimate["surfaces"][0], &real = made["surfaces"][0];
   EXPECT_EQ(predicted["bricks"]["active"], real["bricks"]["active"]);
   for (const char* key : {"triangles", "vertices"}) {

@@ -67,8 +67,10 @@ pid_t spawn(const Arguments& words, const Surroundings& surroundings, int out, i
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, 0, surroundings.input.c_str(), O_RDONLY, 0);
-  if (surroundings.output.empty()) posix_spawn_file_actions_adddup2(&actions, out, 1);
-  else posix_spawn_file_actions_addopen(&actions, 1, surroundings.output.c_str(), O_WRONLY, 0);
+  if (surroundings.output.empty())
+    posix_spawn_file_actions_adddup2(&actions, out, 1);
+  else
+    posix_spawn_file_actions_addopen(&actions, 1, surroundings.output.c_str(), O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, err, 2);
   std::vector<char*> argv;
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
@@ -161,8 +163,8 @@ nlohmann::json ProgramTest::run_json(Arguments arguments, const Surroundings& su
 
 std::string ProgramTest::make_store(const std::string& name, const Arguments& more) {
   const std::string store = path(name + ".zarr");
-  Arguments arguments{"synth",  "gyroid",   store,  "--dims", "40,36,33",
-                      "--type", "u8",       "--brick", "16",  "--shard", "32"};
+  Arguments arguments{"synth", "gyroid",  store, "--dims",  "40,36,33", "--type",
+                      "u8",    "--brick", "16",  "--shard", "32"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   const Outcome outcome = run(arguments);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

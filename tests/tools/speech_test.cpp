@@ -44,10 +44,9 @@ TEST_F(Speech, InfoShowsTheStore) {
                            "index kinds  none", "histogram", "█"})
     EXPECT_NE(outcome.out.find(part), std::string::npos) << part << "\n" << outcome.out;
   const nlohmann::json json = run_json({"info", store});
-  for (const char* key :
-       {"command", "store", "extent", "type", "spacing", "origin", "direction", "unit", "codec",
-        "fill_value", "levels", "bytes", "raw_bytes", "ratio", "value_range", "histogram",
-        "index_kinds"})
+  for (const char* key : {"command", "store", "extent", "type", "spacing", "origin", "direction",
+                          "unit", "codec", "fill_value", "levels", "bytes", "raw_bytes", "ratio",
+                          "value_range", "histogram", "index_kinds"})
     EXPECT_TRUE(json.contains(key)) << key;
   std::uint64_t counted = 0;
   for (const auto& count : json["histogram"]["counts"]) counted += count.get<std::uint64_t>();
