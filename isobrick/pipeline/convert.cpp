@@ -1,11 +1,8 @@
 #include "isobrick/pipeline/convert.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <chrono>
 #include <memory>
-#include <thread>
 #include <vector>
 
 #include "isobrick/bricks/store_writer.h"
@@ -16,6 +13,7 @@
 #include "isobrick/pipeline/convert_staging.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/slab_file.h"
+#include "isobrick/pipeline/workers.h"
 
 namespace isobrick {
 namespace {
@@ -37,9 +35,8 @@ class Conversion {
         store_(staging.path(), layout, staging.resumed()),
         journal_(staging.path(), layout.levels.front().lattice, staging.resumed()) {
     for (int level = 0; level < level_count(); ++level)
-      writers_.push_back(std::make_unique<LevelWriter>(store_, layout, level,
-                                                       plan.bricks_in_flight(),
-                                                       level == 0 ? &journal_ : nullptr));
+      writers_.push_back(std::make_unique<LevelWriter>(
+          store_, layout, level, plan.bricks_in_flight(), level == 0 ? &journal_ : nullptr));
   }
 
   ConvertReport run();
@@ -127,11 +124,11 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
   for_each_point({{0, 0, 0}, pieces}, [&](Int3 p) {
     const Box3 box = box_of(p);
     read_box(source, box, buffer.get());
-    writer.write(box, buffer.get());
-    if (next) {
+    writer.write(box, buffer.get(), [&] {
+      if (!next) return;
       downsample(lattice.type, box.extent(), buffer.get(), half.get());
       next->write({half_extent(box.lo), half_extent(box.hi)}, half.get());
-    }
+    });
     if (p.x + 1 == pieces.x && p.y + 1 == pieces.y) writer.close(box.hi.z);
     if (level == 0) progress_.advance(bytes_of(box.extent(), lattice.type));
   });
@@ -162,17 +159,14 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const StoreLayout layout = plan_layout(source.info(), options);
-  const int threads = options.threads > 0
-                          ? options.threads
-                          : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const ConvertPlan plan(layout, options.memory, threads, source.random_access());
+  const ConvertPlan plan(layout, options.memory, Workers(options.threads).threads(),
+                         source.random_access());
   ConvertStaging staging(out, options.resume, options.force);
-  tbb::task_arena arena(plan.threads());
-  ConvertReport report = arena.execute(
-      [&] { return Conversion(source, layout, plan, staging, progress).run(); });
+  Workers workers(plan.threads());
+  ConvertReport report =
+      workers.execute([&] { return Conversion(source, layout, plan, staging, progress).run(); });
   staging.publish();
-  report.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;
 }
 

@@ -11,14 +11,14 @@ namespace isobrick {
 
 /// How a store is written.
 struct ConvertOptions {
-  Index brick = 64;             ///< samples along each edge of a brick, 16 … 256
-  Index shard = 512;            ///< samples along each edge of a shard, a multiple of `brick`
+  Index brick = 64;                   ///< samples along each edge of a brick, 16 … 256
+  Index shard = 512;                  ///< samples along each edge of a shard, a multiple of `brick`
   std::optional<int> zstd_level = 3;  ///< nothing: bricks are stored as they are
-  std::optional<int> levels;    ///< nothing: until one brick holds the coarsest
+  std::optional<int> levels;          ///< nothing: until one brick holds the coarsest
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
-  int threads = 0;              ///< 0: all cores
-  bool resume = false;          ///< go on with an interrupted conversion of the same input
-  bool force = false;           ///< replace a store that exists (only when the new one is whole)
+  int threads = 0;                                ///< 0: all cores
+  bool resume = false;  ///< go on with an interrupted conversion of the same input
+  bool force = false;   ///< replace a store that exists (only when the new one is whole)
 };
 
 /// What a conversion did.

@@ -35,11 +35,14 @@ class Cascade {
     std::size_t plane_bytes() const {
       return static_cast<std::size_t>(lattice.extent.x * lattice.extent.y) * lattice.sample_bytes();
     }
-    Box3 box(Index count) const { return {{0, 0, z0}, {lattice.extent.x, lattice.extent.y, z0 + count}}; }
+    std::byte* free_planes() const {
+      return slab.get() + plane_bytes() * static_cast<std::size_t>(planes);
+    }
+    std::size_t slab_bytes() const { return plane_bytes() * static_cast<std::size_t>(capacity); }
+    Box3 box() const { return {{0, 0, z0}, {lattice.extent.x, lattice.extent.y, z0 + planes}}; }
   };
 
   void flush(std::size_t stage);
-  void run_alternating(VolumeSource& source, Progress& progress);
 
   std::vector<Stage> stages_;
   bool second_slab_;

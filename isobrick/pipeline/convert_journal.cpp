@@ -26,7 +26,8 @@ std::uint64_t mix(std::uint64_t place, std::uint32_t crc) {
 ConvertJournal::ConvertJournal(const std::filesystem::path& store, const Lattice& lattice,
                                bool resume)
     : path_(store / "convert.journal"), lattice_(lattice) {
-  fd_ = UniqueFd(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | (resume ? 0 : O_TRUNC), 0666));
+  fd_ =
+      UniqueFd(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | (resume ? 0 : O_TRUNC), 0666));
   if (fd_.get() < 0) throw system_error("cannot create", path_.string(), errno);
   earlier_.resize(static_cast<std::size_t>(lattice.bricks().z));
   const ssize_t n = ::pread(fd_.get(), earlier_.data(), earlier_.size() * sizeof(earlier_[0]), 0);
@@ -51,10 +52,10 @@ void ConvertJournal::record(Index layer, std::uint64_t sum) {
   if (i < earlier_.size()) {
     if (earlier_[i] == sum) return;
     const Index z0 = layer * lattice_.brick.z;
-    throw Error(fmt::format("the input is not the one that '{}' was begun with: planes {} to {} "
-                            "differ; --force starts anew",
-                            path_.parent_path().string(), z0,
-                            std::min(z0 + lattice_.brick.z, lattice_.extent.z) - 1));
+    throw Error(fmt::format(
+        "the input is not the one that '{}' was begun with: planes {} to {} "
+        "differ; --force starts anew",
+        path_.parent_path().string(), z0, std::min(z0 + lattice_.brick.z, lattice_.extent.z) - 1));
   }
   if (::pwrite(fd_.get(), &sum, sizeof(sum), static_cast<off_t>(i * sizeof(sum))) !=
       static_cast<ssize_t>(sizeof(sum)))

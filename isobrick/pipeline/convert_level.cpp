@@ -1,5 +1,6 @@
 #include "isobrick/pipeline/convert_level.h"
 
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_pipeline.h>
 
 #include <cstring>
@@ -69,7 +70,13 @@ void LevelWriter::deliver(const Parcel& parcel) {
     ++counts_.absent;
 }
 
-void LevelWriter::write(Box3 box, const std::byte* samples) {
+void LevelWriter::write(Box3 box, const std::byte* samples,
+                        const std::function<void()>& meanwhile) {
+  tbb::parallel_invoke([&] { write_bricks(box, samples); }, [&] { ranges_->add(box, samples); },
+                       meanwhile);
+}
+
+void LevelWriter::write_bricks(Box3 box, const std::byte* samples) {
   const Int3 edge = info_.lattice.brick;
   const Int3 first{box.lo.x / edge.x, box.lo.y / edge.y, box.lo.z / edge.z};
   const Int3 count = ceil_div(box.hi, edge) - first;
@@ -82,12 +89,10 @@ void LevelWriter::write(Box3 box, const std::byte* samples) {
   tbb::parallel_pipeline(
       bricks_in_flight_,
       tbb::make_filter<void, Int3>(tbb::filter_mode::serial_in_order, take) &
-          tbb::make_filter<Int3, Parcel>(
-              tbb::filter_mode::parallel,
-              [&](Int3 brick) { return pack(brick, box, samples); }) &
+          tbb::make_filter<Int3, Parcel>(tbb::filter_mode::parallel,
+                                         [&](Int3 brick) { return pack(brick, box, samples); }) &
           tbb::make_filter<Parcel, void>(tbb::filter_mode::serial_in_order,
                                          [&](const Parcel& parcel) { deliver(parcel); }));
-  ranges_->add(box, samples);
 }
 
 void LevelWriter::finish_shards(Index z1) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -22,10 +23,12 @@ class LevelWriter {
   LevelWriter(StoreWriter& store, const StoreLayout& layout, int level, int bricks_in_flight,
               ConvertJournal* journal);
 
-  /// Writes the bricks of `box`, which is aligned to them; `samples` is dense.
+  /// Writes the bricks of `box`, which is aligned to them, and merges its samples
+  /// into the ranges; `samples` is dense. `meanwhile` runs on some thread beside
+  /// that, so that no thread waits for the last brick.
   /// Bricks reach their shard in the order z, y, x of the calls and in each box,
   /// whatever the threads, so a shard's bytes are always the same.
-  void write(Box3 box, const std::byte* samples);
+  void write(Box3 box, const std::byte* samples, const std::function<void()>& meanwhile);
 
   /// All samples below z1 were written: finishes the shards and ranges that
   /// this completes.
@@ -38,12 +41,15 @@ class LevelWriter {
   /// A brick on its way to its shard.
   struct Parcel {
     Int3 brick;
-    bool kept = false;       ///< its shard was whole already
-    std::uint32_t crc = 0;   ///< of the samples, for the journal
+    bool kept = false;      ///< its shard was whole already
+    std::uint32_t crc = 0;  ///< of the samples, for the journal
     std::optional<std::vector<std::byte>> encoded;
   };
 
-  bool is_kept(Int3 shard) const { return kept_[static_cast<std::size_t>(linear_index(shard, shards_))]; }
+  bool is_kept(Int3 shard) const {
+    return kept_[static_cast<std::size_t>(linear_index(shard, shards_))];
+  }
+  void write_bricks(Box3 box, const std::byte* samples);
   Parcel pack(Int3 brick, Box3 box, const std::byte* samples) const;
   void deliver(const Parcel& parcel);
   void finish_shards(Index z1);

@@ -103,7 +103,8 @@ ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int th
 std::size_t ConvertPlan::encoding_bytes() const {
   const std::size_t brick = layout_.levels.front().lattice.brick_bytes();
   return kProgramBytes +
-         static_cast<std::size_t>(threads_) * (2 * brick + encoder_bytes(layout_.zstd_level, brick)) +
+         static_cast<std::size_t>(threads_) *
+             (2 * brick + encoder_bytes(layout_.zstd_level, brick)) +
          static_cast<std::size_t>(bricks_in_flight_) * brick;
 }
 
@@ -147,8 +148,8 @@ Index ConvertPlan::spool_planes() const {
 
 std::size_t ConvertPlan::least_room(bool random_access) const {
   const Lattice& lattice = layout_.levels.front().lattice;
-  const std::size_t cube = static_cast<std::size_t>(slab_planes_ * slab_planes_ * slab_planes_) *
-                           lattice.sample_bytes();
+  const std::size_t cube =
+      static_cast<std::size_t>(slab_planes_ * slab_planes_ * slab_planes_) * lattice.sample_bytes();
   const std::size_t pieces = ranges_bytes(0) + cube / 8 * 9 + 9;
   const std::size_t plane =
       static_cast<std::size_t>(lattice.extent.x * lattice.extent.y) * lattice.sample_bytes();

@@ -21,7 +21,9 @@ fs::path parent_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
 
-bool is_there(const fs::path& path) { return fs::symlink_status(path).type() != fs::file_type::not_found; }
+bool is_there(const fs::path& path) {
+  return fs::symlink_status(path).type() != fs::file_type::not_found;
+}
 
 /// A Zarr group (or an empty folder): something that is ours to replace.
 bool is_store(const fs::path& path) {
@@ -81,9 +83,10 @@ void ConvertStaging::prepare(bool resume, bool force) {
   resumed_ = resume && is_there(staging_ / kLayoutMarker);
   if (resumed_ || fs::is_empty(staging_)) return;
   if (resume ? !nothing_to_resume(staging_) : !force)
-    throw UsageError(fmt::format("an interrupted conversion is in '{}'; --resume goes on with it, "
-                                 "--force starts anew",
-                                 staging_.string()));
+    throw UsageError(
+        fmt::format("an interrupted conversion is in '{}'; --resume goes on with it, "
+                    "--force starts anew",
+                    staging_.string()));
   for (const fs::directory_entry& entry : fs::directory_iterator(staging_))
     fs::remove_all(entry.path());
 }

@@ -68,8 +68,8 @@ void average_row(const Rows<T>& r, Index width, T* __restrict out) {
         if (!std::isfinite(out[i])) out[i] = mean_of_unusual(r, 2 * i, 2 * i + 1);
     if (width % 2 == 0) return;
     const double sum = plain_sum(r, width - 1, width - 1);
-    out[pairs] = std::isfinite(sum) ? static_cast<T>(sum * 0.125)
-                                    : mean_of_unusual(r, width - 1, width - 1);
+    out[pairs] =
+        std::isfinite(sum) ? static_cast<T>(sum * 0.125) : mean_of_unusual(r, width - 1, width - 1);
   } else {
     for (Index i = 0; i < pairs; ++i) out[i] = mean_of_integers(r, 2 * i, 2 * i + 1);
     if (width % 2 != 0) out[pairs] = mean_of_integers(r, width - 1, width - 1);

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,12 +9,12 @@
 #include <cerrno>
 #include <cstdio>
 #include <memory>
-#include <thread>
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
+#include "isobrick/pipeline/workers.h"
 
 namespace isobrick {
 namespace {
@@ -31,7 +30,8 @@ constexpr std::size_t kPieceBytes = 256 * kMiB;
 /// The file that is written, gone again unless it is published.
 class TemporaryFile {
  public:
-  TemporaryFile(const std::filesystem::path& out, bool force) : out_(out), name_(out), force_(force) {
+  TemporaryFile(const std::filesystem::path& out, bool force)
+      : out_(out), name_(out), force_(force) {
     const auto status = std::filesystem::symlink_status(out);
     if (std::filesystem::exists(status) && !force)
       throw UsageError(fmt::format("'{}' exists; --force replaces it", out.string()));
@@ -77,10 +77,11 @@ Box3 region(const StoreReader& store, int level, const std::optional<Box3>& roi)
   const Box3 all = info.levels[static_cast<std::size_t>(level)].lattice.box();
   if (!roi) return all;
   if (roi->empty() || intersect(*roi, all) != *roi)
-    throw UsageError(fmt::format(
-        "the region [{}, {}) × [{}, {}) × [{}, {}) does not lie in the level's {} × {} × {} samples",
-        roi->lo.x, roi->hi.x, roi->lo.y, roi->hi.y, roi->lo.z, roi->hi.z, all.hi.x, all.hi.y,
-        all.hi.z));
+    throw UsageError(
+        fmt::format("the region [{}, {}) × [{}, {}) × [{}, {}) does not lie in the level's {} × {} "
+                    "× {} samples",
+                    roi->lo.x, roi->hi.x, roi->lo.y, roi->hi.y, roi->lo.z, roi->hi.z, all.hi.x,
+                    all.hi.y, all.hi.z));
   return *roi;
 }
 
@@ -90,8 +91,9 @@ Int3 piece_within(const Lattice& lattice, Int3 extent, std::uint64_t memory, int
       kProgramBytes + static_cast<std::size_t>(threads) * 2 * lattice.brick_bytes();
   const std::size_t least = fixed + lattice.brick_bytes();
   if (memory < least)
-    throw UsageError(fmt::format("a memory budget of {} MiB is too small: {} MiB are needed at least",
-                                 memory / kMiB, least / kMiB + 1));
+    throw UsageError(
+        fmt::format("a memory budget of {} MiB is too small: {} MiB are needed at least",
+                    memory / kMiB, least / kMiB + 1));
   const std::size_t room = std::min(static_cast<std::size_t>(memory) - fixed, kPieceBytes);
   return largest_piece(extent, lattice.brick, room / lattice.sample_bytes());
 }
@@ -114,17 +116,16 @@ std::uint64_t export_raw(const StoreReader& store, int level, std::optional<Box3
                          int threads, Progress& progress) {
   const Box3 box = region(store, level, roi);
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const Int3 piece = piece_within(lattice, box.extent(), memory, threads);
+  Workers workers(threads);
+  const Int3 piece = piece_within(lattice, box.extent(), memory, workers.threads());
   TemporaryFile temporary(out, force);
   const SlabFile file(temporary.open(), temporary.name(), box.extent(), lattice.sample_bytes());
   file.reserve();
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
       static_cast<std::size_t>(volume(min(piece, box.extent()))) * lattice.sample_bytes());
-  tbb::task_arena arena(threads);
   progress.begin("export", file.bytes());
   for_each_piece(box, lattice.brick, piece, [&](Box3 part) {
-    arena.execute([&] { read_slab(store, level, part, buffer.get()); });
+    workers.execute([&] { read_slab(store, level, part, buffer.get()); });
     file.write({part.lo - box.lo, part.hi - box.lo}, buffer.get());
     progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
   });

@@ -99,10 +99,9 @@ struct Samples {
 /// Merges the samples with y in `ys` and z in `zs` into one row of items.
 template <class T>
 void merge_item_row(const Samples<T>& in, Span ys, Span zs, Index edge, ValueRange<T>* row) {
-  const Index items_at_once =
-      std::max<Index>(1, static_cast<Index>(kRowBytes / sizeof(T)) / edge);
-  ColumnRanges<T> columns(static_cast<std::size_t>(
-      std::min(items_at_once * edge + 1, in.box.hi.x - in.box.lo.x)));
+  const Index items_at_once = std::max<Index>(1, static_cast<Index>(kRowBytes / sizeof(T)) / edge);
+  ColumnRanges<T> columns(
+      static_cast<std::size_t>(std::min(items_at_once * edge + 1, in.box.hi.x - in.box.lo.x)));
   const Span all = items_seeing(in.box.lo.x, in.box.hi.x, edge);
   for (Index first = all.first; first <= all.last; first += items_at_once) {
     const Index last = std::min(first + items_at_once - 1, all.last);
@@ -175,7 +174,8 @@ void RangeScanner<T>::close(Index z1, const RangeEmit& emit) {
   while (first_open_ < items_.z && (all || (first_open_ + 1) * edge_.z < z1)) {
     Layer& done = layer(first_open_);
     canonicalise_zeros(done);
-    emit({{0, 0, first_open_}, {items_.x, items_.y, first_open_ + 1}}, std::as_bytes(std::span(done)));
+    emit({{0, 0, first_open_}, {items_.x, items_.y, first_open_ + 1}},
+         std::as_bytes(std::span(done)));
     open_.pop_front();
     ++first_open_;
   }

@@ -67,8 +67,7 @@ void read_slab(const StoreReader& store, int level, Box3 box, std::byte* out,
       }
   };
   tbb::parallel_for(Index{0}, volume(count), [&](Index i) {
-    const Int3 brick =
-        first + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
+    const Int3 brick = first + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
     if (!failure) return copy(brick);
     try {
       copy(brick);

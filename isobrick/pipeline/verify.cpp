@@ -1,19 +1,18 @@
 #include "isobrick/pipeline/verify.h"
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <memory>
 #include <mutex>
 #include <set>
-#include <thread>
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/range_scan.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
+#include "isobrick/pipeline/workers.h"
 
 namespace isobrick {
 namespace {
@@ -78,15 +77,14 @@ void LevelCheck::fail(Int3 brick, const std::string& what) {
 /// Whether the item's cells touch a sample of a brick that could not be read.
 bool LevelCheck::sees_unreadable(Int3 item, Int3 edge) const {
   if (!any_unreadable_) return false;
-  const Box3 seen = intersect({item * edge, (item + Int3{1, 1, 1}) * edge + Int3{1, 1, 1}},
-                              lattice_.box());
+  const Box3 seen =
+      intersect({item * edge, (item + Int3{1, 1, 1}) * edge + Int3{1, 1, 1}}, lattice_.box());
   const Int3 b = lattice_.brick;
   bool found = false;
-  for_each_point({{seen.lo.x / b.x, seen.lo.y / b.y, seen.lo.z / b.z}, ceil_div(seen.hi, b)},
-                 [&](Int3 brick) {
-                   found |= unreadable_[static_cast<std::size_t>(
-                       linear_index(brick, lattice_.bricks()))];
-                 });
+  for_each_point(
+      {{seen.lo.x / b.x, seen.lo.y / b.y, seen.lo.z / b.z}, ceil_div(seen.hi, b)}, [&](Int3 brick) {
+        found |= unreadable_[static_cast<std::size_t>(linear_index(brick, lattice_.bricks()))];
+      });
   return found;
 }
 
@@ -105,13 +103,14 @@ void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pai
     for_each_point(items, [&](Int3 p) {
       const ValueRange<T> range = *found++;
       const ValueRange<double> samples =
-          range.empty() ? ValueRange<double>{}
-                        : ValueRange<double>{static_cast<double>(range.lo), static_cast<double>(range.hi)};
+          range.empty()
+              ? ValueRange<double>{}
+              : ValueRange<double>{static_cast<double>(range.lo), static_cast<double>(range.hi)};
       const ValueRange<double>& said = stored.at(p);
       if (said == samples || (said.empty() && samples.empty()) || sees_unreadable(p, edge)) return;
-      damages_.add(fmt::format("level {}, {} ({}, {}, {}): its range says [{}, {}], its samples [{}, {}]",
-                               level_, what, p.x, p.y, p.z, said.lo, said.hi, samples.lo,
-                               samples.hi));
+      damages_.add(
+          fmt::format("level {}, {} ({}, {}, {}): its range says [{}, {}], its samples [{}, {}]",
+                      level_, what, p.x, p.y, p.z, said.lo, said.hi, samples.lo, samples.hi));
     });
   });
 }
@@ -151,18 +150,17 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
     damages.add(e.what());
     return damages.report();
   }
-  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   const std::vector<LevelInfo>& levels = store->info().levels;
   std::uint64_t bytes = 0;
   for (const LevelInfo& level : levels) {
     damages.report().bricks += static_cast<std::uint64_t>(volume(level.lattice.bricks()));
-    bytes += static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
+    bytes +=
+        static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
   progress.begin("verify", bytes);
-  tbb::task_arena arena(threads);
+  Workers workers(threads);
   for (std::size_t level = 0; level < levels.size(); ++level)
-    arena.execute(
-        [&] { LevelCheck(*store, static_cast<int>(level), damages).run(progress); });
+    workers.execute([&] { LevelCheck(*store, static_cast<int>(level), damages).run(progress); });
   progress.end();
   damages.report().bytes = store->bytes_read();
   return damages.report();

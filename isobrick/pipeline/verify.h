@@ -11,7 +11,8 @@ namespace isobrick {
 
 struct VerifyReport {
   std::uint64_t bricks = 0, bytes = 0;
-  std::vector<std::string> damages;  ///< one line each: level, brick, file, offset, what; at most 1000 kept
+  std::vector<std::string>
+      damages;  ///< one line each: level, brick, file, offset, what; at most 1000 kept
   std::uint64_t damage_count = 0;
 };
 

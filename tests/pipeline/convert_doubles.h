@@ -19,11 +19,13 @@ inline std::size_t bytes_of(Int3 extent, ScalarType type) {
 }
 
 /// Copies `box` out of a dense volume.
-inline void copy_box(const std::byte* from, Int3 extent, std::size_t sample, Box3 box, std::byte* to) {
+inline void copy_box(const std::byte* from, Int3 extent, std::size_t sample, Box3 box,
+                     std::byte* to) {
   const auto row = static_cast<std::size_t>(box.extent().x) * sample;
   for (Index z = box.lo.z; z < box.hi.z; ++z)
     for (Index y = box.lo.y; y < box.hi.y; ++y, to += row)
-      std::memcpy(to, from + static_cast<std::size_t>(linear_index({box.lo.x, y, z}, extent)) * sample,
+      std::memcpy(to,
+                  from + static_cast<std::size_t>(linear_index({box.lo.x, y, z}, extent)) * sample,
                   row);
 }
 
@@ -33,7 +35,8 @@ class MemorySource final : public VolumeSource {
  public:
   MemorySource(const MemorySource& other)
       : info_(other.info_), samples_(other.samples_), random_access_(other.random_access_) {}
-  MemorySource(Int3 extent, ScalarType type, std::vector<std::byte> samples, bool random_access = true)
+  MemorySource(Int3 extent, ScalarType type, std::vector<std::byte> samples,
+               bool random_access = true)
       : samples_(std::move(samples)), random_access_(random_access) {
     info_.extent = extent;
     info_.type = type;
@@ -46,7 +49,8 @@ class MemorySource final : public VolumeSource {
   void read(Box3 box, std::byte* out) override {
     if (!random_access_) {
       const Int3 e = info_.extent;
-      if (box.lo.x != 0 || box.lo.y != 0 || box.hi.x != e.x || box.hi.y != e.y || box.lo.z != next_z_)
+      if (box.lo.x != 0 || box.lo.y != 0 || box.hi.x != e.x || box.hi.y != e.y ||
+          box.lo.z != next_z_)
         throw std::logic_error("a stream must be read in whole planes, in order, once");
       next_z_ = box.hi.z;
     }
@@ -83,8 +87,9 @@ std::vector<T> make_samples(Int3 extent, unsigned seed, bool odd = false) {
       v = static_cast<T>(static_cast<double>(random() % 20001) - 10000.0) / T{7};
       if (odd && random() % 50 == 0) {
         constexpr T inf = std::numeric_limits<T>::infinity();
-        const T unusual[] = {std::numeric_limits<T>::quiet_NaN(), inf, -inf, T{-0.0},
-                             std::numeric_limits<T>::max(), std::numeric_limits<T>::denorm_min()};
+        const T unusual[] = {
+            std::numeric_limits<T>::quiet_NaN(), inf, -inf, T{-0.0}, std::numeric_limits<T>::max(),
+            std::numeric_limits<T>::denorm_min()};
         v = unusual[random() % std::size(unusual)];
       }
     } else {
@@ -107,10 +112,9 @@ template <class T>
 ValueRange<T> brute_range(const std::vector<T>& samples, Int3 extent, Int3 item, Index edge) {
   ValueRange<T> range;
   const Int3 lo = item * edge;
-  for_each_point(intersect({lo, lo + Int3{edge + 1, edge + 1, edge + 1}}, {{0, 0, 0}, extent}),
-                 [&](Int3 p) {
-                   range.include(samples[static_cast<std::size_t>(linear_index(p, extent))]);
-                 });
+  for_each_point(
+      intersect({lo, lo + Int3{edge + 1, edge + 1, edge + 1}}, {{0, 0, 0}, extent}),
+      [&](Int3 p) { range.include(samples[static_cast<std::size_t>(linear_index(p, extent))]); });
   return range;
 }
 

@@ -69,7 +69,8 @@ TYPED_TEST(RangeScan, RowsLongerThanTheCacheWindow) {
 
 TEST(RangeScanFloats, NothingButNanIsEmpty) {
   const Int3 extent{20, 20, 20};
-  check_ranges(std::vector<float>(8000, std::numeric_limits<float>::quiet_NaN()), extent, extent, 16);
+  check_ranges(std::vector<float>(8000, std::numeric_limits<float>::quiet_NaN()), extent, extent,
+               16);
 }
 
 TEST(RangeScanFloats, ZerosHaveOneSign) {

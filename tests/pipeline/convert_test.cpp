@@ -93,7 +93,8 @@ TEST(ConvertLayout, BytesDependOnNothingButTheInputAndTheOptions) {
 }
 
 /// The least budget, as the message of a smaller one says it.
-std::uint64_t least_budget(VolumeSource& source, ConvertOptions options, const TemporaryFolder& folder) {
+std::uint64_t least_budget(VolumeSource& source, ConvertOptions options,
+                           const TemporaryFolder& folder) {
   options.memory = 1;
   try {
     convert_quietly(source, folder / "none", options);
@@ -188,7 +189,8 @@ TEST(ConvertResume, RefusesAnotherInputOrOtherOptions) {
   broken.fail_after(source.samples().size() - 1);
   ConvertOptions options = small_bricks();
   EXPECT_THROW(convert_quietly(broken, folder / "a", options), Error);
-  EXPECT_THROW(convert_quietly(source, folder / "a", options), UsageError);  // says --resume, --force
+  EXPECT_THROW(convert_quietly(source, folder / "a", options),
+               UsageError);  // says --resume, --force
   options.resume = true;
   MemorySource other = make_source<std::uint8_t>(extent, 4);
   EXPECT_THROW(convert_quietly(other, folder / "a", options), Error);
@@ -204,7 +206,8 @@ TEST(ConvertResume, RefusesAnotherInputOrOtherOptions) {
 TEST(ConvertPlace, ReplacesAStoreOnlyWhenTheNewOneIsWhole) {
   const Int3 extent{40, 40, 40};
   TemporaryFolder folder;
-  MemorySource first = make_source<std::uint8_t>(extent, 1), second = make_source<std::uint8_t>(extent, 2);
+  MemorySource first = make_source<std::uint8_t>(extent, 1),
+               second = make_source<std::uint8_t>(extent, 2);
   ConvertOptions options = small_bricks();
   convert_quietly(first, folder / "a", options);
   MemorySource untouched(second);
