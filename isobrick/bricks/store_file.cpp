@@ -86,6 +86,11 @@ void StoreFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const 
   }
 }
 
+void StoreFile::will_need(std::uint64_t offset, std::uint64_t size) const {
+  ::posix_fadvise(descriptor_, static_cast<off_t>(offset), static_cast<off_t>(size),
+                  POSIX_FADV_WILLNEED);
+}
+
 void StoreFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
   checked_offset(offset, bytes.size(), path_);
   while (!bytes.empty()) {

@@ -37,6 +37,8 @@ class StoreFile {
   std::uint64_t size() const;
   /// Reads exactly bytes.size() bytes; DamageError when the file ends before.
   void read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
+  /// Hints that these bytes are read soon; starts the disk, waits for nothing.
+  void will_need(std::uint64_t offset, std::uint64_t size) const;
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   void sync();
 

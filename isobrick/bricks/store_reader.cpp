@@ -249,6 +249,10 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   return true;
 }
 
+void StoreReader::will_need(int level, Int3 b) const {
+  if (const auto place = impl_->find(level, b)) place->file->will_need(place->offset, place->size);
+}
+
 std::uint64_t StoreReader::bytes_read() const { return impl_->bytes_read; }
 
 RangeTable StoreReader::brick_ranges(int level, Box3 box) const {

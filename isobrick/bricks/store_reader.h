@@ -67,6 +67,9 @@ class StoreReader {
   /// Throws DamageError naming level, brick, file and offset.
   bool read_brick(int level, Int3 b, std::byte* out) const;
 
+  /// Hints that brick `b` is read soon; may start the disk.
+  void will_need(int level, Int3 b) const;
+
   /// Bytes read from disk so far (bricks, indices, ranges).
   std::uint64_t bytes_read() const;
 

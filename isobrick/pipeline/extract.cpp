@@ -103,18 +103,21 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     CpuExtractor extractor(lattice, request.surface, plan.limits);
     ChunkWriter writer(sink);
     MeshBuffer mesh;
-    TileBatch batch;
+    TileBatch batch, following;
     progress.begin("extracting", expected.active_bricks * lattice.brick_bytes());
     const double bytes_per_block = static_cast<double>(expected.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /
                                    std::max(1.0, static_cast<double>(expected.active_blocks));
     Workers workers(request.threads);
     workers.execute([&] {
-      while (batches.next(batch)) {
+      for (bool more = batches.next(batch); more; std::swap(batch, following)) {
         {
           Stopwatch watch(report.decode_seconds);
           cache.require(batch.bricks);
         }
+        // The disk works on the next batch while the processors work on this one.
+        more = batches.next(following);
+        cache.will_need(following.bricks);
         {
           Stopwatch watch(report.surface_seconds);
           extractor.extract(batch.tiles, cache, mesh,

@@ -68,6 +68,11 @@ void BrickCache::require(std::span<const Int3> bricks) {
   }
 }
 
+void BrickCache::will_need(std::span<const Int3> bricks) const {
+  for (const Int3 b : bricks)
+    if (!entries_.count(key(b))) store_.will_need(level_, b);
+}
+
 const std::byte* BrickCache::find(Int3 brick) const {
   const auto found = entries_.find(key(brick));
   assert(found != entries_.end());

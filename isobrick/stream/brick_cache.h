@@ -23,6 +23,10 @@ class BrickCache final : public BrickLookup {
   /// find() to them stay valid until the next call.
   void require(std::span<const Int3> bricks);
 
+  /// Hints that these bricks are required next: starts the disk for those that
+  /// are not resident.
+  void will_need(std::span<const Int3> bricks) const;
+
   const std::byte* find(Int3 brick) const override;
 
   std::size_t capacity() const { return capacity_; }
