@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <map>
 #include <random>
 #include <set>
 #include <vector>
@@ -105,7 +104,7 @@ Mesh extract(const Field<T>& field, const Request& request) {
 /// Each triangle as the three lattice edges its vertices lie on, rotated so
 /// that the smallest comes first: a mesh without any order.
 using EdgeKey = std::array<Index, 4>;  // lower sample, axis
-using EdgeTriangles = std::multiset<std::array<EdgeKey, 3>>;
+using EdgeTriangles = std::vector<std::array<EdgeKey, 3>>;  // sorted
 
 inline std::array<EdgeKey, 3> rotated(std::array<EdgeKey, 3> t) {
   while (t[1] < t[0] || t[2] < t[0]) t = {t[1], t[2], t[0]};
@@ -133,8 +132,9 @@ EdgeTriangles reference_triangles(const Field<T>& field, double isovalue) {
     };
     const auto& edges = kCaseTables.edges[index];
     for (std::size_t t = 0; t < kCaseTables.triangles[index]; ++t)
-      triangles.insert(rotated({key(edges[3 * t]), key(edges[3 * t + 1]), key(edges[3 * t + 2])}));
+      triangles.push_back(rotated({key(edges[3 * t]), key(edges[3 * t + 1]), key(edges[3 * t + 2])}));
   });
+  std::sort(triangles.begin(), triangles.end());
   return triangles;
 }
 
@@ -154,22 +154,26 @@ inline EdgeKey edge_of(Vec3f p) {
 inline EdgeTriangles edge_triangles(const Mesh& mesh) {
   EdgeTriangles triangles;
   for (const Triangle& t : mesh.triangles)
-    triangles.insert(rotated({edge_of(mesh.positions[t[0]]), edge_of(mesh.positions[t[1]]),
-                              edge_of(mesh.positions[t[2]])}));
+    triangles.push_back(rotated({edge_of(mesh.positions[t[0]]), edge_of(mesh.positions[t[1]]),
+                                 edge_of(mesh.positions[t[2]])}));
+  std::sort(triangles.begin(), triangles.end());
   return triangles;
 }
 
 /// Checks that every side belongs to two triangles with opposite directions.
 /// Returns the number of sides, or −1.
 inline std::ptrdiff_t closed_sides(const Mesh& mesh) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
+  const auto key = [](std::uint64_t from, std::uint64_t to) { return from << 32 | to; };
+  std::vector<std::uint64_t> forward, backward;
   for (const Triangle& t : mesh.triangles)
-    for (std::size_t i = 0; i < 3; ++i) ++sides[{t[i], t[(i + 1) % 3]}];
-  for (const auto& [side, n] : sides) {
-    const auto reverse = sides.find({side.second, side.first});
-    if (n != 1 || reverse == sides.end() || reverse->second != 1) return -1;
-  }
-  return static_cast<std::ptrdiff_t>(sides.size()) / 2;
+    for (std::size_t i = 0; i < 3; ++i) {
+      forward.push_back(key(t[i], t[(i + 1) % 3]));
+      backward.push_back(key(t[(i + 1) % 3], t[i]));
+    }
+  std::sort(forward.begin(), forward.end());
+  std::sort(backward.begin(), backward.end());
+  const bool twice = std::adjacent_find(forward.begin(), forward.end()) != forward.end();
+  return twice || forward != backward ? -1 : static_cast<std::ptrdiff_t>(forward.size()) / 2;
 }
 
 }  // namespace isobrick::testing
