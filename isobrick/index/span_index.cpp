@@ -1,0 +1,111 @@
+#include "isobrick/index/span_index.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "isobrick/core/error.h"
+#include "isobrick/index/instantiate.h"
+#include "isobrick/index/stab_value.h"
+
+namespace isobrick {
+namespace {
+
+/// The header of an index over a grid of so many ranges.
+IndexHeader header_for(IndexKind kind, ScalarType type, std::size_t items, Int3 grid) {
+  constexpr Index limit = std::numeric_limits<std::uint32_t>::max();
+  if (items > static_cast<std::size_t>(limit))
+    throw UsageError("an index holds less than 2^32 items, not " + std::to_string(items));
+  IndexHeader header;
+  header.kind = kind;
+  header.type = type;
+  header.items = static_cast<std::uint32_t>(items);
+  const bool positive = grid.x > 0 && grid.y > 0 && grid.z > 0;
+  // Divided rather than multiplied: extents may be anything.
+  const bool fits = positive ? grid.x <= limit && grid.y <= limit / grid.x &&
+                                   grid.z <= limit / (grid.x * grid.y) &&
+                                   volume(grid) == static_cast<Index>(items)
+                             : items == 0;
+  if (!fits)
+    throw UsageError("the extents of an index do not give its " + std::to_string(items) +
+                     " ranges");
+  for (int axis = 0; axis < 3 && positive; ++axis)
+    header.grid[axis] = static_cast<std::uint32_t>(grid[axis]);
+  return header;
+}
+
+/// Converts the isovalue to the items' type once and lets the structure report to `sink`.
+template <class Sink>
+void report(const IndexView& index, double iso, Sink& sink) {
+  visit_index(index, [&]<template <class> class View, class T>(const View<T>& view) {
+    const StabValue<T> stab(iso);
+    if (!stab.none) traverse(view, stab.value, sink);
+  });
+}
+
+}  // namespace
+
+template <class T>
+std::vector<std::byte> build_index(IndexKind kind, std::span<const ValueRange<T>> ranges,
+                                   Int3 grid) {
+  const IndexHeader header = header_for(kind, scalar_type_of<T>, ranges.size(), grid);
+  switch (kind) {
+    case IndexKind::interval: return IntervalView<T>::build(header, ranges);
+    case IndexKind::kdtree: return KdView<T>::build(header, ranges);
+    case IndexKind::quadtree: return QuadtreeView<T>::build(header, ranges);
+    case IndexKind::octree: return OctreeView<T>::build(header, ranges);
+    case IndexKind::linear: break;
+  }
+  return LinearView<T>::build(header, ranges);
+}
+
+void query(const IndexView& index, double iso, std::vector<std::uint32_t>& ids) {
+  AppendSink sink(ids);
+  report(index, iso, sink);
+}
+
+std::uint64_t count(const IndexView& index, double iso) {
+  CountSink sink;
+  report(index, iso, sink);
+  return sink.count();
+}
+
+void mark(const IndexView& index, double iso, std::span<std::uint64_t> words) {
+  if (words.size() < mask_words(index.items()))
+    throw UsageError("a mask of " + std::to_string(words.size()) + " words is too small for " +
+                     std::to_string(index.items()) + " items");
+  MarkSink sink(words.data());
+  report(index, iso, sink);
+}
+
+void query_ascending(const IndexView& index, double iso, std::vector<std::uint32_t>& ids) {
+  if (index.kind() == IndexKind::linear) return query(index, iso, ids);
+  const std::size_t before = ids.size();
+  query(index, iso, ids);
+  const std::size_t answers = ids.size() - before;
+  // Sorting k answers takes about k·log₂ k steps; a mask one for each word of it
+  // and one for each answer.
+  constexpr std::size_t log = 16;
+  const std::size_t words = mask_words(index.items());
+  if (answers * log < words) {
+    std::sort(ids.begin() + static_cast<std::ptrdiff_t>(before), ids.end());
+    return;
+  }
+  std::vector<std::uint64_t> mask(words);
+  for (std::size_t i = before; i < ids.size(); ++i) MarkSink(mask.data()).id(ids[i]);
+  ids.resize(before);
+  AppendSink sink(ids);
+  for (std::size_t w = 0; w < words; ++w) sink.bits(static_cast<std::uint32_t>(64 * w), mask[w]);
+}
+
+QuerySteps count_steps(const IndexView& index, double iso) {
+  StepsSink sink;
+  report(index, iso, sink);
+  return sink.steps();
+}
+
+#define ISOBRICK_INSTANTIATE(T) \
+  template std::vector<std::byte> build_index<T>(IndexKind, std::span<const ValueRange<T>>, Int3);
+ISOBRICK_FOR_SAMPLE_TYPES(ISOBRICK_INSTANTIATE)
+#undef ISOBRICK_INSTANTIATE
+
+}  // namespace isobrick
