@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <isa-l/crc.h>
+// For the estimate of a context's size, which is not in the stable part.
+#define ZSTD_STATIC_LINKING_ONLY
 #include <zstd.h>
 
 #include <algorithm>
@@ -164,6 +166,11 @@ void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* bri
         std::fill(row + first, row + full.x, fill);
       }
   });
+}
+
+std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_bytes) {
+  if (!zstd_level) return 0;
+  return ZSTD_estimateCCtxSize_usingCParams(ZSTD_getCParams(*zstd_level, brick_bytes, 0));
 }
 
 std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes) {

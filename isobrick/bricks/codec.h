@@ -54,6 +54,9 @@ std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
                                                    double fill_value,
                                                    std::optional<int> zstd_level);
 
+/// Bytes that zstd keeps for one thread to encode bricks of so many bytes.
+std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_bytes);
+
 /// Encodes bytes by a chain of our own making. Thread-safe.
 std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "isobrick/bricks/codec.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/range_scan.h"
@@ -52,14 +53,6 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
   if (options.threads < 0) throw UsageError(fmt::format("{} threads", options.threads));
 }
 
-/// Tables that zstd keeps for one thread; they grow with the level but need not
-/// be larger than a few times what is compressed.
-std::size_t encoder_bytes(std::optional<int> zstd_level, std::size_t brick_bytes) {
-  if (!zstd_level) return 0;
-  const std::size_t most = (*zstd_level <= 5 ? 3 : *zstd_level <= 12 ? 24 : 96) * kMiB;
-  return std::min(most, 16 * brick_bytes);
-}
-
 }  // namespace
 
 StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options) {
@@ -104,7 +97,7 @@ std::size_t ConvertPlan::encoding_bytes() const {
   const std::size_t brick = layout_.levels.front().lattice.brick_bytes();
   return kProgramBytes +
          static_cast<std::size_t>(threads_) *
-             (2 * brick + encoder_bytes(layout_.zstd_level, brick)) +
+             (2 * brick + encoder_memory(layout_.zstd_level, brick)) +
          static_cast<std::size_t>(bricks_in_flight_) * brick;
 }
 
