@@ -1,7 +1,6 @@
 #include "isobrick/index/interval_tree.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "isobrick/index/instantiate.h"
 #include "isobrick/index/span_items.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "isobrick/core/vec.h"
 #include "isobrick/index/instantiate.h"
 #include "isobrick/index/span_items.h"
 
@@ -31,18 +30,18 @@ void reduce_row(const ValueRange<T>* const* rows, int count, std::uint32_t width
 /// below; `row` is valid during the call.
 template <class T, class F>
 void for_each_reduced_row(const OctreeView<T>& view, int level, F&& f) {
-  const std::uint32_t below[3] = {view.extent(0, level - 1), view.extent(1, level - 1),
-                                  view.extent(2, level - 1)};
-  const std::uint32_t width = view.extent(0, level);
+  const std::uint32_t* below = view.pyramid[level - 1].extent;
+  const std::uint32_t width = view.pyramid[level].extent[0];
   std::vector<ValueRange<T>> row(width);
-  std::uint64_t offset = view.first[level];
+  std::uint64_t offset = view.pyramid[level].first;
   for (std::uint64_t z = 0; z < below[2]; z += 2)
     for (std::uint64_t y = 0; y < below[1]; y += 2, offset += width) {
       const ValueRange<T>* rows[4];
       int count = 0;
       for (std::uint64_t v = z; v < std::min<std::uint64_t>(z + 2, below[2]); ++v)
         for (std::uint64_t u = y; u < std::min<std::uint64_t>(y + 2, below[1]); ++u)
-          rows[count++] = view.ranges + view.first[level - 1] + (v * below[1] + u) * below[0];
+          rows[count++] =
+              view.ranges + view.pyramid[level - 1].first + (v * below[1] + u) * below[0];
       reduce_row(rows, count, below[0], row.data());
       f(offset, width, row.data());
     }

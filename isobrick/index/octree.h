@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -17,24 +18,29 @@ template <class T>
 struct OctreeView {
   static constexpr int kMaxLevels = 33;
 
+  /// The nodes of a level.
+  struct Level {
+    std::uint64_t first = 0;       ///< place of its first range
+    std::uint32_t extent[3] = {};  ///< ⌈extent of the grid / 2^level⌉
+  };
   int levels = 0;
-  std::uint32_t grid[3];
-  std::uint64_t first[kMaxLevels + 1] = {};  ///< where each level begins
+  Level pyramid[kMaxLevels + 1];  ///< and one that says where the last ends
   const ValueRange<T>* ranges;
 
-  OctreeView(const IndexHeader& header, SectionCursor& cursor)
-      : grid{header.grid[0], header.grid[1], header.grid[2]} {
-    if (header.items)
-      for (std::uint64_t n = 0; n != 1; ++levels) {
-        n = std::uint64_t{extent(0, levels)} * extent(1, levels) * extent(2, levels);
-        first[levels + 1] = first[levels] + n;
+  OctreeView(const IndexHeader& header, SectionCursor& cursor) {
+    std::uint64_t nodes = header.items, first = 0;
+    for (; header.items && (levels == 0 || nodes != 1); ++levels, first += nodes) {
+      nodes = 1;
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::uint64_t up = (std::uint64_t{1} << levels) - 1;
+        pyramid[levels].extent[axis] =
+            static_cast<std::uint32_t>((header.grid[axis] + up) >> levels);
+        nodes *= pyramid[levels].extent[axis];
       }
-    ranges = cursor.take<ValueRange<T>>(first[levels]);
-  }
-
-  /// Nodes of a level along an axis: ⌈grid / 2^level⌉.
-  ISOBRICK_HD std::uint32_t extent(int axis, int level) const {
-    return static_cast<std::uint32_t>((grid[axis] + (std::uint64_t{1} << level) - 1) >> level);
+      pyramid[levels].first = first;
+    }
+    pyramid[levels].first = first;
+    ranges = cursor.take<ValueRange<T>>(first);
   }
 
   static std::vector<std::byte> build(IndexHeader header, std::span<const ValueRange<T>> ranges);
@@ -43,74 +49,84 @@ struct OctreeView {
 
 namespace index_detail {
 
+/// The place of the lowest set bit of a byte that is not 0.
+ISOBRICK_HD inline std::uint32_t lowest_bit(std::uint32_t byte) {
+#ifdef __CUDA_ARCH__
+  return static_cast<std::uint32_t>(__ffs(static_cast<int>(byte)) - 1);
+#else
+  return static_cast<std::uint32_t>(std::countr_zero(byte));
+#endif
+}
+
 template <class T>
 ISOBRICK_HD inline bool stabs(const ValueRange<T>& range, T value) {
-  return range.lo < value && value <= range.hi;
+  return (range.lo < value) & (value <= range.hi);
 }
 
-/// A node's place in the pyramid.
-struct OctreePlace {
-  int level;
-  std::uint32_t x, y, z;
-};
-
-/// Moves on to the next node in Z-order that is no descendant; false at the end.
+/// Bit x + 2·y + 4·z: of the nodes (2·px + x, 2·py + y, 2·pz + z) of a level, the
+/// children of node (px, py, pz) above, the one that exists and is stabbed.
 template <class T>
-ISOBRICK_HD inline bool advance(const OctreeView<T>& index, OctreePlace& at) {
-  for (; at.level + 1 < index.levels; ++at.level) {
-    const std::uint32_t ex = index.extent(0, at.level), ey = index.extent(1, at.level),
-                        ez = index.extent(2, at.level);
-    for (std::uint32_t octant = (at.x & 1) + 2 * (at.y & 1) + 4 * (at.z & 1) + 1; octant < 8;
-         ++octant) {
-      const std::uint32_t x = (at.x & ~1u) + (octant & 1), y = (at.y & ~1u) + (octant >> 1 & 1),
-                          z = (at.z & ~1u) + (octant >> 2);
-      if (x < ex && y < ey && z < ez) {
-        at = {at.level, x, y, z};
-        return true;
-      }
-    }
-    at = {at.level, at.x / 2, at.y / 2, at.z / 2};
+ISOBRICK_HD inline std::uint32_t stabbed_children(const OctreeView<T>& index, int level,
+                                                  std::uint32_t px, std::uint32_t py,
+                                                  std::uint32_t pz, T value) {
+  const auto& at = index.pyramid[level];
+  const std::uint32_t ex = at.extent[0], ey = at.extent[1];
+  const std::uint64_t plane = std::uint64_t{ex} * ey;
+  const ValueRange<T>* row =
+      index.ranges + at.first + 2 * pz * plane + 2 * py * std::uint64_t{ex} + 2 * px;
+  const std::uint32_t x1 = ex - 2 * px > 1, y1 = ey - 2 * py > 1, z1 = at.extent[2] - 2 * pz > 1;
+  std::uint32_t bits = 0;
+  // A neighbour that does not exist is the node itself again, and its bit is cut off.
+  for (std::uint32_t octant = 0; octant < 8; ++octant) {
+    const std::uint32_t x = octant & x1, y = octant >> 1 & y1, z = octant >> 2 & z1;
+    bits |= static_cast<std::uint32_t>(stabs(row[z * plane + y * ex + x], value)) << octant;
   }
-  return false;
+  return bits & (x1 ? 0xff : 0x55) & (y1 ? 0xff : 0x33) & (z1 ? 0xff : 0x0f);
 }
 
-/// Reports the stabbed ones of the up to eight items below a node of level 1.
+/// Reports the items that `bits` names among the children of node (px, py, pz) of level 1.
 template <class T, class Sink>
-ISOBRICK_HD inline void report_items(const OctreeView<T>& index, const OctreePlace& at, T value,
-                                     Sink& sink) {
-  const std::uint32_t x0 = 2 * at.x, y0 = 2 * at.y, z0 = 2 * at.z;
-  const std::uint32_t nx = index.grid[0] - x0 > 1 ? 2 : 1, ny = index.grid[1] - y0 > 1 ? 2 : 1,
-                      nz = index.grid[2] - z0 > 1 ? 2 : 1;
-  sink.tested(nx * ny * nz);
-  for (std::uint32_t z = z0; z < z0 + nz; ++z)
-    for (std::uint32_t y = y0; y < y0 + ny; ++y) {
-      // Ids are of 32 bits, so this cannot wrap.
-      const std::uint32_t id = (z * index.grid[1] + y) * index.grid[0] + x0;
-      if (stabs(index.ranges[id], value)) sink.id(id);
-      if (nx == 2 && stabs(index.ranges[id + 1], value)) sink.id(id + 1);
-    }
+ISOBRICK_HD inline void report_items(const OctreeView<T>& index, std::uint32_t px, std::uint32_t py,
+                                     std::uint32_t pz, std::uint32_t bits, Sink& sink) {
+  // Ids are of 32 bits, so that nothing here wraps for an item that exists.
+  const std::uint32_t ex = index.pyramid[0].extent[0], plane = ex * index.pyramid[0].extent[1];
+  const std::uint32_t first = 2 * pz * plane + 2 * py * ex + 2 * px;
+  for (; bits; bits &= bits - 1) {
+    const std::uint32_t octant = lowest_bit(bits);
+    sink.id(first + (octant >> 2) * plane + (octant >> 1 & 1) * ex + (octant & 1));
+  }
 }
 
 }  // namespace index_detail
 
-/// Reports the stabbed items in Z-order (Morton order) of the grid. Needs no
-/// stack: a node's place says which comes next.
+/// Reports the stabbed items in Z-order (Morton order) of the grid. The stack is
+/// a byte for each level: the children that are still to be visited.
 template <class T, class Sink>
 ISOBRICK_HD void traverse(const OctreeView<T>& index, T value, Sink& sink) {
   if (index.levels == 0) return;
-  index_detail::OctreePlace at{index.levels - 1, 0, 0, 0};
-  do {
-    for (;;) {
-      const std::uint64_t row = std::uint64_t{at.z} * index.extent(1, at.level) + at.y;
-      const std::uint64_t i = index.first[at.level] + row * index.extent(0, at.level) + at.x;
-      sink.node();
-      if (!index_detail::stabs(index.ranges[i], value)) break;
-      if (at.level == 0) sink.id(0);  // a grid of one item
-      if (at.level == 1) index_detail::report_items(index, at, value, sink);
-      if (at.level <= 1) break;
-      at = {at.level - 1, 2 * at.x, 2 * at.y, 2 * at.z};
+  const int top = index.levels - 1;
+  sink.node();
+  if (!index_detail::stabs(index.ranges[index.pyramid[top].first], value)) return;
+  if (top == 0) return sink.id(0);
+  std::uint8_t pending[OctreeView<T>::kMaxLevels] = {};
+  std::uint32_t x = 0, y = 0, z = 0;  // a stabbed node of `level`
+  for (int level = top;;) {
+    const std::uint32_t bits = index_detail::stabbed_children(index, level - 1, x, y, z, value);
+    if (level == 1) {
+      sink.tested(8);
+      index_detail::report_items(index, x, y, z, bits, sink);
+    } else {
+      for (int child = 0; child < 8; ++child) sink.node();
+      x *= 2, y *= 2, z *= 2;
+      pending[--level] = static_cast<std::uint8_t>(bits);
     }
-  } while (index_detail::advance(index, at));
+    // Up until something is left to visit, then to the next of it.
+    while (level < top && !pending[level]) x /= 2, y /= 2, z /= 2, ++level;
+    if (level == top) return;
+    const std::uint32_t left = pending[level], octant = index_detail::lowest_bit(left);
+    pending[level] = static_cast<std::uint8_t>(left & (left - 1));
+    x = (x & ~1u) | (octant & 1), y = (y & ~1u) | (octant >> 1 & 1), z = (z & ~1u) | octant >> 2;
+  }
 }
 
 }  // namespace isobrick
