@@ -66,7 +66,7 @@ void place_items(std::span<PlacedItem<T>> by_max, const PodBuffer<T>& splits,
     // Ranks before + 1 … last stab the item. The highest of them in the tree is
     // the one with most trailing zeros: cut `last` at the first bit that differs.
     const std::uint32_t before = splits_up_to(splits.data(), last, item.lo);
-    const int bit = std::bit_width(before ^ last) - 1;
+    const auto bit = std::bit_width(before ^ last) - 1;
     item.node = (last >> bit << bit) - 1;
     ++first[item.node + 1];
   }

@@ -59,7 +59,7 @@ TYPED_TEST_SUITE(Query, SampleTypes);
 
 TYPED_TEST(Query, AnswersAsTheDefinitionSays) {
   using T = TypeParam;
-  for (const std::size_t n : {3, 20, 700})
+  for (const std::size_t n : {3u, 20u, 700u})
     for (const RangeSet<T>& set : range_sets<T>(n)) {
       const std::vector<double> isovalues = isovalues_for(set.ranges, 12);
       for (const IndexKind kind : kIndexKinds) {
