@@ -7,11 +7,13 @@ namespace {
 
 // Each waiting file holds a descriptor.
 constexpr std::size_t kMaxQueue = 64;
+constexpr int kThreads = 8;
 
 }  // namespace
 
-Publisher::Publisher(std::filesystem::path root)
-    : root_(std::move(root)), thread_([this] { run(); }) {}
+Publisher::Publisher(std::filesystem::path root) : root_(std::move(root)) {
+  for (int i = 0; i < kThreads; ++i) threads_.emplace_back([this] { run(); });
+}
 
 Publisher::~Publisher() {
   {
@@ -19,7 +21,21 @@ Publisher::~Publisher() {
     stop_ = true;
   }
   changed_.notify_all();
-  thread_.join();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void Publisher::Job::run() {
+  if (!file) {
+    sync_directory(path);
+    return;
+  }
+  try {
+    publish_file(std::move(file), path);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary_name(path), ignored);
+    throw;
+  }
 }
 
 void Publisher::run() {
@@ -29,18 +45,16 @@ void Publisher::run() {
     if (queue_.empty()) return;
     Job job = std::move(queue_.front());
     queue_.pop_front();
-    busy_ = true;
+    ++busy_;
     lock.unlock();
     std::exception_ptr failure;
     try {
-      publish_file(std::move(job.file), job.path);
+      job.run();
     } catch (...) {
       failure = std::current_exception();
-      std::error_code ignored;
-      std::filesystem::remove(temporary_name(job.path), ignored);
     }
     lock.lock();
-    busy_ = false;
+    --busy_;
     if (failure && !failure_) failure_ = failure;
     changed_.notify_all();
   }
@@ -75,13 +89,17 @@ void Publisher::write(const std::filesystem::path& path, std::string_view text) 
   write(path, std::as_bytes(std::span(text)));
 }
 
+void Publisher::drain(std::unique_lock<std::mutex>& lock) {
+  changed_.wait(lock, [&] { return queue_.empty() && busy_ == 0; });
+  rethrow_failure();
+}
+
 void Publisher::wait() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return queue_.empty() && !busy_; });
-  rethrow_failure();
-  const auto directories = std::exchange(directories_, {});
-  lock.unlock();
-  for (const auto& directory : directories) sync_directory(directory);
+  drain(lock);
+  for (const auto& directory : std::exchange(directories_, {})) queue_.push_back({{}, directory});
+  changed_.notify_all();
+  drain(lock);
 }
 
 }  // namespace isobrick

@@ -11,13 +11,15 @@
 #include <span>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "isobrick/bricks/store_file.h"
 
 namespace isobrick {
 
-/// Syncs finished files and gives them their final names, on a thread of its
-/// own so that nobody waits for the disk; the queue is bounded all the same.
+/// Syncs finished files and gives them their final names, on threads of its own
+/// so that nobody waits for the disk; the queue is bounded all the same. Several
+/// threads, because a file system commits syncs that come together at once.
 /// Failures come out of the next call.
 class Publisher {
  public:
@@ -39,11 +41,14 @@ class Publisher {
   std::uint64_t bytes() const { return bytes_; }
 
  private:
+  /// A file to sync and rename, or without one a directory to sync.
   struct Job {
     StoreFile file;
     std::filesystem::path path;
+    void run();
   };
   void run();
+  void drain(std::unique_lock<std::mutex>& lock);
   void rethrow_failure();
 
   std::filesystem::path root_;
@@ -53,8 +58,9 @@ class Publisher {
   std::deque<Job> queue_;
   std::set<std::filesystem::path> directories_;  // whose entries are not yet durable
   std::exception_ptr failure_;
-  bool busy_ = false, stop_ = false;
-  std::thread thread_;
+  int busy_ = 0;
+  bool stop_ = false;
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace isobrick

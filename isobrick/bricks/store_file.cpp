@@ -29,15 +29,20 @@ StoreFile::~StoreFile() {
 }
 
 StoreFile StoreFile::open_if_exists(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const auto no_file = [&] {
+    return DamageError(fmt::format("'{}' is not a regular file", path.string()));
+  };
+  // Without O_NONBLOCK a FIFO here would wait for somebody who writes to it.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
     if (errno == ENOENT) return {};
+    if (errno == ENXIO) throw no_file();  // a socket, or a device that is not there
     throw system_error("open", path.string(), errno);
   }
   StoreFile file(descriptor, path);
   struct stat status {};
   if (::fstat(descriptor, &status) != 0) throw system_error("examine", path.string(), errno);
-  if (!S_ISREG(status.st_mode)) throw Error(fmt::format("'{}' is not a file", path.string()));
+  if (!S_ISREG(status.st_mode)) throw no_file();
   return file;
 }
 
@@ -107,6 +112,11 @@ void StoreFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes)
 
 void StoreFile::sync() {
   if (::fsync(descriptor_) != 0) throw system_error("sync", path_.string(), errno);
+}
+
+void StoreFile::start_writeback(std::uint64_t offset, std::uint64_t size) {
+  ::sync_file_range(descriptor_, static_cast<off_t>(offset), static_cast<off_t>(size),
+                    SYNC_FILE_RANGE_WRITE);
 }
 
 std::string quoted(const std::filesystem::path& path) { return fmt::format("'{}'", path.string()); }

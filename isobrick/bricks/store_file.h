@@ -25,6 +25,7 @@ class StoreFile {
   ~StoreFile();
 
   /// Opens an existing file for reading; an empty one when there is none.
+  /// DamageError when it is a folder, a FIFO or the like; waits for none of them.
   static StoreFile open_if_exists(const std::filesystem::path& path);
   /// Creates the file, empty, or empties it. Makes the folders above as needed.
   static StoreFile create(const std::filesystem::path& path);
@@ -41,6 +42,8 @@ class StoreFile {
   void will_need(std::uint64_t offset, std::uint64_t size) const;
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   void sync();
+  /// Starts writing these bytes to the disk, so that a later sync finds little to do.
+  void start_writeback(std::uint64_t offset, std::uint64_t size);
 
  private:
   int descriptor_ = -1;

@@ -24,6 +24,9 @@ namespace {
 // many; those beyond reopen it for each brick.
 constexpr int kMaxOpenShards = 256;
 
+// Bytes of a shard after which the disk starts on them.
+constexpr std::uint64_t kWriteback = std::uint64_t{8} << 20;
+
 ArrayMetadata array_metadata(const LevelInfo& level, const StoreLayout& layout) {
   ArrayMetadata array;
   const Int3 e = level.lattice.extent, b = level.lattice.brick, s = level.shard;
@@ -78,6 +81,7 @@ struct OpenShard {
   bool created = false;
   bool counted = false;  // one of kMaxOpenShards
   std::uint64_t end = 0;
+  std::uint64_t writeback_end = 0;  // the disk was told of what is before
   ShardIndex index;
 };
 
@@ -192,6 +196,10 @@ void StoreWriter::Impl::write(OpenShard& shard, std::span<const std::byte> bytes
   }
   shard.file.write_at(shard.end, bytes);
   shard.end += bytes.size();
+  if (shard.end - shard.writeback_end >= kWriteback) {
+    shard.file.start_writeback(shard.writeback_end, shard.end - shard.writeback_end);
+    shard.writeback_end = shard.end;
+  }
   publisher->count(bytes.size());
   if (!shard.counted) shard.file = StoreFile();
 }

@@ -4,7 +4,8 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
-#include <unordered_set>
+#include <utility>
+#include <vector>
 
 #include "isobrick/pipeline/chunk_writer.h"
 #include "isobrick/pipeline/extract_plan.h"
@@ -58,7 +59,7 @@ ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options
   ExtractEstimate result;
   result.bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
   TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
-  std::unordered_set<Index> active;
+  std::vector<bool> active(static_cast<std::size_t>(result.bricks));
   while (const auto work = tiles.next()) {
     for (int i = 0; i < 8; ++i) {
       if (!(work->active_blocks >> i & 1)) continue;
@@ -66,10 +67,11 @@ ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options
       const Int3 corner = work->tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
       const Int3 brick{corner.x / lattice.brick.x, corner.y / lattice.brick.y,
                        corner.z / lattice.brick.z};
-      active.insert(linear_index(brick, lattice.bricks()));
+      auto seen = active[static_cast<std::size_t>(linear_index(brick, lattice.bricks()))];
+      result.active_bricks += !seen;
+      seen = true;
     }
   }
-  result.active_bricks = active.size();
   result.triangles = static_cast<std::uint64_t>(kTrianglesPerBlock * static_cast<double>(result.active_blocks));
   result.vertices = result.triangles / 2;
   result.memory = plan_memory(request, options.memory, result.active_bricks).bytes;

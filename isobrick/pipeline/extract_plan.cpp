@@ -12,7 +12,7 @@
 namespace isobrick {
 namespace {
 
-/// The program, its libraries, shard indices and one range chunk.
+/// The program, its libraries and one range chunk.
 constexpr std::uint64_t kBase = std::uint64_t{48} << 20;
 /// A brick being read: its encoded bytes, in the worst case a little more than
 /// the decoded ones, and the codec's own window, once a thread.
@@ -24,6 +24,29 @@ std::uint64_t boundary_bytes(const Lattice& lattice) {
   const Int3 t = lattice.tiles();
   const auto face = static_cast<std::uint64_t>(std::max({t.x * t.y, t.y * t.z, t.x * t.z}));
   return 2 * face * 3072;
+}
+
+/// Mesh coordinates are float, and so are the factors of positions and normals.
+void check_transform(const StoreInfo& info, const LevelInfo& level) {
+  constexpr double least = 1e-30, most = 1e30;
+  const auto fits = [](double v, double lo) { return std::abs(v) >= lo && std::abs(v) <= most; };
+  const Int3 e = level.lattice.extent;
+  const Vec3d far = level.transform.apply(
+      {static_cast<double>(e.x), static_cast<double>(e.y), static_cast<double>(e.z)});
+  bool fit = true;
+  for (int axis = 0; axis < 3; ++axis)
+    fit = fit && fits(level.transform.spacing[axis], least) &&
+          fits(level.transform.origin[axis], 0) && fits(far[axis], 0);
+  if (!fit)
+    throw Error(fmt::format(
+        "the spacing or origin of '{}' does not fit the 32-bit coordinates of a mesh (1e-30 to "
+        "1e30); convert it with another --spacing, --origin or unit",
+        info.path.string()));
+}
+
+/// Shard indices that the reader keeps: all of a usual volume, bounded of a huge one.
+std::uint64_t index_bytes(const Lattice& lattice) {
+  return std::min(std::uint64_t{64} << 20, 32 * static_cast<std::uint64_t>(volume(lattice.bricks())));
 }
 
 }  // namespace
@@ -38,6 +61,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   ExtractRequest request;
   request.level = &info.levels[static_cast<std::size_t>(options.level)];
+  check_transform(info, *request.level);
   const Box3 box = request.level->lattice.box();
   const Box3 roi = options.roi.value_or(box);
   if (roi.empty() || intersect(roi, box) != roi)
@@ -65,7 +89,7 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
   const std::uint64_t fixed =
-      kBase + threads * (kDecoder + brick_bytes) + boundary_bytes(lattice);
+      kBase + index_bytes(lattice) + threads * (kDecoder + brick_bytes) + boundary_bytes(lattice);
   const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
   if (budget < least)
     throw UsageError(fmt::format(

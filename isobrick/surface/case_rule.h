@@ -110,6 +110,19 @@ constexpr bool triangulate(const Loop& loop, int first, int last, std::array<std
 
 }  // namespace case_rule
 
+/// The same triangles with the other orientation, for volumes whose axes are
+/// left-handed in world space.
+constexpr CaseTables mirrored(CaseTables tables) {
+  for (std::size_t index = 0; index < 256; ++index)
+    for (std::size_t t = 0; t < tables.triangles[index]; ++t) {
+      auto& edges = tables.edges[index];
+      const std::uint8_t second = edges[3 * t + 1];
+      edges[3 * t + 1] = edges[3 * t + 2];
+      edges[3 * t + 2] = second;
+    }
+  return tables;
+}
+
 /// Applies the rule to all cases. Fails to compile (or throws) if a loop had no
 /// triangulation or a case more than five triangles.
 constexpr CaseTables make_case_tables() {

@@ -3,5 +3,6 @@
 namespace isobrick {
 
 constinit const CaseTables kCaseTables = make_case_tables();
+constinit const CaseTables kMirroredCaseTables = mirrored(make_case_tables());
 
 }  // namespace isobrick

@@ -4,7 +4,8 @@
 
 namespace isobrick {
 
-/// The tables that every extraction uses.
+/// The tables that every extraction uses, for right- and for left-handed axes.
 extern const CaseTables kCaseTables;
+extern const CaseTables kMirroredCaseTables;
 
 }  // namespace isobrick

@@ -61,6 +61,7 @@ struct WorldMap {
   float m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   float origin[3] = {0, 0, 0};
   float normal[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< gradients: direction · spacing⁻¹
+  bool mirrored = false;  ///< the axes are left-handed: triangles turn round
 
   ISOBRICK_HD Vec3f position(Vec3f p) const {
     return {origin[0] + (m[0] * p.x + (m[1] * p.y + m[2] * p.z)),

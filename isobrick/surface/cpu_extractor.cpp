@@ -30,6 +30,10 @@ WorldMap world_map(const Transform& t) {
     }
     map.origin[row] = static_cast<float>(t.origin[row]);
   }
+  const auto& d = t.direction;
+  const double handed = d[0] * (d[4] * d[8] - d[5] * d[7]) - d[1] * (d[3] * d[8] - d[5] * d[6]) +
+                        d[2] * (d[3] * d[7] - d[4] * d[6]);
+  map.mirrored = handed * t.spacing.x * t.spacing.y * t.spacing.z < 0;
   return map;
 }
 

@@ -9,6 +9,7 @@
 //
 #include <hwy/highway.h>
 
+#include "isobrick/surface/case_tables.h"
 #include "isobrick/surface/tile_scan-inl.h"
 #include "isobrick/surface/tile_triangles-inl.h"
 #include "isobrick/surface/tile_vertices-inl.h"
@@ -27,7 +28,7 @@ void Emit(ScalarType type, const KernelContext& context, TileState& tile, Vec3f*
   visit_scalar(type, [&](auto tag) {
     emit_vertices<typename decltype(tag)::type>(context, tile, positions, normals);
   });
-  emit_triangles(tile, triangles);
+  emit_triangles(context.world.mirrored ? kMirroredCaseTables : kCaseTables, tile, triangles);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -69,7 +69,7 @@ struct WideRow {
   }
 };
 
-inline void emit_triangles(const TileState& tile, Triangle* out) {
+inline void emit_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   const Wide d;
   WideRow row;
   row.load(tile.rows, 0, 0);
@@ -86,9 +86,9 @@ inline void emit_triangles(const TileState& tile, Triangle* out) {
     const auto before = hn::And(row.words, hn::Load(d, kBefore.at[x]));
     const auto ids = hn::Add(x == 0 ? row.bases_at_0 : row.bases, hn::PopulationCount(before));
     const hn::Rebind<std::uint8_t, Wide> d8;
-    const auto edges = hn::PromoteTo(d, hn::LoadU(d8, kCaseTables.edges[index].data()));
+    const auto edges = hn::PromoteTo(d, hn::LoadU(d8, tables.edges[index].data()));
     const auto corners = hn::TableLookupLanes(ids, hn::IndicesFromVec(d, edges));
-    const std::uint32_t n = std::uint32_t{3} * kCaseTables.triangles[index];
+    const std::uint32_t n = std::uint32_t{3} * tables.triangles[index];
     if (to < careful) {
       hn::StoreU(corners, d, to);
     } else {
@@ -138,7 +138,7 @@ HWY_INLINE void cell_vertices(const CellRow& row, std::uint32_t x, std::uint32_t
   }
 }
 
-inline void emit_triangles(const TileState& tile, Triangle* out) {
+inline void emit_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   CellRow row;
   ActiveCell place = ~ActiveCell{0};
   alignas(64) std::uint32_t ids[16];
@@ -149,8 +149,8 @@ inline void emit_triangles(const TileState& tile, Triangle* out) {
     }
     cell_vertices(row, cell & 31, ids);
     const std::uint32_t index = cell >> 16;
-    const std::uint8_t* edges = kCaseTables.edges[index].data();
-    for (int n = kCaseTables.triangles[index]; n > 0; --n, edges += 3)
+    const std::uint8_t* edges = tables.edges[index].data();
+    for (int n = tables.triangles[index]; n > 0; --n, edges += 3)
       *out++ = {ids[edges[0]], ids[edges[1]], ids[edges[2]]};
   }
 }

@@ -186,6 +186,19 @@ TEST_F(Extract, VolumesWithNaNEqualTheMeshInMemory) {
   }
 }
 
+TEST_F(Extract, SpacingThatNoFloatHoldsIsRefused) {
+  const Field<std::uint8_t> field({20, 20, 20}, [](Int3 p) { return static_cast<double>(p.x); });
+  for (const double spacing : {1e39, 1e-39, 1e300}) {
+    MemorySource source(field.extent, ScalarType::u8, as_bytes(field.samples));
+    source.mutable_info().transform.spacing = {1, spacing, 1};
+    const fs::path path = dir_ / "far.zarr";
+    NoProgress silent;
+    convert(source, path, {.force = true}, silent);
+    MemorySink sink;
+    EXPECT_THROW(run(StoreReader(path), {.isovalue = 5}, sink), Error) << spacing;
+  }
+}
+
 TEST_F(Extract, ASinkThatFailsStopsItAndIsNotFinished) {
   const auto field = mixed_field<std::uint8_t>({140, 120, 90});
   const StoreReader reader = store(field, {.brick = 32, .shard = 64});

@@ -269,6 +269,22 @@ TEST(Extractor, AnisotropicAndTurnedVolumesEndInWorldCoordinates) {
   }
 }
 
+TEST(Extractor, MirroredAxesKeepTheOutsideOutside) {
+  const Field<float> field({40, 40, 40}, [](Int3 p) {
+    const double x = static_cast<double>(p.x) - 19.3, y = static_cast<double>(p.y) - 20.1, z = static_cast<double>(p.z) - 19.8;
+    return 12 - std::sqrt(x * x + y * y + z * z);
+  });
+  for (const double sign : {1.0, -1.0}) {
+    Transform world;
+    world.direction = {sign, 0, 0, 0, 1, 0, 0, 0, 1};
+    const Mesh mesh = extract(field, {.isovalue = 0, .normals = true, .transform = world});
+    const Measures m = measure(mesh, {sign * 19.3, 20.1, 19.8}, 12);
+    EXPECT_NEAR(m.volume / (4.0 / 3 * std::numbers::pi * 12 * 12 * 12), 1, 0.02);
+    EXPECT_LT(m.worst_normal, 0.01);
+    EXPECT_EQ(m.euler, 2);
+  }
+}
+
 TEST(Extractor, NormalsByDefinitionEverywhere) {
   const auto field = padded_noise<float>({66, 35, 34}, -1, 1, -1.0f, 8);
   const Mesh mesh = extract(field, {.isovalue = 0.1, .brick = {32, 32, 32}, .normals = true});
