@@ -6,27 +6,32 @@
 namespace isobrick {
 namespace {
 
-/// Rows are mostly one of a few lengths: a copy of known length is a move or two.
-template <class T>
-inline void copy_run(T* to, const T* from, Index n) {
-  switch (n) {
-    case 1: *to = *from; return;
-    case 16: std::memcpy(to, from, 16 * sizeof(T)); return;
-    case 17: std::memcpy(to, from, 17 * sizeof(T)); return;
-    case 32: std::memcpy(to, from, 32 * sizeof(T)); return;
-    case 33: std::memcpy(to, from, 33 * sizeof(T)); return;
-    case 34: std::memcpy(to, from, 34 * sizeof(T)); return;
-    default: std::memcpy(to, from, static_cast<std::size_t>(n) * sizeof(T)); return;
-  }
-}
-
-template <class T>
-void copy_part(const T* from, Int3 from_extent, T* to, Int3 n) {
+/// Copies rows of N samples, or of n.x when N is 0: of known length, a row is a
+/// move or two.
+template <int N, class T>
+void copy_rows(const T* from, Int3 from_extent, T* to, Int3 n) {
+  const std::size_t bytes = static_cast<std::size_t>(N ? N : n.x) * sizeof(T);
   for (Index z = 0; z < n.z; ++z) {
     const T* row = from + z * from_extent.x * from_extent.y;
     T* out = to + z * TileLayout::kPlane;
     for (Index y = 0; y < n.y; ++y, row += from_extent.x, out += TileLayout::kRow)
-      copy_run(out, row, n.x);
+      std::memcpy(out, row, bytes);
+  }
+}
+
+/// Rows are mostly one of a few lengths: half a tile or a whole one, with or
+/// without what it shares with its neighbours, or only that.
+template <class T>
+void copy_part(const T* from, Int3 from_extent, T* to, Int3 n) {
+  switch (n.x) {
+    case 1: return copy_rows<1>(from, from_extent, to, n);
+    case 16: return copy_rows<16>(from, from_extent, to, n);
+    case 17: return copy_rows<17>(from, from_extent, to, n);
+    case 32: return copy_rows<32>(from, from_extent, to, n);
+    case 33: return copy_rows<33>(from, from_extent, to, n);
+    case 34: return copy_rows<34>(from, from_extent, to, n);
+    case 35: return copy_rows<35>(from, from_extent, to, n);
+    default: return copy_rows<0>(from, from_extent, to, n);
   }
 }
 
