@@ -122,8 +122,8 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, [[maybe_un
         std::sort(ours.begin(), ours.end());
         std::sort(theirs.begin(), theirs.end());
         const std::size_t mid = ours.size() / 2;
-        print(fmt::format("isobrick, {} thread(s){}", threads, normals ? ", normals" : ""), ours[mid],
-              ours[0], extractor.triangles(), extractor.vertices());
+        print(fmt::format("isobrick, {} thread(s){}", threads, normals ? ", normals" : ""),
+              ours[mid], ours[0], extractor.triangles(), extractor.vertices());
         if (!theirs.empty()) {
           print(fmt::format("flying edges, {} thread(s){}", threads, normals ? ", normals" : ""),
                 theirs[mid], theirs[0], their_triangles, their_vertices);
@@ -132,7 +132,8 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, [[maybe_un
         if (threads == 1 && !normals) {
           const double cells = static_cast<double>(volume(v.extent - Int3{1, 1, 1}));
           fmt::print("  tiles {} of {}, about {:.2f} % of the cells active\n", tiles.size(),
-                     volume(lattice.tiles()), 50.0 * static_cast<double>(extractor.triangles()) / cells);
+                     volume(lattice.tiles()),
+                     50.0 * static_cast<double>(extractor.triangles()) / cells);
         }
       }
   });

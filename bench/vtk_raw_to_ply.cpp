@@ -21,7 +21,8 @@ int main(int argc, char** argv) {
                                          {"i16", VTK_SHORT},
                                          {"f32", VTK_FLOAT}};
   if (argc != 9 || !types.count(argv[5])) {
-    std::fprintf(stderr, "usage: vtk_raw_to_ply IN.raw X Y Z u8|i16|u16|f32 ISOVALUE OUT.ply THREADS\n");
+    std::fprintf(stderr,
+                 "usage: vtk_raw_to_ply IN.raw X Y Z u8|i16|u16|f32 ISOVALUE OUT.ply THREADS\n");
     return 2;
   }
   vtkSMPTools::SetBackend("TBB");
@@ -29,7 +30,8 @@ int main(int argc, char** argv) {
   vtkNew<vtkImageReader2> reader;
   reader->SetFileName(argv[1]);
   reader->SetFileDimensionality(3);
-  reader->SetDataExtent(0, std::atoi(argv[2]) - 1, 0, std::atoi(argv[3]) - 1, 0, std::atoi(argv[4]) - 1);
+  reader->SetDataExtent(0, std::atoi(argv[2]) - 1, 0, std::atoi(argv[3]) - 1, 0,
+                        std::atoi(argv[4]) - 1);
   reader->SetDataScalarType(types.at(argv[5]));
   reader->SetDataByteOrderToLittleEndian();
   vtkNew<vtkFlyingEdges3D> contour;

@@ -25,9 +25,11 @@ class DenseBricks final : public BrickLookup {
       for (Index z = box.lo.z; z < box.hi.z; ++z)
         for (Index y = box.lo.y; y < box.hi.y; ++y) {
           const Int3 row = Int3{box.lo.x, y, z} - b * lattice.brick;
-          std::memcpy(brick + static_cast<std::size_t>(linear_index(row, lattice.brick)) * size,
-                      from + static_cast<std::size_t>(linear_index({box.lo.x, y, z}, lattice.extent)) * size,
-                      static_cast<std::size_t>(box.extent().x) * size);
+          std::memcpy(
+              brick + static_cast<std::size_t>(linear_index(row, lattice.brick)) * size,
+              from +
+                  static_cast<std::size_t>(linear_index({box.lo.x, y, z}, lattice.extent)) * size,
+              static_cast<std::size_t>(box.extent().x) * size);
         }
     });
   }

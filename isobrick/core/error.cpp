@@ -5,8 +5,8 @@
 namespace isobrick {
 
 Error system_error(const std::string& what, const std::string& path, int errno_value) {
-  return Error("cannot " + what + " '" + path + "': " +
-               std::generic_category().message(errno_value));
+  return Error("cannot " + what + " '" + path +
+               "': " + std::generic_category().message(errno_value));
 }
 
 }  // namespace isobrick

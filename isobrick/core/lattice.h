@@ -19,8 +19,8 @@ inline constexpr Index kTileEdge = 32;
 
 /// The samples of one level and how they are cut into bricks.
 struct Lattice {
-  Int3 extent;                        ///< samples
-  Int3 brick{64, 64, 64};             ///< samples of a brick
+  Int3 extent;             ///< samples
+  Int3 brick{64, 64, 64};  ///< samples of a brick
   ScalarType type = ScalarType::u8;
 
   friend bool operator==(const Lattice&, const Lattice&) = default;
@@ -29,10 +29,14 @@ struct Lattice {
   Int3 blocks() const { return ceil_div(extent, {kBlockEdge, kBlockEdge, kBlockEdge}); }
   Int3 tiles() const { return ceil_div(extent, {kTileEdge, kTileEdge, kTileEdge}); }
   std::size_t sample_bytes() const { return size_of(type); }
-  std::size_t brick_bytes() const { return static_cast<std::size_t>(volume(brick)) * sample_bytes(); }
+  std::size_t brick_bytes() const {
+    return static_cast<std::size_t>(volume(brick)) * sample_bytes();
+  }
   Box3 box() const { return {{0, 0, 0}, extent}; }
   /// The samples that brick `b` holds, cut at the volume's border.
-  Box3 brick_box(Int3 b) const { return intersect({b * brick, (b + Int3{1, 1, 1}) * brick}, box()); }
+  Box3 brick_box(Int3 b) const {
+    return intersect({b * brick, (b + Int3{1, 1, 1}) * brick}, box());
+  }
 };
 
 /// Number of samples, or nothing when an extent is not positive or the number

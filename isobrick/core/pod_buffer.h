@@ -45,7 +45,8 @@ class PodBuffer {
   void clear() { size_ = 0; }
   /// New elements hold no particular value.
   void resize(std::size_t size) {
-    if (size > capacity_) reserve(size > capacity_ + capacity_ / 2 ? size : capacity_ + capacity_ / 2);
+    if (size > capacity_)
+      reserve(size > capacity_ + capacity_ / 2 ? size : capacity_ + capacity_ / 2);
     size_ = size;
   }
   void reserve(std::size_t capacity) {

@@ -18,13 +18,20 @@ inline constexpr ScalarType kScalarTypes[] = {ScalarType::u8,  ScalarType::i8,  
 
 template <class T>
 inline constexpr ScalarType scalar_type_of = [] {
-  if constexpr (std::is_same_v<T, std::uint8_t>) return ScalarType::u8;
-  else if constexpr (std::is_same_v<T, std::int8_t>) return ScalarType::i8;
-  else if constexpr (std::is_same_v<T, std::uint16_t>) return ScalarType::u16;
-  else if constexpr (std::is_same_v<T, std::int16_t>) return ScalarType::i16;
-  else if constexpr (std::is_same_v<T, std::uint32_t>) return ScalarType::u32;
-  else if constexpr (std::is_same_v<T, std::int32_t>) return ScalarType::i32;
-  else if constexpr (std::is_same_v<T, float>) return ScalarType::f32;
+  if constexpr (std::is_same_v<T, std::uint8_t>)
+    return ScalarType::u8;
+  else if constexpr (std::is_same_v<T, std::int8_t>)
+    return ScalarType::i8;
+  else if constexpr (std::is_same_v<T, std::uint16_t>)
+    return ScalarType::u16;
+  else if constexpr (std::is_same_v<T, std::int16_t>)
+    return ScalarType::i16;
+  else if constexpr (std::is_same_v<T, std::uint32_t>)
+    return ScalarType::u32;
+  else if constexpr (std::is_same_v<T, std::int32_t>)
+    return ScalarType::i32;
+  else if constexpr (std::is_same_v<T, float>)
+    return ScalarType::f32;
   else {
     static_assert(std::is_same_v<T, double>, "not a sample type");
     return ScalarType::f64;

@@ -9,7 +9,7 @@ namespace isobrick {
 /// A tile that the isovalue touches, and what the ranges say of its 2×2×2
 /// blocks of 16³ cells (bit = x + 2·y + 4·z).
 struct TileWork {
-  Int3 tile;                    ///< position in units of kTileEdge
+  Int3 tile;  ///< position in units of kTileEdge
   std::uint8_t active_blocks = 0;
   /// Of the blocks that are not active: whether all their samples are inside.
   std::uint8_t inside_blocks = 0;

@@ -19,7 +19,9 @@ struct Transform {
 
   friend bool operator==(const Transform&, const Transform&) = default;
 
-  bool axis_aligned() const { return direction == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}; }
+  bool axis_aligned() const {
+    return direction == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  }
 
   Vec3d apply(Vec3d p) const {
     const Vec3d s = spacing * p;

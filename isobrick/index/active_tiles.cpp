@@ -17,15 +17,17 @@ void append_active_tiles(Box3 blocks, std::span<const ValueRange<T>> ranges, dou
       if (!Box3{{0, 0, 0}, extent}.contains(block)) continue;
       const ValueRange<T>& range = ranges[static_cast<std::size_t>(linear_index(block, extent))];
       const auto bit = static_cast<std::uint8_t>(1 << i);
-      if (range.stabbed_by(isovalue)) work.active_blocks |= bit;
-      else if (static_cast<double>(range.lo) >= isovalue) work.inside_blocks |= bit;
+      if (range.stabbed_by(isovalue))
+        work.active_blocks |= bit;
+      else if (static_cast<double>(range.lo) >= isovalue)
+        work.inside_blocks |= bit;
     }
     if (work.active_blocks) tiles.push_back(work);
   });
 }
 
-#define ISOBRICK_INSTANTIATE(T)                                                         \
-  template void append_active_tiles<T>(Box3, std::span<const ValueRange<T>>, double,    \
+#define ISOBRICK_INSTANTIATE(T)                                                      \
+  template void append_active_tiles<T>(Box3, std::span<const ValueRange<T>>, double, \
                                        std::vector<TileWork>&);
 ISOBRICK_INSTANTIATE(std::uint8_t)
 ISOBRICK_INSTANTIATE(std::int8_t)

@@ -72,7 +72,8 @@ ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options
       seen = true;
     }
   }
-  result.triangles = static_cast<std::uint64_t>(kTrianglesPerBlock * static_cast<double>(result.active_blocks));
+  result.triangles =
+      static_cast<std::uint64_t>(kTrianglesPerBlock * static_cast<double>(result.active_blocks));
   result.vertices = result.triangles / 2;
   result.memory = plan_memory(request, options.memory, result.active_bricks).bytes;
   return result;

@@ -13,17 +13,17 @@ namespace isobrick {
 struct ExtractOptions {
   double isovalue = 0;
   int level = 0;
-  std::optional<Box3> roi;   ///< samples of that level; nothing: the whole volume
-  bool normals = false;      ///< gradient normals
+  std::optional<Box3> roi;  ///< samples of that level; nothing: the whole volume
+  bool normals = false;     ///< gradient normals
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
-  int threads = 0;           ///< 0: all cores
+  int threads = 0;                                ///< 0: all cores
 };
 
 /// What an extraction will need, from the ranges alone.
 struct ExtractEstimate {
   std::uint64_t bricks = 0, active_bricks = 0, active_blocks = 0;
   std::uint64_t triangles = 0, vertices = 0;  ///< predictions
-  std::uint64_t memory = 0;                   ///< bytes that the extraction will hold, within the budget
+  std::uint64_t memory = 0;  ///< bytes that the extraction will hold, within the budget
 };
 
 /// What an extraction did.

@@ -46,7 +46,8 @@ void check_transform(const StoreInfo& info, const LevelInfo& level) {
 
 /// Shard indices that the reader keeps: all of a usual volume, bounded of a huge one.
 std::uint64_t index_bytes(const Lattice& lattice) {
-  return std::min(std::uint64_t{64} << 20, 32 * static_cast<std::uint64_t>(volume(lattice.bricks())));
+  return std::min(std::uint64_t{64} << 20,
+                  32 * static_cast<std::uint64_t>(volume(lattice.bricks())));
 }
 
 }  // namespace
@@ -98,16 +99,16 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
 
   ExtractPlan plan;
   const std::uint64_t spare = budget - least;
-  plan.limits.tiles = std::clamp<std::size_t>(
-      1 + spare / 6 / workspace, 1, CpuExtractor::good_batch(request.threads));
+  plan.limits.tiles = std::clamp<std::size_t>(1 + spare / 6 / workspace, 1,
+                                              CpuExtractor::good_batch(request.threads));
   // One piece of mesh is written while the next is made.
-  plan.limits.output_bytes = std::clamp<std::uint64_t>(tile_output + spare / 12, tile_output,
-                                                       std::max(tile_output, std::uint64_t{32} << 20));
+  plan.limits.output_bytes = std::clamp<std::uint64_t>(
+      tile_output + spare / 12, tile_output, std::max(tile_output, std::uint64_t{32} << 20));
   const std::uint64_t used = fixed + plan.limits.tiles * workspace + 2 * plan.limits.output_bytes;
   // Neighbours come on top of the active bricks.
-  plan.cache_bricks = static_cast<std::size_t>(std::clamp<std::uint64_t>(
-      (budget - used) / brick_bytes, tile_bricks,
-      std::max<std::uint64_t>(tile_bricks, 8 * active_bricks)));
+  plan.cache_bricks = static_cast<std::size_t>(
+      std::clamp<std::uint64_t>((budget - used) / brick_bytes, tile_bricks,
+                                std::max<std::uint64_t>(tile_bricks, 8 * active_bricks)));
   plan.bytes = used + plan.cache_bricks * brick_bytes;
   return plan;
 }

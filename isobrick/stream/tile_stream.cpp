@@ -14,9 +14,9 @@ constexpr Index kChunkTiles = StoreReader::kRangeChunk / kTileBlocks;
 void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index reach,
                           std::vector<Int3>& bricks) {
   for_each_needed_box(lattice, work, reach, [&](Box3 box) {
-    const Box3 cover{{box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y,
-                      box.lo.z / lattice.brick.z},
-                     ceil_div(box.hi, lattice.brick)};
+    const Box3 cover{
+        {box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y, box.lo.z / lattice.brick.z},
+        ceil_div(box.hi, lattice.brick)};
     for_each_point(cover, [&](Int3 b) {
       if (std::find(bricks.begin(), bricks.end(), b) == bricks.end()) bricks.push_back(b);
     });
@@ -35,7 +35,8 @@ TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box
                 ceil_div(cells_end, {kTileEdge, kTileEdge, kTileEdge})};
   const Int3 chunk{kChunkTiles, kChunkTiles, kChunkTiles};
   for_each_morton(ceil_div(lattice.tiles(), chunk), [&](Int3 c) {
-    if (!intersect({c * chunk, (c + Int3{1, 1, 1}) * chunk}, roi_tiles_).empty()) chunks_.push_back(c);
+    if (!intersect({c * chunk, (c + Int3{1, 1, 1}) * chunk}, roi_tiles_).empty())
+      chunks_.push_back(c);
   });
 }
 

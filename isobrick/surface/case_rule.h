@@ -55,7 +55,8 @@ constexpr std::array<std::uint8_t, 12> faces_of_edges() {
   std::array<std::uint8_t, 12> faces{};
   for (int f = 0; f < 6; ++f)
     for (int i = 0; i < 4; ++i) {
-      auto& bits = faces[static_cast<std::size_t>(edge_between(kFaces[f][i], kFaces[f][(i + 1) % 4]))];
+      auto& bits =
+          faces[static_cast<std::size_t>(edge_between(kFaces[f][i], kFaces[f][(i + 1) % 4]))];
       bits = static_cast<std::uint8_t>(bits | 1 << f);
     }
   return faces;

@@ -28,12 +28,11 @@ struct Threshold {
     using Limits = std::numeric_limits<T>;
     if constexpr (std::is_floating_point_v<T>) {
       value = static_cast<T>(isovalue);
-      if (static_cast<double>(value) < isovalue)
-        value = std::nextafter(value, Limits::infinity());
+      if (static_cast<double>(value) < isovalue) value = std::nextafter(value, Limits::infinity());
     } else {
       const double least = std::ceil(isovalue);
       none = least > static_cast<double>(Limits::max());
-      value = none ? Limits::max()
+      value = none                                             ? Limits::max()
               : least <= static_cast<double>(Limits::lowest()) ? Limits::lowest()
                                                                : static_cast<T>(least);
     }

@@ -115,7 +115,8 @@ struct CpuExtractor::Impl {
     std::size_t i = begin;
     for (; i < count; ++i) {
       TileState& state = *states[i];
-      if (bounded && v > 0 && output_bytes(v + state.vertices, t + state.triangles) > limits.output_bytes)
+      if (bounded && v > 0 &&
+          output_bytes(v + state.vertices, t + state.triangles) > limits.output_bytes)
         break;
       state.vertex_base = v;
       state.triangle_base = t;
@@ -127,8 +128,9 @@ struct CpuExtractor::Impl {
       triangles += state.triangles;
     }
     if (welded() && vertices > std::numeric_limits<std::uint32_t>::max())
-      throw Error("the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
-                  "cannot number; extract it in parts with --roi, or as STL");
+      throw Error(
+          "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
+          "cannot number; extract it in parts with --roi, or as STL");
     return i;
   }
 

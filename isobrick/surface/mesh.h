@@ -25,9 +25,9 @@ enum class Indexing : std::uint8_t {
 
 /// A piece of a mesh, in world space. A view: valid until the call returns.
 struct MeshChunk {
-  std::uint64_t first_vertex = 0;      ///< number of vertices in the chunks before
+  std::uint64_t first_vertex = 0;  ///< number of vertices in the chunks before
   std::span<const Vec3f> positions;
-  std::span<const Vec3f> normals;      ///< unit length, outward; empty or one a position
+  std::span<const Vec3f> normals;  ///< unit length, outward; empty or one a position
   std::span<const Triangle> triangles;
 };
 

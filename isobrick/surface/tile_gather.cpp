@@ -42,9 +42,9 @@ void gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Inde
   T* samples = reinterpret_cast<T*>(tile.samples.data());
   const Int3 origin = tile.work.tile * kTileEdge;
   for_each_needed_box(lattice, tile.work, reach, [&](Box3 box) {
-    const Box3 cover{{box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y,
-                      box.lo.z / lattice.brick.z},
-                     ceil_div(box.hi, lattice.brick)};
+    const Box3 cover{
+        {box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y, box.lo.z / lattice.brick.z},
+        ceil_div(box.hi, lattice.brick)};
     for_each_point(cover, [&](Int3 b) {
       const Int3 corner = b * lattice.brick;
       const Box3 part = intersect(box, {corner, corner + lattice.brick});

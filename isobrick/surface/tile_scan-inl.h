@@ -98,10 +98,9 @@ void find_good_cells(const KernelContext& context, const TileState& tile, GoodCe
     columns |= static_cast<std::uint64_t>(exists(0, x)) << (x + 1);
   for (int z = -1; z <= kTileSamples; ++z)
     for (int y = -1; y <= kTileSamples; ++y)
-      nan[(z + 1) * edge + y + 1] =
-          exists(1, y) && exists(2, z)
-              ? nan_bits(samples + TileLayout::offset(0, y, z)) | ~columns
-              : ~std::uint64_t{0};
+      nan[(z + 1) * edge + y + 1] = exists(1, y) && exists(2, z)
+                                        ? nan_bits(samples + TileLayout::offset(0, y, z)) | ~columns
+                                        : ~std::uint64_t{0};
   for (int z = 0; z < GoodCells::kEdge; ++z)
     for (int y = 0; y < GoodCells::kEdge; ++y) {
       const std::uint64_t any = nan[z * edge + y] | nan[z * edge + y + 1] |
@@ -168,7 +167,9 @@ inline std::uint32_t number_row(TileState& tile, int y, int z, const RowBits& bi
   const TileShape& s = tile.shape;
   const bool own_y = y > 0 || s.first[1], own_z = z > 0 || s.first[2];
   EdgeRow& row = tile.rows[row_index(y, z)];
-  const auto count = [](std::uint32_t word) { return static_cast<std::uint32_t>(std::popcount(word)); };
+  const auto count = [](std::uint32_t word) {
+    return static_cast<std::uint32_t>(std::popcount(word));
+  };
   std::uint8_t at_0 = 0;
   if (own_y && own_z) {
     row.x = static_cast<std::uint32_t>(bits.x);

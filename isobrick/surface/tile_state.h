@@ -30,9 +30,9 @@ struct TileLayout {
 
 /// A tile cut to the volume or the region of interest, in its own coordinates.
 struct TileShape {
-  Int3 origin;         ///< of the tile, in samples
-  int lo[3], hi[3];    ///< cells lo … hi − 1, samples lo … hi along x, y, z
-  bool first[3];       ///< nothing lies before the tile along this axis: it owns its low plane
+  Int3 origin;       ///< of the tile, in samples
+  int lo[3], hi[3];  ///< cells lo … hi − 1, samples lo … hi along x, y, z
+  bool first[3];     ///< nothing lies before the tile along this axis: it owns its low plane
 };
 
 /// The vertices on the lattice edges of one row of samples. An edge lies in the
@@ -69,13 +69,14 @@ struct TileBoundary {
 struct TileState {
   TileWork work;
   TileShape shape;
-  PodBuffer<std::byte> samples;                   ///< TileLayout, of the sample type
-  alignas(64) std::uint64_t inside[kTileRows];    ///< bit x: sample x is inside
+  PodBuffer<std::byte> samples;                 ///< TileLayout, of the sample type
+  alignas(64) std::uint64_t inside[kTileRows];  ///< bit x: sample x is inside
   alignas(64) EdgeRow rows[kTileRows];
   /// Own edges at sample 0 of a row: bit 0 along y, bit 1 along z.
   std::uint8_t own_at_0[kTileRows];
   PodBuffer<ActiveCell> cells;
-  PodBuffer<std::uint32_t> edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
+  PodBuffer<std::uint32_t>
+      edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
   std::uint32_t vertices = 0, triangles = 0;
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
   std::uint32_t number_base = 0;                     ///< what its vertices are numbered from

@@ -25,7 +25,8 @@ inline void list_edges(TileState& tile) {
   tile.edges.resize(tile.vertices);
   std::uint32_t* out = tile.edges.data();
   const auto append = [&out](std::uint32_t word, std::uint32_t code) {
-    for (; word; word &= word - 1) *out++ = code + static_cast<std::uint32_t>(std::countr_zero(word));
+    for (; word; word &= word - 1)
+      *out++ = code + static_cast<std::uint32_t>(std::countr_zero(word));
   };
   for (int z = s.lo[2]; z <= s.hi[2]; ++z)
     for (int y = s.lo[1]; y <= s.hi[1]; ++y) {
@@ -68,12 +69,13 @@ struct ScalarVertices {
   }
 
   void write(std::uint32_t edge, Vec3f* position, Vec3f* normal) const {
-    const int x = edge & 63, y = edge >> 6 & 63, z = edge >> 12 & 63, axis = static_cast<int>(edge >> 18);
+    const int x = edge & 63, y = edge >> 6 & 63, z = edge >> 12 & 63,
+              axis = static_cast<int>(edge >> 18);
     const T* p = samples + TileLayout::offset(x, y, z);
     const R a = static_cast<R>(p[0]), b = static_cast<R>(p[kStep[axis]]);
     const R iso = static_cast<R>(context.isovalue);
-    const float t = static_cast<float>(std::is_floating_point_v<T> ? crossing(a, b, iso)
-                                                                   : (iso - a) / (b - a));
+    const float t =
+        static_cast<float>(std::is_floating_point_v<T> ? crossing(a, b, iso) : (iso - a) / (b - a));
     const Int3 at = tile.shape.origin + Int3{x, y, z};
     Vec3f where{static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)};
     where[axis] += t;
@@ -126,9 +128,9 @@ class VectorVertices {
     const VI z = hn::And(hn::ShiftRight<12>(code), six), axis = hn::ShiftRight<18>(code);
     const auto along_x = hn::Eq(axis, hn::Zero(i)), along_y = hn::Eq(axis, hn::Set(i, 1));
     const auto along_z = hn::Eq(axis, hn::Set(i, 2));
-    const VI step = hn::IfThenElse(along_x, hn::Set(i, 1),
-                                   hn::IfThenElse(along_y, hn::Set(i, TileLayout::kRow),
-                                                  hn::Set(i, TileLayout::kPlane)));
+    const VI step = hn::IfThenElse(
+        along_x, hn::Set(i, 1),
+        hn::IfThenElse(along_y, hn::Set(i, TileLayout::kRow), hn::Set(i, TileLayout::kPlane)));
     const VI offset = hn::Add(x, hn::Add(hn::Mul(y, hn::Set(i, TileLayout::kRow)),
                                          hn::Mul(z, hn::Set(i, TileLayout::kPlane))));
     const VI next = hn::Add(offset, step);
@@ -145,15 +147,16 @@ class VectorVertices {
       const V3 gb = gradient(next, hn::IfThenElse(along_x, hn::Add(gx, one), gx),
                              hn::IfThenElse(along_y, hn::Add(gy, one), gy),
                              hn::IfThenElse(along_z, hn::Add(gz, one), gz));
-      const V3 n = turn(world_.normal, {between(ga.x, gb.x, t), between(ga.y, gb.y, t),
-                                        between(ga.z, gb.z, t)});
+      const V3 n = turn(world_.normal,
+                        {between(ga.x, gb.x, t), between(ga.y, gb.y, t), between(ga.z, gb.z, t)});
       const VF length2 = hn::Add(hn::Mul(n.x, n.x), hn::Add(hn::Mul(n.y, n.y), hn::Mul(n.z, n.z)));
-      if (!hn::AllTrue(f, hn::And(hn::Ge(length2, hn::Set(f, 1e-30f)),
-                                  hn::Le(length2, hn::Set(f, 1e30f)))))
+      if (!hn::AllTrue(
+              f, hn::And(hn::Ge(length2, hn::Set(f, 1e-30f)), hn::Le(length2, hn::Set(f, 1e30f)))))
         return false;
       const VF length = hn::Sqrt(length2);
       store({hn::Div(hn::Neg(n.x), length), hn::Div(hn::Neg(n.y), length),
-             hn::Div(hn::Neg(n.z), length)}, normals);
+             hn::Div(hn::Neg(n.z), length)},
+            normals);
     }
     const auto place = [&](auto along, VI g) {
       const VF at = hn::ConvertTo(f, g);
@@ -161,7 +164,8 @@ class VectorVertices {
     };
     const V3 p = turn(world_.m, {place(along_x, gx), place(along_y, gy), place(along_z, gz)});
     store({hn::Add(hn::Set(f, world_.origin[0]), p.x), hn::Add(hn::Set(f, world_.origin[1]), p.y),
-           hn::Add(hn::Set(f, world_.origin[2]), p.z)}, positions);
+           hn::Add(hn::Set(f, world_.origin[2]), p.z)},
+          positions);
     return true;
   }
 
@@ -208,8 +212,8 @@ class VectorVertices {
   static HWY_INLINE V3 turn(const float (&m)[9], V3 v) {
     const F f;
     const auto row = [&](int r) {
-      return hn::Add(hn::Mul(hn::Set(f, m[r]), v.x),
-                     hn::Add(hn::Mul(hn::Set(f, m[r + 1]), v.y), hn::Mul(hn::Set(f, m[r + 2]), v.z)));
+      return hn::Add(hn::Mul(hn::Set(f, m[r]), v.x), hn::Add(hn::Mul(hn::Set(f, m[r + 1]), v.y),
+                                                             hn::Mul(hn::Set(f, m[r + 2]), v.z)));
     };
     return {row(0), row(3), row(6)};
   }

@@ -18,7 +18,8 @@ TEST(Morton, EncodesAndDecodesAllOf21Bits) {
 }
 
 TEST(Morton, VisitsEveryPointOnceInOrder) {
-  for (const Int3 grid : {Int3{1, 1, 1}, Int3{5, 3, 7}, Int3{1, 40, 2}, Int3{8, 8, 8}, Int3{0, 3, 3}}) {
+  for (const Int3 grid :
+       {Int3{1, 1, 1}, Int3{5, 3, 7}, Int3{1, 40, 2}, Int3{8, 8, 8}, Int3{0, 3, 3}}) {
     std::vector<std::uint64_t> codes;
     for_each_morton(grid, [&](Int3 p) { codes.push_back(morton_encode(p)); });
     EXPECT_EQ(codes.size(), static_cast<std::size_t>(volume(grid)));

@@ -15,16 +15,20 @@ TEST(TileWork, NeededBoxesCoverTheActiveBlocks) {
     for (int active = 1; active < 256; ++active)
       for (const Index reach : {0, 1}) {
         std::vector<bool> covered(static_cast<std::size_t>(volume(lattice.extent)));
-        const auto index = [&](Int3 p) { return static_cast<std::size_t>(linear_index(p, lattice.extent)); };
-        for_each_needed_box(lattice, {tile, static_cast<std::uint8_t>(active), 0}, reach, [&](Box3 box) {
-          EXPECT_EQ(intersect(box, lattice.box()), box);
-          EXPECT_FALSE(box.empty());
-          for_each_point(box, [&](Int3 p) { covered[index(p)] = true; });
-        });
+        const auto index = [&](Int3 p) {
+          return static_cast<std::size_t>(linear_index(p, lattice.extent));
+        };
+        for_each_needed_box(lattice, {tile, static_cast<std::uint8_t>(active), 0}, reach,
+                            [&](Box3 box) {
+                              EXPECT_EQ(intersect(box, lattice.box()), box);
+                              EXPECT_FALSE(box.empty());
+                              for_each_point(box, [&](Int3 p) { covered[index(p)] = true; });
+                            });
         for (int i = 0; i < 8; ++i) {
           if (!(active >> i & 1)) continue;
           const Int3 corner = tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
-          const Box3 block{corner - Int3{reach, reach, reach}, corner + Int3{17 + reach, 17 + reach, 17 + reach}};
+          const Box3 block{corner - Int3{reach, reach, reach},
+                           corner + Int3{17 + reach, 17 + reach, 17 + reach}};
           for_each_point(intersect(block, lattice.box()), [&](Int3 p) {
             ASSERT_TRUE(covered[index(p)]) << active << " block " << i;
           });

@@ -65,7 +65,8 @@ class Extract : public ::testing::Test {
     return StoreReader(path);
   }
 
-  static ExtractReport run(const StoreReader& store, const ExtractOptions& options, MeshSink& sink) {
+  static ExtractReport run(const StoreReader& store, const ExtractOptions& options,
+                           MeshSink& sink) {
     NoProgress silent;
     return extract(store, options, sink, silent);
   }
@@ -79,7 +80,8 @@ template <class T>
 Field<T> mixed_field(Int3 extent) {
   auto field = isobrick::testing::padded_noise<T>(extent, 0, 100, T{0}, 17);
   for_each_point({{10, 10, 10}, {extent.x - 20, 90, extent.z - 5}}, [&](Int3 p) {
-    field.at(p) = static_cast<T>(p.x < 70 ? 95 : 50 + 40 * std::sin(static_cast<double>(p.x + 2 * p.y) / 9));
+    field.at(p) =
+        static_cast<T>(p.x < 70 ? 95 : 50 + 40 * std::sin(static_cast<double>(p.x + 2 * p.y) / 9));
   });
   return field;
 }
@@ -98,9 +100,11 @@ TEST_F(Extract, NothingButVolumeAndIsovalueShowsInTheMesh) {
       for (const int threads : {1, 2, 8})
         for (const std::uint64_t memory : {std::uint64_t{220} << 20, std::uint64_t{1} << 30}) {
           MemorySink sink;
-          const ExtractReport report =
-              run(reader, {.isovalue = iso, .normals = normals, .memory = memory, .threads = threads}, sink);
-          ASSERT_EQ(sink.mesh, expected) << "brick " << brick << " threads " << threads << " memory " << memory;
+          const ExtractReport report = run(
+              reader, {.isovalue = iso, .normals = normals, .memory = memory, .threads = threads},
+              sink);
+          ASSERT_EQ(sink.mesh, expected)
+              << "brick " << brick << " threads " << threads << " memory " << memory;
           EXPECT_TRUE(sink.finished);
           EXPECT_EQ(report.triangles, expected.triangles.size());
           EXPECT_EQ(report.vertices, expected.positions.size());
@@ -126,11 +130,13 @@ TEST_F(Extract, TheLeastBudgetWorksAndLessIsRefusedByName) {
     least = std::stoull(text.substr(at + 9));
   }
   MemorySink least_sink;
-  const ExtractReport report = run(reader, {.isovalue = 60, .memory = least, .threads = 2}, least_sink);
+  const ExtractReport report =
+      run(reader, {.isovalue = 60, .memory = least, .threads = 2}, least_sink);
   EXPECT_EQ(least_sink.mesh, roomy.mesh);
   EXPECT_GE(report.brick_reads, report.bricks_read);
   MemorySink refused;
-  EXPECT_THROW(run(reader, {.isovalue = 60, .memory = least - 1, .threads = 2}, refused), UsageError);
+  EXPECT_THROW(run(reader, {.isovalue = 60, .memory = least - 1, .threads = 2}, refused),
+               UsageError);
 }
 
 TEST_F(Extract, OnlyTouchedBricksAreRead) {
@@ -162,7 +168,8 @@ TEST_F(Extract, LevelsAndRegionsAreExtractedFromTheirSamples) {
   EXPECT_EQ(part.mesh, isobrick::testing::extract(field, request));
   MemorySink none;
   EXPECT_THROW(run(reader, {.isovalue = 60, .level = 9}, none), UsageError);
-  EXPECT_THROW(run(reader, {.isovalue = 60, .roi = Box3{{0, 0, 0}, {131, 1, 1}}}, none), UsageError);
+  EXPECT_THROW(run(reader, {.isovalue = 60, .roi = Box3{{0, 0, 0}, {131, 1, 1}}}, none),
+               UsageError);
   EXPECT_THROW(run(reader, {.isovalue = 60, .roi = Box3{{5, 5, 5}, {5, 9, 9}}}, none), UsageError);
   EXPECT_THROW(run(reader, {.isovalue = NAN}, none), UsageError);
 }
@@ -205,7 +212,9 @@ TEST_F(Extract, ASinkThatFailsStopsItAndIsNotFinished) {
   for (const int at : {1, 2, 3}) {
     MemorySink sink;
     sink.fail_at = at;
-    EXPECT_THROW(run(reader, {.isovalue = 60, .memory = std::uint64_t{80} << 20, .threads = 1}, sink), Error);
+    EXPECT_THROW(
+        run(reader, {.isovalue = 60, .memory = std::uint64_t{80} << 20, .threads = 1}, sink),
+        Error);
     EXPECT_FALSE(sink.finished);
   }
 }
@@ -221,7 +230,8 @@ TEST_F(Extract, ChunksKeepToTheBudget) {
 
 TEST_F(Extract, EstimatesAreNearOnASmoothSurface) {
   const Field<std::uint8_t> field({160, 160, 160}, [](Int3 p) {
-    const double x = static_cast<double>(p.x) - 80, y = static_cast<double>(p.y) - 80, z = static_cast<double>(p.z) - 80;
+    const double x = static_cast<double>(p.x) - 80, y = static_cast<double>(p.y) - 80,
+                 z = static_cast<double>(p.z) - 80;
     return std::max(0.0, 255 - 2 * std::sqrt(x * x + y * y + z * z));
   });
   const StoreReader reader = store(field, {.brick = 32, .shard = 64});

@@ -48,7 +48,8 @@ class Stream : public ::testing::Test {
 TEST_F(Stream, CacheKeepsWhatWasNeededLastAndNoMoreThanItsCapacity) {
   const StoreReader store(path_);
   BrickCache cache(store, 0, 4);
-  const std::vector<Int3> first{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, second{{2, 0, 0}, {3, 0, 0}, {4, 0, 0}};
+  const std::vector<Int3> first{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}},
+      second{{2, 0, 0}, {3, 0, 0}, {4, 0, 0}};
   cache.require(first);
   for (const Int3 b : first) expect_samples(cache, b);
   EXPECT_EQ(cache.find({1, 0, 0}), nullptr) << "absent";
@@ -87,7 +88,8 @@ TEST_F(Stream, BatchesHoldEveryActiveTileOnceInMortonOrderWithItsBricks) {
             for_each_needed_box(lattice, work, reach, [&](Box3 box) {
               for_each_point(box, [&](Int3 p) {
                 const Int3 b{p.x / 32, p.y / 32, p.z / 32};
-                ASSERT_NE(std::find(batch.bricks.begin(), batch.bricks.end(), b), batch.bricks.end());
+                ASSERT_NE(std::find(batch.bricks.begin(), batch.bricks.end(), b),
+                          batch.bricks.end());
               });
             });
           }

@@ -149,8 +149,8 @@ TEST(CaseTables, TrianglesFaceTheOutside) {
   ASSERT_EQ(t.size(), 1u);
   const auto axis_of = [](int edge) { return edge / 4; };
   const std::array<int, 3> axes{axis_of(t[0][0]), axis_of(t[0][1]), axis_of(t[0][2])};
-  const bool even = axes == std::array{0, 1, 2} || axes == std::array{1, 2, 0} ||
-                    axes == std::array{2, 0, 1};
+  const bool even =
+      axes == std::array{0, 1, 2} || axes == std::array{1, 2, 0} || axes == std::array{2, 0, 1};
   EXPECT_TRUE(even);
 }
 

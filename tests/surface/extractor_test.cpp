@@ -48,7 +48,8 @@ TYPED_TEST(EveryType, BrickSizeBatchesAndThreadsNeverShow) {
   const double lo = std::is_signed_v<T> ? -50 : 0;
   auto field = padded_noise<T>({150, 97, 70}, lo, 100, static_cast<T>(lo), 11);
   // A calm half, so that some blocks are not active.
-  for_each_point({{0, 0, 0}, {80, 97, 70}}, [&](Int3 p) { field.at(p) = static_cast<T>(p.z < 30 ? 0 : 90); });
+  for_each_point({{0, 0, 0}, {80, 97, 70}},
+                 [&](Int3 p) { field.at(p) = static_cast<T>(p.z < 30 ? 0 : 90); });
   for (const bool normals : {false, true}) {
     const Mesh expected = extract(field, {.isovalue = 42, .normals = normals});
     ASSERT_GT(expected.triangles.size(), 10000u);
@@ -56,12 +57,13 @@ TYPED_TEST(EveryType, BrickSizeBatchesAndThreadsNeverShow) {
                              Int3{17, 40, 23}, Int3{256, 1, 100}})
       EXPECT_EQ(extract(field, {.isovalue = 42, .brick = brick, .normals = normals}), expected);
     for (const int threads : {1, 2, 8})
-      tbb::task_arena(threads).execute([&] {
-        EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals}), expected);
-      });
+      tbb::task_arena(threads).execute(
+          [&] { EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals}), expected); });
     for (const std::size_t batch : {1u, 3u, 40u})
-      EXPECT_EQ(extract(field, {.isovalue = 42, .normals = normals, .batch = batch,
-                                .workspaces = batch + 1}), expected);
+      EXPECT_EQ(
+          extract(field,
+                  {.isovalue = 42, .normals = normals, .batch = batch, .workspaces = batch + 1}),
+          expected);
   }
 }
 
@@ -84,7 +86,7 @@ TYPED_TEST(EveryType, ChunkLocalMeshHasTheSameTriangles) {
 
 TEST(Extractor, IsovaluesAtAndBeyondTheRange) {
   const auto field = padded_noise<std::uint8_t>({20, 21, 22}, 10, 201, 10, 1);
-  EXPECT_TRUE(extract(field, {.isovalue = 10}).triangles.empty());   // all inside
+  EXPECT_TRUE(extract(field, {.isovalue = 10}).triangles.empty());  // all inside
   EXPECT_TRUE(extract(field, {.isovalue = -1e30}).triangles.empty());
   EXPECT_TRUE(extract(field, {.isovalue = 201}).triangles.empty());  // none inside
   EXPECT_TRUE(extract(field, {.isovalue = 256}).triangles.empty());
@@ -121,7 +123,8 @@ TEST(Extractor, AllPairsOfCellsAgreeWithPlainMarchingCubes) {
   for (int bits = 0; bits < 4096; ++bits) {
     Field<float> field({3, 2, 2});
     for (std::size_t i = 0; i < 12; ++i) field.samples[i] = (bits >> i & 1) ? 1.0f : -1.0f;
-    ASSERT_EQ(edge_triangles(extract(field, {.isovalue = 0})), reference_triangles(field, 0)) << bits;
+    ASSERT_EQ(edge_triangles(extract(field, {.isovalue = 0})), reference_triangles(field, 0))
+        << bits;
   }
 }
 
@@ -208,7 +211,8 @@ TEST(Extractor, SphereConvergesAtSecondOrder) {
   for (const Index n : {17, 33, 65, 129}) {
     const double h = 2.0 / static_cast<double>(n - 1), radius = 0.7;
     const Field<float> field({n, n, n}, [&](Int3 p) {
-      const Vec3d q{static_cast<double>(p.x) * h - 1, static_cast<double>(p.y) * h - 1, static_cast<double>(p.z) * h - 1};
+      const Vec3d q{static_cast<double>(p.x) * h - 1, static_cast<double>(p.y) * h - 1,
+                    static_cast<double>(p.z) * h - 1};
       return radius - std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z);
     });
     Transform world;
@@ -236,7 +240,8 @@ TEST(Extractor, SphereConvergesAtSecondOrder) {
 TEST(Extractor, TorusHasEulerNumberZeroAndItsVolume) {
   const double big = 20, small = 8;
   const Field<float> field({63, 63, 30}, [&](Int3 p) {
-    const double x = static_cast<double>(p.x) - 31.2, y = static_cast<double>(p.y) - 30.9, z = static_cast<double>(p.z) - 14.6;
+    const double x = static_cast<double>(p.x) - 31.2, y = static_cast<double>(p.y) - 30.9,
+                 z = static_cast<double>(p.z) - 14.6;
     const double ring = std::sqrt(x * x + y * y) - big;
     return small - std::sqrt(ring * ring + z * z);
   });
@@ -257,7 +262,9 @@ TEST(Extractor, AnisotropicAndTurnedVolumesEndInWorldCoordinates) {
   const Vec3d n{1 / std::sqrt(14.0), 2 / std::sqrt(14.0), 3 / std::sqrt(14.0)};
   const Vec3d centre = world.apply({20, 15, 12});
   const Field<float> field({41, 33, 29}, [&](Int3 p) {
-    const Vec3d q = world.apply({static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)}) - centre;
+    const Vec3d q = world.apply({static_cast<double>(p.x), static_cast<double>(p.y),
+                                 static_cast<double>(p.z)}) -
+                    centre;
     return -(q.x * n.x + q.y * n.y + q.z * n.z);
   });
   const Mesh mesh = extract(field, {.isovalue = 0, .normals = true, .transform = world});
@@ -271,7 +278,8 @@ TEST(Extractor, AnisotropicAndTurnedVolumesEndInWorldCoordinates) {
 
 TEST(Extractor, MirroredAxesKeepTheOutsideOutside) {
   const Field<float> field({40, 40, 40}, [](Int3 p) {
-    const double x = static_cast<double>(p.x) - 19.3, y = static_cast<double>(p.y) - 20.1, z = static_cast<double>(p.z) - 19.8;
+    const double x = static_cast<double>(p.x) - 19.3, y = static_cast<double>(p.y) - 20.1,
+                 z = static_cast<double>(p.z) - 19.8;
     return 12 - std::sqrt(x * x + y * y + z * z);
   });
   for (const double sign : {1.0, -1.0}) {

@@ -95,7 +95,8 @@ Mesh extract(const Field<T>& field, const Request& request) {
   CpuExtractor extractor(lattice, options, {.tiles = request.workspaces});
   MeshBuffer out;
   for (std::size_t i = 0; i < tiles.size(); i += std::min(request.batch, tiles.size()))
-    extractor.extract(std::span(tiles).subspan(i, std::min(request.batch, tiles.size() - i)), bricks, out);
+    extractor.extract(std::span(tiles).subspan(i, std::min(request.batch, tiles.size() - i)),
+                      bricks, out);
   return {{out.positions.begin(), out.positions.end()},
           {out.normals.begin(), out.normals.end()},
           {out.triangles.begin(), out.triangles.end()}};
@@ -103,7 +104,7 @@ Mesh extract(const Field<T>& field, const Request& request) {
 
 /// Each triangle as the three lattice edges its vertices lie on, rotated so
 /// that the smallest comes first: a mesh without any order.
-using EdgeKey = std::array<Index, 4>;  // lower sample, axis
+using EdgeKey = std::array<Index, 4>;                       // lower sample, axis
 using EdgeTriangles = std::vector<std::array<EdgeKey, 3>>;  // sorted
 
 inline std::array<EdgeKey, 3> rotated(std::array<EdgeKey, 3> t) {
@@ -132,7 +133,8 @@ EdgeTriangles reference_triangles(const Field<T>& field, double isovalue) {
     };
     const auto& edges = kCaseTables.edges[index];
     for (std::size_t t = 0; t < kCaseTables.triangles[index]; ++t)
-      triangles.push_back(rotated({key(edges[3 * t]), key(edges[3 * t + 1]), key(edges[3 * t + 2])}));
+      triangles.push_back(
+          rotated({key(edges[3 * t]), key(edges[3 * t + 1]), key(edges[3 * t + 2])}));
   });
   std::sort(triangles.begin(), triangles.end());
   return triangles;
