@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
 
 #include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/codec.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -13,6 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxLevels = 64;
+constexpr const char* kChecksumKey = "metadata_crc32c";
 
 Json zyx(Vec3d v) { return {v.z, v.y, v.x}; }
 
@@ -96,6 +99,10 @@ void parse_multiscales(const CheckedJson& multiscales, ImageMetadata& image) {
     level.transform.spacing = common.scale * own.scale;
     level.transform.origin = common.scale * own.translation + common.translation;
     level.transform.unit = unit;
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(level.transform.spacing[axis] > 0) || !std::isfinite(level.transform.spacing[axis]) ||
+          !std::isfinite(level.transform.origin[axis]))
+        dataset.damaged("scale must be finite and positive, translation finite");
     image.levels.push_back(std::move(level));
   }
 }
@@ -109,9 +116,25 @@ void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
   if (ours.has("direction")) {
     const CheckedJson direction = ours.at("direction");
     if (direction.array_size() != 9) direction.damaged("must have 9 numbers");
-    for (ImageMetadata::Level& level : image.levels)
-      for (std::size_t i = 0; i < 9; ++i) level.transform.direction[i] = direction.at(i).number();
+    std::array<double, 9> values{};
+    for (std::size_t i = 0; i < 9; ++i) values[i] = direction.at(i).number();
+    if (!is_orthonormal(values)) direction.damaged("must be orthonormal");
+    for (ImageMetadata::Level& level : image.levels) level.transform.direction = values;
   }
+  if (!ours.has(kChecksumKey)) return;
+  const CheckedJson checksum = ours.at(kChecksumKey);
+  const Index value = checksum.integer();
+  if (value < 0 || value > Index{0xffffffff}) checksum.damaged("is no checksum");
+  image.checksum = static_cast<std::uint32_t>(value);
+}
+
+// Numbers as the bits of a double, so that nothing depends on how a program
+// writes them: 2, 2.0 and 2e0 are the same.
+void replace_numbers(nlohmann::json& json) {
+  if (json.is_number())
+    json = fmt::format("{:016x}", std::bit_cast<std::uint64_t>(json.get<double>()));
+  else if (json.is_structured())
+    for (nlohmann::json& element : json) replace_numbers(element);
 }
 
 }  // namespace
@@ -144,6 +167,7 @@ std::string to_json(const ImageMetadata& image) {
   ours["version"] = kStoreVersion;
   if (!finest.axis_aligned()) ours["direction"] = finest.direction;
   if (image.may_have_nan) ours["may_have_nan"] = *image.may_have_nan;
+  if (image.checksum) ours[kChecksumKey] = *image.checksum;
 
   Json attributes;
   attributes["ome"]["version"] = "0.5";
@@ -175,6 +199,38 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
   image.ours = attributes.has("isobrick");
   if (image.ours) parse_ours(attributes.at("isobrick"), image);
   return image;
+}
+
+std::uint32_t metadata_checksum(std::string_view root, std::span<const std::string> levels,
+                                const std::string& where) {
+  const nlohmann::json parsed = parse_json(root, where);
+  const CheckedJson attributes = CheckedJson(parsed, where).at("attributes");
+  nlohmann::json covered;
+  // Other programs may add to the rest of `ome` how they show the image.
+  covered["multiscales"] = attributes.at("ome").at("multiscales").raw();
+  covered["isobrick"] = attributes.at("isobrick").raw();
+  if (covered["isobrick"].is_object()) covered["isobrick"].erase(kChecksumKey);
+  covered["levels"] = nlohmann::json::array();
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    nlohmann::json level = parse_json(levels[i], fmt::format("{}: level {}", where, i));
+    if (level.is_object()) level.erase("attributes");
+    covered["levels"].push_back(std::move(level));
+  }
+  replace_numbers(covered);
+  const std::string text = covered.dump();  // sorted by key, without blanks
+  return crc32c(std::as_bytes(std::span(text)));
+}
+
+bool is_orthonormal(const std::array<double, 9>& direction) {
+  constexpr double tolerance = 1e-4;
+  for (std::size_t a = 0; a < 3; ++a)
+    for (std::size_t b = a; b < 3; ++b) {
+      double product = 0;
+      for (std::size_t row = 0; row < 3; ++row)
+        product += direction[3 * row + a] * direction[3 * row + b];
+      if (!(std::abs(product - (a == b ? 1 : 0)) <= tolerance)) return false;
+    }
+  return true;
 }
 
 }  // namespace isobrick

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +25,8 @@ struct ImageMetadata {
   bool ours = true;  ///< has `attributes.isobrick`
   /// Nothing when the store doesn't say.
   std::optional<bool> may_have_nan;
+  /// What the root says that metadata_checksum() must be.
+  std::optional<std::uint32_t> checksum;
 
   friend bool operator==(const ImageMetadata&, const ImageMetadata&) = default;
 };
@@ -34,5 +39,16 @@ std::string to_json(const ImageMetadata& image);
 /// Reads the root's zarr.json; `where` names the file. DamageError for what is
 /// broken, Error for an unknown version or what is not supported.
 ImageMetadata parse_image_metadata(std::string_view text, const std::string& where);
+
+/// CRC-32C over the values that the root's zarr.json and those of its levels
+/// hold, in the order of the levels; docs/store_format.md says over which and
+/// how. The root's own checksum does not enter it, nor does how the JSON is laid
+/// out. `where` names the root's file.
+std::uint32_t metadata_checksum(std::string_view root, std::span<const std::string> levels,
+                                const std::string& where);
+
+/// Whether the columns have length 1 and are at right angles, within 1e-4.
+/// Mirrored ones are as good.
+bool is_orthonormal(const std::array<double, 9>& direction);
 
 }  // namespace isobrick

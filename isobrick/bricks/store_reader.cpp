@@ -44,7 +44,10 @@ struct StoreReader::Impl {
   };
 
   void open(const std::filesystem::path& path);
-  void open_level(const ImageMetadata::Level& described);
+  void check_ours(const ImageMetadata& image, const std::string& root,
+                  std::span<const std::string> level_texts) const;
+  void open_level(const ImageMetadata::Level& described, const std::string& text);
+  void open_ranges(int level);
   void check_brick(int level, Int3 b) const;
   [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
   std::filesystem::path shard_path(int level, Int3 s) const;
@@ -89,21 +92,60 @@ void StoreReader::Impl::open(const std::filesystem::path& path) {
     throw Error(fmt::format("'{}' is no store: it has no zarr.json", path.string()));
   }
   const ImageMetadata image = parse_image_metadata(text, quoted(file));
-  for (const ImageMetadata::Level& level : image.levels) open_level(level);
+  std::vector<std::string> level_texts;
+  for (const ImageMetadata::Level& level : image.levels) {
+    const std::filesystem::path level_file = path / level.path / "zarr.json";
+    level_texts.push_back(read_small_file(level_file, kMaxMetadataBytes, &exists));
+    if (!exists) throw DamageError(quoted(level_file) + " is missing");
+  }
+  check_ours(image, text, level_texts);
+  for (std::size_t i = 0; i < image.levels.size(); ++i) open_level(image.levels[i], level_texts[i]);
+  if (image.ours)
+    for (std::size_t i = 0; i < levels.size(); ++i) open_ranges(static_cast<int>(i));
   info.type = info.levels[0].lattice.type;
   info.fill_value = levels[0].metadata.fill_value;
   info.codec = levels[0].metadata.codecs.name();
   info.may_have_nan = is_floating(info.type) && image.may_have_nan.value_or(true);
 }
 
-void StoreReader::Impl::open_level(const ImageMetadata::Level& described) {
+// Metadata of ours says what it must be; that of others has only its syntax.
+void StoreReader::Impl::check_ours(const ImageMetadata& image, const std::string& root,
+                                   std::span<const std::string> level_texts) const {
+  const std::string where = quoted(info.path / "zarr.json");
+  if (!image.ours) {
+    if (std::filesystem::exists(info.path / "isobrick" / "zarr.json"))
+      throw DamageError(where + ": metadata was changed: attributes.isobrick is missing");
+    return;
+  }
+  if (!image.checksum)
+    throw DamageError(where +
+                      ": metadata was changed: attributes.isobrick.metadata_crc32c is missing");
+  const std::uint32_t checksum = metadata_checksum(root, level_texts, where);
+  if (checksum != *image.checksum)
+    throw DamageError(
+        fmt::format("{}: metadata was changed, here or in a level's zarr.json: its "
+                    "checksum is {}, not metadata_crc32c {}",
+                    where, checksum, *image.checksum));
+}
+
+// Ranges of other extents than the level's show a shape that cannot be right
+// before anybody walks over it.
+void StoreReader::Impl::open_ranges(int level) {
+  const Lattice& samples = lattice(level);
+  const auto open = [&](const std::filesystem::path& folder, Int3 items) {
+    using Ranges = std::shared_ptr<const RangeArrayReader>;
+    if (!std::filesystem::exists(folder / "zarr.json")) return Ranges();
+    return Ranges(std::make_shared<const RangeArrayReader>(folder, items, samples.type));
+  };
+  Level& l = levels[static_cast<std::size_t>(level)];
+  l.brick_ranges = open(brick_range_folder(info.path, level), samples.bricks());
+  l.block_ranges = open(block_range_folder(info.path, level), samples.blocks());
+}
+
+void StoreReader::Impl::open_level(const ImageMetadata::Level& described, const std::string& text) {
   Level level;
   level.folder = info.path / described.path;
-  const std::filesystem::path file = level.folder / "zarr.json";
-  const std::string where = quoted(file);
-  bool exists = false;
-  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-  if (!exists) throw DamageError(where + " is missing");
+  const std::string where = quoted(level.folder / "zarr.json");
   level.metadata = parse_array_metadata(text, where);
   const ArrayMetadata& array = level.metadata;
   if (array.shape.size() != 3)
@@ -117,6 +159,10 @@ void StoreReader::Impl::open_level(const ImageMetadata::Level& described) {
   out.transform = described.transform;
   if (!checked_volume(out.lattice.extent))
     throw DamageError(where + ": the shape is out of bounds");
+  for (int axis = 0; axis < 3; ++axis)
+    if (out.lattice.extent[axis] > kMaxAxisSamples)
+      throw Error(fmt::format("{}: more than {} samples along an axis are not supported", where,
+                              kMaxAxisSamples));
   level.shards = ceil_div(out.lattice.extent, out.shard);
   level.bricks_per_shard = ceil_div(out.shard, out.lattice.brick);
   if (volume(level.shards) > kMaxShards) throw Error(where + ": too many shards");

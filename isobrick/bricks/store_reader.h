@@ -14,6 +14,10 @@
 
 namespace isobrick {
 
+/// More samples along an axis are not supported: meshes number tiles of 32 cells
+/// with 21 bits an axis.
+inline constexpr Index kMaxAxisSamples = Index{1} << 26;
+
 /// One resolution of a store, 0 the finest.
 struct LevelInfo {
   Lattice lattice;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <atomic>
+#include <cmath>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -57,6 +58,20 @@ void check_layout(const StoreLayout& layout) {
     if (level.lattice.type != layout.levels[0].lattice.type)
       throw UsageError("all levels of a store have the same type");
     if (!checked_volume(level.lattice.extent)) throw UsageError("extents are out of bounds");
+    const Transform& transform = level.transform;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (level.lattice.extent[axis] > kMaxAxisSamples)
+        throw UsageError(
+            fmt::format("more than {} samples along an axis are not supported", kMaxAxisSamples));
+      if (!(transform.spacing[axis] > 0) || !std::isfinite(transform.spacing[axis]))
+        throw Error(fmt::format("level {}: a spacing of {} is not finite and positive", i,
+                                transform.spacing[axis]));
+      if (!std::isfinite(transform.origin[axis]))
+        throw Error(
+            fmt::format("level {}: an origin of {} is not finite", i, transform.origin[axis]));
+    }
+    if (!is_orthonormal(transform.direction))
+      throw Error(fmt::format("level {}: the axes' directions are not orthonormal", i));
     fill_bits(level.lattice.type, layout.fill_value);
     parse_array_metadata(to_json(array_metadata(level, layout)), fmt::format("level {}", i));
   }
@@ -308,6 +323,9 @@ void StoreWriter::finish(bool may_have_nan) {
   // Only now does the directory become a store.
   ImageMetadata image = image_metadata(impl_->layout);
   image.may_have_nan = may_have_nan;
+  std::vector<std::string> levels;
+  for (const Impl::Level& l : impl_->levels) levels.push_back(to_json(l.metadata));
+  image.checksum = metadata_checksum(to_json(image), levels, quoted(impl_->dir / "zarr.json"));
   publisher.write(impl_->dir / "zarr.json", to_json(image));
   publisher.wait();
   std::error_code failure;

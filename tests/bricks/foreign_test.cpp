@@ -147,6 +147,12 @@ TEST_F(Foreign, AnImpossiblyLongBrickCostsNoMemory) {
   EXPECT_THROW(store.read_brick(0, {0, 0, 0}, brick.data()), DamageError);
 }
 
+TEST_F(Foreign, AnAxisOfAsManySamplesAsAreSupported) {
+  metadata.shape = {1, Index{1} << 26, 1};
+  write_metadata();
+  EXPECT_EQ(StoreReader(path).info().levels[0].lattice.extent.y, Index{1} << 26);
+}
+
 TEST_F(Foreign, WhatIsNotSupportedIsNamed) {
   const auto expect = [&](const std::string& part) {
     try {
@@ -170,6 +176,12 @@ TEST_F(Foreign, WhatIsNotSupportedIsNamed) {
   write_metadata();
   expect("out of bounds");
   metadata.shape = {Index{1} << 59, 1, 1};
+  write_metadata();
+  expect("more than 67108864 samples along an axis are not supported");
+  metadata.shape = {1, 1, (Index{1} << 26) + 1};
+  write_metadata();
+  expect("more than 67108864 samples along an axis are not supported");
+  metadata.shape = {Index{1} << 26, Index{1} << 26, 64};
   write_metadata();
   expect("too many shards");
 }

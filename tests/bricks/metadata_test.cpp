@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/image_metadata.h"
@@ -27,6 +28,7 @@ ImageMetadata image() {
   Transform transform{{1, 2, 3}, {4, 5, 6}, {0, 1, 0, 0, 0, 1, 1, 0, 0}, "millimeter"};
   result.levels = {{"0", transform}, {"1", transform}};
   result.may_have_nan = true;
+  result.checksum = 0xffffffff;
   return result;
 }
 
@@ -197,7 +199,23 @@ TEST(ImageMetadata, HostileValues) {
   expect(true, "number", "\"scale\":[3.0,2.0,1.0]", "\"scale\":[null,1,1]");
   expect(true, "JSON", "\"scale\":[3.0,2.0,1.0]", "\"scale\":[1e999,1,1]");
   expect(false, "'affine'", "\"type\":\"scale\"", "\"type\":\"affine\"");
+  expect(true, "finite", "\"scale\":[3.0,2.0,1.0]",
+         "\"scale\":[1e308,1,1]},{\"type\":\"scale\",\"scale\":[10,1,1]");
+  expect(true, "finite", "\"translation\":[6.0,5.0,4.0]",
+         "\"translation\":[1e308,1,1]},{\"type\":\"translation\",\"translation\":[1e308,1,1]");
+  expect(true, "number", "\"translation\":[6.0,5.0,4.0]", "\"translation\":[\"NaN\",1,1]");
   expect(true, "9 numbers", "\"direction\":[", "\"direction\":[1,");
+  const std::string direction = "\"direction\":[0.0,1.0,0.0,0.0,0.0,1.0,1.0,0.0,0.0]";
+  for (const char* bad : {"0,0,0,0,0,0,0,0,0", "0,1,0,0,0,1,1.001,0,0", "0,1,0,0,0.001,1,1,0,0",
+                          "0,1,0,0,1,0,1,0,0", "1e200,0,0,0,1e200,0,0,0,1e200"})
+    expect(true, "orthonormal", direction, std::string("\"direction\":[") + bad + "]");
+  const auto read = [&](const std::string& to) {
+    return parse_image_metadata(replaced(text, direction, "\"direction\":[" + to + "]"), "file");
+  };
+  EXPECT_NO_THROW(read("0,1,0,0,0,1,1.00001,0,0"));
+  EXPECT_EQ(read("-1,0,0,0,1,0,0,0,1").levels[1].transform.direction[0], -1) << "mirrored";
+  expect(true, "no checksum", "\"metadata_crc32c\":4294967295", "\"metadata_crc32c\":4294967296");
+  expect(true, "no checksum", "\"metadata_crc32c\":4294967295", "\"metadata_crc32c\":-1");
   expect(true, "true or false", "\"may_have_nan\":true", "\"may_have_nan\":1");
   for (const char* path : {"", "/etc", "..", "../x", "0/../..", "a/.."})
     expect(true, "inside the store", "\"path\":\"0\"", std::string("\"path\":\"") + path + "\"");
@@ -209,6 +227,57 @@ TEST(ImageMetadata, UnknownVersionStopsTheReader) {
   const std::filesystem::path root = folder / "file.zarr/zarr.json";
   write_file(root, replaced(read_file(root), "\"version\":1", "\"version\":99"));
   expect_error(false, "version 99", [&] { StoreReader store(folder / "file.zarr"); });
+}
+
+TEST(ImageMetadata, TheChecksumIsOverValuesOnly) {
+  const std::string root = to_json(image());
+  const std::vector<std::string> levels = {to_json(sharded()), to_json(sharded())};
+  const auto checksum = [&](const std::string& text) {
+    return metadata_checksum(text, levels, "file");
+  };
+  const std::uint32_t expected = checksum(root);
+  EXPECT_EQ(checksum(nlohmann::json::parse(root).dump()), expected) << "order and blanks";
+  EXPECT_EQ(checksum(replaced(root, "4294967295", "7")), expected) << "the checksum itself";
+  EXPECT_EQ(checksum(replaced(root, "[3.0,2.0,1.0]", "[3,2e0,1.00]")), expected);
+  EXPECT_EQ(checksum(replaced(root, "\"ome\":{", "\"ome\":{\"omero\":{},")), expected);
+  EXPECT_EQ(checksum(replaced(root, "\"attributes\":{", "\"attributes\":{\"theirs\":1,")),
+            expected);
+  EXPECT_NE(checksum(replaced(root, "[3.0,2.0,1.0]", "[3.0,2.0,1.0000000000000002]")), expected);
+  EXPECT_NE(checksum(replaced(root, "[6.0,5.0,4.0]", "[6.0,5.0,-4.0]")), expected);
+  EXPECT_NE(checksum(replaced(root, "\"may_have_nan\":true", "\"may_have_nan\":false")), expected);
+  EXPECT_NE(checksum(replaced(root, "\"isobrick\":{", "\"isobrick\":{\"new\":1,")), expected);
+  auto changed = levels;
+  changed[1] = replaced(changed[1], "-1.5", "-1.25");
+  EXPECT_NE(metadata_checksum(root, changed, "file"), expected);
+  changed[1] = replaced(levels[1], "\"attributes\":{}", "\"attributes\":{\"theirs\":1}");
+  EXPECT_EQ(metadata_checksum(root, changed, "file"), expected);
+}
+
+TEST(StoreWriter, RefusesLayoutsThatNoReaderWouldTake) {
+  const TemporaryFolder folder;
+  const std::vector<Level> levels = {make_level(ScalarType::u8, {4, 4, 4}, 4, 4, 0, false)};
+  const auto refused = [&](const std::string& part, auto&& change) {
+    StoreLayout layout = make_layout(levels, 3, 0);
+    change(layout.levels[0]);
+    try {
+      StoreWriter writer(folder / "a.zarr", layout, false);
+      ADD_FAILURE() << part;
+    } catch (const DamageError& e) {
+      ADD_FAILURE() << e.what();
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.zarr"));
+  };
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  for (const double spacing : {0.0, -1.0, infinity, std::nan("")})
+    refused("spacing", [&](LevelInfo& level) { level.transform.spacing.y = spacing; });
+  refused("origin", [&](LevelInfo& level) { level.transform.origin.z = -infinity; });
+  refused("orthonormal", [](LevelInfo& level) { level.transform.direction[1] = 0.001; });
+  refused("orthonormal", [](LevelInfo& level) { level.transform.direction[4] = std::nan(""); });
+  for (int axis = 0; axis < 3; ++axis)
+    refused("more than 67108864 samples along an axis are not supported",
+            [&](LevelInfo& level) { level.lattice.extent[axis] = kMaxAxisSamples + 1; });
 }
 
 }  // namespace
