@@ -119,6 +119,12 @@ void FileWriter::patch(std::uint64_t offset, std::string_view bytes) {
   }
 }
 
+UniqueFd FileWriter::share() const {
+  UniqueFd fd(::fcntl(fd_.get(), F_DUPFD_CLOEXEC, 0));
+  if (fd.get() < 0) throw system_error("open once more", path_, errno);
+  return fd;
+}
+
 OutputFile::OutputFile(std::string path, bool force)
     : path_(std::move(path)), force_(force), writer_([this] {
         check_target(path_, force_);

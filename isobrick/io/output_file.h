@@ -30,6 +30,10 @@ class FileWriter {
   void patch(std::uint64_t offset, std::string_view bytes);
   void flush();
 
+  /// Another descriptor of the same file, for who writes at places instead of
+  /// appending; the two ways do not mix.
+  UniqueFd share() const;
+
   /// Bytes appended so far.
   std::uint64_t size() const { return written_ + used_; }
 

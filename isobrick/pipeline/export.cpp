@@ -1,16 +1,13 @@
 #include "isobrick/pipeline/export.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
-#include <cstdio>
 #include <memory>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/output_file.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
@@ -26,48 +23,6 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 constexpr std::size_t kProgramBytes = 40 * kMiB;
 /// Larger pieces are no faster.
 constexpr std::size_t kPieceBytes = 256 * kMiB;
-
-/// The file that is written, gone again unless it is published.
-class TemporaryFile {
- public:
-  TemporaryFile(const std::filesystem::path& out, bool force)
-      : out_(out), name_(out), force_(force) {
-    const auto status = std::filesystem::symlink_status(out);
-    if (std::filesystem::exists(status) && !force)
-      throw UsageError(fmt::format("'{}' exists; --force replaces it", out.string()));
-    if (std::filesystem::is_directory(status))
-      throw UsageError(fmt::format("'{}' is a directory", out.string()));
-    name_ += ".partial";
-  }
-  ~TemporaryFile() {
-    if (created_) ::unlink(name_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  UniqueFd open() {
-    UniqueFd fd(::open(name_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    if (fd.get() < 0) throw system_error("cannot create", name_.string(), errno);
-    created_ = true;
-    return fd;
-  }
-
-  void publish() {
-    const unsigned flags = force_ ? 0 : RENAME_NOREPLACE;
-    int result = ::renameat2(AT_FDCWD, name_.c_str(), AT_FDCWD, out_.c_str(), flags);
-    // Not every file system knows the flag.
-    if (result != 0 && errno == EINVAL) result = ::rename(name_.c_str(), out_.c_str());
-    if (result != 0) throw system_error("cannot create", out_.string(), errno);
-    created_ = false;
-  }
-
-  std::string name() const { return name_.string(); }
-
- private:
-  std::filesystem::path out_, name_;
-  bool force_;
-  bool created_ = false;
-};
 
 Box3 region(const StoreReader& store, int level, const std::optional<Box3>& roi) {
   const StoreInfo& info = store.info();
@@ -118,8 +73,8 @@ std::uint64_t export_raw(const StoreReader& store, int level, std::optional<Box3
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   Workers workers(threads);
   const Int3 piece = piece_within(lattice, box.extent(), memory, workers.threads());
-  TemporaryFile temporary(out, force);
-  const SlabFile file(temporary.open(), temporary.name(), box.extent(), lattice.sample_bytes());
+  OutputFile output(out.string(), force);
+  const SlabFile file(output.writer().share(), out.string(), box.extent(), lattice.sample_bytes());
   file.reserve();
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
       static_cast<std::size_t>(volume(min(piece, box.extent()))) * lattice.sample_bytes());
@@ -130,7 +85,7 @@ std::uint64_t export_raw(const StoreReader& store, int level, std::optional<Box3
     progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
   });
   progress.end();
-  temporary.publish();
+  output.publish();
   return file.bytes();
 }
 

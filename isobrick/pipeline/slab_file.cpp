@@ -33,7 +33,7 @@ void write_at(int fd, const std::string& path, std::uint64_t offset, const std::
   while (size > 0) {
     const ssize_t n = ::pwrite(fd, bytes, size, static_cast<off_t>(offset));
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw system_error("cannot write", path, errno);
+    if (n < 0) throw system_error("write", path, errno);
     bytes += n;
     offset += static_cast<std::uint64_t>(n);
     size -= static_cast<std::size_t>(n);
@@ -48,7 +48,7 @@ UniqueFd open_nameless(const std::filesystem::path& beside) {
   // Not every file system has nameless files.
   std::string name = beside.string() + ".spool-XXXXXX";
   UniqueFd named(::mkostemp(name.data(), O_CLOEXEC));
-  if (named.get() < 0) throw system_error("cannot create a temporary file in", folder, errno);
+  if (named.get() < 0) throw system_error("create a temporary file in", folder, errno);
   ::unlink(name.c_str());
   return named;
 }
@@ -66,7 +66,7 @@ void SlabFile::reserve() const {
   const int failure = ::posix_fallocate(fd_.get(), 0, static_cast<off_t>(bytes()));
   // A file system that cannot reserve shows a full disk when it is written to.
   if (failure != 0 && failure != EOPNOTSUPP && failure != EINVAL)
-    throw system_error(fmt::format("cannot make room for {} bytes for", bytes()), path_, failure);
+    throw system_error(fmt::format("make room for {} bytes for", bytes()), path_, failure);
 }
 
 void SlabFile::write(Box3 box, const std::byte* samples) const {

@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <sys/resource.h>
+#include <sys/stat.h>
 
+#include <algorithm>
 #include <csignal>
+#include <thread>
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/export.h"
@@ -35,6 +38,14 @@ class Export : public testing::Test {
     return export_raw(*store_, level, roi, folder_ / "x.raw", force, memory, 2, progress);
   }
 
+  std::vector<std::string> files() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "."))
+      names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
   const Int3 extent_{90, 70, 66};
   TemporaryFolder folder_;
   MemorySource source_ = make_source<float>(extent_, 2, true);
@@ -46,7 +57,7 @@ TEST_F(Export, GivesBackTheInputBitForBit) {
   EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(source_.samples()));
   write(1, std::nullopt, true);
   EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(samples_of(*store_, 1)));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "x.raw.partial"));
+  EXPECT_EQ(files(), (std::vector<std::string>{"a", "x.raw"}));
 }
 
 TEST_F(Export, CutsRegionsWhateverTheBudget) {
@@ -59,6 +70,42 @@ TEST_F(Export, CutsRegionsWhateverTheBudget) {
       ASSERT_EQ(content_of(folder_ / "x.raw"), text_of(expected));
     }
   }
+}
+
+TEST_F(Export, TouchesNothingButItsOwnFile) {
+  namespace fs = std::filesystem;
+  std::ofstream(folder_ / "x.raw.partial") << "precious";
+  write(0, std::nullopt);
+  EXPECT_EQ(content_of(folder_ / "x.raw.partial"), "precious");
+  fs::remove(folder_ / "x.raw.partial");
+  std::ofstream(folder_ / "other") << "precious";
+  fs::create_symlink(folder_ / "other", folder_ / "x.raw.partial");
+  write(0, std::nullopt, true);
+  EXPECT_EQ(content_of(folder_ / "other"), "precious");
+  // A link is replaced, not followed; a pipe stays what it is.
+  fs::remove(folder_ / "x.raw");
+  fs::create_symlink(folder_ / "other", folder_ / "x.raw");
+  EXPECT_THROW(write(0, std::nullopt), UsageError);
+  write(0, std::nullopt, true);
+  EXPECT_EQ(content_of(folder_ / "other"), "precious");
+  EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(source_.samples()));
+  fs::remove(folder_ / "x.raw");
+  ASSERT_EQ(::mkfifo((folder_ / "x.raw").c_str(), 0600), 0);
+  EXPECT_THROW(write(0, std::nullopt, true), UsageError);
+  EXPECT_TRUE(fs::is_fifo(folder_ / "x.raw"));
+}
+
+TEST_F(Export, SeveralAtATimeEachWriteTheirOwn) {
+  NoProgress progress;
+  std::thread other([&] {
+    NoProgress none;
+    for (int i = 0; i < 10; ++i)
+      export_raw(*store_, 0, std::nullopt, folder_ / "x.raw", true, 100 * kMiB, 1, none);
+  });
+  for (int i = 0; i < 10; ++i)
+    export_raw(*store_, 0, std::nullopt, folder_ / "x.raw", true, 100 * kMiB, 1, progress);
+  other.join();
+  EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(source_.samples()));
 }
 
 TEST_F(Export, RefusesWhatMakesNoSense) {
@@ -80,7 +127,7 @@ TEST_F(Export, LeavesNothingWhenABrickIsDamaged) {
   f.close();
   EXPECT_THROW(write(0, std::nullopt), DamageError);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "x.raw"));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "x.raw.partial"));
+  EXPECT_EQ(files(), std::vector<std::string>{"a"});
 }
 
 TEST_F(Export, LeavesNothingWhenThereIsNoRoom) {
@@ -94,7 +141,7 @@ TEST_F(Export, LeavesNothingWhenThereIsNoRoom) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "x.raw"));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "x.raw.partial"));
+  EXPECT_EQ(files(), std::vector<std::string>{"a"});
 }
 
 }  // namespace
