@@ -35,8 +35,9 @@ class Conversion {
         store_(staging.path(), layout, staging.resumed()),
         journal_(staging.path(), layout.levels.front().lattice, staging.resumed()) {
     for (int level = 0; level < level_count(); ++level)
-      writers_.push_back(std::make_unique<LevelWriter>(
-          store_, layout, level, plan.bricks_in_flight(), level == 0 ? &journal_ : nullptr));
+      writers_.push_back(std::make_unique<LevelWriter>(store_, layout, level,
+                                                       plan.bricks_in_flight(),
+                                                       level == 0 ? &journal_ : nullptr, progress));
   }
 
   ConvertReport run();
@@ -97,8 +98,7 @@ void Conversion::write_cascade(int first_level, VolumeSource& source) {
   std::vector<LevelWriter*> writers;
   for (int level = first_level; level < level_count(); ++level)
     writers.push_back(writers_[static_cast<std::size_t>(level)].get());
-  NoProgress none;  // coarser levels are no input
-  Cascade(plan_, layout_, first_level, writers).run(source, first_level == 0 ? progress_ : none);
+  Cascade(plan_, layout_, first_level, writers).run(source);
 }
 
 /// Writes a level whose slabs do not fit and leaves the next one in a temporary
@@ -130,7 +130,6 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
       next->write({half_extent(box.lo), half_extent(box.hi)}, half.get());
     });
     if (p.x + 1 == pieces.x && p.y + 1 == pieces.y) writer.close(box.hi.z);
-    if (level == 0) progress_.advance(bytes_of(box.extent(), lattice.type));
   });
   return next;
 }

@@ -37,7 +37,7 @@ Cascade::Cascade(const ConvertPlan& plan, const StoreLayout& layout, int first_l
   }
 }
 
-void Cascade::run(VolumeSource& source, Progress& progress) {
+void Cascade::run(VolumeSource& source) {
   Stage& first = stages_.front();
   const auto slab_from = [&](Index z) {
     return intersect(
@@ -60,7 +60,6 @@ void Cascade::run(VolumeSource& source, Progress& progress) {
       source.will_need(next);
     first.planes = box.extent().z;
     flush(0);
-    progress.advance(first.plane_bytes() * static_cast<std::size_t>(box.extent().z));
     if (reading.valid()) {
       reading.get();
       std::swap(first.slab, other);

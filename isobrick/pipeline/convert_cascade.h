@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/core/progress.h"
 #include "isobrick/io/volume_source.h"
 #include "isobrick/pipeline/convert_level.h"
 #include "isobrick/pipeline/convert_plan.h"
@@ -23,7 +22,7 @@ class Cascade {
   Cascade(const ConvertPlan& plan, const StoreLayout& layout, int first_level,
           std::vector<LevelWriter*> levels);
 
-  void run(VolumeSource& source, Progress& progress);
+  void run(VolumeSource& source);
 
  private:
   struct Stage {

@@ -28,10 +28,10 @@ ConvertJournal::ConvertJournal(const std::filesystem::path& store, const Lattice
     : path_(store / "convert.journal"), lattice_(lattice) {
   fd_ =
       UniqueFd(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | (resume ? 0 : O_TRUNC), 0666));
-  if (fd_.get() < 0) throw system_error("cannot create", path_.string(), errno);
+  if (fd_.get() < 0) throw system_error("create", path_.string(), errno);
   earlier_.resize(static_cast<std::size_t>(lattice.bricks().z));
   const ssize_t n = ::pread(fd_.get(), earlier_.data(), earlier_.size() * sizeof(earlier_[0]), 0);
-  if (n < 0) throw system_error("cannot read", path_.string(), errno);
+  if (n < 0) throw system_error("read", path_.string(), errno);
   earlier_.resize(static_cast<std::size_t>(n) / sizeof(earlier_[0]));
 }
 
@@ -59,7 +59,7 @@ void ConvertJournal::record(Index layer, std::uint64_t sum) {
   }
   if (::pwrite(fd_.get(), &sum, sizeof(sum), static_cast<off_t>(i * sizeof(sum))) !=
       static_cast<ssize_t>(sizeof(sum)))
-    throw system_error("cannot write", path_.string(), errno);
+    throw system_error("write", path_.string(), errno);
 }
 
 void ConvertJournal::remove() { ::unlink(path_.c_str()); }

@@ -27,7 +27,7 @@ void gather(Box3 brick, Int3 brick_extent, Box3 box, const std::byte* samples,
 }  // namespace
 
 LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int level,
-                         int bricks_in_flight, ConvertJournal* journal)
+                         int bricks_in_flight, ConvertJournal* journal, Progress& progress)
     : store_(store),
       layout_(layout),
       info_(layout.levels[static_cast<std::size_t>(level)]),
@@ -36,6 +36,7 @@ LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int leve
       shards_(ceil_div(info_.lattice.extent, info_.shard)),
       bricks_per_shard_(ceil_div(info_.shard, info_.lattice.brick)),
       journal_(journal),
+      progress_(progress),
       ranges_(make_level_ranges(info_.lattice)) {
   for_each_point({{0, 0, 0}, shards_},
                  [&](Int3 s) { kept_.push_back(store_.shard_is_whole(level_, s)); });
@@ -68,6 +69,9 @@ void LevelWriter::deliver(const Parcel& parcel) {
     store_.put(level_, parcel.brick, *parcel.encoded);
   else
     ++counts_.absent;
+  const auto samples =
+      static_cast<std::uint64_t>(volume(info_.lattice.brick_box(parcel.brick).extent()));
+  progress_.advance(level_ == 0 ? samples * info_.lattice.sample_bytes() : 0);
 }
 
 void LevelWriter::write(Box3 box, const std::byte* samples,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isobrick/bricks/store_writer.h"
+#include "isobrick/core/progress.h"
 #include "isobrick/pipeline/convert_journal.h"
 #include "isobrick/pipeline/range_scan.h"
 
@@ -19,9 +20,11 @@ class LevelWriter {
     std::uint64_t bricks = 0, absent = 0, kept = 0;
   };
 
-  /// `journal`, if there is one, sees every brick.
+  /// `journal`, if there is one, sees every brick. `progress` advances with
+  /// each brick: by its samples in the input's own level, by nothing in coarser
+  /// ones, where it still may throw to stop the conversion.
   LevelWriter(StoreWriter& store, const StoreLayout& layout, int level, int bricks_in_flight,
-              ConvertJournal* journal);
+              ConvertJournal* journal, Progress& progress);
 
   /// Writes the bricks of `box`, which is aligned to them, and merges its samples
   /// into the ranges; `samples` is dense. `meanwhile` runs on some thread beside
@@ -62,6 +65,7 @@ class LevelWriter {
   Int3 shards_, bricks_per_shard_;
   std::vector<bool> kept_;  ///< shards that an interrupted run finished
   ConvertJournal* journal_;
+  Progress& progress_;
   std::unique_ptr<LevelRanges> ranges_;
   Index next_shard_z_ = 0;
   Counts counts_;

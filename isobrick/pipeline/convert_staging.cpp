@@ -30,10 +30,8 @@ bool is_store(const fs::path& path) {
   return fs::is_directory(path) && (fs::is_empty(path) || fs::exists(path / "zarr.json"));
 }
 
-/// Whether a conversion stopped before it wrote anything, or was stopped after
-/// the last file was whole (and cannot be told from one with other options).
+/// Whether a conversion stopped before it wrote anything.
 bool nothing_to_resume(const fs::path& staging) {
-  if (fs::exists(staging / "zarr.json")) return true;
   for (const fs::directory_entry& entry : fs::directory_iterator(staging))
     if (!is_temporary_name(entry.path())) return false;
   return true;
@@ -41,13 +39,12 @@ bool nothing_to_resume(const fs::path& staging) {
 
 void rename_or_throw(const fs::path& from, const fs::path& to) {
   if (::rename(from.c_str(), to.c_str()) != 0)
-    throw system_error(fmt::format("cannot rename '{}' to", from.string()), to.string(), errno);
+    throw system_error(fmt::format("rename '{}' to", from.string()), to.string(), errno);
 }
 
 void sync_folder(const fs::path& folder) {
   const UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (fd.get() < 0 || ::fsync(fd.get()) != 0)
-    throw system_error("cannot sync", folder.string(), errno);
+  if (fd.get() < 0 || ::fsync(fd.get()) != 0) throw system_error("sync", folder.string(), errno);
 }
 
 }  // namespace
@@ -65,6 +62,9 @@ ConvertStaging::ConvertStaging(fs::path out, bool resume, bool force)
 
 void ConvertStaging::check_out(bool force) const {
   if (!is_there(out_)) return;
+  if (fs::is_symlink(fs::symlink_status(out_)))
+    throw UsageError(
+        fmt::format("'{}' is a symbolic link; name the folder that it means", out_.string()));
   if (!force) throw UsageError(fmt::format("'{}' exists; --force replaces it", out_.string()));
   if (!is_store(out_))
     throw UsageError(fmt::format("'{}' is no store: it is not replaced", out_.string()));
@@ -76,13 +76,19 @@ void ConvertStaging::prepare(bool resume, bool force) {
     lock();
     return;
   }
-  if (failure) throw system_error("cannot create", staging_.string(), failure.value());
-  if (!fs::is_directory(staging_))
+  if (failure) throw system_error("create", staging_.string(), failure.value());
+  if (!fs::is_directory(fs::symlink_status(staging_)))
     throw UsageError(fmt::format("'{}' is in the way", staging_.string()));
   lock();
-  resumed_ = resume && is_there(staging_ / kLayoutMarker);
+  const bool begun = is_there(staging_ / kLayoutMarker);
+  resumed_ = resume && begun;
   if (resumed_ || fs::is_empty(staging_)) return;
-  if (resume ? !nothing_to_resume(staging_) : !force)
+  // Whatever else is there, no conversion left it: it is not ours to remove.
+  if (!begun && !nothing_to_resume(staging_))
+    throw UsageError(
+        fmt::format("'{}' is in the way and is no interrupted conversion; move it elsewhere",
+                    staging_.string()));
+  if (!resume && !force)
     throw UsageError(
         fmt::format("an interrupted conversion is in '{}'; --resume goes on with it, "
                     "--force starts anew",
@@ -92,8 +98,8 @@ void ConvertStaging::prepare(bool resume, bool force) {
 }
 
 void ConvertStaging::lock() {
-  lock_ = UniqueFd(::open(staging_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (lock_.get() < 0) throw system_error("cannot open", staging_.string(), errno);
+  lock_ = UniqueFd(::open(staging_.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+  if (lock_.get() < 0) throw system_error("open", staging_.string(), errno);
   if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     throw Error(fmt::format("another conversion is writing '{}'", staging_.string()));
 }

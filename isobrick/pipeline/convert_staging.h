@@ -11,7 +11,8 @@ namespace isobrick {
 class ConvertStaging {
  public:
   /// Throws UsageError when `out` exists (and with `force` when it is no store,
-  /// which is never removed), or when an interrupted conversion is there that
+  /// which is never removed) or a symbolic link, when something else than an
+  /// interrupted conversion is in the way, or when an interrupted conversion is there that
   /// neither `resume` nor `force` says what to do with; Error when another
   /// process is writing it.
   ConvertStaging(std::filesystem::path out, bool resume, bool force);

@@ -237,6 +237,77 @@ TEST(ConvertPlace, NeverReplacesWhatIsNoStore) {
   EXPECT_EQ(content_of(folder / "b" / "file"), "precious");
 }
 
+TEST(ConvertPlace, NeverClearsWhatNoConversionLeft) {
+  namespace fs = std::filesystem;
+  TemporaryFolder folder;
+  MemorySource source = make_source<std::uint8_t>({20, 20, 20}, 1);
+  MemorySource broken(source);
+  broken.fail_after(1);
+  const auto refused = [&](const fs::path& out) {
+    for (const bool resume : {false, true})
+      for (const bool force : {false, true}) {
+        ConvertOptions options = small_bricks();
+        options.resume = resume;
+        options.force = force;
+        EXPECT_THROW(convert_quietly(source, out, options), UsageError) << resume << force;
+      }
+  };
+  fs::create_directory(folder / "a.partial");
+  std::ofstream(folder / "a.partial" / "zarr.json") << "precious";
+  refused(folder / "a");
+  EXPECT_EQ(content_of(folder / "a.partial" / "zarr.json"), "precious");
+  // An interrupted conversion, but behind a link.
+  EXPECT_THROW(convert_quietly(broken, folder / "b", small_bricks()), Error);
+  fs::rename(folder / "b.partial", folder / "real");
+  fs::create_directory_symlink(folder / "real", folder / "b.partial");
+  const auto before = tree_of(folder / "real");
+  refused(folder / "b");
+  EXPECT_EQ(tree_of(folder / "real"), before);
+  // The store itself is a link: to a store, to nothing.
+  convert_quietly(source, folder / "store", small_bricks());
+  fs::create_directory_symlink(folder / "store", folder / "c");
+  fs::create_directory_symlink(folder / "nothing", folder / "d");
+  refused(folder / "c");
+  refused(folder / "d");
+  EXPECT_TRUE(fs::is_symlink(folder / "c"));
+  EXPECT_EQ(samples_of(StoreReader(folder / "store"), 0), source.samples());
+  // An empty folder is anybody's.
+  fs::create_directory(folder / "e.partial");
+  convert_quietly(source, folder / "e", small_bricks());
+}
+
+/// Wants an end after some calls, as Ctrl-C does.
+class Impatient final : public Progress {
+ public:
+  void begin(std::string_view, std::uint64_t total) override { total_ = total; }
+  void advance(std::uint64_t done) override {
+    done_ += done;
+    if (--patience_ == 0) throw std::runtime_error("enough");
+  }
+  void end() override {}
+
+  int patience_ = -1;
+  std::uint64_t total_ = 0, done_ = 0;
+};
+
+TEST(ConvertProgress, ComesWithEveryBrickAndCanStop) {
+  TemporaryFolder folder;
+  MemorySource source = make_source<std::uint16_t>({90, 70, 50}, 1);
+  Impatient progress;
+  convert(source, folder / "a", small_bricks(), progress);
+  EXPECT_EQ(progress.done_, source.samples().size());
+  EXPECT_EQ(progress.total_, progress.done_);
+  Impatient soon;
+  soon.patience_ = 3;  // bricks of the first slab, which holds all of them
+  EXPECT_THROW(convert(source, folder / "b", small_bricks(), soon), std::runtime_error);
+  EXPECT_LE(soon.done_, 3u * 16 * 16 * 16 * 2);
+  EXPECT_FALSE(std::filesystem::exists(folder / "b"));
+  ConvertOptions resume = small_bricks();
+  resume.resume = true;
+  convert_quietly(source, folder / "b", resume);
+  EXPECT_EQ(tree_of(folder / "b"), tree_of(folder / "a"));
+}
+
 TEST(ConvertLayout, LevelsLieInTheWorldWhereTheirSamplesAre) {
   TemporaryFolder folder;
   MemorySource source = make_source<std::uint8_t>({64, 40, 1}, 1);
