@@ -1,5 +1,6 @@
 #include "tools/console.h"
 
+#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -13,6 +14,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/core/cancel.h"
 #include "isobrick/core/error.h"
 #include "tools/format.h"
 
@@ -36,11 +38,30 @@ void put(std::FILE* file, std::string_view text) {
   if (!whole || std::fflush(file) != 0) throw system_error("write to", "standard output", errno);
 }
 
+/// Nobody is left to be told when this fails.
+void say(std::string_view text) noexcept {
+  static_cast<void>(std::fwrite(text.data(), 1, text.size(), stderr));
+}
+
 }  // namespace
+
+int interrupting_signal() { return g_signal; }
+
+void set_up_streams() {
+  // Each takes the lowest number free; the direction makes every use fail as
+  // it would have failed on the closed stream.
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (fcntl(fd, F_GETFD) < 0 && errno == EBADF &&
+        open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0)
+      return;
+}
 
 void set_up_signals() {
   struct sigaction action {};
-  action.sa_handler = [](int signal) { g_signal = signal; };
+  action.sa_handler = [](int signal) {
+    g_signal = signal;
+    request_cancel();
+  };
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
@@ -93,12 +114,11 @@ void TerminalProgress::redraw(Clock::time_point now) {
   last_ = now;
   drawn_ = true;
   const double seconds = std::chrono::duration<double>(now - start_).count();
-  fmt::print(stderr, "\r{}\x1b[K",
-             progress_line(stage_, done_, total_, seconds, terminal_columns()));
+  say(fmt::format("\r{}\x1b[K", progress_line(stage_, done_, total_, seconds, terminal_columns())));
 }
 
 void TerminalProgress::erase() {
-  if (drawn_) std::fputs("\r\x1b[K", stderr);
+  if (drawn_) say("\r\x1b[K");
   drawn_ = false;
 }
 
@@ -118,14 +138,15 @@ void Console::result_text(std::string_view command, std::string_view text) const
 }
 
 void Console::note(std::string_view text) const {
-  if (!speech_.quiet) fmt::print(stderr, "{}\n", text);
+  if (!speech_.quiet) say(fmt::format("{}\n", text));
 }
 
 void print_error(std::string_view command, std::string_view what) {
   std::string line = command.empty() ? "isobrick: " : fmt::format("isobrick {}: ", command);
   line += what;
   std::replace(line.begin(), line.end(), '\n', ' ');
-  fmt::print(stderr, "{}\n", line);
+  line += '\n';
+  say(line);
 }
 
 nlohmann::ordered_json to_json(Int3 v) { return {v.x, v.y, v.z}; }

@@ -34,6 +34,12 @@ class Interrupted : public std::exception {
 /// From now on the first SIGINT or SIGTERM is thrown by the progress calls; a
 /// second one kills at once. A file size limit becomes an ordinary write error.
 void set_up_signals();
+/// The signal that came first, or 0.
+int interrupting_signal();
+
+/// Keeps files that are opened from becoming a standard stream that is closed,
+/// which would send messages into them.
+void set_up_streams();
 
 /// A bar with rate and time left on standard error when that is a terminal.
 class TerminalProgress final : public Progress {
@@ -80,7 +86,7 @@ class Console {
   TerminalProgress progress_;
 };
 
-/// One line on standard error: "isobrick COMMAND: what".
+/// One line on standard error: "isobrick COMMAND: what"; lost when that cannot be written.
 void print_error(std::string_view command, std::string_view what);
 
 nlohmann::ordered_json to_json(Int3 v);

@@ -53,6 +53,34 @@ MeshBytes bytes_of(const Surface& surface) {
   return predict_bytes(format_of(surface), surface.options.normals, surface.estimate);
 }
 
+/// What the picture may take of the memory, so that the extraction keeps most.
+void check_picture(const Arguments& arguments) {
+  const std::uint64_t bytes = PreviewSink::memory(arguments.picture), most = arguments.memory / 4;
+  if (!arguments.preview.empty() && bytes > most)
+    throw UsageError(fmt::format(
+        "a picture of {} x {} pixels takes {} while it is drawn, more than a quarter of the memory "
+        "of {}; choose a smaller --preview-size or a larger --memory",
+        arguments.picture.width, arguments.picture.height, human_bytes(bytes),
+        human_bytes(arguments.memory)));
+}
+
+/// Refuses two outputs that would replace each other.
+void check_names(const Arguments& arguments) {
+  std::vector<fs::path> names;
+  for (const std::string& path : {arguments.output, arguments.preview})
+    for (const double isovalue : arguments.isovalues) {
+      if (path.empty()) continue;
+      const fs::path name = named(path, arguments, isovalue);
+      std::error_code failure;
+      const fs::path canonical = fs::weakly_canonical(fs::absolute(name, failure), failure);
+      names.push_back(failure ? name : canonical);
+    }
+  std::sort(names.begin(), names.end());
+  const auto twice = std::adjacent_find(names.begin(), names.end());
+  if (twice != names.end())
+    throw UsageError(fmt::format("two outputs would have the name '{}'", twice->string()));
+}
+
 void check(const Arguments& arguments) {
   if (arguments.output.empty() && arguments.preview.empty() && !arguments.estimate)
     throw UsageError("nothing to do: give -o MESH, --preview PNG or --estimate");
@@ -61,6 +89,8 @@ void check(const Arguments& arguments) {
   std::sort(sorted.begin(), sorted.end());
   const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
   if (twice != sorted.end()) throw UsageError(fmt::format("isovalue {} is given twice", *twice));
+  check_names(arguments);
+  if (!arguments.estimate) check_picture(arguments);
 }
 
 std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) {
@@ -172,13 +202,14 @@ std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Argume
   return sinks;
 }
 
-ExtractReport make(const Surface& surface, const Sinks& sinks, const StoreReader& store,
-                   Console& console) {
+ExtractReport make(const Surface& surface, const Sinks& sinks, const Arguments& arguments,
+                   const StoreReader& store, Console& console) {
   ExtractReport report;
   if (sinks.mesh) report = extract(store, surface.options, *sinks.mesh, console.progress());
   if (sinks.preview) {
     ExtractOptions shaded = surface.options;
     shaded.normals = true;
+    shaded.memory -= PreviewSink::memory(arguments.picture);
     const ExtractReport drawn = extract(store, shaded, *sinks.preview, console.progress());
     if (!sinks.mesh) report = drawn;
   }
@@ -209,7 +240,7 @@ Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
   std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
   Said said;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    const ExtractReport report = make(surfaces[i], sinks[i], store, console);
+    const ExtractReport report = make(surfaces[i], sinks[i], arguments, store, console);
     const std::uint64_t bytes = sinks[i].mesh ? fs::file_size(surfaces[i].output) : 0;
     said.objects.push_back(report_json(surfaces[i], report, bytes));
     said.text += report_text(surfaces[i], report, bytes);

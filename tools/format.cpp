@@ -35,6 +35,13 @@ std::string human_seconds(double seconds) {
   return fmt::format("{}:{:02} min", whole / 60, whole % 60);
 }
 
+std::string extension_of(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
 std::string human_extent(Int3 extent) {
   return fmt::format("{} x {} x {}", extent.x, extent.y, extent.z);
 }

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include "isobrick/core/vec.h"
 
-// Figures for people.
+// Figures and names as people read and write them.
 namespace isobrick::tools {
 
 /// "512 B", "1.4 MiB".
@@ -19,6 +20,9 @@ std::string human_count(std::uint64_t count);
 
 /// "0.012 s", "3.4 s", "2:05 min".
 std::string human_seconds(double seconds);
+
+/// ".ply" of "Mesh.PLY".
+std::string extension_of(const std::filesystem::path& path);
 
 /// "256 x 256 x 128".
 std::string human_extent(Int3 extent);

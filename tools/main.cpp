@@ -81,6 +81,8 @@ int run(Program& program, int argc, char** argv) {
     return 2;
   } catch (const Interrupted& interrupted) {
     return die_of(interrupted.signal());
+  } catch (const Cancelled&) {
+    return die_of(interrupting_signal());
   } catch (const UsageError& error) {
     print_error(name_of(parsed(program)), error.what());
     return 2;
@@ -97,6 +99,7 @@ int run(Program& program, int argc, char** argv) {
 }  // namespace isobrick::tools
 
 int main(int argc, char** argv) {
+  isobrick::tools::set_up_streams();
   CLI::App app("Isosurfaces of volumes larger than memory.", "isobrick");
   isobrick::tools::Program program{app, {}, {}};
   try {

@@ -5,13 +5,14 @@
 #include "isobrick/core/error.h"
 #include "isobrick/io/ply_sink.h"
 #include "isobrick/io/stl_sink.h"
+#include "tools/format.h"
 
 namespace isobrick::tools {
 
 namespace fs = std::filesystem;
 
 MeshFormat mesh_format(const fs::path& path) {
-  const std::string extension = path.extension().string();
+  const std::string extension = extension_of(path);
   if (extension == ".ply") return MeshFormat::ply;
   if (extension == ".stl") return MeshFormat::stl;
   throw UsageError(
@@ -44,7 +45,13 @@ fs::path with_isovalue(const fs::path& path, double isovalue) {
 
 std::uint64_t free_space(const fs::path& path) {
   const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path();
-  return fs::space(folder).available;
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure))
+    throw Error(
+        fmt::format("cannot create '{}': there is no folder '{}'", path.string(), folder.string()));
+  const fs::space_info space = fs::space(folder, failure);
+  if (failure) throw system_error("tell how full the disk is of", folder.string(), failure.value());
+  return space.available;
 }
 
 }  // namespace isobrick::tools

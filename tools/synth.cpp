@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 #include <memory>
 #include <span>
 
@@ -11,6 +10,7 @@
 #include <tbb/task_arena.h>
 
 #include "isobrick/io/output_file.h"
+#include "tools/format.h"
 #include "tools/options.h"
 
 namespace isobrick::tools {
@@ -89,7 +89,7 @@ int run(const Arguments& arguments, Console& console) {
   synth.type = *arguments.type;
   const auto source = make_synth(synth);
   const ConvertOptions& options = arguments.store;
-  const bool raw = std::filesystem::path(arguments.out).extension() == ".raw";
+  const bool raw = extension_of(arguments.out) == ".raw";
   const ConvertReport report = raw ? write_raw(*source, arguments.out, options, console.progress())
                                    : convert(*source, arguments.out, options, console.progress());
   report_conversion(console, "synth", std::string(name_of(synth.kind)), arguments.out,

@@ -26,6 +26,12 @@ class DamageError : public Error {
   using Error::Error;
 };
 
+/// Somebody asked for an end (see cancel.h) while input was waited for.
+class Cancelled : public Error {
+ public:
+  using Error::Error;
+};
+
 /// "cannot open 'path': Permission denied" for the given errno value.
 Error system_error(const std::string& what, const std::string& path, int errno_value);
 

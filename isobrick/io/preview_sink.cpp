@@ -22,20 +22,27 @@ const PreviewOptions& checked(const PreviewOptions& options) {
 }  // namespace
 
 PreviewSink::PreviewSink(std::string path, bool force, const PreviewOptions& options)
-    : options_(checked(options)),
-      out_(std::move(path), force),
-      raster_(2 * options.width, 2 * options.height) {}
+    : options_(checked(options)), out_(std::move(path), force) {}
 
-void PreviewSink::begin(const MeshHeader& header) {
-  camera_.emplace(header.world_lo, header.world_hi, options_.towards_eye, options_.up,
-                  raster_.width(), raster_.height());
+std::uint64_t PreviewSink::memory(const PreviewOptions& options) {
+  // Four points, the shaded pixel, and the pixel in the file.
+  constexpr std::uint64_t pixel_bytes = 4 * 8 + 3 + 4;
+  return static_cast<std::uint64_t>(options.width) * static_cast<std::uint64_t>(options.height) *
+         pixel_bytes;
 }
 
-void PreviewSink::write(const MeshChunk& chunk) { raster_.draw(*camera_, chunk); }
+void PreviewSink::begin(const MeshHeader& header) {
+  raster_.emplace(2 * options_.width, 2 * options_.height);
+  camera_.emplace(header.world_lo, header.world_hi, options_.towards_eye, options_.up,
+                  raster_->width(), raster_->height());
+}
+
+void PreviewSink::write(const MeshChunk& chunk) { raster_->draw(*camera_, chunk); }
 
 void PreviewSink::finish() {
   write_png(out_, options_.width, options_.height,
-            shade_preview(raster_, camera_->pixel(), options_.colour));
+            shade_preview(*raster_, camera_->pixel(), options_.colour));
+  raster_.reset();
 }
 
 }  // namespace isobrick

@@ -18,13 +18,16 @@ struct PreviewOptions {
   Vec3d up{0, 0, 1};
 };
 
-/// Draws the mesh into a PNG picture. Memory: the picture, however large the
-/// mesh. Looks best with normals; without them facets show.
+/// Draws the mesh into a PNG picture. Memory: `memory`, from begin to
+/// finish, however large the mesh. Looks best with normals; without them facets show.
 class PreviewSink final : public MeshSink {
  public:
   /// Throws UsageError for a size that makes no sense; see OutputFile for what
   /// `path` and `force` may throw.
   PreviewSink(std::string path, bool force, const PreviewOptions& options = {});
+
+  /// Bytes that a picture of this size takes while it is drawn.
+  static std::uint64_t memory(const PreviewOptions& options);
 
   Indexing indexing() const override { return Indexing::chunk_local; }
   void begin(const MeshHeader& header) override;
@@ -35,7 +38,7 @@ class PreviewSink final : public MeshSink {
  private:
   PreviewOptions options_;
   OutputFile out_;
-  PreviewRaster raster_;  ///< two points a pixel along each axis
+  std::optional<PreviewRaster> raster_;  ///< two points a pixel along each axis
   std::optional<PreviewCamera> camera_;
 };
 

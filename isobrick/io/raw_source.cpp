@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <cstring>
 #include <vector>
 
+#include "isobrick/core/cancel.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/byte_order.h"
 
@@ -129,11 +131,24 @@ class StdinSource final : public VolumeSource {
   }
 
  private:
+  /// Returns when a read would not block (or would fail). The signal that asks
+  /// for an end may reach another thread, so this one looks now and then.
+  static void wait() {
+    constexpr int milliseconds = 100;
+    for (int ready = 0; ready <= 0;) {
+      if (cancel_requested()) throw Cancelled("interrupted while reading standard input");
+      pollfd input{STDIN_FILENO, POLLIN, 0};
+      ready = ::poll(&input, 1, milliseconds);
+      if (ready < 0 && errno != EINTR) return;
+    }
+  }
+
   /// Up to `size` bytes, fewer only at the end.
   std::uint64_t take(std::byte* out, std::uint64_t size) {
     std::uint64_t done = 0;
     while (done < size) {
       const std::uint64_t piece = std::min(size - done, std::uint64_t{1} << 30);
+      wait();
       const ssize_t got = ::read(STDIN_FILENO, out + done, piece);
       if (got < 0 && errno == EINTR) continue;
       if (got < 0)

@@ -177,6 +177,61 @@ TEST_F(BadInput, AFullDisk) {
   EXPECT_FALSE(std::filesystem::exists(path("c.zarr")));
 }
 
+TEST_F(BadInput, AFolderThatIsNotThereIsNamed) {
+  const std::string store = make_store("a");
+  for (const char* more : {"--force", "--no-space-check"})
+    expect_refused(
+        run({"extract", store, "--isovalue", "127.5", "-o", path("no/such/x.ply"), more}), 1,
+        {"cannot create", "no/such"});
+  expect_refused(run({"extract", store, "--isovalue", "127.5", "-o", path("no/such/x.ply")}), 1,
+                 {"there is no folder", "no/such"});
+  expect_refused(run({"export", store, path("no/such/x.raw")}), 1, {"cannot create", "no/such"});
+  write_file(path("in_2x2x2_uint8.raw"), "01234567");
+  expect_refused(run({"convert", path("in_2x2x2_uint8.raw"), path("no/such/x.zarr")}), 1,
+                 {"cannot create", "no/such"});
+}
+
+TEST_F(BadInput, TwoOutputsOfOneName) {
+  const std::string store = make_store("a");
+  const std::vector<std::string> names = files();
+  const Arguments extract{"extract", store, "--isovalue", "127.5", "--force"};
+  expect_refused(run(extract + Arguments{"-o", path("x.ply"), "--preview", path("x.ply")}), 2,
+                 {"two outputs", "x.ply"});
+  expect_refused(run(extract + Arguments{"-o", path("x.ply"), "--preview", path("./x.ply")}), 2,
+                 {"two outputs", "x.ply"});
+  expect_refused(
+      run(extract + Arguments{"--isovalue", "1", "-o", path("x.ply"), "--preview", path("x.ply")}),
+      2, {"two outputs"});
+  EXPECT_EQ(files(), names);
+}
+
+TEST_F(BadInput, APictureTooLargeForTheMemory) {
+  const std::string store = make_store("a");
+  expect_refused(run({"extract", store, "--isovalue", "127.5", "--preview", path("a.png"),
+                      "--preview-size", "16384,16384"}),
+                 2, {"16384 x 16384", "9.75 GiB", "1.00 GiB", "--preview-size"});
+  EXPECT_EQ(files(), Arguments{"a.zarr"});
+}
+
+TEST_F(BadInput, StandardErrorThatCannotBeWritten) {
+  const std::string store = make_store("a"), raw = path("a.raw");
+  const auto shell = [](const std::string& arguments) {
+    return run_process({"/bin/sh", "-c", std::string(ISOBRICK_PROGRAM) + " " + arguments});
+  };
+  for (const std::string closed : {"2>/dev/full", "2>&-", "<&- 2>&-"}) {
+    SCOPED_TRACE(closed);
+    EXPECT_EQ(shell("info " + path("none.zarr") + " " + closed).exit_code, 1);
+    EXPECT_EQ(shell("info " + closed).exit_code, 2);
+    const std::string force = " --force -o " + path("a.ply") + " --isovalue ";
+    // The remark that the surface is empty is lost, its file is whole.
+    EXPECT_EQ(shell("extract " + store + force + "1000 " + closed).exit_code, 0);
+    EXPECT_TRUE(read_file(path("a.ply")).starts_with("ply\n"));
+    EXPECT_EQ(shell("export " + store + " " + raw + " --force " + closed).exit_code, 0);
+    EXPECT_EQ(read_file(raw).size(), 40u * 36 * 33);
+  }
+  EXPECT_EQ(shell("info " + store + " >&-").exit_code, 1);
+}
+
 TEST_F(BadInput, AFullStandardOutput) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   expect_refused(run({"man"}, {.output = "/dev/full"}), 1, {"standard output"});

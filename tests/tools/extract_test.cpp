@@ -1,3 +1,7 @@
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <csignal>
 
 #include "tests/tools/program.h"
@@ -123,6 +127,22 @@ TEST_F(Extract, AnInterruptLeavesNothingBehind) {
                               {.interrupt_after = 0.4});
   EXPECT_EQ(outcome.signal, SIGINT);
   EXPECT_TRUE(files().empty());
+}
+
+TEST_F(Extract, AnInterruptEndsTheWaitForStandardInput) {
+  const std::string pipe = path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int writer = open(pipe.c_str(), O_RDWR | O_CLOEXEC);  // so that the pipe never ends
+  ASSERT_GE(writer, 0);
+  const std::string some = noise(5000);
+  ASSERT_EQ(write(writer, some.data(), some.size()), 5000);
+  const Outcome outcome = run(
+      {"convert", "-", path("a.zarr"), "--dims", "100,100,100", "--type", "u8", "--brick", "16"},
+      {.input = pipe, .interrupt_after = 0.4});
+  // Should it not have ended by itself, the runner's time limit says so.
+  EXPECT_EQ(outcome.signal, SIGINT);
+  EXPECT_FALSE(std::filesystem::exists(path("a.zarr")));
+  close(writer);
 }
 
 }  // namespace

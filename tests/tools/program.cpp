@@ -175,6 +175,7 @@ void expect_refused(const Outcome& outcome, int exit_code,
                     std::initializer_list<std::string> parts) {
   EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
   EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err.find("cannot cannot"), std::string::npos) << outcome.err;
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   EXPECT_TRUE(outcome.err.starts_with("isobrick")) << outcome.err;
   EXPECT_TRUE(outcome.err.ends_with("\n")) << outcome.err;

@@ -85,6 +85,17 @@ TEST_F(Speech, JsonOfConversions) {
   }
 }
 
+TEST_F(Speech, ExtensionsInCapitals) {
+  const Outcome synth =
+      run({"synth", "sphere", path("S.RAW"), "--dims", "20,20,20", "--type", "u8"});
+  EXPECT_EQ(synth.exit_code, 0) << synth.err;
+  ASSERT_TRUE(std::filesystem::is_regular_file(path("S.RAW")));
+  EXPECT_EQ(std::filesystem::file_size(path("S.RAW")), 8000u);
+  const std::string store = make_store("a");
+  for (const std::string name : {"X.PLY", "x.Stl"})
+    EXPECT_EQ(run({"extract", store, "--isovalue", "127.5", "-o", path(name)}).exit_code, 0);
+}
+
 TEST_F(Speech, QuietSaysNothing) {
   const std::string store = make_store("a");
   for (const Arguments& arguments :
