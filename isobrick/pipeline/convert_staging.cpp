@@ -30,10 +30,10 @@ bool is_store(const fs::path& path) {
   return fs::is_directory(path) && (fs::is_empty(path) || fs::exists(path / "zarr.json"));
 }
 
-/// Whether a conversion stopped before it wrote anything.
+/// Whether a conversion stopped before its first file, the marker, was whole.
 bool nothing_to_resume(const fs::path& staging) {
   for (const fs::directory_entry& entry : fs::directory_iterator(staging))
-    if (!is_temporary_name(entry.path())) return false;
+    if (!is_temporary_name(entry.path()) || entry.path().stem() != kLayoutMarker) return false;
   return true;
 }
 

@@ -256,6 +256,9 @@ TEST(ConvertPlace, NeverClearsWhatNoConversionLeft) {
   std::ofstream(folder / "a.partial" / "zarr.json") << "precious";
   refused(folder / "a");
   EXPECT_EQ(content_of(folder / "a.partial" / "zarr.json"), "precious");
+  fs::rename(folder / "a.partial" / "zarr.json", folder / "a.partial" / "notes.tmp");
+  refused(folder / "a");
+  EXPECT_EQ(content_of(folder / "a.partial" / "notes.tmp"), "precious");
   // An interrupted conversion, but behind a link.
   EXPECT_THROW(convert_quietly(broken, folder / "b", small_bricks()), Error);
   fs::rename(folder / "b.partial", folder / "real");
