@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <mutex>
 
 #include "isobrick/bricks/array_metadata.h"
@@ -53,6 +54,7 @@ struct StoreReader::Impl {
   std::filesystem::path shard_path(int level, Int3 s) const;
   std::shared_ptr<const StoreFile> shard_file(int level, Int3 s);
   std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
+  void check_missing_shard(int level, Int3 s);
   std::optional<Place> find(int level, Int3 b);
   RangeTable ranges(int level, Box3 box, bool blocks);
   std::uint64_t key(int level, Int3 s) const {
@@ -201,12 +203,36 @@ std::shared_ptr<const StoreFile> StoreReader::Impl::shard_file(int level, Int3 s
   });
 }
 
+// To Zarr a shard without a file holds nothing but fill values, so that a lost
+// file would pass for empty space. The ranges know better: those of its bricks
+// must be the fill value, or hold it where a neighbour's first layer is in them.
+void StoreReader::Impl::check_missing_shard(int level, Int3 s) {
+  if (!at(level).brick_ranges || std::isnan(info.fill_value)) return;
+  const Int3 n = at(level).bricks_per_shard, grid = lattice(level).bricks();
+  const Box3 box = intersect({s * n, (s + Int3{1, 1, 1}) * n}, {{0, 0, 0}, grid});
+  const RangeTable table = ranges(level, box, false);
+  for_each_point(box, [&](Int3 b) {
+    const ValueRange<double>& range = table.at(b);
+    const bool alone = intersect({b, b + Int3{2, 2, 2}}, {{0, 0, 0}, grid}) ==
+                       intersect({b, b + Int3{2, 2, 2}}, box);
+    const bool holds = range.lo <= info.fill_value && info.fill_value <= range.hi;
+    if (!holds || (alone && range.lo != range.hi))
+      throw DamageError(fmt::format(
+          "level {}, shard ({}, {}, {}): '{}' is missing, but brick ({}, {}, {}) has samples from "
+          "{} to {}",
+          level, s.x, s.y, s.z, shard_path(level, s).string(), b.x, b.y, b.z, range.lo, range.hi));
+  });
+}
+
 std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3 s) {
   return indices.get(key(level, s), [&] {
     const auto bricks = static_cast<std::uint64_t>(volume(at(level).bricks_per_shard));
     const auto file = shard_file(level, s);
     // A shard without a file has only absent bricks.
-    if (!*file) return std::pair(std::make_shared<const ShardIndex>(0), std::uint64_t{64});
+    if (!*file) {
+      check_missing_shard(level, s);
+      return std::pair(std::make_shared<const ShardIndex>(0), std::uint64_t{64});
+    }
     const ArrayMetadata::Sharding& sharding = *at(level).metadata.sharding;
     const std::uint64_t size = file->size();
     const std::uint64_t index_size = ShardIndex::encoded_size(bricks, sharding.index_has_crc);

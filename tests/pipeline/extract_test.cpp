@@ -193,6 +193,17 @@ TEST_F(Extract, VolumesWithNaNEqualTheMeshInMemory) {
   }
 }
 
+TEST_F(Extract, ALostShardIsNoEmptySpace) {
+  const auto field = mixed_field<std::uint8_t>({140, 120, 90});
+  const StoreReader whole = store(field, {.brick = 16, .shard = 32});
+  const auto lost = whole.locate(0, {6, 3, 2});
+  ASSERT_TRUE(lost);
+  fs::remove(lost->file);
+  MemorySink sink;
+  EXPECT_THROW(run(StoreReader(whole.info().path), {.isovalue = 60}, sink), DamageError);
+  EXPECT_FALSE(sink.finished);
+}
+
 TEST_F(Extract, SpacingThatNoFloatHoldsIsRefused) {
   const Field<std::uint8_t> field({20, 20, 20}, [](Int3 p) { return static_cast<double>(p.x); });
   for (const double spacing : {1e39, 1e-39, 1e300}) {
