@@ -20,6 +20,9 @@ namespace {
 /// that a hand-off costs nothing, and a work space that stays in the L2 cache.
 constexpr std::size_t kTilesPerThread = 32;
 
+/// A tile takes some 50 µs and a hand-off some 10: fewer tiles stay on one thread.
+constexpr std::size_t kWorthThreads = 6;
+
 WorldMap world_map(const Transform& t) {
   WorldMap map;
   for (int row = 0; row < 3; ++row) {
@@ -98,10 +101,10 @@ struct CpuExtractor::Impl {
 
   template <class F>
   static void for_each_tile(std::size_t begin, std::size_t end, const F& f) {
-    if (end - begin <= kTilesPerThread)
+    if (end - begin < kWorthThreads)
       for (std::size_t i = begin; i < end; ++i) f(i);
     else
-      tbb::parallel_for(begin, end, f);
+      tbb::parallel_for(begin, end, f, tbb::simple_partitioner());
   }
 
   std::uint64_t output_bytes(std::uint64_t v, std::uint64_t t) const {
