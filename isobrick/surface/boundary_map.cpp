@@ -114,20 +114,19 @@ void adopt_boundaries(TileState& tile, const BoundaryMap& map) {
     if ((x && first[0]) || (y && first[1]) || (z && first[2])) return nullptr;
     return map.find(tile.work.tile - Int3{x, y, z});
   };
+  // Where two low planes meet, edges along both belong to the tile before both.
   if (const TileBoundary* b = before(false, true, false))
-    for (int z = first[2] ? 0 : 1; z < kTileSamples; ++z) {
-      adopt_x(tile.rows[row_index(0, z)], b->y_face[static_cast<std::size_t>(z)], b->base);
-      adopt_z(tile.rows[row_index(0, z)], b->y_face[static_cast<std::size_t>(z)], b->base);
+    for (int z = 0; z < kTileSamples; ++z) {
+      const EdgeRow& from = b->y_face[static_cast<std::size_t>(z)];
+      if (z > 0 || first[2]) adopt_x(tile.rows[row_index(0, z)], from, b->base);
+      adopt_z(tile.rows[row_index(0, z)], from, b->base);
     }
-  if (const TileBoundary* b = before(false, true, false); b && !first[2])
-    adopt_z(tile.rows[row_index(0, 0)], b->y_face[0], b->base);
-  if (const TileBoundary* b = before(false, false, true)) {
-    for (int y = first[1] ? 0 : 1; y < kTileSamples; ++y) {
-      adopt_x(tile.rows[row_index(y, 0)], b->z_face[static_cast<std::size_t>(y)], b->base);
-      adopt_y(tile.rows[row_index(y, 0)], b->z_face[static_cast<std::size_t>(y)], b->base);
+  if (const TileBoundary* b = before(false, false, true))
+    for (int y = 0; y < kTileSamples; ++y) {
+      const EdgeRow& from = b->z_face[static_cast<std::size_t>(y)];
+      if (y > 0 || first[1]) adopt_x(tile.rows[row_index(y, 0)], from, b->base);
+      adopt_y(tile.rows[row_index(y, 0)], from, b->base);
     }
-    if (!first[1]) adopt_y(tile.rows[row_index(0, 0)], b->z_face[0], b->base);
-  }
   if (const TileBoundary* b = before(false, true, true))
     adopt_x(tile.rows[row_index(0, 0)], b->y_face[kLast], b->base);
   if (const TileBoundary* b = before(true, false, false)) {

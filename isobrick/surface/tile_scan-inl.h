@@ -170,29 +170,27 @@ inline std::uint32_t number_row(TileState& tile, int y, int z, const RowBits& bi
   const auto count = [](std::uint32_t word) {
     return static_cast<std::uint32_t>(std::popcount(word));
   };
-  std::uint8_t at_0 = 0;
+  // Edges along y or z: the one at sample 0, if it is ours, then the word.
+  const auto number_word = [&](std::uint64_t edges, std::uint32_t& word, std::uint32_t& at_0,
+                               std::uint32_t& base) {
+    const auto own = static_cast<std::uint8_t>(edges & s.first[0]);
+    word = static_cast<std::uint32_t>(edges >> 1);
+    at_0 = number;
+    base = number + own;
+    number = base + count(word);
+    return own;
+  };
   if (own_y && own_z) {
     row.x = static_cast<std::uint32_t>(bits.x);
     row.x_base = number;
     number += count(row.x);
   }
-  if (own_z) {
-    row.y = static_cast<std::uint32_t>(bits.y >> 1);
-    const std::uint32_t own = static_cast<std::uint32_t>(bits.y) & s.first[0];
-    row.y_at_0 = number;
-    row.y_base = number + own;
-    number = row.y_base + count(row.y);
-    at_0 = static_cast<std::uint8_t>(own);
-  }
-  if (own_y) {
-    row.z = static_cast<std::uint32_t>(bits.z >> 1);
-    const std::uint32_t own = static_cast<std::uint32_t>(bits.z) & s.first[0];
-    row.z_at_0 = number;
-    row.z_base = number + own;
-    number = row.z_base + count(row.z);
-    at_0 = static_cast<std::uint8_t>(at_0 | own << 1);
-  }
-  tile.own_at_0[row_index(y, z)] = at_0;
+  std::uint8_t own_at_0 = 0;
+  if (own_z) own_at_0 = number_word(bits.y, row.y, row.y_at_0, row.y_base);
+  if (own_y)
+    own_at_0 = static_cast<std::uint8_t>(own_at_0 |
+                                         number_word(bits.z, row.z, row.z_at_0, row.z_base) << 1);
+  tile.own_at_0[row_index(y, z)] = own_at_0;
   return number;
 }
 
