@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/threshold.h"
 #include "isobrick/index/instantiate.h"
-#include "isobrick/index/stab_value.h"
 
 namespace isobrick {
 namespace {
@@ -38,8 +38,8 @@ IndexHeader header_for(IndexKind kind, ScalarType type, std::size_t items, Int3 
 template <class Sink>
 void report(const IndexView& index, double iso, Sink& sink) {
   visit_index(index, [&]<template <class> class View, class T>(const View<T>& view) {
-    const StabValue<T> stab(iso);
-    if (!stab.none) traverse(view, stab.value, sink);
+    const Threshold<T> threshold(iso);
+    if (!threshold.none) traverse(view, threshold.value, sink);
   });
 }
 

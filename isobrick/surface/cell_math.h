@@ -17,28 +17,6 @@ namespace isobrick {
 template <class T>
 using Real = std::conditional_t<(sizeof(T) <= 2 || std::is_same_v<T, float>), float, double>;
 
-/// `sample >= isovalue` as a comparison in T: the smallest T that is inside.
-/// `none` when no value of T is.
-template <class T>
-struct Threshold {
-  T value{};
-  bool none = false;
-
-  explicit Threshold(double isovalue) {
-    using Limits = std::numeric_limits<T>;
-    if constexpr (std::is_floating_point_v<T>) {
-      value = static_cast<T>(isovalue);
-      if (static_cast<double>(value) < isovalue) value = std::nextafter(value, Limits::infinity());
-    } else {
-      const double least = std::ceil(isovalue);
-      none = least > static_cast<double>(Limits::max());
-      value = none                                             ? Limits::max()
-              : least <= static_cast<double>(Limits::lowest()) ? Limits::lowest()
-                                                               : static_cast<T>(least);
-    }
-  }
-};
-
 /// Where on an edge with samples a and b, on different sides, the isovalue
 /// lies: 0 at a, 1 at b. Defined for infinite samples and for differences that
 /// overflow, too.

@@ -12,6 +12,7 @@
 #include <bit>
 #include <cstring>
 
+#include "isobrick/core/threshold.h"
 #include "isobrick/surface/case_tables.h"
 #include "isobrick/surface/tile_kernels.h"
 
