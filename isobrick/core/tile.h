@@ -6,14 +6,20 @@
 
 namespace isobrick {
 
-/// A tile that the isovalue touches, and what the ranges say of its 2×2×2
-/// blocks of 16³ cells (bit = x + 2·y + 4·z).
+/// A tile that the isovalue touches, and which of its 2×2×2 blocks of 16³ cells
+/// do it (bit = x + 2·y + 4·z).
 struct TileWork {
   Int3 tile;  ///< position in units of kTileEdge
   std::uint8_t active_blocks = 0;
-  /// Of the blocks that are not active: whether all their samples are inside.
-  std::uint8_t inside_blocks = 0;
 };
+
+/// The sample, in tile coordinates, that all blocks of a tile share: its middle,
+/// or what is nearest to it in the volume. A block that is not active lies on
+/// one side as a whole, and so on the side of this sample; whichever block is
+/// active needs it.
+constexpr Int3 common_sample(Int3 extent, Int3 tile) {
+  return min({kBlockEdge, kBlockEdge, kBlockEdge}, extent - Int3{1, 1, 1} - tile * kTileEdge);
+}
 
 /// The samples that `active_blocks` of a tile need: their cells' corners and
 /// `reach` layers more on every side, cut at the volume's border. Calls f(Box3)

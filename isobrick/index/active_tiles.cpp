@@ -11,16 +11,12 @@ void append_active_tiles(Box3 blocks, std::span<const ValueRange<T>> ranges, dou
   const Int3 extent = blocks.extent();
   const Int3 first_tile{blocks.lo.x / edge, blocks.lo.y / edge, blocks.lo.z / edge};
   for_each_morton(ceil_div(extent, {edge, edge, edge}), [&](Int3 t) {
-    TileWork work{first_tile + t, 0, 0};
+    TileWork work{first_tile + t, 0};
     for (int i = 0; i < 8; ++i) {
       const Int3 block = t * edge + Int3{i & 1, i >> 1 & 1, i >> 2};
       if (!Box3{{0, 0, 0}, extent}.contains(block)) continue;
       const ValueRange<T>& range = ranges[static_cast<std::size_t>(linear_index(block, extent))];
-      const auto bit = static_cast<std::uint8_t>(1 << i);
-      if (range.stabbed_by(isovalue))
-        work.active_blocks |= bit;
-      else if (static_cast<double>(range.lo) >= isovalue)
-        work.inside_blocks |= bit;
+      if (range.stabbed_by(isovalue)) work.active_blocks |= static_cast<std::uint8_t>(1 << i);
     }
     if (work.active_blocks) tiles.push_back(work);
   });

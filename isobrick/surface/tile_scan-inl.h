@@ -22,7 +22,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// Bits lo … hi.
-inline std::uint64_t bit_span(int lo, int hi) {
+constexpr std::uint64_t bit_span(int lo, int hi) {
   return (std::uint64_t{2} << hi) - (std::uint64_t{1} << lo);
 }
 
@@ -55,25 +55,32 @@ inline std::uint64_t nan_bits(const T* samples) {
   return bits;
 }
 
-/// Inside bits of all rows; where a block is not active its samples were not
-/// gathered, and its range says what they are.
+/// Inside bits of all rows. Blocks that are not active were not gathered; all
+/// their samples lie on the side of the sample that the tile's blocks share.
 template <class T>
 void classify(const KernelContext& context, TileState& tile) {
   const T threshold = Threshold<T>(context.isovalue).value;
   const T* samples = reinterpret_cast<const T*>(tile.samples.data());
-  constexpr std::uint64_t low = 0xffff, high = 0x1ffff0000;
-  for (int z = tile.shape.lo[2]; z <= tile.shape.hi[2]; ++z)
+  const Int3 common = common_sample(context.extent, tile.work.tile);
+  const T known = samples[TileLayout::offset(static_cast<int>(common.x), static_cast<int>(common.y),
+                                             static_cast<int>(common.z))];
+  const std::uint64_t rest = known >= threshold ? bit_span(0, kTileSamples - 1) : 0;
+  // Sample 16 belongs to the blocks on both sides, and either gathers it.
+  constexpr int middle = static_cast<int>(kBlockEdge);
+  constexpr std::uint64_t low = bit_span(0, middle), high = bit_span(middle, kTileSamples - 1);
+  const auto blocks_at = [](int i) { return (i <= middle ? 1 : 0) | (i >= middle ? 2 : 0); };
+  for (int z = tile.shape.lo[2]; z <= tile.shape.hi[2]; ++z) {
+    const int of_z = (blocks_at(z) & 1 ? tile.work.active_blocks & 15 : 0) |
+                     (blocks_at(z) & 2 ? tile.work.active_blocks >> 4 : 0);
     for (int y = tile.shape.lo[1]; y <= tile.shape.hi[1]; ++y) {
-      const int pair = (y >= 16 ? 2 : 0) + (z >= 16 ? 4 : 0);
-      const int active = tile.work.active_blocks >> pair & 3;
-      const int inside = tile.work.inside_blocks >> pair & 3;
+      const int active = (blocks_at(y) & 1 ? of_z & 3 : 0) | (blocks_at(y) & 2 ? of_z >> 2 : 0);
       const std::uint64_t gathered = (active & 1 ? low : 0) | (active & 2 ? high : 0);
-      const std::uint64_t known = (inside & 1 ? low : 0) | (inside & 2 ? high : 0);
-      std::uint64_t bits = known & ~gathered;
+      std::uint64_t bits = rest & ~gathered;
       if (gathered)
         bits |= gathered & inside_bits(samples + TileLayout::offset(0, y, z), threshold);
       tile.inside[row_index(y, z)] = bits;
     }
+  }
 }
 
 /// Cells without a NaN corner around the tile, as rows of bits: row (y, z) and

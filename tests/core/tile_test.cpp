@@ -18,7 +18,7 @@ TEST(TileWork, NeededBoxesCoverTheActiveBlocks) {
         const auto index = [&](Int3 p) {
           return static_cast<std::size_t>(linear_index(p, lattice.extent));
         };
-        for_each_needed_box(lattice, {tile, static_cast<std::uint8_t>(active), 0}, reach,
+        for_each_needed_box(lattice, {tile, static_cast<std::uint8_t>(active)}, reach,
                             [&](Box3 box) {
                               EXPECT_EQ(intersect(box, lattice.box()), box);
                               EXPECT_FALSE(box.empty());
@@ -34,6 +34,27 @@ TEST(TileWork, NeededBoxesCoverTheActiveBlocks) {
           });
         }
       }
+}
+
+// What the side of blocks that are not active is taken from: a sample of every
+// block that exists, and needed whichever of them is active.
+TEST(TileWork, AllBlocksOfATileShareASample) {
+  for (const Index last : {33, 34, 47, 48, 49, 50, 63, 64, 65, 80}) {
+    const Lattice lattice{{last, 49, 90}, {16, 16, 16}, ScalarType::u8};
+    for_each_point({{0, 0, 0}, lattice.tiles()}, [&](Int3 tile) {
+      const Int3 common = tile * kTileEdge + common_sample(lattice.extent, tile);
+      for (int i = 0; i < 8; ++i) {
+        const Int3 block = tile * 2 + Int3{i & 1, i >> 1 & 1, i >> 2};
+        if (!Box3{{0, 0, 0}, lattice.blocks()}.contains(block)) continue;
+        const Int3 corner = block * kBlockEdge;
+        EXPECT_TRUE(intersect({corner, corner + Int3{17, 17, 17}}, lattice.box()).contains(common));
+        bool needed = false;
+        for_each_needed_box(lattice, {tile, static_cast<std::uint8_t>(1 << i)}, 0,
+                            [&](Box3 box) { needed = needed || box.contains(common); });
+        EXPECT_TRUE(needed);
+      }
+    });
+  }
 }
 
 }  // namespace

@@ -96,6 +96,23 @@ TEST(Extractor, IsovaluesAtAndBeyondTheRange) {
   EXPECT_THROW(extract(field, {.isovalue = NAN}), UsageError);
 }
 
+// One block with a surface, all others of its tile not active and inside or
+// outside, wherever the tile ends.
+TEST(Extractor, BlocksThatAreNotActiveAreFilledWithTheirSide) {
+  for (const Int3 extent : {Int3{33, 33, 33}, Int3{17, 33, 20}, Int3{32, 18, 17}, Int3{49, 50, 66}})
+    for (int block = 0; block < 8; ++block)
+      for (const bool rest_inside : {false, true}) {
+        const Int3 corner = Int3{block & 1, block >> 1 & 1, block >> 2} * kBlockEdge;
+        std::mt19937 random(static_cast<unsigned>(block));
+        const Field<std::int16_t> field(extent, [&](Int3 p) -> double {
+          const Box3 core{corner + Int3{2, 2, 2}, corner + Int3{15, 15, 15}};
+          return core.contains(p) ? static_cast<double>(random() % 100) : rest_inside ? 99 : 0;
+        });
+        EXPECT_EQ(edge_triangles(extract(field, {.isovalue = 49.5})),
+                  reference_triangles(field, 49.5));
+      }
+}
+
 TEST(Extractor, ConstantVolumesAreEmpty) {
   Field<float> field({40, 40, 40});
   for (const double iso : {-1.0, 0.0, 1.0})
