@@ -8,8 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "isobrick/io/preview_sink.h"
+#include "isobrick/pipeline/estimate.h"
 #include "tools/format.h"
 #include "tools/mesh_output.h"
+#include "tools/mesh_space.h"
 #include "tools/options.h"
 #include "tools/store_region.h"
 
@@ -36,7 +38,6 @@ struct Arguments {
 struct Surface {
   ExtractOptions options;
   fs::path output, preview;
-  ExtractEstimate estimate;
 };
 
 /// `path`, told apart by isovalue when there are several.
@@ -47,10 +48,6 @@ fs::path named(const std::string& path, const Arguments& arguments, double isova
 
 MeshFormat format_of(const Surface& surface) {
   return surface.output.empty() ? MeshFormat::ply : mesh_format(surface.output);
-}
-
-MeshBytes bytes_of(const Surface& surface) {
-  return predict_bytes(format_of(surface), surface.options.normals, surface.estimate);
 }
 
 /// What the picture may take of the memory, so that the extraction keeps most.
@@ -104,49 +101,65 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   for (const double isovalue : arguments.isovalues) {
     options.isovalue = isovalue;
     surfaces.push_back({options, named(arguments.output, arguments, isovalue),
-                        named(arguments.preview, arguments, isovalue), estimate(store, options)});
+                        named(arguments.preview, arguments, isovalue)});
   }
   return surfaces;
 }
 
-/// Refuses meshes that cannot fit their disk, before anything is written.
-void check_space(const std::vector<Surface>& surfaces) {
-  std::uint64_t finished = 0;
+/// The meshes to write, with size_of(surface) as PlannedMesh has it.
+template <class F>
+std::vector<PlannedMesh> planned_meshes(const std::vector<Surface>& surfaces, const F& size_of) {
+  std::vector<PlannedMesh> meshes;
   for (const Surface& surface : surfaces) {
     if (surface.output.empty()) continue;
-    const MeshBytes bytes = bytes_of(surface);
-    const std::uint64_t free = free_space(surface.output);
-    if (finished + bytes.needed > free)
-      throw Error(fmt::format(
-          "'{}' would have about {} triangles and need {}, but its disk has {} free; choose "
-          "another disk, a coarser --level or an --roi (or --no-space-check, should the estimate "
-          "be wrong)",
-          surface.output.string(), human_count(surface.estimate.triangles),
-          human_bytes(finished + bytes.needed), human_bytes(free)));
-    finished += bytes.file;
+    PlannedMesh mesh = size_of(surface.options);
+    mesh.path = surface.output;
+    mesh.normals = surface.options.normals;
+    meshes.push_back(std::move(mesh));
   }
+  return meshes;
 }
 
-ordered_json estimate_json(const Surface& surface) {
-  const ExtractEstimate& e = surface.estimate;
+/// Refuses meshes that cannot fit their disk, before anything is written.
+void check_space(const std::vector<Surface>& surfaces, const StoreReader& store) {
+  // Mostly all that the active cells could hold fits, which is known without a sample.
+  const auto largest = planned_meshes(surfaces, [&](const ExtractOptions& options) {
+    return PlannedMesh{.size = largest_mesh(count_active(store, options))};
+  });
+  if (!find_shortage(largest, free_space)) return;
+  const auto likely = planned_meshes(surfaces, [&](const ExtractOptions& options) {
+    const ExtractEstimate guess = estimate(store, options);
+    return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
+  });
+  if (const auto shortage = find_shortage(likely, free_space))
+    throw Error(fmt::format(
+        "'{}' would have about {} triangles and need {}, but its disk has {} free; choose "
+        "another disk, a coarser --level or an --roi (or --no-space-check, should the estimate "
+        "be wrong)",
+        likely[shortage->mesh].path.string(), human_count(likely[shortage->mesh].size.triangles),
+        human_bytes(shortage->needed), human_bytes(shortage->free)));
+}
+
+ordered_json estimate_json(const Surface& surface, const ExtractEstimate& e) {
   return {{"isovalue", surface.options.isovalue},
-          {"bricks", {{"total", e.bricks}, {"active", e.active_bricks}}},
-          {"active_blocks", e.active_blocks},
-          {"triangles", e.triangles},
-          {"vertices", e.vertices},
-          {"file_bytes", bytes_of(surface).file},
+          {"bricks", {{"total", e.active.bricks}, {"active", e.active.active_bricks}}},
+          {"active_blocks", e.active.active_blocks},
+          {"triangles", e.mesh.triangles},
+          {"vertices", e.mesh.vertices},
+          {"uncertainty", e.uncertainty},
+          {"file_bytes", predict_bytes(format_of(surface), surface.options.normals, e.mesh).file},
           {"memory_bytes", e.memory}};
 }
 
-std::string estimate_text(const Surface& surface) {
-  const ExtractEstimate& e = surface.estimate;
-  const char* format = format_of(surface) == MeshFormat::ply ? "PLY" : "STL";
+std::string estimate_text(const Surface& surface, const ExtractEstimate& e) {
+  const MeshFormat format = format_of(surface);
   return fmt::format(
-      "isovalue {}: about {} triangles and {} vertices, {} as {}; {} of {} bricks "
+      "isovalue {}: about {} triangles and {} vertices (± {:.0f} %), {} as {}; {} of {} bricks "
       "active, {} of memory\n",
-      surface.options.isovalue, human_count(e.triangles), human_count(e.vertices),
-      human_bytes(bytes_of(surface).file), format, human_count(e.active_bricks),
-      human_count(e.bricks), human_bytes(e.memory));
+      surface.options.isovalue, human_count(e.mesh.triangles), human_count(e.mesh.vertices),
+      100 * e.uncertainty, human_bytes(predict_bytes(format, surface.options.normals, e.mesh).file),
+      format == MeshFormat::ply ? "PLY" : "STL", human_count(e.active.active_bricks),
+      human_count(e.active.bricks), human_bytes(e.memory));
 }
 
 ordered_json report_json(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
@@ -225,18 +238,19 @@ struct Said {
   std::string text;
 };
 
-Said estimate_all(const std::vector<Surface>& surfaces) {
+Said estimate_all(const std::vector<Surface>& surfaces, const StoreReader& store) {
   Said said;
   for (const Surface& surface : surfaces) {
-    said.objects.push_back(estimate_json(surface));
-    said.text += estimate_text(surface);
+    const ExtractEstimate guess = estimate(store, surface.options);
+    said.objects.push_back(estimate_json(surface, guess));
+    said.text += estimate_text(surface, guess);
   }
   return said;
 }
 
 Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
               const StoreReader& store, Console& console) {
-  if (!arguments.no_space_check) check_space(surfaces);
+  if (!arguments.no_space_check) check_space(surfaces, store);
   std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
   Said said;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
@@ -253,8 +267,8 @@ int run(const Arguments& arguments, Console& console) {
   check(arguments);
   const StoreReader store(arguments.store);
   const std::vector<Surface> surfaces = plan(arguments, store);
-  const Said said =
-      arguments.estimate ? estimate_all(surfaces) : make_all(arguments, surfaces, store, console);
+  const Said said = arguments.estimate ? estimate_all(surfaces, store)
+                                       : make_all(arguments, surfaces, store, console);
   console.result({{"command", "extract"},
                   {"store", arguments.store},
                   {"level", arguments.level},

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isobrick/pipeline/chunk_writer.h"
+#include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
 #include "isobrick/pipeline/workers.h"
 #include "isobrick/stream/brick_cache.h"
@@ -47,37 +48,7 @@ MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface) {
   return header;
 }
 
-/// Triangles that an active block of 16³ cells is expected to hold: the middle
-/// of what was counted in 18 real volumes, see docs/extraction.md.
-constexpr double kTrianglesPerBlock = 700;
-
 }  // namespace
-
-ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options) {
-  const ExtractRequest request = check_request(store, options, Indexing::welded);
-  const Lattice& lattice = request.level->lattice;
-  ExtractEstimate result;
-  result.bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
-  TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
-  std::vector<bool> active(static_cast<std::size_t>(result.bricks));
-  while (const auto work = tiles.next()) {
-    for (int i = 0; i < 8; ++i) {
-      if (!(work->active_blocks >> i & 1)) continue;
-      ++result.active_blocks;
-      const Int3 corner = work->tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
-      const Int3 brick{corner.x / lattice.brick.x, corner.y / lattice.brick.y,
-                       corner.z / lattice.brick.z};
-      auto seen = active[static_cast<std::size_t>(linear_index(brick, lattice.bricks()))];
-      result.active_bricks += !seen;
-      seen = true;
-    }
-  }
-  result.triangles =
-      static_cast<std::uint64_t>(kTrianglesPerBlock * static_cast<double>(result.active_blocks));
-  result.vertices = result.triangles / 2;
-  result.memory = plan_memory(request, options.memory, result.active_bricks).bytes;
-  return result;
-}
 
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
                       Progress& progress) {
@@ -89,14 +60,14 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     const Lattice& lattice = request.level->lattice;
     const Index reach = sample_reach(request.surface);
 
-    ExtractEstimate expected;
+    ActiveParts active;
     {
       Stopwatch watch(report.plan_seconds);
-      expected = estimate(store, options);
+      active = count_active(store, options);
     }
-    report.bricks = expected.bricks;
-    report.active_bricks = expected.active_bricks;
-    const ExtractPlan plan = plan_memory(request, options.memory, expected.active_bricks);
+    report.bricks = active.bricks;
+    report.active_bricks = active.active_bricks;
+    const ExtractPlan plan = plan_memory(request, options.memory, active.active_bricks);
 
     sink.begin(header_of(*request.level, request.surface));
     TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
@@ -107,10 +78,10 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     ChunkWriter writer(sink);
     MeshBuffer mesh;
     TileBatch batch, following;
-    progress.begin("extracting", expected.active_bricks * lattice.brick_bytes());
-    const double bytes_per_block = static_cast<double>(expected.active_bricks) *
+    progress.begin("extracting", active.active_bricks * lattice.brick_bytes());
+    const double bytes_per_block = static_cast<double>(active.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /
-                                   std::max(1.0, static_cast<double>(expected.active_blocks));
+                                   std::max(1.0, static_cast<double>(active.active_blocks));
     Workers workers(request.threads);
     workers.execute([&] {
       for (bool more = batches.next(batch); more; std::swap(batch, following)) {

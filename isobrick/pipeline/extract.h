@@ -19,13 +19,6 @@ struct ExtractOptions {
   int threads = 0;                                ///< 0: all cores
 };
 
-/// What an extraction will need, from the ranges alone.
-struct ExtractEstimate {
-  std::uint64_t bricks = 0, active_bricks = 0, active_blocks = 0;
-  std::uint64_t triangles = 0, vertices = 0;  ///< predictions
-  std::uint64_t memory = 0;  ///< bytes that the extraction will hold, within the budget
-};
-
 /// What an extraction did.
 struct ExtractReport {
   std::uint64_t triangles = 0, vertices = 0;
@@ -33,8 +26,6 @@ struct ExtractReport {
   std::uint64_t bytes_read = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, sink_seconds = 0;
 };
-
-ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options);
 
 /// Streams the isosurface of one level into `sink` (begin … finish).
 /// Throws UsageError for a level, ROI or isovalue that makes no sense or a

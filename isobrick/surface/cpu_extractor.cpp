@@ -85,7 +85,7 @@ struct CpuExtractor::Impl {
     return true;
   }
 
-  void count(TileState& state, const TileWork& work, const BrickLookup& bricks) {
+  void count(TileState& state, const TileWork& work, const BrickLookup& bricks) const {
     state.work = work;
     state.vertices = state.triangles = 0;
     state.cells.clear();
@@ -96,7 +96,7 @@ struct CpuExtractor::Impl {
       gather_tile(lattice, bricks, options.fill_value, sample_reach(options), state);
       scan_tile(lattice.type, context, state);
     }
-    if (welded()) publish_boundary(state);
+    if (state.boundary) publish_boundary(state);
   }
 
   template <class F>
@@ -189,6 +189,12 @@ void CpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& b
     tiles = tiles.subspan(batch);
   }
   if (take) impl_->hand_on(out, take);
+}
+
+MeshSize CpuExtractor::count(const TileWork& tile, const BrickLookup& bricks) const {
+  const auto state = std::make_unique<TileState>();
+  impl_->count(*state, tile, bricks);
+  return {state->vertices, state->triangles};
 }
 
 void CpuExtractor::restart() {

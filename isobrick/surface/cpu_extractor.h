@@ -47,6 +47,9 @@ class CpuExtractor {
   void extract(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out,
                const TakeMesh& take = {});
 
+  /// Counts what extract() makes of one tile, wherever the tile comes in the order.
+  MeshSize count(const TileWork& tile, const BrickLookup& bricks) const;
+
   /// Forgets all that was extracted: the next tile may be any again.
   void restart();
 

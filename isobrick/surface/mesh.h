@@ -31,6 +31,11 @@ struct MeshChunk {
   std::span<const Triangle> triangles;
 };
 
+/// Of what a mesh consists.
+struct MeshSize {
+  std::uint64_t vertices = 0, triangles = 0;
+};
+
 /// What is known before the first chunk.
 struct MeshHeader {
   bool has_normals = false;

@@ -239,20 +239,5 @@ TEST_F(Extract, ChunksKeepToTheBudget) {
   EXPECT_GT(isobrick::testing::closed_sides(sink.mesh), 0);
 }
 
-TEST_F(Extract, EstimatesAreNearOnASmoothSurface) {
-  const Field<std::uint8_t> field({160, 160, 160}, [](Int3 p) {
-    const double x = static_cast<double>(p.x) - 80, y = static_cast<double>(p.y) - 80,
-                 z = static_cast<double>(p.z) - 80;
-    return std::max(0.0, 255 - 2 * std::sqrt(x * x + y * y + z * z));
-  });
-  const StoreReader reader = store(field, {.brick = 32, .shard = 64});
-  const ExtractEstimate guess = estimate(reader, {.isovalue = 127});
-  MemorySink sink;
-  const ExtractReport report = run(reader, {.isovalue = 127}, sink);
-  EXPECT_EQ(guess.active_bricks, report.active_bricks);
-  EXPECT_GT(guess.triangles, report.triangles / 2);
-  EXPECT_LT(guess.triangles, report.triangles * 2);
-}
-
 }  // namespace
 }  // namespace isobrick::test

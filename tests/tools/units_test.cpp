@@ -3,6 +3,7 @@
 #include "isobrick/core/error.h"
 #include "tools/console.h"
 #include "tools/format.h"
+#include "tools/mesh_space.h"
 #include "tools/parse.h"
 
 namespace isobrick::tools {
@@ -75,6 +76,43 @@ TEST(Format, Figures) {
   EXPECT_EQ(human_count(1234567), "1,234,567");
   EXPECT_EQ(human_seconds(0.0123), "0.012 s");
   EXPECT_EQ(human_seconds(125), "2:05 min");
+}
+
+TEST(Space, AMeshNeedsItsScratchFileToo) {
+  const MeshSize size{.vertices = 100, .triangles = 200};
+  const MeshBytes ply = predict_bytes(MeshFormat::ply, false, size);
+  EXPECT_EQ(ply.needed, ply.file + 200 * 13);
+  EXPECT_EQ(predict_bytes(MeshFormat::ply, true, size).file, ply.file + 100 * 12);
+  const MeshBytes stl = predict_bytes(MeshFormat::stl, true, size);
+  EXPECT_EQ(stl.needed, stl.file);
+}
+
+TEST(Space, ShortageNamesTheFirstMeshThatDoesNotFit) {
+  const MeshSize size{.vertices = 500'000, .triangles = 1'000'000};
+  const auto stl = [&](const char* name) { return PlannedMesh{.path = name, .size = size}; };
+  const std::uint64_t each = predict_bytes(MeshFormat::stl, false, size).file;
+  const PlannedMesh meshes[] = {stl("a.stl"), stl("b.stl"), stl("c.stl")};
+  const auto disk = [](std::uint64_t bytes) {
+    return [bytes](const std::filesystem::path&) { return bytes; };
+  };
+  EXPECT_FALSE(find_shortage({}, disk(0)));
+  EXPECT_FALSE(find_shortage(meshes, disk(3 * each)));
+  const auto last = find_shortage(meshes, disk(3 * each - 1));
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->mesh, 2u);
+  EXPECT_EQ(last->needed, 3 * each);
+  EXPECT_EQ(last->free, 3 * each - 1);
+  EXPECT_EQ(find_shortage(meshes, disk(each - 1)).value().mesh, 0u);
+}
+
+TEST(Space, WhatIsUncertainNeedsMore) {
+  PlannedMesh mesh{.path = "a.ply", .size = {.vertices = 1000, .triangles = 2000}};
+  const auto needed = [&] {
+    return find_shortage({&mesh, 1}, [](const auto&) { return std::uint64_t{0}; }).value().needed;
+  };
+  const std::uint64_t sure = needed();
+  mesh.uncertainty = 0.25;
+  EXPECT_NEAR(static_cast<double>(needed()), 1.25 * static_cast<double>(sure), 1000);
 }
 
 TEST(Progress, LineHasRateAndTimeLeft) {

@@ -1,0 +1,214 @@
+#include "isobrick/pipeline/estimate.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "isobrick/pipeline/extract_plan.h"
+#include "isobrick/pipeline/tile_sample.h"
+#include "isobrick/pipeline/workers.h"
+#include "isobrick/stream/brick_cache.h"
+#include "isobrick/stream/tile_stream.h"
+#include "isobrick/surface/case_rule.h"
+
+namespace isobrick {
+namespace {
+
+/// Groups of tiles that are looked at: enough for 10 % where groups differ by
+/// half of their mean.
+constexpr std::size_t kMostGroups = 64;
+/// Fewer where samples or bricks are big, so that decoding stays at some 10 ms a core.
+constexpr std::uint64_t kMostBytes = std::uint64_t{32} << 20;
+constexpr std::size_t kLeastGroups = 4;
+
+Box3 block_box(Int3 tile, int i) {
+  const Int3 corner = tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
+  return {corner, corner + Int3{kBlockEdge, kBlockEdge, kBlockEdge}};
+}
+
+/// Cells between `samples` in the active blocks of a tile.
+std::uint64_t active_cells(const TileWork& work, Box3 samples) {
+  std::uint64_t cells = 0;
+  for (int i = 0; i < 8; ++i)
+    if (work.active_blocks >> i & 1) {
+      const Box3 box = intersect(block_box(work.tile, i),
+                                 {samples.lo, max(samples.hi - Int3{1, 1, 1}, samples.lo)});
+      if (!box.empty()) cells += static_cast<std::uint64_t>(volume(box.extent()));
+    }
+  return cells;
+}
+
+/// Counts what is active and calls visit(TileWork) for every active tile, in order.
+template <class F>
+ActiveParts visit_active(const StoreReader& store, const ExtractRequest& request,
+                         const ExtractOptions& options, F&& visit) {
+  const Lattice& lattice = request.level->lattice;
+  ActiveParts parts;
+  parts.bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
+  TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
+  std::vector<bool> active(static_cast<std::size_t>(parts.bricks));
+  while (const auto work = tiles.next()) {
+    visit(*work);
+    parts.active_cells += active_cells(*work, request.surface.roi);
+    for (int i = 0; i < 8; ++i) {
+      if (!(work->active_blocks >> i & 1)) continue;
+      ++parts.active_blocks;
+      const Int3 corner = block_box(work->tile, i).lo;
+      const Int3 brick{corner.x / lattice.brick.x, corner.y / lattice.brick.y,
+                       corner.z / lattice.brick.z};
+      auto seen = active[static_cast<std::size_t>(linear_index(brick, lattice.bricks()))];
+      parts.active_bricks += !seen;
+      seen = true;
+    }
+  }
+  return parts;
+}
+
+/// The bricks in which a tile's 32³ samples lie. Its last layer of cells may
+/// need one sample more from the bricks behind; rather than to read those for
+/// it, it is left out then.
+Box3 own_bricks(const Lattice& lattice, Int3 tile) {
+  const Int3 lo = tile * kTileEdge;
+  const Int3 hi = min(lo + Int3{kTileEdge, kTileEdge, kTileEdge}, lattice.extent);
+  const Int3 b = lattice.brick;
+  return {{lo.x / b.x, lo.y / b.y, lo.z / b.z}, ceil_div(hi, b)};
+}
+
+/// Only some of a cache's bricks; the rest is as good as absent.
+class SomeBricks final : public BrickLookup {
+ public:
+  SomeBricks(const BrickLookup& all, Box3 box) : all_(all), box_(box) {}
+  const std::byte* find(Int3 b) const override { return box_.contains(b) ? all_.find(b) : nullptr; }
+
+ private:
+  const BrickLookup& all_;
+  Box3 box_;
+};
+
+/// The cells of active blocks that were looked at, and what of the surface
+/// lies in them.
+struct Sampled {
+  double cells = 0, triangles = 0, vertices = 0;
+  Sampled& operator+=(const Sampled& other) {
+    cells += other.cells;
+    triangles += other.triangles;
+    vertices += other.vertices;
+    return *this;
+  }
+};
+
+Sampled look_at(const TileWork& work, const ExtractRequest& request, const BrickLookup& bricks) {
+  const Lattice& lattice = request.level->lattice;
+  const Box3 own = own_bricks(lattice, work.tile);
+  const Int3 corner = work.tile * kTileEdge;
+  const Box3 samples = intersect({corner, own.hi * lattice.brick}, request.surface.roi);
+  const std::uint64_t cells = active_cells(work, samples);
+  if (cells == 0) return {};
+  SurfaceOptions surface = request.surface;
+  surface.normals = false;
+  // Begun one tile earlier where there is one, so that the vertices on the
+  // tile's lower planes are not its own: they are counted with that tile.
+  surface.roi.lo = max(min(samples.lo, corner - Int3{1, 1, 1}), request.surface.roi.lo);
+  surface.roi.hi = samples.hi;
+  const CpuExtractor extractor(lattice, surface, {.tiles = 1});
+  const MeshSize size = extractor.count(work, SomeBricks(bricks, own));
+  return {static_cast<double>(cells), static_cast<double>(size.triangles),
+          static_cast<double>(size.vertices)};
+}
+
+std::vector<Sampled> look_at_all(const StoreReader& store, const ExtractOptions& options,
+                                 const ExtractRequest& request, std::span<const TileWork> tiles,
+                                 std::size_t cache_bricks) {
+  const Lattice& lattice = request.level->lattice;
+  BrickCache cache(store, options.level, cache_bricks);
+  std::vector<Sampled> sampled(tiles.size());
+  std::vector<Int3> bricks;
+  for (std::size_t begin = 0, end = 0; begin < tiles.size(); begin = end) {
+    bricks.clear();
+    for (; end < tiles.size(); ++end) {
+      std::vector<Int3> more;
+      for_each_point(own_bricks(lattice, tiles[end].tile), [&](Int3 b) {
+        if (std::find(bricks.begin(), bricks.end(), b) == bricks.end()) more.push_back(b);
+      });
+      if (end > begin && bricks.size() + more.size() > cache_bricks) break;
+      bricks.insert(bricks.end(), more.begin(), more.end());
+    }
+    cache.require(bricks);
+    tbb::parallel_for(begin, end,
+                      [&](std::size_t i) { sampled[i] = look_at(tiles[i], request, cache); });
+  }
+  return sampled;
+}
+
+/// How many groups of tiles to sample; even.
+std::size_t groups_to_sample(const Lattice& lattice) {
+  std::uint64_t bytes = lattice.sample_bytes();  // of the bricks that a group lies in
+  for (int axis = 0; axis < 3; ++axis) {
+    constexpr Index edge = 2 * kTileEdge;
+    const Index brick = lattice.brick[axis];
+    const Index latest = brick - std::gcd(brick, edge);  // where in its first brick one begins
+    bytes *= static_cast<std::uint64_t>(((latest + edge - 1) / brick + 1) * brick);
+  }
+  return std::clamp<std::size_t>(kMostBytes / bytes & ~std::uint64_t{1}, kLeastGroups, kMostGroups);
+}
+
+/// Scales what was seen in some groups to all active cells, and says how sure
+/// that is: the standard error of a ratio of sums.
+void scale(std::span<const Sampled> sampled, std::uint64_t cells, ExtractEstimate& result) {
+  Sampled sum;
+  for (const Sampled& s : sampled) sum += s;
+  if (sum.triangles == 0) return;
+  const double factor = static_cast<double>(cells) / sum.cells;
+  result.mesh.triangles = static_cast<std::uint64_t>(std::llround(sum.triangles * factor));
+  result.mesh.vertices = static_cast<std::uint64_t>(std::llround(sum.vertices * factor));
+  const auto n = static_cast<double>(sampled.size());
+  double squares = 0;
+  for (const Sampled& s : sampled) {
+    const double off = s.triangles - s.cells * sum.triangles / sum.cells;
+    squares += off * off;
+  }
+  const double unseen = 1 - sum.cells / static_cast<double>(cells);
+  result.uncertainty = 2 * std::sqrt(squares * n / std::max(1.0, n - 1) * unseen) / sum.triangles;
+}
+
+}  // namespace
+
+ActiveParts count_active(const StoreReader& store, const ExtractOptions& options) {
+  return visit_active(store, check_request(store, options, Indexing::welded), options,
+                      [](const TileWork&) {});
+}
+
+MeshSize largest_mesh(const ActiveParts& active) {
+  constexpr Index closed = kBlockEdge + 1;
+  return {3 * closed * closed * closed * active.active_blocks,
+          kMaxCaseTriangles * active.active_cells};
+}
+
+ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options) {
+  const ExtractRequest request = check_request(store, options, Indexing::welded);
+  TileSample sample(groups_to_sample(request.level->lattice));
+  const ActiveParts parts =
+      visit_active(store, request, options, [&](const TileWork& work) { sample.add(work); });
+  const ExtractPlan plan = plan_memory(request, options.memory, parts.active_bricks);
+  ExtractEstimate result{.active = parts, .memory = plan.bytes};
+  const std::vector<TileGroup> groups = sample.chosen();
+  std::vector<TileWork> tiles;
+  for (const TileGroup& group : groups)
+    tiles.insert(tiles.end(), group.tiles, group.tiles + group.count);
+  Workers workers(request.threads);
+  const std::vector<Sampled> of_tiles = workers.execute(
+      [&] { return look_at_all(store, options, request, tiles, plan.cache_bricks); });
+  std::vector<Sampled> of_groups(groups.size());
+  auto next = of_tiles.begin();
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    for (int k = 0; k < groups[i].count; ++k) of_groups[i] += *next++;
+  scale(of_groups, parts.active_cells, result);
+  return result;
+}
+
+}  // namespace isobrick

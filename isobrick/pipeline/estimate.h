@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+
+#include "isobrick/pipeline/extract.h"
+
+namespace isobrick {
+
+/// What of a level the isovalue touches, from the ranges alone.
+struct ActiveParts {
+  std::uint64_t bricks = 0;         ///< all of the level
+  std::uint64_t active_bricks = 0;  ///< with a block that is stabbed
+  std::uint64_t active_blocks = 0;
+  std::uint64_t active_cells = 0;  ///< cells of those blocks, in the region
+};
+
+/// Throws as extract() does for options that make no sense.
+ActiveParts count_active(const StoreReader& store, const ExtractOptions& options);
+
+/// What no mesh in these parts exceeds; real ones are mostly some ten times smaller.
+MeshSize largest_mesh(const ActiveParts& active);
+
+/// What an extraction will need.
+struct ExtractEstimate {
+  ActiveParts active;
+  MeshSize mesh;             ///< predicted
+  double uncertainty = 0;    ///< two standard errors of `mesh`, as a fraction of it
+  std::uint64_t memory = 0;  ///< bytes that the extraction will hold, within the budget
+};
+
+/// Counts the surface in up to 64 cubes of 64³ cells, spread evenly over the
+/// active ones, and scales it to all. Reads and decodes at most 32 MiB of
+/// bricks, or those of 4 cubes where that is more, within the memory budget;
+/// deterministic, also over thread counts. Throws as extract() does.
+ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options);
+
+}  // namespace isobrick

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+
+#include "isobrick/surface/mesh.h"
+#include "tools/mesh_output.h"
+
+namespace isobrick::tools {
+
+/// What a mesh takes on disk.
+struct MeshBytes {
+  std::uint64_t file = 0;    ///< the finished file
+  std::uint64_t needed = 0;  ///< at the worst moment, scratch file included
+};
+MeshBytes predict_bytes(MeshFormat format, bool normals, MeshSize size);
+
+/// Bytes free on the disk that `path` will be written to.
+std::uint64_t free_space(const std::filesystem::path& path);
+
+/// A mesh that is to be written.
+struct PlannedMesh {
+  std::filesystem::path path;
+  bool normals = false;
+  MeshSize size;
+  double uncertainty = 0;  ///< by what fraction it may be larger
+};
+
+/// The first mesh that does not fit its disk.
+struct Shortage {
+  std::size_t mesh = 0;
+  std::uint64_t needed = 0, free = 0;  ///< bytes; `needed` with the meshes before it
+};
+
+/// Whether the meshes, made one after the other, fit what `free_space` says.
+std::optional<Shortage> find_shortage(
+    std::span<const PlannedMesh> meshes,
+    const std::function<std::uint64_t(const std::filesystem::path&)>& free_space);
+
+}  // namespace isobrick::tools
