@@ -78,7 +78,8 @@ void print(const std::string& what, double median, double least, std::uint64_t t
              median * 1e3, least * 1e3, triangles, vertices);
 }
 
-void compare(const Volume& v, double isovalue, Index brick, int runs, [[maybe_unused]] bool alone) {
+void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_degenerate,
+             [[maybe_unused]] bool alone) {
   const Lattice lattice{v.extent, {brick, brick, brick}, v.type};
   const DenseBricks bricks(lattice, v.samples.data());
   visit_scalar(v.type, [&](auto tag) {
@@ -94,6 +95,7 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, [[maybe_un
         options.isovalue = isovalue;
         options.normals = normals;
         options.roi = lattice.box();
+        options.drop_degenerate = drop_degenerate;
         CpuExtractor extractor(lattice, options, {.tiles = CpuExtractor::good_batch(threads)});
         MeshBuffer out;
         std::vector<TileWork> tiles;
@@ -129,6 +131,8 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, [[maybe_un
                 theirs[mid], theirs[0], their_triangles, their_vertices);
           fmt::print("  -> {:.2f} times as fast\n", theirs[mid] / ours[mid]);
         }
+        if (drop_degenerate)
+          fmt::print("  {} degenerate triangles left out\n", extractor.degenerate_triangles());
         if (threads == 1 && !normals) {
           const double cells = static_cast<double>(volume(v.extent - Int3{1, 1, 1}));
           fmt::print("  tiles {} of {}, about {:.2f} % of the cells active\n", tiles.size(),
@@ -149,13 +153,14 @@ int main(int argc, char** argv) {
   Index n = 512, brick = 64;
   double isovalue = 127.5, periods = 6;
   int runs = 9;
-  bool alone = false;
+  bool drop_degenerate = false, alone = false;
   app.add_option("--raw", raw, "a raw volume (else a gyroid)");
   app.add_option("--gyroid", n, "edge of the gyroid, samples");
   app.add_option("--periods", periods, "of the gyroid along each axis");
   app.add_option("--isovalue", isovalue);
   app.add_option("--brick", brick);
   app.add_option("--runs", runs);
+  app.add_flag("--drop-degenerate", drop_degenerate, "leave degenerate triangles out");
   app.add_flag("--alone", alone, "leave the peer out");
   CLI11_PARSE(app, argc, argv);
 #ifdef ISOBRICK_WITH_VTK
@@ -163,5 +168,5 @@ int main(int argc, char** argv) {
 #endif
   const auto v = raw.empty() ? bench::gyroid(n, periods) : bench::read_raw(raw);
   fmt::print("{} isovalue {}\n", raw.empty() ? fmt::format("gyroid {}³ u8", n) : raw, isovalue);
-  bench::compare(v, isovalue, brick, runs, alone);
+  bench::compare(v, isovalue, brick, runs, drop_degenerate, alone);
 }

@@ -28,7 +28,7 @@ struct Arguments {
   PreviewOptions picture;
   int level = 0;
   std::optional<RoiText> roi;
-  bool normals = false;
+  bool normals = false, drop_degenerate = false;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
   bool estimate = false, force = false, no_space_check = false;
@@ -95,6 +95,7 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   options.level = arguments.level;
   options.roi = store_region(store, arguments.level, arguments.roi);
   options.normals = arguments.normals;
+  options.drop_degenerate = arguments.drop_degenerate;
   options.memory = arguments.memory;
   options.threads = arguments.threads;
   std::vector<Surface> surfaces;
@@ -179,6 +180,7 @@ ordered_json report_json(const Surface& surface, const ExtractReport& r, std::ui
         {"decode", r.decode_seconds},
         {"surface", r.surface_seconds},
         {"sink", r.sink_seconds}}}};
+  if (surface.options.drop_degenerate) object["degenerate_triangles"] = r.degenerate_triangles;
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();
   return object;
@@ -189,6 +191,9 @@ std::string report_text(const Surface& surface, const ExtractReport& r, std::uin
       fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
                   surface.options.isovalue, human_count(r.triangles), human_count(r.vertices),
                   human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
+  if (surface.options.drop_degenerate)
+    text +=
+        fmt::format("  {} degenerate triangles left out\n", human_count(r.degenerate_triangles));
   if (!surface.output.empty())
     text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
   if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());
@@ -227,8 +232,9 @@ ExtractReport make(const Surface& surface, const Sinks& sinks, const Arguments& 
     if (!sinks.mesh) report = drawn;
   }
   if (report.triangles == 0)
-    console.note(fmt::format("isovalue {}: no cell is active, the surface is empty",
-                             surface.options.isovalue));
+    console.note(fmt::format(
+        "isovalue {}: {}, the surface is empty", surface.options.isovalue,
+        report.degenerate_triangles > 0 ? "all triangles are degenerate" : "no cell is active"));
   return report;
 }
 
@@ -325,6 +331,8 @@ void add_extract(Program& program) {
   add_roi(app, arguments->roi);
   add_parsed(app, arguments->normals, parse_normals,
              {"--normals", "gradient|none", "Normals at the vertices", "none"});
+  add_flag(app, "--drop-degenerate", arguments->drop_degenerate,
+           "Leave out triangles without area where samples equal the isovalue");
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_force(app, arguments->force);

@@ -109,6 +109,7 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     report.sink_seconds = writer.seconds();
     report.triangles = extractor.triangles();
     report.vertices = extractor.vertices();
+    report.degenerate_triangles = extractor.degenerate_triangles();
     report.bricks_read = cache.bricks_read();
     report.brick_reads = cache.reads();
   }

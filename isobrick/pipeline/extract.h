@@ -13,8 +13,9 @@ namespace isobrick {
 struct ExtractOptions {
   double isovalue = 0;
   int level = 0;
-  std::optional<Box3> roi;  ///< samples of that level; nothing: the whole volume
-  bool normals = false;     ///< gradient normals
+  std::optional<Box3> roi;       ///< samples of that level; nothing: the whole volume
+  bool normals = false;          ///< gradient normals
+  bool drop_degenerate = false;  ///< see SurfaceOptions
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
 };
@@ -22,6 +23,7 @@ struct ExtractOptions {
 /// What an extraction did.
 struct ExtractReport {
   std::uint64_t triangles = 0, vertices = 0;
+  std::uint64_t degenerate_triangles = 0;  ///< left out, with drop_degenerate
   std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
   std::uint64_t bytes_read = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, sink_seconds = 0;

@@ -20,10 +20,10 @@ constexpr std::uint64_t kDecoder = std::uint64_t{2} << 20;
 
 /// The boundaries that wait between finished and unfinished tiles: in Morton
 /// order at most about the largest face of the tile grid, twice.
-std::uint64_t boundary_bytes(const Lattice& lattice) {
+std::uint64_t boundary_bytes(const Lattice& lattice, bool drop_degenerate) {
   const Int3 t = lattice.tiles();
   const auto face = static_cast<std::uint64_t>(std::max({t.x * t.y, t.y * t.z, t.x * t.z}));
-  return 2 * face * 3072;
+  return 2 * face * CpuExtractor::boundary_bytes(drop_degenerate);
 }
 
 /// Mesh coordinates are float, and so are the factors of positions and normals.
@@ -72,6 +72,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
   request.surface = {.isovalue = options.isovalue,
                      .normals = options.normals,
                      .indexing = indexing,
+                     .drop_degenerate = options.drop_degenerate,
                      .roi = roi,
                      .transform = request.level->transform,
                      .fill_value = info.fill_value,
@@ -83,14 +84,15 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
 ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
                         std::uint64_t active_bricks) {
   const Lattice& lattice = request.level->lattice;
+  const bool drop = request.surface.drop_degenerate;
   const auto threads = static_cast<std::uint64_t>(request.threads);
-  const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type);
+  const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type, drop);
   const std::uint64_t tile_output = CpuExtractor::max_tile_output(request.surface.normals);
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
-  const std::uint64_t fixed =
-      kBase + index_bytes(lattice) + threads * (kDecoder + brick_bytes) + boundary_bytes(lattice);
+  const std::uint64_t fixed = kBase + index_bytes(lattice) + threads * (kDecoder + brick_bytes) +
+                              boundary_bytes(lattice, drop);
   const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
   if (budget < least)
     throw UsageError(fmt::format(

@@ -11,7 +11,8 @@
 namespace isobrick {
 
 /// How many layers of samples around its cells a tile needs: one for gradients
-/// and for looking at the neighbours of NaN, none otherwise.
+/// and for looking at the neighbours of NaN and of samples that equal the
+/// isovalue, none otherwise.
 Index sample_reach(const SurfaceOptions& options);
 
 /// What bounds an extractor's memory. Never shows in the mesh.
@@ -56,11 +57,15 @@ class CpuExtractor {
   /// Vertices and triangles made so far.
   std::uint64_t vertices() const;
   std::uint64_t triangles() const;
+  /// Triangles left out so far (SurfaceOptions::drop_degenerate).
+  std::uint64_t degenerate_triangles() const;
 
   /// Tiles between two hand-offs that keep `threads` busy and their caches warm.
   static std::size_t good_batch(int threads);
   /// Bytes of work space for one tile.
-  static std::uint64_t workspace_bytes(ScalarType type);
+  static std::uint64_t workspace_bytes(ScalarType type, bool drop_degenerate);
+  /// Bytes of a finished tile that wait for later tiles, mostly.
+  static std::uint64_t boundary_bytes(bool drop_degenerate);
   /// Bytes of output that one tile can make at most.
   static std::uint64_t max_tile_output(bool normals);
 

@@ -14,6 +14,9 @@ struct SurfaceOptions {
   double isovalue = 0;
   bool normals = false;
   Indexing indexing = Indexing::welded;
+  /// Leaves triangles without area out where samples equal the isovalue: the
+  /// vertices around such a sample become one, the mesh stays welded and closed.
+  bool drop_degenerate = false;
   /// Samples between which cells are looked at.
   Box3 roi;
   Transform transform;

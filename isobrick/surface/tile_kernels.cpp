@@ -11,6 +11,7 @@
 
 #include "isobrick/surface/case_tables.h"
 #include "isobrick/surface/tile_scan-inl.h"
+#include "isobrick/surface/tile_ties-inl.h"
 #include "isobrick/surface/tile_triangles-inl.h"
 #include "isobrick/surface/tile_vertices-inl.h"
 
@@ -26,9 +27,17 @@ void Emit(ScalarType type, const KernelContext& context, TileState& tile, Vec3f*
           Vec3f* normals, Triangle* triangles) {
   list_edges(tile);
   visit_scalar(type, [&](auto tag) {
-    emit_vertices<typename decltype(tag)::type>(context, tile, positions, normals);
+    using T = typename decltype(tag)::type;
+    emit_vertices<T>(context, tile, positions, normals);
+    if (tile.ties)
+      emit_tie_vertices<T>(context, tile, positions + tile.edge_vertices,
+                           normals ? normals + tile.edge_vertices : nullptr);
   });
-  emit_triangles(context.world.mirrored ? kMirroredCaseTables : kCaseTables, tile, triangles);
+  const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;
+  if (tile.ties && tile.ties->matter())
+    emit_kept_triangles(tables, tile, triangles);
+  else
+    emit_triangles(tables, tile, triangles);
 }
 
 }  // namespace HWY_NAMESPACE

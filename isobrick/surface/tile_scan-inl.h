@@ -15,6 +15,7 @@
 #include "isobrick/core/threshold.h"
 #include "isobrick/surface/case_tables.h"
 #include "isobrick/surface/tile_kernels.h"
+#include "isobrick/surface/tile_ties.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {
@@ -26,24 +27,40 @@ constexpr std::uint64_t bit_span(int lo, int hi) {
   return (std::uint64_t{2} << hi) - (std::uint64_t{1} << lo);
 }
 
-/// Bit x: samples[x] >= threshold, for the 33 samples of a row.
-template <class T>
-HWY_INLINE std::uint64_t inside_bits(const T* samples, T threshold) {
+/// Bit x: compare(samples[x]), for the 33 samples of a row. `compare` takes vectors.
+template <class T, class Compare>
+HWY_INLINE std::uint64_t row_of_bits(const T* samples, const Compare& compare) {
   const hn::CappedTag<T, 32> d;
-  const auto limit = hn::Set(d, threshold);
   std::uint64_t bits = 0;
   for (std::size_t x = 0; x < 32; x += hn::Lanes(d)) {
     std::uint8_t mask[8] = {};
-    const auto v = hn::LoadU(d, samples + x);
-    if constexpr (std::is_floating_point_v<T>)
-      hn::StoreMaskBits(d, hn::Ge(v, limit), mask);
-    else
-      hn::StoreMaskBits(d, hn::Not(hn::Lt(v, limit)), mask);
+    hn::StoreMaskBits(d, compare(d, hn::LoadU(d, samples + x)), mask);
     std::uint64_t word;
     std::memcpy(&word, mask, 8);
     bits |= word << x;
   }
+  return bits;
+}
+
+/// Bit x: samples[x] >= threshold.
+template <class T>
+HWY_INLINE std::uint64_t inside_bits(const T* samples, T threshold) {
+  const std::uint64_t bits = row_of_bits(samples, [&](auto d, auto v) HWY_ATTR {
+    const auto limit = hn::Set(d, threshold);
+    if constexpr (std::is_floating_point_v<T>)
+      return hn::Ge(v, limit);
+    else
+      return hn::Not(hn::Lt(v, limit));
+  });
   return bits | static_cast<std::uint64_t>(samples[32] >= threshold) << 32;
+}
+
+/// Bit x: samples[x] == value.
+template <class T>
+HWY_INLINE std::uint64_t equal_bits(const T* samples, T value) {
+  const std::uint64_t bits =
+      row_of_bits(samples, [&](auto d, auto v) HWY_ATTR { return hn::Eq(v, hn::Set(d, value)); });
+  return bits | static_cast<std::uint64_t>(samples[32] == value) << 32;
 }
 
 /// Bit x + 1: samples[x] is not a number, for x = −1 … 33.
@@ -60,6 +77,7 @@ inline std::uint64_t nan_bits(const T* samples) {
 template <class T>
 void classify(const KernelContext& context, TileState& tile) {
   const T threshold = Threshold<T>(context.isovalue).value;
+  const std::optional<T> tie = tie_value<T>(context.isovalue);
   const T* samples = reinterpret_cast<const T*>(tile.samples.data());
   const Int3 common = common_sample(context.extent, tile.work.tile);
   const T known = samples[TileLayout::offset(static_cast<int>(common.x), static_cast<int>(common.y),
@@ -76,9 +94,11 @@ void classify(const KernelContext& context, TileState& tile) {
       const int active = (blocks_at(y) & 1 ? of_z & 3 : 0) | (blocks_at(y) & 2 ? of_z >> 2 : 0);
       const std::uint64_t gathered = (active & 1 ? low : 0) | (active & 2 ? high : 0);
       std::uint64_t bits = rest & ~gathered;
-      if (gathered)
-        bits |= gathered & inside_bits(samples + TileLayout::offset(0, y, z), threshold);
+      const T* row = samples + TileLayout::offset(0, y, z);
+      if (gathered) bits |= gathered & inside_bits(row, threshold);
       tile.inside[row_index(y, z)] = bits;
+      if (tile.ties)
+        tile.ties->at[row_index(y, z)] = gathered ? gathered & equal_bits(row, *tie) : 0;
     }
   }
 }
@@ -148,6 +168,14 @@ inline void leave_out_nan(const GoodCells& good, int y, int z, RowBits& bits) {
   bits.y &= (g10 | g11) >> 1 | (g10 | g11);
   bits.z &= (g01 | g11) >> 1 | (g01 | g11);
   bits.cells &= g11 >> 1;
+}
+
+/// Leaves out the edges with a tie at an end, whose vertices are not numbered with the rest.
+inline void leave_out_ties(const TileTies& ties, int y, int z, RowBits& bits) {
+  const std::uint64_t* at = ties.at + row_index(y, z);
+  bits.x &= ~(at[0] | at[0] >> 1);
+  bits.y &= ~(at[0] | at[1]);
+  bits.z &= ~(at[0] | at[kTileSamples]);
 }
 
 /// Lists the active cells of a row with their cases.
@@ -221,10 +249,11 @@ void scan_samples(const KernelContext& context, TileState& tile) {
       RowBits bits = row_bits(tile, y, z);
       if (!(bits.x | bits.y | bits.z | bits.cells)) continue;
       if (look_for_nan) leave_out_nan(good, y, z, bits);
+      if (tile.ties) leave_out_ties(*tile.ties, y, z, bits);
       number = number_row(tile, y, z, bits, number);
       if (bits.cells) list_cells(tile, y, z, bits.cells);
     }
-  tile.vertices = number;
+  tile.edge_vertices = tile.vertices = number;
 }
 
 }  // namespace HWY_NAMESPACE

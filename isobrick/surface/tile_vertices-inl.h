@@ -12,6 +12,7 @@
 #include <bit>
 #include <cstring>
 
+#include "isobrick/core/threshold.h"
 #include "isobrick/surface/tile_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -22,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// Lists the tile's own edges in the order in which scan numbered them.
 inline void list_edges(TileState& tile) {
   const TileShape& s = tile.shape;
-  tile.edges.resize(tile.vertices);
+  tile.edges.resize(tile.edge_vertices);
   std::uint32_t* out = tile.edges.data();
   const auto append = [&out](std::uint32_t word, std::uint32_t code) {
     for (; word; word &= word - 1)
@@ -88,6 +89,32 @@ struct ScalarVertices {
     Vec3f along{0, 0, 0};
     along[axis] = b > a ? 1.0f : -1.0f;
     *normal = context.world.unit_normal(g, along);
+  }
+
+  /// A vertex on the sample at place x | y << 6 | z << 12. Where its gradient
+  /// vanishes, the normal is along its first crossing edge: −x, +x, −y …
+  void write_sample(std::uint32_t place, Vec3f* position, Vec3f* normal) const {
+    const int x = place & 63, y = place >> 6 & 63, z = place >> 12 & 63;
+    const T* p = samples + TileLayout::offset(x, y, z);
+    const Int3 at = tile.shape.origin + Int3{x, y, z};
+    *position = context.world.position(
+        {static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)});
+    if (normal) *normal = context.world.unit_normal(gradient(p, at), first_crossing_edge(p, at));
+  }
+
+  Vec3f first_crossing_edge(const T* p, Int3 at) const {
+    const T threshold = Threshold<T>(context.isovalue).value;
+    Vec3f along{0, 0, 0};
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int side : {-1, 1}) {
+        const Index next = at[axis] + side;
+        if (next < 0 || next >= context.extent[axis]) continue;
+        const T q = p[side * kStep[axis]];
+        if (q != q || (q >= threshold) == (*p >= threshold)) continue;
+        along[axis] = static_cast<float>(q > *p ? side : -side);
+        return along;
+      }
+    return along;
   }
 };
 

@@ -114,6 +114,27 @@ TEST_F(Extract, NothingButVolumeAndIsovalueShowsInTheMesh) {
   }
 }
 
+TEST_F(Extract, LeavesDegenerateTrianglesOutWhateverTheBudget) {
+  const auto field = mixed_field<std::uint8_t>({140, 120, 90});
+  isobrick::testing::Request request{.isovalue = 60, .drop_degenerate = true};
+  request.transform.spacing = {0.5, 1, 2};
+  Mesh expected = isobrick::testing::extract(field, request);
+  const std::uint64_t left_out = expected.degenerate;
+  ASSERT_GT(left_out, 1000u);
+  expected.degenerate = 0;  // which a sink is not told
+  for (const Index brick : {16, 64}) {
+    const StoreReader reader = store(field, {.brick = brick, .shard = 64});
+    for (const std::uint64_t memory : {std::uint64_t{160} << 20, std::uint64_t{1} << 30}) {
+      MemorySink sink;
+      const ExtractReport report = run(
+          reader, {.isovalue = 60, .drop_degenerate = true, .memory = memory, .threads = 2}, sink);
+      EXPECT_EQ(sink.mesh, expected);
+      EXPECT_EQ(report.triangles, expected.triangles.size());
+      EXPECT_EQ(report.degenerate_triangles, left_out);
+    }
+  }
+}
+
 TEST_F(Extract, TheLeastBudgetWorksAndLessIsRefusedByName) {
   const auto field = mixed_field<std::uint16_t>({140, 120, 90});
   const StoreReader reader = store(field, {.brick = 32, .shard = 64});

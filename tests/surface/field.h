@@ -62,6 +62,7 @@ std::vector<ValueRange<T>> block_ranges(const Field<T>& field) {
 struct Mesh {
   std::vector<Vec3f> positions, normals;
   std::vector<Triangle> triangles;
+  std::uint64_t degenerate = 0;  ///< triangles left out
   friend bool operator==(const Mesh&, const Mesh&) = default;
 };
 
@@ -74,6 +75,7 @@ struct Request {
   Transform transform;
   std::size_t batch = ~std::size_t{0};  ///< tiles a call
   std::size_t workspaces = 64;
+  bool drop_degenerate = false;
 };
 
 /// Our mesh of a field, through bricks, ranges and the CPU extractor.
@@ -87,6 +89,7 @@ Mesh extract(const Field<T>& field, const Request& request) {
   options.indexing = request.indexing;
   options.roi = request.roi.value_or(lattice.box());
   options.transform = request.transform;
+  options.drop_degenerate = request.drop_degenerate;
   if constexpr (std::is_floating_point_v<T>)
     for (const T v : field.samples) options.may_have_nan |= std::isnan(v);
   std::vector<TileWork> tiles;
@@ -99,7 +102,8 @@ Mesh extract(const Field<T>& field, const Request& request) {
                       bricks, out);
   return {{out.positions.begin(), out.positions.end()},
           {out.normals.begin(), out.normals.end()},
-          {out.triangles.begin(), out.triangles.end()}};
+          {out.triangles.begin(), out.triangles.end()},
+          extractor.degenerate_triangles()};
 }
 
 /// Each triangle as the three lattice edges its vertices lie on, rotated so

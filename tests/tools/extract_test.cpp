@@ -51,6 +51,34 @@ TEST_F(Extract, NormalsEnlargeTheVertices) {
                              13 * json["surfaces"][0]["triangles"].get<std::size_t>());
 }
 
+// 128 is a value of the samples, 127.5 is not.
+TEST_F(Extract, DegenerateTrianglesAreLeftOutOnRequest) {
+  const std::string store = make_store("a");
+  const auto surface = [&](const char* isovalue, const char* mesh, const Arguments& more) {
+    Arguments arguments{"extract", store, "--isovalue", isovalue, "-o", path(mesh)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_json(arguments)["surfaces"][0];
+  };
+  const nlohmann::json all = surface("128", "all.ply", {});
+  const nlohmann::json kept = surface("128", "kept.ply", {"--drop-degenerate"});
+  EXPECT_FALSE(all.contains("degenerate_triangles"));
+  EXPECT_GT(kept["degenerate_triangles"].get<int>(), 0);
+  EXPECT_EQ(kept["triangles"].get<int>() + kept["degenerate_triangles"].get<int>(),
+            all["triangles"].get<int>());
+  EXPECT_LT(kept["vertices"].get<int>(), all["vertices"].get<int>());
+  EXPECT_NE(read_file(path("kept.ply")).find("element face " + kept["triangles"].dump()),
+            std::string::npos);
+  const nlohmann::json soup = surface("128", "kept.stl", {"--drop-degenerate"});
+  EXPECT_EQ(soup["triangles"], kept["triangles"]);
+  EXPECT_EQ(soup["degenerate_triangles"], kept["degenerate_triangles"]);
+  surface("127.5", "a.ply", {});
+  EXPECT_EQ(surface("127.5", "b.ply", {"--drop-degenerate"})["degenerate_triangles"], 0);
+  EXPECT_TRUE(read_file(path("a.ply")) == read_file(path("b.ply")));
+  const Outcome said =
+      run({"extract", store, "--isovalue", "128", "-o", path("said.ply"), "--drop-degenerate"});
+  EXPECT_NE(said.out.find("degenerate triangles left out"), std::string::npos);
+}
+
 TEST_F(Extract, SeveralIsovaluesGetNamesOfTheirOwn) {
   const std::string store = make_store("a");
   const nlohmann::json json = run_json({"extract", store, "--isovalue", "100", "--isovalue",

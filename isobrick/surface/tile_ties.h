@@ -1,0 +1,93 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "isobrick/surface/boundary_map.h"
+#include "isobrick/surface/case_tables.h"
+#include "isobrick/surface/cell_math.h"
+#include "isobrick/surface/tile_kernels.h"
+
+// Leaving degenerate triangles out. A sample that equals the isovalue, a *tie*,
+// draws the vertices of all crossing edges around it to itself. Here they become
+// one vertex, and triangles with two corners in one vertex are left out. See
+// docs/extraction.md.
+
+namespace isobrick {
+
+/// The sample of type T at which vertices meet: it equals the isovalue in the
+/// type in which samples are interpolated. Nothing when no finite T does.
+template <class T>
+constexpr std::optional<T> tie_value(double isovalue) {
+  using Limits = std::numeric_limits<T>;
+  if (!(isovalue >= static_cast<double>(Limits::lowest()) &&
+        isovalue <= static_cast<double>(Limits::max())))
+    return std::nullopt;
+  const auto value = static_cast<T>(isovalue);
+  if (static_cast<Real<T>>(value) != static_cast<Real<T>>(isovalue)) return std::nullopt;
+  return value;
+}
+
+/// Whether any sample of the type can be a tie.
+bool has_ties(ScalarType type, double isovalue);
+
+namespace ties {
+
+/// The two corners of each edge of a cell.
+inline constexpr auto kEdgeCorners = [] {
+  std::array<std::array<std::uint8_t, 2>, 12> corners{};
+  for (int a = 0; a < 8; ++a)
+    for (int axis_bit = 1; axis_bit < 8; axis_bit *= 2)
+      if (!(a & axis_bit))
+        corners[static_cast<std::size_t>(case_rule::edge_between(a, a | axis_bit))] = {
+            static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(a | axis_bit)};
+  return corners;
+}();
+
+/// The vertex on a crossing edge of a cell whose ties are the bits `at`: the
+/// corner that is a tie, or 8 + edge. Only one end of a crossing edge can be one.
+constexpr int vertex_on(int edge, std::uint32_t at) {
+  const auto [a, b] = kEdgeCorners[static_cast<std::size_t>(edge)];
+  return at >> a & 1 ? a : at >> b & 1 ? b : 8 + edge;
+}
+
+/// Calls f(a, b, c) with the vertices of each triangle of a case that is kept;
+/// the number of those that are not.
+template <class F>
+constexpr std::uint32_t for_each_kept(const CaseTables& tables, std::uint32_t index,
+                                      std::uint32_t at, F&& f) {
+  std::uint32_t left_out = 0;
+  const std::uint8_t* edges = tables.edges[index].data();
+  for (int n = tables.triangles[index]; n > 0; --n, edges += 3) {
+    const int a = vertex_on(edges[0], at), b = vertex_on(edges[1], at), c = vertex_on(edges[2], at);
+    if (a != b && b != c && c != a)
+      f(a, b, c);
+    else
+      ++left_out;
+  }
+  return left_out;
+}
+
+/// The eight bits of a cell at (x, y, z) from rows of bits, in the order of its corners.
+constexpr std::uint32_t corner_bits(const std::uint64_t* rows, int x, int y, int z) {
+  const std::uint64_t* row = rows + row_index(y, z);
+  return static_cast<std::uint32_t>((row[0] >> x & 3) | (row[1] >> x & 3) << 2 |
+                                    (row[kTileSamples] >> x & 3) << 4 |
+                                    (row[kTileSamples + 1] >> x & 3) << 6);
+}
+
+}  // namespace ties
+
+/// After scan_tile: leaves triangles out, finds the ties that the rest has
+/// corners on and the tile that makes each one's vertex, and completes the counts.
+/// With `alone` no other tile exists.
+void count_ties(ScalarType type, const KernelContext& context, bool alone, TileState& tile);
+
+/// Copies the tile's own vertices on ties on its planes to its boundary.
+void publish_ties(TileState& tile);
+
+/// Turns the numbers of vertices on ties into those of the mesh; vertices of tiles
+/// before are asked for.
+void adopt_ties(TileState& tile, const BoundaryMap& map);
+
+}  // namespace isobrick
