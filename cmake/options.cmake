@@ -15,6 +15,10 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 
+# Only libraries that are really called: loading libhwy costs 5 ms, and optimised
+# programs need nothing but its headers.
+add_link_options(LINKER:--as-needed)
+
 # Every library and program of ours: warnings, and floating point exactly as
 # written (no contraction into fma), so that every machine makes the same mesh.
 add_library(isobrick_flags INTERFACE)

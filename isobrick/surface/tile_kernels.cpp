@@ -47,16 +47,59 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace isobrick {
 
-HWY_EXPORT(Scan);
-HWY_EXPORT(Emit);
+namespace {
+
+struct Kernels {
+  decltype(&HWY_STATIC_DISPATCH(Scan)) scan = nullptr;
+  decltype(&HWY_STATIC_DISPATCH(Emit)) emit = nullptr;
+};
+
+// Empty for a target that was not compiled.
+#define ISOBRICK_KERNELS(TARGET) \
+  Kernels { HWY_CHOOSE_##TARGET(Scan), HWY_CHOOSE_##TARGET(Emit) }
+
+/// Those that this processor runs best. Highway's own dispatch would do the
+/// same, but it links libhwy, which times its clock for 5 ms whenever a program
+/// starts.
+Kernels best_kernels() {
+  Kernels best;
+#if HWY_ARCH_X86
+  __builtin_cpu_init();
+  const bool sse4 = __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("sse4.2") &&
+                    __builtin_cpu_supports("aes") && __builtin_cpu_supports("pclmul");
+  const bool avx2 = sse4 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                    __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+  const bool avx3 = avx2 && __builtin_cpu_supports("avx512f") &&
+                    __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
+                    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd");
+  const bool avx3_dl =
+      avx3 && __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("vpclmulqdq") &&
+      __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") &&
+      __builtin_cpu_supports("avx512bitalg") && __builtin_cpu_supports("avx512vpopcntdq");
+  if (avx3_dl) best = ISOBRICK_KERNELS(AVX3_DL);
+  if (avx3 && !best.scan) best = ISOBRICK_KERNELS(AVX3);
+  if (avx2 && !best.scan) best = ISOBRICK_KERNELS(AVX2);
+  if (sse4 && !best.scan) best = ISOBRICK_KERNELS(SSE4);
+#endif
+  // What the compiler's options allow: all that other processors need.
+  if (!best.scan) best = {&HWY_STATIC_DISPATCH(Scan), &HWY_STATIC_DISPATCH(Emit)};
+  return best;
+}
+
+const Kernels& kernels() {
+  static const Kernels best = best_kernels();
+  return best;
+}
+
+}  // namespace
 
 void scan_tile(ScalarType type, const KernelContext& context, TileState& tile) {
-  HWY_DYNAMIC_DISPATCH(Scan)(type, context, tile);
+  kernels().scan(type, context, tile);
 }
 
 void emit_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
                Vec3f* normals, Triangle* triangles) {
-  HWY_DYNAMIC_DISPATCH(Emit)(type, context, tile, positions, normals, triangles);
+  kernels().emit(type, context, tile, positions, normals, triangles);
 }
 
 }  // namespace isobrick
