@@ -14,6 +14,7 @@
 #include <memory>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/pod_buffer.h"
 
 namespace isobrick {
 namespace {
@@ -51,9 +52,8 @@ void append_crc(std::vector<std::byte>& bytes) {
 // Compresses into a buffer of the thread first: what is handed out is then
 // exactly as large as what it holds, and the bound is not allocated each time.
 std::vector<std::byte> compress(std::span<const std::byte> bytes, int level, std::size_t reserve) {
-  thread_local std::vector<std::byte> buffer;
-  const std::size_t bound = ZSTD_compressBound(bytes.size());
-  if (buffer.size() < bound) buffer.resize(bound);
+  thread_local PodBuffer<std::byte> buffer;
+  buffer.resize(ZSTD_compressBound(bytes.size()));
   const std::size_t size = ZSTD_compressCCtx(compression_context(), buffer.data(), buffer.size(),
                                              bytes.data(), bytes.size(), level);
   if (ZSTD_isError(size))

@@ -7,13 +7,13 @@ namespace {
 
 // Each waiting file holds a descriptor.
 constexpr std::size_t kMaxQueue = 64;
-constexpr int kThreads = 8;
+constexpr std::size_t kMaxThreads = 8;
+// Files up to so many bytes wait in memory.
+constexpr std::size_t kMaxWaiting = std::size_t{64} << 10;
 
 }  // namespace
 
-Publisher::Publisher(std::filesystem::path root) : root_(std::move(root)) {
-  for (int i = 0; i < kThreads; ++i) threads_.emplace_back([this] { run(); });
-}
+Publisher::Publisher(std::filesystem::path root) : root_(std::move(root)) {}
 
 Publisher::~Publisher() {
   {
@@ -25,11 +25,13 @@ Publisher::~Publisher() {
 }
 
 void Publisher::Job::run() {
-  if (!file) {
-    sync_directory(path);
-    return;
-  }
+  if (kind == Kind::sync_directory) return isobrick::sync_directory(path);
+  if (kind == Kind::sync_file) return file.sync();
   try {
+    if (kind == Kind::write) {
+      file = StoreFile::create(temporary_name(path));
+      file.write_at(0, content);
+    }
     publish_file(std::move(file), path);
   } catch (...) {
     std::error_code ignored;
@@ -65,24 +67,45 @@ void Publisher::rethrow_failure() {
   if (failure_) std::rethrow_exception(failure_);
 }
 
-void Publisher::publish(StoreFile temporary, std::filesystem::path path) {
+void Publisher::start_thread() {
+  if (threads_.size() < kMaxThreads && threads_.size() < queue_.size() + busy_)
+    threads_.emplace_back([this] { run(); });
+  changed_.notify_all();
+}
+
+void Publisher::add(Job job, const std::filesystem::path& parent) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return queue_.size() < kMaxQueue; });
   rethrow_failure();
   // The folders above may be new as well, so their own entries must be synced too.
-  for (auto folder = path.parent_path(); directories_.insert(folder).second;
-       folder = folder.parent_path())
+  for (auto folder = parent; directories_.insert(folder).second; folder = folder.parent_path())
     if (folder == root_ || !folder.has_relative_path()) break;
-  queue_.push_back({std::move(temporary), std::move(path)});
-  lock.unlock();
-  changed_.notify_all();
+  queue_.push_back(std::move(job));
+  start_thread();
 }
 
-void Publisher::write(const std::filesystem::path& path, std::span<const std::byte> content) {
+void Publisher::publish(StoreFile temporary, std::filesystem::path path) {
+  const std::filesystem::path parent = path.parent_path();
+  add({Job::Kind::publish, std::move(temporary), std::move(path), {}}, parent);
+}
+
+void Publisher::sync(StoreFile file) {
+  const std::filesystem::path parent = file.path().parent_path();
+  add({Job::Kind::sync_file, std::move(file), {}, {}}, parent);
+}
+
+StoreFile Publisher::write_temporary(const std::filesystem::path& path,
+                                     std::span<const std::byte> content) {
   StoreFile file = StoreFile::create(temporary_name(path));
   file.write_at(0, content);
   count(content.size());
-  publish(std::move(file), path);
+  return file;
+}
+
+void Publisher::write(const std::filesystem::path& path, std::span<const std::byte> content) {
+  if (content.size() > kMaxWaiting) return publish(write_temporary(path, content), path);
+  count(content.size());
+  add({Job::Kind::write, {}, path, {content.begin(), content.end()}}, path.parent_path());
 }
 
 void Publisher::write(const std::filesystem::path& path, std::string_view text) {
@@ -97,8 +120,10 @@ void Publisher::drain(std::unique_lock<std::mutex>& lock) {
 void Publisher::wait() {
   std::unique_lock lock(mutex_);
   drain(lock);
-  for (const auto& directory : std::exchange(directories_, {})) queue_.push_back({{}, directory});
-  changed_.notify_all();
+  for (const auto& directory : std::exchange(directories_, {})) {
+    queue_.push_back({Job::Kind::sync_directory, {}, directory, {}});
+    start_thread();
+  }
   drain(lock);
 }
 

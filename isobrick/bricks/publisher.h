@@ -29,7 +29,12 @@ class Publisher {
 
   /// Takes a file written under its temporary name.
   void publish(StoreFile temporary, std::filesystem::path path);
-  /// Writes a whole file under a temporary name and publishes it.
+  /// Takes a file that only needs to be synced, and keeps the name that it has.
+  void sync(StoreFile file);
+  /// Writes a whole file under the temporary name of `path`, and no more.
+  StoreFile write_temporary(const std::filesystem::path& path, std::span<const std::byte> content);
+  /// Writes a whole file under a temporary name and publishes it, small ones on
+  /// the publisher's threads.
   void write(const std::filesystem::path& path, std::span<const std::byte> content);
   void write(const std::filesystem::path& path, std::string_view text);
   /// Returns when all files are on disk under their final names, the entries of
@@ -41,13 +46,18 @@ class Publisher {
   std::uint64_t bytes() const { return bytes_; }
 
  private:
-  /// A file to sync and rename, or without one a directory to sync.
   struct Job {
+    enum class Kind : std::uint8_t { publish, sync_file, sync_directory, write };
+    Kind kind = Kind::publish;
     StoreFile file;
-    std::filesystem::path path;
+    std::filesystem::path path;      ///< the final one
+    std::vector<std::byte> content;  ///< of a file that is still to be written
     void run();
   };
+  void add(Job job, const std::filesystem::path& parent);
   void run();
+  /// Wakes a thread, or makes one when all have something to do.
+  void start_thread();
   void drain(std::unique_lock<std::mutex>& lock);
   void rethrow_failure();
 
@@ -58,7 +68,7 @@ class Publisher {
   std::deque<Job> queue_;
   std::set<std::filesystem::path> directories_;  // whose entries are not yet durable
   std::exception_ptr failure_;
-  int busy_ = 0;
+  std::size_t busy_ = 0;
   bool stop_ = false;
   std::vector<std::thread> threads_;
 };

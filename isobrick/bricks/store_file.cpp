@@ -144,10 +144,14 @@ bool is_temporary_name(const std::filesystem::path& path) {
   return path.extension() == kTemporarySuffix;
 }
 
+void rename_file(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (::rename(from.c_str(), to.c_str()) != 0)
+    throw system_error("rename a finished file to", to.string(), errno);
+}
+
 void publish_file(StoreFile temporary, const std::filesystem::path& path) {
   temporary.sync();
-  if (::rename(temporary.path().c_str(), path.c_str()) != 0)
-    throw system_error("rename a finished file to", path.string(), errno);
+  rename_file(temporary.path(), path);
 }
 
 void sync_directory(const std::filesystem::path& directory) {

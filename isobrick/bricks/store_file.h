@@ -61,6 +61,9 @@ std::string read_small_file(const std::filesystem::path& path, std::uint64_t lim
 std::filesystem::path temporary_name(const std::filesystem::path& path);
 bool is_temporary_name(const std::filesystem::path& path);
 
+/// Gives a finished file its final name.
+void rename_file(const std::filesystem::path& from, const std::filesystem::path& to);
+
 /// Syncs the temporary file and gives it its final name.
 void publish_file(StoreFile temporary, const std::filesystem::path& path);
 

@@ -169,8 +169,13 @@ void StoreWriter::Impl::begin() {
   }
   publisher = std::make_unique<Publisher>(dir);
   if (empty) {
-    publisher->write(dir / kLayoutMarker, layout_marker(layout).dump(1) + "\n");
-    publisher->wait();
+    // It has its name before any other file is there. That it is durable is not
+    // waited for: what a power failure can take with it was begun a moment ago.
+    const std::string text = layout_marker(layout).dump(1) + "\n";
+    StoreFile marker =
+        publisher->write_temporary(dir / kLayoutMarker, std::as_bytes(std::span(text)));
+    rename_file(marker.path(), dir / kLayoutMarker);
+    publisher->sync(std::move(marker));
   }
   for (std::size_t i = 0; i < layout.levels.size(); ++i) {
     const LevelInfo& info = layout.levels[i];
@@ -319,20 +324,21 @@ void StoreWriter::finish(bool may_have_nan) {
     publisher.write(impl_->dir / "isobrick" / std::to_string(i) / "zarr.json", group_json());
     publisher.write(l.folder / "zarr.json", to_json(l.metadata));
   }
-  publisher.wait();
-  // Only now does the directory become a store.
   ImageMetadata image = image_metadata(impl_->layout);
   image.may_have_nan = may_have_nan;
   std::vector<std::string> levels;
   for (const Impl::Level& l : impl_->levels) levels.push_back(to_json(l.metadata));
   image.checksum = metadata_checksum(to_json(image), levels, quoted(impl_->dir / "zarr.json"));
-  publisher.write(impl_->dir / "zarr.json", to_json(image));
+  const std::filesystem::path root = impl_->dir / "zarr.json";
+  const std::string text = to_json(image);
+  publisher.sync(publisher.write_temporary(root, std::as_bytes(std::span(text))));
   publisher.wait();
+  // Only now, with everything on disk, does the directory become a store.
+  rename_file(temporary_name(root), root);
   std::error_code failure;
   std::filesystem::remove(impl_->dir / kLayoutMarker, failure);
   if (failure) throw system_error("remove", (impl_->dir / kLayoutMarker).string(), failure.value());
   sync_directory(impl_->dir);
-  sync_directory(impl_->dir / "..");  // may be new there itself
 }
 
 std::uint64_t StoreWriter::bytes() const { return impl_->publisher->bytes(); }

@@ -54,7 +54,8 @@ class StoreWriter {
   void put_brick_ranges(int level, Box3 box, std::span<const std::byte> pairs);
   void put_block_ranges(int level, Box3 box, std::span<const std::byte> pairs);
 
-  /// Metadata, the group's last of all; then everything is on disk.
+  /// Metadata, the group's last of all; then everything in `dir` is on disk (its
+  /// own name is the caller's to sync).
   /// `may_have_nan` replaces the layout's, known only now.
   void finish(bool may_have_nan);
 

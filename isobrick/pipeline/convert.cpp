@@ -129,7 +129,9 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
       downsample(lattice.type, box.extent(), buffer.get(), half.get());
       next->write({half_extent(box.lo), half_extent(box.hi)}, half.get());
     });
-    if (p.x + 1 == pieces.x && p.y + 1 == pieces.y) writer.close(box.hi.z);
+    if (p.x + 1 < pieces.x || p.y + 1 < pieces.y) return;
+    writer.record(box.hi.z);
+    writer.close(box.hi.z);
   });
   return next;
 }

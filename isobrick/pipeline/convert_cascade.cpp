@@ -1,6 +1,7 @@
 #include "isobrick/pipeline/convert_cascade.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <future>
@@ -78,12 +79,18 @@ void Cascade::flush(std::size_t i) {
     if (coarser != nullptr)
       downsample(stage.lattice.type, box.extent(), stage.slab.get(), coarser->free_planes());
   });
-  stage.writer->close(box.hi.z);
+  stage.writer->record(box.hi.z);
+  bool coarser_is_full = false;
   if (coarser != nullptr) {
     coarser->planes += half_extent(box.extent()).z;
     const bool last = box.hi.z == stage.lattice.extent.z;
-    if (last || coarser->planes == coarser->capacity) flush(i + 1);
+    coarser_is_full = last || coarser->planes == coarser->capacity;
   }
+  // Coarse levels have too few bricks to keep all threads busy.
+  tbb::parallel_invoke([&] { stage.writer->close(box.hi.z); },
+                       [&] {
+                         if (coarser_is_full) flush(i + 1);
+                       });
   stage.z0 = box.hi.z;
   stage.planes = 0;
 }

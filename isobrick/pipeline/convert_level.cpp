@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "isobrick/bricks/codec.h"
+#include "isobrick/core/pod_buffer.h"
 
 namespace isobrick {
 namespace {
@@ -49,14 +50,15 @@ LevelWriter::Parcel LevelWriter::pack(Int3 brick, Box3 box, const std::byte* sam
   const Int3 n = bricks_per_shard_;
   parcel.kept = is_kept({brick.x / n.x, brick.y / n.y, brick.z / n.z});
   if (parcel.kept && journal_ == nullptr) return parcel;
-  thread_local std::vector<std::byte> scratch;
+  thread_local PodBuffer<std::byte> scratch;
   scratch.resize(lattice.brick_bytes());
   gather(lattice.brick_box(brick), lattice.brick, box, samples, lattice.sample_bytes(),
          scratch.data());
   pad_brick(lattice, brick, layout_.fill_value, scratch.data());
-  if (journal_ != nullptr) parcel.crc = crc32c(scratch);
+  if (journal_ != nullptr) parcel.crc = crc32c(scratch.span());
   if (!parcel.kept)
-    parcel.encoded = encode_brick(lattice.type, scratch, layout_.fill_value, layout_.zstd_level);
+    parcel.encoded =
+        encode_brick(lattice.type, scratch.span(), layout_.fill_value, layout_.zstd_level);
   return parcel;
 }
 
@@ -108,6 +110,10 @@ void LevelWriter::finish_shards(Index z1) {
     });
 }
 
+void LevelWriter::record(Index z1) {
+  if (journal_ != nullptr) journal_->close(z1);
+}
+
 void LevelWriter::close(Index z1) {
   ranges_->close(
       z1,
@@ -117,8 +123,6 @@ void LevelWriter::close(Index z1) {
       [&](Box3 items, std::span<const std::byte> pairs) {
         store_.put_brick_ranges(level_, items, pairs);
       });
-  // What was read is on record before a resume can find it used.
-  if (journal_ != nullptr) journal_->close(z1);
   finish_shards(z1);
 }
 

@@ -33,8 +33,11 @@ class LevelWriter {
   /// whatever the threads, so a shard's bytes are always the same.
   void write(Box3 box, const std::byte* samples, const std::function<void()>& meanwhile);
 
-  /// All samples below z1 were written: finishes the shards and ranges that
-  /// this completes.
+  /// All samples below z1 were written: puts them on the journal's record. Comes
+  /// before anything made of them is finished, here or in a coarser level,
+  /// because a resume takes what is finished as this input's.
+  void record(Index z1);
+  /// Finishes the shards and ranges that the samples below z1 complete.
   void close(Index z1);
 
   bool has_nan() const { return ranges_->has_nan(); }
