@@ -48,8 +48,7 @@ void add_convert(Program& program) {
   add_path(app, "OUT", arguments->out, "Store to write, such as OUT.zarr");
   add_raw_options(app, arguments->raw);
   add_store_options(app, arguments->store);
-  program.commands.push_back(
-      {app, [arguments](Console& console) { return run(*arguments, console); }});
+  add_run(program, app, arguments, run);
 }
 
 }  // namespace isobrick::tools

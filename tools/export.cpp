@@ -56,8 +56,7 @@ void add_export(Program& program) {
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_force(app, arguments->force);
-  program.commands.push_back(
-      {app, [arguments](Console& console) { return run(*arguments, console); }});
+  add_run(program, app, arguments, run);
 }
 
 }  // namespace isobrick::tools

@@ -338,8 +338,7 @@ void add_extract(Program& program) {
   add_force(app, arguments->force);
   add_flag(app, "--no-space-check", arguments->no_space_check,
            "Begin even if the estimate says that the disk is too small");
-  program.commands.push_back(
-      {app, [arguments](Console& console) { return run(*arguments, console); }});
+  add_run(program, app, arguments, run);
 }
 
 }  // namespace isobrick::tools

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,6 +44,14 @@ void add_man(Program& program);
 /// A new subcommand with what all of them have: --json, --quiet, an example.
 CLI::App* add_subcommand(Program& program, const std::string& name, const std::string& description,
                          const std::string& example);
+
+/// What the subcommand does with its arguments, which the options fill.
+template <class Arguments>
+void add_run(Program& program, CLI::App* app, std::shared_ptr<Arguments> arguments,
+             int (*run)(const Arguments&, Console&)) {
+  program.commands.push_back(
+      {app, [arguments, run](Console& console) { return run(*arguments, console); }});
+}
 
 /// How an option is called and explained.
 struct OptionText {

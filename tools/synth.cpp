@@ -117,8 +117,7 @@ void add_synth(Program& program) {
   add_parsed(app, arguments->synth.noise, parse_number,
              {"--noise", "A", "Amplitude of the gyroid's noise, as a part of the field's", "0.01"});
   add_store_options(app, arguments->store);
-  program.commands.push_back(
-      {app, [arguments](Console& console) { return run(*arguments, console); }});
+  add_run(program, app, arguments, run);
 }
 
 }  // namespace isobrick::tools

@@ -53,8 +53,7 @@ void add_verify(Program& program) {
                                  "isobrick verify head.zarr");
   add_path(app, "STORE", arguments->store, "Store to check");
   add_threads(app, arguments->threads);
-  program.commands.push_back(
-      {app, [arguments](Console& console) { return run(*arguments, console); }});
+  add_run(program, app, arguments, run);
 }
 
 }  // namespace isobrick::tools

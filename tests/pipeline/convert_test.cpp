@@ -110,11 +110,7 @@ TEST(ConvertBudget, SlowerPathsWriteTheSameBytes) {
   // A slab has 15 MiB more than the least budget leaves for samples.
   const Int3 extent{400, 300, 36};
   TemporaryFolder folder;
-  ConvertOptions options;
-  options.brick = 16;
-  options.shard = 512;
-  options.threads = 2;
-  options.zstd_level = 1;
+  ConvertOptions options{.brick = 16, .shard = 512, .zstd_level = 1, .threads = 2};
   MemorySource source = make_source<double>(extent, 4);
   convert_quietly(source, folder / "fast", options);
   const auto fast = tree_of(folder / "fast");
@@ -140,10 +136,7 @@ TEST(ConvertBudget, SlowerPathsWriteTheSameBytes) {
 TEST(ConvertBudget, OddBricksKeepSamplesAndRangesInPieces) {
   const Int3 extent{150, 140, 100};
   TemporaryFolder folder;
-  ConvertOptions options;
-  options.brick = 33;
-  options.shard = 99;
-  options.threads = 1;
+  ConvertOptions options{.brick = 33, .shard = 99, .threads = 1};
   MemorySource source = make_source<double>(extent, 8);
   options.memory = least_budget(source, options, folder);
   convert_quietly(source, folder / "a", options);
