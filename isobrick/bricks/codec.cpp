@@ -201,6 +201,16 @@ std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
   return encode_bytes(CodecChain::ours(zstd_level), samples);
 }
 
+std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> encoded) {
+  if (encoded.size() < kCrcBytes) throw DamageError("too short for a checksum");
+  if (chain.steps.front() == ByteCodec::crc32c) return encoded.size() - kCrcBytes;
+  const unsigned long long size =
+      ZSTD_getFrameContentSize(encoded.data(), encoded.size() - kCrcBytes);
+  if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR)
+    throw DamageError("is no zstd frame that says its size");
+  return size;
+}
+
 void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
                   std::span<const std::byte> encoded, std::span<std::byte> out) {
   // Two buffers for the rare chain that compresses more than once.

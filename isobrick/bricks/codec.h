@@ -60,6 +60,10 @@ std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_byte
 /// Encodes bytes by a chain of our own making. Thread-safe.
 std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes);
 
+/// The bytes that `encoded` decodes to, as it says itself; for chains of our own
+/// making. Throws DamageError when it does not say. Nothing is checked but that.
+std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> encoded);
+
 /// Decodes into exactly `out`, native byte order. Throws DamageError saying what
 /// is wrong, not where. Thread-safe.
 void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,

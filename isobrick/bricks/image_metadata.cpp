@@ -208,8 +208,9 @@ std::uint32_t metadata_checksum(std::string_view root, std::span<const std::stri
   nlohmann::json covered;
   // Other programs may add to the rest of `ome` how they show the image.
   covered["multiscales"] = attributes.at("ome").at("multiscales").raw();
-  covered["isobrick"] = attributes.at("isobrick").raw();
-  if (covered["isobrick"].is_object()) covered["isobrick"].erase(kChecksumKey);
+  if (attributes.has("isobrick")) covered["isobrick"] = attributes.at("isobrick").raw();
+  if (attributes.has("isobrick") && covered["isobrick"].is_object())
+    covered["isobrick"].erase(kChecksumKey);
   covered["levels"] = nlohmann::json::array();
   for (std::size_t i = 0; i < levels.size(); ++i) {
     nlohmann::json level = parse_json(levels[i], fmt::format("{}: level {}", where, i));

@@ -43,7 +43,8 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
 /// CRC-32C over the values that the root's zarr.json and those of its levels
 /// hold, in the order of the levels; docs/store_format.md says over which and
 /// how. The root's own checksum does not enter it, nor does how the JSON is laid
-/// out. `where` names the root's file.
+/// out. Images of others, without `attributes.isobrick`, have one, too.
+/// `where` names the root's file.
 std::uint32_t metadata_checksum(std::string_view root, std::span<const std::string> levels,
                                 const std::string& where);
 

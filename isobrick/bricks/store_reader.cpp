@@ -5,8 +5,8 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <mutex>
 
+#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/image_metadata.h"
@@ -37,7 +37,7 @@ struct StoreReader::Impl {
     ArrayMetadata metadata;
     std::filesystem::path folder;
     Int3 shards, bricks_per_shard;
-    std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // once needed
+    std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // null: none
   };
   struct Place {
     std::shared_ptr<const StoreFile> file;
@@ -45,8 +45,8 @@ struct StoreReader::Impl {
   };
 
   void open(const std::filesystem::path& path);
-  void check_ours(const ImageMetadata& image, const std::string& root,
-                  std::span<const std::string> level_texts) const;
+  void check_ours(const ImageMetadata& image) const;
+  bool find_ranges(std::optional<bool>& may_have_nan) const;
   void open_level(const ImageMetadata::Level& described, const std::string& text);
   void open_ranges(int level);
   void check_brick(int level, Int3 b) const;
@@ -73,7 +73,6 @@ struct StoreReader::Impl {
   std::atomic<std::uint64_t> bytes_read = 0;
   LruCache<StoreFile> files{kMaxOpenFiles};
   LruCache<ShardIndex> indices{kIndexCacheBytes};
-  std::mutex range_mutex;
 };
 
 void StoreReader::Impl::open(const std::filesystem::path& path) {
@@ -100,19 +99,21 @@ void StoreReader::Impl::open(const std::filesystem::path& path) {
     level_texts.push_back(read_small_file(level_file, kMaxMetadataBytes, &exists));
     if (!exists) throw DamageError(quoted(level_file) + " is missing");
   }
-  check_ours(image, text, level_texts);
+  info.ours = image.ours;
+  info.metadata_crc32c = metadata_checksum(text, level_texts, quoted(file));
+  check_ours(image);
   for (std::size_t i = 0; i < image.levels.size(); ++i) open_level(image.levels[i], level_texts[i]);
-  if (image.ours)
+  std::optional<bool> may_have_nan = image.may_have_nan;
+  if (image.ours || find_ranges(may_have_nan))
     for (std::size_t i = 0; i < levels.size(); ++i) open_ranges(static_cast<int>(i));
   info.type = info.levels[0].lattice.type;
   info.fill_value = levels[0].metadata.fill_value;
   info.codec = levels[0].metadata.codecs.name();
-  info.may_have_nan = is_floating(info.type) && image.may_have_nan.value_or(true);
+  info.may_have_nan = is_floating(info.type) && may_have_nan.value_or(true);
 }
 
 // Metadata of ours says what it must be; that of others has only its syntax.
-void StoreReader::Impl::check_ours(const ImageMetadata& image, const std::string& root,
-                                   std::span<const std::string> level_texts) const {
+void StoreReader::Impl::check_ours(const ImageMetadata& image) const {
   const std::string where = quoted(info.path / "zarr.json");
   if (!image.ours) {
     if (std::filesystem::exists(info.path / "isobrick" / "zarr.json"))
@@ -122,12 +123,20 @@ void StoreReader::Impl::check_ours(const ImageMetadata& image, const std::string
   if (!image.checksum)
     throw DamageError(where +
                       ": metadata was changed: attributes.isobrick.metadata_crc32c is missing");
-  const std::uint32_t checksum = metadata_checksum(root, level_texts, where);
-  if (checksum != *image.checksum)
+  if (info.metadata_crc32c != *image.checksum)
     throw DamageError(
         fmt::format("{}: metadata was changed, here or in a level's zarr.json: its "
                     "checksum is {}, not metadata_crc32c {}",
-                    where, checksum, *image.checksum));
+                    where, info.metadata_crc32c, *image.checksum));
+}
+
+// Whether ranges were added to an image of others as it is now: if its metadata
+// was changed since, they are of another image.
+bool StoreReader::Impl::find_ranges(std::optional<bool>& may_have_nan) const {
+  const std::optional<AddedRanges> added = read_added_ranges(info.path);
+  if (!added || added->image_crc32c != info.metadata_crc32c) return false;
+  may_have_nan = added->may_have_nan;
+  return true;
 }
 
 // Ranges of other extents than the level's show a shape that cannot be right
@@ -271,19 +280,11 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 
 
 RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
   check_brick(level, {0, 0, 0});
-  std::shared_ptr<const RangeArrayReader> reader;
-  {
-    const std::lock_guard lock(range_mutex);
-    Level& l = levels[static_cast<std::size_t>(level)];
-    auto& cached = blocks ? l.block_ranges : l.brick_ranges;
-    if (!cached) {
-      const Lattice& samples = lattice(level);
-      cached = std::make_shared<const RangeArrayReader>(
-          blocks ? block_range_folder(info.path, level) : brick_range_folder(info.path, level),
-          blocks ? samples.blocks() : samples.bricks(), samples.type);
-    }
-    reader = cached;
-  }
+  const auto& reader = blocks ? at(level).block_ranges : at(level).brick_ranges;
+  if (!reader)
+    throw Error(
+        fmt::format("level {} of '{}' has no ranges; 'isobrick index' with --kind computes them",
+                    level, info.path.string()));
   return reader->read(box, bytes_read);
 }
 
@@ -326,6 +327,11 @@ void StoreReader::will_need(int level, Int3 b) const {
 }
 
 std::uint64_t StoreReader::bytes_read() const { return impl_->bytes_read; }
+
+bool StoreReader::has_ranges(int level) const {
+  const Impl::Level& l = impl_->levels.at(static_cast<std::size_t>(level));
+  return l.brick_ranges && l.block_ranges;
+}
 
 RangeTable StoreReader::brick_ranges(int level, Box3 box) const {
   return impl_->ranges(level, box, false);

@@ -30,10 +30,12 @@ struct StoreInfo {
   std::filesystem::path path;
   std::vector<LevelInfo> levels;
   ScalarType type = ScalarType::u8;
-  double fill_value = 0;        ///< of absent bricks; exact for every type
-  std::string codec;            ///< "zstd:3" or "none"
+  double fill_value = 0;  ///< of absent bricks; exact for every type
+  std::string codec;      ///< "zstd:3" or "none"
   /// Whether level 0 may hold NaN (always false for integers).
   bool may_have_nan = false;
+  bool ours = true;                   ///< false: an image that another program has written
+  std::uint32_t metadata_crc32c = 0;  ///< metadata_checksum() of what was read
 };
 
 /// Where a brick lies on disk.
@@ -76,6 +78,10 @@ class StoreReader {
 
   /// Bytes read from disk so far (bricks, indices, ranges).
   std::uint64_t bytes_read() const;
+
+  /// Whether the level has both kinds of ranges. Without them no surface can be
+  /// extracted; `isobrick index` adds them.
+  bool has_ranges(int level) const;
 
   /// Edge, in blocks, of the chunks in which block ranges are stored: reading
   /// an aligned cube of them touches one file.

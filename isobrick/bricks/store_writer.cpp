@@ -308,7 +308,7 @@ void StoreWriter::put_block_ranges(int level, Box3 box, std::span<const std::byt
   impl_->level(level).block_ranges->put(box, pairs);
 }
 
-void StoreWriter::finish(bool may_have_nan) {
+void StoreWriter::finish(bool may_have_nan, const std::function<void()>& more) {
   Publisher& publisher = *impl_->publisher;
   {
     const std::lock_guard lock(impl_->mutex);
@@ -335,6 +335,7 @@ void StoreWriter::finish(bool may_have_nan) {
   publisher.wait();
   // Only now, with everything on disk, does the directory become a store.
   rename_file(temporary_name(root), root);
+  if (more) more();
   std::error_code failure;
   std::filesystem::remove(impl_->dir / kLayoutMarker, failure);
   if (failure) throw system_error("remove", (impl_->dir / kLayoutMarker).string(), failure.value());

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -56,8 +57,10 @@ class StoreWriter {
 
   /// Metadata, the group's last of all; then everything in `dir` is on disk (its
   /// own name is the caller's to sync).
-  /// `may_have_nan` replaces the layout's, known only now.
-  void finish(bool may_have_nan);
+  /// `may_have_nan` replaces the layout's, known only now. `more`, if there is
+  /// one, adds to the store, which can be read by then; should it fail, a resume
+  /// goes on.
+  void finish(bool may_have_nan, const std::function<void()>& more = nullptr);
 
   /// Bytes written so far, all files.
   std::uint64_t bytes() const;

@@ -1,0 +1,43 @@
+#include "isobrick/bricks/added_ranges.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/sealed_json.h"
+#include "isobrick/bricks/store_file.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kVersion = 1;
+
+}  // namespace
+
+std::filesystem::path added_ranges_file(const std::filesystem::path& store) {
+  return store / "isobrick" / "ranges.json";
+}
+
+std::string to_json(const AddedRanges& added) {
+  nlohmann::json json;
+  json["isobrick_ranges"] = kVersion;
+  json["may_have_nan"] = added.may_have_nan;
+  json["image_crc32c"] = added.image_crc32c;
+  return seal_json(std::move(json));
+}
+
+std::optional<AddedRanges> read_added_ranges(const std::filesystem::path& store) {
+  const std::filesystem::path file = added_ranges_file(store);
+  bool exists = false;
+  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  if (!exists) return std::nullopt;
+  const nlohmann::json object = unseal_json(text, quoted(file));
+  const CheckedJson json(object, quoted(file));
+  if (const Index version = json.at("isobrick_ranges").integer(); version != kVersion)
+    json.unsupported(fmt::format(
+        "ranges version {} is not known to this program, which knows {}; use a newer one", version,
+        kVersion));
+  return AddedRanges{json.at("may_have_nan").boolean(),
+                     static_cast<std::uint32_t>(json.at("image_crc32c").integer())};
+}
+
+}  // namespace isobrick

@@ -1,0 +1,115 @@
+#include "isobrick/bricks/index_chunk.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/codec.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+/// Files up to here are read at once: that is about what a disk reads in the
+/// time of one seek, or of one request to a network.
+constexpr std::uint64_t kSmallFile = std::uint64_t{512} << 10;
+
+CodecChain chain_of(bool compressed) {
+  return CodecChain::ours(compressed ? std::optional(0) : std::nullopt);
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_index_part(std::optional<int> zstd_level,
+                                         std::span<const std::byte> bytes) {
+  return encode_bytes(CodecChain::ours(zstd_level), bytes);
+}
+
+IndexChunkWriter::IndexChunkWriter(std::filesystem::path path, std::size_t parts)
+    : path_(std::move(path)), file_(StoreFile::create(temporary_name(path_))), places_(parts) {}
+
+IndexChunkWriter::~IndexChunkWriter() {
+  std::error_code ignored;
+  if (file_) std::filesystem::remove(temporary_name(path_), ignored);
+}
+
+void IndexChunkWriter::append(std::size_t part, std::span<const std::byte> encoded) {
+  file_.write_at(end_, encoded);
+  places_[part] = {end_, encoded.size()};
+  end_ += encoded.size();
+}
+
+void IndexChunkWriter::publish(Publisher& publisher) {
+  const std::vector<std::byte> places = places_.encode();
+  file_.write_at(end_, places);
+  publisher.count(end_ + places.size());
+  publisher.publish(std::move(file_), path_);
+}
+
+IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed)
+    : file_(StoreFile::open_if_exists(path)), compressed_(compressed), places_(parts) {
+  if (!file_) throw DamageError(fmt::format("'{}' is missing", path.string()));
+  size_ = file_.size();
+  const std::uint64_t tail = ShardIndex::encoded_size(parts, true);
+  if (size_ < tail)
+    throw DamageError(fmt::format("'{}': {} bytes are too few for {} parts of an index",
+                                  path.string(), size_, parts));
+  const bool small = size_ <= kSmallFile;
+  std::vector<std::byte> bytes(static_cast<std::size_t>(small ? size_ : tail));
+  file_.read_at(size_ - bytes.size(), bytes);
+  bytes_read_ += bytes.size();
+  try {
+    places_ = ShardIndex::decode(std::span(bytes).last(static_cast<std::size_t>(tail)), true,
+                                 size_ - tail);
+  } catch (const DamageError& e) {
+    throw DamageError(fmt::format("'{}': {}", path.string(), e.what()));
+  }
+  // Parts leave no gaps, so their sizes tell the file's.
+  if (places_.brick_bytes() != size_ - tail)
+    throw DamageError(fmt::format("'{}' has {} bytes, but its parts and their places {}",
+                                  path.string(), size_, places_.brick_bytes() + tail));
+  if (small) whole_ = std::move(bytes);
+}
+
+bool IndexChunk::is_whole(const std::filesystem::path& path, std::size_t parts) {
+  try {
+    const IndexChunk chunk(path, parts, false);
+    return true;
+  } catch (const DamageError&) {
+    return false;
+  }
+}
+
+std::span<const std::byte> IndexChunk::encoded(const ShardIndex::Entry& place,
+                                               std::vector<std::byte>& buffer) const {
+  const auto size = static_cast<std::size_t>(place.size);
+  if (!whole_.empty())
+    return std::span(whole_).subspan(static_cast<std::size_t>(place.offset), size);
+  if (place.size > kMaxIndexPartBytes + kMaxIndexPartBytes / 8)
+    throw DamageError("too long for a part of an index");
+  buffer.resize(size);
+  file_.read_at(place.offset, buffer);
+  bytes_read_ += place.size;
+  return buffer;
+}
+
+bool IndexChunk::read(std::size_t part, std::vector<std::byte>& out) const {
+  if (!has(part)) return false;
+  const CodecChain chain = chain_of(compressed_);
+  try {
+    std::vector<std::byte> buffer;
+    const auto bytes = encoded(places_[part], buffer);
+    const std::uint64_t size = decoded_size(chain, bytes);
+    if (size > kMaxIndexPartBytes)
+      throw DamageError(fmt::format("{} bytes are too many for a part of an index", size));
+    out.resize(static_cast<std::size_t>(size));
+    decode_bytes(chain, 1, bytes, out);
+  } catch (const DamageError& e) {
+    throw DamageError(fmt::format("{}: {}", where(part), e.what()));
+  }
+  return true;
+}
+
+std::string IndexChunk::where(std::size_t part) const {
+  return fmt::format("{} at {} + {}", quoted(path()), places_[part].offset, places_[part].size);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "isobrick/bricks/publisher.h"
+#include "isobrick/bricks/shard_index.h"
+#include "isobrick/bricks/store_file.h"
+
+// The file of an index chunk: parts, each encoded like a brick, and where they
+// are. What a part holds is not known here. docs/store_format.md has the bytes.
+
+namespace isobrick {
+
+/// A decoded part has no more bytes than this; longer ones are refused, so that
+/// broken files cannot ask for all the memory.
+inline constexpr std::uint64_t kMaxIndexPartBytes = std::uint64_t{64} << 20;
+
+/// Encodes a part. Thread-safe.
+std::vector<std::byte> encode_index_part(std::optional<int> zstd_level,
+                                         std::span<const std::byte> bytes);
+
+/// Writes one index chunk under its temporary name, part after part.
+class IndexChunkWriter {
+ public:
+  IndexChunkWriter(std::filesystem::path path, std::size_t parts);
+  /// Removes what was not published.
+  ~IndexChunkWriter();
+  IndexChunkWriter(const IndexChunkWriter&) = delete;
+  IndexChunkWriter& operator=(const IndexChunkWriter&) = delete;
+
+  /// Each part once at most; those that never come are absent.
+  void append(std::size_t part, std::span<const std::byte> encoded);
+  /// Ends the file and hands it over.
+  void publish(Publisher& publisher);
+
+ private:
+  std::filesystem::path path_;
+  StoreFile file_;
+  ShardIndex places_;
+  std::uint64_t end_ = 0;
+};
+
+/// Reads one index chunk. Thread-safe after construction.
+class IndexChunk {
+ public:
+  /// Reads where the parts are; a small file is read whole, so that its parts
+  /// cost no further reads. DamageError when the file is missing, or not whole.
+  IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed);
+
+  /// Whether the file is there with a checksum and a size that are right.
+  static bool is_whole(const std::filesystem::path& path, std::size_t parts);
+
+  const std::filesystem::path& path() const { return file_.path(); }
+  /// Bytes of the file.
+  std::uint64_t bytes() const { return size_; }
+  /// Bytes read from it so far.
+  std::uint64_t bytes_read() const { return bytes_read_; }
+  bool has(std::size_t part) const { return !places_[part].absent(); }
+
+  /// Checks and decodes a part into `out`; false when it is absent. Throws
+  /// DamageError naming file and offset.
+  bool read(std::size_t part, std::vector<std::byte>& out) const;
+  /// "'file' at 12 + 345": how messages name a part.
+  std::string where(std::size_t part) const;
+
+ private:
+  std::span<const std::byte> encoded(const ShardIndex::Entry& place,
+                                     std::vector<std::byte>& buffer) const;
+
+  StoreFile file_;
+  bool compressed_;
+  std::uint64_t size_ = 0;
+  ShardIndex places_;
+  std::vector<std::byte> whole_;  ///< all of a small file
+  mutable std::atomic<std::uint64_t> bytes_read_ = 0;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,62 @@
+#include "isobrick/bricks/index_layout.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/sealed_json.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kVersion = 1;
+
+ScalarType parse_type(const CheckedJson& json) {
+  const auto type = parse_scalar_type(json.string());
+  if (!type || json.string() != zarr_name(*type)) json.damaged("is no data type");
+  return *type;
+}
+
+Int3 parse_extent(const CheckedJson& json) {
+  if (json.array_size() != 3) json.damaged("must have 3 numbers");
+  return {json.at(std::size_t{2}).positive(), json.at(std::size_t{1}).positive(),
+          json.at(std::size_t{0}).positive()};
+}
+
+}  // namespace
+
+std::string to_json(const IndexLayout& layout) {
+  nlohmann::json json;
+  json["isobrick_index"] = kVersion;
+  json["kind"] = layout.kind;
+  json["leaf"] = layout.leaf;
+  json["data_type"] = zarr_name(layout.type);
+  json["shape"] = {layout.extent.z, layout.extent.y, layout.extent.x};
+  json["brick"] = IndexLayout::kBrick;
+  json["chunk"] = IndexLayout::kChunk * IndexLayout::kBrick;
+  json["zstd_level"] = nullptr;
+  if (layout.zstd_level) json["zstd_level"] = *layout.zstd_level;
+  return seal_json(std::move(json));
+}
+
+IndexLayout parse_index_layout(std::string_view text, const std::string& where) {
+  const nlohmann::json object = unseal_json(text, where);
+  const CheckedJson json(object, where);
+  if (const Index version = json.at("isobrick_index").integer(); version != kVersion)
+    json.unsupported(fmt::format(
+        "index version {} is not known to this program, which knows {}; use a newer one", version,
+        kVersion));
+  if (json.at("brick").integer() != IndexLayout::kBrick ||
+      json.at("chunk").integer() != IndexLayout::kChunk * IndexLayout::kBrick)
+    json.damaged("index bricks have 64 cells, chunks 512");
+  IndexLayout layout;
+  layout.kind = json.string_at("kind");
+  layout.leaf = json.at("leaf").integer();
+  if (!is_index_leaf(layout.leaf)) json.at("leaf").damaged("must be 1, 2, 4, 8 or 16");
+  layout.type = parse_type(json.at("data_type"));
+  layout.extent = parse_extent(json.at("shape"));
+  if (!json.at("zstd_level").raw().is_null())
+    layout.zstd_level = static_cast<int>(json.at("zstd_level").integer());
+  return layout;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,74 @@
+#include "isobrick/bricks/stored_index.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+
+namespace fs = std::filesystem;
+
+static_assert(IndexLayout::kBrick * IndexLayout::kChunk == StoreReader::kRangeChunk * kBlockEdge);
+
+fs::path index_folder(const fs::path& store, int level, const std::string& kind) {
+  return store / "isobrick" / std::to_string(level) / "index" / kind;
+}
+
+fs::path index_description(const fs::path& folder) { return folder / "index.json"; }
+
+fs::path index_chunk_path(const fs::path& folder, Int3 chunk) {
+  return folder / "c" / std::to_string(chunk.z) / std::to_string(chunk.y) / std::to_string(chunk.x);
+}
+
+std::vector<std::string> stored_index_kinds(const fs::path& store, int level) {
+  std::vector<std::string> kinds;
+  std::error_code none;
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(index_folder(store, level, ""), none)) {
+    // A folder NAME.partial is still being built.
+    if (!entry.path().has_extension() && fs::exists(index_description(entry.path()), none))
+      kinds.push_back(entry.path().filename().string());
+  }
+  std::sort(kinds.begin(), kinds.end());
+  return kinds;
+}
+
+bool has_index(const fs::path& store, int level, const std::string& kind) {
+  std::error_code none;
+  return fs::exists(index_description(index_folder(store, level, kind)), none);
+}
+
+StoredIndex::StoredIndex(const StoreReader& store, int level, const std::string& kind)
+    : folder_(index_folder(store.info().path, level, kind)) {
+  const fs::path file = index_description(folder_);
+  bool exists = false;
+  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  if (!exists)
+    throw Error(
+        fmt::format("level {} has no {} index: there is no '{}'", level, kind, file.string()));
+  layout_ = parse_index_layout(text, quoted(file));
+  const Lattice& lattice = store.info().levels.at(static_cast<std::size_t>(level)).lattice;
+  if (layout_.kind != kind || layout_.type != lattice.type || layout_.extent != lattice.extent)
+    throw DamageError(fmt::format("{}: kind, type or shape are not those of level {}'s {} index",
+                                  quoted(file), level, kind));
+}
+
+IndexChunk StoredIndex::open(Int3 chunk) const {
+  return {index_chunk_path(folder_, chunk), layout_.parts_of_chunk(chunk),
+          layout_.zstd_level.has_value()};
+}
+
+std::uint64_t index_bytes(const StoredIndex& index) {
+  std::uint64_t bytes = fs::file_size(index_description(index.folder()));
+  for_each_point({{0, 0, 0}, index.layout().chunks()}, [&](Int3 c) {
+    std::error_code missing;  // verify says so; here it has no bytes
+    const std::uint64_t size = fs::file_size(index_chunk_path(index.folder(), c), missing);
+    if (!missing) bytes += size;
+  });
+  return bytes;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "isobrick/bricks/index_chunk.h"
+#include "isobrick/bricks/index_layout.h"
+#include "isobrick/bricks/store_reader.h"
+
+namespace isobrick {
+
+/// Where an index of a level lies in a store.
+std::filesystem::path index_folder(const std::filesystem::path& store, int level,
+                                   const std::string& kind);
+/// Its description and its chunks; below that folder.
+std::filesystem::path index_description(const std::filesystem::path& folder);
+std::filesystem::path index_chunk_path(const std::filesystem::path& folder, Int3 chunk);
+
+/// The kinds of index that a level has, sorted; what is still being built is none.
+std::vector<std::string> stored_index_kinds(const std::filesystem::path& store, int level);
+bool has_index(const std::filesystem::path& store, int level, const std::string& kind);
+
+/// One index of one level. Thread-safe after construction.
+class StoredIndex {
+ public:
+  /// Throws Error when the level has no such index, DamageError when its
+  /// description is broken or that of another level.
+  StoredIndex(const StoreReader& store, int level, const std::string& kind);
+
+  const IndexLayout& layout() const { return layout_; }
+  const std::filesystem::path& folder() const { return folder_; }
+  /// Throws DamageError as IndexChunk does.
+  IndexChunk open(Int3 chunk) const;
+
+ private:
+  std::filesystem::path folder_;
+  IndexLayout layout_;
+};
+
+/// The bytes of all files of an index.
+std::uint64_t index_bytes(const StoredIndex& index);
+
+}  // namespace isobrick
