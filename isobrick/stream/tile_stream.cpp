@@ -1,9 +1,9 @@
 #include "isobrick/stream/tile_stream.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "isobrick/core/morton.h"
-#include "isobrick/index/active_tiles.h"
 
 namespace isobrick {
 namespace {
@@ -25,8 +25,9 @@ void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index re
 
 }  // namespace
 
-TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box3 roi)
-    : store_(store), level_(level), isovalue_(isovalue) {
+TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box3 roi,
+                       std::optional<IndexKind> index)
+    : search_(make_block_search(store, level, index)), isovalue_(isovalue) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Box3 samples = intersect(roi, lattice.box());
   // The last sample along an axis begins no cell.
@@ -42,15 +43,11 @@ TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box
 
 bool TileStream::load_next_chunk() {
   if (next_chunk_ == chunks_.size()) return false;
-  const Lattice& lattice = store_.info().levels[static_cast<std::size_t>(level_)].lattice;
-  constexpr Int3 edge{StoreReader::kRangeChunk, StoreReader::kRangeChunk, StoreReader::kRangeChunk};
-  const Int3 c = chunks_[next_chunk_++];
-  const RangeTable table = store_.block_ranges(
-      level_, intersect({c * edge, (c + Int3{1, 1, 1}) * edge}, {{0, 0, 0}, lattice.blocks()}));
+  const auto start = std::chrono::steady_clock::now();
   tiles_.clear();
   next_tile_ = 0;
-  append_active_tiles<double>(table.box, table.ranges, isovalue_, tiles_);
-  std::erase_if(tiles_, [&](const TileWork& work) { return !roi_tiles_.contains(work.tile); });
+  search_->append_tiles(chunks_[next_chunk_++], roi_tiles_, isovalue_, tiles_);
+  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return true;
 }
 

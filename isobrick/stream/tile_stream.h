@@ -7,6 +7,7 @@
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/tile.h"
+#include "isobrick/stream/block_search.h"
 
 namespace isobrick {
 
@@ -14,18 +15,24 @@ namespace isobrick {
 /// chunk: memory does not grow with the volume.
 class TileStream {
  public:
-  /// Tiles without a cell in `roi` (samples) are left out.
-  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi);
+  /// Tiles without a cell in `roi` (samples) are left out. They are found by the
+  /// stored index of that kind, or by the block ranges.
+  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi,
+             std::optional<IndexKind> index = std::nullopt);
 
   /// The next tile, or nothing at the end.
   std::optional<TileWork> next();
 
+  /// What searching has cost so far.
+  std::uint64_t bytes_read() const { return search_->bytes_read(); }
+  double seconds() const { return seconds_; }
+
  private:
   bool load_next_chunk();
 
-  const StoreReader& store_;
-  int level_;
+  std::unique_ptr<BlockSearch> search_;
   double isovalue_;
+  double seconds_ = 0;
   Box3 roi_tiles_;
   std::vector<Int3> chunks_;  ///< range chunks in Morton order
   std::size_t next_chunk_ = 0;

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/tile.h"
+#include "isobrick/index/index_kind.h"
+
+namespace isobrick {
+
+/// Finds the active blocks of a level, one range chunk (the cube of 512³ cells
+/// whose block ranges share a file) after the other.
+class BlockSearch {
+ public:
+  virtual ~BlockSearch() = default;
+
+  /// Appends the tiles of a range chunk that lie in `box` (in tiles) and have an
+  /// active block, in Morton order. Blocks without an active cell may be among them.
+  virtual void append_tiles(Int3 chunk, Box3 box, double isovalue,
+                            std::vector<TileWork>& tiles) = 0;
+
+  /// Bytes read from disk so far.
+  virtual std::uint64_t bytes_read() const = 0;
+};
+
+/// The search by a stored index, or by the block ranges alone when there is no
+/// `kind`. Both give the same surface. The index works in parallel in the
+/// caller's TBB arena, in no more than block_search_bytes().
+std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level,
+                                               std::optional<IndexKind> kind);
+
+/// Memory that such a search takes with so many threads, beyond a range chunk.
+std::uint64_t block_search_bytes(const StoreReader& store, int level, std::optional<IndexKind> kind,
+                                 int threads);
+
+}  // namespace isobrick
