@@ -22,13 +22,24 @@ std::size_t bytes_of(Int3 extent, ScalarType type) {
   return static_cast<std::size_t>(volume(extent)) * size_of(type);
 }
 
+/// The index that a conversion adds. In its own folder it may replace anything.
+IndexOptions index_options(const ConvertOptions& options, bool resume) {
+  return {.kind = *options.index,
+          .leaf = options.leaf,
+          .memory = options.memory,
+          .threads = options.threads,
+          .resume = resume,
+          .force = true};
+}
+
 /// One conversion into a staging directory.
 class Conversion {
  public:
   Conversion(VolumeSource& source, const StoreLayout& layout, const ConvertPlan& plan,
-             const ConvertStaging& staging, Progress& progress)
+             const ConvertStaging& staging, const ConvertOptions& options, Progress& progress)
       : source_(source),
         layout_(layout),
+        options_(options),
         plan_(plan),
         staging_(staging),
         progress_(progress),
@@ -45,6 +56,7 @@ class Conversion {
  private:
   int level_count() const { return static_cast<int>(layout_.levels.size()); }
 
+  void add_chosen_index(ConvertReport& report);
   void write_levels();
   void write_cascade(int first_level, VolumeSource& source);
   std::unique_ptr<SpooledVolume> write_in_pieces(int level, VolumeSource& source);
@@ -52,6 +64,7 @@ class Conversion {
 
   VolumeSource& source_;
   const StoreLayout& layout_;
+  const ConvertOptions& options_;
   const ConvertPlan& plan_;
   const ConvertStaging& staging_;
   Progress& progress_;
@@ -62,7 +75,6 @@ class Conversion {
 
 ConvertReport Conversion::run() {
   write_levels();
-  journal_.remove();
   ConvertReport report;
   bool has_nan = false;
   for (const auto& writer : writers_) {
@@ -72,11 +84,23 @@ ConvertReport Conversion::run() {
     // Infinities of both signs make a NaN that only a coarser level has.
     has_nan |= writer->has_nan();
   }
-  store_.finish(has_nan);
+  // The journal goes last: until then a resume compares the input with it.
+  store_.finish(has_nan, [&] {
+    add_chosen_index(report);
+    journal_.remove();
+  });
   report.bytes_in = bytes_of(source_.info().extent, source_.info().type);
-  report.bytes_out = store_.bytes();
+  report.bytes_out = store_.bytes() + report.index_bytes;
   report.levels = level_count();
   return report;
+}
+
+void Conversion::add_chosen_index(ConvertReport& report) {
+  if (!options_.index) return;
+  const IndexReport added =
+      add_index(staging_.path(), index_options(options_, staging_.resumed()), progress_);
+  for (const std::uint64_t bytes : added.level_bytes) report.index_bytes += bytes;
+  report.index_seconds = added.seconds;
 }
 
 void Conversion::write_levels() {
@@ -160,12 +184,14 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const StoreLayout layout = plan_layout(source.info(), options);
+  if (options.index)
+    check_index_options(index_options(options, false), layout.levels.front().lattice);
   const ConvertPlan plan(layout, options.memory, Workers(options.threads).threads(),
                          source.random_access());
   ConvertStaging staging(out, options.resume, options.force);
   Workers workers(plan.threads());
-  ConvertReport report =
-      workers.execute([&] { return Conversion(source, layout, plan, staging, progress).run(); });
+  ConvertReport report = workers.execute(
+      [&] { return Conversion(source, layout, plan, staging, options, progress).run(); });
   staging.publish();
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;

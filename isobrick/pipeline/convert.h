@@ -6,6 +6,7 @@
 
 #include "isobrick/core/progress.h"
 #include "isobrick/io/volume_source.h"
+#include "isobrick/pipeline/index_build.h"
 
 namespace isobrick {
 
@@ -17,8 +18,10 @@ struct ConvertOptions {
   std::optional<int> levels;          ///< nothing: until one brick holds the coarsest
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
-  bool resume = false;  ///< go on with an interrupted conversion of the same input
-  bool force = false;   ///< replace a store that exists (only when the new one is whole)
+  bool resume = false;             ///< go on with an interrupted conversion of the same input
+  bool force = false;              ///< replace a store that exists (only when the new one is whole)
+  std::optional<IndexKind> index;  ///< also add one of this kind to all levels
+  Index leaf = kDefaultLeaf;       ///< of that index
 };
 
 /// What a conversion did.
@@ -26,7 +29,8 @@ struct ConvertReport {
   std::uint64_t bytes_in = 0, bytes_out = 0;
   std::uint64_t bricks = 0, bricks_absent = 0, bricks_kept = 0;  ///< all levels; kept: by resume
   int levels = 0;
-  double seconds = 0;
+  std::uint64_t index_bytes = 0;  ///< part of bytes_out
+  double seconds = 0, index_seconds = 0;
 };
 
 /// Writes `source` as a store at `out`: works in `out` + ".partial" and renames

@@ -6,20 +6,16 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
 
 #include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/core/error.h"
+#include "isobrick/pipeline/replace_folder.h"
 
 namespace isobrick {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path parent_of(const fs::path& path) {
-  return path.has_parent_path() ? path.parent_path() : fs::path(".");
-}
 
 bool is_there(const fs::path& path) {
   return fs::symlink_status(path).type() != fs::file_type::not_found;
@@ -35,16 +31,6 @@ bool nothing_to_resume(const fs::path& staging) {
   for (const fs::directory_entry& entry : fs::directory_iterator(staging))
     if (!is_temporary_name(entry.path()) || entry.path().stem() != kLayoutMarker) return false;
   return true;
-}
-
-void rename_or_throw(const fs::path& from, const fs::path& to) {
-  if (::rename(from.c_str(), to.c_str()) != 0)
-    throw system_error(fmt::format("rename '{}' to", from.string()), to.string(), errno);
-}
-
-void sync_folder(const fs::path& folder) {
-  const UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (fd.get() < 0 || ::fsync(fd.get()) != 0) throw system_error("sync", folder.string(), errno);
 }
 
 }  // namespace
@@ -105,21 +91,8 @@ void ConvertStaging::lock() {
 }
 
 void ConvertStaging::publish() {
-  if (is_there(out_)) {
-    check_out(force_);  // it may have appeared since
-    if (::renameat2(AT_FDCWD, staging_.c_str(), AT_FDCWD, out_.c_str(), RENAME_EXCHANGE) != 0) {
-      fs::path aside = out_;
-      aside += ".replaced";
-      rename_or_throw(out_, aside);
-      rename_or_throw(staging_, out_);
-      staging_ = aside;
-    }
-    sync_folder(parent_of(out_));
-    fs::remove_all(staging_);
-  } else {
-    rename_or_throw(staging_, out_);
-  }
-  sync_folder(parent_of(out_));
+  if (is_there(out_)) check_out(force_);  // it may have appeared since
+  replace_folder(staging_, out_);
 }
 
 }  // namespace isobrick

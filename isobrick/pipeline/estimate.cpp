@@ -50,9 +50,10 @@ ActiveParts visit_active(const StoreReader& store, const ExtractRequest& request
   const Lattice& lattice = request.level->lattice;
   ActiveParts parts;
   parts.bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
-  TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
+  TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.index);
   std::vector<bool> active(static_cast<std::size_t>(parts.bricks));
-  while (const auto work = tiles.next()) {
+  Workers workers(request.threads);  // an index is searched in parallel
+  while (const auto work = workers.execute([&] { return tiles.next(); })) {
     visit(*work);
     parts.active_cells += active_cells(*work, request.surface.roi);
     for (int i = 0; i < 8; ++i) {

@@ -70,7 +70,7 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     const ExtractPlan plan = plan_memory(request, options.memory, active.active_bricks);
 
     sink.begin(header_of(*request.level, request.surface));
-    TileStream tiles(store, options.level, options.isovalue, request.surface.roi);
+    TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.index);
     BatchPlanner batches(tiles, lattice, reach, request.surface.may_have_nan, plan.limits.tiles,
                          plan.cache_bricks);
     BrickCache cache(store, options.level, plan.cache_bricks);
@@ -107,13 +107,18 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     sink.finish();
     progress.end();
     report.sink_seconds = writer.seconds();
+    report.index = request.index;
+    report.search_bytes = tiles.bytes_read();
+    report.search_seconds = tiles.seconds();
     report.triangles = extractor.triangles();
     report.vertices = extractor.vertices();
     report.degenerate_triangles = extractor.degenerate_triangles();
     report.bricks_read = cache.bricks_read();
     report.brick_reads = cache.reads();
   }
+  // The index has files of its own; it is searched for the plan and for the surface.
   report.bytes_read = store.bytes_read() - bytes_before;
+  if (report.index) report.bytes_read += 2 * report.search_bytes;
   return report;
 }
 

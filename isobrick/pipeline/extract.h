@@ -5,6 +5,7 @@
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/progress.h"
+#include "isobrick/pipeline/index_choice.h"
 #include "isobrick/surface/mesh.h"
 
 namespace isobrick {
@@ -18,6 +19,7 @@ struct ExtractOptions {
   bool drop_degenerate = false;  ///< see SurfaceOptions
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
+  IndexChoice index;  ///< how active blocks are found; never shows in the mesh
 };
 
 /// What an extraction did.
@@ -27,6 +29,9 @@ struct ExtractReport {
   std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
   std::uint64_t bytes_read = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, sink_seconds = 0;
+  std::optional<IndexKind> index;  ///< that found the active blocks; nothing: their ranges
+  std::uint64_t search_bytes = 0;  ///< read to find them, once
+  double search_seconds = 0;       ///< to find them, once
 };
 
 /// Streams the isosurface of one level into `sink` (begin … finish).

@@ -78,6 +78,8 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
                      .fill_value = info.fill_value,
                      .may_have_nan = info.may_have_nan && is_floating(info.type)};
   request.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
+  request.index = resolve_index(store, options.level, options.index);
+  request.search_memory = block_search_bytes(store, options.level, request.index, request.threads);
   return request;
 }
 
@@ -92,7 +94,7 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
   const std::uint64_t fixed = kBase + index_bytes(lattice) + threads * (kDecoder + brick_bytes) +
-                              boundary_bytes(lattice, drop);
+                              boundary_bytes(lattice, drop) + request.search_memory;
   const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
   if (budget < least)
     throw UsageError(fmt::format(

@@ -19,9 +19,12 @@ struct ExtractRequest {
   const LevelInfo* level = nullptr;
   SurfaceOptions surface;
   int threads = 1;
+  std::optional<IndexKind> index;   ///< that the level is searched with
+  std::uint64_t search_memory = 0;  ///< that such a search takes
 };
 
-/// Throws UsageError for a level, region or isovalue that makes no sense.
+/// Throws UsageError for a level, region or isovalue that makes no sense, and for
+/// an index that the store lacks.
 ExtractRequest check_request(const StoreReader& store, const ExtractOptions& options,
                              Indexing indexing);
 

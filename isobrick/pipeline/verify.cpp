@@ -8,10 +8,10 @@
 #include <set>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/bricks/stored_index.h"
 #include "isobrick/core/error.h"
-#include "isobrick/pipeline/range_scan.h"
-#include "isobrick/pipeline/slab_piece.h"
-#include "isobrick/pipeline/slab_reader.h"
+#include "isobrick/pipeline/level_scan.h"
+#include "isobrick/pipeline/verify_index.h"
 #include "isobrick/pipeline/workers.h"
 
 namespace isobrick {
@@ -91,6 +91,8 @@ bool LevelCheck::sees_unreadable(Int3 item, Int3 edge) const {
 void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pairs) {
   const Int3 edge = blocks ? Int3{kBlockEdge, kBlockEdge, kBlockEdge} : lattice_.brick;
   const std::string_view what = blocks ? "block" : "brick";
+  // Images of others have ranges only once they were added.
+  if (!store_.info().ours && !store_.has_ranges(level_)) return;
   RangeTable stored;
   try {
     stored = blocks ? store_.block_ranges(level_, items) : store_.brick_ranges(level_, items);
@@ -117,26 +119,12 @@ void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pai
 
 void LevelCheck::run(Progress& progress) {
   const auto ranges = make_level_ranges(lattice_);
-  const Int3 piece =
-      largest_piece(lattice_.extent, lattice_.brick, kPieceBytes / lattice_.sample_bytes());
-  const Int3 pieces = ceil_div(lattice_.extent, piece);
-  const auto bytes_of = [&](Int3 e) {
-    return static_cast<std::size_t>(volume(e)) * lattice_.sample_bytes();
-  };
-  // Zeroed once, so that what a damaged brick leaves is never uninitialised.
-  const auto buffer = std::make_unique<std::byte[]>(bytes_of(min(piece, lattice_.extent)));
-  for_each_point({{0, 0, 0}, pieces}, [&](Int3 p) {
-    const Box3 box = intersect({p * piece, (p + Int3{1, 1, 1}) * piece}, lattice_.box());
-    read_slab(store_, level_, box, buffer.get(),
-              [&](Int3 brick, const std::string& what) { fail(brick, what); });
-    ranges->add(box, buffer.get());
-    if (p.x + 1 == pieces.x && p.y + 1 == pieces.y)
-      ranges->close(
-          box.hi.z,
-          [&](Box3 items, std::span<const std::byte> pairs) { compare(true, items, pairs); },
-          [&](Box3 items, std::span<const std::byte> pairs) { compare(false, items, pairs); });
-    progress.advance(bytes_of(box.extent()));
-  });
+  scan_level(
+      store_, level_, kPieceBytes, *ranges,
+      [&](Int3 brick, const std::string& what) { fail(brick, what); },
+      [&](Box3 items, std::span<const std::byte> pairs) { compare(true, items, pairs); },
+      [&](Box3 items, std::span<const std::byte> pairs) { compare(false, items, pairs); },
+      [&](std::uint64_t done) { progress.advance(done); });
 }
 
 }  // namespace
@@ -162,7 +150,15 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
   for (std::size_t level = 0; level < levels.size(); ++level)
     workers.execute([&] { LevelCheck(*store, static_cast<int>(level), damages).run(progress); });
   progress.end();
-  damages.report().bytes = store->bytes_read();
+  std::uint64_t index_bytes = 0;
+  for (int level = 0; level < static_cast<int>(levels.size()); ++level)
+    for (const std::string& kind : stored_index_kinds(path, level)) {
+      const auto add = [&](const std::string& line) { damages.add(line); };
+      index_bytes += workers.execute(
+          [&] { return verify_index(*store, level, kind, workers.threads(), add, progress); });
+      damages.report().indexes.push_back({level, kind});
+    }
+  damages.report().bytes = store->bytes_read() + index_bytes;
   return damages.report();
 }
 

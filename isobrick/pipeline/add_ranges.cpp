@@ -1,0 +1,98 @@
+#include "isobrick/pipeline/add_ranges.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "isobrick/bricks/added_ranges.h"
+#include "isobrick/bricks/range_array.h"
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/level_scan.h"
+#include "isobrick/pipeline/replace_folder.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Program, libraries, shard indices and stacks.
+constexpr std::uint64_t kProgramBytes = std::uint64_t{96} << 20;
+constexpr std::uint64_t kEnoughForAPiece = std::uint64_t{256} << 20;
+
+fs::path partial(fs::path folder) {
+  folder += ".partial";
+  return folder;
+}
+
+/// Bytes for the samples of a piece: what the budget leaves.
+std::uint64_t piece_bytes(const Lattice& lattice, std::uint64_t memory, int threads) {
+  const std::uint64_t brick = lattice.brick_bytes();
+  // A brick being decoded: itself and its encoded bytes, once a thread.
+  const std::uint64_t fixed = kProgramBytes + static_cast<std::uint64_t>(threads) * brick * 9 / 4 +
+                              level_ranges_bytes(lattice, lattice.brick.z) +
+                              level_ranges_bytes(lattice, StoreReader::kRangeChunk * kBlockEdge);
+  if (memory < fixed + brick)
+    throw UsageError(fmt::format(
+        "a memory budget of {} bytes is too small: computing the ranges needs at least {} bytes "
+        "(--memory {}M)",
+        memory, fixed + brick, ((fixed + brick) >> 20) + 1));
+  return std::min(memory - fixed, kEnoughForAPiece);
+}
+
+/// Writes both range arrays of a level beside their places; whether there was NaN.
+bool write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
+                  Progress& progress) {
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
+  const fs::path& root = store.info().path;
+  RangeArrayWriter blocks(partial(block_range_folder(root, level)), lattice.blocks(), lattice.type,
+                          publisher);
+  RangeArrayWriter bricks(partial(brick_range_folder(root, level)), lattice.bricks(), lattice.type,
+                          publisher);
+  const auto ranges = make_level_ranges(lattice);
+  scan_level(
+      store, level, static_cast<std::size_t>(bytes), *ranges, nullptr,
+      [&](Box3 items, std::span<const std::byte> pairs) { blocks.put(items, pairs); },
+      [&](Box3 items, std::span<const std::byte> pairs) { bricks.put(items, pairs); },
+      [&](std::uint64_t done) { progress.advance(done); });
+  blocks.finish();
+  bricks.finish();
+  return ranges->has_nan();
+}
+
+}  // namespace
+
+void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Progress& progress) {
+  const StoreInfo& info = store.info();
+  const auto levels = static_cast<int>(info.levels.size());
+  std::uint64_t total = 0;
+  for (const LevelInfo& level : info.levels) {
+    piece_bytes(level.lattice, memory, threads);
+    total +=
+        static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
+  }
+  for (int level = 0; level < levels; ++level)
+    for (const fs::path& folder :
+         {block_range_folder(info.path, level), brick_range_folder(info.path, level)})
+      fs::remove_all(partial(folder));  // of a run that was interrupted
+  Publisher publisher(info.path);
+  progress.begin("ranges", total);
+  bool has_nan = false;
+  for (int level = 0; level < levels; ++level)
+    has_nan |= write_ranges(
+        store, level,
+        piece_bytes(info.levels[static_cast<std::size_t>(level)].lattice, memory, threads),
+        publisher, progress);
+  publisher.wait();
+  progress.end();
+  for (int level = 0; level < levels; ++level)
+    for (const fs::path& folder :
+         {block_range_folder(info.path, level), brick_range_folder(info.path, level)})
+      replace_folder(partial(folder), folder);
+  if (info.ours) return;  // its metadata says the rest
+  publisher.write(
+      added_ranges_file(info.path),
+      to_json(AddedRanges{.may_have_nan = has_nan, .image_crc32c = info.metadata_crc32c}));
+  publisher.wait();
+}
+
+}  // namespace isobrick

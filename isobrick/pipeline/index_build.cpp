@@ -1,0 +1,237 @@
+#include "isobrick/pipeline/index_build.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <memory>
+#include <optional>
+
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/stored_index.h"
+#include "isobrick/core/error.h"
+#include "isobrick/core/morton.h"
+#include "isobrick/index/leaf_ranges.h"
+#include "isobrick/io/file.h"
+#include "isobrick/pipeline/add_ranges.h"
+#include "isobrick/pipeline/index_chunk_builder.h"
+#include "isobrick/pipeline/replace_folder.h"
+#include "isobrick/pipeline/workers.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kZstdLevel = 3;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::string kind_of(const IndexOptions& options) { return std::string(name_of(options.kind)); }
+
+/// Compressed if the store is, at its level where that is one that we write.
+std::optional<int> zstd_level_of(const StoreInfo& info) {
+  if (info.codec == "none") return std::nullopt;
+  const int level = std::atoi(info.codec.c_str() + std::string_view("zstd:").size());
+  return level >= 1 && level <= 22 ? level : kZstdLevel;
+}
+
+/// Keeps others from adding to the same store at the same time.
+UniqueFd lock_store(const fs::path& store) {
+  const fs::path folder = store / "isobrick";
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure) throw system_error("create", folder.string(), failure.value());
+  UniqueFd lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (lock.get() < 0) throw system_error("open", folder.string(), errno);
+  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw Error(fmt::format("another process is adding to '{}'", store.string()));
+  return lock;
+}
+
+/// One level's index on its way into the store.
+class LevelIndex {
+ public:
+  LevelIndex(const StoreReader& store, int level, const IndexOptions& options)
+      : store_(store),
+        level_(level),
+        options_(options),
+        place_(index_folder(store.info().path, level, kind_of(options))),
+        partial_(place_) {
+    partial_ += ".partial";
+    layout_.kind = kind_of(options);
+    layout_.leaf = options.leaf;
+    layout_.type = store.info().type;
+    layout_.extent = store.info().levels[static_cast<std::size_t>(level)].lattice.extent;
+    layout_.zstd_level = zstd_level_of(store.info());
+  }
+
+  /// Throws UsageError when something is there and nobody said what to do with it.
+  void check() const;
+  /// Decides what of an earlier run stays, and makes the folder.
+  void prepare(Publisher& publisher);
+  void build(std::uint64_t memory, int threads, Publisher& publisher, Progress& progress,
+             IndexReport& report) const;
+  void publish() const {
+    if (!finished_) replace_folder(partial_, place_);
+  }
+
+ private:
+  bool is_wanted(const fs::path& folder) const;
+  void build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher& publisher) const;
+
+  const StoreReader& store_;
+  int level_;
+  const IndexOptions& options_;
+  fs::path place_, partial_;
+  IndexLayout layout_;
+  bool finished_ = false;  ///< by an earlier run
+};
+
+/// Whether the description in `folder` is that of the index to build.
+bool LevelIndex::is_wanted(const fs::path& folder) const {
+  bool exists = false;
+  const fs::path file = index_description(folder);
+  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  try {
+    return exists && parse_index_layout(text, quoted(file)) == layout_;
+  } catch (const DamageError&) {
+    return false;
+  }
+}
+
+void LevelIndex::check() const {
+  if (options_.force) return;
+  if (fs::exists(place_) && !(options_.resume && is_wanted(place_)))
+    throw UsageError(fmt::format("'{}' has a {} index; --force replaces it",
+                                 store_.info().path.string(), layout_.kind));
+  if (!fs::exists(partial_)) return;
+  if (!options_.resume)
+    throw UsageError(
+        fmt::format("an interrupted build is in '{}'; --resume goes on with it, --force starts "
+                    "anew",
+                    partial_.string()));
+  if (fs::exists(index_description(partial_)) && !is_wanted(partial_))
+    throw UsageError(
+        fmt::format("'{}' was begun with another leaf; resume with the same one, or "
+                    "--force starts anew",
+                    partial_.string()));
+}
+
+void LevelIndex::prepare(Publisher& publisher) {
+  finished_ = options_.resume && is_wanted(place_);
+  if (finished_) return;
+  if (!(options_.resume && is_wanted(partial_))) fs::remove_all(partial_);
+  for_each_point({{0, 0, 0}, layout_.chunks()}, [&](Int3 c) {
+    std::error_code none;
+    fs::remove(temporary_name(index_chunk_path(partial_, c)), none);
+  });
+  publisher.write(index_description(partial_), to_json(layout_));
+  publisher.wait();  // before any chunk, which would else be of nobody knows what
+}
+
+void LevelIndex::build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher& publisher) const {
+  IndexChunkWriter writer(index_chunk_path(partial_, c), layout_.parts_of_chunk(c));
+  builder.build(
+      c, [&](std::vector<std::byte> part) { return encode_index_part(layout_.zstd_level, part); },
+      [&](std::size_t part, std::vector<std::byte> encoded) { writer.append(part, encoded); });
+  writer.publish(publisher);
+}
+
+void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, Progress& progress,
+                       IndexReport& report) const {
+  const IndexChunkBuilder builder(store_, level_, layout_, options_.kind, memory, threads);
+  std::uint64_t bytes = 0;
+  for_each_morton(layout_.chunks(), [&](Int3 c) {
+    const fs::path path = index_chunk_path(finished_ ? place_ : partial_, c);
+    const bool kept =
+        finished_ || (options_.resume && IndexChunk::is_whole(path, layout_.parts_of_chunk(c)));
+    if (!kept) build_chunk(builder, c, publisher);
+    ++report.chunks;
+    report.chunks_kept += kept;
+    const Int3 bricks = layout_.bricks_of_chunk(c).extent();
+    progress.advance(static_cast<std::uint64_t>(volume(bricks)));
+  });
+  publisher.wait();
+  for_each_morton(layout_.chunks(), [&](Int3 c) {
+    bytes += fs::file_size(index_chunk_path(finished_ ? place_ : partial_, c));
+  });
+  bytes += fs::file_size(index_description(finished_ ? place_ : partial_));
+  report.level_bytes.push_back(bytes);
+}
+
+/// Adds what is missing of the ranges, and opens the store again to find it.
+void complete_ranges(std::unique_ptr<StoreReader>& store, const IndexOptions& options, int threads,
+                     Progress& progress, IndexReport& report) {
+  bool missing = !store->info().ours && options.force;
+  for (std::size_t level = 0; level < store->info().levels.size(); ++level)
+    missing |= !store->has_ranges(static_cast<int>(level));
+  if (!missing) return;
+  const auto start = std::chrono::steady_clock::now();
+  add_ranges(*store, options.memory, threads, progress);
+  store = std::make_unique<StoreReader>(store->info().path);
+  report.ranges_added = true;
+  report.range_seconds = seconds_since(start);
+}
+
+IndexReport build_all(const fs::path& path, const IndexOptions& options, int threads,
+                      Progress& progress) {
+  IndexReport report;
+  auto store = std::make_unique<StoreReader>(path);
+  check_index_options(options, store->info().levels.front().lattice);
+  const UniqueFd lock = lock_store(path);
+  const auto level_count = static_cast<int>(store->info().levels.size());
+  for (int level = 0; level < level_count; ++level) LevelIndex(*store, level, options).check();
+  complete_ranges(store, options, threads, progress, report);
+
+  std::vector<LevelIndex> levels;
+  std::uint64_t bricks = 0;
+  for (int level = 0; level < level_count; ++level) {
+    levels.emplace_back(*store, level, options);
+    bricks += static_cast<std::uint64_t>(
+        volume(ceil_div(store->info().levels[static_cast<std::size_t>(level)].lattice.extent,
+                        {IndexLayout::kBrick, IndexLayout::kBrick, IndexLayout::kBrick})));
+  }
+  Publisher publisher(path);
+  progress.begin("index", bricks);
+  for (LevelIndex& level : levels) {
+    level.prepare(publisher);
+    level.build(options.memory, threads, publisher, progress, report);
+  }
+  for (const LevelIndex& level : levels) level.publish();
+  progress.end();
+  return report;
+}
+
+}  // namespace
+
+void check_index_options(const IndexOptions& options, const Lattice& lattice) {
+  if (options.kind == IndexKind::linear)
+    throw UsageError("a linear scan needs no index: that is what a store's ranges are for");
+  if (!is_leaf(options.leaf))
+    throw UsageError(
+        fmt::format("a leaf has 1, 2, 4, 8 or 16 cells along an edge, not {}", options.leaf));
+  const int threads = Workers(options.threads).threads();
+  const std::uint64_t least = IndexChunkBuilder::least_memory(lattice, options.leaf, threads);
+  if (options.memory < least)
+    throw UsageError(fmt::format(
+        "a memory budget of {} bytes is too small: an index with leaf {} needs at least {} bytes "
+        "(--memory {}M)",
+        options.memory, options.leaf, least, (least >> 20) + 1));
+}
+
+IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  Workers workers(options.threads);
+  IndexReport report =
+      workers.execute([&] { return build_all(store, options, workers.threads(), progress); });
+  report.seconds = seconds_since(start);
+  return report;
+}
+
+}  // namespace isobrick

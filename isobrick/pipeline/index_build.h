@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/core/progress.h"
+#include "isobrick/index/index_kind.h"
+
+namespace isobrick {
+
+/// Cells along each edge of an item where nobody says otherwise: the blocks by
+/// which an extraction skips, whose ranges every store has. docs/index.md.
+inline constexpr Index kDefaultLeaf = 16;
+
+/// An index to add to a store.
+struct IndexOptions {
+  IndexKind kind = IndexKind::octree;
+  Index leaf = kDefaultLeaf;                      ///< 1, 2, 4, 8 or 16 cells
+  std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
+  int threads = 0;                                ///< 0: all cores
+  bool resume = false;  ///< go on with an interrupted build of the same index
+  bool force = false;   ///< replace an index of this kind, only when the new one is whole
+};
+
+/// What adding an index did.
+struct IndexReport {
+  std::vector<std::uint64_t> level_bytes;
+  std::uint64_t chunks = 0, chunks_kept = 0;  ///< all levels; kept: by resume
+  bool ranges_added = false;                  ///< the store had none, or they were made anew
+  double seconds = 0, range_seconds = 0;      ///< the former includes the latter
+};
+
+/// Throws UsageError for a kind or leaf that stores cannot have, and for a budget
+/// that is too small for such an index of `lattice`, naming the least that does.
+void check_index_options(const IndexOptions& options, const Lattice& lattice);
+
+/// Adds an index of all levels to a store, that of another program too: ranges
+/// that it lacks are computed first, and with `force` those of an image of others
+/// again. An index grows as KIND.partial beside its place and moves there once it
+/// is whole; until then the store is as it was. Throws UsageError when there is
+/// one and neither `resume` nor `force` says what to do, or when the budget is too
+/// small (naming the least that does), Error when another process is at it.
+IndexReport add_index(const std::filesystem::path& store, const IndexOptions& options,
+                      Progress& progress);
+
+}  // namespace isobrick

@@ -1,0 +1,209 @@
+#include "isobrick/pipeline/index_chunk_builder.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "isobrick/bricks/codec.h"
+#include "isobrick/core/error.h"
+#include "isobrick/core/morton.h"
+#include "isobrick/index/leaf_ranges.h"
+#include "isobrick/index/span_index.h"
+#include "isobrick/pipeline/slab_reader.h"
+
+namespace isobrick {
+namespace {
+
+constexpr Index kEdge = IndexLayout::kBrick;
+constexpr Index kBrickBlocks = kEdge / kBlockEdge;
+/// Program, libraries, a chunk of ranges and stacks.
+constexpr std::uint64_t kProgramBytes = std::uint64_t{40} << 20;
+
+/// The samples of a cube of so many index bricks along each edge, with the layer
+/// of their upper neighbours.
+std::uint64_t piece_bytes(const Lattice& lattice, Index bricks) {
+  const Index samples = bricks * kEdge + 1;
+  return static_cast<std::uint64_t>(volume(min({samples, samples, samples}, lattice.extent))) *
+         lattice.sample_bytes();
+}
+
+/// Making one part: its ranges, what sorting them takes, the index, encoded.
+std::uint64_t part_bytes(ScalarType type, Index leaf) {
+  const auto edge = static_cast<std::uint64_t>(kEdge / leaf);
+  const std::uint64_t size = size_of(type);
+  return edge * edge * edge * (2 * size + 4 * (2 * size + 8) + 2 * (24 + 6 * size)) + 65536;
+}
+
+/// What reading samples takes: shard indices, and a brick a thread, encoded and decoded.
+std::uint64_t reading_bytes(const Lattice& lattice, int threads) {
+  return std::min(std::uint64_t{64} << 20,
+                  32 * static_cast<std::uint64_t>(volume(lattice.bricks()))) +
+         static_cast<std::uint64_t>(threads) * lattice.brick_bytes() * 9 / 4;
+}
+
+std::uint64_t memory_for(const Lattice& lattice, Index leaf, int threads, Index piece,
+                         std::uint64_t batch) {
+  std::uint64_t bytes = kProgramBytes + batch * part_bytes(lattice.type, leaf);
+  if (leaf < kBlockEdge) bytes += reading_bytes(lattice, threads) + piece_bytes(lattice, piece);
+  return bytes;
+}
+
+}  // namespace
+
+std::uint64_t IndexChunkBuilder::least_memory(const Lattice& lattice, Index leaf, int threads) {
+  return memory_for(lattice, leaf, threads, 1, 1);
+}
+
+IndexChunkBuilder::IndexChunkBuilder(const StoreReader& store, int level, const IndexLayout& layout,
+                                     IndexKind kind, std::uint64_t memory, int threads)
+    : store_(store), level_(level), layout_(layout), kind_(kind) {
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
+  const auto fits = [&](Index piece, std::uint64_t batch) {
+    return memory_for(lattice, layout.leaf, threads, piece, batch) <= memory;
+  };
+  std::uint64_t batch = 8 * static_cast<std::uint64_t>(threads);
+  while (batch > 1 && !fits(1, batch)) batch /= 2;
+  batch_ = static_cast<std::size_t>(batch);
+  piece_ = IndexLayout::kChunk;
+  while (piece_ > 1 && !fits(piece_, batch)) piece_ /= 2;
+}
+
+/// The work on one chunk.
+template <class T>
+class IndexChunkBuilder::Chunk {
+ public:
+  Chunk(const IndexChunkBuilder& builder, Int3 c, const Encode& encode, const Take& take)
+      : builder_(builder),
+        layout_(builder.layout_),
+        box_(layout_.bricks_of_chunk(c)),
+        encode_(encode),
+        take_(take) {
+    const Int3 cell_blocks = ceil_div(layout_.cells(), {kBlockEdge, kBlockEdge, kBlockEdge});
+    blocks_ = builder.store_.block_ranges(
+        builder.level_,
+        intersect({box_.lo * kBrickBlocks, box_.hi * kBrickBlocks}, {{0, 0, 0}, cell_blocks}));
+  }
+
+  void run();
+
+ private:
+  /// The ranges of the blocks of an index brick, C order of its grid of leaf 16.
+  std::vector<ValueRange<T>> block_ranges(Int3 b) const;
+  std::vector<Int3> write_directory() const;
+  void build_from_blocks(const std::vector<Int3>& bricks) const;
+  void build_from_samples(const std::vector<Int3>& bricks) const;
+  template <class Ranges>
+  void write_parts(std::span<const Int3> bricks, const Ranges& ranges_of) const;
+
+  const IndexChunkBuilder& builder_;
+  const IndexLayout& layout_;
+  Box3 box_;
+  const Encode& encode_;
+  const Take& take_;
+  RangeTable blocks_;
+};
+
+template <class T>
+std::vector<ValueRange<T>> IndexChunkBuilder::Chunk<T>::block_ranges(Int3 b) const {
+  const Box3 of_brick =
+      intersect({b * kBrickBlocks, (b + Int3{1, 1, 1}) * kBrickBlocks}, blocks_.box);
+  std::vector<ValueRange<T>> ranges;
+  for_each_point(of_brick, [&](Int3 p) {
+    const ValueRange<double>& range = blocks_.at(p);
+    ranges.push_back(range.empty()
+                         ? ValueRange<T>{}
+                         : ValueRange<T>{static_cast<T>(range.lo), static_cast<T>(range.hi)});
+  });
+  return ranges;
+}
+
+/// Hands the directory over; the index bricks that can be active, in Morton order.
+template <class T>
+std::vector<Int3> IndexChunkBuilder::Chunk<T>::write_directory() const {
+  std::vector<ValueRange<T>> ranges(static_cast<std::size_t>(volume(box_.extent())));
+  std::vector<Int3> bricks;
+  for_each_morton(box_.extent(), [&](Int3 p) {
+    ValueRange<T>& range = ranges[static_cast<std::size_t>(linear_index(p, box_.extent()))];
+    for (const ValueRange<T>& block : block_ranges(box_.lo + p)) range.include(block);
+    if (range.lo < range.hi) bricks.push_back(box_.lo + p);
+  });
+  take_(IndexLayout::kDirectory, encode_(build_index<T>(builder_.kind_, ranges, box_.extent())));
+  return bricks;
+}
+
+/// Makes the parts of `bricks`, a batch at a time; ranges_of(brick) are those of its items.
+template <class T>
+template <class Ranges>
+void IndexChunkBuilder::Chunk<T>::write_parts(std::span<const Int3> bricks,
+                                              const Ranges& ranges_of) const {
+  std::vector<std::vector<std::byte>> parts(std::min(builder_.batch_, bricks.size()));
+  for (std::size_t first = 0; first < bricks.size(); first += parts.size()) {
+    const std::size_t count = std::min(parts.size(), bricks.size() - first);
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      const Int3 b = bricks[first + i];
+      const std::vector<ValueRange<T>> ranges = ranges_of(b);
+      parts[i] = encode_(build_index<T>(builder_.kind_, ranges, layout_.leaves_of_brick(b)));
+    });
+    for (std::size_t i = 0; i < count; ++i)
+      take_(layout_.part_of_brick(bricks[first + i]), std::move(parts[i]));
+  }
+}
+
+template <class T>
+void IndexChunkBuilder::Chunk<T>::build_from_blocks(const std::vector<Int3>& bricks) const {
+  write_parts(bricks, [&](Int3 b) { return block_ranges(b); });
+}
+
+template <class T>
+void IndexChunkBuilder::Chunk<T>::build_from_samples(const std::vector<Int3>& bricks) const {
+  const Box3 volume_box{{0, 0, 0}, layout_.extent};
+  std::unique_ptr<std::byte[]> samples;
+  std::size_t room = 0;
+  const auto piece_of = [&](Int3 b) {
+    return Int3{b.x / builder_.piece_, b.y / builder_.piece_, b.z / builder_.piece_};
+  };
+  for (std::size_t first = 0, end = 0; first < bricks.size(); first = end) {
+    // In Morton order the bricks of a piece, a cube of a power of two, follow each other.
+    Box3 box{bricks[first], bricks[first]};
+    for (end = first; end < bricks.size() && piece_of(bricks[end]) == piece_of(bricks[first]);
+         ++end)
+      box = {min(box.lo, bricks[end]), max(box.hi, bricks[end] + Int3{1, 1, 1})};
+    const Box3 seen = intersect({box.lo * kEdge, box.hi * kEdge + Int3{1, 1, 1}}, volume_box);
+    const Int3 extent = seen.extent();
+    const auto bytes = static_cast<std::size_t>(volume(extent)) * sizeof(T);
+    if (bytes > room) {
+      samples.reset();
+      samples = std::make_unique_for_overwrite<std::byte[]>(room = bytes);
+    }
+    read_slab(builder_.store_, builder_.level_, seen, samples.get());
+    const T* typed = reinterpret_cast<const T*>(samples.get());
+    write_parts(std::span(bricks).subspan(first, end - first), [&](Int3 b) {
+      const Box3 of_brick =
+          intersect({b * kEdge, (b + Int3{1, 1, 1}) * kEdge + Int3{1, 1, 1}}, volume_box);
+      std::vector<ValueRange<T>> ranges;
+      leaf_ranges<T>({typed + linear_index(of_brick.lo - seen.lo, extent), of_brick.extent(),
+                      extent.x, extent.x * extent.y},
+                     layout_.leaf, ranges);
+      return ranges;
+    });
+  }
+}
+
+template <class T>
+void IndexChunkBuilder::Chunk<T>::run() {
+  const std::vector<Int3> bricks = write_directory();
+  if (layout_.leaf == kBlockEdge)
+    build_from_blocks(bricks);
+  else
+    build_from_samples(bricks);
+}
+
+void IndexChunkBuilder::build(Int3 chunk, const Encode& encode, const Take& take) const {
+  visit_scalar(layout_.type, [&](auto tag) {
+    Chunk<typename decltype(tag)::type>(*this, chunk, encode, take).run();
+  });
+}
+
+}  // namespace isobrick

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+
+#include "isobrick/pipeline/range_scan.h"
+#include "isobrick/pipeline/slab_reader.h"
+
+namespace isobrick {
+
+/// Reads all samples of a level, in pieces of at most `piece_bytes` (or of one
+/// brick), and feeds them to `ranges`, whose finished layers go to `blocks` and
+/// `bricks`. Without `failure` the first brick that cannot be read ends it.
+/// `advance` is told of each piece's bytes.
+void scan_level(const StoreReader& store, int level, std::size_t piece_bytes, LevelRanges& ranges,
+                const BrickFailure& failure, const RangeEmit& blocks, const RangeEmit& bricks,
+                const std::function<void(std::uint64_t)>& advance);
+
+}  // namespace isobrick
