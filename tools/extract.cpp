@@ -10,6 +10,7 @@
 #include "isobrick/io/preview_sink.h"
 #include "isobrick/pipeline/estimate.h"
 #include "tools/format.h"
+#include "tools/index_options.h"
 #include "tools/mesh_output.h"
 #include "tools/mesh_space.h"
 #include "tools/options.h"
@@ -31,6 +32,7 @@ struct Arguments {
   bool normals = false, drop_degenerate = false;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
+  IndexChoice index;
   bool estimate = false, force = false, no_space_check = false;
 };
 
@@ -98,6 +100,7 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   options.drop_degenerate = arguments.drop_degenerate;
   options.memory = arguments.memory;
   options.threads = arguments.threads;
+  options.index = arguments.index;
   std::vector<Surface> surfaces;
   for (const double isovalue : arguments.isovalues) {
     options.isovalue = isovalue;
@@ -179,7 +182,11 @@ ordered_json report_json(const Surface& surface, const ExtractReport& r, std::ui
         {"plan", r.plan_seconds},
         {"decode", r.decode_seconds},
         {"surface", r.surface_seconds},
-        {"sink", r.sink_seconds}}}};
+        {"sink", r.sink_seconds}}},
+      {"index",
+       {{"used", r.index ? name_of(*r.index) : "none"},
+        {"bytes_read", r.search_bytes},
+        {"seconds", r.search_seconds}}}};
   if (surface.options.drop_degenerate) object["degenerate_triangles"] = r.degenerate_triangles;
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();
@@ -333,6 +340,9 @@ void add_extract(Program& program) {
              {"--normals", "gradient|none", "Normals at the vertices", "none"});
   add_flag(app, "--drop-degenerate", arguments->drop_degenerate,
            "Leave out triangles without area where samples equal the isovalue");
+  add_parsed(app, arguments->index, parse_index_choice,
+             {"--index", "auto|none|interval|kdtree|quadtree|octree",
+              "How active blocks are found; never shows in the mesh", "auto"});
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_force(app, arguments->force);

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/bricks/stored_index.h"
 #include "tools/format.h"
 #include "tools/histogram.h"
 #include "tools/options.h"
@@ -48,13 +50,32 @@ ValueRange<double> value_range(const StoreReader& store) {
   return range;
 }
 
-std::vector<std::string> index_kinds(const fs::path& store) {
-  std::vector<std::string> kinds;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(store / "isobrick" / "0" / "index", none))
-    kinds.push_back(entry.path().filename().string());
-  std::sort(kinds.begin(), kinds.end());
-  return kinds;
+/// A kind of index, and what it takes in each level that has it.
+struct IndexFacts {
+  std::string kind;
+  Index leaf = 0;  ///< of the finest of these levels
+  std::map<int, std::uint64_t> level_bytes;
+
+  std::uint64_t bytes() const {
+    std::uint64_t sum = 0;
+    for (const auto& [level, bytes] : level_bytes) sum += bytes;
+    return sum;
+  }
+};
+
+std::vector<IndexFacts> indexes_of(const StoreReader& store) {
+  std::map<std::string, IndexFacts> kinds;
+  for (int level = 0; level < static_cast<int>(store.info().levels.size()); ++level)
+    for (const std::string& kind : stored_index_kinds(store.info().path, level)) {
+      const StoredIndex index(store, level, kind);
+      IndexFacts& facts = kinds[kind];
+      if (facts.level_bytes.empty()) facts.leaf = index.layout().leaf;
+      facts.kind = kind;
+      facts.level_bytes[level] = index_bytes(index);
+    }
+  std::vector<IndexFacts> list;
+  for (auto& [kind, facts] : kinds) list.push_back(std::move(facts));
+  return list;
 }
 
 /// All that `info` tells, gathered before anything is said.
@@ -63,7 +84,8 @@ struct Facts {
   std::vector<std::uint64_t> stored;  ///< bricks, a level
   ValueRange<double> range;
   Histogram histogram;
-  std::vector<std::string> kinds;
+  bool has_ranges = false;
+  std::vector<IndexFacts> indexes;
 
   double ratio() const { return static_cast<double>(raw_bytes) / static_cast<double>(bytes); }
 };
@@ -76,9 +98,10 @@ Facts gather(const StoreReader& store, Progress& progress) {
   facts.raw_bytes = static_cast<std::uint64_t>(volume(finest.extent)) * finest.sample_bytes();
   for (int level = 0; level < static_cast<int>(info.levels.size()); ++level)
     facts.stored.push_back(stored_bricks(store, level));
-  facts.range = value_range(store);
+  facts.has_ranges = store.has_ranges(0);
+  if (facts.has_ranges) facts.range = value_range(store);
   facts.histogram = histogram(store, progress);
-  facts.kinds = index_kinds(info.path);
+  facts.indexes = indexes_of(store);
   return facts;
 }
 
@@ -102,6 +125,20 @@ ordered_json histogram_json(const Histogram& h) {
           {"infinite", h.infinite}};
 }
 
+ordered_json indexes_json(const Facts& facts) {
+  ordered_json indexes = ordered_json::array();
+  for (const IndexFacts& index : facts.indexes) {
+    ordered_json levels = ordered_json::array();
+    for (const auto& [level, bytes] : index.level_bytes)
+      levels.push_back({{"level", level}, {"bytes", bytes}});
+    indexes.push_back({{"kind", index.kind},
+                       {"leaf", index.leaf},
+                       {"bytes", index.bytes()},
+                       {"levels", std::move(levels)}});
+  }
+  return indexes;
+}
+
 ordered_json json_of(const StoreInfo& info, const Facts& facts) {
   const LevelInfo& finest = info.levels.front();
   ordered_json object{{"command", "info"},
@@ -120,7 +157,9 @@ ordered_json json_of(const StoreInfo& info, const Facts& facts) {
                       {"ratio", facts.ratio()},
                       {"value_range", nullptr},
                       {"histogram", histogram_json(facts.histogram)},
-                      {"index_kinds", facts.kinds}};
+                      {"index_kinds", ordered_json::array()},
+                      {"indexes", indexes_json(facts)}};
+  for (const IndexFacts& index : facts.indexes) object["index_kinds"].push_back(index.kind);
   if (!facts.range.empty()) object["value_range"] = {facts.range.lo, facts.range.hi};
   return object;
 }
@@ -133,6 +172,20 @@ std::string levels_text(const StoreInfo& info, const Facts& facts) {
     text += fmt::format("level {:<6} {}; bricks of {}: {}, {} absent\n", i,
                         human_extent(lattice.extent), human_extent(lattice.brick),
                         human_count(bricks), human_count(bricks - facts.stored[i]));
+  }
+  return text;
+}
+
+std::string indexes_text(const Facts& facts) {
+  if (facts.indexes.empty()) return "index kinds  none\n";
+  std::string text;
+  for (const IndexFacts& index : facts.indexes) {
+    std::vector<std::string> levels;
+    for (const auto& [level, bytes] : index.level_bytes)
+      levels.push_back(fmt::format("level {} {}", level, human_bytes(bytes)));
+    text +=
+        fmt::format("{:<13}{}, leaf {}: {} ({})\n", text.empty() ? "index kinds" : "", index.kind,
+                    index.leaf, human_bytes(index.bytes()), fmt::join(levels, ", "));
   }
   return text;
 }
@@ -151,12 +204,11 @@ std::string text_of(const StoreInfo& info, const Facts& facts) {
   text += fmt::format("codec        {}\n", info.codec);
   text += fmt::format("bytes        {} for {} of samples ({:.2f} to 1)\n", human_bytes(facts.bytes),
                       human_bytes(facts.raw_bytes), facts.ratio());
-  text += facts.range.empty()
+  text += !facts.has_ranges ? "value range  unknown: 'isobrick index' computes the ranges\n"
+          : facts.range.empty()
               ? "value range  none\n"
               : fmt::format("value range  {:g} to {:g}\n", facts.range.lo, facts.range.hi);
-  text +=
-      fmt::format("index kinds  {}\n",
-                  facts.kinds.empty() ? "none" : fmt::format("{}", fmt::join(facts.kinds, ", ")));
+  text += indexes_text(facts);
   text += fmt::format("histogram    of level {}, square-root scale\n{}", h.level, draw(h, 6));
   if (h.not_a_number + h.infinite > 0)
     text += fmt::format("  left out: {} NaN, {} infinite\n", human_count(h.not_a_number),

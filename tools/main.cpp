@@ -38,6 +38,7 @@ void define(Program& program) {
   program.app.footer("Help on a subcommand: isobrick convert --help");
   add_convert(program);
   add_info(program);
+  add_index(program);
   add_verify(program);
   add_extract(program);
   add_export(program);

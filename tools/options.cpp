@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/format.h"
+#include "tools/index_options.h"
 
 namespace isobrick::tools {
 
@@ -111,6 +112,13 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_parsed(app, options.levels, parse_levels,
              {"--levels", "auto|N", "Levels of the pyramid; auto: until one brick holds the last",
               "auto"});
+  add_parsed(app, options.index,
+             [](const std::string& text) {
+               return text == "none" ? std::nullopt : std::optional(parse_stored_kind(text));
+             },
+             {"--index", "none|interval|kdtree|quadtree|octree",
+              "Also add a search structure, as 'isobrick index' does", "none"});
+  add_leaf(app, options.leaf);
   add_memory(app, options.memory);
   add_threads(app, options.threads);
   add_flag(app, "--resume", options.resume, "Go on with an interrupted conversion of this input");
@@ -136,8 +144,10 @@ void report_conversion(Console& console, const std::string& command, const std::
        {{"total", report.bricks}, {"absent", report.bricks_absent}, {"kept", report.bricks_kept}}},
       {"bytes_in", report.bytes_in},
       {"bytes_out", report.bytes_out},
+      {"index_bytes", report.index_bytes},
       {"ratio", ratio},
       {"seconds", report.seconds},
+      {"index_seconds", report.index_seconds},
       {"peak_resident_bytes", peak_resident_bytes()}};
   std::string text = fmt::format("{}: {} samples of {}", output, human_extent(volume.extent),
                                  zarr_name(volume.type));
@@ -149,6 +159,9 @@ void report_conversion(Console& console, const std::string& command, const std::
   text += fmt::format("\n{} in, {} out ({:.2f} to 1) in {}, {}/s\n", human_bytes(report.bytes_in),
                       human_bytes(report.bytes_out), ratio, human_seconds(report.seconds),
                       human_bytes(rate));
+  if (report.index_bytes > 0)
+    text += fmt::format("of that {} for the index, in {}\n", human_bytes(report.index_bytes),
+                        human_seconds(report.index_seconds));
   console.result(object, text);
 }
 

@@ -34,6 +34,7 @@ struct Program {
 // One a file of this folder.
 void add_convert(Program& program);
 void add_info(Program& program);
+void add_index(Program& program);
 void add_verify(Program& program);
 void add_extract(Program& program);
 void add_export(Program& program);

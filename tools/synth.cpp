@@ -58,6 +58,7 @@ Int3 piece_extent(Int3 extent, std::size_t sample_bytes, std::uint64_t bytes) {
 ConvertReport write_raw(VolumeSource& source, const std::string& path,
                         const ConvertOptions& options, Progress& progress) {
   if (options.resume) throw UsageError("--resume is for stores; a raw file is written anew");
+  if (options.index) throw UsageError("--index is for stores; a raw file has no index");
   const Int3 extent = source.info().extent;
   const std::size_t sample_bytes = size_of(source.info().type);
   const Int3 piece = piece_extent(extent, sample_bytes,

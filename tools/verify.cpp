@@ -1,8 +1,10 @@
 #include "isobrick/pipeline/verify.h"
 
 #include <memory>
+#include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "tools/format.h"
@@ -16,6 +18,14 @@ struct Arguments {
   int threads = 0;
 };
 
+/// ", octree and quadtree indices", after the bricks.
+std::string indexes_text(const VerifyReport& report) {
+  std::set<std::string> kinds;
+  for (const VerifyReport::Index& index : report.indexes) kinds.insert(index.kind);
+  if (kinds.empty()) return "";
+  return fmt::format(", {} {}", fmt::join(kinds, " and "), kinds.size() == 1 ? "index" : "indices");
+}
+
 std::string text_of(const std::string& store, const VerifyReport& report) {
   std::string text;
   for (const std::string& damage : report.damages) text += damage + '\n';
@@ -23,9 +33,16 @@ std::string text_of(const std::string& store, const VerifyReport& report) {
     text +=
         fmt::format("… and {} more\n", human_count(report.damage_count - report.damages.size()));
   if (report.damage_count == 0)
-    text += fmt::format("{} is whole: {} bricks, {} read\n", store, human_count(report.bricks),
-                        human_bytes(report.bytes));
+    text += fmt::format("{} is whole: {} bricks{}, {} read\n", store, human_count(report.bricks),
+                        indexes_text(report), human_bytes(report.bytes));
   return text;
+}
+
+nlohmann::ordered_json indexes_json(const VerifyReport& report) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const VerifyReport::Index& index : report.indexes)
+    list.push_back({{"level", index.level}, {"kind", index.kind}});
+  return list;
 }
 
 int run(const Arguments& arguments, Console& console) {
@@ -35,6 +52,7 @@ int run(const Arguments& arguments, Console& console) {
                                       {"whole", report.damage_count == 0},
                                       {"bricks", report.bricks},
                                       {"bytes_read", report.bytes},
+                                      {"indexes", indexes_json(report)},
                                       {"damage_count", report.damage_count},
                                       {"damages", report.damages}};
   console.result(object, text_of(arguments.store, report));
