@@ -126,7 +126,11 @@ void LevelIndex::check() const {
 void LevelIndex::prepare(Publisher& publisher) {
   finished_ = options_.resume && is_wanted(place_);
   if (finished_) return;
-  if (!(options_.resume && is_wanted(partial_))) fs::remove_all(partial_);
+  if (!(options_.resume && is_wanted(partial_))) {
+    std::error_code failure;
+    fs::remove_all(partial_, failure);
+    if (failure) throw system_error("remove", partial_.string(), failure.value());
+  }
   for_each_point({{0, 0, 0}, layout_.chunks()}, [&](Int3 c) {
     std::error_code none;
     fs::remove(temporary_name(index_chunk_path(partial_, c)), none);

@@ -1,0 +1,84 @@
+#include <gtest/gtest.h>
+
+#include "isobrick/bricks/added_ranges.h"
+#include "isobrick/bricks/stored_index.h"
+#include "tests/pipeline/index_fixture.h"
+
+// The bytes of tiny indices, frozen: whatever changes them changes the format,
+// which needs a new version in docs/store_format.md.
+
+namespace isobrick::test {
+namespace {
+
+std::string hex(const std::string& bytes) {
+  std::string text;
+  for (const char c : bytes) {
+    constexpr char digits[] = "0123456789abcdef";
+    text += digits[static_cast<unsigned char>(c) >> 4];
+    text += digits[static_cast<unsigned char>(c) & 15];
+  }
+  return text;
+}
+
+class IndexGolden : public testing::Test {
+ protected:
+  /// 3 × 2 × 2 samples: two cells with the ranges [10, 15] and [11, 30].
+  void SetUp() override {
+    const std::vector<std::uint8_t> samples{10, 12, 30, 11, 11, 11, 14, 13, 12, 15, 15, 15};
+    MemorySource source({3, 2, 2}, ScalarType::u8, as_bytes(samples));
+    convert_quietly(source, store_, {.zstd_level = std::nullopt, .levels = 1});
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path store_ = folder_ / "a";
+};
+
+TEST_F(IndexGolden, Octree) {
+  add_index_quietly(store_, {.kind = IndexKind::octree, .leaf = 1});
+  const auto tree = tree_of(index_folder(store_, 0, "octree"));
+  ASSERT_EQ(tree.size(), 2u);
+  EXPECT_EQ(tree.at("index.json"), R"({
+  "brick": 64,
+  "chunk": 512,
+  "crc32c": 76908537,
+  "data_type": "uint8",
+  "isobrick_index": 1,
+  "kind": "octree",
+  "leaf": 1,
+  "shape": [
+    2,
+    2,
+    3
+  ],
+  "zstd_level": null
+}
+)");
+  EXPECT_EQ(hex(tree.at("c/0/0/0")),
+            // The directory: an octree of one brick with the range [10, 30], CRC-32C.
+            "494253580104000038000000000000000100000001000000"
+            "000000000000000001000000010000000100000000000000"
+            "0a1e000000000000"
+            "01dd10f6"
+            // Brick (0, 0, 0): an octree of two cells and their union, CRC-32C.
+            "494253580104000038000000000000000200000002000000"
+            "000000000000000002000000010000000100000000000000"
+            "0a0f0b1e0a1e0000"
+            "149274a0"
+            // Offset and length of both, CRC-32C.
+            "00000000000000003c00000000000000"
+            "3c000000000000003c00000000000000"
+            "de029fbc");
+}
+
+TEST_F(IndexGolden, AddedRanges) {
+  EXPECT_EQ(to_json(AddedRanges{.may_have_nan = false, .image_crc32c = 305419896}), R"({
+  "crc32c": 710489847,
+  "image_crc32c": 305419896,
+  "isobrick_ranges": 1,
+  "may_have_nan": false
+}
+)");
+}
+
+}  // namespace
+}  // namespace isobrick::test
