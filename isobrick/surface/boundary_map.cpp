@@ -44,7 +44,7 @@ void adopt_x_face(TileState& tile, const TileBoundary& from, bool dy, bool dz) {
     if ((dy && y != kLast) || (dz && z != kLast)) continue;
     if (dy) y = 0;
     if (dz) z = 0;
-    EdgeRow& row = tile.rows[row_index(y, z)];
+    EdgeRow& row = tile.write_row(y, z);
     (AlongY ? row.y_at_0 : row.z_at_0) = from.base + v.number;
   }
 }
@@ -66,7 +66,7 @@ TileBoundary* BoundaryMap::add(Int3 tile) {
 
 const TileBoundary* BoundaryMap::find(Int3 tile) const {
   const auto found = map_.find(morton_encode(tile));
-  return found == map_.end() ? nullptr : found->second.get();
+  return found == map_.end() || found->second->empty ? nullptr : found->second.get();
 }
 
 void BoundaryMap::forget_before(Int3 next) {
@@ -87,6 +87,8 @@ void BoundaryMap::clear() {
 
 void publish_boundary(TileState& tile) {
   TileBoundary& boundary = *tile.boundary;
+  boundary.empty = tile.vertices == 0;
+  if (boundary.empty) return;
   for (int i = 0; i < kTileSamples; ++i) {
     boundary.y_face[static_cast<std::size_t>(i)] = tile.rows[row_index(kLast, i)];
     boundary.z_face[static_cast<std::size_t>(i)] = tile.rows[row_index(i, kLast)];
@@ -100,15 +102,17 @@ void publish_boundary(TileState& tile) {
     to[to.size() - 1] = {static_cast<std::uint16_t>(r),
                          base + static_cast<std::uint32_t>(std::popcount(word)) - 1};
   };
-  for (int r = 0; r < kTileRows; ++r) {
+  tile.for_each_written([&](int y, int z) {
+    const int r = row_index(y, z);
     append(boundary.x_face_y, r, tile.rows[r].y_base, tile.rows[r].y);
     append(boundary.x_face_z, r, tile.rows[r].z_base, tile.rows[r].z);
-  }
+  });
 }
 
 void adopt_boundaries(TileState& tile, const BoundaryMap& map) {
   if (tile.number_base != 0)
-    for (EdgeRow& row : tile.rows) shift(row, tile.number_base);
+    tile.for_each_written(
+        [&](int y, int z) { shift(tile.rows[row_index(y, z)], tile.number_base); });
   const bool* first = tile.shape.first;
   const auto before = [&](bool x, bool y, bool z) -> const TileBoundary* {
     if ((x && first[0]) || (y && first[1]) || (z && first[2])) return nullptr;
@@ -118,17 +122,17 @@ void adopt_boundaries(TileState& tile, const BoundaryMap& map) {
   if (const TileBoundary* b = before(false, true, false))
     for (int z = 0; z < kTileSamples; ++z) {
       const EdgeRow& from = b->y_face[static_cast<std::size_t>(z)];
-      if (z > 0 || first[2]) adopt_x(tile.rows[row_index(0, z)], from, b->base);
-      adopt_z(tile.rows[row_index(0, z)], from, b->base);
+      if (z > 0 || first[2]) adopt_x(tile.write_row(0, z), from, b->base);
+      adopt_z(tile.write_row(0, z), from, b->base);
     }
   if (const TileBoundary* b = before(false, false, true))
     for (int y = 0; y < kTileSamples; ++y) {
       const EdgeRow& from = b->z_face[static_cast<std::size_t>(y)];
-      if (y > 0 || first[1]) adopt_x(tile.rows[row_index(y, 0)], from, b->base);
-      adopt_y(tile.rows[row_index(y, 0)], from, b->base);
+      if (y > 0 || first[1]) adopt_x(tile.write_row(y, 0), from, b->base);
+      adopt_y(tile.write_row(y, 0), from, b->base);
     }
   if (const TileBoundary* b = before(false, true, true))
-    adopt_x(tile.rows[row_index(0, 0)], b->y_face[kLast], b->base);
+    adopt_x(tile.write_row(0, 0), b->y_face[kLast], b->base);
   if (const TileBoundary* b = before(true, false, false)) {
     adopt_x_face<true>(tile, *b, false, false);
     adopt_x_face<false>(tile, *b, false, false);

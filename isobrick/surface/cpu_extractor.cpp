@@ -93,7 +93,7 @@ struct CpuExtractor::Impl {
     state.cells.clear();
     if (options.drop_degenerate && !state.ties) state.ties = std::make_unique<TileTies>();
     if (!shape_tile(state.shape, work.tile)) {
-      for (EdgeRow& row : state.rows) row = {};
+      state.clear_rows();
       if (state.ties) state.ties->clear();
     } else {
       if (options.may_have_nan) state.work.active_blocks = 0xff;

@@ -159,6 +159,29 @@ inline RowBits row_bits(const TileState& tile, int y, int z) {
           (here ^ behind) & sample_mask, up_y && up_z ? mixed : 0};
 }
 
+/// Bit y: in row (y, z) an edge or a cell may begin that the surface passes; in
+/// the others none does. Rows outside the tile's shape may have any bit.
+inline std::uint64_t rows_with_surface(const TileState& tile, int z) {
+  const hn::ScalableTag<std::uint64_t> d;
+  const auto cells = hn::Set(d, bit_span(tile.shape.lo[0], tile.shape.hi[0] - 1));
+  const auto samples = hn::Set(d, bit_span(tile.shape.lo[0], tile.shape.hi[0]));
+  std::uint64_t found = 0;
+  for (std::size_t y = 0; y < static_cast<std::size_t>(kTileSamples); y += hn::Lanes(d)) {
+    const std::uint64_t* inside = tile.inside + row_index(0, z) + y;
+    const auto here = hn::LoadU(d, inside), above = hn::LoadU(d, inside + 1);
+    const auto behind = hn::LoadU(d, inside + kTileSamples);
+    const auto both = hn::LoadU(d, inside + kTileSamples + 1);
+    const auto along_x = hn::And(hn::Xor(here, hn::ShiftRight<1>(here)), cells);
+    const auto across =
+        hn::Or(hn::Or(hn::Xor(here, above), hn::Xor(here, behind)), hn::Xor(here, both));
+    const auto any = hn::Or(along_x, hn::And(across, samples));
+    std::uint8_t mask[8] = {};
+    hn::StoreMaskBits(d, hn::Ne(any, hn::Zero(d)), mask);
+    found |= static_cast<std::uint64_t>(mask[0]) << y;
+  }
+  return found;
+}
+
 /// Leaves out what touches NaN: cells with such a corner, and edges with no
 /// other cell around them.
 inline void leave_out_nan(const GoodCells& good, int y, int z, RowBits& bits) {
@@ -237,15 +260,17 @@ void scan_samples(const KernelContext& context, TileState& tile) {
   const bool look_for_nan = std::is_floating_point_v<T> && context.may_have_nan;
   if (look_for_nan) find_good_cells<T>(context, tile, good);
 
-  std::memset(static_cast<void*>(tile.rows), 0, sizeof tile.rows);
-  std::memset(tile.own_at_0, 0, sizeof tile.own_at_0);
+  tile.clear_rows();
   tile.cells.clear();
   tile.cells.reserve(static_cast<std::size_t>(kTileEdge * kTileEdge * kTileEdge));
   tile.triangles = 0;
   std::uint32_t number = 0;
   const TileShape& s = tile.shape;
-  for (int z = s.lo[2]; z <= s.hi[2]; ++z)
-    for (int y = s.lo[1]; y <= s.hi[1]; ++y) {
+  for (int z = s.lo[2]; z <= s.hi[2]; ++z) {
+    std::uint64_t rows = rows_with_surface(tile, z) & bit_span(s.lo[1], s.hi[1]);
+    tile.written[z] = rows;
+    for (; rows; rows &= rows - 1) {
+      const int y = std::countr_zero(rows);
       RowBits bits = row_bits(tile, y, z);
       if (!(bits.x | bits.y | bits.z | bits.cells)) continue;
       if (look_for_nan) leave_out_nan(good, y, z, bits);
@@ -253,6 +278,7 @@ void scan_samples(const KernelContext& context, TileState& tile) {
       number = number_row(tile, y, z, bits, number);
       if (bits.cells) list_cells(tile, y, z, bits.cells);
     }
+  }
   tile.edge_vertices = tile.vertices = number;
 }
 

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 
 #include "isobrick/core/pod_buffer.h"
@@ -68,6 +71,7 @@ struct FaceTie {
 /// and those on ties on all its planes.
 struct TileBoundary {
   std::uint32_t base = 0;  ///< number of the tile's first vertex in the mesh
+  bool empty = true;       ///< no vertex: what follows holds anything
   /// Rows with y = 32 (by z) and rows with z = 32 (by y); numbers count from `base`.
   std::array<EdgeRow, kTileSamples> y_face, z_face;
   PodBuffer<FaceVertex> x_face_y, x_face_z;  ///< edges along y and along z at x = 32
@@ -104,11 +108,15 @@ struct TileTies {
 struct TileState {
   TileWork work;
   TileShape shape;
-  PodBuffer<std::byte> samples;                 ///< TileLayout, of the sample type
-  alignas(64) std::uint64_t inside[kTileRows];  ///< bit x: sample x is inside
+  PodBuffer<std::byte> samples;  ///< TileLayout, of the sample type
+  /// Bit x: sample x is inside. With room for vector loads that run past the last row.
+  alignas(64) std::uint64_t inside[kTileRows + 2 * kTileSamples] = {};
   alignas(64) EdgeRow rows[kTileRows];
   /// Own edges at sample 0 of a row: bit 0 along y, bit 1 along z.
-  std::uint8_t own_at_0[kTileRows];
+  std::uint8_t own_at_0[kTileRows] = {};
+  /// Bit y of word z: row (y, z) was written to. All other rows (and their
+  /// own_at_0) are zero, so that a tile with little in it costs little.
+  std::uint64_t written[kTileSamples] = {};
   PodBuffer<ActiveCell> cells;
   PodBuffer<std::uint32_t>
       edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
@@ -118,6 +126,24 @@ struct TileState {
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
   std::uint32_t number_base = 0;                     ///< what its vertices are numbered from
   TileBoundary* boundary = nullptr;                  ///< of this tile, when later tiles need it
+
+  EdgeRow& write_row(int y, int z) {
+    written[z] |= std::uint64_t{1} << y;
+    return rows[row_index(y, z)];
+  }
+  /// Calls f(y, z) for the rows that were written to, in their order.
+  template <class F>
+  void for_each_written(F&& f) const {
+    for (int z = 0; z < kTileSamples; ++z)
+      for (std::uint64_t word = written[z]; word; word &= word - 1) f(std::countr_zero(word), z);
+  }
+  void clear_rows() {
+    for_each_written([this](int y, int z) {
+      rows[row_index(y, z)] = {};
+      own_at_0[row_index(y, z)] = 0;
+    });
+    std::fill(std::begin(written), std::end(written), 0);
+  }
 };
 
 }  // namespace isobrick

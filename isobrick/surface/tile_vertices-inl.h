@@ -29,22 +29,25 @@ inline void list_edges(TileState& tile) {
     for (; word; word &= word - 1)
       *out++ = code + static_cast<std::uint32_t>(std::countr_zero(word));
   };
-  for (int z = s.lo[2]; z <= s.hi[2]; ++z)
-    for (int y = s.lo[1]; y <= s.hi[1]; ++y) {
-      const bool own_y = y > 0 || s.first[1], own_z = z > 0 || s.first[2];
-      const EdgeRow& row = tile.rows[row_index(y, z)];
-      const std::uint8_t at_0 = tile.own_at_0[row_index(y, z)];
-      const auto code = static_cast<std::uint32_t>(y << 6 | z << 12);
-      if (own_y && own_z) append(row.x, code);
-      if (own_z) {
-        if (at_0 & 1) *out++ = code | 1u << 18;
-        append(row.y, (code | 1u << 18) + 1);
-      }
-      if (own_y) {
-        if (at_0 & 2) *out++ = code | 2u << 18;
-        append(row.z, (code | 2u << 18) + 1);
-      }
+  const auto append_row = [&](int y, int z) {
+    const bool own_y = y > 0 || s.first[1], own_z = z > 0 || s.first[2];
+    const EdgeRow& row = tile.rows[row_index(y, z)];
+    const std::uint8_t at_0 = tile.own_at_0[row_index(y, z)];
+    const auto code = static_cast<std::uint32_t>(y << 6 | z << 12);
+    if (own_y && own_z) append(row.x, code);
+    if (own_z) {
+      if (at_0 & 1) *out++ = code | 1u << 18;
+      append(row.y, (code | 1u << 18) + 1);
     }
+    if (own_y) {
+      if (at_0 & 2) *out++ = code | 2u << 18;
+      append(row.z, (code | 2u << 18) + 1);
+    }
+  };
+  // Not for_each_written: what is compiled for other processors is not inlined.
+  for (int z = s.lo[2]; z <= s.hi[2]; ++z)
+    for (std::uint64_t rows = tile.written[z]; rows; rows &= rows - 1)
+      append_row(std::countr_zero(rows), z);
 }
 
 /// Vertices one by one: the definition, which the vectors below follow to the bit.
