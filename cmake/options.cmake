@@ -23,10 +23,9 @@ add_link_options(LINKER:--as-needed)
 # written (no contraction into fma), so that every machine makes the same mesh.
 add_library(isobrick_flags INTERFACE)
 target_compile_options(isobrick_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wconversion -Wshadow
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wconversion -Wshadow
   -Wno-missing-field-initializers  # designated initialisers leave out what keeps its default
-  -ffp-contract=off
-  $<$<BOOL:${ISOBRICK_WERROR}>:-Werror>)
+  -ffp-contract=off $<$<BOOL:${ISOBRICK_WERROR}>:-Werror>>)
 if(ISOBRICK_SANITIZE)
   target_compile_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE})
@@ -45,8 +44,3 @@ function(isobrick_library name)
   target_link_libraries(isobrick_${name} PUBLIC ${arg_LINK}
     PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:isobrick_flags>)
 endfunction()
-
-option(ISOBRICK_CUDA "Build the CUDA backend" OFF)
-if(ISOBRICK_CUDA)
-  message(WARNING "isobrick has no CUDA sources yet; ISOBRICK_CUDA changes nothing")
-endif()

@@ -13,6 +13,7 @@
 #include "isobrick/surface/tile_gather.h"
 #include "isobrick/surface/tile_kernels.h"
 #include "isobrick/surface/tile_ties.h"
+#include "isobrick/surface/world_map.h"
 
 namespace isobrick {
 namespace {
@@ -23,23 +24,6 @@ constexpr std::size_t kTilesPerThread = 32;
 
 /// A tile takes some 50 µs and a hand-off some 10: fewer tiles stay on one thread.
 constexpr std::size_t kWorthThreads = 6;
-
-WorldMap world_map(const Transform& t) {
-  WorldMap map;
-  for (int row = 0; row < 3; ++row) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(3 * row + axis);
-      map.m[i] = static_cast<float>(t.direction[i] * t.spacing[axis]);
-      map.normal[i] = static_cast<float>(t.direction[i] / t.spacing[axis]);
-    }
-    map.origin[row] = static_cast<float>(t.origin[row]);
-  }
-  const auto& d = t.direction;
-  const double handed = d[0] * (d[4] * d[8] - d[5] * d[7]) - d[1] * (d[3] * d[8] - d[5] * d[6]) +
-                        d[2] * (d[3] * d[7] - d[4] * d[6]);
-  map.mirrored = handed * t.spacing.x * t.spacing.y * t.spacing.z < 0;
-  return map;
-}
 
 }  // namespace
 

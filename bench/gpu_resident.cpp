@@ -1,0 +1,218 @@
+// A volume resident in device memory to an indexed mesh in device memory, search
+// included, beside the floor that memory bandwidth sets.
+//
+//   gpu_resident --raw bonsai_256x256x256_uint8.raw --isovalue 45 --json
+//   gpu_resident --synth gyroid --frequency 6 --noise 0 --dims 1024,1024,1024 --type u8
+//
+// Correctness first: --check compares the mesh with the CPU's, byte for byte.
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "bench/bandwidth.h"
+#include "isobrick/core/dense_bricks.h"
+#include "isobrick/gpu/device_volume.h"
+#include "isobrick/index/active_tiles.h"
+#include "isobrick/io/open_source.h"
+#include "isobrick/io/synth_source.h"
+#include "isobrick/surface/cpu_extractor.h"
+
+namespace isobrick::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Arguments {
+  std::string raw, synth, type = "u8", write_raw;
+  std::vector<Index> dims{512, 512, 512};
+  double isovalue = 0;
+  bool has_isovalue = false, normals = false, check = false, cpu = false, json = false;
+  double frequency = 0, noise = 0;
+  int runs = 25;
+};
+
+struct Volume {
+  Int3 extent;
+  ScalarType type;
+  std::vector<std::byte> samples;
+};
+
+Volume read_volume(const Arguments& a) {
+  std::unique_ptr<VolumeSource> source;
+  if (!a.raw.empty()) {
+    source = open_source(a.raw, {});
+  } else {
+    SynthOptions options;
+    options.kind = parse_synth_kind(a.synth).value();
+    options.extent = {a.dims[0], a.dims[1], a.dims[2]};
+    options.type = parse_scalar_type(a.type).value();
+    if (a.frequency > 0) options.frequency = a.frequency;
+    options.noise = a.noise;
+    source = make_synth(options);
+  }
+  const VolumeInfo& info = source->info();
+  Volume v{info.extent, info.type, {}};
+  v.samples.resize(static_cast<std::size_t>(volume(v.extent)) * size_of(v.type));
+  const std::size_t plane = static_cast<std::size_t>(v.extent.x * v.extent.y) * size_of(v.type);
+  tbb::parallel_for(Index{0}, v.extent.z, [&](Index z) {
+    source->read({{0, 0, z}, {v.extent.x, v.extent.y, z + 1}},
+                 v.samples.data() + static_cast<std::size_t>(z) * plane);
+  });
+  return v;
+}
+
+template <class T>
+std::vector<ValueRange<T>> ranges_of(const Volume& v, const Lattice& lattice) {
+  std::vector<ValueRange<T>> ranges(static_cast<std::size_t>(volume(lattice.blocks())));
+  const T* samples = reinterpret_cast<const T*>(v.samples.data());
+  const Int3 blocks = lattice.blocks();
+  tbb::parallel_for(Index{0}, blocks.z, [&](Index z) {
+    for_each_point({{0, 0, z}, {blocks.x, blocks.y, z + 1}}, [&](Int3 b) {
+      ValueRange<T>& range = ranges[static_cast<std::size_t>(linear_index(b, blocks))];
+      const Int3 lo = b * kBlockEdge;
+      for_each_point(intersect({lo, lo + Int3{17, 17, 17}}, lattice.box()),
+                     [&](Int3 p) { range.include(samples[linear_index(p, v.extent)]); });
+    });
+  });
+  return ranges;
+}
+
+/// The CPU with all its cores, and its mesh.
+double run_cpu(const Volume& v, const Lattice& lattice, const DenseBricks& bricks,
+               const SurfaceOptions& options, int runs, MeshBuffer& mesh) {
+  double least = 1e30;
+  visit_scalar(v.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    const auto ranges = ranges_of<T>(v, lattice);
+    CpuExtractor extractor(
+        lattice, options,
+        {.tiles = CpuExtractor::good_batch(tbb::this_task_arena::max_concurrency())});
+    std::vector<TileWork> tiles;
+    for (int i = 0; i < runs; ++i) {
+      const auto start = Clock::now();
+      mesh.clear();
+      tiles.clear();
+      extractor.restart();
+      append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, ranges, options.isovalue, tiles);
+      extractor.extract(tiles, bricks, mesh);
+      least = std::min(least, std::chrono::duration<double>(Clock::now() - start).count());
+    }
+  });
+  return least;
+}
+
+template <class V>
+bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(V)) == 0;
+}
+
+int run(const Arguments& a) {
+  const Volume v = read_volume(a);
+  if (!a.write_raw.empty())
+    std::ofstream(a.write_raw, std::ios::binary)
+        .write(reinterpret_cast<const char*>(v.samples.data()),
+               static_cast<std::streamsize>(v.samples.size()));
+  const Lattice lattice{v.extent, {64, 64, 64}, v.type};
+  const DenseBricks bricks(lattice, v.samples.data());
+  SurfaceOptions options;
+  options.isovalue = a.has_isovalue ? a.isovalue : default_isovalue(v.type);
+  options.normals = a.normals;
+  options.roi = lattice.box();
+
+  gpu::DeviceVolume resident(lattice, bricks, 0);
+  gpu::ResidentExtractor extractor(resident, options);
+  const gpu::DeviceCounts counts = extractor.extract(options.isovalue);
+  nlohmann::json out;
+  if (a.check || a.cpu) {
+    MeshBuffer expected, mesh;
+    const double seconds =
+        run_cpu(v, lattice, bricks, options, a.cpu ? 5 : 1, expected);
+    if (a.cpu) out["cpu_ms"] = seconds * 1e3;
+    extractor.download(mesh);
+    const bool same = same_bytes(expected.positions, mesh.positions) &&
+                      same_bytes(expected.normals, mesh.normals) &&
+                      same_bytes(expected.triangles, mesh.triangles);
+    out["same_as_cpu"] = same;
+    if (!same) fmt::print(stderr, "the mesh differs from the CPU's\n");
+  }
+  std::vector<float> times;
+  for (int i = -3; i < a.runs; ++i) {
+    extractor.launch(options.isovalue);
+    const float ms = extractor.milliseconds();
+    if (i >= 0) times.push_back(ms);
+  }
+  std::sort(times.begin(), times.end());
+  const Bandwidth bandwidth = measure_bandwidth(std::size_t{1} << 30);
+  const double read = static_cast<double>(counts.active_tiles) * 32768 *
+                      static_cast<double>(lattice.sample_bytes());
+  const double written =
+      12.0 * static_cast<double>(counts.vertices * (a.normals ? 2 : 1) + counts.triangles);
+  const double floor = (read / bandwidth.read + written / bandwidth.write) * 1e3;
+  const float median = times[times.size() / 2];
+  out["extent"] = {v.extent.x, v.extent.y, v.extent.z};
+  out["type"] = short_name(v.type);
+  out["isovalue"] = options.isovalue;
+  out["normals"] = a.normals;
+  out["vertices"] = counts.vertices;
+  out["triangles"] = counts.triangles;
+  out["active_tiles"] = counts.active_tiles;
+  out["tiles"] = volume(lattice.tiles());
+  out["ms_median"] = median;
+  out["ms_least"] = times.front();
+  out["ms_most"] = times.back();
+  out["floor_ms"] = floor;
+  out["times_floor"] = median / floor;
+  out["read_bytes_per_s"] = bandwidth.read;
+  out["write_bytes_per_s"] = bandwidth.write;
+  out["volume_device_bytes"] = resident.bytes();
+  out["extra_device_bytes"] = extractor.bytes();
+  if (a.json)
+    fmt::print("{}\n", out.dump());
+  else
+    fmt::print("{}x{}x{} {} iso {}{}: {:.3f} ms (least {:.3f}), floor {:.3f}, x{:.2f}; {} triangles, "
+               "{} of {} tiles{}{}\n",
+               v.extent.x, v.extent.y, v.extent.z, short_name(v.type), options.isovalue,
+               a.normals ? " normals" : "", median, times.front(), floor, median / floor,
+               counts.triangles, counts.active_tiles, volume(lattice.tiles()),
+               out.contains("cpu_ms") ? fmt::format(", cpu {:.2f} ms", out["cpu_ms"].get<double>())
+                                      : "",
+               out.contains("same_as_cpu") ? out["same_as_cpu"].get<bool>() ? ", same" : ", DIFFERS"
+                                           : "");
+  return out.contains("same_as_cpu") && !out["same_as_cpu"].get<bool>() ? 1 : 0;
+}
+
+}  // namespace
+}  // namespace isobrick::bench
+
+int main(int argc, char** argv) {
+  isobrick::bench::Arguments a;
+  CLI::App app{"A resident volume to a mesh on the device"};
+  app.add_option("--raw", a.raw, "a raw volume");
+  app.add_option("--synth", a.synth, "a procedural field: sphere, gyroid, …");
+  app.add_option("--dims", a.dims)->delimiter(',')->expected(3);
+  app.add_option("--type", a.type, "of the procedural field");
+  app.add_option("--frequency", a.frequency);
+  app.add_option("--noise", a.noise);
+  app.add_option("--isovalue", a.isovalue)->each([&](const std::string&) { a.has_isovalue = true; });
+  app.add_option("--runs", a.runs);
+  app.add_option("--write-raw", a.write_raw, "also writes the volume");
+  app.add_flag("--normals", a.normals);
+  app.add_flag("--check", a.check, "compare with the CPU's mesh");
+  app.add_flag("--cpu", a.cpu, "time the CPU as well");
+  app.add_flag("--json", a.json);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return isobrick::bench::run(a);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "gpu_resident: {}\n", error.what());
+    return 1;
+  }
+}

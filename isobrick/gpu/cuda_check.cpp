@@ -1,0 +1,26 @@
+#include "isobrick/gpu/cuda_check.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick::gpu {
+namespace {
+
+void fail(cudaError_t result, const char* what, const std::source_location& where) {
+  throw Error(fmt::format("CUDA: {}: {} ({}), at {}:{}", what, cudaGetErrorString(result),
+                          cudaGetErrorName(result), where.file_name(), where.line()));
+}
+
+}  // namespace
+
+void check(cudaError_t result, const std::source_location& where) {
+  if (result != cudaSuccess) fail(result, "call failed", where);
+}
+
+void check_launch(const char* kernel, const std::source_location& where) {
+  const cudaError_t result = cudaGetLastError();
+  if (result != cudaSuccess) fail(result, kernel, where);
+}
+
+}  // namespace isobrick::gpu

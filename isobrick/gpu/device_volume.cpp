@@ -1,0 +1,111 @@
+#include "isobrick/gpu/device_volume.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/core/morton.h"
+#include "isobrick/gpu/device_scalar.h"
+#include "isobrick/gpu/device_volume_impl.h"
+#include "isobrick/gpu/page_gather.h"
+#include "isobrick/gpu/search_kernel.h"
+
+namespace isobrick::gpu {
+namespace {
+
+/// Bytes of samples that are gathered while the ones before are copied.
+constexpr std::size_t kStagingBytes = std::size_t{32} << 20;
+
+}  // namespace
+
+bool device_available() {
+  int count = 0;
+  return cudaGetDeviceCount(&count) == cudaSuccess && count > 0;
+}
+
+DeviceVolume::Impl::Impl(const Lattice& l, const BrickLookup& bricks, double fill_value)
+    : lattice(l) {
+  if (!is_device_scalar(l.type))
+    throw UsageError(fmt::format("samples of type {} have no CUDA kernels; use --backend cpu",
+                                 short_name(l.type)));
+  tile_count = static_cast<std::uint32_t>(volume(l.tiles()));
+  upload_pages(bricks, fill_value);
+  list_tiles();
+}
+
+void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_value) {
+  const Int3 grid = lattice.tiles();
+  const std::size_t page_bytes = kPageSamples * lattice.sample_bytes();
+  pages = DeviceBuffer<std::byte>((std::size_t{tile_count} + 1) * page_bytes, stream);
+  page_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
+  const std::size_t batch = std::max<std::size_t>(1, kStagingBytes / page_bytes);
+  PinnedBuffer<std::byte> staging[2] = {PinnedBuffer<std::byte>(batch * page_bytes),
+                                        PinnedBuffer<std::byte>(batch * page_bytes)};
+  Event copied[2];
+  fill_page(lattice.type, fill_value, staging[0].data());
+  check(cudaMemcpyAsync(pages.data(), staging[0].data(), page_bytes, cudaMemcpyHostToDevice,
+                        stream.get()));
+  copied[0].record(stream);
+  copied[1].record(stream);
+  std::vector<std::uint32_t> table(tile_count);
+  for (std::size_t first = 0, turn = 0; first < tile_count; first += batch, turn ^= 1) {
+    const std::size_t count = std::min<std::size_t>(batch, tile_count - first);
+    std::byte* to = staging[turn].data();
+    copied[turn].wait();
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      const auto n = static_cast<Index>(first + i);
+      const Int3 tile{n % grid.x, n / grid.x % grid.y, n / (grid.x * grid.y)};
+      const bool any = gather_page(lattice, bricks, fill_value, tile, to + i * page_bytes);
+      table[first + i] = any ? static_cast<std::uint32_t>(first + i + 1) : kNone;
+    });
+    check(cudaMemcpyAsync(pages.data() + (first + 1) * page_bytes, to, count * page_bytes,
+                          cudaMemcpyHostToDevice, stream.get()));
+    copied[turn].record(stream);
+  }
+  check(cudaMemcpyAsync(page_of_tile.data(), table.data(), page_of_tile.bytes(),
+                        cudaMemcpyHostToDevice, stream.get()));
+  stream.wait();
+}
+
+void DeviceVolume::Impl::list_tiles() {
+  std::vector<std::int32_t> order;
+  order.reserve(3 * std::size_t{tile_count});
+  for_each_morton(lattice.tiles(), [&](Int3 t) {
+    for (int axis = 0; axis < 3; ++axis) order.push_back(static_cast<std::int32_t>(t[axis]));
+  });
+  tiles = DeviceBuffer<std::int32_t>(order.size(), stream);
+  check(cudaMemcpyAsync(tiles.data(), order.data(), tiles.bytes(), cudaMemcpyHostToDevice,
+                        stream.get()));
+  ranges = DeviceBuffer<std::byte>(2 * lattice.sample_bytes() * tile_count, stream);
+  launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(),
+                     stream.get());
+  stream.wait();
+}
+
+TileParams DeviceVolume::Impl::params() const {
+  TileParams p{};
+  p.pages = pages.data();
+  p.page_of_tile = page_of_tile.data();
+  p.fill_page = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
+    p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);
+  }
+  return p;
+}
+
+DeviceVolume::DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value)
+    : impl_(std::make_unique<Impl>(lattice, bricks, fill_value)) {}
+DeviceVolume::~DeviceVolume() = default;
+
+const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
+
+std::uint64_t DeviceVolume::bytes() const {
+  return impl_->pages.bytes() + impl_->page_of_tile.bytes() + impl_->tiles.bytes() +
+         impl_->ranges.bytes();
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/surface/surface_options.h"
+
+namespace isobrick::gpu {
+
+/// Whether there is a CUDA device that this program can use; never throws.
+bool device_available();
+
+/// A whole volume in device memory, at its own width, as pages of one tile each,
+/// with the ranges of all tiles. Not thread-safe.
+class DeviceVolume {
+ public:
+  /// Copies the volume to the current device. `bricks` must hold every brick that
+  /// is not absent. Throws UsageError for a type that has no kernels, Error when
+  /// the device runs out of memory.
+  DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value);
+  ~DeviceVolume();
+
+  const Lattice& lattice() const;
+  /// Bytes of device memory that it holds.
+  std::uint64_t bytes() const;
+
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What an extraction on the device made.
+struct DeviceCounts {
+  std::uint64_t vertices = 0, triangles = 0;
+  std::uint32_t active_tiles = 0;
+};
+
+/// Isosurfaces of a resident volume: search and extraction without leaving the
+/// device. Keeps its buffers from isovalue to isovalue. Not thread-safe.
+class ResidentExtractor {
+ public:
+  /// The isovalue of `options` is that of the first extraction.
+  ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options);
+  ~ResidentExtractor();
+
+  /// The mesh of `isovalue`, in device memory until the next call. Grows the
+  /// buffers and repeats when it does not fit them.
+  DeviceCounts extract(double isovalue);
+  /// Launches the extraction once more without waiting, for measuring.
+  void launch(double isovalue);
+  /// Milliseconds on the device of the last launch, search included.
+  float milliseconds();
+
+  /// Copies the last mesh to the host.
+  void download(MeshBuffer& mesh) const;
+  /// Bytes of device memory besides the volume's.
+  std::uint64_t bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick::gpu

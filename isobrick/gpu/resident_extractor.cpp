@@ -1,0 +1,202 @@
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "isobrick/core/error.h"
+#include "isobrick/gpu/device_volume_impl.h"
+#include "isobrick/gpu/search_kernel.h"
+#include "isobrick/gpu/tile_kernel.h"
+#include "isobrick/surface/world_map.h"
+
+namespace isobrick::gpu {
+namespace {
+
+/// Small words that kernels share: zeroed before each search but the last.
+struct Counters {
+  std::uint32_t search_ticket, extract_ticket, item_count, unused;
+  SurfaceTotals totals;
+};
+
+/// Mesh to expect of a tile before anything is known: a sheet across it, twice.
+constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
+
+}  // namespace
+
+struct ResidentExtractor::Impl {
+  DeviceVolume::Impl& volume;
+  SurfaceOptions options;
+  int blocks = 0;
+  std::uint32_t epoch = 0;
+  DeviceBuffer<std::uint16_t> case_entries;
+  DeviceBuffer<TileItem> items;
+  DeviceBuffer<std::uint32_t> slot_of_tile;
+  DeviceBuffer<OrderState> order;
+  DeviceBuffer<std::byte> zeroed;  ///< Counters, then the sums of the search
+  DeviceBuffer<RowTable> row_tables;
+  DeviceBuffer<float> positions, normals;
+  DeviceBuffer<std::uint32_t> triangles;
+  PinnedBuffer<Counters> seen{1};
+  Event start, end;
+
+  Impl(DeviceVolume& v, const SurfaceOptions& o)
+      : volume(v.impl()),
+        options(o),
+        blocks(extraction_blocks(volume.lattice.type, o.normals)),
+        case_entries(kCaseEntries, volume.stream),
+        items(volume.tile_count, volume.stream),
+        slot_of_tile(volume.tile_count, volume.stream),
+        order(volume.tile_count, volume.stream),
+        zeroed(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream) {
+    options.roi = intersect(o.roi, volume.lattice.box());
+    if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
+    std::uint16_t entries[kCaseEntries];
+    make_case_entries(world_map(options.transform).mirrored, entries);
+    check(cudaMemcpyAsync(case_entries.data(), entries, sizeof entries, cudaMemcpyHostToDevice,
+                          volume.stream.get()));
+    volume.stream.wait();
+  }
+
+  std::size_t search_blocks() const {
+    return (volume.tile_count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
+  }
+  Counters* counters() const { return reinterpret_cast<Counters*>(zeroed.data()); }
+
+  void launch_search(double isovalue) const {
+    SearchParams p{};
+    p.tiles = volume.tiles.data();
+    p.ranges = volume.ranges.data();
+    p.count = volume.tile_count;
+    const TileParams t = volume.params();
+    std::memcpy(p.grid, t.tiles, sizeof p.grid);
+    for (int axis = 0; axis < 3; ++axis) {
+      p.roi_lo[axis] = static_cast<std::int32_t>(options.roi.lo[axis]);
+      p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
+    }
+    p.isovalue = isovalue;
+    p.items = items.data();
+    p.item_count = &counters()->item_count;
+    p.slot_of_tile = slot_of_tile.data();
+    p.order = order.data();
+    p.sums = reinterpret_cast<unsigned long long*>(counters() + 1);
+    p.ticket = &counters()->search_ticket;
+    check(cudaMemsetAsync(zeroed.data(), 0, zeroed.bytes(), volume.stream.get()));
+    gpu::launch_search(volume.lattice.type, p, volume.stream.get());
+  }
+
+  void launch_tiles(double isovalue) {
+    TileParams p = volume.params();
+    p.items = items.data();
+    p.item_count = &counters()->item_count;
+    p.slot_of_tile = slot_of_tile.data();
+    for (int axis = 0; axis < 3; ++axis) {
+      p.roi_lo[axis] = static_cast<std::int32_t>(options.roi.lo[axis]);
+      p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
+    }
+    p.isovalue = isovalue;
+    p.world = world_map(options.transform);
+    p.diagonal = is_diagonal(p.world);
+    p.row_tables = row_tables.data();
+    p.order = order.data();
+    p.ticket = &counters()->extract_ticket;
+    p.epoch = ++epoch;
+    p.positions = positions.data();
+    p.normals = normals.data();
+    p.triangles = triangles.data();
+    p.vertex_capacity = positions.size() / 3;
+    p.triangle_capacity = triangles.size() / 3;
+    p.totals = &counters()->totals;
+    launch_extraction(volume.lattice.type, options.normals, p, case_entries.data(), blocks,
+                      volume.stream.get());
+  }
+
+  /// Buffers for a mesh of that size. What they held is lost.
+  void make_room(std::uint64_t vertices, std::uint64_t triangle_count) {
+    const Stream& stream = volume.stream;
+    if (3 * vertices > positions.size()) {
+      positions = {};
+      positions = DeviceBuffer<float>(3 * vertices, stream);
+      normals = {};
+      if (options.normals) normals = DeviceBuffer<float>(3 * vertices, stream);
+    }
+    if (3 * triangle_count > triangles.size()) {
+      triangles = {};
+      triangles = DeviceBuffer<std::uint32_t>(3 * triangle_count, stream);
+    }
+  }
+
+  void make_row_tables(std::uint32_t count) {
+    if (count <= row_tables.size()) return;
+    row_tables = {};
+    row_tables = DeviceBuffer<RowTable>(count, volume.stream);
+    check(cudaMemsetAsync(row_tables.data(), 0, row_tables.bytes(), volume.stream.get()));
+    epoch = 0;
+  }
+
+  Counters read_counters() const {
+    check(cudaMemcpyAsync(seen.data(), counters(), sizeof(Counters), cudaMemcpyDeviceToHost,
+                          volume.stream.get()));
+    volume.stream.wait();
+    return seen[0];
+  }
+
+  DeviceCounts extract(double isovalue) {
+    if (std::isnan(isovalue)) throw UsageError("the isovalue is not a number");
+    launch_search(isovalue);
+    const std::uint32_t active = read_counters().item_count;
+    make_row_tables(active);
+    make_room(kVerticesOfTile * active, kTrianglesOfTile * active);
+    for (;;) {
+      launch(isovalue);
+      const SurfaceTotals made = read_counters().totals;
+      if (made.vertices > std::numeric_limits<std::uint32_t>::max())
+        throw Error(
+            "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "
+            "number; extract it in parts with --roi");
+      if (3 * made.vertices <= positions.size() && 3 * made.triangles <= triangles.size())
+        return {made.vertices, made.triangles, active};
+      make_room(made.vertices, made.triangles);
+    }
+  }
+
+  void launch(double isovalue) {
+    start.record(volume.stream);
+    launch_search(isovalue);
+    launch_tiles(isovalue);
+    end.record(volume.stream);
+  }
+};
+
+ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options)
+    : impl_(std::make_unique<Impl>(volume, options)) {}
+ResidentExtractor::~ResidentExtractor() = default;
+
+DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
+void ResidentExtractor::launch(double isovalue) { impl_->launch(isovalue); }
+
+float ResidentExtractor::milliseconds() {
+  impl_->end.wait();
+  return impl_->end.since(impl_->start);
+}
+
+void ResidentExtractor::download(MeshBuffer& mesh) const {
+  const SurfaceTotals made = impl_->read_counters().totals;
+  mesh.clear();
+  mesh.positions.resize(made.vertices);
+  mesh.triangles.resize(made.triangles);
+  if (impl_->options.normals) mesh.normals.resize(made.vertices);
+  const auto copy = [](void* to, const void* from, std::size_t bytes) {
+    if (bytes > 0) check(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToHost));
+  };
+  copy(mesh.positions.data(), impl_->positions.data(), made.vertices * sizeof(Vec3f));
+  copy(mesh.normals.data(), impl_->normals.data(), mesh.normals.size() * sizeof(Vec3f));
+  copy(mesh.triangles.data(), impl_->triangles.data(), made.triangles * sizeof(Triangle));
+}
+
+std::uint64_t ResidentExtractor::bytes() const {
+  const Impl& i = *impl_;
+  return i.case_entries.bytes() + i.items.bytes() + i.slot_of_tile.bytes() + i.order.bytes() +
+         i.zeroed.bytes() + i.row_tables.bytes() + i.positions.bytes() + i.normals.bytes() +
+         i.triangles.bytes();
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,127 @@
+#include "isobrick/gpu/search_kernel.h"
+
+#include "isobrick/core/range.h"
+#include "isobrick/gpu/cuda_check.h"
+#include "isobrick/gpu/device_scalar.h"
+#include "isobrick/gpu/tile_order.cuh"
+
+namespace isobrick::gpu {
+namespace {
+
+constexpr int kTilesOfThread = static_cast<int>(kTilesOfSearchBlock) / kThreads;
+
+/// Whether the isovalue stabs the tile's range and the region of interest
+/// leaves it a cell.
+template <class T>
+__device__ bool is_active(const SearchParams& p, std::uint32_t i) {
+  const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
+  if (!(static_cast<double>(range[0]) < p.isovalue && p.isovalue <= static_cast<double>(range[1])))
+    return false;
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+    const int origin = p.tiles[3 * i + axis] * 32;
+    if (::min(p.roi_hi[axis] - 1, origin + 32) <= ::max(p.roi_lo[axis], origin)) return false;
+  }
+  return true;
+}
+
+template <class T>
+__global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__ SearchParams p) {
+  __shared__ std::uint32_t warp_sums[kWarps];
+  __shared__ std::uint32_t block;
+  __shared__ unsigned long long base;
+  if (threadIdx.x == 0) block = atomicAdd(p.ticket, 1u);
+  __syncthreads();
+  const std::uint32_t first = block * kTilesOfSearchBlock + threadIdx.x * kTilesOfThread;
+  bool active[kTilesOfThread];
+  std::uint32_t own = 0;
+#pragma unroll
+  for (int i = 0; i < kTilesOfThread; ++i) {
+    active[i] = first + i < p.count && is_active<T>(p, first + i);
+    own += active[i];
+  }
+  const std::uint32_t sum = warp_inclusive_sum(own);
+  if (lane_id() == 31) warp_sums[threadIdx.x >> 5] = sum;
+  __syncthreads();
+  const SumOfWarps warps = sum_of_warps(warp_sums);
+  if (threadIdx.x < 32) {
+    const unsigned long long before =
+        sum_before([&](std::uint32_t i) -> unsigned long long& { return p.sums[i]; }, block,
+                   warps.all);
+    if (lane_id() == 0) {
+      base = before;
+      if ((block + 1) * kTilesOfSearchBlock >= p.count)
+        *p.item_count = static_cast<std::uint32_t>(before + warps.all);
+    }
+  }
+  __syncthreads();
+  auto place = static_cast<std::uint32_t>(base) + warps.before + sum - own;
+#pragma unroll
+  for (int i = 0; i < kTilesOfThread; ++i) {
+    if (first + i >= p.count) return;
+    const std::int32_t* t = p.tiles + 3 * static_cast<std::size_t>(first + i);
+    const std::size_t at =
+        (static_cast<std::size_t>(t[2]) * p.grid[1] + t[1]) * p.grid[0] + t[0];
+    p.slot_of_tile[at] = active[i] ? place : kNone;
+    if (!active[i]) continue;
+    p.items[place] = {t[0], t[1], t[2], place};
+    p.order[place] = {0, 0};
+    ++place;
+  }
+}
+
+template <class T>
+__global__ void __launch_bounds__(kThreads)
+    find_tile_ranges(const __grid_constant__ TileParams p, const std::int32_t* tiles, T* ranges) {
+  __shared__ T least[kWarps], most[kWarps];
+  const std::int32_t* t = tiles + 3 * static_cast<std::size_t>(blockIdx.x);
+  ValueRange<T> range;
+  for (int i = static_cast<int>(threadIdx.x); i < 33 * 33 * 33; i += kThreads) {
+    const int x = i % 33, y = i / 33 % 33, z = i / (33 * 33);
+    if (t[0] * 32 + x >= p.extent[0] || t[1] * 32 + y >= p.extent[1] ||
+        t[2] * 32 + z >= p.extent[2])
+      continue;
+    const std::uint32_t own =
+        p.page_of_tile[(static_cast<std::size_t>(t[2] + (z >> 5)) * p.tiles[1] + t[1] + (y >> 5)) *
+                           p.tiles[0] +
+                       t[0] + (x >> 5)];
+    const std::size_t page = own == kNone ? p.fill_page : own;
+    range.include(static_cast<const T*>(
+        p.pages)[page * kPageSamples + ((z & 31) << 10 | (y & 31) << 5 | (x & 31))]);
+  }
+  const auto merge = [&](T lo, T hi) { range.include(ValueRange<T>{lo, hi}); };
+#pragma unroll
+  for (int d = 16; d; d /= 2)
+    merge(static_cast<T>(__shfl_xor_sync(kAll, range.lo, d)),
+          static_cast<T>(__shfl_xor_sync(kAll, range.hi, d)));
+  if (lane_id() == 0) {
+    least[threadIdx.x >> 5] = range.lo;
+    most[threadIdx.x >> 5] = range.hi;
+  }
+  __syncthreads();
+  if (threadIdx.x != 0) return;
+  for (int w = 1; w < kWarps; ++w) merge(least[w], most[w]);
+  ranges[2 * static_cast<std::size_t>(blockIdx.x)] = range.lo;
+  ranges[2 * static_cast<std::size_t>(blockIdx.x) + 1] = range.hi;
+}
+
+}  // namespace
+
+void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream) {
+  const auto blocks = (params.count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
+  visit_device_scalar(type, [&](auto tag) {
+    search_tiles<typename decltype(tag)::type><<<blocks, kThreads, 0, stream>>>(params);
+  });
+  check_launch("search_tiles");
+}
+
+void launch_tile_ranges(ScalarType type, const TileParams& params, const std::int32_t* tiles,
+                        std::uint32_t count, void* ranges, cudaStream_t stream) {
+  visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    find_tile_ranges<T><<<count, kThreads, 0, stream>>>(params, tiles, static_cast<T*>(ranges));
+  });
+  check_launch("find_tile_ranges");
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/gpu/tile_params.h"
+
+namespace isobrick::gpu {
+
+/// All tiles of a volume in Morton order, and what the search for active ones leaves.
+struct SearchParams {
+  const std::int32_t* tiles;  ///< x, y, z of each
+  const void* ranges;         ///< min and max of each, of the sample type
+  std::uint32_t count;
+  std::int32_t grid[3], roi_lo[3], roi_hi[3];  ///< tiles; samples
+  double isovalue;
+  TileItem* items;  ///< room for all
+  std::uint32_t* item_count;
+  std::uint32_t* slot_of_tile;
+  OrderState* order;          ///< of the extraction: zeroed for each item
+  unsigned long long* sums;   ///< one a block of the search, zeroed
+  std::uint32_t* ticket;      ///< zeroed
+};
+
+/// Tiles that a block of the search takes.
+inline constexpr std::uint32_t kTilesOfSearchBlock = 1024;
+
+/// Finds the tiles that the isovalue stabs, in their order, numbered from 0.
+void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream);
+
+/// Ranges of all tiles from their samples: of the 33³ that its cells touch, as
+/// far as the volume goes, NaN left out. Uses items, pages, page_of_tile,
+/// fill_page, tiles and extent of `params`.
+void launch_tile_ranges(ScalarType type, const TileParams& params, const std::int32_t* tiles,
+                        std::uint32_t count, void* ranges, cudaStream_t stream);
+
+}  // namespace isobrick::gpu

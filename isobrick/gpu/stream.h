@@ -1,0 +1,119 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <utility>
+
+#include "isobrick/gpu/cuda_check.h"
+
+// Owners of CUDA objects. Destructors wait for nothing and never throw, also
+// when the driver has already been shut down at exit.
+
+namespace isobrick::gpu {
+
+/// Owns a stream that does not synchronise with the default one.
+class Stream {
+ public:
+  Stream() { check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking)); }
+  Stream(Stream&& other) noexcept : stream_(std::exchange(other.stream_, nullptr)) {}
+  Stream& operator=(Stream&& other) noexcept {
+    std::swap(stream_, other.stream_);
+    return *this;
+  }
+  ~Stream() {
+    if (stream_) (void)cudaStreamDestroy(stream_);
+  }
+
+  cudaStream_t get() const { return stream_; }
+  /// Blocks until all work of the stream is done; throws what went wrong in it.
+  void wait() const { check(cudaStreamSynchronize(stream_)); }
+
+ private:
+  cudaStream_t stream_ = nullptr;
+};
+
+/// Owns an event that can measure time.
+class Event {
+ public:
+  Event() { check(cudaEventCreate(&event_)); }
+  Event(const Event&) = delete;
+  Event& operator=(const Event&) = delete;
+  ~Event() { (void)cudaEventDestroy(event_); }
+
+  cudaEvent_t get() const { return event_; }
+  void record(const Stream& stream) { check(cudaEventRecord(event_, stream.get())); }
+  void wait() const { check(cudaEventSynchronize(event_)); }
+  /// Milliseconds from `start` to this event; both are over.
+  float since(const Event& start) const {
+    float ms = 0;
+    check(cudaEventElapsedTime(&ms, start.event_, event_));
+    return ms;
+  }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
+
+/// Owns `size` elements of device memory, uninitialised, allocated and freed in
+/// the order of a stream, which must outlive it.
+template <class T>
+class DeviceBuffer {
+ public:
+  DeviceBuffer() = default;
+  DeviceBuffer(std::size_t size, const Stream& stream) : size_(size), stream_(stream.get()) {
+    if (size_ > 0) check(cudaMallocAsync(&data_, size_ * sizeof(T), stream_));
+  }
+  DeviceBuffer(DeviceBuffer&& other) noexcept
+      : data_(std::exchange(other.data_, nullptr)),
+        size_(std::exchange(other.size_, 0)),
+        stream_(other.stream_) {}
+  DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(stream_, other.stream_);
+    return *this;
+  }
+  ~DeviceBuffer() {
+    if (data_) (void)cudaFreeAsync(data_, stream_);
+  }
+
+  T* data() const { return static_cast<T*>(data_); }
+  std::size_t size() const { return size_; }
+  std::size_t bytes() const { return size_ * sizeof(T); }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
+  cudaStream_t stream_ = nullptr;
+};
+
+/// Owns page-locked host memory, for copies that run beside everything else.
+template <class T>
+class PinnedBuffer {
+ public:
+  PinnedBuffer() = default;
+  explicit PinnedBuffer(std::size_t size) : size_(size) {
+    if (size_ > 0) check(cudaMallocHost(&data_, size_ * sizeof(T)));
+  }
+  PinnedBuffer(PinnedBuffer&& other) noexcept
+      : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+  PinnedBuffer& operator=(PinnedBuffer&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    return *this;
+  }
+  ~PinnedBuffer() {
+    if (data_) (void)cudaFreeHost(data_);
+  }
+
+  T* data() const { return static_cast<T*>(data_); }
+  T& operator[](std::size_t i) const { return data()[i]; }
+  std::size_t size() const { return size_; }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <type_traits>
+
+#include "isobrick/gpu/tile_shared.cuh"
+
+// First step: the inside bits of a tile's 33 × 33 rows, from global memory.
+
+namespace isobrick::gpu {
+
+/// Inside bits of samples read 16 bytes at a time. Integers are compared within
+/// a word, 4 or 2 at once: the upper bit of (x without it) + c says whether the
+/// lower bits reach those of the threshold, and is joined with x's own.
+template <class T>
+struct Classifier {
+  static constexpr bool kPacked = sizeof(T) <= 2 && std::is_integral_v<T>;
+  T threshold;
+  std::uint32_t addend = 0, either = 0;
+
+  __device__ explicit Classifier(T t) : threshold(t) {
+    if constexpr (kPacked) {
+      using U = std::make_unsigned_t<T>;
+      constexpr std::uint32_t bits = 8 * sizeof(T), top = 1u << (bits - 1);
+      const std::uint32_t u = static_cast<U>(t) ^ (std::is_signed_v<T> ? top : 0u);
+      either = u <= top ? ~0u : 0u;
+      addend = (u <= top ? top - u : 2 * top - u) * (sizeof(T) == 1 ? 0x01010101u : 0x00010001u);
+    }
+  }
+
+  /// The upper bit of each sample in the word: inside.
+  __device__ std::uint32_t tops(std::uint32_t word) const {
+    constexpr std::uint32_t top = sizeof(T) == 1 ? 0x80808080u : 0x80008000u;
+    const std::uint32_t sum = (word & ~top) + addend;
+    const std::uint32_t own = std::is_signed_v<T> ? ~word : word;
+    return ((sum & own) | (either & (sum | own))) & top;
+  }
+
+  /// Bits of the samples of `words` (in memory order), the first in the lowest.
+  template <int N>
+  __device__ std::uint32_t bits(const std::uint32_t (&words)[N]) const {
+    std::uint32_t result = 0;
+#pragma unroll
+    for (int i = N - 1; i >= 0; --i) {
+      if constexpr (sizeof(T) == 1) {
+        // The product lines the four bits up at the top; nothing carries.
+        result = __funnelshift_l(tops(words[i]) * 0x00204081u, result, 4);
+      } else if constexpr (kPacked) {
+        const std::uint32_t both = tops(words[i]);
+        result = __funnelshift_l(both | both << 15, result, 2);
+      } else {
+        result = result << 1 | (__uint_as_float(words[i]) >= threshold ? 1u : 0u);
+      }
+    }
+    return result;
+  }
+
+  __device__ std::uint32_t one(T v) const { return v >= threshold ? 1u : 0u; }
+};
+
+/// Bits of 16 samples in a row.
+template <class T>
+__device__ inline std::uint32_t inside16(const Classifier<T>& classifier, const T* samples) {
+  constexpr int kWords = static_cast<int>(sizeof(T)) * 4;
+  std::uint32_t words[kWords];
+  const uint4* from = reinterpret_cast<const uint4*>(samples);
+#pragma unroll
+  for (int i = 0; i < kWords / 4; ++i) {
+    const uint4 v = __ldg(from + i);
+    words[4 * i] = v.x;
+    words[4 * i + 1] = v.y;
+    words[4 * i + 2] = v.z;
+    words[4 * i + 3] = v.w;
+  }
+  return classifier.bits(words);
+}
+
+/// The page of the tile that holds sample (x, y, z), each in −32 … 63.
+template <class T>
+__device__ inline const T* page_at(const TileShared& s, int x, int y, int z) {
+  return static_cast<const T*>(s.pages[13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5)]);
+}
+
+__device__ inline int offset_in_page(int x, int y, int z) {
+  return (x & 31) | (y & 31) << 5 | (z & 31) << 10;
+}
+
+/// Two threads a row, 16 samples each.
+template <class T>
+__device__ inline void classify(TileShared& s, const Classifier<T>& classifier) {
+  constexpr int kHalves = 2 * kRowsOfTile;
+  constexpr int kSteps = (kHalves + kThreads - 1) / kThreads;
+#pragma unroll 3
+  for (int step = 0; step < kSteps; ++step) {
+    const int i = step * kThreads + static_cast<int>(threadIdx.x);
+    if ((i & ~31) >= kHalves) break;
+    const int row = ::min(i >> 1, kRowsOfTile - 1);
+    const int z = static_cast<int>(z_of_row(row)), y = row - 33 * z;
+    const int offset = offset_in_page(0, y, z);
+    std::uint32_t last = 0;
+    if (!(i & 1)) last = classifier.one(__ldg(page_at<T>(s, 32, y, z) + offset));
+    const std::uint32_t half =
+        inside16(classifier, page_at<T>(s, 0, y, z) + offset + (i & 1) * 16);
+    const std::uint32_t other = __shfl_xor_sync(kAll, half, 1);
+    if (!(i & 1) && i < kHalves) {
+      const std::uint32_t word = half | other << 16;
+      s.rows[row] = {word, word >> 1 | last << 31};
+    }
+  }
+}
+
+}  // namespace isobrick::gpu

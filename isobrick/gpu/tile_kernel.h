@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/gpu/tile_params.h"
+
+namespace isobrick::gpu {
+
+/// Bytes of the table that the kernel reads its cases from, and their making:
+/// for each case five entries of three edges, 4 bits each; the upper 4 bits of
+/// the first entry are the number of triangles.
+inline constexpr std::size_t kCaseEntries = 256 * 5;
+void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]);
+
+/// Blocks that fill the current device.
+int extraction_blocks(ScalarType type, bool normals);
+
+/// Launches the extraction of all items on `stream`: one block takes one tile
+/// after the other, in their order.
+void launch_extraction(ScalarType type, bool normals, const TileParams& params,
+                       const std::uint16_t* case_entries, int blocks, cudaStream_t stream);
+
+}  // namespace isobrick::gpu

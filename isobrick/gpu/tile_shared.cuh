@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "isobrick/gpu/tile_params.h"
+
+// How a block of threads works on one tile; docs/gpu.md has the whole picture.
+
+namespace isobrick::gpu {
+
+inline constexpr int kThreads = 256;
+inline constexpr int kWarps = kThreads / 32;
+inline constexpr int kRowsOfWarp = (kRowsOfTile + kWarps - 1) / kWarps;
+inline constexpr int kRowSteps = (kRowsOfWarp + 31) / 32;
+/// Vertices or cells that are listed at a time; tiles with more take several turns.
+inline constexpr std::uint32_t kListed = 3072;
+inline constexpr unsigned kAll = 0xffffffffu;
+
+/// A row of inside bits: samples 0 … 31, and samples 1 … 32.
+struct RowBits {
+  std::uint32_t at, next;
+};
+
+/// Where the vertex of a cell's edge is found, as byte offsets from the row of
+/// the cell: two words whose difference marks the row's crossing edges, the
+/// number of the first of them, and by how much the mask of earlier ones shifts.
+struct EdgePlace {
+  std::uint32_t first_word, second_word, number, shift;
+};
+
+struct TileShared {
+  RowBits rows[kRowsOfTile];
+  std::uint32_t x_base[kRowsOfTile], y_base[kRowsOfTile], z_base[kRowsOfTile];
+  union {
+    std::uint32_t edges[kListed];  ///< x | y << 6 | z << 12 | axis << 18, by vertex number
+    struct {
+      std::uint32_t y_at_0[kRowsOfTile], z_at_0[kRowsOfTile];
+    };
+  };
+  std::uint32_t cells[kListed];  ///< x | y << 5 | z << 10 | case << 16
+  std::uint32_t staging[kWarps][96];
+  /// Three edges of 4 bits a triangle, and in the upper bits of a case's first
+  /// entry how many triangles it has.
+  std::uint16_t triangles[256 * 5];
+  alignas(16) EdgePlace places[2][12];  ///< of cells with x > 0, of those with x = 0
+  const void* pages[27];                ///< of the tiles around, x + 3·y + 9·z
+  std::uint32_t warp_vertices[kWarps], warp_cells[kWarps], warp_triangles[kWarps];
+  unsigned long long vertex_base, triangle_base;
+  std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis
+  const RowTable* neighbour[8];
+  std::uint32_t item;
+};
+
+/// A tile cut to the region of interest; see TileShape of the CPU.
+struct Shape {
+  int origin[3], lo[3], hi[3];
+  bool first[3], empty;
+  std::uint32_t cell_mask, sample_mask;  ///< bits of x words; of y and z words
+};
+
+__device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }
+__device__ inline unsigned lane_id() { return threadIdx.x & 31u; }
+__device__ inline std::uint32_t lanes_below() { return (1u << lane_id()) - 1u; }
+
+/// Bits lo … hi of the 33 samples of a row.
+__device__ inline unsigned long long bit_span(int lo, int hi) {
+  return (2ull << hi) - (1ull << lo);
+}
+
+__device__ inline Shape shape_of(const TileParams& p, const TileItem& item) {
+  Shape s;
+  const int tile[3] = {item.x, item.y, item.z};
+  s.empty = false;
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+    s.origin[axis] = tile[axis] * 32;
+    s.lo[axis] = ::max(p.roi_lo[axis] - s.origin[axis], 0);
+    s.hi[axis] = ::min(p.roi_hi[axis] - 1 - s.origin[axis], 32);
+    s.first[axis] = tile[axis] == p.roi_lo[axis] / 32;
+    s.empty = s.empty || s.hi[axis] <= s.lo[axis];
+  }
+  s.cell_mask = s.empty ? 0 : static_cast<std::uint32_t>(bit_span(s.lo[0], s.hi[0] - 1));
+  s.sample_mask = s.empty ? 0 : static_cast<std::uint32_t>(bit_span(s.lo[0], s.hi[0]) >> 1);
+  return s;
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "isobrick/core/transform.h"
+#include "isobrick/surface/cell_math.h"
+
+namespace isobrick {
+
+/// The transform as both backends apply it, in float.
+WorldMap world_map(const Transform& transform);
+
+/// Whether nothing lies off the diagonal of `map.m`, so that leaving those terms
+/// out changes no bit of a position.
+bool is_diagonal(const WorldMap& map);
+
+}  // namespace isobrick

@@ -1,0 +1,145 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "isobrick/gpu/device_volume.h"
+#include "tests/surface/field.h"
+
+// The mesh from the device is the CPU's, byte for byte.
+
+namespace isobrick::testing {
+namespace {
+
+template <class T>
+MeshBuffer on_cpu(const Field<T>& field, const Lattice& lattice, const DenseBricks& bricks,
+                  const SurfaceOptions& options) {
+  std::vector<TileWork> tiles;
+  append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, block_ranges(field), options.isovalue,
+                         tiles);
+  CpuExtractor extractor(lattice, options, {});
+  MeshBuffer mesh;
+  extractor.extract(tiles, bricks, mesh);
+  return mesh;
+}
+
+template <class V>
+bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(V)) == 0;
+}
+
+template <class V>
+std::string first_difference(const PodBuffer<V>& a, const PodBuffer<V>& b) {
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    if (std::memcmp(&a[i], &b[i], sizeof(V)) != 0)
+      return "first difference at " + std::to_string(i) + " of " + std::to_string(a.size());
+  return "sizes " + std::to_string(a.size()) + " and " + std::to_string(b.size());
+}
+
+void expect_same(const MeshBuffer& cpu, const MeshBuffer& device) {
+  EXPECT_TRUE(same_bytes(cpu.positions, device.positions))
+      << first_difference(cpu.positions, device.positions);
+  EXPECT_TRUE(same_bytes(cpu.normals, device.normals))
+      << first_difference(cpu.normals, device.normals);
+  EXPECT_TRUE(same_bytes(cpu.triangles, device.triangles))
+      << first_difference(cpu.triangles, device.triangles);
+}
+
+template <class T>
+void compare(const Field<T>& field, std::vector<double> isovalues, SurfaceOptions options,
+             Index brick = 64) {
+  const Lattice lattice{field.extent, {brick, brick, brick}, scalar_type_of<T>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  if (options.roi == Box3{}) options.roi = lattice.box();
+  gpu::DeviceVolume volume(lattice, bricks, options.fill_value);
+  for (const bool normals : {false, true}) {
+    options.normals = normals;
+    gpu::ResidentExtractor extractor(volume, options);
+    for (const double isovalue : isovalues) {
+      options.isovalue = isovalue;
+      const MeshBuffer expected = on_cpu(field, lattice, bricks, options);
+      const gpu::DeviceCounts counts = extractor.extract(isovalue);
+      EXPECT_EQ(counts.vertices, expected.positions.size());
+      EXPECT_EQ(counts.triangles, expected.triangles.size());
+      MeshBuffer mesh;
+      extractor.download(mesh);
+      SCOPED_TRACE("isovalue " + std::to_string(isovalue) + (normals ? ", normals" : ""));
+      expect_same(expected, mesh);
+      if (::testing::Test::HasFailure()) return;
+    }
+  }
+}
+
+template <class T>
+class GpuResident : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
+  }
+  static constexpr double lowest() {
+    return std::is_signed_v<T> ? -100.0 : 0.0;
+  }
+  static Field<T> noise(Int3 extent, unsigned seed) {
+    return padded_noise<T>(extent, lowest(), lowest() + 200, static_cast<T>(lowest()), seed);
+  }
+  static Field<T> waves(Int3 extent) {
+    return Field<T>(extent, [&](Int3 p) {
+      const auto f = [](Index v, double k) { return std::sin(static_cast<double>(v) * k); };
+      return lowest() + 100 + 30 * (f(p.x, 0.11) + f(p.y, 0.13) + f(p.z, 0.07));
+    });
+  }
+};
+
+using DeviceTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float>;
+TYPED_TEST_SUITE(GpuResident, DeviceTypes);
+
+TYPED_TEST(GpuResident, OneTile) { compare(this->waves({33, 33, 33}), {this->lowest() + 100}, {}); }
+
+TYPED_TEST(GpuResident, SmoothFieldOfOddExtents) {
+  const double mid = this->lowest() + 100;
+  compare(this->waves({131, 70, 97}), {mid - 40, mid, mid + 0.5, mid + 30}, {}, 32);
+}
+
+TYPED_TEST(GpuResident, NoiseIsTheHardestInput) {
+  const double mid = this->lowest() + 100;
+  compare(this->noise({67, 41, 75}, 1), {mid, mid + 0.5, mid - 90}, {}, 16);
+}
+
+TYPED_TEST(GpuResident, ExtentsThatFillNoTile) {
+  for (const Int3 extent : {Int3{1, 1, 1}, Int3{1, 40, 40}, Int3{2, 2, 2}, Int3{32, 32, 32},
+                            Int3{34, 5, 3}, Int3{3, 65, 34}, Int3{5, 3, 97}})
+    compare(this->noise(extent, 7), {this->lowest() + 100}, {});
+}
+
+TYPED_TEST(GpuResident, RegionsOfInterest) {
+  const double mid = this->lowest() + 100;
+  for (const Box3 roi : {Box3{{5, 3, 7}, {60, 40, 70}}, Box3{{33, 0, 31}, {66, 39, 75}},
+                         Box3{{31, 31, 31}, {34, 34, 34}}, Box3{{40, 2, 40}, {41, 20, 60}}}) {
+    SurfaceOptions options;
+    options.roi = roi;
+    compare(this->noise({67, 41, 75}, 3), {mid}, options);
+  }
+}
+
+TYPED_TEST(GpuResident, CheckerboardNeedsMoreThanSixteenBits) {
+  const Field<TypeParam> board({70, 70, 70}, [](Int3 p) {
+    return (p.x + p.y + p.z) % 2 ? 100.0 : 0.0;
+  });
+  compare(board, {50}, {});
+}
+
+TYPED_TEST(GpuResident, TransformsTurnAndMirror) {
+  SurfaceOptions options;
+  options.transform.spacing = {0.7, 1.3, -2};
+  options.transform.origin = {-5, 11, 0.25};
+  compare(this->waves({67, 41, 75}), {this->lowest() + 100}, options);
+  options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  compare(this->waves({67, 41, 75}), {this->lowest() + 100}, options);
+}
+
+TYPED_TEST(GpuResident, IsovaluesBeyondTheRangeGiveNothing) {
+  compare(this->waves({67, 41, 75}), {-1e9, 1e9}, {});
+}
+
+}  // namespace
+}  // namespace isobrick::testing
