@@ -133,8 +133,7 @@ int run(const Arguments& a) {
   nlohmann::json out;
   if (a.check || a.cpu) {
     MeshBuffer expected, mesh;
-    const double seconds =
-        run_cpu(v, lattice, bricks, options, a.cpu ? 5 : 1, expected);
+    const double seconds = run_cpu(v, lattice, bricks, options, a.cpu ? 5 : 1, expected);
     if (a.cpu) out["cpu_ms"] = seconds * 1e3;
     extractor.download(mesh);
     const bool same = same_bytes(expected.positions, mesh.positions) &&
@@ -177,15 +176,14 @@ int run(const Arguments& a) {
   if (a.json)
     fmt::print("{}\n", out.dump());
   else
-    fmt::print("{}x{}x{} {} iso {}{}: {:.3f} ms (least {:.3f}), floor {:.3f}, x{:.2f}; {} triangles, "
-               "{} of {} tiles{}{}\n",
-               v.extent.x, v.extent.y, v.extent.z, short_name(v.type), options.isovalue,
-               a.normals ? " normals" : "", median, times.front(), floor, median / floor,
-               counts.triangles, counts.active_tiles, volume(lattice.tiles()),
-               out.contains("cpu_ms") ? fmt::format(", cpu {:.2f} ms", out["cpu_ms"].get<double>())
-                                      : "",
-               out.contains("same_as_cpu") ? out["same_as_cpu"].get<bool>() ? ", same" : ", DIFFERS"
-                                           : "");
+    fmt::print(
+        "{}x{}x{} {} iso {}{}: {:.3f} ms (least {:.3f}), floor {:.3f}, x{:.2f}; {} triangles, "
+        "{} of {} tiles{}{}\n",
+        v.extent.x, v.extent.y, v.extent.z, short_name(v.type), options.isovalue,
+        a.normals ? " normals" : "", median, times.front(), floor, median / floor, counts.triangles,
+        counts.active_tiles, volume(lattice.tiles()),
+        out.contains("cpu_ms") ? fmt::format(", cpu {:.2f} ms", out["cpu_ms"].get<double>()) : "",
+        out.contains("same_as_cpu") ? out["same_as_cpu"].get<bool>() ? ", same" : ", DIFFERS" : "");
   return out.contains("same_as_cpu") && !out["same_as_cpu"].get<bool>() ? 1 : 0;
 }
 
@@ -201,7 +199,9 @@ int main(int argc, char** argv) {
   app.add_option("--type", a.type, "of the procedural field");
   app.add_option("--frequency", a.frequency);
   app.add_option("--noise", a.noise);
-  app.add_option("--isovalue", a.isovalue)->each([&](const std::string&) { a.has_isovalue = true; });
+  app.add_option("--isovalue", a.isovalue)->each([&](const std::string&) {
+    a.has_isovalue = true;
+  });
   app.add_option("--runs", a.runs);
   app.add_option("--write-raw", a.write_raw, "also writes the volume");
   app.add_flag("--normals", a.normals);

@@ -7,8 +7,7 @@
 namespace isobrick::gpu {
 
 /// Throws Error with the name of the CUDA error and where it was noticed.
-void check(cudaError_t result,
-           const std::source_location& where = std::source_location::current());
+void check(cudaError_t result, const std::source_location& where = std::source_location::current());
 
 /// After a launch: throws Error naming the kernel when it could not be launched.
 void check_launch(const char* kernel,

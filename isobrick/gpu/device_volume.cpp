@@ -80,8 +80,7 @@ void DeviceVolume::Impl::list_tiles() {
   check(cudaMemcpyAsync(tiles.data(), order.data(), tiles.bytes(), cudaMemcpyHostToDevice,
                         stream.get()));
   ranges = DeviceBuffer<std::byte>(2 * lattice.sample_bytes() * tile_count, stream);
-  launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(),
-                     stream.get());
+  launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(), stream.get());
   stream.wait();
 }
 

@@ -25,7 +25,7 @@ constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
 struct ResidentExtractor::Impl {
   DeviceVolume::Impl& volume;
   SurfaceOptions options;
-  int blocks = 0;
+  LaunchShape shape;
   std::uint32_t epoch = 0;
   DeviceBuffer<std::uint16_t> case_entries;
   DeviceBuffer<TileItem> items;
@@ -41,7 +41,7 @@ struct ResidentExtractor::Impl {
   Impl(DeviceVolume& v, const SurfaceOptions& o)
       : volume(v.impl()),
         options(o),
-        blocks(extraction_blocks(volume.lattice.type, o.normals)),
+        shape(launch_shape(volume.lattice.type, o.normals, volume.tile_count)),
         case_entries(kCaseEntries, volume.stream),
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
@@ -105,7 +105,7 @@ struct ResidentExtractor::Impl {
     p.vertex_capacity = positions.size() / 3;
     p.triangle_capacity = triangles.size() / 3;
     p.totals = &counters()->totals;
-    launch_extraction(volume.lattice.type, options.normals, p, case_entries.data(), blocks,
+    launch_extraction(volume.lattice.type, options.normals, p, case_entries.data(), shape,
                       volume.stream.get());
   }
 

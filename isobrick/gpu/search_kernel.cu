@@ -8,6 +8,7 @@
 namespace isobrick::gpu {
 namespace {
 
+constexpr int kThreads = 256, kWarps = kThreads / 32;
 constexpr int kTilesOfThread = static_cast<int>(kTilesOfSearchBlock) / kThreads;
 
 /// Whether the isovalue stabs the tile's range and the region of interest
@@ -43,11 +44,10 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   const std::uint32_t sum = warp_inclusive_sum(own);
   if (lane_id() == 31) warp_sums[threadIdx.x >> 5] = sum;
   __syncthreads();
-  const SumOfWarps warps = sum_of_warps(warp_sums);
+  const SumOfWarps warps = sum_of_warps<kThreads>(warp_sums);
   if (threadIdx.x < 32) {
-    const unsigned long long before =
-        sum_before([&](std::uint32_t i) -> unsigned long long& { return p.sums[i]; }, block,
-                   warps.all);
+    const unsigned long long before = sum_before(
+        [&](std::uint32_t i) -> unsigned long long& { return p.sums[i]; }, block, warps.all);
     if (lane_id() == 0) {
       base = before;
       if ((block + 1) * kTilesOfSearchBlock >= p.count)
@@ -60,8 +60,7 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   for (int i = 0; i < kTilesOfThread; ++i) {
     if (first + i >= p.count) return;
     const std::int32_t* t = p.tiles + 3 * static_cast<std::size_t>(first + i);
-    const std::size_t at =
-        (static_cast<std::size_t>(t[2]) * p.grid[1] + t[1]) * p.grid[0] + t[0];
+    const std::size_t at = (static_cast<std::size_t>(t[2]) * p.grid[1] + t[1]) * p.grid[0] + t[0];
     p.slot_of_tile[at] = active[i] ? place : kNone;
     if (!active[i]) continue;
     p.items[place] = {t[0], t[1], t[2], place};

@@ -17,9 +17,9 @@ struct SearchParams {
   TileItem* items;  ///< room for all
   std::uint32_t* item_count;
   std::uint32_t* slot_of_tile;
-  OrderState* order;          ///< of the extraction: zeroed for each item
-  unsigned long long* sums;   ///< one a block of the search, zeroed
-  std::uint32_t* ticket;      ///< zeroed
+  OrderState* order;         ///< of the extraction: zeroed for each item
+  unsigned long long* sums;  ///< one a block of the search, zeroed
+  std::uint32_t* ticket;     ///< zeroed
 };
 
 /// Tiles that a block of the search takes.

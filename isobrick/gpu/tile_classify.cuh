@@ -57,21 +57,28 @@ struct Classifier {
   __device__ std::uint32_t one(T v) const { return v >= threshold ? 1u : 0u; }
 };
 
-/// Bits of 16 samples in a row.
+/// The bits of 32 samples in a row.
 template <class T>
-__device__ inline std::uint32_t inside16(const Classifier<T>& classifier, const T* samples) {
-  constexpr int kWords = static_cast<int>(sizeof(T)) * 4;
-  std::uint32_t words[kWords];
+__device__ inline std::uint32_t inside32(const Classifier<T>& classifier, const T* samples) {
+  constexpr int kVectors = static_cast<int>(sizeof(T)) * 2;
+  constexpr int kPart = kVectors < 4 ? kVectors : 4;  // loads in flight
+  constexpr int kSamples = kPart * 16 / static_cast<int>(sizeof(T));
   const uint4* from = reinterpret_cast<const uint4*>(samples);
+  std::uint32_t result = 0;
 #pragma unroll
-  for (int i = 0; i < kWords / 4; ++i) {
-    const uint4 v = __ldg(from + i);
-    words[4 * i] = v.x;
-    words[4 * i + 1] = v.y;
-    words[4 * i + 2] = v.z;
-    words[4 * i + 3] = v.w;
+  for (int part = 0; part < kVectors / kPart; ++part) {
+    std::uint32_t words[4 * kPart];
+#pragma unroll
+    for (int i = 0; i < kPart; ++i) {
+      const uint4 v = __ldg(from + part * kPart + i);
+      words[4 * i] = v.x;
+      words[4 * i + 1] = v.y;
+      words[4 * i + 2] = v.z;
+      words[4 * i + 3] = v.w;
+    }
+    result |= classifier.bits(words) << (part * kSamples % 32);
   }
-  return classifier.bits(words);
+  return result;
 }
 
 /// The page of the tile that holds sample (x, y, z), each in −32 … 63.
@@ -84,28 +91,27 @@ __device__ inline int offset_in_page(int x, int y, int z) {
   return (x & 31) | (y & 31) << 5 | (z & 31) << 10;
 }
 
-/// Two threads a row, 16 samples each.
-template <class T>
+/// A row a thread.
+template <int N, class T>
 __device__ inline void classify(TileShared& s, const Classifier<T>& classifier) {
-  constexpr int kHalves = 2 * kRowsOfTile;
-  constexpr int kSteps = (kHalves + kThreads - 1) / kThreads;
-#pragma unroll 3
-  for (int step = 0; step < kSteps; ++step) {
-    const int i = step * kThreads + static_cast<int>(threadIdx.x);
-    if ((i & ~31) >= kHalves) break;
-    const int row = ::min(i >> 1, kRowsOfTile - 1);
+#pragma unroll 2
+  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
     const int z = static_cast<int>(z_of_row(row)), y = row - 33 * z;
     const int offset = offset_in_page(0, y, z);
-    std::uint32_t last = 0;
-    if (!(i & 1)) last = classifier.one(__ldg(page_at<T>(s, 32, y, z) + offset));
-    const std::uint32_t half =
-        inside16(classifier, page_at<T>(s, 0, y, z) + offset + (i & 1) * 16);
-    const std::uint32_t other = __shfl_xor_sync(kAll, half, 1);
-    if (!(i & 1) && i < kHalves) {
-      const std::uint32_t word = half | other << 16;
-      s.rows[row] = {word, word >> 1 | last << 31};
-    }
+    const T last = __ldg(page_at<T>(s, 32, y, z) + offset);
+    const std::uint32_t word = inside32(classifier, page_at<T>(s, 0, y, z) + offset);
+    s.rows[row] = {word, word >> 1 | classifier.one(last) << 31};
   }
+}
+
+/// Empties the lists of the tile before.
+template <int N>
+__device__ inline void clear_lists(TileShared& s) {
+  const uint4 zero{0, 0, 0, 0};
+  for (unsigned i = threadIdx.x; i < kListed / 4; i += N)
+    reinterpret_cast<uint4*>(s.cells)[i] = zero;
+  for (unsigned i = threadIdx.x; i < kListed / 8; i += N)
+    reinterpret_cast<uint4*>(s.vertex_marks)[i] = zero;
 }
 
 }  // namespace isobrick::gpu

@@ -3,7 +3,8 @@
 #include "isobrick/gpu/tile_shared.cuh"
 
 // Second step: crossing edges and active cells of each row, numbered by prefix
-// sums; lists of both.
+// sums. Where the vertices and cells of a row begin is marked, so that 32
+// threads that take 32 of them find their rows with a vote.
 
 namespace isobrick::gpu {
 
@@ -18,6 +19,13 @@ struct RowEdges {
   __device__ std::uint32_t vertices() const { return z_start() + z_at_0 + __popc(z); }
 };
 
+__device__ inline std::uint32_t mixed_cells(const RowBits& a, const RowBits& b, const RowBits& c,
+                                            const RowBits& d) {
+  const std::uint32_t any = a.at | a.next | b.at | b.next | c.at | c.next | d.at | d.next;
+  const std::uint32_t all = a.at & a.next & b.at & b.next & c.at & c.next & d.at & d.next;
+  return any & ~all;
+}
+
 __device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape, int row, int y,
                                         int z) {
   RowEdges e{0, 0, 0, 0, 0, 0};
@@ -30,163 +38,166 @@ __device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape,
   if (own_y && own_z) e.x = (here.at ^ here.next) & shape.cell_mask;
   if (own_z) {
     e.y = (here.next ^ above.next) & shape.sample_mask;
-    e.y_at_0 = (here.at ^ above.at) & (shape.first[0] && shape.lo[0] == 0 ? 1u : 0u);
+    e.y_at_0 = (here.at ^ above.at) & shape.at_0;
   }
   if (own_y) {
     e.z = (here.next ^ behind.next) & shape.sample_mask;
-    e.z_at_0 = (here.at ^ behind.at) & (shape.first[0] && shape.lo[0] == 0 ? 1u : 0u);
+    e.z_at_0 = (here.at ^ behind.at) & shape.at_0;
   }
-  if (up_y && up_z) {
-    const RowBits both = s.rows[row + 34];
-    const std::uint32_t any =
-        here.at | here.next | above.at | above.next | behind.at | behind.next | both.at | both.next;
-    const std::uint32_t all =
-        here.at & here.next & above.at & above.next & behind.at & behind.next & both.at & both.next;
-    e.cells = any & ~all & shape.cell_mask;
-  }
+  if (up_y && up_z) e.cells = mixed_cells(here, above, behind, s.rows[row + 34]) & shape.cell_mask;
   return e;
 }
 
-/// A warp's rows lie next to each other and are taken 32 at a time.
-struct RowStep {
-  int row, y, z;
-  bool valid;
+/// What a thread remembers of a row between counting and marking.
+struct RowCount {
+  std::uint32_t before;  ///< of the 32 rows of its warp: vertices | cells << 16
+  std::uint32_t packed;
+
+  __device__ static RowCount of(const RowEdges& e) {
+    return {0, e.y_start() | e.z_start() << 6 | e.vertices() << 13 |
+                   static_cast<std::uint32_t>(__popc(e.cells)) << 20 | e.y_at_0 << 26 |
+                   e.z_at_0 << 27};
+  }
+  __device__ std::uint32_t y_start() const { return packed & 63u; }
+  __device__ std::uint32_t z_start() const { return packed >> 6 & 127u; }
+  __device__ std::uint32_t vertices() const { return packed >> 13 & 127u; }
+  __device__ std::uint32_t cells() const { return packed >> 20 & 63u; }
+  __device__ std::uint32_t y_at_0() const { return packed >> 26 & 1u; }
+  __device__ std::uint32_t z_at_0() const { return packed >> 27 & 1u; }
 };
 
-__device__ inline RowStep row_step(int step) {
-  RowStep r;
-  const int warp = static_cast<int>(threadIdx.x >> 5);
-  const int in_warp = step * 32 + static_cast<int>(lane_id());
-  r.row = warp * kRowsOfWarp + in_warp;
-  r.valid = in_warp < kRowsOfWarp && r.row < kRowsOfTile;
-  if (!r.valid) r.row = 0;
-  r.z = static_cast<int>(z_of_row(r.row));
-  r.y = r.row - 33 * r.z;
-  return r;
-}
-
-__device__ inline RowEdges edges_of_step(const TileShared& s, const Shape& shape,
-                                         const RowStep& r) {
-  if (!r.valid) return {0, 0, 0, 0, 0, 0};
-  return edges_of_row(s, shape, r.row, r.y, r.z);
-}
-
-/// Vertices and cells before each of a thread's rows, counted from the warp's first.
-struct RowPrefix {
-  std::uint32_t packed[kRowSteps];  ///< vertices | cells << 16
-  __device__ std::uint32_t vertices(int step) const { return packed[step] & 0xffffu; }
-  __device__ std::uint32_t cells(int step) const { return packed[step] >> 16; }
+template <int N>
+struct RowCounts {
+  RowCount of_step[Team<N>::kSteps];
 };
 
-__device__ inline std::uint32_t warp_inclusive_sum(std::uint32_t v) {
+template <int N>
+__device__ inline void count_rows(TileShared& s, const Shape& shape, RowCounts<N>& counts) {
 #pragma unroll
-  for (int d = 1; d < 32; d *= 2) {
-    const std::uint32_t below = __shfl_up_sync(kAll, v, d);
-    if (lane_id() >= d) v += below;
-  }
-  return v;
-}
-
-/// Counts, and leaves each warp's sums in shared memory. A warp has at most 137
-/// rows of 98 vertices, so 16 bits hold a sum.
-__device__ inline void count_rows(TileShared& s, const Shape& shape, RowPrefix& prefix) {
-  std::uint32_t before = 0;
-#pragma unroll
-  for (int step = 0; step < kRowSteps; ++step) {
-    const RowEdges e = edges_of_step(s, shape, row_step(step));
-    const std::uint32_t own = e.vertices() | static_cast<std::uint32_t>(__popc(e.cells)) << 16;
-    const std::uint32_t sum = warp_inclusive_sum(own);
-    prefix.packed[step] = before + sum - own;
-    before += __shfl_sync(kAll, sum, 31);
-  }
-  if (lane_id() == 0) {
-    s.warp_vertices[threadIdx.x >> 5] = before & 0xffffu;
-    s.warp_cells[threadIdx.x >> 5] = before >> 16;
-  }
-}
-
-struct SumOfWarps {
-  std::uint32_t before, all;
-};
-
-/// Of one value a warp: the sum before this warp and of all.
-__device__ inline SumOfWarps sum_of_warps(const std::uint32_t (&values)[kWarps]) {
-  SumOfWarps sum{0, 0};
-#pragma unroll
-  for (int w = 0; w < kWarps; ++w) {
-    const std::uint32_t v = values[w];
-    if (w < static_cast<int>(threadIdx.x >> 5)) sum.before += v;
-    sum.all += v;
-  }
-  return sum;
-}
-
-/// Appends code + bit for each set bit of each lane's word at its `place`.
-/// Words with many bits are written by the whole warp, one after the other.
-__device__ inline void list_bits(std::uint32_t* list, std::uint32_t word, std::uint32_t code,
-                                 std::uint32_t place) {
-  constexpr int kMany = 6;
-  for (unsigned many = __ballot_sync(kAll, __popc(word) > kMany); many; many &= many - 1) {
-    const int source = __ffs(static_cast<int>(many)) - 1;
-    const std::uint32_t w = __shfl_sync(kAll, word, source);
-    const std::uint32_t c = __shfl_sync(kAll, code, source);
-    const std::uint32_t at = __shfl_sync(kAll, place, source) + __popc(w & lanes_below());
-    if ((w >> lane_id() & 1u) && at < kListed) list[at] = c + lane_id();
-    if (static_cast<int>(lane_id()) == source) word = 0;
-  }
-  for (; word; word &= word - 1, ++place)
-    if (place < kListed) list[place] = code + static_cast<std::uint32_t>(__ffs(static_cast<int>(word)) - 1);
-}
-
-/// Lists the cells numbered from `first` on, as many as there is room for.
-/// Places below `first` wrap around to huge numbers and are left out.
-__device__ inline void list_cells(TileShared& s, const Shape& shape, const RowPrefix& prefix,
-                                  std::uint32_t before_warp, std::uint32_t first) {
-#pragma unroll 1
-  for (int step = 0; step < kRowSteps; ++step) {
-    const RowStep r = row_step(step);
-    const std::uint32_t cells = edges_of_step(s, shape, r).cells;
-    list_bits(s.cells, cells, static_cast<std::uint32_t>(r.y << 5 | r.z << 10),
-              before_warp + prefix.cells(step) - first);
-  }
-}
-
-/// Lists the tile's own vertices numbered from `first` on.
-__device__ inline void list_edges(TileShared& s, const Shape& shape, const RowPrefix& prefix,
-                                  std::uint32_t before_warp, std::uint32_t first) {
-#pragma unroll 1
-  for (int step = 0; step < kRowSteps; ++step) {
-    const RowStep r = row_step(step);
-    const RowEdges e = edges_of_step(s, shape, r);
-    const auto code = static_cast<std::uint32_t>(r.y << 6 | r.z << 12);
-    std::uint32_t place = before_warp + prefix.vertices(step) - first;
-    list_bits(s.edges, e.x, code, place);
-    place += __popc(e.x);
-    if (e.y_at_0) {
-      if (place < kListed) s.edges[place] = code | 1u << 18;
-      ++place;
+  for (int step = 0; step < Team<N>::kSteps; ++step) {
+    const int row = step * N + static_cast<int>(threadIdx.x);
+    RowCount& count = counts.of_step[step];
+    count = {0, 0};
+    std::uint32_t sum = 0;
+    if ((row & ~31) < kRowsOfTile) {
+      if (row < kRowsOfTile) {
+        const int z = static_cast<int>(z_of_row(row));
+        count = RowCount::of(edges_of_row(s, shape, row, row - 33 * z, z));
+      }
+      const std::uint32_t own = count.vertices() | count.cells() << 16;
+      sum = warp_inclusive_sum(own);
+      count.before = sum - own;
     }
-    list_bits(s.edges, e.y, (code | 1u << 18) + 1, place);
-    place += __popc(e.y);
-    if (e.z_at_0) {
-      if (place < kListed) s.edges[place] = code | 2u << 18;
-      ++place;
-    }
-    list_bits(s.edges, e.z, (code | 2u << 18) + 1, place);
+    if (lane_id() == 31) s.step_sums[step * Team<N>::kWarps + warp_id()] = sum;
   }
 }
 
-/// The eight inside bits of a cell.
-__device__ inline std::uint32_t case_of(const TileShared& s, std::uint32_t x, std::uint32_t row) {
-  const auto pair = [&](std::uint32_t r) {
-    const RowBits b = s.rows[r];
-    return (b.at >> x & 1u) | (b.next >> x & 1u) << 1;
-  };
-  return pair(row) | pair(row + 1) << 2 | pair(row + 33) << 4 | pair(row + 34) << 6;
+/// By one warp, between two barriers: the sums before each 32 rows, and of all.
+template <int N>
+__device__ inline void sum_steps(TileShared& s) {
+  constexpr unsigned kSums = Team<N>::kSteps * Team<N>::kWarps;
+  static_assert(kSums <= 64);
+  const unsigned i = 2 * lane_id();
+  const std::uint32_t a = i < kSums ? s.step_sums[i] : 0;
+  const std::uint32_t b = i + 1 < kSums ? s.step_sums[i + 1] : 0;
+  const std::uint32_t va = a & 0xffffu, vb = b & 0xffffu, ca = a >> 16, cb = b >> 16;
+  const std::uint32_t v = warp_inclusive_sum(va + vb), c = warp_inclusive_sum(ca + cb);
+  s.step_vertices[i] = v - va - vb;
+  s.step_vertices[i + 1] = v - vb;
+  s.step_cells[i] = c - ca - cb;
+  s.step_cells[i + 1] = c - cb;
+  if (lane_id() == 31) {
+    s.all_vertices = v;
+    s.all_cells = c;
+  }
 }
 
-__device__ inline std::uint32_t row_of_cell(std::uint32_t cell) {
-  return (cell >> 10 & 31u) * 33u + (cell >> 5 & 31u);
+/// Marks a row with `count` things from `place` on, counted from the first that
+/// is listed now; it may lie before that.
+template <class Mark>
+__device__ inline void mark_row(Mark* marks, std::uint16_t* rows, int place, int count, int row) {
+  constexpr int kGroups = kListed / 32;
+  if (count == 0) return;
+  if (place >= 0 && place < static_cast<int>(kListed)) marks[place] = static_cast<Mark>(row + 1);
+  for (int group = ::max((place + 31) >> 5, 0); group < kGroups && 32 * group < place + count;
+       ++group)
+    rows[group] = static_cast<std::uint16_t>(row);
+}
+
+/// Leaves the row table for later tiles and the numbers within the tile in
+/// shared memory, and marks the first vertices and cells.
+template <int N>
+__device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, RowTable& table) {
+#pragma unroll
+  for (int step = 0; step < Team<N>::kSteps; ++step) {
+    const int row = step * N + static_cast<int>(threadIdx.x);
+    if (row >= kRowsOfTile) break;
+    const RowCount& count = counts.of_step[step];
+    const unsigned sum = step * Team<N>::kWarps + warp_id();
+    const std::uint32_t base = s.step_vertices[sum] + (count.before & 0xffffu);
+    const std::uint32_t cell = s.step_cells[sum] + (count.before >> 16);
+    const std::uint32_t y = count.y_start(), z = count.z_start();
+    table.rows[row] = base | y << 17 | z << 23;
+    s.x_base[row] = base;
+    s.y_base[row] = base + y + count.y_at_0();
+    s.z_base[row] = base + z + count.z_at_0();
+    s.cell_base[row] = static_cast<std::uint16_t>(cell);
+    mark_row(s.vertex_marks, s.vertex_rows, static_cast<int>(base),
+             static_cast<int>(count.vertices()), row);
+    mark_row(s.cells, s.cell_rows, static_cast<int>(cell), static_cast<int>(count.cells()), row);
+  }
+  if (threadIdx.x == 0) {
+    table.rows[kRowsOfTile] = s.all_vertices;
+    s.cell_base[kRowsOfTile] = static_cast<std::uint16_t>(s.all_cells);
+  }
+}
+
+/// Marks the vertices from `first` on, for tiles that have more than are listed
+/// at a time. Between barriers; the numbers are still those within the tile.
+template <int N>
+__device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
+  for (unsigned i = threadIdx.x; i < kListed; i += N) s.vertex_marks[i] = 0;
+  __syncthreads();
+  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
+    const std::uint32_t begin = s.x_base[row];
+    const std::uint32_t end = row + 1 < kRowsOfTile ? s.x_base[row + 1] : s.all_vertices;
+    mark_row(s.vertex_marks, s.vertex_rows, static_cast<int>(begin - first),
+             static_cast<int>(end - begin), row);
+  }
+  __syncthreads();
+}
+
+template <int N>
+__device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
+  for (unsigned i = threadIdx.x; i < kListed; i += N) s.cells[i] = 0;
+  __syncthreads();
+  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
+    const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
+    mark_row(s.cells, s.cell_rows, static_cast<int>(begin - first), static_cast<int>(end - begin),
+             row);
+  }
+  __syncthreads();
+}
+
+/// The row of each lane's thing, from the marks of 32 in a row.
+__device__ inline std::uint32_t row_of_lane(std::uint32_t mark, std::uint32_t row_before) {
+  const unsigned begins = __ballot_sync(kAll, mark != 0) & (lanes_below() << 1 | 1u);
+  const std::uint32_t found = __shfl_sync(kAll, mark, 31 - __clz(static_cast<int>(begins)));
+  return begins ? found - 1 : row_before;
+}
+
+/// The place of the set bit with `rank` set bits below it.
+__device__ inline std::uint32_t nth_bit(std::uint32_t word, std::uint32_t rank) {
+  std::uint32_t place = 0;
+#pragma unroll
+  for (std::uint32_t half = 16; half; half /= 2) {
+    const std::uint32_t below = __popc(word & ((1u << half) - 1u));
+    const bool upper = rank >= below;
+    rank -= upper ? below : 0;
+    word >>= upper ? half : 0;
+    place += upper ? half : 0;
+  }
+  return place;
 }
 
 /// The part of a list that a warp works on: whole groups of 32.
@@ -194,10 +205,11 @@ struct WarpPart {
   std::uint32_t begin, end;
 };
 
+template <int N>
 __device__ inline WarpPart part_of_warp(std::uint32_t listed) {
   const std::uint32_t groups = (listed + 31) / 32;
-  const std::uint32_t each = (groups + kWarps - 1) / kWarps * 32;
-  const std::uint32_t begin = ::min((threadIdx.x >> 5) * each, listed);
+  const std::uint32_t each = (groups + Team<N>::kWarps - 1) / Team<N>::kWarps * 32;
+  const std::uint32_t begin = ::min(warp_id() * each, listed);
   return {begin, ::min(begin + each, listed)};
 }
 
@@ -205,17 +217,41 @@ __device__ inline std::uint32_t triangles_of(const TileShared& s, std::uint32_t 
   return s.triangles[5 * index] >> 12;
 }
 
-/// Finds the cases of the listed cells; the number of triangles of this warp's part.
-__device__ inline std::uint32_t find_cases(TileShared& s, std::uint32_t listed) {
-  const WarpPart part = part_of_warp(listed);
+/// Finds the marked cells and their cases; the number of triangles of this
+/// warp's part. `first` is the number of the first cell that is listed.
+template <int N>
+__device__ inline std::uint32_t find_cells(TileShared& s, const Shape& shape, std::uint32_t first,
+                                           std::uint32_t listed) {
+  const WarpPart part = part_of_warp<N>(listed);
   std::uint32_t triangles = 0;
-  for (std::uint32_t i = part.begin + lane_id(); i < part.end; i += 32) {
-    const std::uint32_t cell = s.cells[i] & 0x7fffu;
-    const std::uint32_t index = case_of(s, cell & 31u, row_of_cell(cell));
-    triangles += triangles_of(s, index);
-    s.cells[i] = cell | index << 16;
+  for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
+    const std::uint32_t i = begin + lane_id();
+    const std::uint32_t row = row_of_lane(s.cells[i], s.cell_rows[begin / 32]);
+    const RowBits a = s.rows[row], b = s.rows[row + 1], c = s.rows[row + 33], d = s.rows[row + 34];
+    const std::uint32_t x =
+        nth_bit(mixed_cells(a, b, c, d) & shape.cell_mask, first + i - s.cell_base[row]);
+    const auto pair = [x](const RowBits& r) { return (r.at >> x & 1u) | (r.next >> x & 1u) << 1; };
+    const std::uint32_t index = pair(a) | pair(b) << 2 | pair(c) << 4 | pair(d) << 6;
+    if (i < part.end) {
+      triangles += triangles_of(s, index);
+      s.cells[i] = x | row << 5 | index << 16;
+    }
   }
   return __reduce_add_sync(kAll, triangles);
+}
+
+/// Of one value a warp: the sum before this warp and of all.
+struct SumOfWarps {
+  std::uint32_t before, all;
+};
+
+template <int N>
+__device__ inline SumOfWarps sum_of_warps(const std::uint32_t* values) {
+  SumOfWarps sum;
+  const std::uint32_t v = lane_id() < Team<N>::kWarps ? values[lane_id()] : 0;
+  sum.all = __reduce_add_sync(kAll, v);
+  sum.before = __reduce_add_sync(kAll, lane_id() < warp_id() ? v : 0);
+  return sum;
 }
 
 }  // namespace isobrick::gpu

@@ -9,17 +9,19 @@ namespace isobrick::gpu {
 
 /// Up to 32 times three words from a warp to consecutive memory: through
 /// shared memory, so that every store of the warp is one piece.
-template <class Word>
 __device__ inline void store_triples(std::uint32_t* staging, const std::uint32_t (&triple)[3],
-                                     std::uint32_t count, Word* to) {
-  static_assert(sizeof(Word) == 4);
+                                     std::uint32_t count, void* to) {
 #pragma unroll
   for (int i = 0; i < 3; ++i) staging[3 * lane_id() + i] = triple[i];
   __syncwarp();
+  auto* out = static_cast<std::uint32_t*>(to) + lane_id();
+  if (count == 32) {
 #pragma unroll
-  for (int i = 0; i < 3; ++i) {
-    const std::uint32_t at = 32 * i + lane_id();
-    if (at < 3 * count) reinterpret_cast<std::uint32_t*>(to)[at] = staging[at];
+    for (int i = 0; i < 3; ++i) out[32 * i] = staging[32 * i + lane_id()];
+  } else {
+#pragma unroll
+    for (int i = 0; i < 3; ++i)
+      if (32 * i + lane_id() < 3 * count) out[32 * i] = staging[32 * i + lane_id()];
   }
   __syncwarp();
 }
@@ -64,9 +66,7 @@ struct VertexMaker {
   }
 
   template <bool Normals>
-  __device__ void make(std::uint32_t edge, Vec3f& position, Vec3f& normal) const {
-    const int x = edge & 63u, y = edge >> 6 & 63u, z = edge >> 12 & 63u;
-    const int axis = static_cast<int>(edge >> 18);
+  __device__ void make(int x, int y, int z, int axis, Vec3f& position, Vec3f& normal) const {
     const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
     const R a = sample(x, y, z), b = sample(x + dx, y + dy, z + dz);
     const float t = crossing_of(a, b);
@@ -85,25 +85,57 @@ struct VertexMaker {
   }
 };
 
-/// Writes the listed vertices, the first of which has number `first` in the tile.
-template <class T, bool Normals>
-__device__ inline void emit_vertices(TileShared& s, const TileParams& p, const Shape& shape,
-                                     std::uint32_t first, std::uint32_t listed) {
+/// The edge of the tile's own vertex `number`, which lies in `row`: its lower
+/// end along x, and its axis.
+struct EdgeOfVertex {
+  std::uint32_t x, axis;
+};
+
+__device__ inline EdgeOfVertex find_edge(const TileShared& s, const Shape& shape, std::uint32_t row,
+                                         std::uint32_t number) {
+  const std::uint32_t y_base = s.y_base[row], z_base = s.z_base[row];
+  if (shape.at_0) {
+    // The vertices at sample 0 stand before the others along y and along z.
+    const auto z = static_cast<int>(z_of_row(row));
+    const RowEdges e =
+        edges_of_row(s, shape, static_cast<int>(row), static_cast<int>(row) - 33 * z, z);
+    if (e.z_at_0 && number + 1 == z_base) return {0, 2};
+    if (e.y_at_0 && number + 1 == y_base) return {0, 1};
+  }
+  const bool after_y = number >= y_base, after_z = number >= z_base;
+  const std::uint32_t other = s.rows[row + (after_z ? 33 : after_y ? 1 : 0)].next;
+  const RowBits here = s.rows[row];
+  const std::uint32_t word =
+      ((after_y ? here.next : here.at) ^ other) & (after_y ? shape.sample_mask : shape.cell_mask);
+  const std::uint32_t base = after_z ? z_base : after_y ? y_base : s.x_base[row];
+  return {nth_bit(word, number - base) + after_y, std::uint32_t{after_y} + after_z};
+}
+
+/// Writes the marked vertices, the first of which has number `first` in the tile.
+template <int N, class T, bool Normals>
+__device__ inline void emit_vertices(TileShared& s, WarpShared& own, const TileParams& p,
+                                     const Shape& shape, std::uint32_t first,
+                                     std::uint32_t listed) {
   const VertexMaker<T> maker{s, p, shape, static_cast<float>(p.isovalue)};
-  std::uint32_t* staging = s.staging[threadIdx.x >> 5];
-  for (std::uint32_t begin = threadIdx.x & ~31u; begin < listed; begin += kThreads) {
+  for (std::uint32_t begin = threadIdx.x & ~31u; begin < listed; begin += N) {
     const std::uint32_t count = ::min(listed - begin, 32u);
-    const std::uint32_t i = begin + ::min(lane_id(), count - 1);
+    const std::uint32_t i = begin + lane_id();
+    const std::uint32_t row = row_of_lane(s.vertex_marks[i], s.vertex_rows[begin / 32]);
     Vec3f position, normal;
-    maker.template make<Normals>(s.edges[i], position, normal);
+    if (lane_id() < count) {
+      const EdgeOfVertex edge = find_edge(s, shape, row, first + i);
+      const auto z = static_cast<int>(z_of_row(row));
+      maker.template make<Normals>(static_cast<int>(edge.x), static_cast<int>(row) - 33 * z, z,
+                                   static_cast<int>(edge.axis), position, normal);
+    }
     const std::uint64_t to = 3 * (s.vertex_base + first + begin);
     const std::uint32_t words[3] = {__float_as_uint(position.x), __float_as_uint(position.y),
                                     __float_as_uint(position.z)};
-    store_triples(staging, words, count, p.positions + to);
+    store_triples(own.staging, words, count, p.positions + to);
     if constexpr (Normals) {
       const std::uint32_t n[3] = {__float_as_uint(normal.x), __float_as_uint(normal.y),
                                   __float_as_uint(normal.z)};
-      store_triples(staging, n, count, p.normals + to);
+      store_triples(own.staging, n, count, p.normals + to);
     }
   }
 }
@@ -122,8 +154,9 @@ __device__ inline std::uint32_t vertex_number(const TileShared& s, const EdgePla
 }
 
 /// Fills the tables of places and triangles; once a block.
+template <int N>
 __device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles) {
-  for (unsigned i = threadIdx.x; i < 256 * 5; i += kThreads) s.triangles[i] = triangles[i];
+  for (unsigned i = threadIdx.x; i < 256 * 5; i += N) s.triangles[i] = triangles[i];
   if (threadIdx.x >= 24) return;
   const unsigned e = threadIdx.x % 12, at_0 = threadIdx.x / 12;
   const unsigned axis = e / 4, first = e & 1u, second = e >> 1 & 1u;
@@ -138,57 +171,59 @@ __device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles
     const unsigned row = axis == 1 ? 33 * second : second;
     const unsigned step = axis == 1 ? 1 : 33;
     const bool zero = at_0 && first == 0;
-    const auto number =
-        static_cast<std::uint32_t>(axis == 1 ? zero ? offsetof(TileShared, y_at_0)
-                                                    : offsetof(TileShared, y_base)
-                                   : zero ? offsetof(TileShared, z_at_0)
-                                          : offsetof(TileShared, z_base));
+    const auto number = static_cast<std::uint32_t>(axis == 1 ? zero ? offsetof(TileShared, y_at_0)
+                                                                    : offsetof(TileShared, y_base)
+                                                   : zero ? offsetof(TileShared, z_at_0)
+                                                             : offsetof(TileShared, z_base));
     place = {next + 8 * row, next + 8 * (row + step), number + 4 * row, 1 - first};
   }
   s.places[at_0][e] = place;
 }
 
+/// Writes up to 32 of the pending triangles.
+__device__ inline void emit_pending(const TileShared& s, WarpShared& own, std::uint32_t first,
+                                    std::uint32_t count, std::uint32_t* to) {
+  const std::uint32_t entry = own.pending[first + ::min(lane_id(), count - 1)];
+  const std::uint32_t cell = s.cells[entry & 0xfffu];
+  const std::uint32_t x = cell & 31u, row = cell >> 5 & 0x7ffu;
+  const std::uint32_t mask = (1u << x) - 1u;
+  const std::uint32_t edges = s.triangles[5 * (cell >> 16) + (entry >> 12)];
+  const EdgePlace* places = s.places[x == 0];
+  std::uint32_t corners[3];
+#pragma unroll
+  for (int c = 0; c < 3; ++c)
+    corners[c] = vertex_number(s, places[edges >> 4 * c & 15u], row, mask);
+  store_triples(own.staging, corners, count, to);
+}
+
 /// Writes the triangles of the listed cells; `base` is the number of the first
-/// of this warp's part in the mesh.
-__device__ inline void emit_triangles(TileShared& s, const TileParams& p, std::uint32_t listed,
-                                      std::uint64_t base) {
-  const WarpPart part = part_of_warp(listed);
-  std::uint32_t* staging = s.staging[threadIdx.x >> 5];
-  auto* entries = reinterpret_cast<std::uint8_t*>(staging);
+/// of this warp's part in the mesh. Triangles wait until there are 32 of them,
+/// whatever cells they come from, so that no thread idles.
+template <int N>
+__device__ inline void emit_triangles(TileShared& s, WarpShared& own, const TileParams& p,
+                                      std::uint32_t listed, std::uint64_t base) {
+  const WarpPart part = part_of_warp<N>(listed);
+  std::uint32_t* to = p.triangles + 3 * base;
+  std::uint32_t waiting = 0;
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
-    const std::uint32_t cell = i < part.end ? s.cells[i] : 0;
-    const std::uint32_t own = i < part.end ? triangles_of(s, cell >> 16) : 0;
-    const std::uint32_t sum = warp_inclusive_sum(own);
-    const std::uint32_t all = __shfl_sync(kAll, sum, 31);
-    // Lane by lane the triangles of up to 32 cells: cell | triangle << 5.
-    std::uint32_t packed[5];
-    const std::uint32_t before = sum - own;
+    const std::uint32_t count = i < part.end ? triangles_of(s, s.cells[i] >> 16) : 0;
+    const std::uint32_t sum = warp_inclusive_sum(count);
+    std::uint16_t* place = own.pending + waiting + sum - count;
 #pragma unroll
     for (std::uint32_t t = 0; t < 5; ++t)
-      if (t < own) entries[before + t] = static_cast<std::uint8_t>(lane_id() | t << 5);
+      if (t < count) place[t] = static_cast<std::uint16_t>(i + (t << 12));
+    waiting += __shfl_sync(kAll, sum, 31);
     __syncwarp();
-#pragma unroll
-    for (std::uint32_t j = 0; j < 5; ++j)
-      packed[j] = 32 * j < all ? entries[::min(32 * j + lane_id(), all - 1)] : 0;
+    std::uint32_t done = 0;
+    for (; done + 32 <= waiting; done += 32, to += 96) emit_pending(s, own, done, 32, to);
+    waiting -= done;
+    const std::uint16_t rest = lane_id() < waiting ? own.pending[done + lane_id()] : 0;
     __syncwarp();
-#pragma unroll
-    for (std::uint32_t j = 0; j < 5; ++j) {
-      if (32 * j >= all) break;
-      const std::uint32_t source = __shfl_sync(kAll, cell, packed[j] & 31u);
-      const std::uint32_t x = source & 31u, row = row_of_cell(source);
-      const std::uint32_t mask = (1u << x) - 1u;
-      const std::uint32_t edges = s.triangles[5 * (source >> 16) + (packed[j] >> 5)];
-      const EdgePlace* places = s.places[x == 0];
-      std::uint32_t corners[3];
-#pragma unroll
-      for (int c = 0; c < 3; ++c)
-        corners[c] = vertex_number(s, places[edges >> 4 * c & 15u], row, mask);
-      const std::uint32_t count = ::min(all - 32 * j, 32u);
-      store_triples(staging, corners, count, p.triangles + 3 * (base + 32 * j));
-    }
-    base += all;
+    if (lane_id() < waiting) own.pending[lane_id()] = rest;
+    __syncwarp();
   }
+  if (waiting > 0) emit_pending(s, own, 0, waiting, to);
 }
 
 }  // namespace isobrick::gpu

@@ -10,7 +10,9 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr int kBlocksPerMultiprocessor = 4;
+constexpr int kThreadsPerMultiprocessor = 1024;
+/// Threads that share a tile where there are many tiles, and where there are few.
+constexpr int kSmallTeam = 256, kLargeTeam = 1024;
 
 /// Pages of the tiles around one; where there is none, any that is.
 __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,
@@ -18,8 +20,8 @@ __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& i
   if (threadIdx.x >= 27) return;
   const int n = static_cast<int>(threadIdx.x);
   const int x = item.x + n % 3 - 1, y = item.y + n / 3 % 3 - 1, z = item.z + n / 9 - 1;
-  const bool exists = x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] &&
-                      z < p.tiles[2];
+  const bool exists =
+      x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] && z < p.tiles[2];
   std::uint32_t page = p.fill_page;
   if (exists) {
     const std::uint32_t own =
@@ -29,13 +31,19 @@ __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& i
   s.pages[n] = static_cast<const char*>(p.pages) + page * page_bytes;
 }
 
-template <class T, bool Normals>
-__global__ void __launch_bounds__(kThreads, kBlocksPerMultiprocessor)
+template <int N>
+constexpr std::size_t shared_bytes() {
+  return sizeof(TileShared) + Team<N>::kWarps * sizeof(WarpShared);
+}
+
+template <int N, class T, bool Normals>
+__global__ void __launch_bounds__(N, kThreadsPerMultiprocessor / N)
     extract_tiles(const __grid_constant__ TileParams p, const T threshold,
                   const std::uint16_t* __restrict__ case_entries) {
-  extern __shared__ __align__(16) unsigned char shared_bytes[];
-  TileShared& s = *reinterpret_cast<TileShared*>(shared_bytes);
-  fill_tables(s, case_entries);
+  extern __shared__ __align__(16) unsigned char bytes[];
+  TileShared& s = *reinterpret_cast<TileShared*>(bytes);
+  WarpShared& own = reinterpret_cast<WarpShared*>(bytes + sizeof(TileShared))[warp_id()];
+  fill_tables<N>(s, case_entries);
   const Classifier<T> classifier(threshold);
   const std::uint32_t items = *p.item_count;
   for (;;) {
@@ -45,60 +53,64 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerMultiprocessor)
     if (number >= items) return;
     const TileItem item = p.items[number];
     const Shape shape = shape_of(p, item);
-    find_pages(s, p, item, kPageSamples * sizeof(T));
-    __syncthreads();
-    classify(s, classifier);
-    __syncthreads();
-
-    RowPrefix prefix;
-    count_rows(s, shape, prefix);
-    __syncthreads();
-    const SumOfWarps vertices = sum_of_warps(s.warp_vertices), cells = sum_of_warps(s.warp_cells);
     RowTable& table = p.row_tables[item.slot];
-    publish_rows(s, shape, prefix, vertices.before, vertices.all, table);
-    __threadfence();
-    std::uint64_t triangles = 0;
-    std::uint32_t listed = 0;
-    for (std::uint32_t first = 0; first < cells.all; first += kListed) {
-      listed = ::min(cells.all - first, kListed);
-      list_cells(s, shape, prefix, cells.before, first);
+    find_pages(s, p, item, kPageSamples * sizeof(T));
+    clear_lists<N>(s);
+    __syncthreads();
+    classify<N>(s, classifier);
+    __syncthreads();
+    {
+      RowCounts<N> counts;
+      count_rows<N>(s, shape, counts);
       __syncthreads();
-      const std::uint32_t own = find_cases(s, listed);
-      if (lane_id() == 0) s.warp_triangles[threadIdx.x >> 5] = own;
+      if (warp_id() == 0) sum_steps<N>(s);
       __syncthreads();
-      triangles += sum_of_warps(s.warp_triangles).all;
+      publish_rows<N>(s, counts, table);
+      __threadfence();
+      __syncthreads();
     }
+    const std::uint32_t vertices = s.all_vertices, cells = s.all_cells;
+    std::uint64_t triangles = 0;
+    SumOfWarps sums{0, 0};
+    for (std::uint32_t first = 0; first < cells; first += kListed) {
+      if (first > 0) mark_cells<N>(s, first);
+      const std::uint32_t found = find_cells<N>(s, shape, first, ::min(cells - first, kListed));
+      if (lane_id() == 0) s.warp_triangles[warp_id()] = found;
+      __syncthreads();
+      sums = sum_of_warps<N>(s.warp_triangles);
+      triangles += sums.all;
+      __syncthreads();
+    }
+    if (warp_id() == 0) find_place(s, p, vertices, triangles, table);
     __syncthreads();
-    // Warp 0 finds the tile's place while the others list its vertices.
-    if (threadIdx.x < 32) find_place(s, p, vertices.all, triangles, table);
-    list_edges(s, shape, prefix, vertices.before, 0);
-    __syncthreads();
-    if (s.vertex_base + vertices.all <= p.vertex_capacity)
-      for (std::uint32_t first = 0; first < vertices.all; first += kListed) {
-        if (first > 0) {
-          list_edges(s, shape, prefix, vertices.before, first);
-          __syncthreads();
-        }
-        emit_vertices<T, Normals>(s, p, shape, first, ::min(vertices.all - first, kListed));
-        __syncthreads();
+    if (s.vertex_base + vertices <= p.vertex_capacity)
+      for (std::uint32_t first = 0; first < vertices; first += kListed) {
+        if (first > 0) mark_vertices<N>(s, first);
+        emit_vertices<N, T, Normals>(s, own, p, shape, first, ::min(vertices - first, kListed));
+        if (vertices > kListed) __syncthreads();
       }
-    if (threadIdx.x < 32) wait_for_neighbours(s, p, item, shape);
+    if (warp_id() == 0) wait_for_neighbours(s, p, item, shape);
     __syncthreads();
-    adopt_numbers(s, p, shape);
+    shift_rows<N>(s, p, shape);
     __syncthreads();
+    borrow_rows<N>(s, shape);
+    __syncthreads();
+    if (shape.lo[0] > 0) {
+      clip_rows<N>(s, shape);
+      __syncthreads();
+    }
     if (s.triangle_base + triangles <= p.triangle_capacity) {
       std::uint64_t base = s.triangle_base;
-      for (std::uint32_t first = 0; first < cells.all; first += kListed) {
-        if (cells.all > kListed) {
-          listed = ::min(cells.all - first, kListed);
-          list_cells(s, shape, prefix, cells.before, first);
+      for (std::uint32_t first = 0; first < cells; first += kListed) {
+        const std::uint32_t listed = ::min(cells - first, kListed);
+        if (cells > kListed) {
+          mark_cells<N>(s, first);
+          const std::uint32_t found = find_cells<N>(s, shape, first, listed);
+          if (lane_id() == 0) s.warp_triangles[warp_id()] = found;
           __syncthreads();
-          const std::uint32_t own = find_cases(s, listed);
-          if (lane_id() == 0) s.warp_triangles[threadIdx.x >> 5] = own;
-          __syncthreads();
+          sums = sum_of_warps<N>(s.warp_triangles);
         }
-        const SumOfWarps sums = sum_of_warps(s.warp_triangles);
-        emit_triangles(s, p, listed, base + sums.before);
+        emit_triangles<N>(s, own, p, listed, base + sums.before);
         base += sums.all;
         __syncthreads();
       }
@@ -107,30 +119,38 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerMultiprocessor)
   }
 }
 
-template <class T, bool Normals>
-void prepare() {
-  check(cudaFuncSetAttribute(extract_tiles<T, Normals>, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                             sizeof(TileShared)));
-}
+/// How many blocks fill the device, and how they are launched.
+template <int N, class T, bool Normals>
+struct Launcher {
+  static void prepare() {
+    check(cudaFuncSetAttribute(extract_tiles<N, T, Normals>,
+                               cudaFuncAttributeMaxDynamicSharedMemorySize, shared_bytes<N>()));
+  }
+  static int blocks() {
+    prepare();
+    int device = 0, multiprocessors = 0, each = 0;
+    check(cudaGetDevice(&device));
+    check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
+    check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, extract_tiles<N, T, Normals>, N,
+                                                        shared_bytes<N>()));
+    return each * multiprocessors;
+  }
+  static void launch(const TileParams& params, const std::uint16_t* case_entries, int blocks,
+                     cudaStream_t stream) {
+    extract_tiles<N, T, Normals><<<blocks, N, shared_bytes<N>(), stream>>>(
+        params, Threshold<T>(params.isovalue).value, case_entries);
+    check_launch("extract_tiles");
+  }
+};
 
-template <class T, bool Normals>
-void launch(const TileParams& params, const std::uint16_t* case_entries, int blocks,
-            cudaStream_t stream) {
-  prepare<T, Normals>();
-  extract_tiles<T, Normals><<<blocks, kThreads, sizeof(TileShared), stream>>>(
-      params, Threshold<T>(params.isovalue).value, case_entries);
-  check_launch("extract_tiles");
-}
-
-template <class T, bool Normals>
-int resident_blocks() {
-  prepare<T, Normals>();
-  int device = 0, multiprocessors = 0, each = 0;
-  check(cudaGetDevice(&device));
-  check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, extract_tiles<T, Normals>, kThreads,
-                                                      sizeof(TileShared)));
-  return each * multiprocessors;
+template <class F>
+auto visit_launcher(ScalarType type, bool normals, bool few_tiles, F&& f) {
+  return visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    if (few_tiles)
+      return normals ? f(Launcher<kLargeTeam, T, true>()) : f(Launcher<kLargeTeam, T, false>());
+    return normals ? f(Launcher<kSmallTeam, T, true>()) : f(Launcher<kSmallTeam, T, false>());
+  });
 }
 
 }  // namespace
@@ -146,20 +166,21 @@ void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]) {
     }
 }
 
-int extraction_blocks(ScalarType type, bool normals) {
-  return visit_device_scalar(type, [&](auto tag) {
-    using T = typename decltype(tag)::type;
-    return normals ? resident_blocks<T, true>() : resident_blocks<T, false>();
-  });
+LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles) {
+  LaunchShape shape;
+  shape.few_tiles = false;
+  shape.blocks = visit_launcher(type, normals, false, [](auto l) { return l.blocks(); });
+  if (tiles <= static_cast<std::uint32_t>(shape.blocks)) {
+    shape.few_tiles = true;
+    shape.blocks = visit_launcher(type, normals, true, [](auto l) { return l.blocks(); });
+  }
+  return shape;
 }
 
 void launch_extraction(ScalarType type, bool normals, const TileParams& params,
-                       const std::uint16_t* case_entries, int blocks, cudaStream_t stream) {
-  visit_device_scalar(type, [&](auto tag) {
-    using T = typename decltype(tag)::type;
-    normals ? launch<T, true>(params, case_entries, blocks, stream)
-            : launch<T, false>(params, case_entries, blocks, stream);
-  });
+                       const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream) {
+  visit_launcher(type, normals, shape.few_tiles,
+                 [&](auto l) { l.launch(params, case_entries, shape.blocks, stream); });
 }
 
 }  // namespace isobrick::gpu

@@ -13,12 +13,18 @@ namespace isobrick::gpu {
 inline constexpr std::size_t kCaseEntries = 256 * 5;
 void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]);
 
-/// Blocks that fill the current device.
-int extraction_blocks(ScalarType type, bool normals);
+/// How many blocks, and how many threads each.
+struct LaunchShape {
+  int blocks = 0;
+  bool few_tiles = false;  ///< more threads share a tile
+};
+
+/// What fills the current device when about so many tiles are active.
+LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles);
 
 /// Launches the extraction of all items on `stream`: one block takes one tile
 /// after the other, in their order.
 void launch_extraction(ScalarType type, bool normals, const TileParams& params,
-                       const std::uint16_t* case_entries, int blocks, cudaStream_t stream);
+                       const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream);
 
 }  // namespace isobrick::gpu

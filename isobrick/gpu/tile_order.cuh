@@ -52,34 +52,15 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
   return sum;
 }
 
-/// Leaves the row table for later tiles, and the numbers within the tile in shared memory.
-__device__ inline void publish_rows(TileShared& s, const Shape& shape, const RowPrefix& prefix,
-                                    std::uint32_t before_warp, std::uint32_t vertices,
-                                    RowTable& table) {
-#pragma unroll 1
-  for (int step = 0; step < kRowSteps; ++step) {
-    const RowStep r = row_step(step);
-    if (!r.valid) continue;
-    const RowEdges e = edges_of_row(s, shape, r.row, r.y, r.z);
-    const std::uint32_t base = before_warp + prefix.vertices(step);
-    const std::uint32_t y = e.y_start(), z = e.z_start();
-    table.rows[r.row] = base | y << 17 | z << 23;
-    s.x_base[r.row] = base;
-    s.y_base[r.row] = base + y + e.y_at_0;
-    s.z_base[r.row] = base + z + e.z_at_0;
-  }
-  if (threadIdx.x == 0) table.rows[kRowsOfTile] = vertices;
-}
-
 /// The whole of warp 0: this tile's place, made known to those that follow.
 __device__ inline void find_place(TileShared& s, const TileParams& p, std::uint64_t vertices,
                                   std::uint64_t triangles, RowTable& table) {
-  const auto v = sum_before(
-      [&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, s.item,
-      vertices);
-  const auto t = sum_before(
-      [&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; }, s.item,
-      triangles);
+  const auto v =
+      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; },
+                 s.item, vertices);
+  const auto t =
+      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; },
+                 s.item, triangles);
   if (lane_id() != 0) return;
   s.vertex_base = v;
   s.triangle_base = t;
@@ -90,8 +71,8 @@ __device__ inline void find_place(TileShared& s, const TileParams& p, std::uint6
 
 /// Six threads of warp 0, one for each lower neighbour: waits for its numbers.
 /// A neighbour that is not active shares no vertex with this tile.
-__device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p,
-                                           const TileItem& item, const Shape& shape) {
+__device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p, const TileItem& item,
+                                           const Shape& shape) {
   const unsigned n = lane_id();
   if (n < 1 || n > 6) return;
   const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
@@ -110,64 +91,83 @@ __device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p,
   s.neighbour[n] = &table;
 }
 
-/// From numbers within the tile to numbers in the mesh, with those of edges on
-/// the lower planes taken from the tiles that own them (adopt_boundaries of the CPU).
-__device__ inline void adopt_numbers(TileShared& s, const TileParams& p, const Shape& shape) {
+/// From numbers within the tile to numbers in the mesh (adopt_boundaries of the
+/// CPU), but for what borrow_rows takes from others afterwards.
+template <int N>
+__device__ inline void shift_rows(TileShared& s, const TileParams& p, const Shape& shape) {
   const auto own = static_cast<std::uint32_t>(p.number_base + s.vertex_base);
-  const bool fx = shape.first[0], fy = shape.first[1], fz = shape.first[2];
-  // Bits before the region of interest are counted by ranks but have no vertex.
-  const std::uint32_t clipped = (1u << shape.lo[0]) - 1u;
-  const auto entry = [&](int neighbour, int y, int z) {
-    const RowTable* table = s.neighbour[neighbour];
-    return table ? table->rows[z * 33 + y] : 0u;
-  };
-  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += kThreads) {
-    const int z = static_cast<int>(z_of_row(row)), y = row - 33 * z;
-    const bool own_y = y > 0 || fy, own_z = z > 0 || fz;
-    std::uint32_t x_number = s.x_base[row] + own, y_number = s.y_base[row] + own,
-                  z_number = s.z_base[row] + own;
-    if (!own_y || !own_z) {
-      const RowBits here = s.rows[row];
-      if (!own_y) {
-        const int from_z = own_z ? z : 32;
-        const std::uint32_t e = entry(own_z ? 2 : 6, 32, from_z);
-        x_number = (e & 0x1ffffu) + s.neighbour_base[own_z ? 2 : 6];
-        // Along z the tile below along y owns the row also where z is 0.
-        const std::uint32_t ez = entry(2, 32, z);
-        const std::uint32_t at_0 =
-            fx && shape.lo[0] == 0 && z < 32 ? (here.at ^ s.rows[row + 33].at) & 1u : 0u;
-        z_number = (ez & 0x1ffffu) + (ez >> 23) + at_0 + s.neighbour_base[2];
-      }
-      if (!own_z) {
-        const std::uint32_t e = entry(4, y, 32);
-        if (own_y) x_number = (e & 0x1ffffu) + s.neighbour_base[4];
-        const std::uint32_t at_0 =
-            fx && shape.lo[0] == 0 && y < 32 ? (here.at ^ s.rows[row + 1].at) & 1u : 0u;
-        y_number = (e & 0x1ffffu) + (e >> 17 & 63u) + at_0 + s.neighbour_base[4];
-      }
+  const RowTable* before = s.neighbour[1];
+  const std::uint32_t base = s.neighbour_base[1];
+  const bool first = shape.first[0];
+#pragma unroll 2
+  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
+    const std::uint32_t y = s.y_base[row] + own, z = s.z_base[row] + own;
+    s.x_base[row] += own;
+    s.y_base[row] = y;
+    s.z_base[row] = z;
+    // At sample 0 an edge is the one before the row's others, or the last of its
+    // kind in the row of the tile before.
+    std::uint32_t y_at_0 = y - 1, z_at_0 = z - 1;
+    if (!first && before) {
+      const std::uint32_t e = before->rows[row];
+      y_at_0 = base + (e & 0x1ffffu) + (e >> 23) - 1;
+      z_at_0 = base + (before->rows[row + 1] & 0x1ffffu) - 1;
     }
-    std::uint32_t y_at_0 = y_number - 1, z_at_0 = z_number - 1;
-    if (!fx) {
-      const int ny = own_z ? 1 : 5, nz = own_y ? 1 : 3;
-      const std::uint32_t e = entry(ny, y, own_z ? z : 32);
-      y_at_0 = (e & 0x1ffffu) + (e >> 23) - 1 + s.neighbour_base[ny];
-      const int from = z * 33 + (own_y ? y : 32) + 1;
-      const RowTable* table = s.neighbour[nz];
-      z_at_0 = (table ? table->rows[from] & 0x1ffffu : 0u) - 1 + s.neighbour_base[nz];
-    }
-    if (clipped) {
-      const RowBits here = s.rows[row];
-      const RowBits above = y < 32 ? s.rows[row + 1] : here;
-      const RowBits behind = z < 32 ? s.rows[row + 33] : here;
-      x_number -= __popc((here.at ^ here.next) & clipped);
-      y_number -= __popc((here.next ^ above.next) & clipped >> 1);
-      z_number -= __popc((here.next ^ behind.next) & clipped >> 1);
-    }
-    s.x_base[row] = x_number;
-    s.y_base[row] = y_number;
-    s.z_base[row] = z_number;
     s.y_at_0[row] = y_at_0;
     s.z_at_0[row] = z_at_0;
+  }
+}
+
+/// The rows on the lower planes: their vertices belong to tiles before this one.
+template <int N>
+__device__ inline void borrow_rows(TileShared& s, const Shape& shape) {
+  const bool fx = shape.first[0], fy = shape.first[1], fz = shape.first[2];
+  const auto entry = [&](int neighbour, int row) {
+    const RowTable* table = s.neighbour[neighbour];
+    return table ? table->rows[row] : 0u;
+  };
+  const auto base_of = [&](int neighbour, std::uint32_t e) {
+    return s.neighbour_base[neighbour] + (e & 0x1ffffu);
+  };
+  // Threads 0 … 32: rows (0, z); threads 64 … 96: rows (y, 0).
+  const int t = static_cast<int>(threadIdx.x);
+  if (t < 33 && !fy) {
+    const int z = t, row = 33 * z;
+    const bool own_z = z > 0 || fz;
+    const std::uint32_t e = entry(2, row + 32);
+    const int from_x = own_z ? 2 : 6;
+    s.x_base[row] = base_of(from_x, own_z ? e : entry(6, kRowsOfTile - 1));
+    std::uint32_t at_0 = 0;
+    if (z < 32) at_0 = (s.rows[row].at ^ s.rows[row + 33].at) & shape.at_0;
+    const std::uint32_t number = base_of(2, e) + (e >> 23) + at_0;
+    s.z_base[row] = number;
+    s.z_at_0[row] = fx ? number - 1 : base_of(3, entry(3, row + 33)) - 1;
+  }
+  if (t >= 64 && t < 97 && !fz) {
+    const int y = t - 64, row = y;
+    const bool own_y = y > 0 || fy;
+    const std::uint32_t e = entry(4, 33 * 32 + y);
+    if (own_y) s.x_base[row] = base_of(4, e);
+    std::uint32_t at_0 = 0;
+    if (y < 32) at_0 = (s.rows[row].at ^ s.rows[row + 1].at) & shape.at_0;
+    const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + at_0;
+    s.y_base[row] = number;
+    const std::uint32_t corner = entry(5, 33 * 32 + y);
+    s.y_at_0[row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
+  }
+}
+
+/// Bits before the region of interest are counted by ranks but have no vertex.
+template <int N>
+__device__ inline void clip_rows(TileShared& s, const Shape& shape) {
+  const std::uint32_t clipped = (1u << shape.lo[0]) - 1u;
+  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
+    const RowBits here = s.rows[row];
+    const RowBits above = row + 1 < kRowsOfTile ? s.rows[row + 1] : here;
+    const RowBits behind = row + 33 < kRowsOfTile ? s.rows[row + 33] : here;
+    s.x_base[row] -= __popc((here.at ^ here.next) & clipped);
+    s.y_base[row] -= __popc((here.next ^ above.next) & clipped >> 1);
+    s.z_base[row] -= __popc((here.next ^ behind.next) & clipped >> 1);
   }
 }
 

@@ -54,9 +54,9 @@ struct TileParams {
   WorldMap world;
   bool diagonal;  ///< the map has no term off the diagonal
   RowTable* row_tables;
-  OrderState* order;       ///< one an item, zeroed
-  std::uint32_t* ticket;   ///< zeroed
-  std::uint32_t epoch;     ///< never 0, new in each launch
+  OrderState* order;          ///< one an item, zeroed
+  std::uint32_t* ticket;      ///< zeroed
+  std::uint32_t epoch;        ///< never 0, new in each launch
   std::uint64_t number_base;  ///< vertices of the launches before
   float* positions;
   float* normals;

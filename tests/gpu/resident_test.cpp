@@ -76,9 +76,7 @@ class GpuResident : public ::testing::Test {
   void SetUp() override {
     if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
   }
-  static constexpr double lowest() {
-    return std::is_signed_v<T> ? -100.0 : 0.0;
-  }
+  static constexpr double lowest() { return std::is_signed_v<T> ? -100.0 : 0.0; }
   static Field<T> noise(Int3 extent, unsigned seed) {
     return padded_noise<T>(extent, lowest(), lowest() + 200, static_cast<T>(lowest()), seed);
   }
@@ -122,9 +120,8 @@ TYPED_TEST(GpuResident, RegionsOfInterest) {
 }
 
 TYPED_TEST(GpuResident, CheckerboardNeedsMoreThanSixteenBits) {
-  const Field<TypeParam> board({70, 70, 70}, [](Int3 p) {
-    return (p.x + p.y + p.z) % 2 ? 100.0 : 0.0;
-  });
+  const Field<TypeParam> board({70, 70, 70},
+                               [](Int3 p) { return (p.x + p.y + p.z) % 2 ? 100.0 : 0.0; });
   compare(board, {50}, {});
 }
 
