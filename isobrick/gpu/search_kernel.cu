@@ -46,6 +46,7 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   __syncthreads();
   const SumOfWarps warps = sum_of_warps<kThreads>(warp_sums);
   if (threadIdx.x < 32) {
+    if (lane_id() == 0) publish_sum(p.sums[block], block, warps.all);
     const unsigned long long before = sum_before(
         [&](std::uint32_t i) -> unsigned long long& { return p.sums[i]; }, block, warps.all);
     if (lane_id() == 0) {

@@ -208,9 +208,9 @@ struct WarpPart {
 template <int N>
 __device__ inline WarpPart part_of_warp(std::uint32_t listed) {
   const std::uint32_t groups = (listed + 31) / 32;
-  const std::uint32_t each = (groups + Team<N>::kWarps - 1) / Team<N>::kWarps * 32;
-  const std::uint32_t begin = ::min(warp_id() * each, listed);
-  return {begin, ::min(begin + each, listed)};
+  const std::uint32_t begin = groups * warp_id() / Team<N>::kWarps * 32;
+  const std::uint32_t end = groups * (warp_id() + 1) / Team<N>::kWarps * 32;
+  return {begin, ::min(end, listed)};
 }
 
 __device__ inline std::uint32_t triangles_of(const TileShared& s, std::uint32_t index) {

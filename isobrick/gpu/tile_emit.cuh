@@ -34,57 +34,6 @@ __device__ inline Vec3f position_of(const TileParams& p, Vec3f at) {
           p.world.origin[2] + p.world.m[8] * at.z};
 }
 
-template <class T>
-struct VertexMaker {
-  using R = float;
-  const TileShared& s;
-  const TileParams& p;
-  const Shape& shape;
-  R iso;
-
-  __device__ R sample(int x, int y, int z) const {
-    return static_cast<R>(__ldg(page_at<T>(s, x, y, z) + offset_in_page(x, y, z)));
-  }
-
-  __device__ float crossing_of(R a, R b) const {
-    if constexpr (std::is_floating_point_v<T>) return crossing(a, b, iso);
-    return (iso - a) / (b - a);
-  }
-
-  /// Central difference, one-sided at the volume's border.
-  __device__ float difference(int axis, int at, R before, R here, R after) const {
-    const int global = shape.origin[axis] + at;
-    const bool low = global == 0, high = global == p.extent[axis] - 1;
-    const R d = (high ? here : after) - (low ? here : before);
-    return d * (low || high ? R(1) : R(0.5));
-  }
-
-  __device__ Vec3f gradient(int x, int y, int z, R here) const {
-    return {difference(0, x, sample(x - 1, y, z), here, sample(x + 1, y, z)),
-            difference(1, y, sample(x, y - 1, z), here, sample(x, y + 1, z)),
-            difference(2, z, sample(x, y, z - 1), here, sample(x, y, z + 1))};
-  }
-
-  template <bool Normals>
-  __device__ void make(int x, int y, int z, int axis, Vec3f& position, Vec3f& normal) const {
-    const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
-    const R a = sample(x, y, z), b = sample(x + dx, y + dy, z + dz);
-    const float t = crossing_of(a, b);
-    Vec3f at{static_cast<float>(shape.origin[0] + x), static_cast<float>(shape.origin[1] + y),
-             static_cast<float>(shape.origin[2] + z)};
-    if (dx) at.x += t;
-    if (dy) at.y += t;
-    if (dz) at.z += t;
-    position = position_of(p, at);
-    if constexpr (Normals) {
-      const Vec3f ga = gradient(x, y, z, a), gb = gradient(x + dx, y + dy, z + dz, b);
-      const Vec3f g{ga.x + t * (gb.x - ga.x), ga.y + t * (gb.y - ga.y), ga.z + t * (gb.z - ga.z)};
-      const float sign = b > a ? 1.0f : -1.0f;
-      normal = p.world.unit_normal(g, {dx ? sign : 0.0f, dy ? sign : 0.0f, dz ? sign : 0.0f});
-    }
-  }
-};
-
 /// The edge of the tile's own vertex `number`, which lies in `row`: its lower
 /// end along x, and its axis.
 struct EdgeOfVertex {
@@ -111,32 +60,122 @@ __device__ inline EdgeOfVertex find_edge(const TileShared& s, const Shape& shape
   return {nth_bit(word, number - base) + after_y, std::uint32_t{after_y} + after_z};
 }
 
+template <class T>
+struct VertexMaker {
+  using R = float;
+  const TileShared& s;
+  const TileParams& p;
+  const Shape& shape;
+  R iso;
+
+  __device__ R sample(int x, int y, int z) const {
+    return static_cast<R>(__ldg(page_at<T>(s, x, y, z) + offset_in_page(x, y, z)));
+  }
+
+  /// The samples at (x, y, z) and one step along the axis.
+  __device__ void ends(int x, int y, int z, int axis, R& a, R& b) const {
+    int page = 13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5);
+    int offset = offset_in_page(x, y, z);
+    a = static_cast<R>(__ldg(static_cast<const T*>(s.pages[page]) + offset));
+    const int step = 1 << 5 * axis, last = 31 << 5 * axis;
+    const bool over = (offset & last) == last;
+    offset = over ? offset - last : offset + step;
+    if (over) page += axis == 0 ? 1 : axis == 1 ? 3 : 9;
+    b = static_cast<R>(__ldg(static_cast<const T*>(s.pages[page]) + offset));
+  }
+
+  __device__ float crossing_of(R a, R b) const {
+    if constexpr (std::is_floating_point_v<T>) return crossing(a, b, iso);
+    return (iso - a) / (b - a);
+  }
+
+  /// Central difference, one-sided at the volume's border.
+  __device__ float difference(int axis, int at, R before, R here, R after) const {
+    const int global = shape.origin[axis] + at;
+    const bool low = global == 0, high = global == p.extent[axis] - 1;
+    const R d = (high ? here : after) - (low ? here : before);
+    return d * (low || high ? R(1) : R(0.5));
+  }
+
+  __device__ Vec3f gradient(int x, int y, int z, R here) const {
+    return {difference(0, x, sample(x - 1, y, z), here, sample(x + 1, y, z)),
+            difference(1, y, sample(x, y - 1, z), here, sample(x, y + 1, z)),
+            difference(2, z, sample(x, y, z - 1), here, sample(x, y, z + 1))};
+  }
+
+  /// An edge and the samples at its ends.
+  struct Edge {
+    int x, y, z, axis;
+    R a, b;
+  };
+
+  __device__ Edge load(std::uint32_t row, EdgeOfVertex place) const {
+    Edge e;
+    e.x = static_cast<int>(place.x);
+    e.z = static_cast<int>(z_of_row(row));
+    e.y = static_cast<int>(row) - 33 * e.z;
+    e.axis = static_cast<int>(place.axis);
+    ends(e.x, e.y, e.z, e.axis, e.a, e.b);
+    return e;
+  }
+
+  template <bool Normals>
+  __device__ void make(const Edge& e, Vec3f& position, Vec3f& normal) const {
+    const int dx = e.axis == 0, dy = e.axis == 1, dz = e.axis == 2;
+    const float t = crossing_of(e.a, e.b);
+    Vec3f at{static_cast<float>(shape.origin[0] + e.x), static_cast<float>(shape.origin[1] + e.y),
+             static_cast<float>(shape.origin[2] + e.z)};
+    if (dx) at.x += t;
+    if (dy) at.y += t;
+    if (dz) at.z += t;
+    position = position_of(p, at);
+    if constexpr (Normals) {
+      const Vec3f ga = gradient(e.x, e.y, e.z, e.a),
+                  gb = gradient(e.x + dx, e.y + dy, e.z + dz, e.b);
+      const Vec3f g{ga.x + t * (gb.x - ga.x), ga.y + t * (gb.y - ga.y), ga.z + t * (gb.z - ga.z)};
+      const float sign = e.b > e.a ? 1.0f : -1.0f;
+      normal = p.world.unit_normal(g, {dx ? sign : 0.0f, dy ? sign : 0.0f, dz ? sign : 0.0f});
+    }
+  }
+};
+
 /// Writes the marked vertices, the first of which has number `first` in the tile.
+/// The samples of one group are on their way while the next is looked up.
 template <int N, class T, bool Normals>
 __device__ inline void emit_vertices(TileShared& s, WarpShared& own, const TileParams& p,
                                      const Shape& shape, std::uint32_t first,
                                      std::uint32_t listed) {
-  const VertexMaker<T> maker{s, p, shape, static_cast<float>(p.isovalue)};
-  for (std::uint32_t begin = threadIdx.x & ~31u; begin < listed; begin += N) {
-    const std::uint32_t count = ::min(listed - begin, 32u);
+  using Maker = VertexMaker<T>;
+  const Maker maker{s, p, shape, static_cast<float>(p.isovalue)};
+  const auto load = [&](std::uint32_t begin) {
     const std::uint32_t i = begin + lane_id();
     const std::uint32_t row = row_of_lane(s.vertex_marks[i], s.vertex_rows[begin / 32]);
+    // Threads without a vertex take the last one again.
+    const std::uint32_t number = first + ::min(i, listed - 1);
+    return maker.load(row, find_edge(s, shape, row, number));
+  };
+  const WarpPart part = part_of_warp<N>(listed);
+  if (part.begin >= part.end) return;
+  const std::uint64_t start = 3 * (s.vertex_base + first + part.begin);
+  float* to = p.positions + start;
+  float* normals_to = p.normals + start;
+  typename Maker::Edge edge = load(part.begin);
+  for (std::uint32_t begin = part.begin; begin < part.end;
+       begin += 32, to += 96, normals_to += 96) {
+    typename Maker::Edge next = edge;
+    if (begin + 32 < part.end) next = load(begin + 32);
+    const std::uint32_t count = ::min(listed - begin, 32u);
     Vec3f position, normal;
-    if (lane_id() < count) {
-      const EdgeOfVertex edge = find_edge(s, shape, row, first + i);
-      const auto z = static_cast<int>(z_of_row(row));
-      maker.template make<Normals>(static_cast<int>(edge.x), static_cast<int>(row) - 33 * z, z,
-                                   static_cast<int>(edge.axis), position, normal);
-    }
-    const std::uint64_t to = 3 * (s.vertex_base + first + begin);
+    maker.template make<Normals>(edge, position, normal);
     const std::uint32_t words[3] = {__float_as_uint(position.x), __float_as_uint(position.y),
                                     __float_as_uint(position.z)};
-    store_triples(own.staging, words, count, p.positions + to);
+    store_triples(own.staging, words, count, to);
     if constexpr (Normals) {
       const std::uint32_t n[3] = {__float_as_uint(normal.x), __float_as_uint(normal.y),
                                   __float_as_uint(normal.z)};
-      store_triples(own.staging, n, count, p.normals + to);
+      store_triples(own.staging, n, count, normals_to);
     }
+    edge = next;
   }
 }
 
@@ -180,10 +219,11 @@ __device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles
   s.places[at_0][e] = place;
 }
 
-/// Writes up to 32 of the pending triangles.
+/// Writes `count` of the pending triangles, from the ring's place `first` on.
 __device__ inline void emit_pending(const TileShared& s, WarpShared& own, std::uint32_t first,
                                     std::uint32_t count, std::uint32_t* to) {
-  const std::uint32_t entry = own.pending[first + ::min(lane_id(), count - 1)];
+  const std::uint32_t entry =
+      own.pending[(first + ::min(lane_id(), count - 1)) % WarpShared::kRing];
   const std::uint32_t cell = s.cells[entry & 0xfffu];
   const std::uint32_t x = cell & 31u, row = cell >> 5 & 0x7ffu;
   const std::uint32_t mask = (1u << x) - 1u;
@@ -204,26 +244,25 @@ __device__ inline void emit_triangles(TileShared& s, WarpShared& own, const Tile
                                       std::uint32_t listed, std::uint64_t base) {
   const WarpPart part = part_of_warp<N>(listed);
   std::uint32_t* to = p.triangles + 3 * base;
-  std::uint32_t waiting = 0;
+  std::uint32_t written = 0, waiting = 0;
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
     const std::uint32_t count = i < part.end ? triangles_of(s, s.cells[i] >> 16) : 0;
-    const std::uint32_t sum = warp_inclusive_sum(count);
-    std::uint16_t* place = own.pending + waiting + sum - count;
+    // The sum before each lane from the bits of the counts: three votes.
+    const unsigned ones = __ballot_sync(kAll, count & 1u), twos = __ballot_sync(kAll, count & 2u),
+                   fours = __ballot_sync(kAll, count & 4u), below = lanes_below();
+    const std::uint32_t place = written + waiting + __popc(ones & below) +
+                                2 * __popc(twos & below) + 4 * __popc(fours & below);
 #pragma unroll
     for (std::uint32_t t = 0; t < 5; ++t)
-      if (t < count) place[t] = static_cast<std::uint16_t>(i + (t << 12));
-    waiting += __shfl_sync(kAll, sum, 31);
+      if (t < count)
+        own.pending[(place + t) % WarpShared::kRing] = static_cast<std::uint16_t>(i + (t << 12));
+    waiting += __popc(ones) + 2 * __popc(twos) + 4 * __popc(fours);
     __syncwarp();
-    std::uint32_t done = 0;
-    for (; done + 32 <= waiting; done += 32, to += 96) emit_pending(s, own, done, 32, to);
-    waiting -= done;
-    const std::uint16_t rest = lane_id() < waiting ? own.pending[done + lane_id()] : 0;
-    __syncwarp();
-    if (lane_id() < waiting) own.pending[lane_id()] = rest;
-    __syncwarp();
+    for (; waiting >= 32; waiting -= 32, written += 32, to += 96)
+      emit_pending(s, own, written, 32, to);
   }
-  if (waiting > 0) emit_pending(s, own, 0, waiting, to);
+  if (waiting > 0) emit_pending(s, own, written, waiting, to);
 }
 
 }  // namespace isobrick::gpu

@@ -31,6 +31,21 @@ __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& i
   s.pages[n] = static_cast<const char*>(p.pages) + page * page_bytes;
 }
 
+/// Brings the samples of a tile that is about to be taken into the L2 cache.
+template <int N, class T>
+__device__ void prefetch_tile(const TileParams& p, std::uint32_t number) {
+  if (number >= *p.item_count) return;
+  const TileItem item = p.items[number];
+  const std::uint32_t page =
+      p.page_of_tile[(static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] +
+                     item.x];
+  if (page == kNone) return;
+  constexpr std::size_t bytes = kPageSamples * sizeof(T);
+  const char* from = static_cast<const char*>(p.pages) + page * bytes;
+  for (std::size_t at = threadIdx.x * 128; at < bytes; at += N * 128)
+    asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
+}
+
 template <int N>
 constexpr std::size_t shared_bytes() {
   return sizeof(TileShared) + Team<N>::kWarps * sizeof(WarpShared);
@@ -47,6 +62,7 @@ __global__ void __launch_bounds__(N, kThreadsPerMultiprocessor / N)
   const Classifier<T> classifier(threshold);
   const std::uint32_t items = *p.item_count;
   for (;;) {
+    // No earlier than this: a tile that is taken but not begun holds all later ones up.
     if (threadIdx.x == 0) s.item = atomicAdd(p.ticket, 1u);
     __syncthreads();
     const std::uint32_t number = s.item;
@@ -63,7 +79,10 @@ __global__ void __launch_bounds__(N, kThreadsPerMultiprocessor / N)
       RowCounts<N> counts;
       count_rows<N>(s, shape, counts);
       __syncthreads();
-      if (warp_id() == 0) sum_steps<N>(s);
+      if (warp_id() == 0) {
+        sum_steps<N>(s);
+        if (lane_id() == 31) publish_sum(p.order[number].vertices, number, s.all_vertices);
+      }
       __syncthreads();
       publish_rows<N>(s, counts, table);
       __threadfence();
@@ -81,15 +100,20 @@ __global__ void __launch_bounds__(N, kThreadsPerMultiprocessor / N)
       triangles += sums.all;
       __syncthreads();
     }
-    if (warp_id() == 0) find_place(s, p, vertices, triangles, table);
+    if (warp_id() == 0) {
+      if (lane_id() == 0) publish_sum(p.order[number].triangles, number, triangles);
+      find_vertex_base(s, p, number, table);
+    }
     __syncthreads();
+    prefetch_tile<N, T>(p, number + gridDim.x);
     if (s.vertex_base + vertices <= p.vertex_capacity)
       for (std::uint32_t first = 0; first < vertices; first += kListed) {
         if (first > 0) mark_vertices<N>(s, first);
         emit_vertices<N, T, Normals>(s, own, p, shape, first, ::min(vertices - first, kListed));
         if (vertices > kListed) __syncthreads();
       }
-    if (warp_id() == 0) wait_for_neighbours(s, p, item, shape);
+    if (warp_id() == 0) find_triangle_base(s, p, number, triangles);
+    if (warp_id() == 1) wait_for_neighbours(s, p, item, shape);
     __syncthreads();
     shift_rows<N>(s, p, shape);
     __syncthreads();

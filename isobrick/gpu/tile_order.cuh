@@ -21,55 +21,78 @@ __device__ inline unsigned long long warp_sum(unsigned long long v) {
   return v;
 }
 
-/// Publishes an item's own sum and returns the sum of all items before it, after
-/// making the sum with it known to those that follow. One warp. Items are started
-/// in order, so everything that is waited for is on its way. `word(i)` is the
-/// zeroed word of item i.
+/// Publishes an item's own sum: as early as it is known, because all later items
+/// wait for it. One thread. `word` is the item's zeroed word.
+__device__ inline void publish_sum(unsigned long long& word, std::uint32_t item,
+                                   unsigned long long own) {
+  DeviceWord(word).store((item == 0 ? kFullSum : kOwnSum) | own, cuda::memory_order_relaxed);
+}
+
+/// The sum of all items before one that has published its own; makes the sum
+/// with it known to those that follow. One warp. Items are started in order, so
+/// everything that is waited for is on its way. `word(i)` is the word of item i.
 template <class Word>
 __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
                                                 unsigned long long own) {
-  if (item == 0) {
-    if (lane_id() == 0) DeviceWord(word(0)).store(kFullSum | own, cuda::memory_order_relaxed);
-    return 0;
-  }
-  if (lane_id() == 0) DeviceWord(word(item)).store(kOwnSum | own, cuda::memory_order_relaxed);
+  // All the tiles that are worked on now may know no more than their own sum, so
+  // a warp looks at many of them in the time of one.
+  constexpr int kEach = 8;
+  if (item == 0) return 0;
   unsigned long long sum = 0;
-  for (std::int64_t last = static_cast<std::int64_t>(item) - 1;; last -= 32) {
-    const std::int64_t i = last - lane_id();
-    unsigned long long seen = kFullSum;
-    if (i >= 0) {
-      DeviceWord ref(word(static_cast<std::uint32_t>(i)));
-      while ((seen = ref.load(cuda::memory_order_relaxed)) >> 62 == 0) __nanosleep(20);
+  bool found = false;
+  for (std::int64_t last = static_cast<std::int64_t>(item) - 1; !found; last -= 32 * kEach) {
+    unsigned long long seen[kEach];
+#pragma unroll
+    for (int j = 0; j < kEach; ++j) {
+      const std::int64_t i = last - 32 * j - lane_id();
+      seen[j] =
+          i < 0 ? kFullSum
+                : DeviceWord(word(static_cast<std::uint32_t>(i))).load(cuda::memory_order_relaxed);
     }
-    // Lanes up to the first that knows everything before it.
-    const unsigned full = __ballot_sync(kAll, seen >> 62 == 2);
-    const unsigned used = full ? full ^ (full - 1) : kAll;
-    sum += warp_sum(used >> lane_id() & 1u ? seen & kSumMask : 0ull);
-    if (full) break;
+#pragma unroll
+    for (int j = 0; j < kEach; ++j) {
+      if (found) break;
+      const std::int64_t i = last - 32 * j - lane_id();
+      while (seen[j] >> 62 == 0)
+        seen[j] = DeviceWord(word(static_cast<std::uint32_t>(i))).load(cuda::memory_order_relaxed);
+      // Lanes up to the first that knows everything before it.
+      const unsigned full = __ballot_sync(kAll, seen[j] >> 62 == 2);
+      const unsigned used = full ? full ^ (full - 1) : kAll;
+      sum += used >> lane_id() & 1u ? seen[j] & kSumMask : 0ull;
+      found = full != 0;
+    }
   }
+  sum = warp_sum(sum);
   if (lane_id() == 0)
     DeviceWord(word(item)).store(kFullSum | (sum + own), cuda::memory_order_relaxed);
   return sum;
 }
 
-/// The whole of warp 0: this tile's place, made known to those that follow.
-__device__ inline void find_place(TileShared& s, const TileParams& p, std::uint64_t vertices,
-                                  std::uint64_t triangles, RowTable& table) {
-  const auto v =
-      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; },
-                 s.item, vertices);
-  const auto t =
-      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; },
-                 s.item, triangles);
+/// Where the tile's vertices go; with that its row table is complete. One warp.
+__device__ inline void find_vertex_base(TileShared& s, const TileParams& p, std::uint32_t item,
+                                        RowTable& table) {
+  const auto base =
+      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
+                 s.all_vertices);
   if (lane_id() != 0) return;
-  s.vertex_base = v;
-  s.triangle_base = t;
-  table.number_base = static_cast<std::uint32_t>(p.number_base + v);
+  s.vertex_base = base;
+  table.number_base = static_cast<std::uint32_t>(p.number_base + base);
   DeviceFlag(table.ready).store(p.epoch, cuda::memory_order_release);
-  if (s.item + 1 == *p.item_count) *p.totals = {v + vertices, t + triangles};
+  if (item + 1 == *p.item_count) p.totals->vertices = base + s.all_vertices;
 }
 
-/// Six threads of warp 0, one for each lower neighbour: waits for its numbers.
+/// Where the tile's triangles go. One warp.
+__device__ inline void find_triangle_base(TileShared& s, const TileParams& p, std::uint32_t item,
+                                          std::uint64_t triangles) {
+  const auto base =
+      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; }, item,
+                 triangles);
+  if (lane_id() != 0) return;
+  s.triangle_base = base;
+  if (item + 1 == *p.item_count) p.totals->triangles = base + triangles;
+}
+
+/// Six threads of a warp, one for each lower neighbour: waits for its numbers.
 /// A neighbour that is not active shares no vertex with this tile.
 __device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p, const TileItem& item,
                                            const Shape& shape) {

@@ -64,7 +64,10 @@ struct TileShared {
 /// What each warp has for itself, after TileShared.
 struct WarpShared {
   std::uint32_t staging[96];
-  std::uint16_t pending[192];  ///< triangles not yet written: cell | triangle << 12
+  /// Triangles not yet written, cell | triangle << 12, in a ring: fewer than 32
+  /// wait while those of 32 cells come.
+  static constexpr std::uint32_t kRing = 256;
+  std::uint16_t pending[kRing];
 };
 
 /// A tile cut to the region of interest; see TileShape of the CPU.
