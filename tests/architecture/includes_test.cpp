@@ -89,6 +89,17 @@ TEST(Includes, NameFilesThatExist) {
   });
 }
 
+TEST(Includes, OnlyTheGpuFolderKnowsCuda) {
+  for (const auto& entry : fs::recursive_directory_iterator(library())) {
+    if (!entry.is_regular_file() || !is_source(entry.path())) continue;
+    if (folder_of(fs::relative(entry.path(), library()).string()) == "gpu") continue;
+    for (const std::string& name : includes_of(entry.path()))
+      EXPECT_FALSE(name.starts_with("cuda") || name.starts_with("cub/") ||
+                   name.ends_with(".cuh"))
+          << entry.path() << " includes " << name;
+  }
+}
+
 TEST(Includes, EveryFolderStandsInTheTable) {
   for (const auto& entry : fs::directory_iterator(library()))
     if (entry.is_directory()) {
