@@ -42,33 +42,33 @@ struct Search {
   double seconds = 0;
 };
 
-Search search(const StoreReader& store, double isovalue, std::optional<IndexKind> kind) {
+Search search(const StoreReader& store, double isovalue, SearchBy by) {
   const auto start = std::chrono::steady_clock::now();
-  TileStream stream(store, 0, isovalue, store.info().levels[0].lattice.box(), kind);
+  TileStream stream(store, 0, isovalue, store.info().levels[0].lattice.box(), by);
   Search result;
   while (stream.next()) ++result.tiles;
-  result.bytes = stream.bytes_read();
+  result.bytes = stream.range_bytes() + stream.index_bytes();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }
 
-void measure(const fs::path& path, const StoreReader& store, double isovalue,
-             std::optional<IndexKind> kind) {
-  Search result = search(store, isovalue, kind);
+void measure(const fs::path& path, const StoreReader& store, double isovalue, SearchBy by) {
+  Search result = search(store, isovalue, by);
   double warm = result.seconds;
   const auto begin = std::chrono::steady_clock::now();
   for (int i = 0; i < 200 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(1);
        ++i)
-    warm = std::min(warm, search(store, isovalue, kind).seconds);
+    warm = std::min(warm, search(store, isovalue, by).seconds);
   std::vector<double> cold;
   for (int i = 0; i < 7; ++i) {
     drop_pages(path);
-    cold.push_back(search(store, isovalue, kind).seconds);
+    cold.push_back(search(store, isovalue, by).seconds);
   }
   std::sort(cold.begin(), cold.end());
-  const long leaf = kind ? StoredIndex(store, 0, std::string(name_of(*kind))).layout().leaf : 16;
-  const std::string name = kind ? std::string(name_of(*kind)) : "none";
-  std::printf("%-9s %4ld %9g %8zu %11llu %10.3f %10.3f\n", name.c_str(), leaf, isovalue,
+  const std::string kind = by.kind ? std::string(name_of(*by.kind)) : "none";
+  const long leaf = by.kind ? StoredIndex(store, 0, kind).layout().leaf : 16;
+  const std::string name = (by.only_if_few ? "if few: " : "") + kind;
+  std::printf("%-17s %4ld %9g %8zu %11llu %10.3f %10.3f\n", name.c_str(), leaf, isovalue,
               result.tiles, static_cast<unsigned long long>(result.bytes), 1e3 * warm,
               1e3 * cold[cold.size() / 2]);
 }
@@ -79,12 +79,13 @@ int run(int argc, char** argv) {
     return 2;
   }
   const StoreReader store(argv[1]);
-  std::printf("index     leaf  isovalue    tiles       bytes    warm ms    cold ms\n");
+  std::printf("index             leaf  isovalue    tiles       bytes    warm ms    cold ms\n");
   for (int i = 2; i < argc; ++i) {
     const double isovalue = std::atof(argv[i]);
-    measure(argv[1], store, isovalue, std::nullopt);
+    measure(argv[1], store, isovalue, {});
     for (const std::string& kind : stored_index_kinds(argv[1], 0))
-      measure(argv[1], store, isovalue, parse_index_kind(kind));
+      for (const bool only_if_few : {false, true})
+        measure(argv[1], store, isovalue, {parse_index_kind(kind), only_if_few});
   }
   return 0;
 }

@@ -8,8 +8,8 @@
 namespace isobrick {
 namespace {
 
-/// Files up to here are read at once: that is about what a disk reads in the
-/// time of one seek, or of one request to a network.
+/// Larger files are not read at once: it is about what a disk reads in the time
+/// of one seek, or of one request to a network.
 constexpr std::uint64_t kSmallFile = std::uint64_t{512} << 10;
 
 CodecChain chain_of(bool compressed) {
@@ -52,13 +52,11 @@ IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, boo
   if (size_ < tail)
     throw DamageError(fmt::format("'{}': {} bytes are too few for {} parts of an index",
                                   path.string(), size_, parts));
-  const bool small = size_ <= kSmallFile;
-  std::vector<std::byte> bytes(static_cast<std::size_t>(small ? size_ : tail));
-  file_.read_at(size_ - bytes.size(), bytes);
-  bytes_read_ += bytes.size();
+  std::vector<std::byte> bytes(static_cast<std::size_t>(tail));
+  file_.read_at(size_ - tail, bytes);
+  bytes_read_ += tail;
   try {
-    places_ = ShardIndex::decode(std::span(bytes).last(static_cast<std::size_t>(tail)), true,
-                                 size_ - tail);
+    places_ = ShardIndex::decode(bytes, true, size_ - tail);
   } catch (const DamageError& e) {
     throw DamageError(fmt::format("'{}': {}", path.string(), e.what()));
   }
@@ -66,7 +64,14 @@ IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, boo
   if (places_.brick_bytes() != size_ - tail)
     throw DamageError(fmt::format("'{}' has {} bytes, but its parts and their places {}",
                                   path.string(), size_, places_.brick_bytes() + tail));
-  if (small) whole_ = std::move(bytes);
+}
+
+void IndexChunk::read_whole() {
+  if (size_ > kSmallFile) return;
+  std::vector<std::byte> bytes(static_cast<std::size_t>(size_));
+  file_.read_at(0, bytes);
+  bytes_read_ += size_;
+  whole_ = std::move(bytes);
 }
 
 bool IndexChunk::is_whole(const std::filesystem::path& path, std::size_t parts) {

@@ -49,8 +49,7 @@ class IndexChunkWriter {
 /// Reads one index chunk. Thread-safe after construction.
 class IndexChunk {
  public:
-  /// Reads where the parts are; a small file is read whole, so that its parts
-  /// cost no further reads. DamageError when the file is missing, or not whole.
+  /// Reads where the parts are. DamageError when the file is missing, or not whole.
   IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed);
 
   /// Whether the file is there with a checksum and a size that are right.
@@ -62,6 +61,10 @@ class IndexChunk {
   /// Bytes read from it so far.
   std::uint64_t bytes_read() const { return bytes_read_; }
   bool has(std::size_t part) const { return !places_[part].absent(); }
+
+  /// Reads all of a file that is not large at once, for those who then want many
+  /// of its parts. Not thread-safe.
+  void read_whole();
 
   /// Checks and decodes a part into `out`; false when it is absent. Throws
   /// DamageError naming file and offset.
@@ -77,7 +80,7 @@ class IndexChunk {
   bool compressed_;
   std::uint64_t size_ = 0;
   ShardIndex places_;
-  std::vector<std::byte> whole_;  ///< all of a small file
+  std::vector<std::byte> whole_;  ///< all of the file, if it was read whole
   mutable std::atomic<std::uint64_t> bytes_read_ = 0;
 };
 

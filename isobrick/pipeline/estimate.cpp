@@ -50,7 +50,7 @@ ActiveParts visit_active(const StoreReader& store, const ExtractRequest& request
   const Lattice& lattice = request.level->lattice;
   ActiveParts parts;
   parts.bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
-  TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.index);
+  TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
   std::vector<bool> active(static_cast<std::size_t>(parts.bricks));
   Workers workers(request.threads);  // an index is searched in parallel
   while (const auto work = workers.execute([&] { return tiles.next(); })) {

@@ -70,7 +70,7 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     const ExtractPlan plan = plan_memory(request, options.memory, active.active_bricks);
 
     sink.begin(header_of(*request.level, request.surface));
-    TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.index);
+    TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
     BatchPlanner batches(tiles, lattice, reach, request.surface.may_have_nan, plan.limits.tiles,
                          plan.cache_bricks);
     BrickCache cache(store, options.level, plan.cache_bricks);
@@ -107,8 +107,10 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     sink.finish();
     progress.end();
     report.sink_seconds = writer.seconds();
-    report.index = request.index;
-    report.search_bytes = tiles.bytes_read();
+    report.index = request.search.kind;
+    report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
+    // Once for the plan and once for the surface; the index has files of its own.
+    report.bytes_read = 2 * tiles.index_bytes();
     report.search_seconds = tiles.seconds();
     report.triangles = extractor.triangles();
     report.vertices = extractor.vertices();
@@ -116,9 +118,7 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     report.bricks_read = cache.bricks_read();
     report.brick_reads = cache.reads();
   }
-  // The index has files of its own; it is searched for the plan and for the surface.
-  report.bytes_read = store.bytes_read() - bytes_before;
-  if (report.index) report.bytes_read += 2 * report.search_bytes;
+  report.bytes_read += store.bytes_read() - bytes_before;
   return report;
 }
 

@@ -29,7 +29,7 @@ struct ExtractReport {
   std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
   std::uint64_t bytes_read = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, sink_seconds = 0;
-  std::optional<IndexKind> index;  ///< that found the active blocks; nothing: their ranges
+  std::optional<IndexKind> index;  ///< that was asked for active blocks; nothing: only ranges
   std::uint64_t search_bytes = 0;  ///< read to find them, once
   double search_seconds = 0;       ///< to find them, once
 };

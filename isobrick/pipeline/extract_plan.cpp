@@ -78,8 +78,8 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
                      .fill_value = info.fill_value,
                      .may_have_nan = info.may_have_nan && is_floating(info.type)};
   request.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
-  request.index = resolve_index(store, options.level, options.index);
-  request.search_memory = block_search_bytes(store, options.level, request.index, request.threads);
+  request.search = resolve_index(store, options.level, options.index);
+  request.search_memory = block_search_bytes(store, options.level, request.search, request.threads);
   return request;
 }
 

@@ -19,7 +19,7 @@ struct ExtractRequest {
   const LevelInfo* level = nullptr;
   SurfaceOptions surface;
   int threads = 1;
-  std::optional<IndexKind> index;   ///< that the level is searched with
+  SearchBy search;                  ///< for its active blocks
   std::uint64_t search_memory = 0;  ///< that such a search takes
 };
 

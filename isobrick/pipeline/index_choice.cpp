@@ -7,17 +7,34 @@
 
 namespace isobrick {
 
-std::optional<IndexKind> resolve_index(const StoreReader& store, int level,
-                                       const IndexChoice& choice) {
-  // The block ranges are the fastest in every measurement of docs/index.md.
-  if (choice.automatic || !choice.kind) return std::nullopt;
+namespace {
+
+/// The stored index that finds blocks fastest, if one does at all: finer leaves
+/// than the blocks themselves only add to what is read. The order is that of the
+/// figures in docs/index.md.
+SearchBy fastest(const StoreReader& store, int level) {
+  for (const IndexKind kind :
+       {IndexKind::octree, IndexKind::kdtree, IndexKind::interval, IndexKind::quadtree}) {
+    const std::string name(name_of(kind));
+    if (has_index(store.info().path, level, name) &&
+        StoredIndex(store, level, name).layout().leaf == kBlockEdge)
+      return {.kind = kind, .only_if_few = true};
+  }
+  return {};
+}
+
+}  // namespace
+
+SearchBy resolve_index(const StoreReader& store, int level, const IndexChoice& choice) {
+  if (choice.automatic) return fastest(store, level);
+  if (!choice.kind) return {};
   const std::string kind(name_of(*choice.kind));
   if (!has_index(store.info().path, level, kind))
     throw UsageError(
         fmt::format("level {} of '{}' has no {} index; 'isobrick index {} --kind {}' "
                     "adds it",
                     level, store.info().path.string(), kind, store.info().path.string(), kind));
-  return choice.kind;
+  return {.kind = choice.kind, .only_if_few = false};
 }
 
 }  // namespace isobrick

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "isobrick/bricks/store_reader.h"
-#include "isobrick/index/index_kind.h"
+#include "isobrick/stream/block_search.h"
 
 namespace isobrick {
 
@@ -13,9 +13,8 @@ struct IndexChoice {
   std::optional<IndexKind> kind;  ///< otherwise: that index; nothing: the block ranges
 };
 
-/// The index that a level is searched with; nothing: the block ranges. Throws
-/// UsageError when the level lacks the one that was asked for.
-std::optional<IndexKind> resolve_index(const StoreReader& store, int level,
-                                       const IndexChoice& choice);
+/// How a level is searched then. Throws UsageError when the level lacks the index
+/// that was asked for.
+SearchBy resolve_index(const StoreReader& store, int level, const IndexChoice& choice);
 
 }  // namespace isobrick

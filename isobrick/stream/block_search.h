@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -9,6 +10,12 @@
 #include "isobrick/index/index_kind.h"
 
 namespace isobrick {
+
+/// How the active blocks of a level are searched for.
+struct SearchBy {
+  std::optional<IndexKind> kind;  ///< a stored index; nothing: the block ranges
+  bool only_if_few = false;       ///< the index only for range chunks where little is active
+};
 
 /// Finds the active blocks of a level, one range chunk (the cube of 512³ cells
 /// whose block ranges share a file) after the other.
@@ -21,18 +28,17 @@ class BlockSearch {
   virtual void append_tiles(Int3 chunk, Box3 box, double isovalue,
                             std::vector<TileWork>& tiles) = 0;
 
-  /// Bytes read from disk so far.
-  virtual std::uint64_t bytes_read() const = 0;
+  /// Bytes read from disk so far: of ranges, which StoreReader::bytes_read()
+  /// counts as well, and of an index.
+  virtual std::uint64_t range_bytes() const { return 0; }
+  virtual std::uint64_t index_bytes() const { return 0; }
 };
 
-/// The search by a stored index, or by the block ranges alone when there is no
-/// `kind`. Both give the same surface. The index works in parallel in the
-/// caller's TBB arena, in no more than block_search_bytes().
-std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level,
-                                               std::optional<IndexKind> kind);
+/// All of them give the same surface. An index works in parallel in the caller's
+/// TBB arena, in no more than block_search_bytes().
+std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level, SearchBy by);
 
 /// Memory that such a search takes with so many threads, beyond a range chunk.
-std::uint64_t block_search_bytes(const StoreReader& store, int level, std::optional<IndexKind> kind,
-                                 int threads);
+std::uint64_t block_search_bytes(const StoreReader& store, int level, SearchBy by, int threads);
 
 }  // namespace isobrick

@@ -18,6 +18,9 @@ constexpr Index kBrickTiles = IndexLayout::kBrick / kTileEdge;
 /// Parts that are searched at a time have at most about so many bytes.
 constexpr std::uint64_t kWaveBytes = std::uint64_t{64} << 20;
 
+/// More parts of a file than these are not read one by one.
+constexpr std::size_t kPartsOneByOne = 16;
+
 constexpr std::uint64_t block_bit(Int3 b) {
   return std::uint64_t{1} << (b.x + kBrickBlocks * (b.y + kBrickBlocks * b.z));
 }
@@ -154,11 +157,29 @@ std::uint64_t IndexSearch::with_cell_less_blocks(std::uint64_t blocks, Int3 bric
 }
 
 void IndexSearch::append_tiles(Int3 c, Box3 box, double isovalue, std::vector<TileWork>& tiles) {
+  append_tiles_if_few(c, box, isovalue, 1, tiles);
+}
+
+bool IndexSearch::append_tiles_if_few(Int3 c, Box3 box, double isovalue, double few,
+                                      std::vector<TileWork>& tiles) {
   const Int3 chunks = index_.layout().chunks();
   // The last samples of a volume may make range chunks without cells.
-  if (c.x >= chunks.x || c.y >= chunks.y || c.z >= chunks.z) return;
-  const IndexChunk chunk = index_.open(c);
+  if (c.x >= chunks.x || c.y >= chunks.y || c.z >= chunks.z) return true;
+  IndexChunk chunk = index_.open(c);
   const std::vector<Int3> bricks = active_bricks(chunk, c, box, isovalue);
+  const auto all = static_cast<double>(index_.layout().parts_of_chunk(c) - 1);
+  const bool is_few = static_cast<double>(bricks.size()) <= few * all;
+  if (is_few) {
+    if (bricks.size() > kPartsOneByOne) chunk.read_whole();
+    append_tiles_of(chunk, bricks, box, isovalue, tiles);
+  }
+  bytes_read_ += chunk.bytes_read();
+  return is_few;
+}
+
+/// Searches the parts of active index bricks, which are in Morton order.
+void IndexSearch::append_tiles_of(const IndexChunk& chunk, const std::vector<Int3>& bricks,
+                                  Box3 box, double isovalue, std::vector<TileWork>& tiles) const {
   std::vector<std::uint64_t> blocks(bricks.size());
   const auto wave = static_cast<std::size_t>(
       IndexSearch::wave(index_.layout(), tbb::this_task_arena::max_concurrency()));
@@ -172,7 +193,6 @@ void IndexSearch::append_tiles(Int3 c, Box3 box, double isovalue, std::vector<Ti
                           .active_blocks = blocks_of_tile(blocks[i], t)};
       if (work.active_blocks != 0 && box.contains(work.tile)) tiles.push_back(work);
     });
-  bytes_read_ += chunk.bytes_read();
 }
 
 }  // namespace isobrick

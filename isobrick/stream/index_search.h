@@ -32,7 +32,12 @@ class IndexSearch final : public BlockSearch {
   IndexSearch(const StoreReader& store, int level, IndexKind kind);
 
   void append_tiles(Int3 chunk, Box3 box, double isovalue, std::vector<TileWork>& tiles) override;
-  std::uint64_t bytes_read() const override { return bytes_read_; }
+  std::uint64_t index_bytes() const override { return bytes_read_; }
+
+  /// The same, unless more than `few` of the chunk's index bricks are active, as a
+  /// fraction: then nothing is appended and it returns false.
+  bool append_tiles_if_few(Int3 chunk, Box3 box, double isovalue, double few,
+                           std::vector<TileWork>& tiles);
 
   /// The most bytes that searching one part takes, and how many parts are
   /// searched at a time.
@@ -42,6 +47,8 @@ class IndexSearch final : public BlockSearch {
  private:
   std::vector<Int3> active_bricks(const IndexChunk& chunk, Int3 c, Box3 tiles,
                                   double isovalue) const;
+  void append_tiles_of(const IndexChunk& chunk, const std::vector<Int3>& bricks, Box3 box,
+                       double isovalue, std::vector<TileWork>& tiles) const;
   std::uint64_t active_blocks(const IndexChunk& chunk, Int3 brick, double isovalue) const;
   std::uint64_t with_cell_less_blocks(std::uint64_t blocks, Int3 brick) const;
 

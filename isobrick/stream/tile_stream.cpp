@@ -25,9 +25,8 @@ void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index re
 
 }  // namespace
 
-TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box3 roi,
-                       std::optional<IndexKind> index)
-    : search_(make_block_search(store, level, index)), isovalue_(isovalue) {
+TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by)
+    : search_(make_block_search(store, level, by)), isovalue_(isovalue) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Box3 samples = intersect(roi, lattice.box());
   // The last sample along an axis begins no cell.

@@ -15,16 +15,16 @@ namespace isobrick {
 /// chunk: memory does not grow with the volume.
 class TileStream {
  public:
-  /// Tiles without a cell in `roi` (samples) are left out. They are found by the
-  /// stored index of that kind, or by the block ranges.
-  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi,
-             std::optional<IndexKind> index = std::nullopt);
+  /// Tiles without a cell in `roi` (samples) are left out. `by` says how
+  /// they are found.
+  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by = {});
 
   /// The next tile, or nothing at the end.
   std::optional<TileWork> next();
 
   /// What searching has cost so far.
-  std::uint64_t bytes_read() const { return search_->bytes_read(); }
+  std::uint64_t range_bytes() const { return search_->range_bytes(); }
+  std::uint64_t index_bytes() const { return search_->index_bytes(); }
   double seconds() const { return seconds_; }
 
  private:
