@@ -126,6 +126,33 @@ TEST_F(Indexes, OfSeveralKindsLiveSideBySide) {
   EXPECT_EQ(verify_quietly(store_).damage_count, 0u);
 }
 
+TEST_F(Indexes, AutoTakesTheFastestWhereLittleIsActive) {
+  const auto automatic = [&](double iso) {
+    const StoreReader store(store_);
+    BytesSink sink;
+    NoProgress silent;
+    const ExtractReport report = extract(store, {.isovalue = iso, .threads = 2}, sink, silent);
+    EXPECT_TRUE(sink.mesh() == mesh_of(store_, {.isovalue = iso}, std::nullopt));
+    return report;
+  };
+  EXPECT_EQ(automatic(77.5).index, std::nullopt);
+  add_index_quietly(store_, {.kind = IndexKind::quadtree, .leaf = 8});
+  EXPECT_EQ(automatic(77.5).index, std::nullopt) << "finer leaves cost more";
+  add_index_quietly(store_, {.kind = IndexKind::interval});
+  EXPECT_EQ(automatic(77.5).index, IndexKind::interval);
+  add_index_quietly(store_, {.kind = IndexKind::octree});
+  const ExtractReport dense = automatic(77.5), empty = automatic(300);
+  EXPECT_EQ(dense.index, IndexKind::octree);
+  ExtractReport by_ranges;
+  mesh_of(store_, {.isovalue = 77.5}, std::nullopt, &by_ranges);
+  EXPECT_GT(dense.search_bytes, by_ranges.search_bytes);
+  // Where nothing is active only directories are read.
+  ExtractReport by_index;
+  mesh_of(store_, {.isovalue = 300}, IndexKind::octree, &by_index);
+  EXPECT_EQ(empty.search_bytes, by_index.search_bytes);
+  EXPECT_LT(empty.search_bytes, dense.search_bytes);
+}
+
 TEST_F(Indexes, BytesDependOnTheVolumeAlone) {
   add_index_quietly(store_, {.kind = IndexKind::kdtree, .leaf = 2});
   const auto roomy = tree_of(index_folder(store_, 0, "kdtree"));

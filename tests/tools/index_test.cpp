@@ -46,6 +46,12 @@ TEST_F(IndexCommand, AddsKindsThatExtractUsesAndInfoShows) {
     EXPECT_GT(used["index"]["seconds"].get<double>(), 0);
   }
   EXPECT_TRUE(mesh(store, "auto") == expected);
+  ASSERT_EQ(run({"index", store, "--kind", "kdtree", "--force"}).exit_code, 0);
+  EXPECT_TRUE(mesh(store, "auto") == expected);
+  const nlohmann::json automatic = run_json(
+      {"extract", store, "--isovalue", "127.5", "-o", path("n.ply"), "--force"})["surfaces"][0];
+  EXPECT_EQ(automatic["index"]["used"], "kdtree") << "the only one with leaf 16";
+  ASSERT_EQ(run({"index", store, "--kind", "kdtree", "--leaf", "4", "--force"}).exit_code, 0);
   const nlohmann::json info = run_json({"info", store});
   EXPECT_EQ(info["index_kinds"], nlohmann::json({"interval", "kdtree", "octree", "quadtree"}));
   ASSERT_EQ(info["indexes"].size(), 4u);

@@ -10,7 +10,7 @@ namespace {
 
 using Speech = ProgramTest;
 
-constexpr std::array kCommands{"convert", "info",  "verify",     "extract",
+constexpr std::array kCommands{"convert", "info",  "index",      "verify", "extract",
                                "export",  "synth", "completion", "man"};
 
 bool available(const std::string& program) {
