@@ -112,7 +112,7 @@ TEST_F(Speech, QuietSaysNothing) {
 }
 
 TEST_F(Speech, ABarOnATerminalAndNoneInAPipe) {
-  const Arguments arguments{"synth",  "mixing", path("a.raw"), "--dims", "256,256,256",
+  const Arguments arguments{"synth",  "mixing", path("a.raw"), "--dims", "512,512,256",
                             "--type", "f32",    "--threads",   "1",      "--force"};
   const Outcome terminal = run(arguments, {.terminal = true});
   EXPECT_EQ(terminal.exit_code, 0);
