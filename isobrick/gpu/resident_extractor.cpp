@@ -93,6 +93,7 @@ struct ResidentExtractor::Impl {
       p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
     }
     p.isovalue = isovalue;
+    p.crossing = static_cast<float>(isovalue);
     p.world = world_map(options.transform);
     p.diagonal = is_diagonal(p.world);
     p.row_tables = row_tables.data();

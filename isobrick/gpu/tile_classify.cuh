@@ -8,8 +8,8 @@
 
 namespace isobrick::gpu {
 
-/// Inside bits of samples read 16 bytes at a time. Integers are compared within
-/// a word, 4 or 2 at once: the upper bit of (x without it) + c says whether the
+/// Which samples are inside. Narrow integers are compared within a word, 4 or 2 at
+/// once: the upper bit of (x without it) + c says whether the
 /// lower bits reach those of the threshold, and is joined with x's own.
 template <class T>
 struct Classifier {
@@ -44,11 +44,9 @@ struct Classifier {
       if constexpr (sizeof(T) == 1) {
         // The product lines the four bits up at the top; nothing carries.
         result = __funnelshift_l(tops(words[i]) * 0x00204081u, result, 4);
-      } else if constexpr (kPacked) {
+      } else {
         const std::uint32_t both = tops(words[i]);
         result = __funnelshift_l(both | both << 15, result, 2);
-      } else {
-        result = result << 1 | (__uint_as_float(words[i]) >= threshold ? 1u : 0u);
       }
     }
     return result;
@@ -61,24 +59,17 @@ struct Classifier {
 template <class T>
 __device__ inline std::uint32_t inside32(const Classifier<T>& classifier, const T* samples) {
   constexpr int kVectors = static_cast<int>(sizeof(T)) * 2;
-  constexpr int kPart = kVectors < 4 ? kVectors : 4;  // loads in flight
-  constexpr int kSamples = kPart * 16 / static_cast<int>(sizeof(T));
   const uint4* from = reinterpret_cast<const uint4*>(samples);
-  std::uint32_t result = 0;
+  std::uint32_t words[4 * kVectors];
 #pragma unroll
-  for (int part = 0; part < kVectors / kPart; ++part) {
-    std::uint32_t words[4 * kPart];
-#pragma unroll
-    for (int i = 0; i < kPart; ++i) {
-      const uint4 v = __ldg(from + part * kPart + i);
-      words[4 * i] = v.x;
-      words[4 * i + 1] = v.y;
-      words[4 * i + 2] = v.z;
-      words[4 * i + 3] = v.w;
-    }
-    result |= classifier.bits(words) << (part * kSamples % 32);
+  for (int i = 0; i < kVectors; ++i) {
+    const uint4 v = __ldg(from + i);
+    words[4 * i] = v.x;
+    words[4 * i + 1] = v.y;
+    words[4 * i + 2] = v.z;
+    words[4 * i + 3] = v.w;
   }
-  return result;
+  return classifier.bits(words);
 }
 
 /// The page of the tile that holds sample (x, y, z), each in −32 … 63.
@@ -91,9 +82,9 @@ __device__ inline int offset_in_page(int x, int y, int z) {
   return (x & 31) | (y & 31) << 5 | (z & 31) << 10;
 }
 
-/// A row a thread.
+/// A row a thread: a row of narrow samples is a piece of memory or two.
 template <int N, class T>
-__device__ inline void classify(TileShared& s, const Classifier<T>& classifier) {
+__device__ inline void classify_rows(TileShared& s, const Classifier<T>& classifier) {
 #pragma unroll 2
   for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
     const int z = static_cast<int>(z_of_row(row)), y = row - 33 * z;
@@ -102,6 +93,38 @@ __device__ inline void classify(TileShared& s, const Classifier<T>& classifier) 
     const std::uint32_t word = inside32(classifier, page_at<T>(s, 0, y, z) + offset);
     s.rows[row] = {word, word >> 1 | classifier.one(last) << 31};
   }
+}
+
+/// A plane a warp and a sample a thread: rows of wide samples, read by one thread
+/// each, would be fetched in pieces again and again.
+template <int N, class T>
+__device__ inline void classify_planes(TileShared& s, const Classifier<T>& classifier) {
+  const int lane = static_cast<int>(lane_id());
+  const auto inside = [&](T v) { return __ballot_sync(kAll, v >= classifier.threshold); };
+  for (int z = static_cast<int>(warp_id()); z < 33; z += Team<N>::kWarps) {
+    const int plane = offset_in_page(0, 0, z);
+    const T* from = page_at<T>(s, 0, 0, z) + plane + lane;
+    std::uint32_t word = 0;
+#pragma unroll 16
+    for (int y = 0; y < 32; ++y) {
+      const std::uint32_t row = inside(__ldg(from + 32 * y));
+      if (lane == y) word = row;
+    }
+    const T last = __ldg(page_at<T>(s, 32, lane, z) + offset_in_page(0, lane, z));
+    s.rows[33 * z + lane] = {word, word >> 1 | classifier.one(last) << 31};
+    // The row at y = 32 lies in the tile above.
+    const std::uint32_t top = inside(__ldg(page_at<T>(s, 0, 32, z) + plane + lane));
+    const T corner = __ldg(page_at<T>(s, 32, 32, z) + plane);
+    if (lane == 0) s.rows[33 * z + 32] = {top, top >> 1 | classifier.one(corner) << 31};
+  }
+}
+
+template <int N, class T>
+__device__ inline void classify(TileShared& s, const Classifier<T>& classifier) {
+  if constexpr (sizeof(T) <= 2)
+    classify_rows<N>(s, classifier);
+  else
+    classify_planes<N>(s, classifier);
 }
 
 /// Empties the lists of the tile before.

@@ -191,11 +191,8 @@ __device__ inline std::uint32_t nth_bit(std::uint32_t word, std::uint32_t rank) 
   std::uint32_t place = 0;
 #pragma unroll
   for (std::uint32_t half = 16; half; half /= 2) {
-    const std::uint32_t below = __popc(word & ((1u << half) - 1u));
-    const bool upper = rank >= below;
-    rank -= upper ? below : 0;
-    word >>= upper ? half : 0;
-    place += upper ? half : 0;
+    const std::uint32_t upper = place + half;
+    if (static_cast<std::uint32_t>(__popc(word & ~(~0u << upper))) <= rank) place = upper;
   }
   return place;
 }

@@ -146,7 +146,7 @@ __device__ inline void emit_vertices(TileShared& s, WarpShared& own, const TileP
                                      const Shape& shape, std::uint32_t first,
                                      std::uint32_t listed) {
   using Maker = VertexMaker<T>;
-  const Maker maker{s, p, shape, static_cast<float>(p.isovalue)};
+  const Maker maker{s, p, shape, p.crossing};
   const auto load = [&](std::uint32_t begin) {
     const std::uint32_t i = begin + lane_id();
     const std::uint32_t row = row_of_lane(s.vertex_marks[i], s.vertex_rows[begin / 32]);
@@ -222,8 +222,8 @@ __device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles
 /// Writes `count` of the pending triangles, from the ring's place `first` on.
 __device__ inline void emit_pending(const TileShared& s, WarpShared& own, std::uint32_t first,
                                     std::uint32_t count, std::uint32_t* to) {
-  const std::uint32_t entry =
-      own.pending[(first + ::min(lane_id(), count - 1)) % WarpShared::kRing];
+  const std::uint32_t place = first + (count == 32 ? lane_id() : ::min(lane_id(), count - 1));
+  const std::uint32_t entry = own.pending[place % WarpShared::kRing];
   const std::uint32_t cell = s.cells[entry & 0xfffu];
   const std::uint32_t x = cell & 31u, row = cell >> 5 & 0x7ffu;
   const std::uint32_t mask = (1u << x) - 1u;

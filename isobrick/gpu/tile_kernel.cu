@@ -10,9 +10,9 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr int kThreadsPerMultiprocessor = 1024;
+constexpr int kThreadsPerMultiprocessor = 1152;
 /// Threads that share a tile where there are many tiles, and where there are few.
-constexpr int kSmallTeam = 256, kLargeTeam = 1024;
+constexpr int kSmallTeam = 288, kLargeTeam = 1024;
 
 /// Pages of the tiles around one; where there is none, any that is.
 __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,

@@ -51,6 +51,7 @@ struct TileParams {
   std::int32_t tiles[3];
   std::int32_t extent[3], roi_lo[3], roi_hi[3];  ///< samples
   double isovalue;
+  float crossing;  ///< the isovalue as vertices are interpolated
   WorldMap world;
   bool diagonal;  ///< the map has no term off the diagonal
   RowTable* row_tables;
