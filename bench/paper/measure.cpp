@@ -11,6 +11,7 @@
 #include <functional>
 #include <mutex>
 
+#include "bench/paper/cell_by_cell.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/morton.h"
 #include "isobrick/index/active_tiles.h"
@@ -54,7 +55,8 @@ class Measurement {
         lattice_{v.extent, {kBrick, kBrick, kBrick}, v.type},
         bricks_(lattice_, v.samples.data()),
         surface_(make_surface()),
-        extractor_(lattice_, surface_, {.tiles = CpuExtractor::good_batch(arena_.max_concurrency())}) {}
+        extractor_(lattice_, surface_,
+                   {.tiles = CpuExtractor::good_batch(arena_.max_concurrency())}) {}
 
   nlohmann::json run() {
     nlohmann::json out;
@@ -66,6 +68,15 @@ class Measurement {
     out["cells"] = volume(cells);
     out["threads"] = arena_.max_concurrency();
     out["sample_bytes"] = volume_.samples.size();
+    std::vector<std::vector<Vec3f>> soup;
+    out["cell_by_cell_s"] = median_of(options_.runs, [&] {
+      arena_.execute([&] {
+        out["cell_by_cell_triangles"] =
+            cell_by_cell(reinterpret_cast<const T*>(volume_.samples.data()), volume_.extent,
+                         volume_.isovalue, soup);
+      });
+    });
+    soup = {};
     out["brute_s"] = contour([&](double, std::vector<TileWork>& tiles) { all_tiles(tiles); });
     out["triangles"] = extractor_.triangles();
     out["vertices"] = extractor_.vertices();
@@ -145,8 +156,7 @@ class Measurement {
     const std::span<const ValueRange<T>> view(ranges);
     for (const IndexKind kind : kIndexKinds) {
       auto& o = out[std::string(name_of(kind))];
-      o["build_s"] =
-          median_of(options_.runs, [&] { BlockIndex(kind, lattice_.blocks(), view); });
+      o["build_s"] = median_of(options_.runs, [&] { BlockIndex(kind, lattice_.blocks(), view); });
       const BlockIndex index(kind, lattice_.blocks(), view);
       o["bytes"] = index.bytes();
       std::vector<TileWork> tiles;

@@ -9,9 +9,9 @@ namespace isobrick::bench {
 
 struct MeasureOptions {
   int runs = 7;
-  int threads = 0;      ///< 0: all
-  bool cells = true;    ///< also the structures over single cells
-  bool peers = true;    ///< also VTK's trees
+  int threads = 0;    ///< 0: all
+  bool cells = true;  ///< also the structures over single cells
+  bool peers = true;  ///< also VTK's trees
 };
 
 std::uint64_t count_triangles(const LoadedVolume& v);

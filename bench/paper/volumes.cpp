@@ -57,9 +57,9 @@ LoadedVolume load(const PaperVolume& paper, const std::string& folder) {
   }
   // Triangles grow nearly in proportion to the frequency.
   const double cells = static_cast<double>(volume(paper.extent));
-  double frequency = static_cast<double>(paper.triangles) / 2 / cells *
-                     static_cast<double>(std::max({paper.extent.x, paper.extent.y, paper.extent.z})) /
-                     4.6;
+  double frequency =
+      static_cast<double>(paper.triangles) / 2 / cells *
+      static_cast<double>(std::max({paper.extent.x, paper.extent.y, paper.extent.z})) / 4.6;
   LoadedVolume v;
   for (int round = 0; round < 6; ++round) {
     v = gyroid(paper.extent, frequency);
