@@ -55,18 +55,16 @@ LoadedVolume load(const PaperVolume& paper, const std::string& folder) {
     v.name = paper.name;
     return v;
   }
-  // Triangles grow nearly in proportion to the frequency.
-  const double cells = static_cast<double>(volume(paper.extent));
-  double frequency =
-      static_cast<double>(paper.triangles) / 2 / cells *
-      static_cast<double>(std::max({paper.extent.x, paper.extent.y, paper.extent.z})) / 4.6;
-  LoadedVolume v;
-  for (int round = 0; round < 6; ++round) {
-    v = gyroid(paper.extent, frequency);
-    const double ratio = static_cast<double>(paper.triangles) /
-                         static_cast<double>(std::max<std::uint64_t>(1, count_triangles(v)));
-    if (std::abs(ratio - 1) < 0.005) break;
-    frequency *= ratio;
+  // A gyroid with some more triangles than wanted; away from the middle its
+  // surface shrinks.
+  const auto edge = static_cast<double>(std::max({paper.extent.x, paper.extent.y, paper.extent.z}));
+  const double active =
+      static_cast<double>(paper.triangles) / 2 / static_cast<double>(volume(paper.extent));
+  LoadedVolume v = gyroid(paper.extent, std::max(1.0, 1.2 * active * edge / 4.6));
+  double least = 127, most = 254;
+  while (most - least > 1) {
+    v.isovalue = std::floor((least + most) / 2) + 0.5;
+    (count_triangles(v) > paper.triangles ? least : most) = std::floor(v.isovalue);
   }
   v.name = paper.name;
   return v;

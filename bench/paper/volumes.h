@@ -41,8 +41,8 @@ struct LoadedVolume {
   std::vector<std::byte> samples;
 };
 
-/// The real volume when `folder` has it, otherwise a gyroid whose frequency is
-/// chosen so that its surface has about as many triangles.
+/// The real volume when `folder` has it, otherwise a gyroid, and an isovalue at
+/// which its surface has about as many triangles.
 LoadedVolume load(const PaperVolume& paper, const std::string& folder);
 
 /// A gyroid without noise, isovalue 127.5.

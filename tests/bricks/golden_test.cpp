@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "tests/bricks/hex.h"
 #include "tests/bricks/store_fixture.h"
 
 // The bytes of a tiny store, frozen: whatever changes them changes the format,
@@ -9,16 +10,6 @@
 
 namespace isobrick::test {
 namespace {
-
-std::string hex(const std::string& bytes) {
-  std::string text;
-  for (const char c : bytes) {
-    constexpr char digits[] = "0123456789abcdef";
-    text += digits[static_cast<unsigned char>(c) >> 4];
-    text += digits[static_cast<unsigned char>(c) & 15];
-  }
-  return text;
-}
 
 /// 3 × 2 × 1 samples 10 … 15 in bricks of 2³, the last of them padded.
 Level tiny_level() {

@@ -2,6 +2,7 @@
 
 #include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/stored_index.h"
+#include "tests/bricks/hex.h"
 #include "tests/pipeline/index_fixture.h"
 
 // The bytes of tiny indices, frozen: whatever changes them changes the format,
@@ -9,16 +10,6 @@
 
 namespace isobrick::test {
 namespace {
-
-std::string hex(const std::string& bytes) {
-  std::string text;
-  for (const char c : bytes) {
-    constexpr char digits[] = "0123456789abcdef";
-    text += digits[static_cast<unsigned char>(c) >> 4];
-    text += digits[static_cast<unsigned char>(c) & 15];
-  }
-  return text;
-}
 
 class IndexGolden : public testing::Test {
  protected:

@@ -61,16 +61,6 @@ TYPED_TEST(DropDegenerate, ChangesNothingWithoutTies) {
 
 TYPED_TEST(DropDegenerate, ChunksStandAlone) {
   const auto field = coarse_noise<TypeParam>({70, 40, 37}, 3);
-  const auto soup = [](const Mesh& mesh) {
-    std::multiset<std::array<float, 9>> triangles;
-    for (const Triangle& t : mesh.triangles) {
-      std::array<float, 9> corners{};
-      for (std::size_t i = 0; i < 9; ++i)
-        corners[i] = mesh.positions[t[i / 3]][static_cast<int>(i % 3)];
-      triangles.insert(corners);
-    }
-    return triangles;
-  };
   Request request{.isovalue = 2, .drop_degenerate = true};
   const Mesh welded = extract(field, request);
   request.indexing = Indexing::chunk_local;

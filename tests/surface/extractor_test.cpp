@@ -70,16 +70,6 @@ TYPED_TEST(EveryType, BrickSizeBatchesAndThreadsNeverShow) {
 TYPED_TEST(EveryType, ChunkLocalMeshHasTheSameTriangles) {
   using T = TypeParam;
   const auto field = padded_noise<T>({70, 40, 37}, 0, 100, T{0}, 5);
-  const auto soup = [](const Mesh& mesh) {
-    std::multiset<std::array<float, 9>> triangles;
-    for (const Triangle& t : mesh.triangles) {
-      std::array<float, 9> corners{};
-      for (std::size_t i = 0; i < 9; ++i)
-        corners[i] = mesh.positions[t[i / 3]][static_cast<int>(i % 3)];
-      triangles.insert(corners);
-    }
-    return triangles;
-  };
   const Mesh local = extract(field, {.isovalue = 42, .indexing = Indexing::chunk_local});
   EXPECT_EQ(soup(local), soup(extract(field, {.isovalue = 42})));
 }

@@ -166,6 +166,18 @@ inline EdgeTriangles edge_triangles(const Mesh& mesh) {
   return triangles;
 }
 
+/// The corners of the triangles, without order and without numbers.
+inline std::multiset<std::array<float, 9>> soup(const Mesh& mesh) {
+  std::multiset<std::array<float, 9>> triangles;
+  for (const Triangle& t : mesh.triangles) {
+    std::array<float, 9> corners{};
+    for (std::size_t i = 0; i < 9; ++i)
+      corners[i] = mesh.positions[t[i / 3]][static_cast<int>(i % 3)];
+    triangles.insert(corners);
+  }
+  return triangles;
+}
+
 /// Checks that every side belongs to two triangles with opposite directions.
 /// Returns the number of sides, or −1.
 inline std::ptrdiff_t closed_sides(const Mesh& mesh) {
