@@ -234,7 +234,7 @@ __device__ inline std::uint32_t find_cells(TileShared& s, const Shape& shape, st
       s.cells[i] = x | row << 5 | index << 16;
     }
   }
-  return __reduce_add_sync(kAll, triangles);
+  return warp_sum(triangles);
 }
 
 /// Of one value a warp: the sum before this warp and of all.
@@ -246,8 +246,8 @@ template <int N>
 __device__ inline SumOfWarps sum_of_warps(const std::uint32_t* values) {
   SumOfWarps sum;
   const std::uint32_t v = lane_id() < Team<N>::kWarps ? values[lane_id()] : 0;
-  sum.all = __reduce_add_sync(kAll, v);
-  sum.before = __reduce_add_sync(kAll, lane_id() < warp_id() ? v : 0);
+  sum.all = warp_sum(v);
+  sum.before = warp_sum(lane_id() < warp_id() ? v : 0u);
   return sum;
 }
 

@@ -150,11 +150,14 @@ struct Launcher {
     check(cudaFuncSetAttribute(extract_tiles<N, T, Normals>,
                                cudaFuncAttributeMaxDynamicSharedMemorySize, shared_bytes<N>()));
   }
+  /// 0 where the device has too little shared memory for one.
   static int blocks() {
-    prepare();
-    int device = 0, multiprocessors = 0, each = 0;
+    int device = 0, multiprocessors = 0, each = 0, shared = 0;
     check(cudaGetDevice(&device));
     check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
+    check(cudaDeviceGetAttribute(&shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
+    if (static_cast<std::size_t>(shared) < shared_bytes<N>()) return 0;
+    prepare();
     check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, extract_tiles<N, T, Normals>, N,
                                                         shared_bytes<N>()));
     return each * multiprocessors;
@@ -194,10 +197,9 @@ LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles) {
   LaunchShape shape;
   shape.few_tiles = false;
   shape.blocks = visit_launcher(type, normals, false, [](auto l) { return l.blocks(); });
-  if (tiles <= static_cast<std::uint32_t>(shape.blocks)) {
-    shape.few_tiles = true;
-    shape.blocks = visit_launcher(type, normals, true, [](auto l) { return l.blocks(); });
-  }
+  if (tiles > static_cast<std::uint32_t>(shape.blocks)) return shape;
+  const int large = visit_launcher(type, normals, true, [](auto l) { return l.blocks(); });
+  if (large > 0) shape = {large, true};
   return shape;
 }
 

@@ -15,7 +15,7 @@ inline constexpr unsigned long long kOwnSum = 1ull << 62, kFullSum = 2ull << 62,
 using DeviceWord = cuda::atomic_ref<unsigned long long, cuda::thread_scope_device>;
 using DeviceFlag = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>;
 
-__device__ inline unsigned long long warp_sum(unsigned long long v) {
+__device__ inline unsigned long long warp_sum_64(unsigned long long v) {
 #pragma unroll
   for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kAll, v, d);
   return v;
@@ -62,7 +62,7 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
       found = full != 0;
     }
   }
-  sum = warp_sum(sum);
+  sum = warp_sum_64(sum);
   if (lane_id() == 0)
     DeviceWord(word(item)).store(kFullSum | (sum + own), cuda::memory_order_relaxed);
   return sum;

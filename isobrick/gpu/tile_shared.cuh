@@ -83,6 +83,16 @@ __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
 __device__ inline unsigned lane_id() { return threadIdx.x & 31u; }
 __device__ inline std::uint32_t lanes_below() { return (1u << lane_id()) - 1u; }
 
+__device__ inline std::uint32_t warp_sum(std::uint32_t v) {
+#if __CUDA_ARCH__ >= 800
+  return __reduce_add_sync(kAll, v);
+#else
+#pragma unroll
+  for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kAll, v, d);
+  return v;
+#endif
+}
+
 __device__ inline std::uint32_t warp_inclusive_sum(std::uint32_t v) {
 #pragma unroll
   for (int d = 1; d < 32; d *= 2) {
