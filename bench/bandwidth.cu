@@ -30,19 +30,23 @@ __global__ void write_all(uint4* to, std::size_t n, unsigned value) {
 
 Bandwidth measure_bandwidth(std::size_t bytes) {
   const gpu::Stream stream;
+  int device = 0, multiprocessors = 0;
+  gpu::check(cudaGetDevice(&device));
+  gpu::check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
   const gpu::DeviceBuffer<uint4> buffer(bytes / sizeof(uint4), stream);
   const gpu::DeviceBuffer<unsigned> sink(1, stream);
   gpu::Event start, end;
   float read = std::numeric_limits<float>::max(), write = read;
   for (int i = 0; i < 10; ++i) {
     start.record(stream);
-    write_all<<<132 * 16, kThreads, 0, stream.get()>>>(buffer.data(), buffer.size(),
-                                                       static_cast<unsigned>(i));
+    write_all<<<multiprocessors * 16, kThreads, 0, stream.get()>>>(buffer.data(), buffer.size(),
+                                                                   static_cast<unsigned>(i));
     end.record(stream);
     end.wait();
     write = std::min(write, end.since(start));
     start.record(stream);
-    read_all<<<132 * 8, kThreads, 0, stream.get()>>>(buffer.data(), buffer.size(), sink.data());
+    read_all<<<multiprocessors * 8, kThreads, 0, stream.get()>>>(buffer.data(), buffer.size(),
+                                                                 sink.data());
     end.record(stream);
     end.wait();
     read = std::min(read, end.since(start));

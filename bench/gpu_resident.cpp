@@ -7,7 +7,7 @@
 // Correctness first: --check compares the mesh with the CPU's, byte for byte.
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -18,10 +18,11 @@
 #include <vector>
 
 #include "bench/bandwidth.h"
+#include "bench/volume.h"
 #include "isobrick/core/dense_bricks.h"
+#include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume.h"
 #include "isobrick/index/active_tiles.h"
-#include "isobrick/io/open_source.h"
 #include "isobrick/io/synth_source.h"
 #include "isobrick/surface/cpu_extractor.h"
 
@@ -39,50 +40,18 @@ struct Arguments {
   int runs = 25;
 };
 
-struct Volume {
-  Int3 extent;
-  ScalarType type;
-  std::vector<std::byte> samples;
-};
-
 Volume read_volume(const Arguments& a) {
-  std::unique_ptr<VolumeSource> source;
-  if (!a.raw.empty()) {
-    source = open_source(a.raw, {});
-  } else {
-    SynthOptions options;
-    options.kind = parse_synth_kind(a.synth).value();
-    options.extent = {a.dims[0], a.dims[1], a.dims[2]};
-    options.type = parse_scalar_type(a.type).value();
-    if (a.frequency > 0) options.frequency = a.frequency;
-    options.noise = a.noise;
-    source = make_synth(options);
-  }
-  const VolumeInfo& info = source->info();
-  Volume v{info.extent, info.type, {}};
-  v.samples.resize(static_cast<std::size_t>(volume(v.extent)) * size_of(v.type));
-  const std::size_t plane = static_cast<std::size_t>(v.extent.x * v.extent.y) * size_of(v.type);
-  tbb::parallel_for(Index{0}, v.extent.z, [&](Index z) {
-    source->read({{0, 0, z}, {v.extent.x, v.extent.y, z + 1}},
-                 v.samples.data() + static_cast<std::size_t>(z) * plane);
-  });
-  return v;
-}
-
-template <class T>
-std::vector<ValueRange<T>> ranges_of(const Volume& v, const Lattice& lattice) {
-  std::vector<ValueRange<T>> ranges(static_cast<std::size_t>(volume(lattice.blocks())));
-  const T* samples = reinterpret_cast<const T*>(v.samples.data());
-  const Int3 blocks = lattice.blocks();
-  tbb::parallel_for(Index{0}, blocks.z, [&](Index z) {
-    for_each_point({{0, 0, z}, {blocks.x, blocks.y, z + 1}}, [&](Int3 b) {
-      ValueRange<T>& range = ranges[static_cast<std::size_t>(linear_index(b, blocks))];
-      const Int3 lo = b * kBlockEdge;
-      for_each_point(intersect({lo, lo + Int3{17, 17, 17}}, lattice.box()),
-                     [&](Int3 p) { range.include(samples[linear_index(p, v.extent)]); });
-    });
-  });
-  return ranges;
+  if (!a.raw.empty()) return read_raw(a.raw);
+  const auto kind = parse_synth_kind(a.synth);
+  const auto type = parse_scalar_type(a.type);
+  if (!kind || !type) throw UsageError("give --raw FILE, or --synth KIND and a --type that exist");
+  SynthOptions options;
+  options.kind = *kind;
+  options.extent = {a.dims[0], a.dims[1], a.dims[2]};
+  options.type = *type;
+  if (a.frequency > 0) options.frequency = a.frequency;
+  options.noise = a.noise;
+  return read_all(*make_synth(options));
 }
 
 /// The CPU with all its cores, and its mesh.
@@ -91,7 +60,8 @@ double run_cpu(const Volume& v, const Lattice& lattice, const DenseBricks& brick
   double least = 1e30;
   visit_scalar(v.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    const auto ranges = ranges_of<T>(v, lattice);
+    std::vector<ValueRange<T>> ranges;
+    find_block_ranges(v, ranges);
     CpuExtractor extractor(
         lattice, options,
         {.tiles = CpuExtractor::good_batch(tbb::this_task_arena::max_concurrency())});
@@ -116,10 +86,12 @@ bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
 
 int run(const Arguments& a) {
   const Volume v = read_volume(a);
-  if (!a.write_raw.empty())
-    std::ofstream(a.write_raw, std::ios::binary)
-        .write(reinterpret_cast<const char*>(v.samples.data()),
-               static_cast<std::streamsize>(v.samples.size()));
+  if (!a.write_raw.empty()) {
+    std::ofstream out(a.write_raw, std::ios::binary);
+    out.write(reinterpret_cast<const char*>(v.samples.data()),
+              static_cast<std::streamsize>(v.samples.size()));
+    if (!out.flush()) throw Error(fmt::format("cannot write '{}'", a.write_raw));
+  }
   const Lattice lattice{v.extent, {64, 64, 64}, v.type};
   const DenseBricks bricks(lattice, v.samples.data());
   SurfaceOptions options;
@@ -144,7 +116,7 @@ int run(const Arguments& a) {
   }
   std::vector<float> times;
   for (int i = -3; i < a.runs; ++i) {
-    extractor.launch(options.isovalue);
+    extractor.repeat();
     const float ms = extractor.milliseconds();
     if (i >= 0) times.push_back(ms);
   }

@@ -15,9 +15,9 @@
 #include <cmath>
 #include <vector>
 
+#include "bench/volume.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/index/active_tiles.h"
-#include "isobrick/io/open_source.h"
 #include "isobrick/surface/cpu_extractor.h"
 #ifdef ISOBRICK_WITH_VTK
 #include "bench/vtk_peer.h"
@@ -27,20 +27,6 @@ namespace isobrick::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-struct Volume {
-  Int3 extent;
-  ScalarType type;
-  std::vector<std::byte> samples;
-};
-
-Volume read_raw(const std::string& path) {
-  const auto source = open_source(path, {});
-  Volume v{source->info().extent, source->info().type, {}};
-  v.samples.resize(static_cast<std::size_t>(volume(v.extent)) * size_of(v.type));
-  source->read({{0, 0, 0}, v.extent}, v.samples.data());
-  return v;
-}
 
 Volume gyroid(Index n, double periods) {
   Volume v{{n, n, n}, ScalarType::u8, std::vector<std::byte>(static_cast<std::size_t>(n * n * n))};
@@ -58,20 +44,6 @@ Volume gyroid(Index n, double periods) {
   return v;
 }
 
-template <class T>
-std::vector<ValueRange<T>> ranges_of(const Volume& v, const Lattice& lattice) {
-  std::vector<ValueRange<T>> ranges;
-  const T* samples = reinterpret_cast<const T*>(v.samples.data());
-  for_each_point({{0, 0, 0}, lattice.blocks()}, [&](Int3 b) {
-    ValueRange<T> range;
-    const Int3 lo = b * kBlockEdge;
-    for_each_point(intersect({lo, lo + Int3{17, 17, 17}}, lattice.box()),
-                   [&](Int3 p) { range.include(samples[linear_index(p, v.extent)]); });
-    ranges.push_back(range);
-  });
-  return ranges;
-}
-
 void print(const std::string& what, double median, double least, std::uint64_t triangles,
            std::uint64_t vertices) {
   fmt::print("  {:<34} median {:8.2f} ms   least {:8.2f} ms   {} triangles, {} vertices\n", what,
@@ -84,7 +56,8 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_
   const DenseBricks bricks(lattice, v.samples.data());
   visit_scalar(v.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    const auto ranges = ranges_of<T>(v, lattice);
+    std::vector<ValueRange<T>> ranges;
+    find_block_ranges(v, ranges);
 #ifdef ISOBRICK_WITH_VTK
     VtkPeer peer(v.extent.x, v.extent.y, v.extent.z, static_cast<int>(v.type),
                  const_cast<std::byte*>(v.samples.data()));

@@ -1,6 +1,5 @@
 #include "bench/vtk_peer.h"
 
-#include <vtkDataArray.h>
 #include <vtkFlyingEdges3D.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
@@ -12,28 +11,16 @@
 
 #include <chrono>
 
+#include "bench/vtk_volume.h"
+
 namespace isobrick::bench {
-namespace {
-
-int vtk_type(int type) {
-  constexpr int types[] = {VTK_UNSIGNED_CHAR, VTK_SIGNED_CHAR, VTK_UNSIGNED_SHORT, VTK_SHORT,
-                           VTK_UNSIGNED_INT,  VTK_INT,         VTK_FLOAT,          VTK_DOUBLE};
-  return types[type];
-}
-
-}  // namespace
-
 struct VtkPeer::Impl {
   vtkNew<vtkImageData> image;
 };
 
 VtkPeer::VtkPeer(std::int64_t x, std::int64_t y, std::int64_t z, int type, void* samples)
     : impl_(std::make_unique<Impl>()) {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtk_type(type)));
-  array->SetVoidArray(samples, x * y * z, 1);
-  array->SetName("samples");
-  impl_->image->SetDimensions(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z));
-  impl_->image->GetPointData()->SetScalars(array);
+  show_samples(impl_->image, x, y, z, type, samples);
 }
 
 VtkPeer::~VtkPeer() = default;

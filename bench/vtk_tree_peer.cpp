@@ -2,7 +2,6 @@
 
 #include <malloc.h>
 #include <vtkContourFilter.h>
-#include <vtkDataArray.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
@@ -13,16 +12,12 @@
 
 #include <chrono>
 
+#include "bench/vtk_volume.h"
+
 namespace isobrick::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-int vtk_type(int type) {
-  constexpr int types[] = {VTK_UNSIGNED_CHAR, VTK_SIGNED_CHAR, VTK_UNSIGNED_SHORT, VTK_SHORT,
-                           VTK_UNSIGNED_INT,  VTK_INT,         VTK_FLOAT,          VTK_DOUBLE};
-  return types[type];
-}
 
 std::uint64_t heap_bytes() {
   const struct mallinfo2 info = mallinfo2();
@@ -44,11 +39,7 @@ struct VtkTreePeer::Impl {
 VtkTreePeer::VtkTreePeer(std::int64_t x, std::int64_t y, std::int64_t z, int type, void* samples,
                          Tree tree)
     : impl_(std::make_unique<Impl>()) {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtk_type(type)));
-  array->SetVoidArray(samples, x * y * z, 1);
-  array->SetName("samples");
-  impl_->grid->SetDimensions(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z));
-  impl_->grid->GetPointData()->SetScalars(array);
+  show_samples(impl_->grid, x, y, z, type, samples);
   if (tree == Tree::simple) impl_->tree = vtkSmartPointer<vtkSimpleScalarTree>::New();
   if (tree == Tree::span_space) impl_->tree = vtkSmartPointer<vtkSpanSpace>::New();
   vtkContourFilter* filter = impl_->filter;

@@ -40,7 +40,7 @@ int main(int argc, char** argv) {
   if (edge > 0) {
     say(bench::gyroid({edge, edge, edge}, frequency));
   } else if (!raw.empty()) {
-    say(bench::read_raw(raw, isovalue));
+    say(bench::load_raw(raw, isovalue));
   } else {
     for (const bench::PaperVolume& paper : bench::kPaperVolumes) say(bench::load(paper, data));
   }

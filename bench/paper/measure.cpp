@@ -72,8 +72,7 @@ class Measurement {
     out["cell_by_cell_s"] = median_of(options_.runs, [&] {
       arena_.execute([&] {
         out["cell_by_cell_triangles"] =
-            cell_by_cell(reinterpret_cast<const T*>(volume_.samples.data()), volume_.extent,
-                         volume_.isovalue, soup);
+            cell_by_cell(volume_.data<T>(), volume_.extent, volume_.isovalue, soup);
       });
     });
     soup = {};
@@ -125,7 +124,7 @@ class Measurement {
   }
 
   std::uint64_t count_active_cells() const {
-    const T* s = reinterpret_cast<const T*>(volume_.samples.data());
+    const T* s = volume_.data<T>();
     const Int3 e = volume_.extent;
     std::atomic<std::uint64_t> active = 0;
     tbb::parallel_for(Index{0}, e.z - 1, [&](Index z) {
@@ -142,16 +141,11 @@ class Measurement {
     return active;
   }
 
-  SampleBlock<T> samples_of(Int3 lo, Int3 hi) const {
-    const Int3 e = volume_.extent;
-    const T* s = reinterpret_cast<const T*>(volume_.samples.data());
-    return {s + linear_index(lo, e), min(hi + Int3{1, 1, 1}, e) - lo, e.x, e.x * e.y};
-  }
-
   /// One structure over all blocks of 16³ cells, the default.
   void blocks(nlohmann::json& out) {
     std::vector<ValueRange<T>> ranges;
-    out["range_s"] = median_of(options_.runs, [&] { block_ranges(ranges); });
+    out["range_s"] = median_of(
+        options_.runs, [&] { arena_.execute([&] { find_block_ranges(volume_, ranges); }); });
     out["items"] = ranges.size();
     const std::span<const ValueRange<T>> view(ranges);
     for (const IndexKind kind : kIndexKinds) {
@@ -171,23 +165,6 @@ class Measurement {
     }
   }
 
-  void block_ranges(std::vector<ValueRange<T>>& ranges) {
-    const Int3 grid = lattice_.blocks(), e = volume_.extent;
-    ranges.assign(static_cast<std::size_t>(volume(grid)), {});
-    arena_.execute([&] {
-      tbb::parallel_for(Index{0}, grid.z, [&](Index z) {
-        std::vector<ValueRange<T>> layer;
-        const Index top = std::min((z + 1) * kBlockEdge, e.z - 1);
-        leaf_ranges(samples_of({0, 0, z * kBlockEdge}, {e.x, e.y, top}), kBlockEdge, layer);
-        const Int3 found = leaf_grid({e.x, e.y, top - z * kBlockEdge + 1}, kBlockEdge);
-        for (Index y = 0; y < found.y && found.z > 0; ++y)
-          for (Index x = 0; x < found.x; ++x)
-            ranges[static_cast<std::size_t>(linear_index({x, y, z}, grid))] =
-                layer[static_cast<std::size_t>(linear_index({x, y, 0}, found))];
-      });
-    });
-  }
-
   /// The paper's: every cell is an item. A structure for each brick of 64³ cells,
   /// built in parallel over bricks.
   void single_cells(nlohmann::json& out) {
@@ -202,7 +179,7 @@ class Measurement {
           tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
             std::vector<ValueRange<T>> ranges;
             const Int3 hi = min(origins[i] + Int3{kBrick, kBrick, kBrick}, cells);
-            leaf_ranges(samples_of(origins[i], hi), 1, ranges);
+            leaf_ranges(volume_.block<T>(origins[i], hi), 1, ranges);
             indices[i] = build_index<T>(kind, ranges, hi - origins[i]);
           });
         });

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
+#include "bench/volume.h"
 
 namespace isobrick::bench {
 
@@ -31,14 +30,11 @@ inline const std::vector<PaperVolume> kPaperVolumes = {
     {"Aneurism", {512, 512, 512}, 45, 835068, ""},
 };
 
-/// A volume in memory.
-struct LoadedVolume {
+/// A volume to measure.
+struct LoadedVolume : Volume {
   std::string name;
-  Int3 extent;
   double isovalue = 0;
   bool real = false;  ///< otherwise a procedural field of the same extents and triangles
-  ScalarType type = ScalarType::u8;
-  std::vector<std::byte> samples;
 };
 
 /// The real volume when `folder` has it, otherwise a gyroid, and an isovalue at
@@ -48,6 +44,6 @@ LoadedVolume load(const PaperVolume& paper, const std::string& folder);
 /// A gyroid without noise, isovalue 127.5.
 LoadedVolume gyroid(Int3 extent, double frequency);
 /// A raw volume named as open_source takes it.
-LoadedVolume read_raw(const std::string& path, double isovalue);
+LoadedVolume load_raw(const std::string& path, double isovalue);
 
 }  // namespace isobrick::bench

@@ -31,6 +31,8 @@ DeviceVolume::Impl::Impl(const Lattice& l, const BrickLookup& bricks, double fil
   if (!is_device_scalar(l.type))
     throw UsageError(fmt::format("samples of type {} have no CUDA kernels; use --backend cpu",
                                  short_name(l.type)));
+  if (volume(l.tiles()) >= kNone)
+    throw UsageError("the volume has too many tiles to be resident on a device");
   tile_count = static_cast<std::uint32_t>(volume(l.tiles()));
   upload_pages(bricks, fill_value);
   list_tiles();

@@ -42,16 +42,18 @@ struct DeviceCounts {
 /// device. Keeps its buffers from isovalue to isovalue. Not thread-safe.
 class ResidentExtractor {
  public:
-  /// The isovalue of `options` is that of the first extraction.
+  /// The isovalue of `options` does not matter. Throws UsageError for what the
+  /// device cannot do yet: volumes that may hold NaN, dropping degenerate
+  /// triangles, meshes that are not welded.
   ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options);
   ~ResidentExtractor();
 
   /// The mesh of `isovalue`, in device memory until the next call. Grows the
   /// buffers and repeats when it does not fit them.
   DeviceCounts extract(double isovalue);
-  /// Launches the extraction once more without waiting, for measuring.
-  void launch(double isovalue);
-  /// Milliseconds on the device of the last launch, search included.
+  /// Makes the last mesh once more, without waiting; for measuring.
+  void repeat();
+  /// Milliseconds on the device of the last extraction, search included.
   float milliseconds();
 
   /// Copies the last mesh to the host.

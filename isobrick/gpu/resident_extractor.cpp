@@ -17,6 +17,15 @@ struct Counters {
   SurfaceTotals totals;
 };
 
+void check_supported(const SurfaceOptions& options, ScalarType type) {
+  if (options.may_have_nan && is_floating(type))
+    throw UsageError("volumes that may hold NaN have no CUDA kernels yet; use the CPU");
+  if (options.drop_degenerate)
+    throw UsageError("degenerate triangles cannot be dropped on the device yet; use the CPU");
+  if (options.indexing != Indexing::welded)
+    throw UsageError("the device makes welded meshes only; use the CPU");
+}
+
 /// Mesh to expect of a tile before anything is known: a sheet across it, twice.
 constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
 
@@ -26,6 +35,7 @@ struct ResidentExtractor::Impl {
   DeviceVolume::Impl& volume;
   SurfaceOptions options;
   LaunchShape shape;
+  double isovalue = 0;
   std::uint32_t epoch = 0;
   DeviceBuffer<std::uint16_t> case_entries;
   DeviceBuffer<TileItem> items;
@@ -47,6 +57,7 @@ struct ResidentExtractor::Impl {
         slot_of_tile(volume.tile_count, volume.stream),
         order(volume.tile_count, volume.stream),
         zeroed(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream) {
+    check_supported(o, volume.lattice.type);
     options.roi = intersect(o.roi, volume.lattice.box());
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
     std::uint16_t entries[kCaseEntries];
@@ -61,7 +72,7 @@ struct ResidentExtractor::Impl {
   }
   Counters* counters() const { return reinterpret_cast<Counters*>(zeroed.data()); }
 
-  void launch_search(double isovalue) const {
+  void launch_search() const {
     SearchParams p{};
     p.tiles = volume.tiles.data();
     p.ranges = volume.ranges.data();
@@ -83,7 +94,7 @@ struct ResidentExtractor::Impl {
     gpu::launch_search(volume.lattice.type, p, volume.stream.get());
   }
 
-  void launch_tiles(double isovalue) {
+  void launch_tiles() {
     TileParams p = volume.params();
     p.items = items.data();
     p.item_count = &counters()->item_count;
@@ -140,14 +151,15 @@ struct ResidentExtractor::Impl {
     return seen[0];
   }
 
-  DeviceCounts extract(double isovalue) {
-    if (std::isnan(isovalue)) throw UsageError("the isovalue is not a number");
-    launch_search(isovalue);
+  DeviceCounts extract(double value) {
+    if (std::isnan(value)) throw UsageError("the isovalue is not a number");
+    isovalue = value;
+    launch_search();
     const std::uint32_t active = read_counters().item_count;
     make_row_tables(active);
     make_room(kVerticesOfTile * active, kTrianglesOfTile * active);
     for (;;) {
-      launch(isovalue);
+      launch();
       const SurfaceTotals made = read_counters().totals;
       if (made.vertices > std::numeric_limits<std::uint32_t>::max())
         throw Error(
@@ -159,10 +171,10 @@ struct ResidentExtractor::Impl {
     }
   }
 
-  void launch(double isovalue) {
+  void launch() {
     start.record(volume.stream);
-    launch_search(isovalue);
-    launch_tiles(isovalue);
+    launch_search();
+    launch_tiles();
     end.record(volume.stream);
   }
 };
@@ -172,7 +184,7 @@ ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions&
 ResidentExtractor::~ResidentExtractor() = default;
 
 DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
-void ResidentExtractor::launch(double isovalue) { impl_->launch(isovalue); }
+void ResidentExtractor::repeat() { impl_->launch(); }
 
 float ResidentExtractor::milliseconds() {
   impl_->end.wait();

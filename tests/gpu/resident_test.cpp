@@ -1,8 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <limits>
+#include <functional>
 
+#include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume.h"
 #include "tests/surface/field.h"
 
@@ -132,6 +133,75 @@ TYPED_TEST(GpuResident, TransformsTurnAndMirror) {
   compare(this->waves({67, 41, 75}), {this->lowest() + 100}, options);
   options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
   compare(this->waves({67, 41, 75}), {this->lowest() + 100}, options);
+}
+
+TYPED_TEST(GpuResident, AbsentBricksAreTheFillValue) {
+  using T = TypeParam;
+  const auto fill = static_cast<T>(this->lowest() + 30);
+  auto field = this->waves({131, 70, 97});
+  const Lattice lattice{field.extent, {32, 32, 32}, scalar_type_of<T>};
+  const auto absent = [](Int3 b) { return (b.x + b.y + 2 * b.z) % 3 == 0; };
+  for_each_point(field.box(), [&](Int3 p) {
+    if (absent({p.x / 32, p.y / 32, p.z / 32})) field.at(p) = fill;
+  });
+  const DenseBricks all(lattice, field.samples.data());
+  struct Some final : BrickLookup {
+    const DenseBricks& all;
+    std::function<bool(Int3)> absent;
+    Some(const DenseBricks& a, std::function<bool(Int3)> f) : all(a), absent(std::move(f)) {}
+    const std::byte* find(Int3 b) const override { return absent(b) ? nullptr : all.find(b); }
+  };
+  SurfaceOptions options;
+  options.roi = lattice.box();
+  options.normals = true;
+  options.isovalue = this->lowest() + 100.5;
+  options.fill_value = static_cast<double>(fill);
+  gpu::DeviceVolume volume(lattice, Some(all, absent), options.fill_value);
+  gpu::ResidentExtractor extractor(volume, options);
+  EXPECT_GT(extractor.extract(options.isovalue).triangles, 1000u);
+  MeshBuffer mesh;
+  extractor.download(mesh);
+  expect_same(on_cpu(field, lattice, all, options), mesh);
+}
+
+TYPED_TEST(GpuResident, ARepeatMakesTheSameMesh) {
+  const auto field = this->waves({131, 70, 97});
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  SurfaceOptions options;
+  options.roi = lattice.box();
+  gpu::DeviceVolume volume(lattice, bricks, 0);
+  gpu::ResidentExtractor extractor(volume, options);
+  extractor.extract(this->lowest() + 60);
+  extractor.extract(this->lowest() + 100.5);
+  MeshBuffer once, again;
+  extractor.download(once);
+  extractor.repeat();
+  EXPECT_GT(extractor.milliseconds(), 0);
+  extractor.download(again);
+  expect_same(once, again);
+}
+
+TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {
+  const auto field = this->waves({40, 33, 35});
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  gpu::DeviceVolume volume(lattice, bricks, 0);
+  SurfaceOptions good;
+  good.roi = lattice.box();
+  SurfaceOptions dropping = good, local = good, nan = good, nowhere = good;
+  dropping.drop_degenerate = true;
+  local.indexing = Indexing::chunk_local;
+  nan.may_have_nan = true;
+  nowhere.roi = {{1000, 0, 0}, {1001, 1, 1}};
+  EXPECT_THROW(gpu::ResidentExtractor(volume, dropping), UsageError);
+  EXPECT_THROW(gpu::ResidentExtractor(volume, local), UsageError);
+  EXPECT_THROW(gpu::ResidentExtractor(volume, nowhere), UsageError);
+  if (std::is_floating_point_v<TypeParam>) {
+    EXPECT_THROW(gpu::ResidentExtractor(volume, nan), UsageError);
+  }
+  gpu::ResidentExtractor extractor(volume, good);
+  EXPECT_THROW(extractor.extract(std::nan("")), UsageError);
 }
 
 TYPED_TEST(GpuResident, IsovaluesBeyondTheRangeGiveNothing) {
