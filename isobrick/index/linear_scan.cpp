@@ -10,7 +10,7 @@ using namespace index_detail;
 template <class T>
 std::vector<std::byte> LinearView<T>::build(IndexHeader header,
                                             std::span<const ValueRange<T>> ranges) {
-  for (const ValueRange<T>& range : ranges) header.stored += can_be_active(range) ? 1 : 0;
+  header.stored = count_active(ranges);
   auto block = make_block<LinearView>(header);
   const auto view = view_of<LinearView>(header, block.data());
   T* mins = writable(view.mins);

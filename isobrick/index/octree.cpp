@@ -52,7 +52,7 @@ void for_each_reduced_row(const OctreeView<T>& view, int level, F&& f) {
 template <class T>
 std::vector<std::byte> OctreeView<T>::build(IndexHeader header,
                                             std::span<const ValueRange<T>> ranges) {
-  for (const ValueRange<T>& range : ranges) header.stored += can_be_active(range) ? 1 : 0;
+  header.stored = count_active(ranges);
   auto block = make_block<OctreeView>(header);
   const auto view = view_of<OctreeView>(header, block.data());
   ValueRange<T>* out = writable(view.ranges);

@@ -21,6 +21,13 @@ constexpr bool can_be_active(const ValueRange<T>& range) {
   return range.lo < range.hi;
 }
 
+template <class T>
+std::uint32_t count_active(std::span<const ValueRange<T>> ranges) {
+  std::uint32_t n = 0;
+  for (const ValueRange<T>& range : ranges) n += can_be_active(range) ? 1 : 0;
+  return n;
+}
+
 /// −0 becomes +0: equal bounds have equal bytes.
 template <class T>
 constexpr T canonical(T v) {

@@ -141,9 +141,9 @@ TEST_F(Speech, BashCompletes) {
   write_file(path("script"), run({"completion", "bash"}).out);
   const auto completed = [&](const std::string& words, int at) {
     return run_process({"bash", "-c",
-                        fmt::format("source {}; COMP_WORDS=({}); COMP_CWORD={}; _isobrick; "
+                        fmt::format("cd {}; source {}; COMP_WORDS=({}); COMP_CWORD={}; _isobrick; "
                                     "echo \"${{COMPREPLY[@]}}\"",
-                                    path("script"), words, at)})
+                                    path("."), path("script"), words, at)})
         .out;
   };
   EXPECT_EQ(completed("isobrick ex", 1), "extract export\n");
