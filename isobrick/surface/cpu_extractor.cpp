@@ -210,8 +210,10 @@ std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerat
 }
 
 std::uint64_t CpuExtractor::boundary_bytes(bool drop_degenerate) {
-  // Ties are few but in noise; of the 6,146 samples on a tile's planes every eighth.
-  return 3072 + (drop_degenerate ? 768 * sizeof(FaceTie) : 0);
+  // Any sample on a tile's six planes may be a tie.
+  constexpr std::uint64_t inner = kTileSamples - 2;
+  constexpr std::uint64_t planes = kTileSamples * kTileRows - inner * inner * inner;
+  return 3072 + (drop_degenerate ? planes * sizeof(FaceTie) : 0);
 }
 
 std::uint64_t CpuExtractor::max_tile_output(bool normals) {

@@ -147,12 +147,18 @@ void count_ties(ScalarType type, const KernelContext& context, bool alone, TileS
 
 void publish_ties(TileState& tile) {
   PodBuffer<FaceTie>& published = tile.boundary->ties;
+  const auto for_each_shared = [&](auto&& f) {
+    for (const TieVertex& vertex : tile.ties->vertices)
+      if (vertex.owner == TieVertex::kOwn && on_planes(vertex.place)) f(vertex);
+  };
+  std::size_t count = 0;
+  for_each_shared([&](const TieVertex&) { ++count; });
   published.clear();
-  for (const TieVertex& vertex : tile.ties->vertices) {
-    if (vertex.owner != TieVertex::kOwn || !on_planes(vertex.place)) continue;
+  published.reserve(count);  // no more than that: boundaries are what a budget counts
+  for_each_shared([&](const TieVertex& vertex) {
     published.resize(published.size() + 1);
     published[published.size() - 1] = {vertex.place, vertex.number};
-  }
+  });
 }
 
 void adopt_ties(TileState& tile, const BoundaryMap& map) {

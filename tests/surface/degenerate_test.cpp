@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
+#include "isobrick/surface/tile_ties.h"
 #include "tests/surface/kept_triangles.h"
 
 // SurfaceOptions::drop_degenerate.
@@ -68,6 +69,24 @@ TYPED_TEST(DropDegenerate, ChunksStandAlone) {
   EXPECT_EQ(soup(local), soup(welded));
   EXPECT_EQ(local.degenerate, welded.degenerate);
   EXPECT_EQ(unused_vertices(local), 0u);
+}
+
+// The budget of an extraction counts on this for any input.
+TEST(DropDegenerateAt, BoundariesAreNoLargerThanTheirBound) {
+  TileBoundary boundary;
+  TileState tile;
+  tile.boundary = &boundary;
+  tile.ties = std::make_unique<TileTies>();
+  PodBuffer<TieVertex>& vertices = tile.ties->vertices;
+  for_each_point({{0, 0, 0}, {kTileSamples, kTileSamples, kTileSamples}}, [&](Int3 p) {
+    vertices.resize(vertices.size() + 1);
+    vertices[vertices.size() - 1] = {static_cast<std::uint32_t>(p.x | p.y << 6 | p.z << 12), 0,
+                                     TieVertex::kOwn};
+  });
+  publish_ties(tile);
+  EXPECT_EQ(boundary.ties.size(), 33u * 33 * 33 - 31 * 31 * 31);
+  EXPECT_LE(boundary.ties.capacity() * sizeof(FaceTie),
+            CpuExtractor::boundary_bytes(true) - CpuExtractor::boundary_bytes(false));
 }
 
 // Where eight tiles meet, whoever of them has the first triangle.
