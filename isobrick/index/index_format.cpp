@@ -1,6 +1,7 @@
 #include "isobrick/index/index_format.h"
 
 #include <cstring>
+#include <limits>
 #include <string>
 
 #include "isobrick/core/error.h"
@@ -12,6 +13,36 @@ namespace index_detail {
 
 void require(bool holds, const char* what) {
   if (!holds) throw DamageError(std::string("index: ") + what);
+}
+
+IndexHeader header_for(IndexKind kind, ScalarType type, std::size_t items, Int3 grid) {
+  constexpr Index limit = std::numeric_limits<std::uint32_t>::max();
+  if (items > static_cast<std::size_t>(limit))
+    throw UsageError("an index holds less than 2^32 items, not " + std::to_string(items));
+  IndexHeader header;
+  header.kind = kind;
+  header.type = type;
+  header.items = static_cast<std::uint32_t>(items);
+  const bool positive = grid.x > 0 && grid.y > 0 && grid.z > 0;
+  // Divided rather than multiplied: extents may be anything.
+  const bool fits = positive ? grid.x <= limit && grid.y <= limit / grid.x &&
+                                   grid.z <= limit / (grid.x * grid.y) &&
+                                   volume(grid) == static_cast<Index>(items)
+                             : items == 0;
+  if (!fits)
+    throw UsageError("the extents of an index do not give its " + std::to_string(items) +
+                     " ranges");
+  for (int axis = 0; axis < 3 && positive; ++axis)
+    header.grid[axis] = static_cast<std::uint32_t>(grid[axis]);
+  return header;
+}
+
+std::uint64_t block_bytes(const IndexHeader& header) {
+  return visit_index(IndexView(header, nullptr), [&](const auto& view) {
+    SectionCursor measure(nullptr);
+    std::remove_cvref_t<decltype(view)>(header, measure);
+    return measure.bytes();
+  });
 }
 
 }  // namespace index_detail
@@ -51,12 +82,8 @@ IndexView view_index(std::span<const std::byte> bytes) {
     throw UsageError("the bytes of an index must lie at a multiple of 8");
   const IndexHeader header = read_header(bytes);
   // Measured before any pointer into the block exists.
-  const std::uint64_t needed = visit_index(IndexView(header, nullptr), [&](const auto& view) {
-    SectionCursor measure(nullptr);
-    std::remove_cvref_t<decltype(view)>(header, measure);
-    return measure.bytes();
-  });
-  require(needed == bytes.size(), "has not the size that its counts say");
+  require(index_detail::block_bytes(header) == bytes.size(),
+          "has not the size that its counts say");
   return IndexView(header, bytes.data());
 }
 

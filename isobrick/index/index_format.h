@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "isobrick/core/host_device.h"
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/vec.h"
 #include "isobrick/index/index_kind.h"
@@ -44,17 +45,17 @@ inline constexpr std::size_t kIndexAlignment = 8;
 /// Walks over the arrays of a block in their order. Without a block it only measures.
 class SectionCursor {
  public:
-  explicit SectionCursor(const std::byte* block) : block_(block) {}
+  ISOBRICK_HD explicit SectionCursor(const std::byte* block) : block_(block) {}
 
   template <class T>
-  const T* take(std::uint64_t count) {
+  ISOBRICK_HD const T* take(std::uint64_t count) {
     static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= kIndexAlignment);
     const std::uint64_t at = bytes_;
     // Counts are of 32 bits and elements small: the sum of all arrays fits.
     bytes_ += (count * sizeof(T) + kIndexAlignment - 1) / kIndexAlignment * kIndexAlignment;
     return block_ ? reinterpret_cast<const T*>(block_ + at) : nullptr;
   }
-  std::uint64_t bytes() const { return bytes_; }
+  ISOBRICK_HD std::uint64_t bytes() const { return bytes_; }
 
  private:
   const std::byte* block_;
@@ -97,6 +98,13 @@ namespace index_detail {
 /// Throws DamageError("index: " what) unless `holds`.
 void require(bool holds, const char* what);
 
+/// The header of an index over a grid of so many ranges, before anything is
+/// counted. Throws UsageError as build_index does.
+IndexHeader header_for(IndexKind kind, ScalarType type, std::size_t items, Int3 grid);
+
+/// Bytes of the whole block, from the counts of its header.
+std::uint64_t block_bytes(const IndexHeader& header);
+
 /// A zeroed block for the arrays of View<T>, with its header in place.
 template <class View>
 std::vector<std::byte> make_block(IndexHeader header) {
@@ -109,14 +117,14 @@ std::vector<std::byte> make_block(IndexHeader header) {
 }
 
 template <class View>
-View view_of(const IndexHeader& header, const std::byte* block) {
+ISOBRICK_HD View view_of(const IndexHeader& header, const std::byte* block) {
   SectionCursor cursor(block);
   return View(header, cursor);
 }
 
 /// Builders fill the block that they own through the view that reads it.
 template <class T>
-T* writable(const T* section) {
+ISOBRICK_HD T* writable(const T* section) {
   return const_cast<T*>(section);
 }
 

@@ -25,7 +25,7 @@ struct IntervalView {
   const T* mins;  ///< of the items in by_min
   const T* maxs;  ///< of the items in by_max
 
-  IntervalView(const IndexHeader& header, SectionCursor& cursor)
+  ISOBRICK_HD IntervalView(const IndexHeader& header, SectionCursor& cursor)
       : nodes(header.nodes),
         first(cursor.take<std::uint32_t>(std::uint64_t{header.nodes} + 1)),
         by_min(cursor.take<std::uint32_t>(header.stored)),

@@ -24,7 +24,7 @@ struct KdView {
   const T* mins;
   const T* maxs;
 
-  KdView(const IndexHeader& header, SectionCursor& cursor)
+  ISOBRICK_HD KdView(const IndexHeader& header, SectionCursor& cursor)
       : stored(header.stored),
         ids(cursor.take<std::uint32_t>(header.stored)),
         mins(cursor.take<T>(header.stored)),

@@ -18,7 +18,7 @@ struct LinearView {
   const T* mins;
   const T* maxs;
 
-  LinearView(const IndexHeader& header, SectionCursor& cursor)
+  ISOBRICK_HD LinearView(const IndexHeader& header, SectionCursor& cursor)
       : items(header.items),
         mins(cursor.take<T>(header.items)),
         maxs(cursor.take<T>(header.items)) {}

@@ -27,7 +27,7 @@ struct OctreeView {
   Level pyramid[kMaxLevels + 1];  ///< and one that says where the last ends
   const ValueRange<T>* ranges;
 
-  OctreeView(const IndexHeader& header, SectionCursor& cursor) {
+  ISOBRICK_HD OctreeView(const IndexHeader& header, SectionCursor& cursor) {
     std::uint64_t nodes = header.items, first = 0;
     for (; header.items && (levels == 0 || nodes != 1); ++levels, first += nodes) {
       nodes = 1;

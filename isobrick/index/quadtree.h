@@ -33,7 +33,7 @@ struct QuadtreeView {
   const T* mins;
   const T* maxs;
 
-  QuadtreeView(const IndexHeader& header, SectionCursor& cursor)
+  ISOBRICK_HD QuadtreeView(const IndexHeader& header, SectionCursor& cursor)
       : nodes(header.nodes),
         points(header.points),
         node(cursor.take<QuadNode<T>>(std::uint64_t{header.nodes} + 1)),

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <limits>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/threshold.h"
@@ -10,29 +9,6 @@
 
 namespace isobrick {
 namespace {
-
-/// The header of an index over a grid of so many ranges.
-IndexHeader header_for(IndexKind kind, ScalarType type, std::size_t items, Int3 grid) {
-  constexpr Index limit = std::numeric_limits<std::uint32_t>::max();
-  if (items > static_cast<std::size_t>(limit))
-    throw UsageError("an index holds less than 2^32 items, not " + std::to_string(items));
-  IndexHeader header;
-  header.kind = kind;
-  header.type = type;
-  header.items = static_cast<std::uint32_t>(items);
-  const bool positive = grid.x > 0 && grid.y > 0 && grid.z > 0;
-  // Divided rather than multiplied: extents may be anything.
-  const bool fits = positive ? grid.x <= limit && grid.y <= limit / grid.x &&
-                                   grid.z <= limit / (grid.x * grid.y) &&
-                                   volume(grid) == static_cast<Index>(items)
-                             : items == 0;
-  if (!fits)
-    throw UsageError("the extents of an index do not give its " + std::to_string(items) +
-                     " ranges");
-  for (int axis = 0; axis < 3 && positive; ++axis)
-    header.grid[axis] = static_cast<std::uint32_t>(grid[axis]);
-  return header;
-}
 
 /// Converts the isovalue to the items' type once and lets the structure report to `sink`.
 template <class Sink>
@@ -48,7 +24,7 @@ void report(const IndexView& index, double iso, Sink& sink) {
 template <class T>
 std::vector<std::byte> build_index(IndexKind kind, std::span<const ValueRange<T>> ranges,
                                    Int3 grid) {
-  const IndexHeader header = header_for(kind, scalar_type_of<T>, ranges.size(), grid);
+  const IndexHeader header = index_detail::header_for(kind, scalar_type_of<T>, ranges.size(), grid);
   switch (kind) {
     case IndexKind::interval: return IntervalView<T>::build(header, ranges);
     case IndexKind::kdtree: return KdView<T>::build(header, ranges);
