@@ -32,6 +32,16 @@ class DeviceVolume {
   std::unique_ptr<Impl> impl_;
 };
 
+/// How the active tiles of a volume are found; none of it shows in the mesh.
+enum class TileSearch : std::uint8_t {
+  ranges,  ///< compares the range of every tile
+  interval,
+  kdtree,
+  quadtree,
+  octree,  ///< through that structure over the tiles, built on the device
+  none     ///< takes every tile: brute force
+};
+
 /// What an extraction on the device made.
 struct DeviceCounts {
   std::uint64_t vertices = 0, triangles = 0;
@@ -45,7 +55,8 @@ class ResidentExtractor {
   /// The isovalue of `options` does not matter. Throws UsageError for what the
   /// device cannot do yet: volumes that may hold NaN, dropping degenerate
   /// triangles, meshes that are not welded.
-  ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options);
+  ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
+                    TileSearch search = TileSearch::ranges);
   ~ResidentExtractor();
 
   /// The mesh of `isovalue`, in device memory until the next call. Grows the

@@ -1,10 +1,12 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume_impl.h"
 #include "isobrick/gpu/search_kernel.h"
+#include "isobrick/gpu/tile_index.h"
 #include "isobrick/gpu/tile_kernel.h"
 #include "isobrick/surface/world_map.h"
 
@@ -47,8 +49,10 @@ struct ResidentExtractor::Impl {
   DeviceBuffer<std::uint32_t> triangles;
   PinnedBuffer<Counters> seen{1};
   Event start, end;
+  TileSearch search;
+  std::optional<SpanIndices> index;  ///< of the tiles, where the search is through one
 
-  Impl(DeviceVolume& v, const SurfaceOptions& o)
+  Impl(DeviceVolume& v, const SurfaceOptions& o, TileSearch s)
       : volume(v.impl()),
         options(o),
         shape(launch_shape(volume.lattice.type, o.normals, volume.tile_count)),
@@ -56,7 +60,9 @@ struct ResidentExtractor::Impl {
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
         order(volume.tile_count, volume.stream),
-        zeroed(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream) {
+        zeroed(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
+        search(s) {
+    if (const auto kind = index_kind_of(s)) index.emplace(index_tiles(volume, *kind));
     check_supported(o, volume.lattice.type);
     options.roi = intersect(o.roi, volume.lattice.box());
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
@@ -72,8 +78,13 @@ struct ResidentExtractor::Impl {
   }
   Counters* counters() const { return reinterpret_cast<Counters*>(zeroed.data()); }
 
-  void launch_search() const {
+  void launch_search() {
     SearchParams p{};
+    p.test = test_of(search);
+    if (index) {
+      index->search(isovalue, volume.stream);
+      p.mask = index->mask();
+    }
     p.tiles = volume.tiles.data();
     p.ranges = volume.ranges.data();
     p.count = volume.tile_count;
@@ -179,8 +190,9 @@ struct ResidentExtractor::Impl {
   }
 };
 
-ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options)
-    : impl_(std::make_unique<Impl>(volume, options)) {}
+ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
+                                     TileSearch search)
+    : impl_(std::make_unique<Impl>(volume, options, search)) {}
 ResidentExtractor::~ResidentExtractor() = default;
 
 DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
@@ -209,7 +221,7 @@ std::uint64_t ResidentExtractor::bytes() const {
   const Impl& i = *impl_;
   return i.case_entries.bytes() + i.items.bytes() + i.slot_of_tile.bytes() + i.order.bytes() +
          i.zeroed.bytes() + i.row_tables.bytes() + i.positions.bytes() + i.normals.bytes() +
-         i.triangles.bytes();
+         i.triangles.bytes() + (i.index ? i.index->bytes() : 0);
 }
 
 }  // namespace isobrick::gpu

@@ -11,13 +11,30 @@ namespace {
 constexpr int kThreads = 256, kWarps = kThreads / 32;
 constexpr int kTilesOfThread = static_cast<int>(kTilesOfSearchBlock) / kThreads;
 
+/// Where tile (t[0], t[1], t[2]) lies in C order [z, y, x].
+__device__ std::size_t place_of(const std::int32_t* t, const std::int32_t (&grid)[3]) {
+  return (static_cast<std::size_t>(t[2]) * grid[1] + t[1]) * grid[0] + t[0];
+}
+
+template <class T>
+__device__ bool is_stabbed(const SearchParams& p, std::uint32_t i) {
+  if (p.test == TileTest::all) return true;
+  if (p.test == TileTest::ranges) {
+    const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
+    return static_cast<double>(range[0]) < p.isovalue &&
+           p.isovalue <= static_cast<double>(range[1]);
+  }
+  const std::size_t bit = p.test == TileTest::mask_by_order
+                              ? i
+                              : place_of(p.tiles + 3 * static_cast<std::size_t>(i), p.grid);
+  return p.mask[bit >> 5] >> (bit & 31) & 1u;
+}
+
 /// Whether the isovalue stabs the tile's range and the region of interest
 /// leaves it a cell.
 template <class T>
 __device__ bool is_active(const SearchParams& p, std::uint32_t i) {
-  const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
-  if (!(static_cast<double>(range[0]) < p.isovalue && p.isovalue <= static_cast<double>(range[1])))
-    return false;
+  if (!is_stabbed<T>(p, i)) return false;
 #pragma unroll
   for (int axis = 0; axis < 3; ++axis) {
     const int origin = p.tiles[3 * i + axis] * 32;
@@ -61,13 +78,25 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   for (int i = 0; i < kTilesOfThread; ++i) {
     if (first + i >= p.count) return;
     const std::int32_t* t = p.tiles + 3 * static_cast<std::size_t>(first + i);
-    const std::size_t at = (static_cast<std::size_t>(t[2]) * p.grid[1] + t[1]) * p.grid[0] + t[0];
+    const std::size_t at = place_of(t, p.grid);
     p.slot_of_tile[at] = active[i] ? place : kNone;
     if (!active[i]) continue;
     p.items[place] = {t[0], t[1], t[2], place};
     p.order[place] = {0, 0};
     ++place;
   }
+}
+
+struct Grid {
+  std::int32_t extent[3];
+};
+
+template <class T>
+__global__ void __launch_bounds__(kThreads)
+    place_ranges(const std::int32_t* tiles, std::uint32_t count, const Grid grid,
+                 const ValueRange<T>* ranges, ValueRange<T>* placed) {
+  const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
+  if (i < count) placed[place_of(tiles + 3 * static_cast<std::size_t>(i), grid.extent)] = ranges[i];
 }
 
 template <class T>
@@ -113,6 +142,18 @@ void launch_search(ScalarType type, const SearchParams& params, cudaStream_t str
     search_tiles<typename decltype(tag)::type><<<blocks, kThreads, 0, stream>>>(params);
   });
   check_launch("search_tiles");
+}
+
+void launch_place_ranges(ScalarType type, const std::int32_t* tiles, std::uint32_t count,
+                         const std::int32_t (&grid)[3], const void* ranges, void* placed,
+                         cudaStream_t stream) {
+  visit_device_scalar(type, [&](auto tag) {
+    using Range = ValueRange<typename decltype(tag)::type>;
+    place_ranges<<<(count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(
+        tiles, count, Grid{{grid[0], grid[1], grid[2]}}, static_cast<const Range*>(ranges),
+        static_cast<Range*>(placed));
+  });
+  check_launch("place_ranges");
 }
 
 void launch_tile_ranges(ScalarType type, const TileParams& params, const std::int32_t* tiles,

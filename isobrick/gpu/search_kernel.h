@@ -7,8 +7,18 @@
 
 namespace isobrick::gpu {
 
+/// How the search knows which tiles an isovalue stabs.
+enum class TileTest : std::uint8_t {
+  ranges,         ///< compares the range of each
+  mask_by_order,  ///< bit i of the mask: tile i in Morton order
+  mask_by_place,  ///< bit i of the mask: tile i in C order [z, y, x]
+  all             ///< takes them all
+};
+
 /// All tiles of a volume in Morton order, and what the search for active ones leaves.
 struct SearchParams {
+  TileTest test;
+  const std::uint32_t* mask;
   const std::int32_t* tiles;  ///< x, y, z of each
   const void* ranges;         ///< min and max of each, of the sample type
   std::uint32_t count;
@@ -27,6 +37,11 @@ inline constexpr std::uint32_t kTilesOfSearchBlock = 1024;
 
 /// Finds the tiles that the isovalue stabs, in their order, numbered from 0.
 void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream);
+
+/// Ranges in Morton order to C order [z, y, x] of `grid`.
+void launch_place_ranges(ScalarType type, const std::int32_t* tiles, std::uint32_t count,
+                         const std::int32_t (&grid)[3], const void* ranges, void* placed,
+                         cudaStream_t stream);
 
 /// Ranges of all tiles from their samples: of the 33³ that its cells touch, as
 /// far as the volume goes, NaN left out. Uses items, pages, page_of_tile,

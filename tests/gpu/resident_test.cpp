@@ -182,6 +182,37 @@ TYPED_TEST(GpuResident, ARepeatMakesTheSameMesh) {
   expect_same(once, again);
 }
 
+TYPED_TEST(GpuResident, AnySearchMakesTheSameMesh) {
+  const auto field = this->waves({131, 70, 197});
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  SurfaceOptions options;
+  gpu::DeviceVolume volume(lattice, bricks, 0);
+  for (const Box3 roi : {lattice.box(), Box3{{5, 33, 40}, {97, 66, 190}}}) {
+    options.roi = roi;
+    gpu::ResidentExtractor by_ranges(volume, options);
+    for (const auto search :
+         {gpu::TileSearch::none, gpu::TileSearch::interval, gpu::TileSearch::kdtree,
+          gpu::TileSearch::quadtree, gpu::TileSearch::octree}) {
+      gpu::ResidentExtractor extractor(volume, options, search);
+      for (const double shift : {0.0, 35.5, -60.0, 1e9}) {
+        const auto expected = by_ranges.extract(this->lowest() + 100 + shift);
+        const auto counts = extractor.extract(this->lowest() + 100 + shift);
+        EXPECT_EQ(counts.triangles, expected.triangles);
+        if (search != gpu::TileSearch::none) {
+          EXPECT_EQ(counts.active_tiles, expected.active_tiles);
+        }
+        MeshBuffer one, other;
+        by_ranges.download(one);
+        extractor.download(other);
+        SCOPED_TRACE("search " + std::to_string(static_cast<int>(search)) + ", shift " +
+                     std::to_string(shift));
+        expect_same(one, other);
+      }
+    }
+  }
+}
+
 TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {
   const auto field = this->waves({40, 33, 35});
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
