@@ -1,5 +1,6 @@
 #include "isobrick/pipeline/convert.h"
 
+#include <limits>
 #include <memory>
 
 #include "isobrick/io/open_source.h"
@@ -10,27 +11,34 @@ namespace {
 
 struct Arguments {
   std::string in, out;
-  RawDescription raw;
+  VolumeRequest volume;
   ConvertOptions store;
 };
 
-void add_raw_options(CLI::App* app, RawDescription& raw) {
-  add_dims(app, raw.extent);
-  add_type(app, raw.type);
-  add_parsed(app, raw.order, parse_byte_order,
-             {"--endian", "little|big", "Byte order of the samples", "little"});
-  add_parsed(app, raw.offset, parse_offset,
-             {"--offset", "BYTES", "Bytes before the first sample", "0"});
-  add_parsed(app, raw.spacing, parse_vector,
-             {"--spacing", "X,Y,Z", "World distance between samples", "1,1,1"});
-  add_parsed(app, raw.origin, parse_vector,
-             {"--origin", "X,Y,Z", "World position of the first sample", "0,0,0"});
-  add_parsed(app, raw.unit, [](const std::string& text) { return text; },
+void add_volume_options(CLI::App* app, VolumeRequest& volume) {
+  add_dims(app, volume.extent);
+  add_type(app, volume.type);
+  add_parsed(app, volume.order, parse_byte_order,
+             {"--endian", "little|big", "Byte order of the samples of a raw file", "little"});
+  add_parsed(app, volume.offset, parse_offset,
+             {"--offset", "BYTES", "Bytes before the first sample of a raw file", "0"});
+  add_parsed(app, volume.spacing, parse_vector,
+             {"--spacing", "X,Y,Z", "World distance between samples", "the file's, or 1,1,1"});
+  add_parsed(app, volume.origin, parse_vector,
+             {"--origin", "X,Y,Z", "World position of the first sample", "the file's, or 0,0,0"});
+  add_parsed(app, volume.unit, [](const std::string& text) { return text; },
              {"--unit", "NAME", "Unit of world space, such as micrometer"});
+  const auto place = [](const std::string& text) {
+    return std::optional(parse_whole(text, 0, std::numeric_limits<Index>::max()));
+  };
+  add_parsed(app, volume.selection.channel, place,
+             {"--channel", "C", "Which channel of a file that has several, from 0"});
+  add_parsed(app, volume.selection.time, place,
+             {"--time", "T", "Which time of a file that has several, from 0"});
 }
 
 int run(const Arguments& arguments, Console& console) {
-  const auto source = open_source(arguments.in, arguments.raw);
+  const auto source = open_source(arguments.in, arguments.volume);
   const ConvertReport report = convert(*source, arguments.out, arguments.store, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
   return 0;
@@ -44,9 +52,10 @@ void add_convert(Program& program) {
       program, "convert", "Turn a volume into a store, within a memory budget.",
       "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
       "  isobrick convert engine_256x256x128_uint8.raw engine.zarr   # the name says it all");
-  add_path(app, "IN", arguments->in, "Raw file, .nhdr or .mhd header, or - for standard input");
+  add_path(app, "IN", arguments->in,
+           "Volume of a known format, raw file, or - for raw samples on standard input");
   add_path(app, "OUT", arguments->out, "Store to write, such as OUT.zarr");
-  add_raw_options(app, arguments->raw);
+  add_volume_options(app, arguments->volume);
   add_store_options(app, arguments->store);
   add_run(program, app, arguments, run);
 }

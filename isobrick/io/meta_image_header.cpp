@@ -14,13 +14,27 @@ namespace {
 /// the header.
 class Fields {
  public:
-  explicit Fields(const std::string& path) : path_(path), text_(read_header_text(path)) {
-    std::string_view rest = text_;
-    while (!rest.empty() && !fields_.contains("elementdatafile")) {
-      const std::string_view line = next_line(rest);
+  explicit Fields(const std::string& path) : path_(path), lines_(path) {
+    while (!lines_.at_end() && !fields_.contains("elementdatafile")) {
+      const std::string_view line = lines_.next();
       if (!trim(line).empty()) add(line);
     }
+    size_ = lines_.position();
+    const auto data = find({"ElementDataFile"});
+    if (!data || !is_list(*data)) return;
+    while (!lines_.at_end())
+      if (const std::string_view name = trim(lines_.next()); !name.empty()) list_.push_back(name);
   }
+
+  static bool is_list(std::string_view data) {
+    const auto words = split_words(data);
+    return !words.empty() && lower(words[0]) == "list";
+  }
+
+  /// The names that follow "ElementDataFile = LIST".
+  const std::vector<std::string_view>& list() const { return list_; }
+  /// Bytes of the header.
+  std::uint64_t size() const { return size_; }
 
   /// The value of the first of `keys` (spellings of one field) that is there.
   std::optional<std::string_view> find(std::initializer_list<const char*> keys) const {
@@ -75,8 +89,11 @@ class Fields {
       header_error(path_, fmt::format("'{}' appears twice", key.substr(0, 60)));
   }
 
-  std::string path_, text_;
+  std::string path_;
+  HeaderLines lines_;
   std::map<std::string, std::string_view> fields_;
+  std::vector<std::string_view> list_;
+  std::uint64_t size_ = 0;
 };
 
 ScalarType read_type(const Fields& fields) {
@@ -94,66 +111,100 @@ ScalarType read_type(const Fields& fields) {
                fmt::format("samples of type '{}' are not supported", name.substr(0, 60)));
 }
 
-void refuse_unsupported(const Fields& fields) {
-  if (parse_integer(fields.path(), "NDims", fields.need("NDims")) != 3)
-    header_error(fields.path(), "NDims: only 3 is supported");
-  if (fields.flag({"CompressedData"}))
-    header_error(fields.path(), "compressed samples (CompressedData = True) are not supported");
-  if (const auto binary = fields.find({"BinaryData"}); binary && !fields.flag({"BinaryData"}))
-    header_error(fields.path(), "samples as text (BinaryData = False) are not supported");
-  if (const auto channels = fields.find({"ElementNumberOfChannels"});
-      channels && parse_integer(fields.path(), "ElementNumberOfChannels", *channels) != 1)
-    header_error(fields.path(), "several channels (ElementNumberOfChannels) are not supported");
+/// Returns how many dimensions the header's matrices and vectors have.
+std::size_t read_view(const Fields& fields, const Selection& selection, TextHeader& header) {
+  const Index dimensions = parse_integer(fields.path(), "NDims", fields.need("NDims"));
+  if (dimensions != 3 && dimensions != 4)
+    header_error(fields.path(),
+                 fmt::format("NDims = {}: 3, and 4 with time, are supported", dimensions));
+  std::vector<ArrayAxis> axes;
+  if (const auto channels = fields.find({"ElementNumberOfChannels"}))
+    axes.push_back(
+        {parse_integer(fields.path(), "ElementNumberOfChannels", *channels), AxisRole::channel});
+  const auto count = static_cast<std::size_t>(dimensions);
+  const auto sizes = fields.words("DimSize", fields.need("DimSize"), count);
+  for (std::size_t i = 0; i < count; ++i)
+    axes.push_back({parse_integer(fields.path(), "DimSize", sizes[i]),
+                    i < 3 ? AxisRole::space : AxisRole::time});
+  header.view = select_volume(fields.path(), axes, selection);
+  return count;
 }
 
-void read_layout(const Fields& fields, DetachedHeader& header) {
-  const auto sizes = fields.words("DimSize", fields.need("DimSize"), 3);
-  for (int i = 0; i < 3; ++i)
-    header.extent[i] = parse_integer(fields.path(), "DimSize", sizes[static_cast<std::size_t>(i)]);
+Encoding read_encoding(const Fields& fields) {
+  const bool text = fields.find({"BinaryData"}) && !fields.flag({"BinaryData"});
+  if (!fields.flag({"CompressedData"})) return text ? Encoding::text : Encoding::raw;
+  if (text) header_error(fields.path(), "compressed text is not supported");
+  return Encoding::zlib;
+}
+
+std::vector<std::string> read_data_paths(const Fields& fields) {
+  const std::string_view data = fields.need("ElementDataFile");
+  if (lower(data) == "local") return {fields.path()};
+  if (Fields::is_list(data)) {
+    std::vector<std::string> paths;
+    for (const auto name : fields.list()) paths.push_back(resolve_data_file(fields.path(), name));
+    if (paths.empty()) header_error(fields.path(), "the list of data files is empty");
+    return paths;
+  }
+  if (data.find('%') != std::string_view::npos) return resolve_data_pattern(fields.path(), data);
+  return {resolve_data_file(fields.path(), data)};
+}
+
+void read_layout(const Fields& fields, TextHeader& header) {
   header.type = read_type(fields);
+  header.encoding = read_encoding(fields);
   const bool big = fields.flag({"ElementByteOrderMSB", "BinaryDataByteOrderMSB"});
   header.order = big ? ByteOrder::big : ByteOrder::little;
+  header.data_paths = read_data_paths(fields);
+  if (header.attached()) {
+    header.data_begin = fields.size();
+    return;  // HeaderSize is about files of samples
+  }
   if (const auto text = fields.find({"HeaderSize"})) {
     const Index skip = parse_integer(fields.path(), "HeaderSize", *text);
     if (skip < -1) header_error(fields.path(), "HeaderSize is negative");
     header.data_at_end = skip == -1;
     header.skip_bytes = skip > 0 ? static_cast<std::uint64_t>(skip) : 0;
   }
-  const std::string_view data = fields.need("ElementDataFile");
-  if (lower(data) == "local")
-    header_error(fields.path(),
-                 "samples in the same file as the header (ElementDataFile = LOCAL) "
-                 "are not supported");
-  header.data_path = resolve_data_file(fields.path(), data);
 }
 
-void read_transform(const Fields& fields, Transform& transform) {
+/// The first three of as many numbers as there are dimensions.
+std::optional<Vec3d> read_vector(const Fields& fields, std::initializer_list<const char*> keys,
+                                 std::size_t dimensions) {
+  const auto numbers = fields.reals(keys, dimensions);
+  if (!numbers) return std::nullopt;
+  return Vec3d{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+}
+
+void read_transform(const Fields& fields, std::size_t dimensions, Transform& transform) {
   // The numbers of an axis stand together: a column of the matrix after another.
-  const auto matrix = fields.reals({"TransformMatrix", "Orientation", "Rotation"}, 9);
+  const auto matrix =
+      fields.reals({"TransformMatrix", "Orientation", "Rotation"}, dimensions * dimensions);
   if (matrix) {
-    const auto& m = *matrix;
-    const Vec3d axes[3] = {{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}};
+    Vec3d axes[3];
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j)
+        axes[i][static_cast<int>(j)] = (*matrix)[i * dimensions + j];
     set_axes(fields.path(), transform, axes);
   }
-  transform.spacing = {1, 1, 1};
-  if (const auto spacing = fields.reals({"ElementSpacing", "ElementSize"}, 3))
-    transform.spacing = {(*spacing)[0], (*spacing)[1], (*spacing)[2]};
+  transform.spacing =
+      read_vector(fields, {"ElementSpacing", "ElementSize"}, dimensions).value_or(Vec3d{1, 1, 1});
   for (int i = 0; i < 3; ++i)
     if (transform.spacing[i] <= 0) header_error(fields.path(), "ElementSpacing is not positive");
-  if (const auto origin = fields.reals({"Offset", "Position", "Origin"}, 3))
-    transform.origin = {(*origin)[0], (*origin)[1], (*origin)[2]};
+  if (const auto origin = read_vector(fields, {"Offset", "Position", "Origin"}, dimensions))
+    transform.origin = *origin;
   if (const auto unit = fields.find({"DistanceUnits"})) transform.unit = unit_name(*unit);
 }
 
 }  // namespace
 
-DetachedHeader parse_meta_image_header(const std::string& path) {
+TextHeader parse_meta_image_header(const std::string& path, const Selection& selection) {
   const Fields fields(path);
-  refuse_unsupported(fields);
-  DetachedHeader header;
+  TextHeader header;
   header.path = path;
+  const std::size_t dimensions = read_view(fields, selection, header);
   read_layout(fields, header);
-  read_transform(fields, header.transform);
+  read_transform(fields, dimensions, header.transform);
   return header;
 }
 

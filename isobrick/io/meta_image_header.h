@@ -2,12 +2,12 @@
 
 #include <string>
 
-#include "isobrick/io/detached_header.h"
+#include "isobrick/io/text_header.h"
 
 namespace isobrick {
 
-/// Parses a MetaImage header (`.mhd`) whose samples lie, uncompressed, in one
-/// file of their own.
-DetachedHeader parse_meta_image_header(const std::string& path);
+/// Parses a MetaImage header (`.mhd`, or the beginning of a `.mha`) and selects
+/// one volume where there are several.
+TextHeader parse_meta_image_header(const std::string& path, const Selection& selection);
 
 }  // namespace isobrick

@@ -39,17 +39,22 @@ std::optional<ScalarType> parse_type(const std::string& name) {
 /// "datafile" are one).
 class Fields {
  public:
-  explicit Fields(const std::string& path) : path_(path), text_(read_header_text(path)) {
-    std::string_view rest = text_;
-    const std::string_view magic = next_line(rest);
+  explicit Fields(const std::string& path) : path_(path), lines_(path) {
+    const std::string_view magic = lines_.next();
     if (magic.size() != 8 || !magic.starts_with("NRRD000") || magic[7] < '1' || magic[7] > '5')
       header_error(path, "not a NRRD header: it does not begin with NRRD0001 … NRRD0005");
-    while (!rest.empty()) {
-      const std::string_view line = next_line(rest);
+    while (!lines_.at_end()) {
+      const std::string_view line = lines_.next();
       if (trim(line).empty()) break;
       if (!line.starts_with('#')) add(line);
+      if (listed_) read_list();
     }
   }
+
+  /// The names that follow "data file: LIST".
+  const std::vector<std::string_view>& list() const { return list_; }
+  /// Bytes of the header.
+  std::uint64_t size() const { return lines_.position(); }
 
   std::optional<std::string_view> find(const std::string& name) const {
     const auto at = fields_.find(name);
@@ -72,28 +77,31 @@ class Fields {
     if (line.substr(colon).starts_with(":=")) return;  // key/value pair
     std::string name = lower(line.substr(0, colon));
     std::erase(name, ' ');
-    if (!fields_.emplace(name, trim(line.substr(colon + 1))).second)
+    const std::string_view value = trim(line.substr(colon + 1));
+    if (!fields_.emplace(name, value).second)
       header_error(path_, fmt::format("the field '{}' appears twice", name.substr(0, 60)));
+    listed_ = name == "datafile" && (value == "LIST" || value.starts_with("LIST "));
   }
 
-  std::string path_, text_;
+  void read_list() {
+    while (!lines_.at_end())
+      if (const std::string_view name = trim(lines_.next()); !name.empty()) list_.push_back(name);
+  }
+
+  std::string path_;
+  HeaderLines lines_;
   std::map<std::string, std::string_view> fields_;
+  std::vector<std::string_view> list_;
+  bool listed_ = false;
 };
 
-/// Which of the file's axes are x, y and z: all three or, of four, those left
-/// without one of extent 1.
-struct Axes {
-  std::size_t dimension = 3;
-  std::array<std::size_t, 3> kept{0, 1, 2};
-};
-
-/// One word an axis.
-std::vector<std::string_view> per_axis(const Fields& fields, const Axes& axes,
+/// One entry an axis.
+std::vector<std::string_view> per_axis(const Fields& fields, std::size_t dimension,
                                        const std::string& name,
                                        std::vector<std::string_view> words) {
-  if (words.size() != axes.dimension)
+  if (words.size() != dimension)
     header_error(fields.path(), fmt::format("'{}' has {} entries for {} dimensions", name,
-                                            words.size(), axes.dimension));
+                                            words.size(), dimension));
   return words;
 }
 
@@ -130,56 +138,117 @@ Vec3d parse_vector(const Fields& fields, const std::string& name, std::string_vi
   return vector;
 }
 
-Axes read_extent(const Fields& fields, DetachedHeader& header) {
-  Axes axes;
-  const Index dimension = parse_integer(fields.path(), "dimension", fields.need("dimension"));
-  if (dimension != 3 && dimension != 4)
-    header_error(fields.path(), fmt::format("dimension {}: only volumes of 3 dimensions (or 4, "
-                                            "one of them of size 1) are supported",
-                                            dimension));
-  axes.dimension = static_cast<std::size_t>(dimension);
-  const auto words = per_axis(fields, axes, "sizes", split_words(fields.need("sizes")));
-  std::vector<Index> sizes;
-  for (const auto word : words) sizes.push_back(parse_integer(fields.path(), "sizes", word));
-  if (axes.dimension == 4) {
-    const auto single =
-        static_cast<std::size_t>(std::find(sizes.begin(), sizes.end(), Index{1}) - sizes.begin());
-    if (single == 4)
-      header_error(fields.path(),
-                   "4 dimensions, none of size 1: several samples a point or "
-                   "time steps are not supported");
-    for (std::size_t i = 0; i < 3; ++i) axes.kept[i] = i < single ? i : i + 1;
-  }
-  for (int i = 0; i < 3; ++i) header.extent[i] = sizes[axes.kept[static_cast<std::size_t>(i)]];
-  return axes;
+/// What the kinds say of an axis; nothing where they leave it open.
+std::optional<AxisRole> role_of_kind(const std::string& kind) {
+  if (kind == "domain" || kind == "space") return AxisRole::space;
+  if (kind == "time") return AxisRole::time;
+  if (kind == "???" || kind == "none" || kind.empty()) return std::nullopt;
+  return AxisRole::channel;  // lists, vectors, colours, matrices, …
 }
 
-void read_layout(const Fields& fields, DetachedHeader& header) {
+bool three_of_space(std::span<const ArrayAxis> axes) {
+  return std::count_if(axes.begin(), axes.end(),
+                       [](const ArrayAxis& axis) { return axis.role == AxisRole::space; }) == 3;
+}
+
+/// Roles by the field 'kinds', else by which axes have a direction in space.
+/// True when that leaves three of space.
+bool find_roles(const Fields& fields, std::vector<ArrayAxis>& axes) {
+  if (const auto text = fields.find("kinds")) {
+    const auto kinds = per_axis(fields, axes.size(), "kinds", split_words(*text));
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      axes[i].role = role_of_kind(lower(kinds[i])).value_or(AxisRole::channel);
+    if (three_of_space(axes)) return true;
+  }
+  if (const auto text = fields.find("spacedirections")) {
+    const auto entries =
+        per_axis(fields, axes.size(), "space directions", split_entries(fields, *text));
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      axes[i].role = lower(entries[i]) == "none" ? AxisRole::channel : AxisRole::space;
+    if (three_of_space(axes)) return true;
+  }
+  for (ArrayAxis& axis : axes) axis.role = AxisRole::space;
+  return axes.size() == 3;
+}
+
+/// Where the header leaves open which three of four axes are space: one of size
+/// 1 is not, nor is the first (fastest) when a channel is asked for, nor the last
+/// when a time is.
+void guess_roles(const Fields& fields, const Selection& selection, std::vector<ArrayAxis>& axes) {
+  const auto single =
+      std::find_if(axes.begin(), axes.end(), [](const ArrayAxis& axis) { return axis.size == 1; });
+  if (axes.size() == 4 && single != axes.end())
+    single->role = AxisRole::channel;
+  else if (axes.size() == 4 && selection.channel && !selection.time)
+    axes.front().role = AxisRole::channel;
+  else if (axes.size() == 4 && selection.time && !selection.channel)
+    axes.back().role = AxisRole::time;
+  else
+    header_error(fields.path(),
+                 fmt::format("{} dimensions, and neither 'kinds' nor 'space directions' say which "
+                             "3 are space; of 4, --channel C takes the first for channels and "
+                             "--time T the last for time",
+                             axes.size()));
+}
+
+/// Returns how many axes the array has.
+std::size_t read_view(const Fields& fields, const Selection& selection, TextHeader& header) {
+  constexpr Index kMostDimensions = 16;
+  const Index dimension = parse_integer(fields.path(), "dimension", fields.need("dimension"));
+  if (dimension < 3 || dimension > kMostDimensions)
+    header_error(
+        fields.path(),
+        fmt::format("dimension {}: volumes have 3, or more with channels and times", dimension));
+  std::vector<ArrayAxis> axes;
+  for (const auto word : per_axis(fields, static_cast<std::size_t>(dimension), "sizes",
+                                  split_words(fields.need("sizes"))))
+    axes.push_back({parse_integer(fields.path(), "sizes", word), AxisRole::space});
+  if (!find_roles(fields, axes)) guess_roles(fields, selection, axes);
+  header.view = select_volume(fields.path(), axes, selection);
+  return axes.size();
+}
+
+Encoding read_encoding(const Fields& fields) {
+  const std::string name = lower(fields.need("encoding"));
+  if (name == "raw") return Encoding::raw;
+  if (name == "gzip" || name == "gz") return Encoding::gzip;
+  if (name == "text" || name == "txt" || name == "ascii") return Encoding::text;
+  header_error(fields.path(), fmt::format("encoding '{}' is not supported; raw, gzip and text are",
+                                          name.substr(0, 60)));
+}
+
+std::vector<std::string> read_data_paths(const Fields& fields) {
+  const auto data = fields.find("datafile");
+  if (!data) return {fields.path()};
+  if (data->starts_with("LIST") && (data->size() == 4 || (*data)[4] == ' ')) {
+    std::vector<std::string> paths;
+    for (const auto name : fields.list()) paths.push_back(resolve_data_file(fields.path(), name));
+    if (paths.empty()) header_error(fields.path(), "the list of data files is empty");
+    return paths;
+  }
+  if (data->find('%') != std::string_view::npos) return resolve_data_pattern(fields.path(), *data);
+  return {resolve_data_file(fields.path(), *data)};
+}
+
+void read_layout(const Fields& fields, TextHeader& header) {
   const std::string type = lower(fields.need("type"));
   if (const auto known = parse_type(type))
     header.type = *known;
   else
     header_error(fields.path(),
                  fmt::format("samples of type '{}' are not supported", type.substr(0, 60)));
-  const std::string encoding = lower(fields.need("encoding"));
-  if (encoding != "raw")
-    header_error(fields.path(),
-                 fmt::format("encoding '{}' is not supported, only 'raw'", encoding.substr(0, 60)));
+  header.encoding = read_encoding(fields);
   if (const auto endian = fields.find("endian")) {
     const std::string order = lower(*endian);
     if (order != "little" && order != "big")
       header_error(fields.path(), "'endian' is neither little nor big");
     header.order = order == "big" ? ByteOrder::big : ByteOrder::little;
   }
-  const auto data = fields.find("datafile");
-  if (!data)
-    header_error(fields.path(),
-                 "the field 'data file' is missing; samples in the same file as "
-                 "the header are not supported");
-  header.data_path = resolve_data_file(fields.path(), *data);
+  header.data_paths = read_data_paths(fields);
+  if (header.attached()) header.data_begin = fields.size();
 }
 
-void read_skips(const Fields& fields, DetachedHeader& header) {
+void read_skips(const Fields& fields, TextHeader& header) {
   const auto number = [&](const char* name) {
     const auto text = fields.find(name);
     return text ? parse_integer(fields.path(), name, *text) : Index{0};
@@ -192,24 +261,27 @@ void read_skips(const Fields& fields, DetachedHeader& header) {
   header.skip_bytes = bytes > 0 ? static_cast<std::uint64_t>(bytes) : 0;
 }
 
-void read_spacings(const Fields& fields, const Axes& axes, Transform& transform) {
+void read_spacings(const Fields& fields, std::size_t dimension, const ArrayView& view,
+                   Transform& transform) {
   const auto text = fields.find("spacings");
   if (!text) return;
-  const auto words = per_axis(fields, axes, "spacings", split_words(*text));
+  const auto words = per_axis(fields, dimension, "spacings", split_words(*text));
   for (int i = 0; i < 3; ++i) {
     const double spacing =
-        parse_real(fields.path(), "spacings", words[axes.kept[static_cast<std::size_t>(i)]], true);
+        parse_real(fields.path(), "spacings", words[view.kept[static_cast<std::size_t>(i)]], true);
     if (spacing <= 0) header_error(fields.path(), "a spacing is not positive");
     if (!std::isnan(spacing)) transform.spacing[i] = spacing;  // NaN: not known
   }
 }
 
-void read_directions(const Fields& fields, const Axes& axes, Transform& transform) {
+void read_directions(const Fields& fields, std::size_t dimension, const ArrayView& view,
+                     Transform& transform) {
   if (const auto text = fields.find("spacedirections")) {
-    const auto entries = per_axis(fields, axes, "space directions", split_entries(fields, *text));
+    const auto entries =
+        per_axis(fields, dimension, "space directions", split_entries(fields, *text));
     Vec3d steps[3];
     for (std::size_t i = 0; i < 3; ++i)
-      steps[i] = parse_vector(fields, "space directions", entries[axes.kept[i]]);
+      steps[i] = parse_vector(fields, "space directions", entries[view.kept[i]]);
     set_axes(fields.path(), transform, steps);
   }
   if (const auto text = fields.find("spaceorigin"))
@@ -231,18 +303,18 @@ std::string read_unit(const Fields& fields, const std::string& name, std::size_t
 
 }  // namespace
 
-DetachedHeader parse_nrrd_header(const std::string& path) {
+TextHeader parse_nrrd_header(const std::string& path, const Selection& selection) {
   const Fields fields(path);
-  DetachedHeader header;
+  TextHeader header;
   header.path = path;
-  const Axes axes = read_extent(fields, header);
+  const std::size_t dimension = read_view(fields, selection, header);
   read_layout(fields, header);
   read_skips(fields, header);
-  read_spacings(fields, axes, header.transform);
-  read_directions(fields, axes, header.transform);
+  read_spacings(fields, dimension, header.view, header.transform);
+  read_directions(fields, dimension, header.view, header.transform);
   header.transform.unit = read_unit(fields, "spaceunits", 3, {0, 1, 2});
   if (header.transform.unit.empty())
-    header.transform.unit = read_unit(fields, "units", axes.dimension, axes.kept);
+    header.transform.unit = read_unit(fields, "units", dimension, header.view.kept);
   return header;
 }
 

@@ -2,12 +2,13 @@
 
 #include <string>
 
-#include "isobrick/io/detached_header.h"
+#include "isobrick/io/text_header.h"
 
 namespace isobrick {
 
-/// Parses a NRRD header (NRRD0001 … NRRD0005) whose samples lie, uncompressed,
-/// in one file of their own. Comments and key/value pairs are skipped.
-DetachedHeader parse_nrrd_header(const std::string& path);
+/// Parses a NRRD header (NRRD0001 … NRRD0005), attached to its samples or not,
+/// and selects one volume where there are several. Comments and key/value pairs
+/// are skipped.
+TextHeader parse_nrrd_header(const std::string& path, const Selection& selection);
 
 }  // namespace isobrick

@@ -24,10 +24,17 @@ class VolumeSource {
 
   virtual const VolumeInfo& info() const = 0;
 
-  /// True when boxes may be read in any order and from several threads at
-  /// once. Otherwise only whole planes [0,X)×[0,Y)×[z0,z1) with increasing z
-  /// may be asked for, each once, from one thread.
+  /// True when boxes may be read in any order, each as often as one likes.
+  /// Otherwise only whole planes [0,X)×[0,Y)×[z0,z1) with increasing z may be
+  /// asked for, each once, from one thread.
   virtual bool random_access() const = 0;
+
+  /// Of a source with random access: true when several threads may read at once.
+  virtual bool parallel() const { return random_access(); }
+
+  /// Bytes of memory that the source takes for itself at most, beside the
+  /// samples that it is asked for; budgets count them.
+  virtual std::size_t memory() const { return 0; }
 
   /// Copies the samples of `box` to `out`, C order [z, y, x], native byte
   /// order. `box` lies inside the extent; `out` has room for it.

@@ -187,7 +187,7 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
   if (options.index)
     check_index_options(index_options(options, false), layout.levels.front().lattice);
   const ConvertPlan plan(layout, options.memory, Workers(options.threads).threads(),
-                         source.random_access());
+                         source.random_access(), source.memory());
   ConvertStaging staging(out, options.resume, options.force);
   Workers workers(plan.threads());
   ConvertReport report = workers.execute(

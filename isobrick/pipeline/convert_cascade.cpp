@@ -11,7 +11,7 @@
 namespace isobrick {
 
 void read_box(VolumeSource& source, Box3 box, std::byte* out) {
-  if (!source.random_access()) return source.read(box, out);
+  if (!source.parallel()) return source.read(box, out);
   const Int3 e = box.extent();
   const std::size_t plane = static_cast<std::size_t>(e.x * e.y) * size_of(source.info().type);
   // Pieces of a few MiB: long enough for the disk, short enough to share out.
@@ -45,10 +45,10 @@ void Cascade::run(VolumeSource& source) {
         {{0, 0, z}, {first.lattice.extent.x, first.lattice.extent.y, z + first.capacity}},
         first.lattice.box());
   };
-  // Files are copied by all threads at once; a stream keeps one thread waiting,
-  // so that one fills a second slab meanwhile.
+  // Most files are copied by all threads at once; a stream keeps one thread
+  // waiting, so that one fills a second slab meanwhile.
   std::unique_ptr<std::byte[]> other;
-  if (!source.random_access() && second_slab_)
+  if (!source.parallel() && second_slab_)
     other = std::make_unique_for_overwrite<std::byte[]>(first.slab_bytes());
   Box3 box = slab_from(0);
   read_box(source, box, first.slab.get());

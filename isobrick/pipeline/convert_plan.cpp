@@ -74,8 +74,11 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
 }
 
 ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads,
-                         bool random_access)
-    : layout_(layout), threads_(threads), bricks_in_flight_(2 * threads + 2) {
+                         bool random_access, std::size_t source_bytes)
+    : layout_(layout),
+      source_bytes_(source_bytes),
+      threads_(threads),
+      bricks_in_flight_(2 * threads + 2) {
   const Lattice& lattice = layout.levels.front().lattice;
   slab_planes_ = lattice.brick.z % 2 == 0 ? lattice.brick.z : 2 * lattice.brick.z;
   const std::size_t samples = least_room(random_access);
@@ -95,7 +98,7 @@ ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int th
 
 std::size_t ConvertPlan::encoding_bytes() const {
   const std::size_t brick = layout_.levels.front().lattice.brick_bytes();
-  return kProgramBytes +
+  return kProgramBytes + source_bytes_ +
          static_cast<std::size_t>(threads_) *
              (2 * brick + encoder_memory(layout_.zstd_level, brick)) +
          static_cast<std::size_t>(bricks_in_flight_) * brick;

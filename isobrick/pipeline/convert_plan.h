@@ -22,8 +22,10 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
 /// smaller pieces and the next one through a temporary file.
 class ConvertPlan {
  public:
-  /// Throws UsageError naming the least budget when not even one piece fits.
-  ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads, bool random_access);
+  /// `source_bytes`: what the source takes for itself. Throws UsageError naming
+  /// the least budget when not even one piece fits.
+  ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads, bool random_access,
+              std::size_t source_bytes = 0);
 
   /// As many as asked for, or fewer where the budget is small for the bricks.
   int threads() const { return threads_; }
@@ -48,6 +50,7 @@ class ConvertPlan {
   std::size_t least_room(bool random_access) const;
 
   const StoreLayout& layout_;
+  std::size_t source_bytes_;
   int threads_, bricks_in_flight_;
   Index slab_planes_;
   std::size_t room_ = 0;  ///< what the program itself and the encoders leave

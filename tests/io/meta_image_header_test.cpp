@@ -61,25 +61,23 @@ TEST_F(MetaImageHeader, Geometry) {
 }
 
 TEST_F(MetaImageHeader, RefusesWhatIsNotSupportedByName) {
-  EXPECT_TRUE(contains(refuse(plus("CompressedData = True\n")), "compressed"));
-  EXPECT_TRUE(contains(refuse(plus("ElementNumberOfChannels = 3\n")), "channels"));
-  EXPECT_TRUE(contains(refuse(with("= v.raw", "= LOCAL")), "LOCAL"));
-  EXPECT_TRUE(contains(refuse(with("= v.raw", "= LIST")), "LIST"));
-  EXPECT_TRUE(contains(refuse(with("= v.raw", "= v%02d.raw 1 9 1")), "several"));
-  EXPECT_TRUE(contains(refuse(with("NDims = 3", "NDims = 4")), "NDims"));
-  EXPECT_TRUE(contains(refuse(with("BinaryData = True", "BinaryData = False")), "text"));
+  EXPECT_TRUE(contains(refuse(plus("ElementNumberOfChannels = 3\n")), "3 channels"));
+  EXPECT_TRUE(contains(refuse(with("NDims = 3", "NDims = 2")), "NDims"));
+  EXPECT_TRUE(contains(refuse(with("NDims = 3", "NDims = 5")), "NDims"));
+  EXPECT_TRUE(contains(refuse(with("= v.raw", "= LIST")), "empty"));
   EXPECT_NO_THROW(parse(plus("CompressedData = False\nElementNumberOfChannels = 1\n")));
 }
 
 TEST_F(MetaImageHeader, RefusesToLeaveItsFolder) {
-  for (const char* name : {"/etc/passwd", "../v.raw", "a/../../v.raw"})
+  for (const char* name :
+       {"/etc/passwd", "../v.raw", "a/../../v.raw", "LIST\na.raw\n../b.raw", "../v%02d.raw 1 9 1"})
     EXPECT_TRUE(contains(refuse(with("v.raw", name)), "outside")) << name;
 }
 
 TEST_F(MetaImageHeader, HostileHeaders) {
   refuse("");
   refuse("no equals sign");
-  EXPECT_TRUE(contains(refuse(std::string(kPlain) + std::string("a\0b", 3)), "NUL"));
+  EXPECT_TRUE(contains(refuse(plus(std::string("a = \0\n", 6))), "NUL"));
   EXPECT_TRUE(contains(refuse(plus("DimSize = 1 1 1\n")), "twice"));
   EXPECT_TRUE(contains(refuse(with("DimSize = 7 5 4\n", "")), "'DimSize' is missing"));
   EXPECT_TRUE(contains(refuse(with("ElementType = MET_SHORT\n", "")), "'ElementType' is missing"));

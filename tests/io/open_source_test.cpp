@@ -17,8 +17,8 @@ std::string whole(ScalarType type, bool swapped = false) {
   return sample_bytes(type, {{0, 0, 0}, kExtent}, kExtent, swapped);
 }
 
-RawDescription describe(Int3 extent, ScalarType type) {
-  RawDescription said;
+VolumeRequest describe(Int3 extent, ScalarType type) {
+  VolumeRequest said;
   said.extent = extent;
   said.type = type;
   return said;
@@ -29,7 +29,7 @@ TEST(OpenSource, AllTypesAndBothByteOrders) {
   for (const ScalarType type : kScalarTypes)
     for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
       const auto path = dir.write("v.raw", whole(type, order == ByteOrder::big));
-      RawDescription said = describe(kExtent, type);
+      VolumeRequest said = describe(kExtent, type);
       said.order = order;
       const auto source = open_source(path, said);
       EXPECT_TRUE(source->random_access());
@@ -45,7 +45,7 @@ TEST(OpenSource, AllTypesAndBothByteOrders) {
 TEST(OpenSource, EveryBox) {
   const TempDir dir;
   const auto source =
-      open_source(dir.write("v_7x5x4_u16.raw", whole(ScalarType::u16)), RawDescription{});
+      open_source(dir.write("v_7x5x4_u16.raw", whole(ScalarType::u16)), VolumeRequest{});
   for_each_point({{0, 0, 0}, kExtent}, [&](Int3 lo) {
     for_each_point({lo + Int3{1, 1, 1}, kExtent + Int3{1, 1, 1}}, [&](Int3 hi) {
       source->will_need({lo, hi});
@@ -66,7 +66,7 @@ TEST(OpenSource, WideRowsAreReadOneByOne) {
 TEST(OpenSource, ThreadsReadAtOnce) {
   const TempDir dir;
   const auto source =
-      open_source(dir.write("v_7x5x4_f64.raw", whole(ScalarType::f64)), RawDescription{});
+      open_source(dir.write("v_7x5x4_f64.raw", whole(ScalarType::f64)), VolumeRequest{});
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t)
     threads.emplace_back([&, t] {
@@ -80,7 +80,7 @@ TEST(OpenSource, ThreadsReadAtOnce) {
 TEST(OpenSource, SkipsAnOffset) {
   const TempDir dir;
   const auto path = dir.write("v.raw", "12345" + whole(ScalarType::f32));
-  RawDescription said = describe(kExtent, ScalarType::f32);
+  VolumeRequest said = describe(kExtent, ScalarType::f32);
   said.offset = 5;
   EXPECT_EQ(read_box(*open_source(path, said), {{0, 0, 0}, kExtent}), whole(ScalarType::f32));
 }
@@ -96,7 +96,7 @@ TEST(OpenSource, SizeErrorsNameBothNumbersAndHelp) {
   EXPECT_TRUE(contains(message, "--offset 70")) << message;
   message = message_of([&] { open_source(path, describe({100, 100, 100}, ScalarType::u16)); });
   EXPECT_TRUE(contains(message, "280") && contains(message, "2000000")) << message;
-  RawDescription said = describe(kExtent, ScalarType::u16);
+  VolumeRequest said = describe(kExtent, ScalarType::u16);
   said.offset = ~std::uint64_t{0};
   message_of([&] { open_source(path, said); });
   said.offset = 1;
@@ -124,7 +124,7 @@ TEST(OpenSource, SaysWhatIsNotKnown) {
 
 TEST(OpenSource, RefusesWhatIsNoFile) {
   const TempDir dir;
-  const RawDescription said = describe(kExtent, ScalarType::u8);
+  const VolumeRequest said = describe(kExtent, ScalarType::u8);
   message_of<Error>([&] { open_source(dir / "missing.raw", said); });
   EXPECT_TRUE(contains(message_of([&] { open_source(dir / ".", said); }), "directory"));
   ASSERT_EQ(::mkfifo((dir / "pipe").c_str(), 0600), 0);
@@ -152,7 +152,7 @@ TEST(OpenSource, SaidBeforeHeaderBeforeName) {
   EXPECT_EQ(source->info().type, ScalarType::u16);
   EXPECT_EQ(source->info().transform.spacing, (Vec3d{1, 2, 3}));
 
-  RawDescription said;
+  VolumeRequest said;
   said.type = ScalarType::i16;
   said.spacing = Vec3d{4, 4, 4};
   said.origin = Vec3d{1, 0, 0};
@@ -187,7 +187,7 @@ TEST(OpenSource, ADamagedHeaderBesideMattersOnlyIfNeeded) {
 TEST(OpenSource, SpacingMustBePositive) {
   const TempDir dir;
   const auto path = dir.write("v_7x5x4_u8.raw", whole(ScalarType::u8));
-  RawDescription said;
+  VolumeRequest said;
   said.spacing = Vec3d{1, 0, 1};
   message_of([&] { open_source(path, said); });
 }

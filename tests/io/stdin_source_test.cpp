@@ -47,8 +47,8 @@ class StdinPipe {
   std::thread writer_;
 };
 
-RawDescription said_type(ScalarType type) {
-  RawDescription said;
+VolumeRequest said_type(ScalarType type) {
+  VolumeRequest said;
   said.extent = kExtent;
   said.type = type;
   return said;
@@ -68,7 +68,7 @@ TEST(StdinSource, PlanesInOrder) {
 TEST(StdinSource, OffsetByteOrderAndSkippedPlanes) {
   const StdinPipe pipe(std::string(100000, '!') +
                        sample_bytes(ScalarType::u16, kWhole, kExtent, true));
-  RawDescription said = said_type(ScalarType::u16);
+  VolumeRequest said = said_type(ScalarType::u16);
   said.offset = 100000;
   said.order = ByteOrder::big;
   const auto source = open_source("-", said);

@@ -1,4 +1,4 @@
-#include "isobrick/io/detached_header.h"
+#include "isobrick/io/text_header.h"
 
 #include <fmt/format.h>
 
@@ -25,28 +25,43 @@ constexpr std::string_view kBlanks = " \t\r";
 
 double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
+/// Axes that few digits left a little off right angles are put right, x first.
+void square(std::array<double, 9>& direction) {
+  Vec3d axes[3];
+  for (std::size_t i = 0; i < 9; ++i) axes[i % 3][static_cast<int>(i / 3)] = direction[i];
+  const auto off = [&](int a, int b) { return std::abs(dot(axes[a], axes[b])); };
+  if (std::max({off(0, 1), off(1, 2), off(2, 0)}) < 1e-6) return;
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < a; ++b) axes[a] = axes[a] - axes[b] * dot(axes[a], axes[b]);
+    axes[a] = axes[a] * (1 / std::sqrt(dot(axes[a], axes[a])));
+  }
+  for (std::size_t i = 0; i < 9; ++i) direction[i] = axes[i % 3][static_cast<int>(i / 3)];
+}
+
 }  // namespace
 
 void header_error(const std::string& path, const std::string& what) {
   throw UsageError(fmt::format("'{}': {}", path, what));
 }
 
-std::string read_header_text(const std::string& path) {
+HeaderLines::HeaderLines(const std::string& path) : path_(path) {
   const InputFile file = open_input(path);
-  if (file.size > kMostHeader)
-    header_error(path, fmt::format("the header is {} bytes long, more than the {} allowed",
-                                   file.size, kMostHeader));
-  std::string text(file.size, '\0');
-  read_at(file.fd.get(), path, 0, reinterpret_cast<std::byte*>(text.data()), text.size());
-  if (const std::size_t at = text.find('\0'); at != std::string::npos)
-    header_error(path, fmt::format("not a text header: it has a NUL byte at offset {}", at));
-  return text;
+  file_size_ = file.size;
+  text_.resize(static_cast<std::size_t>(std::min(file.size, kMostHeader)));
+  read_at(file.fd.get(), path, 0, reinterpret_cast<std::byte*>(text_.data()), text_.size());
+  rest_ = text_;
 }
 
-std::string_view next_line(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
-  std::string_view line = text.substr(0, end);
-  text.remove_prefix(std::min(end + 1, text.size()));
+std::string_view HeaderLines::next() {
+  const std::size_t end = std::min(rest_.find('\n'), rest_.size());
+  if (end == rest_.size() && text_.size() < file_size_)
+    header_error(path_, fmt::format("the header does not end within its first {} bytes (of {})",
+                                    kMostHeader, file_size_));
+  std::string_view line = rest_.substr(0, end);
+  if (const std::size_t at = line.find('\0'); at != std::string_view::npos)
+    header_error(path_,
+                 fmt::format("not a text header: it has a NUL byte at offset {}", position() + at));
+  rest_.remove_prefix(std::min(end + 1, rest_.size()));
   if (line.ends_with('\r')) line.remove_suffix(1);
   return line;
 }
@@ -96,15 +111,45 @@ double parse_real(const std::string& path, std::string_view field, std::string_v
 
 std::string resolve_data_file(const std::string& path, std::string_view name) {
   if (name.empty()) header_error(path, "the name of the data file is empty");
-  if (lower(split_words(name)[0]) == "list" || name.find('%') != std::string_view::npos)
-    header_error(path, fmt::format("samples spread over several files ({}) are not supported",
-                                   quoted(name)));
   const std::filesystem::path data(name);
   if (data.is_absolute() || std::find(data.begin(), data.end(), "..") != data.end())
     header_error(path, fmt::format("the data file {} is outside the header's folder; give the "
                                    "data file itself with its extent and type",
                                    quoted(name)));
   return (std::filesystem::path(path).parent_path() / data).string();
+}
+
+std::vector<std::string> resolve_data_pattern(const std::string& path, std::string_view text) {
+  constexpr Index kMostFiles = 1'000'000;
+  constexpr std::size_t kMostText = std::size_t{64} << 20;
+  const auto words = split_words(text);
+  if (words.size() != 3 && words.size() != 4)
+    header_error(path, fmt::format("{} is not 'PATTERN FIRST LAST [STEP]'", quoted(text)));
+  const auto number = [&](std::size_t i) { return parse_integer(path, "data file", words[i]); };
+  const Index first = number(1), last = number(2), step = words.size() == 4 ? number(3) : 1;
+  if (first < 0 || last < first || step < 1 || (last - first) / step >= kMostFiles ||
+      static_cast<std::size_t>((last - first) / step) * (path.size() + words[0].size()) > kMostText)
+    header_error(path, fmt::format("the numbers of {} make no sense", quoted(text)));
+  const std::string_view pattern = words[0];
+  const std::size_t percent = pattern.find('%');
+  const std::size_t end = pattern.find_first_not_of("0123456789", percent + 1);
+  const std::string_view width = pattern.substr(percent + 1, end - percent - 1);
+  if (end == std::string_view::npos || pattern[end] != 'd' ||
+      pattern.find('%', end) != std::string_view::npos || width.size() > 3)
+    header_error(path,
+                 fmt::format("{} is no pattern with one number such as %03d", quoted(pattern)));
+  const Index digits = width.empty() ? 0 : parse_integer(path, "data file", width);
+  std::vector<std::string> names;
+  for (Index i = first; i <= last; i += step) {
+    std::string text_of_number = std::to_string(i);
+    if (static_cast<Index>(text_of_number.size()) < digits)
+      text_of_number.insert(0, static_cast<std::size_t>(digits) - text_of_number.size(),
+                            width.starts_with('0') ? '0' : ' ');
+    names.push_back(resolve_data_file(path, std::string(pattern.substr(0, percent)) +
+                                                text_of_number +
+                                                std::string(pattern.substr(end + 1))));
+  }
+  return names;
 }
 
 void set_axes(const std::string& path, Transform& transform, const Vec3d (&axes)[3]) {
@@ -124,6 +169,7 @@ void set_axes(const std::string& path, Transform& transform, const Vec3d (&axes)
                                      "supported",
                                      a, b));
   }
+  square(transform.direction);
 }
 
 std::string unit_name(std::string_view unit) {

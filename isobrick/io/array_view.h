@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "isobrick/core/vec.h"
+
+namespace isobrick {
+
+/// Which of several volumes in one file is meant, counted from 0.
+struct Selection {
+  std::optional<Index> channel;
+  std::optional<Index> time;
+};
+
+/// What an axis of an array in a file stands for.
+enum class AxisRole : std::uint8_t { space, channel, time };
+
+struct ArrayAxis {
+  Index size = 0;
+  AxisRole role = AxisRole::space;
+};
+
+/// The volume that a selection leaves of an array of several dimensions.
+struct ArrayView {
+  Int3 extent;
+  Int3 stride;                               ///< samples from one to the next along x, y, z
+  Index first = 0;                           ///< its first sample
+  Index total = 0;                           ///< samples of the whole array
+  std::array<std::size_t, 3> kept{0, 1, 2};  ///< which axes are x, y, z
+
+  friend bool operator==(const ArrayView&, const ArrayView&) = default;
+};
+
+/// Selects a volume from an array whose fastest axis is the first of `axes`.
+/// Exactly three are space. Throws UsageError, beginning with `path`, for sizes
+/// that are not positive or overflow, for channels and times that must be chosen
+/// and were not, and for choices that are not there.
+ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes,
+                        const Selection& selection);
+
+/// The place on an axis of `count` channels or times that is chosen. `option` is
+/// "--channel" or "--time".
+Index choose(const std::string& path, const char* option, Index count, std::optional<Index> chosen);
+
+}  // namespace isobrick

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace isobrick {
+
+/// Bytes that come in order, from the first to the last, each once: a part of
+/// a file, what a compressed file unpacks to, standard input. One thread at a time.
+class ByteStream {
+ public:
+  virtual ~ByteStream() = default;
+
+  /// Copies up to `size` bytes to `out` and returns how many; fewer only at the
+  /// end. Throws Error or DamageError naming the file.
+  virtual std::size_t read(std::byte* out, std::size_t size) = 0;
+
+  /// What the bytes are, for messages: "'scan.nii.gz'", "standard input".
+  virtual std::string name() const = 0;
+
+  /// The most bytes that there can be: refuses headers that promise more before
+  /// anything is read. Unlimited where nothing is known.
+  virtual std::uint64_t most_bytes() const = 0;
+
+  /// Bytes of memory that the stream holds.
+  virtual std::size_t memory() const { return 0; }
+
+  /// Passes over `size` bytes; throws Error when there are fewer, and Cancelled
+  /// when an end is asked for meanwhile.
+  void skip(std::uint64_t size);
+
+  /// Fills `out`; throws Error when there are fewer bytes.
+  void read_exactly(std::byte* out, std::size_t size);
+};
+
+}  // namespace isobrick

@@ -1,0 +1,94 @@
+#include "isobrick/io/file_stream.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <limits>
+#include <utility>
+
+#include "isobrick/core/cancel.h"
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+class FileStream final : public ByteStream {
+ public:
+  FileStream(InputFile file, std::string path, std::uint64_t begin, std::uint64_t end)
+      : file_(std::move(file)), path_(std::move(path)), position_(begin), end_(end), begin_(begin) {
+    ::posix_fadvise(file_.fd.get(), static_cast<off_t>(begin), static_cast<off_t>(end - begin),
+                    POSIX_FADV_SEQUENTIAL);
+  }
+
+  std::size_t read(std::byte* out, std::size_t size) override {
+    size = static_cast<std::size_t>(std::min<std::uint64_t>(size, end_ - position_));
+    read_at(file_.fd.get(), path_, position_, out, size);
+    position_ += size;
+    return size;
+  }
+
+  std::string name() const override { return "'" + path_ + "'"; }
+  std::uint64_t most_bytes() const override { return end_ - begin_; }
+
+ private:
+  InputFile file_;
+  std::string path_;
+  std::uint64_t position_, end_, begin_;
+};
+
+class StdinStream final : public ByteStream {
+ public:
+  StdinStream() {
+    if (::isatty(STDIN_FILENO))
+      throw UsageError("standard input is a terminal; give a file or a pipe");
+  }
+
+  std::size_t read(std::byte* out, std::size_t size) override {
+    std::size_t done = 0;
+    while (done < size) {
+      const std::size_t piece = std::min(size - done, std::size_t{1} << 30);
+      wait();
+      const ssize_t got = ::read(STDIN_FILENO, out + done, piece);
+      if (got < 0 && errno == EINTR) continue;
+      if (got < 0)
+        throw system_error(fmt::format("read at offset {} of", position_), name(), errno);
+      if (got == 0) break;
+      done += static_cast<std::size_t>(got);
+      position_ += static_cast<std::uint64_t>(got);
+    }
+    return done;
+  }
+
+  std::string name() const override { return "standard input"; }
+  std::uint64_t most_bytes() const override { return std::numeric_limits<std::uint64_t>::max(); }
+
+ private:
+  /// Returns when a read would not block (or would fail). The signal that asks
+  /// for an end may reach another thread, so this one looks now and then.
+  static void wait() {
+    constexpr int milliseconds = 100;
+    for (int ready = 0; ready <= 0;) {
+      if (cancel_requested()) throw Cancelled("interrupted while reading standard input");
+      pollfd input{STDIN_FILENO, POLLIN, 0};
+      ready = ::poll(&input, 1, milliseconds);
+      if (ready < 0 && errno != EINTR) return;
+    }
+  }
+
+  std::uint64_t position_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<ByteStream> make_file_stream(InputFile file, std::string path, std::uint64_t begin,
+                                             std::uint64_t end) {
+  return std::make_unique<FileStream>(std::move(file), std::move(path), begin, end);
+}
+
+std::unique_ptr<ByteStream> make_stdin_stream() { return std::make_unique<StdinStream>(); }
+
+}  // namespace isobrick

@@ -1,0 +1,132 @@
+#include "isobrick/io/text_stream.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::size_t kBuffer = 65536;
+/// No number that anybody writes is longer.
+constexpr std::size_t kMostWord = 400;
+
+bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0'; }
+
+/// The value of a word, if it is a number that T holds.
+template <class T>
+bool parse(std::string_view word, T& value) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const char* const end = word.data() + word.size();
+  const auto [at, error] = std::from_chars(word.data(), end, value);
+  if (error == std::errc{} && at == end) return true;
+  if constexpr (std::is_floating_point_v<T>) {
+    // Numbers beyond the type's range are infinite or zero, as strtod has them.
+    double wide = 0;
+    const auto [last, failure] = std::from_chars(word.data(), end, wide);
+    value = static_cast<T>(wide);
+    return failure == std::errc{} && last == end;
+  } else {
+    double whole = 0;
+    const auto [last, failure] = std::from_chars(word.data(), end, whole);
+    if (failure != std::errc{} || last != end || std::trunc(whole) != whole ||
+        whole < static_cast<double>(std::numeric_limits<T>::min()) ||
+        whole > static_cast<double>(std::numeric_limits<T>::max()))
+      return false;
+    value = static_cast<T>(whole);
+    return true;
+  }
+}
+
+class TextStream final : public ByteStream {
+ public:
+  TextStream(std::unique_ptr<ByteStream> text, ScalarType type)
+      : text_(std::move(text)),
+        type_(type),
+        buffer_(std::make_unique_for_overwrite<char[]>(kBuffer)) {}
+
+  std::size_t read(std::byte* out, std::size_t size) override {
+    return visit_scalar(type_, [&](auto tag) {
+      using T = typename decltype(tag)::type;
+      std::size_t done = 0;
+      for (; done + sizeof(T) <= size; done += sizeof(T)) {
+        const std::string_view word = next_word();
+        if (word.empty()) break;
+        T value{};
+        if (!parse(word, value)) refuse(word);
+        std::memcpy(out + done, &value, sizeof(T));
+      }
+      return done;
+    });
+  }
+
+  std::string name() const override { return text_->name(); }
+  /// A number takes a digit and a blank, the last one no blank.
+  std::uint64_t most_bytes() const override {
+    const std::uint64_t text = text_->most_bytes(), numbers = text / 2 + text % 2;
+    return numbers > std::numeric_limits<std::uint64_t>::max() / size_of(type_)
+               ? std::numeric_limits<std::uint64_t>::max()
+               : numbers * size_of(type_);
+  }
+  std::size_t memory() const override { return text_->memory() + kBuffer; }
+
+ private:
+  /// The next number's text, or nothing at the end.
+  std::string_view next_word() {
+    for (;;) {
+      while (begin_ < end_ && is_blank(buffer_[begin_])) ++begin_;
+      std::size_t at = begin_;
+      while (at < end_ && !is_blank(buffer_[at])) ++at;
+      if (at < end_ || (ended_ && at > begin_)) {
+        const std::string_view word(&buffer_[begin_], at - begin_);
+        begin_ = at;
+        return word;
+      }
+      if (ended_) return {};
+      if (at - begin_ > kMostWord) refuse({&buffer_[begin_], at - begin_});
+      refill();
+    }
+  }
+
+  void refill() {
+    std::copy(&buffer_[begin_], &buffer_[0] + end_, &buffer_[0]);
+    consumed_ += begin_;
+    end_ -= begin_;
+    begin_ = 0;
+    const std::size_t room = kBuffer - end_;
+    const std::size_t got = text_->read(reinterpret_cast<std::byte*>(&buffer_[end_]), room);
+    ended_ = got < room;
+    end_ += got;
+  }
+
+  [[noreturn]] void refuse(std::string_view word) const {
+    std::string shown(word.substr(0, 40));
+    std::replace_if(
+        shown.begin(), shown.end(), [](char c) { return c < 0x20 || c >= 0x7f; }, '?');
+    throw Error(fmt::format("{}: '{}', before byte {} of its numbers, is no number of type {}",
+                            name(), shown, consumed_ + begin_, short_name(type_)));
+  }
+
+  std::unique_ptr<ByteStream> text_;
+  ScalarType type_;
+  std::unique_ptr<char[]> buffer_;
+  std::size_t begin_ = 0, end_ = 0;  ///< of what is in the buffer and was not parsed
+  std::uint64_t consumed_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, ScalarType type) {
+  return std::make_unique<TextStream>(std::move(text), type);
+}
+
+}  // namespace isobrick

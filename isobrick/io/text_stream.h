@@ -1,0 +1,15 @@
+#pragma once
+
+#include <memory>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/io/byte_stream.h"
+
+namespace isobrick {
+
+/// Samples of `type` in native byte order, from numbers in a text that blanks
+/// or line ends separate. Throws Error, with the position, for words that are no
+/// number of the type. Whole numbers may be written with a fraction of zeros.
+std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, ScalarType type);
+
+}  // namespace isobrick

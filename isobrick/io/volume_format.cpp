@@ -1,0 +1,59 @@
+#include "isobrick/io/volume_format.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "isobrick/io/file.h"
+#include "isobrick/io/text_header.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::size_t kHeadBytes = 4096;
+
+std::string read_head(const std::string& path) {
+  const InputFile file = open_input(path);
+  std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size, kHeadBytes)), '\0');
+  read_at(file.fd.get(), path, 0, reinterpret_cast<std::byte*>(head.data()), head.size());
+  return head;
+}
+
+/// A MetaImage begins with one of the keys that its writers put first.
+bool is_meta_image(std::string_view head) {
+  const std::size_t equals = head.find('=');
+  if (equals == std::string_view::npos || equals > 64) return false;
+  const std::string key = lower(trim(head.substr(0, equals)));
+  return key == "objecttype" || key == "ndims" || key == "comment";
+}
+
+std::optional<VolumeFormat> by_content(std::string_view head) {
+  if (head.starts_with("NRRD000")) return VolumeFormat::nrrd;
+  if (is_meta_image(head)) return VolumeFormat::meta_image;
+  return std::nullopt;
+}
+
+VolumeFormat by_extension(const std::string& path) {
+  constexpr std::pair<std::string_view, VolumeFormat> extensions[] = {
+      {".nhdr", VolumeFormat::nrrd},
+      {".nrrd", VolumeFormat::nrrd},
+      {".mhd", VolumeFormat::meta_image},
+      {".mha", VolumeFormat::meta_image},
+  };
+  const std::string extension = lower(std::filesystem::path(path).extension().string());
+  for (const auto& [known, format] : extensions)
+    if (extension == known) return format;
+  return VolumeFormat::raw;
+}
+
+}  // namespace
+
+VolumeFormat recognise_format(const std::string& path) {
+  const std::string head = read_head(path);
+  return by_content(head).value_or(by_extension(path));
+}
+
+}  // namespace isobrick

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "isobrick/io/array_view.h"
+#include "isobrick/io/volume_source.h"
+
+namespace isobrick {
+
+enum class ByteOrder : std::uint8_t { little, big };
+
+/// What the caller says about a volume. The first four are for raw files, where
+/// they go before what a header beside the file or its name says; the others
+/// are for all formats and go before what the file says.
+struct VolumeRequest {
+  std::optional<Int3> extent;
+  std::optional<ScalarType> type;
+  std::optional<ByteOrder> order;
+  std::optional<std::uint64_t> offset;  ///< bytes before the first sample
+  std::optional<Vec3d> spacing;
+  std::optional<Vec3d> origin;
+  std::optional<std::string> unit;
+  Selection selection;
+};
+
+/// What a file and the caller together say of a volume. Throws UsageError for
+/// extents and geometry that make no sense.
+VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
+                           Transform transform, const VolumeRequest& said);
+
+/// Throws UsageError when the caller describes raw samples although the file, a
+/// `format` ("a NIfTI file"), describes itself.
+void refuse_raw_description(const std::string& path, std::string_view format,
+                            const VolumeRequest& said);
+
+/// Throws UsageError for a channel or a time that a file with one of each lacks.
+void refuse_selection(const std::string& path, const VolumeRequest& said);
+
+}  // namespace isobrick
