@@ -14,9 +14,9 @@ namespace {
 
 class StreamSource final : public VolumeSource {
  public:
-  StreamSource(SampleLayout layout, std::unique_ptr<ByteStream> stream,
-               std::optional<std::uint64_t> end)
-      : layout_(std::move(layout)), stream_(std::move(stream)), end_(end) {
+  StreamSource(SampleLayout layout, std::unique_ptr<ByteStream> stream, std::uint64_t end,
+               AfterEnd after_end)
+      : layout_(std::move(layout)), stream_(std::move(stream)), end_(end), after_end_(after_end) {
     if (stream_->most_bytes() < layout_.end())
       throw UsageError(
           fmt::format("{} can hold at most {} bytes of samples, but its header "
@@ -48,27 +48,27 @@ class StreamSource final : public VolumeSource {
     position_ += got;
     if (got < size)
       throw UsageError(fmt::format("{} ended after {} bytes, {} were expected", stream_->name(),
-                                   position_, end_.value_or(layout_.end())));
+                                   position_, end_));
   }
 
   /// Where the last sample is (nearly) the last byte, the stream must end: that
   /// is also where its checksums are compared.
   void expect_end() {
     constexpr std::uint64_t most = 1 << 20;
-    if (!end_ || *end_ - position_ > most) return;
-    stream_->skip(*end_ - position_);
+    if (end_ - position_ > most) return;
+    stream_->skip(end_ - position_);
     // Counted only so far: the rest of an endless stream would never be.
     std::vector<std::byte> rest(most);
     const std::size_t extra = stream_->read(rest.data(), most);
-    if (extra > 0)
+    if (extra > 0 && after_end_ == AfterEnd::refused)
       throw UsageError(fmt::format("{} goes on after the {} bytes expected: {}{} more",
-                                   stream_->name(), *end_, extra == most ? "at least " : "",
-                                   extra));
+                                   stream_->name(), end_, extra == most ? "at least " : "", extra));
   }
 
   SampleLayout layout_;
   std::unique_ptr<ByteStream> stream_;
-  std::optional<std::uint64_t> end_;
+  std::uint64_t end_;
+  AfterEnd after_end_;
   std::uint64_t position_ = 0;
   Index next_plane_ = 0;
 };
@@ -77,8 +77,8 @@ class StreamSource final : public VolumeSource {
 
 std::unique_ptr<VolumeSource> make_stream_source(SampleLayout layout,
                                                  std::unique_ptr<ByteStream> stream,
-                                                 std::optional<std::uint64_t> end) {
-  return std::make_unique<StreamSource>(std::move(layout), std::move(stream), end);
+                                                 std::uint64_t end, AfterEnd after_end) {
+  return std::make_unique<StreamSource>(std::move(layout), std::move(stream), end, after_end);
 }
 
 }  // namespace isobrick

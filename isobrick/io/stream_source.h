@@ -2,18 +2,22 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 
 #include "isobrick/io/byte_stream.h"
 #include "isobrick/io/sample_layout.h"
 
 namespace isobrick {
 
-/// Reads planes from a stream. `end` is where the stream must end, if that is
-/// known and matters: bytes left over are an error then, found when the last
-/// plane is read. Throws UsageError when the stream cannot have enough bytes.
+/// What becomes of bytes that follow the samples.
+enum class AfterEnd : unsigned char { refused, ignored };
+
+/// Reads planes from a stream. `end` is where its samples end, also those that
+/// are not of this volume; where that is near the last one read, checksums at the
+/// end of the stream are compared and bytes left over are found. Throws
+/// UsageError when the stream cannot have enough bytes.
 std::unique_ptr<VolumeSource> make_stream_source(SampleLayout layout,
                                                  std::unique_ptr<ByteStream> stream,
-                                                 std::optional<std::uint64_t> end);
+                                                 std::uint64_t end,
+                                                 AfterEnd after_end = AfterEnd::refused);
 
 }  // namespace isobrick

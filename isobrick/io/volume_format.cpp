@@ -1,13 +1,17 @@
 #include "isobrick/io/volume_format.h"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 
+#include "isobrick/core/error.h"
 #include "isobrick/io/file.h"
+#include "isobrick/io/file_stream.h"
+#include "isobrick/io/inflate_stream.h"
+#include "isobrick/io/nifti_header.h"
 #include "isobrick/io/text_header.h"
 
 namespace isobrick {
@@ -30,19 +34,41 @@ bool is_meta_image(std::string_view head) {
   return key == "objecttype" || key == "ndims" || key == "comment";
 }
 
-std::optional<VolumeFormat> by_content(std::string_view head) {
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return {reinterpret_cast<const std::byte*>(text.data()), text.size()};
+}
+
+/// The beginning of what a compressed file unpacks to; empty when it is damaged.
+std::string unpack_head(const std::string& path) {
+  InputFile file = open_input(path);
+  const std::uint64_t size = file.size;
+  std::string head(kHeadBytes, '\0');
+  try {
+    const auto stream =
+        make_inflate_stream(make_file_stream(std::move(file), path, 0, size), Wrapper::gzip);
+    head.resize(stream->read(reinterpret_cast<std::byte*>(head.data()), head.size()));
+    return head;
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+std::optional<VolumeFormat> by_content(const std::string& path, std::string_view head) {
   if (head.starts_with("NRRD000")) return VolumeFormat::nrrd;
   if (is_meta_image(head)) return VolumeFormat::meta_image;
+  if (is_nifti(bytes_of(head))) return VolumeFormat::nifti;
+  if (head.starts_with("\x1f\x8b") && is_nifti(bytes_of(unpack_head(path))))
+    return VolumeFormat::nifti;
   return std::nullopt;
 }
 
 VolumeFormat by_extension(const std::string& path) {
   constexpr std::pair<std::string_view, VolumeFormat> extensions[] = {
-      {".nhdr", VolumeFormat::nrrd},
-      {".nrrd", VolumeFormat::nrrd},
-      {".mhd", VolumeFormat::meta_image},
-      {".mha", VolumeFormat::meta_image},
+      {".nhdr", VolumeFormat::nrrd},      {".nrrd", VolumeFormat::nrrd},
+      {".mhd", VolumeFormat::meta_image}, {".mha", VolumeFormat::meta_image},
+      {".nii", VolumeFormat::nifti},      {".hdr", VolumeFormat::nifti},
   };
+  if (lower(path).ends_with(".nii.gz")) return VolumeFormat::nifti;
   const std::string extension = lower(std::filesystem::path(path).extension().string());
   for (const auto& [known, format] : extensions)
     if (extension == known) return format;
@@ -53,7 +79,7 @@ VolumeFormat by_extension(const std::string& path) {
 
 VolumeFormat recognise_format(const std::string& path) {
   const std::string head = read_head(path);
-  return by_content(head).value_or(by_extension(path));
+  return by_content(path, head).value_or(by_extension(path));
 }
 
 }  // namespace isobrick

@@ -9,6 +9,7 @@ enum class VolumeFormat : std::uint8_t {
   raw,  ///< and whatever is not recognised
   nrrd,
   meta_image,
+  nifti,
 };
 
 /// The format of a file: by its first bytes, else by its extension. Throws Error
