@@ -82,11 +82,11 @@ void FileWriter::fail(int errno_value) const {
   throw system_error(fmt::format("write after {} bytes to", written_), path_, errno_value);
 }
 
-void FileWriter::append_file(FileWriter& other) {
+void FileWriter::append_range(FileWriter& other, std::uint64_t offset, std::uint64_t size) {
   flush();
   other.flush();
-  off_t from = 0;
-  const auto end = static_cast<off_t>(other.written_);
+  auto from = static_cast<off_t>(offset);
+  const auto end = static_cast<off_t>(offset + size);
   while (from < end) {
     const ssize_t moved =
         ::copy_file_range(other.fd_.get(), &from, fd_.get(), nullptr,
@@ -117,6 +117,17 @@ void FileWriter::patch(std::uint64_t offset, std::string_view bytes) {
     offset += static_cast<std::uint64_t>(put);
     bytes.remove_prefix(static_cast<std::size_t>(put));
   }
+}
+
+void FileWriter::read_back(std::uint64_t offset, std::span<std::byte> bytes) {
+  flush();
+  read_at(fd_.get(), path_, offset, bytes.data(), bytes.size());
+}
+
+void FileWriter::restart() {
+  used_ = 0;
+  written_ = 0;
+  if (::ftruncate(fd_.get(), 0) != 0 || ::lseek(fd_.get(), 0, SEEK_SET) != 0) fail(errno);
 }
 
 UniqueFd FileWriter::share() const {

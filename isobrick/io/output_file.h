@@ -24,10 +24,16 @@ class FileWriter {
   void append(std::span<const std::byte> bytes);
   void append(std::string_view text) { append(std::as_bytes(std::span(text))); }
   /// Appends all that `other` has taken so far, moved by the kernel where it can.
-  void append_file(FileWriter& other);
+  void append_file(FileWriter& other) { append_range(other, 0, other.size()); }
+  /// Appends `size` bytes of `other` from `offset` on; they are there already.
+  void append_range(FileWriter& other, std::uint64_t offset, std::uint64_t size);
 
   /// Replaces bytes that were appended before.
   void patch(std::uint64_t offset, std::string_view bytes);
+  /// Reads back bytes that were appended before; the file is open for reading, too.
+  void read_back(std::uint64_t offset, std::span<std::byte> bytes);
+  /// Forgets everything: the next byte is the first.
+  void restart();
   void flush();
 
   /// Another descriptor of the same file, for who writes at places instead of

@@ -8,27 +8,15 @@
 #include <limits>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/vertex_rows.h"
 
 namespace isobrick {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "samples are written as they lie");
-static_assert(sizeof(Vec3f) == 12 && sizeof(Triangle) == 12);
+static_assert(sizeof(Triangle) == 12);
 
 constexpr std::size_t kFaceBytes = 13;
-
-void append_vertices(FileWriter& out, const MeshChunk& chunk) {
-  constexpr std::size_t batch = FileWriter::kBuffer / (2 * sizeof(Vec3f));
-  for (std::size_t first = 0; first < chunk.positions.size(); first += batch) {
-    const std::size_t count = std::min(batch, chunk.positions.size() - first);
-    std::byte* to = out.reserve(count * 2 * sizeof(Vec3f));
-    for (std::size_t i = first; i < first + count; ++i, to += 2 * sizeof(Vec3f)) {
-      std::memcpy(to, &chunk.positions[i], sizeof(Vec3f));
-      std::memcpy(to + sizeof(Vec3f), &chunk.normals[i], sizeof(Vec3f));
-    }
-    out.commit(count * 2 * sizeof(Vec3f));
-  }
-}
 
 void append_faces(FileWriter& out, std::span<const Triangle> triangles) {
   constexpr std::size_t batch = FileWriter::kBuffer / kFaceBytes;
@@ -77,10 +65,7 @@ void PlySink::write(const MeshChunk& chunk) {
         fmt::format("'{}': the mesh has more than 4294967295 vertices, which PLY cannot "
                     "number; write STL instead or extract parts with --roi",
                     out_.path()));
-  if (has_normals_)
-    append_vertices(out_.writer(), chunk);
-  else
-    out_.writer().append(std::as_bytes(chunk.positions));
+  append_rows(out_.writer(), chunk);
   append_faces(faces_, chunk.triangles);
 }
 

@@ -55,6 +55,8 @@ class MeshSink {
   virtual void finish() = 0;
   /// Bytes written so far.
   virtual std::uint64_t bytes() const = 0;
+  /// Bytes that it holds at most, beyond a few buffers of FileWriter::kBuffer.
+  virtual std::uint64_t memory() const { return 0; }
 };
 
 }  // namespace isobrick

@@ -6,8 +6,11 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
+#include "isobrick/io/glb_sink.h"
+#include "isobrick/io/obj_sink.h"
 #include "isobrick/io/ply_sink.h"
 #include "isobrick/io/stl_sink.h"
+#include "isobrick/io/vtp_sink.h"
 #include "temp_dir.h"
 #include "test_meshes.h"
 
@@ -133,6 +136,15 @@ TEST(OutputFile, AFullDiskIsReportedAndLeavesNothing) {
   EXPECT_EQ(with_full_disk([&] { return write_until_full<StlSink>(dir / "a.stl", 100); }), 0);
   // Vertices and faces fit, but not both: fails while they are joined.
   EXPECT_EQ(with_full_disk([&] { return write_until_full<PlySink>(dir / "b.ply", 9); }), 0);
+  for (const int chunks : {4, 100}) {
+    EXPECT_EQ(with_full_disk([&] { return write_until_full<ObjSink>(dir / "a.obj", chunks); }), 0);
+    EXPECT_EQ(with_full_disk([&] { return write_until_full<GlbSink>(dir / "a.glb", 3 * chunks); }),
+              0);
+    EXPECT_EQ(with_full_disk([&] { return write_until_full<VtpSink>(dir / "a.vtp", 3 * chunks); }),
+              0);
+    EXPECT_EQ(
+        with_full_disk([&] { return write_until_full<PvtpSink>(dir / "a.pvtp", 3 * chunks); }), 0);
+  }
   EXPECT_EQ(dir.list(), Names{});
 }
 

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isobrick/core/vec.h"
+#include "isobrick/io/output_file.h"
+
+namespace isobrick {
+
+/// Smallest and largest of what was included, axis by axis.
+struct Bounds3f {
+  Vec3f lo, hi;
+  bool empty = true;
+
+  void include(std::span<const Vec3f> positions);
+  void include(const Bounds3f& other);
+};
+
+/// How a glTF file holds vertices: rows of float, or of 16 bits on a grid.
+struct GlbVertices {
+  bool normals = false, quantized = false;
+  Vec3d origin;     ///< of the grid, world units
+  double step = 1;  ///< of the grid, the same along all axes, so that normals stay right
+
+  /// The grid that covers `bounds`.
+  void set_grid(const Bounds3f& bounds);
+  std::size_t row_bytes() const;
+  /// A position as stored; whole numbers on a grid.
+  Vec3f stored(Vec3f position) const;
+  Bounds3f stored(const Bounds3f& bounds) const;
+  /// Appends rows of float x y z [nx ny nz], at most FileWriter::kBuffer bytes, in
+  /// this form. Returns the bounds of their positions as stored.
+  Bounds3f append(FileWriter& out, std::span<const std::byte> rows) const;
+};
+
+/// One primitive: vertices, then triangles of UInt32, in a buffer of its own.
+struct GlbPrimitive {
+  std::uint64_t vertices = 0, triangles = 0;
+  Bounds3f bounds;  ///< of the positions as stored
+  std::string uri;  ///< of its buffer; empty: the file's own
+  std::uint64_t vertex_bytes = 0;
+  std::uint64_t bytes() const { return vertex_bytes + triangles * 3 * sizeof(std::uint32_t); }
+};
+
+/// The scene's JSON.
+std::string glb_json(const GlbVertices& vertices, std::span<const GlbPrimitive> primitives);
+
+/// What precedes the buffer: the file's header, the JSON padded to a multiple of
+/// four, and the header of the buffer unless that is empty.
+std::string glb_start(std::string json, std::uint64_t buffer_bytes);
+
+/// `text` as it may stand in a URI.
+std::string percent_encoded(std::string_view text);
+
+}  // namespace isobrick

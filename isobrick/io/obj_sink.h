@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <tbb/task_arena.h>
+
+#include "isobrick/io/output_file.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// Writes a welded mesh as Wavefront OBJ: `v x y z` [`vn x y z`] for each vertex,
+/// then `f a b c` (`f a//a b//b c//c` with normals), numbers from 1 on. Decimals
+/// are the shortest that read back as the same float. Text is made by `threads`
+/// threads, 0 for all cores; the file never depends on them.
+class ObjSink final : public MeshSink {
+ public:
+  /// See OutputFile for what `path` and `force` may throw.
+  ObjSink(std::string path, bool force, int threads = 0);
+
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader& header) override;
+  void write(const MeshChunk& chunk) override;
+  void finish() override;
+  std::uint64_t bytes() const override { return out_.writer().size() + faces_.size(); }
+  std::uint64_t memory() const override;
+
+ private:
+  OutputFile out_;    ///< vertices; the faces at the end
+  FileWriter faces_;  ///< text as well; waits until all vertices are written
+  tbb::task_arena arena_;
+};
+
+}  // namespace isobrick

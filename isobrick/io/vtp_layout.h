@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "isobrick/io/output_file.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// A VTK PolyData file (.vtp) of one piece: XML, then the arrays appended raw,
+/// little endian, each behind its length in bytes as UInt64: points, normals,
+/// connectivity, offsets.
+struct VtpLayout {
+  MeshSize size;
+  bool normals = false;
+
+  /// Numbers are Int32 where they fit, as VTK holds them, and Int64 otherwise.
+  bool wide() const;
+  /// All that comes before the points; its length does not depend on the sizes.
+  std::string header() const;
+  std::uint64_t point_bytes() const { return size.vertices * sizeof(Vec3f); }
+  std::uint64_t connectivity_bytes() const;
+  std::uint64_t offset_bytes() const;
+};
+
+/// The length that precedes an array.
+void append_length(FileWriter& out, std::uint64_t bytes);
+
+/// Appends vertex numbers as the layout's type.
+void append_connectivity(FileWriter& out, const VtpLayout& layout,
+                         std::span<const Triangle> triangles);
+
+/// Appends the array of offsets with its length, and the end of the file.
+void append_vtp_end(FileWriter& out, const VtpLayout& layout);
+
+}  // namespace isobrick

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace isobrick {
+
+/// Whether XML can hold the text: UTF-8 without control characters.
+bool is_xml_text(std::string_view text);
+
+/// For an attribute's value between double quotes.
+std::string xml_escaped(std::string_view text);
+
+}  // namespace isobrick
