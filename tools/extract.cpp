@@ -26,6 +26,8 @@ struct Arguments {
   std::string store;
   std::vector<double> isovalues;
   std::string output, preview;
+  std::optional<MeshFormat> format;  ///< of the output; nothing: by its name
+  bool quantize = false;
   PreviewOptions picture;
   int level = 0;
   std::optional<RoiText> roi;
@@ -39,6 +41,7 @@ struct Arguments {
 /// One isosurface to make and where it goes (empty: nowhere).
 struct Surface {
   ExtractOptions options;
+  MeshForm form;
   fs::path output, preview;
 };
 
@@ -48,8 +51,17 @@ fs::path named(const std::string& path, const Arguments& arguments, double isova
   return with_isovalue(path, isovalue);
 }
 
-MeshFormat format_of(const Surface& surface) {
-  return surface.output.empty() ? MeshFormat::ply : mesh_format(surface.output);
+/// How the mesh is written, or would be if it had a name.
+MeshForm form_of(const Arguments& arguments) {
+  MeshForm form{.normals = arguments.normals, .quantize = arguments.quantize};
+  if (arguments.format)
+    form.format = *arguments.format;
+  else if (!arguments.output.empty())
+    form.format = mesh_format(arguments.output);
+  if (form.quantize && form.format != MeshFormat::glb)
+    throw UsageError(
+        fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  return form;
 }
 
 /// What the picture may take of the memory, so that the extraction keeps most.
@@ -83,7 +95,7 @@ void check_names(const Arguments& arguments) {
 void check(const Arguments& arguments) {
   if (arguments.output.empty() && arguments.preview.empty() && !arguments.estimate)
     throw UsageError("nothing to do: give -o MESH, --preview PNG or --estimate");
-  if (!arguments.output.empty()) mesh_format(arguments.output);
+  form_of(arguments);
   std::vector<double> sorted = arguments.isovalues;
   std::sort(sorted.begin(), sorted.end());
   const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
@@ -101,10 +113,11 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   options.memory = arguments.memory;
   options.threads = arguments.threads;
   options.index = arguments.index;
+  const MeshForm form = form_of(arguments);
   std::vector<Surface> surfaces;
   for (const double isovalue : arguments.isovalues) {
     options.isovalue = isovalue;
-    surfaces.push_back({options, named(arguments.output, arguments, isovalue),
+    surfaces.push_back({options, form, named(arguments.output, arguments, isovalue),
                         named(arguments.preview, arguments, isovalue)});
   }
   return surfaces;
@@ -118,7 +131,7 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<Surface>& surfaces, co
     if (surface.output.empty()) continue;
     PlannedMesh mesh = size_of(surface.options);
     mesh.path = surface.output;
-    mesh.normals = surface.options.normals;
+    mesh.form = surface.form;
     meshes.push_back(std::move(mesh));
   }
   return meshes;
@@ -151,18 +164,17 @@ ordered_json estimate_json(const Surface& surface, const ExtractEstimate& e) {
           {"triangles", e.mesh.triangles},
           {"vertices", e.mesh.vertices},
           {"uncertainty", e.uncertainty},
-          {"file_bytes", predict_bytes(format_of(surface), surface.options.normals, e.mesh).file},
+          {"file_bytes", predict_bytes(surface.form, e.mesh).file},
           {"memory_bytes", e.memory}};
 }
 
 std::string estimate_text(const Surface& surface, const ExtractEstimate& e) {
-  const MeshFormat format = format_of(surface);
   return fmt::format(
       "isovalue {}: about {} triangles and {} vertices (± {:.0f} %), {} as {}; {} of {} bricks "
       "active, {} of memory\n",
       surface.options.isovalue, human_count(e.mesh.triangles), human_count(e.mesh.vertices),
-      100 * e.uncertainty, human_bytes(predict_bytes(format, surface.options.normals, e.mesh).file),
-      format == MeshFormat::ply ? "PLY" : "STL", human_count(e.active.active_bricks),
+      100 * e.uncertainty, human_bytes(predict_bytes(surface.form, e.mesh).file),
+      name_of(surface.form.format), human_count(e.active.active_bricks),
       human_count(e.active.bricks), human_bytes(e.memory));
 }
 
@@ -219,7 +231,8 @@ std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Argume
   std::vector<Sinks> sinks;
   for (const Surface& surface : surfaces) {
     Sinks& of_surface = sinks.emplace_back();
-    if (!surface.output.empty()) of_surface.mesh = open_mesh(surface.output, force);
+    if (!surface.output.empty())
+      of_surface.mesh = open_mesh(surface.output, surface.form, force, arguments.threads);
     if (!surface.preview.empty())
       of_surface.preview =
           std::make_unique<PreviewSink>(surface.preview.string(), force, arguments.picture);
@@ -268,7 +281,7 @@ Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
   Said said;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ExtractReport report = make(surfaces[i], sinks[i], arguments, store, console);
-    const std::uint64_t bytes = sinks[i].mesh ? fs::file_size(surfaces[i].output) : 0;
+    const std::uint64_t bytes = sinks[i].mesh ? mesh_bytes(surfaces[i].output) : 0;
     said.objects.push_back(report_json(surfaces[i], report, bytes));
     said.text += report_text(surfaces[i], report, bytes);
     sinks[i] = {};
@@ -329,8 +342,13 @@ void add_extract(Program& program) {
       });
   add_text(app,
            {"-o,--output", "MESH",
-            "Mesh to write, .ply or .stl; several isovalues make head_500.ply and so on"},
+            "Mesh to write, .ply, .stl, .obj, .glb, .vtp or .pvtp; several isovalues make "
+            "head_500.ply and so on"},
            [&output = arguments->output](const std::string& text) { output = text; });
+  add_parsed(app, arguments->format, parse_mesh_format,
+             {"--format", "ply|stl|obj|glb|vtp|pvtp", "Format of the mesh", "by its extension"});
+  add_flag(app, "--quantize", arguments->quantize,
+           "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
   add_preview_options(app, *arguments);
   add_flag(app, "--estimate", arguments->estimate,
            "Write nothing; predict triangles, vertices, bytes and memory");

@@ -2,26 +2,77 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 #include "isobrick/core/error.h"
+#include "isobrick/io/glb_sink.h"
+#include "isobrick/io/obj_sink.h"
 #include "isobrick/io/ply_sink.h"
 #include "isobrick/io/stl_sink.h"
+#include "isobrick/io/vtp_sink.h"
 #include "tools/format.h"
 
 namespace isobrick::tools {
+namespace {
 
 namespace fs = std::filesystem;
 
-MeshFormat mesh_format(const fs::path& path) {
-  const std::string extension = extension_of(path);
-  if (extension == ".ply") return MeshFormat::ply;
-  if (extension == ".stl") return MeshFormat::stl;
-  throw UsageError(
-      fmt::format("'{}' is no mesh that can be written; name it .ply or .stl", path.string()));
+struct NamedFormat {
+  MeshFormat format;
+  std::string_view word, name;
+};
+
+constexpr std::array<NamedFormat, 6> kFormats{{{MeshFormat::ply, "ply", "PLY"},
+                                               {MeshFormat::stl, "stl", "STL"},
+                                               {MeshFormat::obj, "obj", "OBJ"},
+                                               {MeshFormat::glb, "glb", "GLB"},
+                                               {MeshFormat::vtp, "vtp", "VTP"},
+                                               {MeshFormat::pvtp, "pvtp", "PVTP"}}};
+
+}  // namespace
+
+std::string_view name_of(MeshFormat format) {
+  return kFormats[static_cast<std::size_t>(format)].name;
 }
 
-std::unique_ptr<MeshSink> open_mesh(const fs::path& path, bool force) {
-  if (mesh_format(path) == MeshFormat::ply) return std::make_unique<PlySink>(path.string(), force);
-  return std::make_unique<StlSink>(path.string(), force);
+MeshFormat mesh_format(const fs::path& path) {
+  const std::string extension = extension_of(path);
+  for (const NamedFormat& known : kFormats)
+    if (extension == fmt::format(".{}", known.word)) return known.format;
+  throw UsageError(
+      fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp or "
+                  ".pvtp, or say --format",
+                  path.string()));
+}
+
+MeshFormat parse_mesh_format(const std::string& text) {
+  for (const NamedFormat& known : kFormats)
+    if (text == known.word) return known.format;
+  throw UsageError(
+      fmt::format("'{}' is no format of a mesh; it is ply, stl, obj, glb, vtp or pvtp", text));
+}
+
+std::unique_ptr<MeshSink> open_mesh(const fs::path& path, const MeshForm& form, bool force,
+                                    int threads) {
+  const std::string name = path.string();
+  switch (form.format) {
+    case MeshFormat::ply: return std::make_unique<PlySink>(name, force);
+    case MeshFormat::stl: return std::make_unique<StlSink>(name, force);
+    case MeshFormat::obj: return std::make_unique<ObjSink>(name, force, threads);
+    case MeshFormat::glb:
+      return std::make_unique<GlbSink>(name, force, GlbOptions{.quantize = form.quantize});
+    case MeshFormat::vtp: return std::make_unique<VtpSink>(name, force);
+    case MeshFormat::pvtp: return std::make_unique<PvtpSink>(name, force);
+  }
+  throw UsageError("no such format of a mesh");
+}
+
+std::uint64_t mesh_bytes(const fs::path& path) {
+  std::uint64_t bytes = fs::file_size(path);
+  std::error_code none;
+  for (const fs::directory_entry& part : fs::directory_iterator(path.string() + ".parts", none))
+    bytes += part.file_size();
+  return bytes;
 }
 
 fs::path with_isovalue(const fs::path& path, double isovalue) {

@@ -10,16 +10,38 @@ namespace isobrick::tools {
 
 namespace fs = std::filesystem;
 
-MeshBytes predict_bytes(MeshFormat format, bool normals, MeshSize size) {
-  constexpr std::uint64_t header = 512, triangle_of_ply = 13, triangle_of_stl = 50;
-  if (format == MeshFormat::stl) {
-    const std::uint64_t file = header + size.triangles * triangle_of_stl;
-    return {file, file};
+MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
+  constexpr std::uint64_t header = 2048, triangle = 12, vector = 12, quantized_vector = 8;
+  const std::uint64_t vectors = form.normals ? 2 : 1, v = size.vertices, t = size.triangles;
+  const std::uint64_t rows = v * vectors * vector;
+  // What waits in scratch files is on the disk twice for a moment.
+  switch (form.format) {
+    case MeshFormat::stl: return {header + t * 50, header + t * 50};
+    case MeshFormat::ply: return {header + rows + t * 13, header + rows + 2 * t * 13};
+    case MeshFormat::obj: {
+      // As long as such lines are mostly; decimals end where they say enough.
+      constexpr std::uint64_t vertex_line = 22, normal_line = 34;
+      const std::uint64_t digits = fmt::formatted_size("{}", v / 2);
+      const std::uint64_t vertices = v * (vertex_line + (form.normals ? normal_line : 0));
+      const std::uint64_t faces =
+          t * (form.normals ? 2 + 3 * (2 * digits + 3) : 2 + 3 * (digits + 1));
+      return {header + vertices + faces, header + vertices + 2 * faces};
+    }
+    case MeshFormat::glb: {
+      const std::uint64_t stored = form.quantize ? v * vectors * quantized_vector : rows;
+      return {header + stored + t * triangle, header + stored + rows + 2 * t * triangle};
+    }
+    case MeshFormat::vtp: {
+      const std::uint64_t file = header + rows + t * (triangle + 4);
+      return {file, file + (vectors - 1) * v * vector + t * triangle};
+    }
+    case MeshFormat::pvtp: {
+      // A few vertices in a hundred belong to several parts.
+      const std::uint64_t file = header + rows + rows / 20 + t * (triangle + 4);
+      return {file, file + rows + t * triangle};
+    }
   }
-  // The faces wait in a scratch file until all vertices are written.
-  const std::uint64_t faces = size.triangles * triangle_of_ply;
-  const std::uint64_t file = header + size.vertices * (normals ? 24 : 12) + faces;
-  return {file, file + faces};
+  return {};
 }
 
 std::uint64_t free_space(const fs::path& path) {
@@ -42,9 +64,9 @@ std::optional<Shortage> find_shortage(
   std::uint64_t finished = 0;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const PlannedMesh& mesh = meshes[i];
-    const MeshBytes bytes = predict_bytes(mesh_format(mesh.path), mesh.normals,
-                                          {enlarged(mesh.size.vertices, mesh.uncertainty),
-                                           enlarged(mesh.size.triangles, mesh.uncertainty)});
+    const MeshBytes bytes =
+        predict_bytes(mesh.form, {enlarged(mesh.size.vertices, mesh.uncertainty),
+                                  enlarged(mesh.size.triangles, mesh.uncertainty)});
     const std::uint64_t free = free_space(mesh.path);
     if (finished + bytes.needed > free) return Shortage{i, finished + bytes.needed, free};
     finished += bytes.file;

@@ -14,9 +14,9 @@ namespace isobrick::tools {
 /// What a mesh takes on disk.
 struct MeshBytes {
   std::uint64_t file = 0;    ///< the finished file
-  std::uint64_t needed = 0;  ///< at the worst moment, scratch file included
+  std::uint64_t needed = 0;  ///< at the worst moment, scratch files included
 };
-MeshBytes predict_bytes(MeshFormat format, bool normals, MeshSize size);
+MeshBytes predict_bytes(const MeshForm& form, MeshSize size);
 
 /// Bytes free on the disk that `path` will be written to.
 std::uint64_t free_space(const std::filesystem::path& path);
@@ -24,7 +24,7 @@ std::uint64_t free_space(const std::filesystem::path& path);
 /// A mesh that is to be written.
 struct PlannedMesh {
   std::filesystem::path path;
-  bool normals = false;
+  MeshForm form;
   MeshSize size;
   double uncertainty = 0;  ///< by what fraction it may be larger
 };

@@ -84,7 +84,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
 }
 
 ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
-                        std::uint64_t active_bricks) {
+                        std::uint64_t active_bricks, std::uint64_t sink_bytes) {
   const Lattice& lattice = request.level->lattice;
   const bool drop = request.surface.drop_degenerate;
   const auto threads = static_cast<std::uint64_t>(request.threads);
@@ -94,7 +94,7 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
   const std::uint64_t fixed = kBase + index_bytes(lattice) + threads * (kDecoder + brick_bytes) +
-                              boundary_bytes(lattice, drop) + request.search_memory;
+                              boundary_bytes(lattice, drop) + request.search_memory + sink_bytes;
   const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
   if (budget < least)
     throw UsageError(fmt::format(

@@ -167,6 +167,9 @@ TEST_F(BadInput, AFullDisk) {
                  {"a.ply", "File too large"});
   expect_refused(run({"extract", store, "--isovalue", "127.5", "-o", path("a.stl")}, full), 1,
                  {"a.stl", "File too large"});
+  for (const char* name : {"a.obj", "a.glb", "a.vtp", "a.pvtp"})
+    expect_refused(run({"extract", store, "--isovalue", "127.5", "-o", path(name)}, full), 1,
+                   {name, "File too large"});
   expect_refused(run({"export", store, path("a.raw")}, full), 1, {"a.raw", "File too large"});
   expect_refused(
       run({"synth", "sphere", path("b.raw"), "--dims", "64,64,64", "--type", "u8"}, full), 1,
@@ -189,6 +192,29 @@ TEST_F(BadInput, AFolderThatIsNotThereIsNamed) {
   write_file(path("in_2x2x2_uint8.raw"), "01234567");
   expect_refused(run({"convert", path("in_2x2x2_uint8.raw"), path("no/such/x.zarr")}), 1,
                  {"cannot create", "no/such"});
+}
+
+TEST_F(BadInput, FormatsOfMeshes) {
+  const std::string store = make_store("a");
+  const std::vector<std::string> names = files();
+  const Arguments extract{"extract", store, "--isovalue", "127.5"};
+  expect_refused(run(extract + Arguments{"-o", path("a.step")}), 2,
+                 {"a.step", ".pvtp", "--format"});
+  expect_refused(run(extract + Arguments{"-o", path("a"), "--format", "step"}), 2,
+                 {"--format", "'step'"});
+  expect_refused(run(extract + Arguments{"-o", path("a.ply"), "--quantize"}), 2,
+                 {"--quantize", "GLB", "PLY"});
+  expect_refused(run(extract + Arguments{"-o", path("a\nb.pvtp")}), 2, {"XML"});
+  // A budget that leaves no room for cutting the mesh in parts.
+  const Arguments tight{"--memory", "80M", "--threads", "1"};
+  EXPECT_EQ(run(extract + Arguments{"-o", path("b.ply")} + tight).exit_code, 0);
+  expect_refused(run(extract + Arguments{"-o", path("a.pvtp")} + tight), 2, {"--memory"});
+  EXPECT_EQ(files().size(), names.size() + 1);
+  // Nobody's folder is taken for parts of a mesh.
+  std::filesystem::create_directory(path("a.pvtp.parts"));
+  write_file(path("a.pvtp.parts/thesis.tex"), "mine");
+  expect_refused(run(extract + Arguments{"-o", path("a.pvtp"), "--force"}), 2, {"thesis.tex"});
+  EXPECT_EQ(read_file(path("a.pvtp.parts/thesis.tex")), "mine");
 }
 
 TEST_F(BadInput, TwoOutputsOfOneName) {

@@ -41,6 +41,49 @@ TEST_F(Extract, WritesStl) {
             84 + 50 * json["surfaces"][0]["triangles"].get<std::size_t>());
 }
 
+TEST_F(Extract, WritesEveryFormatOfTheSameMesh) {
+  const std::string store = make_store("a");
+  const auto extract = [&](const std::string& name, const Arguments& more = {}) {
+    Arguments arguments{"extract", store, "--isovalue", "127.5", "-o", path(name)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_json(arguments)["surfaces"][0];
+  };
+  const nlohmann::json ply = extract("a.ply");
+  for (const char* name : {"a.obj", "a.glb", "a.vtp", "a.pvtp"}) {
+    const nlohmann::json surface = extract(name);
+    EXPECT_EQ(surface["triangles"], ply["triangles"]) << name;
+    EXPECT_EQ(surface["vertices"], ply["vertices"]) << name;
+  }
+  const nlohmann::json parted = extract("a.PVTP");
+  EXPECT_EQ(parted["output_bytes"].get<std::size_t>(),
+            read_file(path("a.PVTP")).size() + read_file(path("a.PVTP.parts/part_0.vtp")).size());
+  const std::string obj = read_file(path("a.obj"));
+  EXPECT_EQ(std::count(obj.begin(), obj.end(), '\n') - 1,
+            ply["vertices"].get<int>() + ply["triangles"].get<int>());
+  // The name need not say the format.
+  extract("mesh", {"--format", "vtp"});
+  EXPECT_TRUE(read_file(path("mesh")) == read_file(path("a.vtp")));
+  extract("mesh.ply", {"--format", "glb", "--quantize"});
+  EXPECT_TRUE(read_file(path("mesh.ply")).starts_with("glTF"));
+  EXPECT_LT(read_file(path("mesh.ply")).size(), read_file(path("a.glb")).size());
+}
+
+TEST_F(Extract, EveryFormatIsAsLongAsPredicted) {
+  const std::string store = make_store("a");
+  for (const char* format : {"ply", "stl", "obj", "glb", "vtp", "pvtp"})
+    for (const char* normals : {"none", "gradient"}) {
+      const Arguments extract{"extract",  store,  "--isovalue", "127.5", "-o",     path("a"),
+                              "--format", format, "--normals",  normals, "--force"};
+      Arguments estimate = extract;
+      estimate.push_back("--estimate");
+      const nlohmann::json made = run_json(extract)["surfaces"][0];
+      const double bytes = made["output_bytes"];
+      EXPECT_NEAR(run_json(estimate)["surfaces"][0]["file_bytes"].get<double>(), bytes,
+                  0.25 * bytes)
+          << format << ' ' << normals;
+    }
+}
+
 TEST_F(Extract, NormalsEnlargeTheVertices) {
   const std::string store = make_store("a");
   const nlohmann::json json = run_json(

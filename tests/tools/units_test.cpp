@@ -80,17 +80,28 @@ TEST(Format, Figures) {
 
 TEST(Space, AMeshNeedsItsScratchFileToo) {
   const MeshSize size{.vertices = 100, .triangles = 200};
-  const MeshBytes ply = predict_bytes(MeshFormat::ply, false, size);
+  const MeshBytes ply = predict_bytes({.format = MeshFormat::ply}, size);
   EXPECT_EQ(ply.needed, ply.file + 200 * 13);
-  EXPECT_EQ(predict_bytes(MeshFormat::ply, true, size).file, ply.file + 100 * 12);
-  const MeshBytes stl = predict_bytes(MeshFormat::stl, true, size);
+  EXPECT_EQ(predict_bytes({.format = MeshFormat::ply, .normals = true}, size).file,
+            ply.file + 100 * 12);
+  const MeshBytes stl = predict_bytes({.format = MeshFormat::stl, .normals = true}, size);
   EXPECT_EQ(stl.needed, stl.file);
+  const MeshForm glb{.format = MeshFormat::glb, .normals = true};
+  const MeshForm quantized{.format = MeshFormat::glb, .normals = true, .quantize = true};
+  EXPECT_EQ(predict_bytes(quantized, size).file + 100 * 8, predict_bytes(glb, size).file);
+  for (const MeshFormat format :
+       {MeshFormat::ply, MeshFormat::obj, MeshFormat::glb, MeshFormat::vtp, MeshFormat::pvtp})
+    EXPECT_GT(predict_bytes({.format = format}, size).needed,
+              predict_bytes({.format = format}, size).file)
+        << name_of(format);
 }
 
 TEST(Space, ShortageNamesTheFirstMeshThatDoesNotFit) {
   const MeshSize size{.vertices = 500'000, .triangles = 1'000'000};
-  const auto stl = [&](const char* name) { return PlannedMesh{.path = name, .size = size}; };
-  const std::uint64_t each = predict_bytes(MeshFormat::stl, false, size).file;
+  const auto stl = [&](const char* name) {
+    return PlannedMesh{.path = name, .form = {.format = MeshFormat::stl}, .size = size};
+  };
+  const std::uint64_t each = predict_bytes({.format = MeshFormat::stl}, size).file;
   const PlannedMesh meshes[] = {stl("a.stl"), stl("b.stl"), stl("c.stl")};
   const auto disk = [](std::uint64_t bytes) {
     return [bytes](const std::filesystem::path&) { return bytes; };
