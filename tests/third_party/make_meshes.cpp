@@ -1,0 +1,56 @@
+// Writes meshes in every format, for readers of others to compare: one file
+// name a mesh, one extension a format. Cases that no small volume brings about.
+
+#include <filesystem>
+#include <limits>
+
+#include "isobrick/io/glb_sink.h"
+#include "isobrick/io/obj_sink.h"
+#include "isobrick/io/ply_sink.h"
+#include "isobrick/io/vtp_sink.h"
+#include "tests/io/test_meshes.h"
+
+namespace isobrick {
+namespace {
+
+void write(MeshSink&& sink, const TestMesh& mesh, bool normals) {
+  sink.begin({.has_normals = normals});
+  if (!mesh.positions.empty()) sink.write(mesh.chunk(0, normals));
+  sink.finish();
+}
+
+void write_all(const std::filesystem::path& base, const TestMesh& mesh, bool normals) {
+  constexpr std::uint64_t part = 1000, cut = 100'000;
+  const auto name = [&](const char* extension) { return base.string() + extension; };
+  write(PlySink(name(".ply"), true), mesh, normals);
+  write(ObjSink(name(".obj"), true), mesh, normals);
+  write(VtpSink(name(".vtp"), true), mesh, normals);
+  write(PvtpSink(name(".pvtp"), true, part), mesh, normals);
+  write(GlbSink(name(".glb"), true), mesh, normals);
+  write(GlbSink(name(".quantized.glb"), true, {.quantize = true}), mesh, normals);
+  for (const bool quantize : {false, true})
+    write(GlbSink(name(quantize ? ".quantized.cut.glb" : ".cut.glb"), true,
+                  {.quantize = quantize, .file_bytes = cut, .part_triangles = part}),
+          mesh, normals);
+}
+
+void write_cases(const std::filesystem::path& folder) {
+  const TestMesh ball = make_ball({1000.125f, -2, 3e-3f}, 7, 40);
+  write_all(folder / "ball", ball, false);
+  write_all(folder / "ball with 100% normals & <more>", ball, true);
+  write_all(folder / "empty", {}, false);
+  write_all(folder / "empty_normals", {}, true);
+  TestMesh flat;
+  flat.positions = {{1, 5, 7}, {2, 5, 7}, {3, 5, 7}};
+  flat.normals = {{0, 0, 1}, {0, 1, 0}, {-0.6f, 0, 0.8f}};
+  flat.triangles = {{0, 1, 2}};
+  write_all(folder / "line", flat, true);
+}
+
+}  // namespace
+}  // namespace isobrick
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  isobrick::write_cases(argv[1]);
+}
