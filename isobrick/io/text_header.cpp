@@ -181,7 +181,10 @@ std::string unit_name(std::string_view unit) {
   for (const auto& [symbol, name] : names)
     if (unit == symbol || unit == name) return std::string(name);
   if (unit == "micron" || unit == "microns") return "micrometer";
-  return {};
+  // Lengths that OME-Zarr names and hardly anybody uses.
+  const bool length =
+      unit.ends_with("meter") || unit == "yard" || unit == "mile" || unit == "parsec";
+  return length ? std::string(unit) : std::string();
 }
 
 }  // namespace isobrick

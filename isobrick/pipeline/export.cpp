@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/nrrd_writer.h"
 #include "isobrick/io/output_file.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
@@ -64,23 +65,36 @@ void for_each_piece(Box3 box, Int3 brick, Int3 piece, F&& f) {
   });
 }
 
+/// The exported box as a volume of its own.
+VolumeInfo describe(const LevelInfo& level, Box3 box, const std::string& name) {
+  VolumeInfo info{box.extent(), level.lattice.type, level.transform, name};
+  info.transform.origin =
+      level.transform.apply({static_cast<double>(box.lo.x), static_cast<double>(box.lo.y),
+                             static_cast<double>(box.lo.z)});
+  return info;
+}
+
 }  // namespace
 
-std::uint64_t export_raw(const StoreReader& store, int level, std::optional<Box3> roi,
-                         const std::filesystem::path& out, bool force, std::uint64_t memory,
-                         int threads, Progress& progress) {
-  const Box3 box = region(store, level, roi);
-  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-  Workers workers(threads);
-  const Int3 piece = piece_within(lattice, box.extent(), memory, workers.threads());
-  OutputFile output(out.string(), force);
-  const SlabFile file(output.writer().share(), out.string(), box.extent(), lattice.sample_bytes());
+std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
+                            const ExportOptions& options, Progress& progress) {
+  const Box3 box = region(store, options.level, options.roi);
+  const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
+  const Lattice& lattice = level.lattice;
+  Workers workers(options.threads);
+  const Int3 piece = piece_within(lattice, box.extent(), options.memory, workers.threads());
+  OutputFile output(out.string(), options.force);
+  if (options.format == ExportFormat::nrrd)
+    output.writer().append(nrrd_header_text(describe(level, box, out.string())));
+  output.writer().flush();
+  const SlabFile file(output.writer().share(), out.string(), box.extent(), lattice.sample_bytes(),
+                      output.writer().size());
   file.reserve();
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
       static_cast<std::size_t>(volume(min(piece, box.extent()))) * lattice.sample_bytes());
   progress.begin("export", file.bytes());
   for_each_piece(box, lattice.brick, piece, [&](Box3 part) {
-    workers.execute([&] { read_slab(store, level, part, buffer.get()); });
+    workers.execute([&] { read_slab(store, options.level, part, buffer.get()); });
     file.write({part.lo - box.lo, part.hi - box.lo}, buffer.get());
     progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
   });

@@ -9,12 +9,23 @@
 
 namespace isobrick {
 
-/// Writes the samples of one level (or of `roi`, in samples of that level) as a
-/// raw file, C order [z, y, x], little endian. Memory: one row of bricks at a
-/// time, within `memory`. Nothing appears under the final name until it is whole.
-/// Returns the bytes written.
-std::uint64_t export_raw(const StoreReader& store, int level, std::optional<Box3> roi,
-                         const std::filesystem::path& out, bool force, std::uint64_t memory,
-                         int threads, Progress& progress);
+/// The files that samples can become.
+enum class ExportFormat : std::uint8_t { raw, nrrd };
+
+struct ExportOptions {
+  ExportFormat format = ExportFormat::raw;
+  int level = 0;
+  std::optional<Box3> roi;  ///< samples of that level; nothing: all
+  bool force = false;       ///< replace a file that exists, once the new one is whole
+  std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
+  int threads = 0;                                ///< 0: all cores
+};
+
+/// Writes the samples of one level (or of a region) bit for bit, C order [z, y, x],
+/// little endian; as NRRD behind a header that keeps their place in world space.
+/// Memory: one row of bricks at a time, within the budget. Nothing appears under
+/// the final name until it is whole. Returns the bytes of samples written.
+std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
+                            const ExportOptions& options, Progress& progress);
 
 }  // namespace isobrick

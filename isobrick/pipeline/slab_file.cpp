@@ -55,15 +55,21 @@ UniqueFd open_nameless(const std::filesystem::path& beside) {
 
 }  // namespace
 
-SlabFile::SlabFile(UniqueFd fd, std::string path, Int3 extent, std::size_t sample_bytes)
-    : fd_(std::move(fd)), path_(std::move(path)), extent_(extent), sample_bytes_(sample_bytes) {}
+SlabFile::SlabFile(UniqueFd fd, std::string path, Int3 extent, std::size_t sample_bytes,
+                   std::uint64_t begin)
+    : fd_(std::move(fd)),
+      path_(std::move(path)),
+      extent_(extent),
+      sample_bytes_(sample_bytes),
+      begin_(begin) {}
 
 std::uint64_t SlabFile::bytes() const {
   return static_cast<std::uint64_t>(volume(extent_)) * sample_bytes_;
 }
 
 void SlabFile::reserve() const {
-  const int failure = ::posix_fallocate(fd_.get(), 0, static_cast<off_t>(bytes()));
+  const int failure =
+      ::posix_fallocate(fd_.get(), static_cast<off_t>(begin_), static_cast<off_t>(bytes()));
   // A file system that cannot reserve shows a full disk when it is written to.
   if (failure != 0 && failure != EOPNOTSUPP && failure != EINVAL)
     throw system_error(fmt::format("make room for {} bytes for", bytes()), path_, failure);
@@ -72,14 +78,14 @@ void SlabFile::reserve() const {
 void SlabFile::write(Box3 box, const std::byte* samples) const {
   for_each_run(box, extent_, sample_bytes_,
                [&](std::uint64_t offset, std::size_t inside, std::size_t bytes) {
-                 write_at(fd_.get(), path_, offset, samples + inside, bytes);
+                 write_at(fd_.get(), path_, begin_ + offset, samples + inside, bytes);
                });
 }
 
 void SlabFile::read(Box3 box, std::byte* samples) const {
   for_each_run(box, extent_, sample_bytes_,
                [&](std::uint64_t offset, std::size_t inside, std::size_t bytes) {
-                 read_at(fd_.get(), path_, offset, samples + inside, bytes);
+                 read_at(fd_.get(), path_, begin_ + offset, samples + inside, bytes);
                });
 }
 

@@ -15,8 +15,9 @@ namespace isobrick {
 /// in any order and by any thread.
 class SlabFile {
  public:
-  /// `path` is for messages.
-  SlabFile(UniqueFd fd, std::string path, Int3 extent, std::size_t sample_bytes);
+  /// `path` is for messages; the array begins `begin` bytes into the file.
+  SlabFile(UniqueFd fd, std::string path, Int3 extent, std::size_t sample_bytes,
+           std::uint64_t begin = 0);
 
   /// Takes the room on disk for all of it, so that a full disk shows at once.
   void reserve() const;
@@ -30,6 +31,7 @@ class SlabFile {
   std::string path_;
   Int3 extent_;
   std::size_t sample_bytes_;
+  std::uint64_t begin_;
 };
 
 /// A level on its way into a store that does not fit in memory: a nameless file

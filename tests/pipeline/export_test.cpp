@@ -35,7 +35,9 @@ class Export : public testing::Test {
   std::uint64_t write(int level, std::optional<Box3> roi, bool force = false,
                       std::uint64_t memory = 100 * kMiB) {
     NoProgress progress;
-    return export_raw(*store_, level, roi, folder_ / "x.raw", force, memory, 2, progress);
+    return export_volume(
+        *store_, folder_ / "x.raw",
+        {.level = level, .roi = roi, .force = force, .memory = memory, .threads = 2}, progress);
   }
 
   std::vector<std::string> files() const {
@@ -96,14 +98,14 @@ TEST_F(Export, TouchesNothingButItsOwnFile) {
 }
 
 TEST_F(Export, SeveralAtATimeEachWriteTheirOwn) {
-  NoProgress progress;
-  std::thread other([&] {
+  const auto write_often = [&] {
     NoProgress none;
     for (int i = 0; i < 10; ++i)
-      export_raw(*store_, 0, std::nullopt, folder_ / "x.raw", true, 100 * kMiB, 1, none);
-  });
-  for (int i = 0; i < 10; ++i)
-    export_raw(*store_, 0, std::nullopt, folder_ / "x.raw", true, 100 * kMiB, 1, progress);
+      export_volume(*store_, folder_ / "x.raw", {.force = true, .memory = 100 * kMiB, .threads = 1},
+                    none);
+  };
+  std::thread other(write_often);
+  write_often();
   other.join();
   EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(source_.samples()));
 }

@@ -38,6 +38,54 @@ TEST_F(RoundTrip, EveryType) {
   }
 }
 
+TEST_F(RoundTrip, EveryTypeThroughNrrd) {
+  const Int3 extent{37, 23, 19};
+  for (const ScalarType type : kScalarTypes) {
+    SCOPED_TRACE(short_name(type));
+    const std::string bytes = noise(bytes_of(extent, type));
+    write_file(path("in.raw"), bytes);
+    const auto succeed = [&](const Arguments& arguments) {
+      const Outcome outcome = run(arguments);
+      ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    };
+    succeed({"convert", path("in.raw"), path("a.zarr"), "--dims", dims_of(extent), "--type",
+             std::string(short_name(type)), "--brick", "16", "--spacing", "0.3,1,2.7e-5",
+             "--origin", "-1e-3,2,1e6", "--unit", "micrometer", "--force"});
+    succeed({"export", path("a.zarr"), path("a.nrrd"), "--force"});
+    succeed({"convert", path("a.nrrd"), path("b.zarr"), "--brick", "16", "--force"});
+    const nlohmann::json a = run_json({"info", path("a.zarr")}),
+                         b = run_json({"info", path("b.zarr")});
+    for (const char* key : {"extent", "type", "spacing", "origin", "unit"})
+      EXPECT_EQ(a[key], b[key]) << key;
+    EXPECT_EQ(a["direction"], b["direction"]);
+    succeed({"export", path("b.zarr"), path("b.raw"), "--force"});
+    EXPECT_TRUE(read_file(path("b.raw")) == bytes);
+    // And the file itself is a fixed point.
+    succeed({"export", path("b.zarr"), path("b"), "--format", "nrrd", "--force"});
+    EXPECT_TRUE(read_file(path("b")) == read_file(path("a.nrrd")));
+  }
+}
+
+// A mesh of a part lies where it lies in the whole.
+TEST_F(RoundTrip, ARegionKeepsItsPlaceInTheWorld) {
+  const std::string store = path("a.zarr");
+  write_file(path("in.nhdr"),
+             "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 30 20 10\nspace dimension: 3\n"
+             "space directions: (0,2,0) (-3,0,0) (0,0,0.5)\nspace origin: (100,200,300)\n"
+             "space units: \"mm\" \"mm\" \"mm\"\nencoding: raw\ndata file: in.raw\n");
+  write_file(path("in.raw"), noise(6000));
+  ASSERT_EQ(run({"convert", path("in.nhdr"), store, "--brick", "16"}).exit_code, 0);
+  ASSERT_EQ(run({"export", store, path("part.nrrd"), "--roi", "5:25,3:,1:9"}).exit_code, 0);
+  const std::string header = read_file(path("part.nrrd")).substr(0, 400);
+  EXPECT_NE(header.find("sizes: 20 17 8\n"), std::string::npos) << header;
+  EXPECT_NE(header.find("space origin: (91,210,300.5)\n"), std::string::npos) << header;
+  EXPECT_NE(header.find("space units: \"mm\""), std::string::npos) << header;
+  ASSERT_EQ(run({"convert", path("part.nrrd"), path("b.zarr"), "--brick", "16"}).exit_code, 0);
+  const nlohmann::json a = run_json({"info", store}), b = run_json({"info", path("b.zarr")});
+  for (const char* key : {"type", "spacing", "direction", "unit"}) EXPECT_EQ(a[key], b[key]) << key;
+  EXPECT_EQ(b["origin"], nlohmann::json({91.0, 210.0, 300.5}));
+}
+
 TEST_F(RoundTrip, ExtentsThatDivideNothing) {
   for (const Int3 extent : {Int3{1, 1, 1}, Int3{1, 17, 33}, Int3{131, 1, 7}, Int3{67, 61, 1}}) {
     SCOPED_TRACE(dims_of(extent));
