@@ -55,7 +55,7 @@ class StreamSource final : public VolumeSource {
   /// is also where its checksums are compared.
   void expect_end() {
     constexpr std::uint64_t most = 1 << 20;
-    if (end_ - position_ > most) return;
+    if (after_end_ == AfterEnd::unread || end_ - position_ > most) return;
     stream_->skip(end_ - position_);
     // Counted only so far: the rest of an endless stream would never be.
     std::vector<std::byte> rest(most);

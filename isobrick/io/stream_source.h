@@ -9,7 +9,11 @@
 namespace isobrick {
 
 /// What becomes of bytes that follow the samples.
-enum class AfterEnd : unsigned char { refused, ignored };
+enum class AfterEnd : unsigned char {
+  refused,
+  ignored,  ///< they are read (where checksums follow) but not looked at
+  unread,
+};
 
 /// Reads planes from a stream. `end` is where its samples end, also those that
 /// are not of this volume; where that is near the last one read, checksums at the

@@ -50,6 +50,8 @@ class HeaderLines {
   /// The next line without its end (LF or CR LF). Refuses NUL bytes, and headers
   /// longer than kMostHeader.
   std::string_view next();
+  /// What comes next, as far as it was read.
+  std::string_view rest() const { return rest_; }
   /// Bytes before the line that comes next.
   std::uint64_t position() const { return text_.size() - rest_.size(); }
 

@@ -59,6 +59,9 @@ std::optional<VolumeFormat> by_content(const std::string& path, std::string_view
   if (is_nifti(bytes_of(head))) return VolumeFormat::nifti;
   if (head.starts_with("\x1f\x8b") && is_nifti(bytes_of(unpack_head(path))))
     return VolumeFormat::nifti;
+  if (head.starts_with("# vtk DataFile")) return VolumeFormat::legacy_vtk;
+  if (head.starts_with("<") && head.substr(0, 1024).find("<VTKFile") != std::string_view::npos)
+    return VolumeFormat::vti;
   return std::nullopt;
 }
 
@@ -67,6 +70,7 @@ VolumeFormat by_extension(const std::string& path) {
       {".nhdr", VolumeFormat::nrrd},      {".nrrd", VolumeFormat::nrrd},
       {".mhd", VolumeFormat::meta_image}, {".mha", VolumeFormat::meta_image},
       {".nii", VolumeFormat::nifti},      {".hdr", VolumeFormat::nifti},
+      {".vti", VolumeFormat::vti},        {".vtk", VolumeFormat::legacy_vtk},
   };
   if (lower(path).ends_with(".nii.gz")) return VolumeFormat::nifti;
   const std::string extension = lower(std::filesystem::path(path).extension().string());
@@ -80,6 +84,14 @@ VolumeFormat by_extension(const std::string& path) {
 VolumeFormat recognise_format(const std::string& path) {
   const std::string head = read_head(path);
   return by_content(path, head).value_or(by_extension(path));
+}
+
+VolumePath split_volume_path(const std::string& path) {
+  const std::size_t colon = path.rfind(":/");
+  std::error_code ignored;
+  if (colon == std::string::npos || colon == 0 || std::filesystem::exists(path, ignored))
+    return {path, {}};
+  return {path.substr(0, colon), path.substr(colon + 2)};
 }
 
 }  // namespace isobrick

@@ -10,10 +10,21 @@ enum class VolumeFormat : std::uint8_t {
   nrrd,
   meta_image,
   nifti,
+  vti,         ///< VTK's XML
+  legacy_vtk,  ///< VTK's older format
 };
 
 /// The format of a file: by its first bytes, else by its extension. Throws Error
 /// when it cannot be read, UsageError when it is no regular file.
 VolumeFormat recognise_format(const std::string& path);
+
+/// A path and what it names within the file: "run.h5:/data/temperature".
+struct VolumePath {
+  std::string file;
+  std::string inner;  ///< "data/temperature", or empty
+};
+
+/// Parts a path at its last ":/" unless a file has the whole name.
+VolumePath split_volume_path(const std::string& path);
 
 }  // namespace isobrick

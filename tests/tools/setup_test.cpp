@@ -121,7 +121,7 @@ TEST_F(Setup, FailsOnlyWhenWhatIsNeededCannotBeInstalled) {
   add("apt-get", record + "case \"$*\" in *man-db*) exit 100 ;; esac");
   const Outcome outcome = as_user_setup({"--tests"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("some tests are skipped"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("tests are skipped"), std::string::npos) << outcome.err;
 }
 
 }  // namespace

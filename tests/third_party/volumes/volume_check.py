@@ -29,7 +29,7 @@ class Check:
         self.failures = []
 
     def run(self, *words):
-        return subprocess.run([self.program, *map(str, words)], capture_output=True, text=True,
+        return subprocess.run([self.program, *map(str, words)], capture_output=True, encoding="utf-8",
                               check=False)
 
     def read(self, path, *options):

@@ -1,0 +1,114 @@
+#include "isobrick/io/zlib_block_stream.h"
+
+#include <fmt/format.h>
+#include <isa-l/igzip_lib.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/byte_order.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::uint64_t kMostBlock = std::uint64_t{64} << 20;
+
+/// Nothing that zlib makes of `bytes` is longer.
+constexpr std::uint64_t most_packed(std::uint64_t bytes) { return bytes + bytes / 1000 + 64; }
+
+class ZlibBlockStream final : public ByteStream {
+ public:
+  ZlibBlockStream(const BlockTable& table, std::unique_ptr<ByteStream> sizes,
+                  std::unique_ptr<ByteStream> packed)
+      : table_(table), sizes_(std::move(sizes)), packed_(std::move(packed)) {
+    if (table_.block_bytes == 0 || table_.block_bytes > kMostBlock ||
+        table_.last_bytes > table_.block_bytes)
+      throw UsageError(
+          fmt::format("{}: compressed blocks of {} bytes, the last one of {}, make no "
+                      "sense (at most {} are supported)",
+                      packed_->name(), table_.block_bytes, table_.last_bytes, kMostBlock));
+    if (table_.blocks > sizes_->most_bytes() / static_cast<std::uint64_t>(table_.entry_bytes))
+      throw UsageError(fmt::format("{}: the file has no room for the sizes of {} compressed blocks",
+                                   packed_->name(), table_.blocks));
+    if (table_.last_bytes == 0) table_.last_bytes = table_.block_bytes;
+    block_.resize(table_.block_bytes);
+    input_.resize(most_packed(table_.block_bytes));
+  }
+
+  std::size_t read(std::byte* out, std::size_t size) override {
+    std::size_t done = 0;
+    while (done < size) {
+      if (at_ == end_ && !next_block()) break;
+      const std::size_t count = std::min(size - done, end_ - at_);
+      std::memcpy(out + done, block_.data() + at_, count);
+      at_ += count;
+      done += count;
+    }
+    return done;
+  }
+
+  std::string name() const override { return packed_->name(); }
+  std::uint64_t most_bytes() const override {
+    return table_.blocks == 0 ? 0 : (table_.blocks - 1) * table_.block_bytes + table_.last_bytes;
+  }
+  std::size_t memory() const override {
+    return sizes_->memory() + packed_->memory() + block_.size() + input_.size();
+  }
+
+ private:
+  std::uint64_t next_size() {
+    std::uint64_t size = 0;
+    const auto bytes = static_cast<std::size_t>(table_.entry_bytes);
+    std::byte raw[8];
+    sizes_->read_exactly(raw, bytes);
+    if (table_.swap) swap_byte_order(raw, 1, bytes);
+    std::memcpy(&size, raw, bytes);
+    return size;
+  }
+
+  bool next_block() {
+    if (index_ == table_.blocks) return false;
+    const std::uint64_t packed = next_size();
+    end_ = static_cast<std::size_t>(index_ + 1 == table_.blocks ? table_.last_bytes
+                                                                : table_.block_bytes);
+    if (packed > input_.size())
+      throw DamageError(
+          fmt::format("{}: compressed block {} would have {} bytes, more than any of "
+                      "{} unpacked",
+                      name(), index_, packed, end_));
+    packed_->read_exactly(input_.data(), static_cast<std::size_t>(packed));
+    inflate_state state;
+    isal_inflate_init(&state);
+    state.crc_flag = ISAL_ZLIB;
+    state.next_in = reinterpret_cast<std::uint8_t*>(input_.data());
+    state.avail_in = static_cast<std::uint32_t>(packed);
+    state.next_out = reinterpret_cast<std::uint8_t*>(block_.data());
+    state.avail_out = static_cast<std::uint32_t>(end_);
+    const int result = isal_inflate(&state);
+    if (result != ISAL_DECOMP_OK || state.avail_out != 0 || state.block_state != ISAL_BLOCK_FINISH)
+      throw DamageError(
+          fmt::format("{}: compressed block {} is damaged (code {})", name(), index_, result));
+    at_ = 0;
+    ++index_;
+    return true;
+  }
+
+  BlockTable table_;
+  std::unique_ptr<ByteStream> sizes_, packed_;
+  std::vector<std::byte> block_, input_;
+  std::size_t at_ = 0, end_ = 0;
+  std::uint64_t index_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<ByteStream> make_zlib_block_stream(const BlockTable& table,
+                                                   std::unique_ptr<ByteStream> sizes,
+                                                   std::unique_ptr<ByteStream> packed) {
+  return std::make_unique<ZlibBlockStream>(table, std::move(sizes), std::move(packed));
+}
+
+}  // namespace isobrick
