@@ -32,7 +32,7 @@ class DeviceVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-/// How the active tiles of a volume are found; none of it shows in the mesh.
+/// How the active tiles of a volume are found.
 enum class TileSearch : std::uint8_t {
   ranges,  ///< compares the range of every tile
   interval,
@@ -40,6 +40,14 @@ enum class TileSearch : std::uint8_t {
   quadtree,
   octree,  ///< through that structure over the tiles, built on the device
   none     ///< takes every tile: brute force
+};
+
+/// How a resident volume is extracted; none of it shows in the mesh.
+struct ResidentTuning {
+  TileSearch search = TileSearch::ranges;
+  /// Threads that share a tile: 0 chooses, 288 and 1024 always work, 32, 64, 128,
+  /// 256 and 512 for u8 without normals.
+  int threads = 0;
 };
 
 /// What an extraction on the device made.
@@ -54,9 +62,9 @@ class ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Throws UsageError for what the
   /// device cannot do yet: volumes that may hold NaN, dropping degenerate
-  /// triangles, meshes that are not welded.
+  /// triangles, meshes that are not welded; and for threads that have no kernels.
   ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
-                    TileSearch search = TileSearch::ranges);
+                    const ResidentTuning& tuning = {});
   ~ResidentExtractor();
 
   /// The mesh of `isovalue`, in device memory until the next call. Grows the

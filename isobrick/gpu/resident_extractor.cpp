@@ -52,17 +52,17 @@ struct ResidentExtractor::Impl {
   TileSearch search;
   std::optional<SpanIndices> index;  ///< of the tiles, where the search is through one
 
-  Impl(DeviceVolume& v, const SurfaceOptions& o, TileSearch s)
+  Impl(DeviceVolume& v, const SurfaceOptions& o, const ResidentTuning& tuning)
       : volume(v.impl()),
         options(o),
-        shape(launch_shape(volume.lattice.type, o.normals, volume.tile_count)),
+        shape(launch_shape(volume.lattice.type, o.normals, volume.tile_count, tuning.threads)),
         case_entries(kCaseEntries, volume.stream),
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
         order(volume.tile_count, volume.stream),
         zeroed(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
-        search(s) {
-    if (const auto kind = index_kind_of(s)) index.emplace(index_tiles(volume, *kind));
+        search(tuning.search) {
+    if (const auto kind = index_kind_of(search)) index.emplace(index_tiles(volume, *kind));
     check_supported(o, volume.lattice.type);
     options.roi = intersect(o.roi, volume.lattice.box());
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
@@ -165,12 +165,14 @@ struct ResidentExtractor::Impl {
   DeviceCounts extract(double value) {
     if (std::isnan(value)) throw UsageError("the isovalue is not a number");
     isovalue = value;
+    start.record(volume.stream);
     launch_search();
     const std::uint32_t active = read_counters().item_count;
     make_row_tables(active);
     make_room(kVerticesOfTile * active, kTrianglesOfTile * active);
+    launch_tiles();
+    end.record(volume.stream);
     for (;;) {
-      launch();
       const SurfaceTotals made = read_counters().totals;
       if (made.vertices > std::numeric_limits<std::uint32_t>::max())
         throw Error(
@@ -179,6 +181,7 @@ struct ResidentExtractor::Impl {
       if (3 * made.vertices <= positions.size() && 3 * made.triangles <= triangles.size())
         return {made.vertices, made.triangles, active};
       make_room(made.vertices, made.triangles);
+      launch();
     }
   }
 
@@ -191,8 +194,8 @@ struct ResidentExtractor::Impl {
 };
 
 ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
-                                     TileSearch search)
-    : impl_(std::make_unique<Impl>(volume, options, search)) {}
+                                     const ResidentTuning& tuning)
+    : impl_(std::make_unique<Impl>(volume, options, tuning)) {}
 ResidentExtractor::~ResidentExtractor() = default;
 
 DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }

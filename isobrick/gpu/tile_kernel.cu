@@ -1,5 +1,6 @@
 #include "isobrick/gpu/tile_kernel.h"
 
+#include "isobrick/core/error.h"
 #include "isobrick/core/threshold.h"
 #include "isobrick/gpu/cuda_check.h"
 #include "isobrick/gpu/device_scalar.h"
@@ -13,6 +14,11 @@ namespace {
 constexpr int kThreadsPerMultiprocessor = 1152;
 /// Threads that share a tile where there are many tiles, and where there are few.
 constexpr int kSmallTeam = 288, kLargeTeam = 1024;
+
+/// Blocks of N threads a multiprocessor: shared memory has room for four.
+constexpr int blocks_of(int n) {
+  return kThreadsPerMultiprocessor / n < 4 ? kThreadsPerMultiprocessor / n : 4;
+}
 
 /// Pages of the tiles around one; where there is none, any that is.
 __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,
@@ -52,7 +58,7 @@ constexpr std::size_t shared_bytes() {
 }
 
 template <int N, class T, bool Normals>
-__global__ void __launch_bounds__(N, kThreadsPerMultiprocessor / N)
+__global__ void __launch_bounds__(N, blocks_of(N))
     extract_tiles(const __grid_constant__ TileParams p, const T threshold,
                   const std::uint16_t* __restrict__ case_entries) {
   extern __shared__ __align__(16) unsigned char bytes[];
@@ -113,7 +119,7 @@ __global__ void __launch_bounds__(N, kThreadsPerMultiprocessor / N)
         if (vertices > kListed) __syncthreads();
       }
     if (warp_id() == 0) find_triangle_base(s, p, number, triangles);
-    if (warp_id() == 1) wait_for_neighbours(s, p, item, shape);
+    if (warp_id() == (Team<N>::kWarps > 1 ? 1 : 0)) wait_for_neighbours(s, p, item, shape);
     __syncthreads();
     shift_rows<N>(s, p, shape);
     __syncthreads();
@@ -170,14 +176,34 @@ struct Launcher {
   }
 };
 
+/// The number of threads is kSmallTeam or kLargeTeam; the others have
+/// kernels for bytes without normals only.
 template <class F>
-auto visit_launcher(ScalarType type, bool normals, bool few_tiles, F&& f) {
+auto visit_launcher(ScalarType type, bool normals, int threads, F&& f) {
+  using Byte = std::uint8_t;
+  switch (threads) {
+    case 32: return f(Launcher<32, Byte, false>());
+    case 64: return f(Launcher<64, Byte, false>());
+    case 128: return f(Launcher<128, Byte, false>());
+    case 256: return f(Launcher<256, Byte, false>());
+    case 512: return f(Launcher<512, Byte, false>());
+    default: break;
+  }
   return visit_device_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    if (few_tiles)
+    if (threads == kLargeTeam)
       return normals ? f(Launcher<kLargeTeam, T, true>()) : f(Launcher<kLargeTeam, T, false>());
     return normals ? f(Launcher<kSmallTeam, T, true>()) : f(Launcher<kSmallTeam, T, false>());
   });
+}
+
+void check_threads(ScalarType type, bool normals, int threads) {
+  for (const int known : {0, kSmallTeam, kLargeTeam})
+    if (threads == known) return;
+  for (const int known : {32, 64, 128, 256, 512})
+    if (threads == known && type == ScalarType::u8 && !normals) return;
+  throw UsageError(
+      "288 or 1024 threads share a tile, and for u8 without normals also 32, 64, 128, 256 or 512");
 }
 
 }  // namespace
@@ -193,19 +219,25 @@ void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]) {
     }
 }
 
-LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles) {
-  LaunchShape shape;
-  shape.few_tiles = false;
-  shape.blocks = visit_launcher(type, normals, false, [](auto l) { return l.blocks(); });
-  if (tiles > static_cast<std::uint32_t>(shape.blocks)) return shape;
-  const int large = visit_launcher(type, normals, true, [](auto l) { return l.blocks(); });
-  if (large > 0) shape = {large, true};
-  return shape;
+LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles, int threads) {
+  check_threads(type, normals, threads);
+  const auto blocks = [&](int n) {
+    return visit_launcher(type, normals, n, [](auto l) { return l.blocks(); });
+  };
+  if (threads > 0) {
+    const LaunchShape shape{blocks(threads), threads};
+    if (shape.blocks == 0) throw UsageError("the device has too little shared memory for that");
+    return shape;
+  }
+  const LaunchShape small{blocks(kSmallTeam), kSmallTeam};
+  if (tiles > static_cast<std::uint32_t>(small.blocks)) return small;
+  const LaunchShape large{blocks(kLargeTeam), kLargeTeam};
+  return large.blocks > 0 ? large : small;
 }
 
 void launch_extraction(ScalarType type, bool normals, const TileParams& params,
                        const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream) {
-  visit_launcher(type, normals, shape.few_tiles,
+  visit_launcher(type, normals, shape.threads,
                  [&](auto l) { l.launch(params, case_entries, shape.blocks, stream); });
 }
 

@@ -16,11 +16,12 @@ void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]);
 /// How many blocks, and how many threads each.
 struct LaunchShape {
   int blocks = 0;
-  bool few_tiles = false;  ///< more threads share a tile
+  int threads = 0;
 };
 
-/// What fills the current device when about so many tiles are active.
-LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles);
+/// What fills the current device when about so many tiles are active. `threads`
+/// that share a tile: 0 chooses. Throws UsageError for numbers that have no kernels.
+LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles, int threads = 0);
 
 /// Launches the extraction of all items on `stream`: one block takes one tile
 /// after the other, in their order.

@@ -152,31 +152,32 @@ __device__ inline void borrow_rows(TileShared& s, const Shape& shape) {
   const auto base_of = [&](int neighbour, std::uint32_t e) {
     return s.neighbour_base[neighbour] + (e & 0x1ffffu);
   };
-  // Threads 0 … 32: rows (0, z); threads 64 … 96: rows (y, 0).
-  const int t = static_cast<int>(threadIdx.x);
-  if (t < 33 && !fy) {
-    const int z = t, row = 33 * z;
-    const bool own_z = z > 0 || fz;
-    const std::uint32_t e = entry(2, row + 32);
-    const int from_x = own_z ? 2 : 6;
-    s.x_base[row] = base_of(from_x, own_z ? e : entry(6, kRowsOfTile - 1));
-    std::uint32_t at_0 = 0;
-    if (z < 32) at_0 = (s.rows[row].at ^ s.rows[row + 33].at) & shape.at_0;
-    const std::uint32_t number = base_of(2, e) + (e >> 23) + at_0;
-    s.z_base[row] = number;
-    s.z_at_0[row] = fx ? number - 1 : base_of(3, entry(3, row + 33)) - 1;
-  }
-  if (t >= 64 && t < 97 && !fz) {
-    const int y = t - 64, row = y;
-    const bool own_y = y > 0 || fy;
-    const std::uint32_t e = entry(4, 33 * 32 + y);
-    if (own_y) s.x_base[row] = base_of(4, e);
-    std::uint32_t at_0 = 0;
-    if (y < 32) at_0 = (s.rows[row].at ^ s.rows[row + 1].at) & shape.at_0;
-    const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + at_0;
-    s.y_base[row] = number;
-    const std::uint32_t corner = entry(5, 33 * 32 + y);
-    s.y_at_0[row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
+  // Turns 0 … 32: rows (0, z); turns 64 … 96: rows (y, 0).
+  for (int t = static_cast<int>(threadIdx.x); t < 97; t += N) {
+    if (t < 33 && !fy) {
+      const int z = t, row = 33 * z;
+      const bool own_z = z > 0 || fz;
+      const std::uint32_t e = entry(2, row + 32);
+      const int from_x = own_z ? 2 : 6;
+      s.x_base[row] = base_of(from_x, own_z ? e : entry(6, kRowsOfTile - 1));
+      std::uint32_t at_0 = 0;
+      if (z < 32) at_0 = (s.rows[row].at ^ s.rows[row + 33].at) & shape.at_0;
+      const std::uint32_t number = base_of(2, e) + (e >> 23) + at_0;
+      s.z_base[row] = number;
+      s.z_at_0[row] = fx ? number - 1 : base_of(3, entry(3, row + 33)) - 1;
+    }
+    if (t >= 64 && t < 97 && !fz) {
+      const int y = t - 64, row = y;
+      const bool own_y = y > 0 || fy;
+      const std::uint32_t e = entry(4, 33 * 32 + y);
+      if (own_y) s.x_base[row] = base_of(4, e);
+      std::uint32_t at_0 = 0;
+      if (y < 32) at_0 = (s.rows[row].at ^ s.rows[row + 1].at) & shape.at_0;
+      const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + at_0;
+      s.y_base[row] = number;
+      const std::uint32_t corner = entry(5, 33 * 32 + y);
+      s.y_at_0[row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
+    }
   }
 }
 

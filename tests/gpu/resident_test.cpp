@@ -194,7 +194,7 @@ TYPED_TEST(GpuResident, AnySearchMakesTheSameMesh) {
     for (const auto search :
          {gpu::TileSearch::none, gpu::TileSearch::interval, gpu::TileSearch::kdtree,
           gpu::TileSearch::quadtree, gpu::TileSearch::octree}) {
-      gpu::ResidentExtractor extractor(volume, options, search);
+      gpu::ResidentExtractor extractor(volume, options, {.search = search});
       for (const double shift : {0.0, 35.5, -60.0, 1e9}) {
         const auto expected = by_ranges.extract(this->lowest() + 100 + shift);
         const auto counts = extractor.extract(this->lowest() + 100 + shift);
@@ -211,6 +211,36 @@ TYPED_TEST(GpuResident, AnySearchMakesTheSameMesh) {
       }
     }
   }
+}
+
+TYPED_TEST(GpuResident, AnyNumberOfThreadsMakesTheSameMesh) {
+  const auto field = this->noise({67, 41, 35}, 9);
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  SurfaceOptions options;
+  options.roi = {{3, 0, 5}, field.extent};
+  gpu::DeviceVolume volume(lattice, bricks, 0);
+  for (const bool normals : {false, true}) {
+    options.normals = normals;
+    gpu::ResidentExtractor usual(volume, options);
+    usual.extract(this->lowest() + 100);
+    MeshBuffer expected;
+    usual.download(expected);
+    for (const int threads : {32, 64, 128, 256, 288, 512, 1024}) {
+      SCOPED_TRACE(std::to_string(threads) + " threads");
+      const bool studied = std::is_same_v<TypeParam, std::uint8_t> && !normals;
+      if (threads != 288 && threads != 1024 && !studied) {
+        EXPECT_THROW(gpu::ResidentExtractor(volume, options, {.threads = threads}), UsageError);
+        continue;
+      }
+      gpu::ResidentExtractor extractor(volume, options, {.threads = threads});
+      extractor.extract(this->lowest() + 100);
+      MeshBuffer mesh;
+      extractor.download(mesh);
+      expect_same(expected, mesh);
+    }
+  }
+  EXPECT_THROW(gpu::ResidentExtractor(volume, options, {.threads = 100}), UsageError);
 }
 
 TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {
