@@ -1,7 +1,6 @@
 #include "isobrick/gpu/span_indices.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "isobrick/core/error.h"
 
@@ -17,19 +16,12 @@ DeviceBuffer<T> to_device(const std::vector<T>& values, const Stream& stream) {
   return buffer;
 }
 
-/// Threads for indices of so many items: a warp for few.
-int threads_for(std::uint32_t items) {
-  const std::uint32_t wanted = std::bit_ceil(std::max(items / 64, 1u));
-  return static_cast<int>(std::clamp<std::uint32_t>(wanted, 32, kSearchThreads));
-}
-
 }  // namespace
 
 SpanIndices::SpanIndices(IndexBlocks blocks, const Stream& stream) : blocks_(std::move(blocks)) {
   std::vector<MaskPiece> pieces;
   std::vector<IndexPlace> places;
   std::uint64_t words = 0;
-  std::uint32_t most = 0;
   for (std::size_t i = 0; i < headers().size(); ++i) {
     const std::uint32_t items = headers()[i].items, own = items / 32 + (items % 32 ? 1 : 0);
     places.push_back({blocks_.offsets[i], words});
@@ -37,7 +29,7 @@ SpanIndices::SpanIndices(IndexBlocks blocks, const Stream& stream) : blocks_(std
     for (std::uint32_t at = 0; at < own; at += MaskPiece::kWords)
       pieces.push_back({words + at, std::min(own - at, MaskPiece::kWords), 32 * at});
     words += own;
-    most = std::max(most, items);
+    most_items_ = std::max(most_items_, items);
   }
   first_pieces_.push_back(static_cast<std::uint32_t>(pieces.size()));
   pieces_ = to_device(pieces, stream);
@@ -45,7 +37,6 @@ SpanIndices::SpanIndices(IndexBlocks blocks, const Stream& stream) : blocks_(std
   mask_ = DeviceBuffer<std::uint32_t>(words + 1, stream);
   if (headers().size() == 1 && headers()[0].kind == IndexKind::quadtree)
     runs_ = DeviceBuffer<Run>(RunQueue::room_for(headers()[0].stored), stream);
-  threads_ = threads_for(most);
 }
 
 void SpanIndices::search(double isovalue, const Stream& stream) {
@@ -57,7 +48,7 @@ void SpanIndices::search(double isovalue, const Stream& stream) {
     launch_search_one(like, isovalue, mask_.data(), later, stream.get());
   else
     launch_search_many(like, blocks_.bytes.data(), places_.data(),
-                       static_cast<std::uint32_t>(headers().size()), threads_, isovalue,
+                       static_cast<std::uint32_t>(headers().size()), most_items_, isovalue,
                        mask_.data(), stream.get());
 }
 

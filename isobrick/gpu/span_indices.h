@@ -14,8 +14,8 @@ class SpanIndices {
  public:
   SpanIndices(IndexBlocks blocks, const Stream& stream);
 
-  /// Launches a search. One index is searched by the whole device, several by a
-  /// block of threads each.
+  /// Launches a search. One index is searched by the whole device, several by
+  /// blocks of threads each.
   void search(double isovalue, const Stream& stream);
 
   const std::vector<IndexHeader>& headers() const { return blocks_.headers; }
@@ -36,7 +36,7 @@ class SpanIndices {
   DeviceBuffer<IndexPlace> places_;
   DeviceBuffer<std::uint32_t> mask_;  ///< and the number of runs that wait
   DeviceBuffer<Run> runs_;
-  int threads_ = kSearchThreads;  ///< of a block, where there are several indices
+  std::uint32_t most_items_ = 0;  ///< of an index
 };
 
 /// Uploads indices of one kind and type as they are. Throws UsageError when they

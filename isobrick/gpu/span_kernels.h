@@ -52,15 +52,16 @@ struct MaskPiece {
 void launch_search_one(const IndexView& index, double isovalue, std::uint32_t* mask,
                        const RunQueue& later, cudaStream_t stream);
 
-/// Searches `count` indices of the kind and type of `like`, a block of threads
-/// each. `threads`: of a block, a power of two, 32 … kSearchThreads.
+/// Searches `count` indices of the kind and type of `like`, none of which has more
+/// than `most_items`: blocks of threads for each.
 void launch_search_many(const IndexView& like, const std::byte* blocks, const IndexPlace* places,
-                        std::uint32_t count, int threads, double isovalue, std::uint32_t* mask,
-                        cudaStream_t stream);
+                        std::uint32_t count, std::uint32_t most_items, double isovalue,
+                        std::uint32_t* mask, cudaStream_t stream);
 
-/// The number of bits that are set in each piece.
+/// The number of bits that are set in each piece, and the sum of those before it:
+/// `first` has one more, the sum of all. So has `counts`, a 0.
 void launch_count_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
-                       std::uint32_t* counts, cudaStream_t stream);
+                       std::uint32_t* counts, std::uint32_t* first, cudaStream_t stream);
 
 /// Writes the ids of the set bits ascending, those of piece i from first[i] on;
 /// none at `room` or above.

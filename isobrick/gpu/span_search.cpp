@@ -6,7 +6,6 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/span_indices.h"
-#include "isobrick/gpu/span_sort.h"
 #include "isobrick/index/instantiate.h"
 
 namespace isobrick::gpu {
@@ -122,8 +121,7 @@ struct SpanSearch::Impl {
     start.record(stream);
     indices.search(isovalue, stream);
     launch_count_bits(indices.mask(), indices.pieces().data(), pieces(), counts.data(),
-                      stream.get());
-    exclusive_sum(counts.data(), first.data(), pieces() + 1, stream);
+                      first.data(), stream.get());
     list();
     end.record(stream);
     check(cudaMemcpyAsync(total.data(), first.data() + pieces(), sizeof(std::uint32_t),

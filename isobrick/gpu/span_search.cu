@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 
 #include "isobrick/core/threshold.h"
 #include "isobrick/gpu/cuda_check.h"
@@ -32,7 +33,8 @@ __global__ void __launch_bounds__(kSearchThreads)
                    const T value, std::uint32_t* mask) {
   __shared__ WalkShared<View> shared;
   __shared__ alignas(View) unsigned char bytes[sizeof(View)];
-  const Crew crew{threadIdx.x / 32, blockDim.x / 32, threadIdx.x % 32};
+  const std::uint32_t warps = blockDim.x / 32;
+  const Crew crew{blockIdx.y * warps + threadIdx.x / 32, gridDim.y * warps, threadIdx.x % 32};
   for (std::uint32_t i = blockIdx.x; i < count; i += gridDim.x) {
     const std::byte* block = blocks + places[i].block;
     __syncthreads();
@@ -45,30 +47,81 @@ __global__ void __launch_bounds__(kSearchThreads)
   }
 }
 
-__device__ std::uint32_t sum_of_warp(std::uint32_t v) {
+/// Of the threads of a block: the sum before this one, and of all. Ends with a barrier.
+struct BlockSum {
+  std::uint32_t before, all;
+
+  __device__ BlockSum(std::uint32_t own, std::uint32_t (&of_warp)[kWarps]) {
+    const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+    std::uint32_t sum = own;
 #pragma unroll
-  for (int d = 16; d; d /= 2) v += __shfl_xor_sync(0xffffffffu, v, d);
-  return v;
+    for (std::uint32_t d = 1; d < 32; d *= 2) {
+      const std::uint32_t below = __shfl_up_sync(0xffffffffu, sum, d);
+      if (lane >= d) sum += below;
+    }
+    if (lane == 31) of_warp[warp] = sum;
+    __syncthreads();
+    before = sum - own;
+    all = 0;
+#pragma unroll
+    for (std::uint32_t w = 0; w < kWarps; ++w) {
+      if (w < warp) before += of_warp[w];
+      all += of_warp[w];
+    }
+    __syncthreads();
+  }
+};
+
+/// The numbers of bits of all pieces to where each one's ids begin, and their sum
+/// behind; one block.
+__device__ void place_pieces(const std::uint32_t* counts, std::uint32_t count, std::uint32_t* first,
+                             std::uint32_t (&of_warp)[kWarps]) {
+  constexpr std::uint32_t kEach = 8;
+  std::uint32_t base = 0;
+  for (std::uint64_t begin = 0; begin < count; begin += kEach * kSearchThreads) {
+    std::uint32_t values[kEach], own = 0;
+#pragma unroll
+    for (std::uint32_t k = 0; k < kEach; ++k) {
+      const std::uint64_t i = begin + kEach * threadIdx.x + k;
+      values[k] = i < count ? __ldcg(counts + i) : 0;
+      own += values[k];
+    }
+    const BlockSum sum(own, of_warp);
+    std::uint32_t place = base + sum.before;
+#pragma unroll
+    for (std::uint32_t k = 0; k < kEach; ++k) {
+      const std::uint64_t i = begin + kEach * threadIdx.x + k;
+      if (i < count) first[i] = place;
+      place += values[k];
+    }
+    base += sum.all;
+  }
+  if (threadIdx.x == 0) first[count] = base;
 }
 
+/// The block that is the last to be done places all pieces.
 __global__ void __launch_bounds__(kSearchThreads)
     count_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
-               std::uint32_t* counts) {
+               std::uint32_t* counts, std::uint32_t* done, std::uint32_t* first) {
   __shared__ std::uint32_t of_warp[kWarps];
+  __shared__ bool last;
   for (std::uint32_t i = blockIdx.x; i < count; i += gridDim.x) {
     const MaskPiece piece = pieces[i];
     std::uint32_t bits = 0;
     for (std::uint32_t w = threadIdx.x; w < piece.words; w += kSearchThreads)
       bits += __popc(mask[piece.first_word + w]);
-    bits = sum_of_warp(bits);
-    if (threadIdx.x % 32 == 0) of_warp[threadIdx.x / 32] = bits;
-    __syncthreads();
-    if (threadIdx.x == 0) {
-      for (int w = 1; w < kWarps; ++w) bits += of_warp[w];
-      counts[i] = bits;
-    }
-    __syncthreads();
+    const BlockSum sum(bits, of_warp);
+    if (threadIdx.x == 0) counts[i] = sum.all;
   }
+  if (threadIdx.x == 0) {
+    __threadfence();
+    last = atomicAdd(done, 1u) + 1 == gridDim.x;
+    __threadfence();
+  }
+  __syncthreads();
+  if (!last) return;
+  place_pieces(counts, count, first, of_warp);
+  if (threadIdx.x == 0) *done = 0;
 }
 
 __global__ void __launch_bounds__(kSearchThreads)
@@ -76,7 +129,6 @@ __global__ void __launch_bounds__(kSearchThreads)
               const std::uint32_t* first, std::uint32_t* ids, std::uint64_t room) {
   constexpr std::uint32_t kEach = MaskPiece::kWords / kSearchThreads;
   __shared__ std::uint32_t of_warp[kWarps];
-  const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
   for (std::uint32_t i = blockIdx.x; i < count; i += gridDim.x) {
     const MaskPiece piece = pieces[i];
     std::uint32_t words[kEach], own = 0;
@@ -86,16 +138,7 @@ __global__ void __launch_bounds__(kSearchThreads)
       words[k] = w < piece.words ? mask[piece.first_word + w] : 0;
       own += __popc(words[k]);
     }
-    std::uint32_t sum = own;
-#pragma unroll
-    for (std::uint32_t d = 1; d < 32; d *= 2) {
-      const std::uint32_t below = __shfl_up_sync(0xffffffffu, sum, d);
-      if (lane >= d) sum += below;
-    }
-    if (lane == 31) of_warp[warp] = sum;
-    __syncthreads();
-    std::uint64_t place = std::uint64_t{first[i]} + sum - own;
-    for (std::uint32_t w = 0; w < warp; ++w) place += of_warp[w];
+    std::uint64_t place = std::uint64_t{first[i]} + BlockSum(own, of_warp).before;
 #pragma unroll
     for (std::uint32_t k = 0; k < kEach; ++k) {
       const std::uint32_t id = piece.first_id + 32 * (kEach * threadIdx.x + k);
@@ -103,7 +146,6 @@ __global__ void __launch_bounds__(kSearchThreads)
         if (place < room)
           ids[place] = id + static_cast<std::uint32_t>(__ffs(static_cast<int>(left))) - 1;
     }
-    __syncthreads();
   }
 }
 
@@ -139,13 +181,17 @@ void launch_search_one(const IndexView& index, double isovalue, std::uint32_t* m
 }
 
 void launch_search_many(const IndexView& like, const std::byte* blocks, const IndexPlace* places,
-                        std::uint32_t count, int threads, double isovalue, std::uint32_t* mask,
-                        cudaStream_t stream) {
+                        std::uint32_t count, std::uint32_t most_items, double isovalue,
+                        std::uint32_t* mask, cudaStream_t stream) {
   visit_index(like, [&]<template <class> class View, class T>(const View<T>&) {
     const Threshold<T> threshold(isovalue);
     if (threshold.none) return;
-    const unsigned grid =
-        std::min(count, blocks_for(~0ull) * (kSearchThreads / static_cast<unsigned>(threads)));
+    // A warp for few items; several blocks where the indices are few and large.
+    const unsigned threads =
+        std::clamp<unsigned>(std::bit_ceil(most_items / 64 + 1), 32, kSearchThreads);
+    const unsigned room = blocks_for(~0ull);
+    const unsigned parts = std::clamp(room / count, 1u, most_items / (4 * kSearchThreads) + 1);
+    const dim3 grid(std::min(count, room * (kSearchThreads / threads)), parts);
     search_indices<View<T>, T>
         <<<grid, threads, 0, stream>>>(blocks, places, count, threshold.value, mask);
     check_launch("search_indices");
@@ -153,8 +199,9 @@ void launch_search_many(const IndexView& like, const std::byte* blocks, const In
 }
 
 void launch_count_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
-                       std::uint32_t* counts, cudaStream_t stream) {
-  count_bits<<<blocks_for(count), kSearchThreads, 0, stream>>>(mask, pieces, count, counts);
+                       std::uint32_t* counts, std::uint32_t* first, cudaStream_t stream) {
+  count_bits<<<blocks_for(count), kSearchThreads, 0, stream>>>(mask, pieces, count, counts,
+                                                               counts + count, first);
   check_launch("count_bits");
 }
 

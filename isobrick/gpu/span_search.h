@@ -13,8 +13,8 @@ namespace isobrick::gpu {
 
 /// Span-space indices in device memory: the bytes of index/, searched there and
 /// built there. One index, such as that of a volume's blocks, is searched by the
-/// whole device; several, such as those of the cells of each brick, at once by a
-/// block of threads each. All eight types. Not thread-safe; the current device at
+/// whole device; several, such as those of the cells of each brick, at once by
+/// blocks of threads each. All eight types. Not thread-safe; the current device at
 /// construction is used.
 class SpanSearch {
  public:
