@@ -15,7 +15,7 @@ namespace {
 
 /// Small words that kernels share: zeroed before each search but the last.
 struct Counters {
-  std::uint32_t search_ticket, extract_ticket, item_count, unused;
+  std::uint32_t search_ticket, extract_ticket, item_count, found;
   SurfaceTotals totals;
 };
 
@@ -96,7 +96,9 @@ struct ResidentExtractor::Impl {
     }
     p.isovalue = isovalue;
     p.items = items.data();
+    p.found = &counters()->found;
     p.item_count = &counters()->item_count;
+    p.item_room = static_cast<std::uint32_t>(row_tables.size());
     p.slot_of_tile = slot_of_tile.data();
     p.order = order.data();
     p.sums = reinterpret_cast<unsigned long long*>(counters() + 1);
@@ -165,23 +167,23 @@ struct ResidentExtractor::Impl {
   DeviceCounts extract(double value) {
     if (std::isnan(value)) throw UsageError("the isovalue is not a number");
     isovalue = value;
-    start.record(volume.stream);
-    launch_search();
-    const std::uint32_t active = read_counters().item_count;
-    make_row_tables(active);
-    make_room(kVerticesOfTile * active, kTrianglesOfTile * active);
-    launch_tiles();
-    end.record(volume.stream);
+    // Tiles that have no room are not begun: the first launch tells how many there are.
     for (;;) {
-      const SurfaceTotals made = read_counters().totals;
+      launch();
+      const Counters c = read_counters();
+      if (c.found > row_tables.size()) {
+        make_row_tables(c.found);
+        make_room(kVerticesOfTile * c.found, kTrianglesOfTile * c.found);
+        continue;
+      }
+      const SurfaceTotals made = c.totals;
       if (made.vertices > std::numeric_limits<std::uint32_t>::max())
         throw Error(
             "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "
             "number; extract it in parts with --roi");
       if (3 * made.vertices <= positions.size() && 3 * made.triangles <= triangles.size())
-        return {made.vertices, made.triangles, active};
+        return {made.vertices, made.triangles, c.found};
       make_room(made.vertices, made.triangles);
-      launch();
     }
   }
 

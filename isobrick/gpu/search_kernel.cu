@@ -68,8 +68,11 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
         [&](std::uint32_t i) -> unsigned long long& { return p.sums[i]; }, block, warps.all);
     if (lane_id() == 0) {
       base = before;
-      if ((block + 1) * kTilesOfSearchBlock >= p.count)
-        *p.item_count = static_cast<std::uint32_t>(before + warps.all);
+      if ((block + 1) * kTilesOfSearchBlock >= p.count) {
+        const auto found = static_cast<std::uint32_t>(before + warps.all);
+        *p.found = found;
+        *p.item_count = found <= p.item_room ? found : 0;
+      }
     }
   }
   __syncthreads();

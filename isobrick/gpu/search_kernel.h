@@ -25,7 +25,9 @@ struct SearchParams {
   std::int32_t grid[3], roi_lo[3], roi_hi[3];  ///< tiles; samples
   double isovalue;
   TileItem* items;  ///< room for all
-  std::uint32_t* item_count;
+  std::uint32_t* found;
+  std::uint32_t* item_count;  ///< the same, but 0 where it is above item_room
+  std::uint32_t item_room;
   std::uint32_t* slot_of_tile;
   OrderState* order;         ///< of the extraction: zeroed for each item
   unsigned long long* sums;  ///< one a block of the search, zeroed
