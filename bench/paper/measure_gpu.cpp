@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using gpu::TileSearch;
 
-constexpr int kFrames = 25;
+constexpr int kFrames = 101;
 constexpr Index kBrick = 64;  ///< cells along the bricks of the structures over cells
 /// Cells whose structures are built at a time.
 constexpr std::size_t kCellsAtOnce = std::size_t{1} << 26;
