@@ -27,7 +27,7 @@ class SpanSearch {
   /// volume(grids[i]) ranges, C order [z, y, x], and its bytes are those of
   /// build_index on the CPU. Throws UsageError when there is no grid, when the
   /// grids are not those of the ranges, and for 2³² − 1 ranges and more; Error when
-  /// device memory does not suffice: at most some 100 bytes a range, 180 of f64.
+  /// device memory does not suffice: at most some 160 bytes a range, 240 of f64.
   template <class T>
   SpanSearch(IndexKind kind, std::span<const ValueRange<T>> ranges, std::span<const Int3> grids);
 
