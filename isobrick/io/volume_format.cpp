@@ -59,6 +59,14 @@ std::optional<VolumeFormat> by_content(const std::string& path, std::string_view
   if (is_nifti(bytes_of(head))) return VolumeFormat::nifti;
   if (head.starts_with("\x1f\x8b") && is_nifti(bytes_of(unpack_head(path))))
     return VolumeFormat::nifti;
+  using namespace std::string_view_literals;
+  for (const auto magic : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
+    if (head.starts_with(magic)) return VolumeFormat::tiff;
+  // An HDF5 file may begin with something of its user's.
+  for (const std::size_t at : {0, 512, 1024, 2048})
+    if (head.size() > at && head.substr(at).starts_with("\x89HDF\r\n\x1a\n"))
+      return VolumeFormat::hdf5;
+  if (head.size() >= 132 && head.substr(128, 4) == "DICM") return VolumeFormat::dicom;
   if (head.starts_with("# vtk DataFile")) return VolumeFormat::legacy_vtk;
   if (head.starts_with("<") && head.substr(0, 1024).find("<VTKFile") != std::string_view::npos)
     return VolumeFormat::vti;
@@ -71,6 +79,9 @@ VolumeFormat by_extension(const std::string& path) {
       {".mhd", VolumeFormat::meta_image}, {".mha", VolumeFormat::meta_image},
       {".nii", VolumeFormat::nifti},      {".hdr", VolumeFormat::nifti},
       {".vti", VolumeFormat::vti},        {".vtk", VolumeFormat::legacy_vtk},
+      {".tif", VolumeFormat::tiff},       {".tiff", VolumeFormat::tiff},
+      {".h5", VolumeFormat::hdf5},        {".hdf5", VolumeFormat::hdf5},
+      {".dcm", VolumeFormat::dicom},
   };
   if (lower(path).ends_with(".nii.gz")) return VolumeFormat::nifti;
   const std::string extension = lower(std::filesystem::path(path).extension().string());

@@ -12,6 +12,9 @@ enum class VolumeFormat : std::uint8_t {
   nifti,
   vti,         ///< VTK's XML
   legacy_vtk,  ///< VTK's older format
+  tiff,
+  hdf5,
+  dicom,
 };
 
 /// The format of a file: by its first bytes, else by its extension. Throws Error

@@ -1,0 +1,72 @@
+#include "isobrick/io/optional_formats.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+
+#ifdef ISOBRICK_WITH_EXPAT
+#include "isobrick/io/vti_volume.h"
+#endif
+#ifdef ISOBRICK_WITH_TIFF
+#include "isobrick/io/tiff_volume.h"
+#endif
+#ifdef ISOBRICK_WITH_HDF5
+#include "isobrick/io/hdf5_volume.h"
+#endif
+#ifdef ISOBRICK_WITH_DICOM
+#include "isobrick/io/dicom_volume.h"
+#endif
+
+namespace isobrick {
+namespace {
+
+[[noreturn, maybe_unused]] void built_without(const std::string& name, const char* format,
+                                              const char* library) {
+  throw UsageError(
+      fmt::format("'{}' is {}, which this isobrick cannot read: it was built without {}", name,
+                  format, library));
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_vti_if_built(const std::string& file,
+                                                [[maybe_unused]] const std::string& array,
+                                                [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_EXPAT
+  return open_vti(file, array, said);
+#else
+  built_without(file, "a VTK image", "libexpat1-dev");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_tiff_if_built(
+    const std::string& name, [[maybe_unused]] const std::vector<std::string>& files,
+    [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_TIFF
+  return open_tiff(name, files, said);
+#else
+  built_without(name, "a TIFF stack", "libtiff-dev 4.5");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_hdf5_if_built(const std::string& file,
+                                                 [[maybe_unused]] const std::string& dataset,
+                                                 [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_HDF5
+  return open_hdf5(file, dataset, said);
+#else
+  built_without(file, "an HDF5 file", "libhdf5-dev");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_dicom_if_built(
+    const std::string& name, [[maybe_unused]] const std::vector<std::string>& files,
+    [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_DICOM
+  return open_dicom(name, files, said);
+#else
+  built_without(name, "a DICOM series", "libdcmtk-dev");
+#endif
+}
+
+}  // namespace isobrick
