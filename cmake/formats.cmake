@@ -12,3 +12,13 @@ endmacro()
 
 isobrick_format_library(ISOBRICK_EXPAT EXPAT "VTK images (.vti)")
 isobrick_format_library(ISOBRICK_TIFF TIFF "TIFF stacks" 4.5)
+
+# CMake's own module for HDF5 needs a C compiler; Debian calls the library that
+# is not for MPI hdf5-serial.
+pkg_search_module(hdf5 QUIET IMPORTED_TARGET hdf5-serial hdf5)
+option(ISOBRICK_HDF5 "Read HDF5 datasets" ${hdf5_FOUND})
+if(ISOBRICK_HDF5)
+  pkg_search_module(hdf5 REQUIRED IMPORTED_TARGET hdf5-serial hdf5)
+else()
+  message(STATUS "HDF5 not found or turned off: HDF5 datasets cannot be read")
+endif()

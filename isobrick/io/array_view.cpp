@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <limits>
-#include <vector>
 
 #include "isobrick/core/error.h"
 
@@ -55,6 +54,25 @@ Index choose(const std::string& path, const char* option, Index count,
     throw UsageError(fmt::format("'{}' has {} {}{}: {} {} is not there", path, count, what,
                                  count == 1 ? "" : "s", option, *chosen));
   return chosen.value_or(0);
+}
+
+bool guess_roles(std::vector<ArrayAxis>& axes, const Selection& selection) {
+  for (ArrayAxis& axis : axes) axis.role = AxisRole::space;
+  std::size_t left = axes.size();
+  for (ArrayAxis& axis : axes) {
+    if (left == 3 || axis.size != 1) continue;
+    axis.role = AxisRole::channel;
+    --left;
+  }
+  if (left > 3 && selection.channel && axes.front().role == AxisRole::space) {
+    axes.front().role = AxisRole::channel;
+    --left;
+  }
+  if (left > 3 && selection.time && axes.back().role == AxisRole::space) {
+    axes.back().role = AxisRole::time;
+    --left;
+  }
+  return left == 3;
 }
 
 ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes,

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "isobrick/core/vec.h"
 
@@ -41,6 +42,15 @@ struct ArrayView {
 /// and were not, and for choices that are not there.
 ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes,
                         const Selection& selection);
+
+/// Where a file leaves open which three of its axes (fastest first) are space:
+/// those of size 1 are not, nor is the first when a channel is asked for, nor the
+/// last when a time is. False when that leaves other than three.
+bool guess_roles(std::vector<ArrayAxis>& axes, const Selection& selection);
+
+/// What to do about guess_roles being false, for a message.
+inline constexpr const char* kRolesHint =
+    "--channel C takes the fastest axis for channels, --time T the slowest one for time";
 
 /// The place on an axis of `count` channels or times that is chosen. `option` is
 /// "--channel" or "--time".

@@ -171,26 +171,6 @@ bool find_roles(const Fields& fields, std::vector<ArrayAxis>& axes) {
   return axes.size() == 3;
 }
 
-/// Where the header leaves open which three of four axes are space: one of size
-/// 1 is not, nor is the first (fastest) when a channel is asked for, nor the last
-/// when a time is.
-void guess_roles(const Fields& fields, const Selection& selection, std::vector<ArrayAxis>& axes) {
-  const auto single =
-      std::find_if(axes.begin(), axes.end(), [](const ArrayAxis& axis) { return axis.size == 1; });
-  if (axes.size() == 4 && single != axes.end())
-    single->role = AxisRole::channel;
-  else if (axes.size() == 4 && selection.channel && !selection.time)
-    axes.front().role = AxisRole::channel;
-  else if (axes.size() == 4 && selection.time && !selection.channel)
-    axes.back().role = AxisRole::time;
-  else
-    header_error(fields.path(),
-                 fmt::format("{} dimensions, and neither 'kinds' nor 'space directions' say which "
-                             "3 are space; of 4, --channel C takes the first for channels and "
-                             "--time T the last for time",
-                             axes.size()));
-}
-
 /// Returns how many axes the array has.
 std::size_t read_view(const Fields& fields, const Selection& selection, TextHeader& header) {
   constexpr Index kMostDimensions = 16;
@@ -203,7 +183,11 @@ std::size_t read_view(const Fields& fields, const Selection& selection, TextHead
   for (const auto word : per_axis(fields, static_cast<std::size_t>(dimension), "sizes",
                                   split_words(fields.need("sizes"))))
     axes.push_back({parse_integer(fields.path(), "sizes", word), AxisRole::space});
-  if (!find_roles(fields, axes)) guess_roles(fields, selection, axes);
+  if (!find_roles(fields, axes) && !guess_roles(axes, selection))
+    header_error(fields.path(),
+                 fmt::format("{} dimensions, and neither 'kinds' nor 'space directions' say which "
+                             "3 are space: {}",
+                             axes.size(), kRolesHint));
   header.view = select_volume(fields.path(), axes, selection);
   return axes.size();
 }
