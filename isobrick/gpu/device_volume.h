@@ -45,8 +45,8 @@ enum class TileSearch : std::uint8_t {
 /// How a resident volume is extracted; none of it shows in the mesh.
 struct ResidentTuning {
   TileSearch search = TileSearch::ranges;
-  /// Threads that share a tile: 0 chooses, 288 and 1024 always work, 32, 64, 128,
-  /// 256 and 512 for u8 without normals.
+  /// Threads that share a tile: 0 chooses, 384, 640 and 1024 always work, 32, 64,
+  /// 128, 256 and 512 for u8 without normals.
   int threads = 0;
 };
 

@@ -36,7 +36,8 @@ constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
 struct ResidentExtractor::Impl {
   DeviceVolume::Impl& volume;
   SurfaceOptions options;
-  LaunchShape shape;
+  LaunchShapes shapes;
+  std::uint32_t active = 0;  ///< tiles of the last extraction
   double isovalue = 0;
   std::uint32_t epoch = 0;
   DeviceBuffer<std::uint16_t> case_entries;
@@ -45,8 +46,8 @@ struct ResidentExtractor::Impl {
   DeviceBuffer<OrderState> order;
   DeviceBuffer<std::byte> zeroed;  ///< Counters, then the sums of the search
   DeviceBuffer<RowTable> row_tables;
-  DeviceBuffer<float> positions, normals;
-  DeviceBuffer<std::uint32_t> triangles;
+  DeviceBuffer<Vec3f> positions, normals;
+  DeviceBuffer<Triangle> triangles;
   PinnedBuffer<Counters> seen{1};
   Event start, end;
   TileSearch search;
@@ -55,7 +56,7 @@ struct ResidentExtractor::Impl {
   Impl(DeviceVolume& v, const SurfaceOptions& o, const ResidentTuning& tuning)
       : volume(v.impl()),
         options(o),
-        shape(launch_shape(volume.lattice.type, o.normals, volume.tile_count, tuning.threads)),
+        shapes(launch_shapes(volume.lattice.type, o.normals, tuning.threads)),
         case_entries(kCaseEntries, volume.stream),
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
@@ -127,25 +128,25 @@ struct ResidentExtractor::Impl {
     p.positions = positions.data();
     p.normals = normals.data();
     p.triangles = triangles.data();
-    p.vertex_capacity = positions.size() / 3;
-    p.triangle_capacity = triangles.size() / 3;
+    p.vertex_capacity = positions.size();
+    p.triangle_capacity = triangles.size();
     p.totals = &counters()->totals;
-    launch_extraction(volume.lattice.type, options.normals, p, case_entries.data(), shape,
-                      volume.stream.get());
+    launch_extraction(volume.lattice.type, options.normals, p, case_entries.data(),
+                      shapes.of(active), volume.stream.get());
   }
 
   /// Buffers for a mesh of that size. What they held is lost.
   void make_room(std::uint64_t vertices, std::uint64_t triangle_count) {
     const Stream& stream = volume.stream;
-    if (3 * vertices > positions.size()) {
+    if (vertices > positions.size()) {
       positions = {};
-      positions = DeviceBuffer<float>(3 * vertices, stream);
+      positions = DeviceBuffer<Vec3f>(vertices, stream);
       normals = {};
-      if (options.normals) normals = DeviceBuffer<float>(3 * vertices, stream);
+      if (options.normals) normals = DeviceBuffer<Vec3f>(vertices, stream);
     }
-    if (3 * triangle_count > triangles.size()) {
+    if (triangle_count > triangles.size()) {
       triangles = {};
-      triangles = DeviceBuffer<std::uint32_t>(3 * triangle_count, stream);
+      triangles = DeviceBuffer<Triangle>(triangle_count, stream);
     }
   }
 
@@ -171,6 +172,7 @@ struct ResidentExtractor::Impl {
     for (;;) {
       launch();
       const Counters c = read_counters();
+      active = c.found;
       if (c.found > row_tables.size()) {
         make_row_tables(c.found);
         make_room(kVerticesOfTile * c.found, kTrianglesOfTile * c.found);
@@ -181,7 +183,7 @@ struct ResidentExtractor::Impl {
         throw Error(
             "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "
             "number; extract it in parts with --roi");
-      if (3 * made.vertices <= positions.size() && 3 * made.triangles <= triangles.size())
+      if (made.vertices <= positions.size() && made.triangles <= triangles.size())
         return {made.vertices, made.triangles, c.found};
       make_room(made.vertices, made.triangles);
     }

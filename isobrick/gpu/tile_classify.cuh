@@ -72,14 +72,18 @@ __device__ inline std::uint32_t inside32(const Classifier<T>& classifier, const 
   return classifier.bits(words);
 }
 
-/// The page of the tile that holds sample (x, y, z), each in −32 … 63.
-template <class T>
-__device__ inline const T* page_at(const TileShared& s, int x, int y, int z) {
-  return static_cast<const T*>(s.pages[13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5)]);
+/// Where the samples of a row lie, counted from sample (0, 0, 0) of the tile.
+__device__ inline int row_start(int row, int z) { return (row - z) * 32; }
+
+/// The page of a sample, each coordinate in −32 … 63.
+__device__ inline int page_of(int x, int y, int z) {
+  return 13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5);
 }
 
-__device__ inline int offset_in_page(int x, int y, int z) {
-  return (x & 31) | (y & 31) << 5 | (z & 31) << 10;
+/// The sample at `place` = x + 32·y + 1024·z, which lies in `page`.
+template <class T>
+__device__ inline const T* sample_at(const TileShared& s, int page, int place) {
+  return reinterpret_cast<const T*>(s.pages[page]) + place;
 }
 
 /// A row a thread: a row of narrow samples is a piece of memory or two.
@@ -88,10 +92,10 @@ __device__ inline void classify_rows(TileShared& s, const Classifier<T>& classif
 #pragma unroll 2
   for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
     const int z = static_cast<int>(z_of_row(row)), y = row - 33 * z;
-    const int offset = offset_in_page(0, y, z);
-    const T last = __ldg(page_at<T>(s, 32, y, z) + offset);
-    const std::uint32_t word = inside32(classifier, page_at<T>(s, 0, y, z) + offset);
-    s.rows[row] = {word, word >> 1 | classifier.one(last) << 31};
+    const int page = page_of(0, y, z), start = row_start(row, z);
+    const T last = __ldg(sample_at<T>(s, page + 1, start + 32));
+    const std::uint32_t word = inside32(classifier, sample_at<T>(s, page, start));
+    s.rows[row] = {word, classifier.one(last)};
   }
 }
 
@@ -102,20 +106,20 @@ __device__ inline void classify_planes(TileShared& s, const Classifier<T>& class
   const int lane = static_cast<int>(lane_id());
   const auto inside = [&](T v) { return __ballot_sync(kAll, v >= classifier.threshold); };
   for (int z = static_cast<int>(warp_id()); z < 33; z += Team<N>::kWarps) {
-    const int plane = offset_in_page(0, 0, z);
-    const T* from = page_at<T>(s, 0, 0, z) + plane + lane;
+    const int page = page_of(0, 0, z), start = 1024 * z;
+    const T* from = sample_at<T>(s, page, start + lane);
     std::uint32_t word = 0;
 #pragma unroll 16
     for (int y = 0; y < 32; ++y) {
       const std::uint32_t row = inside(__ldg(from + 32 * y));
       if (lane == y) word = row;
     }
-    const T last = __ldg(page_at<T>(s, 32, lane, z) + offset_in_page(0, lane, z));
-    s.rows[33 * z + lane] = {word, word >> 1 | classifier.one(last) << 31};
+    const T last = __ldg(sample_at<T>(s, page + 1, start + 32 * lane + 32));
+    s.rows[33 * z + lane] = {word, classifier.one(last)};
     // The row at y = 32 lies in the tile above.
-    const std::uint32_t top = inside(__ldg(page_at<T>(s, 0, 32, z) + plane + lane));
-    const T corner = __ldg(page_at<T>(s, 32, 32, z) + plane);
-    if (lane == 0) s.rows[33 * z + 32] = {top, top >> 1 | classifier.one(corner) << 31};
+    const std::uint32_t top = inside(__ldg(sample_at<T>(s, page + 3, start + 1024 + lane)));
+    const T corner = __ldg(sample_at<T>(s, page + 4, start + 1024 + 32));
+    if (lane == 0) s.rows[33 * z + 32] = {top, classifier.one(corner)};
   }
 }
 
@@ -132,7 +136,7 @@ template <int N>
 __device__ inline void clear_lists(TileShared& s) {
   const uint4 zero{0, 0, 0, 0};
   for (unsigned i = threadIdx.x; i < kListed / 4; i += N)
-    reinterpret_cast<uint4*>(s.cells)[i] = zero;
+    reinterpret_cast<uint4*>(s.cells())[i] = zero;
   for (unsigned i = threadIdx.x; i < kListed / 8; i += N)
     reinterpret_cast<uint4*>(s.vertex_marks)[i] = zero;
 }

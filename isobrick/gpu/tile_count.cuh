@@ -8,42 +8,39 @@
 
 namespace isobrick::gpu {
 
-/// The crossing edges that start in a row and belong to the tile, as words of
-/// the CPU's EdgeRow; those at sample 0 are apart.
+/// The crossing edges that start in a row, as words of EdgeRow, and those at sample
+/// 0, which only the first tiles have. Not all belong to the tile.
 struct RowEdges {
   std::uint32_t x, y, z, y_at_0, z_at_0;
   std::uint32_t cells;
+  bool own_y, own_z;
 
-  __device__ std::uint32_t y_start() const { return __popc(x); }
-  __device__ std::uint32_t z_start() const { return __popc(x) + y_at_0 + __popc(y); }
-  __device__ std::uint32_t vertices() const { return z_start() + z_at_0 + __popc(z); }
+  __device__ std::uint32_t xs() const { return own_y && own_z ? __popc(x) : 0; }
+  __device__ std::uint32_t ys() const { return own_z ? __popc(y) : 0; }
+  __device__ std::uint32_t zs() const { return own_y ? __popc(z) : 0; }
 };
 
 __device__ inline std::uint32_t mixed_cells(const RowBits& a, const RowBits& b, const RowBits& c,
                                             const RowBits& d) {
-  const std::uint32_t any = a.at | a.next | b.at | b.next | c.at | c.next | d.at | d.next;
-  const std::uint32_t all = a.at & a.next & b.at & b.next & c.at & c.next & d.at & d.next;
+  const std::uint32_t an = a.next(), bn = b.next(), cn = c.next(), dn = d.next();
+  const std::uint32_t any = a.at | an | b.at | bn | c.at | cn | d.at | dn;
+  const std::uint32_t all = a.at & an & b.at & bn & c.at & cn & d.at & dn;
   return any & ~all;
 }
 
-__device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape, int row, int y,
-                                        int z) {
-  RowEdges e{0, 0, 0, 0, 0, 0};
+__device__ inline RowEdges edges_of_row(const TileShared& s, int row, int y, int z) {
+  const Shape& shape = s.shape;
+  RowEdges e{0, 0, 0, 0, 0, 0, y > 0 || shape.first[1], z > 0 || shape.first[2]};
   if (z < shape.lo[2] || z > shape.hi[2] || y < shape.lo[1] || y > shape.hi[1]) return e;
   const bool up_y = y < shape.hi[1], up_z = z < shape.hi[2];
-  const bool own_y = y > 0 || shape.first[1], own_z = z > 0 || shape.first[2];
   const RowBits here = s.rows[row];
   const RowBits above = up_y ? s.rows[row + 1] : here;
   const RowBits behind = up_z ? s.rows[row + 33] : here;
-  if (own_y && own_z) e.x = (here.at ^ here.next) & shape.cell_mask;
-  if (own_z) {
-    e.y = (here.next ^ above.next) & shape.sample_mask;
-    e.y_at_0 = (here.at ^ above.at) & shape.at_0;
-  }
-  if (own_y) {
-    e.z = (here.next ^ behind.next) & shape.sample_mask;
-    e.z_at_0 = (here.at ^ behind.at) & shape.at_0;
-  }
+  e.x = (here.at ^ here.next()) & shape.cell_mask;
+  e.y = (here.next() ^ above.next()) & shape.sample_mask;
+  e.z = (here.next() ^ behind.next()) & shape.sample_mask;
+  if (e.own_z) e.y_at_0 = (here.at ^ above.at) & shape.at_0;
+  if (e.own_y) e.z_at_0 = (here.at ^ behind.at) & shape.at_0;
   if (up_y && up_z) e.cells = mixed_cells(here, above, behind, s.rows[row + 34]) & shape.cell_mask;
   return e;
 }
@@ -54,7 +51,9 @@ struct RowCount {
   std::uint32_t packed;
 
   __device__ static RowCount of(const RowEdges& e) {
-    return {0, e.y_start() | e.z_start() << 6 | e.vertices() << 13 |
+    const std::uint32_t y_start = e.xs(), z_start = y_start + e.y_at_0 + e.ys();
+    const std::uint32_t all = z_start + e.z_at_0 + e.zs();
+    return {0, y_start | z_start << 6 | all << 13 |
                    static_cast<std::uint32_t>(__popc(e.cells)) << 20 | e.y_at_0 << 26 |
                    e.z_at_0 << 27};
   }
@@ -72,7 +71,7 @@ struct RowCounts {
 };
 
 template <int N>
-__device__ inline void count_rows(TileShared& s, const Shape& shape, RowCounts<N>& counts) {
+__device__ inline void count_rows(TileShared& s, RowCounts<N>& counts) {
 #pragma unroll
   for (int step = 0; step < Team<N>::kSteps; ++step) {
     const int row = step * N + static_cast<int>(threadIdx.x);
@@ -82,7 +81,12 @@ __device__ inline void count_rows(TileShared& s, const Shape& shape, RowCounts<N
     if ((row & ~31) < kRowsOfTile) {
       if (row < kRowsOfTile) {
         const int z = static_cast<int>(z_of_row(row));
-        count = RowCount::of(edges_of_row(s, shape, row, row - 33 * z, z));
+        const RowEdges edges = edges_of_row(s, row, row - 33 * z, z);
+        s.crossing[0][row] = edges.x;
+        s.crossing[1][row] = edges.y;
+        s.crossing[2][row] = edges.z;
+        s.mixed[row] = edges.cells;
+        count = RowCount::of(edges);
       }
       const std::uint32_t own = count.vertices() | count.cells() << 16;
       sum = warp_inclusive_sum(own);
@@ -115,13 +119,14 @@ __device__ inline void sum_steps(TileShared& s) {
 /// Marks a row with `count` things from `place` on, counted from the first that
 /// is listed now; it may lie before that.
 template <class Mark>
-__device__ inline void mark_row(Mark* marks, std::uint16_t* rows, int place, int count, int row) {
+__device__ inline void mark_row(Mark* marks, FirstOfGroup* groups, int place, int count, int row) {
   constexpr int kGroups = kListed / 32;
   if (count == 0) return;
   if (place >= 0 && place < static_cast<int>(kListed)) marks[place] = static_cast<Mark>(row + 1);
   for (int group = ::max((place + 31) >> 5, 0); group < kGroups && 32 * group < place + count;
        ++group)
-    rows[group] = static_cast<std::uint16_t>(row);
+    groups[group] = {static_cast<std::uint16_t>(row),
+                     static_cast<std::uint16_t>(32 * group - place)};
 }
 
 /// Leaves the row table for later tiles and the numbers within the tile in
@@ -138,13 +143,14 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, R
     const std::uint32_t cell = s.step_cells[sum] + (count.before >> 16);
     const std::uint32_t y = count.y_start(), z = count.z_start();
     table.rows[row] = base | y << 17 | z << 23;
-    s.x_base[row] = base;
-    s.y_base[row] = base + y + count.y_at_0();
-    s.z_base[row] = base + z + count.z_at_0();
+    s.number[0][row] = base;
+    s.number[1][row] = base + y + count.y_at_0();
+    s.number[2][row] = base + z + count.z_at_0();
     s.cell_base[row] = static_cast<std::uint16_t>(cell);
-    mark_row(s.vertex_marks, s.vertex_rows, static_cast<int>(base),
+    mark_row(s.vertex_marks, s.vertex_groups, static_cast<int>(base),
              static_cast<int>(count.vertices()), row);
-    mark_row(s.cells, s.cell_rows, static_cast<int>(cell), static_cast<int>(count.cells()), row);
+    mark_row(s.cells(), s.cell_groups, static_cast<int>(cell), static_cast<int>(count.cells()),
+             row);
   }
   if (threadIdx.x == 0) {
     table.rows[kRowsOfTile] = s.all_vertices;
@@ -153,15 +159,15 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, R
 }
 
 /// Marks the vertices from `first` on, for tiles that have more than are listed
-/// at a time. Between barriers; the numbers are still those within the tile.
+/// at a time. Between barriers.
 template <int N>
 __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
   for (unsigned i = threadIdx.x; i < kListed; i += N) s.vertex_marks[i] = 0;
   __syncthreads();
   for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
-    const std::uint32_t begin = s.x_base[row];
-    const std::uint32_t end = row + 1 < kRowsOfTile ? s.x_base[row + 1] : s.all_vertices;
-    mark_row(s.vertex_marks, s.vertex_rows, static_cast<int>(begin - first),
+    const std::uint32_t begin = s.number[0][row];
+    const std::uint32_t end = row + 1 < kRowsOfTile ? s.number[0][row + 1] : s.all_vertices;
+    mark_row(s.vertex_marks, s.vertex_groups, static_cast<int>(begin - first),
              static_cast<int>(end - begin), row);
   }
   __syncthreads();
@@ -169,21 +175,28 @@ __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
 
 template <int N>
 __device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
-  for (unsigned i = threadIdx.x; i < kListed; i += N) s.cells[i] = 0;
+  for (unsigned i = threadIdx.x; i < kListed; i += N) s.cells()[i] = 0;
   __syncthreads();
   for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
-    mark_row(s.cells, s.cell_rows, static_cast<int>(begin - first), static_cast<int>(end - begin),
-             row);
+    mark_row(s.cells(), s.cell_groups, static_cast<int>(begin - first),
+             static_cast<int>(end - begin), row);
   }
   __syncthreads();
 }
 
-/// The row of each lane's thing, from the marks of 32 in a row.
-__device__ inline std::uint32_t row_of_lane(std::uint32_t mark, std::uint32_t row_before) {
+/// The row of a lane's thing, and its place among the row's.
+struct PlaceInRow {
+  std::uint32_t row, rank;
+};
+
+/// From the marks of 32 things in a row.
+__device__ inline PlaceInRow place_of_lane(std::uint32_t mark, const FirstOfGroup& group) {
   const unsigned begins = __ballot_sync(kAll, mark != 0) & (lanes_below() << 1 | 1u);
-  const std::uint32_t found = __shfl_sync(kAll, mark, 31 - __clz(static_cast<int>(begins)));
-  return begins ? found - 1 : row_before;
+  const auto from = static_cast<unsigned>(31 - __clz(static_cast<int>(begins)));
+  const std::uint32_t found = __shfl_sync(kAll, mark, from);
+  if (begins) return {found - 1, lane_id() - from};
+  return {group.row, group.before + lane_id()};
 }
 
 /// The place of the set bit with `rank` set bits below it.
@@ -204,37 +217,55 @@ struct WarpPart {
 
 template <int N>
 __device__ inline WarpPart part_of_warp(std::uint32_t listed) {
-  const std::uint32_t groups = (listed + 31) / 32;
-  const std::uint32_t begin = groups * warp_id() / Team<N>::kWarps * 32;
-  const std::uint32_t end = groups * (warp_id() + 1) / Team<N>::kWarps * 32;
-  return {begin, ::min(end, listed)};
+  const std::uint32_t all = uniform(listed), warp = uniform(warp_id()), groups = (all + 31) / 32;
+  const std::uint32_t begin = groups * warp / Team<N>::kWarps * 32;
+  const std::uint32_t end = groups * (warp + 1) / Team<N>::kWarps * 32;
+  return {begin, ::min(end, all)};
 }
 
-__device__ inline std::uint32_t triangles_of(const TileShared& s, std::uint32_t index) {
-  return s.triangles[5 * index] >> 12;
+/// The same where the first warp has something else to do: `Halves` halves of what
+/// the others get for it.
+template <int N, int Halves>
+__device__ inline WarpPart part_beside_first(std::uint32_t listed) {
+  if constexpr (Team<N>::kWarps == 1) {
+    return part_of_warp<N>(listed);
+  } else {
+    constexpr std::uint32_t kParts = 2 * (Team<N>::kWarps - 1) + Halves;
+    const std::uint32_t all = uniform(listed), warp = uniform(warp_id()), groups = (all + 31) / 32;
+    const std::uint32_t last = 2 * warp + Halves;
+    const std::uint32_t begin = warp == 0 ? 0 : groups * (last - 2) / kParts * 32;
+    const std::uint32_t end = groups * last / kParts * 32;
+    return {begin, ::min(end, all)};
+  }
 }
 
-/// Finds the marked cells and their cases; the number of triangles of this
-/// warp's part. `first` is the number of the first cell that is listed.
+/// Finds the marked cells and their cases, and how many triangles each 32 have.
 template <int N>
-__device__ inline std::uint32_t find_cells(TileShared& s, const Shape& shape, std::uint32_t first,
-                                           std::uint32_t listed) {
-  const WarpPart part = part_of_warp<N>(listed);
-  std::uint32_t triangles = 0;
+__device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
+  const WarpPart part = part_beside_first<N, 1>(listed);
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
-    const std::uint32_t row = row_of_lane(s.cells[i], s.cell_rows[begin / 32]);
-    const RowBits a = s.rows[row], b = s.rows[row + 1], c = s.rows[row + 33], d = s.rows[row + 34];
-    const std::uint32_t x =
-        nth_bit(mixed_cells(a, b, c, d) & shape.cell_mask, first + i - s.cell_base[row]);
-    const auto pair = [x](const RowBits& r) { return (r.at >> x & 1u) | (r.next >> x & 1u) << 1; };
-    const std::uint32_t index = pair(a) | pair(b) << 2 | pair(c) << 4 | pair(d) << 6;
-    if (i < part.end) {
-      triangles += triangles_of(s, index);
-      s.cells[i] = x | row << 5 | index << 16;
-    }
+    const PlaceInRow place = place_of_lane(s.cells()[i], s.cell_groups[begin / 32]);
+    const std::uint32_t x = nth_bit(s.mixed[place.row], place.rank);
+    const auto pair = [&](int step) {
+      const RowBits bits = s.rows[place.row + step];
+      return __funnelshift_r(bits.at, bits.last, x) & 3u;
+    };
+    const std::uint32_t index = pair(0) | pair(1) << 2 | pair(33) << 4 | pair(34) << 6;
+    const std::uint32_t count = i < part.end ? s.triangle_count[index] : 0;
+    if (i < part.end) s.cells()[i] = x | place.row << 5 | 10 * index << 16 | count << 28;
+    const std::uint32_t all = warp_sum(count);
+    if (lane_id() == 0) s.group_triangles[begin / 32] = static_cast<std::uint16_t>(all);
   }
-  return warp_sum(triangles);
+}
+
+/// The triangles of the first `groups` groups of cells. For whole warps.
+__device__ inline std::uint32_t triangles_before(const TileShared& s, std::uint32_t groups) {
+  std::uint32_t sum = 0;
+#pragma unroll
+  for (std::uint32_t i = 0; i < (kListed / 32 + 31) / 32; ++i)
+    if (lane_id() + 32 * i < groups) sum += s.group_triangles[lane_id() + 32 * i];
+  return warp_sum(sum);
 }
 
 /// Of one value a warp: the sum before this warp and of all.

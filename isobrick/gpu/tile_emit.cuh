@@ -7,25 +7,6 @@
 
 namespace isobrick::gpu {
 
-/// Up to 32 times three words from a warp to consecutive memory: through
-/// shared memory, so that every store of the warp is one piece.
-__device__ inline void store_triples(std::uint32_t* staging, const std::uint32_t (&triple)[3],
-                                     std::uint32_t count, void* to) {
-#pragma unroll
-  for (int i = 0; i < 3; ++i) staging[3 * lane_id() + i] = triple[i];
-  __syncwarp();
-  auto* out = static_cast<std::uint32_t*>(to) + lane_id();
-  if (count == 32) {
-#pragma unroll
-    for (int i = 0; i < 3; ++i) out[32 * i] = staging[32 * i + lane_id()];
-  } else {
-#pragma unroll
-    for (int i = 0; i < 3; ++i)
-      if (32 * i + lane_id() < 3 * count) out[32 * i] = staging[32 * i + lane_id()];
-  }
-  __syncwarp();
-}
-
 /// The map of WorldMap::position where nothing lies off the diagonal: the
 /// terms left out are zeros.
 __device__ inline Vec3f position_of(const TileParams& p, Vec3f at) {
@@ -40,24 +21,20 @@ struct EdgeOfVertex {
   std::uint32_t x, axis;
 };
 
-__device__ inline EdgeOfVertex find_edge(const TileShared& s, const Shape& shape, std::uint32_t row,
+__device__ inline EdgeOfVertex find_edge(const TileShared& s, std::uint32_t row,
                                          std::uint32_t number) {
-  const std::uint32_t y_base = s.y_base[row], z_base = s.z_base[row];
-  if (shape.at_0) {
+  const std::uint32_t y_first = s.number[1][row], z_first = s.number[2][row];
+  if (s.shape.at_0) {
     // The vertices at sample 0 stand before the others along y and along z.
     const auto z = static_cast<int>(z_of_row(row));
-    const RowEdges e =
-        edges_of_row(s, shape, static_cast<int>(row), static_cast<int>(row) - 33 * z, z);
-    if (e.z_at_0 && number + 1 == z_base) return {0, 2};
-    if (e.y_at_0 && number + 1 == y_base) return {0, 1};
+    const RowEdges e = edges_of_row(s, static_cast<int>(row), static_cast<int>(row) - 33 * z, z);
+    if (e.z_at_0 && number + 1 == z_first) return {0, 2};
+    if (e.y_at_0 && number + 1 == y_first) return {0, 1};
   }
-  const bool after_y = number >= y_base, after_z = number >= z_base;
-  const std::uint32_t other = s.rows[row + (after_z ? 33 : after_y ? 1 : 0)].next;
-  const RowBits here = s.rows[row];
-  const std::uint32_t word =
-      ((after_y ? here.next : here.at) ^ other) & (after_y ? shape.sample_mask : shape.cell_mask);
-  const std::uint32_t base = after_z ? z_base : after_y ? y_base : s.x_base[row];
-  return {nth_bit(word, number - base) + after_y, std::uint32_t{after_y} + after_z};
+  const std::uint32_t axis = std::uint32_t{number >= y_first} + (number >= z_first);
+  const std::uint32_t place = row + axis * kRowsOfTile;
+  const std::uint32_t rank = number - s.number[0][place];
+  return {nth_bit(s.crossing[0][place], rank) + (axis > 0), axis};
 }
 
 template <class T>
@@ -65,23 +42,10 @@ struct VertexMaker {
   using R = float;
   const TileShared& s;
   const TileParams& p;
-  const Shape& shape;
   R iso;
 
   __device__ R sample(int x, int y, int z) const {
-    return static_cast<R>(__ldg(page_at<T>(s, x, y, z) + offset_in_page(x, y, z)));
-  }
-
-  /// The samples at (x, y, z) and one step along the axis.
-  __device__ void ends(int x, int y, int z, int axis, R& a, R& b) const {
-    int page = 13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5);
-    int offset = offset_in_page(x, y, z);
-    a = static_cast<R>(__ldg(static_cast<const T*>(s.pages[page]) + offset));
-    const int step = 1 << 5 * axis, last = 31 << 5 * axis;
-    const bool over = (offset & last) == last;
-    offset = over ? offset - last : offset + step;
-    if (over) page += axis == 0 ? 1 : axis == 1 ? 3 : 9;
-    b = static_cast<R>(__ldg(static_cast<const T*>(s.pages[page]) + offset));
+    return static_cast<R>(__ldg(sample_at<T>(s, page_of(x, y, z), x + 32 * y + 1024 * z)));
   }
 
   __device__ float crossing_of(R a, R b) const {
@@ -91,7 +55,7 @@ struct VertexMaker {
 
   /// Central difference, one-sided at the volume's border.
   __device__ float difference(int axis, int at, R before, R here, R after) const {
-    const int global = shape.origin[axis] + at;
+    const int global = s.shape.origin[axis] + at;
     const bool low = global == 0, high = global == p.extent[axis] - 1;
     const R d = (high ? here : after) - (low ? here : before);
     return d * (low || high ? R(1) : R(0.5));
@@ -109,13 +73,19 @@ struct VertexMaker {
     R a, b;
   };
 
-  __device__ Edge load(std::uint32_t row, EdgeOfVertex place) const {
+  __device__ Edge load(std::uint32_t row, EdgeOfVertex edge) const {
     Edge e;
-    e.x = static_cast<int>(place.x);
+    e.x = static_cast<int>(edge.x);
     e.z = static_cast<int>(z_of_row(row));
     e.y = static_cast<int>(row) - 33 * e.z;
-    e.axis = static_cast<int>(place.axis);
-    ends(e.x, e.y, e.z, e.axis, e.a, e.b);
+    e.axis = static_cast<int>(edge.axis);
+    const int page = page_of(e.x, e.y, e.z);
+    const int place = row_start(static_cast<int>(row), e.z) + e.x;
+    e.a = static_cast<R>(__ldg(sample_at<T>(s, page, place)));
+    const int along = e.axis == 0 ? e.x : e.axis == 1 ? e.y : e.z;
+    // 1, 3 or 9 pages on, 1, 32 or 1024 samples.
+    const int next = page + (along == 31 ? 0x931 >> 4 * e.axis & 15 : 0);
+    e.b = static_cast<R>(__ldg(sample_at<T>(s, next, place + (1 << 5 * e.axis))));
     return e;
   }
 
@@ -123,8 +93,9 @@ struct VertexMaker {
   __device__ void make(const Edge& e, Vec3f& position, Vec3f& normal) const {
     const int dx = e.axis == 0, dy = e.axis == 1, dz = e.axis == 2;
     const float t = crossing_of(e.a, e.b);
-    Vec3f at{static_cast<float>(shape.origin[0] + e.x), static_cast<float>(shape.origin[1] + e.y),
-             static_cast<float>(shape.origin[2] + e.z)};
+    Vec3f at{static_cast<float>(s.shape.origin[0] + e.x),
+             static_cast<float>(s.shape.origin[1] + e.y),
+             static_cast<float>(s.shape.origin[2] + e.z)};
     if (dx) at.x += t;
     if (dy) at.y += t;
     if (dz) at.z += t;
@@ -140,129 +111,109 @@ struct VertexMaker {
 };
 
 /// Writes the marked vertices, the first of which has number `first` in the tile.
-/// The samples of one group are on their way while the next is looked up.
 template <int N, class T, bool Normals>
-__device__ inline void emit_vertices(TileShared& s, WarpShared& own, const TileParams& p,
-                                     const Shape& shape, std::uint32_t first,
+__device__ inline void emit_vertices(const TileShared& s, const TileParams& p, std::uint32_t first,
                                      std::uint32_t listed) {
   using Maker = VertexMaker<T>;
-  const Maker maker{s, p, shape, p.crossing};
-  const auto load = [&](std::uint32_t begin) {
+  const Maker maker{s, p, p.crossing};
+  const WarpPart part = part_beside_first<N, 0>(listed);
+  for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
-    const std::uint32_t row = row_of_lane(s.vertex_marks[i], s.vertex_rows[begin / 32]);
-    // Threads without a vertex take the last one again.
-    const std::uint32_t number = first + ::min(i, listed - 1);
-    return maker.load(row, find_edge(s, shape, row, number));
-  };
-  const WarpPart part = part_of_warp<N>(listed);
-  if (part.begin >= part.end) return;
-  const std::uint64_t start = 3 * (s.vertex_base + first + part.begin);
-  float* to = p.positions + start;
-  float* normals_to = p.normals + start;
-  typename Maker::Edge edge = load(part.begin);
-  for (std::uint32_t begin = part.begin; begin < part.end;
-       begin += 32, to += 96, normals_to += 96) {
-    typename Maker::Edge next = edge;
-    if (begin + 32 < part.end) next = load(begin + 32);
-    const std::uint32_t count = ::min(listed - begin, 32u);
+    const std::uint32_t row = place_of_lane(s.vertex_marks[i], s.vertex_groups[begin / 32]).row;
+    if (i >= listed) continue;
+    const typename Maker::Edge edge = maker.load(row, find_edge(s, row, first + i));
     Vec3f position, normal;
     maker.template make<Normals>(edge, position, normal);
-    const std::uint32_t words[3] = {__float_as_uint(position.x), __float_as_uint(position.y),
-                                    __float_as_uint(position.z)};
-    store_triples(own.staging, words, count, to);
-    if constexpr (Normals) {
-      const std::uint32_t n[3] = {__float_as_uint(normal.x), __float_as_uint(normal.y),
-                                  __float_as_uint(normal.z)};
-      store_triples(own.staging, n, count, normals_to);
-    }
-    edge = next;
+    const std::uint64_t to = s.vertex_base + first + i;
+    p.positions[to] = position;
+    if constexpr (Normals) p.normals[to] = normal;
   }
 }
 
-/// The vertex number on an edge of the cell at `x`, `row`. The mask has the bits of
-/// the crossing edges before the cell's upper ones.
-__device__ inline std::uint32_t vertex_number(const TileShared& s, const EdgePlace& place,
-                                              std::uint32_t row, std::uint32_t mask) {
-  const char* base = reinterpret_cast<const char*>(&s);
-  const auto word = [base](std::uint32_t at) {
-    return *reinterpret_cast<const std::uint32_t*>(base + at);
-  };
-  const std::uint32_t crossing =
-      word(place.first_word + 8 * row) ^ word(place.second_word + 8 * row);
-  return word(place.number + 4 * row) + __popc(crossing & mask >> place.shift);
-}
+/// How far behind a row's word its number lies, in bytes.
+inline constexpr std::uint32_t kNumberOfWord =
+    offsetof(TileShared, number) - offsetof(TileShared, crossing);
 
 /// Fills the tables of places and triangles; once a block.
 template <int N>
 __device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles) {
-  for (unsigned i = threadIdx.x; i < 256 * 5; i += N) s.triangles[i] = triangles[i];
-  if (threadIdx.x >= 24) return;
-  const unsigned e = threadIdx.x % 12, at_0 = threadIdx.x / 12;
-  const unsigned axis = e / 4, first = e & 1u, second = e >> 1 & 1u;
-  const auto at = static_cast<std::uint32_t>(offsetof(TileShared, rows));
-  const auto next = at + 4u;
-  EdgePlace place;
-  if (axis == 0) {
-    const unsigned row = first + 33 * second;
-    place = {at + 8 * row, next + 8 * row,
-             static_cast<std::uint32_t>(offsetof(TileShared, x_base)) + 4 * row, 0};
-  } else {
-    const unsigned row = axis == 1 ? 33 * second : second;
-    const unsigned step = axis == 1 ? 1 : 33;
-    const bool zero = at_0 && first == 0;
-    const auto number = static_cast<std::uint32_t>(axis == 1 ? zero ? offsetof(TileShared, y_at_0)
-                                                                    : offsetof(TileShared, y_base)
-                                                   : zero ? offsetof(TileShared, z_at_0)
-                                                             : offsetof(TileShared, z_base));
-    place = {next + 8 * row, next + 8 * (row + step), number + 4 * row, 1 - first};
+  for (unsigned i = threadIdx.x; i < 256 * 5; i += N) {
+    const std::uint32_t entry = triangles[i];
+    s.triangles[i] = static_cast<std::uint16_t>((entry & 0xfffu) << 3);
+    if (i % 5 == 0) s.triangle_count[i / 5] = static_cast<std::uint8_t>(entry >> 12);
   }
-  s.places[at_0][e] = place;
+  for (unsigned t = threadIdx.x; t < 24; t += N) {
+    const unsigned e = t % 12, at_0 = t / 12;
+    const unsigned axis = e / 4, first = e & 1u, second = e >> 1 & 1u;
+    const unsigned row = axis == 0 ? first + 33 * second : axis == 1 ? 33 * second : second;
+    // The word that belongs to a number at sample 0 is never counted.
+    const std::size_t array = offsetof(TileShared, at_0) - kNumberOfWord;
+    s.places[at_0][e].offset = static_cast<std::uint32_t>(
+        axis > 0 && at_0 && first == 0
+            ? array + 4 * (kRowsOfTile * (axis - 1) + row)
+            : offsetof(TileShared, crossing) + 4 * (kRowsOfTile * axis + row));
+  }
 }
 
-/// Writes `count` of the pending triangles, from the ring's place `first` on.
-__device__ inline void emit_pending(const TileShared& s, WarpShared& own, std::uint32_t first,
-                                    std::uint32_t count, std::uint32_t* to) {
-  const std::uint32_t place = first + (count == 32 ? lane_id() : ::min(lane_id(), count - 1));
-  const std::uint32_t entry = own.pending[place % WarpShared::kRing];
-  const std::uint32_t cell = s.cells[entry & 0xfffu];
-  const std::uint32_t x = cell & 31u, row = cell >> 5 & 0x7ffu;
-  const std::uint32_t mask = (1u << x) - 1u;
-  const std::uint32_t edges = s.triangles[5 * (cell >> 16) + (entry >> 12)];
-  const EdgePlace* places = s.places[x == 0];
+/// The lowest `x` bits.
+__device__ inline std::uint32_t low_bits(std::uint32_t x) {
+  std::uint32_t mask;
+  asm("bmsk.clamp.b32 %0, 0, %1;" : "=r"(mask) : "r"(x));
+  return mask;
+}
+
+/// Writes a pending triangle.
+__device__ inline void emit_triangle(const TileShared& s, std::uint32_t entry, Triangle& to) {
+  const char* base = reinterpret_cast<const char*>(&s);
+  const auto word = [base](std::uint32_t at) {
+    return *reinterpret_cast<const std::uint32_t*>(base + at);
+  };
+  const std::uint32_t cell = s.cells()[entry & 0xfffu];
+  const std::uint32_t x = cell & 31u, row = cell >> 3 & 0x1ffcu, mask = low_bits(x);
+  const std::uint32_t edges = *reinterpret_cast<const std::uint16_t*>(
+      reinterpret_cast<const char*>(s.triangles) + (cell >> 16 & 0xfffu) + (entry >> 11 & 0x1eu));
+  const std::uint32_t places = x == 0 ? static_cast<std::uint32_t>(sizeof s.places[0]) : 0;
   std::uint32_t corners[3];
 #pragma unroll
-  for (int c = 0; c < 3; ++c)
-    corners[c] = vertex_number(s, places[edges >> 4 * c & 15u], row, mask);
-  store_triples(own.staging, corners, count, to);
+  for (int c = 0; c < 3; ++c) {
+    const EdgePlace place = *reinterpret_cast<const EdgePlace*>(
+        reinterpret_cast<const char*>(s.places) + ((edges >> 4 * c & 0x78u) | places));
+    const std::uint32_t at = row + place.offset;
+    corners[c] = word(at + kNumberOfWord) + place.addend + __popc(word(at) & mask);
+  }
+  to = {corners[0], corners[1], corners[2]};
 }
 
-/// Writes the triangles of the listed cells; `base` is the number of the first
-/// of this warp's part in the mesh. Triangles wait until there are 32 of them,
+/// Writes the triangles of the listed cells; `base` is the number of the first of
+/// them in the mesh. Triangles wait until there are 32 of them,
 /// whatever cells they come from, so that no thread idles.
 template <int N>
 __device__ inline void emit_triangles(TileShared& s, WarpShared& own, const TileParams& p,
                                       std::uint32_t listed, std::uint64_t base) {
   const WarpPart part = part_of_warp<N>(listed);
-  std::uint32_t* to = p.triangles + 3 * base;
-  std::uint32_t written = 0, waiting = 0;
+  Triangle* to = p.triangles + base + triangles_before(s, part.begin / 32) + lane_id();
+  std::uint32_t waiting = 0;
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
-    const std::uint32_t count = i < part.end ? triangles_of(s, s.cells[i] >> 16) : 0;
+    const std::uint32_t count = i < part.end ? s.cells()[i] >> 28 : 0;
     // The sum before each lane from the bits of the counts: three votes.
     const unsigned ones = __ballot_sync(kAll, count & 1u), twos = __ballot_sync(kAll, count & 2u),
                    fours = __ballot_sync(kAll, count & 4u), below = lanes_below();
-    const std::uint32_t place = written + waiting + __popc(ones & below) +
-                                2 * __popc(twos & below) + 4 * __popc(fours & below);
+    std::uint16_t* place = own.pending + waiting + __popc(ones & below) + 2 * __popc(twos & below) +
+                           4 * __popc(fours & below);
 #pragma unroll
     for (std::uint32_t t = 0; t < 5; ++t)
-      if (t < count)
-        own.pending[(place + t) % WarpShared::kRing] = static_cast<std::uint16_t>(i + (t << 12));
+      if (t < count) place[t] = static_cast<std::uint16_t>(i + (t << 12));
     waiting += __popc(ones) + 2 * __popc(twos) + 4 * __popc(fours);
     __syncwarp();
-    for (; waiting >= 32; waiting -= 32, written += 32, to += 96)
-      emit_pending(s, own, written, 32, to);
+    std::uint32_t written = 0;
+    for (; waiting >= 32; waiting -= 32, written += 32, to += 32)
+      emit_triangle(s, own.pending[written + lane_id()], *to);
+    __syncwarp();
+    if (written > 0) own.pending[lane_id()] = own.pending[written + lane_id()];
+    __syncwarp();
   }
-  if (waiting > 0) emit_pending(s, own, written, waiting, to);
+  if (lane_id() < waiting) emit_triangle(s, own.pending[lane_id()], *to);
 }
 
 }  // namespace isobrick::gpu

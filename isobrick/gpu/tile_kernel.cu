@@ -11,21 +11,18 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr int kThreadsPerMultiprocessor = 1152;
-/// Threads that share a tile where there are many tiles, and where there are few.
-constexpr int kSmallTeam = 288, kLargeTeam = 1024;
-
-/// Blocks of N threads a multiprocessor: shared memory has room for four.
-constexpr int blocks_of(int n) {
-  return kThreadsPerMultiprocessor / n < 4 ? kThreadsPerMultiprocessor / n : 4;
+/// How many teams of so many threads a multiprocessor has registers for.
+constexpr int teams_of_multiprocessor(int threads) {
+  return threads <= 384 ? 3 : threads <= 640 ? 2 : 1;
 }
 
 /// Pages of the tiles around one; where there is none, any that is.
-__device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,
-                           std::size_t page_bytes) {
+template <class T>
+__device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item) {
   if (threadIdx.x >= 27) return;
   const int n = static_cast<int>(threadIdx.x);
-  const int x = item.x + n % 3 - 1, y = item.y + n / 3 % 3 - 1, z = item.z + n / 9 - 1;
+  const int dx = n % 3 - 1, dy = n / 3 % 3 - 1, dz = n / 9 - 1;
+  const int x = item.x + dx, y = item.y + dy, z = item.z + dz;
   const bool exists =
       x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] && z < p.tiles[2];
   std::uint32_t page = p.fill_page;
@@ -34,7 +31,27 @@ __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& i
         p.page_of_tile[(static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x];
     if (own != kNone) page = own;
   }
-  s.pages[n] = static_cast<const char*>(p.pages) + page * page_bytes;
+  const int before = dx * 32 + dy * 1024 + dz * 32768;  // samples of the pages between
+  s.pages[n] = reinterpret_cast<std::uintptr_t>(p.pages) +
+               (static_cast<std::int64_t>(page) * kPageSamples - before) *
+                   static_cast<std::int64_t>(sizeof(T));
+}
+
+/// The first warp takes the next tile.
+template <class T>
+__device__ void take_tile(TileShared& s, const TileParams& p) {
+  if (warp_id() != 0) return;
+  std::uint32_t number = 0;
+  if (lane_id() == 0) number = atomicAdd(p.ticket, 1u);
+  number = __shfl_sync(kAll, number, 0);
+  if (lane_id() == 0) s.item = number;
+  if (number >= *p.item_count) return;
+  const TileItem tile = p.items[number];
+  find_pages<T>(s, p, tile);
+  if (lane_id() == 0) {
+    s.tile = tile;
+    s.shape = shape_of(p, tile);
+  }
 }
 
 /// Brings the samples of a tile that is about to be taken into the L2 cache.
@@ -53,131 +70,165 @@ __device__ void prefetch_tile(const TileParams& p, std::uint32_t number) {
 }
 
 template <int N>
-constexpr std::size_t shared_bytes() {
-  return sizeof(TileShared) + Team<N>::kWarps * sizeof(WarpShared);
+constexpr std::size_t shared_bytes(std::uint32_t listed) {
+  return sizeof(TileShared) + listed * sizeof(std::uint32_t) + Team<N>::kWarps * sizeof(WarpShared);
+}
+
+static_assert(shared_bytes<384>(kListedBeforeAmpere) <= 64 << 10, "what Turing has");
+
+/// Counts a tile's crossing edges and active cells, and leaves their places.
+template <int N>
+__device__ void count_tile(TileShared& s, const TileParams& p) {
+  RowCounts<N> counts;
+  count_rows<N>(s, counts);
+  __syncthreads();
+  if (warp_id() == 0) {
+    sum_steps<N>(s);
+    if (lane_id() == 31) publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
+  }
+  __syncthreads();
+  publish_rows<N>(s, counts, p.row_tables[s.tile.slot]);
+  __threadfence();
+  __syncthreads();
+}
+
+/// Finds the tile's cells; how many triangles they have. The last kListed cells
+/// stay listed. Ends with a barrier.
+template <int N>
+__device__ std::uint64_t count_triangles(TileShared& s) {
+  const std::uint32_t cells = s.all_cells;
+  std::uint64_t triangles = 0;
+  std::uint32_t first = 0;
+  do {
+    if (first > 0) mark_cells<N>(s, first);
+    const std::uint32_t listed = ::min(cells - first, kListed);
+    find_cells<N>(s, listed);
+    __syncthreads();
+    triangles += triangles_before(s, (listed + 31) / 32);
+    if (cells > kListed) __syncthreads();
+    first += kListed;
+  } while (first < cells);
+  return triangles;
 }
 
 template <int N, class T, bool Normals>
-__global__ void __launch_bounds__(N, blocks_of(N))
+__device__ void emit_all_vertices(TileShared& s, const TileParams& p) {
+  const std::uint32_t vertices = s.all_vertices;
+  if (s.vertex_base + vertices > p.vertex_capacity) return;
+  for (std::uint32_t first = 0; first < vertices; first += kListed) {
+    if (first > 0) mark_vertices<N>(s, first);
+    emit_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
+    if (vertices > kListed) __syncthreads();
+  }
+}
+
+template <int N>
+__device__ void emit_all_triangles(TileShared& s, WarpShared& own, const TileParams& p,
+                                   std::uint64_t triangles) {
+  const std::uint32_t cells = s.all_cells;
+  std::uint64_t base = s.triangle_base;
+  if (base + triangles > p.triangle_capacity) return;
+  for (std::uint32_t first = 0; first < cells; first += kListed) {
+    const std::uint32_t listed = ::min(cells - first, kListed);
+    if (cells > kListed) {
+      mark_cells<N>(s, first);
+      find_cells<N>(s, listed);
+      __syncthreads();
+    }
+    emit_triangles<N>(s, own, p, listed, base);
+    if (cells > kListed) {
+      base += triangles_before(s, (listed + 31) / 32);
+      __syncthreads();
+    }
+  }
+}
+
+template <int N, class T, bool Normals>
+__global__ void __launch_bounds__(N, teams_of_multiprocessor(N))
     extract_tiles(const __grid_constant__ TileParams p, const T threshold,
                   const std::uint16_t* __restrict__ case_entries) {
-  extern __shared__ __align__(16) unsigned char bytes[];
+  extern __shared__ __align__(256) unsigned char bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(bytes);
-  WarpShared& own = reinterpret_cast<WarpShared*>(bytes + sizeof(TileShared))[warp_id()];
+  WarpShared& own = reinterpret_cast<WarpShared*>(s.cells() + kListed)[warp_id()];
   fill_tables<N>(s, case_entries);
   const Classifier<T> classifier(threshold);
   const std::uint32_t items = *p.item_count;
-  for (;;) {
-    // No earlier than this: a tile that is taken but not begun holds all later ones up.
-    if (threadIdx.x == 0) s.item = atomicAdd(p.ticket, 1u);
-    __syncthreads();
-    const std::uint32_t number = s.item;
-    if (number >= items) return;
-    const TileItem item = p.items[number];
-    const Shape shape = shape_of(p, item);
-    RowTable& table = p.row_tables[item.slot];
-    find_pages(s, p, item, kPageSamples * sizeof(T));
+  take_tile<T>(s, p);
+  __syncthreads();
+  while (s.item < items) {
     clear_lists<N>(s);
-    __syncthreads();
     classify<N>(s, classifier);
     __syncthreads();
-    {
-      RowCounts<N> counts;
-      count_rows<N>(s, shape, counts);
-      __syncthreads();
-      if (warp_id() == 0) {
-        sum_steps<N>(s);
-        if (lane_id() == 31) publish_sum(p.order[number].vertices, number, s.all_vertices);
-      }
-      __syncthreads();
-      publish_rows<N>(s, counts, table);
-      __threadfence();
-      __syncthreads();
-    }
-    const std::uint32_t vertices = s.all_vertices, cells = s.all_cells;
-    std::uint64_t triangles = 0;
-    SumOfWarps sums{0, 0};
-    for (std::uint32_t first = 0; first < cells; first += kListed) {
-      if (first > 0) mark_cells<N>(s, first);
-      const std::uint32_t found = find_cells<N>(s, shape, first, ::min(cells - first, kListed));
-      if (lane_id() == 0) s.warp_triangles[warp_id()] = found;
-      __syncthreads();
-      sums = sum_of_warps<N>(s.warp_triangles);
-      triangles += sums.all;
-      __syncthreads();
-    }
+    count_tile<N>(s, p);
+    // The first warp asks what other tiles know while the others go on.
+    if (warp_id() == 0) find_vertex_base(s, p);
+    const std::uint64_t triangles = count_triangles<N>(s);
     if (warp_id() == 0) {
-      if (lane_id() == 0) publish_sum(p.order[number].triangles, number, triangles);
-      find_vertex_base(s, p, number, table);
+      if (lane_id() == 0) publish_sum(p.order[s.item].triangles, s.item, triangles);
+      find_triangle_base(s, p, triangles);
+      ask_neighbours(s, p);
     }
+    prefetch_tile<N, T>(p, s.item + gridDim.x);
+    emit_all_vertices<N, T, Normals>(s, p);
     __syncthreads();
-    prefetch_tile<N, T>(p, number + gridDim.x);
-    if (s.vertex_base + vertices <= p.vertex_capacity)
-      for (std::uint32_t first = 0; first < vertices; first += kListed) {
-        if (first > 0) mark_vertices<N>(s, first);
-        emit_vertices<N, T, Normals>(s, own, p, shape, first, ::min(vertices - first, kListed));
-        if (vertices > kListed) __syncthreads();
-      }
-    if (warp_id() == 0) find_triangle_base(s, p, number, triangles);
-    if (warp_id() == (Team<N>::kWarps > 1 ? 1 : 0)) wait_for_neighbours(s, p, item, shape);
+    number_at_0<N>(s);
+    borrow_rows<N>(s);
+    place_numbers<N>(s, p);
     __syncthreads();
-    shift_rows<N>(s, p, shape);
-    __syncthreads();
-    borrow_rows<N>(s, shape);
-    __syncthreads();
-    if (shape.lo[0] > 0) {
-      clip_rows<N>(s, shape);
-      __syncthreads();
-    }
-    if (s.triangle_base + triangles <= p.triangle_capacity) {
-      std::uint64_t base = s.triangle_base;
-      for (std::uint32_t first = 0; first < cells; first += kListed) {
-        const std::uint32_t listed = ::min(cells - first, kListed);
-        if (cells > kListed) {
-          mark_cells<N>(s, first);
-          const std::uint32_t found = find_cells<N>(s, shape, first, listed);
-          if (lane_id() == 0) s.warp_triangles[warp_id()] = found;
-          __syncthreads();
-          sums = sum_of_warps<N>(s.warp_triangles);
-        }
-        emit_triangles<N>(s, own, p, listed, base + sums.before);
-        base += sums.all;
-        __syncthreads();
-      }
-    }
+    emit_all_triangles<N>(s, own, p, triangles);
+    // No earlier than this: a tile that is taken but not begun holds all later ones up.
+    take_tile<T>(s, p);
     __syncthreads();
   }
+}
+
+int device_attribute(cudaDeviceAttr attribute) {
+  int device = 0, value = 0;
+  check(cudaGetDevice(&device));
+  check(cudaDeviceGetAttribute(&value, attribute, device));
+  return value;
 }
 
 /// How many blocks fill the device, and how they are launched.
 template <int N, class T, bool Normals>
 struct Launcher {
-  static void prepare() {
-    check(cudaFuncSetAttribute(extract_tiles<N, T, Normals>,
-                               cudaFuncAttributeMaxDynamicSharedMemorySize, shared_bytes<N>()));
+  static std::size_t shared() {
+    const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
+    return shared_bytes<N>(before_ampere ? kListedBeforeAmpere : kMostListed);
   }
   /// 0 where the device has too little shared memory for one.
   static int blocks() {
-    int device = 0, multiprocessors = 0, each = 0, shared = 0;
-    check(cudaGetDevice(&device));
-    check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
-    check(cudaDeviceGetAttribute(&shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
-    if (static_cast<std::size_t>(shared) < shared_bytes<N>()) return 0;
-    prepare();
+    const std::size_t bytes = shared();
+    if (static_cast<std::size_t>(device_attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin)) < bytes)
+      return 0;
+    check(cudaFuncSetAttribute(extract_tiles<N, T, Normals>,
+                               cudaFuncAttributeMaxDynamicSharedMemorySize,
+                               static_cast<int>(bytes)));
+    int each = 0;
     check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, extract_tiles<N, T, Normals>, N,
-                                                        shared_bytes<N>()));
-    return each * multiprocessors;
+                                                        bytes));
+    return each * device_attribute(cudaDevAttrMultiProcessorCount);
   }
   static void launch(const TileParams& params, const std::uint16_t* case_entries, int blocks,
                      cudaStream_t stream) {
-    extract_tiles<N, T, Normals><<<blocks, N, shared_bytes<N>(), stream>>>(
+    extract_tiles<N, T, Normals><<<blocks, N, shared(), stream>>>(
         params, Threshold<T>(params.isovalue).value, case_entries);
     check_launch("extract_tiles");
   }
 };
 
-/// The number of threads is kSmallTeam or kLargeTeam; the others have
-/// kernels for bytes without normals only.
+template <int N, class F>
+auto visit_launcher_of(ScalarType type, bool normals, F&& f) {
+  return visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    return normals ? f(Launcher<N, T, true>()) : f(Launcher<N, T, false>());
+  });
+}
+
+/// Numbers of threads that have kernels for everything, and others for bytes without
+/// normals only.
+constexpr int kTeams[3] = {1024, 640, 384}, kByteTeams[5] = {32, 64, 128, 256, 512};
+
 template <class F>
 auto visit_launcher(ScalarType type, bool normals, int threads, F&& f) {
   using Byte = std::uint8_t;
@@ -187,23 +238,20 @@ auto visit_launcher(ScalarType type, bool normals, int threads, F&& f) {
     case 128: return f(Launcher<128, Byte, false>());
     case 256: return f(Launcher<256, Byte, false>());
     case 512: return f(Launcher<512, Byte, false>());
-    default: break;
+    case 640: return visit_launcher_of<640>(type, normals, f);
+    case 1024: return visit_launcher_of<1024>(type, normals, f);
+    default: return visit_launcher_of<384>(type, normals, f);
   }
-  return visit_device_scalar(type, [&](auto tag) {
-    using T = typename decltype(tag)::type;
-    if (threads == kLargeTeam)
-      return normals ? f(Launcher<kLargeTeam, T, true>()) : f(Launcher<kLargeTeam, T, false>());
-    return normals ? f(Launcher<kSmallTeam, T, true>()) : f(Launcher<kSmallTeam, T, false>());
-  });
 }
 
 void check_threads(ScalarType type, bool normals, int threads) {
-  for (const int known : {0, kSmallTeam, kLargeTeam})
+  for (const int known : kTeams)
     if (threads == known) return;
-  for (const int known : {32, 64, 128, 256, 512})
+  for (const int known : kByteTeams)
     if (threads == known && type == ScalarType::u8 && !normals) return;
   throw UsageError(
-      "288 or 1024 threads share a tile, and for u8 without normals also 32, 64, 128, 256 or 512");
+      "384, 640 or 1024 threads share a tile, and for u8 without normals also 32, 64, 128, 256 or "
+      "512");
 }
 
 }  // namespace
@@ -219,20 +267,28 @@ void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]) {
     }
 }
 
-LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles, int threads) {
-  check_threads(type, normals, threads);
-  const auto blocks = [&](int n) {
-    return visit_launcher(type, normals, n, [](auto l) { return l.blocks(); });
-  };
-  if (threads > 0) {
-    const LaunchShape shape{blocks(threads), threads};
-    if (shape.blocks == 0) throw UsageError("the device has too little shared memory for that");
-    return shape;
+LaunchShapes launch_shapes(ScalarType type, bool normals, int threads) {
+  if (threads > 0) check_threads(type, normals, threads);
+  LaunchShapes shapes;
+  for (int i = 0; i < 3; ++i) {
+    const int team = threads > 0 ? threads : kTeams[i];
+    shapes.shapes[i] = {visit_launcher(type, normals, team, [](auto l) { return l.blocks(); }),
+                        team};
   }
-  const LaunchShape small{blocks(kSmallTeam), kSmallTeam};
-  if (tiles > static_cast<std::uint32_t>(small.blocks)) return small;
-  const LaunchShape large{blocks(kLargeTeam), kLargeTeam};
-  return large.blocks > 0 ? large : small;
+  if (shapes.shapes[2].blocks == 0)
+    throw Error("the device has too little shared memory for the extraction kernel");
+  return shapes;
+}
+
+LaunchShape LaunchShapes::of(std::uint32_t tiles) const {
+  const auto threads_at_work = [](const LaunchShape& s) { return s.blocks * s.threads; };
+  const LaunchShape* best = &shapes[2];
+  // Where shared memory is scarce, a larger team keeps more threads at work.
+  for (const LaunchShape& shape : shapes)
+    if (threads_at_work(shape) > 2 * threads_at_work(*best)) best = &shape;
+  for (const LaunchShape& shape : shapes)
+    if (shape.blocks > 0 && tiles <= static_cast<std::uint32_t>(shape.blocks)) return shape;
+  return *best;
 }
 
 void launch_extraction(ScalarType type, bool normals, const TileParams& params,

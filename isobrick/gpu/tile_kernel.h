@@ -13,15 +13,23 @@ namespace isobrick::gpu {
 inline constexpr std::size_t kCaseEntries = 256 * 5;
 void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]);
 
-/// How many blocks, and how many threads each.
+/// How many blocks, and how many threads each; no blocks where one does not fit.
 struct LaunchShape {
-  int blocks = 0;
-  int threads = 0;
+  int blocks = 0, threads = 0;
 };
 
-/// What fills the current device when about so many tiles are active. `threads`
-/// that share a tile: 0 chooses. Throws UsageError for numbers that have no kernels.
-LaunchShape launch_shape(ScalarType type, bool normals, std::uint32_t tiles, int threads = 0);
+/// What fills the current device: the fewer tiles there are, the more threads share
+/// one.
+struct LaunchShapes {
+  LaunchShape shapes[3];  ///< by falling number of threads
+
+  /// For so many tiles.
+  LaunchShape of(std::uint32_t tiles) const;
+};
+
+/// `threads` that share a tile: 0 chooses. Throws UsageError for numbers that have no
+/// kernels, Error where no kernel fits the device.
+LaunchShapes launch_shapes(ScalarType type, bool normals, int threads = 0);
 
 /// Launches the extraction of all items on `stream`: one block takes one tile
 /// after the other, in their order.

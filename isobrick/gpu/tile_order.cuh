@@ -69,8 +69,9 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
 }
 
 /// Where the tile's vertices go; with that its row table is complete. One warp.
-__device__ inline void find_vertex_base(TileShared& s, const TileParams& p, std::uint32_t item,
-                                        RowTable& table) {
+__device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
+  const std::uint32_t item = s.item;
+  RowTable& table = p.row_tables[s.tile.slot];
   const auto base =
       sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
                  s.all_vertices);
@@ -82,8 +83,9 @@ __device__ inline void find_vertex_base(TileShared& s, const TileParams& p, std:
 }
 
 /// Where the tile's triangles go. One warp.
-__device__ inline void find_triangle_base(TileShared& s, const TileParams& p, std::uint32_t item,
+__device__ inline void find_triangle_base(TileShared& s, const TileParams& p,
                                           std::uint64_t triangles) {
+  const std::uint32_t item = s.item;
   const auto base =
       sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; }, item,
                  triangles);
@@ -92,106 +94,149 @@ __device__ inline void find_triangle_base(TileShared& s, const TileParams& p, st
   if (item + 1 == *p.item_count) p.totals->triangles = base + triangles;
 }
 
-/// Six threads of a warp, one for each lower neighbour: waits for its numbers.
-/// A neighbour that is not active shares no vertex with this tile.
-__device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p, const TileItem& item,
-                                           const Shape& shape) {
-  const unsigned n = lane_id();
-  if (n < 1 || n > 6) return;
-  const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
-  s.neighbour[n] = nullptr;
-  s.neighbour_base[n] = 0;
-  if ((dx && shape.first[0]) || (dy && shape.first[1]) || (dz && shape.first[2])) return;
-  const std::int64_t tile =
-      (static_cast<std::int64_t>(item.z - dz) * p.tiles[1] + (item.y - dy)) * p.tiles[0] +
-      (item.x - dx);
-  const std::uint32_t slot = p.slot_of_tile[tile];
-  if (slot == kNone) return;
-  RowTable& table = p.row_tables[slot];
-  DeviceFlag ready(table.ready);
-  while (ready.load(cuda::memory_order_acquire) != p.epoch) __nanosleep(20);
-  s.neighbour_base[n] = table.number_base;
-  s.neighbour[n] = &table;
+/// Brings the row table of the tile before to shared memory, on the way while this
+/// returns. One warp.
+__device__ inline void copy_before(TileShared& s, const RowTable& table) {
+#if __CUDA_ARCH__ >= 800
+  static_assert(sizeof(RowTable) % 16 == 0);
+  const auto to = static_cast<std::uint32_t>(__cvta_generic_to_shared(&s.before_copy));
+  const char* from = reinterpret_cast<const char*>(&table);
+  for (unsigned at = 16 * lane_id(); at < sizeof(RowTable); at += 16 * 32)
+    asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(to + at), "l"(from + at)
+                 : "memory");
+  asm volatile("cp.async.commit_group;" ::: "memory");
+#else
+  for (unsigned i = lane_id(); i <= kRowsOfTile; i += 32) s.before_copy.rows[i] = table.rows[i];
+#endif
 }
 
-/// From numbers within the tile to numbers in the mesh (adopt_boundaries of the
-/// CPU), but for what borrow_rows takes from others afterwards.
+/// One warp: waits for the numbers of the lower neighbours, which from now on count
+/// from this tile's first vertex, and fetches what this tile needs of their rows.
+/// A neighbour that is not active shares no vertex with this tile.
+__device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
+  const TileItem& item = s.tile;
+  const Shape& shape = s.shape;
+  const unsigned n = lane_id();
+  const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
+  const bool inside = n >= 1 && n <= 6 && !(dx && shape.first[0]) && !(dy && shape.first[1]) &&
+                      !(dz && shape.first[2]);
+  std::uint32_t slot = kNone;
+  if (inside)
+    slot = p.slot_of_tile[(static_cast<std::int64_t>(item.z - dz) * p.tiles[1] + (item.y - dy)) *
+                              p.tiles[0] +
+                          (item.x - dx)];
+  if (slot != kNone) {
+    RowTable& table = p.row_tables[slot];
+    DeviceFlag ready(table.ready);
+    while (ready.load(cuda::memory_order_acquire) != p.epoch) __nanosleep(20);
+    s.neighbour_base[n] =
+        table.number_base - static_cast<std::uint32_t>(p.number_base + s.vertex_base);
+  } else if (n < 8) {
+    s.neighbour_base[n] = 0;
+  }
+  __syncwarp();
+  const auto slot_of = [&](int neighbour) { return __shfl_sync(kAll, slot, neighbour); };
+  const std::uint32_t before = slot_of(1);
+  // Where the cells' rows are needed again, the table is read where it is.
+  const bool copied = before != kNone && s.all_cells <= kListed;
+  if (copied) copy_before(s, p.row_tables[before]);
+  if (n == 0)
+    s.before = before == kNone ? nullptr : copied ? &s.before_copy : &p.row_tables[before];
+  // All on their way before the first is waited for.
+  const auto fetch = [&](int neighbour, unsigned row) {
+    const std::uint32_t from = slot_of(neighbour);
+    return from == kNone ? 0 : p.row_tables[from].rows[row];
+  };
+  const std::uint32_t y = fetch(2, 33 * n + 32), xy = fetch(3, 33 * n + 33),
+                      z = fetch(4, 33 * 32 + n), xz = fetch(5, 33 * 32 + n);
+  // The last of each, and the row that three tiles share.
+  const std::uint32_t from = __shfl_sync(kAll, slot, ::min(n + 2, 6u));
+  const std::uint32_t last_row = n == 1 ? kRowsOfTile : kRowsOfTile - 1;
+  const std::uint32_t last = n < 5 && from != kNone ? p.row_tables[from].rows[last_row] : 0;
+  s.lower.y[n] = y;
+  s.lower.xy[n] = xy;
+  s.lower.z[n] = z;
+  s.lower.xz[n] = xz;
+  if (n < 4) (&s.lower.y[32])[33 * n] = last;
+  if (n == 4) s.lower.yz = last;
+#if __CUDA_ARCH__ >= 800
+  asm volatile("cp.async.wait_all;" ::: "memory");
+#endif
+}
+
+/// The numbers of vertices that cells at x = 0 have at sample 0: an edge there is
+/// the one before the row's others, or the last of its kind in the row of the
+/// tile before.
 template <int N>
-__device__ inline void shift_rows(TileShared& s, const TileParams& p, const Shape& shape) {
-  const auto own = static_cast<std::uint32_t>(p.number_base + s.vertex_base);
-  const RowTable* before = s.neighbour[1];
-  const std::uint32_t base = s.neighbour_base[1];
-  const bool first = shape.first[0];
-#pragma unroll 2
-  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
-    const std::uint32_t y = s.y_base[row] + own, z = s.z_base[row] + own;
-    s.x_base[row] += own;
-    s.y_base[row] = y;
-    s.z_base[row] = z;
-    // At sample 0 an edge is the one before the row's others, or the last of its
-    // kind in the row of the tile before.
-    std::uint32_t y_at_0 = y - 1, z_at_0 = z - 1;
-    if (!first && before) {
+__device__ inline void number_at_0(TileShared& s) {
+  const RowTable* before = s.before;
+  const std::uint32_t base = s.neighbour_base[1] - 1;
+  const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
+#pragma unroll 3
+  for (unsigned row = threadIdx.x; row < kRowsOfTile; row += N) {
+    // The rows on the lower planes are borrowed.
+    const bool keep_y = own_z || row >= 33, keep_z = own_y || row % 33 != 0;
+    std::uint32_t y = 0, z = 0;
+    if (before) {
       const std::uint32_t e = before->rows[row];
-      y_at_0 = base + (e & 0x1ffffu) + (e >> 23) - 1;
-      z_at_0 = base + (before->rows[row + 1] & 0x1ffffu) - 1;
+      y = base + (e & 0x1ffffu) + (e >> 23);
+      z = base + (before->rows[row + 1] & 0x1ffffu);
+    } else {
+      if (keep_y) y = s.number[1][row] - 1;
+      if (keep_z) z = s.number[2][row] - 1;
     }
-    s.y_at_0[row] = y_at_0;
-    s.z_at_0[row] = z_at_0;
+    if (keep_y) s.at_0[0][row] = y;
+    if (keep_z) s.at_0[1][row] = z;
   }
 }
 
 /// The rows on the lower planes: their vertices belong to tiles before this one.
 template <int N>
-__device__ inline void borrow_rows(TileShared& s, const Shape& shape) {
+__device__ inline void borrow_rows(TileShared& s) {
+  const Shape& shape = s.shape;
   const bool fx = shape.first[0], fy = shape.first[1], fz = shape.first[2];
-  const auto entry = [&](int neighbour, int row) {
-    const RowTable* table = s.neighbour[neighbour];
-    return table ? table->rows[row] : 0u;
-  };
   const auto base_of = [&](int neighbour, std::uint32_t e) {
     return s.neighbour_base[neighbour] + (e & 0x1ffffu);
   };
-  // Turns 0 … 32: rows (0, z); turns 64 … 96: rows (y, 0).
-  for (int t = static_cast<int>(threadIdx.x); t < 97; t += N) {
-    if (t < 33 && !fy) {
-      const int z = t, row = 33 * z;
-      const bool own_z = z > 0 || fz;
-      const std::uint32_t e = entry(2, row + 32);
-      const int from_x = own_z ? 2 : 6;
-      s.x_base[row] = base_of(from_x, own_z ? e : entry(6, kRowsOfTile - 1));
-      std::uint32_t at_0 = 0;
-      if (z < 32) at_0 = (s.rows[row].at ^ s.rows[row + 33].at) & shape.at_0;
-      const std::uint32_t number = base_of(2, e) + (e >> 23) + at_0;
-      s.z_base[row] = number;
-      s.z_at_0[row] = fx ? number - 1 : base_of(3, entry(3, row + 33)) - 1;
-    }
-    if (t >= 64 && t < 97 && !fz) {
-      const int y = t - 64, row = y;
-      const bool own_y = y > 0 || fy;
-      const std::uint32_t e = entry(4, 33 * 32 + y);
-      if (own_y) s.x_base[row] = base_of(4, e);
-      std::uint32_t at_0 = 0;
-      if (y < 32) at_0 = (s.rows[row].at ^ s.rows[row + 1].at) & shape.at_0;
-      const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + at_0;
-      s.y_base[row] = number;
-      const std::uint32_t corner = entry(5, 33 * 32 + y);
-      s.y_at_0[row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
-    }
+  const auto row_0_of = [&](int z) {
+    const int row = 33 * z;
+    const bool own_z = z > 0 || fz;
+    const std::uint32_t e = s.lower.y[z];
+    const int from_x = own_z ? 2 : 6;
+    s.number[0][row] = base_of(from_x, own_z ? e : s.lower.yz);
+    std::uint32_t at_0 = 0;
+    if (z < 32) at_0 = (s.rows[row].at ^ s.rows[row + 33].at) & shape.at_0;
+    const std::uint32_t number = base_of(2, e) + (e >> 23) + at_0;
+    s.number[2][row] = number;
+    s.at_0[1][row] = fx ? number - 1 : base_of(3, s.lower.xy[z]) - 1;
+  };
+  const auto row_of_plane_0 = [&](int y) {
+    const int row = y;
+    const bool own_y = y > 0 || fy;
+    const std::uint32_t e = s.lower.z[y];
+    if (own_y) s.number[0][row] = base_of(4, e);
+    std::uint32_t at_0 = 0;
+    if (y < 32) at_0 = (s.rows[row].at ^ s.rows[row + 1].at) & shape.at_0;
+    const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + at_0;
+    s.number[1][row] = number;
+    const std::uint32_t corner = s.lower.xz[y];
+    s.at_0[0][row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
+  };
+  for (int t = static_cast<int>(threadIdx.x); t < 128; t += N) {
+    if (t < 33 && !fy) row_0_of(t);
+    if (t >= 64 && t < 97 && !fz) row_of_plane_0(t - 64);
   }
 }
 
-/// Bits before the region of interest are counted by ranks but have no vertex.
+/// The numbers in the mesh from those in the tile. The lower of a cell's edges along
+/// y and z are counted by the mask of its upper ones, so one too many.
 template <int N>
-__device__ inline void clip_rows(TileShared& s, const Shape& shape) {
-  const std::uint32_t clipped = (1u << shape.lo[0]) - 1u;
-  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
-    const RowBits here = s.rows[row];
-    const RowBits above = row + 1 < kRowsOfTile ? s.rows[row + 1] : here;
-    const RowBits behind = row + 33 < kRowsOfTile ? s.rows[row + 33] : here;
-    s.x_base[row] -= __popc((here.at ^ here.next) & clipped);
-    s.y_base[row] -= __popc((here.next ^ above.next) & clipped >> 1);
-    s.z_base[row] -= __popc((here.next ^ behind.next) & clipped >> 1);
+__device__ inline void place_numbers(TileShared& s, const TileParams& p) {
+  for (unsigned t = threadIdx.x; t < 24; t += N) {
+    const unsigned e = t % 12, at_0 = t / 12;
+    const bool lower = e >= 4 && (e & 1u) == 0;
+    s.places[at_0][e].addend =
+        static_cast<std::uint32_t>(p.number_base + s.vertex_base) - (lower && !at_0 ? 1u : 0u);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "isobrick/surface/cell_math.h"
+#include "isobrick/surface/mesh.h"
 
 // What the host hands to the extraction kernel. Plain data, no CUDA header.
 
@@ -25,7 +26,7 @@ inline constexpr std::uint32_t kNone = 0xffffffffu;
 /// row, counted from the tile's first vertex, and where in the row those on
 /// edges along y and along z begin: base | y << 17 | z << 23. One entry more
 /// ends the last row.
-struct RowTable {
+struct alignas(16) RowTable {
   std::uint32_t rows[kRowsOfTile + 1];
   std::uint32_t number_base;  ///< mesh number of the tile's first vertex
   std::uint32_t ready;        ///< the epoch in which number_base was written
@@ -59,9 +60,9 @@ struct TileParams {
   std::uint32_t* ticket;      ///< zeroed
   std::uint32_t epoch;        ///< never 0, new in each launch
   std::uint64_t number_base;  ///< vertices of the launches before
-  float* positions;
-  float* normals;
-  std::uint32_t* triangles;
+  Vec3f* positions;
+  Vec3f* normals;
+  Triangle* triangles;
   std::uint64_t vertex_capacity, triangle_capacity;
   SurfaceTotals* totals;
 };

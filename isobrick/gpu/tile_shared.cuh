@@ -10,7 +10,13 @@
 namespace isobrick::gpu {
 
 /// Vertices or cells that are found at a time; tiles with more take several turns.
-inline constexpr std::uint32_t kListed = 2560;
+/// A multiprocessor before Ampere has 64 KiB of shared memory.
+inline constexpr std::uint32_t kMostListed = 2560, kListedBeforeAmpere = 512;
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+inline constexpr std::uint32_t kListed = kListedBeforeAmpere;
+#else
+inline constexpr std::uint32_t kListed = kMostListed;
+#endif
 inline constexpr unsigned kAll = 0xffffffffu;
 
 /// How many threads share a tile, and how its rows are dealt out to them.
@@ -20,54 +26,24 @@ struct Team {
   static constexpr int kSteps = (kRowsOfTile + N - 1) / N;
 };
 
-/// A row of inside bits: samples 0 … 31, and samples 1 … 32.
+/// A row of inside bits: samples 0 … 31, and sample 32 in the lowest bit.
 struct RowBits {
-  std::uint32_t at, next;
+  std::uint32_t at, last;
+
+  /// Samples 1 … 32.
+  __device__ std::uint32_t next() const { return __funnelshift_r(at, last, 1); }
 };
 
-/// Where the vertex of a cell's edge is found, as byte offsets from the row of
-/// the cell: two words whose difference marks the row's crossing edges, the
-/// number of the first of them, and by how much the mask of earlier ones shifts.
+/// Where the number of the vertex on an edge of a cell is found: in which word of
+/// TileShared::crossing for a cell in row 0, as bytes, and what else is added.
 struct EdgePlace {
-  std::uint32_t first_word, second_word, number, shift;
+  std::uint32_t offset, addend;
 };
 
-struct TileShared {
-  RowBits rows[kRowsOfTile];
-  std::uint32_t x_base[kRowsOfTile], y_base[kRowsOfTile], z_base[kRowsOfTile];
-  std::uint16_t cell_base[kRowsOfTile + 1];
-  union {
-    alignas(16) std::uint16_t vertex_marks[kListed];  ///< row + 1 where a row's vertices begin
-    struct {
-      std::uint32_t y_at_0[kRowsOfTile], z_at_0[kRowsOfTile];
-    };
-  };
-  /// Row + 1 where a row's cells begin, else 0; then x | row << 5 | case << 16.
-  alignas(16) std::uint32_t cells[kListed];
-  /// The rows that the first of each 32 vertices and cells lie in.
-  std::uint16_t vertex_rows[kListed / 32], cell_rows[kListed / 32];
-  /// Three edges of 4 bits a triangle, and in the upper bits of a case's first
-  /// entry how many triangles it has.
-  std::uint16_t triangles[256 * 5];
-  alignas(16) EdgePlace places[2][12];              ///< of cells with x > 0, of those with x = 0
-  const void* pages[27];                            ///< of the tiles around, x + 3·y + 9·z
-  std::uint32_t step_sums[64];                      ///< of 32 rows each: vertices | cells << 16
-  std::uint32_t step_vertices[64], step_cells[64];  ///< before them
-  std::uint32_t all_vertices, all_cells;
-  std::uint32_t warp_triangles[32];
-  unsigned long long vertex_base, triangle_base;
-  std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis
-  const RowTable* neighbour[8];
-  std::uint32_t item;
-};
-
-/// What each warp has for itself, after TileShared.
-struct WarpShared {
-  std::uint32_t staging[96];
-  /// Triangles not yet written, cell | triangle << 12, in a ring: fewer than 32
-  /// wait while those of 32 cells come.
-  static constexpr std::uint32_t kRing = 256;
-  std::uint16_t pending[kRing];
+/// The row that the first of 32 listed things lies in, and how many of the row
+/// come before it.
+struct FirstOfGroup {
+  std::uint16_t row, before;
 };
 
 /// A tile cut to the region of interest; see TileShape of the CPU.
@@ -78,8 +54,68 @@ struct Shape {
   std::uint32_t at_0;                    ///< 1 where the tile owns edges at sample 0
 };
 
+/// What a tile needs of the row tables of the tiles below; 0 where there is none.
+struct LowerRows {
+  std::uint32_t y[33], xy[33], z[33], xz[33], yz;
+};
+
+/// Numbers of vertices count from the tile's first one.
+struct alignas(256) TileShared {
+  RowBits rows[kRowsOfTile];
+  /// The crossing edges of each row along x, y and z, the tile's own and those of
+  /// lower tiles, and the number of the first. Bit x stands for the edge between
+  /// samples x and x + 1 along x, for the one at sample x + 1 along y and z.
+  std::uint32_t crossing[3][kRowsOfTile], number[3][kRowsOfTile];
+  union {
+    std::uint32_t mixed[kRowsOfTile];  ///< cells with corners on both sides
+    alignas(16) RowTable before_copy;
+  };
+  std::uint16_t cell_base[kRowsOfTile + 1];
+  union {
+    alignas(16) std::uint16_t vertex_marks[kMostListed];  ///< row + 1 where a row's vertices begin
+    /// Numbers of the vertices at sample 0 on edges along y and along z.
+    std::uint32_t at_0[2][kRowsOfTile];
+  };
+  FirstOfGroup vertex_groups[kMostListed / 32], cell_groups[kMostListed / 32];
+  /// Three edges times 8, 4 bits apart, a triangle.
+  std::uint16_t triangles[256 * 5];
+  std::uint8_t triangle_count[256];
+  alignas(256) EdgePlace places[2][16];  ///< of cells with x > 0, of those with x = 0
+  /// Of the tiles around, x + 3·y + 9·z, where their sample (0, 0, 0) of this tile's
+  /// coordinates would be.
+  std::uintptr_t pages[27];
+  std::uint32_t step_sums[64];                      ///< of 32 rows each: vertices | cells << 16
+  std::uint32_t step_vertices[64], step_cells[64];  ///< before them
+  std::uint32_t all_vertices, all_cells;
+  std::uint16_t group_triangles[kMostListed / 32];  ///< of 32 listed cells each
+  unsigned long long vertex_base, triangle_base;
+  std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis
+  LowerRows lower;
+  const RowTable* before;  ///< of the tile one lower along x, or null
+  std::uint32_t item;      ///< the number of the tile that is worked on
+  TileItem tile;
+  Shape shape;
+
+  /// Row + 1 where a row's cells begin, else 0; then x | row << 5 | ten times the
+  /// case << 16 | triangles << 28. kListed of them, behind everything else.
+  __device__ std::uint32_t* cells() { return reinterpret_cast<std::uint32_t*>(this + 1); }
+  __device__ const std::uint32_t* cells() const {
+    return reinterpret_cast<const std::uint32_t*>(this + 1);
+  }
+};
+
+/// What each warp has for itself, after the cells.
+struct WarpShared {
+  /// Triangles not yet written, cell | triangle << 12: fewer than 32 wait while
+  /// those of 32 cells come.
+  std::uint16_t pending[32 + 32 * 5];
+};
+
 __device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }
 __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
+/// What all threads of a warp have alike, so that the compiler knows it too: loops
+/// and branches on it then need no care for threads that part.
+__device__ inline std::uint32_t uniform(std::uint32_t v) { return __shfl_sync(kAll, v, 0); }
 __device__ inline unsigned lane_id() { return threadIdx.x & 31u; }
 __device__ inline std::uint32_t lanes_below() { return (1u << lane_id()) - 1u; }
 
