@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 
 #include "isobrick/gpu/span_kernels.h"
 #include "isobrick/index/span_index.h"
@@ -66,16 +67,42 @@ struct WalkShared<OctreeView<T>> {
 
 // ---- linear scan ----
 
-/// 32 items a warp become a word; words without answers are written as well.
+/// Bit j: item first + j of a thread's 8 bytes of minima and of maxima is stabbed.
+template <class T>
+__device__ std::uint32_t stabbed_bits(const LinearView<T>& view, std::uint64_t first, T value) {
+  constexpr int kEach = 8 / sizeof(T);
+  std::uint32_t bits = 0;
+  if (first + kEach <= view.items) {
+    T lo[kEach], hi[kEach];
+    const auto a = *reinterpret_cast<const unsigned long long*>(view.mins + first);
+    const auto b = *reinterpret_cast<const unsigned long long*>(view.maxs + first);
+    memcpy(lo, &a, sizeof a);
+    memcpy(hi, &b, sizeof b);
+#pragma unroll
+    for (int j = 0; j < kEach; ++j)
+      bits |= static_cast<std::uint32_t>(lo[j] < value && value <= hi[j]) << j;
+  } else {
+    for (std::uint64_t i = first; i < view.items; ++i)
+      bits |= static_cast<std::uint32_t>(view.mins[i] < value && value <= view.maxs[i])
+              << (i - first);
+  }
+  return bits;
+}
+
+/// Threads that have bits of one word put them together.
 template <class T>
 __device__ void walk(const LinearView<T>& view, T value, const Marker& mark, const Crew& crew,
                      WalkShared<LinearView<T>>&) {
-#pragma unroll 4
-  for (std::uint64_t first = 32ull * crew.warp; first < view.items; first += 32ull * crew.warps) {
-    const std::uint64_t i = first + crew.lane;
-    const bool stabbed = i < view.items && view.mins[i] < value && value <= view.maxs[i];
-    const std::uint32_t word = __ballot_sync(0xffffffffu, stabbed);
-    if (crew.lane == 0) mark.words[first >> 5] = word;
+  constexpr std::uint32_t kEach = 8 / sizeof(T), kThreadsOfWord = 32 / kEach;
+#pragma unroll 2
+  for (std::uint64_t begin = 32ull * kEach * crew.warp; begin < view.items;
+       begin += 32ull * kEach * crew.warps) {
+    const std::uint64_t first = begin + kEach * crew.lane;
+    std::uint32_t word = first < view.items ? stabbed_bits(view, first, value) << (first & 31) : 0;
+#pragma unroll
+    for (std::uint32_t d = 1; d < kThreadsOfWord; d *= 2)
+      word |= __shfl_xor_sync(0xffffffffu, word, d);
+    if (crew.lane % kThreadsOfWord == 0 && word != 0) mark.words[first >> 5] = word;
   }
 }
 
