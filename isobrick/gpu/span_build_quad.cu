@@ -154,7 +154,6 @@ void divide(const DevicePoints<BoundKey<T>>& points, Tree<BoundKey<T>>& tree,
                       [squares = tree.squares.data(), made = first + 2, lo = points.lo.data(),
                        hi = points.hi.data()] __device__(std::uint32_t i) {
                         Square<BoundKey<T>>& square = squares[i];
-                        square.children_count = 0;
                         if (square.end - square.begin <= QuadtreeView<T>::kBucket) return;
                         const Quarters<BoundKey<T>> quarters(lo, hi, square.begin, square.end);
                         square.children_count = quarters.count;
@@ -162,8 +161,7 @@ void divide(const DevicePoints<BoundKey<T>>& points, Tree<BoundKey<T>>& tree,
                         std::uint32_t begin = square.begin;
                         for (const std::uint32_t end : quarters.end) {
                           if (begin == end) continue;
-                          squares[child].begin = begin;
-                          squares[child++].end = end;
+                          squares[child++] = {begin, end, 0, 0, 1, 0, 0, 0, 0, 0};
                           begin = end;
                         }
                       });
@@ -232,9 +230,7 @@ Tree<BoundKey<T>> make_tree(const DevicePoints<BoundKey<T>>& points, std::uint32
              root[i] = 0;
              if (first[i] == first[i + 1]) return;
              root[i] = atomicAdd(made, 1u);
-             squares[root[i]].begin = first[i];
-             squares[root[i]].end = first[i + 1];
-             squares[root[i]].place = 0;
+             squares[root[i]] = {first[i], first[i + 1], 0, 0, 1, 0, 0, 0, 0, 0};
            });
   divide<T>(points, tree, stream);
   for (int level = tree.levels; level-- > 0;) sum_up<T>(points, tree, level, stream);

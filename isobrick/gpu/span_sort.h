@@ -23,8 +23,7 @@ void sort_pairs(DeviceBuffer<std::uint64_t>& keys, DeviceBuffer<std::uint32_t>& 
 /// A value of one of several groups, in the order of the groups first.
 template <class Key>
 struct GroupValue {
-  std::uint32_t group;
-  Key value;
+  Key group, value;  // of one width: no byte between them is undefined
 };
 
 /// Replaces each of n elements by the least of it and those before.
