@@ -29,7 +29,7 @@ Json codec_list(const CodecChain& chain) {
     if (step == ByteCodec::zstd)
       list.push_back(named("zstd", {{"level", chain.zstd_level}, {"checksum", false}}));
     else
-      list.push_back({{"name", "crc32c"}});
+      list.push_back({{"name", name_of(step)}});
   }
   return list;
 }
@@ -104,6 +104,16 @@ std::string codec_name(const CheckedJson& codec) {
   return codec.raw().is_string() ? codec.string() : codec.string_at("name");
 }
 
+// Also those that Zarr-Python keeps under the names of numcodecs.
+std::optional<ByteCodec> byte_codec(std::string_view name) {
+  constexpr std::string_view other = "numcodecs.";
+  if (name.starts_with(other)) name.remove_prefix(other.size());
+  for (const ByteCodec codec : {ByteCodec::zstd, ByteCodec::crc32c, ByteCodec::gzip,
+                                ByteCodec::zlib, ByteCodec::lz4, ByteCodec::blosc})
+    if (name == name_of(codec)) return codec;
+  return std::nullopt;
+}
+
 CodecChain parse_chain(const CheckedJson& codecs, ScalarType type) {
   CodecChain chain;
   const std::size_t count = codecs.array_size();
@@ -125,8 +135,11 @@ CodecChain parse_chain(const CheckedJson& codecs, ScalarType type) {
       chain.steps.push_back(ByteCodec::zstd);
       if (codec.has("configuration") && codec.at("configuration").has("level"))
         chain.zstd_level = static_cast<int>(codec.at("configuration").at("level").integer());
-    } else if (name == "crc32c") {
-      chain.steps.push_back(ByteCodec::crc32c);
+    } else if (const auto step = byte_codec(name)) {
+      if (*step != ByteCodec::crc32c && !can_decompress(*step))
+        codec.unsupported(
+            fmt::format("this program was built without what decompresses '{}'", name));
+      chain.steps.push_back(*step);
     } else {
       codec.unsupported(fmt::format("codec '{}' is not supported", name));
     }

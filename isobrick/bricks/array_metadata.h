@@ -35,6 +35,8 @@ struct ArrayMetadata {
 
   friend bool operator==(const ArrayMetadata&, const ArrayMetadata&) = default;
 
+  /// What is encoded by itself: the inner chunk of a shard, or a chunk.
+  const std::vector<Index>& brick() const { return sharding ? sharding->brick : chunk; }
   /// File of a chunk relative to the array's folder: "c/z/y/x".
   std::string chunk_key(std::span<const Index> chunk_coordinates) const;
 };

@@ -25,19 +25,12 @@ constexpr std::size_t kCrcBytes = 4;
 
 struct FreeContext {
   void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
-  void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
 };
 
 // A context costs a megabyte and its creation more than a small brick, so each
 // thread keeps one.
 ZSTD_CCtx* compression_context() {
   thread_local const std::unique_ptr<ZSTD_CCtx, FreeContext> context(ZSTD_createCCtx());
-  if (!context) throw std::bad_alloc();
-  return context.get();
-}
-
-ZSTD_DCtx* decompression_context() {
-  thread_local const std::unique_ptr<ZSTD_DCtx, FreeContext> context(ZSTD_createDCtx());
   if (!context) throw std::bad_alloc();
   return context.get();
 }
@@ -62,14 +55,6 @@ std::vector<std::byte> compress(std::span<const std::byte> bytes, int level, std
   result.reserve(size + reserve);
   result.insert(result.end(), buffer.data(), buffer.data() + size);
   return result;
-}
-
-std::size_t decompress(std::span<const std::byte> encoded, std::span<std::byte> out) {
-  const std::size_t size = ZSTD_decompressDCtx(decompression_context(), out.data(), out.size(),
-                                               encoded.data(), encoded.size());
-  if (ZSTD_isError(size))
-    throw DamageError(fmt::format("zstd cannot decompress: {}", ZSTD_getErrorName(size)));
-  return size;
 }
 
 std::span<const std::byte> check_crc(std::span<const std::byte> encoded) {
@@ -101,8 +86,11 @@ CodecChain CodecChain::ours(std::optional<int> zstd_level) {
 }
 
 std::string CodecChain::name() const {
-  const bool compressed = std::find(steps.begin(), steps.end(), ByteCodec::zstd) != steps.end();
-  return compressed ? fmt::format("zstd:{}", zstd_level) : "none";
+  for (const ByteCodec step : steps) {
+    if (step == ByteCodec::zstd) return fmt::format("zstd:{}", zstd_level);
+    if (step != ByteCodec::crc32c) return std::string(name_of(step));
+  }
+  return "none";
 }
 
 std::uint32_t crc32c(std::span<const std::byte> bytes) {
@@ -180,7 +168,9 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
     if (step == ByteCodec::zstd)
       result =
           compress(first ? bytes : std::span<const std::byte>(result), chain.zstd_level, kCrcBytes);
-    else {
+    else if (step != ByteCodec::crc32c) {
+      throw Error(fmt::format("{} is only read, not written", name_of(step)));
+    } else {
       if (first) {
         result.reserve(bytes.size() + kCrcBytes);
         result.assign(bytes.begin(), bytes.end());
@@ -224,14 +214,14 @@ void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
     }
     if (i == 0) {
       // The fast path: straight to where the samples are wanted.
-      const std::size_t size = decompress(current, out);
+      const std::size_t size = decompress(chain.steps[i], current, out);
       if (size != out.size())
         throw DamageError(fmt::format("decodes to {} bytes, must be {}", size, out.size()));
       in_place = true;
     } else {
       // What an inner step leaves is at most the samples and a few checksums or frames.
       next.resize(ZSTD_compressBound(out.size()) + kCrcBytes * chain.steps.size());
-      next.resize(decompress(current, next));
+      next.resize(decompress(chain.steps[i], current, next));
       storage.swap(next);
       current = storage;
     }

@@ -7,12 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "isobrick/bricks/decompress.h"
 #include "isobrick/core/lattice.h"
 
 namespace isobrick {
-
-/// A step of a Zarr codec chain that turns bytes into bytes.
-enum class ByteCodec : std::uint8_t { zstd, crc32c };
 
 /// How the samples of a chunk become bytes: little or big endian, then the
 /// steps in the order of encoding.
@@ -25,7 +23,7 @@ struct CodecChain {
 
   /// What we write: bytes → zstd → crc32c, or bytes → crc32c.
   static CodecChain ours(std::optional<int> zstd_level);
-  /// "zstd:3" or "none": how StoreInfo names a chain.
+  /// "zstd:3", "blosc" or "none": how StoreInfo names a chain.
   std::string name() const;
 };
 

@@ -14,14 +14,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMaxLevels = 64;
+constexpr std::size_t kMaxLevels = 64, kMaxAxes = 5;
 constexpr const char* kChecksumKey = "metadata_crc32c";
 
 Json zyx(Vec3d v) { return {v.z, v.y, v.x}; }
 
-Vec3d parse_zyx(const CheckedJson& json) {
-  if (json.array_size() != 3) json.damaged("must have 3 numbers");
-  return {json.at(2).number(), json.at(1).number(), json.at(std::size_t{0}).number()};
+// The last three of as many numbers as there are axes.
+Vec3d parse_zyx(const CheckedJson& json, std::size_t axes) {
+  if (json.array_size() != axes) json.damaged(fmt::format("must have {} numbers", axes));
+  return {json.at(axes - 1).number(), json.at(axes - 2).number(), json.at(axes - 3).number()};
 }
 
 // world = translation + scale ∘ index, from a list of OME-Zarr's transformations.
@@ -29,19 +30,19 @@ struct ScaleAndTranslation {
   Vec3d scale{1, 1, 1}, translation{0, 0, 0};
 };
 
-ScaleAndTranslation parse_transformations(const CheckedJson& list) {
+ScaleAndTranslation parse_transformations(const CheckedJson& list, std::size_t axes) {
   ScaleAndTranslation result;
   for (std::size_t i = 0; i < list.array_size(); ++i) {
     const CheckedJson item = list.at(i);
     const std::string type = item.string_at("type");
     if (type == "scale") {
-      const Vec3d scale = parse_zyx(item.at("scale"));
+      const Vec3d scale = parse_zyx(item.at("scale"), axes);
       for (int axis = 0; axis < 3; ++axis)
         if (!(scale[axis] > 0)) item.damaged("scale must be positive");
       result.scale = result.scale * scale;
       result.translation = result.translation * scale;
     } else if (type == "translation") {
-      result.translation = result.translation + parse_zyx(item.at("translation"));
+      result.translation = result.translation + parse_zyx(item.at("translation"), axes);
     } else if (type != "identity") {
       item.unsupported(fmt::format("transformation '{}' is not supported", type));
     }
@@ -49,13 +50,30 @@ ScaleAndTranslation parse_transformations(const CheckedJson& list) {
   return result;
 }
 
-std::string parse_unit(const CheckedJson& axes) {
-  if (axes.array_size() != 3)
+ImageMetadata::Axis parse_leading_axis(const CheckedJson& axis) {
+  using enum ImageMetadata::Axis::Role;
+  ImageMetadata::Axis result{axis.string_at("name"), unknown};
+  const std::string type =
+      axis.has("type") && axis.raw()["type"].is_string() ? axis.string_at("type") : "";
+  if (type == "space")
+    axis.unsupported(
+        fmt::format("axis '{}' is not supported, only z, y, x in this order", result.name));
+  if (type == "time" || result.name == "t") result.role = time;
+  if (type == "channel" || result.name == "c") result.role = channel;
+  return result;
+}
+
+// Returns the unit of z, y, x, which must be the last.
+std::string parse_axes(const CheckedJson& axes, ImageMetadata& image) {
+  const std::size_t count = axes.array_size();
+  if (count < 3 || count > kMaxAxes)
     axes.unsupported(
-        fmt::format("images of {} dimensions are not supported, only z, y, x", axes.array_size()));
+        fmt::format("images of {} dimensions are not supported, only [t, c,] z, y, x", count));
+  for (std::size_t i = 0; i + 3 < count; ++i)
+    image.leading.push_back(parse_leading_axis(axes.at(i)));
   std::string unit;
   for (std::size_t i = 0; i < 3; ++i) {
-    const CheckedJson axis = axes.at(i);
+    const CheckedJson axis = axes.at(count - 3 + i);
     const std::string name = axis.string_at("name");
     if (name != std::string(1, "zyx"[i]) || (axis.has("type") && axis.string_at("type") != "space"))
       axis.unsupported(fmt::format("axis '{}' is not supported, only z, y, x in this order", name));
@@ -83,10 +101,11 @@ void parse_multiscales(const CheckedJson& multiscales, ImageMetadata& image) {
   if (multiscales.array_size() == 0) multiscales.damaged("is empty");
   const CheckedJson first = multiscales.at(std::size_t{0});
   if (first.has("name") && first.raw()["name"].is_string()) image.name = first.string_at("name");
-  const std::string unit = parse_unit(first.at("axes"));
+  const std::string unit = parse_axes(first.at("axes"), image);
+  const std::size_t axes = image.leading.size() + 3;
   ScaleAndTranslation common;
   if (first.has("coordinateTransformations"))
-    common = parse_transformations(first.at("coordinateTransformations"));
+    common = parse_transformations(first.at("coordinateTransformations"), axes);
   const CheckedJson datasets = first.at("datasets");
   const std::size_t count = datasets.array_size();
   if (count == 0 || count > kMaxLevels) datasets.damaged(fmt::format("{} levels", count));
@@ -95,7 +114,7 @@ void parse_multiscales(const CheckedJson& multiscales, ImageMetadata& image) {
     ImageMetadata::Level level;
     level.path = dataset.string_at("path");
     check_path(dataset, level.path);
-    const auto own = parse_transformations(dataset.at("coordinateTransformations"));
+    const auto own = parse_transformations(dataset.at("coordinateTransformations"), axes);
     level.transform.spacing = common.scale * own.scale;
     level.transform.origin = common.scale * own.translation + common.translation;
     level.transform.unit = unit;
@@ -188,7 +207,9 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
     json.unsupported("is an array; only OME-Zarr images (groups) are supported");
   const CheckedJson attributes = json.at("attributes");
   if (!attributes.has("ome"))
-    json.unsupported("is no OME-Zarr 0.5 image: attributes.ome is missing");
+    json.unsupported(
+        "is no OME-Zarr 0.5 image: attributes.ome is missing; an image or an array in it can be "
+        "named");
   const CheckedJson ome = attributes.at("ome");
   if (const std::string version = ome.string_at("version"); version != "0.5")
     ome.unsupported(fmt::format("OME-Zarr {} is not supported, only 0.5", version));

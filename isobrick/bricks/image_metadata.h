@@ -20,7 +20,15 @@ struct ImageMetadata {
     Transform transform;
     friend bool operator==(const Level&, const Level&) = default;
   };
+  /// An axis before z, y, x.
+  struct Axis {
+    enum class Role : std::uint8_t { time, channel, unknown };
+    std::string name;
+    Role role = Role::unknown;
+    friend bool operator==(const Axis&, const Axis&) = default;
+  };
   std::string name;
+  std::vector<Axis> leading;  ///< none in ours
   std::vector<Level> levels;
   bool ours = true;  ///< has `attributes.isobrick`
   /// Nothing when the store doesn't say.

@@ -2,19 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 
 #include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/image_metadata.h"
 #include "isobrick/bricks/lru_cache.h"
+#include "isobrick/bricks/metadata_files.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/shard_index.h"
 #include "isobrick/bricks/store_file.h"
-#include "isobrick/bricks/store_names.h"
+#include "isobrick/bricks/volume_choice.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -24,7 +23,10 @@ constexpr std::uint64_t kMaxOpenFiles = 128;
 constexpr std::uint64_t kIndexCacheBytes = std::uint64_t{64} << 20;
 constexpr Index kMaxShards = Index{1} << 56;  // so that a shard and its level make one key
 
-Int3 xyz(std::span<const Index> zyx) { return {zyx[2], zyx[1], zyx[0]}; }
+Int3 last_xyz(std::span<const Index> extents) {
+  const std::size_t n = extents.size();
+  return {extents[n - 1], extents[n - 2], extents[n - 3]};
+}
 
 // No encoder makes a brick much larger than it is; a length beyond is damage,
 // and must not make us ask for that much memory.
@@ -32,10 +34,17 @@ std::uint64_t largest_encoded(std::uint64_t decoded) { return decoded + decoded 
 
 }  // namespace
 
+std::uint64_t decode_extra(const StoreInfo& info, int threads) {
+  std::uint64_t most = 0;
+  for (const LevelInfo& level : info.levels) most = std::max(most, level.decode_extra);
+  return most * static_cast<std::uint64_t>(threads);
+}
+
 struct StoreReader::Impl {
   struct Level {
     ArrayMetadata metadata;
     std::filesystem::path folder;
+    VolumePlace place;
     Int3 shards, bricks_per_shard;
     std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // null: none
   };
@@ -44,10 +53,9 @@ struct StoreReader::Impl {
     std::uint64_t offset = 0, size = 0;
   };
 
-  void open(const std::filesystem::path& path);
-  void check_ours(const ImageMetadata& image) const;
+  void open(const std::filesystem::path& path, const Selection& selection);
   bool find_ranges(std::optional<bool>& may_have_nan) const;
-  void open_level(const ImageMetadata::Level& described, const std::string& text);
+  void open_level(const ImageMetadata::Level& described, MetadataFiles::Level&& read);
   void open_ranges(int level);
   void check_brick(int level, Int3 b) const;
   [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
@@ -69,40 +77,24 @@ struct StoreReader::Impl {
   }
 
   StoreInfo info;
+  VolumeChoice volume_choice;
   std::vector<Level> levels;
   std::atomic<std::uint64_t> bytes_read = 0;
   LruCache<StoreFile> files{kMaxOpenFiles};
   LruCache<ShardIndex> indices{kIndexCacheBytes};
 };
 
-void StoreReader::Impl::open(const std::filesystem::path& path) {
+void StoreReader::Impl::open(const std::filesystem::path& path, const Selection& selection) {
   info.path = path;
-  const std::filesystem::path file = path / "zarr.json";
-  if (!std::filesystem::is_directory(path))
-    throw Error(fmt::format("'{}' is no store: not a directory", path.string()));
-  bool exists = false;
-  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-  if (!exists) {
-    if (std::filesystem::exists(path / kLayoutMarker))
-      throw Error(fmt::format("'{}' is unfinished: its conversion was interrupted; resume it",
-                              path.string()));
-    if (std::filesystem::exists(path / ".zgroup") || std::filesystem::exists(path / ".zarray"))
-      throw Error(
-          fmt::format("'{}' is Zarr version 2; only OME-Zarr 0.5 (Zarr version 3) is supported",
-                      path.string()));
-    throw Error(fmt::format("'{}' is no store: it has no zarr.json", path.string()));
-  }
-  const ImageMetadata image = parse_image_metadata(text, quoted(file));
-  std::vector<std::string> level_texts;
-  for (const ImageMetadata::Level& level : image.levels) {
-    const std::filesystem::path level_file = path / level.path / "zarr.json";
-    level_texts.push_back(read_small_file(level_file, kMaxMetadataBytes, &exists));
-    if (!exists) throw DamageError(quoted(level_file) + " is missing");
-  }
+  info.selection = selection;
+  MetadataFiles metadata = read_metadata_files(path);
+  const ImageMetadata& image = metadata.image;
   info.ours = image.ours;
-  info.metadata_crc32c = metadata_checksum(text, level_texts, quoted(file));
-  check_ours(image);
-  for (std::size_t i = 0; i < image.levels.size(); ++i) open_level(image.levels[i], level_texts[i]);
+  info.metadata_crc32c = metadata.crc32c;
+  volume_choice = choose_volume(path, image, metadata.levels.front().array, selection);
+  info.additions = path / volume_choice.folder;
+  for (std::size_t i = 0; i < image.levels.size(); ++i)
+    open_level(image.levels[i], std::move(metadata.levels[i]));
   std::optional<bool> may_have_nan = image.may_have_nan;
   if (image.ours || find_ranges(may_have_nan))
     for (std::size_t i = 0; i < levels.size(); ++i) open_ranges(static_cast<int>(i));
@@ -112,28 +104,10 @@ void StoreReader::Impl::open(const std::filesystem::path& path) {
   info.may_have_nan = is_floating(info.type) && may_have_nan.value_or(true);
 }
 
-// Metadata of ours says what it must be; that of others has only its syntax.
-void StoreReader::Impl::check_ours(const ImageMetadata& image) const {
-  const std::string where = quoted(info.path / "zarr.json");
-  if (!image.ours) {
-    if (std::filesystem::exists(info.path / "isobrick" / "zarr.json"))
-      throw DamageError(where + ": metadata was changed: attributes.isobrick is missing");
-    return;
-  }
-  if (!image.checksum)
-    throw DamageError(where +
-                      ": metadata was changed: attributes.isobrick.metadata_crc32c is missing");
-  if (info.metadata_crc32c != *image.checksum)
-    throw DamageError(
-        fmt::format("{}: metadata was changed, here or in a level's zarr.json: its "
-                    "checksum is {}, not metadata_crc32c {}",
-                    where, info.metadata_crc32c, *image.checksum));
-}
-
 // Whether ranges were added to an image of others as it is now: if its metadata
 // was changed since, they are of another image.
 bool StoreReader::Impl::find_ranges(std::optional<bool>& may_have_nan) const {
-  const std::optional<AddedRanges> added = read_added_ranges(info.path);
+  const std::optional<AddedRanges> added = read_added_ranges(info.additions);
   if (!added || added->image_crc32c != info.metadata_crc32c) return false;
   may_have_nan = added->may_have_nan;
   return true;
@@ -149,25 +123,26 @@ void StoreReader::Impl::open_ranges(int level) {
     return Ranges(std::make_shared<const RangeArrayReader>(folder, items, samples.type));
   };
   Level& l = levels[static_cast<std::size_t>(level)];
-  l.brick_ranges = open(brick_range_folder(info.path, level), samples.bricks());
-  l.block_ranges = open(block_range_folder(info.path, level), samples.blocks());
+  l.brick_ranges = open(brick_range_folder(info.additions, level), samples.bricks());
+  l.block_ranges = open(block_range_folder(info.additions, level), samples.blocks());
 }
 
-void StoreReader::Impl::open_level(const ImageMetadata::Level& described, const std::string& text) {
+void StoreReader::Impl::open_level(const ImageMetadata::Level& described,
+                                   MetadataFiles::Level&& read) {
   Level level;
-  level.folder = info.path / described.path;
-  const std::string where = quoted(level.folder / "zarr.json");
-  level.metadata = parse_array_metadata(text, where);
+  level.folder = std::move(read.folder);
+  const std::string where = quoted(read.file);
+  level.metadata = std::move(read.array);
   const ArrayMetadata& array = level.metadata;
-  if (array.shape.size() != 3)
-    throw Error(fmt::format("{}: arrays of {} dimensions are not supported, only z, y, x", where,
-                            array.shape.size()));
+  level.place = place_volume(array, volume_choice.place, where);
   LevelInfo out;
-  out.lattice.extent = xyz(array.shape);
-  out.lattice.brick = xyz(array.sharding ? array.sharding->brick : array.chunk);
+  out.lattice.extent = last_xyz(array.shape);
+  out.lattice.brick = last_xyz(array.brick());
   out.lattice.type = array.type;
-  out.shard = xyz(array.chunk);
+  out.shard = last_xyz(array.chunk);
   out.transform = described.transform;
+  if (level.place.chunk_volumes > 1)
+    out.decode_extra = 2 * level.place.chunk_volumes * out.lattice.brick_bytes();
   if (!checked_volume(out.lattice.extent))
     throw DamageError(where + ": the shape is out of bounds");
   for (int axis = 0; axis < 3; ++axis)
@@ -202,7 +177,9 @@ void StoreReader::Impl::damaged(int level, Int3 b, const Place& place,
 }
 
 std::filesystem::path StoreReader::Impl::shard_path(int level, Int3 s) const {
-  return at(level).folder / at(level).metadata.chunk_key(std::array<Index, 3>{s.z, s.y, s.x});
+  std::vector<Index> coordinates = at(level).place.chunk;
+  coordinates.insert(coordinates.end(), {s.z, s.y, s.x});
+  return at(level).folder / at(level).metadata.chunk_key(coordinates);
 }
 
 std::shared_ptr<const StoreFile> StoreReader::Impl::shard_file(int level, Int3 s) {
@@ -235,7 +212,8 @@ void StoreReader::Impl::check_missing_shard(int level, Int3 s) {
 
 std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3 s) {
   return indices.get(key(level, s), [&] {
-    const auto bricks = static_cast<std::uint64_t>(volume(at(level).bricks_per_shard));
+    const auto bricks = static_cast<std::uint64_t>(volume(at(level).bricks_per_shard)) *
+                        at(level).place.shard_volumes;
     const auto file = shard_file(level, s);
     // A shard without a file has only absent bricks.
     if (!*file) {
@@ -273,7 +251,8 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 
   const Int3 s{b.x / n.x, b.y / n.y, b.z / n.z};
   const auto index = shard_index(level, s);
   if (index->size() == 0) return std::nullopt;
-  const ShardIndex::Entry entry = (*index)[static_cast<std::size_t>(linear_index(b - s * n, n))];
+  const ShardIndex::Entry entry = (*index)[static_cast<std::size_t>(
+      static_cast<Index>(at(level).place.in_shard) * volume(n) + linear_index(b - s * n, n))];
   if (entry.absent()) return std::nullopt;
   return Place{shard_file(level, s), entry.offset, entry.size};
 }
@@ -288,8 +267,9 @@ RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
   return reader->read(box, bytes_read);
 }
 
-StoreReader::StoreReader(const std::filesystem::path& path) : impl_(std::make_unique<Impl>()) {
-  impl_->open(path);
+StoreReader::StoreReader(const std::filesystem::path& path, const Selection& selection)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->open(path, selection);
 }
 
 StoreReader::~StoreReader() = default;
@@ -306,19 +286,23 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   const auto place = impl_->find(level, b);
   if (!place) return false;
   const Lattice& lattice = impl_->lattice(level);
-  const std::size_t decoded = lattice.brick_bytes();
+  const VolumePlace& volumes = impl_->at(level).place;
+  const std::size_t bytes = lattice.brick_bytes(), decoded = bytes * volumes.chunk_volumes;
   if (place->size > largest_encoded(decoded))
     impl_->damaged(level, b, *place, fmt::format("too long for {} bytes of samples", decoded));
-  thread_local std::vector<std::byte> buffer;
+  thread_local std::vector<std::byte> buffer, several;
   if (buffer.size() < place->size) buffer.resize(static_cast<std::size_t>(place->size));
   const auto encoded = std::span(buffer).first(static_cast<std::size_t>(place->size));
+  if (volumes.chunk_volumes > 1) several.resize(decoded);
+  const std::span to = volumes.chunk_volumes > 1 ? std::span(several) : std::span(out, decoded);
   try {
     place->file->read_at(place->offset, encoded);
     impl_->bytes_read += place->size;
-    decode_bytes(impl_->at(level).metadata.codecs, lattice.sample_bytes(), encoded, {out, decoded});
+    decode_bytes(impl_->at(level).metadata.codecs, lattice.sample_bytes(), encoded, to);
   } catch (const DamageError& e) {
     impl_->damaged(level, b, *place, e.what());
   }
+  if (volumes.chunk_volumes > 1) std::copy_n(several.data() + volumes.in_chunk * bytes, bytes, out);
   return true;
 }
 

@@ -10,6 +10,7 @@
 
 #include "isobrick/core/lattice.h"
 #include "isobrick/core/range.h"
+#include "isobrick/core/selection.h"
 #include "isobrick/core/transform.h"
 
 namespace isobrick {
@@ -23,11 +24,18 @@ struct LevelInfo {
   Lattice lattice;
   Int3 shard;           ///< samples of a shard
   Transform transform;  ///< index space of this level to world space
+  /// Bytes that each thread needs to decode a brick, beyond the brick and what it
+  /// is encoded to: nothing unless a chunk holds several channels or times.
+  std::uint64_t decode_extra = 0;
 };
 
 /// What a store's metadata says.
 struct StoreInfo {
   std::filesystem::path path;
+  /// What ranges and indices are found under: `path`, or a folder in it that
+  /// belongs to one of several channels or times.
+  std::filesystem::path additions;
+  Selection selection;  ///< as it was asked for
   std::vector<LevelInfo> levels;
   ScalarType type = ScalarType::u8;
   double fill_value = 0;  ///< of absent bricks; exact for every type
@@ -37,6 +45,9 @@ struct StoreInfo {
   bool ours = true;                   ///< false: an image that another program has written
   std::uint32_t metadata_crc32c = 0;  ///< metadata_checksum() of what was read
 };
+
+/// The most that any level's decode_extra takes for so many threads.
+std::uint64_t decode_extra(const StoreInfo& info, int threads);
 
 /// Where a brick lies on disk.
 struct BrickLocation {
@@ -54,13 +65,15 @@ struct RangeTable {
   }
 };
 
-/// Reads a store. Thread-safe after construction; keeps shard indices cached
+/// Reads a store, or an image or array that another program has written as Zarr
+/// version 2 or 3. Thread-safe after construction; keeps shard indices cached
 /// in bounded memory, never samples.
 class StoreReader {
  public:
   /// Throws Error when `path` is no store, is one of an unknown version, or
-  /// lacks what is needed; DamageError when its metadata is broken.
-  explicit StoreReader(const std::filesystem::path& path);
+  /// lacks what is needed; DamageError when its metadata is broken; UsageError
+  /// when the selection leaves open which volume is meant, or means none.
+  explicit StoreReader(const std::filesystem::path& path, const Selection& selection = {});
   ~StoreReader();
 
   const StoreInfo& info() const;

@@ -42,7 +42,7 @@ bool has_index(const fs::path& store, int level, const std::string& kind) {
 }
 
 StoredIndex::StoredIndex(const StoreReader& store, int level, const std::string& kind)
-    : folder_(index_folder(store.info().path, level, kind)) {
+    : folder_(index_folder(store.info().additions, level, kind)) {
   const fs::path file = index_description(folder_);
   bool exists = false;
   const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);

@@ -44,18 +44,6 @@ void check_sizes(const std::string& path, std::span<const ArrayAxis> axes) {
 
 }  // namespace
 
-Index choose(const std::string& path, const char* option, Index count,
-             std::optional<Index> chosen) {
-  const std::string_view what = std::string_view(option) == "--time" ? "time" : "channel";
-  if (!chosen && count > 1)
-    throw UsageError(fmt::format("'{}' has {} {}s: choose one with {} 0 … {}", path, count, what,
-                                 option, count - 1));
-  if (chosen && (*chosen < 0 || *chosen >= count))
-    throw UsageError(fmt::format("'{}' has {} {}{}: {} {} is not there", path, count, what,
-                                 count == 1 ? "" : "s", option, *chosen));
-  return chosen.value_or(0);
-}
-
 bool guess_roles(std::vector<ArrayAxis>& axes, const Selection& selection) {
   for (ArrayAxis& axis : axes) axis.role = AxisRole::space;
   std::size_t left = axes.size();

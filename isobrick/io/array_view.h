@@ -7,15 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "isobrick/core/selection.h"
 #include "isobrick/core/vec.h"
 
 namespace isobrick {
-
-/// Which of several volumes in one file is meant, counted from 0.
-struct Selection {
-  std::optional<Index> channel;
-  std::optional<Index> time;
-};
 
 /// What an axis of an array in a file stands for.
 enum class AxisRole : std::uint8_t { space, channel, time };
@@ -51,9 +46,5 @@ bool guess_roles(std::vector<ArrayAxis>& axes, const Selection& selection);
 /// What to do about guess_roles being false, for a message.
 inline constexpr const char* kRolesHint =
     "--channel C takes the fastest axis for channels, --time T the slowest one for time";
-
-/// The place on an axis of `count` channels or times that is chosen. `option` is
-/// "--channel" or "--time".
-Index choose(const std::string& path, const char* option, Index count, std::optional<Index> chosen);
 
 }  // namespace isobrick

@@ -131,8 +131,8 @@ TEST(ArrayMetadata, HostileValues) {
   expect(false, "'complex64'", "float32", "complex64");
   expect(false, "'int64'", "float32", "int64");
   expect(false, "'f32'", "float32", "f32");
-  expect(false, "'blosc'", "zstd", "blosc");
-  expect(false, "'gzip'", "zstd", "gzip");
+  expect(false, "'lzma'", "zstd", "lzma");
+  expect(false, "'numcodecs.bz2'", "zstd", "numcodecs.bz2");
   expect(false, "'transpose'", "\"name\":\"bytes\"", "\"name\":\"transpose\"");
   expect(false, "'rectilinear'", "regular", "rectilinear");
   expect(false, "'mine'", "\"name\":\"default\"", "\"name\":\"mine\"");
@@ -191,7 +191,11 @@ TEST(ImageMetadata, HostileValues) {
   expect(false, "array", "\"group\"", "\"array\"");
   expect(false, "multiscale", "multiscales", "plate");
   expect(false, "'c'", "\"name\":\"z\"", "\"name\":\"c\"");
-  expect(false, "4 dimensions", "\"axes\":[", "\"axes\":[{\"name\":\"t\",\"type\":\"time\"},");
+  expect(true, "must have 4 numbers", "\"axes\":[",
+         "\"axes\":[{\"name\":\"t\",\"type\":\"time\"},");
+  expect(false, "axis 'w'", "\"axes\":[", "\"axes\":[{\"name\":\"w\",\"type\":\"space\"},");
+  const std::string axis = "{\"name\":\"t\",\"type\":\"time\"},";
+  expect(false, "6 dimensions", "\"axes\":[", "\"axes\":[" + axis + axis + axis);
   expect(false, "units", "\"millimeter\"", "\"meter\"");
   expect(true, "positive", "\"scale\":[3.0,2.0,1.0]", "\"scale\":[3.0,0,1.0]");
   expect(true, "positive", "\"scale\":[3.0,2.0,1.0]", "\"scale\":[3.0,-2,1.0]");

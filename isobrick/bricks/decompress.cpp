@@ -1,0 +1,128 @@
+#include "isobrick/bricks/decompress.h"
+
+#include <fmt/format.h>
+#include <isa-l/igzip_lib.h>
+#include <zstd.h>
+#ifdef ISOBRICK_WITH_BLOSC
+#include <blosc.h>
+#endif
+#ifdef ISOBRICK_WITH_LZ4
+#include <lz4.h>
+#endif
+
+#include <array>
+#include <cstring>
+#include <limits>
+#include <memory>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::array<std::string_view, 6> kNames{"zstd", "crc32c", "gzip", "zlib", "lz4", "blosc"};
+
+struct FreeContext {
+  void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
+};
+
+std::size_t decompress_zstd(std::span<const std::byte> encoded, std::span<std::byte> out) {
+  // A context costs a megabyte, so each thread keeps one.
+  thread_local const std::unique_ptr<ZSTD_DCtx, FreeContext> context(ZSTD_createDCtx());
+  if (!context) throw std::bad_alloc();
+  const std::size_t size =
+      ZSTD_decompressDCtx(context.get(), out.data(), out.size(), encoded.data(), encoded.size());
+  if (ZSTD_isError(size))
+    throw DamageError(fmt::format("zstd cannot decompress: {}", ZSTD_getErrorName(size)));
+  return size;
+}
+
+/// A deflate stream with the frame of gzip or zlib, whose checksum is compared.
+std::size_t inflate(std::uint32_t frame, std::span<const std::byte> encoded,
+                    std::span<std::byte> out) {
+  thread_local const auto state = std::make_unique<inflate_state>();
+  isal_inflate_init(state.get());
+  state->crc_flag = frame;
+  state->next_in = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(encoded.data()));
+  state->avail_in = static_cast<std::uint32_t>(encoded.size());
+  state->next_out = reinterpret_cast<std::uint8_t*>(out.data());
+  state->avail_out = static_cast<std::uint32_t>(out.size());
+  const int result = isal_inflate(state.get());
+  if (result != ISAL_DECOMP_OK)
+    throw DamageError(fmt::format("no valid deflate stream (code {})", result));
+  if (state->block_state != ISAL_BLOCK_FINISH)
+    throw DamageError(state->avail_out == 0 ? "the deflate stream is longer than its samples"
+                                            : "the deflate stream is cut off");
+  return out.size() - state->avail_out;
+}
+
+std::size_t decompress_lz4([[maybe_unused]] std::span<const std::byte> encoded,
+                           [[maybe_unused]] std::span<std::byte> out) {
+#ifdef ISOBRICK_WITH_LZ4
+  // The length comes first, as numcodecs writes it.
+  std::uint32_t length = 0;
+  if (encoded.size() < sizeof(length)) throw DamageError("too short for LZ4");
+  std::memcpy(&length, encoded.data(), sizeof(length));
+  const auto block = encoded.subspan(sizeof(length));
+  if (length > out.size())
+    throw DamageError(fmt::format("LZ4 says {} bytes, must be {}", length, out.size()));
+  const int size = LZ4_decompress_safe(reinterpret_cast<const char*>(block.data()),
+                                       reinterpret_cast<char*>(out.data()),
+                                       static_cast<int>(block.size()), static_cast<int>(length));
+  if (size < 0 || static_cast<std::uint32_t>(size) != length)
+    throw DamageError("no valid LZ4 block");
+  return length;
+#else
+  throw Error("this program was built without lz4, which compressed the samples");
+#endif
+}
+
+std::size_t decompress_blosc([[maybe_unused]] std::span<const std::byte> encoded,
+                             [[maybe_unused]] std::span<std::byte> out) {
+#ifdef ISOBRICK_WITH_BLOSC
+  std::size_t size = 0;
+  if (encoded.size() < BLOSC_MIN_HEADER_LENGTH ||
+      blosc_cbuffer_validate(encoded.data(), encoded.size(), &size) != 0)
+    throw DamageError("no valid Blosc header");
+  if (size > out.size())
+    throw DamageError(fmt::format("Blosc says {} bytes, must be {}", size, out.size()));
+  const int got = blosc_decompress_ctx(encoded.data(), out.data(), out.size(), 1);
+  if (got < 0 || static_cast<std::size_t>(got) != size)
+    throw DamageError(fmt::format("Blosc cannot decompress (code {})", got));
+  return size;
+#else
+  throw Error("this program was built without libblosc, which compressed the samples");
+#endif
+}
+
+}  // namespace
+
+std::string_view name_of(ByteCodec codec) { return kNames[static_cast<std::size_t>(codec)]; }
+
+bool can_decompress(ByteCodec codec) {
+#ifndef ISOBRICK_WITH_BLOSC
+  if (codec == ByteCodec::blosc) return false;
+#endif
+#ifndef ISOBRICK_WITH_LZ4
+  if (codec == ByteCodec::lz4) return false;
+#endif
+  return codec != ByteCodec::crc32c;
+}
+
+std::size_t decompress(ByteCodec codec, std::span<const std::byte> encoded,
+                       std::span<std::byte> out) {
+  // The libraries count in ints.
+  if (encoded.size() > std::numeric_limits<std::int32_t>::max())
+    throw DamageError(fmt::format("{} compressed bytes are too many", encoded.size()));
+  switch (codec) {
+    case ByteCodec::zstd: return decompress_zstd(encoded, out);
+    case ByteCodec::gzip: return inflate(ISAL_GZIP, encoded, out);
+    case ByteCodec::zlib: return inflate(ISAL_ZLIB, encoded, out);
+    case ByteCodec::lz4: return decompress_lz4(encoded, out);
+    case ByteCodec::blosc: return decompress_blosc(encoded, out);
+    case ByteCodec::crc32c: break;
+  }
+  throw Error("a checksum compresses nothing");
+}
+
+}  // namespace isobrick

@@ -1,0 +1,79 @@
+#include "isobrick/bricks/volume_choice.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+using Role = ImageMetadata::Axis::Role;
+
+/// The place on one axis, whose role the selection decides where it is open.
+Index choose_on_axis(const std::string& path, const ImageMetadata::Axis& axis, Index count,
+                     Role role, const Selection& selection) {
+  if (role == Role::time) return choose(path, "--time", count, selection.time);
+  if (role == Role::channel) return choose(path, "--channel", count, selection.channel);
+  if (count == 1) return 0;
+  throw UsageError(
+      fmt::format("'{}' has {} volumes along axis '{}': choose one with --channel 0 … {} or --time",
+                  path, count, axis.name, count - 1));
+}
+
+}  // namespace
+
+VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadata& image,
+                           const ArrayMetadata& array, const Selection& selection) {
+  if (array.shape.size() != image.leading.size() + 3)
+    throw Error(fmt::format("'{}': arrays of {} dimensions do not fit axes of {}", path.string(),
+                            array.shape.size(), image.leading.size() + 3));
+  VolumeChoice choice;
+  std::string name;
+  bool times = false, channels = false;
+  for (std::size_t i = 0; i < image.leading.size(); ++i) {
+    const ImageMetadata::Axis& axis = image.leading[i];
+    const Index count = array.shape[i];
+    Role role = axis.role;
+    // Whoever chooses on an axis that says nothing of itself says what it is.
+    if (role == Role::unknown && count > 1 &&
+        selection.channel.has_value() != selection.time.has_value())
+      role = selection.channel ? Role::channel : Role::time;
+    if ((role == Role::time && times) || (role == Role::channel && channels))
+      throw Error(fmt::format("'{}' has several axes of {}, which is not supported", path.string(),
+                              role == Role::time ? "time" : "channels"));
+    times |= role == Role::time;
+    channels |= role == Role::channel;
+    choice.place.push_back(choose_on_axis(path.string(), axis, count, role, selection));
+    if (count > 1)
+      name += fmt::format("{}{}_{}", name.empty() ? "" : "_",
+                          role == Role::time ? "time" : "channel", choice.place.back());
+  }
+  if (!times) choose(path.string(), "--time", 1, selection.time);
+  if (!channels) choose(path.string(), "--channel", 1, selection.channel);
+  if (!name.empty()) choice.folder = std::filesystem::path("isobrick") / name;
+  return choice;
+}
+
+VolumePlace place_volume(const ArrayMetadata& array, const std::vector<Index>& place,
+                         const std::string& where) {
+  if (array.shape.size() != place.size() + 3)
+    throw Error(fmt::format("{}: arrays of {} dimensions are not supported here, only of {}", where,
+                            array.shape.size(), place.size() + 3));
+  VolumePlace result;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    if (place[i] >= array.shape[i])
+      throw Error(fmt::format("{}: the level lacks number {} of axis {}", where, place[i], i));
+    const Index chunk = array.chunk[i], brick = array.brick()[i];
+    const auto bricks = static_cast<std::uint64_t>(chunk / brick);
+    result.chunk.push_back(place[i] / chunk);
+    result.in_shard =
+        result.in_shard * bricks + static_cast<std::uint64_t>(place[i] % chunk / brick);
+    result.shard_volumes *= bricks;
+    result.in_chunk = result.in_chunk * static_cast<std::uint64_t>(brick) +
+                      static_cast<std::uint64_t>(place[i] % brick);
+    result.chunk_volumes *= static_cast<std::uint64_t>(brick);
+  }
+  return result;
+}
+
+}  // namespace isobrick

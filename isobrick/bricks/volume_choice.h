@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "isobrick/bricks/array_metadata.h"
+#include "isobrick/bricks/image_metadata.h"
+#include "isobrick/core/selection.h"
+
+namespace isobrick {
+
+/// Which volume of an image with channels and times is read.
+struct VolumeChoice {
+  std::vector<Index> place;      ///< on the axes before z, y, x
+  std::filesystem::path folder;  ///< of its ranges; empty when the image has one volume
+};
+
+/// Throws UsageError when there are several volumes and the selection does not
+/// say which, or says one that is not there. `array` is that of a level.
+VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadata& image,
+                           const ArrayMetadata& array, const Selection& selection);
+
+/// Where a volume's samples are among those of others in chunks and shards.
+struct VolumePlace {
+  std::vector<Index> chunk;                       ///< first coordinates of its chunks
+  std::uint64_t in_shard = 0, shard_volumes = 1;  ///< its bricks, in units of all bricks of one
+  std::uint64_t in_chunk = 0, chunk_volumes = 1;  ///< its samples in a decoded brick
+};
+
+/// `where` names the array's file; Error when it lacks the place.
+VolumePlace place_volume(const ArrayMetadata& array, const std::vector<Index>& place,
+                         const std::string& where);
+
+}  // namespace isobrick

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace isobrick {
+
+// Zarr version 2, said in the words of version 3, so that one parser reads
+// both. `where` names the file; DamageError for what is no valid Zarr, Error
+// for what is not supported, naming it.
+
+/// The zarr.json that means what a .zarray means.
+std::string v3_from_zarray(std::string_view text, const std::string& where);
+
+/// The zarr.json that means what the .zattrs of an OME-NGFF 0.4 image means;
+/// empty when it is no image.
+std::string v3_from_zattrs(std::string_view text, const std::string& where);
+
+}  // namespace isobrick

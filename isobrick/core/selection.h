@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "isobrick/core/vec.h"
+
+namespace isobrick {
+
+/// Which of several volumes in one file is meant, counted from 0.
+struct Selection {
+  std::optional<Index> channel;
+  std::optional<Index> time;
+};
+
+/// The place on an axis of `count` channels or times that is chosen. `option` is
+/// "--channel" or "--time". Throws UsageError, beginning with `path`, for one
+/// that must be chosen and was not, and for one that is not there.
+Index choose(const std::string& path, const char* option, Index count, std::optional<Index> chosen);
+
+}  // namespace isobrick
