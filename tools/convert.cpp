@@ -1,9 +1,10 @@
 #include "isobrick/pipeline/convert.h"
 
-#include <limits>
 #include <memory>
 
+#include "isobrick/bricks/metadata_files.h"
 #include "isobrick/io/open_source.h"
+#include "isobrick/pipeline/store_source.h"
 #include "tools/options.h"
 
 namespace isobrick::tools {
@@ -28,17 +29,18 @@ void add_volume_options(CLI::App* app, VolumeRequest& volume) {
              {"--origin", "X,Y,Z", "World position of the first sample", "the file's, or 0,0,0"});
   add_parsed(app, volume.unit, [](const std::string& text) { return text; },
              {"--unit", "NAME", "Unit of world space, such as micrometer"});
-  const auto place = [](const std::string& text) {
-    return std::optional(parse_whole(text, 0, std::numeric_limits<Index>::max()));
-  };
-  add_parsed(app, volume.selection.channel, place,
-             {"--channel", "C", "Which channel of a file that has several, from 0"});
-  add_parsed(app, volume.selection.time, place,
-             {"--time", "T", "Which time of a file that has several, from 0"});
+  add_selection(app, volume.selection);
+}
+
+/// Zarr is read as stores are, all else as files.
+std::unique_ptr<VolumeSource> open_input(const Arguments& arguments) {
+  if (is_zarr(arguments.in))
+    return open_store_source(arguments.in, arguments.volume, arguments.store.threads);
+  return open_source(arguments.in, arguments.volume);
 }
 
 int run(const Arguments& arguments, Console& console) {
-  const auto source = open_source(arguments.in, arguments.volume);
+  const auto source = open_input(arguments);
   const ConvertReport report = convert(*source, arguments.out, arguments.store, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
   return 0;

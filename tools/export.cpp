@@ -16,11 +16,12 @@ struct Arguments {
   std::string store, out;
   std::optional<ExportFormat> format;  ///< nothing: by the name
   std::optional<RoiText> roi;
+  Selection selection;
   ExportOptions options;
 };
 
 int run(const Arguments& arguments, Console& console) {
-  const StoreReader store(arguments.store);
+  const StoreReader store(arguments.store, arguments.selection);
   ExportOptions options = arguments.options;
   const Box3 box = store_region(store, options.level, arguments.roi);
   options.roi = box;
@@ -66,6 +67,7 @@ void add_export(Program& program) {
               "Format of the file; NRRD keeps spacing, origin and direction", "by its extension"});
   add_level(app, arguments->options.level);
   add_roi(app, arguments->roi);
+  add_selection(app, arguments->selection);
   add_memory(app, arguments->options.memory);
   add_threads(app, arguments->options.threads);
   add_force(app, arguments->options.force);

@@ -31,6 +31,7 @@ struct Arguments {
   PreviewOptions picture;
   int level = 0;
   std::optional<RoiText> roi;
+  Selection selection;
   bool normals = false, drop_degenerate = false;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
@@ -291,7 +292,7 @@ Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
 
 int run(const Arguments& arguments, Console& console) {
   check(arguments);
-  const StoreReader store(arguments.store);
+  const StoreReader store(arguments.store, arguments.selection);
   const std::vector<Surface> surfaces = plan(arguments, store);
   const Said said = arguments.estimate ? estimate_all(surfaces, store)
                                        : make_all(arguments, surfaces, store, console);
@@ -354,6 +355,7 @@ void add_extract(Program& program) {
            "Write nothing; predict triangles, vertices, bytes and memory");
   add_level(app, arguments->level);
   add_roi(app, arguments->roi);
+  add_selection(app, arguments->selection);
   add_parsed(app, arguments->normals, parse_normals,
              {"--normals", "gradient|none", "Normals at the vertices", "none"});
   add_flag(app, "--drop-degenerate", arguments->drop_degenerate,

@@ -61,9 +61,11 @@ void add_index(Program& program) {
       "Add a search structure to a store, and the ranges of samples that another program's image "
       "lacks.",
       "isobrick index head.zarr --kind octree");
-  add_path(app, "STORE", arguments->store, "Store to add to, or another program's OME-Zarr image");
+  add_path(app, "STORE", arguments->store,
+           "Store to add to, or another program's Zarr image or array");
   add_parsed(app, arguments->index.kind, parse_stored_kind,
              {"--kind", "interval|kdtree|quadtree|octree", "Which structure", "", true});
+  add_selection(app, arguments->index.selection);
   add_leaf(app, arguments->index.leaf);
   add_memory(app, arguments->index.memory);
   add_threads(app, arguments->index.threads);

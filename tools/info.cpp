@@ -66,7 +66,7 @@ struct IndexFacts {
 std::vector<IndexFacts> indexes_of(const StoreReader& store) {
   std::map<std::string, IndexFacts> kinds;
   for (int level = 0; level < static_cast<int>(store.info().levels.size()); ++level)
-    for (const std::string& kind : stored_index_kinds(store.info().path, level)) {
+    for (const std::string& kind : stored_index_kinds(store.info().additions, level)) {
       const StoredIndex index(store, level, kind);
       IndexFacts& facts = kinds[kind];
       if (facts.level_bytes.empty()) facts.leaf = index.layout().leaf;
@@ -219,13 +219,18 @@ std::string text_of(const StoreInfo& info, const Facts& facts) {
 }  // namespace
 
 void add_info(Program& program) {
-  auto path = std::make_shared<std::string>();
+  struct Arguments {
+    std::string path;
+    Selection selection;
+  };
+  auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(program, "info",
                                  "Show what a store holds: extents, levels, bricks, histogram.",
                                  "isobrick info head.zarr");
-  add_path(app, "STORE", *path, "Store to look at");
-  program.commands.push_back({app, [path](Console& console) {
-                                const StoreReader store(*path);
+  add_path(app, "STORE", arguments->path, "Store to look at, or another program's Zarr");
+  add_selection(app, arguments->selection);
+  program.commands.push_back({app, [arguments](Console& console) {
+                                const StoreReader store(arguments->path, arguments->selection);
                                 const Facts facts = gather(store, console.progress());
                                 console.result(json_of(store.info(), facts),
                                                text_of(store.info(), facts));

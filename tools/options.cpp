@@ -1,6 +1,9 @@
 #include "tools/options.h"
 
 #include <fmt/format.h>
+
+#include <limits>
+
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -98,6 +101,16 @@ void add_threads(CLI::App* app, int& threads) {
 
 void add_force(CLI::App* app, bool& force) {
   add_flag(app, "--force", force, "Replace an output that exists, once the new one is whole");
+}
+
+void add_selection(CLI::App* app, Selection& selection) {
+  const auto place = [](const std::string& text) {
+    return std::optional(parse_whole(text, 0, std::numeric_limits<Index>::max()));
+  };
+  add_parsed(app, selection.channel, place,
+             {"--channel", "C", "Which channel of an input that has several, from 0"});
+  add_parsed(app, selection.time, place,
+             {"--time", "T", "Which time of an input that has several, from 0"});
 }
 
 void add_store_options(CLI::App* app, ConvertOptions& options) {

@@ -87,6 +87,8 @@ void add_roi(CLI::App* app, std::optional<RoiText>& roi);
 void add_memory(CLI::App* app, std::uint64_t& memory);
 void add_threads(CLI::App* app, int& threads);
 void add_force(CLI::App* app, bool& force);
+/// --channel and --time.
+void add_selection(CLI::App* app, Selection& selection);
 
 /// How a store is written: what `convert` and `synth` share.
 void add_store_options(CLI::App* app, ConvertOptions& options);

@@ -15,6 +15,7 @@ namespace {
 
 struct Arguments {
   std::string store;
+  Selection selection;
   int threads = 0;
 };
 
@@ -46,7 +47,8 @@ nlohmann::ordered_json indexes_json(const VerifyReport& report) {
 }
 
 int run(const Arguments& arguments, Console& console) {
-  const VerifyReport report = verify(arguments.store, arguments.threads, console.progress());
+  const VerifyReport report =
+      verify(arguments.store, arguments.threads, console.progress(), arguments.selection);
   const nlohmann::ordered_json object{{"command", "verify"},
                                       {"store", arguments.store},
                                       {"whole", report.damage_count == 0},
@@ -70,6 +72,7 @@ void add_verify(Program& program) {
                                  "Read all of a store; check every checksum, range and size.",
                                  "isobrick verify head.zarr");
   add_path(app, "STORE", arguments->store, "Store to check");
+  add_selection(app, arguments->selection);
   add_threads(app, arguments->threads);
   add_run(program, app, arguments, run);
 }

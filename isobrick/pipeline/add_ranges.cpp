@@ -43,7 +43,7 @@ std::uint64_t piece_bytes(const Lattice& lattice, std::uint64_t memory, int thre
 bool write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
                   Progress& progress) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-  const fs::path& root = store.info().path;
+  const fs::path& root = store.info().additions;
   RangeArrayWriter blocks(partial(block_range_folder(root, level)), lattice.blocks(), lattice.type,
                           publisher);
   RangeArrayWriter bricks(partial(brick_range_folder(root, level)), lattice.bricks(), lattice.type,
@@ -72,9 +72,9 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
   }
   for (int level = 0; level < levels; ++level)
     for (const fs::path& folder :
-         {block_range_folder(info.path, level), brick_range_folder(info.path, level)})
+         {block_range_folder(info.additions, level), brick_range_folder(info.additions, level)})
       fs::remove_all(partial(folder));  // of a run that was interrupted
-  Publisher publisher(info.path);
+  Publisher publisher(info.additions);
   progress.begin("ranges", total);
   bool has_nan = false;
   for (int level = 0; level < levels; ++level)
@@ -86,11 +86,11 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
   progress.end();
   for (int level = 0; level < levels; ++level)
     for (const fs::path& folder :
-         {block_range_folder(info.path, level), brick_range_folder(info.path, level)})
+         {block_range_folder(info.additions, level), brick_range_folder(info.additions, level)})
       replace_folder(partial(folder), folder);
   if (info.ours) return;  // its metadata says the rest
   publisher.write(
-      added_ranges_file(info.path),
+      added_ranges_file(info.additions),
       to_json(AddedRanges{.may_have_nan = has_nan, .image_crc32c = info.metadata_crc32c}));
   publisher.wait();
 }

@@ -82,7 +82,10 @@ std::uint64_t export_volume(const StoreReader& store, const std::filesystem::pat
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   const Lattice& lattice = level.lattice;
   Workers workers(options.threads);
-  const Int3 piece = piece_within(lattice, box.extent(), options.memory, workers.threads());
+  const Int3 piece = piece_within(
+      lattice, box.extent(),
+      options.memory - std::min(options.memory, decode_extra(store.info(), workers.threads())),
+      workers.threads());
   OutputFile output(out.string(), options.force);
   if (options.format == ExportFormat::nrrd)
     output.writer().append(nrrd_header_text(describe(level, box, out.string())));

@@ -67,7 +67,9 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     }
     report.bricks = active.bricks;
     report.active_bricks = active.active_bricks;
-    const ExtractPlan plan = plan_memory(request, options.memory, active.active_bricks, sink.memory());
+    const ExtractPlan plan =
+        plan_memory(request, options.memory, active.active_bricks,
+                    sink.memory() + decode_extra(store.info(), request.threads));
 
     sink.begin(header_of(*request.level, request.surface));
     TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);

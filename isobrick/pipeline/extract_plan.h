@@ -28,8 +28,8 @@ struct ExtractRequest {
 ExtractRequest check_request(const StoreReader& store, const ExtractOptions& options,
                              Indexing indexing);
 
-/// `active_bricks` bounds what a cache can use, `sink_bytes` are the sink's. Throws UsageError naming the
-/// least budget that works when this one does not.
+/// `active_bricks` bounds what a cache can use, `sink_bytes` are the sink's. Throws UsageError
+/// naming the least budget that works when this one does not.
 ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
                         std::uint64_t active_bricks, std::uint64_t sink_bytes = 0);
 

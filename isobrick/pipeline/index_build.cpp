@@ -61,7 +61,7 @@ class LevelIndex {
       : store_(store),
         level_(level),
         options_(options),
-        place_(index_folder(store.info().path, level, kind_of(options))),
+        place_(index_folder(store.info().additions, level, kind_of(options))),
         partial_(place_) {
     partial_ += ".partial";
     layout_.kind = kind_of(options);
@@ -178,15 +178,18 @@ void complete_ranges(std::unique_ptr<StoreReader>& store, const IndexOptions& op
   if (!missing) return;
   const auto start = std::chrono::steady_clock::now();
   add_ranges(*store, options.memory, threads, progress);
-  store = std::make_unique<StoreReader>(store->info().path);
+  store = std::make_unique<StoreReader>(store->info().path, options.selection);
   report.ranges_added = true;
   report.range_seconds = seconds_since(start);
 }
 
-IndexReport build_all(const fs::path& path, const IndexOptions& options, int threads,
+IndexReport build_all(const fs::path& path, const IndexOptions& given, int threads,
                       Progress& progress) {
   IndexReport report;
-  auto store = std::make_unique<StoreReader>(path);
+  auto store = std::make_unique<StoreReader>(path, given.selection);
+  // What decoding takes beyond bricks is nobody else's.
+  IndexOptions options = given;
+  options.memory -= std::min(options.memory, decode_extra(store->info(), threads));
   check_index_options(options, store->info().levels.front().lattice);
   const UniqueFd lock = lock_store(path);
   const auto level_count = static_cast<int>(store->info().levels.size());
@@ -201,7 +204,7 @@ IndexReport build_all(const fs::path& path, const IndexOptions& options, int thr
         volume(ceil_div(store->info().levels[static_cast<std::size_t>(level)].lattice.extent,
                         {IndexLayout::kBrick, IndexLayout::kBrick, IndexLayout::kBrick})));
   }
-  Publisher publisher(path);
+  Publisher publisher(store->info().additions);
   progress.begin("index", bricks);
   for (LevelIndex& level : levels) {
     level.prepare(publisher);

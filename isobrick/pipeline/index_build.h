@@ -6,6 +6,7 @@
 
 #include "isobrick/core/lattice.h"
 #include "isobrick/core/progress.h"
+#include "isobrick/core/selection.h"
 #include "isobrick/index/index_kind.h"
 
 namespace isobrick {
@@ -17,6 +18,7 @@ inline constexpr Index kDefaultLeaf = 16;
 /// An index to add to a store.
 struct IndexOptions {
   IndexKind kind = IndexKind::octree;
+  Selection selection;                            ///< of an image with several channels or times
   Index leaf = kDefaultLeaf;                      ///< 1, 2, 4, 8 or 16 cells
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores

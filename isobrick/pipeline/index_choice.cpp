@@ -16,7 +16,7 @@ SearchBy fastest(const StoreReader& store, int level) {
   for (const IndexKind kind :
        {IndexKind::octree, IndexKind::kdtree, IndexKind::interval, IndexKind::quadtree}) {
     const std::string name(name_of(kind));
-    if (has_index(store.info().path, level, name) &&
+    if (has_index(store.info().additions, level, name) &&
         StoredIndex(store, level, name).layout().leaf == kBlockEdge)
       return {.kind = kind, .only_if_few = true};
   }
@@ -29,7 +29,7 @@ SearchBy resolve_index(const StoreReader& store, int level, const IndexChoice& c
   if (choice.automatic) return fastest(store, level);
   if (!choice.kind) return {};
   const std::string kind(name_of(*choice.kind));
-  if (!has_index(store.info().path, level, kind))
+  if (!has_index(store.info().additions, level, kind))
     throw UsageError(
         fmt::format("level {} of '{}' has no {} index; 'isobrick index {} --kind {}' "
                     "adds it",

@@ -129,11 +129,12 @@ void LevelCheck::run(Progress& progress) {
 
 }  // namespace
 
-VerifyReport verify(const std::filesystem::path& path, int threads, Progress& progress) {
+VerifyReport verify(const std::filesystem::path& path, int threads, Progress& progress,
+                    const Selection& selection) {
   DamageList damages;
   std::unique_ptr<StoreReader> store;
   try {
-    store = std::make_unique<StoreReader>(path);
+    store = std::make_unique<StoreReader>(path, selection);
   } catch (const DamageError& e) {
     damages.add(e.what());
     return damages.report();
@@ -152,7 +153,7 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
   progress.end();
   std::uint64_t index_bytes = 0;
   for (int level = 0; level < static_cast<int>(levels.size()); ++level)
-    for (const std::string& kind : stored_index_kinds(path, level)) {
+    for (const std::string& kind : stored_index_kinds(store->info().additions, level)) {
       const auto add = [&](const std::string& line) { damages.add(line); };
       index_bytes += workers.execute(
           [&] { return verify_index(*store, level, kind, workers.threads(), add, progress); });

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isobrick/core/progress.h"
+#include "isobrick/core/selection.h"
 
 namespace isobrick {
 
@@ -24,6 +25,7 @@ struct VerifyReport {
 /// Reads all of a store: metadata, shard indices, every brick's checksum and
 /// size, the ranges against the samples, and every index against both. Only an unreadable root
 /// throws.
-VerifyReport verify(const std::filesystem::path& store, int threads, Progress& progress);
+VerifyReport verify(const std::filesystem::path& store, int threads, Progress& progress,
+                    const Selection& selection = {});
 
 }  // namespace isobrick

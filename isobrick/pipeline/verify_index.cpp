@@ -130,7 +130,7 @@ std::uint64_t verify_index(const StoreReader& store, int level, const std::strin
   const auto known = parse_index_kind(kind);
   if (!known || *known == IndexKind::linear) {
     damage(fmt::format("level {}: '{}' is no kind of index that this program knows", level,
-                       index_folder(store.info().path, level, kind).string()));
+                       index_folder(store.info().additions, level, kind).string()));
     return 0;
   }
   try {

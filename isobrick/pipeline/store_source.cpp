@@ -1,0 +1,48 @@
+#include "isobrick/pipeline/store_source.h"
+
+#include <tbb/info.h>
+
+#include <utility>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/pipeline/slab_reader.h"
+
+namespace isobrick {
+namespace {
+
+class StoreSource final : public VolumeSource {
+ public:
+  StoreSource(const std::string& path, const VolumeRequest& said, int threads)
+      : store_(path, said.selection),
+        threads_(threads > 0 ? threads : tbb::info::default_concurrency()) {
+    const LevelInfo& finest = store_.info().levels.front();
+    info_ =
+        describe_volume(path, finest.lattice.extent, finest.lattice.type, finest.transform, said);
+  }
+
+  const VolumeInfo& info() const override { return info_; }
+  bool random_access() const override { return true; }
+  std::size_t memory() const override {
+    // A chunk and its encoded bytes for each thread, and indices of shards.
+    constexpr std::size_t indices = std::size_t{16} << 20;
+    const std::size_t brick = store_.info().levels.front().lattice.brick_bytes();
+    return indices + static_cast<std::size_t>(threads_) * 2 * brick +
+           static_cast<std::size_t>(decode_extra(store_.info(), threads_));
+  }
+  void read(Box3 box, std::byte* out) override { read_slab(store_, 0, box, out); }
+
+ private:
+  StoreReader store_;
+  int threads_;
+  VolumeInfo info_;
+};
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_store_source(const std::string& path, const VolumeRequest& said,
+                                                int threads) {
+  refuse_raw_description(path, "Zarr", said);
+  return std::make_unique<StoreSource>(path, said, threads);
+}
+
+}  // namespace isobrick
