@@ -1,0 +1,265 @@
+"""Writes Zarr version 2 with Zarr-Python and compares what isobrick makes of it.
+
+  python3 check_zarr.py ISOBRICK [ORIGINAL]
+
+Exit status: 0 equal, 1 different, 77 Zarr-Python is not installed.
+"""
+
+import itertools
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numcodecs
+    import numpy
+    import zarr
+except ImportError as error:
+    print(f"skipped: {error}")
+    sys.exit(77)
+
+isobrick = sys.argv[1]
+failures = 0
+checks = 0
+
+
+def run(*arguments, expect=0):
+    result = subprocess.run([isobrick, *map(str, arguments)], capture_output=True, text=True)
+    check(result.returncode == expect, f"{arguments}: {result.returncode} {result.stderr.strip()}")
+    return result
+
+
+def check(condition, what):
+    global failures, checks
+    checks += 1
+    if not condition:
+        failures += 1
+        print(f"wrong: {what}")
+
+
+def samples(shape, dtype, seed=0):
+    """Smooth and then noisy values, so that compressors have something to do."""
+    rng = numpy.random.default_rng(seed)
+    grid = numpy.indices(shape).sum(axis=0)
+    values = 60 + 50 * numpy.sin(grid / 5) + rng.integers(0, 9, shape)
+    if numpy.dtype(dtype).kind == "i":
+        values -= 64
+    return values.astype(dtype)
+
+
+def write_array(path, data, **options):
+    options.setdefault("chunks", (8, 16, 20)[-data.ndim :] if data.ndim == 3 else None)
+    array = zarr.open_array(
+        str(path), mode="w", shape=data.shape, dtype=data.dtype, zarr_version=2, **options
+    )
+    array[...] = data
+    return array
+
+
+def expect_samples(folder, zarr_path, expected, *selection):
+    """Both in place and through a conversion."""
+    little = expected.astype(expected.dtype.newbyteorder("<"))
+    for way in ("place", "store"):
+        source = zarr_path
+        if way == "store":
+            source = folder / "converted.zarr"
+            run("convert", zarr_path, source, "--brick", 16, "--force", *selection)
+        chosen = selection if way == "place" else ()
+        raw = folder / "out.raw"
+        run("export", source, raw, "--force", *chosen)
+        check(raw.read_bytes() == little.tobytes(), f"{zarr_path.name} {selection} by {way}")
+
+
+def write_image(path, levels, axes, scales, **options):
+    """An OME-NGFF 0.4 image."""
+    group = zarr.open_group(str(path), mode="w", zarr_version=2)
+    datasets = []
+    for i, data in enumerate(levels):
+        write_array(path / str(i), data, dimension_separator="/", **options)
+        datasets.append(
+            {
+                "path": str(i),
+                "coordinateTransformations": [{"type": "scale", "scale": scales[i]}],
+            }
+        )
+    group.attrs["multiscales"] = [{"version": "0.4", "axes": axes, "datasets": datasets}]
+
+
+def axis(name, kind, unit=None):
+    return {"name": name, "type": kind, **({"unit": unit} if unit else {})}
+
+
+SPACE = [axis(name, "space", "micrometer") for name in "zyx"]
+
+
+def check_types(folder):
+    for code, order in itertools.product(("u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8"), "<>"):
+        data = samples((19, 33, 41), order + code)
+        path = folder / f"type_{code}_{'little' if order == '<' else 'big'}.zarr"
+        write_array(path, data, compressor=numcodecs.Zlib(3))
+        expect_samples(folder, path, data)
+
+
+def check_compressors(folder):
+    data = samples((19, 33, 41), "<u2")
+    compressors = {
+        "none": None,
+        "zlib": numcodecs.Zlib(5),
+        "gzip": numcodecs.GZip(5),
+        "zstd": numcodecs.Zstd(5),
+        "lz4": numcodecs.LZ4(),
+    }
+    for cname, shuffle in itertools.product(numcodecs.blosc.list_compressors(), (0, 1, 2)):
+        compressors[f"blosc_{cname}_{shuffle}"] = numcodecs.Blosc(cname, 5, shuffle)
+    for name, compressor in compressors.items():
+        for separator in "./":
+            path = folder / f"{name}_{'dot' if separator == '.' else 'slash'}.zarr"
+            write_array(path, data, compressor=compressor, dimension_separator=separator)
+            expect_samples(folder, path, data)
+
+
+def check_fill_values(folder):
+    for dtype, fill in (("<i2", -7), ("<f4", float("nan")), ("<f8", float("-inf")), ("|u1", None),
+                        ("<f4", 0.1)):
+        data = samples((20, 33, 41), dtype)
+        path = folder / f"fill_{dtype[1:]}_{fill}.zarr"
+        array = write_array(path, data, fill_value=fill)
+        # Two chunks are lost, which is how Zarr says that nothing was written there.
+        (path / "1.1.1").unlink()
+        (path / "0.0.0").unlink()
+        # Zarr-Python leaves what it does not know as it finds it in memory.
+        expected = array[...] if fill is not None else data.copy()
+        if fill is None:
+            expected[8:16, 16:32, 20:40] = 0
+            expected[0:8, 0:16, 0:20] = 0
+        expect_samples(folder, path, expected)
+
+
+def check_channels_and_times(folder):
+    data = samples((2, 3, 19, 33, 41), "<u2")
+    levels = [data, data[:, :, ::2, ::2, ::2]]
+    scales = [[1, 1, 2.0, 0.5, 0.25], [1, 1, 4.0, 1.0, 0.5]]
+    for name, chunks in (("one", (1, 1, 8, 16, 20)), ("some", (2, 2, 8, 16, 20))):
+        path = folder / f"channels_{name}.zarr"
+        write_image(path, levels, [axis("t", "time"), axis("c", "channel"), *SPACE], scales,
+                    chunks=chunks)
+        for time, channel in itertools.product(range(2), range(3)):
+            expect_samples(folder, path, data[time, channel], "--time", time, "--channel", channel)
+        said = run("info", path, expect=2).stderr
+        check("2 times" in said and "--time" in said, f"ambiguous: {said}")
+        said = run("info", path, "--time", 1, "--channel", 3, expect=2).stderr
+        check("--channel 3 is not there" in said, f"not there: {said}")
+        check_in_place(folder, path, data[1, 2], "--time", 1, "--channel", 2)
+        # Each volume has ranges of its own.
+        check_in_place(folder, path, data[0, 1], "--time", 0, "--channel", 1)
+    single = folder / "single.zarr"
+    write_image(single, [data[:1, :1]], [axis("t", "time"), axis("c", "channel"), *SPACE], scales)
+    expect_samples(folder, single, data[0, 0])
+    four = folder / "four.zarr"
+    write_array(four, data[0], chunks=(2, 8, 16, 20))
+    expect_samples(folder, four, data[0, 1], "--channel", 1)
+    expect_samples(folder, four, data[0, 2], "--time", 2)
+    said = run("info", four, expect=2).stderr
+    check("choose one" in said, f"ambiguous: {said}")
+
+
+def check_in_place(folder, path, expected, *selection):
+    """Indexed and extracted as it is, equal to the mesh of our own store."""
+    raw = folder / "same.raw"
+    raw.write_bytes(expected.tobytes())
+    z, y, x = expected.shape
+    run("convert", raw, folder / "same.zarr", "--dims", f"{x},{y},{z}", "--type", "u16",
+        "--spacing", "0.25,0.5,2", "--unit", "micrometer", "--brick", 16, "--force")
+    run("index", path, "--kind", "octree", *selection)
+    meshes = []
+    for store, chosen in ((path, selection), (folder / "same.zarr", ())):
+        mesh = folder / f"{len(meshes)}.ply"
+        run("extract", store, "--isovalue", 77.5, "--normals", "gradient", "-o", mesh, "--force",
+            *chosen)
+        meshes.append(mesh.read_bytes())
+    check(meshes[0] == meshes[1] and len(meshes[0]) > 100_000, f"{path.name}: mesh")
+    run("verify", path, *selection)
+    info = json.loads(run("info", path, "--json", *selection).stdout)
+    check(info["spacing"] == [0.25, 0.5, 2.0] and info["unit"] == "micrometer",
+          f"{path.name}: {info['spacing']} {info['unit']}")
+
+
+def check_refusals(folder):
+    path = folder / "a.zarr"
+    data = samples((5, 6, 7), "<u2")
+
+    def refused(part, change=None, **options):
+        write_array(path, data, **options)
+        if change:
+            meta = json.loads((path / ".zarray").read_text())
+            meta.update(change)
+            (path / ".zarray").write_text(json.dumps(meta))
+        said = run("info", path, expect=1).stderr
+        check(part in said and said.count("\n") == 1, f"{part!r} is not in {said!r}")
+        shutil.rmtree(path)
+
+    refused("order 'F'", order="F")
+    refused("filter 'delta'", filters=[numcodecs.Delta("<u2")])
+    refused("'bz2'", compressor=numcodecs.BZ2())
+    refused("'<u8'", {"dtype": "<u8"})
+    refused("'<f2'", {"dtype": "<f2"})
+    refused("structured", {"dtype": [["a", "<u2"]]})
+    refused("out of bounds", {"shape": [2**61, 4, 5], "chunks": [1, 1, 1]})
+    refused("bytes at a time", {"chunks": [2**40, 4, 5]})
+    refused("0 is out of bounds", {"chunks": [0, 4, 5]})
+    refused("dimensions", {"shape": [4, 5], "chunks": [4, 5]})
+    refused("zarr_format", {"zarr_format": 7})
+    zarr.open_group(str(path), mode="w", zarr_version=2)
+    said = run("info", path, expect=1).stderr
+    check("no image" in said, said)
+    zarr.open_group(str(path), mode="a").attrs["multiscales"] = [{"version": "0.2"}]
+    said = run("info", path, expect=1).stderr
+    check("0.2" in said, said)
+
+
+def check_damage(folder):
+    """Chunks cut off, lengthened, or with changed bytes: one line, no samples."""
+    data = samples((16, 32, 40), "<u2")
+    rng = numpy.random.default_rng(1)
+    compressors = (numcodecs.Zlib(1), numcodecs.GZip(1), numcodecs.Zstd(1), numcodecs.LZ4(),
+                   numcodecs.Blosc("lz4", 5, 1), numcodecs.Blosc("zstd", 5, 2))
+    for compressor in compressors:
+        path = folder / "damaged.zarr"
+        write_array(path, data, compressor=compressor, chunks=data.shape)
+        chunk = path / "0.0.0"
+        whole = chunk.read_bytes()
+        for broken in (b"", whole[:7], whole[: len(whole) // 2], whole[:-1], b"\xff" * 40,
+                       whole[:4] + b"\xff" * 12 + whole[16:]):
+            chunk.write_bytes(broken)
+            result = subprocess.run([isobrick, "export", path, folder / "x.raw", "--force"],
+                                    capture_output=True, text=True)
+            check(result.returncode == 1 and "0.0.0" in result.stderr
+                  and result.stderr.count("\n") == 1,
+                  f"{compressor}: {result.returncode} {result.stderr!r}")
+        for _ in range(20):  # never a crash; not every format has a checksum
+            broken = bytearray(whole)
+            for at in rng.integers(0, len(whole), 3):
+                broken[at] = rng.integers(0, 256)
+            chunk.write_bytes(bytes(broken))
+            code = subprocess.run([isobrick, "export", path, folder / "x.raw", "--force"],
+                                  capture_output=True).returncode
+            check(code in (0, 1), f"{compressor}: {code}")
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as name:
+        for part in (check_types, check_compressors, check_fill_values,
+                     check_channels_and_times, check_refusals, check_damage):
+            folder = pathlib.Path(name) / part.__name__
+            folder.mkdir()
+            part(folder)
+            shutil.rmtree(folder)
+    print(f"{checks} checks, {failures} failures")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
