@@ -1,6 +1,7 @@
 #include "isobrick/pipeline/store_source.h"
 
 #include <tbb/info.h>
+#include <tbb/task_arena.h>
 
 #include <utility>
 
@@ -14,7 +15,8 @@ class StoreSource final : public VolumeSource {
  public:
   StoreSource(const std::string& path, const VolumeRequest& said, int threads)
       : store_(path, said.selection),
-        threads_(threads > 0 ? threads : tbb::info::default_concurrency()) {
+        threads_(threads > 0 ? threads : tbb::info::default_concurrency()),
+        arena_(threads_) {
     const LevelInfo& finest = store_.info().levels.front();
     info_ =
         describe_volume(path, finest.lattice.extent, finest.lattice.type, finest.transform, said);
@@ -22,6 +24,9 @@ class StoreSource final : public VolumeSource {
 
   const VolumeInfo& info() const override { return info_; }
   bool random_access() const override { return true; }
+  // A read takes all threads itself. Small pieces read side by side would each
+  // decode the whole chunks that they have a part of.
+  bool parallel() const override { return false; }
   std::size_t memory() const override {
     // A chunk and its encoded bytes for each thread, and indices of shards.
     constexpr std::size_t indices = std::size_t{16} << 20;
@@ -29,11 +34,14 @@ class StoreSource final : public VolumeSource {
     return indices + static_cast<std::size_t>(threads_) * 2 * brick +
            static_cast<std::size_t>(decode_extra(store_.info(), threads_));
   }
-  void read(Box3 box, std::byte* out) override { read_slab(store_, 0, box, out); }
+  void read(Box3 box, std::byte* out) override {
+    arena_.execute([&] { read_slab(store_, 0, box, out); });
+  }
 
  private:
   StoreReader store_;
   int threads_;
+  tbb::task_arena arena_;
   VolumeInfo info_;
 };
 
