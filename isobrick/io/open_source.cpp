@@ -37,6 +37,9 @@ std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeR
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) return open_folder(path, said);
   const auto [file, inner] = split_volume_path(path);
+  // Raw samples may begin with anything: who says all of them is believed.
+  if (said.extent && said.type && format_of_extension(path) == VolumeFormat::raw)
+    return open_raw(path, said);
   const VolumeFormat format = recognise_format(file);
   if (format == VolumeFormat::vti) return open_vti_if_built(file, inner, said);
   if (format == VolumeFormat::hdf5) return open_hdf5_if_built(file, inner, said);

@@ -73,7 +73,9 @@ std::optional<VolumeFormat> by_content(const std::string& path, std::string_view
   return std::nullopt;
 }
 
-VolumeFormat by_extension(const std::string& path) {
+}  // namespace
+
+VolumeFormat format_of_extension(const std::string& path) {
   constexpr std::pair<std::string_view, VolumeFormat> extensions[] = {
       {".nhdr", VolumeFormat::nrrd},      {".nrrd", VolumeFormat::nrrd},
       {".mhd", VolumeFormat::meta_image}, {".mha", VolumeFormat::meta_image},
@@ -90,11 +92,9 @@ VolumeFormat by_extension(const std::string& path) {
   return VolumeFormat::raw;
 }
 
-}  // namespace
-
 VolumeFormat recognise_format(const std::string& path) {
   const std::string head = read_head(path);
-  return by_content(path, head).value_or(by_extension(path));
+  return by_content(path, head).value_or(format_of_extension(path));
 }
 
 VolumePath split_volume_path(const std::string& path) {

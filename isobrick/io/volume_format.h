@@ -21,6 +21,9 @@ enum class VolumeFormat : std::uint8_t {
 /// when it cannot be read, UsageError when it is no regular file.
 VolumeFormat recognise_format(const std::string& path);
 
+/// The format that goes by a path's extension, whatever the file holds.
+VolumeFormat format_of_extension(const std::string& path);
+
 /// A path and what it names within the file: "run.h5:/data/temperature".
 struct VolumePath {
   std::string file;

@@ -184,6 +184,13 @@ TEST(OpenSource, ADamagedHeaderBesideMattersOnlyIfNeeded) {
   EXPECT_NO_THROW(open_source(path, describe(kExtent, ScalarType::u8)));
 }
 
+TEST(OpenSource, RawSamplesMayBeginLikeAnotherFormat) {
+  const TempDir dir;
+  const std::string samples = "II*" + std::string(137, '\0');
+  const auto source = open_source(dir.write("v.raw", samples), describe(kExtent, ScalarType::u8));
+  EXPECT_EQ(read_box(*source, {{0, 0, 0}, kExtent}), samples);
+}
+
 TEST(OpenSource, SpacingMustBePositive) {
   const TempDir dir;
   const auto path = dir.write("v_7x5x4_u8.raw", whole(ScalarType::u8));

@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""Times `isobrick convert` of each volume format beside the library of that format.
+
+The samples of a raw volume are repeated to fill a cube of u16, written in each format
+by its Python library, and then, in turn, so that whatever else the machine does meets
+all alike: the library reads the file, isobrick converts the raw file, isobrick converts
+the file. The last should take at most 1.3 times the slower of the first two.
+
+    bench/format_bench.py build/bin/isobrick bonsai_256x256x256_uint8.raw
+
+Needs Debian's numpy, and of nibabel, vtkmodules, tifffile, h5py, pydicom what is to be
+compared.
+"""
+
+import argparse
+import gzip
+import os
+import pathlib
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy
+
+
+def nrrd(path, samples):
+    header = "NRRD0004\ntype: ushort\ndimension: 3\nsizes: {} {} {}\nendian: little\nencoding: gzip\n\n"
+    path.write_bytes(header.format(*samples.shape[::-1]).encode() + gzip.compress(samples.tobytes(), 6))
+
+
+def nifti(path, samples):
+    import nibabel
+    nibabel.save(nibabel.Nifti1Image(samples.T, numpy.eye(4)), path)
+
+
+def vti(path, samples, how=("SetCompressorTypeToZLib",)):
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
+    image = vtkImageData()
+    image.SetDimensions(*samples.shape[::-1])
+    array = numpy_to_vtk(samples.ravel())
+    array.SetName("v")
+    image.GetPointData().SetScalars(array)
+    writer = vtkXMLImageDataWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(image)
+    for call in how:
+        getattr(writer, call)()
+    writer.Write()
+
+
+def vti_base64(path, samples):
+    vti(path, samples, ("SetCompressorTypeToNone", "EncodeAppendedDataOn"))
+
+
+def tiff(path, samples):
+    import tifffile
+    tifffile.imwrite(path, samples, photometric="minisblack", compression="zlib", metadata=None)
+
+
+def tiff_plain(path, samples):
+    import tifffile
+    tifffile.imwrite(path, samples, photometric="minisblack", metadata=None)
+
+
+def hdf5(path, samples):
+    import h5py
+    with h5py.File(path, "w") as file:
+        file.create_dataset("v", data=samples, chunks=(64, 64, 64), compression="gzip")
+
+
+def dicom(path, samples):
+    import pydicom
+    from pydicom.dataset import FileDataset, FileMetaDataset
+    path.mkdir()
+    for z, plane in enumerate(samples):
+        meta = FileMetaDataset()
+        meta.MediaStorageSOPClassUID = pydicom.uid.CTImageStorage
+        meta.MediaStorageSOPInstanceUID = pydicom.uid.generate_uid()
+        meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
+        data = FileDataset(None, {}, file_meta=meta, preamble=b"\0" * 128)
+        data.SOPClassUID = meta.MediaStorageSOPClassUID
+        data.SOPInstanceUID, data.SeriesInstanceUID = meta.MediaStorageSOPInstanceUID, "1.2.3"
+        data.Rows, data.Columns = plane.shape
+        data.SamplesPerPixel, data.PhotometricInterpretation = 1, "MONOCHROME2"
+        data.BitsAllocated, data.BitsStored, data.HighBit = 16, 16, 15
+        data.PixelRepresentation, data.PixelSpacing = 0, [1, 1]
+        data.ImageOrientationPatient, data.ImagePositionPatient = [1, 0, 0, 0, 1, 0], [0, 0, z]
+        data.PixelData = plane.tobytes()
+        data.is_little_endian, data.is_implicit_VR = True, False
+        data.save_as(path / f"{z}.dcm", write_like_original=False)
+
+
+READERS = {
+    "nrrd": "import gzip, numpy; f = open(path, 'rb').read(); "
+            "numpy.frombuffer(gzip.decompress(f[f.index(b'\\n\\n') + 2:]), 'u2')",
+    "nifti": "import nibabel, numpy; numpy.asanyarray(nibabel.load(path).dataobj)",
+    "vti": "from vtkmodules.vtkIOXML import vtkXMLImageDataReader as R; r = R(); "
+           "r.SetFileName(path); r.Update()",
+    "tiff": "import tifffile; tifffile.imread(path)",
+    "hdf5": "import h5py; h5py.File(path)['v'][:]",
+    "dicom": "import pathlib, pydicom; "
+             "[pydicom.dcmread(p).pixel_array.copy() for p in pathlib.Path(path).iterdir()]",
+}
+CASES = {
+    "nrrd gzip": (nrrd, "v.nrrd", "nrrd"), "nifti gzip": (nifti, "v.nii.gz", "nifti"),
+    "nifti": (nifti, "v.nii", "nifti"), "vti zlib": (vti, "v.vti", "vti"),
+    "vti base64": (vti_base64, "b.vti", "vti"), "tiff zlib": (tiff, "z.tif", "tiff"),
+    "tiff": (tiff_plain, "v.tif", "tiff"), "hdf5 gzip": (hdf5, "v.h5", "hdf5"),
+    "dicom": (dicom, "series", "dicom"),
+}
+
+
+def read_by_library(kind, path):
+    """Seconds that reading takes, without the start of Python and its imports."""
+    imports = READERS[kind].split(";", maxsplit=1)[0]
+    program = (f"import time; {imports}; path = {str(path)!r}; start = time.monotonic()\n"
+               f"{READERS[kind]}\nprint(time.monotonic() - start)")
+    return float(subprocess.run([sys.executable, "-c", program], check=True, capture_output=True,
+                                encoding="utf-8").stdout)
+
+
+def convert(program, path, store):
+    shutil.rmtree(store, ignore_errors=True)
+    start = time.monotonic()
+    subprocess.run([program, "convert", path, store, "--quiet"], check=True)
+    return time.monotonic() - start
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("isobrick")
+    parser.add_argument("raw", help="a volume of u8 whose name tells its extent")
+    parser.add_argument("--edge", type=int, default=512, help="samples along each edge of the cube")
+    parser.add_argument("--repeat", type=int, default=5)
+    parser.add_argument("--only", nargs="*", default=list(CASES))
+    parser.add_argument("--folder", help="where to write")
+    arguments = parser.parse_args()
+    extent = [int(n) for n in re.search(r"(\d+)x(\d+)x(\d+)", arguments.raw).groups()]
+    samples = numpy.fromfile(arguments.raw, "u1").reshape(extent[::-1])
+    edge = arguments.edge
+    samples = numpy.tile(samples, [-(-edge // size) for size in samples.shape])[:edge, :edge, :edge]
+    samples = samples.astype("u2") * 257
+    print(f"{edge}³ samples of u16, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    with tempfile.TemporaryDirectory(dir=arguments.folder) as folder:
+        folder = pathlib.Path(folder)
+        raw, store = folder / f"raw_{edge}x{edge}x{edge}_uint16.raw", folder / "out.zarr"
+        samples.tofile(raw)
+        for name in arguments.only:
+            write, file, kind = CASES[name]
+            write(folder / file, samples)
+            runs = [(read_by_library(kind, folder / file), convert(arguments.isobrick, raw, store),
+                     convert(arguments.isobrick, folder / file, store))
+                    for _ in range(arguments.repeat)]
+            library, plain, ours = (statistics.median(times) for times in zip(*runs))
+            print(f"  {name:11} library {library:7.3f} s   raw {plain:7.3f} s   convert {ours:7.3f} s"
+                  f"   {ours / max(library, plain):5.2f} of the slower", flush=True)
+
+
+if __name__ == "__main__":
+    main()
