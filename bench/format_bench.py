@@ -4,7 +4,8 @@
 The samples of a raw volume are repeated to fill a cube of u16, written in each format
 by its Python library, and then, in turn, so that whatever else the machine does meets
 all alike: the library reads the file, isobrick converts the raw file, isobrick converts
-the file. The last should take at most 1.3 times the slower of the first two.
+the file. The last should take at most 1.3 times the slower of the first two. Wall
+and processor seconds, medians; on a busy machine the latter say more.
 
     bench/format_bench.py build/bin/isobrick bonsai_256x256x256_uint8.raw
 
@@ -17,6 +18,7 @@ import gzip
 import os
 import pathlib
 import re
+import resource
 import shutil
 import statistics
 import subprocess
@@ -117,19 +119,22 @@ CASES = {
 
 
 def read_by_library(kind, path):
-    """Seconds that reading takes, without the start of Python and its imports."""
+    """Wall and processor seconds of reading, without the start of Python and its imports."""
     imports = READERS[kind].split(";", maxsplit=1)[0]
-    program = (f"import time; {imports}; path = {str(path)!r}; start = time.monotonic()\n"
-               f"{READERS[kind]}\nprint(time.monotonic() - start)")
-    return float(subprocess.run([sys.executable, "-c", program], check=True, capture_output=True,
-                                encoding="utf-8").stdout)
+    program = (f"import time; {imports}; path = {str(path)!r}\n"
+               f"start = time.monotonic(), time.process_time()\n{READERS[kind]}\n"
+               f"print(time.monotonic() - start[0], time.process_time() - start[1])")
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True,
+                          encoding="utf-8")
+    return [float(number) for number in done.stdout.split()]
 
 
 def convert(program, path, store):
     shutil.rmtree(store, ignore_errors=True)
-    start = time.monotonic()
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
     subprocess.run([program, "convert", path, store, "--quiet"], check=True)
-    return time.monotonic() - start
+    wall, after = time.monotonic() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def main():
@@ -157,9 +162,12 @@ def main():
             runs = [(read_by_library(kind, folder / file), convert(arguments.isobrick, raw, store),
                      convert(arguments.isobrick, folder / file, store))
                     for _ in range(arguments.repeat)]
-            library, plain, ours = (statistics.median(times) for times in zip(*runs))
-            print(f"  {name:11} library {library:7.3f} s   raw {plain:7.3f} s   convert {ours:7.3f} s"
-                  f"   {ours / max(library, plain):5.2f} of the slower", flush=True)
+            for i, clock in enumerate(("wall", "cpu")):
+                library, plain, ours = (statistics.median(run[i] for run in runs_of_one)
+                                        for runs_of_one in zip(*runs))
+                print(f"  {name if i == 0 else '':11} {clock:4} library {library:7.3f} s   "
+                      f"raw {plain:7.3f} s   convert {ours:7.3f} s   "
+                      f"{ours / max(library, plain):5.2f} of the slower", flush=True)
 
 
 if __name__ == "__main__":
