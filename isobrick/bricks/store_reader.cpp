@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 
 #include "isobrick/bricks/added_ranges.h"
@@ -18,6 +19,8 @@
 
 namespace isobrick {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t kMaxOpenFiles = 128;
 constexpr std::uint64_t kIndexCacheBytes = std::uint64_t{64} << 20;
@@ -80,6 +83,8 @@ struct StoreReader::Impl {
   VolumeChoice volume_choice;
   std::vector<Level> levels;
   std::atomic<std::uint64_t> bytes_read = 0;
+  std::atomic<std::uint64_t> brick_bytes_read = 0, brick_bytes_decoded = 0;
+  std::atomic<Clock::rep> read_ticks = 0, decode_ticks = 0;
   LruCache<StoreFile> files{kMaxOpenFiles};
   LruCache<ShardIndex> indices{kIndexCacheBytes};
 };
@@ -296,9 +301,15 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   if (volumes.chunk_volumes > 1) several.resize(decoded);
   const std::span to = volumes.chunk_volumes > 1 ? std::span(several) : std::span(out, decoded);
   try {
+    const auto start = Clock::now();
     place->file->read_at(place->offset, encoded);
+    const auto read = Clock::now();
     impl_->bytes_read += place->size;
+    impl_->brick_bytes_read += place->size;
+    impl_->read_ticks += (read - start).count();
     decode_bytes(impl_->at(level).metadata.codecs, lattice.sample_bytes(), encoded, to);
+    impl_->brick_bytes_decoded += decoded;
+    impl_->decode_ticks += (Clock::now() - read).count();
   } catch (const DamageError& e) {
     impl_->damaged(level, b, *place, e.what());
   }
@@ -311,6 +322,14 @@ void StoreReader::will_need(int level, Int3 b) const {
 }
 
 std::uint64_t StoreReader::bytes_read() const { return impl_->bytes_read; }
+
+BrickTimes StoreReader::brick_times() const {
+  const auto seconds = [](Clock::rep ticks) {
+    return std::chrono::duration<double>(Clock::duration(ticks)).count();
+  };
+  return {seconds(impl_->read_ticks), seconds(impl_->decode_ticks), impl_->brick_bytes_read,
+          impl_->brick_bytes_decoded};
+}
 
 bool StoreReader::has_ranges(int level) const {
   const Impl::Level& l = impl_->levels.at(static_cast<std::size_t>(level));

@@ -55,6 +55,12 @@ struct BrickLocation {
   std::uint64_t offset = 0, size = 0;
 };
 
+/// What reading bricks has cost so far, summed over threads.
+struct BrickTimes {
+  double read_seconds = 0, decode_seconds = 0;
+  std::uint64_t bytes_read = 0, bytes_decoded = 0;  ///< encoded and decoded
+};
+
 /// Ranges of an aligned box of 16³ blocks (or of bricks), C order [z, y, x]
 /// over `box`, as doubles: exact for all types but 64-bit ones that we don't have.
 struct RangeTable {
@@ -91,6 +97,8 @@ class StoreReader {
 
   /// Bytes read from disk so far (bricks, indices, ranges).
   std::uint64_t bytes_read() const;
+  /// The bricks among it.
+  BrickTimes brick_times() const;
 
   /// Whether the level has both kinds of ranges. Without them no surface can be
   /// extracted; `isobrick index` adds them.
