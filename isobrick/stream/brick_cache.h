@@ -12,6 +12,17 @@
 
 namespace isobrick {
 
+/// Some bricks of a cache, looked up without it: it may take in others meanwhile.
+class BrickView final : public BrickLookup {
+ public:
+  const std::byte* find(Int3 brick) const override;
+
+ private:
+  friend class BrickCache;
+  Int3 grid_;
+  std::unordered_map<std::uint64_t, const std::byte*> samples_;
+};
+
 /// Decoded bricks of one level, the least recently needed of them dropped when
 /// more than `capacity` would be held.
 class BrickCache final : public BrickLookup {
@@ -19,9 +30,13 @@ class BrickCache final : public BrickLookup {
   BrickCache(const StoreReader& store, int level, std::size_t capacity);
 
   /// Makes these bricks (no more than the capacity, none twice) resident,
-  /// reading and decoding in parallel in the caller's TBB arena. Pointers from
-  /// find() to them stay valid until the next call.
+  /// reading and decoding in parallel in the caller's TBB arena. Their samples stay where
+  /// they are until the next call, and during it as well when both calls together name no
+  /// more bricks than the capacity.
   void require(std::span<const Int3> bricks);
+
+  /// Bricks that were required by the last call.
+  BrickView view(std::span<const Int3> bricks) const;
 
   /// Hints that these bricks are required next: starts the disk for those that
   /// are not resident.
