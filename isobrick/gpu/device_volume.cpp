@@ -1,6 +1,5 @@
 #include "isobrick/gpu/device_volume.h"
 
-#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "isobrick/gpu/device_volume_impl.h"
 #include "isobrick/gpu/page_gather.h"
 #include "isobrick/gpu/search_kernel.h"
+#include "isobrick/gpu/supported.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -21,16 +21,9 @@ constexpr std::size_t kStagingBytes = std::size_t{32} << 20;
 
 }  // namespace
 
-bool device_available() {
-  int count = 0;
-  return cudaGetDeviceCount(&count) == cudaSuccess && count > 0;
-}
-
 DeviceVolume::Impl::Impl(const Lattice& l, const BrickLookup& bricks, double fill_value)
     : lattice(l) {
-  if (!is_device_scalar(l.type))
-    throw UsageError(fmt::format("samples of type {} have no CUDA kernels; use --backend cpu",
-                                 short_name(l.type)));
+  if (!is_device_scalar(l.type)) throw UsageError(*why_unsupported(l.type, {}));
   if (volume(l.tiles()) >= kNone)
     throw UsageError("the volume has too many tiles to be resident on a device");
   tile_count = static_cast<std::uint32_t>(volume(l.tiles()));

@@ -4,12 +4,10 @@
 #include <memory>
 
 #include "isobrick/core/lattice.h"
+#include "isobrick/gpu/device.h"
 #include "isobrick/surface/surface_options.h"
 
 namespace isobrick::gpu {
-
-/// Whether there is a CUDA device that this program can use; never throws.
-bool device_available();
 
 /// A whole volume in device memory, at its own width, as pages of one tile each,
 /// with the ranges of all tiles. Not thread-safe.

@@ -6,6 +6,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume_impl.h"
 #include "isobrick/gpu/search_kernel.h"
+#include "isobrick/gpu/supported.h"
 #include "isobrick/gpu/tile_index.h"
 #include "isobrick/gpu/tile_kernel.h"
 #include "isobrick/surface/world_map.h"
@@ -16,17 +17,9 @@ namespace {
 /// Small words that kernels share: zeroed before each search but the last.
 struct Counters {
   std::uint32_t search_ticket, extract_ticket, item_count, found;
+  unsigned long long number_start, number_end;
   SurfaceTotals totals;
 };
-
-void check_supported(const SurfaceOptions& options, ScalarType type) {
-  if (options.may_have_nan && is_floating(type))
-    throw UsageError("volumes that may hold NaN have no CUDA kernels yet; use the CPU");
-  if (options.drop_degenerate)
-    throw UsageError("degenerate triangles cannot be dropped on the device yet; use the CPU");
-  if (options.indexing != Indexing::welded)
-    throw UsageError("the device makes welded meshes only; use the CPU");
-}
 
 /// Mesh to expect of a tile before anything is known: a sheet across it, twice.
 constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
@@ -64,7 +57,9 @@ struct ResidentExtractor::Impl {
         zeroed(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
         search(tuning.search) {
     if (const auto kind = index_kind_of(search)) index.emplace(index_tiles(volume, *kind));
-    check_supported(o, volume.lattice.type);
+    check_supported(volume.lattice.type, o);
+    if (o.indexing != Indexing::welded)
+      throw UsageError("a resident volume makes welded meshes only; use the CPU");
     options.roi = intersect(o.roi, volume.lattice.box());
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
     std::uint16_t entries[kCaseEntries];
@@ -125,6 +120,8 @@ struct ResidentExtractor::Impl {
     p.order = order.data();
     p.ticket = &counters()->extract_ticket;
     p.epoch = ++epoch;
+    p.number_start = &counters()->number_start;
+    p.number_end = &counters()->number_end;
     p.positions = positions.data();
     p.normals = normals.data();
     p.triangles = triangles.data();

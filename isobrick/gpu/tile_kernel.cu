@@ -4,6 +4,7 @@
 #include "isobrick/core/threshold.h"
 #include "isobrick/gpu/cuda_check.h"
 #include "isobrick/gpu/device_scalar.h"
+#include "isobrick/gpu/streamed_pages.cuh"
 #include "isobrick/gpu/tile_emit.cuh"
 #include "isobrick/gpu/tile_order.cuh"
 #include "isobrick/surface/case_tables.h"
@@ -18,23 +19,29 @@ constexpr int teams_of_multiprocessor(int threads) {
 
 /// Pages of the tiles around one; where there is none, any that is.
 template <class T>
-__device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item) {
+__device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,
+                           std::uint32_t number) {
   if (threadIdx.x >= 27) return;
   const int n = static_cast<int>(threadIdx.x);
   const int dx = n % 3 - 1, dy = n / 3 % 3 - 1, dz = n / 9 - 1;
-  const int x = item.x + dx, y = item.y + dy, z = item.z + dz;
-  const bool exists =
-      x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] && z < p.tiles[2];
-  std::uint32_t page = p.fill_page;
-  if (exists) {
-    const std::uint32_t own =
-        p.page_of_tile[(static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x];
-    if (own != kNone) page = own;
+  std::int64_t start = 0;
+  if (p.links) {
+    start = streamed_page(number, n);
+  } else {
+    const int x = item.x + dx, y = item.y + dy, z = item.z + dz;
+    const bool exists =
+        x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] && z < p.tiles[2];
+    std::uint32_t page = p.fill_page;
+    if (exists) {
+      const std::uint32_t own =
+          p.page_of_tile[(static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x];
+      if (own != kNone) page = own;
+    }
+    start = static_cast<std::int64_t>(page) * kPageSamples;
   }
   const int before = dx * 32 + dy * 1024 + dz * 32768;  // samples of the pages between
   s.pages[n] = reinterpret_cast<std::uintptr_t>(p.pages) +
-               (static_cast<std::int64_t>(page) * kPageSamples - before) *
-                   static_cast<std::int64_t>(sizeof(T));
+               (start - before) * static_cast<std::int64_t>(sizeof(T));
 }
 
 /// The first warp takes the next tile.
@@ -47,7 +54,7 @@ __device__ void take_tile(TileShared& s, const TileParams& p) {
   if (lane_id() == 0) s.item = number;
   if (number >= *p.item_count) return;
   const TileItem tile = p.items[number];
-  find_pages<T>(s, p, tile);
+  find_pages<T>(s, p, tile, number);
   if (lane_id() == 0) {
     s.tile = tile;
     s.shape = shape_of(p, tile);
@@ -58,13 +65,18 @@ __device__ void take_tile(TileShared& s, const TileParams& p) {
 template <int N, class T>
 __device__ void prefetch_tile(const TileParams& p, std::uint32_t number) {
   if (number >= *p.item_count) return;
-  const TileItem item = p.items[number];
-  const std::uint32_t page =
-      p.page_of_tile[(static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] +
-                     item.x];
-  if (page == kNone) return;
   constexpr std::size_t bytes = kPageSamples * sizeof(T);
-  const char* from = static_cast<const char*>(p.pages) + page * bytes;
+  const char* from = static_cast<const char*>(p.pages);
+  if (p.links) {
+    from += streamed_page(number, kOwnPage) * static_cast<std::int64_t>(sizeof(T));
+  } else {
+    const TileItem item = p.items[number];
+    const std::uint32_t page =
+        p.page_of_tile[(static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] +
+                       item.x];
+    if (page == kNone) return;
+    from += page * bytes;
+  }
   for (std::size_t at = threadIdx.x * 128; at < bytes; at += N * 128)
     asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
 }
@@ -173,7 +185,7 @@ __global__ void __launch_bounds__(N, teams_of_multiprocessor(N))
     __syncthreads();
     number_at_0<N>(s);
     borrow_rows<N>(s);
-    place_numbers<N>(s, p);
+    place_numbers<N>(s);
     __syncthreads();
     emit_all_triangles<N>(s, own, p, triangles);
     // No earlier than this: a tile that is taken but not begun holds all later ones up.

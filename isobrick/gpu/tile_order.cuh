@@ -10,7 +10,7 @@
 namespace isobrick::gpu {
 
 inline constexpr unsigned long long kOwnSum = 1ull << 62, kFullSum = 2ull << 62,
-                                    kSumMask = (1ull << 62) - 1;
+                                    kSumMask = kOrderMask;
 
 using DeviceWord = cuda::atomic_ref<unsigned long long, cuda::thread_scope_device>;
 using DeviceFlag = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>;
@@ -72,14 +72,18 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
 __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   const std::uint32_t item = s.item;
   RowTable& table = p.row_tables[s.tile.slot];
+  const unsigned long long start = *p.number_start;
   const auto base =
       sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
                  s.all_vertices);
   if (lane_id() != 0) return;
   s.vertex_base = base;
-  table.number_base = static_cast<std::uint32_t>(p.number_base + base);
+  s.number_base = static_cast<std::uint32_t>(start + base);
+  table.number_base = s.number_base;
   DeviceFlag(table.ready).store(p.epoch, cuda::memory_order_release);
-  if (item + 1 == *p.item_count) p.totals->vertices = base + s.all_vertices;
+  if (item + 1 < *p.item_count) return;
+  p.totals->vertices = base + s.all_vertices;
+  *p.number_end = start + base + s.all_vertices;
 }
 
 /// Where the tile's triangles go. One warp.
@@ -121,16 +125,21 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
   const bool inside = n >= 1 && n <= 6 && !(dx && shape.first[0]) && !(dy && shape.first[1]) &&
                       !(dz && shape.first[2]);
   std::uint32_t slot = kNone;
-  if (inside)
+  bool wait = true;
+  if (inside && p.links) {
+    slot = p.links[s.item].before[n - 1];
+    wait = (slot & TileLinks::kSameLaunch) && !p.tables_known;
+    if (slot != kNone) slot &= ~TileLinks::kSameLaunch;
+  } else if (inside) {
     slot = p.slot_of_tile[(static_cast<std::int64_t>(item.z - dz) * p.tiles[1] + (item.y - dy)) *
                               p.tiles[0] +
                           (item.x - dx)];
+  }
   if (slot != kNone) {
     RowTable& table = p.row_tables[slot];
     DeviceFlag ready(table.ready);
-    while (ready.load(cuda::memory_order_acquire) != p.epoch) __nanosleep(20);
-    s.neighbour_base[n] =
-        table.number_base - static_cast<std::uint32_t>(p.number_base + s.vertex_base);
+    while (wait && ready.load(cuda::memory_order_acquire) != p.epoch) __nanosleep(20);
+    s.neighbour_base[n] = table.number_base - s.number_base;
   } else if (n < 8) {
     s.neighbour_base[n] = 0;
   }
@@ -231,12 +240,11 @@ __device__ inline void borrow_rows(TileShared& s) {
 /// The numbers in the mesh from those in the tile. The lower of a cell's edges along
 /// y and z are counted by the mask of its upper ones, so one too many.
 template <int N>
-__device__ inline void place_numbers(TileShared& s, const TileParams& p) {
+__device__ inline void place_numbers(TileShared& s) {
   for (unsigned t = threadIdx.x; t < 24; t += N) {
     const unsigned e = t % 12, at_0 = t / 12;
     const bool lower = e >= 4 && (e & 1u) == 0;
-    s.places[at_0][e].addend =
-        static_cast<std::uint32_t>(p.number_base + s.vertex_base) - (lower && !at_0 ? 1u : 0u);
+    s.places[at_0][e].addend = s.number_base - (lower && !at_0 ? 1u : 0u);
   }
 }
 

@@ -32,11 +32,23 @@ struct alignas(16) RowTable {
   std::uint32_t ready;        ///< the epoch in which number_base was written
 };
 
+/// What a launch of its own must know of an item, where no tables of the whole grid are
+/// kept: the row tables of the lower neighbours, at n − 1 for the one lower along x, y, z
+/// where bits 0, 1, 2 of n are set; kNone where that has none.
+struct TileLinks {
+  /// The neighbour is of the same launch: it may have to be waited for.
+  static constexpr std::uint32_t kSameLaunch = 0x80000000u;
+  std::uint32_t before[6];
+  std::uint32_t active_blocks;  ///< as in TileWork
+};
+
 /// The running totals that tiles pass on in their order (decoupled look-back,
 /// Merrill and Garland 2016): a value with a state in the two upper bits.
 struct OrderState {
   unsigned long long vertices, triangles;
 };
+/// The value of such a word.
+inline constexpr unsigned long long kOrderMask = (1ull << 62) - 1;
 
 struct SurfaceTotals {
   unsigned long long vertices, triangles;
@@ -48,6 +60,9 @@ struct TileParams {
   const void* pages;
   const std::uint32_t* page_of_tile;  ///< [z, y, x] of `tiles`; kNone: all fill value
   const std::uint32_t* slot_of_tile;  ///< the same; kNone: not active
+  const TileLinks* links;             ///< one an item, instead of the two tables; or null
+  bool tables_known;  ///< with links: a launch before has left all row tables as they will be
+  bool alone;         ///< every tile owns all its edges
   std::uint32_t fill_page;
   std::int32_t tiles[3];
   std::int32_t extent[3], roi_lo[3], roi_hi[3];  ///< samples
@@ -56,10 +71,11 @@ struct TileParams {
   WorldMap world;
   bool diagonal;  ///< the map has no term off the diagonal
   RowTable* row_tables;
-  OrderState* order;          ///< one an item, zeroed
-  std::uint32_t* ticket;      ///< zeroed
-  std::uint32_t epoch;        ///< never 0, new in each launch
-  std::uint64_t number_base;  ///< vertices of the launches before
+  OrderState* order;                       ///< one an item, zeroed
+  std::uint32_t* ticket;                   ///< zeroed
+  std::uint32_t epoch;                     ///< never 0, new in each launch
+  const unsigned long long* number_start;  ///< vertices of the launches before
+  unsigned long long* number_end;          ///< and of this one, once it is over
   Vec3f* positions;
   Vec3f* normals;
   Triangle* triangles;

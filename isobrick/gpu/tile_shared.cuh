@@ -89,6 +89,7 @@ struct alignas(256) TileShared {
   std::uint32_t all_vertices, all_cells;
   std::uint16_t group_triangles[kMostListed / 32];  ///< of 32 listed cells each
   unsigned long long vertex_base, triangle_base;
+  std::uint32_t number_base;        ///< mesh number of the tile's first vertex
   std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis
   LowerRows lower;
   const RowTable* before;  ///< of the tile one lower along x, or null
@@ -152,12 +153,12 @@ __device__ inline Shape shape_of(const TileParams& p, const TileItem& item) {
     s.origin[axis] = tile[axis] * 32;
     s.lo[axis] = ::max(p.roi_lo[axis] - s.origin[axis], 0);
     s.hi[axis] = ::min(p.roi_hi[axis] - 1 - s.origin[axis], 32);
-    s.first[axis] = tile[axis] == p.roi_lo[axis] / 32;
+    s.first[axis] = p.alone || tile[axis] == p.roi_lo[axis] / 32;
     s.empty = s.empty || s.hi[axis] <= s.lo[axis];
   }
   s.cell_mask = s.empty ? 0 : static_cast<std::uint32_t>(bit_span(s.lo[0], s.hi[0] - 1));
   s.sample_mask = s.empty ? 0 : static_cast<std::uint32_t>(bit_span(s.lo[0], s.hi[0]) >> 1);
-  s.at_0 = s.first[0] && s.lo[0] == 0 ? 1u : 0u;
+  s.at_0 = s.first[0] && s.lo[0] == 0 && !s.empty ? 1u : 0u;
   return s;
 }
 

@@ -1,50 +1,15 @@
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <functional>
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume.h"
-#include "tests/surface/field.h"
+#include "tests/gpu/compare.h"
 
 // The mesh from the device is the CPU's, byte for byte.
 
 namespace isobrick::testing {
 namespace {
-
-template <class T>
-MeshBuffer on_cpu(const Field<T>& field, const Lattice& lattice, const DenseBricks& bricks,
-                  const SurfaceOptions& options) {
-  std::vector<TileWork> tiles;
-  append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, block_ranges(field), options.isovalue,
-                         tiles);
-  CpuExtractor extractor(lattice, options, {});
-  MeshBuffer mesh;
-  extractor.extract(tiles, bricks, mesh);
-  return mesh;
-}
-
-template <class V>
-bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(V)) == 0;
-}
-
-template <class V>
-std::string first_difference(const PodBuffer<V>& a, const PodBuffer<V>& b) {
-  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
-    if (std::memcmp(&a[i], &b[i], sizeof(V)) != 0)
-      return "first difference at " + std::to_string(i) + " of " + std::to_string(a.size());
-  return "sizes " + std::to_string(a.size()) + " and " + std::to_string(b.size());
-}
-
-void expect_same(const MeshBuffer& cpu, const MeshBuffer& device) {
-  EXPECT_TRUE(same_bytes(cpu.positions, device.positions))
-      << first_difference(cpu.positions, device.positions);
-  EXPECT_TRUE(same_bytes(cpu.normals, device.normals))
-      << first_difference(cpu.normals, device.normals);
-  EXPECT_TRUE(same_bytes(cpu.triangles, device.triangles))
-      << first_difference(cpu.triangles, device.triangles);
-}
 
 template <class T>
 void compare(const Field<T>& field, std::vector<double> isovalues, SurfaceOptions options,
@@ -72,24 +37,8 @@ void compare(const Field<T>& field, std::vector<double> isovalues, SurfaceOption
 }
 
 template <class T>
-class GpuResident : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
-  }
-  static constexpr double lowest() { return std::is_signed_v<T> ? -100.0 : 0.0; }
-  static Field<T> noise(Int3 extent, unsigned seed) {
-    return padded_noise<T>(extent, lowest(), lowest() + 200, static_cast<T>(lowest()), seed);
-  }
-  static Field<T> waves(Int3 extent) {
-    return Field<T>(extent, [&](Int3 p) {
-      const auto f = [](Index v, double k) { return std::sin(static_cast<double>(v) * k); };
-      return lowest() + 100 + 30 * (f(p.x, 0.11) + f(p.y, 0.13) + f(p.z, 0.07));
-    });
-  }
-};
+class GpuResident : public DeviceTest<T> {};
 
-using DeviceTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float>;
 TYPED_TEST_SUITE(GpuResident, DeviceTypes);
 
 TYPED_TEST(GpuResident, OneTile) { compare(this->waves({33, 33, 33}), {this->lowest() + 100}, {}); }

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace isobrick::gpu {
+
+/// CUDA devices that this program can use; 0 also where there is no driver.
+int device_count() noexcept;
+
+/// Whether there is one.
+inline bool device_available() noexcept { return device_count() > 0; }
+
+struct DeviceInfo {
+  std::string name;
+  std::uint64_t free_bytes = 0, total_bytes = 0;  ///< of its memory, now
+};
+
+/// Sets the device up for this process (some tenths of a second the first time) and
+/// makes it the calling thread's. Throws Error when that fails.
+DeviceInfo open_device(int device);
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "isobrick/core/tile.h"
+#include "isobrick/gpu/stream_sizes.h"
+#include "isobrick/surface/surface_options.h"
+
+namespace isobrick::gpu {
+
+/// Takes a piece of the mesh. It stays as it is until `release` is called, once, from any
+/// thread. When it throws, it has not taken the piece.
+using TakeChunk = std::function<void(const MeshChunk& chunk, std::function<void()> release)>;
+
+/// How long a stage was busy, and with how much.
+struct StreamStage {
+  double seconds = 0;
+  std::uint64_t bytes = 0;
+};
+
+/// What a streaming extraction did.
+struct StreamReport {
+  std::uint64_t vertices = 0, triangles = 0;
+  StreamStage gather, upload, kernel, download;
+  std::uint64_t launches = 0, repeats = 0;  ///< repeats: parts of launches whose mesh was too large
+  std::uint32_t tiles_of_launch = 0;        ///< at most
+  std::uint64_t device_bytes = 0;           ///< device memory held
+  std::uint64_t pinned_bytes = 0;           ///< page-locked host memory held
+};
+
+/// Marching cubes on a device, for volumes that need not fit it: tiles in, the CPU's mesh
+/// out, byte for byte. Gathering, upload, kernels, download and whoever takes the mesh
+/// work at the same time, on some hundred tiles each. docs/gpu.md says how.
+class GpuExtractor {
+ public:
+  /// Buffers of the given sizes on the device, which open_device has made ready; of smaller
+  /// launches where the device has no room for them. `take` is called from a thread of
+  /// the extractor's own. Throws UsageError for what has no kernels (supported.h), an
+  /// isovalue that is not a number or an empty region, Error where a single tile does not fit.
+  GpuExtractor(int device, const Lattice& lattice, const SurfaceOptions& options,
+               const StreamSizes& sizes, TakeChunk take);
+  /// Stops; waits for pieces that were taken and not released.
+  ~GpuExtractor();
+
+  /// Sends the tiles off. Over all calls tiles come in Morton order, none twice; `bricks`
+  /// holds what for_each_needed_box says, and is not looked at any more afterwards. Gathers in
+  /// the caller's TBB arena. Throws what went wrong on the device or in `take`, also of
+  /// earlier tiles, and Error when a welded mesh gets more vertices than 32 bits number.
+  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks);
+  /// Waits until all of the mesh was taken.
+  void finish();
+
+  /// Whole after finish().
+  StreamReport report() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <queue>
+#include <unordered_map>
+#include <vector>
+
+#include "isobrick/core/vec.h"
+#include "isobrick/gpu/tile_params.h"
+
+namespace isobrick::gpu {
+
+/// Which row table on the device belongs to which tile, as the BoundaryMap of the CPU:
+/// tiles come in Morton order, and a tile's last asker is its neighbour at (+1, +1, +1).
+/// Host books only; not thread-safe.
+class RowSlots {
+ public:
+  explicit RowSlots(std::uint32_t slots);
+
+  /// A slot for a tile that is about to be extracted, of the launch that is being
+  /// put together. Throws Error when none is left.
+  std::uint32_t add(Int3 tile);
+  /// What TileLinks says of a tile: its slot, or kNone when it has none.
+  std::uint32_t find(Int3 tile) const;
+  /// Ends a launch whose last tile is `last`. Appends the slots that no later tile will
+  /// ask for; they go back with recycle(), when the launch need not be repeated any more.
+  void end_launch(Int3 last, std::vector<std::uint32_t>& unused);
+  void recycle(std::vector<std::uint32_t>& slots);
+
+ private:
+  struct Entry {
+    std::uint32_t slot, launch;
+  };
+  struct Expiry {
+    std::uint64_t last_asker, key;
+    bool operator>(const Expiry& other) const { return last_asker > other.last_asker; }
+  };
+  std::unordered_map<std::uint64_t, Entry> map_;
+  std::priority_queue<Expiry, std::vector<Expiry>, std::greater<>> expiries_;
+  std::vector<std::uint32_t> free_;
+  std::uint32_t launch_ = 0;
+};
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,228 @@
+#include "isobrick/gpu/stream_collector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick::gpu {
+namespace {
+
+/// Part of a launch's capacity that its mesh is meant to fill.
+constexpr double kFill = 0.85;
+
+std::uint64_t mesh_bytes(SurfaceTotals size, bool normals) {
+  return size.vertices * sizeof(Vec3f) * (normals ? 2 : 1) + size.triangles * sizeof(Triangle);
+}
+
+double seconds_between(const Event& start, const Event& end) { return end.since(start) * 1e-3; }
+
+}  // namespace
+
+StreamCollector::StreamCollector(int cuda_device, StreamDevice& device, bool welded, bool normals,
+                                 TakeChunk take)
+    : cuda_device_(cuda_device),
+      device_(device),
+      welded_(welded),
+      normals_(normals),
+      take_(std::move(take)),
+      good_tiles_(device.sizes().tiles),
+      outputs_(kOutputs) {
+  for (std::size_t i = 0; i < kOutputs; ++i) free_outputs_.push_back(kOutputs - 1 - i);
+  thread_ = std::thread([this] { run(); });
+}
+
+StreamCollector::~StreamCollector() {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = stop_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return taken_outputs_ == 0; });
+}
+
+void StreamCollector::wait_for_lane() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return error_ || busy_lanes_ < kLanes; });
+  if (error_) std::rethrow_exception(error_);
+}
+
+void StreamCollector::submitted(Lane& lane) {
+  {
+    const std::lock_guard lock(mutex_);
+    ++busy_lanes_;
+    lanes_.push_back(&lane);
+  }
+  changed_.notify_all();
+}
+
+std::uint32_t StreamCollector::good_tiles() const {
+  const std::lock_guard lock(mutex_);
+  return good_tiles_;
+}
+
+void StreamCollector::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  if (error_) std::rethrow_exception(error_);
+}
+
+void StreamCollector::run() {
+  try {
+    check(cudaSetDevice(cuda_device_));
+    follow();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    error_ = std::current_exception();
+  }
+  changed_.notify_all();
+}
+
+void StreamCollector::follow() {
+  for (;;) {
+    // A mesh is handed on while the next one is downloaded, or nothing else is to do.
+    Lane* lane = next_lane(!pending_);
+    if (!lane && !pending_) return;
+    std::optional<Pending> next;
+    if (lane) next = collect(*lane);
+    if (pending_) deliver(*pending_);
+    pending_ = next;
+  }
+}
+
+/// Null at the end, or when none is there and `wait` is not set.
+Lane* StreamCollector::next_lane(bool wait) {
+  std::unique_lock lock(mutex_);
+  if (wait) changed_.wait(lock, [&] { return closed_ || !lanes_.empty(); });
+  if (stop_ || lanes_.empty()) return nullptr;
+  Lane* lane = lanes_.front();
+  lanes_.pop_front();
+  return lane;
+}
+
+std::optional<StreamCollector::Pending> StreamCollector::collect(Lane& lane) {
+  lane.extracted.wait();
+  const StreamSizes& sizes = device_.sizes();
+  const SurfaceTotals size = lane.totals[0];
+  ++report_.launches;
+  report_.upload.seconds += seconds_between(lane.upload_begin, lane.uploaded);
+  report_.upload.bytes += device_.layout().blocks + lane.count * sizes.block_bytes;
+  report_.kernel.seconds += seconds_between(lane.kernel_begin, lane.extracted);
+  report_.kernel.bytes += lane.count * sizes.block_bytes + mesh_bytes(size, normals_);
+  check_numbers(size.vertices);
+  std::optional<Pending> next;
+  if (size.vertices > sizes.vertices || size.triangles > sizes.triangles) {
+    if (pending_) deliver(*pending_);
+    pending_.reset();
+    repeat_in_parts(lane);
+  } else if (size.vertices + size.triangles > 0) {
+    next = start_download(lane, size);
+  }
+  free_lane(lane.count, size);
+  return next;
+}
+
+/// As many tiles at a time as fit; the sums that they have passed on say how many.
+void StreamCollector::repeat_in_parts(Lane& lane) {
+  const std::vector<OrderState> sums = device_.totals_of_tiles(lane);
+  const StreamSizes& sizes = device_.sizes();
+  const std::uint64_t start = report_.vertices;
+  OrderState before{0, 0};
+  for (std::uint32_t first = 0; first < lane.count;) {
+    std::uint32_t end = first + 1;
+    while (end < lane.count && sums[end].vertices - before.vertices <= sizes.vertices &&
+           sums[end].triangles - before.triangles <= sizes.triangles)
+      ++end;
+    device_.submit_part(lane, first, end - first, start + before.vertices);
+    lane.extracted.wait();
+    ++report_.repeats;
+    report_.kernel.seconds += seconds_between(lane.kernel_begin, lane.extracted);
+    const SurfaceTotals size = lane.totals[0];
+    if (size.vertices + size.triangles > 0) deliver(start_download(lane, size));
+    before = sums[end - 1];
+    first = end;
+  }
+}
+
+void StreamCollector::check_numbers(std::uint64_t more) const {
+  if (welded_ && report_.vertices + more > std::numeric_limits<std::uint32_t>::max())
+    throw Error(
+        "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
+        "cannot number; extract it in parts with --roi, or as STL");
+}
+
+StreamCollector::Pending StreamCollector::start_download(Lane& lane, SurfaceTotals size) {
+  Pending pending{&lane, take_output(), size, report_.vertices};
+  device_.download(lane, *outputs_[pending.output], size);
+  report_.vertices += size.vertices;
+  report_.triangles += size.triangles;
+  return pending;
+}
+
+void StreamCollector::deliver(const Pending& pending) {
+  pending.lane->downloaded.wait();
+  report_.download.seconds +=
+      seconds_between(pending.lane->download_begin, pending.lane->downloaded);
+  report_.download.bytes += mesh_bytes(pending.size, normals_);
+  const HostOutput& output = *outputs_[pending.output];
+  const auto vertices = static_cast<std::size_t>(pending.size.vertices);
+  const MeshChunk chunk{pending.first_vertex,
+                        {output.positions.data(), vertices},
+                        {output.normals.data(), normals_ ? vertices : 0},
+                        {output.triangles.data(), pending.size.triangles}};
+  {
+    const std::lock_guard lock(mutex_);
+    ++taken_outputs_;
+  }
+  try {
+    take_(chunk, [this, index = pending.output] { give_output(index); });
+  } catch (...) {
+    give_output(pending.output);
+    throw;
+  }
+}
+
+std::size_t StreamCollector::take_output() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return !free_outputs_.empty(); });
+  const std::size_t index = free_outputs_.back();
+  free_outputs_.pop_back();
+  lock.unlock();
+  // Made when it is first needed: page-locking takes a while, and others work meanwhile.
+  if (!outputs_[index]) outputs_[index] = std::make_unique<HostOutput>(device_.sizes(), normals_);
+  return index;
+}
+
+void StreamCollector::give_output(std::size_t output) {
+  // Notified under the lock: once the last output is back, this object may go.
+  const std::lock_guard lock(mutex_);
+  free_outputs_.push_back(output);
+  --taken_outputs_;
+  changed_.notify_all();
+}
+
+void StreamCollector::free_lane(std::uint32_t tiles, SurfaceTotals size) {
+  const StreamSizes& sizes = device_.sizes();
+  const auto fitting = [&](std::uint64_t capacity, std::uint64_t made) {
+    return kFill * static_cast<double>(capacity) * tiles /
+           static_cast<double>(std::max<std::uint64_t>(made, 1));
+  };
+  const double good =
+      std::min(fitting(sizes.vertices, size.vertices), fitting(sizes.triangles, size.triangles));
+  {
+    const std::lock_guard lock(mutex_);
+    --busy_lanes_;
+    good_tiles_ =
+        static_cast<std::uint32_t>(std::clamp(good, 1.0, static_cast<double>(sizes.tiles)));
+  }
+  changed_.notify_all();
+}
+
+}  // namespace isobrick::gpu

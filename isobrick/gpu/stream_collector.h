@@ -1,0 +1,80 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "isobrick/gpu/gpu_extractor.h"
+#include "isobrick/gpu/stream_device.h"
+
+namespace isobrick::gpu {
+
+/// Follows the launches of a streaming extraction on a thread of its own: waits for their
+/// kernels, repeats in parts what did not fit its output, downloads the meshes and
+/// hands them on in order.
+class StreamCollector {
+ public:
+  StreamCollector(int cuda_device, StreamDevice& device, bool welded, bool normals, TakeChunk take);
+  ~StreamCollector();
+
+  /// Waits until the lane of the next launch is free. Rethrows what went wrong.
+  void wait_for_lane();
+  /// A launch was submitted on its lane.
+  void submitted(Lane& lane);
+  /// How many tiles a launch may have, going by the meshes so far.
+  std::uint32_t good_tiles() const;
+  /// Waits until every mesh was taken. Rethrows what went wrong.
+  void finish();
+  /// All but what the host's side knows; after finish().
+  const StreamReport& report() const { return report_; }
+
+ private:
+  /// A mesh on its way to the host.
+  struct Pending {
+    Lane* lane = nullptr;
+    std::size_t output = 0;
+    SurfaceTotals size{};
+    std::uint64_t first_vertex = 0;
+  };
+
+  void run();
+  void follow();
+  Lane* next_lane(bool wait);
+  std::optional<Pending> collect(Lane& lane);
+  void repeat_in_parts(Lane& lane);
+  Pending start_download(Lane& lane, SurfaceTotals size);
+  void deliver(const Pending& pending);
+  void check_numbers(std::uint64_t more) const;
+  std::size_t take_output();
+  void give_output(std::size_t output);
+  void free_lane(std::uint32_t tiles, SurfaceTotals size);
+
+  int cuda_device_;
+  StreamDevice& device_;
+  bool welded_, normals_;
+  TakeChunk take_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Lane*> lanes_;  ///< submitted, not collected
+  int busy_lanes_ = 0;       ///< submitted, not free
+  bool closed_ = false, stop_ = false;
+  std::exception_ptr error_;
+  std::uint32_t good_tiles_;
+  std::vector<std::unique_ptr<HostOutput>> outputs_;
+  std::vector<std::size_t> free_outputs_;
+  int taken_outputs_ = 0;  ///< handed on, not released
+
+  // Of the thread alone, until it ends.
+  std::optional<Pending> pending_;
+  StreamReport report_;
+
+  std::thread thread_;
+};
+
+}  // namespace isobrick::gpu

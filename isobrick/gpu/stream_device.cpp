@@ -1,0 +1,176 @@
+#include "isobrick/gpu/stream_device.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+#include "isobrick/gpu/page_groups.h"
+#include "isobrick/gpu/unpack_kernel.h"
+#include "isobrick/surface/world_map.h"
+
+namespace isobrick::gpu {
+
+DeviceArena::DeviceArena(std::size_t bytes) : bytes_(bytes) {
+  void* data = nullptr;
+  const cudaError_t result = cudaMalloc(&data, bytes);
+  if (result == cudaErrorMemoryAllocation) {
+    (void)cudaGetLastError();  // or the next launch would report it
+    return;
+  }
+  check(result);
+  data_ = static_cast<std::byte*>(data);
+}
+
+DeviceArena::~DeviceArena() {
+  if (data_) (void)cudaFree(data_);
+}
+
+Lane::Lane(const StreamSizes& sizes) : staging(sizes.staging_bytes) {}
+
+StreamDevice::StreamDevice(const Lattice& lattice, const SurfaceOptions& options,
+                           const StreamSizes& sizes)
+    : lattice_(lattice), options_(options) {
+  for (StreamSizes s = sizes; !allocate(s); s = stream_sizes(lattice, options, s.tiles / 2))
+    if (s.tiles == 1)
+      throw Error(fmt::format(
+          "the GPU has no {} bytes of free memory, which a single tile takes; use --backend cpu",
+          s.device_bytes));
+  shapes_ = launch_shapes(lattice.type, options.normals);
+}
+
+StreamDevice::~StreamDevice() {
+  for (const Stream* stream : {&upload_, &kernel_, &download_})
+    (void)cudaStreamSynchronize(stream->get());
+}
+
+bool StreamDevice::allocate(const StreamSizes& sizes) {
+  auto arena = std::make_unique<DeviceArena>(sizes.device_bytes);
+  if (!*arena) return false;
+  arena_ = std::move(arena);
+  sizes_ = sizes;
+  layout_ = StagingLayout(sizes.tiles, sizes.block_bytes);
+  for (int i = 0; i < kLanes; ++i) {
+    auto lane = std::make_unique<Lane>(sizes);
+    lane->device = arena_->take<std::byte>(sizes.staging_bytes);
+    lane->positions = arena_->take<Vec3f>(sizes.vertices);
+    if (options_.normals) lane->normals = arena_->take<Vec3f>(sizes.vertices);
+    lane->triangles = arena_->take<Triangle>(sizes.triangles);
+    lanes_.push_back(std::move(lane));
+  }
+  pages_ = arena_->take<std::byte>(sizes.page_bytes);
+  case_entries_ = arena_->take<std::uint16_t>(kCaseEntries);
+  number_ends_ = arena_->take<unsigned long long>(kEnds + 1);
+  params_.row_tables = arena_->take<RowTable>(sizes.slots);
+  check(cudaMemsetAsync(number_ends_, 0, (kEnds + 1) * sizeof(unsigned long long), kernel_.get()));
+  check(cudaMemsetAsync(params_.row_tables, 0, sizes.slots * sizeof(RowTable), kernel_.get()));
+  const WorldMap world = world_map(options_.transform);
+  std::uint16_t entries[kCaseEntries];
+  make_case_entries(world.mirrored, entries);
+  check(cudaMemcpyAsync(case_entries_, entries, sizeof entries, cudaMemcpyHostToDevice,
+                        kernel_.get()));
+  kernel_.wait();
+  params_.pages = pages_;
+  for (int axis = 0; axis < 3; ++axis) {
+    params_.tiles[axis] = static_cast<std::int32_t>(lattice_.tiles()[axis]);
+    params_.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
+    params_.roi_lo[axis] = static_cast<std::int32_t>(options_.roi.lo[axis]);
+    params_.roi_hi[axis] = static_cast<std::int32_t>(options_.roi.hi[axis]);
+  }
+  params_.isovalue = options_.isovalue;
+  params_.crossing = static_cast<float>(options_.isovalue);
+  params_.world = world;
+  params_.diagonal = is_diagonal(world);
+  params_.alone = options_.indexing == Indexing::chunk_local;
+  params_.vertex_capacity = sizes.vertices;
+  params_.triangle_capacity = sizes.triangles;
+  return true;
+}
+
+void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
+                          const unsigned long long* number_start, unsigned long long* number_end,
+                          bool tables_known) {
+  auto* header = reinterpret_cast<LaunchHeader*>(lane.device);
+  TileParams p = params_;
+  p.items = reinterpret_cast<const TileItem*>(lane.device + layout_.items) + first;
+  p.links = reinterpret_cast<const TileLinks*>(lane.device + layout_.links) + first;
+  p.order = reinterpret_cast<OrderState*>(lane.device + layout_.order);
+  p.item_count = &header->item_count;
+  p.ticket = &header->ticket;
+  p.totals = &header->totals;
+  p.tables_known = tables_known;
+  p.epoch = ++epoch_;
+  p.number_start = params_.alone ? number_ends_ + kEnds : number_start;
+  p.number_end = params_.alone ? &header->number_end : number_end;
+  p.positions = lane.positions;
+  p.normals = lane.normals;
+  p.triangles = lane.triangles;
+  UnpackParams u{p.items,
+                 p.links,
+                 count,
+                 lane.device + layout_.blocks + first * sizes_.block_bytes,
+                 sizes_.block_bytes,
+                 reach_of(options_.normals),
+                 {},
+                 pages_};
+  for (int axis = 0; axis < 3; ++axis) u.extent[axis] = p.extent[axis];
+  launch_unpack(lattice_.type, u, kernel_.get());
+  launch_extraction(lattice_.type, options_.normals, p, case_entries_, shapes_.of(count),
+                    kernel_.get());
+  check(cudaMemcpyAsync(lane.totals.data(), &header->totals, sizeof(SurfaceTotals),
+                        cudaMemcpyDeviceToHost, kernel_.get()));
+  lane.extracted.record(kernel_);
+}
+
+void StreamDevice::submit(Lane& lane, std::uint64_t launch_number) {
+  const std::lock_guard lock(launching_);
+  lane.upload_begin.record(upload_);
+  check(cudaMemcpyAsync(lane.device, lane.staging.data(),
+                        layout_.blocks + lane.count * sizes_.block_bytes, cudaMemcpyHostToDevice,
+                        upload_.get()));
+  lane.uploaded.record(upload_);
+  check(cudaStreamWaitEvent(kernel_.get(), lane.uploaded.get()));
+  check(cudaStreamWaitEvent(kernel_.get(), lane.downloaded.get()));
+  lane.kernel_begin.record(kernel_);
+  launch(lane, 0, lane.count, number_ends_ + launch_number % kEnds,
+         number_ends_ + (launch_number + 1) % kEnds, false);
+}
+
+void StreamDevice::submit_part(Lane& lane, std::uint32_t first, std::uint32_t count,
+                               std::uint64_t number_start) {
+  const std::lock_guard lock(launching_);
+  auto* header = reinterpret_cast<LaunchHeader*>(lane.device);
+  LaunchHeader& sent = *reinterpret_cast<LaunchHeader*>(lane.at(0));
+  sent = {};
+  sent.item_count = count;
+  sent.number_start = number_start;
+  check(cudaMemcpyAsync(header, &sent, sizeof sent, cudaMemcpyHostToDevice, kernel_.get()));
+  check(cudaMemsetAsync(lane.device + layout_.order, 0, count * sizeof(OrderState), kernel_.get()));
+  lane.kernel_begin.record(kernel_);
+  launch(lane, first, count, &header->number_start, &header->number_end, true);
+}
+
+std::vector<OrderState> StreamDevice::totals_of_tiles(Lane& lane) {
+  std::vector<OrderState> totals(lane.count);
+  check(cudaMemcpyAsync(totals.data(), lane.device + layout_.order,
+                        totals.size() * sizeof(OrderState), cudaMemcpyDeviceToHost,
+                        download_.get()));
+  download_.wait();
+  for (OrderState& t : totals) {
+    t.vertices &= kOrderMask;
+    t.triangles &= kOrderMask;
+  }
+  return totals;
+}
+
+void StreamDevice::download(Lane& lane, const HostOutput& to, SurfaceTotals size) {
+  const auto copy = [&](void* host, const void* device, std::size_t bytes) {
+    if (bytes > 0)
+      check(cudaMemcpyAsync(host, device, bytes, cudaMemcpyDeviceToHost, download_.get()));
+  };
+  lane.download_begin.record(download_);
+  copy(to.positions.data(), lane.positions, size.vertices * sizeof(Vec3f));
+  if (options_.normals) copy(to.normals.data(), lane.normals, size.vertices * sizeof(Vec3f));
+  copy(to.triangles.data(), lane.triangles, size.triangles * sizeof(Triangle));
+  lane.downloaded.record(download_);
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "isobrick/gpu/stream.h"
+#include "isobrick/gpu/stream_layout.h"
+#include "isobrick/gpu/stream_sizes.h"
+#include "isobrick/gpu/tile_kernel.h"
+
+namespace isobrick::gpu {
+
+/// Device memory in one piece, cut from the front.
+class DeviceArena {
+ public:
+  /// Empty when the device does not have so much.
+  explicit DeviceArena(std::size_t bytes);
+  DeviceArena(const DeviceArena&) = delete;
+  DeviceArena& operator=(const DeviceArena&) = delete;
+  ~DeviceArena();
+
+  explicit operator bool() const { return data_ != nullptr; }
+  std::size_t bytes() const { return bytes_; }
+  template <class T>
+  T* take(std::size_t count) {
+    std::byte* at = data_ + used_;
+    used_ += StagingLayout::aligned(count * sizeof(T));
+    return reinterpret_cast<T*>(at);
+  }
+
+ private:
+  std::byte* data_ = nullptr;
+  std::size_t bytes_ = 0, used_ = 0;
+};
+
+/// A launch under way: what the host sends, and where its mesh goes on the device.
+struct Lane {
+  explicit Lane(const StreamSizes& sizes);
+
+  PinnedBuffer<std::byte> staging;
+  std::byte* device = nullptr;  ///< the same, on the device
+  Vec3f *positions = nullptr, *normals = nullptr;
+  Triangle* triangles = nullptr;
+  PinnedBuffer<SurfaceTotals> totals{1};
+  Event upload_begin{cudaEventBlockingSync}, uploaded{cudaEventBlockingSync},
+      kernel_begin{cudaEventBlockingSync}, extracted{cudaEventBlockingSync},
+      download_begin{cudaEventBlockingSync}, downloaded{cudaEventBlockingSync};
+  std::uint32_t count = 0;                  ///< tiles
+  std::vector<std::uint32_t> unused_slots;  ///< once this launch is not repeated any more
+
+  std::byte* at(std::size_t offset) const { return staging.data() + offset; }
+};
+
+/// Page-locked memory for the mesh of a launch.
+struct HostOutput {
+  explicit HostOutput(const StreamSizes& sizes, bool with_normals)
+      : positions(sizes.vertices),
+        normals(with_normals ? sizes.vertices : 0),
+        triangles(sizes.triangles) {}
+  PinnedBuffer<Vec3f> positions, normals;
+  PinnedBuffer<Triangle> triangles;
+};
+
+/// The device's side of a streaming extraction: its memory, its streams, its launches.
+class StreamDevice {
+ public:
+  /// Halves the launches until the device has room. Throws Error when one tile has none.
+  StreamDevice(const Lattice& lattice, const SurfaceOptions& options, const StreamSizes& sizes);
+  ~StreamDevice();
+
+  const StreamSizes& sizes() const { return sizes_; }
+  const StagingLayout& layout() const { return layout_; }
+  Lane& lane(std::uint64_t launch) { return *lanes_[launch % kLanes]; }
+
+  /// Uploads a lane and extracts it, as launch number `launch`; waits for nothing.
+  void submit(Lane& lane, std::uint64_t launch);
+  /// Extracts tiles [first, first + count) of a lane that has been extracted once more, its
+  /// vertices numbered from `number_start`. May be called beside submit().
+  void submit_part(Lane& lane, std::uint32_t first, std::uint32_t count,
+                   std::uint64_t number_start);
+  /// The running totals of a lane's tiles; waits for them.
+  std::vector<OrderState> totals_of_tiles(Lane& lane);
+  /// Copies a lane's mesh to the host; waits for nothing.
+  void download(Lane& lane, const HostOutput& to, SurfaceTotals size);
+
+ private:
+  void launch(Lane& lane, std::uint32_t first, std::uint32_t count,
+              const unsigned long long* number_start, unsigned long long* number_end,
+              bool tables_known);
+  bool allocate(const StreamSizes& sizes);
+
+  Lattice lattice_;
+  SurfaceOptions options_;
+  StreamSizes sizes_;
+  StagingLayout layout_{0, 0};
+  // Streams end before the memory that they work on.
+  std::unique_ptr<DeviceArena> arena_;
+  std::vector<std::unique_ptr<Lane>> lanes_;
+  Stream upload_, kernel_, download_;
+  std::mutex launching_;
+  TileParams params_{};
+  std::byte* pages_ = nullptr;
+  std::uint16_t* case_entries_ = nullptr;
+  static constexpr std::uint64_t kEnds = 4;
+  unsigned long long* number_ends_ = nullptr;  ///< of the last launches, in turn; then a zero
+  std::uint32_t epoch_ = 0;
+  LaunchShapes shapes_;
+};
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,81 @@
+#include "isobrick/gpu/stream_sizes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "isobrick/core/error.h"
+#include "isobrick/gpu/page_groups.h"
+#include "isobrick/gpu/stream_layout.h"
+
+namespace isobrick::gpu {
+namespace {
+
+/// Mesh to expect of a tile before anything is known; launches shrink where there is more.
+constexpr std::uint64_t kVerticesOfTile = 1600, kTrianglesOfTile = 3200;
+/// What a tile can make at most: 3 edges a sample, 5 triangles a cell.
+constexpr std::uint64_t kMostVertices = std::uint64_t{3} * 33 * 33 * 33,
+                        kMostTriangles = std::uint64_t{5} * 32 * 32 * 32;
+/// Case table, ends of the numbering, and the rounding of buffers.
+constexpr std::uint64_t kSmallBuffers = 64 << 10;
+/// A row table in the host's books: its slot, its tile, its expiry.
+constexpr std::uint64_t kBytesOfSlot = 96;
+
+/// Row tables that are needed at a time: as with the CPU's boundaries those between
+/// finished and unfinished tiles, at most about twice the largest face of the grid, and
+/// those of the launches under way.
+std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles) {
+  if (!welded) return tiles;
+  const Int3 t = lattice.tiles();
+  const auto face = static_cast<std::uint64_t>(std::max({t.x * t.y, t.y * t.z, t.x * t.z}));
+  return std::min(static_cast<std::uint64_t>(volume(t)), 2 * face + (kLanes + 1) * tiles);
+}
+
+std::string too_small(const char* option, std::uint64_t budget, std::uint64_t least) {
+  return fmt::format(
+      "{} of {} bytes is too small for the GPU: this needs at least {} bytes ({} {}M)", option,
+      budget, least, option, (least >> 20) + 1);
+}
+
+}  // namespace
+
+StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
+                         std::uint32_t tiles) {
+  StreamSizes s;
+  s.tiles = tiles;
+  s.vertices = std::max(kMostVertices, tiles * kVerticesOfTile);
+  s.triangles = std::max(kMostTriangles, tiles * kTrianglesOfTile);
+  s.slots =
+      static_cast<std::uint32_t>(slots_for(lattice, options.indexing == Indexing::welded, tiles));
+  s.block_bytes = block_bytes(options.normals, lattice.sample_bytes());
+  s.staging_bytes = StagingLayout(tiles, s.block_bytes).end;
+  s.output_bytes =
+      s.vertices * sizeof(Vec3f) * (options.normals ? 2 : 1) + s.triangles * sizeof(Triangle);
+  const std::uint64_t groups = (tiles + kTilesOfPageGroup - 1) / kTilesOfPageGroup;
+  s.page_bytes = groups * kPageGroupSamples * lattice.sample_bytes();
+  s.device_bytes = kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.page_bytes +
+                   kLanes * (s.staging_bytes + s.output_bytes);
+  s.pinned_bytes = kSmallBuffers + kLanes * s.staging_bytes + kOutputs * s.output_bytes;
+  s.host_bytes = kBytesOfSlot * s.slots + std::uint64_t{kLanes} * tiles * sizeof(OrderState);
+  return s;
+}
+
+StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
+                             std::uint64_t device_budget, std::uint64_t host_budget,
+                             std::uint64_t other_host_bytes) {
+  const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
+  auto tiles = static_cast<std::uint32_t>(std::min<std::uint64_t>(kMostTilesOfLaunch, all));
+  for (;; tiles /= 2) {
+    const StreamSizes s = stream_sizes(lattice, options, tiles);
+    const std::uint64_t own = s.pinned_bytes + s.host_bytes, host = own + other_host_bytes;
+    // Launches of more than a tile leave half to the bricks.
+    const std::uint64_t wanted = tiles > 1 ? host + own : host;
+    if (s.device_bytes <= device_budget && wanted <= host_budget) return s;
+    if (tiles > 1) continue;
+    if (s.device_bytes > device_budget)
+      throw UsageError(too_small("--gpu-memory", device_budget, s.device_bytes));
+    throw UsageError(too_small("--memory", host_budget, host));
+  }
+}
+
+}  // namespace isobrick::gpu

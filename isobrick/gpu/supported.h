@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "isobrick/core/error.h"
+#include "isobrick/gpu/device_scalar.h"
+#include "isobrick/surface/surface_options.h"
+
+namespace isobrick::gpu {
+
+/// Why the kernels cannot make such a surface, in a line; nothing when they can.
+inline std::optional<std::string> why_unsupported(ScalarType type, const SurfaceOptions& options) {
+  if (!is_device_scalar(type))
+    return "samples of type " + std::string(short_name(type)) +
+           " have no CUDA kernels; use --backend cpu";
+  if (options.may_have_nan && is_floating(type))
+    return "volumes that may hold NaN have no CUDA kernels; use --backend cpu";
+  if (options.drop_degenerate)
+    return "degenerate triangles cannot be left out on a GPU; use --backend cpu";
+  return std::nullopt;
+}
+
+/// Throws UsageError with that line.
+inline void check_supported(ScalarType type, const SurfaceOptions& options) {
+  if (const auto why = why_unsupported(type, options)) throw UsageError(*why);
+}
+
+}  // namespace isobrick::gpu

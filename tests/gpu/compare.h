@@ -1,0 +1,76 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "isobrick/gpu/device.h"
+#include "tests/surface/field.h"
+
+namespace isobrick::testing {
+
+template <class T>
+std::vector<TileWork> active_tiles(const Field<T>& field, double isovalue) {
+  std::vector<TileWork> tiles;
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<T>};
+  append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, block_ranges(field), isovalue, tiles);
+  return tiles;
+}
+
+/// The mesh that those from a device are compared with.
+template <class T>
+MeshBuffer on_cpu(const Field<T>& field, const Lattice& lattice, const DenseBricks& bricks,
+                  const SurfaceOptions& options) {
+  const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+  CpuExtractor extractor(lattice, options, {});
+  MeshBuffer mesh;
+  extractor.extract(tiles, bricks, mesh);
+  return mesh;
+}
+
+template <class V>
+bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(V)) == 0;
+}
+
+template <class V>
+std::string first_difference(const PodBuffer<V>& a, const PodBuffer<V>& b) {
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    if (std::memcmp(&a[i], &b[i], sizeof(V)) != 0)
+      return "first difference at " + std::to_string(i) + " of " + std::to_string(a.size());
+  return "sizes " + std::to_string(a.size()) + " and " + std::to_string(b.size());
+}
+
+inline void expect_same(const MeshBuffer& cpu, const MeshBuffer& device) {
+  EXPECT_TRUE(same_bytes(cpu.positions, device.positions))
+      << first_difference(cpu.positions, device.positions);
+  EXPECT_TRUE(same_bytes(cpu.normals, device.normals))
+      << first_difference(cpu.normals, device.normals);
+  EXPECT_TRUE(same_bytes(cpu.triangles, device.triangles))
+      << first_difference(cpu.triangles, device.triangles);
+}
+
+/// Fields in the range of every type that has kernels; skipped where there is no device.
+template <class T>
+class DeviceTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
+  }
+  static constexpr double lowest() { return std::is_signed_v<T> ? -100.0 : 0.0; }
+  static Field<T> noise(Int3 extent, unsigned seed) {
+    return padded_noise<T>(extent, lowest(), lowest() + 200, static_cast<T>(lowest()), seed);
+  }
+  static Field<T> waves(Int3 extent) {
+    return Field<T>(extent, [&](Int3 p) {
+      const auto f = [](Index v, double k) { return std::sin(static_cast<double>(v) * k); };
+      return lowest() + 100 + 30 * (f(p.x, 0.11) + f(p.y, 0.13) + f(p.z, 0.07));
+    });
+  }
+};
+
+using DeviceTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float>;
+
+}  // namespace isobrick::testing

@@ -1,0 +1,263 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "isobrick/core/error.h"
+#include "isobrick/gpu/gpu_extractor.h"
+#include "tests/gpu/compare.h"
+
+// The streamed mesh is the CPU's, byte for byte, however it is cut into launches.
+
+namespace isobrick::testing {
+namespace {
+
+template <class V>
+void append(PodBuffer<V>& to, std::span<const V> values) {
+  const std::size_t before = to.size();
+  to.resize(before + values.size());
+  std::copy(values.begin(), values.end(), to.begin() + before);
+}
+
+/// How a field is streamed.
+struct Way {
+  std::uint32_t tiles = 512;           ///< a launch
+  std::size_t call = ~std::size_t{0};  ///< tiles a call
+  Index brick = 64;
+};
+
+/// Only what the active tiles need may be looked at: other bricks are poison.
+class NeededBricks final : public BrickLookup {
+ public:
+  NeededBricks(const DenseBricks& all, const Lattice& lattice, std::span<const TileWork> tiles,
+               Index reach)
+      : all_(all), grid_(lattice.bricks()), needed_(static_cast<std::size_t>(volume(grid_))) {
+    const Int3 one{1, 1, 1};
+    for (const TileWork& work : tiles)
+      for_each_needed_box(lattice, work, reach, [&](Box3 box) {
+        const Int3 last = box.hi - one, b = lattice.brick;
+        for_each_point(
+            {{box.lo.x / b.x, box.lo.y / b.y, box.lo.z / b.z},
+             Int3{last.x / b.x, last.y / b.y, last.z / b.z} + one},
+            [&](Int3 p) { needed_[static_cast<std::size_t>(linear_index(p, grid_))] = 1; });
+      });
+  }
+  const std::byte* find(Int3 b) const override {
+    EXPECT_TRUE(needed_[static_cast<std::size_t>(linear_index(b, grid_))]);
+    return all_.find(b);
+  }
+
+ private:
+  const DenseBricks& all_;
+  Int3 grid_;
+  std::vector<char> needed_;
+};
+
+struct Streamed {
+  MeshBuffer mesh;
+  gpu::StreamReport report;
+};
+
+Streamed stream(const Lattice& lattice, const BrickLookup& bricks, const SurfaceOptions& options,
+                std::span<const TileWork> tiles, const Way& way) {
+  Streamed result;
+  const auto take = [&](const MeshChunk& chunk, const std::function<void()>& release) {
+    EXPECT_EQ(chunk.first_vertex, result.mesh.positions.size());
+    append(result.mesh.positions, chunk.positions);
+    append(result.mesh.normals, chunk.normals);
+    const std::size_t before = result.mesh.triangles.size();
+    append(result.mesh.triangles, chunk.triangles);
+    if (options.indexing == Indexing::chunk_local)
+      for (std::size_t i = before; i < result.mesh.triangles.size(); ++i)
+        for (std::uint32_t& v : result.mesh.triangles[i]) {
+          EXPECT_LT(v, chunk.positions.size());
+          v += static_cast<std::uint32_t>(chunk.first_vertex);
+        }
+    release();
+  };
+  gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, way.tiles),
+                              take);
+  for (std::size_t i = 0; i < tiles.size(); i += std::min(way.call, tiles.size()))
+    extractor.extract(tiles.subspan(i, std::min(way.call, tiles.size() - i)), bricks);
+  extractor.finish();
+  result.report = extractor.report();
+  return result;
+}
+
+template <class T>
+void compare(const Field<T>& field, double isovalue, SurfaceOptions options,
+             const std::vector<Way>& ways) {
+  options.isovalue = isovalue;
+  if (options.roi == Box3{}) options.roi = {{0, 0, 0}, field.extent};
+  for (const bool normals : {false, true}) {
+    options.normals = normals;
+    std::optional<MeshBuffer> expected;
+    for (const Way& way : ways) {
+      SCOPED_TRACE("launches of " + std::to_string(way.tiles) + ", bricks of " +
+                   std::to_string(way.brick) + (normals ? ", normals" : ""));
+      const Lattice lattice{field.extent, {way.brick, way.brick, way.brick}, scalar_type_of<T>};
+      const DenseBricks all(lattice, field.samples.data());
+      if (!expected) expected = on_cpu(field, lattice, all, options);
+      const std::vector<TileWork> tiles = active_tiles(field, isovalue);
+      const NeededBricks bricks(all, lattice, tiles, sample_reach(options));
+      const Streamed made = stream(lattice, bricks, options, tiles, way);
+      expect_same(*expected, made.mesh);
+      EXPECT_EQ(made.report.vertices, expected->positions.size());
+      EXPECT_EQ(made.report.triangles, expected->triangles.size());
+      if (::testing::Test::HasFailure()) return;
+    }
+  }
+}
+
+const std::vector<Way> kManyWays{{512, ~std::size_t{0}, 64},
+                                 {1, ~std::size_t{0}, 16},
+                                 {3, 4, 48},
+                                 {8, ~std::size_t{0}, 20},
+                                 {20, 7, 32}};
+
+template <class T>
+class GpuStream : public DeviceTest<T> {};
+TYPED_TEST_SUITE(GpuStream, DeviceTypes);
+
+TYPED_TEST(GpuStream, SmoothFieldHoweverItIsCut) {
+  compare(this->waves({131, 70, 97}), this->lowest() + 100.5, {}, kManyWays);
+  compare(this->waves({131, 70, 97}), this->lowest() + 140, {}, {{5, 3, 64}});
+}
+
+// The mesh of eight tiles of noise is larger than the output of such a launch.
+TYPED_TEST(GpuStream, WhatDoesNotFitItsOutputIsMadeInParts) {
+  const auto field = this->noise({97, 70, 75}, 1);
+  SurfaceOptions options;
+  compare(field, this->lowest() + 100, options, {{8, ~std::size_t{0}, 64}, {40, 19, 32}});
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  options.isovalue = this->lowest() + 100;
+  options.roi = lattice.box();
+  const Streamed made =
+      stream(lattice, bricks, options, active_tiles(field, options.isovalue), {8});
+  EXPECT_GT(made.report.repeats, 1u);
+}
+
+TYPED_TEST(GpuStream, ExtentsThatFillNoTile) {
+  for (const Int3 extent : {Int3{2, 2, 2}, Int3{32, 32, 32}, Int3{34, 5, 3}, Int3{3, 65, 34},
+                            Int3{5, 3, 97}, Int3{33, 33, 33}, Int3{48, 49, 17}})
+    compare(this->noise(extent, 7), this->lowest() + 100, {}, {{512}, {1, 1, 16}});
+}
+
+TYPED_TEST(GpuStream, RegionsOfInterest) {
+  for (const Box3 roi : {Box3{{5, 3, 7}, {60, 40, 70}}, Box3{{33, 0, 31}, {66, 39, 75}},
+                         Box3{{31, 31, 31}, {34, 34, 34}}, Box3{{40, 2, 40}, {41, 20, 60}}}) {
+    SurfaceOptions options;
+    options.roi = roi;
+    compare(this->noise({67, 41, 75}, 3), this->lowest() + 100, options, {{512}, {2, 3, 20}});
+  }
+}
+
+TYPED_TEST(GpuStream, EveryTileAloneForFormatsWithoutSharing) {
+  SurfaceOptions options;
+  options.indexing = Indexing::chunk_local;
+  compare(this->waves({131, 70, 97}), this->lowest() + 100.5, options, kManyWays);
+  compare(this->noise({67, 41, 75}, 3), this->lowest() + 100, options, {{512}, {8, 5, 20}});
+}
+
+TYPED_TEST(GpuStream, TransformsTurnAndMirror) {
+  SurfaceOptions options;
+  options.transform.spacing = {0.7, 1.3, -2};
+  options.transform.origin = {-5, 11, 0.25};
+  options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  compare(this->waves({67, 41, 75}), this->lowest() + 100, options, {{512}, {4}});
+}
+
+TYPED_TEST(GpuStream, AbsentBricksAreTheFillValue) {
+  using T = TypeParam;
+  const auto fill = static_cast<T>(this->lowest() + 30);
+  auto field = this->waves({131, 70, 97});
+  const Lattice lattice{field.extent, {32, 32, 32}, scalar_type_of<T>};
+  const auto absent = [](Int3 b) { return (b.x + b.y + 2 * b.z) % 3 == 0; };
+  for_each_point(field.box(), [&](Int3 p) {
+    if (absent({p.x / 32, p.y / 32, p.z / 32})) field.at(p) = fill;
+  });
+  const DenseBricks all(lattice, field.samples.data());
+  struct Some final : BrickLookup {
+    const DenseBricks& all;
+    std::function<bool(Int3)> absent;
+    Some(const DenseBricks& a, std::function<bool(Int3)> f) : all(a), absent(std::move(f)) {}
+    const std::byte* find(Int3 b) const override { return absent(b) ? nullptr : all.find(b); }
+  };
+  SurfaceOptions options;
+  options.roi = lattice.box();
+  options.normals = true;
+  options.isovalue = this->lowest() + 100.5;
+  options.fill_value = static_cast<double>(fill);
+  const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+  const Streamed made = stream(lattice, Some(all, absent), options, tiles, {16});
+  EXPECT_GT(made.report.triangles, 1000u);
+  expect_same(on_cpu(field, lattice, all, options), made.mesh);
+}
+
+TYPED_TEST(GpuStream, WhoTakesTheMeshMayFail) {
+  const auto field = this->waves({131, 70, 97});
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  SurfaceOptions options;
+  options.isovalue = this->lowest() + 100;
+  options.roi = lattice.box();
+  const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+  int taken = 0;
+  const auto take = [&](const MeshChunk&, const std::function<void()>& release) {
+    if (++taken == 3) throw Error("the sink broke");
+    release();
+  };
+  gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, 2), take);
+  EXPECT_THROW(
+      {
+        extractor.extract(tiles, bricks);
+        extractor.finish();
+      },
+      Error);
+  EXPECT_EQ(taken, 3);
+}
+
+TEST(GpuStreamSizes, TheLeastBudgetWorksAndLessIsRefusedByName) {
+  const Lattice lattice{{1024, 1024, 1024}, {64, 64, 64}, ScalarType::u16};
+  const SurfaceOptions options{.roi = lattice.box()};
+  constexpr std::uint64_t much = std::uint64_t{1} << 40;
+  const gpu::StreamSizes least = gpu::stream_sizes(lattice, options, 1);
+  EXPECT_EQ(gpu::fit_stream_sizes(lattice, options, least.device_bytes, much, 0).tiles, 1u);
+  EXPECT_EQ(gpu::fit_stream_sizes(lattice, options, much, much, 0).tiles, gpu::kMostTilesOfLaunch);
+  const auto refusal = [&](std::uint64_t device, std::uint64_t host) -> std::string {
+    try {
+      gpu::fit_stream_sizes(lattice, options, device, host, 100);
+    } catch (const UsageError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(refusal(least.device_bytes - 1, much)
+                .find("at least " + std::to_string(least.device_bytes) + " bytes (--gpu-memory "),
+            std::string::npos);
+  const std::uint64_t host = least.pinned_bytes + least.host_bytes + 100;
+  EXPECT_EQ(refusal(much, host), "");
+  EXPECT_NE(refusal(much, host - 1).find("at least " + std::to_string(host) + " bytes (--memory "),
+            std::string::npos);
+  EXPECT_LT(least.device_bytes, std::uint64_t{32} << 20);
+}
+
+TEST(GpuStreamSizes, WhatHasNoKernelsIsRefused) {
+  if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
+  const auto refused = [](ScalarType type, auto change) {
+    const Lattice lattice{{64, 64, 64}, {64, 64, 64}, type};
+    SurfaceOptions options{.roi = lattice.box()};
+    change(options);
+    EXPECT_THROW(gpu::GpuExtractor(0, lattice, options, gpu::stream_sizes(lattice, options, 1), {}),
+                 UsageError);
+  };
+  refused(ScalarType::f64, [](SurfaceOptions&) {});
+  refused(ScalarType::i32, [](SurfaceOptions&) {});
+  refused(ScalarType::f32, [](SurfaceOptions& o) { o.may_have_nan = true; });
+  refused(ScalarType::u8, [](SurfaceOptions& o) { o.drop_degenerate = true; });
+  refused(ScalarType::u8, [](SurfaceOptions& o) { o.isovalue = std::nan(""); });
+  refused(ScalarType::u8, [](SurfaceOptions& o) { o.roi = {{99, 0, 0}, {100, 1, 1}}; });
+}
+
+}  // namespace
+}  // namespace isobrick::testing
