@@ -36,6 +36,9 @@ struct Arguments {
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
   IndexChoice index;
+  Backend backend = Backend::automatic;
+  std::uint64_t gpu_memory = 0;
+  int device = 0;
   bool estimate = false, force = false, no_space_check = false;
 };
 
@@ -114,6 +117,9 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   options.memory = arguments.memory;
   options.threads = arguments.threads;
   options.index = arguments.index;
+  options.backend = arguments.backend;
+  options.gpu_memory = arguments.gpu_memory;
+  options.device = arguments.device;
   const MeshForm form = form_of(arguments);
   std::vector<Surface> surfaces;
   for (const double isovalue : arguments.isovalues) {
@@ -179,6 +185,20 @@ std::string estimate_text(const Surface& surface, const ExtractEstimate& e) {
       human_count(e.active.bricks), human_bytes(e.memory));
 }
 
+/// Who made the surface, and how long its stages were busy.
+void add_backend(ordered_json& object, const ExtractReport& r) {
+  object["backend"] = r.backend;
+  object["device"] = r.device.empty() ? ordered_json() : ordered_json(r.device);
+  for (const auto& [name, stage] : stages_of(r))
+    object["stages"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
+  object["bound"] = bound_of(r);
+  if (r.backend != "cuda") return;
+  object["launches"] = r.launches;
+  object["device_bytes"] = r.device_bytes;
+  object["device_bytes_in_use"] = r.device_bytes_in_use;
+  object["pinned_bytes"] = r.pinned_bytes;
+}
+
 ordered_json report_json(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
   ordered_json object{
       {"isovalue", surface.options.isovalue},
@@ -200,6 +220,7 @@ ordered_json report_json(const Surface& surface, const ExtractReport& r, std::ui
        {{"used", r.index ? name_of(*r.index) : "none"},
         {"bytes_read", r.search_bytes},
         {"seconds", r.search_seconds}}}};
+  add_backend(object, r);
   if (surface.options.drop_degenerate) object["degenerate_triangles"] = r.degenerate_triangles;
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();
@@ -211,6 +232,9 @@ std::string report_text(const Surface& surface, const ExtractReport& r, std::uin
       fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
                   surface.options.isovalue, human_count(r.triangles), human_count(r.vertices),
                   human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
+  if (r.backend == "cuda")
+    text += fmt::format("  on {} with {} of its memory, bound by {}\n", r.device,
+                        human_bytes(r.device_bytes), bound_of(r));
   if (surface.options.drop_degenerate)
     text +=
         fmt::format("  {} degenerate triangles left out\n", human_count(r.degenerate_triangles));
@@ -312,6 +336,25 @@ bool parse_normals(const std::string& text) {
   throw UsageError(fmt::format("'{}' is no kind of normals; it is gradient or none", text));
 }
 
+Backend parse_backend(const std::string& text) {
+  if (text == "auto") return Backend::automatic;
+  if (text == "cpu") return Backend::cpu;
+  if (text == "cuda") return Backend::cuda;
+  throw UsageError(fmt::format("'{}' is no backend; it is auto, cpu or cuda", text));
+}
+
+void add_backend_options(CLI::App* app, Arguments& arguments) {
+  add_parsed(
+      app, arguments.backend, parse_backend,
+      {"--backend", "auto|cpu|cuda",
+       "What makes the surface, the same on either; auto: a GPU where that is faster", "auto"});
+  add_parsed(app, arguments.gpu_memory, parse_bytes,
+             {"--gpu-memory", "BYTES", "Budget of device memory, such as 512M or 1.5G",
+              "what is free less 10 %"});
+  add_parsed(app, arguments.device, [](const std::string& text) { return parse_int(text, 0, 255); },
+             {"--device", "N", "Which CUDA device, the first is 0", "0"});
+}
+
 void add_preview_options(CLI::App* app, Arguments& arguments) {
   PreviewOptions& picture = arguments.picture;
   add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface"},
@@ -365,6 +408,7 @@ void add_extract(Program& program) {
               "How active blocks are found; never shows in the mesh", "auto"});
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
+  add_backend_options(app, *arguments);
   add_force(app, arguments->force);
   add_flag(app, "--no-space-check", arguments->no_space_check,
            "Begin even if the estimate says that the disk is too small");

@@ -25,7 +25,7 @@ void ChunkWriter::run() {
     if (job->last) return;
     if (!failed_) try {
         const auto start = std::chrono::steady_clock::now();
-        sink_.write(job->mesh.chunk(job->first_vertex));
+        sink_.write(job->chunk);
         const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
         seconds_ = seconds_ + took.count();
       } catch (...) {
@@ -33,24 +33,37 @@ void ChunkWriter::run() {
         failed_ = true;
       }
     // The buffer comes back whatever happened, or the producer would wait for ever.
-    job->mesh.clear();
-    free_.push(std::make_shared<MeshBuffer>(std::move(job->mesh)));
+    job->release();
   }
 }
 
 MeshBuffer ChunkWriter::take_free() {
   std::shared_ptr<MeshBuffer> buffer;
   free_.pop(buffer);
-  if (failed_ && error_) std::rethrow_exception(error_);
+  rethrow();
   return std::move(*buffer);
+}
+
+void ChunkWriter::rethrow() const {
+  if (failed_ && error_) std::rethrow_exception(error_);
 }
 
 void ChunkWriter::write(MeshBuffer& mesh, std::uint64_t first_vertex) {
   MeshBuffer next = take_free();
-  auto job = std::make_shared<Job>();
-  job->mesh = std::move(mesh);
-  job->first_vertex = first_vertex;
+  auto lent = std::make_shared<MeshBuffer>(std::move(mesh));
   mesh = std::move(next);
+  const MeshChunk chunk = lent->chunk(first_vertex);
+  write(chunk, [this, lent] {
+    lent->clear();
+    free_.push(lent);
+  });
+}
+
+void ChunkWriter::write(const MeshChunk& chunk, std::function<void()> release) {
+  rethrow();
+  auto job = std::make_shared<Job>();
+  job->chunk = chunk;
+  job->release = std::move(release);
   jobs_.push(std::move(job));
 }
 

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <thread>
 
@@ -12,7 +13,8 @@
 namespace isobrick {
 
 /// Hands mesh chunks to a sink on a thread of its own, so that writing overlaps
-/// with making the next one. Two buffers go round; no more are ever made.
+/// with making the next one. Either two buffers go round, or whoever makes the mesh lends
+/// its own; either way nothing is copied.
 class ChunkWriter {
  public:
   explicit ChunkWriter(MeshSink& sink);
@@ -22,6 +24,9 @@ class ChunkWriter {
   /// Queues the buffer's mesh and puts an empty buffer in its place; waits while
   /// the chunk before is being written. Rethrows what the sink threw.
   void write(MeshBuffer& mesh, std::uint64_t first_vertex);
+  /// Queues a chunk that stays as it is until `release` is called, on the writer's
+  /// thread. Waits for nothing; rethrows what the sink threw, and does not take it then.
+  void write(const MeshChunk& chunk, std::function<void()> release);
   /// Waits until all is written.
   void finish();
   /// Seconds that the sink was busy.
@@ -29,12 +34,13 @@ class ChunkWriter {
 
  private:
   struct Job {
-    MeshBuffer mesh;
-    std::uint64_t first_vertex = 0;
+    MeshChunk chunk;
+    std::function<void()> release;
     bool last = false;
   };
   void run();
   MeshBuffer take_free();
+  void rethrow() const;
 
   MeshSink& sink_;
   tbb::concurrent_bounded_queue<std::shared_ptr<Job>> jobs_;

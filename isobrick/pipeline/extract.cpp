@@ -1,15 +1,21 @@
 #include "isobrick/pipeline/extract.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <utility>
 #include <vector>
 
-#include "isobrick/pipeline/chunk_writer.h"
+#include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
+#include "isobrick/pipeline/gpu_backend.h"
+#include "isobrick/pipeline/surface_extractor.h"
 #include "isobrick/pipeline/workers.h"
 #include "isobrick/stream/brick_cache.h"
 #include "isobrick/stream/tile_stream.h"
@@ -48,12 +54,93 @@ MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface) {
   return header;
 }
 
+/// Surface and bricks of an extraction that is under way.
+struct Stages {
+  BrickCache& cache;
+  BatchPlanner& batches;
+  SurfaceExtractor& surface;
+  ExtractReport& report;
+
+  void decode(const TileBatch& batch) const {
+    Stopwatch watch(report.decode_seconds);
+    cache.require(batch.bricks);
+  }
+  void extract(const TileBatch& batch, const BrickLookup& bricks) const {
+    Stopwatch watch(report.surface_seconds);
+    surface.extract(batch.tiles, bricks);
+  }
+};
+
+/// Batch after batch, each decoded and then extracted: for a surface that keeps all cores
+/// busy itself. Calls done(batch) after each.
+template <class F>
+void extract_in_turn(const Stages& stages, const F& done) {
+  TileBatch batch, following;
+  for (bool more = stages.batches.next(batch); more; std::swap(batch, following)) {
+    stages.decode(batch);
+    // The disk works on the next batch while the processors work on this one.
+    more = stages.batches.next(following);
+    stages.cache.will_need(following.bricks);
+    stages.extract(batch, stages.cache);
+    done(batch);
+  }
+}
+
+/// A batch is extracted while the next is decoded, the disk reads the one after that, and
+/// the one behind is planned.
+template <class F>
+void extract_overlapped(const Stages& stages, const F& done) {
+  std::array<TileBatch, 4> batches;
+  for (int i = 0; i < 3; ++i) stages.batches.next(batches[i]);
+  stages.decode(batches[0]);
+  while (!batches[0].tiles.empty()) {
+    const BrickView bricks = stages.cache.view(batches[0].bricks);
+    tbb::parallel_invoke([&] { stages.extract(batches[0], bricks); },
+                         [&] { stages.decode(batches[1]); },
+                         [&] { stages.batches.next(batches[3]); });
+    stages.cache.will_need(batches[3].bricks);
+    done(batches[0]);
+    std::rotate(batches.begin(), batches.begin() + 1, batches.end());
+  }
+}
+
+/// The GPU, where it makes the surface. A device takes some tenths of a second to set up:
+/// when it is known that there will be one, that goes on while active blocks are counted.
+std::unique_ptr<GpuSession> open_backend(const ExtractRequest& request,
+                                         const ExtractOptions& options, const StoreReader& store,
+                                         ActiveParts& active) {
+  std::future<std::unique_ptr<GpuSession>> early;
+  if (options.backend == Backend::cuda && use_cuda(request, options, 0))
+    early = std::async(std::launch::async, open_gpu, options.device);
+  active = count_active(store, options);
+  if (early.valid()) return early.get();
+  if (use_cuda(request, options, active.active_blocks)) return open_gpu(options.device);
+  return nullptr;
+}
+
 }  // namespace
+
+std::vector<std::pair<std::string_view, StageReport>> stages_of(const ExtractReport& r) {
+  if (r.backend == "cpu")
+    return {{"read", r.read}, {"decode", r.decode}, {"surface", r.surface}, {"sink", r.sink}};
+  return {{"read", r.read},     {"decode", r.decode}, {"gather", r.gather},
+          {"upload", r.upload}, {"kernel", r.kernel}, {"download", r.download},
+          {"sink", r.sink}};
+}
+
+std::string_view bound_of(const ExtractReport& report) {
+  const auto stages = stages_of(report);
+  return std::max_element(
+             stages.begin(), stages.end(),
+             [](const auto& a, const auto& b) { return a.second.seconds < b.second.seconds; })
+      ->first;
+}
 
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
                       Progress& progress) {
   ExtractReport report;
   const std::uint64_t bytes_before = store.bytes_read();
+  const BrickTimes times_before = store.brick_times();
   {
     Stopwatch whole(report.seconds);
     const ExtractRequest request = check_request(store, options, sink.indexing());
@@ -61,64 +148,56 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     const Index reach = sample_reach(request.surface);
 
     ActiveParts active;
+    std::unique_ptr<GpuSession> gpu;
     {
       Stopwatch watch(report.plan_seconds);
-      active = count_active(store, options);
+      gpu = open_backend(request, options, store, active);
     }
     report.bricks = active.bricks;
     report.active_bricks = active.active_bricks;
+    const std::uint64_t other = sink.memory() + decode_extra(store.info(), request.threads);
     const ExtractPlan plan =
-        plan_memory(request, options.memory, active.active_bricks,
-                    sink.memory() + decode_extra(store.info(), request.threads));
+        gpu ? plan_gpu_memory(request, options, active.active_bricks, other, *gpu)
+            : plan_memory(request, options.memory, active.active_bricks, other);
 
     sink.begin(header_of(*request.level, request.surface));
     TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
     BatchPlanner batches(tiles, lattice, reach, request.surface.may_have_nan, plan.limits.tiles,
-                         plan.cache_bricks);
+                         plan.batch_bricks);
     BrickCache cache(store, options.level, plan.cache_bricks);
-    CpuExtractor extractor(lattice, request.surface, plan.limits);
-    ChunkWriter writer(sink);
-    MeshBuffer mesh;
-    TileBatch batch, following;
+    const auto surface =
+        gpu ? gpu->make_surface(request, sink) : make_cpu_surface(request, plan.limits, sink);
     progress.begin("extracting", active.active_bricks * lattice.brick_bytes());
     const double bytes_per_block = static_cast<double>(active.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /
                                    std::max(1.0, static_cast<double>(active.active_blocks));
+    const auto done = [&](const TileBatch& batch) {
+      double blocks = 0;
+      for (const TileWork& work : batch.tiles)
+        blocks += static_cast<double>(std::popcount(work.active_blocks));
+      progress.advance(static_cast<std::uint64_t>(blocks * bytes_per_block));
+    };
+    const Stages stages{cache, batches, *surface, report};
     Workers workers(request.threads);
-    workers.execute([&] {
-      for (bool more = batches.next(batch); more; std::swap(batch, following)) {
-        {
-          Stopwatch watch(report.decode_seconds);
-          cache.require(batch.bricks);
-        }
-        // The disk works on the next batch while the processors work on this one.
-        more = batches.next(following);
-        cache.will_need(following.bricks);
-        {
-          Stopwatch watch(report.surface_seconds);
-          extractor.extract(batch.tiles, cache, mesh,
-                            [&](MeshBuffer& m, std::uint64_t first) { writer.write(m, first); });
-        }
-        double blocks = 0;
-        for (const TileWork& work : batch.tiles)
-          blocks += static_cast<double>(std::popcount(work.active_blocks));
-        progress.advance(static_cast<std::uint64_t>(blocks * bytes_per_block));
-      }
-    });
-    writer.finish();
+    workers.execute(
+        [&] { plan.overlap ? extract_overlapped(stages, done) : extract_in_turn(stages, done); });
+    surface->finish();
     sink.finish();
     progress.end();
-    report.sink_seconds = writer.seconds();
+    surface->report(report);
+    report.sink_seconds = report.sink.seconds;
     report.index = request.search.kind;
     report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
     // Once for the plan and once for the surface; the index has files of its own.
     report.bytes_read = 2 * tiles.index_bytes();
     report.search_seconds = tiles.seconds();
-    report.triangles = extractor.triangles();
-    report.vertices = extractor.vertices();
-    report.degenerate_triangles = extractor.degenerate_triangles();
     report.bricks_read = cache.bricks_read();
     report.brick_reads = cache.reads();
+    const BrickTimes times = store.brick_times();
+    report.read = {(times.read_seconds - times_before.read_seconds) / request.threads,
+                   times.bytes_read - times_before.bytes_read};
+    report.decode = {(times.decode_seconds - times_before.decode_seconds) / request.threads,
+                     times.bytes_decoded - times_before.bytes_decoded};
   }
   report.bytes_read += store.bytes_read() - bytes_before;
   return report;

@@ -2,6 +2,10 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/progress.h"
@@ -9,6 +13,13 @@
 #include "isobrick/surface/mesh.h"
 
 namespace isobrick {
+
+/// What makes the surface. The mesh is the same.
+enum class Backend : std::uint8_t {
+  automatic,  ///< the GPU where there is one that is expected to be faster
+  cpu,
+  cuda,
+};
 
 /// Which surface, from which part of a store, and with what means.
 struct ExtractOptions {
@@ -20,6 +31,16 @@ struct ExtractOptions {
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
   IndexChoice index;  ///< how active blocks are found; never shows in the mesh
+  Backend backend = Backend::automatic;
+  std::uint64_t gpu_memory = 0;  ///< hard budget of device memory, bytes; 0: what is free less 10 %
+  int device = 0;                ///< of the CUDA devices, the first is 0
+};
+
+/// How long a stage was busy, and with how many bytes. What all cores share (read, decode,
+/// gather) counts the time of every thread, divided by their number.
+struct StageReport {
+  double seconds = 0;
+  std::uint64_t bytes = 0;
 };
 
 /// What an extraction did.
@@ -30,13 +51,29 @@ struct ExtractReport {
   std::uint64_t bytes_read = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, sink_seconds = 0;
   std::optional<IndexKind> index;  ///< that was asked for active blocks; nothing: only ranges
-  std::uint64_t search_bytes = 0;  ///< read to find them, once
-  double search_seconds = 0;       ///< to find them, once
+  std::string backend = "cpu";     ///< or "cuda"
+  std::string device;              ///< its name, of the latter
+  /// Encoded bricks, decoded ones; samples for the device and there; the mesh. The GPU has
+  /// no stage `surface` and the CPU only that one between decode and sink.
+  StageReport read, decode, gather, upload, kernel, download, surface, sink;
+  std::uint64_t device_bytes = 0;         ///< device memory that was held, within gpu_memory
+  std::uint64_t device_bytes_in_use = 0;  ///< the same as the driver counts it
+  std::uint64_t pinned_bytes = 0;         ///< page-locked host memory, within memory
+  std::uint64_t launches = 0;             ///< of kernels
+  std::uint64_t search_bytes = 0;         ///< read to find them, once
+  double search_seconds = 0;              ///< to find them, once
 };
 
+/// The stages that there were, by name.
+std::vector<std::pair<std::string_view, StageReport>> stages_of(const ExtractReport& report);
+
+/// The stage that was busy longest.
+std::string_view bound_of(const ExtractReport& report);
+
 /// Streams the isosurface of one level into `sink` (begin … finish).
-/// Throws UsageError for a level, ROI or isovalue that makes no sense or a
-/// budget too small for one tile with its neighbours.
+/// Throws UsageError for a level, ROI or isovalue that makes no sense, a budget too small
+/// for one tile with its neighbours, or a surface that Backend::cuda cannot make; Error where
+/// there is no CUDA device for it.
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
                       Progress& progress);
 

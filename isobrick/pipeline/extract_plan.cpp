@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "isobrick/core/error.h"
+#include "isobrick/pipeline/gpu_backend.h"
 #include "isobrick/stream/tile_stream.h"
 
 namespace isobrick {
@@ -44,10 +45,29 @@ void check_transform(const StoreInfo& info, const LevelInfo& level) {
         info.path.string()));
 }
 
+/// What the CUDA driver and its context take of the host's memory.
+constexpr std::uint64_t kCudaDriver = std::uint64_t{128} << 20;
+
 /// Shard indices that the reader keeps: all of a usual volume, bounded of a huge one.
 std::uint64_t index_bytes(const Lattice& lattice) {
   return std::min(std::uint64_t{64} << 20,
                   32 * static_cast<std::uint64_t>(volume(lattice.bricks())));
+}
+
+/// What every extraction takes besides its surface and its bricks.
+std::uint64_t fixed_bytes(const ExtractRequest& request) {
+  const Lattice& lattice = request.level->lattice;
+  return kBase + index_bytes(lattice) +
+         static_cast<std::uint64_t>(request.threads) * (kDecoder + lattice.brick_bytes()) +
+         request.search_memory;
+}
+
+/// Neighbours come on top of the active bricks.
+std::size_t fit_cache(const Lattice& lattice, std::uint64_t bytes, std::size_t tile_bricks,
+                      std::uint64_t active_bricks) {
+  return static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(bytes / lattice.brick_bytes(), tile_bricks,
+                                std::max<std::uint64_t>(tile_bricks, 8 * active_bricks)));
 }
 
 }  // namespace
@@ -87,14 +107,12 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
                         std::uint64_t active_bricks, std::uint64_t sink_bytes) {
   const Lattice& lattice = request.level->lattice;
   const bool drop = request.surface.drop_degenerate;
-  const auto threads = static_cast<std::uint64_t>(request.threads);
   const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type, drop);
   const std::uint64_t tile_output = CpuExtractor::max_tile_output(request.surface.normals);
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
-  const std::uint64_t fixed = kBase + index_bytes(lattice) + threads * (kDecoder + brick_bytes) +
-                              boundary_bytes(lattice, drop) + request.search_memory + sink_bytes;
+  const std::uint64_t fixed = fixed_bytes(request) + boundary_bytes(lattice, drop) + sink_bytes;
   const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
   if (budget < least)
     throw UsageError(fmt::format(
@@ -109,10 +127,26 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
   plan.limits.output_bytes = std::clamp<std::uint64_t>(
       tile_output + spare / 12, tile_output, std::max(tile_output, std::uint64_t{32} << 20));
   const std::uint64_t used = fixed + plan.limits.tiles * workspace + 2 * plan.limits.output_bytes;
-  // Neighbours come on top of the active bricks.
-  plan.cache_bricks = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>((budget - used) / brick_bytes, tile_bricks,
-                                std::max<std::uint64_t>(tile_bricks, 8 * active_bricks)));
+  plan.cache_bricks = fit_cache(lattice, budget - used, tile_bricks, active_bricks);
+  plan.batch_bricks = plan.cache_bricks;
+  plan.bytes = used + plan.cache_bricks * brick_bytes;
+  return plan;
+}
+
+ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions& options,
+                            std::uint64_t active_bricks, std::uint64_t sink_bytes,
+                            GpuSession& gpu) {
+  const Lattice& lattice = request.level->lattice;
+  const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
+  const std::uint64_t brick_bytes = lattice.brick_bytes();
+  const std::uint64_t fixed = fixed_bytes(request) + kCudaDriver + sink_bytes;
+  const std::uint64_t used = fixed + gpu.plan(request, options.gpu_memory, options.memory,
+                                              fixed + tile_bricks * brick_bytes);
+  ExtractPlan plan;
+  plan.limits.tiles = gpu.good_batch();
+  plan.cache_bricks = fit_cache(lattice, options.memory - used, tile_bricks, active_bricks);
+  plan.overlap = plan.cache_bricks >= 2 * tile_bricks;
+  plan.batch_bricks = plan.overlap ? plan.cache_bricks / 2 : plan.cache_bricks;
   plan.bytes = used + plan.cache_bricks * brick_bytes;
   return plan;
 }

@@ -7,11 +7,15 @@
 
 namespace isobrick {
 
+class GpuSession;
+
 /// How an extraction divides its memory budget.
 struct ExtractPlan {
-  ExtractorLimits limits;
+  ExtractorLimits limits;  ///< of the CPU's extractor; tiles: of a batch on any
   std::size_t cache_bricks = 0;
-  std::uint64_t bytes = 0;  ///< all of it, the program itself included
+  std::size_t batch_bricks = 0;  ///< that a batch may need
+  bool overlap = false;          ///< a batch is decoded while the one before is extracted
+  std::uint64_t bytes = 0;       ///< all of it, the program itself included
 };
 
 /// What the options say of the store's level, checked.
@@ -32,5 +36,11 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
 /// naming the least budget that works when this one does not.
 ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
                         std::uint64_t active_bricks, std::uint64_t sink_bytes = 0);
+
+/// The same where a GPU makes the surface, whose buffers `gpu` plans: page-locked memory
+/// and what its driver takes are within the budget.
+ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions& options,
+                            std::uint64_t active_bricks, std::uint64_t sink_bytes,
+                            GpuSession& gpu);
 
 }  // namespace isobrick

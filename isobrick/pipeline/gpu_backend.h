@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "isobrick/pipeline/surface_extractor.h"
+
+// The CUDA backend as the pipeline sees it: gpu_backend.cpp where it is built, else
+// no_gpu_backend.cpp.
+
+namespace isobrick {
+
+/// Whether this program has the CUDA backend.
+bool built_with_cuda();
+/// CUDA devices; 0 without the backend or a driver. The first call takes some tenths of
+/// a second.
+int cuda_device_count();
+
+/// A CUDA device that is ready to work.
+class GpuSession {
+ public:
+  virtual ~GpuSession() = default;
+
+  virtual const std::string& name() const = 0;
+  /// Chooses buffers within `device_budget` (0: what is free less 10 %) and within
+  /// `host_budget`, of which `other_host_bytes` are taken. The host memory that they take.
+  /// Throws UsageError naming the least that works.
+  virtual std::uint64_t plan(const ExtractRequest& request, std::uint64_t device_budget,
+                             std::uint64_t host_budget, std::uint64_t other_host_bytes) = 0;
+  /// Tiles to hand to its surface at a time, as planned.
+  virtual std::size_t good_batch() const = 0;
+  /// As planned. Session and sink must outlive it.
+  virtual std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
+                                                         MeshSink& sink) = 0;
+};
+
+/// Throws Error when the device cannot be made ready, or without the backend.
+std::unique_ptr<GpuSession> open_gpu(int device);
+
+}  // namespace isobrick

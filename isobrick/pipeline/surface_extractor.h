@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "isobrick/core/tile.h"
+#include "isobrick/pipeline/extract_plan.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// Makes the surface of tiles and hands it to a sink, on whatever backend. Everywhere the
+/// mesh is the same.
+class SurfaceExtractor {
+ public:
+  virtual ~SurfaceExtractor() = default;
+
+  /// Over all calls, tiles come in Morton order, none twice; `bricks` holds what
+  /// for_each_needed_box says, and is not looked at any more afterwards. Called in the TBB
+  /// arena that does the work.
+  virtual void extract(std::span<const TileWork> tiles, const BrickLookup& bricks) = 0;
+  /// Waits until the sink has taken all of the mesh.
+  virtual void finish() = 0;
+  /// Adds counts and stages; after finish().
+  virtual void report(ExtractReport& report) const = 0;
+};
+
+/// The CPU. The sink must outlive it.
+std::unique_ptr<SurfaceExtractor> make_cpu_surface(const ExtractRequest& request,
+                                                   const ExtractorLimits& limits, MeshSink& sink);
+
+}  // namespace isobrick

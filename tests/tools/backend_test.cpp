@@ -1,0 +1,193 @@
+#include <algorithm>
+#include <limits>
+
+#include "tests/tools/program.h"
+
+namespace isobrick::test {
+namespace {
+
+/// Whether an outcome says that CUDA cannot work on this machine.
+bool without_cuda(const Outcome& outcome) {
+  return outcome.exit_code == 1 && (outcome.err.find("no CUDA device") != std::string::npos ||
+                                    outcome.err.find("built without CUDA") != std::string::npos);
+}
+
+/// Of a store that waves() has made: an isovalue in the middle of its samples.
+std::string middle_of(const std::filesystem::path& store) {
+  const std::string type = store.stem().string();
+  return type == "f32" ? "0.01" : type == "u16" ? "32767.5" : type == "u8" ? "127.5" : "0.5";
+}
+
+class Backend : public ProgramTest {
+ protected:
+  Outcome on_cuda(const std::string& store, const Arguments& more = {}) const {
+    Arguments arguments{"extract",     store,     "--isovalue", "127.5", "-o",
+                        path("a.ply"), "--force", "--backend",  "cuda"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+
+  /// A store of samples of a wavy field, large enough for several launches.
+  std::string waves(const std::string& type, const Arguments& more = {}) const {
+    const std::string store = path(type + ".zarr");
+    Arguments arguments{"synth",      "gyroid", store, "--dims",
+                        "150,131,97", "--type", type,  "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(run(arguments).exit_code, 0);
+    return store;
+  }
+};
+
+/// The stage that was busy longest.
+std::string longest(const nlohmann::json& stages) {
+  std::string name;
+  double seconds = -1;
+  for (const auto& [key, stage] : stages.items()) {
+    EXPECT_TRUE(stage["bytes"].is_number_unsigned()) << key;
+    if (stage["seconds"].get<double>() > seconds) {
+      seconds = stage["seconds"];
+      name = key;
+    }
+  }
+  return name;
+}
+
+TEST_F(Backend, TheCpuReportsItsStages) {
+  const std::string store = make_store("a");
+  const nlohmann::json surface = run_json({"extract", store, "--isovalue", "127.5", "-o",
+                                           path("a.ply"), "--backend", "cpu"})["surfaces"][0];
+  EXPECT_EQ(surface["backend"], "cpu");
+  EXPECT_TRUE(surface["device"].is_null());
+  EXPECT_FALSE(surface.contains("device_bytes"));
+  const nlohmann::json& stages = surface["stages"];
+  std::vector<std::string> names;
+  for (const auto& [name, stage] : stages.items()) names.push_back(name);
+  EXPECT_EQ(names, (Arguments{"decode", "read", "sink", "surface"}));
+  EXPECT_GT(stages["read"]["bytes"].get<std::uint64_t>(), 0u);
+  EXPECT_LE(stages["read"]["bytes"].get<std::uint64_t>(),
+            surface["bytes_read"].get<std::uint64_t>());
+  EXPECT_EQ(stages["decode"]["bytes"].get<std::uint64_t>(),
+            surface["brick_reads"].get<std::uint64_t>() * 16 * 16 * 16);
+  EXPECT_EQ(
+      stages["sink"]["bytes"].get<std::uint64_t>(),
+      12 * (surface["vertices"].get<std::uint64_t>() + surface["triangles"].get<std::uint64_t>()));
+  EXPECT_EQ(surface["bound"], longest(stages));
+}
+
+TEST_F(Backend, OptionsThatMakeNoSense) {
+  const std::string store = make_store("a");
+  const auto refused = [&](const Arguments& more, const std::string& part) {
+    SCOPED_TRACE(part);
+    Arguments arguments{"extract", store, "--isovalue", "127.5", "-o", path("a.ply")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refused(run(arguments), 2, {more[0], part});
+  };
+  refused({"--backend", "metal"}, "auto, cpu or cuda");
+  refused({"--gpu-memory", "lots"}, "lots");
+  refused({"--gpu-memory", "0"}, "0");
+  refused({"--device", "-1"}, "-1");
+  refused({"--device", "first"}, "first");
+  EXPECT_EQ(files(), Arguments{"a.zarr"});
+}
+
+TEST_F(Backend, WhatHasNoKernelsIsRefusedAndAutoTakesTheCpu) {
+  const auto check = [&](const std::string& store, const Arguments& more, const std::string& why) {
+    SCOPED_TRACE(why);
+    expect_refused(on_cuda(store, more), 2, {"--backend cuda: ", why, "--backend cpu"});
+    EXPECT_FALSE(std::filesystem::exists(path("a.ply")));
+    Arguments arguments{"extract", store, "--isovalue", "127.5", "-o", path("auto.ply"), "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(run_json(arguments)["surfaces"][0]["backend"], "cpu");
+  };
+  check(make_store("a"), {"--drop-degenerate"}, "degenerate");
+  check(waves("f64", {"--levels", "1"}), {}, "f64");
+  check(waves("u32", {"--levels", "1"}), {}, "u32");
+  const float samples[] = {std::numeric_limits<float>::quiet_NaN(), 0, 255, 0, 0, 0, 255, 255};
+  write_file(path("nan_2x2x2_float32.raw"),
+             std::string(reinterpret_cast<const char*>(samples), sizeof samples));
+  ASSERT_EQ(run({"convert", path("nan_2x2x2_float32.raw"), path("nan.zarr")}).exit_code, 0);
+  check(path("nan.zarr"), {}, "NaN");
+}
+
+TEST_F(Backend, WithoutADeviceCudaIsRefusedAndAutoTakesTheCpu) {
+  const std::string store = make_store("a");
+  const Outcome refused = on_cuda(store);
+  if (!without_cuda(refused)) GTEST_SKIP() << "there is a CUDA device";
+  expect_refused(refused, 1, {"--backend cuda: ", "--backend cpu"});
+  EXPECT_EQ(files(), Arguments{"a.zarr"});
+  EXPECT_EQ(run_json({"extract", store, "--isovalue", "127.5", "-o", path("a.ply"), "--backend",
+                      "auto", "--device", "1"})["surfaces"][0]["backend"],
+            "cpu");
+}
+
+/// What needs a device.
+class Cuda : public Backend {
+ protected:
+  void SetUp() override {
+    if (without_cuda(on_cuda(make_store("probe")))) GTEST_SKIP() << "no CUDA device";
+  }
+
+  /// Makes the surface on both backends, expects equal files and returns what CUDA said.
+  nlohmann::json compare(const std::string& store, const std::string& extension,
+                         const Arguments& more, const Arguments& on_device = {}) const {
+    Arguments arguments{"extract", store, "--isovalue", middle_of(store), "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto extract = [&](const std::string& backend, const Arguments& also) {
+      Arguments all = arguments;
+      all.insert(all.end(), {"--backend", backend, "-o", path(backend + extension)});
+      all.insert(all.end(), also.begin(), also.end());
+      return run_json(all)["surfaces"][0];
+    };
+    const nlohmann::json cpu = extract("cpu", {}), cuda = extract("cuda", on_device);
+    EXPECT_EQ(cuda["backend"], "cuda");
+    EXPECT_EQ(cpu["triangles"], cuda["triangles"]);
+    EXPECT_GT(cpu["triangles"].get<int>(), 100);
+    EXPECT_TRUE(read_file(path("cpu" + extension)) == read_file(path("cuda" + extension)));
+    return cuda;
+  }
+};
+
+TEST_F(Cuda, FilesAreThoseOfTheCpu) {
+  for (const std::string type : {"u8", "i8", "u16", "i16", "f32"})
+    for (const std::string brick : {"20", "32", "48", "64"}) {
+      SCOPED_TRACE(type + ", bricks of " + brick);
+      const std::string store = waves(type, {"--brick", brick});
+      compare(store, ".ply", {});
+      compare(store, ".ply", {"--normals", "gradient"});
+    }
+  const std::string store = waves("u8", {"--brick", "32"});
+  compare(store, ".stl", {});
+  compare(store, ".ply", {"--level", "1"});
+  compare(store, ".ply", {"--roi", "11:99,40:,:77"});
+  compare(store, ".stl", {"--roi", "11:99,40:,:77", "--normals", "gradient"});
+}
+
+TEST_F(Cuda, ReportsItsStages) {
+  const nlohmann::json surface = compare(waves("u16"), ".ply", {}, {"--gpu-memory", "64M"});
+  EXPECT_FALSE(surface["device"].get<std::string>().empty());
+  EXPECT_LE(surface["device_bytes"].get<std::uint64_t>(), std::uint64_t{64} << 20);
+  EXPECT_GT(surface["pinned_bytes"].get<std::uint64_t>(), 0u);
+  EXPECT_GT(surface["launches"].get<int>(), 0);
+  const nlohmann::json& stages = surface["stages"];
+  for (const char* name : {"read", "decode", "gather", "upload", "kernel", "download", "sink"})
+    EXPECT_GT(stages[name]["bytes"].get<std::uint64_t>(), 0u) << name;
+  EXPECT_EQ(surface["bound"], longest(stages));
+}
+
+TEST_F(Cuda, TheLeastMemoryOfTheDeviceWorksAndLessIsRefusedByName) {
+  const std::string store = waves("u8", {"--brick", "32"});
+  const Outcome refused = on_cuda(store, {"--gpu-memory", "100K"});
+  expect_refused(refused, 2, {"--gpu-memory of 102400 bytes", "at least "});
+  const std::string least =
+      std::to_string(std::stoull(refused.err.substr(refused.err.find("at least ") + 9)));
+  EXPECT_EQ(compare(store, ".ply", {}, {"--gpu-memory", least})["device_bytes"].dump(), least);
+  compare(store, ".ply", {"--normals", "gradient"}, {"--gpu-memory", "32M", "--memory", "280M"});
+  expect_refused(on_cuda(store, {"--memory", "100M"}), 2, {"--memory of 104857600 bytes"});
+}
+
+TEST_F(Cuda, ADeviceThatDoesNotExistIsRefused) {
+  expect_refused(on_cuda(make_store("a"), {"--device", "200"}), 2, {"--device 200", "CUDA device"});
+}
+
+}  // namespace
+}  // namespace isobrick::test
