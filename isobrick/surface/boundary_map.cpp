@@ -60,7 +60,7 @@ TileBoundary* BoundaryMap::add(Int3 tile) {
     boundary = std::move(spare_.back());
     spare_.pop_back();
   }
-  expiries_.push({morton_encode(tile + Int3{1, 1, 1}), key});
+  expiries_.push({morton_encode(min(tile + Int3{1, 1, 1}, last_tile_)), key});
   return (map_[key] = std::move(boundary)).get();
 }
 

@@ -12,9 +12,12 @@ namespace isobrick {
 
 /// The boundaries of finished tiles that tiles still to come will ask for.
 /// Tiles come in Morton order, so a tile's last asker is its neighbour at
-/// (+1, +1, +1): memory follows the surface between finished and unfinished.
+/// (+1, +1, +1), or what is nearest to that in the grid: memory follows the surface between finished and unfinished.
 class BoundaryMap {
  public:
+  /// `tiles` is the grid.
+  explicit BoundaryMap(Int3 tiles) : last_tile_(tiles - Int3{1, 1, 1}) {}
+
   /// A boundary to fill for a tile about to be extracted.
   TileBoundary* add(Int3 tile);
   /// The boundary of a tile, or null when no surface passes it.
@@ -29,6 +32,7 @@ class BoundaryMap {
     std::uint64_t last_asker, key;
     bool operator>(const Expiry& other) const { return last_asker > other.last_asker; }
   };
+  Int3 last_tile_;
   std::unordered_map<std::uint64_t, std::unique_ptr<TileBoundary>> map_;
   std::priority_queue<Expiry, std::vector<Expiry>, std::greater<>> expiries_;
   std::vector<std::unique_ptr<TileBoundary>> spare_;

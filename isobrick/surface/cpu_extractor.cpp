@@ -42,7 +42,7 @@ struct CpuExtractor::Impl {
   std::uint64_t vertices = 0, triangles = 0, degenerate = 0;
 
   Impl(const Lattice& l, const SurfaceOptions& o, ExtractorLimits bounds)
-      : lattice(l), options(o), limits(bounds) {
+      : lattice(l), options(o), limits(bounds), boundaries(l.tiles()) {
     options.roi = intersect(o.roi, l.box());
     if (std::isnan(o.isovalue)) throw UsageError("the isovalue is not a number");
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
