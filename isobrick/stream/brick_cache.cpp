@@ -1,8 +1,11 @@
 #include "isobrick/stream/brick_cache.h"
 
+#include <sys/mman.h>
 #include <tbb/parallel_for_each.h>
 
+#include <algorithm>
 #include <cassert>
+#include <new>
 
 namespace isobrick {
 
@@ -19,21 +22,38 @@ std::uint64_t BrickCache::key(Int3 brick) const {
 
 BrickCache::Samples BrickCache::take_buffer() {
   if (!spare_.empty()) {
-    Samples buffer = std::move(spare_.back());
+    Samples buffer = spare_.back();
     spare_.pop_back();
     return buffer;
   }
-  if (buffers_ < capacity_) {
-    ++buffers_;
-    return Samples(new std::byte[lattice_.brick_bytes()]);
-  }
+  if (buffers_ < capacity_) return new_buffer();
   // What is required now was moved to the front, so the back is free to go.
   for (;;) {
-    Samples buffer = std::move(order_.back().samples);
+    Samples buffer = order_.back().samples;
     entries_.erase(order_.back().key);
     order_.pop_back();
     if (buffer) return buffer;
   }
+}
+
+/// Memory comes in large pages, for the first touch of a small one costs as much as the
+/// decoding of what it holds.
+BrickCache::Samples BrickCache::new_buffer() {
+  constexpr std::size_t page = std::size_t{2} << 20, good = 16 * page;
+  const std::size_t brick = lattice_.brick_bytes();
+  if (slab_buffers_ == 0) {
+    slab_buffers_ = std::clamp<std::size_t>(good / brick, 1, capacity_ - buffers_);
+    const std::size_t bytes = slab_buffers_ * brick;
+    const bool large = bytes >= page;
+    const std::size_t align = large ? page : 64;
+    auto* slab =
+        static_cast<std::byte*>(std::aligned_alloc(align, (bytes + align - 1) / align * align));
+    if (!slab) throw std::bad_alloc();
+    slabs_.emplace_back(slab);
+    if (large) (void)madvise(slab, bytes, MADV_HUGEPAGE);
+  }
+  ++buffers_;
+  return slabs_.back().get() + --slab_buffers_ * brick;
 }
 
 void BrickCache::require(std::span<const Int3> bricks) {
@@ -48,22 +68,22 @@ void BrickCache::require(std::span<const Int3> bricks) {
   }
   struct Load {
     Int3 brick;
-    Samples samples;
+    Samples samples = nullptr;
     bool present = false;
   };
   std::vector<Load> loads;
   for (const Int3 b : missing) loads.push_back({b, take_buffer()});
   tbb::parallel_for_each(loads, [&](Load& load) {
-    load.present = store_.read_brick(level_, load.brick, load.samples.get());
+    load.present = store_.read_brick(level_, load.brick, load.samples);
   });
   for (Load& load : loads) {
-    if (!load.present) spare_.push_back(std::move(load.samples));
+    if (!load.present) spare_.push_back(load.samples);
     if (load.present) {
       ++reads_;
       bricks_read_ += !seen_[key(load.brick)];
       seen_[key(load.brick)] = true;
     }
-    order_.push_front({key(load.brick), std::move(load.samples)});
+    order_.push_front({key(load.brick), load.present ? load.samples : nullptr});
     entries_[key(load.brick)] = order_.begin();
   }
 }
@@ -92,7 +112,7 @@ void BrickCache::will_need(std::span<const Int3> bricks) const {
 const std::byte* BrickCache::find(Int3 brick) const {
   const auto found = entries_.find(key(brick));
   assert(found != entries_.end());
-  return found->second->samples.get();
+  return found->second->samples;
 }
 
 }  // namespace isobrick

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <list>
 #include <memory>
 #include <span>
@@ -50,15 +51,16 @@ class BrickCache final : public BrickLookup {
   std::uint64_t bricks_read() const { return bricks_read_; }
 
  private:
-  using Samples = std::unique_ptr<std::byte[]>;
+  using Samples = std::byte*;
   struct Entry {
     std::uint64_t key = 0;
-    Samples samples;  ///< none: the brick is absent
+    Samples samples = nullptr;  ///< null: the brick is absent
   };
   using Order = std::list<Entry>;
 
   std::uint64_t key(Int3 brick) const;
   Samples take_buffer();
+  Samples new_buffer();
 
   const StoreReader& store_;
   int level_;
@@ -68,6 +70,11 @@ class BrickCache final : public BrickLookup {
   Order order_;              ///< most recently needed first
   std::unordered_map<std::uint64_t, Order::iterator> entries_;
   std::vector<Samples> spare_;
+  struct Free {
+    void operator()(std::byte* slab) const { std::free(slab); }
+  };
+  std::vector<std::unique_ptr<std::byte, Free>> slabs_;  ///< memory of many bricks each
+  std::size_t slab_buffers_ = 0;                         ///< not yet used in the last one
   std::vector<bool> seen_;
   std::uint64_t reads_ = 0, bricks_read_ = 0;
 };
