@@ -54,7 +54,7 @@ struct GpuExtractor::Impl {
         options(checked(l, o)),
         first_tile(tile_of(options.roi.lo)),
         device(l, options, sizes),
-        slots(device.sizes().slots),
+        slots(device.sizes().slots, l.tiles()),
         collector(id, device, welded(), options.normals, std::move(take)) {}
 
   bool welded() const { return options.indexing == Indexing::welded; }

@@ -5,7 +5,7 @@
 
 namespace isobrick::gpu {
 
-RowSlots::RowSlots(std::uint32_t slots) {
+RowSlots::RowSlots(std::uint32_t slots, Int3 tiles) : last_tile_(tiles - Int3{1, 1, 1}) {
   free_.reserve(slots);
   for (std::uint32_t i = slots; i > 0; --i) free_.push_back(i - 1);
 }
@@ -19,7 +19,7 @@ std::uint32_t RowSlots::add(Int3 tile) {
   free_.pop_back();
   const std::uint64_t key = morton_encode(tile);
   map_[key] = {slot, launch_};
-  expiries_.push({morton_encode(tile + Int3{1, 1, 1}), key});
+  expiries_.push({morton_encode(min(tile + Int3{1, 1, 1}, last_tile_)), key});
   return slot;
 }
 

@@ -15,7 +15,8 @@ namespace isobrick::gpu {
 /// Host books only; not thread-safe.
 class RowSlots {
  public:
-  explicit RowSlots(std::uint32_t slots);
+  /// `tiles` is the grid: where a neighbour is beyond it, the last asker is nearer.
+  RowSlots(std::uint32_t slots, Int3 tiles);
 
   /// A slot for a tile that is about to be extracted, of the launch that is being
   /// put together. Throws Error when none is left.
@@ -38,6 +39,7 @@ class RowSlots {
   std::unordered_map<std::uint64_t, Entry> map_;
   std::priority_queue<Expiry, std::vector<Expiry>, std::greater<>> expiries_;
   std::vector<std::uint32_t> free_;
+  Int3 last_tile_;
   std::uint32_t launch_ = 0;
 };
 

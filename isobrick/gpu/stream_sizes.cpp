@@ -21,14 +21,13 @@ constexpr std::uint64_t kSmallBuffers = 64 << 10;
 /// A row table in the host's books: its slot, its tile, its expiry.
 constexpr std::uint64_t kBytesOfSlot = 96;
 
-/// Row tables that are needed at a time: as with the CPU's boundaries those between
-/// finished and unfinished tiles, at most about twice the largest face of the grid, and
-/// those of the launches under way.
+/// Row tables that are needed at a time: as with the CPU's boundaries those on the upper
+/// faces of what is finished, and those of the launches under way.
 std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles) {
   if (!welded) return tiles;
   const Int3 t = lattice.tiles();
-  const auto face = static_cast<std::uint64_t>(std::max({t.x * t.y, t.y * t.z, t.x * t.z}));
-  return std::min(static_cast<std::uint64_t>(volume(t)), 2 * face + (kLanes + 1) * tiles);
+  const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
+  return std::min(static_cast<std::uint64_t>(volume(t)), faces + (kLanes + 1) * tiles);
 }
 
 std::string too_small(const char* option, std::uint64_t budget, std::uint64_t least) {

@@ -26,8 +26,9 @@ struct StreamSizes {
 inline constexpr int kLanes = 2;
 /// Meshes in host memory at a time: one is downloaded, one written, one waits.
 inline constexpr int kOutputs = 3;
-/// More tiles a launch gain nothing: they fill the largest devices.
-inline constexpr std::uint32_t kMostTilesOfLaunch = 512;
+/// More tiles a launch gain little, for a device is faster than what feeds it, and cost
+/// page-locked memory, which takes long to get.
+inline constexpr std::uint32_t kMostTilesOfLaunch = 256;
 
 /// The sizes for launches of `tiles` tiles.
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options,

@@ -91,8 +91,12 @@ void extract_in_turn(const Stages& stages, const F& done) {
 template <class F>
 void extract_overlapped(const Stages& stages, const F& done) {
   std::array<TileBatch, 4> batches;
-  for (int i = 0; i < 3; ++i) stages.batches.next(batches[i]);
-  stages.decode(batches[0]);
+  stages.batches.next(batches[0]);
+  tbb::parallel_invoke([&] { stages.decode(batches[0]); },
+                       [&] {
+                         stages.batches.next(batches[1]);
+                         stages.batches.next(batches[2]);
+                       });
   while (!batches[0].tiles.empty()) {
     const BrickView bricks = stages.cache.view(batches[0].bricks);
     tbb::parallel_invoke([&] { stages.extract(batches[0], bricks); },

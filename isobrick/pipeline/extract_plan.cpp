@@ -19,12 +19,12 @@ constexpr std::uint64_t kBase = std::uint64_t{48} << 20;
 /// the decoded ones, and the codec's own window, once a thread.
 constexpr std::uint64_t kDecoder = std::uint64_t{2} << 20;
 
-/// The boundaries that wait between finished and unfinished tiles: in Morton
-/// order at most about the largest face of the tile grid, twice.
+/// The boundaries that wait between finished and unfinished tiles: in Morton order at
+/// most about those on the three upper faces of the tile grid.
 std::uint64_t boundary_bytes(const Lattice& lattice, bool drop_degenerate) {
   const Int3 t = lattice.tiles();
-  const auto face = static_cast<std::uint64_t>(std::max({t.x * t.y, t.y * t.z, t.x * t.z}));
-  return 2 * face * CpuExtractor::boundary_bytes(drop_degenerate);
+  const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
+  return faces * CpuExtractor::boundary_bytes(drop_degenerate);
 }
 
 /// Mesh coordinates are float, and so are the factors of positions and normals.

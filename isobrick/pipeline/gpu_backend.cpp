@@ -73,7 +73,9 @@ class CudaSession final : public GpuSession {
   }
 
   std::size_t good_batch() const override {
-    constexpr std::size_t launches = 4;  // so that the cores find bricks enough to share
+    // So many that the cores find bricks enough to share, and so few that these are still
+    // in a cache when tiles are gathered from them.
+    constexpr std::size_t launches = 2;
     return launches * sizes_.tiles;
   }
 

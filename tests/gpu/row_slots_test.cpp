@@ -1,0 +1,58 @@
+#include "isobrick/gpu/row_slots.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "isobrick/core/morton.h"
+#include "isobrick/gpu/stream_sizes.h"
+
+namespace isobrick::testing {
+namespace {
+
+// The worst case: the surface passes every tile.
+TEST(RowSlots, StreamSizesHaveEnoughForEveryGrid) {
+  for (const Int3 grid : {Int3{32, 32, 32}, Int3{33, 33, 33}, Int3{17, 17, 17}, Int3{64, 64, 8},
+                          Int3{8, 64, 64}, Int3{64, 8, 64}, Int3{100, 3, 50}, Int3{1, 1, 200},
+                          Int3{200, 2, 2}, Int3{40, 70, 20}, Int3{1, 90, 90}})
+    for (const std::uint32_t tiles : {1u, 7u, 256u}) {
+      SCOPED_TRACE(std::to_string(grid.x) + "x" + std::to_string(grid.y) + "x" +
+                   std::to_string(grid.z) + ", launches of " + std::to_string(tiles));
+      const Lattice lattice{grid * kTileEdge, {64, 64, 64}, ScalarType::u8};
+      gpu::RowSlots slots(gpu::stream_sizes(lattice, {.roi = lattice.box()}, tiles).slots, grid);
+      std::array<std::vector<std::uint32_t>, gpu::kLanes> unused;
+      std::size_t launch = 0;
+      std::uint32_t in_launch = 0;
+      Int3 last{};
+      const auto end_launch = [&] {
+        slots.end_launch(last, unused[launch % gpu::kLanes]);
+        in_launch = 0;
+        ++launch;
+        slots.recycle(unused[launch % gpu::kLanes]);
+      };
+      ASSERT_NO_THROW(for_each_morton(grid, [&](Int3 tile) {
+        slots.add(tile);
+        last = tile;
+        if (++in_launch == tiles) end_launch();
+      }));
+    }
+}
+
+TEST(RowSlots, ATileIsFoundUntilItsLastAskerIsDone) {
+  const Int3 grid{2, 2, 2};
+  gpu::RowSlots slots(8, grid);
+  std::vector<std::uint32_t> unused;
+  const std::uint32_t first = slots.add({0, 0, 0});
+  EXPECT_EQ(slots.find({0, 0, 0}), first | gpu::TileLinks::kSameLaunch);
+  EXPECT_EQ(slots.find({1, 0, 0}), gpu::kNone);
+  slots.end_launch({0, 0, 0}, unused);
+  EXPECT_TRUE(unused.empty());
+  EXPECT_EQ(slots.find({0, 0, 0}), first);
+  const std::uint32_t last = slots.add({1, 1, 1});
+  slots.end_launch({1, 1, 1}, unused);
+  EXPECT_EQ(unused, (std::vector{first, last}));
+  EXPECT_EQ(slots.find({0, 0, 0}), gpu::kNone);
+}
+
+}  // namespace
+}  // namespace isobrick::testing
