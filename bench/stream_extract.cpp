@@ -1,0 +1,232 @@
+// A store to a mesh in host memory through the GPU, beside each of its stages alone.
+//
+//   isobrick synth gyroid g.zarr --dims 1024,1024,1024 --type u16
+//   bench_stream_extract g.zarr --isovalue 32767.5 --gpu-memory 256M --memory 1G
+//
+// What the stages do alone is measured in the same run: reading the encoded bricks (from
+// the page cache, where they fit it), reading and decoding them on all cores, copies of
+// the same bytes up and down. --check compares the mesh with the CPU's by a hash.
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for_each.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "bench/copies.h"
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/extract.h"
+#include "isobrick/pipeline/extract_plan.h"
+#include "isobrick/pipeline/workers.h"
+#include "isobrick/stream/tile_stream.h"
+
+namespace isobrick::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Takes the mesh in host memory and, when asked to, hashes it.
+class HashSink final : public MeshSink {
+ public:
+  explicit HashSink(bool hash) : hash_(hash) {}
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader&) override {}
+  void write(const MeshChunk& chunk) override {
+    bytes_ +=
+        chunk.positions.size_bytes() + chunk.normals.size_bytes() + chunk.triangles.size_bytes();
+    if (!hash_) return;
+    add(0, chunk.positions);
+    add(1, chunk.normals);
+    add(2, chunk.triangles);
+  }
+  void finish() override {}
+  std::uint64_t bytes() const override { return bytes_; }
+  const std::array<std::uint64_t, 3>& hashes() const { return sums_; }
+
+ private:
+  template <class V>
+  void add(std::size_t stream, std::span<const V> values) {
+    const auto* words = reinterpret_cast<const std::uint32_t*>(values.data());
+    std::uint64_t sum = sums_[stream];
+    for (std::size_t i = 0; i < values.size_bytes() / sizeof(*words); ++i)
+      sum = (sum ^ words[i]) * 0x100000001b3ull;
+    sums_[stream] = sum;
+  }
+  bool hash_;
+  std::uint64_t bytes_ = 0;
+  std::array<std::uint64_t, 3> sums_{};
+};
+
+struct Arguments {
+  std::string store;
+  ExtractOptions options;
+  int runs = 3;
+  bool check = false, json = false;
+};
+
+std::vector<Int3> needed_bricks(const StoreReader& store, const ExtractOptions& options) {
+  const ExtractRequest request = check_request(store, options, Indexing::welded);
+  TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
+  const Lattice& lattice = request.level->lattice;
+  BatchPlanner planner(tiles, lattice, sample_reach(request.surface), false, 1 << 14, 1 << 20);
+  std::vector<bool> seen(static_cast<std::size_t>(volume(lattice.bricks())));
+  std::vector<Int3> bricks;
+  for (TileBatch batch; planner.next(batch);)
+    for (const Int3 b : batch.bricks) {
+      auto is_seen = seen[static_cast<std::size_t>(linear_index(b, lattice.bricks()))];
+      if (!is_seen) bricks.push_back(b);
+      is_seen = true;
+    }
+  return bricks;
+}
+
+/// Reading alone, on all cores.
+double read_alone(const StoreReader& store, int level, const std::vector<Int3>& bricks) {
+  std::map<std::string, int> files;
+  struct Piece {
+    int file;
+    BrickLocation at;
+  };
+  std::vector<Piece> pieces;
+  std::uint64_t most = 0;
+  for (const Int3 b : bricks)
+    if (const auto at = store.locate(level, b)) {
+      auto [file, added] = files.try_emplace(at->file.string(), -1);
+      if (added) file->second = open(at->file.c_str(), O_RDONLY | O_CLOEXEC);
+      pieces.push_back({file->second, *at});
+      most = std::max(most, at->size);
+    }
+  tbb::enumerable_thread_specific<std::vector<std::byte>> buffers(
+      [&] { return std::vector<std::byte>(most); });
+  const auto start = Clock::now();
+  tbb::parallel_for_each(pieces, [&](const Piece& piece) {
+    if (pread(piece.file, buffers.local().data(), piece.at.size,
+              static_cast<off_t>(piece.at.offset)) != static_cast<ssize_t>(piece.at.size))
+      throw Error("a brick cannot be read");
+  });
+  const double seconds = seconds_since(start);
+  for (const auto& [name, file] : files) close(file);
+  return seconds;
+}
+
+/// Reading and decoding, on all cores.
+double decode_alone(const StoreReader& store, int level, const std::vector<Int3>& bricks) {
+  const std::size_t bytes =
+      store.info().levels[static_cast<std::size_t>(level)].lattice.brick_bytes();
+  tbb::enumerable_thread_specific<std::vector<std::byte>> buffers(
+      [&] { return std::vector<std::byte>(bytes); });
+  const auto start = Clock::now();
+  tbb::parallel_for_each(bricks,
+                         [&](Int3 b) { (void)store.read_brick(level, b, buffers.local().data()); });
+  return seconds_since(start);
+}
+
+int run(Arguments a) {
+  const StoreReader store(a.store);
+  a.options.backend = Backend::cuda;
+  NoProgress silent;
+  const std::vector<Int3> bricks = needed_bricks(store, a.options);
+  nlohmann::ordered_json out{{"store", a.store}, {"bricks", bricks.size()}};
+
+  std::vector<ExtractReport> reports;
+  for (int i = 0; i < a.runs; ++i) {
+    HashSink sink(false);
+    reports.push_back(extract(store, a.options, sink, silent));
+  }
+  const auto best =
+      std::min_element(reports.begin(), reports.end(),
+                       [](const auto& l, const auto& r) { return l.seconds < r.seconds; });
+  const ExtractReport& r = *best;
+
+  std::map<std::string, double> alone;
+  Workers workers(a.options.threads);
+  workers.execute([&] {
+    alone["read"] = read_alone(store, a.options.level, bricks);
+    alone["decode"] = decode_alone(store, a.options.level, bricks);
+  });
+  const std::uint64_t launches = std::max<std::uint64_t>(r.launches, 1);
+  alone["upload"] = copy_seconds(r.upload.bytes, r.upload.bytes / launches, true);
+  alone["download"] = copy_seconds(r.download.bytes, r.download.bytes / launches, false);
+  alone["kernel"] = r.kernel.seconds;  // by events: nothing else runs on the multiprocessors
+  const auto slowest = std::max_element(
+      alone.begin(), alone.end(), [](const auto& l, const auto& n) { return l.second < n.second; });
+  // Reading, decoding again what was dropped and gathering share the cores.
+  const double cores = alone["decode"] * static_cast<double>(r.brick_reads) /
+                           static_cast<double>(std::max<std::uint64_t>(r.bricks_read, 1)) +
+                       r.gather.seconds;
+  const double prediction = std::max(cores, slowest->second) + r.plan_seconds;
+
+  out["seconds"] = r.seconds;
+  out["first_seconds"] = reports.front().seconds;
+  out["plan_seconds"] = r.plan_seconds;
+  out["prediction"] = prediction;
+  out["slowest_alone"] = slowest->first;
+  out["ratio"] = slowest->second / r.seconds;
+  for (const auto& [name, seconds] : alone) out["alone"][name] = seconds;
+  for (const auto& [name, stage] : stages_of(r))
+    out["busy"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
+  out["triangles"] = r.triangles;
+  out["brick_reads"] = r.brick_reads;
+  out["bricks_read"] = r.bricks_read;
+  out["launches"] = r.launches;
+  out["device_bytes"] = r.device_bytes;
+  out["device_bytes_in_use"] = r.device_bytes_in_use;
+  out["pinned_bytes"] = r.pinned_bytes;
+  if (a.check) {
+    HashSink gpu(true), cpu(true);
+    extract(store, a.options, gpu, silent);
+    a.options.backend = Backend::cpu;
+    out["cpu_seconds"] = extract(store, a.options, cpu, silent).seconds;
+    out["same_as_cpu"] = gpu.hashes() == cpu.hashes() && gpu.bytes() == cpu.bytes();
+  }
+  if (a.json) {
+    fmt::print("{}\n", out.dump());
+  } else {
+    fmt::print(
+        "{} triangles in {:.3f} s (first {:.3f}), predicted {:.3f}; slowest alone: {} {:.3f}, "
+        "ratio {:.2f}\n",
+        r.triangles, r.seconds, reports.front().seconds, prediction, slowest->first,
+        slowest->second, slowest->second / r.seconds);
+    for (const auto& [name, stage] : stages_of(r))
+      fmt::print(
+          "  {:9} busy {:.3f} s, {:8.1f} MiB, alone {}\n", name, stage.seconds,
+          static_cast<double>(stage.bytes) / 1048576,
+          alone.count(std::string(name)) ? fmt::format("{:.3f}", alone[std::string(name)]) : "-");
+  }
+  return out.value("same_as_cpu", true) ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace isobrick::bench
+
+int main(int argc, char** argv) {
+  isobrick::bench::Arguments a;
+  CLI::App app{"A store to a mesh through the GPU, beside its stages alone"};
+  app.add_option("store", a.store)->required();
+  app.add_option("--isovalue", a.options.isovalue)->required();
+  app.add_option("--memory", a.options.memory)->transform(CLI::AsSizeValue(false));
+  app.add_option("--gpu-memory", a.options.gpu_memory)->transform(CLI::AsSizeValue(false));
+  app.add_option("--threads", a.options.threads);
+  app.add_flag("--normals", a.options.normals);
+  app.add_option("--runs", a.runs);
+  app.add_flag("--check", a.check, "compare with the CPU's mesh");
+  app.add_flag("--json", a.json);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return isobrick::bench::run(a);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bench_stream_extract: {}\n", error.what());
+    return 1;
+  }
+}
