@@ -15,10 +15,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "bench/copies.h"
 #include "isobrick/core/error.h"
@@ -31,6 +31,8 @@ namespace isobrick::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / 1048576; }
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -187,7 +189,9 @@ int run(Arguments a) {
     HashSink gpu(true), cpu(true);
     extract(store, a.options, gpu, silent);
     a.options.backend = Backend::cpu;
-    out["cpu_seconds"] = extract(store, a.options, cpu, silent).seconds;
+    extract(store, a.options, cpu, silent);
+    HashSink none(false);
+    out["cpu_seconds"] = extract(store, a.options, none, silent).seconds;
     out["same_as_cpu"] = gpu.hashes() == cpu.hashes() && gpu.bytes() == cpu.bytes();
   }
   if (a.json) {
@@ -198,10 +202,18 @@ int run(Arguments a) {
         "ratio {:.2f}\n",
         r.triangles, r.seconds, reports.front().seconds, prediction, slowest->first,
         slowest->second, slowest->second / r.seconds);
+    fmt::print(
+        "  of that {:.3f} s to plan; {} bricks read {} times; {} launches; {:.1f} MiB of device "
+        "memory, {:.1f} page-locked{}\n",
+        r.plan_seconds, r.bricks_read, r.brick_reads, r.launches, mebibytes(r.device_bytes),
+        mebibytes(r.pinned_bytes),
+        a.check ? fmt::format("; the CPU alone {:.3f} s, {}", out["cpu_seconds"].get<double>(),
+                              out["same_as_cpu"].get<bool>() ? "same mesh" : "OTHER MESH")
+                : "");
     for (const auto& [name, stage] : stages_of(r))
       fmt::print(
           "  {:9} busy {:.3f} s, {:8.1f} MiB, alone {}\n", name, stage.seconds,
-          static_cast<double>(stage.bytes) / 1048576,
+          mebibytes(stage.bytes),
           alone.count(std::string(name)) ? fmt::format("{:.3f}", alone[std::string(name)]) : "-");
   }
   return out.value("same_as_cpu", true) ? 0 : 1;

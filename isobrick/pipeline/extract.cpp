@@ -1,6 +1,8 @@
 #include "isobrick/pipeline/extract.h"
 
+#include <tbb/global_control.h>
 #include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -87,9 +89,13 @@ void extract_in_turn(const Stages& stages, const F& done) {
 }
 
 /// A batch is extracted while the next is decoded, the disk reads the one after that, and
-/// the one behind is planned.
+/// the one behind is planned. The cores prefer what the extraction asks of them: it is short,
+/// others wait for it, and decoding fills the time between.
 template <class F>
-void extract_overlapped(const Stages& stages, const F& done) {
+void extract_overlapped(const Stages& stages, int threads, const F& done) {
+  tbb::task_arena first(threads, 1, tbb::task_arena::priority::high);
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(threads));
   std::array<TileBatch, 4> batches;
   stages.batches.next(batches[0]);
   tbb::parallel_invoke([&] { stages.decode(batches[0]); },
@@ -99,7 +105,7 @@ void extract_overlapped(const Stages& stages, const F& done) {
                        });
   while (!batches[0].tiles.empty()) {
     const BrickView bricks = stages.cache.view(batches[0].bricks);
-    tbb::parallel_invoke([&] { stages.extract(batches[0], bricks); },
+    tbb::parallel_invoke([&] { first.execute([&] { stages.extract(batches[0], bricks); }); },
                          [&] { stages.decode(batches[1]); },
                          [&] { stages.batches.next(batches[3]); });
     stages.cache.will_need(batches[3].bricks);
@@ -183,8 +189,10 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     };
     const Stages stages{cache, batches, *surface, report};
     Workers workers(request.threads);
-    workers.execute(
-        [&] { plan.overlap ? extract_overlapped(stages, done) : extract_in_turn(stages, done); });
+    workers.execute([&] {
+      plan.overlap ? extract_overlapped(stages, request.threads, done)
+                   : extract_in_turn(stages, done);
+    });
     surface->finish();
     sink.finish();
     progress.end();

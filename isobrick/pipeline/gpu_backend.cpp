@@ -73,9 +73,7 @@ class CudaSession final : public GpuSession {
   }
 
   std::size_t good_batch() const override {
-    // So many that the cores find bricks enough to share, and so few that these are still
-    // in a cache when tiles are gathered from them.
-    constexpr std::size_t launches = 2;
+    constexpr std::size_t launches = 8;  // so that all cores find bricks enough to share
     return launches * sizes_.tiles;
   }
 
