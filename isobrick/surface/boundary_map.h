@@ -12,7 +12,8 @@ namespace isobrick {
 
 /// The boundaries of finished tiles that tiles still to come will ask for.
 /// Tiles come in Morton order, so a tile's last asker is its neighbour at
-/// (+1, +1, +1), or what is nearest to that in the grid: memory follows the surface between finished and unfinished.
+/// (+1, +1, +1), or what is nearest to that in the grid: memory follows the surface between
+/// finished and unfinished.
 class BoundaryMap {
  public:
   /// `tiles` is the grid.
