@@ -132,6 +132,7 @@ void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
         "store version {} is not known to this program, which knows {}; use a newer one", version,
         kStoreVersion));
   if (ours.has("may_have_nan")) image.may_have_nan = ours.at("may_have_nan").boolean();
+  if (ours.has("grid_class")) image.grid_class = ours.string_at("grid_class");
   if (ours.has("direction")) {
     const CheckedJson direction = ours.at("direction");
     if (direction.array_size() != 9) direction.damaged("must have 9 numbers");
@@ -185,6 +186,7 @@ std::string to_json(const ImageMetadata& image) {
   Json ours;
   ours["version"] = kStoreVersion;
   if (!finest.axis_aligned()) ours["direction"] = finest.direction;
+  if (!image.grid_class.empty()) ours["grid_class"] = image.grid_class;
   if (image.may_have_nan) ours["may_have_nan"] = *image.may_have_nan;
   if (image.checksum) ours[kChecksumKey] = *image.checksum;
 

@@ -33,6 +33,7 @@ struct ImageMetadata {
   bool ours = true;  ///< has `attributes.isobrick`
   /// Nothing when the store doesn't say.
   std::optional<bool> may_have_nan;
+  std::string grid_class;  ///< as OpenVDB calls it ("level set"), or empty
   /// What the root says that metadata_checksum() must be.
   std::optional<std::uint32_t> checksum;
 

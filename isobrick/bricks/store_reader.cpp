@@ -104,6 +104,7 @@ void StoreReader::Impl::open(const std::filesystem::path& path, const Selection&
   if (image.ours || find_ranges(may_have_nan))
     for (std::size_t i = 0; i < levels.size(); ++i) open_ranges(static_cast<int>(i));
   info.type = info.levels[0].lattice.type;
+  info.grid_class = image.grid_class;
   info.fill_value = levels[0].metadata.fill_value;
   info.codec = levels[0].metadata.codecs.name();
   info.may_have_nan = is_floating(info.type) && may_have_nan.value_or(true);

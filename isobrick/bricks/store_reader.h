@@ -38,8 +38,9 @@ struct StoreInfo {
   Selection selection;  ///< as it was asked for
   std::vector<LevelInfo> levels;
   ScalarType type = ScalarType::u8;
-  double fill_value = 0;  ///< of absent bricks; exact for every type
-  std::string codec;      ///< "zstd:3" or "none"
+  double fill_value = 0;   ///< of absent bricks; exact for every type
+  std::string grid_class;  ///< of the OpenVDB grid that it came from ("level set"), or empty
+  std::string codec;       ///< "zstd:3" or "none"
   /// Whether level 0 may hold NaN (always false for integers).
   bool may_have_nan = false;
   bool ours = true;                   ///< false: an image that another program has written

@@ -44,6 +44,7 @@ ArrayMetadata array_metadata(const LevelInfo& level, const StoreLayout& layout) 
 ImageMetadata image_metadata(const StoreLayout& layout) {
   ImageMetadata image;
   image.name = layout.name;
+  image.grid_class = layout.grid_class;
   for (std::size_t i = 0; i < layout.levels.size(); ++i)
     image.levels.push_back({std::to_string(i), layout.levels[i].transform});
   return image;

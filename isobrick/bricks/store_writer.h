@@ -21,6 +21,7 @@ struct StoreLayout {
   double fill_value = 0;
   bool may_have_nan = false;
   std::string name;
+  std::string grid_class;  ///< as OpenVDB calls it, or empty
 };
 
 /// Writes a store into a directory: bricks into shard files under temporary

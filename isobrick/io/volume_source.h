@@ -14,7 +14,9 @@ struct VolumeInfo {
   Int3 extent;  ///< samples along x, y, z
   ScalarType type = ScalarType::u8;
   Transform transform;
-  std::string name;  ///< for messages and metadata: the path, "standard input", "gyroid"
+  std::string name;        ///< for messages and metadata: the path, "standard input", "gyroid"
+  double fill_value = 0;   ///< what absent bricks hold: the value of empty space
+  std::string grid_class;  ///< what OpenVDB calls it: "level set", "fog volume", …; or empty
 };
 
 /// A volume that can be read piece by piece. Never holds the whole of it.
@@ -35,6 +37,14 @@ class VolumeSource {
   /// Bytes of memory that the source takes for itself at most, beside the
   /// samples that it is asked for; budgets count them.
   virtual std::size_t memory() const { return 0; }
+
+  /// True of a source with random access most of which may be the fill value;
+  /// is_fill() then tells quickly of what.
+  virtual bool sparse() const { return false; }
+
+  /// True when every sample of `box` is known, without looking at each, to be
+  /// the fill value; false says nothing. Thread-safe.
+  virtual bool is_fill(Box3) const { return false; }
 
   /// Copies the samples of `box` to `out`, C order [z, y, x], native byte
   /// order. `box` lies inside the extent; `out` has room for it.

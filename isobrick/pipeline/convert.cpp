@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "isobrick/bricks/store_writer.h"
@@ -10,6 +11,7 @@
 #include "isobrick/pipeline/convert_journal.h"
 #include "isobrick/pipeline/convert_level.h"
 #include "isobrick/pipeline/convert_plan.h"
+#include "isobrick/pipeline/convert_sparse.h"
 #include "isobrick/pipeline/convert_staging.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/slab_file.h"
@@ -35,19 +37,22 @@ IndexOptions index_options(const ConvertOptions& options, bool resume) {
 /// One conversion into a staging directory.
 class Conversion {
  public:
-  Conversion(VolumeSource& source, const StoreLayout& layout, const ConvertPlan& plan,
-             const ConvertStaging& staging, const ConvertOptions& options, Progress& progress)
+  /// By one of `plan` and `sparse`; the other is null.
+  Conversion(VolumeSource& source, const StoreLayout& layout, const ConvertPlan* plan,
+             SparsePyramid* sparse, const ConvertStaging& staging, const ConvertOptions& options,
+             Progress& progress)
       : source_(source),
         layout_(layout),
         options_(options),
         plan_(plan),
+        sparse_(sparse),
         staging_(staging),
         progress_(progress),
         store_(staging.path(), layout, staging.resumed()),
         journal_(staging.path(), layout.levels.front().lattice, staging.resumed()) {
-    for (int level = 0; level < level_count(); ++level)
+    for (int level = 0; plan != nullptr && level < level_count(); ++level)
       writers_.push_back(std::make_unique<LevelWriter>(store_, layout, level,
-                                                       plan.bricks_in_flight(),
+                                                       plan->bricks_in_flight(),
                                                        level == 0 ? &journal_ : nullptr, progress));
   }
 
@@ -65,7 +70,8 @@ class Conversion {
   VolumeSource& source_;
   const StoreLayout& layout_;
   const ConvertOptions& options_;
-  const ConvertPlan& plan_;
+  const ConvertPlan* plan_;
+  SparsePyramid* sparse_;
   const ConvertStaging& staging_;
   Progress& progress_;
   StoreWriter store_;
@@ -74,9 +80,18 @@ class Conversion {
 };
 
 ConvertReport Conversion::run() {
-  write_levels();
   ConvertReport report;
   bool has_nan = false;
+  if (sparse_ != nullptr) {
+    const SparsePyramid::Counts counts =
+        sparse_->write(store_, journal_, staging_.path(), staging_.resumed(), progress_);
+    report.bricks = counts.bricks;
+    report.bricks_absent = counts.absent;
+    report.bricks_kept = counts.kept;
+    has_nan = counts.has_nan;
+  } else {
+    write_levels();
+  }
   for (const auto& writer : writers_) {
     report.bricks += writer->counts().bricks;
     report.bricks_absent += writer->counts().absent;
@@ -105,11 +120,11 @@ void Conversion::add_chosen_index(ConvertReport& report) {
 
 void Conversion::write_levels() {
   std::unique_ptr<SpooledVolume> spooled;
-  if (!source_.random_access() && !plan_.cascade_fits(0)) spooled = spool_stream();
+  if (!source_.random_access() && !plan_->cascade_fits(0)) spooled = spool_stream();
   progress_.begin("convert", bytes_of(source_.info().extent, source_.info().type));
   for (int level = 0; level < level_count(); ++level) {
     VolumeSource& source = spooled ? static_cast<VolumeSource&>(*spooled) : source_;
-    if (plan_.cascade_fits(level)) {
+    if (plan_->cascade_fits(level)) {
       write_cascade(level, source);
       break;
     }
@@ -122,7 +137,7 @@ void Conversion::write_cascade(int first_level, VolumeSource& source) {
   std::vector<LevelWriter*> writers;
   for (int level = first_level; level < level_count(); ++level)
     writers.push_back(writers_[static_cast<std::size_t>(level)].get());
-  Cascade(plan_, layout_, first_level, writers).run(source);
+  Cascade(*plan_, layout_, first_level, writers).run(source);
 }
 
 /// Writes a level whose slabs do not fit and leaves the next one in a temporary
@@ -136,7 +151,7 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
     info.extent = half_extent(lattice.extent);
     next = std::make_unique<SpooledVolume>(staging_.path(), info);
   }
-  const Int3 piece = plan_.piece(level);
+  const Int3 piece = plan_->piece(level);
   const Int3 pieces = ceil_div(lattice.extent, piece);
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
       bytes_of(min(piece, lattice.extent), lattice.type));
@@ -163,7 +178,7 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
 std::unique_ptr<SpooledVolume> Conversion::spool_stream() {
   const VolumeInfo& info = source_.info();
   auto spooled = std::make_unique<SpooledVolume>(staging_.path(), info);
-  const Index planes = std::min(plan_.spool_planes(), info.extent.z);
+  const Index planes = std::min(plan_->spool_planes(), info.extent.z);
   Box3 box{{0, 0, 0}, {info.extent.x, info.extent.y, 0}};
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
       bytes_of({info.extent.x, info.extent.y, planes}, info.type));
@@ -186,12 +201,20 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
   const StoreLayout layout = plan_layout(source.info(), options);
   if (options.index)
     check_index_options(index_options(options, false), layout.levels.front().lattice);
-  const ConvertPlan plan(layout, options.memory, Workers(options.threads).threads(),
-                         source.random_access(), source.memory());
+  const int threads = Workers(options.threads).threads();
+  std::optional<ConvertPlan> plan;
+  std::optional<SparsePyramid> sparse;
+  if (SparsePyramid::possible(source, layout))
+    sparse.emplace(source, layout, options, threads);
+  else
+    plan.emplace(layout, options.memory, threads, source.random_access(), source.memory());
   ConvertStaging staging(out, options.resume, options.force);
-  Workers workers(plan.threads());
-  ConvertReport report = workers.execute(
-      [&] { return Conversion(source, layout, plan, staging, options, progress).run(); });
+  Workers workers(plan ? plan->threads() : sparse->threads());
+  ConvertReport report = workers.execute([&] {
+    return Conversion(source, layout, plan ? &*plan : nullptr, sparse ? &*sparse : nullptr, staging,
+                      options, progress)
+        .run();
+  });
   staging.publish();
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;

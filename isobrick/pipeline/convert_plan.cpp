@@ -59,6 +59,8 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
   check_options(volume, options);
   StoreLayout layout;
   layout.zstd_level = options.zstd_level;
+  layout.fill_value = volume.fill_value;
+  layout.grid_class = volume.grid_class;
   layout.name = std::filesystem::path(volume.name).filename().string();
   const Index shard = options.shard / options.brick * options.brick;
   LevelInfo level;

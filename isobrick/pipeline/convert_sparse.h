@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <set>
+#include <tuple>
+#include <vector>
+
+#include "isobrick/bricks/store_writer.h"
+#include "isobrick/core/progress.h"
+#include "isobrick/io/volume_source.h"
+#include "isobrick/pipeline/convert.h"
+#include "isobrick/pipeline/convert_journal.h"
+#include "isobrick/pipeline/sparse_ranges.h"
+
+namespace isobrick {
+
+/// Converts a source that knows where it is the fill value: only the bricks that
+/// may be something else are read, encoded and averaged, so that time and memory
+/// follow what is there and not the extent. The store is the one that a Cascade
+/// writes, but for the order of bricks within a shard.
+///
+/// A level is worked through by the bricks of the next one: the up to eight
+/// bricks that are averaged into one go through memory together, and the next
+/// level's bricks wait in a temporary file.
+class SparsePyramid {
+ public:
+  struct Counts {
+    std::uint64_t bricks = 0, absent = 0, kept = 0;
+    bool has_nan = false;
+  };
+
+  /// Whether a source and a layout can be converted in this way.
+  static bool possible(const VolumeSource& source, const StoreLayout& layout);
+
+  /// Throws UsageError, naming the least that does, for a budget that is too small.
+  SparsePyramid(VolumeSource& source, const StoreLayout& layout, const ConvertOptions& options,
+                int threads);
+
+  int threads() const { return threads_; }
+
+  Counts write(StoreWriter& store, ConvertJournal& journal, const std::filesystem::path& folder,
+               bool resumed, Progress& progress);
+
+ private:
+  class Level;
+
+  VolumeSource& source_;
+  const StoreLayout& layout_;
+  int threads_;
+  std::size_t in_flight_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,149 @@
+#include "isobrick/pipeline/sparse_ranges.h"
+
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <cstring>
+#include <map>
+#include <utility>
+
+#include "isobrick/core/range.h"
+#include "isobrick/pipeline/range_scan.h"
+
+namespace isobrick {
+namespace {
+
+constexpr Int3 kBlock{kBlockEdge, kBlockEdge, kBlockEdge};
+/// A chunk of ranges, in blocks and in samples.
+constexpr Index kChunkBlocks = StoreReader::kRangeChunk;
+constexpr Index kChunkSamples = kChunkBlocks * kBlockEdge;
+
+constexpr Int3 floor_div(Int3 a, Index b) { return {a.x / b, a.y / b, a.z / b}; }
+
+template <class T>
+class TypedSparseRanges final : public SparseRanges {
+ public:
+  TypedSparseRanges(StoreWriter& store, int level, const Lattice& lattice, double fill_value,
+                    BrickTest is_there)
+      : store_(store),
+        level_(level),
+        lattice_(lattice),
+        chunks_(ceil_div(lattice.blocks(), {kChunkBlocks, kChunkBlocks, kChunkBlocks})),
+        is_there_(std::move(is_there)) {
+    // Which zero a range keeps must not depend on where a sample lay.
+    fill_.include(static_cast<T>(fill_value));
+    if (!fill_.empty()) fill_ = {static_cast<T>(fill_.lo + T{0}), static_cast<T>(fill_.hi + T{0})};
+  }
+
+  void add(const BrickBlocks& brick) override {
+    const auto* pairs = reinterpret_cast<const ValueRange<T>*>(brick.pairs.data());
+    for_each_point(brick.blocks, [&](Int3 block) {
+      const Int3 chunk = floor_div(block, kChunkBlocks);
+      auto& ranges = open_[{chunk.z, chunk.y, chunk.x}];
+      if (ranges.empty()) ranges.resize(kChunkBlocks * kChunkBlocks * kChunkBlocks);
+      const Int3 inside = block - chunk * kChunkBlocks;
+      ranges[static_cast<std::size_t>(
+                 linear_index(inside, {kChunkBlocks, kChunkBlocks, kChunkBlocks}))]
+          .include(*pairs++);
+    });
+  }
+
+  void close(Index z1) override {
+    const bool all = z1 >= lattice_.extent.z;
+    // The last blocks of a layer see the first plane of the next one.
+    for (; next_ < chunks_.z && (all || (next_ + 1) * kChunkSamples < z1); ++next_) {
+      tbb::parallel_for(Index{0}, chunks_.x * chunks_.y, [&](Index i) {
+        const Int3 chunk{i % chunks_.x, i / chunks_.x, next_};
+        const auto found = open_.find({chunk.z, chunk.y, chunk.x});
+        put(chunk, found == open_.end() ? nullptr : &found->second);
+      });
+      open_.erase(open_.begin(), open_.lower_bound({next_ + 1, 0, 0}));
+    }
+  }
+
+ private:
+  using Ranges = std::vector<ValueRange<T>>;
+
+  /// Writes a chunk's blocks and the bricks that they make up.
+  void put(Int3 chunk, const Ranges* seen) {
+    const Int3 first = chunk * kChunkBlocks;
+    const Box3 blocks = intersect({first, first + Int3{kChunkBlocks, kChunkBlocks, kChunkBlocks}},
+                                  {{0, 0, 0}, lattice_.blocks()});
+    const Index edge = lattice_.brick.x;
+    const Box3 bricks{floor_div(first * kBlockEdge, edge),
+                      min(lattice_.bricks(), floor_div(first * kBlockEdge, edge) +
+                                                 Int3{1, 1, 1} * (kChunkSamples / edge))};
+    Ranges of_blocks(static_cast<std::size_t>(volume(blocks.extent())), fill_);
+    Ranges of_bricks(static_cast<std::size_t>(volume(bricks.extent())),
+                     seen == nullptr ? fill_ : ValueRange<T>{});
+    if (seen != nullptr) {
+      auto* out = of_blocks.data();
+      for_each_point(blocks, [&](Int3 block) {
+        ValueRange<T> range = (*seen)[static_cast<std::size_t>(
+            linear_index(block - first, {kChunkBlocks, kChunkBlocks, kChunkBlocks}))];
+        if (sees_fill(block)) range.include(fill_);
+        *out++ = range;
+        const Int3 brick = floor_div(block * kBlockEdge, edge) - bricks.lo;
+        of_bricks[static_cast<std::size_t>(linear_index(brick, bricks.extent()))].include(range);
+      });
+    }
+    store_.put_block_ranges(level_, blocks, std::as_bytes(std::span(of_blocks)));
+    store_.put_brick_ranges(level_, bricks, std::as_bytes(std::span(of_bricks)));
+  }
+
+  /// Whether any of the bricks that a block's cells touch is not there.
+  bool sees_fill(Int3 block) const {
+    const Int3 last = min(block * kBlockEdge + kBlock, lattice_.extent - Int3{1, 1, 1});
+    const Box3 bricks{floor_div(block * kBlockEdge, lattice_.brick.x),
+                      floor_div(last, lattice_.brick.x) + Int3{1, 1, 1}};
+    bool fill = false;
+    for_each_point(bricks, [&](Int3 brick) { fill = fill || !is_there_(brick); });
+    return fill;
+  }
+
+  StoreWriter& store_;
+  int level_;
+  Lattice lattice_;
+  Int3 chunks_;
+  BrickTest is_there_;
+  ValueRange<T> fill_;
+  std::map<std::array<Index, 3>, Ranges> open_;  ///< by z, y, x of the chunk
+  Index next_ = 0;
+};
+
+}  // namespace
+
+BrickBlocks scan_brick(const Lattice& lattice, Box3 box, const std::byte* samples) {
+  // A lattice of its own, which begins one block below the brick.
+  const Int3 origin = max(box.lo - kBlock, {0, 0, 0});
+  const Lattice local{box.hi - origin, lattice.brick, lattice.type};
+  const auto ranges = make_level_ranges(local);
+  ranges->add({box.lo - origin, box.hi - origin}, samples);
+  BrickBlocks result;
+  const Int3 first = floor_div(origin, kBlockEdge);
+  result.blocks = {first, first + local.blocks()};
+  ranges->close(
+      local.extent.z,
+      [&](Box3, std::span<const std::byte> pairs) {
+        result.pairs.insert(result.pairs.end(), pairs.begin(), pairs.end());
+      },
+      [](Box3, std::span<const std::byte>) {});
+  result.has_nan = ranges->has_nan();
+  return result;
+}
+
+bool sparse_ranges_possible(const Lattice& lattice) {
+  const Index edge = lattice.brick.x;
+  return edge % kBlockEdge == 0 && kChunkSamples % edge == 0;
+}
+
+std::unique_ptr<SparseRanges> make_sparse_ranges(StoreWriter& store, int level,
+                                                 const Lattice& lattice, double fill_value,
+                                                 BrickTest is_there) {
+  return visit_scalar(lattice.type, [&](auto tag) -> std::unique_ptr<SparseRanges> {
+    return std::make_unique<TypedSparseRanges<typename decltype(tag)::type>>(
+        store, level, lattice, fill_value, std::move(is_there));
+  });
+}
+
+}  // namespace isobrick
