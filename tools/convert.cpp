@@ -30,13 +30,23 @@ void add_volume_options(CLI::App* app, VolumeRequest& volume) {
   add_parsed(app, volume.unit, [](const std::string& text) { return text; },
              {"--unit", "NAME", "Unit of world space, such as micrometer"});
   add_selection(app, volume.selection);
+  add_parsed(app, volume.grid, [](const std::string& text) { return text; },
+             {"--grid", "NAME", "Which grid of an OpenVDB file that has several"});
+  add_parsed(app, volume.region, parse_roi,
+             {"--roi", "X0:X1,Y0:Y1,Z0:Z1",
+              "Box of an OpenVDB grid in its own coordinates, such as --roi=-8:8,:,:",
+              "its active voxels"});
 }
 
 /// Zarr is read as stores are, all else as files.
 std::unique_ptr<VolumeSource> open_input(const Arguments& arguments) {
-  if (is_zarr(arguments.in))
+  if (is_zarr(arguments.in)) {
+    refuse_grid(arguments.in, arguments.volume);
     return open_store_source(arguments.in, arguments.volume, arguments.store.threads);
-  return open_source(arguments.in, arguments.volume);
+  }
+  VolumeRequest volume = arguments.volume;
+  volume.memory = arguments.store.memory;
+  return open_source(arguments.in, volume);
 }
 
 int run(const Arguments& arguments, Console& console) {

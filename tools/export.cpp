@@ -20,25 +20,36 @@ struct Arguments {
   ExportOptions options;
 };
 
+constexpr std::pair<std::string_view, ExportFormat> kFormats[] = {
+    {"raw", ExportFormat::raw}, {"nrrd", ExportFormat::nrrd}, {"vdb", ExportFormat::vdb}};
+
+ExportFormat format_by_name(const std::string& path) {
+  for (const auto& [name, format] : kFormats)
+    if (extension_of(path) == fmt::format(".{}", name)) return format;
+  return ExportFormat::raw;
+}
+
+std::string_view name_of(ExportFormat format) {
+  return kFormats[static_cast<std::size_t>(format)].first;
+}
+
 int run(const Arguments& arguments, Console& console) {
   const StoreReader store(arguments.store, arguments.selection);
   ExportOptions options = arguments.options;
   const Box3 box = store_region(store, options.level, arguments.roi);
   options.roi = box;
-  const bool named_nrrd = extension_of(arguments.out) == ".nrrd";
-  options.format = arguments.format.value_or(named_nrrd ? ExportFormat::nrrd : ExportFormat::raw);
+  options.format = arguments.format.value_or(format_by_name(arguments.out));
   const std::uint64_t bytes = export_volume(store, arguments.out, options, console.progress());
   const ScalarType type = store.info().type;
-  const nlohmann::ordered_json object{
-      {"command", "export"},
-      {"store", arguments.store},
-      {"output", arguments.out},
-      {"format", options.format == ExportFormat::nrrd ? "nrrd" : "raw"},
-      {"level", options.level},
-      {"extent", to_json(box.extent())},
-      {"type", zarr_name(type)},
-      {"bytes_out", bytes},
-      {"peak_resident_bytes", peak_resident_bytes()}};
+  const nlohmann::ordered_json object{{"command", "export"},
+                                      {"store", arguments.store},
+                                      {"output", arguments.out},
+                                      {"format", name_of(options.format)},
+                                      {"level", options.level},
+                                      {"extent", to_json(box.extent())},
+                                      {"type", zarr_name(type)},
+                                      {"bytes_out", bytes},
+                                      {"peak_resident_bytes", peak_resident_bytes()}};
   console.result(object,
                  fmt::format("{}: {} samples of {}, little endian, {}\n", arguments.out,
                              human_extent(box.extent()), zarr_name(type), human_bytes(bytes)));
@@ -46,9 +57,9 @@ int run(const Arguments& arguments, Console& console) {
 }
 
 ExportFormat parse_format(const std::string& text) {
-  if (text == "raw") return ExportFormat::raw;
-  if (text == "nrrd") return ExportFormat::nrrd;
-  throw UsageError(fmt::format("'{}' is no format of a volume; it is raw or nrrd", text));
+  for (const auto& [name, format] : kFormats)
+    if (text == name) return format;
+  throw UsageError(fmt::format("'{}' is no format of a volume; it is raw, nrrd or vdb", text));
 }
 
 }  // namespace
@@ -59,12 +70,14 @@ void add_export(Program& program) {
       add_subcommand(program, "export", "Write the samples of a store as a file, bit for bit.",
                      "isobrick export head.zarr jaw.nrrd --roi :,:,0:40");
   add_path(app, "STORE", arguments->store, "Store to read");
-  add_path(
-      app, "OUT", arguments->out,
-      "File to write: NRRD if it ends in .nrrd, raw otherwise; C order [z, y, x], little endian");
+  add_path(app, "OUT", arguments->out,
+           "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb, raw otherwise (C order "
+           "[z, y, x], "
+           "little endian)");
   add_parsed(app, arguments->format, parse_format,
-             {"--format", "raw|nrrd",
-              "Format of the file; NRRD keeps spacing, origin and direction", "by its extension"});
+             {"--format", "raw|nrrd|vdb",
+              "Format of the file; NRRD and OpenVDB keep spacing, origin and direction",
+              "by its extension"});
   add_level(app, arguments->options.level);
   add_roi(app, arguments->roi);
   add_selection(app, arguments->selection);

@@ -132,7 +132,7 @@ std::optional<int> parse_levels(std::string_view text) {
 RoiText parse_roi(std::string_view text) {
   const auto parts = split3(text);
   if (!parts) throw UsageError(fmt::format("'{}' is not of the form X0:X1,Y0:Y1,Z0:Z1", text));
-  constexpr Index most = std::numeric_limits<Index>::max();
+  constexpr Index most = Index{1} << 32;
   RoiText roi;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string_view part = (*parts)[axis];
@@ -140,8 +140,8 @@ RoiText parse_roi(std::string_view text) {
     const auto colon = part.find(':');
     if (colon == std::string_view::npos)
       throw UsageError(fmt::format("'{}' in '{}' is not of the form FROM:TO", part, text));
-    if (colon > 0) roi.lo[axis] = parse_whole(part.substr(0, colon), 0, most);
-    if (colon + 1 < part.size()) roi.hi[axis] = parse_whole(part.substr(colon + 1), 0, most);
+    if (colon > 0) roi.lo[axis] = parse_whole(part.substr(0, colon), -most, most);
+    if (colon + 1 < part.size()) roi.hi[axis] = parse_whole(part.substr(colon + 1), -most, most);
   }
   return roi;
 }
@@ -152,7 +152,7 @@ Box3 resolve_roi(const RoiText& roi, Int3 extent) {
     const auto i = static_cast<std::size_t>(axis);
     box.lo[axis] = roi.lo[i].value_or(0);
     box.hi[axis] = roi.hi[i].value_or(extent[axis]);
-    if (box.lo[axis] >= box.hi[axis] || box.hi[axis] > extent[axis])
+    if (box.lo[axis] < 0 || box.lo[axis] >= box.hi[axis] || box.hi[axis] > extent[axis])
       throw UsageError(
           fmt::format("the region {}:{} along {} is empty or leaves the volume, which "
                       "has samples 0:{} there",

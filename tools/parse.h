@@ -56,9 +56,7 @@ std::optional<int> parse_codec(std::string_view text);
 std::optional<int> parse_levels(std::string_view text);
 
 /// A region as it was typed: what is left out reaches to the border.
-struct RoiText {
-  std::array<std::optional<Index>, 3> lo, hi;
-};
+using RoiText = RegionRequest;
 
 /// "X0:X1,Y0:Y1,Z0:Z1", half-open; any number, or a whole part, may be left out.
 RoiText parse_roi(std::string_view text);

@@ -13,6 +13,10 @@
 #ifdef ISOBRICK_WITH_HDF5
 #include "isobrick/io/hdf5_volume.h"
 #endif
+#ifdef ISOBRICK_WITH_OPENVDB
+#include "isobrick/io/vdb_module.h"
+#endif
+#include "isobrick/io/vdb_writer.h"
 #ifdef ISOBRICK_WITH_DICOM
 #include "isobrick/io/dicom_volume.h"
 #endif
@@ -56,6 +60,24 @@ std::unique_ptr<VolumeSource> open_hdf5_if_built(const std::string& file,
   return open_hdf5(file, dataset, said);
 #else
   built_without(file, "an HDF5 file", "libhdf5-dev");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file,
+                                                [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_OPENVDB
+  return vdb_module().open(file, said);
+#else
+  built_without(file, "an OpenVDB file", "libopenvdb-dev");
+#endif
+}
+
+std::unique_ptr<VdbWriter> make_vdb_writer_if_built([[maybe_unused]] const VolumeInfo& info,
+                                                    [[maybe_unused]] const std::string& name) {
+#ifdef ISOBRICK_WITH_OPENVDB
+  return vdb_module().make_writer(info, name);
+#else
+  throw UsageError("this isobrick cannot write OpenVDB files: it was built without libopenvdb-dev");
 #endif
 }
 

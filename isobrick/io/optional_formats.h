@@ -19,6 +19,7 @@ std::unique_ptr<VolumeSource> open_tiff_if_built(const std::string& name,
 std::unique_ptr<VolumeSource> open_hdf5_if_built(const std::string& file,
                                                  const std::string& dataset,
                                                  const VolumeRequest& said);
+std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file, const VolumeRequest& said);
 std::unique_ptr<VolumeSource> open_dicom_if_built(const std::string& name,
                                                   const std::vector<std::string>& files,
                                                   const VolumeRequest& said);

@@ -74,6 +74,9 @@ class OutputFile {
   FileWriter& writer() { return writer_; }
   const FileWriter& writer() const { return writer_; }
   const std::string& path() const { return path_; }
+  /// Where it is until it is published, for a library that opens files itself;
+  /// the writer is not used then.
+  const std::string& temporary_path() const { return temporary_; }
 
   /// Flushes and renames. Replaces a file that appeared in the meantime only with `force`.
   void publish();

@@ -15,6 +15,7 @@ enum class VolumeFormat : std::uint8_t {
   tiff,
   hdf5,
   dicom,
+  vdb,  ///< OpenVDB
 };
 
 /// The format of a file: by its first bytes, else by its extension. Throws Error

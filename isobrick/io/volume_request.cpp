@@ -30,7 +30,11 @@ void check_geometry(const VolumeInfo& info) {
 
 VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
                            Transform transform, const VolumeRequest& said) {
-  VolumeInfo info{extent, type, std::move(transform), path};
+  VolumeInfo info;
+  info.extent = extent;
+  info.type = type;
+  info.transform = std::move(transform);
+  info.name = path;
   if (said.spacing) info.transform.spacing = *said.spacing;
   if (said.origin) info.transform.origin = *said.origin;
   if (said.unit) info.transform.unit = *said.unit;
@@ -50,6 +54,12 @@ void refuse_raw_description(const std::string& path, std::string_view format,
         fmt::format("'{}' is {}, which says itself what --dims, --type, --endian and "
                     "--offset are for: leave {} out",
                     path, format, option));
+}
+
+void refuse_grid(const std::string& path, const VolumeRequest& said) {
+  if (said.grid || said.region)
+    throw UsageError(
+        fmt::format("'{}' is no OpenVDB file: leave {} out", path, said.grid ? "--grid" : "--roi"));
 }
 
 void refuse_selection(const std::string& path, const VolumeRequest& said) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -11,6 +12,11 @@
 namespace isobrick {
 
 enum class ByteOrder : std::uint8_t { little, big };
+
+/// A box of which every bound may be left out; half-open.
+struct RegionRequest {
+  std::array<std::optional<Index>, 3> lo, hi;
+};
 
 /// What the caller says about a volume. The first four are for raw files, where
 /// they go before what a header beside the file or its name says; the others
@@ -24,6 +30,11 @@ struct VolumeRequest {
   std::optional<Vec3d> origin;
   std::optional<std::string> unit;
   Selection selection;
+  std::optional<std::string> grid;      ///< of an OpenVDB file
+  std::optional<RegionRequest> region;  ///< of a sparse grid, in its own index coordinates
+  /// Bytes that a source may take for itself: one that holds its samples in
+  /// memory refuses when it needs more; nothing: as many as it likes.
+  std::optional<std::uint64_t> memory;
 };
 
 /// What a file and the caller together say of a volume. Throws UsageError for
@@ -35,6 +46,9 @@ VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type
 /// `format` ("a NIfTI file"), describes itself.
 void refuse_raw_description(const std::string& path, std::string_view format,
                             const VolumeRequest& said);
+
+/// Throws UsageError for a grid or a region of grids where there are none.
+void refuse_grid(const std::string& path, const VolumeRequest& said);
 
 /// Throws UsageError for a channel or a time that a file with one of each lacks.
 void refuse_selection(const std::string& path, const VolumeRequest& said);

@@ -9,6 +9,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/io/nrrd_writer.h"
 #include "isobrick/io/output_file.h"
+#include "isobrick/io/vdb_writer.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
@@ -67,11 +68,58 @@ void for_each_piece(Box3 box, Int3 brick, Int3 piece, F&& f) {
 
 /// The exported box as a volume of its own.
 VolumeInfo describe(const LevelInfo& level, Box3 box, const std::string& name) {
-  VolumeInfo info{box.extent(), level.lattice.type, level.transform, name};
+  VolumeInfo info;
+  info.extent = box.extent();
+  info.type = level.lattice.type;
+  info.transform = level.transform;
+  info.name = name;
   info.transform.origin =
       level.transform.apply({static_cast<double>(box.lo.x), static_cast<double>(box.lo.y),
                              static_cast<double>(box.lo.z)});
   return info;
+}
+
+/// What a reader of the file sees: the samples of a box of the store.
+struct Piece {
+  const StoreReader& store;
+  int level;
+  Box3 box;
+  const Lattice& lattice() const {
+    return store.info().levels[static_cast<std::size_t>(level)].lattice;
+  }
+};
+
+/// Whether all bricks that `part` touches are absent.
+bool is_absent(const Piece& in, Box3 part) {
+  const Int3 edge = in.lattice().brick;
+  bool absent = true;
+  for_each_point(
+      {{part.lo.x / edge.x, part.lo.y / edge.y, part.lo.z / edge.z}, ceil_div(part.hi, edge)},
+      [&](Int3 b) { absent = absent && !in.store.locate(in.level, b); });
+  return absent;
+}
+
+void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& options,
+                Workers& workers, OutputFile& output, Progress& progress) {
+  const Lattice& lattice = in.lattice();
+  VolumeInfo grid_info = info;
+  grid_info.fill_value = in.store.info().fill_value;
+  grid_info.grid_class = in.store.info().grid_class;
+  const auto grid = make_vdb_writer_if_built(grid_info, "density");
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
+  for_each_piece(in.box, lattice.brick, lattice.brick, [&](Box3 part) {
+    const auto bytes = static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes();
+    progress.advance(bytes);
+    if (is_absent(in, part)) return;
+    workers.execute([&] { read_slab(in.store, in.level, part, buffer.get()); });
+    grid->put({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
+    if (const std::uint64_t held = grid->memory() + kProgramBytes; held > options.memory)
+      throw UsageError(fmt::format(
+          "the grid takes more than the memory budget of {} MiB, and OpenVDB holds it whole: "
+          "give more, or export a region or a coarser level",
+          options.memory / kMiB));
+  });
+  grid->write(output.temporary_path());
 }
 
 }  // namespace
@@ -87,6 +135,16 @@ std::uint64_t export_volume(const StoreReader& store, const std::filesystem::pat
       options.memory - std::min(options.memory, decode_extra(store.info(), workers.threads())),
       workers.threads());
   OutputFile output(out.string(), options.force);
+  if (options.format == ExportFormat::vdb) {
+    const std::uint64_t bytes =
+        static_cast<std::uint64_t>(volume(box.extent())) * lattice.sample_bytes();
+    progress.begin("export", bytes);
+    export_vdb({store, options.level, box}, describe(level, box, out.string()), options, workers,
+               output, progress);
+    progress.end();
+    output.publish();
+    return bytes;
+  }
   if (options.format == ExportFormat::nrrd)
     output.writer().append(nrrd_header_text(describe(level, box, out.string())));
   output.writer().flush();

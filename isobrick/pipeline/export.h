@@ -10,7 +10,7 @@
 namespace isobrick {
 
 /// The files that samples can become.
-enum class ExportFormat : std::uint8_t { raw, nrrd };
+enum class ExportFormat : std::uint8_t { raw, nrrd, vdb };
 
 struct ExportOptions {
   ExportFormat format = ExportFormat::raw;
@@ -23,7 +23,11 @@ struct ExportOptions {
 
 /// Writes the samples of one level (or of a region) bit for bit, C order [z, y, x],
 /// little endian; as NRRD behind a header that keeps their place in world space.
-/// Memory: one row of bricks at a time, within the budget. Nothing appears under
+/// As OpenVDB: a sparse grid with the same samples and place; smaller integers
+/// become int32, u32 becomes int64.
+/// Memory: one row of bricks at a time, within the budget; for OpenVDB also the
+/// grid, which must be whole before it can be written: its samples that are not
+/// the fill value, or a UsageError once they exceed the budget. Nothing appears under
 /// the final name until it is whole. Returns the bytes of samples written.
 std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
                             const ExportOptions& options, Progress& progress);

@@ -61,9 +61,9 @@ TEST(Parse, Roi) {
   EXPECT_EQ(box("1:2,3:4,5:6"), (Box3{{1, 3, 5}, {2, 4, 6}}));
   EXPECT_EQ(box(":5,,"), (Box3{{0, 0, 0}, {5, 20, 30}}));
   EXPECT_EQ(box(":,7:,:30"), (Box3{{0, 7, 0}, {10, 20, 30}}));
-  for (const char* text : {"", ":", "1,2,3", ":,:", "a:b,,", "-1:2,,", "1:2:3,,", ",,,"})
+  for (const char* text : {"", ":", "1,2,3", ":,:", "a:b,,", "1:2:3,,", ",,,"})
     EXPECT_THROW(parse_roi(text), UsageError) << text;
-  for (const char* text : {"0:11,,", "5:5,,", "6:5,,", ",20:,", ",,30:31"})
+  for (const char* text : {"-1:2,,", "0:11,,", "5:5,,", "6:5,,", ",20:,", ",,30:31"})
     EXPECT_THROW(box(text), UsageError) << text;
 }
 
