@@ -20,7 +20,8 @@ namespace {
 /// a stream that throws can. It is read at once: nothing is loaded later.
 class GridArchive : public openvdb::io::Archive {
  public:
-  explicit GridArchive(const std::string& path) : buffer_(std::size_t{1} << 20) {
+  // OpenVDB seeks often, and a file stream fills its buffer anew each time.
+  explicit GridArchive(const std::string& path) : buffer_(std::size_t{1} << 14) {
     in_.rdbuf()->pubsetbuf(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
     in_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
     in_.open(path, std::ios::binary);
