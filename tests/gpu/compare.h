@@ -52,6 +52,30 @@ inline void expect_same(const MeshBuffer& cpu, const MeshBuffer& device) {
       << first_difference(cpu.triangles, device.triangles);
 }
 
+/// A field a part of whose bricks of 32³ is absent, and so nothing but the fill value.
+template <class T>
+struct HoledField final : BrickLookup {
+  Field<T> field;
+  Lattice lattice;
+  DenseBricks bricks;  ///< all of them
+
+  HoledField(Field<T> f, T fill)
+      : field(holed(std::move(f), fill)),
+        lattice{field.extent, {32, 32, 32}, scalar_type_of<T>},
+        bricks(lattice, field.samples.data()) {}
+
+  static bool absent(Int3 b) { return (b.x + b.y + 2 * b.z) % 3 == 0; }
+  const std::byte* find(Int3 b) const override { return absent(b) ? nullptr : bricks.find(b); }
+
+ private:
+  static Field<T> holed(Field<T> f, T fill) {
+    for_each_point(f.box(), [&](Int3 p) {
+      if (absent({p.x / 32, p.y / 32, p.z / 32})) f.at(p) = fill;
+    });
+    return f;
+  }
+};
+
 /// Fields in the range of every type that has kernels; skipped where there is no device.
 template <class T>
 class DeviceTest : public ::testing::Test {

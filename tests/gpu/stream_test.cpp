@@ -170,28 +170,16 @@ TYPED_TEST(GpuStream, TransformsTurnAndMirror) {
 TYPED_TEST(GpuStream, AbsentBricksAreTheFillValue) {
   using T = TypeParam;
   const auto fill = static_cast<T>(this->lowest() + 30);
-  auto field = this->waves({131, 70, 97});
-  const Lattice lattice{field.extent, {32, 32, 32}, scalar_type_of<T>};
-  const auto absent = [](Int3 b) { return (b.x + b.y + 2 * b.z) % 3 == 0; };
-  for_each_point(field.box(), [&](Int3 p) {
-    if (absent({p.x / 32, p.y / 32, p.z / 32})) field.at(p) = fill;
-  });
-  const DenseBricks all(lattice, field.samples.data());
-  struct Some final : BrickLookup {
-    const DenseBricks& all;
-    std::function<bool(Int3)> absent;
-    Some(const DenseBricks& a, std::function<bool(Int3)> f) : all(a), absent(std::move(f)) {}
-    const std::byte* find(Int3 b) const override { return absent(b) ? nullptr : all.find(b); }
-  };
+  const HoledField<T> holed(this->waves({131, 70, 97}), fill);
   SurfaceOptions options;
-  options.roi = lattice.box();
+  options.roi = holed.lattice.box();
   options.normals = true;
   options.isovalue = this->lowest() + 100.5;
   options.fill_value = static_cast<double>(fill);
-  const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
-  const Streamed made = stream(lattice, Some(all, absent), options, tiles, {16});
+  const std::vector<TileWork> tiles = active_tiles(holed.field, options.isovalue);
+  const Streamed made = stream(holed.lattice, holed, options, tiles, {16});
   EXPECT_GT(made.report.triangles, 1000u);
-  expect_same(on_cpu(field, lattice, all, options), made.mesh);
+  expect_same(on_cpu(holed.field, holed.lattice, holed.bricks, options), made.mesh);
 }
 
 TYPED_TEST(GpuStream, WhoTakesTheMeshMayFail) {
