@@ -22,7 +22,7 @@ inline constexpr unsigned kAll = 0xffffffffu;
 /// How many threads share a tile, and how its rows are dealt out to them.
 template <int N>
 struct Team {
-  static constexpr int kThreads = N, kWarps = N / 32;
+  static constexpr int kWarps = N / 32;
   static constexpr int kSteps = (kRowsOfTile + N - 1) / N;
 };
 

@@ -55,22 +55,34 @@ inline void expect_same(const MeshBuffer& cpu, const MeshBuffer& device) {
 /// A field a part of whose bricks of 32³ is absent, and so nothing but the fill value.
 template <class T>
 struct HoledField final : BrickLookup {
+  T fill;
   Field<T> field;
   Lattice lattice;
   DenseBricks bricks;  ///< all of them
 
-  HoledField(Field<T> f, T fill)
-      : field(holed(std::move(f), fill)),
+  HoledField(Field<T> f, T value)
+      : fill(value),
+        field(holed(std::move(f), value)),
         lattice{field.extent, {32, 32, 32}, scalar_type_of<T>},
         bricks(lattice, field.samples.data()) {}
+
+  /// With normals, of the whole.
+  SurfaceOptions options(double isovalue) const {
+    SurfaceOptions options;
+    options.roi = lattice.box();
+    options.normals = true;
+    options.isovalue = isovalue;
+    options.fill_value = static_cast<double>(fill);
+    return options;
+  }
 
   static bool absent(Int3 b) { return (b.x + b.y + 2 * b.z) % 3 == 0; }
   const std::byte* find(Int3 b) const override { return absent(b) ? nullptr : bricks.find(b); }
 
  private:
-  static Field<T> holed(Field<T> f, T fill) {
+  static Field<T> holed(Field<T> f, T value) {
     for_each_point(f.box(), [&](Int3 p) {
-      if (absent({p.x / 32, p.y / 32, p.z / 32})) f.at(p) = fill;
+      if (absent({p.x / 32, p.y / 32, p.z / 32})) f.at(p) = value;
     });
     return f;
   }

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume.h"
 #include "tests/gpu/compare.h"
@@ -85,13 +84,8 @@ TYPED_TEST(GpuResident, TransformsTurnAndMirror) {
 
 TYPED_TEST(GpuResident, AbsentBricksAreTheFillValue) {
   using T = TypeParam;
-  const auto fill = static_cast<T>(this->lowest() + 30);
-  const HoledField<T> holed(this->waves({131, 70, 97}), fill);
-  SurfaceOptions options;
-  options.roi = holed.lattice.box();
-  options.normals = true;
-  options.isovalue = this->lowest() + 100.5;
-  options.fill_value = static_cast<double>(fill);
+  const HoledField<T> holed(this->waves({131, 70, 97}), static_cast<T>(this->lowest() + 30));
+  const SurfaceOptions options = holed.options(this->lowest() + 100.5);
   gpu::DeviceVolume volume(holed.lattice, holed, options.fill_value);
   gpu::ResidentExtractor extractor(volume, options);
   EXPECT_GT(extractor.extract(options.isovalue).triangles, 1000u);

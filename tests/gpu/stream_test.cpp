@@ -169,13 +169,8 @@ TYPED_TEST(GpuStream, TransformsTurnAndMirror) {
 
 TYPED_TEST(GpuStream, AbsentBricksAreTheFillValue) {
   using T = TypeParam;
-  const auto fill = static_cast<T>(this->lowest() + 30);
-  const HoledField<T> holed(this->waves({131, 70, 97}), fill);
-  SurfaceOptions options;
-  options.roi = holed.lattice.box();
-  options.normals = true;
-  options.isovalue = this->lowest() + 100.5;
-  options.fill_value = static_cast<double>(fill);
+  const HoledField<T> holed(this->waves({131, 70, 97}), static_cast<T>(this->lowest() + 30));
+  const SurfaceOptions options = holed.options(this->lowest() + 100.5);
   const std::vector<TileWork> tiles = active_tiles(holed.field, options.isovalue);
   const Streamed made = stream(holed.lattice, holed, options, tiles, {16});
   EXPECT_GT(made.report.triangles, 1000u);
