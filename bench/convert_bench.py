@@ -5,7 +5,7 @@ Both run in turn, so that whatever else the machine does meets both alike; the
 medians of wall and processor time are printed, and their ratio. A conversion
 also computes ranges and the pyramid; zstd only compresses.
 
-    bench/convert_bench.py build/bin/isobrick engine_256x256x128_uint8.raw …
+    bench/convert_bench.py build/release/bin/isobrick engine_256x256x128_uint8.raw …
 """
 
 import argparse

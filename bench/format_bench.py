@@ -7,7 +7,7 @@ all alike: the library reads the file, isobrick converts the raw file, isobrick 
 the file. The last should take at most 1.3 times the slower of the first two. Wall
 and processor seconds, medians; on a busy machine the latter say more.
 
-    bench/format_bench.py build/bin/isobrick bonsai_256x256x256_uint8.raw
+    bench/format_bench.py build/release/bin/isobrick bonsai_256x256x256_uint8.raw
 
 Needs Debian's numpy, and of nibabel, vtkmodules, tifffile, h5py, pydicom what is to be
 compared.

@@ -64,7 +64,7 @@ option(ISOBRICK_OPENVDB "Read and write OpenVDB grids" ${isobrick_openvdb_found}
 if(ISOBRICK_OPENVDB AND NOT isobrick_openvdb_found)
   message(FATAL_ERROR "ISOBRICK_OPENVDB is on, but OpenVDB or Boost's headers were not found")
 elseif(NOT ISOBRICK_OPENVDB)
-  message(STATUS "OpenVDB not found or turned off: .vdb files cannot be read or written")
+  message(STATUS "OpenVDB or Boost's headers not found, or turned off: .vdb files cannot be read or written")
 endif()
 set(isobrick_openvdb_libraries ${ISOBRICK_OPENVDB_LIBRARY})
 if(ISOBRICK_IMATH_LIBRARY)

@@ -65,7 +65,8 @@ void add_convert(Program& program) {
       "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
       "  isobrick convert engine_256x256x128_uint8.raw engine.zarr   # the name says it all");
   add_path(app, "IN", arguments->in,
-           "Volume of a known format, raw file, or - for raw samples on standard input");
+           "Volume of a known format, FILE:/NAME for an array in it, folder of slices, Zarr, raw "
+           "file, or - for raw samples on standard input");
   add_path(app, "OUT", arguments->out, "Store to write, such as OUT.zarr");
   add_volume_options(app, arguments->volume);
   add_store_options(app, arguments->store);

@@ -1,5 +1,6 @@
 #include "isobrick/pipeline/export.h"
 
+#include <filesystem>
 #include <memory>
 
 #include <fmt/format.h>
@@ -39,7 +40,8 @@ int run(const Arguments& arguments, Console& console) {
   const Box3 box = store_region(store, options.level, arguments.roi);
   options.roi = box;
   options.format = arguments.format.value_or(format_by_name(arguments.out));
-  const std::uint64_t bytes = export_volume(store, arguments.out, options, console.progress());
+  export_volume(store, arguments.out, options, console.progress());
+  const std::uint64_t bytes = std::filesystem::file_size(arguments.out);
   const ScalarType type = store.info().type;
   const nlohmann::ordered_json object{{"command", "export"},
                                       {"store", arguments.store},
@@ -50,9 +52,10 @@ int run(const Arguments& arguments, Console& console) {
                                       {"type", zarr_name(type)},
                                       {"bytes_out", bytes},
                                       {"peak_resident_bytes", peak_resident_bytes()}};
-  console.result(object,
-                 fmt::format("{}: {} samples of {}, little endian, {}\n", arguments.out,
-                             human_extent(box.extent()), zarr_name(type), human_bytes(bytes)));
+  console.result(object, fmt::format("{}: {} samples of {}{}, {}\n", arguments.out,
+                                     human_extent(box.extent()), zarr_name(type),
+                                     options.format == ExportFormat::vdb ? "" : ", little endian",
+                                     human_bytes(bytes)));
   return 0;
 }
 
@@ -67,7 +70,7 @@ ExportFormat parse_format(const std::string& text) {
 void add_export(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app =
-      add_subcommand(program, "export", "Write the samples of a store as a file, bit for bit.",
+      add_subcommand(program, "export", "Write the samples of a store as a file, value for value.",
                      "isobrick export head.zarr jaw.nrrd --roi :,:,0:40");
   add_path(app, "STORE", arguments->store, "Store to read");
   add_path(app, "OUT", arguments->out,

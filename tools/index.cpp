@@ -71,7 +71,8 @@ void add_index(Program& program) {
   add_threads(app, arguments->index.threads);
   add_flag(app, "--resume", arguments->index.resume, "Go on with an interrupted build");
   add_flag(app, "--force", arguments->index.force,
-           "Replace an index of this kind, once the new one is whole");
+           "Replace an index of this kind, once the new one is whole, and compute the ranges of "
+           "another program's image anew");
   program.commands.push_back(
       {app, [arguments](Console& console) { return run(*arguments, console); }});
 }

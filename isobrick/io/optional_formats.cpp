@@ -68,7 +68,7 @@ std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file,
 #ifdef ISOBRICK_WITH_OPENVDB
   return vdb_module().open(file, said);
 #else
-  built_without(file, "an OpenVDB file", "libopenvdb-dev");
+  built_without(file, "an OpenVDB file", "libopenvdb-dev and libboost-dev");
 #endif
 }
 
@@ -77,7 +77,9 @@ std::unique_ptr<VdbWriter> make_vdb_writer_if_built([[maybe_unused]] const Volum
 #ifdef ISOBRICK_WITH_OPENVDB
   return vdb_module().make_writer(info, name);
 #else
-  throw UsageError("this isobrick cannot write OpenVDB files: it was built without libopenvdb-dev");
+  throw UsageError(
+      "this isobrick cannot write OpenVDB files: it was built without "
+      "libopenvdb-dev and libboost-dev");
 #endif
 }
 

@@ -19,7 +19,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"io", {"core", "surface/mesh.h"}},
     {"bricks", {"core"}},
     {"index", {"core"}},
-    {"surface", {"core", "index"}},
+    {"surface", {"core"}},
     {"stream", {"core", "bricks", "index"}},
     {"gpu", {"core", "surface", "index"}},
     {"pipeline", {"core", "io", "bricks", "index", "surface", "stream", "gpu"}},
