@@ -23,8 +23,8 @@
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume.h"
 #include "isobrick/index/active_tiles.h"
-#include "isobrick/io/synth_source.h"
 #include "isobrick/surface/cpu_extractor.h"
+#include "isobrick/volumes/synth_source.h"
 
 namespace isobrick::bench {
 namespace {

@@ -10,7 +10,7 @@
 #include "isobrick/core/lattice.h"
 #include "isobrick/core/range.h"
 #include "isobrick/index/leaf_ranges.h"
-#include "isobrick/io/volume_source.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick::bench {
 

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "isobrick/bricks/metadata_files.h"
-#include "isobrick/io/open_source.h"
 #include "isobrick/pipeline/store_source.h"
+#include "isobrick/volumes/open_source.h"
 #include "tools/options.h"
 
 namespace isobrick::tools {

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/io/preview_sink.h"
+#include "isobrick/meshes/preview_sink.h"
 #include "isobrick/pipeline/estimate.h"
 #include "tools/format.h"
 #include "tools/index_options.h"

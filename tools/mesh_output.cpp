@@ -5,11 +5,11 @@
 #include <array>
 
 #include "isobrick/core/error.h"
-#include "isobrick/io/glb_sink.h"
-#include "isobrick/io/obj_sink.h"
-#include "isobrick/io/ply_sink.h"
-#include "isobrick/io/stl_sink.h"
-#include "isobrick/io/vtp_sink.h"
+#include "isobrick/meshes/glb_sink.h"
+#include "isobrick/meshes/obj_sink.h"
+#include "isobrick/meshes/ply_sink.h"
+#include "isobrick/meshes/stl_sink.h"
+#include "isobrick/meshes/vtp_sink.h"
 #include "tools/format.h"
 
 namespace isobrick::tools {

@@ -8,7 +8,7 @@
 
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/vec.h"
-#include "isobrick/io/open_source.h"
+#include "isobrick/volumes/open_source.h"
 
 // The values of the command line: text to meaning. Every function throws
 // UsageError with a line that says what was given and what would do.

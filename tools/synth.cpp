@@ -1,4 +1,4 @@
-#include "isobrick/io/synth_source.h"
+#include "isobrick/volumes/synth_source.h"
 
 #include <algorithm>
 #include <chrono>

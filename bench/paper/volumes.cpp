@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "bench/paper/measure.h"
-#include "isobrick/io/synth_source.h"
+#include "isobrick/volumes/synth_source.h"
 
 namespace isobrick::bench {
 LoadedVolume gyroid(Int3 extent, double frequency) {

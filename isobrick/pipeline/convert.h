@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "isobrick/core/progress.h"
-#include "isobrick/io/volume_source.h"
 #include "isobrick/pipeline/index_build.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
 

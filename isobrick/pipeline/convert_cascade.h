@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/io/volume_source.h"
 #include "isobrick/pipeline/convert_level.h"
 #include "isobrick/pipeline/convert_plan.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
 

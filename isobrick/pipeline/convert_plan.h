@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "isobrick/bricks/store_writer.h"
-#include "isobrick/io/volume_source.h"
 #include "isobrick/pipeline/convert.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
 

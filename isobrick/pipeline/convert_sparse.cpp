@@ -205,13 +205,12 @@ class SparsePyramid::Level {
         next->append(parcel->parent, parcel->average.span());
     };
     tbb::parallel_pipeline(
-        in_flight,
-        tbb::make_filter<void, Family*>(tbb::filter_mode::serial_in_order, take) &
-            tbb::make_filter<Family*, std::shared_ptr<Parcel>>(
-                tbb::filter_mode::parallel,
-                [&](Family* family) { return pack(*family, source, spool, next); }) &
-            tbb::make_filter<std::shared_ptr<Parcel>, void>(tbb::filter_mode::serial_in_order,
-                                                            deliver));
+        in_flight, tbb::make_filter<void, Family*>(tbb::filter_mode::serial_in_order, take) &
+                       tbb::make_filter<Family*, std::shared_ptr<Parcel>>(
+                           tbb::filter_mode::parallel,
+                           [&](Family* family) { return pack(*family, source, spool, next); }) &
+                       tbb::make_filter<std::shared_ptr<Parcel>, void>(
+                           tbb::filter_mode::serial_in_order, deliver));
     close(info_.lattice.extent.z);
     if (next != nullptr) next->finish();
   }

@@ -10,10 +10,10 @@
 
 #include "isobrick/bricks/store_writer.h"
 #include "isobrick/core/progress.h"
-#include "isobrick/io/volume_source.h"
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/pipeline/convert_journal.h"
 #include "isobrick/pipeline/sparse_ranges.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
 

@@ -7,13 +7,13 @@
 #include <memory>
 
 #include "isobrick/core/error.h"
-#include "isobrick/io/nrrd_writer.h"
 #include "isobrick/io/output_file.h"
-#include "isobrick/io/vdb_writer.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
 #include "isobrick/pipeline/workers.h"
+#include "isobrick/volumes/nrrd_writer.h"
+#include "isobrick/volumes/vdb_writer.h"
 
 namespace isobrick {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "isobrick/core/vec.h"
 #include "isobrick/io/file.h"
-#include "isobrick/io/volume_source.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
 

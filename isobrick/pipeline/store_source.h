@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/io/volume_request.h"
-#include "isobrick/io/volume_source.h"
+#include "isobrick/volumes/volume_request.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
 

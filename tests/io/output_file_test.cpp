@@ -6,11 +6,11 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
-#include "isobrick/io/glb_sink.h"
-#include "isobrick/io/obj_sink.h"
-#include "isobrick/io/ply_sink.h"
-#include "isobrick/io/stl_sink.h"
-#include "isobrick/io/vtp_sink.h"
+#include "isobrick/meshes/glb_sink.h"
+#include "isobrick/meshes/obj_sink.h"
+#include "isobrick/meshes/ply_sink.h"
+#include "isobrick/meshes/stl_sink.h"
+#include "isobrick/meshes/vtp_sink.h"
 #include "temp_dir.h"
 #include "test_meshes.h"
 

@@ -4,9 +4,9 @@
 
 #include <filesystem>
 
-#include "isobrick/io/glb_scene.h"
-#include "isobrick/io/vtp_sink.h"
 #include "isobrick/io/xml_text.h"
+#include "isobrick/meshes/glb_scene.h"
+#include "isobrick/meshes/vtp_sink.h"
 #include "temp_dir.h"
 #include "test_meshes.h"
 

@@ -10,7 +10,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/range.h"
-#include "isobrick/io/volume_source.h"
+#include "isobrick/volumes/volume_source.h"
 
 namespace isobrick::test {
 

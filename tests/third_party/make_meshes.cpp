@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <limits>
 
-#include "isobrick/io/glb_sink.h"
-#include "isobrick/io/obj_sink.h"
-#include "isobrick/io/ply_sink.h"
-#include "isobrick/io/vtp_sink.h"
-#include "tests/io/test_meshes.h"
+#include "isobrick/meshes/glb_sink.h"
+#include "isobrick/meshes/obj_sink.h"
+#include "isobrick/meshes/ply_sink.h"
+#include "isobrick/meshes/vtp_sink.h"
+#include "tests/meshes/test_meshes.h"
 
 namespace isobrick {
 namespace {

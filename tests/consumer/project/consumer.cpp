@@ -6,10 +6,10 @@
 
 #include <isobrick/bricks/store_reader.h>
 #include <isobrick/core/progress.h>
-#include <isobrick/io/ply_sink.h>
-#include <isobrick/io/synth_source.h>
+#include <isobrick/meshes/ply_sink.h>
 #include <isobrick/pipeline/convert.h>
 #include <isobrick/pipeline/extract.h>
+#include <isobrick/volumes/synth_source.h>
 
 namespace {
 

@@ -1,0 +1,230 @@
+#include "isobrick/meshes/glb_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+namespace isobrick {
+namespace {
+
+using nlohmann::ordered_json;
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as they lie");
+
+constexpr int kFloat = 5126, kUint32 = 5125, kUint16 = 5123, kInt16 = 5122;
+constexpr int kArrayBuffer = 34962, kElementBuffer = 34963, kTriangles = 4;
+constexpr double kGridSteps = 65535;
+
+/// Three numbers of 16 bits and two bytes that align the next.
+using Quantized = std::array<std::uint16_t, 4>;
+
+Quantized on_grid(Vec3f whole) {
+  return {static_cast<std::uint16_t>(whole.x), static_cast<std::uint16_t>(whole.y),
+          static_cast<std::uint16_t>(whole.z), 0};
+}
+
+/// Fractions of 32767, two's complement.
+Quantized signed_fractions(Vec3f v) {
+  Quantized fractions{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double part = std::clamp(double{v[static_cast<int>(axis)]}, -1.0, 1.0);
+    fractions[axis] =
+        std::bit_cast<std::uint16_t>(static_cast<std::int16_t>(std::nearbyint(part * 32767)));
+  }
+  return fractions;
+}
+
+ordered_json triple(Vec3f v) {
+  // Every float is a double, whose shortest decimals the JSON holds.
+  return {double{v.x}, double{v.y}, double{v.z}};
+}
+
+ordered_json whole_triple(Vec3f v) {
+  return {static_cast<int>(v.x), static_cast<int>(v.y), static_cast<int>(v.z)};
+}
+
+ordered_json material() {
+  return {
+      {"pbrMetallicRoughness",
+       {{"baseColorFactor", {0.87, 0.8, 0.7, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0.7}}},
+      // A surface ends where the volume does, and is then seen from behind.
+      {"doubleSided", true}};
+}
+
+/// The scene's lists, kept apart: adding to an ordered object moves what it holds.
+struct Lists {
+  ordered_json buffers = ordered_json::array(), views = ordered_json::array(),
+               accessors = ordered_json::array(), primitives = ordered_json::array();
+
+  void add(const GlbVertices& form, const GlbPrimitive& primitive);
+};
+
+void Lists::add(const GlbVertices& form, const GlbPrimitive& primitive) {
+  const std::size_t buffer = buffers.size();
+  ordered_json object{{"byteLength", primitive.bytes()}};
+  if (!primitive.uri.empty()) object["uri"] = primitive.uri;
+  buffers.push_back(std::move(object));
+
+  const std::size_t rows = views.size();
+  views.push_back({{"buffer", buffer},
+                   {"byteLength", primitive.vertex_bytes},
+                   {"byteStride", form.row_bytes()},
+                   {"target", kArrayBuffer}});
+  views.push_back({{"buffer", buffer},
+                   {"byteOffset", primitive.vertex_bytes},
+                   {"byteLength", primitive.bytes() - primitive.vertex_bytes},
+                   {"target", kElementBuffer}});
+
+  ordered_json attributes{{"POSITION", accessors.size()}};
+  const auto of_positions = form.quantized ? whole_triple : triple;
+  accessors.push_back({{"bufferView", rows},
+                       {"componentType", form.quantized ? kUint16 : kFloat},
+                       {"count", primitive.vertices},
+                       {"type", "VEC3"},
+                       {"min", of_positions(primitive.bounds.lo)},
+                       {"max", of_positions(primitive.bounds.hi)}});
+  if (form.normals) {
+    attributes["NORMAL"] = accessors.size();
+    ordered_json normals{{"bufferView", rows},
+                         {"byteOffset", form.quantized ? sizeof(Quantized) : sizeof(Vec3f)},
+                         {"componentType", form.quantized ? kInt16 : kFloat},
+                         {"count", primitive.vertices},
+                         {"type", "VEC3"}};
+    if (form.quantized) normals["normalized"] = true;
+    accessors.push_back(std::move(normals));
+  }
+  const std::size_t indices = accessors.size();
+  accessors.push_back({{"bufferView", rows + 1},
+                       {"componentType", kUint32},
+                       {"count", 3 * primitive.triangles},
+                       {"type", "SCALAR"}});
+  primitives.push_back({{"attributes", std::move(attributes)},
+                        {"indices", indices},
+                        {"material", 0},
+                        {"mode", kTriangles}});
+}
+
+}  // namespace
+
+void Bounds3f::include(std::span<const Vec3f> positions) {
+  if (positions.empty()) return;
+  if (std::exchange(empty, false)) lo = hi = positions.front();
+  for (const Vec3f& p : positions)
+    for (int axis = 0; axis < 3; ++axis) {
+      lo[axis] = std::min(lo[axis], p[axis]);
+      hi[axis] = std::max(hi[axis], p[axis]);
+    }
+}
+
+void GlbVertices::set_grid(const Bounds3f& bounds) {
+  double longest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    origin[axis] = bounds.lo[axis];
+    longest = std::max(longest, double{bounds.hi[axis]} - bounds.lo[axis]);
+  }
+  step = longest > 0 ? longest / kGridSteps : 1;
+}
+
+void Bounds3f::include(const Bounds3f& other) {
+  if (!other.empty) include(std::array{other.lo, other.hi});
+}
+
+std::size_t GlbVertices::row_bytes() const {
+  return (normals ? 2 : 1) * (quantized ? sizeof(Quantized) : sizeof(Vec3f));
+}
+
+Vec3f GlbVertices::stored(Vec3f position) const {
+  if (!quantized) return position;
+  Vec3f whole;
+  for (int axis = 0; axis < 3; ++axis)
+    whole[axis] = static_cast<float>(std::clamp(
+        std::nearbyint((double{position[axis]} - origin[axis]) / step), 0.0, kGridSteps));
+  return whole;
+}
+
+Bounds3f GlbVertices::stored(const Bounds3f& bounds) const {
+  return {stored(bounds.lo), stored(bounds.hi), bounds.empty};
+}
+
+Bounds3f GlbVertices::append(FileWriter& out, std::span<const std::byte> rows) const {
+  const std::size_t from_bytes = (normals ? 2 : 1) * sizeof(Vec3f);
+  const std::size_t count = rows.size() / from_bytes;
+  std::byte* to = out.reserve(count * row_bytes());
+  Bounds3f bounds;
+  for (std::size_t i = 0; i < count; ++i, to += row_bytes()) {
+    std::array<Vec3f, 2> row;
+    std::memcpy(row.data(), rows.data() + i * from_bytes, from_bytes);
+    row[0] = stored(row[0]);
+    bounds.include({&row[0], 1});
+    if (quantized) {
+      const std::array<Quantized, 2> packed{on_grid(row[0]), signed_fractions(row[1])};
+      std::memcpy(to, packed.data(), row_bytes());
+    } else {
+      std::memcpy(to, row.data(), row_bytes());
+    }
+  }
+  out.commit(count * row_bytes());
+  return bounds;
+}
+
+std::string glb_json(const GlbVertices& vertices, std::span<const GlbPrimitive> primitives) {
+  ordered_json scene{{"asset", {{"version", "2.0"}, {"generator", "Isobrick"}}}};
+  scene["scene"] = 0;
+  scene["scenes"] = ordered_json::array({ordered_json::object()});
+  if (primitives.empty()) return scene.dump();
+  scene["scenes"][0]["nodes"] = ordered_json::array({0});
+  ordered_json node{{"mesh", 0}};
+  if (vertices.quantized) {
+    for (const char* key : {"extensionsUsed", "extensionsRequired"})
+      scene[key] = ordered_json::array({"KHR_mesh_quantization"});
+    node["scale"] = {vertices.step, vertices.step, vertices.step};
+    node["translation"] = {vertices.origin.x, vertices.origin.y, vertices.origin.z};
+  }
+  Lists lists;
+  for (const GlbPrimitive& primitive : primitives) lists.add(vertices, primitive);
+  scene["nodes"] = ordered_json::array({std::move(node)});
+  scene["materials"] = ordered_json::array({material()});
+  scene["meshes"] = ordered_json::array({{{"primitives", std::move(lists.primitives)}}});
+  scene["accessors"] = std::move(lists.accessors);
+  scene["bufferViews"] = std::move(lists.views);
+  scene["buffers"] = std::move(lists.buffers);
+  return scene.dump();
+}
+
+std::string glb_start(std::string json, std::uint64_t buffer_bytes) {
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const std::uint64_t buffer_part = buffer_bytes > 0 ? 8 + buffer_bytes : 0;
+  std::string text;
+  const auto add = [&text](std::uint64_t number) {
+    const auto word = static_cast<std::uint32_t>(number);
+    char bytes[sizeof(word)];
+    std::memcpy(bytes, &word, sizeof(word));
+    text.append(bytes, sizeof(word));
+  };
+  text += "glTF";
+  add(2);
+  add(12 + 8 + json.size() + buffer_part);
+  add(json.size());
+  text += "JSON" + json;
+  if (buffer_bytes > 0) {
+    add(buffer_bytes);
+    text.append("BIN\0", 4);
+  }
+  return text;
+}
+
+std::string percent_encoded(std::string_view text) {
+  std::string encoded;
+  for (const char c : text) {
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+                       std::string_view("-._~/").find(c) != std::string_view::npos;
+    encoded += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return encoded;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "isobrick/io/output_file.h"
+#include "isobrick/io/parted_output.h"
+#include "isobrick/meshes/glb_scene.h"
+#include "isobrick/meshes/mesh_parts.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+struct GlbOptions {
+  /// Positions and normals of 16 bits (KHR_mesh_quantization): positions lie on
+  /// a grid whose step is the mesh's longest edge / 65535, so that no coordinate
+  /// moves by more than half a step; normals are exact to 1.6e-5 a component.
+  bool quantize = false;
+  /// What does not fit one file of this size (the length in its header has 32
+  /// bits) is cut into parts.
+  std::uint64_t file_bytes = std::numeric_limits<std::uint32_t>::max();
+  std::uint64_t part_triangles = std::uint64_t{1} << 20;
+};
+
+/// Writes a welded mesh as binary glTF 2.0, coordinates in world units as they
+/// are. One primitive in one file; beyond GlbOptions::file_bytes one primitive a
+/// part, with a buffer each in the folder `path`.parts, vertices that several
+/// parts name repeated in each. A mesh without triangles is an empty scene.
+class GlbSink final : public MeshSink {
+ public:
+  /// See PartedOutput for what `path` and `force` may throw.
+  GlbSink(std::string path, bool force, const GlbOptions& options = {});
+
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader& header) override;
+  void write(const MeshChunk& chunk) override;
+  void finish() override;
+  std::uint64_t bytes() const override {
+    return rows_.size() + triangles_.size() + part_bytes_ + out_.index().writer().size();
+  }
+  std::uint64_t memory() const override { return part_memory(options_.part_triangles); }
+
+ private:
+  GlbPrimitive append_part(FileWriter& out, const MeshPart& part);
+  void finish_whole(const GlbPrimitive& primitive);
+  void finish_parts();
+
+  GlbOptions options_;
+  PartedOutput out_;
+  FileWriter rows_, triangles_;  ///< the whole mesh, until its size and bounds are known
+  MeshSize size_;
+  Bounds3f bounds_;
+  GlbVertices vertices_;
+  std::uint64_t part_bytes_ = 0;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,78 @@
+#include "isobrick/meshes/ply_sink.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+
+#include "isobrick/core/error.h"
+#include "isobrick/meshes/vertex_rows.h"
+
+namespace isobrick {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "samples are written as they lie");
+static_assert(sizeof(Triangle) == 12);
+
+constexpr std::size_t kFaceBytes = 13;
+
+void append_faces(FileWriter& out, std::span<const Triangle> triangles) {
+  constexpr std::size_t batch = FileWriter::kBuffer / kFaceBytes;
+  while (!triangles.empty()) {
+    const std::size_t count = std::min(batch, triangles.size());
+    std::byte* to = out.reserve(count * kFaceBytes);
+    for (const Triangle& triangle : triangles.first(count)) {
+      *to = std::byte{3};
+      std::memcpy(to + 1, triangle.data(), sizeof(Triangle));
+      to += kFaceBytes;
+    }
+    out.commit(count * kFaceBytes);
+    triangles = triangles.subspan(count);
+  }
+}
+
+}  // namespace
+
+PlySink::PlySink(std::string path, bool force)
+    : out_(std::move(path), force), faces_(open_scratch_beside(out_.path())) {}
+
+/// Always of the same length, so that it can be replaced when the counts are
+/// known. Padding goes into a comment: some readers take a count with leading
+/// zeros for octal and some choke on trailing blanks.
+std::string PlySink::header_text() const {
+  const std::string counts = fmt::format("{}{}", vertices_, triangles_);
+  const std::size_t most = 2 * std::numeric_limits<std::uint64_t>::digits10 + 2;
+  return fmt::format(
+      "ply\nformat binary_little_endian 1.0\ncomment Isobrick {}\n"
+      "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n{}"
+      "element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+      std::string(most - counts.size(), '.'), vertices_,
+      has_normals_ ? "property float nx\nproperty float ny\nproperty float nz\n" : "", triangles_);
+}
+
+void PlySink::begin(const MeshHeader& header) {
+  has_normals_ = header.has_normals;
+  out_.writer().append(header_text());
+}
+
+void PlySink::write(const MeshChunk& chunk) {
+  vertices_ += chunk.positions.size();
+  triangles_ += chunk.triangles.size();
+  if (vertices_ > std::numeric_limits<std::uint32_t>::max())
+    throw Error(
+        fmt::format("'{}': the mesh has more than 4294967295 vertices, which PLY cannot "
+                    "number; write STL instead or extract parts with --roi",
+                    out_.path()));
+  append_rows(out_.writer(), chunk);
+  append_faces(faces_, chunk.triangles);
+}
+
+void PlySink::finish() {
+  out_.writer().append_file(faces_);
+  out_.writer().patch(0, header_text());
+  out_.publish();
+}
+
+}  // namespace isobrick

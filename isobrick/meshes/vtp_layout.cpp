@@ -1,0 +1,109 @@
+#include "isobrick/meshes/vtp_layout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+
+namespace isobrick {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as they lie");
+
+/// Twenty digits in each place fill some 1150.
+constexpr std::size_t kHeaderBytes = 1280;
+
+std::string data_array(std::string_view type, std::string_view name, int components,
+                       std::uint64_t offset) {
+  return fmt::format(
+      "        <DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" "
+      "offset=\"{}\"/>\n",
+      type, name, components, offset);
+}
+
+template <class Number, class F>
+void append_numbers(FileWriter& out, std::uint64_t count, const F& number) {
+  constexpr std::uint64_t batch = FileWriter::kBuffer / sizeof(Number);
+  for (std::uint64_t first = 0; first < count; first += batch) {
+    const std::uint64_t end = std::min(count, first + batch);
+    std::byte* to = out.reserve(static_cast<std::size_t>(end - first) * sizeof(Number));
+    for (std::uint64_t i = first; i < end; ++i, to += sizeof(Number)) {
+      const auto value = static_cast<Number>(number(i));
+      std::memcpy(to, &value, sizeof(Number));
+    }
+    out.commit(static_cast<std::size_t>(end - first) * sizeof(Number));
+  }
+}
+
+template <class F>
+void append_numbers(FileWriter& out, bool wide, std::uint64_t count, const F& number) {
+  if (wide)
+    append_numbers<std::int64_t>(out, count, number);
+  else
+    append_numbers<std::int32_t>(out, count, number);
+}
+
+}  // namespace
+
+bool VtpLayout::wide() const {
+  constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
+  return size.vertices > most || size.triangles > most / 3;
+}
+
+std::uint64_t VtpLayout::connectivity_bytes() const {
+  return size.triangles * 3 * (wide() ? sizeof(std::int64_t) : sizeof(std::int32_t));
+}
+
+std::uint64_t VtpLayout::offset_bytes() const { return connectivity_bytes() / 3; }
+
+std::string VtpLayout::header() const {
+  constexpr std::uint64_t length = sizeof(std::uint64_t);
+  const std::string_view number = wide() ? "Int64" : "Int32";
+  std::uint64_t offset = length + point_bytes();
+  std::string point_data = "      <PointData>\n";
+  if (normals) {
+    point_data =
+        "      <PointData Normals=\"Normals\">\n" + data_array("Float32", "Normals", 3, offset);
+    offset += length + point_bytes();
+  }
+  std::string text = fmt::format(
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n"
+      "  <PolyData>\n"
+      "    <Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
+      "NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n{}      </PointData>\n"
+      "      <Points>\n{}      </Points>\n      <Polys>\n{}{}      </Polys>\n"
+      "    </Piece>\n  </PolyData>\n",
+      size.vertices, size.triangles, point_data, data_array("Float32", "Points", 3, 0),
+      data_array(number, "connectivity", 1, offset),
+      data_array(number, "offsets", 1, offset + length + connectivity_bytes()));
+  constexpr std::string_view data = "\n  <AppendedData encoding=\"raw\">\n   _";
+  text.resize(kHeaderBytes - data.size(), ' ');
+  return text.append(data);
+}
+
+void append_length(FileWriter& out, std::uint64_t bytes) {
+  out.append(std::as_bytes(std::span(&bytes, 1)));
+}
+
+void append_connectivity(FileWriter& out, const VtpLayout& layout,
+                         std::span<const Triangle> triangles) {
+  if (!layout.wide()) {
+    out.append(std::as_bytes(triangles));
+    return;
+  }
+  append_numbers<std::int64_t>(out, 3 * triangles.size(),
+                               [&](std::uint64_t i) { return triangles[i / 3][i % 3]; });
+}
+
+void append_vtp_end(FileWriter& out, const VtpLayout& layout) {
+  append_length(out, layout.offset_bytes());
+  append_numbers(out, layout.wide(), layout.size.triangles,
+                 [](std::uint64_t i) { return 3 * (i + 1); });
+  out.append("\n  </AppendedData>\n</VTKFile>\n");
+}
+
+}  // namespace isobrick

@@ -1,0 +1,150 @@
+#include "isobrick/meshes/vtp_sink.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <filesystem>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/xml_text.h"
+#include "isobrick/meshes/mesh_parts.h"
+#include "isobrick/meshes/vertex_rows.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::string_view kPartExtension = ".vtp";
+
+/// Refuses a name that the index could not hold, before anything is created.
+std::string named_in_xml(std::string path) {
+  const std::string name = std::filesystem::path(path).filename().string();
+  if (!is_xml_text(name))
+    throw UsageError(fmt::format(
+        "'{}': a .pvtp names its parts after itself in XML, which takes no name that is not "
+        "UTF-8 or has control characters; choose another name",
+        path));
+  return path;
+}
+
+/// Appends the floats [first, first + 3) of each row.
+void append_column(FileWriter& out, std::span<const std::byte> rows, std::size_t row,
+                   std::size_t first) {
+  const std::size_t count = rows.size() / row;
+  std::byte* to = out.reserve(count * sizeof(Vec3f));
+  for (std::size_t i = 0; i < count; ++i)
+    std::memcpy(to + i * sizeof(Vec3f), rows.data() + i * row + first, sizeof(Vec3f));
+  out.commit(count * sizeof(Vec3f));
+}
+
+void write_part(FileWriter& out, const VertexRows& rows, FileWriter& triangles,
+                const MeshPart& part) {
+  const VtpLayout layout{{part.vertices(), part.triangles}, rows.row_bytes == row_bytes(true)};
+  out.append(layout.header());
+  for (std::size_t column = 0; column < rows.row_bytes; column += sizeof(Vec3f)) {
+    append_length(out, layout.point_bytes());
+    for_each_row_run(rows, part, [&](std::span<const std::byte> run) {
+      append_column(out, run, rows.row_bytes, column);
+    });
+  }
+  append_length(out, layout.connectivity_bytes());
+  for_each_triangle_run(triangles, part, [&](std::span<const Triangle> run) {
+    append_connectivity(out, layout, run);
+  });
+  append_vtp_end(out, layout);
+  out.flush();
+}
+
+}  // namespace
+
+VtpSink::VtpSink(std::string path, bool force)
+    : out_(std::move(path), force),
+      normals_(open_scratch_beside(out_.path())),
+      triangles_(open_scratch_beside(out_.path())) {}
+
+void VtpSink::begin(const MeshHeader& header) {
+  layout_.normals = header.has_normals;
+  out_.writer().append(layout_.header());
+  append_length(out_.writer(), 0);
+}
+
+void VtpSink::write(const MeshChunk& chunk) {
+  layout_.size.vertices += chunk.positions.size();
+  layout_.size.triangles += chunk.triangles.size();
+  out_.writer().append(std::as_bytes(chunk.positions));
+  normals_.append(std::as_bytes(chunk.normals));
+  triangles_.append(std::as_bytes(chunk.triangles));
+}
+
+void VtpSink::finish() {
+  FileWriter& out = out_.writer();
+  const std::string header = layout_.header();
+  const std::uint64_t points = layout_.point_bytes();
+  out.patch(0, header);
+  out.patch(header.size(), {reinterpret_cast<const char*>(&points), sizeof(points)});
+  if (layout_.normals) {
+    append_length(out, points);
+    out.append_file(normals_);
+  }
+  append_length(out, layout_.connectivity_bytes());
+  if (layout_.wide()) {
+    const MeshPart all{.triangles = layout_.size.triangles};
+    for_each_triangle_run(triangles_, all, [&](std::span<const Triangle> run) {
+      append_connectivity(out, layout_, run);
+    });
+  } else {
+    out.append_file(triangles_);
+  }
+  append_vtp_end(out, layout_);
+  out_.publish();
+}
+
+PvtpSink::PvtpSink(std::string path, bool force, std::uint64_t part_triangles)
+    : out_(named_in_xml(std::move(path)), force),
+      rows_(open_scratch_beside(out_.index().path())),
+      triangles_(open_scratch_beside(out_.index().path())),
+      part_triangles_(part_triangles) {}
+
+std::uint64_t PvtpSink::memory() const { return part_memory(part_triangles_); }
+
+void PvtpSink::begin(const MeshHeader& header) { has_normals_ = header.has_normals; }
+
+void PvtpSink::write(const MeshChunk& chunk) {
+  size_.vertices += chunk.positions.size();
+  size_.triangles += chunk.triangles.size();
+  append_rows(rows_, chunk);
+  triangles_.append(std::as_bytes(chunk.triangles));
+}
+
+void PvtpSink::finish() {
+  const VertexRows rows{rows_, 0, row_bytes(has_normals_)};
+  for_each_part(triangles_, size_, part_triangles_, [&](const MeshPart& part) {
+    FileWriter out = out_.create_part(kPartExtension);
+    write_part(out, rows, triangles_, part);
+    part_bytes_ += out.size();
+  });
+  out_.index().writer().append(index_text());
+  out_.publish();
+}
+
+std::string PvtpSink::index_text() const {
+  std::string text =
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"PPolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n"
+      "  <PPolyData GhostLevel=\"0\">\n";
+  if (has_normals_)
+    text +=
+        "    <PPointData Normals=\"Normals\">\n"
+        "      <PDataArray type=\"Float32\" Name=\"Normals\" NumberOfComponents=\"3\"/>\n"
+        "    </PPointData>\n";
+  text +=
+      "    <PPoints>\n"
+      "      <PDataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\"/>\n"
+      "    </PPoints>\n";
+  for (std::size_t i = 0; i < out_.parts(); ++i)
+    text +=
+        fmt::format("    <Piece Source=\"{}\"/>\n", xml_escaped(out_.reference(i, kPartExtension)));
+  return text + "  </PPolyData>\n</VTKFile>\n";
+}
+
+}  // namespace isobrick

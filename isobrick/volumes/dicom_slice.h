@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/core/vec.h"
+#include "isobrick/volumes/scaled_source.h"
+
+namespace isobrick {
+
+/// What a DICOM file says of its image.
+struct DicomSlice {
+  std::string path;
+  std::string series;                ///< its SeriesInstanceUID
+  Int3 extent;                       ///< columns, rows, frames
+  ScalarType type = ScalarType::u8;  ///< as stored
+  int bits = 8;                      ///< that are used of each sample, the lowest
+  ValueScale scale;
+  Vec3d spacing{1, 1, 1};               ///< of columns, rows, frames or slices
+  std::optional<Vec3d> position;        ///< of the first sample in space, millimetres
+  Vec3d row{1, 0, 0}, column{0, 1, 0};  ///< directions in which x and y grow
+  Index time = 0, instance = 0;         ///< TemporalPositionIdentifier, InstanceNumber
+};
+
+/// Reads a file without its samples; nothing for a DICOMDIR and what else is no
+/// image. Throws UsageError for what is not supported, DamageError where the file
+/// is damaged. From any number of threads.
+std::optional<DicomSlice> read_dicom_slice(const std::string& path);
+
+/// Copies one frame of a file to `out`, as stored, unused bits cleared (or equal
+/// to the sign). Decompresses (JPEG, JPEG-LS, RLE). From any number of threads.
+void read_dicom_frame(const DicomSlice& slice, Index frame, std::byte* out);
+
+}  // namespace isobrick

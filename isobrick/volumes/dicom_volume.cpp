@@ -1,0 +1,225 @@
+#include "isobrick/volumes/dicom_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <semaphore>
+#include <thread>
+#include <utility>
+
+#include "isobrick/core/error.h"
+#include "isobrick/volumes/dicom_slice.h"
+#include "isobrick/volumes/text_header.h"
+
+namespace isobrick {
+namespace {
+
+double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+double length(Vec3d a) { return std::sqrt(dot(a, a)); }
+Vec3d cross(Vec3d a, Vec3d b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Slices of one file each, or one file of frames.
+class DicomSource final : public VolumeSource {
+ public:
+  DicomSource(VolumeInfo info, std::vector<DicomSlice> slices, bool scaled)
+      : info_(std::move(info)), slices_(std::move(slices)), scaled_(scaled), room_(readers()) {}
+
+  const VolumeInfo& info() const override { return info_; }
+  bool random_access() const override { return true; }
+  std::size_t memory() const override {
+    return static_cast<std::size_t>(readers()) * slice_memory() + slices_.size() * 512;
+  }
+
+  void read(Box3 box, std::byte* out) override {
+    if (box.empty()) return;
+    const Int3 e = info_.extent;
+    const bool whole = box.extent().x == e.x && box.extent().y == e.y;
+    const std::size_t plane =
+        static_cast<std::size_t>(box.extent().x * box.extent().y) * size_of(info_.type);
+    std::vector<std::byte> spare(whole ? 0
+                                       : static_cast<std::size_t>(e.x * e.y) * size_of(info_.type));
+    for (Index z = box.lo.z; z < box.hi.z; ++z, out += plane) {
+      read_plane(z, whole ? out : spare.data());
+      if (!whole) copy_part(spare.data(), box, out);
+    }
+  }
+
+ private:
+  /// Beside the plane itself: the file, and the frame as it is decompressed.
+  std::size_t slice_memory() const {
+    return static_cast<std::size_t>(info_.extent.x * info_.extent.y) *
+               (2 * size_of(slices_[0].type) + size_of(info_.type)) +
+           (std::size_t{1} << 18);
+  }
+  std::ptrdiff_t readers() const {
+    constexpr std::size_t kEnough = std::size_t{64} << 20;
+    const std::size_t most = std::max(1u, std::thread::hardware_concurrency());
+    return static_cast<std::ptrdiff_t>(std::clamp<std::size_t>(kEnough / slice_memory(), 1, most));
+  }
+
+  void read_plane(Index z, std::byte* out) {
+    const bool frames = slices_.size() == 1;
+    const DicomSlice& slice = slices_[frames ? 0 : static_cast<std::size_t>(z)];
+    const auto count = static_cast<std::size_t>(info_.extent.x * info_.extent.y);
+    const std::size_t before = count * (size_of(info_.type) - size_of(slice.type));
+    room_.acquire();
+    try {
+      read_dicom_frame(slice, frames ? z : 0, out + before);
+    } catch (...) {
+      room_.release();
+      throw;
+    }
+    room_.release();
+    if (scaled_) scale_in_place(slice.type, count, slice.scale, out);
+  }
+
+  void copy_part(const std::byte* plane, Box3 box, std::byte* out) const {
+    const std::size_t sample = size_of(info_.type);
+    const auto row = static_cast<std::size_t>(box.extent().x) * sample;
+    for (Index y = box.lo.y; y < box.hi.y; ++y, out += row)
+      std::copy_n(plane + static_cast<std::size_t>(y * info_.extent.x + box.lo.x) * sample, row,
+                  out);
+  }
+
+  VolumeInfo info_;
+  std::vector<DicomSlice> slices_;
+  bool scaled_;
+  std::counting_semaphore<> room_;
+};
+
+std::vector<DicomSlice> read_slices(const std::string& name,
+                                    const std::vector<std::string>& files) {
+  std::vector<DicomSlice> slices;
+  std::map<std::string, std::size_t> series;
+  for (const std::string& file : files)
+    if (auto slice = read_dicom_slice(file)) {
+      ++series[slice->series];
+      slices.push_back(std::move(*slice));
+    }
+  if (slices.empty()) throw UsageError(fmt::format("'{}' holds no DICOM images", name));
+  if (series.size() > 1) {
+    std::string list;
+    for (const auto& [uid, count] : series)
+      if (list.size() < 300)
+        list +=
+            fmt::format("{}{} of {}", list.empty() ? "" : ", ", count, uid.empty() ? "none" : uid);
+    throw UsageError(
+        fmt::format("'{}' holds {} DICOM series ({}): put each into a folder of its own", name,
+                    series.size(), list));
+  }
+  return slices;
+}
+
+void check_alike(const DicomSlice& first, const DicomSlice& other) {
+  const auto differ = [&](const char* what) {
+    throw UsageError(
+        fmt::format("'{}' has {} than '{}', of the same series", other.path, what, first.path));
+  };
+  if (other.extent != first.extent) differ("another extent");
+  if (other.type != first.type || other.bits != first.bits) differ("samples of another type");
+  if (other.position.has_value() != first.position.has_value())
+    differ("more or less of a position");
+  if (std::abs(other.spacing.x - first.spacing.x) > 1e-3 * first.spacing.x ||
+      std::abs(other.spacing.y - first.spacing.y) > 1e-3 * first.spacing.y)
+    differ("another spacing of its pixels");
+  if (length(other.row - first.row) > 1e-3 || length(other.column - first.column) > 1e-3)
+    differ("another orientation");
+}
+
+/// How far along the normal of the slices one of them lies.
+double height_of(const DicomSlice& slice) {
+  return slice.position ? dot(*slice.position, cross(slice.row, slice.column))
+                        : static_cast<double>(slice.instance);
+}
+
+/// Of slices sorted by height, those of one time: each place has as many slices.
+std::vector<DicomSlice> choose_time(const std::string& name, std::vector<DicomSlice> sorted,
+                                    const Selection& selection) {
+  const auto same = [](const DicomSlice& a, const DicomSlice& b) {
+    return std::abs(height_of(a) - height_of(b)) <= 1e-4;
+  };
+  std::size_t times = 1;
+  while (times < sorted.size() && same(sorted[0], sorted[times])) ++times;
+  for (std::size_t i = 0; i < sorted.size(); i += times)
+    for (std::size_t j = 0; j <= times && i + j < sorted.size(); ++j)
+      if (same(sorted[i], sorted[i + j]) != (j < times) || sorted.size() % times != 0)
+        throw UsageError(
+            fmt::format("'{}': some places have {} slices and others not ('{}'): these "
+                        "are no complete times",
+                        name, times, sorted[i + j].path));
+  const auto time =
+      static_cast<std::size_t>(choose(name, "--time", static_cast<Index>(times), selection.time));
+  std::vector<DicomSlice> chosen;
+  for (std::size_t i = 0; i < sorted.size(); i += times) {
+    const auto from = sorted.begin() + static_cast<std::ptrdiff_t>(i);
+    std::sort(from, from + static_cast<std::ptrdiff_t>(times),
+              [](const DicomSlice& a, const DicomSlice& b) {
+                return std::pair(a.time, a.instance) < std::pair(b.time, b.instance);
+              });
+    chosen.push_back(sorted[i + time]);
+  }
+  return chosen;
+}
+
+/// From one slice to the next, which must be the same throughout and along the
+/// normal.
+double find_step(const std::string& name, const std::vector<DicomSlice>& slices) {
+  if (slices.size() < 2 || !slices[0].position) return slices[0].spacing.z;
+  const Vec3d normal = cross(slices[0].row, slices[0].column);
+  const auto last = static_cast<double>(slices.size() - 1);
+  const double step = (height_of(slices.back()) - height_of(slices[0])) / last;
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    const Vec3d way = *slices[i].position - *slices[i - 1].position;
+    const double up = dot(way, normal);
+    // Positions are written with few digits.
+    const double tolerance = 0.02 * step + 1e-3;
+    if (std::abs(up - step) > tolerance)
+      throw UsageError(
+          fmt::format("'{}': the slices are not evenly spaced (a slice may be missing): "
+                      "'{}' lies {:.4g} behind '{}', on average it is {:.4g}",
+                      name, slices[i].path, up, slices[i - 1].path, step));
+    if (length(way - normal * up) > tolerance)
+      throw UsageError(
+          fmt::format("'{}': '{}' is shifted sideways against '{}' (a tilted gantry?), "
+                      "which is not supported",
+                      name, slices[i].path, slices[i - 1].path));
+  }
+  return step;
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_dicom(const std::string& name,
+                                         const std::vector<std::string>& files,
+                                         const VolumeRequest& said) {
+  refuse_raw_description(name, "a DICOM series", said);
+  std::vector<DicomSlice> slices = read_slices(name, files);
+  for (const DicomSlice& slice : slices) check_alike(slices[0], slice);
+  const DicomSlice first = slices[0];
+  if (slices.size() > 1 && first.extent.z > 1)
+    throw UsageError(
+        fmt::format("'{}' holds several files of several frames each: give one of them", name));
+  choose(name, "--channel", 1, said.selection.channel);
+  std::sort(slices.begin(), slices.end(),
+            [](const DicomSlice& a, const DicomSlice& b) { return height_of(a) < height_of(b); });
+  slices = choose_time(name, std::move(slices), said.selection);
+  bool scaled = false;
+  for (const DicomSlice& slice : slices) scaled = scaled || !slice.scale.identity();
+  Transform transform;
+  const Vec3d normal = cross(first.row, first.column);
+  const Vec3d axes[3] = {first.row * first.spacing.x, first.column * first.spacing.y,
+                         normal * find_step(name, slices)};
+  set_axes(name, transform, axes);
+  transform.origin = slices[0].position.value_or(Vec3d{0, 0, 0});
+  transform.unit = "millimeter";
+  const Index planes = slices.size() == 1 ? first.extent.z : static_cast<Index>(slices.size());
+  VolumeInfo info = describe_volume(name, {first.extent.x, first.extent.y, planes},
+                                    scaled ? scaled_type(first.type) : first.type, transform, said);
+  return std::make_unique<DicomSource>(std::move(info), std::move(slices), scaled);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/volumes/array_view.h"
+
+namespace isobrick {
+
+/// An open dataset of an HDF5 file. The library is not made for threads: all
+/// calls of all datasets take turns.
+class Hdf5Dataset {
+ public:
+  /// `name` empty: the only one of three or more dimensions. Throws UsageError
+  /// for none, several (which are listed) and what is not supported; DamageError
+  /// where the file is damaged.
+  Hdf5Dataset(const std::string& path, const std::string& name);
+  ~Hdf5Dataset();
+
+  ScalarType type() const;
+  /// Fastest first. Roles are those that labels of the dimensions say.
+  const std::vector<ArrayAxis>& axes() const;
+  /// Whether labels said all roles.
+  bool labelled() const;
+  /// The attribute `element_size_um` that Fiji and ilastik write, or zeros.
+  Vec3d element_size() const;
+  /// Bytes that reading takes: a chunk, and a layer of them if that is not much.
+  std::size_t memory() const;
+
+  /// Copies a box of the array, whose first sample is `start` and which has
+  /// `count` samples along each axis (fastest first), to `out` in C order.
+  void read(const std::vector<Index>& start, const std::vector<Index>& count, std::byte* out) const;
+
+ private:
+  struct Handles;
+  std::unique_ptr<Handles> handles_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "isobrick/volumes/volume_request.h"
+
+namespace isobrick {
+
+/// Opens a dataset of an HDF5 file; `dataset` empty: the only one that can be a
+/// volume.
+std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::string& dataset,
+                                        const VolumeRequest& said);
+
+}  // namespace isobrick

@@ -1,0 +1,176 @@
+#include "isobrick/volumes/legacy_vtk.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/file_stream.h"
+#include "isobrick/io/text_stream.h"
+#include "isobrick/volumes/raw_source.h"
+#include "isobrick/volumes/stream_source.h"
+#include "isobrick/volumes/text_header.h"
+
+namespace isobrick {
+namespace {
+
+struct Header {
+  ArrayView view;
+  ScalarType type = ScalarType::u8;
+  Transform transform;
+  bool text = false;
+  std::uint64_t begin = 0;
+};
+
+ScalarType read_type(const std::string& path, const std::string& name) {
+  // long is missing on purpose: it has 4 or 8 bytes, depending on who wrote it.
+  constexpr std::pair<std::string_view, ScalarType> types[] = {
+      {"unsigned_char", ScalarType::u8}, {"char", ScalarType::i8},
+      {"signed_char", ScalarType::i8},   {"unsigned_short", ScalarType::u16},
+      {"short", ScalarType::i16},        {"unsigned_int", ScalarType::u32},
+      {"int", ScalarType::i32},          {"float", ScalarType::f32},
+      {"double", ScalarType::f64}};
+  for (const auto& [known, type] : types)
+    if (name == known) return type;
+  header_error(path, fmt::format("samples of type '{}' are not supported", name.substr(0, 60)));
+}
+
+/// Reads keyword by keyword up to the samples.
+class Parser {
+ public:
+  Parser(const std::string& path, const Selection& selection)
+      : path_(path), selection_(selection), lines_(path) {}
+
+  Header parse() {
+    lines_.next();
+    lines_.next();  // the title
+    std::string encoding;
+    while (encoding.empty() && !lines_.at_end()) encoding = lower(trim(lines_.next()));
+    if (encoding != "ascii" && encoding != "binary")
+      header_error(path_, fmt::format("'{}' is neither ASCII nor BINARY", encoding.substr(0, 60)));
+    header_.text = encoding == "ascii";
+    while (!found_) {
+      if (lines_.at_end()) header_error(path_, "there are no samples");
+      const auto words = split_words(lines_.next());
+      if (!words.empty()) take(lower(words[0]), words);
+    }
+    header_.begin = lines_.position();
+    finish();
+    return header_;
+  }
+
+ private:
+  using Words = std::vector<std::string_view>;
+
+  void take(const std::string& key, const Words& words) {
+    if (key == "dataset") {
+      if (words.size() < 2 || lower(words[1]) != "structured_points")
+        header_error(path_, "only a DATASET of STRUCTURED_POINTS is supported");
+    } else if (key == "dimensions") {
+      for (int i = 0; i < 3; ++i) points_[i] = parse_integer(path_, key, word(words, i + 1));
+    } else if (key == "spacing" || key == "aspect_ratio") {
+      for (int i = 0; i < 3; ++i) spacing_[i] = parse_real(path_, key, word(words, i + 1));
+    } else if (key == "origin") {
+      for (int i = 0; i < 3; ++i) origin_[i] = parse_real(path_, key, word(words, i + 1));
+    } else if (key == "point_data" || key == "cell_data") {
+      cells_ = key == "cell_data";
+      tuples_ = parse_integer(path_, key, word(words, 1));
+    } else if (tuples_ && key == "scalars") {
+      take_scalars(words);
+    } else if (tuples_ && key == "color_scalars") {
+      if (header_.text)
+        header_error(path_, "COLOR_SCALARS as text, which are fractions, are not supported");
+      header_.type = ScalarType::u8;
+      components_ = parse_integer(path_, key, word(words, 2));
+      found_ = true;
+    } else if (tuples_ && key == "field") {
+      take_field();
+    } else {
+      header_error(path_, fmt::format("'{}' is not supported{}", key.substr(0, 60),
+                                      tuples_ ? " before the SCALARS" : ""));
+    }
+  }
+
+  std::string_view word(const Words& words, int i) const {
+    if (words.size() <= static_cast<std::size_t>(i))
+      header_error(path_,
+                   fmt::format("'{}' has too few words", std::string(words[0].substr(0, 60))));
+    return words[static_cast<std::size_t>(i)];
+  }
+
+  void take_scalars(const Words& words) {
+    header_.type = read_type(path_, lower(word(words, 2)));
+    components_ = words.size() > 3 ? parse_integer(path_, "SCALARS", words[3]) : 1;
+    if (lower(lines_.rest().substr(0, 12)) == "lookup_table") lines_.next();
+    found_ = true;
+  }
+
+  /// NAME COMPONENTS TUPLES TYPE, of which the first array is taken.
+  void take_field() {
+    const auto words = split_words(lines_.next());
+    if (words.size() < 4)
+      header_error(path_, "FIELD: an array is not 'NAME COMPONENTS TUPLES TYPE'");
+    components_ = parse_integer(path_, "FIELD", words[1]);
+    if (parse_integer(path_, "FIELD", words[2]) != *tuples_)
+      header_error(path_, "FIELD: an array is not as long as its data set");
+    header_.type = read_type(path_, lower(words[3]));
+    found_ = true;
+  }
+
+  void finish() {
+    const Int3 extent = cells_ ? points_ - Int3{1, 1, 1} : points_;
+    const ArrayAxis axes[] = {{components_, AxisRole::channel},
+                              {extent.x, AxisRole::space},
+                              {extent.y, AxisRole::space},
+                              {extent.z, AxisRole::space}};
+    header_.view = select_volume(path_, axes, selection_);
+    if (header_.view.total / components_ != *tuples_)
+      header_error(path_, fmt::format("{} data for {} x {} x {} samples", *tuples_, extent.x,
+                                      extent.y, extent.z));
+    const Vec3d axis[3] = {{spacing_.x, 0, 0}, {0, spacing_.y, 0}, {0, 0, spacing_.z}};
+    set_axes(path_, header_.transform, axis);
+    header_.transform.origin = origin_;
+    if (cells_) header_.transform.origin = header_.transform.apply({0.5, 0.5, 0.5});
+  }
+
+  const std::string& path_;
+  const Selection& selection_;
+  HeaderLines lines_;
+  Header header_;
+  Int3 points_;
+  Vec3d spacing_{1, 1, 1}, origin_;
+  std::optional<Index> tuples_;
+  Index components_ = 1;
+  bool cells_ = false, found_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path, const VolumeRequest& said) {
+  refuse_raw_description(path, "a VTK file", said);
+  const Header header = Parser(path, said.selection).parse();
+  const std::size_t sample = size_of(header.type);
+  SampleLayout layout;
+  layout.info = describe_volume(path, header.view.extent, header.type, header.transform, said);
+  layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
+  layout.stride = header.view.stride;
+  InputFile file = open_input(path);
+  const std::uint64_t size = file.size;
+  if (header.text) {
+    const std::uint64_t total = static_cast<std::uint64_t>(header.view.total) * sample;
+    auto text = make_file_stream(std::move(file), path, header.begin, size);
+    return make_stream_source(std::move(layout), make_text_stream(std::move(text), header.type),
+                              total, AfterEnd::unread);
+  }
+  layout.offset += header.begin;
+  layout.swap = sample > 1 && std::endian::native == std::endian::little;  // always big endian
+  if (size < layout.end())
+    throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
+                                 path, size, layout.end()));
+  return make_raw_source(std::move(layout), std::move(file));
+}
+
+}  // namespace isobrick

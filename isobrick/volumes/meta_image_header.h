@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "isobrick/volumes/text_header.h"
+
+namespace isobrick {
+
+/// Parses a MetaImage header (`.mhd`, or the beginning of a `.mha`) and selects
+/// one volume where there are several.
+TextHeader parse_meta_image_header(const std::string& path, const Selection& selection);
+
+}  // namespace isobrick

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/core/transform.h"
+#include "isobrick/volumes/array_view.h"
+#include "isobrick/volumes/scaled_source.h"
+
+namespace isobrick {
+
+/// What the header of a NIfTI file says.
+struct NiftiHeader {
+  ArrayView view;
+  ScalarType type = ScalarType::u8;  ///< as stored
+  bool swap = false;                 ///< of the other byte order
+  bool detached = false;             ///< the samples lie in a file of their own (.hdr and .img)
+  std::uint64_t offset = 0;          ///< of the first sample of the array
+  ValueScale scale;
+  Transform transform;  ///< to the space of sform, else of qform, else of the spacing alone
+};
+
+/// Bytes of the longer one of both headers, NIfTI-2's.
+inline constexpr std::size_t kNiftiHeaderBytes = 540;
+
+/// Whether a file that begins so is NIfTI-1 or NIfTI-2, of either byte order.
+bool is_nifti(std::span<const std::byte> head);
+
+/// Parses a header and selects one volume where there are several. `path` is for
+/// messages. Throws UsageError.
+NiftiHeader parse_nifti_header(const std::string& path, std::span<const std::byte> head,
+                               const Selection& selection);
+
+}  // namespace isobrick

@@ -1,0 +1,74 @@
+#include "isobrick/volumes/nifti_volume.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <utility>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/file_stream.h"
+#include "isobrick/io/inflate_stream.h"
+#include "isobrick/volumes/nifti_header.h"
+#include "isobrick/volumes/raw_source.h"
+#include "isobrick/volumes/stream_source.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::unique_ptr<ByteStream> open_stream(const std::string& path, bool packed) {
+  InputFile file = open_input(path);
+  const std::uint64_t size = file.size;
+  auto stream = make_file_stream(std::move(file), path, 0, size);
+  return packed ? make_inflate_stream(std::move(stream), Wrapper::gzip) : std::move(stream);
+}
+
+/// Where the samples of a header's file lie: beside it, under the name of an image.
+std::string image_path(const std::string& path) {
+  const fs::path header(path);
+  const bool packed = header.extension() == ".gz";
+  fs::path image = packed ? header.stem() : header.filename();
+  image.replace_extension(image.extension() == ".HDR" ? ".IMG" : ".img");
+  image = header.parent_path() / image;
+  fs::path other = image;
+  (packed ? image : other) += ".gz";
+  std::error_code ignored;
+  return (fs::exists(image, ignored) || !fs::exists(other, ignored) ? image : other).string();
+}
+
+bool is_packed(const std::string& path) {
+  const InputFile file = open_input(path);
+  std::array<std::byte, 2> magic{};
+  if (file.size >= 2) read_at(file.fd.get(), path, 0, magic.data(), 2);
+  return magic == std::array{std::byte{0x1f}, std::byte{0x8b}};
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& said) {
+  refuse_raw_description(path, "a NIfTI file", said);
+  std::array<std::byte, kNiftiHeaderBytes> head;
+  const std::size_t got = open_stream(path, is_packed(path))->read(head.data(), head.size());
+  const NiftiHeader header = parse_nifti_header(path, {head.data(), got}, said.selection);
+  const std::string data_path = header.detached ? image_path(path) : path;
+  const std::size_t sample = size_of(header.type);
+  SampleLayout layout;
+  layout.info = describe_volume(data_path, header.view.extent, header.type, header.transform, said);
+  layout.offset = header.offset + static_cast<std::uint64_t>(header.view.first) * sample;
+  layout.swap = header.swap && sample > 1;
+  layout.stride = header.view.stride;
+  const std::uint64_t end = header.offset + static_cast<std::uint64_t>(header.view.total) * sample;
+  if (is_packed(data_path))
+    return scale_source(
+        make_stream_source(std::move(layout), open_stream(data_path, true), end, AfterEnd::ignored),
+        header.scale);
+  InputFile file = open_input(data_path);
+  if (file.size < layout.end())
+    throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
+                                 data_path, file.size, layout.end()));
+  return scale_source(make_raw_source(std::move(layout), std::move(file)), header.scale);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "isobrick/volumes/volume_request.h"
+
+namespace isobrick {
+
+/// Opens a NIfTI-1 or NIfTI-2 volume: `.nii`, or `.hdr` with the `.img` beside it,
+/// each also compressed as a whole (`.nii.gz`).
+std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& said);
+
+}  // namespace isobrick

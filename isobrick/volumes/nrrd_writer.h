@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "isobrick/volumes/volume_source.h"
+
+namespace isobrick {
+
+/// The header of a NRRD file, up to and with the empty line that the samples
+/// follow: raw, little endian, x fastest. Numbers are the shortest decimals that
+/// read back as the same double.
+std::string nrrd_header_text(const VolumeInfo& info);
+
+}  // namespace isobrick

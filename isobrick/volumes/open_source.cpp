@@ -1,0 +1,58 @@
+#include "isobrick/volumes/open_source.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "isobrick/core/error.h"
+#include "isobrick/volumes/legacy_vtk.h"
+#include "isobrick/volumes/nifti_volume.h"
+#include "isobrick/volumes/optional_formats.h"
+#include "isobrick/volumes/raw_volume.h"
+#include "isobrick/volumes/volume_folder.h"
+#include "isobrick/volumes/volume_format.h"
+
+namespace isobrick {
+namespace {
+
+std::unique_ptr<VolumeSource> open_file(VolumeFormat format, const std::string& file,
+                                        const VolumeRequest& said) {
+  switch (format) {
+    case VolumeFormat::nrrd:
+    case VolumeFormat::meta_image:
+      return open_text_volume(parse_text_header(file, format == VolumeFormat::nrrd, said.selection),
+                              said);
+    case VolumeFormat::nifti: return open_nifti(file, said);
+    case VolumeFormat::legacy_vtk: return open_legacy_vtk(file, said);
+    case VolumeFormat::tiff: return open_tiff_if_built(file, {file}, said);
+    case VolumeFormat::vdb: return open_vdb_if_built(file, said);
+    case VolumeFormat::dicom: return open_dicom_if_built(file, {file}, said);
+    default: return open_raw(file, said);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeRequest& said) {
+  std::error_code ignored;
+  const bool folder = std::filesystem::is_directory(path, ignored);
+  if (path == "-" || folder) {
+    refuse_grid(path, said);
+    return folder ? open_folder(path, said) : open_stdin(said);
+  }
+  const auto [file, inner] = split_volume_path(path);
+  // Raw samples may begin with anything: who says all of them is believed.
+  if (said.extent && said.type && format_of_extension(path) == VolumeFormat::raw) {
+    refuse_grid(path, said);
+    return open_raw(path, said);
+  }
+  const VolumeFormat format = recognise_format(file);
+  if (format != VolumeFormat::vdb) refuse_grid(file, said);
+  if (format == VolumeFormat::vti) return open_vti_if_built(file, inner, said);
+  if (format == VolumeFormat::hdf5) return open_hdf5_if_built(file, inner, said);
+  if (!inner.empty())
+    throw UsageError(fmt::format("'{}' holds no arrays with names: leave ':/{}' out", file, inner));
+  return open_file(format, file, said);
+}
+
+}  // namespace isobrick

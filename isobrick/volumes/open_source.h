@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "isobrick/volumes/volume_request.h"
+#include "isobrick/volumes/volume_source.h"
+
+namespace isobrick {
+
+/// Opens a volume: a file of a known format (recognised by its content before
+/// its extension; docs/formats.md lists them), a raw file, or standard input ("-").
+/// Throws UsageError when what the file and the caller say makes no volume: no
+/// known extent or type, sizes that are zero, overflow or contradict the file's
+/// size, a channel that must be chosen; Error when the file cannot be read.
+std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeRequest& said);
+
+}  // namespace isobrick

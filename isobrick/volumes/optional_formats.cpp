@@ -1,0 +1,96 @@
+#include "isobrick/volumes/optional_formats.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+
+#ifdef ISOBRICK_WITH_EXPAT
+#include "isobrick/volumes/vti_volume.h"
+#endif
+#ifdef ISOBRICK_WITH_TIFF
+#include "isobrick/volumes/tiff_volume.h"
+#endif
+#ifdef ISOBRICK_WITH_HDF5
+#include "isobrick/volumes/hdf5_volume.h"
+#endif
+#ifdef ISOBRICK_WITH_OPENVDB
+#include "isobrick/volumes/vdb_module.h"
+#endif
+#include "isobrick/volumes/vdb_writer.h"
+#ifdef ISOBRICK_WITH_DICOM
+#include "isobrick/volumes/dicom_volume.h"
+#endif
+
+namespace isobrick {
+namespace {
+
+[[noreturn, maybe_unused]] void built_without(const std::string& name, const char* format,
+                                              const char* library) {
+  throw UsageError(
+      fmt::format("'{}' is {}, which this isobrick cannot read: it was built without {}", name,
+                  format, library));
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_vti_if_built(const std::string& file,
+                                                [[maybe_unused]] const std::string& array,
+                                                [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_EXPAT
+  return open_vti(file, array, said);
+#else
+  built_without(file, "a VTK image", "libexpat1-dev");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_tiff_if_built(
+    const std::string& name, [[maybe_unused]] const std::vector<std::string>& files,
+    [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_TIFF
+  return open_tiff(name, files, said);
+#else
+  built_without(name, "a TIFF stack", "libtiff-dev 4.5");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_hdf5_if_built(const std::string& file,
+                                                 [[maybe_unused]] const std::string& dataset,
+                                                 [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_HDF5
+  return open_hdf5(file, dataset, said);
+#else
+  built_without(file, "an HDF5 file", "libhdf5-dev");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file,
+                                                [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_OPENVDB
+  return vdb_module().open(file, said);
+#else
+  built_without(file, "an OpenVDB file", "libopenvdb-dev and libboost-dev");
+#endif
+}
+
+std::unique_ptr<VdbWriter> make_vdb_writer_if_built([[maybe_unused]] const VolumeInfo& info,
+                                                    [[maybe_unused]] const std::string& name) {
+#ifdef ISOBRICK_WITH_OPENVDB
+  return vdb_module().make_writer(info, name);
+#else
+  throw UsageError(
+      "this isobrick cannot write OpenVDB files: it was built without "
+      "libopenvdb-dev and libboost-dev");
+#endif
+}
+
+std::unique_ptr<VolumeSource> open_dicom_if_built(
+    const std::string& name, [[maybe_unused]] const std::vector<std::string>& files,
+    [[maybe_unused]] const VolumeRequest& said) {
+#ifdef ISOBRICK_WITH_DICOM
+  return open_dicom(name, files, said);
+#else
+  built_without(name, "a DICOM series", "libdcmtk-dev");
+#endif
+}
+
+}  // namespace isobrick

@@ -1,0 +1,254 @@
+#include "isobrick/volumes/raw_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <filesystem>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/concat_stream.h"
+#include "isobrick/io/file.h"
+#include "isobrick/io/file_stream.h"
+#include "isobrick/io/inflate_stream.h"
+#include "isobrick/io/text_stream.h"
+#include "isobrick/volumes/meta_image_header.h"
+#include "isobrick/volumes/nrrd_header.h"
+#include "isobrick/volumes/raw_name.h"
+#include "isobrick/volumes/raw_source.h"
+#include "isobrick/volumes/stream_source.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr ByteOrder kNativeOrder =
+    std::endian::native == std::endian::little ? ByteOrder::little : ByteOrder::big;
+
+/// The header beside a raw file, if there is one and it means this very file.
+std::optional<TextHeader> find_header_beside(const std::string& path, const VolumeRequest& said) {
+  for (const char* extension : {".nhdr", ".mhd"}) {
+    const std::string candidate = fs::path(path).replace_extension(extension).string();
+    std::error_code error;
+    if (!fs::is_regular_file(candidate, error)) continue;
+    try {
+      auto header = parse_text_header(candidate, extension[1] == 'n', said.selection);
+      if (header.data_paths.size() == 1 && fs::equivalent(header.data_paths[0], path, error))
+        return header;
+    } catch (const UsageError&) {
+      // Somebody who says everything does not need the header.
+      if (!said.extent || !said.type) throw;
+    }
+  }
+  return std::nullopt;
+}
+
+std::string describe(Int3 extent, ScalarType type) {
+  return fmt::format("{}x{}x{} {}", extent.x, extent.y, extent.z, short_name(type));
+}
+
+bool must_swap(std::optional<ByteOrder> order, ScalarType type) {
+  return order && *order != kNativeOrder && size_of(type) > 1;
+}
+
+/// The order that is said, else the header's, which may not be missing where it matters.
+std::optional<ByteOrder> order_of(const TextHeader& header, ScalarType type,
+                                  const VolumeRequest& said) {
+  const auto order = said.order ? said.order : header.order;
+  if (!order && size_of(type) > 1) header_error(header.path, "the field 'endian' is missing");
+  return order;
+}
+
+/// Where the text lines end that a NRRD header says to skip.
+std::uint64_t after_lines(const InputFile& file, const std::string& path, std::uint64_t begin,
+                          std::uint64_t lines) {
+  if (lines == 0) return begin;
+  std::string text(std::min(file.size - std::min(begin, file.size), kMostHeader), '\0');
+  read_at(file.fd.get(), path, begin, reinterpret_cast<std::byte*>(text.data()), text.size());
+  std::size_t at = 0;
+  for (std::uint64_t i = 0; i < lines; ++i) {
+    at = text.find('\n', at);
+    if (at == std::string::npos)
+      throw UsageError(fmt::format("'{}' has only {} of the {} lines to skip in its first {} bytes",
+                                   path, i, lines, text.size()));
+    ++at;
+  }
+  return begin + at;
+}
+
+/// What else would make the size right, as " (would fit …)".
+std::string size_hint(const VolumeInfo& info, std::uint64_t samples, std::uint64_t offset,
+                      std::uint64_t size) {
+  const std::uint64_t count = samples / size_of(info.type);
+  std::string types;
+  for (const ScalarType type : kScalarTypes)
+    if (size > offset && count * size_of(type) == size - offset)
+      types += fmt::format("{}{}", types.empty() ? "" : " or ", short_name(type));
+  if (!types.empty()) return fmt::format(" (would fit --type {})", types);
+  constexpr std::uint64_t likely_header = 64 * 1024;
+  if (size >= samples && size - samples <= likely_header)
+    return fmt::format(" (would fit --offset {})", size - samples);
+  return {};
+}
+
+/// The file must hold `samples` bytes from the layout's offset on.
+void check_size(const VolumeInfo& info, std::uint64_t offset, std::uint64_t samples,
+                std::uint64_t size) {
+  if (offset <= size && size - offset == samples) return;
+  const std::string at = offset ? fmt::format(" after offset {}", offset) : "";
+  const bool whole =
+      samples == static_cast<std::uint64_t>(volume(info.extent)) * size_of(info.type);
+  throw UsageError(fmt::format("'{}' has {} bytes, but {} samples{}{} make {}{}", info.name, size,
+                               describe(info.extent, info.type),
+                               whole ? "" : " of each channel and time", at,
+                               // Only in words if the sum would wrap around.
+                               offset > std::numeric_limits<std::uint64_t>::max() - samples
+                                   ? std::string("far more")
+                                   : fmt::format("{}", offset + samples),
+                               size_hint(info, samples, offset, size)));
+}
+
+/// Opens samples that lie as they are in one file: what is said goes before what
+/// the header says.
+std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const VolumeRequest& said,
+                                             InputFile file) {
+  const std::string& path = header.data_paths[0];
+  const ScalarType type = said.type.value_or(header.type);
+  SampleLayout layout;
+  layout.info =
+      describe_volume(path, said.extent.value_or(header.view.extent), type, header.transform, said);
+  layout.swap = must_swap(order_of(header, type, said), type);
+  const auto total =
+      static_cast<std::uint64_t>(said.extent ? volume(*said.extent) : header.view.total) *
+      size_of(type);
+  std::uint64_t offset = header.data_begin;
+  if (said.offset)
+    offset = *said.offset;
+  else if (header.data_at_end)
+    offset = std::max(offset, file.size > total ? file.size - total : 0);
+  else
+    offset = after_lines(file, path, header.data_begin, header.skip_lines) + header.skip_bytes;
+  check_size(layout.info, offset, total, file.size);
+  layout.offset = offset;
+  if (!said.extent) {
+    layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);
+    layout.stride = header.view.stride;
+  }
+  return make_raw_source(std::move(layout), std::move(file));
+}
+
+/// One data file, from where its samples begin.
+std::unique_ptr<ByteStream> open_data(const TextHeader& header, const std::string& path) {
+  InputFile file = open_input(path);
+  const std::uint64_t begin = after_lines(file, path, header.data_begin, header.skip_lines);
+  const std::uint64_t end = file.size;
+  const bool packed = header.encoding == Encoding::gzip || header.encoding == Encoding::zlib;
+  if (packed && begin == end) header_error(header.path, "no samples follow");
+  std::byte first{};
+  if (packed) read_at(file.fd.get(), path, begin, &first, 1);
+  const std::uint64_t skip = packed ? 0 : header.skip_bytes;
+  if (begin > end || end - begin < skip)
+    header_error(header.path,
+                 fmt::format("'{}' has {} bytes, fewer than are to be skipped", path, end));
+  auto stream = make_file_stream(std::move(file), path, begin + skip, end);
+  if (!packed) return stream;
+  // MetaImage's writers have wrapped deflated data either way.
+  constexpr std::byte kGzip{0x1f};
+  stream = make_inflate_stream(std::move(stream), first == kGzip ? Wrapper::gzip : Wrapper::zlib);
+  if (header.skip_bytes > stream->most_bytes())
+    header_error(header.path,
+                 fmt::format("'{}' cannot have {} bytes to skip", path, header.skip_bytes));
+  stream->skip(header.skip_bytes);
+  return stream;
+}
+
+std::unique_ptr<ByteStream> open_all_data(const TextHeader& header) {
+  if (header.data_paths.size() == 1) return open_data(header, header.data_paths[0]);
+  return make_concat_stream(
+      "the data files of '" + header.path + "'", header.data_paths.size(),
+      [header](std::size_t i) { return open_data(header, header.data_paths[i]); });
+}
+
+}  // namespace
+
+TextHeader parse_text_header(const std::string& path, bool nrrd, const Selection& selection) {
+  return nrrd ? parse_nrrd_header(path, selection) : parse_meta_image_header(path, selection);
+}
+
+std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
+                                               const VolumeRequest& said) {
+  if (header.encoding == Encoding::raw && header.data_paths.size() == 1)
+    return open_described(header, said, open_input(header.data_paths[0]));
+  VolumeRequest rest = said;
+  rest.order.reset();
+  refuse_raw_description(header.path, "a header that describes its samples", rest);
+  if (header.data_at_end)
+    header_error(header.path, "samples at the end of a file must be raw and in one file");
+  SampleLayout layout;
+  layout.info =
+      describe_volume(header.path, header.view.extent, header.type, header.transform, said);
+  const std::size_t sample = size_of(header.type);
+  layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
+  layout.stride = header.view.stride;
+  const std::uint64_t end = static_cast<std::uint64_t>(header.view.total) * sample;
+  auto stream = open_all_data(header);
+  if (header.encoding == Encoding::text)
+    stream = make_text_stream(std::move(stream), header.type);
+  else
+    layout.swap = must_swap(order_of(header, header.type, said), header.type);
+  return make_stream_source(std::move(layout), std::move(stream), end);
+}
+
+namespace {
+
+/// Extent and type that are said, else those in the name.
+TextHeader describe_by_name(const std::string& path, const VolumeRequest& said) {
+  const RawName name = parse_raw_name(fs::path(path).stem().string());
+  const auto extent = said.extent ? said.extent : name.extent;
+  const auto type = said.type ? said.type : name.type;
+  if (!extent || !type)
+    throw UsageError(
+        fmt::format("the {} of '{}' {} not known: say so, name the file like "
+                    "'scan_256x256x128_uint8.raw', or give a .nhdr or .mhd header",
+                    extent ? "type"
+                    : type ? "extent"
+                           : "extent and type",
+                    path, extent || type ? "is" : "are"));
+  refuse_selection(path, said);
+  TextHeader header;
+  header.path = path;
+  header.data_paths = {path};
+  header.type = *type;
+  header.order = ByteOrder::little;
+  const VolumeInfo checked = describe_volume(path, *extent, *type, {}, said);
+  header.view = {checked.extent, {1, extent->x, extent->x * extent->y}, 0, volume(checked.extent)};
+  return header;
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& said) {
+  InputFile file = open_input(path);
+  if (const auto header = find_header_beside(path, said)) return open_text_volume(*header, said);
+  return open_described(describe_by_name(path, said), said, std::move(file));
+}
+
+std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& said) {
+  const std::string name = "standard input";
+  const TextHeader header = describe_by_name(name, said);
+  const std::uint64_t offset = said.offset.value_or(0);
+  if (offset > std::numeric_limits<std::uint64_t>::max() / 2)
+    throw UsageError(fmt::format("an offset of {} bytes is too large", offset));
+  SampleLayout layout;
+  layout.info = describe_volume(name, header.view.extent, header.type, {}, said);
+  layout.offset = offset;
+  layout.swap = must_swap(said.order.value_or(ByteOrder::little), header.type);
+  const std::uint64_t end = layout.end();
+  return make_stream_source(std::move(layout), make_stdin_stream(), end);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "isobrick/volumes/text_header.h"
+#include "isobrick/volumes/volume_request.h"
+
+namespace isobrick {
+
+/// Opens a file of raw samples, described by the caller, by a header that lies
+/// beside it (`x.nhdr`, `x.mhd`) or by its name.
+std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& said);
+
+/// Standard input, which must end with the last sample.
+std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& said);
+
+/// Opens the samples that a text header describes. Throws UsageError when their
+/// number is not what the header says.
+std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header, const VolumeRequest& said);
+
+/// The header of a NRRD or a MetaImage.
+TextHeader parse_text_header(const std::string& path, bool nrrd, const Selection& selection);
+
+}  // namespace isobrick

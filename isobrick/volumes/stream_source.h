@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "isobrick/io/byte_stream.h"
+#include "isobrick/volumes/sample_layout.h"
+
+namespace isobrick {
+
+/// What becomes of bytes that follow the samples.
+enum class AfterEnd : unsigned char {
+  refused,
+  ignored,  ///< they are read (where checksums follow) but not looked at
+  unread,
+};
+
+/// Reads planes from a stream. `end` is where its samples end, also those that
+/// are not of this volume; where that is near the last one read, checksums at the
+/// end of the stream are compared and bytes left over are found. Throws
+/// UsageError when the stream cannot have enough bytes.
+std::unique_ptr<VolumeSource> make_stream_source(SampleLayout layout,
+                                                 std::unique_ptr<ByteStream> stream,
+                                                 std::uint64_t end,
+                                                 AfterEnd after_end = AfterEnd::refused);
+
+}  // namespace isobrick

@@ -1,0 +1,122 @@
+#include "isobrick/volumes/synth_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/core/lattice.h"
+#include "isobrick/volumes/synth_field.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::string_view kNames[] = {"sphere", "gyroid", "marschner-lobb", "mixing"};
+constexpr SynthKind kKinds[] = {SynthKind::sphere, SynthKind::gyroid, SynthKind::marschner_lobb,
+                                SynthKind::mixing};
+
+/// float where it resolves all of the type's values.
+template <class T>
+using RealFor = std::conditional_t<std::is_same_v<T, float> || sizeof(T) <= 2, float, double>;
+
+template <class T>
+void quantize(const RealFor<T>* field, std::size_t n, std::byte* bytes) {
+  using Real = RealFor<T>;
+  if constexpr (std::is_floating_point_v<T>) {
+    std::memcpy(bytes, field, n * sizeof(T));
+  } else {
+    using Wide = std::conditional_t<sizeof(T) == 4, std::int64_t, std::int32_t>;
+    constexpr Real half =
+        static_cast<Real>(std::numeric_limits<std::make_unsigned_t<T>>::max()) / 2;
+    constexpr auto lowest = static_cast<Wide>(std::numeric_limits<T>::lowest());
+    for (std::size_t i = 0; i < n; ++i) {
+      Real f = field[i];
+      f = f < Real{-1} ? Real{-1} : f;
+      f = f > Real{1} ? Real{1} : f;
+      // Never negative, so truncation rounds to nearest.
+      const auto sample = static_cast<T>(static_cast<Wide>(f * half + (half + Real{0.5})) + lowest);
+      std::memcpy(bytes + i * sizeof(T), &sample, sizeof(T));
+    }
+  }
+}
+
+class SynthSource final : public VolumeSource {
+ public:
+  explicit SynthSource(const SynthOptions& options) : options_(options) {
+    info_.extent = options.extent;
+    info_.type = options.type;
+    info_.name = name_of(options.kind);
+  }
+
+  const VolumeInfo& info() const override { return info_; }
+  bool random_access() const override { return true; }
+
+  void read(Box3 box, std::byte* out) override {
+    if (box.empty()) return;
+    visit_scalar(options_.type, [&](auto tag) { fill<typename decltype(tag)::type>(box, out); });
+  }
+
+ private:
+  template <class T>
+  void fill(Box3 box, std::byte* out) const {
+    using Real = RealFor<T>;
+    const auto field = make_synth_field<Real>(options_, box);
+    const Int3 size = box.extent();
+    std::vector<Real> row(static_cast<std::size_t>(size.x));
+    // y outside: some fields keep what depends on x and y.
+    for (Index y = box.lo.y; y < box.hi.y; ++y)
+      for (Index z = box.lo.z; z < box.hi.z; ++z) {
+        field->row(y, z, row.data());
+        const Index at = linear_index({0, y - box.lo.y, z - box.lo.z}, size);
+        quantize<T>(row.data(), row.size(), out + static_cast<std::size_t>(at) * sizeof(T));
+      }
+  }
+
+  SynthOptions options_;
+  VolumeInfo info_;
+};
+
+}  // namespace
+
+std::string_view name_of(SynthKind kind) { return kNames[static_cast<int>(kind)]; }
+
+std::optional<SynthKind> parse_synth_kind(std::string_view name) {
+  for (const SynthKind kind : kKinds)
+    if (name == name_of(kind)) return kind;
+  return std::nullopt;
+}
+
+double default_isovalue(ScalarType type) {
+  return visit_scalar(type, [](auto tag) {
+    using Limits = std::numeric_limits<typename decltype(tag)::type>;
+    if constexpr (Limits::is_integer)
+      return (static_cast<double>(Limits::lowest()) + static_cast<double>(Limits::max())) / 2;
+    else
+      return 0.0;
+  });
+}
+
+std::unique_ptr<VolumeSource> make_synth(const SynthOptions& options) {
+  if (!checked_volume(options.extent))
+    throw UsageError(fmt::format("an extent of {}x{}x{} samples is not positive or too large",
+                                 options.extent.x, options.extent.y, options.extent.z));
+  const Int3 e = options.extent;
+  // Finer structure than this is not structure any more.
+  const double finest = std::max(2.0, static_cast<double>(std::max({e.x, e.y, e.z})));
+  SynthOptions complete = options;
+  if (!complete.frequency)
+    complete.frequency = std::min(options.kind == SynthKind::mixing ? 6.0 : 2.0, finest);
+  if (!(*complete.frequency > 0 && *complete.frequency <= finest))
+    throw UsageError(fmt::format("a frequency of {} is not between 0 and the longest edge",
+                                 *complete.frequency));
+  if (!std::isfinite(options.noise) || options.noise < 0)
+    throw UsageError("the noise is negative or not a number");
+  return std::make_unique<SynthSource>(complete);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "isobrick/volumes/volume_source.h"
+
+namespace isobrick {
+
+enum class SynthKind : std::uint8_t {
+  sphere,          ///< a ball of 0.4 times the shortest edge with a soft rim
+  gyroid,          ///< the triply periodic surface, with white noise on top
+  marschner_lobb,  ///< the test signal of Marschner and Lobb (f_M = 6, α = ¼)
+  mixing,          ///< two fluids, layered along z, that mix in turbulence at mid-height
+};
+
+/// "sphere", "gyroid", "marschner-lobb", "mixing".
+std::string_view name_of(SynthKind kind);
+std::optional<SynthKind> parse_synth_kind(std::string_view name);
+
+/// A volume made by computation.
+struct SynthOptions {
+  SynthKind kind = SynthKind::gyroid;
+  Int3 extent{256, 256, 256};
+  ScalarType type = ScalarType::u8;
+  std::uint64_t seed = 1;
+  /// gyroid: periods along the longest edge; of N cells along that edge about
+  /// 4.6 · frequency / N are active (2 at 512³: 1.8 %).
+  /// mixing: largest eddies along the longest edge. Nothing: 2 and 6.
+  std::optional<double> frequency;
+  /// gyroid: amplitude of the noise, as a part of the field's.
+  double noise = 0.01;
+};
+
+/// The isovalue in the middle of every kind's field, where all of them have an
+/// obvious surface. A field in [−1, 1] fills the type: floating samples are the
+/// field itself (isovalue 0); unsigned ones reach from 0 to their maximum
+/// (127.5 for u8), signed ones from their minimum to their maximum (−0.5). The
+/// isovalue lies between two integers, so that no sample equals it.
+double default_isovalue(ScalarType type);
+
+/// Samples are the same on every machine, whatever the boxes they are read by;
+/// random access from any thread. Throws UsageError for options that make no sense.
+std::unique_ptr<VolumeSource> make_synth(const SynthOptions& options);
+
+}  // namespace isobrick

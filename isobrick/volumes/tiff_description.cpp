@@ -1,0 +1,99 @@
+#include "isobrick/volumes/tiff_description.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <string_view>
+
+#include "isobrick/volumes/text_header.h"
+
+namespace isobrick {
+namespace {
+
+Index read_count(const std::string& path, const char* name, std::string_view text) {
+  constexpr Index kMost = Index{1} << 31;
+  const Index count = parse_integer(path, name, text);
+  if (count < 1 || count > kMost)
+    header_error(path, fmt::format("{} = {} makes no sense", name, count));
+  return count;
+}
+
+double read_length(const std::string& path, const char* name, std::string_view text) {
+  const double length = parse_real(path, name, text);
+  return length > 0 ? length : 0;
+}
+
+/// `key=value` lines.
+TiffDescription parse_image_j(const std::string& path, std::string_view text) {
+  TiffDescription said;
+  said.image_j = true;
+  Index images = 1;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    const std::size_t equals = line.find('=');
+    if (equals == std::string_view::npos) continue;
+    const std::string_view key = line.substr(0, equals), value = trim(line.substr(equals + 1));
+    if (key == "images") images = read_count(path, "images", value);
+    if (key == "channels") said.channels = read_count(path, "channels", value);
+    if (key == "slices") said.slices = read_count(path, "slices", value);
+    if (key == "frames") said.times = read_count(path, "frames", value);
+    if (key == "spacing") said.spacing.z = read_length(path, "spacing", value);
+    // A micro sign that ImageJ could not write.
+    if (key == "unit") said.unit = value == "\\u00B5m" ? "micrometer" : unit_name(lower(value));
+  }
+  if (said.slices == 0) said.slices = images / said.channels / said.times;
+  return said;
+}
+
+/// The value of an attribute in the tag that `text` begins with.
+std::optional<std::string_view> attribute(std::string_view text, std::string_view name) {
+  const std::string_view tag = text.substr(0, text.find('>'));
+  const std::string before = fmt::format(" {}=\"", name);
+  const std::size_t at = tag.find(before);
+  if (at == std::string_view::npos) return std::nullopt;
+  const std::string_view rest = tag.substr(at + before.size());
+  return rest.substr(0, rest.find('"'));
+}
+
+TiffDescription parse_ome(const std::string& path, std::string_view text) {
+  TiffDescription said;
+  const std::string_view pixels = text.substr(text.find("<Pixels"));
+  const auto count = [&](const char* name) {
+    const auto value = attribute(pixels, name);
+    return value ? read_count(path, name, *value) : 1;
+  };
+  said.channels = count("SizeC");
+  said.slices = count("SizeZ");
+  said.times = count("SizeT");
+  // Colours of a pixel are no pages.
+  if (const std::size_t at = pixels.find("<Channel"); at != std::string_view::npos)
+    if (const auto samples = attribute(pixels.substr(at), "SamplesPerPixel"))
+      said.channels =
+          std::max<Index>(1, said.channels / read_count(path, "SamplesPerPixel", *samples));
+  if (const auto order = attribute(pixels, "DimensionOrder")) {
+    said.order = order->starts_with("XY") ? std::string(order->substr(2)) : "";
+    for (const char axis : {'C', 'Z', 'T'})
+      if (said.order.size() != 3 || said.order.find(axis) == std::string::npos)
+        header_error(path, "OME: the DimensionOrder is not known");
+  }
+  constexpr const char* names[] = {"PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"};
+  for (int axis = 0; axis < 3; ++axis)
+    if (const auto value = attribute(pixels, names[axis]))
+      said.spacing[axis] = read_length(path, names[axis], *value);
+  if (said.spacing.x > 0)
+    said.unit = unit_name(attribute(pixels, "PhysicalSizeXUnit").value_or("µm"));
+  return said;
+}
+
+}  // namespace
+
+TiffDescription parse_tiff_description(const std::string& path, const std::string& text) {
+  if (text.starts_with("ImageJ=")) return parse_image_j(path, text);
+  if (text.find("<OME") != std::string::npos && text.find("<Pixels") != std::string::npos)
+    return parse_ome(path, text);
+  return {};
+}
+
+}  // namespace isobrick

@@ -1,0 +1,206 @@
+#include "isobrick/volumes/vdb_header.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
+
+namespace isobrick {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "OpenVDB's files are little endian");
+
+constexpr std::string_view kMagic{" BDV\0\0\0\0", 8};
+constexpr std::uint32_t kOldest = 222, kNewest = 224;
+constexpr std::string_view kHalfSuffix = "_HalfFloat";
+/// Between a name and the number of its repetition.
+constexpr char kSeparator = '\x1e';
+constexpr std::size_t kUuidBytes = 36;
+/// A name, a type or a piece of metadata that is longer is damage.
+constexpr std::uint32_t kMostText = 1 << 20;
+constexpr std::uint32_t kMostItems = 1 << 16;
+
+using Metadata = std::map<std::string, std::string>;
+
+/// Walks through the fields of a file.
+class Fields {
+ public:
+  explicit Fields(const std::string& path) : path_(path), file_(open_input(path)) {}
+
+  std::uint64_t size() const { return file_.size; }
+  std::uint64_t at() const { return at_; }
+  void seek(std::uint64_t at) { at_ = at; }
+
+  [[noreturn]] void damaged(const std::string& what) const {
+    throw Error(fmt::format("'{}': no sound OpenVDB file: {} at byte {}", path_, what, at_));
+  }
+
+  std::string bytes(std::size_t count) {
+    if (at_ > size() || count > size() - at_) damaged("it ends within its header");
+    std::string text(count, '\0');
+    read_at(file_.fd.get(), path_, at_, reinterpret_cast<std::byte*>(text.data()), count);
+    at_ += count;
+    return text;
+  }
+  template <class T>
+  T number() {
+    const std::string raw = bytes(sizeof(T));
+    T value;
+    std::memcpy(&value, raw.data(), sizeof(T));
+    return value;
+  }
+  std::string text() {
+    const auto length = number<std::uint32_t>();
+    if (length > kMostText) damaged(fmt::format("a text of {} bytes", length));
+    return bytes(length);
+  }
+  std::uint64_t position() {
+    const auto value = number<std::int64_t>();
+    if (value < 0 || static_cast<std::uint64_t>(value) > size())
+      damaged(fmt::format("the position {}", value));
+    return static_cast<std::uint64_t>(value);
+  }
+  Metadata metadata() {
+    const auto count = number<std::uint32_t>();
+    if (count > kMostItems) damaged(fmt::format("{} items of metadata", count));
+    Metadata items;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::string name = text();
+      text();  // the type
+      items[name] = text();
+    }
+    return items;
+  }
+
+ private:
+  const std::string& path_;
+  InputFile file_;
+  std::uint64_t at_ = 0;
+};
+
+/// As it may be shown: what a file says of itself may be anything.
+std::string printable(std::string text) {
+  for (char& c : text)
+    if (c < 0x20 || c > 0x7e) c = '?';
+  if (text.size() > 100) text.resize(100);
+  return text;
+}
+
+std::string shown_name(const std::string& unique, bool repeated) {
+  const std::size_t separator = unique.find(kSeparator);
+  const std::string name = printable(unique.substr(0, separator));
+  if (separator == std::string::npos) return name;
+  return repeated ? fmt::format("{}[{}]", name, printable(unique.substr(separator + 1))) : name;
+}
+
+void read_own_header(Fields& in, VdbGrid& grid) {
+  const std::uint64_t next = in.at();
+  in.seek(grid.begin);
+  in.number<std::uint32_t>();  // how it is compressed
+  Metadata metadata = in.metadata();
+  grid.grid_class = printable(metadata["class"]);
+  grid.map = printable(in.text());
+  if (const std::string& memory = metadata["file_mem_bytes"];
+      memory.size() == sizeof(std::uint64_t))
+    std::memcpy(&grid.memory.emplace(), memory.data(), sizeof(std::uint64_t));
+  in.seek(next);
+}
+
+VdbGrid read_grid(Fields& in) {
+  VdbGrid grid;
+  grid.unique_name = in.text();
+  grid.type = printable(in.text());
+  grid.half = grid.type.ends_with(kHalfSuffix);
+  if (grid.half) grid.type.resize(grid.type.size() - kHalfSuffix.size());
+  grid.parent = in.text();
+  const std::uint64_t fields = in.at() + 3 * sizeof(std::int64_t);
+  grid.begin = in.position();
+  grid.blocks = in.position();
+  grid.end = in.position();
+  if (grid.begin < fields || grid.end < grid.begin) in.damaged("a grid outside of its place");
+  read_own_header(in, grid);
+  in.seek(grid.end);
+  return grid;
+}
+
+void check_version(Fields& in, const std::string& path) {
+  if (in.bytes(kMagic.size()) != kMagic) in.damaged("not what such files begin with");
+  const auto version = in.number<std::uint32_t>();
+  if (version < kOldest || version > kNewest)
+    throw Error(
+        fmt::format("'{}' is an OpenVDB file of version {}; {} to {} can be read: let "
+                    "OpenVDB's own programs write it anew",
+                    path, version, kOldest, kNewest));
+  in.bytes(2 * sizeof(std::uint32_t));  // the library's own version
+  if (in.number<char>() == 0)
+    throw Error(
+        fmt::format("'{}' is an OpenVDB stream that does not say where its grids are: "
+                    "let OpenVDB write it to a file",
+                    path));
+  in.bytes(kUuidBytes);
+}
+
+std::string list(const std::vector<VdbGrid>& grids) {
+  std::vector<std::string> lines;
+  for (const VdbGrid& grid : grids)
+    lines.push_back(fmt::format("{} ({}{}{})", grid.name, grid.value_type(),
+                                grid.grid_class.empty() ? "" : ", ", grid.grid_class));
+  return fmt::format("{}", fmt::join(lines, "; "));
+}
+
+}  // namespace
+
+std::string VdbGrid::value_type() const {
+  if (!type.starts_with("Tree_")) return type;
+  const std::string rest = type.substr(5);
+  return rest.substr(0, rest.find('_'));
+}
+
+std::vector<VdbGrid> read_vdb_header(const std::string& path) {
+  Fields in(path);
+  check_version(in, path);
+  in.metadata();
+  const auto count = in.number<std::uint32_t>();
+  if (count > kMostItems) in.damaged(fmt::format("{} grids", count));
+  std::vector<VdbGrid> grids;
+  std::map<std::string, int> times;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    grids.push_back(read_grid(in));
+    ++times[shown_name(grids.back().unique_name, false)];
+  }
+  for (VdbGrid& grid : grids)
+    grid.name = shown_name(grid.unique_name, times[shown_name(grid.unique_name, false)] > 1);
+  return grids;
+}
+
+const VdbGrid& choose_vdb_grid(const std::string& path, const std::vector<VdbGrid>& grids,
+                               const std::optional<std::string>& name,
+                               const std::vector<std::string_view>& types) {
+  const auto readable = [&](const VdbGrid& grid) {
+    return std::find(types.begin(), types.end(), grid.type) != types.end();
+  };
+  const auto fits = [&](const VdbGrid& grid) {
+    return name ? grid.name == printable(*name) : readable(grid);
+  };
+  if (grids.empty()) throw UsageError(fmt::format("'{}' holds no grids", path));
+  const auto chosen = std::find_if(grids.begin(), grids.end(), fits);
+  const auto count = std::count_if(grids.begin(), grids.end(), fits);
+  if (count == 0 && name)
+    throw UsageError(
+        fmt::format("'{}' has no grid '{}'; it has {}", path, printable(*name), list(grids)));
+  if (count == 0 || !readable(*chosen))
+    throw UsageError(
+        fmt::format("'{}': only grids of float, double, int32, int64, bool and mask can be read, "
+                    "not {}",
+                    path, name ? chosen->value_type() : list(grids)));
+  if (count > 1)
+    throw UsageError(fmt::format("'{}' holds several grids: choose one with --grid NAME: {}", path,
+                                 list(grids)));
+  return *chosen;
+}
+
+}  // namespace isobrick

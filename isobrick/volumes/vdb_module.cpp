@@ -1,0 +1,10 @@
+#include "isobrick/volumes/vdb_module.h"
+
+#include "isobrick/volumes/vdb_volume.h"
+
+extern "C" __attribute__((visibility("default"))) const isobrick::VdbModule*
+isobrick_openvdb_module() {
+  static constexpr isobrick::VdbModule module{ISOBRICK_VERSION, isobrick::open_vdb,
+                                              isobrick::make_vdb_writer};
+  return &module;
+}

@@ -1,0 +1,74 @@
+#include "isobrick/volumes/volume_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/volumes/optional_formats.h"
+#include "isobrick/volumes/volume_format.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// The digits that `text` begins with, without zeros in front.
+std::string_view leading_number(std::string_view text) {
+  std::size_t end = 0;
+  while (end < text.size() && is_digit(text[end])) ++end;
+  const std::size_t zeros = text.substr(0, end).find_first_not_of('0');
+  return text.substr(std::min(zeros, end), end - std::min(zeros, end));
+}
+
+/// Whether a comes before b: "slice9" before "slice10".
+bool before(std::string_view a, std::string_view b) {
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (is_digit(a[i]) && is_digit(b[j])) {
+      const std::string_view m = leading_number(a.substr(i)), n = leading_number(b.substr(j));
+      if (m.size() != n.size()) return m.size() < n.size();
+      if (m != n) return m < n;
+      while (i < a.size() && is_digit(a[i])) ++i;
+      while (j < b.size() && is_digit(b[j])) ++j;
+    } else if (a[i] != b[j]) {
+      return a[i] < b[j];
+    } else {
+      ++i;
+      ++j;
+    }
+  }
+  return a.size() - i != b.size() - j ? a.size() - i < b.size() - j : a < b;
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_folder(const std::string& path, const VolumeRequest& said) {
+  std::vector<std::string> tiff, dicom;
+  std::error_code failure;
+  fs::directory_iterator entries(path, failure);
+  if (failure) throw system_error("list", path, failure.value());
+  for (const fs::directory_entry& entry : entries) {
+    if (!entry.is_regular_file(failure) || entry.path().filename().string().starts_with('.'))
+      continue;
+    const VolumeFormat format = recognise_format(entry.path().string());
+    if (format == VolumeFormat::tiff) tiff.push_back(entry.path().string());
+    if (format == VolumeFormat::dicom) dicom.push_back(entry.path().string());
+  }
+  if (!tiff.empty() && !dicom.empty())
+    throw UsageError(fmt::format("'{}' holds TIFF and DICOM files: which are meant?", path));
+  if (tiff.empty() && dicom.empty())
+    throw UsageError(fmt::format("'{}' is a directory without TIFF or DICOM files", path));
+  std::sort(tiff.begin(), tiff.end(), before);
+  std::sort(dicom.begin(), dicom.end(), before);
+  return tiff.empty() ? open_dicom_if_built(path, dicom, said)
+                      : open_tiff_if_built(path, tiff, said);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,70 @@
+#include "isobrick/volumes/volume_request.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "isobrick/core/error.h"
+#include "isobrick/core/lattice.h"
+
+namespace isobrick {
+namespace {
+
+void check_geometry(const VolumeInfo& info) {
+  const Int3 e = info.extent;
+  if (e.x <= 0 || e.y <= 0 || e.z <= 0)
+    throw UsageError(
+        fmt::format("'{}': the extent {}x{}x{} is not positive", info.name, e.x, e.y, e.z));
+  if (!checked_volume(e))
+    throw UsageError(fmt::format("'{}': a volume of {}x{}x{} samples is too large to address",
+                                 info.name, e.x, e.y, e.z));
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(info.transform.spacing[i]) || info.transform.spacing[i] <= 0 ||
+        !std::isfinite(info.transform.origin[i]))
+      throw UsageError(
+          fmt::format("'{}': spacing must be positive and finite, the origin finite", info.name));
+}
+
+}  // namespace
+
+VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
+                           Transform transform, const VolumeRequest& said) {
+  VolumeInfo info;
+  info.extent = extent;
+  info.type = type;
+  info.transform = std::move(transform);
+  info.name = path;
+  if (said.spacing) info.transform.spacing = *said.spacing;
+  if (said.origin) info.transform.origin = *said.origin;
+  if (said.unit) info.transform.unit = *said.unit;
+  check_geometry(info);
+  return info;
+}
+
+void refuse_raw_description(const std::string& path, std::string_view format,
+                            const VolumeRequest& said) {
+  const char* option = said.extent   ? "--dims"
+                       : said.type   ? "--type"
+                       : said.order  ? "--endian"
+                       : said.offset ? "--offset"
+                                     : nullptr;
+  if (option)
+    throw UsageError(
+        fmt::format("'{}' is {}, which says itself what --dims, --type, --endian and "
+                    "--offset are for: leave {} out",
+                    path, format, option));
+}
+
+void refuse_grid(const std::string& path, const VolumeRequest& said) {
+  if (said.grid || said.region)
+    throw UsageError(
+        fmt::format("'{}' is no OpenVDB file: leave {} out", path, said.grid ? "--grid" : "--roi"));
+}
+
+void refuse_selection(const std::string& path, const VolumeRequest& said) {
+  choose(path, "--channel", 1, said.selection.channel);
+  choose(path, "--time", 1, said.selection.time);
+}
+
+}  // namespace isobrick

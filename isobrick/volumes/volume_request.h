@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "isobrick/volumes/array_view.h"
+#include "isobrick/volumes/volume_source.h"
+
+namespace isobrick {
+
+enum class ByteOrder : std::uint8_t { little, big };
+
+/// A box of which every bound may be left out; half-open.
+struct RegionRequest {
+  std::array<std::optional<Index>, 3> lo, hi;
+};
+
+/// What the caller says about a volume. The first four are for raw files, where
+/// they go before what a header beside the file or its name says; the others
+/// are for all formats and go before what the file says.
+struct VolumeRequest {
+  std::optional<Int3> extent;
+  std::optional<ScalarType> type;
+  std::optional<ByteOrder> order;
+  std::optional<std::uint64_t> offset;  ///< bytes before the first sample
+  std::optional<Vec3d> spacing;
+  std::optional<Vec3d> origin;
+  std::optional<std::string> unit;
+  Selection selection;
+  std::optional<std::string> grid;      ///< of an OpenVDB file
+  std::optional<RegionRequest> region;  ///< of a sparse grid, in its own index coordinates
+  /// Bytes that a source may take for itself: one that holds its samples in
+  /// memory refuses when it needs more; nothing: as many as it likes.
+  std::optional<std::uint64_t> memory;
+};
+
+/// What a file and the caller together say of a volume. Throws UsageError for
+/// extents and geometry that make no sense.
+VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
+                           Transform transform, const VolumeRequest& said);
+
+/// Throws UsageError when the caller describes raw samples although the file, a
+/// `format` ("a NIfTI file"), describes itself.
+void refuse_raw_description(const std::string& path, std::string_view format,
+                            const VolumeRequest& said);
+
+/// Throws UsageError for a grid or a region of grids where there are none.
+void refuse_grid(const std::string& path, const VolumeRequest& said);
+
+/// Throws UsageError for a channel or a time that a file with one of each lacks.
+void refuse_selection(const std::string& path, const VolumeRequest& said);
+
+}  // namespace isobrick

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "isobrick/volumes/volume_request.h"
+
+namespace isobrick {
+
+/// Opens a VTK image file (`.vti`): its array `array`, or its scalars where that
+/// is empty.
+std::unique_ptr<VolumeSource> open_vti(const std::string& path, const std::string& array,
+                                       const VolumeRequest& said);
+
+}  // namespace isobrick

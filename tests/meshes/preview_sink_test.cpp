@@ -1,0 +1,169 @@
+#include "isobrick/meshes/preview_sink.h"
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <limits>
+
+#include "isobrick/io/png_file.h"
+#include "temp_dir.h"
+#include "test_meshes.h"
+
+namespace isobrick {
+namespace {
+
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;
+
+  const std::uint8_t* at(int x, int y) const { return rgb.data() + 3 * (y * width + x); }
+  /// The background is bluish, the surface reddish.
+  bool surface(int x, int y) const { return at(x, y)[0] > at(x, y)[2] + 8; }
+  int brightness(int x, int y) const { return at(x, y)[0] + at(x, y)[1] + at(x, y)[2]; }
+};
+
+Picture read_png(const std::string& path) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  EXPECT_NE(png_image_begin_read_from_file(&image, path.c_str()), 0);
+  image.format = PNG_FORMAT_RGB;
+  Picture picture{static_cast<int>(image.width), static_cast<int>(image.height), {}};
+  picture.rgb.resize(PNG_IMAGE_SIZE(image));
+  EXPECT_NE(png_image_finish_read(&image, nullptr, picture.rgb.data(), 0, nullptr), 0);
+  return picture;
+}
+
+PreviewOptions small() {
+  PreviewOptions options;
+  options.width = 200;
+  options.height = 160;
+  return options;
+}
+
+Picture draw(const std::vector<MeshChunk>& chunks, const PreviewOptions& options = small(),
+             bool normals = true) {
+  const TempDir dir;
+  PreviewSink sink(dir / "a.png", false, options);
+  EXPECT_EQ(sink.indexing(), Indexing::chunk_local);
+  sink.begin({normals, {-1, -1, -1}, {1, 1, 1}});
+  for (const MeshChunk& chunk : chunks) sink.write(chunk);
+  sink.finish();
+  EXPECT_EQ(dir.list(), std::vector<std::string>{"a.png"});
+  return read_png(dir / "a.png");
+}
+
+TEST(PreviewSink, ABallIsARoundSpotInTheMiddle) {
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 100);
+  const Picture picture = draw({ball.chunk()});
+  ASSERT_EQ(picture.width, 200);
+  ASSERT_EQ(picture.height, 160);
+  int left = 200, right = 0, top = 160, bottom = 0, area = 0;
+  for (int y = 0; y < 160; ++y)
+    for (int x = 0; x < 200; ++x)
+      if (picture.surface(x, y)) {
+        left = std::min(left, x), right = std::max(right, x);
+        top = std::min(top, y), bottom = std::max(bottom, y);
+        ++area;
+      }
+  EXPECT_NEAR((left + right) / 2.0, 99.5, 1.5);
+  EXPECT_NEAR((top + bottom) / 2.0, 79.5, 1.5);
+  const double across = right - left + 1, down = bottom - top + 1;
+  EXPECT_NEAR(across, down, 3);
+  EXPECT_GT(down, 60);
+  EXPECT_LT(down, 150);
+  // No hole: as many pixels as a disc has.
+  EXPECT_NEAR(area, 3.14159 / 4 * across * down, 0.03 * area);
+}
+
+TEST(PreviewSink, LightComesFromAboveAndLeft) {
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 100);
+  const Picture picture = draw({ball.chunk()});
+  EXPECT_GT(picture.brightness(90, 65), picture.brightness(112, 98) + 60);
+  EXPECT_GT(picture.brightness(0, 0), picture.brightness(0, 159));
+}
+
+TEST(PreviewSink, TheNearestIsSeenWhateverTheOrder) {
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 60);
+  // Between the eye and the ball, facing away: hides it, lit all the same.
+  const TestMesh front = make_ball({0.5f, -0.9f, 0.45f}, 0.2f, 30);
+  const Picture one = draw({ball.chunk(), front.chunk()});
+  const Picture other = draw({front.chunk(), ball.chunk()});
+  EXPECT_EQ(one.rgb, other.rgb);
+  EXPECT_NE(one.rgb, draw({ball.chunk()}).rgb);
+}
+
+TEST(PreviewSink, BothSidesAreLitAlike) {
+  TestMesh ball = make_ball({0, 0, 0}, 1, 60);
+  const Picture outside = draw({ball.chunk()});
+  for (Vec3f& n : ball.normals) n = n * -1.0f;
+  for (Triangle& t : ball.triangles) std::swap(t[0], t[1]);
+  const Picture inside = draw({ball.chunk()});
+  for (int y = 0; y < outside.height; ++y)
+    for (int x = 0; x < outside.width; ++x)
+      EXPECT_NEAR(outside.brightness(x, y), inside.brightness(x, y), 12);
+}
+
+TEST(PreviewSink, FacetsWithoutNormals) {
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 100);
+  const Picture smooth = draw({ball.chunk()}),
+                facets = draw({ball.chunk(0, false)}, small(), false);
+  EXPECT_TRUE(facets.surface(100, 80));
+  EXPECT_NEAR(smooth.brightness(100, 80), facets.brightness(100, 80), 30);
+}
+
+TEST(PreviewSink, ViewAndColourCanBeChosen) {
+  PreviewOptions options = small();
+  options.towards_eye = {0, 0, 1};  // along `up`
+  options.colour = {0.2f, 0.3f, 0.9f};
+  const TestMesh ball = make_ball({0, 0, 0.9f}, 0.1f, 20);
+  const Picture picture = draw({ball.chunk()}, options);
+  EXPECT_GT(picture.at(100, 80)[2], picture.at(100, 80)[0] + 50);
+}
+
+TEST(PreviewSink, UpIsUpAndRightIsRight) {
+  PreviewOptions options = small();
+  options.towards_eye = {0, -1, 0};
+  const TestMesh up = make_ball({0, 0, 0.8f}, 0.2f, 20), right = make_ball({0.8f, 0, 0}, 0.2f, 20);
+  EXPECT_TRUE(draw({up.chunk()}, options).surface(100, 80 - 45));
+  EXPECT_TRUE(draw({right.chunk()}, options).surface(100 + 45, 80));
+}
+
+TEST(PreviewSink, SurvivesBadNumbers) {
+  TestMesh mesh = make_ball({0, 0, 0}, 1, 20);
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  mesh.positions[3] = {nan, 0, 0};
+  mesh.positions[60] = {inf, -inf, 0};
+  mesh.positions[100] = {1e30f, -1e30f, 1e30f};
+  mesh.positions[140] = {0.55f * 1e3f, -1e3f, 0.5f * 1e3f};  // behind the eye
+  mesh.normals[200] = {nan, nan, nan};
+  mesh.normals[300] = {0, 0, 0};
+  EXPECT_TRUE(draw({mesh.chunk()}).surface(100, 80));
+  EXPECT_FALSE(draw({}).surface(100, 80));
+}
+
+TEST(PreviewSink, SizesAreChecked) {
+  const TempDir dir;
+  PreviewOptions options;
+  for (const int width : {0, -1, 15, 20000}) {
+    options.width = width;
+    message_of([&] { PreviewSink(dir / "a.png", false, options); });
+  }
+  EXPECT_TRUE(dir.list().empty());
+}
+
+TEST(Png, RoundTrip) {
+  const TempDir dir;
+  std::vector<std::uint8_t> rgb;
+  for (int i = 0; i < 3 * 5 * 7; ++i) rgb.push_back(static_cast<std::uint8_t>(i * 37));
+  write_png(dir / "a.png", 5, 7, rgb, false);
+  const Picture picture = read_png(dir / "a.png");
+  EXPECT_EQ(picture.width, 5);
+  EXPECT_EQ(picture.rgb, rgb);
+  message_of([&] { write_png(dir / "a.png", 5, 7, rgb, false); });
+  message_of<Error>([&] { write_png(dir / "b.png", 5, 8, rgb, false); });
+  EXPECT_EQ(dir.list(), std::vector<std::string>{"a.png"});
+}
+
+}  // namespace
+}  // namespace isobrick

@@ -1,0 +1,244 @@
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "isobrick/volumes/open_source.h"
+#include "packed.h"
+#include "temp_dir.h"
+#include "test_samples.h"
+
+// NRRD and MetaImage files with everything that their headers may say of samples.
+namespace isobrick {
+namespace {
+
+constexpr Int3 kExtent{7, 5, 4};
+constexpr Box3 kWhole{{0, 0, 0}, kExtent};
+
+std::string whole(ScalarType type, bool swapped = false) {
+  return sample_bytes(type, kWhole, kExtent, swapped);
+}
+
+std::string nrrd(const std::string& more) {
+  return "NRRD0004\ntype: short\ndimension: 3\nsizes: 7 5 4\n" + more;
+}
+
+/// All samples, read in two slabs as a stream must be.
+std::string read_all(VolumeSource& source) {
+  const Int3 e = source.info().extent;
+  const Index half = e.z / 2;
+  std::string bytes;
+  if (half > 0) bytes = read_box(source, {{0, 0, 0}, {e.x, e.y, half}});
+  return bytes + read_box(source, {{0, 0, half}, e});
+}
+
+class TextVolume : public ::testing::Test {
+ protected:
+  std::string open_and_read(const std::string& name, const VolumeRequest& said = {}) const {
+    return read_all(*open_source(dir / name, said));
+  }
+  void expect_whole(const std::string& name) const {
+    EXPECT_EQ(open_and_read(name), whole(ScalarType::i16)) << name;
+  }
+
+  TempDir dir;
+};
+
+TEST_F(TextVolume, NrrdAttachedAndPacked) {
+  const std::string big = whole(ScalarType::i16, true), little = whole(ScalarType::i16);
+  dir.write("raw.nrrd", nrrd("encoding: raw\nendian: big\n\n") + big);
+  dir.write("gzip.nrrd", nrrd("encoding: gzip\nendian: little\n\n") + gzip(little));
+  dir.write("members.nrrd", nrrd("encoding: gz\nendian: little\n\n") + gzip(little.substr(0, 99)) +
+                                gzip(little.substr(99)) + std::string(512, '\0'));
+  dir.write("content", nrrd("encoding: gzip\nendian: big\nbyte skip: 3\n\n") + gzip("abc" + big));
+  dir.write("v.raw.gz", gzip(little));
+  dir.write("v.nhdr", nrrd("encoding: gzip\nendian: little\ndata file: v.raw.gz\n"));
+  for (const char* name : {"raw.nrrd", "gzip.nrrd", "members.nrrd", "content", "v.nhdr"})
+    expect_whole(name);
+  EXPECT_TRUE(open_source(dir / "raw.nrrd", {})->random_access());
+  const auto packed = open_source(dir / "gzip.nrrd", {});
+  EXPECT_FALSE(packed->random_access());
+  EXPECT_GT(packed->memory(), 32768u);
+  EXPECT_LT(packed->memory(), 1u << 20);
+}
+
+TEST_F(TextVolume, NrrdInSeveralFiles) {
+  const std::string all = whole(ScalarType::i16);
+  const std::size_t plane = all.size() / 4;
+  for (int z = 0; z < 4; ++z)
+    dir.write(std::string("s").append(std::to_string(z + 8)).append(".raw"),
+              "#\n" + all.substr(static_cast<std::size_t>(z) * plane, plane));
+  const std::string common = nrrd("encoding: raw\nendian: little\nline skip: 1\n");
+  dir.write("list.nhdr", common + "data file: LIST\ns8.raw\ns9.raw\ns10.raw\ns11.raw\n");
+  expect_whole("list.nhdr");
+  dir.write("pattern.nhdr", common + "data file: s%d.raw 8 11 1\n");
+  expect_whole("pattern.nhdr");
+  dir.write("three.nhdr", common + "data file: s%d.raw 8 10\n");
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "three.nhdr", {}); }), "at most 210"));
+  dir.write("five.nhdr", common + "data file: LIST\ns8.raw\ns9.raw\ns10.raw\ns11.raw\ns11.raw\n");
+  EXPECT_TRUE(contains(message_of([&] { open_and_read("five.nhdr"); }), "goes on"));
+  dir.write("s9.raw", "#\n" + all.substr(plane, plane - 2));
+  EXPECT_TRUE(contains(message_of([&] { open_and_read("list.nhdr"); }), "s9.raw"));
+  for (const char* pattern : {"s%s.raw 1 2", "s%d.raw 1", "s%d.raw 2 1", "s%d%d.raw 1 2",
+                              "s%9999d.raw 1 2", "s%d.raw 0 9223372036854775807"}) {
+    dir.write("bad.nhdr", common + "data file: " + pattern + "\n");
+    message_of([&] { open_source(dir / "bad.nhdr", {}); });
+  }
+}
+
+TEST_F(TextVolume, NrrdAsText) {
+  dir.write("v.nrrd",
+            "NRRD0001\ntype: float\ndimension: 3\nsizes: 2 2 2\nencoding: ascii\n\n"
+            "1 -2.5e1\n+3 nan\r\n  0.125 inf 1e300 7");
+  const auto bytes = open_and_read("v.nrrd");
+  std::array<float, 8> v{};
+  ASSERT_EQ(bytes.size(), sizeof(v));
+  std::memcpy(v.data(), bytes.data(), sizeof(v));
+  EXPECT_EQ(v[0], 1);
+  EXPECT_EQ(v[1], -25);
+  EXPECT_EQ(v[2], 3);
+  EXPECT_TRUE(v[3] != v[3]);
+  EXPECT_EQ(v[4], 0.125f);
+  EXPECT_EQ(v[5], std::numeric_limits<float>::infinity());
+  EXPECT_EQ(v[6], std::numeric_limits<float>::infinity());
+  EXPECT_EQ(v[7], 7);
+  const std::string header =
+      "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 2 1\nencoding: text\n\n";
+  dir.write("w.nrrd", header + "1 2 3 256");
+  EXPECT_TRUE(contains(message_of<Error>([&] { open_and_read("w.nrrd"); }), "'256'"));
+  dir.write("w.nrrd", header + "1 2 3 4 5");
+  EXPECT_TRUE(contains(message_of([&] { open_and_read("w.nrrd"); }), "1 more"));
+  dir.write("w.nrrd", header + "1 2");
+  EXPECT_TRUE(contains(message_of([&] { open_and_read("w.nrrd"); }), "at most 2"));
+  dir.write("w.nrrd", header + std::string(100000, '1'));
+  message_of<Error>([&] { open_and_read("w.nrrd"); });
+}
+
+/// Channels first (fastest) and times last.
+TEST_F(TextVolume, ChannelsAndTimes) {
+  const Int3 e{3, 2, 2};
+  std::string all;
+  std::array<std::array<std::string, 2>, 3> volumes;
+  for (std::size_t t = 0; t < 2; ++t)
+    for (std::size_t i = 0; i < 12; ++i)
+      for (std::size_t c = 0; c < 3; ++c) {
+        const char v = static_cast<char>(i + 20 * c + 100 * t);
+        all += v;
+        volumes[c][t] += v;
+      }
+  const std::string sizes = "NRRD0004\ntype: uchar\ndimension: 5\nsizes: 3 3 2 2 2\n";
+  const std::string kinds = "kinds: vector domain domain domain time\n";
+  dir.write("raw.nrrd", sizes + kinds + "encoding: raw\n\n" + all);
+  dir.write("gzip.nrrd", sizes + kinds + "encoding: gzip\n\n" + gzip(all));
+  dir.write("v.mha",
+            "NDims = 4\nDimSize = 3 2 2 2\nElementNumberOfChannels = 3\n"
+            "ElementSpacing = 2 3 4 1\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" +
+                all);
+  for (const char* name : {"raw.nrrd", "gzip.nrrd", "v.mha"}) {
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t t = 0; t < 2; ++t) {
+        VolumeRequest said;
+        said.selection = {static_cast<Index>(c), static_cast<Index>(t)};
+        EXPECT_EQ(open_and_read(name, said), volumes[c][t]) << name;
+        EXPECT_EQ(open_source(dir / name, said)->info().extent, e);
+      }
+    VolumeRequest said;
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, said); }),
+                         "3 channels: choose one with --channel 0 … 2"));
+    said.selection.channel = 3;
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, said); }), "--channel 3"));
+    said.selection.channel = 1;
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, said); }),
+                         "2 times: choose one with --time 0 … 1"));
+  }
+  VolumeRequest said;
+  said.selection.time = 1;
+  dir.write("v.nrrd", nrrd("encoding: raw\nendian: little\n\n") + whole(ScalarType::i16));
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nrrd", said); }), "1 time:"));
+  // Without kinds the request itself says which axis is not space.
+  dir.write("w.nrrd", "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 2 2 2\nencoding: raw\n\n" +
+                          all.substr(0, 24));
+  EXPECT_EQ(open_and_read("w.nrrd", said), all.substr(12, 12));
+}
+
+TEST_F(TextVolume, MetaImageLocalPackedAndListed) {
+  const std::string big = whole(ScalarType::i16, true);
+  const std::string common =
+      "ObjectType = Image\nNDims = 3\nElementByteOrderMSB = True\n"
+      "DimSize = 7 5 4\nElementType = MET_SHORT\n";
+  dir.write("local.mha", common + "ElementDataFile = LOCAL\n" + big);
+  dir.write("zlib.mha",
+            common + "CompressedData = True\nElementDataFile = LOCAL\n" + pack(big, false));
+  dir.write("gzip.mha", common + "CompressedData = True\nElementDataFile = LOCAL\n" + gzip(big));
+  dir.write("v.zraw", pack(big, false));
+  dir.write("v.mhd", common + "CompressedData = True\nElementDataFile = v.zraw\n");
+  dir.write("low.raw", big.substr(0, big.size() / 2));
+  dir.write("high.raw", big.substr(big.size() / 2));
+  dir.write("list.mhd", common + "ElementDataFile = LIST\nlow.raw\nhigh.raw\n");
+  for (const char* name : {"local.mha", "zlib.mha", "gzip.mha", "v.mhd", "list.mhd"})
+    expect_whole(name);
+  std::string text;
+  for (int i = 0; i < 140; ++i) text += std::to_string(i - 70) + (i % 7 == 6 ? "\n" : " ");
+  dir.write("text.mha", common + "BinaryData = False\nElementDataFile = LOCAL\n" + text);
+  const std::string read = open_and_read("text.mha");
+  std::int16_t first;
+  std::memcpy(&first, read.data(), sizeof(first));
+  EXPECT_EQ(first, -70);
+}
+
+TEST_F(TextVolume, DamagedCompression) {
+  const std::string head = nrrd("encoding: gzip\nendian: little\n\n");
+  const std::string packed = gzip(whole(ScalarType::i16));
+  const auto refused = [&](const std::string& bytes) {
+    dir.write("v.nrrd", head + bytes);
+    try {
+      open_and_read("v.nrrd");
+    } catch (const Error& error) {
+      EXPECT_TRUE(contains(error.what(), "v.nrrd")) << error.what();
+      return;
+    }
+    ADD_FAILURE() << "read although damaged";
+  };
+  for (std::size_t size = 0; size < packed.size(); ++size) refused(packed.substr(0, size));
+  std::string wrong = packed;
+  wrong[packed.size() - 6] ^= 1;  // in the checksum
+  refused(wrong);
+  for (std::size_t i = 10; i < packed.size(); ++i) {
+    wrong = packed;
+    wrong[i] ^= 0x55;
+    refused(wrong);
+  }
+}
+
+TEST_F(TextVolume, ABombIsNotUnpacked) {
+  const std::string bomb = gzip(std::string(64 << 20, '\0'), 9);
+  dir.write("small.nrrd", nrrd("encoding: gzip\nendian: little\n\n") + bomb);
+  EXPECT_TRUE(contains(message_of([&] { open_and_read("small.nrrd"); }), "at least 1048576 more"));
+  const std::string header = "NRRD0004\ntype: uchar\ndimension: 3\nencoding: gzip\n";
+  dir.write("large.nrrd", header + "sizes: 1000000 1000000 100000\n\n" + bomb);
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "large.nrrd", {}); }), "at most"));
+  dir.write("skip.nrrd", header + "sizes: 2 2 2\nbyte skip: 9000000000000000000\n\n" + bomb);
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "skip.nrrd", {}); }), "to skip"));
+}
+
+TEST_F(TextVolume, WhatTheFileSaysItselfIsNotSaidAgain) {
+  dir.write("v.nrrd", nrrd("encoding: gzip\nendian: little\n\n") + gzip(whole(ScalarType::i16)));
+  VolumeRequest said;
+  said.type = ScalarType::u16;
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nrrd", said); }), "--type"));
+  said.type.reset();
+  said.spacing = Vec3d{1, 2, 3};
+  EXPECT_EQ(open_source(dir / "v.nrrd", said)->info().transform.spacing, (Vec3d{1, 2, 3}));
+}
+
+TEST_F(TextVolume, AxesThatFewDigitsLeftAskewAreSquare) {
+  dir.write("v.nrrd", nrrd("space dimension: 3\nspace directions: (1,0.0005,0) (0,1,0) (0,0,2)\n"
+                           "encoding: raw\nendian: little\n\n") +
+                          whole(ScalarType::i16));
+  const Transform t = open_source(dir / "v.nrrd", {})->info().transform;
+  const auto& d = t.direction;
+  EXPECT_NEAR(d[0] * d[1] + d[3] * d[4] + d[6] * d[7], 0, 1e-15);
+  EXPECT_NEAR(d[3], 0.0005, 1e-9);
+}
+
+}  // namespace
+}  // namespace isobrick

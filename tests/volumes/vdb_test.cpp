@@ -1,0 +1,215 @@
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include "damaged_files.h"
+#include "isobrick/volumes/open_source.h"
+#include "isobrick/volumes/vdb_writer.h"
+
+namespace isobrick {
+namespace {
+
+/// Values of their own for voxels, tiles of several sizes and inactive voxels.
+template <class Grid>
+typename Grid::Ptr make_grid(typename Grid::ValueType background) {
+  using Value = typename Grid::ValueType;
+  const auto grid = Grid::create(background);
+  grid->setName("v");
+  grid->tree().fill(openvdb::CoordBBox({-20, -8, 0}, {11, 15, 40}), static_cast<Value>(1));
+  grid->tree().fill(openvdb::CoordBBox({-20, -8, 16}, {-5, 7, 31}), static_cast<Value>(3), false);
+  auto accessor = grid->getAccessor();
+  for (int i = 0; i < 300; ++i)
+    accessor.setValue({i * 7 % 31 - 20, i * 5 % 23 - 8, i * 3 % 40}, static_cast<Value>(i % 50));
+  for (int i = 0; i < 50; ++i)
+    accessor.setValueOff({i % 31 - 20, 9, i * 3 % 40}, static_cast<Value>(i));
+  return grid;
+}
+
+class Vdb : public ::testing::Test {
+ protected:
+  Vdb() { openvdb::initialize(); }
+
+  std::string write(const openvdb::GridCPtrVec& grids) const {
+    openvdb::io::File(dir / "v.vdb").write(grids);
+    return dir / "v.vdb";
+  }
+
+  /// Every voxel of the box of active ones against OpenVDB's accessor.
+  template <class Out, class Grid>
+  void expect_same(const Grid& grid, const std::string& path,
+                   const VolumeRequest& said = {}) const {
+    const auto source = open_source(path, said);
+    ASSERT_EQ(source->info().type, scalar_type_of<Out>);
+    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    const Int3 extent = source->info().extent;
+    ASSERT_EQ(extent, (Int3{box.dim().x(), box.dim().y(), box.dim().z()}));
+    // The last one does not begin where leaves do.
+    for (const Box3 part : {Box3{{0, 0, 0}, extent}, Box3{{5, 3, 9}, {27, 4, 33}}}) {
+      std::vector<Out> samples(static_cast<std::size_t>(volume(part.extent())));
+      source->read(part, reinterpret_cast<std::byte*>(samples.data()));
+      const auto accessor = grid.getConstAccessor();
+      std::size_t at = 0, different = 0;
+      for_each_point(part, [&](Int3 p) {
+        const openvdb::Coord c =
+            box.min().offsetBy(static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z));
+        different += samples[at++] != static_cast<Out>(accessor.getValue(c)) ? 1 : 0;
+      });
+      EXPECT_EQ(different, 0U);
+    }
+  }
+
+  TempDir dir;
+};
+
+TEST_F(Vdb, AllTypes) {
+  const auto f = make_grid<openvdb::FloatGrid>(-2.5F);
+  expect_same<float>(*f, write({f}));
+  const auto d = make_grid<openvdb::DoubleGrid>(0.1);
+  expect_same<double>(*d, write({d}));
+  const auto i = make_grid<openvdb::Int32Grid>(-7);
+  expect_same<std::int32_t>(*i, write({i}));
+  const auto b = make_grid<openvdb::BoolGrid>(true);
+  expect_same<std::uint8_t>(*b, write({b}));
+  const auto m = openvdb::MaskGrid::create();
+  m->tree().topologyUnion(f->tree());
+  expect_same<std::uint8_t>(*m, write({m}));
+}
+
+TEST_F(Vdb, LongIntegersTakeTheTypeThatHoldsThem) {
+  const auto grid = make_grid<openvdb::Int64Grid>(0);
+  expect_same<std::int32_t>(*grid, write({grid}));
+  auto accessor = grid->getAccessor();
+  accessor.setValue({0, 0, 0}, std::int64_t{4000000000});
+  expect_same<std::uint32_t>(*grid, write({grid}));
+  accessor.setValue({0, 0, 1}, -(std::int64_t{1} << 50));
+  expect_same<double>(*grid, write({grid}));
+  accessor.setValue({0, 0, 2}, (std::int64_t{1} << 60) + 1);
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(write({grid}), {}); }),
+                       "1152921504606846977"));
+}
+
+TEST_F(Vdb, ChoosesAmongSeveral) {
+  const auto a = make_grid<openvdb::FloatGrid>(0), b = make_grid<openvdb::FloatGrid>(1);
+  const auto c = openvdb::Vec3SGrid::create();
+  a->setName("a");
+  a->setGridClass(openvdb::GRID_LEVEL_SET);
+  b->setName("b");
+  c->setName("c");
+  // The second one shares the tree of the first.
+  const auto shared = openvdb::gridPtrCast<openvdb::FloatGrid>(a->copyGrid());
+  shared->setName("shared");
+  const std::string path = write({a, b, c, shared});
+  const std::string list = message_of<UsageError>([&] { open_source(path, {}); });
+  for (const char* part : {"a (float, level set)", "b (float", "c (vec3s", "--grid"})
+    EXPECT_TRUE(contains(list, part)) << list;
+  VolumeRequest said;
+  said.grid = "a";
+  expect_same<float>(*a, path, said);
+  EXPECT_EQ(open_source(path, said)->info().grid_class, "level set");
+  said.grid = "b";
+  expect_same<float>(*b, path, said);
+  EXPECT_EQ(open_source(path, said)->info().fill_value, 1);
+  said.grid = "shared";
+  expect_same<float>(*a, path, said);
+  said.grid = "c";
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, said); }), "vec3s"));
+  said.grid = "d";
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, said); }), "'d'"));
+  EXPECT_TRUE(contains(
+      message_of<UsageError>([&] { open_source(dir.write("r_1x1x1_uint8.raw", "x"), said); }),
+      "--grid"));
+  EXPECT_EQ(open_source(write({a, c}), {})->info().grid_class, "level set");
+}
+
+TEST_F(Vdb, KnowsWhereNothingIs) {
+  const auto grid = openvdb::FloatGrid::create(2);
+  auto accessor = grid->getAccessor();
+  accessor.setValue({0, 0, 0}, 1);
+  accessor.setValue({40000, 50000, 60000}, 1);
+  grid->tree().fill(openvdb::CoordBBox({8192, 8192, 8192}, {8319, 8319, 8319}), 5);
+  const auto source = open_source(write({grid}), {});
+  EXPECT_TRUE(source->sparse());
+  EXPECT_FALSE(source->is_fill({{0, 0, 0}, source->info().extent}));
+  EXPECT_TRUE(source->is_fill({{8, 0, 0}, {40000, 8192, 8192}}));
+  EXPECT_FALSE(source->is_fill({{8300, 8300, 8300}, {8400, 8400, 8400}}));
+  EXPECT_TRUE(source->is_fill({{8320, 0, 0}, {40000, 50000, 60000}}));
+  EXPECT_FALSE(source->is_fill({{0, 0, 0}, {1, 1, 1}}));
+}
+
+TEST_F(Vdb, RefusesWhatDoesNotFit) {
+  const std::string path = write({make_grid<openvdb::FloatGrid>(0)});
+  VolumeRequest said;
+  said.memory = 1000;
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, said); }), "--memory"));
+}
+
+TEST_F(Vdb, WritesWhatItReads) {
+  const auto round_trip = [&]<class T>(T fill) {
+    VolumeInfo info;
+    info.extent = {37, 29, 33};
+    info.type = scalar_type_of<T>;
+    info.fill_value = static_cast<double>(fill);
+    info.transform.spacing = {0.5, 2, 3};
+    info.transform.origin = {1, -2, 3};
+    info.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+    info.grid_class = "unknown";
+    const auto value = [&](Int3 p) {
+      if (p.x >= 8 && p.x < 24 && p.y < 16 && p.z < 8) return static_cast<T>(7);
+      return p.z > 20 || p.y < 3 ? fill : sample_at<T>(p, info.extent);
+    };
+    const auto writer = make_vdb_writer_if_built(info, "density");
+    // Boxes that do not begin where leaves do, and what is never put.
+    for (Index z = 0; z < 21; z += 7) {
+      const Box3 box{{0, 0, z}, {37, 29, z + 7}};
+      std::vector<T> samples;
+      for_each_point(box, [&](Int3 p) { samples.push_back(value(p)); });
+      writer->put(box, reinterpret_cast<const std::byte*>(samples.data()));
+    }
+    EXPECT_GT(writer->memory(), 0U);
+    writer->write(dir / "out.vdb");
+    const auto source = open_source(dir / "out.vdb", {});
+    EXPECT_EQ(source->info().extent, info.extent);
+    EXPECT_EQ(source->info().grid_class, "unknown");
+    EXPECT_EQ(source->info().fill_value, info.fill_value);
+    for (const Vec3d p : {Vec3d{0, 0, 0}, Vec3d{1, 0, 0}, Vec3d{0, 10, 20}}) {
+      const Vec3d a = source->info().transform.apply(p), b = info.transform.apply(p);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(a[axis], b[axis], 1e-12);
+    }
+    const std::string bytes = read_box(*source, {{0, 0, 0}, info.extent});
+    std::size_t at = 0, different = 0;
+    const ScalarType type = source->info().type;
+    for_each_point({{0, 0, 0}, info.extent}, [&](Int3 p) {
+      visit_scalar(type, [&](auto tag) {
+        typename decltype(tag)::type got;
+        std::memcpy(&got, bytes.data() + at, sizeof(got));
+        at += sizeof(got);
+        different += static_cast<double>(got) != static_cast<double>(value(p)) ? 1 : 0;
+      });
+    });
+    EXPECT_EQ(different, 0U);
+    return type;
+  };
+  EXPECT_EQ(round_trip(0.25F), ScalarType::f32);
+  EXPECT_EQ(round_trip(-1e300), ScalarType::f64);
+  EXPECT_EQ(round_trip(std::int32_t{-5}), ScalarType::i32);
+  EXPECT_EQ(round_trip(std::uint8_t{0}), ScalarType::i32);
+  EXPECT_EQ(round_trip(std::int16_t{3}), ScalarType::i32);
+  round_trip(std::uint32_t{9});
+}
+
+TEST_F(Vdb, DamagedFiles) {
+  const auto grid = openvdb::FloatGrid::create(0);
+  for (int i = 0; i < 20; ++i)
+    grid->getAccessor().setValue({i * 9, i, 3 * i}, 1.0F + static_cast<float>(i));
+  const std::string bytes = [&] {
+    write({grid});
+    return dir.read("v.vdb");
+  }();
+  for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 300) {
+    std::filesystem::remove(dir / "v.vdb");
+    const std::string path = dir.write("v.vdb", bytes.substr(0, size));
+    EXPECT_TRUE(contains(message_of<Error>([&] { open_source(path, {}); }), "v.vdb")) << size;
+  }
+}
+
+}  // namespace
+}  // namespace isobrick

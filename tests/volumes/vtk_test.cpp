@@ -1,0 +1,232 @@
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "isobrick/volumes/open_source.h"
+#include "packed.h"
+#include "temp_dir.h"
+#include "test_samples.h"
+
+namespace isobrick {
+namespace {
+
+constexpr Int3 kExtent{7, 5, 4};
+constexpr Box3 kWhole{{0, 0, 0}, kExtent};
+
+std::string base64(std::string_view bytes) {
+  constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t j = 0; j < 3; ++j)
+      bits = bits << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0u);
+    for (std::size_t j = 0; j < 4; ++j)
+      text += i + j < bytes.size() + 1 ? digits[bits >> (18 - 6 * j) & 63] : '=';
+  }
+  return text;
+}
+
+std::string number(std::uint32_t value) {
+  std::string bytes(4, '\0');
+  std::memcpy(bytes.data(), &value, 4);
+  return bytes;
+}
+
+/// The table and the blocks of `bytes`, as VTK compresses them.
+std::pair<std::string, std::string> blocks(const std::string& bytes, std::size_t block) {
+  const std::size_t count = (bytes.size() + block - 1) / block;
+  std::string sizes = number(static_cast<std::uint32_t>(count)) +
+                      number(static_cast<std::uint32_t>(block)) +
+                      number(static_cast<std::uint32_t>(bytes.size() % block));
+  std::string packed;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string one = pack(bytes.substr(i * block, block), false);
+    sizes += number(static_cast<std::uint32_t>(one.size()));
+    packed += one;
+  }
+  return {sizes, packed};
+}
+
+struct Parts {
+  std::string file = "byte_order=\"LittleEndian\" compressor=\"vtkZLibDataCompressor\"";
+  std::string extent = "0 6 0 4 0 3";
+  std::string array = "type=\"Int16\" Name=\"a\" format=\"appended\" offset=\"0\"/";
+  std::string appended = "raw\">\n _";
+  std::string data;
+
+  std::string text() const {
+    return "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" " + file +
+           ">\n<ImageData WholeExtent=\"" + extent +
+           "\" Origin=\"1 2 3\" Spacing=\"1 2 0.5\"><Piece Extent=\"" + extent +
+           "\"><PointData Scalars=\"a\"><DataArray " + array +
+           "></PointData></Piece></ImageData><AppendedData encoding=\"" + appended + data +
+           "</AppendedData></VTKFile>";
+  }
+};
+
+class Vtk : public ::testing::Test {
+ protected:
+  std::unique_ptr<VolumeSource> open(const std::string& bytes, const VolumeRequest& said = {}) {
+    return open_source(dir.write("v.vtx", bytes), said);  // known by its content alone
+  }
+  /// Opens and reads, which must fail with one line that names the file.
+  std::string refuse(const std::string& bytes) {
+    try {
+      const auto source = open(bytes);
+      read_box(*source, {{0, 0, 0}, min(kExtent, source->info().extent)});
+    } catch (const Error& error) {
+      EXPECT_TRUE(contains(error.what(), "v.vtx")) << error.what();
+      EXPECT_FALSE(contains(error.what(), "\n")) << error.what();
+      return error.what();
+    }
+    ADD_FAILURE() << "read: " << bytes.substr(0, 400);
+    return {};
+  }
+  static std::string samples(bool swap = false) {
+    return sample_bytes(ScalarType::i16, kWhole, kExtent, swap);
+  }
+
+  TempDir dir;
+};
+
+class VtkXml : public Vtk {
+ protected:
+  void SetUp() override {
+#ifndef ISOBRICK_WITH_EXPAT
+    EXPECT_TRUE(contains(message_of([&] { open(Parts{}.text()); }), "built without"));
+    GTEST_SKIP() << "built without expat";
+#endif
+    const auto [sizes, packed] = blocks(samples(), 64);
+    parts.data = sizes + packed;
+  }
+
+  Parts parts;
+};
+
+TEST_F(VtkXml, ReadsCompressedBlocks) {
+  const auto source = open(parts.text());
+  EXPECT_EQ(read_box(*source, kWhole), samples());
+  EXPECT_EQ(source->info().transform.origin, (Vec3d{1, 2, 3}));
+  EXPECT_EQ(source->info().transform.spacing, (Vec3d{1, 2, 0.5}));
+  const auto [sizes, packed] = blocks(samples(), 56);  // no shorter block at the end
+  parts.data = base64(sizes) + base64(packed);
+  parts.appended = "base64\">_";
+  EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
+  parts.array = "type=\"Int16\" Name=\"a\" format=\"binary\">\n" + base64(sizes) + base64(packed) +
+                "\n</DataArray";
+  parts.appended = "raw\">_";
+  EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
+}
+
+TEST_F(VtkXml, ReadsPlainSamples) {
+  parts.file = "byte_order=\"LittleEndian\"";
+  parts.data = number(280) + samples();
+  EXPECT_TRUE(open(parts.text())->random_access());
+  EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
+  parts.appended = "base64\"> _";
+  parts.data = base64(number(280) + samples());
+  EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
+  parts.data = base64(number(280)) + base64(samples());
+  EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
+}
+
+TEST_F(VtkXml, CellDataLieAtTheCentres) {
+  std::string text = parts.text();
+  for (const char* tag : {"<PointData", "</PointData"})
+    text.replace(text.find(tag) + std::string(tag).size() - 9, 9, "CellData");
+  const std::size_t at = text.find("0 6 0 4 0 3");
+  text.replace(at, 11, "0 7 0 5 0 4");
+  text.replace(text.find("0 6 0 4 0 3"), 11, "0 7 0 5 0 4");
+  const auto source = open(text);
+  EXPECT_EQ(source->info().extent, kExtent);
+  EXPECT_EQ(source->info().transform.origin, (Vec3d{1.5, 3, 3.25}));
+  EXPECT_EQ(read_box(*source, kWhole), samples());
+}
+
+TEST_F(VtkXml, HostileFiles) {
+  const Parts good = parts;
+  const auto with = [&](auto change) {
+    Parts changed = good;
+    change(changed);
+    return refuse(changed.text());
+  };
+  const auto extent = [&](const char* text) { return with([&](Parts& p) { p.extent = text; }); };
+  extent("0 6 0 4");
+  extent("0 -9 0 4 0 3");
+  extent("0 9223372036854775807 0 4 0 3");
+  extent("-9223372036854775808 9223372036854775807 0 4 0 3");
+  extent("0 2000000000 0 2000000000 0 2000000000");
+  EXPECT_TRUE(contains(extent("0 6 0 4 0 30"), "at most"));
+  extent("0 6 0 4 0 2");
+  with([](Parts& p) { p.array = "type=\"Int64\" Name=\"a\" format=\"appended\" offset=\"0\"/"; });
+  with([](Parts& p) { p.array = "type=\"Int16\" Name=\"b\" format=\"appended\" offset=\"0\"/"; });
+  for (const char* offset : {"-1", "9223372036854775807", "99999999999999999999", "x", "1"})
+    with([&](Parts& p) {
+      p.array =
+          std::string("type=\"Int16\" Name=\"a\" format=\"appended\" offset=\"") + offset + "\"/";
+    });
+  for (const char* count : {"0", "-1", "3", "9223372036854775807"})
+    with(
+        [&](Parts& p) { p.array.insert(0, std::string("NumberOfComponents=\"") + count + "\" "); });
+  with([](Parts& p) { p.file = "compressor=\"vtkLZ4DataCompressor\""; });
+  with([](Parts& p) { p.file += " header_type=\"UInt16\""; });
+  for (std::size_t at = 0; at < 12; at += 4)
+    for (const std::uint32_t value : {0u, 1u, 0x7fffffffu, 0xffffffffu})
+      if (!(at == 8 && value == 0)) with([&](Parts& p) { p.data.replace(at, 4, number(value)); });
+  for (std::size_t at = 12; at < good.data.size(); at += 5)
+    with([&](Parts& p) { p.data[at] = static_cast<char>(p.data[at] ^ 0x55); });
+  const std::string text = good.text();
+  for (std::size_t size = 10; size < text.size() - 40; size += 7) {
+    const std::string cut = text.substr(0, size);
+    if (contains(cut, "<VTKFile")) refuse(cut);
+  }
+  std::string bomb = text;
+  bomb.insert(22, "<!DOCTYPE a [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;&a;\">]>");
+  EXPECT_TRUE(contains(refuse(bomb), "DOCTYPE"));
+  refuse("<VTKFile " + std::string(8 << 20, 'a'));
+  refuse("<VTKFile type=\"PolyData\"></VTKFile>");
+}
+
+const std::string kLegacy =
+    "# vtk DataFile Version 3.0\ntitle\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS 7 5 4\n"
+    "SPACING 1 2 0.5\nORIGIN 1 2 3\nPOINT_DATA 140\nSCALARS s short\nLOOKUP_TABLE default\n";
+
+TEST_F(Vtk, Legacy) {
+  const auto source = open(kLegacy + samples(true) + "\nMETADATA\n");
+  EXPECT_EQ(source->info().transform.origin, (Vec3d{1, 2, 3}));
+  EXPECT_EQ(source->info().transform.spacing, (Vec3d{1, 2, 0.5}));
+  EXPECT_EQ(read_box(*source, kWhole), samples());
+  std::string field = kLegacy;
+  field.replace(field.find("SCALARS"), std::string::npos, "FIELD f 1\ns 1 140 short\n");
+  EXPECT_EQ(read_box(*open(field + samples(true)), kWhole), samples());
+}
+
+TEST_F(Vtk, HostileLegacyFiles) {
+  const auto with = [&](const char* piece, const char* other) {
+    std::string text = kLegacy;
+    return refuse(text.replace(text.find(piece), std::string(piece).size(), other) + samples(true));
+  };
+  with("7 5 4", "7 5");
+  with("7 5 4", "-7 5 4");
+  with("7 5 4", "9223372036854775807 9223372036854775807 2");
+  with("7 5 4", "7 5 9223372036854775808");
+  with("POINT_DATA 140", "POINT_DATA 141");
+  with("POINT_DATA 140\n", "");
+  with("short", "long");
+  with("short", "short 0");
+  with("short", "short 3");
+  with("STRUCTURED_POINTS", "POLYDATA");
+  with("SCALARS", "VECTORS");
+  with("BINARY", "ROT13");
+  with("SPACING 1", "SPACING nan");
+  with("SPACING 1", "SPACING 0");
+  std::string ascii = kLegacy;
+  ascii.replace(ascii.find("BINARY"), 6, "ASCII");
+  refuse(ascii + "1 2 3");
+  refuse(ascii + std::string(600, 'x'));
+  for (std::size_t size = 14; size < kLegacy.size(); ++size) refuse(kLegacy.substr(0, size));
+  refuse(kLegacy + samples().substr(1));
+}
+
+}  // namespace
+}  // namespace isobrick
