@@ -8,7 +8,7 @@
 #include "isobrick/meshes/glb_scene.h"
 #include "isobrick/meshes/vtp_sink.h"
 #include "temp_dir.h"
-#include "test_meshes.h"
+#include "tests/meshes/test_meshes.h"
 
 namespace isobrick {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "temp_dir.h"
 #include "test_meshes.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 

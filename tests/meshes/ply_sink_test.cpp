@@ -5,8 +5,8 @@
 #include <cstring>
 #include <sstream>
 
-#include "temp_dir.h"
 #include "test_meshes.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 namespace {

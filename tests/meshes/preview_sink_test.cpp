@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "isobrick/io/png_file.h"
-#include "temp_dir.h"
 #include "test_meshes.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <cstring>
 
-#include "temp_dir.h"
 #include "test_meshes.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/volumes/open_source.h"
-#include "temp_dir.h"
 #include "test_samples.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 

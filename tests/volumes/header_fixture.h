@@ -8,8 +8,8 @@
 
 #include "isobrick/volumes/open_source.h"
 #include "isobrick/volumes/text_header.h"
-#include "temp_dir.h"
 #include "test_samples.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 

@@ -5,9 +5,9 @@
 
 #include "isobrick/io/byte_order.h"
 #include "isobrick/volumes/open_source.h"
-#include "packed.h"
-#include "temp_dir.h"
 #include "test_samples.h"
+#include "tests/io/packed.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -5,8 +5,8 @@
 #include <thread>
 
 #include "isobrick/volumes/open_source.h"
-#include "temp_dir.h"
 #include "test_samples.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -6,8 +6,8 @@
 #include <map>
 
 #include "isobrick/volumes/synth_math.h"
-#include "temp_dir.h"
 #include "test_samples.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick {
 namespace {

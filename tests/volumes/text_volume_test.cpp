@@ -3,9 +3,9 @@
 #include <array>
 
 #include "isobrick/volumes/open_source.h"
-#include "packed.h"
-#include "temp_dir.h"
 #include "test_samples.h"
+#include "tests/io/packed.h"
+#include "tests/io/temp_dir.h"
 
 // NRRD and MetaImage files with everything that their headers may say of samples.
 namespace isobrick {
