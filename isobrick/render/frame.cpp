@@ -1,0 +1,111 @@
+#include "isobrick/render/frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/trigonometric.hpp>
+
+#include "isobrick/render/vectors.h"
+
+namespace isobrick {
+namespace {
+
+float to_linear(float v) {
+  v = std::clamp(v, 0.0f, 1.0f);
+  return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
+}
+
+/// In double up to the eye, so that far from the world's origin nothing jitters.
+glm::vec4 half_space(Vec3d point, Vec3d inward, Vec3d eye) {
+  const Vec3d n = unit(inward, {0, 0, 1});
+  const Vec3f f = to_float(n);
+  return {f.x, f.y, f.z, static_cast<float>(dot(n, eye - point))};
+}
+
+}  // namespace
+
+glm::vec4 to_linear(Vec3f colour, float alpha) {
+  return {to_linear(colour.x), to_linear(colour.y), to_linear(colour.z), alpha};
+}
+
+FrameBlock make_frame(const Camera& camera, int width, int height,
+                      const PictureSettings& settings) {
+  FrameBlock frame{};
+  const double aspect = static_cast<double>(width) / height;
+  frame.projection = glm::mat4(camera.projection(aspect));
+  frame.rotation = glm::mat4(glm::mat3(camera.rotation()));
+
+  int count = 0;
+  for (const ClipPlane& plane : settings.planes)
+    frame.half_spaces[static_cast<std::size_t>(count++)] =
+        half_space(plane.point, plane.inward, camera.eye);
+  if (settings.region)
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3d inward;
+      inward[axis] = 1;
+      frame.half_spaces[static_cast<std::size_t>(count++)] =
+          half_space(settings.region->lo, inward, camera.eye);
+      frame.half_spaces[static_cast<std::size_t>(count++)] =
+          half_space(settings.region->hi, inward * -1.0, camera.eye);
+    }
+  frame.counts = {std::min(count, kClipDistances), count, 0, 0};
+
+  const double near = camera.near_depth(), far = camera.far_depth();
+  const double tangent = std::tan(glm::radians(camera.field_of_view) / 2);
+  const double shorter = camera.orthographic ? tangent * camera.distance() : tangent;
+  const double pixel = 2 * shorter / std::min(width, height);
+  frame.depth = {static_cast<float>(near), static_cast<float>(far),
+                 camera.orthographic ? 1.0f : 0.0f, static_cast<float>(1 / (far - near))};
+  frame.viewport = {static_cast<float>(width), static_cast<float>(height),
+                    static_cast<float>(pixel * width / 2), static_cast<float>(pixel * height / 2)};
+  frame.pixel = {static_cast<float>(pixel), 0, 0, 0};
+  frame.top = to_linear(settings.background_top, 1);
+  frame.bottom = to_linear(settings.background_bottom, 1);
+  return frame;
+}
+
+const char* const kFrameGlsl = R"(
+layout(std140, binding = 0) uniform Frame {
+  mat4 projection, rotation;
+  vec4 half_spaces[12];
+  vec4 depth_range;
+  vec4 viewport;
+  vec4 pixel;
+  vec4 background_top, background_bottom;
+  ivec4 counts;
+};
+
+// World length in front of the eye, from what the depth buffer holds.
+float depth_of(float stored) {
+  return depth_range.z > 0.5 ? depth_range.y - stored * (depth_range.y - depth_range.x)
+                             : depth_range.x / stored;
+}
+vec3 view_position(vec2 at, float depth) {
+  vec2 across = (at / viewport.xy * 2 - 1) * viewport.zw;
+  return vec3(depth_range.z > 0.5 ? across : across * depth, -depth);
+}
+float pixel_length(float depth) { return depth_range.z > 0.5 ? pixel.x : pixel.x * depth; }
+vec3 towards_eye(vec3 position) {
+  return depth_range.z > 0.5 ? vec3(0, 0, 1) : normalize(-position);
+}
+)";
+
+const char* const kLightGlsl = R"(
+// Linear light that a surface sends to the eye; all in camera space. A key light from
+// above and left, sky and ground, a little light from the eye, gloss and a bright rim.
+vec3 lit(vec3 normal, vec3 eye, vec3 colour) {
+  const vec3 key = normalize(vec3(-0.46, 0.64, 0.62));
+  const vec3 fill = normalize(vec3(0.75, 0.05, 0.45));
+  const vec3 sky = vec3(0.97, 0.99, 1.05), ground = vec3(0.62, 0.57, 0.53);
+  float facing = clamp(dot(normal, eye), 0.0, 1.0);
+  float wrapped = (dot(normal, key) + 0.15) / 1.15;
+  vec3 light = mix(ground, sky, 0.5 + 0.5 * normal.y) * 0.30;
+  light += vec3(1.0, 0.985, 0.95) * 0.72 * max(wrapped, 0.0);
+  light += vec3(0.92, 0.96, 1.0) * (0.10 * max(dot(normal, fill), 0.0) + 0.08 * facing);
+  vec3 halfway = normalize(key + eye);
+  float gloss = pow(max(dot(normal, halfway), 0.0), 48.0);
+  float rim = pow(1.0 - facing, 4.0) * (0.55 + 0.45 * normal.y);
+  return colour * light + vec3(0.11 * gloss + 0.07 * rim);
+}
+)";
+
+}  // namespace isobrick

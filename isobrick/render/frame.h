@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec4.hpp>
+
+#include "isobrick/render/camera.h"
+#include "isobrick/render/gl_objects.h"
+#include "isobrick/render/renderer.h"
+
+namespace isobrick {
+
+/// Planes and box faces that cut; what OpenGL must offer clips exactly, the rest by pixel.
+inline constexpr int kMostHalfSpaces = 12, kClipDistances = 8;
+
+/// What every shader knows of the picture: the uniform block Frame of frame_glsl.
+struct FrameBlock {
+  glm::mat4 projection, rotation;
+  /// dot(xyz, position relative to the eye) + w >= 0 is kept.
+  std::array<glm::vec4, kMostHalfSpaces> half_spaces;
+  glm::vec4 depth;        ///< near, far, orthographic, 1 / depth of the scene
+  glm::vec4 viewport;     ///< width, height, half width and half height at depth 1 (or everywhere)
+  glm::vec4 pixel;        ///< length of a pixel at depth 1 (or everywhere)
+  glm::vec4 top, bottom;  ///< background, linear
+  glm::ivec4 counts;      ///< clip distances, half spaces
+};
+
+FrameBlock make_frame(const Camera& camera, int width, int height, const PictureSettings& settings);
+
+/// GLSL: the block Frame and functions of depth and camera space.
+extern const char* const kFrameGlsl;
+/// GLSL: light on a surface, after kFrameGlsl.
+extern const char* const kLightGlsl;
+
+/// sRGB in [0, 1] to linear.
+glm::vec4 to_linear(Vec3f colour, float alpha);
+
+}  // namespace isobrick

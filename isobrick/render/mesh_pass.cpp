@@ -1,0 +1,222 @@
+#include "isobrick/render/mesh_pass.h"
+
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/vec4.hpp>
+#include <numeric>
+
+#include "isobrick/render/frame.h"
+#include "isobrick/render/vectors.h"
+
+namespace isobrick {
+namespace {
+
+/// How one mesh is drawn; std430.
+struct Look {
+  glm::vec4 offset;  ///< from the eye; w: has normals
+  glm::vec4 colour;  ///< linear; alpha: opacity
+  glm::vec4 inside;
+  glm::uvec4 id;
+};
+
+/// What glMultiDrawElementsIndirect reads.
+struct Command {
+  std::uint32_t count, instances, first_index;
+  std::int32_t base_vertex;
+  std::uint32_t base_instance;
+};
+
+const char* const kLooks = R"(
+struct Look { vec4 offset, colour, inside; uvec4 id; };
+layout(std430, binding = 0) readonly buffer Looks { Look looks[]; };
+)";
+
+const char* const kVertex = R"(
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in uint number;
+out vec3 from_eye;
+centroid out vec3 world_normal;
+flat out uint look;
+out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[8]; };
+
+void main() {
+  from_eye = position + looks[number].offset.xyz;
+  world_normal = normal;
+  look = number;
+  gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
+  for (int i = 0; i < 8; ++i)
+    gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
+}
+)";
+
+const char* const kFragment = R"(
+in vec3 from_eye;
+centroid in vec3 world_normal;
+flat in uint look;
+
+struct Seen { vec3 position, normal, eye, light; };
+
+Seen see() {
+  for (int i = 8; i < counts.y; ++i)
+    if (dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w < 0) discard;
+  Seen s;
+  s.position = mat3(rotation) * from_eye;
+  s.eye = towards_eye(s.position);
+  vec3 facet = cross(dFdx(s.position), dFdy(s.position));
+  facet = dot(facet, facet) > 0 ? normalize(facet) : s.eye;
+  if (dot(facet, s.eye) < 0) facet = -facet;
+  s.normal = mat3(rotation) * world_normal;
+  float size = dot(s.normal, s.normal);
+  if (looks[look].offset.w < 0.5 || !(size > 1e-12) || isinf(size))
+    s.normal = facet;
+  else
+    s.normal *= inversesqrt(size);
+  // Both sides are lit, whatever way round the file has them.
+  if (dot(s.normal, facet) < 0) s.normal = -s.normal;
+  float facing = dot(s.normal, s.eye);
+  if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
+  bool cut = counts.y > 0 && !gl_FrontFacing;
+  s.light = lit(s.normal, s.eye, cut ? looks[look].inside.rgb : looks[look].colour.rgb);
+  return s;
+}
+)";
+
+const char* const kOpaque = R"(
+layout(location = 0) out vec4 colour;
+layout(location = 1) out vec2 normal;
+layout(location = 2) out uint id;
+
+void main() {
+  Seen s = see();
+  colour = vec4(min(s.light, vec3(4)), 1);
+  normal = s.normal.xy;
+  id = looks[look].id.x;
+}
+)";
+
+const char* const kTransparent = R"(
+layout(location = 0) out vec4 sum;
+layout(location = 1) out float hidden;
+
+void main() {
+  Seen s = see();
+  // Slanting rays have a longer way through it.
+  float facing = max(dot(s.normal, s.eye), 0.12);
+  float alpha = 1 - pow(1 - looks[look].colour.a, 1 / facing);
+  // What is near counts more; half floats hold these weights.
+  float far = clamp((-s.position.z - depth_range.x) * depth_range.w, 0.0, 1.0);
+  float weight = 64 * exp2(-12 * far);
+  sum = vec4(min(s.light, vec3(2)), 1) * alpha * weight;
+  hidden = alpha;
+}
+)";
+
+glm::vec4 offset_of(Vec3d origin, Vec3d eye, bool normals) {
+  const Vec3f from_eye = to_float(origin - eye);
+  return {from_eye.x, from_eye.y, from_eye.z, normals ? 1.0f : 0.0f};
+}
+
+Look look_of(const MeshStyle& style, Vec3d origin, Vec3d eye, bool normals) {
+  const Vec3f c = style.colour;
+  const Vec3f darker{0.30f + 0.42f * c.x, 0.24f + 0.38f * c.y, 0.22f + 0.34f * c.z};
+  const float opacity = std::clamp(style.opacity, 0.0f, 1.0f);
+  return {offset_of(origin, eye, normals),
+          to_linear(c, opacity),
+          to_linear(style.inside.value_or(darker), opacity),
+          {style.id, 0, 0, 0}};
+}
+
+}  // namespace
+
+MeshPass::MeshPass()
+    : vertices_(make_vertex_array()),
+      looks_(make_stream_buffer()),
+      numbers_(make_stream_buffer()),
+      commands_(make_stream_buffer()),
+      positions_(make_stream_buffer()),
+      normals_(make_stream_buffer()),
+      triangles_(make_stream_buffer()) {
+  const std::string common = std::string(kFrameGlsl) + kLooks;
+  const std::string fragment = common + kLightGlsl + kFragment;
+  opaque_ = make_program(common + kVertex, fragment + kOpaque, "meshes");
+  transparent_ = make_program(common + kVertex, fragment + kTransparent, "transparent meshes");
+  const unsigned array = vertices_.get();
+  for (unsigned attribute : {0u, 1u}) {
+    glEnableVertexArrayAttrib(array, attribute);
+    glVertexArrayAttribFormat(array, attribute, 3, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(array, attribute, attribute);
+  }
+  glEnableVertexArrayAttrib(array, 2);
+  glVertexArrayAttribIFormat(array, 2, 1, GL_UNSIGNED_INT, 0);
+  glVertexArrayAttribBinding(array, 2, 2);
+  glVertexArrayBindingDivisor(array, 2, 1);
+  check_gl("the attributes of meshes");
+}
+
+void MeshPass::need_numbers(std::size_t count) {
+  if (count > number_count_) {
+    std::vector<std::uint32_t> numbers(std::max<std::size_t>(2 * count, 1024));
+    std::iota(numbers.begin(), numbers.end(), 0u);
+    fill_buffer(numbers_, std::as_bytes(std::span(numbers)));
+    number_count_ = numbers.size();
+  }
+  glVertexArrayVertexBuffer(vertices_.get(), 2, numbers_.get(), 0, sizeof(std::uint32_t));
+}
+
+void MeshPass::bind(bool transparent) {
+  glUseProgram(transparent ? transparent_.get() : opaque_.get());
+  glBindVertexArray(vertices_.get());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, looks_.get());
+}
+
+void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent) {
+  if (meshes.empty()) return;
+  std::vector<Look> looks;
+  std::vector<Command> commands;
+  for (const MeshDraw& draw : meshes) {
+    const MeshPlace& place = draw.mesh->place();
+    commands.push_back({3 * place.triangle_count, 1, 3 * place.first_triangle,
+                        static_cast<std::int32_t>(place.first_vertex),
+                        static_cast<std::uint32_t>(looks.size())});
+    looks.push_back(look_of(draw.style, draw.mesh->origin(), eye, draw.mesh->has_normals()));
+  }
+  fill_buffer(looks_, std::as_bytes(std::span(looks)));
+  fill_buffer(commands_, std::as_bytes(std::span(commands)));
+  need_numbers(looks.size());
+  const MeshPlace& place = meshes.front().mesh->place();
+  glVertexArrayVertexBuffer(vertices_.get(), 0, place.positions, 0, sizeof(Vec3f));
+  glVertexArrayVertexBuffer(vertices_.get(), 1, place.normals, 0, sizeof(Vec3f));
+  glVertexArrayElementBuffer(vertices_.get(), place.triangles);
+  bind(transparent);
+  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.get());
+  glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr,
+                              static_cast<GLsizei>(commands.size()), 0);
+  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
+  check_gl("drawing meshes");
+}
+
+void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin, Vec3d eye,
+                    bool transparent) {
+  kept_.clear();
+  const std::span<const Triangle> triangles = drawable_triangles(mesh, kept_);
+  if (triangles.empty()) return;
+  const Look look = look_of(style, origin, eye, !mesh.normals.empty());
+  fill_buffer(looks_, std::as_bytes(std::span(&look, 1)));
+  fill_buffer(positions_, std::as_bytes(mesh.positions));
+  if (!mesh.normals.empty()) fill_buffer(normals_, std::as_bytes(mesh.normals));
+  fill_buffer(triangles_, std::as_bytes(triangles));
+  need_numbers(1);
+  const GlBuffer& normals = mesh.normals.empty() ? positions_ : normals_;
+  glVertexArrayVertexBuffer(vertices_.get(), 0, positions_.get(), 0, sizeof(Vec3f));
+  glVertexArrayVertexBuffer(vertices_.get(), 1, normals.get(), 0, sizeof(Vec3f));
+  glVertexArrayElementBuffer(vertices_.get(), triangles_.get());
+  bind(transparent);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * triangles.size()), GL_UNSIGNED_INT,
+                 nullptr);
+  check_gl("drawing a mesh");
+}
+
+}  // namespace isobrick

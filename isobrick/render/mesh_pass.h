@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isobrick/core/vec.h"
+#include "isobrick/render/gl_objects.h"
+#include "isobrick/render/mesh_pool.h"
+#include "isobrick/render/renderer.h"
+
+namespace isobrick {
+
+/// A mesh and how it looks.
+struct MeshDraw {
+  const PooledMesh* mesh;
+  MeshStyle style;
+};
+
+/// Draws meshes into the framebuffer that is bound, opaque or weighted for blending.
+class MeshPass {
+ public:
+  MeshPass();
+
+  /// Those of one block of a pool with one call.
+  void draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent);
+  /// One that lies in memory.
+  void draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin, Vec3d eye,
+            bool transparent);
+
+ private:
+  void bind(bool transparent);
+  /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
+  void need_numbers(std::size_t count);
+
+  GlProgram opaque_, transparent_;
+  GlVertexArray vertices_;
+  GlBuffer looks_, numbers_, commands_;
+  GlBuffer positions_, normals_, triangles_;  ///< of meshes that lie in memory
+  std::size_t number_count_ = 0;
+  std::vector<Triangle> kept_;
+};
+
+}  // namespace isobrick

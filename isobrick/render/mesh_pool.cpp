@@ -1,0 +1,251 @@
+#include "isobrick/render/mesh_pool.h"
+
+#include <epoxy/gl.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+static_assert(sizeof(Vec3f) == 12 && sizeof(Triangle) == 12);
+
+/// Which parts of [0, size) are free; the first that is large enough is taken.
+class FreeList {
+ public:
+  explicit FreeList(std::uint32_t size) { free_.push_back({0, size}); }
+
+  std::optional<std::uint32_t> take(std::uint32_t size) {
+    for (std::size_t i = 0; i < free_.size(); ++i) {
+      if (free_[i].size < size) continue;
+      const std::uint32_t at = free_[i].at;
+      free_[i].at += size;
+      free_[i].size -= size;
+      if (free_[i].size == 0) free_.erase(free_.begin() + static_cast<std::ptrdiff_t>(i));
+      return at;
+    }
+    return std::nullopt;
+  }
+
+  void give_back(std::uint32_t at, std::uint32_t size) {
+    if (size == 0) return;
+    auto next = std::lower_bound(free_.begin(), free_.end(), at,
+                                 [](const Range& range, std::uint32_t v) { return range.at < v; });
+    next = free_.insert(next, {at, size});
+    if (next + 1 != free_.end() && at + size == (next + 1)->at) {
+      next->size += (next + 1)->size;
+      free_.erase(next + 1);
+    }
+    if (next != free_.begin() && (next - 1)->at + (next - 1)->size == at) {
+      (next - 1)->size += next->size;
+      free_.erase(next);
+    }
+  }
+
+ private:
+  struct Range {
+    std::uint32_t at, size;
+  };
+  std::vector<Range> free_;  ///< ascending, never touching
+};
+
+std::uint64_t bytes_of(std::uint64_t vertices, std::uint64_t triangles) {
+  return vertices * 2 * sizeof(Vec3f) + triangles * sizeof(Triangle);
+}
+
+bool is_finite(Vec3f v) { return std::isfinite(v.x + v.y + v.z); }
+
+}  // namespace
+
+struct MeshBlock {
+  MeshBlock(std::uint32_t vertex_count, std::uint32_t triangle_count)
+      : vertex_room(vertex_count),
+        triangle_room(triangle_count),
+        free_vertices(vertex_count),
+        free_triangles(triangle_count),
+        positions(make_buffer(vertex_count * sizeof(Vec3f), "memory for positions")),
+        normals(make_buffer(vertex_count * sizeof(Vec3f), "memory for normals")),
+        triangles(make_buffer(triangle_count * sizeof(Triangle), "memory for triangles")) {}
+
+  /// The places of both kinds, or nothing of either.
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> take(std::uint32_t vertex_count,
+                                                              std::uint32_t triangle_count) {
+    const auto vertex = free_vertices.take(vertex_count);
+    if (!vertex) return std::nullopt;
+    const auto triangle = free_triangles.take(triangle_count);
+    if (triangle) {
+      used += bytes_of(vertex_count, triangle_count);
+      return std::pair(*vertex, *triangle);
+    }
+    free_vertices.give_back(*vertex, vertex_count);
+    return std::nullopt;
+  }
+
+  void give_back(const MeshPlace& place) {
+    free_vertices.give_back(place.first_vertex, place.vertices);
+    free_triangles.give_back(place.first_triangle, place.triangle_count);
+    used -= bytes_of(place.vertices, place.triangle_count);
+  }
+
+  std::uint32_t vertex_room, triangle_room;
+  std::uint64_t used = 0;
+  FreeList free_vertices, free_triangles;
+  GlBuffer positions, normals, triangles;
+};
+
+struct MeshPool::State {
+  std::uint32_t block_vertices = 0;
+  std::vector<std::shared_ptr<MeshBlock>> blocks;
+
+  /// One empty block stays for what comes next; more go back to the device.
+  void trim() {
+    bool kept = false;
+    std::erase_if(blocks, [&](const std::shared_ptr<MeshBlock>& block) {
+      return block->used == 0 && (block->vertex_room > block_vertices || std::exchange(kept, true));
+    });
+  }
+};
+
+PooledMesh& PooledMesh::operator=(PooledMesh&& other) noexcept {
+  std::swap(block_, other.block_);
+  std::swap(place_, other.place_);
+  std::swap(origin_, other.origin_);
+  std::swap(has_normals_, other.has_normals_);
+  return *this;
+}
+
+std::uint64_t PooledMesh::bytes() const {
+  return block_ ? bytes_of(place_.vertices, place_.triangle_count) : 0;
+}
+
+void PooledMesh::reset() {
+  if (block_) block_->give_back(place_);
+  block_.reset();
+  place_ = {};
+}
+
+MeshPool::MeshPool(std::uint32_t block_vertices) : state_(std::make_unique<State>()) {
+  state_->block_vertices = block_vertices;
+}
+MeshPool::~MeshPool() = default;
+MeshPool::MeshPool(MeshPool&&) noexcept = default;
+MeshPool& MeshPool::operator=(MeshPool&&) noexcept = default;
+
+PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bool normals,
+                             Vec3d origin) {
+  PooledMesh mesh;
+  mesh.origin_ = origin;
+  mesh.has_normals_ = normals;
+  if (vertices == 0 || triangles == 0) return mesh;
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> at;
+  for (const std::shared_ptr<MeshBlock>& block : state_->blocks)
+    if ((at = block->take(vertices, triangles))) {
+      mesh.block_ = block;
+      break;
+    }
+  if (!at) {
+    state_->trim();
+    const std::uint32_t room = state_->block_vertices;
+    mesh.block_ =
+        std::make_shared<MeshBlock>(std::max(room, vertices), std::max(2 * room, triangles));
+    state_->blocks.push_back(mesh.block_);
+    at = mesh.block_->take(vertices, triangles);
+  }
+  mesh.place_ = {mesh.block_->positions.get(),
+                 mesh.block_->normals.get(),
+                 mesh.block_->triangles.get(),
+                 at->first,
+                 vertices,
+                 at->second,
+                 triangles};
+  return mesh;
+}
+
+PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
+  std::vector<Triangle> kept;
+  const std::span<const Triangle> triangles = drawable_triangles(chunk, kept);
+  constexpr std::size_t most = std::numeric_limits<std::int32_t>::max() / 3;
+  if (chunk.positions.size() > most || triangles.size() > most)
+    throw Error(
+        fmt::format("a mesh of {} vertices and {} triangles is too large to be drawn as one",
+                    chunk.positions.size(), triangles.size()));
+  PooledMesh mesh =
+      reserve(static_cast<std::uint32_t>(chunk.positions.size()),
+              static_cast<std::uint32_t>(triangles.size()), !chunk.normals.empty(), origin);
+  if (mesh.empty()) return mesh;
+  const auto upload = [](unsigned buffer, std::uint64_t first, auto span) {
+    glNamedBufferSubData(buffer, static_cast<GLintptr>(first * sizeof(span[0])),
+                         static_cast<GLsizeiptr>(span.size_bytes()), span.data());
+  };
+  const MeshPlace& place = mesh.place();
+  upload(place.positions, place.first_vertex, chunk.positions);
+  if (mesh.has_normals()) upload(place.normals, place.first_vertex, chunk.normals);
+  upload(place.triangles, place.first_triangle, triangles);
+  check_gl("a mesh");
+  return mesh;
+}
+
+MeshPool::Mapping MeshPool::map(const PooledMesh& mesh) {
+  const MeshPlace& place = mesh.place();
+  const auto span_of = [&]<class T>(unsigned buffer, std::uint32_t first, std::uint32_t count, T*) {
+    void* at = glMapNamedBufferRange(buffer, static_cast<GLintptr>(first * sizeof(T)),
+                                     static_cast<GLsizeiptr>(count * sizeof(T)),
+                                     GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT);
+    return std::span<T>(static_cast<T*>(at), at == nullptr ? 0 : count);
+  };
+  if (mesh.empty()) return {};
+  Mapping mapping;
+  mapping.positions = span_of(place.positions, place.first_vertex, place.vertices, (Vec3f*)nullptr);
+  if (mesh.has_normals())
+    mapping.normals = span_of(place.normals, place.first_vertex, place.vertices, (Vec3f*)nullptr);
+  mapping.triangles =
+      span_of(place.triangles, place.first_triangle, place.triangle_count, (Triangle*)nullptr);
+  check_gl("a mesh mapped");
+  return mapping;
+}
+
+void MeshPool::unmap(const PooledMesh& mesh) {
+  if (mesh.empty()) return;
+  glUnmapNamedBuffer(mesh.place().positions);
+  if (mesh.has_normals()) glUnmapNamedBuffer(mesh.place().normals);
+  glUnmapNamedBuffer(mesh.place().triangles);
+  check_gl("a mesh unmapped");
+}
+
+std::uint64_t MeshPool::bytes() const {
+  std::uint64_t sum = 0;
+  for (const std::shared_ptr<MeshBlock>& block : state_->blocks) sum += block->used;
+  return sum;
+}
+
+std::uint64_t MeshPool::capacity() const {
+  std::uint64_t sum = 0;
+  for (const std::shared_ptr<MeshBlock>& block : state_->blocks)
+    sum += bytes_of(block->vertex_room, block->triangle_room);
+  return sum;
+}
+
+std::span<const Triangle> drawable_triangles(const MeshChunk& mesh, std::vector<Triangle>& kept) {
+  std::uint32_t largest = 0;
+  for (const Triangle& t : mesh.triangles) largest = std::max({largest, t[0], t[1], t[2]});
+  if (!mesh.triangles.empty() && largest >= mesh.positions.size())
+    throw Error(fmt::format("a triangle names vertex {} of a mesh that has {}", largest,
+                            mesh.positions.size()));
+  if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size())
+    throw Error(fmt::format("a mesh of {} vertices has {} normals", mesh.positions.size(),
+                            mesh.normals.size()));
+  if (std::all_of(mesh.positions.begin(), mesh.positions.end(), is_finite)) return mesh.triangles;
+  for (const Triangle& t : mesh.triangles)
+    if (is_finite(mesh.positions[t[0]]) && is_finite(mesh.positions[t[1]]) &&
+        is_finite(mesh.positions[t[2]]))
+      kept.push_back(t);
+  return kept;
+}
+
+}  // namespace isobrick

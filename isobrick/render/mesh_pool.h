@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "isobrick/core/vec.h"
+#include "isobrick/render/gl_objects.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+struct MeshBlock;
+
+/// Where a mesh lies in the buffers that it shares with others, for who fills it
+/// from CUDA (cudaGraphicsGLRegisterBuffer) or draws it himself.
+struct MeshPlace {
+  unsigned positions = 0, normals = 0, triangles = 0;  ///< names of OpenGL buffers
+  std::uint32_t first_vertex = 0, vertices = 0;        ///< of 12 bytes each
+  std::uint32_t first_triangle = 0, triangle_count = 0;
+};
+
+/// A mesh in a pool; its room is free again when it is destroyed. Numbers of its
+/// triangles count from its first vertex. To be destroyed in a current context
+/// that shares the pool's objects.
+class PooledMesh {
+ public:
+  PooledMesh() = default;
+  PooledMesh(PooledMesh&&) noexcept = default;
+  PooledMesh& operator=(PooledMesh&& other) noexcept;
+  ~PooledMesh() { reset(); }
+
+  bool empty() const { return place_.triangle_count == 0; }
+  bool has_normals() const { return has_normals_; }
+  /// World position of (0, 0, 0) in the mesh's own coordinates.
+  Vec3d origin() const { return origin_; }
+  const MeshPlace& place() const { return place_; }
+  /// Of device memory.
+  std::uint64_t bytes() const;
+  void reset();
+
+ private:
+  friend class MeshPool;
+  std::shared_ptr<MeshBlock> block_;
+  MeshPlace place_;
+  Vec3d origin_;
+  bool has_normals_ = false;
+};
+
+/// Meshes of any size in a few large buffers, so that thousands are drawn with one
+/// call. One thread at a time, with a context current.
+class MeshPool {
+ public:
+  /// `block_vertices`: room of a block; it has twice as many triangles. Larger
+  /// meshes get a block of their own.
+  explicit MeshPool(std::uint32_t block_vertices = 1u << 19);
+  ~MeshPool();
+  MeshPool(MeshPool&&) noexcept;
+  MeshPool& operator=(MeshPool&&) noexcept;
+
+  /// Copies a mesh whose triangles count from its own first vertex. Triangles with a
+  /// coordinate that is not finite are left out. Throws Error for triangles
+  /// that name other vertices, and when device memory is short.
+  PooledMesh add(const MeshChunk& mesh, Vec3d origin = {});
+
+  /// Room for a mesh that the caller fills before it is drawn.
+  PooledMesh reserve(std::uint32_t vertices, std::uint32_t triangles, bool normals,
+                     Vec3d origin = {});
+
+  /// Room in memory to write a reserved mesh to; it must be unmapped before drawing.
+  struct Mapping {
+    std::span<Vec3f> positions, normals;
+    std::span<Triangle> triangles;
+  };
+  static Mapping map(const PooledMesh& mesh);
+  static void unmap(const PooledMesh& mesh);
+
+  /// Device memory in use by meshes, and taken for blocks.
+  std::uint64_t bytes() const;
+  std::uint64_t capacity() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The triangles whose vertices are all finite: `mesh`'s own if all are, else a copy in
+/// `kept`. Throws Error for a triangle that names a vertex beyond the mesh's.
+std::span<const Triangle> drawable_triangles(const MeshChunk& mesh, std::vector<Triangle>& kept);
+
+}  // namespace isobrick

@@ -1,0 +1,55 @@
+#include "isobrick/render/picture_targets.h"
+
+#include <epoxy/gl.h>
+
+#include <array>
+#include <vector>
+
+namespace isobrick {
+
+PictureTargets::PictureTargets(int picture_width, int picture_height, int sample_count,
+                               bool with_ids)
+    : width(picture_width), height(picture_height), samples(sample_count), ids(with_ids) {
+  const auto texture = [&](unsigned format, int count) {
+    return make_texture(format, width, height, count, "memory for the picture");
+  };
+  colour = texture(GL_RGBA16F, samples);
+  normal = texture(GL_RG16F, samples);
+  depth = texture(GL_DEPTH_COMPONENT32F, samples);
+  near_depth = texture(GL_R32F, 1);
+  near_normal = texture(GL_RG16F, 1);
+  std::vector<unsigned> each{colour.get(), normal.get()},
+      nearest_each{near_depth.get(), near_normal.get()};
+  if (ids) {
+    id = texture(GL_R32UI, samples);
+    near_id = texture(GL_R32UI, 1);
+    each.push_back(id.get());
+    nearest_each.push_back(near_id.get());
+  }
+  opaque = make_framebuffer(each, depth.get(), "the picture of opaque meshes");
+  nearest = make_framebuffer(nearest_each, 0, "the nearest samples");
+
+  open = texture(GL_R8, 1);
+  open_rows = texture(GL_R8, 1);
+  open_target = make_framebuffer(std::array{open.get()}, 0, "the occlusion");
+  open_rows_target = make_framebuffer(std::array{open_rows.get()}, 0, "the occlusion");
+  picture = texture(GL_RGBA8, 1);
+  picture_target = make_framebuffer(std::array{picture.get()}, 0, "the picture");
+}
+
+void PictureTargets::add_transparent() {
+  if (transparent) return;
+  sum = make_texture(GL_RGBA16F, width, height, samples, "memory for transparency");
+  seen = make_texture(GL_R16F, width, height, samples, "memory for transparency");
+  transparent = make_framebuffer(std::array{sum.get(), seen.get()}, depth.get(), "transparency");
+}
+
+std::uint64_t PictureTargets::bytes(int width, int height, int samples, bool ids,
+                                    bool transparent) {
+  const std::uint64_t sample = 8 + 4 + 4 + (ids ? 4 : 0) + (transparent ? 8 + 2 : 0);
+  const std::uint64_t pixel = 4 + 4 + (ids ? 4 : 0) + 1 + 1 + 4;
+  return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
+         (sample * static_cast<std::uint64_t>(samples) + pixel);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+
+#include "isobrick/render/gl_objects.h"
+
+namespace isobrick {
+
+/// The textures that a picture goes through, and framebuffers of them.
+struct PictureTargets {
+  PictureTargets(int picture_width, int picture_height, int sample_count, bool with_ids);
+
+  /// Those of transparent meshes, made when the first one comes.
+  void add_transparent();
+
+  /// Device memory in all.
+  static std::uint64_t bytes(int width, int height, int samples, bool ids, bool transparent);
+
+  int width, height, samples;
+  bool ids;
+
+  // Of each sample: lit colour (alpha 0: no light is taken away later), normal, mesh, depth.
+  GlTexture colour, normal, id, depth;
+  GlFramebuffer opaque;
+  // Of each sample: weighted sum, and what part of the background is still seen.
+  GlTexture sum, seen;
+  GlFramebuffer transparent;
+  // Of each pixel: the nearest sample's depth (world length; 0: background), normal, mesh.
+  GlTexture near_depth, near_normal, near_id;
+  GlFramebuffer nearest;
+  // Of each pixel: how open it is, and that smoothed along rows.
+  GlTexture open, open_rows;
+  GlFramebuffer open_target, open_rows_target;
+  GlTexture picture;
+  GlFramebuffer picture_target;
+};
+
+}  // namespace isobrick

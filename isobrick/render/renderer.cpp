@@ -1,0 +1,253 @@
+#include "isobrick/render/renderer.h"
+
+#include <epoxy/gl.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <functional>
+#include <map>
+
+#include "isobrick/core/error.h"
+#include "isobrick/render/frame.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/render/mesh_pass.h"
+#include "isobrick/render/picture_targets.h"
+#include "isobrick/render/screen_pass.h"
+#include "isobrick/render/vectors.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kSamples = 4;
+constexpr std::size_t kMostPlanes = 6;
+
+int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
+
+/// What drawing needs of a context's switches; leaves OpenGL's defaults.
+class Switches {
+ public:
+  explicit Switches(const FrameBlock& frame) {
+    glGetIntegerv(GL_VIEWPORT, viewport_.data());
+    glViewport(0, 0, static_cast<int>(frame.viewport.x), static_cast<int>(frame.viewport.y));
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glDepthFunc(GL_GREATER);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    for (const GLenum off : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
+                             GL_FRAMEBUFFER_SRGB, GL_DEPTH_TEST})
+      glDisable(off);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  }
+  ~Switches() {
+    meshes(0, false, false);
+    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+    glDepthFunc(GL_LESS);
+    glViewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glUseProgram(0);
+    glBindVertexArray(0);
+  }
+  Switches(const Switches&) = delete;
+  Switches& operator=(const Switches&) = delete;
+
+  /// Depth test, clipping by the first `distances` planes, weighted blending.
+  void meshes(int distances, bool depth_test, bool blended) const {
+    const auto set = [](GLenum what, bool on) { on ? glEnable(what) : glDisable(what); };
+    set(GL_DEPTH_TEST, depth_test);
+    glDepthMask(!blended);
+    for (int i = 0; i < kClipDistances; ++i)
+      set(GL_CLIP_DISTANCE0 + static_cast<GLenum>(i), i < distances);
+    set(GL_BLEND, blended);
+    if (!blended) return;
+    glBlendFunci(0, GL_ONE, GL_ONE);
+    glBlendFunci(1, GL_ZERO, GL_ONE_MINUS_SRC_COLOR);
+  }
+
+ private:
+  std::array<int, 4> viewport_{};
+};
+
+/// Meshes of the same block stand together.
+bool before(const MeshDraw& a, const MeshDraw& b) {
+  return a.mesh->place().positions < b.mesh->place().positions;
+}
+
+}  // namespace
+
+struct Renderer::State {
+  State() : device(current_gl_device()), frame_buffer(make_stream_buffer()) {
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest_edge);
+    check_gl("the limits of the device");
+  }
+
+  void start(const Camera& new_camera, int width, int height, const PictureSettings& new_settings);
+  void clear();
+  void clear_transparent();
+  void bind_frame() { glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.get()); }
+  void draw_blocks(const Switches& switches, std::vector<MeshDraw>& list, bool transparent);
+  void finish();
+
+  GlDevice device;
+  int largest_edge = 0;
+  MeshPass meshes;
+  std::optional<ScreenPass> screen;
+  std::optional<PictureTargets> targets;
+
+  Camera camera;
+  PictureSettings settings;
+  FrameBlock frame{};
+  GlBuffer frame_buffer;
+  std::vector<MeshDraw> opaque, transparent;
+  bool any_transparent = false;  ///< in this picture
+};
+
+void Renderer::State::start(const Camera& new_camera, int width, int height,
+                            const PictureSettings& new_settings) {
+  if (width < 1 || height < 1 || width > largest_edge || height > largest_edge)
+    throw UsageError(fmt::format("a picture of {} x {} pixels: {} draws 1 to {} along an edge",
+                                 width, height, device.renderer, largest_edge));
+  if (new_settings.planes.size() > kMostPlanes)
+    throw UsageError(fmt::format("{} clipping planes: a picture can have {}",
+                                 new_settings.planes.size(), kMostPlanes));
+  camera = new_camera;
+  settings = new_settings;
+  frame = make_frame(camera, width, height, settings);
+  opaque.clear();
+  transparent.clear();
+  any_transparent = false;
+  const int samples = samples_of(settings);
+  if (!screen || screen->samples() != samples) screen.emplace(samples);
+  if (!targets || targets->width != width || targets->height != height ||
+      targets->samples != samples || targets->ids != settings.picking) {
+    targets.reset();  // first, so that both are never there at once
+    targets.emplace(width, height, samples, settings.picking);
+  }
+  fill_buffer(frame_buffer, std::as_bytes(std::span(&frame, 1)));
+  clear();
+}
+
+void Renderer::State::clear() {
+  const Switches switches(frame);
+  const std::array<float, 4> nothing{};
+  const std::array<unsigned, 4> nobody{};
+  const unsigned target = targets->opaque.get();
+  glClearNamedFramebufferfv(target, GL_COLOR, 0, nothing.data());
+  glClearNamedFramebufferfv(target, GL_COLOR, 1, nothing.data());
+  if (targets->ids) glClearNamedFramebufferuiv(target, GL_COLOR, 2, nobody.data());
+  glClearNamedFramebufferfv(target, GL_DEPTH, 0, nothing.data());  // 0 is far
+  check_gl("clearing the picture");
+}
+
+void Renderer::State::clear_transparent() {
+  if (std::exchange(any_transparent, true)) return;
+  targets->add_transparent();
+  const std::array<float, 4> nothing{}, all{1, 1, 1, 1};
+  glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 0, nothing.data());
+  glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 1, all.data());
+}
+
+void Renderer::State::draw_blocks(const Switches& switches, std::vector<MeshDraw>& list,
+                                  bool blended) {
+  if (list.empty()) return;
+  if (blended) clear_transparent();
+  glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets->transparent.get() : targets->opaque.get());
+  switches.meshes(frame.counts.x, true, blended);
+  std::stable_sort(list.begin(), list.end(), before);
+  for (auto first = list.begin(); first != list.end();) {
+    const auto last = std::upper_bound(first, list.end(), *first, before);
+    meshes.draw(std::span(first, last), camera.eye, blended);
+    first = last;
+  }
+}
+
+void Renderer::State::finish() {
+  const Switches switches(frame);
+  bind_frame();
+  draw_blocks(switches, opaque, false);
+  draw_blocks(switches, transparent, true);
+  switches.meshes(0, false, false);
+  screen->run(*targets, settings, any_transparent);
+}
+
+Renderer::Renderer() : state_(std::make_unique<State>()) {}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+
+std::uint64_t Renderer::memory(int width, int height, const PictureSettings& settings,
+                               bool transparent) {
+  return PictureTargets::bytes(width, height, samples_of(settings), settings.picking, transparent);
+}
+
+int Renderer::largest_edge() const { return state_->largest_edge; }
+
+void Renderer::begin(const Camera& camera, int width, int height, const PictureSettings& settings) {
+  state_->start(camera, width, height, settings);
+}
+
+void Renderer::draw(const PooledMesh& mesh, const MeshStyle& style) {
+  if (mesh.empty() || style.opacity <= 0) return;
+  (style.opacity < 1 ? state_->transparent : state_->opaque).push_back({&mesh, style});
+}
+
+void Renderer::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin) {
+  if (style.opacity <= 0) return;
+  const bool blended = style.opacity < 1;
+  const Switches switches(state_->frame);
+  state_->bind_frame();
+  if (blended) state_->clear_transparent();
+  const PictureTargets& targets = *state_->targets;
+  glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets.transparent.get() : targets.opaque.get());
+  switches.meshes(state_->frame.counts.x, true, blended);
+  state_->meshes.draw(mesh, style, origin, state_->camera.eye, blended);
+}
+
+void Renderer::end() { state_->finish(); }
+
+int Renderer::width() const { return state_->targets ? state_->targets->width : 0; }
+int Renderer::height() const { return state_->targets ? state_->targets->height : 0; }
+
+std::vector<std::uint8_t> Renderer::read_pixels() const {
+  const std::size_t row = 4 * static_cast<std::size_t>(width());
+  const auto rows = static_cast<std::size_t>(height());
+  std::vector<std::uint8_t> pixels(row * rows);
+  glGetTextureImage(texture(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(pixels.size()),
+                    pixels.data());
+  check_gl("reading the picture");
+  for (std::size_t y = 0; y < rows / 2; ++y)
+    std::swap_ranges(pixels.data() + y * row, pixels.data() + (y + 1) * row,
+                     pixels.data() + (rows - 1 - y) * row);
+  return pixels;
+}
+
+unsigned Renderer::texture() const { return state_->targets->picture.get(); }
+
+void Renderer::copy_to(unsigned framebuffer, int x, int y) const {
+  glBlitNamedFramebuffer(state_->targets->picture_target.get(), framebuffer, 0, 0, width(),
+                         height(), x, y, x + width(), y + height(), GL_COLOR_BUFFER_BIT,
+                         GL_NEAREST);
+  check_gl("showing the picture");
+}
+
+std::optional<Picked> Renderer::pick(int x, int y) const {
+  if (x < 0 || y < 0 || x >= width() || y >= height()) return std::nullopt;
+  const PictureTargets& targets = *state_->targets;
+  const int from_bottom = height() - 1 - y;
+  float depth = 0;
+  glGetTextureSubImage(targets.near_depth.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED, GL_FLOAT,
+                       sizeof(depth), &depth);
+  Picked picked;
+  if (targets.ids)
+    glGetTextureSubImage(targets.near_id.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED_INTEGER,
+                         GL_UNSIGNED_INT, sizeof(picked.id), &picked.id);
+  check_gl("reading a pixel");
+  if (!(depth > 0)) return std::nullopt;
+  const Camera& camera = state_->camera;
+  const WorldRay ray = camera.ray(x + 0.5, y + 0.5, width(), height());
+  // The depth is along the line of sight, the ray may slant.
+  picked.position = ray.origin + ray.direction * (depth / -dot(ray.direction, camera.back));
+  return picked;
+}
+
+}  // namespace isobrick

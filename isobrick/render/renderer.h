@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isobrick/core/vec.h"
+#include "isobrick/render/camera.h"
+#include "isobrick/render/mesh_pool.h"
+
+namespace isobrick {
+
+/// Keeps what lies on the side of `point` that `inward` points to, world space.
+struct ClipPlane {
+  Vec3d point, inward;
+};
+
+/// A box of world space, axis by axis.
+struct WorldBox {
+  Vec3d lo, hi;
+};
+
+/// How a picture is made. Colours are sRGB in [0, 1].
+struct PictureSettings {
+  Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
+  bool multisample = true;         ///< four samples a pixel
+  bool occlusion = true;           ///< less light where the surroundings are near
+  bool edges = false;              ///< dark lines where depth or direction break off
+  bool picking = false;            ///< keep which mesh each pixel shows
+  std::vector<ClipPlane> planes;   ///< up to 6: what lies within all of them is drawn
+  std::optional<WorldBox> region;  ///< and within this box
+};
+
+/// How a mesh is drawn.
+struct MeshStyle {
+  Vec3f colour{0.87f, 0.80f, 0.70f};
+  float opacity = 1;                 ///< of a piece seen face to face; below 1: transparent
+  std::optional<Vec3f> inside = {};  ///< of the back where something is cut off; else a darker tone
+  std::uint32_t id = 0;              ///< what pick() tells; 0: nothing
+};
+
+/// What is under a pixel.
+struct Picked {
+  Vec3d position;        ///< world space, of the nearest opaque surface
+  std::uint32_t id = 0;  ///< of its MeshStyle; 0 for others, and without PictureSettings::picking
+};
+
+/// Draws meshes into a picture of its own, in whatever context is current: that of a
+/// window or a GlContext. One thread; the context that it was made in must be
+/// current for every call. It leaves that context's framebuffer, program, vertex
+/// array, viewport and switches at OpenGL's defaults.
+///
+/// Transparency is weighted and blended (McGuire and Bavoil 2013): one pass, any
+/// order, which is what meshes need that pass by once and are not kept. Peeling would be exact
+/// where several surfaces lie behind each other, but would need them all once a layer.
+class Renderer {
+ public:
+  /// Throws Error when the current context is older than OpenGL 4.5.
+  Renderer();
+  ~Renderer();
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+
+  /// Device memory of a picture of this size while it is made. With transparent meshes: more.
+  static std::uint64_t memory(int width, int height, const PictureSettings& settings,
+                              bool transparent);
+  /// Pixels along an edge that the device allows.
+  int largest_edge() const;
+
+  /// Starts a picture. Throws UsageError for a size that cannot be.
+  void begin(const Camera& camera, int width, int height, const PictureSettings& settings);
+
+  /// Draws a mesh at end(); it must live until then.
+  void draw(const PooledMesh& mesh, const MeshStyle& style);
+  /// Draws a mesh now, without keeping it; numbers count from its first vertex.
+  /// Opaque ones before transparent ones.
+  void draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin = {});
+  /// Finishes the picture.
+  void end();
+
+  int width() const;
+  int height() const;
+  /// The picture after end(): RGBA, 4 bytes a pixel, sRGB, rows from the top.
+  std::vector<std::uint8_t> read_pixels() const;
+  /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for ImGui::Image say.
+  unsigned texture() const;
+  /// Copies it into a framebuffer (0: the window's), lower left corner at (x, y).
+  void copy_to(unsigned framebuffer, int x, int y) const;
+
+  /// What the picture shows at pixel (x, y), rows from the top; nothing on the background.
+  std::optional<Picked> pick(int x, int y) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace isobrick

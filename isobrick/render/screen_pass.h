@@ -1,0 +1,27 @@
+#pragma once
+
+#include "isobrick/render/gl_objects.h"
+#include "isobrick/render/picture_targets.h"
+#include "isobrick/render/renderer.h"
+
+namespace isobrick {
+
+/// Turns what was drawn into a picture: nearest samples, occlusion, edges, blending,
+/// the background.
+class ScreenPass {
+ public:
+  /// For targets of this many samples.
+  explicit ScreenPass(int samples);
+
+  int samples() const { return samples_; }
+  void run(const PictureTargets& targets, const PictureSettings& settings, bool transparent);
+
+ private:
+  void draw(const GlProgram& program, const GlFramebuffer& target);
+
+  int samples_;
+  GlVertexArray nothing_;  ///< the triangle over all comes from its vertices' numbers
+  GlProgram nearest_, occlusion_, smooth_, compose_;
+};
+
+}  // namespace isobrick

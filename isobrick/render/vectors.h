@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cmath>
+
+#include "isobrick/core/vec.h"
+
+namespace isobrick {
+
+inline double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+inline Vec3d cross(Vec3d a, Vec3d b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+inline double length(Vec3d v) { return std::sqrt(dot(v, v)); }
+
+/// v at unit length, or `otherwise` if it has none.
+inline Vec3d unit(Vec3d v, Vec3d otherwise) {
+  const double size = length(v);
+  return size > 0 && std::isfinite(size) ? v * (1 / size) : otherwise;
+}
+
+inline Vec3f to_float(Vec3d v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+inline Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
+
+}  // namespace isobrick
