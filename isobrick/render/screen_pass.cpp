@@ -38,13 +38,18 @@ layout(location = 2) out uint near_id;
 
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  float stored = 0;
+  float stored = 0, farthest = 1e30, sum = 0;
   int nearest = 0;
   for (int i = 0; i < SAMPLES; ++i) {
     float other = texelFetch(depths, at, AT(i)).r;
     if (other > stored) { stored = other; nearest = i; }
+    farthest = min(farthest, other);
+    sum += other;
   }
   near_depth = stored > 0 ? depth_of(stored) : 0.0;
+  // Samples lie around the pixel's centre, and what is stored is linear in the picture.
+  if (farthest > 0 && depth_of(farthest) < near_depth + 8 * pixel_length(near_depth))
+    near_depth = depth_of(sum / float(SAMPLES));
   near_normal = texelFetch(normals, at, AT(nearest)).rg;
   near_id = has_ids && stored > 0 ? texelFetch(ids, at, AT(nearest)).r : 0u;
 }
