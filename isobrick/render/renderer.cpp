@@ -13,8 +13,10 @@
 #include "isobrick/render/frame.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/render/mesh_pass.h"
+#include "isobrick/render/overlay_pass.h"
 #include "isobrick/render/picture_targets.h"
 #include "isobrick/render/screen_pass.h"
+#include "isobrick/render/slice_pass.h"
 #include "isobrick/render/vectors.h"
 
 namespace isobrick {
@@ -85,12 +87,17 @@ struct Renderer::State {
   void clear();
   void clear_transparent();
   void bind_frame() { glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.get()); }
-  void draw_blocks(const Switches& switches, std::vector<MeshDraw>& list, bool transparent);
+  /// Makes ready to draw meshes or slices.
+  void bind_target(const Switches& switches, bool blended);
+  void draw_blocks(const Switches& switches, std::vector<MeshDraw>& list, bool blended);
+  void draw_slices(const Switches& switches, bool blended);
   void finish();
 
   GlDevice device;
   int largest_edge = 0;
   MeshPass meshes;
+  SlicePass slices;
+  OverlayPass overlays;
   std::optional<ScreenPass> screen;
   std::optional<PictureTargets> targets;
 
@@ -115,6 +122,8 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   frame = make_frame(camera, width, height, settings);
   opaque.clear();
   transparent.clear();
+  slices.clear();
+  overlays.start(camera, width, height);
   any_transparent = false;
   const int samples = samples_of(settings);
   if (!screen || screen->samples() != samples) screen.emplace(samples);
@@ -147,6 +156,18 @@ void Renderer::State::clear_transparent() {
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 1, all.data());
 }
 
+void Renderer::State::bind_target(const Switches& switches, bool blended) {
+  if (blended) clear_transparent();
+  glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets->transparent.get() : targets->opaque.get());
+  switches.meshes(frame.counts.x, true, blended);
+}
+
+void Renderer::State::draw_slices(const Switches& switches, bool blended) {
+  if (!slices.any(blended)) return;
+  bind_target(switches, blended);
+  slices.draw(camera.eye, blended);
+}
+
 void Renderer::State::draw_blocks(const Switches& switches, std::vector<MeshDraw>& list,
                                   bool blended) {
   if (list.empty()) return;
@@ -165,9 +186,12 @@ void Renderer::State::finish() {
   const Switches switches(frame);
   bind_frame();
   draw_blocks(switches, opaque, false);
+  draw_slices(switches, false);
   draw_blocks(switches, transparent, true);
+  draw_slices(switches, true);
   switches.meshes(0, false, false);
   screen->run(*targets, settings, any_transparent);
+  overlays.run(*targets);
 }
 
 Renderer::Renderer() : state_(std::make_unique<State>()) {}
@@ -196,11 +220,36 @@ void Renderer::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin)
   const bool blended = style.opacity < 1;
   const Switches switches(state_->frame);
   state_->bind_frame();
-  if (blended) state_->clear_transparent();
-  const PictureTargets& targets = *state_->targets;
-  glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets.transparent.get() : targets.opaque.get());
-  switches.meshes(state_->frame.counts.x, true, blended);
+  state_->bind_target(switches, blended);
   state_->meshes.draw(mesh, style, origin, state_->camera.eye, blended);
+}
+
+void Renderer::draw(const SliceImage& slice) {
+  if (slice.opacity > 0) state_->slices.add(slice);
+}
+
+void Renderer::draw_lines(std::span<const WorldLine> lines, Vec3f colour, float line_width) {
+  for (const WorldLine& line : lines) state_->overlays.add_line(line, colour, line_width);
+}
+
+void Renderer::draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float line_width) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (int corner = 0; corner < 4; ++corner) {
+      const int second = (axis + 1) % 3, third = (axis + 2) % 3;
+      WorldLine line{lo, lo};
+      if (corner & 1) line.from[second] = hi[second];
+      if (corner & 2) line.from[third] = hi[third];
+      line.to = line.from;
+      line.to[axis] = hi[axis];
+      state_->overlays.add_line(line, colour, line_width);
+    }
+}
+
+void Renderer::draw_axes() { state_->overlays.add_axes(); }
+void Renderer::draw_scale_bar(const std::string& unit) { state_->overlays.add_scale_bar(unit); }
+void Renderer::draw_text(const std::string& text, double x, double y, double line_height,
+                         Vec3f colour) {
+  state_->overlays.add_text(text, x, y, line_height, colour);
 }
 
 void Renderer::end() { state_->finish(); }

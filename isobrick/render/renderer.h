@@ -42,6 +42,21 @@ struct MeshStyle {
   std::uint32_t id = 0;              ///< what pick() tells; 0: nothing
 };
 
+/// A plane picture in space: samples from corner to corner.
+struct SliceImage {
+  Vec3d corner, along_x, along_y;  ///< world space: the picture's first corner and its two edges
+  int width = 0, height = 0;       ///< samples, x fastest
+  std::span<const float> samples;  ///< NaN: nothing there
+  float window_lo = 0, window_hi = 1;   ///< what becomes the map's first and last colour
+  std::span<const Vec3f> colours = {};  ///< map, sRGB; empty: grey
+  float opacity = 1;
+};
+
+/// A segment of world space.
+struct WorldLine {
+  Vec3d from, to;
+};
+
 /// What is under a pixel.
 struct Picked {
   Vec3d position;        ///< world space, of the nearest opaque surface
@@ -78,6 +93,22 @@ class Renderer {
   /// Draws a mesh now, without keeping it; numbers count from its first vertex.
   /// Opaque ones before transparent ones.
   void draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin = {});
+  /// Draws a slice at end(); copies its samples now.
+  void draw(const SliceImage& slice);
+
+  // On top of the finished picture, at end().
+
+  /// Lines `width` pixels thick, faint where a surface hides them.
+  void draw_lines(std::span<const WorldLine> lines, Vec3f colour, float width = 1.5f);
+  void draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float width = 1.5f);
+  /// The world's axes x (red), y (green) and z (blue) in the lower left corner.
+  void draw_axes();
+  /// A bar of a round length at the target's depth in the lower right corner, such as
+  /// "20 mm". `unit` may be empty.
+  void draw_scale_bar(const std::string& unit);
+  /// A line of text, its top left corner at a pixel; `height` of a line in pixels.
+  void draw_text(const std::string& text, double x, double y, double height, Vec3f colour);
+
   /// Finishes the picture.
   void end();
 

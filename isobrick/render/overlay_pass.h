@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isobrick/render/camera.h"
+#include "isobrick/render/font_atlas.h"
+#include "isobrick/render/gl_objects.h"
+#include "isobrick/render/picture_targets.h"
+#include "isobrick/render/renderer.h"
+
+namespace isobrick {
+
+/// Lines and text on top of a finished picture.
+class OverlayPass {
+ public:
+  OverlayPass();
+
+  /// Forgets what was added; the next picture has this camera and size.
+  void start(const Camera& camera, int width, int height);
+
+  void add_line(const WorldLine& line, Vec3f colour, float width);
+  /// From pixel to pixel, always seen.
+  void add_flat_line(Vec3d from, Vec3d to, Vec3f colour, float width);
+  void add_text(const std::string& text, double x, double y, double line_height, Vec3f colour);
+  double text_width(const std::string& text, double line_height) const;
+
+  /// Axes of the world in the lower left corner.
+  void add_axes();
+  /// A round length in the lower right corner.
+  void add_scale_bar(const std::string& unit);
+
+  void run(const PictureTargets& targets);
+
+ private:
+  /// A corner of a rectangle: on the screen, depth, and what its kind needs.
+  struct Corner {
+    float x, y;        ///< pixels, rows from the top
+    float depth;       ///< orthographic: world length; else its reciprocal; 0: before all
+    float u, v;        ///< of text: in the atlas; of a line: along and across it, pixels
+    float half_width;  ///< of a line; 0: text
+    float length;      ///< of a line, pixels
+    float red, green, blue;
+  };
+
+  void add_rectangle(const std::array<Corner, 4>& corners);
+  void add_projected(Vec3d from, Vec3d to, Vec3f colour, float width);
+  /// Pixels of a line of text, about the same part of every picture.
+  float unit_height() const;
+
+  Camera camera_;
+  int width_ = 0, height_ = 0;
+  std::vector<Corner> corners_;
+  FontAtlas font_;
+  GlTexture atlas_;
+  GlProgram program_;
+  GlVertexArray vertices_;
+  GlBuffer buffer_;
+};
+
+/// The largest of 1, 2, 5 times a power of ten that is not above `length`.
+double round_length(double length);
+
+}  // namespace isobrick
