@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isobrick/viewer/node_tree.h"
+#include "isobrick/viewer/view.h"
+
+namespace isobrick {
+
+/// What a cut may hold. Estimates: a node's triangles are its active blocks
+/// times `triangles_per_block`.
+struct CutBudget {
+  std::uint64_t triangles = 20'000'000;
+  std::uint64_t mesh_bytes = std::uint64_t{2} << 30;
+  double triangles_per_block = 600;
+};
+
+/// Bytes of mesh for each triangle: its corners, and half a vertex with a normal.
+inline constexpr std::uint64_t kBytesPerTriangle = 24;
+
+/// A node of a cut.
+struct CutNode {
+  NodeKey key;
+  /// Directions in which the neighbour lies one level above.
+  std::uint32_t coarser = 0;
+  float pixels = 0;    ///< a cell's length on the picture
+  float distance = 0;  ///< from the eye, world length
+  bool visible = false;
+};
+
+/// A set of nodes that covers the volume once. Face, edge and corner neighbours
+/// differ by at most one level.
+struct Cut {
+  std::vector<CutNode> nodes;
+  std::vector<double> isovalues;
+  std::uint64_t triangles = 0;     ///< estimate
+  bool limited_by_budget = false;  ///< without a budget it would be finer
+};
+
+/// Chooses cuts. Keeps what the last one was, so that small motions of the camera
+/// do not make nodes come and go: use one for a window. Not thread-safe.
+class CutSelector {
+ public:
+  explicit CutSelector(const NodeTree& tree);
+
+  /// The cut for a view: nodes are refined, the longest cells on the picture first,
+  /// while these are longer than the view's pixel error, visible, and not without
+  /// any surface below, and while the budget lasts. A function of its arguments
+  /// and of the cut before.
+  Cut select(std::span<const double> isovalues, const View& view, const CutBudget& budget);
+
+  /// Forgets the cut before.
+  void restart();
+
+ private:
+  using Flags = std::vector<std::vector<std::uint8_t>>;
+
+  std::uint8_t& flag(Flags& flags, const NodeKey& n) const;
+  bool refined(const NodeKey& n) { return flag(refined_, n) != 0; }
+  double urgency(const NodeKey& n, std::span<const double> isovalues, const NodeView& view);
+  double triangles(const NodeKey& n, std::span<const double> isovalues, double per_block) const;
+  void collect(const NodeKey& n, std::vector<NodeKey>& needed);
+  std::uint32_t coarser_neighbours(const NodeKey& n);
+  void append(const NodeKey& n, const NodeView& view, Cut& cut);
+
+  const NodeTree& tree_;
+  Flags refined_, before_, wanted_;
+};
+
+}  // namespace isobrick

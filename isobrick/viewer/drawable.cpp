@@ -1,0 +1,120 @@
+#include "isobrick/viewer/drawable.h"
+
+namespace isobrick {
+namespace {
+
+class Cover {
+ public:
+  Cover(const NodeTree& tree, const CutIndex& cut, double isovalue, int number, MeshCache& meshes,
+        std::vector<DrawnNode>& nodes, bool& complete)
+      : tree_(tree),
+        cut_(cut),
+        isovalue_(isovalue),
+        number_(number),
+        meshes_(meshes),
+        nodes_(nodes),
+        complete_(complete) {}
+
+  bool cover(const NodeKey& n) {
+    if (const CutNode* in_cut = cut_.find(n)) return cover_cut(n, in_cut->coarser);
+    if (!tree_.active_below(n, isovalue_)) return cover_border(n);
+    const std::size_t mark = nodes_.size();
+    bool all = true;
+    for_each_child(n, [&](const NodeKey& child) { all &= cover(child); });
+    // Where this level has no surface, its absence shows no more than the children
+    // that are there.
+    if (all || !tree_.active(n, isovalue_)) return true;
+    const MeshPtr mesh = meshes_.find_any(n, isovalue_, 0);
+    if (!mesh) return false;
+    nodes_.resize(mark);
+    draw(mesh);
+    return true;
+  }
+
+ private:
+  bool cover_cut(const NodeKey& n, std::uint32_t coarser) {
+    if (!tree_.may_hold_surface(n, isovalue_, coarser)) return true;
+    const MeshPtr mesh = meshes_.find_any(n, isovalue_, coarser);
+    if (mesh) {
+      complete_ &= mesh->coarser == coarser;
+      draw(mesh);
+      return true;
+    }
+    complete_ = false;
+    if (cover_finer(n)) return true;
+    // What a neighbour's values bring onto a border can wait.
+    return !tree_.active(n, isovalue_);
+  }
+
+  /// No surface of its own below, but perhaps on borders to coarser neighbours.
+  bool cover_border(const NodeKey& n) {
+    for_each_child(n, [&](const NodeKey& child) { cover(child); });
+    return true;
+  }
+
+  /// By the node's finer nodes, if all that need it are there.
+  bool cover_finer(const NodeKey& n) {
+    if (n.level == 0) return false;
+    const std::size_t mark = nodes_.size();
+    bool all = true, any = false;
+    for_each_child(n, [&](const NodeKey& child) {
+      if (!all || !tree_.active(child, isovalue_)) return;
+      any = true;
+      if (const MeshPtr mesh = meshes_.find_any(child, isovalue_, 0))
+        draw(mesh);
+      else
+        all = cover_finer(child);
+    });
+    if (all && any) return true;
+    nodes_.resize(mark);
+    return false;
+  }
+
+  void draw(const MeshPtr& mesh) {
+    if (!mesh->empty() || !mesh->damage.empty()) nodes_.push_back({mesh, number_});
+  }
+
+  template <class F>
+  void for_each_child(const NodeKey& n, F&& f) {
+    for_each_point(tree_.grid().children(n), [&](Int3 c) { f(NodeKey{n.level - 1, c}); });
+  }
+
+  const NodeTree& tree_;
+  const CutIndex& cut_;
+  double isovalue_;
+  int number_;
+  MeshCache& meshes_;
+  std::vector<DrawnNode>& nodes_;
+  bool& complete_;
+};
+
+}  // namespace
+
+CutIndex::CutIndex(const NodeGrid& grid, const Cut& cut) {
+  nodes_.reserve(cut.nodes.size());
+  for (const CutNode& node : cut.nodes) {
+    nodes_.emplace(node.key, node);
+    for (NodeKey n = node.key; grid.has_parent(n);) {
+      n = grid.parent(n);
+      if (!refined_.insert(n).second) break;
+    }
+  }
+}
+
+const CutNode* CutIndex::find(const NodeKey& key) const {
+  const auto found = nodes_.find(key);
+  return found == nodes_.end() ? nullptr : &found->second;
+}
+
+bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
+                     MeshCache& meshes, std::vector<DrawnNode>& nodes, bool& complete) {
+  Cover cover(tree, cut, isovalue, number, meshes, nodes, complete);
+  const int top = tree.grid().levels() - 1;
+  bool all = true;
+  for_each_point({{0, 0, 0}, tree.grid().level(top).nodes}, [&](Int3 p) {
+    all &= cover.cover({top, p});
+  });
+  return all;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "isobrick/viewer/cut.h"
+#include "isobrick/viewer/mesh_cache.h"
+
+namespace isobrick {
+
+/// A mesh to be drawn.
+struct DrawnNode {
+  MeshPtr mesh;
+  int isovalue = 0;  ///< which of the cut's, for its colour
+};
+
+/// What shows the scene now: for each isovalue meshes of nodes no two of which lie
+/// over the same place. Meshes without triangles are left out unless they are damaged.
+struct Drawable {
+  std::vector<DrawnNode> nodes;
+  std::uint64_t version = 0;  ///< differs when the nodes do
+  bool complete = false;      ///< the whole cut, nothing stands in
+  std::uint64_t triangles = 0;
+};
+
+/// A cut that is looked up.
+class CutIndex {
+ public:
+  CutIndex(const NodeGrid& grid, const Cut& cut);
+  /// The node's neighbours one level above, or null when it is not in the cut.
+  const CutNode* find(const NodeKey& key) const;
+  /// Whether nodes of the cut lie below.
+  bool refined(const NodeKey& key) const { return refined_.contains(key); }
+
+ private:
+  std::unordered_map<NodeKey, CutNode, NodeKeyHash> nodes_;
+  std::unordered_set<NodeKey, NodeKeyHash> refined_;
+};
+
+/// Appends the meshes that show one isovalue of a cut as far as they are there: a
+/// node of the cut, its finished finer nodes, or its nearest finished ancestor
+/// instead. False when some part can not be shown; then its surroundings are.
+/// `complete` becomes false where anything stands in.
+bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
+                     MeshCache& meshes, std::vector<DrawnNode>& nodes, bool& complete);
+
+}  // namespace isobrick

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "isobrick/viewer/node_mesh.h"
+
+namespace isobrick {
+
+using MeshPtr = std::shared_ptr<const NodeMesh>;
+
+/// Node meshes under a budget, of all isovalues and borders, the least recently
+/// used dropped first. Not thread-safe.
+class MeshCache {
+ public:
+  explicit MeshCache(std::uint64_t budget) : budget_(budget) {}
+
+  /// The node's mesh with exactly these coarser neighbours, or null.
+  MeshPtr find(const NodeKey& key, double isovalue, std::uint32_t coarser);
+  /// The same, or else one with other neighbours.
+  MeshPtr find_any(const NodeKey& key, double isovalue, std::uint32_t coarser);
+  bool has_any(const NodeKey& key, double isovalue) const;
+
+  void put(MeshPtr mesh);
+
+  /// What is found from now on is kept by the next shrink().
+  void begin_use() { ++now_; }
+  /// Drops what was not used since begin_use() until the budget is kept. False
+  /// when that does not do.
+  bool shrink();
+
+  std::uint64_t bytes() const { return bytes_; }
+  std::uint64_t meshes() const { return meshes_; }
+
+ private:
+  struct Entry {
+    MeshPtr mesh;
+    std::uint64_t used = 0;
+  };
+
+  std::uint64_t budget_, bytes_ = 0, meshes_ = 0, now_ = 1;
+  std::unordered_map<NodeKey, std::vector<Entry>, NodeKeyHash> nodes_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,134 @@
+#include "isobrick/viewer/node_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+/// Components along the volume's own axes.
+Vec3d turned_back(const Transform& t, Vec3d v) {
+  const auto& d = t.direction;
+  return {d[0] * v.x + d[3] * v.y + d[6] * v.z, d[1] * v.x + d[4] * v.y + d[7] * v.z,
+          d[2] * v.x + d[5] * v.y + d[8] * v.z};
+}
+
+void check_direction(const StoreInfo& info, const Transform& t) {
+  for (std::size_t i = 0; i < 9; ++i)
+    if (std::abs(t.direction[i] - info.levels.front().transform.direction[i]) > 1e-6)
+      throw Error("'" + info.path.string() +
+                  "': levels that lie at different angles cannot be shown together");
+}
+
+/// Powers of two by which a level is coarser than level 0.
+Int3 exponents_of(const Transform& finest, const Transform& t) {
+  Int3 e;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double ratio = std::abs(t.spacing[axis] / finest.spacing[axis]);
+    e[axis] = std::clamp<Index>(std::lround(std::log2(ratio)), 0, 40);
+  }
+  return e;
+}
+
+constexpr Index power(Index e) { return Index{1} << e; }
+
+}  // namespace
+
+NodeGrid::NodeGrid(const StoreInfo& info) : transform_(info.levels.front().transform) {
+  cells_ = info.levels.front().lattice.extent - Int3{1, 1, 1};
+  for (const LevelInfo& level : info.levels) stored_extents_.push_back(level.lattice.extent);
+  Int3 exponents;
+  add_levels(info, 0, exponents);
+  for (std::size_t i = 1; i < info.levels.size(); ++i)
+    add_levels(info, static_cast<int>(i), exponents);
+}
+
+/// Where a stored level is more than twice as coarse as the one before, levels
+/// between them take the finer one's samples.
+void NodeGrid::add_levels(const StoreInfo& info, int source, Int3& exponents) {
+  const Transform& t = info.levels[static_cast<std::size_t>(source)].transform;
+  check_direction(info, t);
+  const Int3 target = max(exponents_of(transform_, t), exponents);
+  if (source > 0 && target == exponents) return;
+  do {
+    exponents = min(target, exponents + Int3{1, 1, 1});
+    Level level;
+    level.source = exponents == target ? source : source - 1;
+    const Transform& s = info.levels[static_cast<std::size_t>(level.source)].transform;
+    const Vec3d shift = turned_back(transform_, transform_.origin - s.origin);
+    for (int axis = 0; axis < 3; ++axis) {
+      level.step[axis] = power(exponents[axis]);
+      level.scale[axis] = transform_.spacing[axis] / s.spacing[axis];
+      level.offset[axis] = shift[axis] / s.spacing[axis];
+      level.spacing = std::max(level.spacing, std::abs(transform_.spacing[axis]) *
+                                                  static_cast<double>(level.step[axis]));
+    }
+    level.cells = ceil_div(cells_, level.step);
+    level.nodes = ceil_div(level.cells, {kNodeEdge, kNodeEdge, kNodeEdge});
+    if (volume(level.nodes) == 0) level.nodes = {};
+    levels_.push_back(level);
+  } while (exponents != target);
+}
+
+Int3 NodeGrid::node_cells(const NodeKey& n) const {
+  return min({kNodeEdge, kNodeEdge, kNodeEdge}, level(n.level).cells - n.node * kNodeEdge);
+}
+
+Index NodeGrid::position(int v, int axis, Index point) const {
+  return std::min(point * level(v).step[axis], cells_[axis]);
+}
+
+IndexBox NodeGrid::box(const NodeKey& n) const {
+  IndexBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.lo[axis] = static_cast<double>(position(n.level, axis, n.node[axis] * kNodeEdge));
+    box.hi[axis] = static_cast<double>(position(n.level, axis, (n.node[axis] + 1) * kNodeEdge));
+  }
+  return box;
+}
+
+Int3 NodeGrid::ratio(int v) const {
+  Int3 r;
+  for (int axis = 0; axis < 3; ++axis) r[axis] = level(v + 1).step[axis] / level(v).step[axis];
+  return r;
+}
+
+NodeKey NodeGrid::parent(const NodeKey& n) const {
+  const Int3 r = ratio(n.level);
+  return {n.level + 1, {n.node.x / r.x, n.node.y / r.y, n.node.z / r.z}};
+}
+
+Box3 NodeGrid::children(const NodeKey& n) const {
+  const Int3 r = ratio(n.level - 1);
+  return intersect({n.node * r, (n.node + Int3{1, 1, 1}) * r},
+                   {{0, 0, 0}, level(n.level - 1).nodes});
+}
+
+NodeGrid::Between NodeGrid::between(int v, int axis, Index point) const {
+  const Level& l = level(v);
+  const auto last =
+      static_cast<double>(stored_extents_[static_cast<std::size_t>(l.source)][axis] - 1);
+  const double at = std::clamp(
+      l.scale[axis] * static_cast<double>(position(v, axis, point)) + l.offset[axis], 0.0, last);
+  // Rounding must not make a sample's value one between it and its neighbour.
+  const double nearest = std::round(at);
+  if (std::abs(at - nearest) < 1e-6) return {static_cast<Index>(nearest), 0};
+  const double below = std::floor(at);
+  return {static_cast<Index>(below), at - below};
+}
+
+Box3 NodeGrid::samples(const NodeKey& n) const {
+  Box3 box;
+  const Int3 cells = node_cells(n);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Between lo = between(n.level, axis, n.node[axis] * kNodeEdge);
+    const Between hi = between(n.level, axis, n.node[axis] * kNodeEdge + cells[axis]);
+    box.lo[axis] = lo.first;
+    box.hi[axis] = hi.first + (hi.weight > 0 ? 2 : 1);
+  }
+  return box;
+}
+
+}  // namespace isobrick

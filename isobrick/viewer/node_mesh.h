@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "isobrick/surface/surface_options.h"
+#include "isobrick/viewer/node_grid.h"
+
+namespace isobrick {
+
+/// The surface in one node. Immutable once it is made.
+struct NodeMesh {
+  NodeKey key;
+  double isovalue = 0;
+  std::uint32_t coarser = 0;  ///< directions of the neighbours one level above that it meets
+  /// Positions in world space minus the scene's origin; unit normals towards
+  /// smaller samples; triangles number the mesh's own vertices, counter-clockwise
+  /// from that side.
+  MeshBuffer mesh;
+  /// How many of the triangles, the last ones, are the ribbons along the borders to coarser
+  /// neighbours: a small part of a cell wide, across the surface, seen from both sides.
+  std::uint32_t ribbon_triangles = 0;
+  /// What is wrong with the samples; empty when all is well. The mesh is empty otherwise.
+  std::string damage;
+
+  bool empty() const { return mesh.triangles.size() == 0; }
+  std::uint64_t bytes() const {
+    return sizeof(NodeMesh) + mesh.positions.capacity() * sizeof(Vec3f) +
+           mesh.normals.capacity() * sizeof(Vec3f) + mesh.triangles.capacity() * sizeof(Triangle);
+  }
+};
+
+}  // namespace isobrick

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "isobrick/viewer/node_mesh.h"
+#include "isobrick/viewer/node_samples.h"
+
+namespace isobrick {
+
+/// Makes node meshes. One for each thread: keeps its work space.
+///
+/// A grid point that lies in a coarser neighbour as well (on a face, an edge or a
+/// corner) takes the value that the neighbour has there. Both sides then cross the
+/// same edges of the coarser grid at the same points; vertices of the finer side
+/// between them are moved onto the coarser side's chords. Nodes of one level have
+/// the same samples on the face between them and so the same vertices, bit by bit.
+class NodeMesher {
+ public:
+  /// `origin`, in world space, is subtracted from all positions.
+  NodeMesher(const NodeGrid& grid, ResidentBricks& bricks, Vec3d origin);
+  ~NodeMesher();
+
+  /// The mesh of a node whose neighbours in `coarser` (directions) lie one level
+  /// above. Throws Abandoned, DamageError and what else reading bricks throws.
+  NodeMesh mesh(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
+
+  /// The bricks that this needs, by stored level.
+  struct Needs {
+    int stored;
+    Box3 bricks;
+  };
+  Needs needs(const NodeKey& key) const;
+
+  /// Seconds spent on meshing so far, without waiting for bricks.
+  double seconds() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick

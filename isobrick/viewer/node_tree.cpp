@@ -1,0 +1,139 @@
+#include "isobrick/viewer/node_tree.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace isobrick {
+namespace {
+
+/// Nodes along each axis whose ranges are read together: at level 0 those of one
+/// stored chunk of block ranges.
+constexpr Index kGroup = StoreReader::kRangeChunk * kBlockEdge / kNodeEdge;
+
+/// What holds `r` in float. An empty range stays empty.
+ValueRange<float> outwards(const ValueRange<double>& r) {
+  ValueRange<float> out;
+  if (r.empty()) return out;
+  constexpr double most = std::numeric_limits<float>::max();
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  const auto convert = [](double v) {
+    return std::abs(v) > most ? std::copysign(inf, static_cast<float>(v > 0 ? 1 : -1))
+                              : static_cast<float>(v);
+  };
+  out.lo = convert(r.lo);
+  out.hi = convert(r.hi);
+  if (static_cast<double>(out.lo) > r.lo) out.lo = std::nextafter(out.lo, -inf);
+  if (static_cast<double>(out.hi) < r.hi) out.hi = std::nextafter(out.hi, inf);
+  if (r.lo < -most) out.lo = -inf;
+  if (r.hi > most) out.hi = inf;
+  return out;
+}
+
+Box3 blocks_of(Box3 samples, Int3 all) {
+  // Block b has the samples 16 b … 16 b + 16, so cells are enough to look at.
+  const Int3 edge{kBlockEdge, kBlockEdge, kBlockEdge};
+  const Int3 lo{samples.lo.x / edge.x, samples.lo.y / edge.y, samples.lo.z / edge.z};
+  const Int3 cells = samples.hi - Int3{1, 1, 1};
+  return intersect({lo, max(ceil_div(cells, edge), lo + Int3{1, 1, 1})}, {{0, 0, 0}, all});
+}
+
+}  // namespace
+
+NodeTree::NodeTree(const BrickSource& source) : grid_(source.info()) {
+  nodes_.resize(static_cast<std::size_t>(grid_.levels()));
+  for (int v = 0; v < grid_.levels(); ++v) {
+    read_level(source, v);
+    merge_below(v);
+  }
+}
+
+void NodeTree::read_level(const BrickSource& source, int v) {
+  const Int3 all = grid_.level(v).nodes;
+  nodes_[static_cast<std::size_t>(v)].resize(static_cast<std::size_t>(volume(all)));
+  if (volume(all) == 0) return;
+  const Int3 groups = ceil_div(all, {kGroup, kGroup, kGroup});
+  tbb::parallel_for(Index{0}, volume(groups), [&](Index i) {
+    const Int3 g{i % groups.x, i / groups.x % groups.y, i / groups.x / groups.y};
+    read_nodes(source, v, intersect({g * kGroup, (g + Int3{1, 1, 1}) * kGroup}, {{0, 0, 0}, all}));
+  });
+}
+
+void NodeTree::read_nodes(const BrickSource& source, int v, Box3 nodes) {
+  const int stored = grid_.level(v).source;
+  const Int3 blocks = source.info().levels[static_cast<std::size_t>(stored)].lattice.blocks();
+  const Box3 samples{grid_.samples({v, nodes.lo}).lo,
+                     grid_.samples({v, nodes.hi - Int3{1, 1, 1}}).hi};
+  const RangeTable table = source.block_ranges(stored, blocks_of(samples, blocks));
+  for_each_point(nodes, [&](Int3 p) {
+    const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(v).nodes));
+    nodes_[static_cast<std::size_t>(v)][i] =
+        summary(table, blocks_of(grid_.samples({v, p}), blocks));
+  });
+}
+
+double NodeTree::part(const Node& node, double value) {
+  const double lo = node.own.lo, width = static_cast<double>(node.own.hi) - lo;
+  if (!(width > 0) || std::isinf(width)) return 0;
+  return std::clamp((value - lo) / width * kParts, 0.0, static_cast<double>(kParts - 1));
+}
+
+NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks) const {
+  Node node;
+  ValueRange<double> own;
+  for_each_point(blocks, [&](Int3 b) { own.include(table.at(b)); });
+  node.own = node.below = outwards(own);
+  for_each_point(blocks, [&](Int3 b) {
+    const ValueRange<double>& range = table.at(b);
+    if (range.empty() || range.lo == range.hi) return;
+    const auto first = static_cast<std::size_t>(part(node, range.lo));
+    const auto last = static_cast<std::size_t>(part(node, range.hi));
+    for (std::size_t i = first; i <= last; ++i)
+      if (node.blocks[i] < 255) ++node.blocks[i];
+  });
+  return node;
+}
+
+void NodeTree::merge_below(int v) {
+  if (v == 0) return;
+  const Int3 all = grid_.level(v).nodes;
+  std::size_t i = 0;
+  for_each_point({{0, 0, 0}, all}, [&](Int3 p) {
+    Node& node = nodes_[static_cast<std::size_t>(v)][i++];
+    for_each_point(grid_.children({v, p}), [&](Int3 c) {
+      node.below.include(at({v - 1, c}).below);
+    });
+  });
+}
+
+bool NodeTree::active(const NodeKey& n, double isovalue) const {
+  return at(n).own.stabbed_by(isovalue);
+}
+
+bool NodeTree::active_below(const NodeKey& n, double isovalue) const {
+  return at(n).below.stabbed_by(isovalue);
+}
+
+bool NodeTree::may_hold_surface(const NodeKey& n, double isovalue, std::uint32_t coarser) const {
+  if (active(n, isovalue)) return true;
+  for (int i = 0; i < kDirections; ++i)
+    if (coarser >> i & 1 && active(grid_.parent({n.level, n.node + direction(i)}), isovalue))
+      return true;
+  return false;
+}
+
+int NodeTree::active_blocks(const NodeKey& n, double isovalue) const {
+  const Node& node = at(n);
+  if (!node.own.stabbed_by(isovalue)) return 0;
+  return std::max<int>(1, node.blocks[static_cast<std::size_t>(part(node, isovalue))]);
+}
+
+std::uint64_t NodeTree::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& level : nodes_) bytes += level.capacity() * sizeof(Node);
+  return bytes;
+}
+
+}  // namespace isobrick

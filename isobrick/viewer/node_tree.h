@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "isobrick/core/range.h"
+#include "isobrick/viewer/brick_source.h"
+#include "isobrick/viewer/node_grid.h"
+
+namespace isobrick {
+
+/// The nodes of all levels with their ranges: some 32 bytes for each 64³ cells.
+/// Immutable and so thread-safe once it is made.
+class NodeTree {
+ public:
+  /// Reads the block ranges of all levels, in parallel in the caller's TBB arena.
+  /// Throws what reading them throws.
+  explicit NodeTree(const BrickSource& source);
+
+  const NodeGrid& grid() const { return grid_; }
+
+  /// Whether the node's own field may cross the isovalue: lo < isovalue <= hi.
+  bool active(const NodeKey& n, double isovalue) const;
+  /// Whether its field or that of any node below it may.
+  bool active_below(const NodeKey& n, double isovalue) const;
+  /// Whether its surface may hold anything when the neighbours in `coarser`
+  /// (directions) lie one level above: a face takes their values.
+  bool may_hold_surface(const NodeKey& n, double isovalue, std::uint32_t coarser) const;
+
+  /// About how many of the node's blocks of 16³ cells are active (never fewer
+  /// than there are).
+  int active_blocks(const NodeKey& n, double isovalue) const;
+
+  /// Own and of all nodes below it, in float, rounded outwards.
+  ValueRange<float> range(const NodeKey& n) const { return at(n).own; }
+  ValueRange<float> range_below(const NodeKey& n) const { return at(n).below; }
+
+  std::uint64_t bytes() const;
+
+ private:
+  static constexpr int kParts = 8;
+  struct Node {
+    ValueRange<float> own, below;
+    /// Blocks that are active in each part of the node's own range; 255: as many or more.
+    std::array<std::uint8_t, kParts> blocks{};
+  };
+
+  const Node& at(const NodeKey& n) const {
+    return nodes_[static_cast<std::size_t>(n.level)]
+                 [static_cast<std::size_t>(linear_index(n.node, grid_.level(n.level).nodes))];
+  }
+  void read_level(const BrickSource& source, int v);
+  void read_nodes(const BrickSource& source, int v, Box3 nodes);
+  Node summary(const RangeTable& table, Box3 blocks) const;
+  void merge_below(int v);
+  static double part(const Node& node, double value);
+
+  NodeGrid grid_;
+  std::vector<std::vector<Node>> nodes_;  ///< by level, x fastest
+};
+
+}  // namespace isobrick

@@ -1,0 +1,141 @@
+#include "isobrick/viewer/resident_bricks.h"
+
+#include <chrono>
+#include <utility>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How often a thread that waits for another's brick asks whether it is still wanted.
+constexpr std::chrono::milliseconds kPatience{5};
+
+}  // namespace
+
+std::size_t ResidentBricks::KeyHash::operator()(const Key& k) const {
+  auto h = static_cast<std::uint64_t>(k.level);
+  for (int axis = 0; axis < 3; ++axis) {
+    h = (h ^ static_cast<std::uint64_t>(k.brick[axis])) * 0x9e3779b97f4a7c15ULL;
+    h ^= h >> 29;
+  }
+  return static_cast<std::size_t>(h);
+}
+
+ResidentBricks::ResidentBricks(std::shared_ptr<const BrickSource> source, std::uint64_t budget)
+    : source_(std::move(source)), budget_(budget) {}
+
+/// Drops what nobody uses until so many bytes fit, as far as that goes.
+void ResidentBricks::make_room(std::uint64_t bytes) {
+  for (auto at = order_.end(); at != order_.begin() && counters_.bytes + bytes > budget_;) {
+    --at;
+    const auto found = entries_.find(*at);
+    if (found->second.samples && found->second.samples.use_count() > 1) continue;
+    if (found->second.samples) {
+      counters_.bytes -= found->second.samples->size();
+      --counters_.bricks;
+    }
+    entries_.erase(found);
+    at = order_.erase(at);
+  }
+}
+
+std::shared_ptr<const BrickSamples> ResidentBricks::load(const Key& key) {
+  const Lattice& lattice = source_->info().levels[static_cast<std::size_t>(key.level)].lattice;
+  auto samples = std::make_shared<BrickSamples>(lattice.brick_bytes());
+  if (!source_->read_brick(key.level, key.brick, samples->data())) {
+    samples->clear();
+    samples->shrink_to_fit();
+  }
+  return samples;
+}
+
+std::shared_ptr<const BrickSamples> ResidentBricks::get(int level, Int3 brick,
+                                                        const Wanted& wanted) {
+  const Key key{level, brick};
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wanted.check();
+    const auto found = entries_.find(key);
+    if (found == entries_.end()) break;
+    Entry& entry = found->second;
+    if (!entry.loading) {
+      order_.splice(order_.begin(), order_, entry.order);
+      if (entry.failure) std::rethrow_exception(entry.failure);
+      return entry.samples;
+    }
+    loaded_.wait_for(lock, kPatience);
+  }
+  entries_[key];
+  const std::uint64_t bytes =
+      source_->info().levels[static_cast<std::size_t>(level)].lattice.brick_bytes();
+  make_room(bytes);
+  // Counted before it is there: threads that load at once must not all find room.
+  counters_.bytes += bytes;
+  counters_.peak_bytes = std::max(counters_.peak_bytes, counters_.bytes);
+  lock.unlock();
+  std::shared_ptr<const BrickSamples> samples;
+  std::exception_ptr failure;
+  const auto start = Clock::now();
+  try {
+    samples = load(key);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  lock.lock();
+  counters_.read_seconds += std::chrono::duration<double>(Clock::now() - start).count();
+  ++counters_.reads;
+  counters_.bytes -= bytes;
+  if (samples) {
+    counters_.bytes += samples->size();
+    ++counters_.bricks;
+  }
+  Entry& entry = entries_[key];
+  entry.loading = false;
+  entry.samples = samples;
+  entry.failure = failure;
+  order_.push_front(key);
+  entry.order = order_.begin();
+  loaded_.notify_all();
+  if (counters_.bytes > budget_) make_room(0);
+  lock.unlock();
+  if (failure) std::rethrow_exception(failure);
+  return samples;
+}
+
+std::shared_ptr<const BrickSamples> ResidentBricks::find(int level, Int3 brick) {
+  const std::lock_guard lock(mutex_);
+  const auto found = entries_.find({level, brick});
+  if (found == entries_.end() || found->second.loading) return nullptr;
+  return found->second.samples;
+}
+
+bool ResidentBricks::resident(int level, Box3 box) const {
+  const std::lock_guard lock(mutex_);
+  for (Index z = box.lo.z; z < box.hi.z; ++z)
+    for (Index y = box.lo.y; y < box.hi.y; ++y)
+      for (Index x = box.lo.x; x < box.hi.x; ++x) {
+        const auto found = entries_.find({level, {x, y, z}});
+        if (found == entries_.end() || found->second.loading) return false;
+      }
+  return true;
+}
+
+void ResidentBricks::will_need(int level, Box3 box) const {
+  for_each_point(box, [&](Int3 b) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (entries_.contains({level, b})) return;
+    }
+    source_->will_need(level, b);
+  });
+}
+
+ResidentBricks::Counters ResidentBricks::counters() const {
+  const std::lock_guard lock(mutex_);
+  return counters_;
+}
+
+}  // namespace isobrick

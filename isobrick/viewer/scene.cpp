@@ -1,0 +1,42 @@
+#include "isobrick/viewer/scene.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace isobrick {
+namespace {
+
+bool same_cut(const Cut& a, const Cut& b) {
+  return a.isovalues == b.isovalues &&
+         std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
+                    [](const CutNode& p, const CutNode& q) {
+                      return p.key == q.key && p.coarser == q.coarser && p.visible == q.visible;
+                    });
+}
+
+}  // namespace
+
+Vec3d middle_of(const NodeGrid& grid) {
+  const Int3 cells = grid.cells();
+  return grid.transform().apply({static_cast<double>(cells.x) / 2, static_cast<double>(cells.y) / 2,
+                                 static_cast<double>(cells.z) / 2});
+}
+
+Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
+    : tree_(std::make_shared<const NodeTree>(*source)),
+      origin_(middle_of(tree_->grid())),
+      selector_(*tree_) {
+  options.origin = origin_;
+  stream_ = std::make_unique<SceneStream>(std::move(source), tree_, std::move(options));
+}
+
+void Scene::update(const std::vector<double>& isovalues, const View& view, CutBudget budget) {
+  const double measured = stream_->counters().triangles_per_block;
+  if (measured > 0) budget.triangles_per_block = measured;
+  Cut cut = selector_.select(isovalues, view, budget);
+  if (same_cut(cut, cut_)) return;
+  cut_ = std::move(cut);
+  stream_->set_cut(cut_);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "isobrick/viewer/scene_stream.h"
+
+namespace isobrick {
+
+/// A store on the screen, without the screen: choose a view, draw what there is.
+/// Functions are called from one thread.
+class Scene {
+ public:
+  /// Reads the ranges of all levels. options.origin is set to the volume's middle
+  /// (see origin()). Throws what NodeTree does.
+  Scene(std::shared_ptr<const BrickSource> source, StreamOptions options);
+
+  /// World space; positions of meshes are relative to it.
+  Vec3d origin() const { return origin_; }
+  const NodeTree& tree() const { return *tree_; }
+
+  /// Chooses the cut for a view and starts on it. `budget.triangles_per_block` is
+  /// replaced by what has been measured. Cheap enough for every frame; nothing
+  /// happens when neither the view nor the isovalues have changed.
+  void update(const std::vector<double>& isovalues, const View& view, CutBudget budget);
+
+  const Cut& cut() const { return cut_; }
+  std::shared_ptr<const Drawable> drawable() { return stream_->drawable(); }
+  SceneStream& stream() { return *stream_; }
+  const SceneStream& stream() const { return *stream_; }
+
+ private:
+  std::shared_ptr<const NodeTree> tree_;
+  Vec3d origin_;
+  CutSelector selector_;
+  Cut cut_;
+  std::unique_ptr<SceneStream> stream_;
+};
+
+/// World space of a volume's middle.
+Vec3d middle_of(const NodeGrid& grid);
+
+}  // namespace isobrick

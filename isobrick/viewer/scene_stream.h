@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "isobrick/viewer/cut.h"
+#include "isobrick/viewer/drawable.h"
+#include "isobrick/viewer/resident_bricks.h"
+
+namespace isobrick {
+
+struct StreamOptions {
+  int threads = 0;  ///< that read, decode and mesh; 0: all cores but one
+  std::uint64_t brick_bytes = std::uint64_t{1} << 30;  ///< budget of decoded bricks
+  std::uint64_t mesh_bytes = std::uint64_t{1} << 30;   ///< budget of node meshes
+  Vec3d origin;  ///< world space; subtracted from all positions
+  /// Called from a worker's thread whenever drawable() may give something new. Must
+  /// not call the stream.
+  std::function<void()> on_change;
+};
+
+/// What a stream has done so far and has before it.
+struct StreamCounters {
+  double read_seconds = 0, decode_seconds = 0, mesh_seconds = 0;  ///< summed over threads
+  std::uint64_t bytes_read = 0;                                   ///< encoded
+  std::uint64_t bricks_resident = 0, brick_bytes = 0, brick_bytes_peak = 0, bricks_read = 0;
+  std::uint64_t bricks_wanted = 0;  ///< that waiting work needs and are not there
+  std::uint64_t meshes = 0, mesh_bytes = 0, meshes_made = 0;
+  std::uint64_t queue = 0, working = 0;  ///< meshes that wait, that are being made
+  std::uint64_t damaged = 0;             ///< nodes that cannot be shown
+  double triangles_per_block = 0;        ///< of the meshes made; 0: none yet
+  bool mesh_budget_full = false;         ///< meshes are not made for lack of room
+};
+
+/// Makes the meshes of cuts on threads of its own, the most urgent first, and says
+/// what can be drawn meanwhile.
+///
+/// All functions may be called from any thread; none of them waits for a brick or a
+/// mesh. The destructor returns within 100 ms: a thread that is held up in a read
+/// then ends by itself when the read does, and keeps what it needs alive until then.
+class SceneStream {
+ public:
+  SceneStream(std::shared_ptr<const BrickSource> source, std::shared_ptr<const NodeTree> tree,
+              StreamOptions options);
+  ~SceneStream();
+  SceneStream(const SceneStream&) = delete;
+  SceneStream& operator=(const SceneStream&) = delete;
+
+  /// From now on this is wanted. Work that it does not need is abandoned at the next brick.
+  void set_cut(const Cut& cut);
+
+  /// What to draw now. The same object until something changes. While an isovalue
+  /// has nothing to show yet, what the one in its place showed before is kept.
+  std::shared_ptr<const Drawable> drawable();
+
+  /// Whether nothing is left to be done for the cut, or nothing can be.
+  bool idle() const;
+  /// Waits for that at most so long.
+  bool wait_idle(double seconds) const;
+
+  StreamCounters counters() const;
+  /// The decoded bricks; thread-safe by itself.
+  ResidentBricks& bricks() const;
+
+ private:
+  struct Shared;
+  std::shared_ptr<Shared> shared_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "isobrick/viewer/drawable.h"
+#include "isobrick/viewer/node_mesher.h"
+
+namespace isobrick {
+
+/// A mesh that is wanted.
+struct MeshJob {
+  NodeKey key;
+  double isovalue = 0;
+  std::uint32_t coarser = 0;
+  bool visible = false, resident = false;
+  float pixels = 0, distance = 0;
+
+  bool same_mesh(const MeshJob& other) const {
+    return key == other.key && isovalue == other.isovalue && coarser == other.coarser;
+  }
+};
+
+/// The meshes that a cut lacks, most urgent first: visible ones, of them those whose
+/// bricks are resident, of them coarse ones, then those with the longest cells on
+/// the picture, then near ones. Nodes without any mesh bring the ancestors along
+/// that will stand in for them.
+std::vector<MeshJob> plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
+                               const ResidentBricks& bricks, const NodeMesher& mesher);
+
+}  // namespace isobrick

@@ -1,0 +1,96 @@
+#include "isobrick/viewer/view.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace isobrick {
+namespace {
+
+double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+Vec3d cross(Vec3d a, Vec3d b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+Vec3d unit(Vec3d v) { return v * (1 / std::sqrt(dot(v, v))); }
+
+}  // namespace
+
+std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
+                                        double aspect, double near, double far) {
+  const Vec3d ahead = unit(target - eye), right = unit(cross(ahead, up));
+  const Vec3d above = cross(right, ahead);
+  const double f = 1 / std::tan(fov_y / 2);
+  const Vec3d rows[4] = {right * (f / aspect), above * f, ahead * ((far + near) / (far - near)),
+                         ahead};
+  const double last[4] = {0, 0, -2 * far * near / (far - near), 0};
+  std::array<double, 16> m{};
+  for (std::size_t row = 0; row < 4; ++row) {
+    for (std::size_t column = 0; column < 3; ++column)
+      m[4 * column + row] = rows[row][static_cast<int>(column)];
+    m[12 + row] = last[row] - dot(rows[row], eye);
+  }
+  return m;
+}
+
+NodeView::NodeView(const View& view, const NodeGrid& grid) : grid_(grid), clip_(view.clip) {
+  const Transform& t = grid.transform();
+  const auto& m = view.view_projection;
+  const auto axis = [&](std::size_t i) {
+    return Vec3d{t.direction[i], t.direction[3 + i], t.direction[6 + i]};
+  };
+  for (int i = 0; i < 3; ++i) {
+    spacing_[i] = std::abs(t.spacing[i]);
+    eye_[i] = dot(axis(static_cast<std::size_t>(i)), view.eye - t.origin) *
+              std::copysign(1.0, t.spacing[i]);
+  }
+  Vec3d rows[4];
+  double offsets[4];
+  for (std::size_t r = 0; r < 4; ++r) {
+    const Vec3d world{m[r], m[4 + r], m[8 + r]};
+    for (int i = 0; i < 3; ++i)
+      rows[r][i] = dot(world, axis(static_cast<std::size_t>(i))) * t.spacing[i];
+    offsets[r] = dot(world, t.origin) + m[12 + r];
+  }
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double sign = i % 2 ? -1 : 1;
+    planes_[i] = {rows[3] + rows[i / 2] * sign, offsets[3] + sign * offsets[i / 2]};
+  }
+  const Vec3d second{m[1], m[5], m[9]}, fourth{m[3], m[7], m[11]};
+  const double w = std::sqrt(dot(fourth, fourth));
+  parallel_ = w == 0;
+  pixels_per_length_ = view.height / 2.0 * std::sqrt(dot(second, second)) / (parallel_ ? 1 : w);
+}
+
+bool NodeView::visible(const NodeKey& n) const {
+  const IndexBox box = grid_.box(n);
+  if (clip_)
+    for (int axis = 0; axis < 3; ++axis)
+      if (box.hi[axis] < clip_->lo[axis] || clip_->hi[axis] < box.lo[axis]) return false;
+  return std::all_of(planes_.begin(), planes_.end(), [&](const Plane& plane) {
+    double most = plane.offset;
+    for (int axis = 0; axis < 3; ++axis)
+      most += plane.normal[axis] * (plane.normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
+    return most >= 0;
+  });
+}
+
+double NodeView::distance(const NodeKey& n) const {
+  const IndexBox box = grid_.box(n);
+  Vec3d apart;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double lo = box.lo[axis] * spacing_[axis], hi = box.hi[axis] * spacing_[axis];
+    apart[axis] = std::max({lo - eye_[axis], eye_[axis] - hi, 0.0});
+  }
+  return std::sqrt(dot(apart, apart));
+}
+
+double NodeView::pixels(const NodeKey& n) const {
+  const double cell = grid_.level(n.level).spacing;
+  if (parallel_) return cell * pixels_per_length_;
+  // Inside a node its surface may be as near as one likes; finer than the finest
+  // cell at the distance of one makes no sense.
+  return cell * pixels_per_length_ / std::max(distance(n), grid_.level(0).spacing);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "isobrick/viewer/node_grid.h"
+
+namespace isobrick {
+
+/// From where and how a scene is seen.
+struct View {
+  Vec3d eye;  ///< world space; of no meaning where the projection is parallel
+  /// World space to clip space, column-major as OpenGL has it:
+  /// clip = M · (x, y, z, 1), visible where −w <= x, y, z <= w.
+  std::array<double, 16> view_projection{};
+  int width = 1, height = 1;  ///< of the picture, pixels
+  double pixel_error = 1.5;   ///< how long a cell's edge may be on the picture, pixels
+  /// What is shown of the volume, in level-0 index space; nothing: all.
+  std::optional<IndexBox> clip;
+};
+
+/// A camera that looks from `eye` at `target`: the matrix for View. `fov_y` in
+/// radians; near and far are distances.
+std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
+                                        double aspect, double near, double far);
+
+/// A view in the volume's own axes: what nodes are tested against.
+class NodeView {
+ public:
+  NodeView(const View& view, const NodeGrid& grid);
+
+  /// False when the node lies outside of the picture or of the clip box for certain.
+  bool visible(const NodeKey& n) const;
+  /// Length of one of the node's cells on the picture, pixels, where the node is
+  /// nearest. The direction of the view does not enter it.
+  double pixels(const NodeKey& n) const;
+  /// From the eye to the node, world length.
+  double distance(const NodeKey& n) const;
+
+ private:
+  struct Plane {
+    Vec3d normal;
+    double offset;  ///< inside: normal · p + offset >= 0
+  };
+  const NodeGrid& grid_;
+  Vec3d spacing_, eye_;  ///< the eye in lengths along the volume's axes, from its origin
+  std::array<Plane, 6> planes_;
+  std::optional<IndexBox> clip_;
+  double pixels_per_length_ = 0;  ///< at distance 1, or anywhere
+  bool parallel_ = false;
+};
+
+}  // namespace isobrick

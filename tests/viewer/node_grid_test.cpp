@@ -1,0 +1,143 @@
+#include "isobrick/viewer/node_grid.h"
+
+#include <gtest/gtest.h>
+
+#include "isobrick/pipeline/downsample.h"
+#include "isobrick/viewer/node_tree.h"
+#include "tests/viewer/memory_bricks.h"
+
+namespace isobrick::test {
+namespace {
+
+StoreInfo halved(Int3 extent, int levels) {
+  StoreInfo info;
+  LevelInfo level;
+  level.lattice.extent = extent;
+  level.transform.spacing = {0.5, 2, 3};
+  level.transform.origin = {10, -4, 7};
+  for (int i = 0; i < levels; ++i) {
+    info.levels.push_back(level);
+    level.transform = half_transform(level.transform, level.lattice.extent);
+    level.lattice.extent = half_extent(level.lattice.extent);
+  }
+  return info;
+}
+
+TEST(NodeGrid, PointsOfALevelArePointsOfAllFinerOnes) {
+  const NodeGrid grid(halved({300, 201, 130}, 4));
+  ASSERT_EQ(grid.levels(), 4);
+  for (int v = 1; v < 4; ++v)
+    for (int axis = 0; axis < 3; ++axis)
+      for (Index p = 0; p <= grid.level(v).cells[axis]; ++p) {
+        const Index finer = std::min(2 * p, grid.level(v - 1).cells[axis]);
+        EXPECT_EQ(grid.position(v, axis, p), grid.position(v - 1, axis, finer));
+      }
+}
+
+TEST(NodeGrid, ChildrenCoverTheirParentExactly) {
+  const NodeGrid grid(halved({300, 201, 130}, 4));
+  for (int v = 1; v < 4; ++v) {
+    Index children = 0;
+    for_each_point({{0, 0, 0}, grid.level(v).nodes}, [&](Int3 p) {
+      const IndexBox box = grid.box({v, p});
+      Vec3d lo = box.hi, hi = box.lo;
+      for_each_point(grid.children({v, p}), [&](Int3 c) {
+        ++children;
+        EXPECT_EQ(grid.parent({v - 1, c}), (NodeKey{v, p}));
+        const IndexBox part = grid.box({v - 1, c});
+        for (int axis = 0; axis < 3; ++axis) {
+          lo[axis] = std::min(lo[axis], part.lo[axis]);
+          hi[axis] = std::max(hi[axis], part.hi[axis]);
+        }
+      });
+      EXPECT_EQ(lo, box.lo);
+      EXPECT_EQ(hi, box.hi);
+    });
+    EXPECT_EQ(children, volume(grid.level(v - 1).nodes));
+  }
+}
+
+TEST(NodeGrid, StoredSamplesLieWhereTheirTransformsSay) {
+  const StoreInfo info = halved({300, 201, 130}, 3);
+  const NodeGrid grid(info);
+  for (int v = 0; v < 3; ++v)
+    for (const Index p : {Index{3}, Index{17}, Index{20}}) {
+      Vec3d stored;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto between = grid.between(v, axis, p);
+        stored[axis] = static_cast<double>(between.first) + between.weight;
+        EXPECT_EQ(between.weight > 0, v > 0);
+      }
+      const auto at = static_cast<double>(p * grid.level(v).step.x);
+      const Vec3d a = info.levels[0].transform.apply({at, at, at});
+      const Vec3d b = info.levels[static_cast<std::size_t>(v)].transform.apply(stored);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(a[axis], b[axis], 1e-9);
+    }
+}
+
+TEST(NodeGrid, AnAxisThatIsNotHalvedKeepsItsStep) {
+  StoreInfo info = halved({200, 200, 200}, 1);
+  LevelInfo half = info.levels[0];
+  half.transform.spacing.x *= 2;
+  half.transform.spacing.y *= 2;
+  half.lattice.extent = {100, 100, 200};
+  info.levels.push_back(half);
+  half.transform.spacing = half.transform.spacing * 4;
+  half.lattice.extent = {25, 25, 50};
+  info.levels.push_back(half);
+  const NodeGrid grid(info);
+  ASSERT_EQ(grid.levels(), 4) << "one between the levels that are four times apart";
+  EXPECT_EQ(grid.level(1).step, (Int3{2, 2, 1}));
+  EXPECT_EQ(grid.level(1).source, 1);
+  EXPECT_EQ(grid.level(2).step, (Int3{4, 4, 2}));
+  EXPECT_EQ(grid.level(2).source, 1);
+  EXPECT_EQ(grid.level(3).step, (Int3{8, 8, 4}));
+  EXPECT_EQ(grid.level(3).source, 2);
+  EXPECT_EQ(grid.children({1, {0, 0, 1}}), (Box3{{0, 0, 1}, {2, 2, 2}}));
+}
+
+TEST(NodeTree, RangesHoldWhatTheNodesValuesTake) {
+  const Index n = 150;
+  const MemoryBricks source(
+      {n, n, n},
+      std::function<float(Int3)>([&](Int3 p) { return static_cast<float>(blobs(p, n)); }), {});
+  const NodeTree tree(source);
+  const NodeGrid& grid = tree.grid();
+  for (int v = 0; v < grid.levels(); ++v)
+    for_each_point({{0, 0, 0}, grid.level(v).nodes}, [&](Int3 p) {
+      ValueRange<double> exact;
+      for_each_point(grid.samples({v, p}),
+                     [&](Int3 s) { exact.include(source.value(grid.level(v).source, s)); });
+      const ValueRange<float> own = tree.range({v, p}), below = tree.range_below({v, p});
+      EXPECT_LE(own.lo, exact.lo);
+      EXPECT_GE(own.hi, exact.hi);
+      EXPECT_LE(below.lo, own.lo);
+      EXPECT_GE(below.hi, own.hi);
+      if (v > 0)
+        for_each_point(grid.children({v, p}), [&](Int3 c) {
+          EXPECT_LE(below.lo, tree.range_below({v - 1, c}).lo);
+          EXPECT_GE(below.hi, tree.range_below({v - 1, c}).hi);
+        });
+    });
+}
+
+TEST(NodeTree, CountsNoFewerActiveBlocksThanThereAre) {
+  const Index n = 130;
+  const MemoryBricks source(
+      {n, n, n},
+      std::function<float(Int3)>([&](Int3 p) { return static_cast<float>(blobs(p, n)); }), {});
+  const NodeTree tree(source);
+  const Int3 blocks = source.info().levels[0].lattice.blocks();
+  const RangeTable table = source.block_ranges(0, {{0, 0, 0}, blocks});
+  for (const double isovalue : {-3.0, 0.0, 0.7, 4.0})
+    for_each_point({{0, 0, 0}, tree.grid().level(0).nodes}, [&](Int3 p) {
+      int active = 0;
+      for_each_point(intersect({p * 4, (p + Int3{1, 1, 1}) * 4}, {{0, 0, 0}, blocks}),
+                     [&](Int3 b) { active += table.at(b).stabbed_by(isovalue); });
+      EXPECT_GE(tree.active_blocks({0, p}, isovalue), active);
+      EXPECT_LE(tree.active_blocks({0, p}, isovalue), 64);
+    });
+}
+
+}  // namespace
+}  // namespace isobrick::test

@@ -1,0 +1,251 @@
+#include "isobrick/viewer/scene_stream.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <set>
+
+#include "isobrick/viewer/scene.h"
+#include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/random_cut.h"
+
+namespace isobrick::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::shared_ptr<MemoryBricks> make_source(Index n, Index brick = 32) {
+  return std::make_shared<MemoryBricks>(Int3{n, n, n}, std::function<float(Int3)>([n](Int3 p) {
+                                          return static_cast<float>(gyroid_ball(p, n));
+                                        }),
+                                        MemoryBricks::Options{.brick = brick});
+}
+
+/// Whether the nodes' boxes overlap.
+bool overlap(const NodeGrid& grid, const NodeKey& a, const NodeKey& b) {
+  const IndexBox p = grid.box(a), q = grid.box(b);
+  for (int axis = 0; axis < 3; ++axis)
+    if (p.hi[axis] <= q.lo[axis] || q.hi[axis] <= p.lo[axis]) return false;
+  return true;
+}
+
+void expect_no_overlap(const NodeGrid& grid, const Drawable& drawable) {
+  for (std::size_t i = 0; i < drawable.nodes.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (drawable.nodes[i].isovalue == drawable.nodes[j].isovalue) {
+        EXPECT_FALSE(overlap(grid, drawable.nodes[i].mesh->key, drawable.nodes[j].mesh->key));
+      }
+}
+
+/// Whether every finest node with a surface lies in some node that is drawn, or in
+/// one whose own level has none.
+bool covers(const NodeTree& tree, const Drawable& drawable, double isovalue) {
+  bool all = true;
+  for_each_point({{0, 0, 0}, tree.grid().level(0).nodes}, [&](Int3 p) {
+    bool found = false, shown = true;
+    for (const DrawnNode& node : drawable.nodes)
+      found |= overlap(tree.grid(), node.mesh->key, {0, p});
+    for (NodeKey n{0, p};;) {
+      shown &= tree.active(n, isovalue);
+      if (!tree.grid().has_parent(n)) break;
+      n = tree.grid().parent(n);
+    }
+    all &= found || !shown;
+  });
+  return all;
+}
+
+TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {
+  const auto source = make_source(200);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  source->set_delay(milliseconds(2));
+  SceneStream stream(source, tree, {.threads = 2});
+  for (unsigned seed = 1; seed < 4; ++seed) {
+    const Cut cut = RandomCut(tree->grid(), seed, 5).cut({0.0});
+    stream.set_cut(cut);
+    std::set<std::uint64_t> versions;
+    bool begun = false;
+    for (;;) {
+      const bool idle = stream.idle();
+      const auto drawable = stream.drawable();
+      expect_no_overlap(tree->grid(), *drawable);
+      versions.insert(drawable->version);
+      if (begun) {
+        EXPECT_TRUE(covers(*tree, *drawable, 0));
+      }
+      begun |= covers(*tree, *drawable, 0);
+      if (idle) break;
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+    const auto last = stream.drawable();
+    EXPECT_TRUE(last->complete);
+    EXPECT_GT(versions.size(), 3u);
+    for (const DrawnNode& drawn : last->nodes) {
+      const auto in_cut = std::find_if(cut.nodes.begin(), cut.nodes.end(), [&](const CutNode& n) {
+        return n.key == drawn.mesh->key && n.coarser == drawn.mesh->coarser;
+      });
+      EXPECT_NE(in_cut, cut.nodes.end());
+    }
+    EXPECT_EQ(stream.drawable(), last) << "the same until something changes";
+  }
+}
+
+TEST(SceneStream, CoarseNodesComeFirst) {
+  const auto source = make_source(200);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  source->set_delay(milliseconds(1));
+  SceneStream stream(source, tree, {.threads = 1});
+  stream.set_cut(RandomCut(tree->grid(), 1, 100).cut({0.0}));
+  int finest_seen = tree->grid().levels();
+  while (!stream.idle()) {
+    const auto drawable = stream.drawable();
+    for (const DrawnNode& node : drawable->nodes)
+      finest_seen = std::min(finest_seen, node.mesh->key.level);
+    if (finest_seen == 0) break;
+    const auto made = stream.counters().meshes_made;
+    if (made == 1) {
+      EXPECT_GE(finest_seen, tree->grid().levels() - 1);
+    }
+  }
+  stream.wait_idle(60);
+  EXPECT_TRUE(stream.drawable()->complete);
+}
+
+TEST(SceneStream, AnotherIsovalueNeedsNoBrickAgain) {
+  const auto source = make_source(150);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  SceneStream stream(source, tree, {.threads = 2});
+  Cut cut = RandomCut(tree->grid(), 2, 3).cut({0.0});
+  stream.set_cut(cut);
+  ASSERT_TRUE(stream.wait_idle(60));
+  const auto reads = source->reads();
+  const auto before = stream.drawable();
+  cut.isovalues = {-0.5};
+  stream.set_cut(cut);
+  EXPECT_FALSE(stream.drawable()->nodes.empty()) << "the isovalue before stays until then";
+  ASSERT_TRUE(stream.wait_idle(60));
+  EXPECT_LE(source->reads(), reads + reads / 2);
+  for (const DrawnNode& node : stream.drawable()->nodes) EXPECT_EQ(node.mesh->isovalue, -0.5);
+  // And back without any work at all.
+  const auto made = stream.counters().meshes_made;
+  cut.isovalues = {0.0};
+  stream.set_cut(cut);
+  EXPECT_TRUE(stream.idle());
+  EXPECT_EQ(stream.drawable()->triangles, before->triangles);
+  EXPECT_EQ(stream.counters().meshes_made, made);
+}
+
+TEST(SceneStream, ShowsSeveralIsovaluesAtOnce) {
+  const auto source = make_source(150);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  SceneStream stream(source, tree, {.threads = 2});
+  stream.set_cut(RandomCut(tree->grid(), 2, 3).cut({-1.0, 0.0, 1.0}));
+  ASSERT_TRUE(stream.wait_idle(60));
+  const auto drawable = stream.drawable();
+  EXPECT_TRUE(drawable->complete);
+  std::set<int> numbers;
+  for (const DrawnNode& node : drawable->nodes) {
+    numbers.insert(node.isovalue);
+    EXPECT_EQ(node.mesh->isovalue, node.isovalue - 1.0);
+  }
+  EXPECT_EQ(numbers.size(), 3u);
+  expect_no_overlap(tree->grid(), *drawable);
+}
+
+TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
+  const auto source = make_source(150);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  source->damage(0, {2, 2, 1});
+  SceneStream stream(source, tree, {.threads = 2});
+  stream.set_cut(RandomCut(tree->grid(), 1, 100).cut({0.0}));
+  ASSERT_TRUE(stream.wait_idle(60));
+  const auto drawable = stream.drawable();
+  int damaged = 0, whole = 0;
+  for (const DrawnNode& node : drawable->nodes) {
+    damaged += !node.mesh->damage.empty();
+    whole += node.mesh->damage.empty();
+    if (!node.mesh->damage.empty()) {
+      EXPECT_NE(node.mesh->damage.find("damaged"), std::string::npos);
+    }
+  }
+  EXPECT_GT(damaged, 0);
+  EXPECT_GT(whole, 5);
+  EXPECT_EQ(stream.counters().damaged, static_cast<std::uint64_t>(damaged));
+  EXPECT_TRUE(drawable->complete);
+}
+
+TEST(SceneStream, EndsAtOnceWhateverIsGoingOn) {
+  const auto source = make_source(150, 16);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  for (const int delay : {20, 2000}) {
+    source->set_delay(milliseconds(delay));
+    auto stream = std::make_unique<SceneStream>(source, tree, StreamOptions{.threads = 4});
+    Cut cut = RandomCut(tree->grid(), 1, 10).cut({0.0});
+    stream->set_cut(cut);
+    std::this_thread::sleep_for(milliseconds(60));
+    for (const double isovalue : {0.1, 0.2, 0.3}) {
+      cut.isovalues = {isovalue};
+      const auto start = Clock::now();
+      stream->set_cut(cut);
+      EXPECT_LT(seconds_since(start), 0.1);
+      const auto drawing = Clock::now();
+      (void)stream->drawable();
+      EXPECT_LT(seconds_since(drawing), 0.1);
+    }
+    const auto start = Clock::now();
+    stream.reset();
+    EXPECT_LT(seconds_since(start), 0.1) << "reads of " << delay << " ms";
+  }
+}
+
+TEST(SceneStream, KeepsBricksAndMeshesWithinTheirBudgets) {
+  const Index n = 256;
+  const auto source = make_source(n, 16);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  const std::uint64_t volume_bytes = static_cast<std::uint64_t>(n * n * n) * 4;
+  StreamOptions options{.threads = 2, .brick_bytes = volume_bytes / 8, .mesh_bytes = 4 << 20};
+  SceneStream stream(source, tree, options);
+  std::uint64_t most_meshes = 0;
+  for (unsigned seed = 1; seed < 5; ++seed) {
+    stream.set_cut(RandomCut(tree->grid(), seed, 4).cut({0.0}));
+    while (!stream.wait_idle(0.005)) {
+      (void)stream.drawable();
+      most_meshes = std::max(most_meshes, stream.counters().mesh_bytes);
+    }
+    EXPECT_TRUE(covers(*tree, *stream.drawable(), 0));
+  }
+  EXPECT_LE(stream.counters().brick_bytes_peak, options.brick_bytes);
+  EXPECT_GT(stream.counters().brick_bytes_peak, options.brick_bytes / 2);
+  // One mesh of each thread may come on top.
+  EXPECT_LE(most_meshes, options.mesh_bytes + 2 * (2 << 20));
+}
+
+TEST(Scene, AWindowsLoopEndsWithTheWholeCut) {
+  const auto source = make_source(200);
+  Scene scene(source, {.threads = 2});
+  View view;
+  view.eye = {99.5, 99.5, 500};
+  view.width = view.height = 500;
+  view.pixel_error = 2;
+  view.view_projection = perspective_view(view.eye, {99.5, 99.5, 99.5}, {0, 1, 0}, 0.8, 1, 1, 2000);
+  for (int frame = 0; frame < 2000; ++frame) {
+    scene.update({0.0}, view, {});
+    if (scene.drawable()->complete && scene.stream().idle()) break;
+    std::this_thread::sleep_for(milliseconds(2));
+  }
+  const auto drawable = scene.drawable();
+  EXPECT_TRUE(drawable->complete);
+  EXPECT_GT(drawable->triangles, 10000u);
+  EXPECT_TRUE(covers(scene.tree(), *drawable, 0));
+  for (const DrawnNode& node : drawable->nodes)
+    for (const Vec3f p : node.mesh->mesh.positions)
+      EXPECT_LT(std::abs(p.x) + std::abs(p.y) + std::abs(p.z), 200.0f) << "around the origin";
+}
+
+}  // namespace
+}  // namespace isobrick::test
