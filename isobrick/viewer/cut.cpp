@@ -44,8 +44,10 @@ double CutSelector::urgency(const NodeKey& n, std::span<const double> isovalues,
                             const NodeView& view) {
   const bool active = std::any_of(isovalues.begin(), isovalues.end(),
                                   [&](double iso) { return tree_.active_below(n, iso); });
-  if (n.level == 0 || !active || !view.visible(n)) return 0;
-  return view.pixels(n) * (flag(before_, n) ? kHysteresis : 1);
+  if (n.level == 0 || !active) return 0;
+  const bool before = flag(before_, n) != 0;
+  if (!(before ? view.nearly_visible(n) : view.visible(n))) return 0;
+  return view.pixels(n) * (before ? kHysteresis : 1);
 }
 
 double CutSelector::triangles(const NodeKey& n, std::span<const double> isovalues,

@@ -141,7 +141,8 @@ void NodeBorder::take_values(int i, double isovalue, const Wanted& wanted, GridV
 }
 
 /// Where the coarser side has an ambiguous cell it connects the inside; the finer
-/// side does the same when the middle of that cell is inside.
+/// side does the same when the middle of that cell is inside. Clearly so: at the isovalue
+/// itself the vertices around the middle would be in one place.
 void NodeBorder::connect_inside(int face, GridValues& field) const {
   const int normal = face / 2, u = first_axis(normal), v = second_axis(normal);
   if (ratio_[u] != 2 || ratio_[v] != 2) return;
@@ -161,7 +162,9 @@ void NodeBorder::connect_inside(int face, GridValues& field) const {
       middle[v] = 2 * j + 1;
       // A cell that is cut short by the volume's border may have no middle.
       if (middle[u] >= hi_[u] || middle[v] >= hi_[v]) continue;
-      field.at(middle) = std::max(field.at(middle), 0.0f);
+      if (field.at(middle) < 0)
+        field.at(middle) =
+            std::min(std::max(cell.v[0], cell.v[1]), std::max(cell.v[2], cell.v[3])) / 2;
     }
 }
 

@@ -6,6 +6,9 @@
 namespace isobrick {
 namespace {
 
+/// How much larger the picture is in which nodes that were refined stay so.
+constexpr double kWider = 1.15;
+
 double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 Vec3d cross(Vec3d a, Vec3d b) {
@@ -18,7 +21,12 @@ Vec3d unit(Vec3d v) { return v * (1 / std::sqrt(dot(v, v))); }
 
 std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
                                         double aspect, double near, double far) {
-  const Vec3d ahead = unit(target - eye), right = unit(cross(ahead, up));
+  const Vec3d ahead = unit(target - eye);
+  // Along the view no direction is up: then another one is.
+  Vec3d across = cross(ahead, up);
+  if (dot(across, across) < 1e-12 * dot(up, up))
+    across = cross(ahead, std::abs(ahead.x) < 0.7 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
+  const Vec3d right = unit(across);
   const Vec3d above = cross(right, ahead);
   const double f = 1 / std::tan(fov_y / 2);
   const Vec3d rows[4] = {right * (f / aspect), above * f, ahead * ((far + near) / (far - near)),
@@ -54,7 +62,12 @@ NodeView::NodeView(const View& view, const NodeGrid& grid) : grid_(grid), clip_(
   }
   for (std::size_t i = 0; i < 6; ++i) {
     const double sign = i % 2 ? -1 : 1;
-    planes_[i] = {rows[3] + rows[i / 2] * sign, offsets[3] + sign * offsets[i / 2]};
+    const auto plane = [&](double width) {
+      return Plane{rows[3] * width + rows[i / 2] * sign,
+                   offsets[3] * width + sign * offsets[i / 2]};
+    };
+    planes_[i] = plane(1);
+    wider_[i] = plane(i < 4 ? kWider : 1);
   }
   const Vec3d second{m[1], m[5], m[9]}, fourth{m[3], m[7], m[11]};
   const double w = std::sqrt(dot(fourth, fourth));
@@ -62,12 +75,12 @@ NodeView::NodeView(const View& view, const NodeGrid& grid) : grid_(grid), clip_(
   pixels_per_length_ = view.height / 2.0 * std::sqrt(dot(second, second)) / (parallel_ ? 1 : w);
 }
 
-bool NodeView::visible(const NodeKey& n) const {
+bool NodeView::visible(const NodeKey& n, const Planes& planes) const {
   const IndexBox box = grid_.box(n);
   if (clip_)
     for (int axis = 0; axis < 3; ++axis)
       if (box.hi[axis] < clip_->lo[axis] || clip_->hi[axis] < box.lo[axis]) return false;
-  return std::all_of(planes_.begin(), planes_.end(), [&](const Plane& plane) {
+  return std::all_of(planes.begin(), planes.end(), [&](const Plane& plane) {
     double most = plane.offset;
     for (int axis = 0; axis < 3; ++axis)
       most += plane.normal[axis] * (plane.normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);

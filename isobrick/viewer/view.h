@@ -11,7 +11,8 @@ namespace isobrick {
 struct View {
   Vec3d eye;  ///< world space; of no meaning where the projection is parallel
   /// World space to clip space, column-major as OpenGL has it:
-  /// clip = M · (x, y, z, 1), visible where −w <= x, y, z <= w.
+  /// clip = M · (x, y, z, 1), visible where −w <= x, y, z <= w. Depth from 0 to w,
+  /// also reversed or without a far end, does as well.
   std::array<double, 16> view_projection{};
   int width = 1, height = 1;  ///< of the picture, pixels
   double pixel_error = 1.5;   ///< how long a cell's edge may be on the picture, pixels
@@ -20,7 +21,8 @@ struct View {
 };
 
 /// A camera that looks from `eye` at `target`: the matrix for View. `fov_y` in
-/// radians; near and far are distances.
+/// radians; near and far are distances. Where `up` is along the view another
+/// direction is taken.
 std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
                                         double aspect, double near, double far);
 
@@ -30,7 +32,9 @@ class NodeView {
   NodeView(const View& view, const NodeGrid& grid);
 
   /// False when the node lies outside of the picture or of the clip box for certain.
-  bool visible(const NodeKey& n) const;
+  bool visible(const NodeKey& n) const { return visible(n, planes_); }
+  /// The same for a picture that is a little larger.
+  bool nearly_visible(const NodeKey& n) const { return visible(n, wider_); }
   /// Length of one of the node's cells on the picture, pixels, where the node is
   /// nearest. The direction of the view does not enter it.
   double pixels(const NodeKey& n) const;
@@ -42,9 +46,12 @@ class NodeView {
     Vec3d normal;
     double offset;  ///< inside: normal · p + offset >= 0
   };
+  using Planes = std::array<Plane, 6>;
+  bool visible(const NodeKey& n, const Planes& planes) const;
+
   const NodeGrid& grid_;
   Vec3d spacing_, eye_;  ///< the eye in lengths along the volume's axes, from its origin
-  std::array<Plane, 6> planes_;
+  Planes planes_, wider_;
   std::optional<IndexBox> clip_;
   double pixels_per_length_ = 0;  ///< at distance 1, or anywhere
   bool parallel_ = false;

@@ -1,0 +1,121 @@
+#include <gtest/gtest.h>
+
+#include "isobrick/viewer/node_mesher.h"
+#include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/random_cut.h"
+#include "tests/viewer/rasteriser.h"
+
+namespace isobrick::test {
+namespace {
+
+class Always final : public Wanted {
+ public:
+  void check() const override {}
+};
+
+struct Shape {
+  const char* name;
+  std::function<double(Int3, Index)> field;
+};
+
+constexpr Index kEdge = 150;
+constexpr int kPicture = 500;
+constexpr int kViews = 3;
+
+Rasteriser picture(int view) {
+  return {kPicture, {74.5, 74.5, 74.5}, 68, static_cast<unsigned>(view)};
+}
+
+class Cracks : public ::testing::TestWithParam<Shape> {
+ protected:
+  Cracks()
+      : source_(std::make_shared<MemoryBricks>(
+            Int3{kEdge, kEdge, kEdge}, std::function<float(Int3)>([](Int3 p) {
+              return static_cast<float>(GetParam().field(p, kEdge));
+            }),
+            MemoryBricks::Options{.brick = 16})),
+        grid_(source_->info()),
+        bricks_(source_, std::uint64_t{1} << 30),
+        mesher_(grid_, bricks_, {}) {}
+
+  std::vector<NodeMesh> meshes_of(const Cut& cut) {
+    std::vector<NodeMesh> meshes;
+    for (const CutNode& node : cut.nodes)
+      meshes.push_back(mesher_.mesh(node.key, 0, node.coarser, Always()));
+    return meshes;
+  }
+
+  std::shared_ptr<MemoryBricks> source_;
+  NodeGrid grid_;
+  ResidentBricks bricks_;
+  NodeMesher mesher_;
+};
+
+/// Along every ray through a closed surface as many sheets face the eye as face
+/// away, and the first one faces it: whatever the cut and from wherever it is seen.
+TEST_P(Cracks, AreNotBetweenLevels) {
+  std::size_t covered = 0, unbalanced = 0, inside_seen = 0, ribbons = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const std::vector<NodeMesh> meshes =
+        meshes_of(RandomCut(grid_, seed, 2 + static_cast<int>(seed) * 2).cut({0}));
+    for (const NodeMesh& mesh : meshes) ribbons += mesh.ribbon_triangles;
+    for (int view = 0; view < kViews; ++view) {
+      Rasteriser raster = picture(view + static_cast<int>(seed) * 100);
+      for (const NodeMesh& mesh : meshes) raster.draw(mesh);
+      for (const Rasteriser::Pixel& pixel : raster.pixels()) {
+        covered += pixel.front > 0;
+        unbalanced += pixel.front != pixel.back;
+        inside_seen += pixel.nearest_is_back;
+      }
+    }
+  }
+  EXPECT_GT(covered, 500000u);
+  EXPECT_GT(ribbons, 1000u) << "there are borders between levels";
+  // A vertex on a chord is on it to within float's rounding.
+  EXPECT_LE(unbalanced, covered / 100000);
+  EXPECT_EQ(inside_seen, 0u);
+}
+
+/// Of a shape that coarse levels have as well.
+class Holes : public Cracks {};
+
+/// Where the finest mesh shows something all around, every cut shows something.
+TEST_P(Holes, AreNotInsideTheSilhouette) {
+  constexpr int kCoarseCell = 8 * kPicture / (2 * 68);  // of the coarsest level, pixels
+  Cut finest;
+  for_each_point({{0, 0, 0}, grid_.level(0).nodes}, [&](Int3 p) {
+    finest.nodes.push_back({{0, p}});
+  });
+  Rasteriser whole = picture(0);
+  for (const NodeMesh& mesh : meshes_of(finest)) whole.draw(mesh);
+  const auto shown = [](const Rasteriser& r, int x, int y) {
+    return r.pixels()[static_cast<std::size_t>(y * kPicture + x)].front > 0;
+  };
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    Rasteriser raster = picture(0);
+    for (const NodeMesh& mesh : meshes_of(RandomCut(grid_, seed, static_cast<int>(seed)).cut({0})))
+      raster.draw(mesh);
+    std::size_t inside = 0, missing = 0;
+    const int r = kCoarseCell;
+    for (int y = r; y < kPicture - r; ++y)
+      for (int x = r; x < kPicture - r; ++x) {
+        bool all = true;
+        for (const int d : {-r, 0, r}) all &= shown(whole, x + d, y) && shown(whole, x, y + d);
+        inside += all;
+        missing += all && !shown(raster, x, y);
+      }
+    EXPECT_GT(inside, 50000u);
+    EXPECT_EQ(missing, 0u);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Cracks,
+                         ::testing::Values(Shape{"ball", ball}, Shape{"gyroid", gyroid_ball},
+                                           Shape{"blobs", blobs}),
+                         [](const auto& shape) { return shape.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Holes, ::testing::Values(Shape{"ball", ball}),
+                         [](const auto& shape) { return shape.param.name; });
+
+}  // namespace
+}  // namespace isobrick::test

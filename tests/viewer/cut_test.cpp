@@ -1,0 +1,160 @@
+#include "isobrick/viewer/cut.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "tests/viewer/memory_bricks.h"
+
+namespace isobrick::test {
+namespace {
+
+View look(Vec3d eye, Vec3d target, double pixel_error) {
+  View view;
+  view.eye = eye;
+  view.width = 800;
+  view.height = 600;
+  view.pixel_error = pixel_error;
+  view.view_projection = perspective_view(eye, target, {0, 0, 1}, 0.8, 800.0 / 600, 1, 10000);
+  return view;
+}
+
+class CutTest : public ::testing::Test {
+ protected:
+  static constexpr Index kEdge = 300;
+  static const MemoryBricks& source() {
+    static const MemoryBricks bricks({kEdge, kEdge, kEdge},
+                                     std::function<std::uint8_t(Int3)>([](Int3 p) {
+                                       return static_cast<std::uint8_t>(128 + ball(p, kEdge) / 3);
+                                     }),
+                                     {});
+    return bricks;
+  }
+  static const NodeTree& tree() {
+    static const NodeTree t(source());
+    return t;
+  }
+};
+
+/// Every finest node's place belongs to one node of the cut, and neighbours differ
+/// by at most a level; masks say where.
+void expect_sound(const NodeGrid& grid, const Cut& cut) {
+  std::map<std::tuple<Index, Index, Index>, NodeKey> owner;
+  const Box3 finest{{0, 0, 0}, grid.level(0).nodes};
+  for (const CutNode& node : cut.nodes) {
+    const IndexBox box = grid.box(node.key);
+    for_each_point(finest, [&](Int3 p) {
+      const IndexBox part = grid.box({0, p});
+      for (int axis = 0; axis < 3; ++axis)
+        if (part.lo[axis] < box.lo[axis] || part.hi[axis] > box.hi[axis]) return;
+      EXPECT_TRUE(owner.emplace(std::tuple(p.x, p.y, p.z), node.key).second);
+    });
+  }
+  EXPECT_EQ(static_cast<Index>(owner.size()), volume(finest.hi));
+  std::map<std::tuple<int, Index, Index, Index>, std::uint32_t> masks;
+  for (const CutNode& node : cut.nodes)
+    masks[{node.key.level, node.key.node.x, node.key.node.y, node.key.node.z}] = node.coarser;
+  std::map<std::tuple<int, Index, Index, Index>, std::uint32_t> expected;
+  for_each_point(finest, [&](Int3 p) {
+    const NodeKey mine = owner.at({p.x, p.y, p.z});
+    for (int i = 0; i < kDirections; ++i) {
+      const Int3 q = p + direction(i);
+      if (!finest.contains(q)) continue;
+      const NodeKey other = owner.at({q.x, q.y, q.z});
+      EXPECT_LE(std::abs(mine.level - other.level), 1);
+    }
+    for (int i = 0; i < kDirections; ++i) {
+      const NodeKey beside{mine.level, mine.node + direction(i)};
+      if (!grid.contains(beside) || !grid.has_parent(beside)) continue;
+      const NodeKey above = grid.parent(beside);
+      if (masks.contains({above.level, above.node.x, above.node.y, above.node.z}))
+        expected[{mine.level, mine.node.x, mine.node.y, mine.node.z}] |= 1u << i;
+    }
+  });
+  for (const auto& [key, mask] : masks) EXPECT_EQ(mask, expected[key]);
+}
+
+TEST_F(CutTest, CoversTheVolumeOnceAndIsBalanced) {
+  CutSelector selector(tree());
+  const std::vector<double> isovalues{128};
+  std::set<int> levels;
+  for (const double pixel_error : {1000.0, 100.0, 10.0, 4.0, 1.0})
+    for (const Vec3d eye : {Vec3d{-200, -150, 400}, Vec3d{150, 20, 150}, Vec3d{290, 290, 5}}) {
+      const Cut cut = selector.select(isovalues, look(eye, {150, 150, 150}, pixel_error), {});
+      expect_sound(tree().grid(), cut);
+      for (const CutNode& node : cut.nodes) levels.insert(node.key.level);
+    }
+  EXPECT_GE(levels.size(), 4u);
+}
+
+TEST_F(CutTest, NearNodesAreFinerAndWhatIsNotSeenStaysCoarse) {
+  CutSelector selector(tree());
+  const std::vector<double> isovalues{128};
+  const View view = look({150, 150, 320}, {150, 150, 150}, 3);
+  const Cut cut = selector.select(isovalues, view, {});
+  const NodeView seen(view, tree().grid());
+  for (const CutNode& node : cut.nodes) {
+    const bool active = tree().active_below(node.key, 128);
+    if (node.key.level > 0 && active && seen.visible(node.key)) {
+      EXPECT_LE(seen.pixels(node.key), 3.0);
+    }
+  }
+  const Cut away =
+      CutSelector(tree()).select(isovalues, look({150, 150, 320}, {150, 150, 1000}, 3), {});
+  EXPECT_EQ(away.nodes.size(), static_cast<std::size_t>(
+                                   volume(tree().grid().level(tree().grid().levels() - 1).nodes)));
+}
+
+TEST_F(CutTest, KeepsTheBudgetAndSaysSo) {
+  const std::vector<double> isovalues{128};
+  const View view = look({150, 150, 320}, {150, 150, 150}, 0.5);
+  const Cut all = CutSelector(tree()).select(isovalues, view, {});
+  EXPECT_FALSE(all.limited_by_budget);
+  for (const std::uint64_t budget : {all.triangles / 2, all.triangles / 8}) {
+    const Cut less = CutSelector(tree()).select(isovalues, view, {.triangles = budget});
+    EXPECT_TRUE(less.limited_by_budget);
+    EXPECT_LE(less.triangles, budget);
+    expect_sound(tree().grid(), less);
+  }
+  const Cut bytes =
+      CutSelector(tree()).select(isovalues, view, {.mesh_bytes = all.triangles * 24 / 4});
+  EXPECT_LE(bytes.triangles * 24, all.triangles * 24 / 4);
+}
+
+TEST_F(CutTest, IsTheSameEveryTimeAndStaysWhenTheCameraTrembles) {
+  const std::vector<double> isovalues{128};
+  const auto keys = [](const Cut& cut) {
+    std::vector<std::tuple<int, Index, Index, Index, std::uint32_t>> all;
+    for (const CutNode& n : cut.nodes)
+      all.emplace_back(n.key.level, n.key.node.x, n.key.node.y, n.key.node.z, n.coarser);
+    return all;
+  };
+  const View view = look({150, 150, 420}, {150, 150, 150}, 2);
+  EXPECT_EQ(keys(CutSelector(tree()).select(isovalues, view, {})),
+            keys(CutSelector(tree()).select(isovalues, view, {})));
+  CutSelector selector(tree());
+  Cut last = selector.select(isovalues, look({150, 150, 500}, {150, 150, 150}, 2), {});
+  int changes = 0;
+  // There and back a little: without memory each distance has its own cut.
+  for (int i = 0; i < 40; ++i) {
+    const double z = 440 + (i % 2 ? 5 : -5);
+    const Cut cut = selector.select(isovalues, look({150, 150, z}, {150, 150, 150}, 2), {});
+    if (i > 1) changes += keys(cut) != keys(last);
+    last = cut;
+  }
+  EXPECT_EQ(changes, 0);
+}
+
+TEST_F(CutTest, AClipBoxHidesNodes) {
+  const std::vector<double> isovalues{128};
+  View view = look({150, 150, 420}, {150, 150, 150}, 2);
+  view.clip = IndexBox{{0, 0, 0}, {299, 299, 60}};
+  const Cut cut = CutSelector(tree()).select(isovalues, view, {});
+  for (const CutNode& node : cut.nodes)
+    EXPECT_EQ(node.visible && tree().grid().box(node.key).lo.z > 60, false);
+}
+
+}  // namespace
+}  // namespace isobrick::test

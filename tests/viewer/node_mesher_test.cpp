@@ -1,0 +1,191 @@
+#include "isobrick/viewer/node_mesher.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <map>
+
+#include "tests/surface/field.h"
+#include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/random_cut.h"
+
+namespace isobrick::test {
+namespace {
+
+class Always final : public Wanted {
+ public:
+  void check() const override {}
+};
+
+using Field = std::function<double(Int3, Index)>;
+
+std::shared_ptr<MemoryBricks> cube_of(const Field& field, Index n,
+                                      const MemoryBricks::Options& options = {}) {
+  return std::make_shared<MemoryBricks>(
+      Int3{n, n, n},
+      std::function<float(Int3)>([&](Int3 p) { return static_cast<float>(field(p, n)); }), options);
+}
+
+/// The meshes of all nodes of a cut.
+std::vector<NodeMesh> meshes_of(std::shared_ptr<const BrickSource> source, const Cut& cut,
+                                Vec3d origin = {}) {
+  const NodeGrid grid(source->info());
+  ResidentBricks bricks(std::move(source), std::uint64_t{1} << 30);
+  NodeMesher mesher(grid, bricks, origin);
+  std::vector<NodeMesh> meshes;
+  for (const CutNode& node : cut.nodes)
+    meshes.push_back(mesher.mesh(node.key, cut.isovalues.front(), node.coarser, Always()));
+  return meshes;
+}
+
+Cut uniform_cut(const NodeGrid& grid, int level, double isovalue) {
+  Cut cut;
+  cut.isovalues = {isovalue};
+  for_each_point({{0, 0, 0}, grid.level(level).nodes}, [&](Int3 p) {
+    cut.nodes.push_back({{level, p}});
+  });
+  return cut;
+}
+
+/// One mesh of many: vertices at the same place, bit by bit, become one.
+testing::Mesh weld(const std::vector<NodeMesh>& meshes) {
+  testing::Mesh whole;
+  std::map<std::array<float, 3>, std::uint32_t> numbers;
+  for (const NodeMesh& node : meshes) {
+    std::vector<std::uint32_t> number;
+    for (std::size_t i = 0; i < node.mesh.positions.size(); ++i) {
+      const Vec3f p = node.mesh.positions[i];
+      const auto next = static_cast<std::uint32_t>(whole.positions.size());
+      const auto [place, added] = numbers.try_emplace({p.x, p.y, p.z}, next);
+      if (added) {
+        whole.positions.push_back(p);
+        whole.normals.push_back(node.mesh.normals[i]);
+      }
+      EXPECT_EQ(whole.normals[place->second], node.mesh.normals[i]);
+      number.push_back(place->second);
+    }
+    for (const Triangle& t : node.mesh.triangles)
+      whole.triangles.push_back({number[t[0]], number[t[1]], number[t[2]]});
+  }
+  return whole;
+}
+
+/// Every side is there as often in one direction as in the other.
+bool closed(const testing::Mesh& mesh) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> forward, backward;
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t i = 0; i < 3; ++i) {
+      forward.emplace_back(t[i], t[(i + 1) % 3]);
+      backward.emplace_back(t[(i + 1) % 3], t[i]);
+    }
+  std::sort(forward.begin(), forward.end());
+  std::sort(backward.begin(), backward.end());
+  return !forward.empty() && forward == backward;
+}
+
+TEST(NodeMesher, NodesOfTheFinestLevelMakeTheSurfaceOfTheExtractor) {
+  const Index n = 140;
+  const auto source = cube_of(blobs, n, {.brick = 48});
+  const NodeGrid grid(source->info());
+  const testing::Mesh whole = weld(meshes_of(source, uniform_cut(grid, 0, 0.25)));
+  const testing::Field<float> field(
+      {n, n, n}, [&](Int3 p) { return static_cast<double>(static_cast<float>(blobs(p, n))); });
+  const testing::Mesh expected = testing::extract(field, {.isovalue = 0.25, .normals = true});
+  EXPECT_EQ(whole.triangles.size(), expected.triangles.size());
+  EXPECT_EQ(whole.positions.size(), expected.positions.size());
+  EXPECT_GT(testing::closed_sides(whole), 0);
+  const auto key = [](Vec3f p) {
+    return std::array{std::lround(p.x * 512), std::lround(p.y * 512), std::lround(p.z * 512)};
+  };
+  std::map<std::array<long, 3>, Vec3f> normals;
+  for (std::size_t i = 0; i < expected.positions.size(); ++i)
+    normals[key(expected.positions[i])] = expected.normals[i];
+  std::size_t same = 0;
+  for (std::size_t i = 0; i < whole.positions.size(); ++i)
+    if (const auto found = normals.find(key(whole.positions[i])); found != normals.end()) {
+      ++same;
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(whole.normals[i][axis], found->second[axis], 2e-3);
+    }
+  EXPECT_GT(same, whole.positions.size() * 9 / 10);
+}
+
+TEST(NodeMesher, EveryLevelAloneIsClosedAndSharesVerticesBitByBit) {
+  int number = 0;
+  for (const Field& field : {Field(ball), Field(gyroid_ball), Field(blobs)}) {
+    ++number;
+    const auto source = cube_of(field, 171);
+    const NodeGrid grid(source->info());
+    for (int v = 0; v < grid.levels(); ++v)
+      EXPECT_TRUE(closed(weld(meshes_of(source, uniform_cut(grid, v, 0.013), {85, 85, 85}))))
+          << "level " << v << " of field " << number;
+  }
+}
+
+TEST(NodeMesher, WorldSpaceFollowsSpacingDirectionAndOrigin) {
+  MemoryBricks::Options options;
+  options.transform.spacing = {0.5, 1, 2};
+  options.transform.origin = {1e6, -2e6, 3e6};
+  options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, -1};  // mirrored
+  const Index n = 70;
+  const auto source = cube_of(ball, n, options);
+  const NodeGrid grid(source->info());
+  const Vec3d middle = options.transform.apply({34.5, 34.5, 34.5});
+  const auto meshes = meshes_of(source, uniform_cut(grid, 0, 0), middle);
+  double six_volumes = 0;
+  for (const NodeMesh& mesh : meshes) {
+    for (std::size_t i = 0; i < mesh.mesh.positions.size(); ++i) {
+      const Vec3f p = mesh.mesh.positions[i], normal = mesh.mesh.normals[i];
+      const double x = p.x / 1.0, y = p.y / 0.5, z = p.z / 2.0;
+      EXPECT_NEAR(std::sqrt(x * x + y * y + z * z), 0.4 * n, 0.02);
+      EXPECT_GT(normal.x * p.x + normal.y * p.y + normal.z * p.z, 0);
+    }
+    for (const Triangle& t : mesh.mesh.triangles) {
+      const Vec3f a = mesh.mesh.positions[t[0]], b = mesh.mesh.positions[t[1]],
+                  c = mesh.mesh.positions[t[2]];
+      six_volumes += a.x * (b.y * c.z - b.z * c.y) - a.y * (b.x * c.z - b.z * c.x) +
+                     a.z * (b.x * c.y - b.y * c.x);
+    }
+  }
+  EXPECT_NEAR(six_volumes / 6, 4.18879 * 28 * 28 * 28, 300) << "counter-clockwise from outside";
+}
+
+TEST(NodeMesher, HolesOfNaNAndAbsentBricksDoNotDisturbIt) {
+  const Index n = 100;
+  const auto field = [&](Int3 p) -> float {
+    if (p.x > 60 && p.y > 60) return std::numeric_limits<float>::quiet_NaN();
+    if (p.x < 32 && p.y < 32 && p.z < 32) return -1.0f;
+    return static_cast<float>(blobs(p, n));
+  };
+  const auto source = std::make_shared<MemoryBricks>(
+      Int3{n, n, n}, std::function<float(Int3)>(field), MemoryBricks::Options{.fill_value = -1});
+  const NodeGrid grid(source->info());
+  for (unsigned seed = 1; seed < 4; ++seed) {
+    const Cut cut = RandomCut(grid, seed, 3).cut({0});
+    std::size_t triangles = 0;
+    for (const NodeMesh& mesh : meshes_of(source, cut)) {
+      for (const Vec3f p : mesh.mesh.positions) {
+        EXPECT_TRUE(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
+      }
+      for (const Vec3f v : mesh.mesh.normals)
+        EXPECT_NEAR(v.x * v.x + v.y * v.y + v.z * v.z, 1, 1e-4);
+      triangles += mesh.mesh.triangles.size();
+    }
+    EXPECT_GT(triangles, 1000u);
+  }
+}
+
+TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
+  class Never final : public Wanted {
+   public:
+    void check() const override { throw Abandoned(); }
+  };
+  const auto source = cube_of(ball, 70);
+  const NodeGrid grid(source->info());
+  ResidentBricks bricks(source, 1 << 20);
+  NodeMesher mesher(grid, bricks, {});
+  EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, Never()), Abandoned);
+}
+
+}  // namespace
+}  // namespace isobrick::test
