@@ -1,9 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <cstring>
 #include <vector>
 
+#include "isobrick/core/copy_box.h"
 #include "isobrick/core/lattice.h"
 
 namespace isobrick {
@@ -18,19 +18,9 @@ class DenseBricks final : public BrickLookup {
       : lattice_(lattice),
         bytes_(static_cast<std::size_t>(volume(lattice.bricks())) * lattice.brick_bytes()) {
     const auto* from = static_cast<const std::byte*>(samples);
-    const std::size_t size = lattice.sample_bytes();
     for_each_point({{0, 0, 0}, lattice.bricks()}, [&](Int3 b) {
-      const Box3 box = lattice.brick_box(b);
-      std::byte* brick = at(b);
-      for (Index z = box.lo.z; z < box.hi.z; ++z)
-        for (Index y = box.lo.y; y < box.hi.y; ++y) {
-          const Int3 row = Int3{box.lo.x, y, z} - b * lattice.brick;
-          std::memcpy(
-              brick + static_cast<std::size_t>(linear_index(row, lattice.brick)) * size,
-              from +
-                  static_cast<std::size_t>(linear_index({box.lo.x, y, z}, lattice.extent)) * size,
-              static_cast<std::size_t>(box.extent().x) * size);
-        }
+      copy_box({from, lattice.box()}, {at(b), lattice.full_brick_box(b)}, lattice.brick_box(b),
+               lattice.sample_bytes());
     });
   }
 

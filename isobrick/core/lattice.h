@@ -33,10 +33,14 @@ struct Lattice {
     return static_cast<std::size_t>(volume(brick)) * sample_bytes();
   }
   Box3 box() const { return {{0, 0, 0}, extent}; }
+  /// The lattice points of brick `b`, also those beyond the volume's border.
+  Box3 full_brick_box(Int3 b) const { return {b * brick, (b + Int3{1, 1, 1}) * brick}; }
   /// The samples that brick `b` holds, cut at the volume's border.
-  Box3 brick_box(Int3 b) const {
-    return intersect({b * brick, (b + Int3{1, 1, 1}) * brick}, box());
-  }
+  Box3 brick_box(Int3 b) const { return intersect(full_brick_box(b), box()); }
+  /// The brick that holds sample `p`.
+  Int3 brick_of(Int3 p) const { return floor_div(p, brick); }
+  /// The bricks that hold the samples of `samples`, which is not empty.
+  Box3 bricks_of(Box3 samples) const { return {brick_of(samples.lo), ceil_div(samples.hi, brick)}; }
 };
 
 /// Number of samples, or nothing when an extent is not positive or the number

@@ -23,6 +23,12 @@ struct Transform {
     return direction == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1};
   }
 
+  /// From a sample to the next one along an index axis, in world space.
+  Vec3d step(int axis) const {
+    const auto column = static_cast<std::size_t>(axis);
+    return Vec3d{direction[column], direction[column + 3], direction[column + 6]} * spacing[axis];
+  }
+
   Vec3d apply(Vec3d p) const {
     const Vec3d s = spacing * p;
     return {origin.x + direction[0] * s.x + direction[1] * s.y + direction[2] * s.z,

@@ -33,6 +33,17 @@ constexpr Int3 ceil_div(Int3 a, Int3 b) {
   return {(a.x + b.x - 1) / b.x, (a.y + b.y - 1) / b.y, (a.z + b.z - 1) / b.z};
 }
 constexpr Index ceil_div(Index a, Index b) { return (a + b - 1) / b; }
+/// Componentwise ⌊a / b⌋ for a >= 0, b > 0.
+constexpr Int3 floor_div(Int3 a, Int3 b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }
+
+template <class T>
+constexpr T dot(Vec3<T> a, Vec3<T> b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class T>
+constexpr Vec3<T> cross(Vec3<T> a, Vec3<T> b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 
 constexpr Int3 min(Int3 a, Int3 b) {
   return {a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z};

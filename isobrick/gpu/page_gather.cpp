@@ -12,11 +12,8 @@ template <class T>
 bool gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Int3 tile, T* page) {
   const Int3 origin = tile * kTileEdge;
   const Box3 box = intersect({origin, origin + kPage}, lattice.box());
-  const Box3 cover{
-      {box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y, box.lo.z / lattice.brick.z},
-      ceil_div(box.hi, lattice.brick)};
   bool any = false;
-  for_each_point(cover, [&](Int3 b) {
+  for_each_point(lattice.bricks_of(box), [&](Int3 b) {
     const Int3 corner = b * lattice.brick;
     const Box3 part = intersect(box, {corner, corner + lattice.brick});
     const T* from = reinterpret_cast<const T*>(bricks.find(b));

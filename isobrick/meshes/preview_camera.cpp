@@ -6,12 +6,6 @@
 namespace isobrick {
 namespace {
 
-double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-Vec3d cross(Vec3d a, Vec3d b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 Vec3d normalized(Vec3d v, Vec3d otherwise) {
   const double length = std::sqrt(dot(v, v));
   return length > 1e-9 && std::isfinite(length) ? v * (1 / length) : otherwise;

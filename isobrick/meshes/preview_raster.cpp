@@ -25,10 +25,6 @@ float unpack_component(std::uint64_t bits) {
   return (static_cast<float>(bits & 1023) - 511.0f) * (1.0f / 511.0f);
 }
 
-Vec3f cross(Vec3f a, Vec3f b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 }  // namespace
 
 PreviewRaster::PreviewRaster(int width, int height)

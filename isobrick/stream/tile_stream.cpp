@@ -14,10 +14,7 @@ constexpr Index kChunkTiles = StoreReader::kRangeChunk / kTileBlocks;
 void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index reach,
                           std::vector<Int3>& bricks) {
   for_each_needed_box(lattice, work, reach, [&](Box3 box) {
-    const Box3 cover{
-        {box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y, box.lo.z / lattice.brick.z},
-        ceil_div(box.hi, lattice.brick)};
-    for_each_point(cover, [&](Int3 b) {
+    for_each_point(lattice.bricks_of(box), [&](Int3 b) {
       if (std::find(bricks.begin(), bricks.end(), b) == bricks.end()) bricks.push_back(b);
     });
   });

@@ -40,10 +40,7 @@ void gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Inde
             const TileWork& work, const TileBlock& block) {
   const Int3 origin = work.tile * kTileEdge;
   for_each_needed_box(lattice, work, reach, [&](Box3 box) {
-    const Box3 cover{
-        {box.lo.x / lattice.brick.x, box.lo.y / lattice.brick.y, box.lo.z / lattice.brick.z},
-        ceil_div(box.hi, lattice.brick)};
-    for_each_point(cover, [&](Int3 b) {
+    for_each_point(lattice.bricks_of(box), [&](Int3 b) {
       const Int3 corner = b * lattice.brick;
       const Box3 part = intersect(box, {corner, corner + lattice.brick});
       const Int3 local = part.lo - origin, inner = part.lo - corner, n = part.extent();

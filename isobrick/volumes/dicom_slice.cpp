@@ -16,6 +16,7 @@
 #include <type_traits>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 
 namespace isobrick {
 namespace {
@@ -38,10 +39,7 @@ void prepare_library() {
 }
 
 [[noreturn]] void fail(const std::string& path, const char* what, const OFCondition& condition) {
-  std::string why = condition.text();
-  for (char& c : why)
-    if (c < 0x20 || c >= 0x7f) c = '?';
-  throw DamageError(fmt::format("'{}' {} ({})", path, what, why));
+  throw DamageError(fmt::format("'{}' {} ({})", path, what, printable(condition.text(), 200)));
 }
 
 /// Typed access to the attributes of a file.
@@ -52,10 +50,7 @@ class Attributes {
   std::string text(const DcmTagKey& tag) const {
     OFString value;
     if (item_.findAndGetOFString(tag, value).bad()) return {};
-    std::string kept(value.c_str());
-    for (char& c : kept)
-      if (c < 0x20 || c >= 0x7f) c = '?';
-    return kept.substr(0, 100);
+    return printable(value.c_str(), 100);
   }
   int number(const DcmTagKey& tag, int fallback) const {
     Uint16 value = 0;

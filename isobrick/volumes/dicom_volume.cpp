@@ -16,11 +16,7 @@
 namespace isobrick {
 namespace {
 
-double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 double length(Vec3d a) { return std::sqrt(dot(a, a)); }
-Vec3d cross(Vec3d a, Vec3d b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 /// Slices of one file each, or one file of frames.
 class DicomSource final : public VolumeSource {

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <bit>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 #include "isobrick/io/file_stream.h"
 #include "isobrick/io/text_stream.h"
 #include "isobrick/volumes/raw_source.h"
@@ -35,7 +35,7 @@ ScalarType read_type(const std::string& path, const std::string& name) {
       {"double", ScalarType::f64}};
   for (const auto& [known, type] : types)
     if (name == known) return type;
-  header_error(path, fmt::format("samples of type '{}' are not supported", name.substr(0, 60)));
+  header_error(path, fmt::format("samples of type '{}' are not supported", printable(name, 60)));
 }
 
 /// Reads keyword by keyword up to the samples.
@@ -50,7 +50,7 @@ class Parser {
     std::string encoding;
     while (encoding.empty() && !lines_.at_end()) encoding = lower(trim(lines_.next()));
     if (encoding != "ascii" && encoding != "binary")
-      header_error(path_, fmt::format("'{}' is neither ASCII nor BINARY", encoding.substr(0, 60)));
+      header_error(path_, fmt::format("'{}' is neither ASCII nor BINARY", printable(encoding, 60)));
     header_.text = encoding == "ascii";
     while (!found_) {
       if (lines_.at_end()) header_error(path_, "there are no samples");
@@ -89,15 +89,14 @@ class Parser {
     } else if (tuples_ && key == "field") {
       take_field();
     } else {
-      header_error(path_, fmt::format("'{}' is not supported{}", key.substr(0, 60),
+      header_error(path_, fmt::format("'{}' is not supported{}", printable(key, 60),
                                       tuples_ ? " before the SCALARS" : ""));
     }
   }
 
   std::string_view word(const Words& words, int i) const {
     if (words.size() <= static_cast<std::size_t>(i))
-      header_error(path_,
-                   fmt::format("'{}' has too few words", std::string(words[0].substr(0, 60))));
+      header_error(path_, fmt::format("'{}' has too few words", printable(words[0], 60)));
     return words[static_cast<std::size_t>(i)];
   }
 
@@ -166,7 +165,7 @@ std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path, const Vol
                               total, AfterEnd::unread);
   }
   layout.offset += header.begin;
-  layout.swap = sample > 1 && std::endian::native == std::endian::little;  // always big endian
+  layout.swap = sample > 1 && kNativeOrder != ByteOrder::big;
   if (size < layout.end())
     throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
                                  path, size, layout.end()));

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 
 namespace isobrick {
 namespace {
@@ -86,7 +87,7 @@ class Fields {
       header_error(path_, "not a MetaImage header: a line is not 'Key = Value'");
     const std::string key = lower(trim(line.substr(0, equals)));
     if (!fields_.emplace(key, trim(line.substr(equals + 1))).second)
-      header_error(path_, fmt::format("'{}' appears twice", key.substr(0, 60)));
+      header_error(path_, fmt::format("'{}' appears twice", printable(key, 60)));
   }
 
   std::string path_;
@@ -108,7 +109,7 @@ ScalarType read_type(const Fields& fields) {
   for (const auto& [spelling, type] : types)
     if (name == spelling) return type;
   header_error(fields.path(),
-               fmt::format("samples of type '{}' are not supported", name.substr(0, 60)));
+               fmt::format("samples of type '{}' are not supported", printable(name, 60)));
 }
 
 /// Returns how many dimensions the header's matrices and vectors have.

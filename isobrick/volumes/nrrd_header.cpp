@@ -9,6 +9,7 @@
 #include <span>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 
 namespace isobrick {
 namespace {
@@ -79,7 +80,7 @@ class Fields {
     std::erase(name, ' ');
     const std::string_view value = trim(line.substr(colon + 1));
     if (!fields_.emplace(name, value).second)
-      header_error(path_, fmt::format("the field '{}' appears twice", name.substr(0, 60)));
+      header_error(path_, fmt::format("the field '{}' appears twice", printable(name, 60)));
     listed_ = name == "datafile" && (value == "LIST" || value.starts_with("LIST "));
   }
 
@@ -198,7 +199,7 @@ Encoding read_encoding(const Fields& fields) {
   if (name == "gzip" || name == "gz") return Encoding::gzip;
   if (name == "text" || name == "txt" || name == "ascii") return Encoding::text;
   header_error(fields.path(), fmt::format("encoding '{}' is not supported; raw, gzip and text are",
-                                          name.substr(0, 60)));
+                                          printable(name, 60)));
 }
 
 std::vector<std::string> read_data_paths(const Fields& fields) {
@@ -220,7 +221,7 @@ void read_layout(const Fields& fields, TextHeader& header) {
     header.type = *known;
   else
     header_error(fields.path(),
-                 fmt::format("samples of type '{}' are not supported", type.substr(0, 60)));
+                 fmt::format("samples of type '{}' are not supported", printable(type, 60)));
   header.encoding = read_encoding(fields);
   if (const auto endian = fields.find("endian")) {
     const std::string order = lower(*endian);

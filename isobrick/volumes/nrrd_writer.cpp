@@ -25,15 +25,6 @@ std::string unit_symbol(const std::string& unit) {
 
 std::string vector_text(Vec3d v) { return fmt::format("({},{},{})", v.x, v.y, v.z); }
 
-/// The world vector of one step along an index axis.
-Vec3d step(const Transform& transform, int axis) {
-  Vec3d vector;
-  for (int row = 0; row < 3; ++row)
-    vector[row] =
-        transform.direction[static_cast<std::size_t>(3 * row + axis)] * transform.spacing[axis];
-  return vector;
-}
-
 }  // namespace
 
 std::string nrrd_header_text(const VolumeInfo& info) {
@@ -44,8 +35,8 @@ std::string nrrd_header_text(const VolumeInfo& info) {
       info.type == ScalarType::f32   ? "float"
       : info.type == ScalarType::f64 ? "double"
                                      : zarr_name(info.type),
-      info.extent.x, info.extent.y, info.extent.z, vector_text(step(t, 0)), vector_text(step(t, 1)),
-      vector_text(step(t, 2)), vector_text(t.origin));
+      info.extent.x, info.extent.y, info.extent.z, vector_text(t.step(0)), vector_text(t.step(1)),
+      vector_text(t.step(2)), vector_text(t.origin));
   if (!t.unit.empty())
     text += fmt::format("space units: \"{0}\" \"{0}\" \"{0}\"\n", unit_symbol(t.unit));
   return text + "endian: little\nencoding: raw\n\n";

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <filesystem>
 #include <limits>
 #include <string_view>
@@ -25,9 +24,6 @@ namespace isobrick {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr ByteOrder kNativeOrder =
-    std::endian::native == std::endian::little ? ByteOrder::little : ByteOrder::big;
 
 /// The header beside a raw file, if there is one and it means this very file.
 std::optional<TextHeader> find_header_beside(const std::string& path, const VolumeRequest& said) {

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 
 namespace isobrick {
 namespace {
@@ -20,10 +21,7 @@ constexpr std::size_t kMostBlock = std::size_t{512} << 20;
 int keep_complaint(TIFF*, void* to, const char*, const char* format, va_list words) {
   char text[400];
   std::vsnprintf(text, sizeof(text), format, words);
-  std::string& complaint = *static_cast<std::string*>(to);
-  complaint = text;
-  for (char& c : complaint)
-    if (c < 0x20 || c >= 0x7f) c = '?';
+  *static_cast<std::string*>(to) = printable(text, sizeof(text));
   return 1;
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 #include "isobrick/io/file.h"
 
 namespace isobrick {
@@ -82,19 +83,15 @@ class Fields {
   std::uint64_t at_ = 0;
 };
 
-/// As it may be shown: what a file says of itself may be anything.
-std::string printable(std::string text) {
-  for (char& c : text)
-    if (c < 0x20 || c > 0x7e) c = '?';
-  if (text.size() > 100) text.resize(100);
-  return text;
-}
+/// As much of what a file says of itself as is shown.
+constexpr std::size_t kMostShown = 100;
+std::string shown(std::string_view text) { return printable(text, kMostShown); }
 
 std::string shown_name(const std::string& unique, bool repeated) {
   const std::size_t separator = unique.find(kSeparator);
-  const std::string name = printable(unique.substr(0, separator));
+  const std::string name = shown(unique.substr(0, separator));
   if (separator == std::string::npos) return name;
-  return repeated ? fmt::format("{}[{}]", name, printable(unique.substr(separator + 1))) : name;
+  return repeated ? fmt::format("{}[{}]", name, shown(unique.substr(separator + 1))) : name;
 }
 
 void read_own_header(Fields& in, VdbGrid& grid) {
@@ -102,8 +99,8 @@ void read_own_header(Fields& in, VdbGrid& grid) {
   in.seek(grid.begin);
   in.number<std::uint32_t>();  // how it is compressed
   Metadata metadata = in.metadata();
-  grid.grid_class = printable(metadata["class"]);
-  grid.map = printable(in.text());
+  grid.grid_class = shown(metadata["class"]);
+  grid.map = shown(in.text());
   if (const std::string& memory = metadata["file_mem_bytes"];
       memory.size() == sizeof(std::uint64_t))
     std::memcpy(&grid.memory.emplace(), memory.data(), sizeof(std::uint64_t));
@@ -113,13 +110,13 @@ void read_own_header(Fields& in, VdbGrid& grid) {
 VdbGrid read_grid(Fields& in) {
   VdbGrid grid;
   grid.unique_name = in.text();
-  grid.type = printable(in.text());
+  grid.type = shown(in.text());
   grid.half = grid.type.ends_with(kHalfSuffix);
   if (grid.half) grid.type.resize(grid.type.size() - kHalfSuffix.size());
   grid.parent = in.text();
   const std::uint64_t fields = in.at() + 3 * sizeof(std::int64_t);
   grid.begin = in.position();
-  grid.blocks = in.position();
+  in.position();  // of its blocks
   grid.end = in.position();
   if (grid.begin < fields || grid.end < grid.begin) in.damaged("a grid outside of its place");
   read_own_header(in, grid);
@@ -184,14 +181,14 @@ const VdbGrid& choose_vdb_grid(const std::string& path, const std::vector<VdbGri
     return std::find(types.begin(), types.end(), grid.type) != types.end();
   };
   const auto fits = [&](const VdbGrid& grid) {
-    return name ? grid.name == printable(*name) : readable(grid);
+    return name ? grid.name == shown(*name) : readable(grid);
   };
   if (grids.empty()) throw UsageError(fmt::format("'{}' holds no grids", path));
   const auto chosen = std::find_if(grids.begin(), grids.end(), fits);
   const auto count = std::count_if(grids.begin(), grids.end(), fits);
   if (count == 0 && name)
     throw UsageError(
-        fmt::format("'{}' has no grid '{}'; it has {}", path, printable(*name), list(grids)));
+        fmt::format("'{}' has no grid '{}'; it has {}", path, shown(*name), list(grids)));
   if (count == 0 || !readable(*chosen))
     throw UsageError(
         fmt::format("'{}': only grids of float, double, int32, int64, bool and mask can be read, "

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -12,6 +13,9 @@
 namespace isobrick {
 
 enum class ByteOrder : std::uint8_t { little, big };
+/// That of this machine.
+inline constexpr ByteOrder kNativeOrder =
+    std::endian::native == std::endian::little ? ByteOrder::little : ByteOrder::big;
 
 /// A box of which every bound may be left out; half-open.
 struct RegionRequest {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <bit>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -20,10 +19,7 @@
 namespace isobrick {
 namespace {
 
-bool must_swap(const VtiHeader& header) {
-  return header.order !=
-         (std::endian::native == std::endian::little ? ByteOrder::little : ByteOrder::big);
-}
+bool must_swap(const VtiHeader& header) { return header.order != kNativeOrder; }
 
 /// The array's bytes as the encoding leaves them, `from` characters after its
 /// beginning.
