@@ -10,6 +10,7 @@
 #include <cerrno>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/exchange.h"
 
 namespace isobrick {
 namespace {
@@ -53,21 +54,18 @@ fs::path create_folder_beside(const fs::path& folder) {
   }
 }
 
-void rename_with(const fs::path& from, const fs::path& to, unsigned flags) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), flags) == 0) return;
-  // The file system cannot do both at once.
+/// Moves `from` to `to`, where nothing may be.
+void move_to_free_place(const fs::path& from, const fs::path& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
+  // The file system may not know the flag.
   const bool plain = errno == EINVAL || errno == ENOSYS;
-  const fs::path aside = to.string() + ".replaced";
-  if (plain && flags == RENAME_EXCHANGE && ::rename(to.c_str(), aside.c_str()) == 0 &&
-      ::rename(from.c_str(), to.c_str()) == 0 && ::rename(aside.c_str(), from.c_str()) == 0)
-    return;
-  if (plain && flags == RENAME_NOREPLACE && ::rename(from.c_str(), to.c_str()) == 0) return;
+  if (plain && ::rename(from.c_str(), to.c_str()) == 0) return;
   throw system_error("rename the finished folder to", to.string(), errno);
 }
 
 /// Moves `from` to `to`; when that exists the two change places.
 void move_folder(const fs::path& from, const fs::path& to, bool exists) {
-  rename_with(from, to, exists ? RENAME_EXCHANGE : RENAME_NOREPLACE);
+  exists ? exchange(from, to) : move_to_free_place(from, to);
 }
 
 }  // namespace

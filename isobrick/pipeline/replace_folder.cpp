@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/exchange.h"
 #include "isobrick/io/file.h"
 
 namespace isobrick {
@@ -27,18 +28,12 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-void replace_folder(fs::path finished, const fs::path& place) {
+void replace_folder(const fs::path& finished, const fs::path& place) {
   const fs::path parent = place.has_parent_path() ? place.parent_path() : fs::path(".");
   if (fs::symlink_status(place).type() == fs::file_type::not_found) {
     rename_or_throw(finished, place);
   } else {
-    if (::renameat2(AT_FDCWD, finished.c_str(), AT_FDCWD, place.c_str(), RENAME_EXCHANGE) != 0) {
-      fs::path aside = place;
-      aside += ".replaced";
-      rename_or_throw(place, aside);
-      rename_or_throw(finished, place);
-      finished = aside;
-    }
+    exchange(finished, place);
     sync_folder(parent);
     fs::remove_all(finished);
   }
