@@ -1,6 +1,8 @@
 #include "isobrick/io/text_stream.h"
 
 #include <fmt/format.h>
+#include <locale.h>
+#include <stdlib.h>
 
 #include <algorithm>
 #include <charconv>
@@ -11,6 +13,7 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 
 namespace isobrick {
 namespace {
@@ -21,6 +24,12 @@ constexpr std::size_t kMostWord = 400;
 
 bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0'; }
 
+/// A number as strtod() rounds it, in any locale.
+double rounded(std::string_view number) {
+  static const locale_t c_locale = ::newlocale(LC_ALL_MASK, "C", nullptr);
+  return ::strtod_l(std::string(number).c_str(), nullptr, c_locale);
+}
+
 /// The value of a word, if it is a number that T holds.
 template <class T>
 bool parse(std::string_view word, T& value) {
@@ -29,11 +38,10 @@ bool parse(std::string_view word, T& value) {
   const auto [at, error] = std::from_chars(word.data(), end, value);
   if (error == std::errc{} && at == end) return true;
   if constexpr (std::is_floating_point_v<T>) {
-    // Numbers beyond the type's range are infinite or zero, as strtod has them.
-    double wide = 0;
-    const auto [last, failure] = std::from_chars(word.data(), end, wide);
-    value = static_cast<T>(wide);
-    return failure == std::errc{} && last == end;
+    // Only a number beyond the type's range is left: it is infinite or zero.
+    if (error != std::errc::result_out_of_range || at != end) return false;
+    value = static_cast<T>(rounded(word));
+    return true;
   } else {
     double whole = 0;
     const auto [last, failure] = std::from_chars(word.data(), end, whole);
@@ -108,11 +116,8 @@ class TextStream final : public ByteStream {
   }
 
   [[noreturn]] void refuse(std::string_view word) const {
-    std::string shown(word.substr(0, 40));
-    std::replace_if(
-        shown.begin(), shown.end(), [](char c) { return c < 0x20 || c >= 0x7f; }, '?');
     throw Error(fmt::format("{}: '{}', before byte {} of its numbers, is no number of type {}",
-                            name(), shown, consumed_ + begin_, short_name(type_)));
+                            name(), printable(word, 40), consumed_ + begin_, short_name(type_)));
   }
 
   std::unique_ptr<ByteStream> text_;

@@ -137,8 +137,8 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
   return make_raw_source(std::move(layout), std::move(file));
 }
 
-/// One data file, from where its samples begin.
-std::unique_ptr<ByteStream> open_data(const TextHeader& header, const std::string& path) {
+/// The bytes of one data file, from where its samples begin.
+std::unique_ptr<ByteStream> open_bytes(const TextHeader& header, const std::string& path) {
   InputFile file = open_input(path);
   const std::uint64_t begin = after_lines(file, path, header.data_begin, header.skip_lines);
   const std::uint64_t end = file.size;
@@ -160,6 +160,13 @@ std::unique_ptr<ByteStream> open_data(const TextHeader& header, const std::strin
                  fmt::format("'{}' cannot have {} bytes to skip", path, header.skip_bytes));
   stream->skip(header.skip_bytes);
   return stream;
+}
+
+/// The samples of one data file. Each is a text of its own: a number ends with its file.
+std::unique_ptr<ByteStream> open_data(const TextHeader& header, const std::string& path) {
+  auto bytes = open_bytes(header, path);
+  if (header.encoding != Encoding::text) return bytes;
+  return make_text_stream(std::move(bytes), header.type);
 }
 
 std::unique_ptr<ByteStream> open_all_data(const TextHeader& header) {
@@ -192,9 +199,7 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   layout.stride = header.view.stride;
   const std::uint64_t end = static_cast<std::uint64_t>(header.view.total) * sample;
   auto stream = open_all_data(header);
-  if (header.encoding == Encoding::text)
-    stream = make_text_stream(std::move(stream), header.type);
-  else
+  if (header.encoding != Encoding::text)
     layout.swap = must_swap(order_of(header, header.type, said), header.type);
   return make_stream_source(std::move(layout), std::move(stream), end);
 }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 #include "isobrick/io/file.h"
 
 namespace isobrick {
@@ -16,14 +17,10 @@ namespace {
 
 /// As much of a header as a message should show.
 std::string quoted(std::string_view text) {
-  std::string shown = "'";
-  for (const char c : text.substr(0, 60)) shown += c >= 0x20 && c < 0x7f ? c : '?';
-  return shown + (text.size() > 60 ? "…'" : "'");
+  return fmt::format("'{}{}'", printable(text, 60), text.size() > 60 ? "…" : "");
 }
 
 constexpr std::string_view kBlanks = " \t\r";
-
-double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 /// Axes that few digits left a little off right angles are put right, x first.
 void square(std::array<double, 9>& direction) {
@@ -122,13 +119,17 @@ std::string resolve_data_file(const std::string& path, std::string_view name) {
 std::vector<std::string> resolve_data_pattern(const std::string& path, std::string_view text) {
   constexpr Index kMostFiles = 1'000'000;
   constexpr std::size_t kMostText = std::size_t{64} << 20;
+  constexpr Index kMostDigits = 20;
   const auto words = split_words(text);
   if (words.size() != 3 && words.size() != 4)
     header_error(path, fmt::format("{} is not 'PATTERN FIRST LAST [STEP]'", quoted(text)));
   const auto number = [&](std::size_t i) { return parse_integer(path, "data file", words[i]); };
   const Index first = number(1), last = number(2), step = words.size() == 4 ? number(3) : 1;
-  if (first < 0 || last < first || step < 1 || (last - first) / step >= kMostFiles ||
-      static_cast<std::size_t>((last - first) / step) * (path.size() + words[0].size()) > kMostText)
+  const bool ordered = first >= 0 && last >= first && step >= 1;
+  const Index count = ordered ? std::min((last - first) / step, kMostFiles) + 1 : 0;
+  // A number in a name takes no more characters than the largest one or the widest pattern.
+  const std::size_t name = path.size() + words[0].size() + static_cast<std::size_t>(kMostDigits);
+  if (count < 1 || count > kMostFiles || static_cast<std::size_t>(count) * name > kMostText)
     header_error(path, fmt::format("the numbers of {} make no sense", quoted(text)));
   const std::string_view pattern = words[0];
   const std::size_t percent = pattern.find('%');
@@ -139,9 +140,12 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
     header_error(path,
                  fmt::format("{} is no pattern with one number such as %03d", quoted(pattern)));
   const Index digits = width.empty() ? 0 : parse_integer(path, "data file", width);
+  if (digits > kMostDigits)
+    header_error(path,
+                 fmt::format("{}: numbers of {} digits make no sense", quoted(pattern), digits));
   std::vector<std::string> names;
-  for (Index i = first; i <= last; i += step) {
-    std::string text_of_number = std::to_string(i);
+  for (Index i = 0; i < count; ++i) {
+    std::string text_of_number = std::to_string(first + i * step);
     if (static_cast<Index>(text_of_number.size()) < digits)
       text_of_number.insert(0, static_cast<std::size_t>(digits) - text_of_number.size(),
                             width.starts_with('0') ? '0' : ' ');
@@ -172,19 +176,42 @@ void set_axes(const std::string& path, Transform& transform, const Vec3d (&axes)
   square(transform.direction);
 }
 
+namespace {
+
+/// A unit of length; picometers make the factors between them exact.
+struct LengthUnit {
+  std::string_view symbol, name;
+  double picometers;
+};
+constexpr LengthUnit kLengthUnits[] = {
+    {"m", "meter", 1e12},      {"cm", "centimeter", 1e10}, {"mm", "millimeter", 1e9},
+    {"um", "micrometer", 1e6}, {"µm", "micrometer", 1e6},  {"μm", "micrometer", 1e6},
+    {"nm", "nanometer", 1e3},  {"pm", "picometer", 1},     {"km", "kilometer", 1e15},
+    {"in", "inch", 2.54e10},   {"ft", "foot", 3.048e11},   {"å", "angstrom", 100},
+    {"Å", "angstrom", 100},
+};
+
+}  // namespace
+
 std::string unit_name(std::string_view unit) {
-  constexpr std::pair<std::string_view, std::string_view> names[] = {
-      {"m", "meter"},       {"cm", "centimeter"}, {"mm", "millimeter"}, {"um", "micrometer"},
-      {"µm", "micrometer"}, {"μm", "micrometer"}, {"nm", "nanometer"},  {"pm", "picometer"},
-      {"km", "kilometer"},  {"in", "inch"},       {"ft", "foot"},       {"å", "angstrom"},
-  };
-  for (const auto& [symbol, name] : names)
-    if (unit == symbol || unit == name) return std::string(name);
+  for (const LengthUnit& known : kLengthUnits)
+    if (unit == known.symbol || unit == known.name) return std::string(known.name);
   if (unit == "micron" || unit == "microns") return "micrometer";
   // Lengths that OME-Zarr names and hardly anybody uses.
   const bool length =
       unit.ends_with("meter") || unit == "yard" || unit == "mile" || unit == "parsec";
   return length ? std::string(unit) : std::string();
+}
+
+std::optional<double> unit_ratio(std::string_view unit, std::string_view other) {
+  if (unit == other) return 1;
+  const auto find = [](std::string_view name) {
+    return std::find_if(std::begin(kLengthUnits), std::end(kLengthUnits),
+                        [&](const LengthUnit& known) { return known.name == name; });
+  };
+  const auto *const a = find(unit), *const b = find(other);
+  if (a == std::end(kLengthUnits) || b == std::end(kLengthUnits)) return std::nullopt;
+  return a->picometers / b->picometers;
 }
 
 }  // namespace isobrick

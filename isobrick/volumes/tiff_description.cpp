@@ -5,13 +5,14 @@
 #include <optional>
 #include <string_view>
 
+#include "isobrick/core/printable.h"
 #include "isobrick/volumes/text_header.h"
 
 namespace isobrick {
 namespace {
 
 Index read_count(const std::string& path, const char* name, std::string_view text) {
-  constexpr Index kMost = Index{1} << 31;
+  constexpr Index kMost = Index{1} << 20;  // so that three of them can be multiplied
   const Index count = parse_integer(path, name, text);
   if (count < 1 || count > kMost)
     header_error(path, fmt::format("{} = {} makes no sense", name, count));
@@ -57,6 +58,28 @@ std::optional<std::string_view> attribute(std::string_view text, std::string_vie
   return rest.substr(0, rest.find('"'));
 }
 
+/// Spacing, in the unit of the first axis that has one; each axis says its own.
+void read_physical_size(const std::string& path, std::string_view pixels, TiffDescription& said) {
+  constexpr const char* names[] = {"PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"};
+  std::optional<std::string_view> first;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto value = attribute(pixels, names[axis]);
+    const double length = value ? read_length(path, names[axis], *value) : 0;
+    if (length == 0) continue;
+    const auto unit = attribute(pixels, fmt::format("{}Unit", names[axis])).value_or("µm");
+    if (!first) {
+      first = unit;
+      said.unit = unit_name(unit);
+    }
+    const auto ratio = unit == *first ? std::optional(1.0) : unit_ratio(unit_name(unit), said.unit);
+    if (!ratio)
+      header_error(path, fmt::format("OME: {} is in units of '{}', which cannot be compared with "
+                                     "'{}'",
+                                     names[axis], printable(unit, 20), printable(*first, 20)));
+    said.spacing[axis] = length * *ratio;
+  }
+}
+
 TiffDescription parse_ome(const std::string& path, std::string_view text) {
   TiffDescription said;
   const std::string_view pixels = text.substr(text.find("<Pixels"));
@@ -78,12 +101,7 @@ TiffDescription parse_ome(const std::string& path, std::string_view text) {
       if (said.order.size() != 3 || said.order.find(axis) == std::string::npos)
         header_error(path, "OME: the DimensionOrder is not known");
   }
-  constexpr const char* names[] = {"PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"};
-  for (int axis = 0; axis < 3; ++axis)
-    if (const auto value = attribute(pixels, names[axis]))
-      said.spacing[axis] = read_length(path, names[axis], *value);
-  if (said.spacing.x > 0)
-    said.unit = unit_name(attribute(pixels, "PhysicalSizeXUnit").value_or("µm"));
+  read_physical_size(path, pixels, said);
   return said;
 }
 

@@ -209,19 +209,18 @@ std::vector<double> reals(const std::string& path, const Attributes& attributes,
   return numbers;
 }
 
-/// First and one after the last sample.
-Box3 read_extent(const std::string& path, const std::string& text) {
+/// First and one after the last sample, as the attribute `name` says.
+Box3 read_extent(const std::string& path, const char* name, const std::string& text) {
   const auto words = split_words(text);
-  if (words.size() != 6) header_error(path, "an extent does not have 6 numbers");
+  if (words.size() != 6) header_error(path, fmt::format("{} does not have 6 numbers", name));
   Box3 box;
   constexpr Index kMost = Index{1} << 31;
   for (int axis = 0; axis < 3; ++axis) {
     const auto at = static_cast<std::size_t>(2 * axis);
-    box.lo[axis] = parse_integer(path, "WholeExtent", words[at]);
-    box.hi[axis] = parse_integer(path, "WholeExtent", words[at + 1]);
+    box.lo[axis] = parse_integer(path, name, words[at]);
+    box.hi[axis] = parse_integer(path, name, words[at + 1]);
     if (box.lo[axis] < -kMost || box.hi[axis] > kMost || box.hi[axis] < box.lo[axis])
-      header_error(path,
-                   fmt::format("the extent {} {} makes no sense", box.lo[axis], box.hi[axis]));
+      header_error(path, fmt::format("{}: {} {} makes no sense", name, box.lo[axis], box.hi[axis]));
     ++box.hi[axis];
   }
   return box;
@@ -317,8 +316,8 @@ VtiHeader parse_vti_header(const std::string& path, const std::string& array,
   reader.read();
   VtiHeader header;
   const std::string whole = value_of(reader.image(), "WholeExtent", "");
-  const Box3 box = read_extent(path, whole);
-  if (!(read_extent(path, value_of(reader.piece(), "Extent", whole.c_str())) == box))
+  const Box3 box = read_extent(path, "WholeExtent", whole);
+  if (!(read_extent(path, "Extent", value_of(reader.piece(), "Extent", whole.c_str())) == box))
     header_error(path, "the piece is not the whole extent, which is not supported");
   const Attributes& chosen = reader.array().attributes;
   const Int3 extent = reader.array().cells ? box.extent() - Int3{1, 1, 1} : box.extent();

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <filesystem>
 
 #include "isobrick/volumes/open_source.h"
 #include "test_samples.h"
@@ -10,6 +12,8 @@
 // NRRD and MetaImage files with everything that their headers may say of samples.
 namespace isobrick {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr Int3 kExtent{7, 5, 4};
 constexpr Box3 kWhole{{0, 0, 0}, kExtent};
@@ -78,11 +82,35 @@ TEST_F(TextVolume, NrrdInSeveralFiles) {
   EXPECT_TRUE(contains(message_of([&] { open_and_read("five.nhdr"); }), "goes on"));
   dir.write("s9.raw", "#\n" + all.substr(plane, plane - 2));
   EXPECT_TRUE(contains(message_of([&] { open_and_read("list.nhdr"); }), "s9.raw"));
-  for (const char* pattern : {"s%s.raw 1 2", "s%d.raw 1", "s%d.raw 2 1", "s%d%d.raw 1 2",
-                              "s%9999d.raw 1 2", "s%d.raw 0 9223372036854775807"}) {
+  for (const char* pattern :
+       {"s%s.raw 1 2", "s%d.raw 1", "s%d.raw 2 1", "s%d%d.raw 1 2", "s%9999d.raw 1 2",
+        "s%999d.raw 1 2", "s%021d.raw 1 2", "s%d.raw 0 9223372036854775807", "s%d.raw 0 1000000"}) {
     dir.write("bad.nhdr", common + "data file: " + pattern + "\n");
     message_of([&] { open_source(dir / "bad.nhdr", {}); });
   }
+}
+
+/// The last number is the largest there is: nothing comes after it.
+TEST_F(TextVolume, PatternsOfHugeNumbersEnd) {
+  const std::string all = whole(ScalarType::i16);
+  const std::string last = "9223372036854775807", before = "6917529027641081856";
+  dir.write("s" + before + ".raw", all.substr(0, all.size() / 2));
+  dir.write("s0" + last + ".raw", all.substr(all.size() / 2));
+  fs::rename(dir / ("s" + before + ".raw"), dir / ("s0" + before + ".raw"));
+  dir.write("v.nhdr", nrrd("encoding: raw\nendian: little\ndata file: s%020d.raw " + before + " " +
+                           last + " 2305843009213693951\n"));
+  expect_whole("v.nhdr");
+}
+
+TEST_F(TextVolume, TextInSeveralFilesIsNotOneText) {
+  dir.write("a.txt", "1 2 3 12");
+  dir.write("b.txt", "34 5 6\n7\n");
+  dir.write("v.nhdr",
+            "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: text\n"
+            "data file: LIST\na.txt\nb.txt\n");
+  EXPECT_EQ(open_and_read("v.nhdr"), std::string({1, 2, 3, 12, 34, 5, 6, 7}));
+  dir.write("b.txt", "34 5 6");
+  EXPECT_TRUE(contains(message_of([&] { open_and_read("v.nhdr"); }), "b.txt"));
 }
 
 TEST_F(TextVolume, NrrdAsText) {
@@ -101,6 +129,16 @@ TEST_F(TextVolume, NrrdAsText) {
   EXPECT_EQ(v[5], std::numeric_limits<float>::infinity());
   EXPECT_EQ(v[6], std::numeric_limits<float>::infinity());
   EXPECT_EQ(v[7], 7);
+  dir.write("d.nrrd",
+            "NRRD0001\ntype: double\ndimension: 3\nsizes: 2 2 2\nencoding: ascii\n\n"
+            "1e400 -1e400 1e-400 -1e-400 1e308 5e-324 0 -0");
+  const std::string wide = open_and_read("d.nrrd");
+  std::array<double, 8> w{};
+  ASSERT_EQ(wide.size(), sizeof(w));
+  std::memcpy(w.data(), wide.data(), sizeof(w));
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(w, (std::array<double, 8>{infinite, -infinite, 0, 0, 1e308, 5e-324, 0, 0}));
+  EXPECT_TRUE(std::signbit(w[3]) && std::signbit(w[7]) && !std::signbit(w[2]));
   const std::string header =
       "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 2 1\nencoding: text\n\n";
   dir.write("w.nrrd", header + "1 2 3 256");

@@ -130,6 +130,9 @@ TEST_F(Tiff, WhatDescriptionsPromiseMustBeThere) {
   EXPECT_TRUE(contains(refused("<OME><Pixels DimensionOrder=\"XYZCT\" SizeZ=\"1\" SizeC=\"5\">"),
                        "5 chan"));
   EXPECT_TRUE(contains(refused("<OME><Pixels DimensionOrder=\"XYQ\" SizeZ=\"5\">"), "Order"));
+  // 2^66 pages in all, which are 0 where the product wraps around.
+  EXPECT_TRUE(contains(refused("ImageJ=1.54\nchannels=4194304\nslices=4194304\nframes=4194304\n"),
+                       "no sense"));
   const auto one = write("one.tif", {.description = "ImageJ=1.54\nimages=9\nslices=9\n"}, 0, 1);
   EXPECT_TRUE(contains(message_of([&] { open_source(one, {}); }), "promises samples"));
   const auto spaced =
@@ -137,6 +140,34 @@ TEST_F(Tiff, WhatDescriptionsPromiseMustBeThere) {
                                      "unit=nm\n"});
   EXPECT_EQ(open_source(spaced, {})->info().transform.spacing, (Vec3d{1, 1, 2.5}));
   EXPECT_EQ(open_source(spaced, {})->info().transform.unit, "nanometer");
+}
+
+TEST_F(Tiff, EachAxisOfOmeHasAUnitOfItsOwn) {
+  const auto transform = [&](const std::string& sizes) {
+    const auto path =
+        write("v.tif", {.description = "<OME><Pixels DimensionOrder=\"XYZCT\" SizeZ=\"5\" " +
+                                       sizes + "></Pixels></OME>"});
+    return open_source(path, {})->info().transform;
+  };
+  const Transform mixed = transform(
+      "PhysicalSizeX=\"250\" PhysicalSizeXUnit=\"nm\" PhysicalSizeY=\"0.25\" "
+      "PhysicalSizeZ=\"0.0015\" PhysicalSizeZUnit=\"mm\"");
+  EXPECT_EQ(mixed.unit, "nanometer");
+  EXPECT_EQ(mixed.spacing, (Vec3d{250, 250, 1500}));
+  const Transform depth = transform("PhysicalSizeZ=\"3\" PhysicalSizeZUnit=\"Å\"");
+  EXPECT_EQ(depth.unit, "angstrom");
+  EXPECT_EQ(depth.spacing, (Vec3d{1, 1, 3}));
+  const Transform pixels = transform(
+      "PhysicalSizeX=\"2\" PhysicalSizeXUnit=\"pixel\" PhysicalSizeY=\"3\" "
+      "PhysicalSizeYUnit=\"pixel\"");
+  EXPECT_EQ(pixels.unit, "");
+  EXPECT_EQ(pixels.spacing, (Vec3d{2, 3, 1}));
+  EXPECT_TRUE(contains(message_of([&] {
+                         transform(
+                             "PhysicalSizeX=\"2\" PhysicalSizeXUnit=\"pixel\" "
+                             "PhysicalSizeY=\"3\"");
+                       }),
+                       "PhysicalSizeY is in units of"));
 }
 
 TEST_F(Tiff, DamagedFiles) {
