@@ -137,23 +137,26 @@ bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_v
          std::memcmp(samples.data(), samples.data() + size, samples.size() - size) == 0;
 }
 
-void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* brick) {
-  const Int3 held = lattice.brick_box(b).extent();
-  const Int3 full = lattice.brick;
-  if (held == full) return;
-  visit_scalar(lattice.type, [&](auto tag) {
+void fill_box(ScalarType type, double fill_value, BoxSamples<std::byte> samples, Box3 part) {
+  visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    const std::uint64_t bits = fill_bits(lattice.type, fill_value);
+    const std::uint64_t bits = fill_bits(type, fill_value);
     T fill;
     std::memcpy(&fill, &bits, sizeof fill);
-    T* const samples = reinterpret_cast<T*>(brick);
-    for (Index z = 0; z < full.z; ++z)
-      for (Index y = 0; y < full.y; ++y) {
-        T* const row = samples + (z * full.y + y) * full.x;
-        const Index first = z < held.z && y < held.y ? held.x : 0;
-        std::fill(row + first, row + full.x, fill);
-      }
+    for (Index z = part.lo.z; z < part.hi.z; ++z)
+      for (Index y = part.lo.y; y < part.hi.y; ++y)
+        std::fill_n(reinterpret_cast<T*>(samples.at({part.lo.x, y, z}, sizeof(T))),
+                    part.hi.x - part.lo.x, fill);
   });
+}
+
+void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* brick) {
+  const Box3 full = lattice.full_brick_box(b), held = lattice.brick_box(b);
+  for (int axis = 0; axis < 3; ++axis) {
+    Box3 beyond = full;
+    beyond.lo[axis] = held.hi[axis];
+    if (!beyond.empty()) fill_box(lattice.type, fill_value, {brick, full}, beyond);
+  }
 }
 
 std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_bytes) {

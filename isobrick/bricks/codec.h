@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isobrick/bricks/decompress.h"
+#include "isobrick/core/copy_box.h"
 #include "isobrick/core/lattice.h"
 
 namespace isobrick {
@@ -40,6 +41,9 @@ std::uint64_t fill_bits(ScalarType type, double fill_value);
 
 /// True when every sample equals the fill value, bit for bit.
 bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_value);
+
+/// Sets the samples of `part`, which lies in the box, to the fill value.
+void fill_box(ScalarType type, double fill_value, BoxSamples<std::byte> samples, Box3 part);
 
 /// Sets the samples of brick `b` that lie outside the volume to the fill value:
 /// what bricks at the border are padded with before they are encoded.

@@ -36,8 +36,8 @@ std::optional<Text> read_array(const fs::path& folder) {
   return std::nullopt;
 }
 
-/// Names of an array's axes before its last three: those that it says itself, if
-/// they are time and channel; five dimensions are t, c, z, y, x.
+/// Names of an array's axes before its last three: those that it says itself. Where it says
+/// none, five dimensions are t, c, z, y, x, and other axes have no name ("?").
 std::vector<std::string> leading_names(const ArrayMetadata& array) {
   const std::size_t count = array.shape.size() - 3;
   std::vector<std::string> names(count, "?");

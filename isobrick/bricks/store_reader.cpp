@@ -31,6 +31,17 @@ Int3 last_xyz(std::span<const Index> extents) {
   return {extents[n - 1], extents[n - 2], extents[n - 3]};
 }
 
+/// What an index of so many bricks weighs in the cache.
+std::uint64_t index_weight(std::uint64_t bricks) {
+  return 64 + ShardIndex::encoded_size(bricks, true);
+}
+
+/// What the cache holds of a level whose shards are so many.
+std::uint64_t most_index_bytes(std::uint64_t shards, std::uint64_t bricks_of_shard) {
+  const std::uint64_t one = index_weight(bricks_of_shard);
+  return shards <= kIndexCacheBytes / one ? shards * one : std::max(one, kIndexCacheBytes);
+}
+
 // No encoder makes a brick much larger than it is; a length beyond is damage,
 // and must not make us ask for that much memory.
 std::uint64_t largest_encoded(std::uint64_t decoded) { return decoded + decoded / 8 + (64 << 10); }
@@ -158,6 +169,10 @@ void StoreReader::Impl::open_level(const ImageMetadata::Level& described,
   level.shards = ceil_div(out.lattice.extent, out.shard);
   level.bricks_per_shard = ceil_div(out.shard, out.lattice.brick);
   if (volume(level.shards) > kMaxShards) throw Error(where + ": too many shards");
+  if (array.sharding)
+    out.index_bytes = most_index_bytes(
+        static_cast<std::uint64_t>(volume(level.shards)),
+        static_cast<std::uint64_t>(volume(level.bricks_per_shard)) * level.place.shard_volumes);
   if (!levels.empty()) {
     const ArrayMetadata& finest = levels[0].metadata;
     if (array.type != finest.type ||
@@ -224,7 +239,7 @@ std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3
     // A shard without a file has only absent bricks.
     if (!*file) {
       check_missing_shard(level, s);
-      return std::pair(std::make_shared<const ShardIndex>(0), std::uint64_t{64});
+      return std::pair(std::make_shared<const ShardIndex>(0), index_weight(0));
     }
     const ArrayMetadata::Sharding& sharding = *at(level).metadata.sharding;
     const std::uint64_t size = file->size();
@@ -238,7 +253,7 @@ std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3
       bytes_read += index_size;
       return std::pair(std::make_shared<const ShardIndex>(
                            ShardIndex::decode(bytes, sharding.index_has_crc, size)),
-                       64 + index_size);
+                       index_weight(bricks));
     } catch (const DamageError& e) {
       throw DamageError(fmt::format("level {}, shard ({}, {}, {}): '{}': {}", level, s.x, s.y, s.z,
                                     file->path().string(), e.what()));

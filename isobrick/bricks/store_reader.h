@@ -27,6 +27,9 @@ struct LevelInfo {
   /// Bytes that each thread needs to decode a brick, beyond the brick and what it
   /// is encoded to: nothing unless a chunk holds several channels or times.
   std::uint64_t decode_extra = 0;
+  /// Bytes of this level's shard indices that the reader keeps at most: all of a usual
+  /// volume, bounded of a huge one.
+  std::uint64_t index_bytes = 0;
 };
 
 /// What a store's metadata says.

@@ -9,15 +9,38 @@ namespace {
 
 using Role = ImageMetadata::Axis::Role;
 
-/// The place on one axis, whose role the selection decides where it is open.
-Index choose_on_axis(const std::string& path, const ImageMetadata::Axis& axis, Index count,
-                     Role role, const Selection& selection) {
+/// Roles that no axis of the image has by its own words: whoever chooses by such a role on
+/// an axis that says nothing of itself says what it is.
+struct FreeRoles {
+  bool time = true, channel = true;
+
+  explicit FreeRoles(const ImageMetadata& image) {
+    for (const ImageMetadata::Axis& axis : image.leading) {
+      time = time && axis.role != Role::time;
+      channel = channel && axis.role != Role::channel;
+    }
+  }
+
+  Role chosen(const Selection& selection) const {
+    const bool by_time = time && selection.time, by_channel = channel && selection.channel;
+    if (by_time == by_channel) return Role::unknown;
+    return by_time ? Role::time : Role::channel;
+  }
+};
+
+/// There are at most two such axes, so that at least one role is free for an axis without.
+[[noreturn]] void refuse_axis(const std::string& path, const std::string& axis, Index count,
+                              const FreeRoles& free) {
+  throw UsageError(fmt::format("'{}' has {} volumes along axis '{}': choose one with {} 0 … {}{}",
+                               path, count, axis, free.channel ? "--channel" : "--time", count - 1,
+                               free.channel && free.time ? " or --time" : ""));
+}
+
+/// The place on one axis of a role, or of none and one place.
+Index choose_on_axis(const std::string& path, Index count, Role role, const Selection& selection) {
   if (role == Role::time) return choose(path, "--time", count, selection.time);
   if (role == Role::channel) return choose(path, "--channel", count, selection.channel);
-  if (count == 1) return 0;
-  throw UsageError(
-      fmt::format("'{}' has {} volumes along axis '{}': choose one with --channel 0 … {} or --time",
-                  path, count, axis.name, count - 1));
+  return 0;
 }
 
 }  // namespace
@@ -29,21 +52,22 @@ VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadat
                             array.shape.size(), image.leading.size() + 3));
   VolumeChoice choice;
   std::string name;
+  const FreeRoles free(image);
   bool times = false, channels = false;
   for (std::size_t i = 0; i < image.leading.size(); ++i) {
     const ImageMetadata::Axis& axis = image.leading[i];
     const Index count = array.shape[i];
     Role role = axis.role;
-    // Whoever chooses on an axis that says nothing of itself says what it is.
-    if (role == Role::unknown && count > 1 &&
-        selection.channel.has_value() != selection.time.has_value())
-      role = selection.channel ? Role::channel : Role::time;
+    if (role == Role::unknown && count > 1) {
+      role = free.chosen(selection);
+      if (role == Role::unknown) refuse_axis(path.string(), axis.name, count, free);
+    }
     if ((role == Role::time && times) || (role == Role::channel && channels))
       throw Error(fmt::format("'{}' has several axes of {}, which is not supported", path.string(),
                               role == Role::time ? "time" : "channels"));
     times |= role == Role::time;
     channels |= role == Role::channel;
-    choice.place.push_back(choose_on_axis(path.string(), axis, count, role, selection));
+    choice.place.push_back(choose_on_axis(path.string(), count, role, selection));
     if (count > 1)
       name += fmt::format("{}{}_{}", name.empty() ? "" : "_",
                           role == Role::time ? "time" : "channel", choice.place.back());

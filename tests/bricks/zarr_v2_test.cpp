@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "isobrick/bricks/codec.h"
 #include "isobrick/bricks/decompress.h"
 #include "isobrick/bricks/metadata_files.h"
 #include "tests/bricks/store_fixture.h"
@@ -156,6 +157,34 @@ TEST_F(ZarrV2, AFourthAxisIsWhatItIsChosenFor) {
   expect_refused<UsageError>("choose one", {.channel = 0, .time = 0});
 }
 
+TEST_F(ZarrV2, AnAxisWithoutARoleTakesTheOneThatIsFree) {
+  const auto write = [&](std::vector<std::string> leading) {
+    std::filesystem::remove_all(path);
+    json axes = json::array();
+    for (const std::string& name : leading) axes.push_back({{"name", name}});
+    for (const char* name : {"z", "y", "x"}) axes.push_back({{"name", name}, {"type", "space"}});
+    std::vector<double> ones(axes.size(), 1);
+    const json scale{
+        {"version", "0.4"},
+        {"axes", axes},
+        {"datasets",
+         {{{"path", "0"}, {"coordinateTransformations", {{{"type", "scale"}, {"scale", ones}}}}}}}};
+    write_file(path / ".zattrs", json{{"multiscales", {scale}}}.dump());
+    write_array(path / "0", {3, 4, 2, 5, 7}, {2, 2, 2, 2, 2});
+  };
+  write({"t", "phase"});
+  for (Index time = 0; time < 3; ++time)
+    for (Index phase = 0; phase < 4; ++phase)
+      expect_counting(StoreReader(path, {.channel = phase, .time = time}), 0,
+                      (time * 4 + phase) * 2 * 5 * 7);
+  expect_refused<UsageError>("axis 'phase': choose one with --channel 0 … 3", {.time = 0});
+  write({"phase", "c"});
+  expect_counting(StoreReader(path, {.channel = 1, .time = 2}), 0, (2 * 4 + 1) * 2 * 5 * 7);
+  EXPECT_EQ(StoreReader(path, {.channel = 1, .time = 2}).info().additions,
+            path / "isobrick" / "time_2_channel_1");
+  expect_refused<UsageError>("axis 'phase': choose one with --time 0 … 2", {.channel = 0});
+}
+
 TEST_F(ZarrV2, WhatIsBrokenIsNamed) {
   const auto expect = [&](const char* part, const char* key, const json& value, bool damage) {
     const json whole = meta;
@@ -175,7 +204,7 @@ TEST_F(ZarrV2, WhatIsBrokenIsNamed) {
   expect("structured", "dtype", json::array(), false);
   expect("filter 'x'", "filters", json::array({{{"id", "x"}}}), false);
   expect("'lzma'", "compressor", {{"id", "lzma"}}, false);
-  expect("id", "compressor", json::object(), true);
+  expect("compressor: has no 'id'", "compressor", json::object(), true);
   expect("fill_value", "fill_value", "NaN", true);
   expect("separator", "dimension_separator", "-", true);
   expect("out of bounds", "shape", {Index{1} << 62, 4, 5}, true);
@@ -183,6 +212,63 @@ TEST_F(ZarrV2, WhatIsBrokenIsNamed) {
   expect("must have 6", "shape", {1, 1, 1, 1, 1, 1}, true);
   write_file(path / ".zarray", "{");
   expect_refused<DamageError>(".zarray");
+}
+
+/// Eight times 0, eight times 1, … eight times 7.
+std::vector<std::byte> steps() {
+  std::vector<std::byte> bytes;
+  for (int i = 0; i < 64; ++i) bytes.push_back(static_cast<std::byte>(i / 8));
+  return bytes;
+}
+
+/// The same as other programs have compressed it, or as their formats have it.
+std::vector<std::byte> compressed_steps(ByteCodec codec) {
+  const auto bytes = [](std::initializer_list<int> values) {
+    std::vector<std::byte> result;
+    for (const int value : values) result.push_back(static_cast<std::byte>(value));
+    return result;
+  };
+  if (codec == ByteCodec::zstd)
+    return encode_bytes({.steps = {ByteCodec::zstd}, .zstd_level = 3}, steps());
+  if (codec == ByteCodec::zlib)
+    return bytes({0x78, 0xda, 0x63, 0x60, 0x80, 0x00, 0x46, 0x28, 0x60, 0x82,
+                  0x02, 0x66, 0x28, 0x60, 0x81, 0x02, 0x56, 0x28, 0x60, 0x83,
+                  0x02, 0x76, 0x28, 0x00, 0x00, 0x12, 0x30, 0x00, 0xe1});
+  if (codec == ByteCodec::gzip)
+    return bytes({0x1f, 0x8b, 0x08, 0x00, 0x00, 0x00, 0x00, 0x00, 0x02, 0xff, 0x63,
+                  0x60, 0x80, 0x00, 0x46, 0x28, 0x60, 0x82, 0x02, 0x66, 0x28, 0x60,
+                  0x81, 0x02, 0x56, 0x28, 0x60, 0x83, 0x02, 0x76, 0x28, 0x00, 0x00,
+                  0x6c, 0xd1, 0x0a, 0xbb, 0x40, 0x00, 0x00, 0x00});
+  if (codec == ByteCodec::lz4) {
+    // The length; a literal and its repetition six times; sixteen literals.
+    auto block = bytes({64, 0, 0, 0});
+    for (int k = 0; k < 6; ++k)
+      for (const std::byte b : bytes({0x13, k, 1, 0})) block.push_back(b);
+    for (const std::byte b : bytes({0xf0, 1, 6, 6, 6, 6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 7, 7}))
+      block.push_back(b);
+    return block;
+  }
+  // Blosc: format 2, samples stored as they are.
+  auto frame = bytes({2, 1, 2, 1, 64, 0, 0, 0, 64, 0, 0, 0, 80, 0, 0, 0});
+  for (const std::byte b : steps()) frame.push_back(b);
+  return frame;
+}
+
+TEST(Decompress, GivesBackWhatWasCompressed) {
+  for (const ByteCodec codec :
+       {ByteCodec::zstd, ByteCodec::gzip, ByteCodec::zlib, ByteCodec::lz4, ByteCodec::blosc}) {
+    if (!can_decompress(codec)) continue;
+    SCOPED_TRACE(name_of(codec));
+    const std::vector<std::byte> encoded = compressed_steps(codec);
+    std::vector<std::byte> out(64), more(65, std::byte{0xee}), less(63);
+    EXPECT_EQ(decompress(codec, encoded, out), 64u);
+    EXPECT_EQ(out, steps());
+    EXPECT_EQ(decompress(codec, encoded, more), 64u);
+    EXPECT_EQ(more.back(), std::byte{0xee});
+    EXPECT_THROW(decompress(codec, encoded, less), DamageError);
+    for (std::size_t size = 1; size < encoded.size(); ++size)
+      EXPECT_THROW(decompress(codec, std::span(encoded).first(size), out), DamageError) << size;
+  }
 }
 
 TEST(Decompress, RefusesWhatIsNotCompressed) {
