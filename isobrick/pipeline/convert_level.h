@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "isobrick/bricks/store_writer.h"
 #include "isobrick/core/progress.h"
+#include "isobrick/pipeline/brick_output.h"
 #include "isobrick/pipeline/convert_journal.h"
 #include "isobrick/pipeline/range_scan.h"
 
@@ -16,13 +16,7 @@ namespace isobrick {
 /// Writes one level of a store: bricks, encoded in parallel, and ranges.
 class LevelWriter {
  public:
-  struct Counts {
-    std::uint64_t bricks = 0, absent = 0, kept = 0;
-  };
-
-  /// `journal`, if there is one, sees every brick. `progress` advances with
-  /// each brick: by its samples in the input's own level, by nothing in coarser
-  /// ones, where it still may throw to stop the conversion.
+  /// As BrickOutput.
   LevelWriter(StoreWriter& store, const StoreLayout& layout, int level, int bricks_in_flight,
               ConvertJournal* journal, Progress& progress);
 
@@ -41,37 +35,25 @@ class LevelWriter {
   void close(Index z1);
 
   bool has_nan() const { return ranges_->has_nan(); }
-  const Counts& counts() const { return counts_; }
+  const BrickCounts& counts() const { return output_.counts(); }
 
  private:
-  /// A brick on its way to its shard.
-  struct Parcel {
-    Int3 brick;
-    bool kept = false;      ///< its shard was whole already
-    std::uint32_t crc = 0;  ///< of the samples, for the journal
-    std::optional<std::vector<std::byte>> encoded;
-  };
-
   bool is_kept(Int3 shard) const {
     return kept_[static_cast<std::size_t>(linear_index(shard, shards_))];
   }
   void write_bricks(Box3 box, const std::byte* samples);
-  Parcel pack(Int3 brick, Box3 box, const std::byte* samples) const;
-  void deliver(const Parcel& parcel);
   void finish_shards(Index z1);
 
   StoreWriter& store_;
-  const StoreLayout& layout_;
   const LevelInfo& info_;
   int level_;
   std::size_t bricks_in_flight_;
   Int3 shards_, bricks_per_shard_;
   std::vector<bool> kept_;  ///< shards that an interrupted run finished
   ConvertJournal* journal_;
-  Progress& progress_;
+  BrickOutput output_;
   std::unique_ptr<LevelRanges> ranges_;
   Index next_shard_z_ = 0;
-  Counts counts_;
 };
 
 }  // namespace isobrick

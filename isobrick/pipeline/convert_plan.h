@@ -25,7 +25,7 @@ class ConvertPlan {
   /// `source_bytes`: what the source takes for itself. Throws UsageError naming
   /// the least budget when not even one piece fits.
   ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads, bool random_access,
-              std::size_t source_bytes = 0);
+              std::size_t source_bytes);
 
   /// As many as asked for, or fewer where the budget is small for the bricks.
   int threads() const { return threads_; }

@@ -2,16 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
-#include <memory>
-#include <set>
-#include <tuple>
-#include <vector>
 
 #include "isobrick/bricks/store_writer.h"
 #include "isobrick/core/progress.h"
+#include "isobrick/pipeline/brick_output.h"
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/pipeline/convert_journal.h"
+#include "isobrick/pipeline/sparse_bricks.h"
 #include "isobrick/pipeline/sparse_ranges.h"
 #include "isobrick/volumes/volume_source.h"
 
@@ -27,15 +24,15 @@ namespace isobrick {
 /// level's bricks wait in a temporary file.
 class SparsePyramid {
  public:
-  struct Counts {
-    std::uint64_t bricks = 0, absent = 0, kept = 0;
+  struct Counts : BrickCounts {
     bool has_nan = false;
   };
 
   /// Whether a source and a layout can be converted in this way.
   static bool possible(const VolumeSource& source, const StoreLayout& layout);
 
-  /// Throws UsageError, naming the least that does, for a budget that is too small.
+  /// Looks for the bricks that are there. Throws UsageError, naming the least that does, for
+  /// a budget that is too small.
   SparsePyramid(VolumeSource& source, const StoreLayout& layout, const ConvertOptions& options,
                 int threads);
 
@@ -47,10 +44,14 @@ class SparsePyramid {
  private:
   class Level;
 
+  /// Chooses threads and bricks in flight that leave room for `fixed` bytes.
+  void fit(std::size_t fixed, std::uint64_t memory);
+
   VolumeSource& source_;
   const StoreLayout& layout_;
   int threads_;
   std::size_t in_flight_;
+  SparseBricks bricks_;  ///< of level 0, until they are written
 };
 
 }  // namespace isobrick

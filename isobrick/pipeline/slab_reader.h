@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -10,6 +11,9 @@ namespace isobrick {
 
 /// Told of a brick that cannot be read and why; called from any thread.
 using BrickFailure = std::function<void(Int3 brick, const std::string& what)>;
+
+/// Bytes that read_slab() takes on so many threads, and the reader for its shard indices.
+std::uint64_t slab_memory(const StoreInfo& store, int level, int threads);
 
 /// Decodes the samples of `box` of a level into `out`, dense in C order, on all
 /// threads of the current arena. Without `failure` the first brick that cannot

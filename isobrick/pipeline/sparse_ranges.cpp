@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <map>
@@ -17,8 +18,7 @@ constexpr Int3 kBlock{kBlockEdge, kBlockEdge, kBlockEdge};
 /// A chunk of ranges, in blocks and in samples.
 constexpr Index kChunkBlocks = StoreReader::kRangeChunk;
 constexpr Index kChunkSamples = kChunkBlocks * kBlockEdge;
-
-constexpr Int3 floor_div(Int3 a, Index b) { return {a.x / b, a.y / b, a.z / b}; }
+constexpr Int3 kChunk{kChunkBlocks, kChunkBlocks, kChunkBlocks};
 
 template <class T>
 class TypedSparseRanges final : public SparseRanges {
@@ -28,7 +28,7 @@ class TypedSparseRanges final : public SparseRanges {
       : store_(store),
         level_(level),
         lattice_(lattice),
-        chunks_(ceil_div(lattice.blocks(), {kChunkBlocks, kChunkBlocks, kChunkBlocks})),
+        chunks_(ceil_div(lattice.blocks(), kChunk)),
         is_there_(std::move(is_there)) {
     // Which zero a range keeps must not depend on where a sample lay.
     fill_.include(static_cast<T>(fill_value));
@@ -38,13 +38,11 @@ class TypedSparseRanges final : public SparseRanges {
   void add(const BrickBlocks& brick) override {
     const auto* pairs = reinterpret_cast<const ValueRange<T>*>(brick.pairs.data());
     for_each_point(brick.blocks, [&](Int3 block) {
-      const Int3 chunk = floor_div(block, kChunkBlocks);
+      const Int3 chunk = floor_div(block, kChunk);
       auto& ranges = open_[{chunk.z, chunk.y, chunk.x}];
       if (ranges.empty()) ranges.resize(kChunkBlocks * kChunkBlocks * kChunkBlocks);
       const Int3 inside = block - chunk * kChunkBlocks;
-      ranges[static_cast<std::size_t>(
-                 linear_index(inside, {kChunkBlocks, kChunkBlocks, kChunkBlocks}))]
-          .include(*pairs++);
+      ranges[static_cast<std::size_t>(linear_index(inside, kChunk))].include(*pairs++);
     });
   }
 
@@ -67,23 +65,20 @@ class TypedSparseRanges final : public SparseRanges {
   /// Writes a chunk's blocks and the bricks that they make up.
   void put(Int3 chunk, const Ranges* seen) {
     const Int3 first = chunk * kChunkBlocks;
-    const Box3 blocks = intersect({first, first + Int3{kChunkBlocks, kChunkBlocks, kChunkBlocks}},
-                                  {{0, 0, 0}, lattice_.blocks()});
-    const Index edge = lattice_.brick.x;
-    const Box3 bricks{floor_div(first * kBlockEdge, edge),
-                      min(lattice_.bricks(), floor_div(first * kBlockEdge, edge) +
-                                                 Int3{1, 1, 1} * (kChunkSamples / edge))};
+    const Box3 blocks = intersect({first, first + kChunk}, {{0, 0, 0}, lattice_.blocks()});
+    const Box3 bricks =
+        lattice_.bricks_of({blocks.lo * kBlock, min(blocks.hi * kBlock, lattice_.extent)});
     Ranges of_blocks(static_cast<std::size_t>(volume(blocks.extent())), fill_);
     Ranges of_bricks(static_cast<std::size_t>(volume(bricks.extent())),
                      seen == nullptr ? fill_ : ValueRange<T>{});
     if (seen != nullptr) {
       auto* out = of_blocks.data();
       for_each_point(blocks, [&](Int3 block) {
-        ValueRange<T> range = (*seen)[static_cast<std::size_t>(
-            linear_index(block - first, {kChunkBlocks, kChunkBlocks, kChunkBlocks}))];
+        ValueRange<T> range =
+            (*seen)[static_cast<std::size_t>(linear_index(block - first, kChunk))];
         if (sees_fill(block)) range.include(fill_);
         *out++ = range;
-        const Int3 brick = floor_div(block * kBlockEdge, edge) - bricks.lo;
+        const Int3 brick = lattice_.brick_of(block * kBlock) - bricks.lo;
         of_bricks[static_cast<std::size_t>(linear_index(brick, bricks.extent()))].include(range);
       });
     }
@@ -93,11 +88,10 @@ class TypedSparseRanges final : public SparseRanges {
 
   /// Whether any of the bricks that a block's cells touch is not there.
   bool sees_fill(Int3 block) const {
-    const Int3 last = min(block * kBlockEdge + kBlock, lattice_.extent - Int3{1, 1, 1});
-    const Box3 bricks{floor_div(block * kBlockEdge, lattice_.brick.x),
-                      floor_div(last, lattice_.brick.x) + Int3{1, 1, 1}};
+    const Int3 first = block * kBlock;
+    const Box3 seen = intersect({first, first + kBlock + Int3{1, 1, 1}}, lattice_.box());
     bool fill = false;
-    for_each_point(bricks, [&](Int3 brick) { fill = fill || !is_there_(brick); });
+    for_each_point(lattice_.bricks_of(seen), [&](Int3 brick) { fill = fill || !is_there_(brick); });
     return fill;
   }
 
@@ -120,7 +114,7 @@ BrickBlocks scan_brick(const Lattice& lattice, Box3 box, const std::byte* sample
   const auto ranges = make_level_ranges(local);
   ranges->add({box.lo - origin, box.hi - origin}, samples);
   BrickBlocks result;
-  const Int3 first = floor_div(origin, kBlockEdge);
+  const Int3 first = floor_div(origin, kBlock);
   result.blocks = {first, first + local.blocks()};
   ranges->close(
       local.extent.z,
@@ -135,6 +129,33 @@ BrickBlocks scan_brick(const Lattice& lattice, Box3 box, const std::byte* sample
 bool sparse_ranges_possible(const Lattice& lattice) {
   const Index edge = lattice.brick.x;
   return edge % kBlockEdge == 0 && kChunkSamples % edge == 0;
+}
+
+std::size_t sparse_ranges_bytes(const Lattice& lattice, std::span<const Int3> bricks, int threads) {
+  const Int3 chunks = ceil_div(lattice.blocks(), kChunk);
+  const Int3 samples = kChunk * kBlock;
+  std::vector<bool> touched(static_cast<std::size_t>(volume(chunks)));
+  std::vector<std::size_t> of_layer(static_cast<std::size_t>(chunks.z) + 1);
+  for (const Int3 b : bricks) {
+    const Box3 box = lattice.brick_box(b);
+    const Int3 first = floor_div(max(box.lo - kBlock, {0, 0, 0}), samples);
+    for_each_point({first, ceil_div(box.hi, samples)}, [&](Int3 chunk) {
+      auto seen = touched[static_cast<std::size_t>(linear_index(chunk, chunks))];
+      of_layer[static_cast<std::size_t>(chunk.z)] += !seen;
+      seen = true;
+    });
+  }
+  // A layer waits for the first bricks of the next one.
+  std::size_t open = of_layer[0];
+  for (std::size_t z = 0; z + 1 < of_layer.size(); ++z)
+    open = std::max(open, of_layer[z] + of_layer[z + 1]);
+  // What a thread makes of a chunk: ranges of blocks and of bricks, as the writer takes them
+  // and as they are encoded. The writer gathers a layer of chunks of bricks.
+  const auto written = 4 * static_cast<std::size_t>(threads);
+  const Int3 of_bricks = ceil_div(lattice.bricks(), kChunk);
+  const auto gathered = static_cast<std::size_t>(of_bricks.x * of_bricks.y);
+  return (open + written + gathered) * static_cast<std::size_t>(volume(kChunk)) * 2 *
+         lattice.sample_bytes();
 }
 
 std::unique_ptr<SparseRanges> make_sparse_ranges(StoreWriter& store, int level,

@@ -42,6 +42,10 @@ using BrickTest = std::function<bool(Int3 brick)>;
 /// are no sparse ranges.
 bool sparse_ranges_possible(const Lattice& lattice);
 
+/// Bytes that sparse ranges take while `bricks` are added by `threads` threads, and the
+/// store's writer for them.
+std::size_t sparse_ranges_bytes(const Lattice& lattice, std::span<const Int3> bricks, int threads);
+
 /// `store` outlives the ranges.
 std::unique_ptr<SparseRanges> make_sparse_ranges(StoreWriter& store, int level,
                                                  const Lattice& lattice, double fill_value,

@@ -20,6 +20,8 @@ class StoreSource final : public VolumeSource {
     const LevelInfo& finest = store_.info().levels.front();
     info_ =
         describe_volume(path, finest.lattice.extent, finest.lattice.type, finest.transform, said);
+    info_.fill_value = store_.info().fill_value;
+    info_.grid_class = store_.info().grid_class;
   }
 
   const VolumeInfo& info() const override { return info_; }
@@ -28,11 +30,7 @@ class StoreSource final : public VolumeSource {
   // decode the whole chunks that they have a part of.
   bool parallel() const override { return false; }
   std::size_t memory() const override {
-    // A chunk and its encoded bytes for each thread, and indices of shards.
-    constexpr std::size_t indices = std::size_t{16} << 20;
-    const std::size_t brick = store_.info().levels.front().lattice.brick_bytes();
-    return indices + static_cast<std::size_t>(threads_) * 2 * brick +
-           static_cast<std::size_t>(decode_extra(store_.info(), threads_));
+    return static_cast<std::size_t>(slab_memory(store_.info(), 0, threads_));
   }
   void read(Box3 box, std::byte* out) override {
     arena_.execute([&] { read_slab(store_, 0, box, out); });

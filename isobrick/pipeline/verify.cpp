@@ -79,12 +79,10 @@ bool LevelCheck::sees_unreadable(Int3 item, Int3 edge) const {
   if (!any_unreadable_) return false;
   const Box3 seen =
       intersect({item * edge, (item + Int3{1, 1, 1}) * edge + Int3{1, 1, 1}}, lattice_.box());
-  const Int3 b = lattice_.brick;
   bool found = false;
-  for_each_point(
-      {{seen.lo.x / b.x, seen.lo.y / b.y, seen.lo.z / b.z}, ceil_div(seen.hi, b)}, [&](Int3 brick) {
-        found |= unreadable_[static_cast<std::size_t>(linear_index(brick, lattice_.bricks()))];
-      });
+  for_each_point(lattice_.bricks_of(seen), [&](Int3 brick) {
+    found |= unreadable_[static_cast<std::size_t>(linear_index(brick, lattice_.bricks()))];
+  });
   return found;
 }
 

@@ -1,0 +1,52 @@
+#include "isobrick/pipeline/brick_output.h"
+
+#include "isobrick/bricks/codec.h"
+#include "isobrick/core/copy_box.h"
+#include "isobrick/core/pod_buffer.h"
+
+namespace isobrick {
+
+BrickOutput::BrickOutput(StoreWriter& store, const StoreLayout& layout, int level,
+                         ConvertJournal* journal, Progress& progress)
+    : store_(store),
+      layout_(layout),
+      level_(level),
+      lattice_(layout.levels[static_cast<std::size_t>(level)].lattice),
+      journal_(journal),
+      progress_(progress) {}
+
+PackedBrick BrickOutput::pack(Int3 brick, Box3 box, const std::byte* samples, bool kept) const {
+  PackedBrick packed{.brick = brick, .kept = kept};
+  if (kept && journal_ == nullptr) return packed;
+  thread_local PodBuffer<std::byte> whole;
+  whole.resize(lattice_.brick_bytes());
+  copy_box({samples, box}, {whole.data(), lattice_.full_brick_box(brick)},
+           lattice_.brick_box(brick), lattice_.sample_bytes());
+  pad_brick(lattice_, brick, layout_.fill_value, whole.data());
+  if (journal_ != nullptr) packed.crc = crc32c(whole.span());
+  if (!kept)
+    packed.encoded =
+        encode_brick(lattice_.type, whole.span(), layout_.fill_value, layout_.zstd_level);
+  return packed;
+}
+
+void BrickOutput::deliver(const PackedBrick& packed) {
+  ++counts_.bricks;
+  if (journal_ != nullptr) journal_->add(packed.brick, packed.crc);
+  if (packed.kept)
+    ++counts_.kept;
+  else if (packed.encoded)
+    store_.put(level_, packed.brick, *packed.encoded);
+  else
+    ++counts_.absent;
+  const auto samples =
+      static_cast<std::uint64_t>(volume(lattice_.brick_box(packed.brick).extent()));
+  progress_.advance(level_ == 0 ? samples * lattice_.sample_bytes() : 0);
+}
+
+void BrickOutput::skip(std::uint64_t bricks) {
+  counts_.bricks += bricks;
+  counts_.absent += bricks;
+}
+
+}  // namespace isobrick

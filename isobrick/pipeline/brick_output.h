@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "isobrick/bricks/store_writer.h"
+#include "isobrick/core/progress.h"
+#include "isobrick/pipeline/convert_journal.h"
+
+namespace isobrick {
+
+/// A brick on its way to its shard.
+struct PackedBrick {
+  Int3 brick;
+  bool kept = false;      ///< its shard was whole already
+  std::uint32_t crc = 0;  ///< of the samples, for the journal
+  std::optional<std::vector<std::byte>> encoded;
+};
+
+/// Of one level or of all: `kept` by a resume, `absent` as all fill value.
+struct BrickCounts {
+  std::uint64_t bricks = 0, absent = 0, kept = 0;
+};
+
+/// Where the bricks of one level go: encoded into the store, and on the journal's record.
+class BrickOutput {
+ public:
+  /// `journal`, if there is one, sees every brick. `progress` advances with each brick: by
+  /// its samples in the input's own level, by nothing in coarser ones, where it still may
+  /// throw to stop the conversion.
+  BrickOutput(StoreWriter& store, const StoreLayout& layout, int level, ConvertJournal* journal,
+              Progress& progress);
+
+  /// Encodes a brick of the samples of `box`, dense, in which it lies. `kept`: it is on disk
+  /// already, and only the journal asks for it. Thread-safe.
+  PackedBrick pack(Int3 brick, Box3 box, const std::byte* samples, bool kept) const;
+  /// From one thread, in the order that the bricks of a shard will have.
+  void deliver(const PackedBrick& packed);
+  /// Bricks that are known to be the fill value and are not delivered.
+  void skip(std::uint64_t bricks);
+
+  const BrickCounts& counts() const { return counts_; }
+
+ private:
+  StoreWriter& store_;
+  const StoreLayout& layout_;
+  int level_;
+  const Lattice& lattice_;
+  ConvertJournal* journal_;
+  Progress& progress_;
+  BrickCounts counts_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/volumes/volume_source.h"
+
+namespace isobrick {
+
+/// A brick that may be something else than the fill value.
+struct SparseBrick {
+  Int3 brick;
+  std::size_t place = 0;  ///< of its samples in a spool
+};
+
+/// The brick of the next level that a brick is averaged into.
+constexpr Int3 parent_of(Int3 brick) { return floor_div(brick, {2, 2, 2}); }
+
+/// Such bricks of one level, in families: those that are averaged into one brick of the next
+/// level stand together. Families are in the order z, y, x of their parents.
+class SparseBricks {
+ public:
+  SparseBricks() = default;
+  explicit SparseBricks(std::vector<SparseBrick> bricks);
+
+  std::span<const SparseBrick> all() const { return bricks_; }
+  std::size_t families() const;
+  /// The family whose first brick is number `first` of all; empty at the end.
+  std::span<const SparseBrick> family_at(std::size_t first) const;
+  bool contains(Int3 brick) const;
+
+ private:
+  std::vector<SparseBrick> bricks_;
+};
+
+/// How many bricks of `source` are not known to be the fill value.
+std::size_t count_sparse_bricks(const VolumeSource& source, const Lattice& lattice);
+/// Those bricks, `count` of them.
+std::vector<SparseBrick> find_sparse_bricks(const VolumeSource& source, const Lattice& lattice,
+                                            std::size_t count);
+
+}  // namespace isobrick

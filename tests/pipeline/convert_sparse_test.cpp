@@ -1,0 +1,154 @@
+#include "isobrick/pipeline/convert_sparse.h"
+
+#include <gtest/gtest.h>
+
+#include "isobrick/pipeline/verify.h"
+#include "tests/pipeline/convert_store.h"
+
+namespace isobrick::test {
+namespace {
+
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+
+/// A volume in memory that knows where it is the fill value.
+class SparseMemory final : public VolumeSource {
+ public:
+  SparseMemory(const MemorySource& dense, Box3 there) : dense_(dense), there_(there) {}
+
+  const VolumeInfo& info() const override { return dense_.info(); }
+  bool random_access() const override { return true; }
+  bool sparse() const override { return true; }
+  bool is_fill(Box3 box) const override { return intersect(box, there_).empty(); }
+  void read(Box3 box, std::byte* out) override { dense_.read(box, out); }
+
+  MemorySource& dense() { return dense_; }
+
+ private:
+  MemorySource dense_;
+  Box3 there_;
+};
+
+/// Noise in a box, the fill value elsewhere.
+template <class T>
+SparseMemory make_sparse(Int3 extent, Box3 there, double fill) {
+  auto samples = make_samples<T>(extent, 9, true);
+  std::size_t i = 0;
+  for_each_point({{0, 0, 0}, extent}, [&](Int3 p) {
+    if (!there.contains(p)) samples[i] = static_cast<T>(fill);
+    ++i;
+  });
+  MemorySource dense(extent, scalar_type_of<T>, as_bytes(samples));
+  dense.mutable_info().fill_value = fill;
+  return {dense, there};
+}
+
+/// All but the shards, in which bricks have another order.
+std::map<std::string, std::string> without_shards(std::map<std::string, std::string> tree) {
+  std::erase_if(tree, [](const auto& file) { return file.first.find("/c/") == 1; });
+  return tree;
+}
+
+template <class T>
+void expect_dense_store(Int3 extent, Box3 there, double fill, const ConvertOptions& options) {
+  TemporaryFolder folder;
+  SparseMemory sparse = make_sparse<T>(extent, there, fill);
+  const ConvertReport a = convert_quietly(sparse.dense(), folder / "dense", options);
+  const std::uint64_t all = sparse.dense().bytes_read();
+  const ConvertReport b = convert_quietly(sparse, folder / "sparse", options);
+  EXPECT_LT(sparse.dense().bytes_read() - all, all * 2 / 3);
+  EXPECT_EQ(a.bricks, b.bricks);
+  EXPECT_EQ(a.bricks_absent, b.bricks_absent);
+  EXPECT_EQ(without_shards(tree_of(folder / "dense")), without_shards(tree_of(folder / "sparse")));
+  const StoreReader dense_store(folder / "dense"), store(folder / "sparse");
+  for (int level = 0; level < b.levels; ++level)
+    EXPECT_EQ(samples_of(store, level), samples_of(dense_store, level)) << level;
+  NoProgress silent;
+  EXPECT_EQ(verify(folder / "sparse", 2, silent).damage_count, 0u);
+}
+
+TEST(ConvertSparse, TheStoreIsThatOfTheDenseVolume) {
+  const Int3 extent{131, 90, 150};
+  const Box3 there{{60, 17, 64}, {120, 70, 129}};
+  for (const Index brick : {16, 32, 64}) {
+    SCOPED_TRACE(brick);
+    const ConvertOptions options{.brick = brick, .shard = 64, .memory = 200 * kMiB, .threads = 3};
+    expect_dense_store<std::uint8_t>(extent, there, 7, options);
+    expect_dense_store<float>(extent, there, -2.5, options);
+  }
+}
+
+/// Ranges in chunks of 512³ samples: bricks on both sides of a border between them.
+TEST(ConvertSparse, AcrossChunksOfRanges) {
+  expect_dense_store<std::uint8_t>({560, 40, 530}, {{500, 0, 500}, {530, 40, 530}}, 3,
+                                   {.brick = 16, .shard = 64, .memory = 200 * kMiB});
+}
+
+TEST(ConvertSparse, ResumesToTheSameBytes) {
+  TemporaryFolder folder;
+  const ConvertOptions options{.brick = 16, .shard = 32, .memory = 200 * kMiB, .threads = 2};
+  SparseMemory source = make_sparse<std::uint16_t>({100, 90, 130}, {{10, 10, 0}, {80, 80, 130}}, 5);
+  convert_quietly(source, folder / "whole", options);
+  SparseMemory broken = source;
+  broken.dense().fail_after(1000000);
+  EXPECT_THROW(convert_quietly(broken, folder / "a", options), Error);
+  ConvertOptions resume = options;
+  resume.resume = true;
+  const ConvertReport report = convert_quietly(source, folder / "a", resume);
+  EXPECT_GT(report.bricks_kept, 0u);
+  EXPECT_EQ(tree_of(folder / "a"), tree_of(folder / "whole"));
+}
+
+/// A volume that is there from end to end and is never read.
+class Endless final : public VolumeSource {
+ public:
+  explicit Endless(Int3 extent) {
+    info_.extent = extent;
+    info_.name = "endless";
+  }
+  const VolumeInfo& info() const override { return info_; }
+  bool random_access() const override { return true; }
+  bool sparse() const override { return true; }
+  void read(Box3, std::byte*) override { FAIL() << "it was read"; }
+
+ private:
+  VolumeInfo info_;
+};
+
+TEST(ConvertSparse, WhatIsRememberedOfEachBrickIsPartOfTheBudget) {
+  Endless source({2048, 2048, 2048});  // 2 million bricks
+  TemporaryFolder folder;
+  try {
+    convert_quietly(source, folder / "a", {.brick = 16, .memory = 150 * kMiB, .threads = 2});
+    FAIL() << "the bricks were not counted";
+  } catch (const UsageError& e) {
+    EXPECT_NE(std::string(e.what()).find("150 MiB is too small"), std::string::npos) << e.what();
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.partial"));
+}
+
+TEST(SparseBricks, FamiliesStandTogetherInTheOrderOfTheirParents) {
+  std::vector<SparseBrick> bricks;
+  for_each_point({{0, 0, 0}, {5, 3, 4}}, [&](Int3 p) {
+    if ((p.x + p.y + p.z) % 3 != 0) bricks.push_back({p, bricks.size()});
+  });
+  const SparseBricks sorted(bricks);
+  std::size_t families = 0, at = 0;
+  Int3 last{-1, -1, -1};
+  while (at < sorted.all().size()) {
+    const auto family = sorted.family_at(at);
+    const Int3 parent = parent_of(family.front().brick);
+    EXPECT_LT(std::tuple(last.z, last.y, last.x), std::tuple(parent.z, parent.y, parent.x));
+    for (const SparseBrick& b : family) EXPECT_EQ(parent_of(b.brick), parent);
+    last = parent;
+    at += family.size();
+    ++families;
+  }
+  EXPECT_EQ(families, sorted.families());
+  EXPECT_EQ(at, bricks.size());
+  EXPECT_TRUE(sorted.family_at(at).empty());
+  for_each_point({{0, 0, 0}, {5, 3, 4}},
+                 [&](Int3 p) { EXPECT_EQ(sorted.contains(p), (p.x + p.y + p.z) % 3 != 0); });
+}
+
+}  // namespace
+}  // namespace isobrick::test
