@@ -21,7 +21,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "raw files are written as they are");
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
-/// Program, libraries and the reader's caches.
+/// Program, libraries and stacks.
 constexpr std::size_t kProgramBytes = 40 * kMiB;
 /// Larger pieces are no faster.
 constexpr std::size_t kPieceBytes = 256 * kMiB;
@@ -42,24 +42,26 @@ Box3 region(const StoreReader& store, int level, const std::optional<Box3>& roi)
   return *roi;
 }
 
-/// The box of bricks to hold at a time.
-Int3 piece_within(const Lattice& lattice, Int3 extent, std::uint64_t memory, int threads) {
-  const std::size_t fixed =
-      kProgramBytes + static_cast<std::size_t>(threads) * 2 * lattice.brick_bytes();
-  const std::size_t least = fixed + lattice.brick_bytes();
+/// What there is beside the samples of a piece.
+std::uint64_t fixed_bytes(const StoreInfo& store, int level, int threads) {
+  return kProgramBytes + slab_memory(store, level, threads);
+}
+
+/// The box of bricks to hold at a time; `fixed` bytes go for other things.
+Int3 piece_within(const Lattice& lattice, Int3 extent, std::uint64_t memory, std::uint64_t fixed) {
+  const std::uint64_t least = fixed + lattice.brick_bytes();
   if (memory < least)
     throw UsageError(
         fmt::format("a memory budget of {} MiB is too small: {} MiB are needed at least",
                     memory / kMiB, least / kMiB + 1));
-  const std::size_t room = std::min(static_cast<std::size_t>(memory) - fixed, kPieceBytes);
+  const std::size_t room = std::min(static_cast<std::size_t>(memory - fixed), kPieceBytes);
   return largest_piece(extent, lattice.brick, room / lattice.sample_bytes());
 }
 
 /// Bricks of `piece` samples over `box`, aligned to the lattice of bricks.
 template <class F>
 void for_each_piece(Box3 box, Int3 brick, Int3 piece, F&& f) {
-  const Int3 start{box.lo.x / brick.x * brick.x, box.lo.y / brick.y * brick.y,
-                   box.lo.z / brick.z * brick.z};
+  const Int3 start = floor_div(box.lo, brick) * brick;
   for_each_point({{0, 0, 0}, ceil_div(box.hi - start, piece)}, [&](Int3 p) {
     const Int3 lo = start + p * piece;
     f(intersect({lo, lo + piece}, box));
@@ -91,11 +93,9 @@ struct Piece {
 
 /// Whether all bricks that `part` touches are absent.
 bool is_absent(const Piece& in, Box3 part) {
-  const Int3 edge = in.lattice().brick;
   bool absent = true;
-  for_each_point(
-      {{part.lo.x / edge.x, part.lo.y / edge.y, part.lo.z / edge.z}, ceil_div(part.hi, edge)},
-      [&](Int3 b) { absent = absent && !in.store.locate(in.level, b); });
+  for_each_point(in.lattice().bricks_of(part),
+                 [&](Int3 b) { absent = absent && !in.store.locate(in.level, b); });
   return absent;
 }
 
@@ -107,13 +107,15 @@ void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& op
   grid_info.grid_class = in.store.info().grid_class;
   const auto grid = make_vdb_writer_if_built(grid_info, "density");
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
+  const std::uint64_t others =
+      fixed_bytes(in.store.info(), in.level, workers.threads()) + lattice.brick_bytes();
   for_each_piece(in.box, lattice.brick, lattice.brick, [&](Box3 part) {
     const auto bytes = static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes();
     progress.advance(bytes);
     if (is_absent(in, part)) return;
     workers.execute([&] { read_slab(in.store, in.level, part, buffer.get()); });
     grid->put({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
-    if (const std::uint64_t held = grid->memory() + kProgramBytes; held > options.memory)
+    if (grid->memory() + others > options.memory)
       throw UsageError(fmt::format(
           "the grid takes more than the memory budget of {} MiB, and OpenVDB holds it whole: "
           "give more, or export a region or a coarser level",
@@ -124,26 +126,23 @@ void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& op
 
 }  // namespace
 
-std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
-                            const ExportOptions& options, Progress& progress) {
+void export_volume(const StoreReader& store, const std::filesystem::path& out,
+                   const ExportOptions& options, Progress& progress) {
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   const Lattice& lattice = level.lattice;
   Workers workers(options.threads);
-  const Int3 piece = piece_within(
-      lattice, box.extent(),
-      options.memory - std::min(options.memory, decode_extra(store.info(), workers.threads())),
-      workers.threads());
+  const Int3 piece = piece_within(lattice, box.extent(), options.memory,
+                                  fixed_bytes(store.info(), options.level, workers.threads()));
   OutputFile output(out.string(), options.force);
   if (options.format == ExportFormat::vdb) {
-    const std::uint64_t bytes =
-        static_cast<std::uint64_t>(volume(box.extent())) * lattice.sample_bytes();
-    progress.begin("export", bytes);
+    progress.begin("export",
+                   static_cast<std::uint64_t>(volume(box.extent())) * lattice.sample_bytes());
     export_vdb({store, options.level, box}, describe(level, box, out.string()), options, workers,
                output, progress);
     progress.end();
     output.publish();
-    return bytes;
+    return;
   }
   if (options.format == ExportFormat::nrrd)
     output.writer().append(nrrd_header_text(describe(level, box, out.string())));
@@ -161,7 +160,6 @@ std::uint64_t export_volume(const StoreReader& store, const std::filesystem::pat
   });
   progress.end();
   output.publish();
-  return file.bytes();
 }
 
 }  // namespace isobrick

@@ -28,8 +28,8 @@ struct ExportOptions {
 /// Memory: one row of bricks at a time, within the budget; for OpenVDB also the
 /// grid, which must be whole before it can be written: its samples that are not
 /// the fill value, or a UsageError once they exceed the budget. Nothing appears under
-/// the final name until it is whole. Returns the bytes of samples written.
-std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
-                            const ExportOptions& options, Progress& progress);
+/// the final name until it is whole.
+void export_volume(const StoreReader& store, const std::filesystem::path& out,
+                   const ExportOptions& options, Progress& progress);
 
 }  // namespace isobrick

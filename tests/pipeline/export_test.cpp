@@ -32,12 +32,12 @@ class Export : public testing::Test {
     store_ = std::make_unique<StoreReader>(folder_ / "a");
   }
 
-  std::uint64_t write(int level, std::optional<Box3> roi, bool force = false,
-                      std::uint64_t memory = 100 * kMiB) {
+  void write(int level, std::optional<Box3> roi, bool force = false,
+             std::uint64_t memory = 100 * kMiB) {
     NoProgress progress;
-    return export_volume(
-        *store_, folder_ / "x.raw",
-        {.level = level, .roi = roi, .force = force, .memory = memory, .threads = 2}, progress);
+    export_volume(*store_, folder_ / "x.raw",
+                  {.level = level, .roi = roi, .force = force, .memory = memory, .threads = 2},
+                  progress);
   }
 
   std::vector<std::string> files() const {
@@ -55,7 +55,7 @@ class Export : public testing::Test {
 };
 
 TEST_F(Export, GivesBackTheInputBitForBit) {
-  EXPECT_EQ(write(0, std::nullopt), source_.samples().size());
+  write(0, std::nullopt);
   EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(source_.samples()));
   write(1, std::nullopt, true);
   EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(samples_of(*store_, 1)));
@@ -119,6 +119,32 @@ TEST_F(Export, RefusesWhatMakesNoSense) {
   std::ofstream(folder_ / "x.raw") << "precious";
   EXPECT_THROW(write(0, std::nullopt), UsageError);
   EXPECT_EQ(content_of(folder_ / "x.raw"), "precious");
+}
+
+TEST_F(Export, TheGridAndTheDecodersShareOneBudget) {
+  MemorySource noise = make_source<float>({128, 128, 128}, 3);
+  ConvertOptions options;
+  options.brick = options.shard = 128;
+  options.levels = 1;
+  convert_quietly(noise, folder_ / "b", options);
+  const StoreReader store(folder_ / "b");
+  NoProgress progress;
+  const auto write_grid = [&](std::uint64_t memory) {
+    export_volume(store, folder_ / "b.vdb",
+                  {.format = ExportFormat::vdb, .memory = memory, .threads = 2}, progress);
+  };
+  // A brick of 8 MiB, four for the decoders; then another one for the grid.
+  try {
+    write_grid(85 * kMiB);
+    FAIL() << "the grid was not counted";
+  } catch (const UsageError& e) {
+    const std::string what = e.what();
+    if (what.find("built without") != std::string::npos) GTEST_SKIP() << what;
+    EXPECT_NE(what.find("the grid takes more than the memory budget"), std::string::npos) << what;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "b.vdb"));
+  write_grid(140 * kMiB);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "b.vdb"));
 }
 
 TEST_F(Export, LeavesNothingWhenABrickIsDamaged) {
