@@ -130,13 +130,13 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   return surfaces;
 }
 
-/// The meshes to write, with size_of(surface) as PlannedMesh has it.
+/// The meshes to write, with size_of(Surface) as PlannedMesh has it.
 template <class F>
 std::vector<PlannedMesh> planned_meshes(const std::vector<Surface>& surfaces, const F& size_of) {
   std::vector<PlannedMesh> meshes;
   for (const Surface& surface : surfaces) {
     if (surface.output.empty()) continue;
-    PlannedMesh mesh = size_of(surface.options);
+    PlannedMesh mesh = size_of(surface);
     mesh.path = surface.output;
     mesh.form = surface.form;
     meshes.push_back(std::move(mesh));
@@ -144,15 +144,20 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<Surface>& surfaces, co
   return meshes;
 }
 
+ExtractEstimate estimate_one(const Surface& surface, const StoreReader& store) {
+  return estimate(store, surface.options,
+                  mesh_memory(surface.form.format, surface.options.threads));
+}
+
 /// Refuses meshes that cannot fit their disk, before anything is written.
 void check_space(const std::vector<Surface>& surfaces, const StoreReader& store) {
   // Mostly all that the active cells could hold fits, which is known without a sample.
-  const auto largest = planned_meshes(surfaces, [&](const ExtractOptions& options) {
-    return PlannedMesh{.size = largest_mesh(count_active(store, options))};
+  const auto largest = planned_meshes(surfaces, [&](const Surface& surface) {
+    return PlannedMesh{.size = largest_mesh(count_active(store, surface.options))};
   });
   if (!find_shortage(largest, free_space)) return;
-  const auto likely = planned_meshes(surfaces, [&](const ExtractOptions& options) {
-    const ExtractEstimate guess = estimate(store, options);
+  const auto likely = planned_meshes(surfaces, [&](const Surface& surface) {
+    const ExtractEstimate guess = estimate_one(surface, store);
     return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
   });
   if (const auto shortage = find_shortage(likely, free_space))
@@ -189,6 +194,7 @@ std::string estimate_text(const Surface& surface, const ExtractEstimate& e) {
 void add_backend(ordered_json& object, const ExtractReport& r) {
   object["backend"] = r.backend;
   object["device"] = r.device.empty() ? ordered_json() : ordered_json(r.device);
+  object["gpu_refusal"] = r.gpu_refusal.empty() ? ordered_json() : ordered_json(r.gpu_refusal);
   for (const auto& [name, stage] : stages_of(r))
     object["stages"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
   object["bound"] = bound_of(r);
@@ -215,7 +221,7 @@ ordered_json report_json(const Surface& surface, const ExtractReport& r, std::ui
         {"plan", r.plan_seconds},
         {"decode", r.decode_seconds},
         {"surface", r.surface_seconds},
-        {"sink", r.sink_seconds}}},
+        {"sink", r.sink.seconds}}},
       {"index",
        {{"used", r.index ? name_of(*r.index) : "none"},
         {"bytes_read", r.search_bytes},
@@ -232,6 +238,8 @@ std::string report_text(const Surface& surface, const ExtractReport& r, std::uin
       fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
                   surface.options.isovalue, human_count(r.triangles), human_count(r.vertices),
                   human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
+  if (!r.gpu_refusal.empty())
+    text += fmt::format("  on the CPU, for the GPU cannot: {}\n", r.gpu_refusal);
   if (r.backend == "cuda")
     text += fmt::format("  on {} with {} of its memory, bound by {}\n", r.device,
                         human_bytes(r.device_bytes), bound_of(r));
@@ -292,7 +300,7 @@ struct Said {
 Said estimate_all(const std::vector<Surface>& surfaces, const StoreReader& store) {
   Said said;
   for (const Surface& surface : surfaces) {
-    const ExtractEstimate guess = estimate(store, surface.options);
+    const ExtractEstimate guess = estimate_one(surface, store);
     said.objects.push_back(estimate_json(surface, guess));
     said.text += estimate_text(surface, guess);
   }

@@ -6,6 +6,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/meshes/glb_sink.h"
+#include "isobrick/meshes/mesh_parts.h"
 #include "isobrick/meshes/obj_sink.h"
 #include "isobrick/meshes/ply_sink.h"
 #include "isobrick/meshes/stl_sink.h"
@@ -65,6 +66,15 @@ std::unique_ptr<MeshSink> open_mesh(const fs::path& path, const MeshForm& form, 
     case MeshFormat::pvtp: return std::make_unique<PvtpSink>(name, force);
   }
   throw UsageError("no such format of a mesh");
+}
+
+std::uint64_t mesh_memory(MeshFormat format, int threads) {
+  switch (format) {
+    case MeshFormat::obj: return ObjSink::memory_with(threads);
+    case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
+    case MeshFormat::pvtp: return part_memory(PvtpSink::kPartTriangles);
+    default: return 0;
+  }
 }
 
 std::uint64_t mesh_bytes(const fs::path& path) {

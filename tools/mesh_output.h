@@ -32,6 +32,9 @@ MeshFormat parse_mesh_format(const std::string& text);
 std::unique_ptr<MeshSink> open_mesh(const std::filesystem::path& path, const MeshForm& form,
                                     bool force, int threads);
 
+/// What MeshSink::memory() of such a mesh is.
+std::uint64_t mesh_memory(MeshFormat format, int threads);
+
 /// Bytes of a finished mesh, its parts included.
 std::uint64_t mesh_bytes(const std::filesystem::path& path);
 

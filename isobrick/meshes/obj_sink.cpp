@@ -1,5 +1,6 @@
 #include "isobrick/meshes/obj_sink.h"
 
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -82,8 +83,9 @@ ObjSink::ObjSink(std::string path, bool force, int threads)
       faces_(open_scratch_beside(out_.path())),
       arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
-std::uint64_t ObjSink::memory() const {
-  return static_cast<std::uint64_t>(arena_.max_concurrency()) * kBatchText;
+std::uint64_t ObjSink::memory_with(int threads) {
+  return static_cast<std::uint64_t>(threads > 0 ? threads : tbb::info::default_concurrency()) *
+         kBatchText;
 }
 
 void ObjSink::begin(const MeshHeader&) { out_.writer().append("# Isobrick\n"); }

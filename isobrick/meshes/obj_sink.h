@@ -24,7 +24,9 @@ class ObjSink final : public MeshSink {
   void write(const MeshChunk& chunk) override;
   void finish() override;
   std::uint64_t bytes() const override { return out_.writer().size() + faces_.size(); }
-  std::uint64_t memory() const override;
+  std::uint64_t memory() const override { return memory_with(arena_.max_concurrency()); }
+  /// The same before there is one.
+  static std::uint64_t memory_with(int threads);
 
  private:
   OutputFile out_;    ///< vertices; the faces at the end

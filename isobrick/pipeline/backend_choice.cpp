@@ -4,7 +4,6 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/supported.h"
-#include "isobrick/pipeline/gpu_backend.h"
 
 namespace isobrick {
 namespace {
@@ -38,6 +37,27 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
                                  options.device, devices == 1 ? "is" : "are", devices,
                                  devices == 1 ? "" : "s"));
   return wanted && devices > 0;
+}
+
+ChosenBackend set_up_backend(const ExtractRequest& request, const ExtractOptions& options,
+                             std::uint64_t active_bricks, std::uint64_t other_bytes, MeshSink& sink,
+                             const OpenGpu& open) {
+  ChosenBackend chosen;
+  try {
+    chosen.gpu = open();
+    if (chosen.gpu) {
+      chosen.plan = plan_gpu_memory(request, options, active_bricks, other_bytes, *chosen.gpu);
+      chosen.surface = chosen.gpu->make_surface(request, sink);
+      return chosen;
+    }
+  } catch (const Error& e) {
+    if (options.backend == Backend::cuda) throw;
+    chosen.gpu_refusal = e.what();
+    chosen.gpu.reset();
+  }
+  chosen.plan = plan_memory(request, options.memory, active_bricks, other_bytes);
+  chosen.surface = make_cpu_surface(request, chosen.plan.limits, sink);
+  return chosen;
 }
 
 }  // namespace isobrick

@@ -60,8 +60,7 @@ ActiveParts visit_active(const StoreReader& store, const ExtractRequest& request
       if (!(work->active_blocks >> i & 1)) continue;
       ++parts.active_blocks;
       const Int3 corner = block_box(work->tile, i).lo;
-      const Int3 brick{corner.x / lattice.brick.x, corner.y / lattice.brick.y,
-                       corner.z / lattice.brick.z};
+      const Int3 brick = lattice.brick_of(corner);
       auto seen = active[static_cast<std::size_t>(linear_index(brick, lattice.bricks()))];
       parts.active_bricks += !seen;
       seen = true;
@@ -75,9 +74,8 @@ ActiveParts visit_active(const StoreReader& store, const ExtractRequest& request
 /// it, it is left out then.
 Box3 own_bricks(const Lattice& lattice, Int3 tile) {
   const Int3 lo = tile * kTileEdge;
-  const Int3 hi = min(lo + Int3{kTileEdge, kTileEdge, kTileEdge}, lattice.extent);
-  const Int3 b = lattice.brick;
-  return {{lo.x / b.x, lo.y / b.y, lo.z / b.z}, ceil_div(hi, b)};
+  return lattice.bricks_of(
+      intersect({lo, lo + Int3{kTileEdge, kTileEdge, kTileEdge}}, lattice.box()));
 }
 
 /// Only some of a cache's bricks; the rest is as good as absent.
@@ -190,12 +188,14 @@ MeshSize largest_mesh(const ActiveParts& active) {
           kMaxCaseTriangles * active.active_cells};
 }
 
-ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options) {
+ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options,
+                         std::uint64_t sink_bytes) {
   const ExtractRequest request = check_request(store, options, Indexing::welded);
   TileSample sample(groups_to_sample(request.level->lattice));
   const ActiveParts parts =
       visit_active(store, request, options, [&](const TileWork& work) { sample.add(work); });
-  const ExtractPlan plan = plan_memory(request, options.memory, parts.active_bricks);
+  const ExtractPlan plan = plan_memory(request, options.memory, parts.active_bricks,
+                                       sink_bytes + decode_extra(store.info(), request.threads));
   ExtractEstimate result{.active = parts, .memory = plan.bytes};
   const std::vector<TileGroup> groups = sample.chosen();
   std::vector<TileWork> tiles;

@@ -31,7 +31,9 @@ struct ExtractEstimate {
 /// Counts the surface in up to 64 cubes of 64³ cells, spread evenly over the
 /// active ones, and scales it to all. Reads and decodes at most 32 MiB of
 /// bricks, or those of 4 cubes where that is more, within the memory budget;
-/// deterministic, also over thread counts. Throws as extract() does.
-ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options);
+/// deterministic, also over thread counts. `sink_bytes` is the MeshSink::memory() of the sink
+/// that the mesh will go to. Throws as extract() does.
+ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options,
+                         std::uint64_t sink_bytes);
 
 }  // namespace isobrick

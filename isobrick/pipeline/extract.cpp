@@ -16,8 +16,6 @@
 #include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/pipeline/surface_extractor.h"
 #include "isobrick/pipeline/workers.h"
 #include "isobrick/stream/brick_cache.h"
 #include "isobrick/stream/tile_stream.h"
@@ -103,6 +101,8 @@ void extract_overlapped(const Stages& stages, int threads, const F& done) {
                          stages.batches.next(batches[1]);
                          stages.batches.next(batches[2]);
                        });
+  stages.cache.will_need(batches[1].bricks);
+  stages.cache.will_need(batches[2].bricks);
   while (!batches[0].tiles.empty()) {
     const BrickView bricks = stages.cache.view(batches[0].bricks);
     tbb::parallel_invoke([&] { first.execute([&] { stages.extract(batches[0], bricks); }); },
@@ -114,18 +114,21 @@ void extract_overlapped(const Stages& stages, int threads, const F& done) {
   }
 }
 
-/// The GPU, where it makes the surface. A device takes some tenths of a second to set up:
-/// when it is known that there will be one, that goes on while active blocks are counted.
-std::unique_ptr<GpuSession> open_backend(const ExtractRequest& request,
-                                         const ExtractOptions& options, const StoreReader& store,
-                                         ActiveParts& active) {
+/// Counts what is active and sets up who makes the surface. A device takes some tenths of a
+/// second to open: when it is known that there will be one, that goes on meanwhile.
+ChosenBackend choose_backend(const ExtractRequest& request, const ExtractOptions& options,
+                             const StoreReader& store, MeshSink& sink, ActiveParts& active) {
   std::future<std::unique_ptr<GpuSession>> early;
   if (options.backend == Backend::cuda && use_cuda(request, options, 0))
     early = std::async(std::launch::async, open_gpu, options.device);
   active = count_active(store, options);
-  if (early.valid()) return early.get();
-  if (use_cuda(request, options, active.active_blocks)) return open_gpu(options.device);
-  return nullptr;
+  const bool wanted = early.valid() || use_cuda(request, options, active.active_blocks);
+  const std::uint64_t other = sink.memory() + decode_extra(store.info(), request.threads);
+  return set_up_backend(request, options, active.active_bricks, other, sink,
+                        [&]() -> std::unique_ptr<GpuSession> {
+                          if (early.valid()) return early.get();
+                          return wanted ? open_gpu(options.device) : nullptr;
+                        });
 }
 
 }  // namespace
@@ -158,25 +161,21 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     const Index reach = sample_reach(request.surface);
 
     ActiveParts active;
-    std::unique_ptr<GpuSession> gpu;
+    ChosenBackend backend;
     {
       Stopwatch watch(report.plan_seconds);
-      gpu = open_backend(request, options, store, active);
+      backend = choose_backend(request, options, store, sink, active);
     }
+    const ExtractPlan& plan = backend.plan;
     report.bricks = active.bricks;
     report.active_bricks = active.active_bricks;
-    const std::uint64_t other = sink.memory() + decode_extra(store.info(), request.threads);
-    const ExtractPlan plan =
-        gpu ? plan_gpu_memory(request, options, active.active_bricks, other, *gpu)
-            : plan_memory(request, options.memory, active.active_bricks, other);
+    report.gpu_refusal = backend.gpu_refusal;
 
     sink.begin(header_of(*request.level, request.surface));
     TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
     BatchPlanner batches(tiles, lattice, reach, request.surface.may_have_nan, plan.limits.tiles,
                          plan.batch_bricks);
     BrickCache cache(store, options.level, plan.cache_bricks);
-    const auto surface =
-        gpu ? gpu->make_surface(request, sink) : make_cpu_surface(request, plan.limits, sink);
     progress.begin("extracting", active.active_bricks * lattice.brick_bytes());
     const double bytes_per_block = static_cast<double>(active.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /
@@ -187,17 +186,16 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
         blocks += static_cast<double>(std::popcount(work.active_blocks));
       progress.advance(static_cast<std::uint64_t>(blocks * bytes_per_block));
     };
-    const Stages stages{cache, batches, *surface, report};
+    const Stages stages{cache, batches, *backend.surface, report};
     Workers workers(request.threads);
     workers.execute([&] {
       plan.overlap ? extract_overlapped(stages, request.threads, done)
                    : extract_in_turn(stages, done);
     });
-    surface->finish();
+    backend.surface->finish();
     sink.finish();
     progress.end();
-    surface->report(report);
-    report.sink_seconds = report.sink.seconds;
+    backend.surface->report(report);
     report.index = request.search.kind;
     report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
     // Once for the plan and once for the surface; the index has files of its own.

@@ -49,10 +49,12 @@ struct ExtractReport {
   std::uint64_t degenerate_triangles = 0;  ///< left out, with drop_degenerate
   std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
   std::uint64_t bytes_read = 0;
-  double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, sink_seconds = 0;
+  double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0;
   std::optional<IndexKind> index;  ///< that was asked for active blocks; nothing: only ranges
   std::string backend = "cpu";     ///< or "cuda"
   std::string device;              ///< its name, of the latter
+  /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.
+  std::string gpu_refusal;
   /// Encoded bricks, decoded ones; samples for the device and there; the mesh. The GPU has
   /// no stage `surface` and the CPU only that one between decode and sink.
   StageReport read, decode, gather, upload, kernel, download, surface, sink;
@@ -73,7 +75,7 @@ std::string_view bound_of(const ExtractReport& report);
 /// Streams the isosurface of one level into `sink` (begin … finish).
 /// Throws UsageError for a level, ROI or isovalue that makes no sense, a budget too small
 /// for one tile with its neighbours, or a surface that Backend::cuda cannot make; Error where
-/// there is no CUDA device for it.
+/// there is no CUDA device for it. Backend::automatic takes the CPU where the GPU cannot.
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
                       Progress& progress);
 

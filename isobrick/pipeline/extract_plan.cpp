@@ -48,16 +48,10 @@ void check_transform(const StoreInfo& info, const LevelInfo& level) {
 /// What the CUDA driver and its context take of the host's memory.
 constexpr std::uint64_t kCudaDriver = std::uint64_t{128} << 20;
 
-/// Shard indices that the reader keeps: all of a usual volume, bounded of a huge one.
-std::uint64_t index_bytes(const Lattice& lattice) {
-  return std::min(std::uint64_t{64} << 20,
-                  32 * static_cast<std::uint64_t>(volume(lattice.bricks())));
-}
-
 /// What every extraction takes besides its surface and its bricks.
 std::uint64_t fixed_bytes(const ExtractRequest& request) {
   const Lattice& lattice = request.level->lattice;
-  return kBase + index_bytes(lattice) +
+  return kBase + request.level->index_bytes +
          static_cast<std::uint64_t>(request.threads) * (kDecoder + lattice.brick_bytes()) +
          request.search_memory;
 }
@@ -104,7 +98,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
 }
 
 ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
-                        std::uint64_t active_bricks, std::uint64_t sink_bytes) {
+                        std::uint64_t active_bricks, std::uint64_t other_bytes) {
   const Lattice& lattice = request.level->lattice;
   const bool drop = request.surface.drop_degenerate;
   const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type, drop);
@@ -112,7 +106,7 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
-  const std::uint64_t fixed = fixed_bytes(request) + boundary_bytes(lattice, drop) + sink_bytes;
+  const std::uint64_t fixed = fixed_bytes(request) + boundary_bytes(lattice, drop) + other_bytes;
   const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
   if (budget < least)
     throw UsageError(fmt::format(
@@ -134,12 +128,12 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
 }
 
 ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions& options,
-                            std::uint64_t active_bricks, std::uint64_t sink_bytes,
+                            std::uint64_t active_bricks, std::uint64_t other_bytes,
                             GpuSession& gpu) {
   const Lattice& lattice = request.level->lattice;
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
-  const std::uint64_t fixed = fixed_bytes(request) + kCudaDriver + sink_bytes;
+  const std::uint64_t fixed = fixed_bytes(request) + kCudaDriver + other_bytes;
   const std::uint64_t used = fixed + gpu.plan(request, options.gpu_memory, options.memory,
                                               fixed + tile_bricks * brick_bytes);
   ExtractPlan plan;

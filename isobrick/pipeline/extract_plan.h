@@ -32,14 +32,16 @@ struct ExtractRequest {
 ExtractRequest check_request(const StoreReader& store, const ExtractOptions& options,
                              Indexing indexing);
 
-/// `active_bricks` bounds what a cache can use, `sink_bytes` are the sink's and of decoding beyond
-/// the usual. Throws UsageError naming the least budget that works when this one does not.
+/// `active_bricks` bounds what a cache can use, `other_bytes` are the sink's (MeshSink::memory())
+/// and those of decoding beyond the usual (decode_extra()). Throws UsageError naming the least
+/// budget that works when this one does not.
 ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
-                        std::uint64_t active_bricks, std::uint64_t sink_bytes = 0);
+                        std::uint64_t active_bricks, std::uint64_t other_bytes);
 
 /// The same where a GPU makes the surface, whose buffers `gpu` plans: page-locked memory
 /// and what its driver takes are within the budget.
 ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions& options,
-                            std::uint64_t active_bricks, std::uint64_t sink_bytes, GpuSession& gpu);
+                            std::uint64_t active_bricks, std::uint64_t other_bytes,
+                            GpuSession& gpu);
 
 }  // namespace isobrick

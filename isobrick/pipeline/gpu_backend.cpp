@@ -62,8 +62,6 @@ class CudaSession final : public GpuSession {
  public:
   explicit CudaSession(int device) : device_(device), info_(gpu::open_device(device)) {}
 
-  const std::string& name() const override { return info_.name; }
-
   std::uint64_t plan(const ExtractRequest& request, std::uint64_t device_budget,
                      std::uint64_t host_budget, std::uint64_t other_host_bytes) override {
     if (device_budget == 0) device_budget = info_.free_bytes - info_.free_bytes / 10;

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "isobrick/pipeline/surface_extractor.h"
 
@@ -22,7 +21,6 @@ class GpuSession {
  public:
   virtual ~GpuSession() = default;
 
-  virtual const std::string& name() const = 0;
   /// Chooses buffers within `device_budget` (0: what is free less 10 %) and within
   /// `host_budget`, of which `other_host_bytes` are taken. The host memory that they take.
   /// Throws UsageError naming the least that works.

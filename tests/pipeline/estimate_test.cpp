@@ -32,7 +32,7 @@ MeshSize extracted(const StoreReader& store, const ExtractOptions& options) {
 /// The estimate beside the mesh: off by less than `most` (a fraction).
 void expect_near(const StoreReader& store, const ExtractOptions& options, double most) {
   const MeshSize mesh = extracted(store, options);
-  const ExtractEstimate guess = estimate(store, options);
+  const ExtractEstimate guess = estimate(store, options, 0);
   ASSERT_GT(mesh.triangles, 1000u);
   EXPECT_NEAR(static_cast<double>(guess.mesh.triangles), static_cast<double>(mesh.triangles),
               most * static_cast<double>(mesh.triangles));
@@ -104,8 +104,8 @@ TEST_F(Estimate, SamplesOfAManyTimesLargerVolumeDo) {
     return std::min(distance(p, 190, 190, 120) + (p.x < 192 ? wave[x] * wave[y] : 0), 255.0);
   });
   const StoreReader reader = store(extent, samples, {.zstd_level = 1});
-  ASSERT_LT(estimate(reader, {.isovalue = 180.5}).uncertainty, 0.3);
-  ASSERT_GT(estimate(reader, {.isovalue = 180.5}).uncertainty, 0.02);  // not all was looked at
+  ASSERT_LT(estimate(reader, {.isovalue = 180.5}, 0).uncertainty, 0.3);
+  ASSERT_GT(estimate(reader, {.isovalue = 180.5}, 0).uncertainty, 0.02);  // not all was looked at
   expect_near(reader, {.isovalue = 180.5}, 0.25);
 }
 
@@ -119,12 +119,12 @@ TEST_F(Estimate, ReadsOnlySoMuchAndIsTheSameForAnyMeans) {
   const StoreReader reader = store(extent, samples, {.zstd_level = std::nullopt});
   const double middle = 0x1p52;
   const std::uint64_t before = reader.bytes_read();
-  const ExtractEstimate guess = estimate(reader, {.isovalue = middle, .threads = 1});
+  const ExtractEstimate guess = estimate(reader, {.isovalue = middle, .threads = 1}, 0);
   EXPECT_LT(reader.bytes_read() - before, std::uint64_t{33} << 20);
   EXPECT_GT(guess.mesh.triangles, static_cast<std::uint64_t>(volume(extent)));
   for (const int threads : {2, 7}) {
     const ExtractEstimate again = estimate(
-        reader, {.isovalue = middle, .memory = std::uint64_t{160} << 20, .threads = threads});
+        reader, {.isovalue = middle, .memory = std::uint64_t{160} << 20, .threads = threads}, 0);
     EXPECT_EQ(again.mesh.triangles, guess.mesh.triangles);
     EXPECT_EQ(again.mesh.vertices, guess.mesh.vertices);
     EXPECT_EQ(again.uncertainty, guess.uncertainty);
@@ -135,13 +135,31 @@ TEST_F(Estimate, NothingActiveIsNothing) {
   const Int3 extent{40, 40, 40};
   const StoreReader reader =
       store(extent, sampled<std::uint8_t>(extent, [](Int3) { return 9; }), {.brick = 16});
-  const ExtractEstimate guess = estimate(reader, {.isovalue = 20});
+  const ExtractEstimate guess = estimate(reader, {.isovalue = 20}, 0);
   EXPECT_EQ(guess.mesh.triangles, 0u);
   EXPECT_EQ(guess.mesh.vertices, 0u);
   EXPECT_EQ(guess.uncertainty, 0);
   EXPECT_EQ(guess.active.active_blocks, 0u);
-  EXPECT_THROW(estimate(reader, {.isovalue = NAN}), UsageError);
-  EXPECT_THROW(estimate(reader, {.isovalue = 5, .level = 7}), UsageError);
+  EXPECT_THROW(estimate(reader, {.isovalue = NAN}, 0), UsageError);
+  EXPECT_THROW(estimate(reader, {.isovalue = 5, .level = 7}, 0), UsageError);
+}
+
+/// What the sink takes is of the same budget, as it is in the extraction.
+TEST_F(Estimate, TheSinksMemoryIsPartOfIt) {
+  const Int3 extent{90, 90, 90};
+  const StoreReader reader =
+      store(extent, sampled<std::uint8_t>(extent, [](Int3 p) { return p.x; }), {.brick = 16});
+  const auto least = [&](std::uint64_t sink) -> std::uint64_t {
+    try {
+      estimate(reader, {.isovalue = 40.5, .memory = 1, .threads = 2}, sink);
+    } catch (const UsageError& e) {
+      const std::string what = e.what(), before = "at least ";
+      return std::stoull(what.substr(what.find(before) + before.size()));
+    }
+    return 0;
+  };
+  EXPECT_GT(least(0), std::uint64_t{1} << 20);
+  EXPECT_EQ(least(1000000), least(0) + 1000000);
 }
 
 TEST(TileSample, TakesOneGroupOfEveryStratum) {

@@ -1,0 +1,108 @@
+#include "isobrick/pipeline/backend_choice.h"
+
+#include <gtest/gtest.h>
+
+#include "isobrick/core/error.h"
+#include "tests/pipeline/convert_store.h"
+
+namespace isobrick::test {
+namespace {
+
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+
+class NoSink final : public MeshSink {
+ public:
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader&) override {}
+  void write(const MeshChunk&) override {}
+  void finish() override {}
+  std::uint64_t bytes() const override { return 0; }
+};
+
+class NoSurface final : public SurfaceExtractor {
+ public:
+  void extract(std::span<const TileWork>, const BrickLookup&) override {}
+  void finish() override {}
+  void report(ExtractReport&) const override {}
+};
+
+/// A GPU that is busy or small, or neither.
+class FakeGpu final : public GpuSession {
+ public:
+  FakeGpu(std::uint64_t pinned, bool full) : pinned_(pinned), full_(full) {}
+
+  std::uint64_t plan(const ExtractRequest&, std::uint64_t, std::uint64_t host_budget,
+                     std::uint64_t other) override {
+    if (host_budget < other + pinned_) throw UsageError("--memory is too small for the GPU");
+    return pinned_;
+  }
+  std::size_t good_batch() const override { return 8; }
+  std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, MeshSink&) override {
+    if (full_) throw Error("no device memory is left");
+    return std::make_unique<NoSurface>();
+  }
+
+ private:
+  std::uint64_t pinned_;
+  bool full_;
+};
+
+class BackendChoice : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    MemorySource source = make_source<std::uint8_t>({60, 60, 60}, 1);
+    convert_quietly(source, folder_ / "a", {.brick = 16, .shard = 32});
+    store_ = std::make_unique<StoreReader>(folder_ / "a");
+  }
+
+  ChosenBackend choose(Backend backend, std::uint64_t memory, const OpenGpu& open) {
+    const ExtractOptions options{
+        .isovalue = 100, .memory = memory, .threads = 2, .backend = backend};
+    const ExtractRequest request = check_request(*store_, options, Indexing::welded);
+    return set_up_backend(request, options, 64, 0, sink_, open);
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<StoreReader> store_;
+  NoSink sink_;
+};
+
+OpenGpu gpu(std::uint64_t pinned, bool full = false) {
+  return [=] { return std::make_unique<FakeGpu>(pinned, full); };
+}
+
+TEST_F(BackendChoice, AGpuThatWorksIsTaken) {
+  for (const Backend backend : {Backend::automatic, Backend::cuda}) {
+    const ChosenBackend chosen = choose(backend, 400 * kMiB, gpu(100 * kMiB));
+    EXPECT_TRUE(chosen.gpu);
+    EXPECT_TRUE(chosen.surface);
+    EXPECT_EQ(chosen.gpu_refusal, "");
+  }
+  const ChosenBackend cpu = choose(Backend::automatic, 400 * kMiB, [] { return nullptr; });
+  EXPECT_FALSE(cpu.gpu);
+  EXPECT_TRUE(cpu.surface);
+  EXPECT_EQ(cpu.gpu_refusal, "");
+}
+
+TEST_F(BackendChoice, TheCpuStepsInForAnAutomaticGpuAndSaysWhy) {
+  const OpenGpu lost = []() -> std::unique_ptr<GpuSession> { throw Error("the device is busy"); };
+  const auto expect_cpu = [&](std::uint64_t memory, const OpenGpu& open, const std::string& why) {
+    const ChosenBackend chosen = choose(Backend::automatic, memory, open);
+    EXPECT_FALSE(chosen.gpu);
+    EXPECT_TRUE(chosen.surface);
+    EXPECT_LE(chosen.plan.bytes, memory);
+    EXPECT_EQ(chosen.gpu_refusal, why);
+  };
+  expect_cpu(400 * kMiB, lost, "the device is busy");
+  expect_cpu(100 * kMiB, gpu(100 * kMiB), "--memory is too small for the GPU");
+  expect_cpu(400 * kMiB, gpu(kMiB, true), "no device memory is left");
+  EXPECT_THROW(choose(Backend::automatic, kMiB, gpu(kMiB)), UsageError);
+}
+
+TEST_F(BackendChoice, AGpuThatIsDemandedFailsAloud) {
+  EXPECT_THROW(choose(Backend::cuda, 100 * kMiB, gpu(100 * kMiB)), UsageError);
+  EXPECT_THROW(choose(Backend::cuda, 400 * kMiB, gpu(kMiB, true)), Error);
+}
+
+}  // namespace
+}  // namespace isobrick::test
