@@ -58,6 +58,7 @@ TEST_F(Backend, TheCpuReportsItsStages) {
                                            path("a.ply"), "--backend", "cpu"})["surfaces"][0];
   EXPECT_EQ(surface["backend"], "cpu");
   EXPECT_TRUE(surface["device"].is_null());
+  EXPECT_TRUE(surface["gpu_refusal"].is_null());
   EXPECT_FALSE(surface.contains("device_bytes"));
   const nlohmann::json& stages = surface["stages"];
   std::vector<std::string> names;

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
 #include "isobrick/core/error.h"
+#include "tests/io/temp_dir.h"
 #include "tools/console.h"
 #include "tools/format.h"
+#include "tools/mesh_output.h"
 #include "tools/mesh_space.h"
 #include "tools/parse.h"
 
@@ -76,6 +78,16 @@ TEST(Format, Figures) {
   EXPECT_EQ(human_count(1234567), "1,234,567");
   EXPECT_EQ(human_seconds(0.0123), "0.012 s");
   EXPECT_EQ(human_seconds(125), "2:05 min");
+}
+
+TEST(Mesh, ItsMemoryIsKnownBeforeItIsOpened) {
+  const TempDir dir;
+  for (const MeshFormat format : {MeshFormat::ply, MeshFormat::stl, MeshFormat::obj,
+                                  MeshFormat::glb, MeshFormat::vtp, MeshFormat::pvtp})
+    for (const int threads : {0, 3})
+      EXPECT_EQ(mesh_memory(format, threads),
+                open_mesh(dir / "a", {.format = format}, true, threads)->memory())
+          << name_of(format);
 }
 
 TEST(Space, AMeshNeedsItsScratchFileToo) {
