@@ -68,9 +68,15 @@ void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_val
 void DeviceVolume::Impl::list_tiles() {
   std::vector<std::int32_t> order;
   order.reserve(3 * std::size_t{tile_count});
+  std::vector<std::uint32_t> places(tile_count);
   for_each_morton(lattice.tiles(), [&](Int3 t) {
+    places[static_cast<std::size_t>(linear_index(t, lattice.tiles()))] =
+        static_cast<std::uint32_t>(order.size() / 3);
     for (int axis = 0; axis < 3; ++axis) order.push_back(static_cast<std::int32_t>(t[axis]));
   });
+  order_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
+  check(cudaMemcpyAsync(order_of_tile.data(), places.data(), order_of_tile.bytes(),
+                        cudaMemcpyHostToDevice, stream.get()));
   tiles = DeviceBuffer<std::int32_t>(order.size(), stream);
   check(cudaMemcpyAsync(tiles.data(), order.data(), tiles.bytes(), cudaMemcpyHostToDevice,
                         stream.get()));
@@ -99,7 +105,7 @@ const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
 
 std::uint64_t DeviceVolume::bytes() const {
   return impl_->pages.bytes() + impl_->page_of_tile.bytes() + impl_->tiles.bytes() +
-         impl_->ranges.bytes();
+         impl_->order_of_tile.bytes() + impl_->ranges.bytes();
 }
 
 }  // namespace isobrick::gpu

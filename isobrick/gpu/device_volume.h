@@ -70,7 +70,7 @@ class ResidentExtractor {
   DeviceCounts extract(double isovalue);
   /// Makes the last mesh once more, without waiting; for measuring.
   void repeat();
-  /// Milliseconds on the device of the last extraction, search included.
+  /// Milliseconds on the device of the last repeat(), search included.
   float milliseconds();
 
   /// Copies the last mesh to the host.

@@ -1,4 +1,6 @@
+#include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -14,12 +16,17 @@
 namespace isobrick::gpu {
 namespace {
 
-/// Small words that kernels share: zeroed before each search but the last.
+/// Small words that kernels share.
 struct Counters {
-  std::uint32_t search_ticket, extract_ticket, item_count, found;
+  std::uint32_t item_count, found;
   unsigned long long number_start, number_end;
   SurfaceTotals totals;
+  // From here on, with the sums of the search behind it, zeroed by the end of each launch.
+  alignas(8) std::uint32_t search_ticket, extract_ticket, done, unused;
 };
+
+/// How often the host looks at a report before it asks the driver whether all is well.
+constexpr std::uint32_t kLooks = 4096;
 
 /// Mesh to expect of a tile before anything is known: a sheet across it, twice.
 constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
@@ -37,11 +44,13 @@ struct ResidentExtractor::Impl {
   DeviceBuffer<TileItem> items;
   DeviceBuffer<std::uint32_t> slot_of_tile;
   DeviceBuffer<OrderState> order;
-  DeviceBuffer<std::byte> zeroed;  ///< Counters, then the sums of the search
+  DeviceBuffer<std::byte> words;  ///< Counters, then the sums of the search
   DeviceBuffer<RowTable> row_tables;
   DeviceBuffer<Vec3f> positions, normals;
   DeviceBuffer<Triangle> triangles;
-  PinnedBuffer<Counters> seen{1};
+  MappedHost<LaunchReport> report;
+  std::uint32_t launches = 0;
+  SurfaceTotals made{};  ///< by the last extraction
   Event start, end;
   TileSearch search;
   std::optional<SpanIndices> index;  ///< of the tiles, where the search is through one
@@ -54,7 +63,7 @@ struct ResidentExtractor::Impl {
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
         order(volume.tile_count, volume.stream),
-        zeroed(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
+        words(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
         search(tuning.search) {
     if (const auto kind = index_kind_of(search)) index.emplace(index_tiles(volume, *kind));
     check_supported(volume.lattice.type, o);
@@ -66,24 +75,40 @@ struct ResidentExtractor::Impl {
     make_case_entries(world_map(options.transform).mirrored, entries);
     check(cudaMemcpyAsync(case_entries.data(), entries, sizeof entries, cudaMemcpyHostToDevice,
                           volume.stream.get()));
+    check(cudaMemsetAsync(words.data(), 0, words.bytes(), volume.stream.get()));
+    if (searched_by_blocks()) {
+      make_row_tables(volume.tile_count);
+      check(cudaMemsetAsync(order.data(), 0, order.bytes(), volume.stream.get()));
+    }
     volume.stream.wait();
   }
 
+  /// Few tiles need no launch of their own to find the active ones.
+  bool searched_by_blocks() const { return volume.tile_count <= kMostSearchedByBlock; }
   std::size_t search_blocks() const {
     return (volume.tile_count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
   }
-  Counters* counters() const { return reinterpret_cast<Counters*>(zeroed.data()); }
+  Counters* counters() const { return reinterpret_cast<Counters*>(words.data()); }
+
+  /// All tiles, the index searched where there is one.
+  TileCandidates candidates() {
+    TileCandidates c{};
+    c.test = test_of(search);
+    c.uncut = options.roi == volume.lattice.box();
+    if (index) {
+      index->search(isovalue, volume.stream);
+      c.mask = index->mask();
+    }
+    c.tiles = volume.tiles.data();
+    c.order_of_tile = volume.order_of_tile.data();
+    c.ranges = volume.ranges.data();
+    c.count = volume.tile_count;
+    return c;
+  }
 
   void launch_search() {
     SearchParams p{};
-    p.test = test_of(search);
-    if (index) {
-      index->search(isovalue, volume.stream);
-      p.mask = index->mask();
-    }
-    p.tiles = volume.tiles.data();
-    p.ranges = volume.ranges.data();
-    p.count = volume.tile_count;
+    p.candidates = candidates();
     const TileParams t = volume.params();
     std::memcpy(p.grid, t.tiles, sizeof p.grid);
     for (int axis = 0; axis < 3; ++axis) {
@@ -99,15 +124,18 @@ struct ResidentExtractor::Impl {
     p.order = order.data();
     p.sums = reinterpret_cast<unsigned long long*>(counters() + 1);
     p.ticket = &counters()->search_ticket;
-    check(cudaMemsetAsync(zeroed.data(), 0, zeroed.bytes(), volume.stream.get()));
     gpu::launch_search(volume.lattice.type, p, volume.stream.get());
   }
 
   void launch_tiles() {
     TileParams p = volume.params();
-    p.items = items.data();
-    p.item_count = &counters()->item_count;
-    p.slot_of_tile = slot_of_tile.data();
+    if (searched_by_blocks()) {
+      p.candidates = candidates();
+    } else {
+      p.items = items.data();
+      p.item_count = &counters()->item_count;
+      p.slot_of_tile = slot_of_tile.data();
+    }
     for (int axis = 0; axis < 3; ++axis) {
       p.roi_lo[axis] = static_cast<std::int32_t>(options.roi.lo[axis]);
       p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
@@ -128,6 +156,13 @@ struct ResidentExtractor::Impl {
     p.vertex_capacity = positions.size();
     p.triangle_capacity = triangles.size();
     p.totals = &counters()->totals;
+    p.end.report = report.on_device();
+    p.end.launch = ++launches;
+    p.end.found = &counters()->found;
+    p.end.done = &counters()->done;
+    p.end.zero = &counters()->search_ticket;
+    p.end.zero_words = static_cast<std::uint32_t>(
+        (words.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
     launch_extraction(volume.lattice.type, options.normals, p, case_entries.data(),
                       shapes.of(active), volume.stream.get());
   }
@@ -155,11 +190,19 @@ struct ResidentExtractor::Impl {
     epoch = 0;
   }
 
-  Counters read_counters() const {
-    check(cudaMemcpyAsync(seen.data(), counters(), sizeof(Counters), cudaMemcpyDeviceToHost,
-                          volume.stream.get()));
-    volume.stream.wait();
-    return seen[0];
+  /// Waits for the last launch. Its report comes some microseconds before an event would.
+  LaunchReport wait_for_report() const {
+    LaunchReport& seen = *report;
+    const std::atomic_ref<std::uint32_t> launch(seen.launch);
+    for (std::uint32_t looks = 1; launch.load(std::memory_order_acquire) != launches; ++looks) {
+      if (looks % kLooks != 0) continue;
+      const cudaError_t state = cudaStreamQuery(volume.stream.get());
+      if (state == cudaErrorNotReady) continue;
+      check(state);
+      if (launch.load(std::memory_order_acquire) != launches)
+        throw Error("the device has ended an extraction without saying what it made");
+    }
+    return seen;
   }
 
   DeviceCounts extract(double value) {
@@ -168,28 +211,32 @@ struct ResidentExtractor::Impl {
     // Tiles that have no room are not begun: the first launch tells how many there are.
     for (;;) {
       launch();
-      const Counters c = read_counters();
-      active = c.found;
-      if (c.found > row_tables.size()) {
-        make_row_tables(c.found);
-        make_room(kVerticesOfTile * c.found, kTrianglesOfTile * c.found);
+      const LaunchReport seen = wait_for_report();
+      active = seen.found;
+      if (seen.found > row_tables.size()) make_row_tables(seen.found);
+      if (seen.found > 0 && positions.size() == 0) {
+        make_room(kVerticesOfTile * seen.found, kTrianglesOfTile * seen.found);
         continue;
       }
-      const SurfaceTotals made = c.totals;
+      made = seen.made;
       if (made.vertices > std::numeric_limits<std::uint32_t>::max())
         throw Error(
             "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "
             "number; extract it in parts with --roi");
       if (made.vertices <= positions.size() && made.triangles <= triangles.size())
-        return {made.vertices, made.triangles, c.found};
+        return {made.vertices, made.triangles, seen.found};
       make_room(made.vertices, made.triangles);
     }
   }
 
   void launch() {
-    start.record(volume.stream);
-    launch_search();
+    if (!searched_by_blocks()) launch_search();
     launch_tiles();
+  }
+
+  void repeat() {
+    start.record(volume.stream);
+    launch();
     end.record(volume.stream);
   }
 };
@@ -200,7 +247,7 @@ ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions&
 ResidentExtractor::~ResidentExtractor() = default;
 
 DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
-void ResidentExtractor::repeat() { impl_->launch(); }
+void ResidentExtractor::repeat() { impl_->repeat(); }
 
 float ResidentExtractor::milliseconds() {
   impl_->end.wait();
@@ -208,7 +255,8 @@ float ResidentExtractor::milliseconds() {
 }
 
 void ResidentExtractor::download(MeshBuffer& mesh) const {
-  const SurfaceTotals made = impl_->read_counters().totals;
+  const SurfaceTotals made = impl_->made;
+  impl_->volume.stream.wait();
   mesh.clear();
   mesh.positions.resize(made.vertices);
   mesh.triangles.resize(made.triangles);
@@ -224,7 +272,7 @@ void ResidentExtractor::download(MeshBuffer& mesh) const {
 std::uint64_t ResidentExtractor::bytes() const {
   const Impl& i = *impl_;
   return i.case_entries.bytes() + i.items.bytes() + i.slot_of_tile.bytes() + i.order.bytes() +
-         i.zeroed.bytes() + i.row_tables.bytes() + i.positions.bytes() + i.normals.bytes() +
+         i.words.bytes() + i.row_tables.bytes() + i.positions.bytes() + i.normals.bytes() +
          i.triangles.bytes() + (i.index ? i.index->bytes() : 0);
 }
 

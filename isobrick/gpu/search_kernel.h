@@ -7,21 +7,9 @@
 
 namespace isobrick::gpu {
 
-/// How the search knows which tiles an isovalue stabs.
-enum class TileTest : std::uint8_t {
-  ranges,         ///< compares the range of each
-  mask_by_order,  ///< bit i of the mask: tile i in Morton order
-  mask_by_place,  ///< bit i of the mask: tile i in C order [z, y, x]
-  all             ///< takes them all
-};
-
-/// All tiles of a volume in Morton order, and what the search for active ones leaves.
+/// All tiles of a volume, and what the search for active ones leaves.
 struct SearchParams {
-  TileTest test;
-  const std::uint32_t* mask;
-  const std::int32_t* tiles;  ///< x, y, z of each
-  const void* ranges;         ///< min and max of each, of the sample type
-  std::uint32_t count;
+  TileCandidates candidates;
   std::int32_t grid[3], roi_lo[3], roi_hi[3];  ///< tiles; samples
   double isovalue;
   TileItem* items;  ///< room for all

@@ -3,6 +3,7 @@
 #include <cuda_runtime_api.h>
 
 #include <cstddef>
+#include <cstring>
 #include <utility>
 
 #include "isobrick/gpu/cuda_check.h"
@@ -89,6 +90,27 @@ class DeviceBuffer {
   void* data_ = nullptr;
   std::size_t size_ = 0;
   cudaStream_t stream_ = nullptr;
+};
+
+/// Owns one T of page-locked host memory that kernels write to; zeroed at first.
+template <class T>
+class MappedHost {
+ public:
+  MappedHost() {
+    check(cudaHostAlloc(&host_, sizeof(T), cudaHostAllocMapped));
+    std::memset(host_, 0, sizeof(T));
+    check(cudaHostGetDevicePointer(&device_, host_, 0));
+  }
+  MappedHost(const MappedHost&) = delete;
+  MappedHost& operator=(const MappedHost&) = delete;
+  ~MappedHost() { (void)cudaFreeHost(host_); }
+
+  T& operator*() const { return *static_cast<T*>(host_); }
+  T* on_device() const { return static_cast<T*>(device_); }
+
+ private:
+  void* host_ = nullptr;
+  void* device_ = nullptr;
 };
 
 /// Owns page-locked host memory, for copies that run beside everything else. Mapped in

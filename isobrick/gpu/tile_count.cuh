@@ -117,17 +117,22 @@ __device__ inline void sum_steps(TileShared& s) {
 }
 
 /// Marks a row with `count` things from `place` on, counted from the first that
-/// is listed now; it may lie before that.
-template <class Mark>
+/// is listed now; it may lie before that. A row has at most `Most` things.
+template <int Most, class Mark>
 __device__ inline void mark_row(Mark* marks, FirstOfGroup* groups, int place, int count, int row) {
   constexpr int kGroups = kListed / 32;
   if (count == 0) return;
   if (place >= 0 && place < static_cast<int>(kListed)) marks[place] = static_cast<Mark>(row + 1);
-  for (int group = ::max((place + 31) >> 5, 0); group < kGroups && 32 * group < place + count;
-       ++group)
+  int group = ::max((place + 31) >> 5, 0);
+  // Hardly any row reaches from one group to the next.
+#pragma unroll 1
+  for (int reached = 0; reached < Most; reached += 32, ++group) {
+    if (group >= kGroups || 32 * group >= place + count) break;
     groups[group] = {static_cast<std::uint16_t>(row),
                      static_cast<std::uint16_t>(32 * group - place)};
+  }
 }
+inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
 
 /// Leaves the row table for later tiles and the numbers within the tile in
 /// shared memory, and marks the first vertices and cells.
@@ -147,10 +152,10 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, R
     s.number[1][row] = base + y + count.y_at_0();
     s.number[2][row] = base + z + count.z_at_0();
     s.cell_base[row] = static_cast<std::uint16_t>(cell);
-    mark_row(s.vertex_marks, s.vertex_groups, static_cast<int>(base),
-             static_cast<int>(count.vertices()), row);
-    mark_row(s.cells(), s.cell_groups, static_cast<int>(cell), static_cast<int>(count.cells()),
-             row);
+    mark_row<kMostVerticesOfRow>(s.vertex_marks, s.vertex_groups, static_cast<int>(base),
+                                 static_cast<int>(count.vertices()), row);
+    mark_row<kMostCellsOfRow>(s.cells(), s.cell_groups, static_cast<int>(cell),
+                              static_cast<int>(count.cells()), row);
   }
   if (threadIdx.x == 0) {
     table.rows[kRowsOfTile] = s.all_vertices;
@@ -167,8 +172,8 @@ __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
   for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.number[0][row];
     const std::uint32_t end = row + 1 < kRowsOfTile ? s.number[0][row + 1] : s.all_vertices;
-    mark_row(s.vertex_marks, s.vertex_groups, static_cast<int>(begin - first),
-             static_cast<int>(end - begin), row);
+    mark_row<kMostVerticesOfRow>(s.vertex_marks, s.vertex_groups, static_cast<int>(begin - first),
+                                 static_cast<int>(end - begin), row);
   }
   __syncthreads();
 }
@@ -179,8 +184,8 @@ __device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
   __syncthreads();
   for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
-    mark_row(s.cells(), s.cell_groups, static_cast<int>(begin - first),
-             static_cast<int>(end - begin), row);
+    mark_row<kMostCellsOfRow>(s.cells(), s.cell_groups, static_cast<int>(begin - first),
+                              static_cast<int>(end - begin), row);
   }
   __syncthreads();
 }
@@ -223,17 +228,17 @@ __device__ inline WarpPart part_of_warp(std::uint32_t listed) {
   return {begin, ::min(end, all)};
 }
 
-/// The same where the first warp has something else to do: `Halves` halves of what
-/// the others get for it.
-template <int N, int Halves>
+/// The same where the first warp has something else to do: `First` pieces for it when
+/// each of the others gets `Others`.
+template <int N, int First, int Others>
 __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
   if constexpr (Team<N>::kWarps == 1) {
     return part_of_warp<N>(listed);
   } else {
-    constexpr std::uint32_t kParts = 2 * (Team<N>::kWarps - 1) + Halves;
+    constexpr std::uint32_t kParts = Others * (Team<N>::kWarps - 1) + First;
     const std::uint32_t all = uniform(listed), warp = uniform(warp_id()), groups = (all + 31) / 32;
-    const std::uint32_t last = 2 * warp + Halves;
-    const std::uint32_t begin = warp == 0 ? 0 : groups * (last - 2) / kParts * 32;
+    const std::uint32_t last = Others * warp + First;
+    const std::uint32_t begin = warp == 0 ? 0 : groups * (last - Others) / kParts * 32;
     const std::uint32_t end = groups * last / kParts * 32;
     return {begin, ::min(end, all)};
   }
@@ -242,7 +247,7 @@ __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
 /// Finds the marked cells and their cases, and how many triangles each 32 have.
 template <int N>
 __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
-  const WarpPart part = part_beside_first<N, 1>(listed);
+  const WarpPart part = part_beside_first<N, 1, 2>(listed);
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
     const PlaceInRow place = place_of_lane(s.cells()[i], s.cell_groups[begin / 32]);

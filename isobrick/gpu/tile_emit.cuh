@@ -116,7 +116,7 @@ __device__ inline void emit_vertices(const TileShared& s, const TileParams& p, s
                                      std::uint32_t listed) {
   using Maker = VertexMaker<T>;
   const Maker maker{s, p, p.crossing};
-  const WarpPart part = part_beside_first<N, 0>(listed);
+  const WarpPart part = part_beside_first<N, 0, 1>(listed);
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
     const std::uint32_t row = place_of_lane(s.vertex_marks[i], s.vertex_groups[begin / 32]).row;
@@ -162,16 +162,17 @@ __device__ inline std::uint32_t low_bits(std::uint32_t x) {
   return mask;
 }
 
-/// Writes a pending triangle.
-__device__ inline void emit_triangle(const TileShared& s, std::uint32_t entry, Triangle& to) {
+/// Writes triangle `number` of a listed cell.
+__device__ inline void emit_triangle(const TileShared& s, std::uint32_t listed_cell,
+                                     std::uint32_t number, Triangle& to) {
   const char* base = reinterpret_cast<const char*>(&s);
   const auto word = [base](std::uint32_t at) {
     return *reinterpret_cast<const std::uint32_t*>(base + at);
   };
-  const std::uint32_t cell = s.cells()[entry & 0xfffu];
+  const std::uint32_t cell = s.cells()[listed_cell];
   const std::uint32_t x = cell & 31u, row = cell >> 3 & 0x1ffcu, mask = low_bits(x);
   const std::uint32_t edges = *reinterpret_cast<const std::uint16_t*>(
-      reinterpret_cast<const char*>(s.triangles) + (cell >> 16 & 0xfffu) + (entry >> 11 & 0x1eu));
+      reinterpret_cast<const char*>(s.triangles) + (cell >> 16 & 0xfffu) + 2 * number);
   const std::uint32_t places = x == 0 ? static_cast<std::uint32_t>(sizeof s.places[0]) : 0;
   std::uint32_t corners[3];
 #pragma unroll
@@ -184,14 +185,50 @@ __device__ inline void emit_triangle(const TileShared& s, std::uint32_t entry, T
   to = {corners[0], corners[1], corners[2]};
 }
 
+/// 1 at that place; 0 where it is none of 0 … 31.
+__device__ inline std::uint32_t bit_at(std::uint32_t place) {
+  std::uint32_t bit;
+  asm("shl.b32 %0, 1, %1;" : "=r"(bit) : "r"(place));
+  return bit;
+}
+
+__device__ inline std::uint32_t warp_or(std::uint32_t v) {
+#if __CUDA_ARCH__ >= 800
+  return __reduce_or_sync(kAll, v);
+#else
+#pragma unroll
+  for (int d = 16; d; d /= 2) v |= __shfl_xor_sync(kAll, v, d);
+  return v;
+#endif
+}
+
+/// The next triangles of a warp's cells that are to be written, at most 32 at a time
+/// whatever cells they come from, so that no thread idles. All threads have the same.
+struct PendingTriangles {
+  std::uint32_t cell;    ///< listed cells that have begun before the first of them
+  std::uint32_t into;    ///< triangles of the last of those that are written
+  std::uint32_t starts;  ///< bit i: with triangle i a cell begins
+
+  /// One a lane.
+  __device__ void emit(const TileShared& s, Triangle& to) const {
+    const std::uint32_t begun = starts & (lanes_below() << 1 | 1u);
+    const auto from = static_cast<std::uint32_t>(31 - __clz(static_cast<int>(begun)));
+    emit_triangle(s, cell + __popc(begun) - 1, begun ? lane_id() - from : lane_id() + into, to);
+  }
+  __device__ void pass_32() {
+    into = starts ? 1 + static_cast<std::uint32_t>(__clz(static_cast<int>(starts))) : into + 32;
+    cell += __popc(starts);
+  }
+};
+
 /// Writes the triangles of the listed cells; `base` is the number of the first of
-/// them in the mesh. Triangles wait until there are 32 of them,
-/// whatever cells they come from, so that no thread idles.
+/// them in the mesh.
 template <int N>
-__device__ inline void emit_triangles(TileShared& s, WarpShared& own, const TileParams& p,
+__device__ inline void emit_triangles(const TileShared& s, const TileParams& p,
                                       std::uint32_t listed, std::uint64_t base) {
   const WarpPart part = part_of_warp<N>(listed);
   Triangle* to = p.triangles + base + triangles_before(s, part.begin / 32) + lane_id();
+  PendingTriangles pending{part.begin, 0, 0};
   std::uint32_t waiting = 0;
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
@@ -199,21 +236,18 @@ __device__ inline void emit_triangles(TileShared& s, WarpShared& own, const Tile
     // The sum before each lane from the bits of the counts: three votes.
     const unsigned ones = __ballot_sync(kAll, count & 1u), twos = __ballot_sync(kAll, count & 2u),
                    fours = __ballot_sync(kAll, count & 4u), below = lanes_below();
-    std::uint16_t* place = own.pending + waiting + __popc(ones & below) + 2 * __popc(twos & below) +
-                           4 * __popc(fours & below);
-#pragma unroll
-    for (std::uint32_t t = 0; t < 5; ++t)
-      if (t < count) place[t] = static_cast<std::uint16_t>(i + (t << 12));
+    std::uint32_t place =
+        waiting + __popc(ones & below) + 2 * __popc(twos & below) + 4 * __popc(fours & below);
     waiting += __popc(ones) + 2 * __popc(twos) + 4 * __popc(fours);
-    __syncwarp();
-    std::uint32_t written = 0;
-    for (; waiting >= 32; waiting -= 32, written += 32, to += 32)
-      emit_triangle(s, own.pending[written + lane_id()], *to);
-    __syncwarp();
-    if (written > 0) own.pending[lane_id()] = own.pending[written + lane_id()];
-    __syncwarp();
+    pending.starts |= warp_or(bit_at(place));
+    for (; waiting >= 32; waiting -= 32, to += 32) {
+      pending.emit(s, *to);
+      pending.pass_32();
+      place -= 32;
+      pending.starts = warp_or(bit_at(place));
+    }
   }
-  if (lane_id() < waiting) emit_triangle(s, own.pending[lane_id()], *to);
+  if (lane_id() < waiting) pending.emit(s, *to);
 }
 
 }  // namespace isobrick::gpu

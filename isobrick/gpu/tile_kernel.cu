@@ -44,16 +44,25 @@ __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& i
                (start - before) * static_cast<std::int64_t>(sizeof(T));
 }
 
-/// The first warp takes the next tile.
+__device__ TileItem item_of(const TileShared& s, const TileParams& p, std::uint32_t number) {
+  if (p.candidates.count == 0) return p.items[number];
+  const std::int32_t* tile = p.candidates.tiles + 3 * candidate_of_number(s, number);
+  return {tile[0], tile[1], tile[2], number};
+}
+
+/// Which tile is the next. The first thread; others get anything.
+__device__ std::uint32_t next_number(const TileParams& p) {
+  return threadIdx.x == 0 ? atomicAdd(p.ticket, 1u) : 0;
+}
+
+/// The first warp takes the tile with that number.
 template <class T>
-__device__ void take_tile(TileShared& s, const TileParams& p) {
+__device__ void take_tile(TileShared& s, const TileParams& p, std::uint32_t number) {
   if (warp_id() != 0) return;
-  std::uint32_t number = 0;
-  if (lane_id() == 0) number = atomicAdd(p.ticket, 1u);
   number = __shfl_sync(kAll, number, 0);
   if (lane_id() == 0) s.item = number;
-  if (number >= *p.item_count) return;
-  const TileItem tile = p.items[number];
+  if (number >= s.items) return;
+  const TileItem tile = item_of(s, p, number);
   find_pages<T>(s, p, tile, number);
   if (lane_id() == 0) {
     s.tile = tile;
@@ -63,14 +72,14 @@ __device__ void take_tile(TileShared& s, const TileParams& p) {
 
 /// Brings the samples of a tile that is about to be taken into the L2 cache.
 template <int N, class T>
-__device__ void prefetch_tile(const TileParams& p, std::uint32_t number) {
-  if (number >= *p.item_count) return;
+__device__ void prefetch_tile(const TileShared& s, const TileParams& p, std::uint32_t number) {
+  if (number >= s.items) return;
   constexpr std::size_t bytes = kPageSamples * sizeof(T);
   const char* from = static_cast<const char*>(p.pages);
   if (p.links) {
     from += streamed_page(number, kOwnPage) * static_cast<std::int64_t>(sizeof(T));
   } else {
-    const TileItem item = p.items[number];
+    const TileItem item = item_of(s, p, number);
     const std::uint32_t page =
         p.page_of_tile[(static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] +
                        item.x];
@@ -81,12 +90,11 @@ __device__ void prefetch_tile(const TileParams& p, std::uint32_t number) {
     asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
 }
 
-template <int N>
 constexpr std::size_t shared_bytes(std::uint32_t listed) {
-  return sizeof(TileShared) + listed * sizeof(std::uint32_t) + Team<N>::kWarps * sizeof(WarpShared);
+  return sizeof(TileShared) + listed * sizeof(std::uint32_t);
 }
 
-static_assert(shared_bytes<384>(kListedBeforeAmpere) <= 64 << 10, "what Turing has");
+static_assert(shared_bytes(kListedBeforeAmpere) <= 64 << 10, "what Turing has");
 
 /// Counts a tile's crossing edges and active cells, and leaves their places.
 template <int N>
@@ -100,27 +108,54 @@ __device__ void count_tile(TileShared& s, const TileParams& p) {
   }
   __syncthreads();
   publish_rows<N>(s, counts, p.row_tables[s.tile.slot]);
-  __threadfence();
   __syncthreads();
 }
 
-/// Finds the tile's cells; how many triangles they have. The last kListed cells
-/// stay listed. Ends with a barrier.
+/// The triangles of a tile with more cells than are listed at a time. The last
+/// kListed cells stay listed.
 template <int N>
-__device__ std::uint64_t count_triangles(TileShared& s) {
+__device__ std::uint32_t count_in_turns(TileShared& s) {
   const std::uint32_t cells = s.all_cells;
-  std::uint64_t triangles = 0;
-  std::uint32_t first = 0;
-  do {
+  std::uint32_t triangles = 0;
+  for (std::uint32_t first = 0; first < cells; first += kListed) {
     if (first > 0) mark_cells<N>(s, first);
     const std::uint32_t listed = ::min(cells - first, kListed);
     find_cells<N>(s, listed);
     __syncthreads();
     triangles += triangles_before(s, (listed + 31) / 32);
-    if (cells > kListed) __syncthreads();
-    first += kListed;
-  } while (first < cells);
+    __syncthreads();
+  }
   return triangles;
+}
+
+/// Finds the tile's cells and where its vertices and triangles go. The first warp asks
+/// what other tiles know; the others wait for no more than the place of the vertices.
+template <int N>
+__device__ void find_places(TileShared& s, const TileParams& p) {
+  const std::uint32_t cells = s.all_cells;
+  if (warp_id() == 0) {
+    find_vertex_base(s, p);
+    arrive<N, TeamBarrier::vertex_base>();
+  }
+  std::uint32_t triangles = 0;
+  if (cells <= kListed) {
+    find_cells<N>(s, cells);
+  } else {
+    triangles = count_in_turns<N>(s);
+  }
+  if (warp_id() != 0) {
+    arrive<N, TeamBarrier::cells>();
+    wait<N, TeamBarrier::vertex_base>();
+    return;
+  }
+  wait<N, TeamBarrier::cells>();
+  if (cells <= kListed) triangles = triangles_before(s, (cells + 31) / 32);
+  if (lane_id() == 0) {
+    s.all_triangles = triangles;
+    publish_sum(p.order[s.item].triangles, s.item, triangles);
+  }
+  find_triangle_base(s, p, triangles);
+  ask_neighbours(s, p);
 }
 
 template <int N, class T, bool Normals>
@@ -135,11 +170,10 @@ __device__ void emit_all_vertices(TileShared& s, const TileParams& p) {
 }
 
 template <int N>
-__device__ void emit_all_triangles(TileShared& s, WarpShared& own, const TileParams& p,
-                                   std::uint64_t triangles) {
+__device__ void emit_all_triangles(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
   std::uint64_t base = s.triangle_base;
-  if (base + triangles > p.triangle_capacity) return;
+  if (base + s.all_triangles > p.triangle_capacity) return;
   for (std::uint32_t first = 0; first < cells; first += kListed) {
     const std::uint32_t listed = ::min(cells - first, kListed);
     if (cells > kListed) {
@@ -147,12 +181,34 @@ __device__ void emit_all_triangles(TileShared& s, WarpShared& own, const TilePar
       find_cells<N>(s, listed);
       __syncthreads();
     }
-    emit_triangles<N>(s, own, p, listed, base);
+    emit_triangles<N>(s, p, listed, base);
     if (cells > kListed) {
       base += triangles_before(s, (listed + 31) / 32);
       __syncthreads();
     }
   }
+}
+
+/// The last block to come here tells the host and leaves everything as the next launch
+/// needs it.
+template <int N>
+__device__ void end_launch(TileShared& s, const TileParams& p) {
+  const LaunchEnd& end = p.end;
+  if (!end.report) return;
+  if (threadIdx.x == 0)
+    s.done_before = DeviceFlag(*end.done).fetch_add(1, cuda::memory_order_acq_rel);
+  __syncthreads();
+  if (s.done_before + 1 < gridDim.x) return;
+  if (threadIdx.x == 0) {
+    LaunchReport& report = *end.report;
+    report.made = s.items > 0 ? *p.totals : SurfaceTotals{};
+    report.found = p.candidates.count > 0 ? s.items : *end.found;
+    cuda::atomic_ref<std::uint32_t, cuda::thread_scope_system>(report.launch)
+        .store(end.launch, cuda::memory_order_release);
+  }
+  for (std::uint32_t i = threadIdx.x; i < end.zero_words; i += N) end.zero[i] = 0;
+  if (p.candidates.count == 0) return;
+  for (std::uint32_t i = threadIdx.x; i < s.items; i += N) p.order[i] = {0, 0};
 }
 
 template <int N, class T, bool Normals>
@@ -161,37 +217,35 @@ __global__ void __launch_bounds__(N, teams_of_multiprocessor(N))
                   const std::uint16_t* __restrict__ case_entries) {
   extern __shared__ __align__(256) unsigned char bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(bytes);
-  WarpShared& own = reinterpret_cast<WarpShared*>(s.cells() + kListed)[warp_id()];
+  const std::uint32_t first = next_number(p);
+  if (p.candidates.count > 0)
+    find_candidates<N, T>(s, p);
+  else if (threadIdx.x == 0)
+    s.items = *p.item_count;
   fill_tables<N>(s, case_entries);
   const Classifier<T> classifier(threshold);
-  const std::uint32_t items = *p.item_count;
-  take_tile<T>(s, p);
   __syncthreads();
-  while (s.item < items) {
+  take_tile<T>(s, p, first);
+  __syncthreads();
+  while (s.item < s.items) {
     clear_lists<N>(s);
     classify<N>(s, classifier);
     __syncthreads();
     count_tile<N>(s, p);
-    // The first warp asks what other tiles know while the others go on.
-    if (warp_id() == 0) find_vertex_base(s, p);
-    const std::uint64_t triangles = count_triangles<N>(s);
-    if (warp_id() == 0) {
-      if (lane_id() == 0) publish_sum(p.order[s.item].triangles, s.item, triangles);
-      find_triangle_base(s, p, triangles);
-      ask_neighbours(s, p);
-    }
-    prefetch_tile<N, T>(p, s.item + gridDim.x);
+    find_places<N>(s, p);
+    prefetch_tile<N, T>(s, p, s.item + gridDim.x);
     emit_all_vertices<N, T, Normals>(s, p);
     __syncthreads();
     number_at_0<N>(s);
     borrow_rows<N>(s);
     place_numbers<N>(s);
     __syncthreads();
-    emit_all_triangles<N>(s, own, p, triangles);
+    emit_all_triangles<N>(s, p);
     // No earlier than this: a tile that is taken but not begun holds all later ones up.
-    take_tile<T>(s, p);
+    take_tile<T>(s, p, next_number(p));
     __syncthreads();
   }
+  end_launch<N>(s, p);
 }
 
 int device_attribute(cudaDeviceAttr attribute) {
@@ -206,7 +260,7 @@ template <int N, class T, bool Normals>
 struct Launcher {
   static std::size_t shared() {
     const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
-    return shared_bytes<N>(before_ampere ? kListedBeforeAmpere : kMostListed);
+    return shared_bytes(before_ampere ? kListedBeforeAmpere : kMostListed);
   }
   /// 0 where the device has too little shared memory for one.
   static int blocks() {

@@ -2,7 +2,7 @@
 
 #include <cuda/atomic>
 
-#include "isobrick/gpu/tile_count.cuh"
+#include "isobrick/gpu/tile_find.cuh"
 
 // Third step: where the tile's output goes, and the numbers of vertices that
 // belong to tiles before it.
@@ -81,7 +81,7 @@ __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   s.number_base = static_cast<std::uint32_t>(start + base);
   table.number_base = s.number_base;
   DeviceFlag(table.ready).store(p.epoch, cuda::memory_order_release);
-  if (item + 1 < *p.item_count) return;
+  if (item + 1 < s.items) return;
   p.totals->vertices = base + s.all_vertices;
   *p.number_end = start + base + s.all_vertices;
 }
@@ -95,7 +95,15 @@ __device__ inline void find_triangle_base(TileShared& s, const TileParams& p,
                  triangles);
   if (lane_id() != 0) return;
   s.triangle_base = base;
-  if (item + 1 == *p.item_count) p.totals->triangles = base + triangles;
+  if (item + 1 == s.items) p.totals->triangles = base + triangles;
+}
+
+/// Where an active tile of a resident volume leaves its row table; kNone for others.
+__device__ inline std::uint32_t slot_of(const TileShared& s, const TileParams& p, int x, int y,
+                                        int z) {
+  const std::int64_t place = (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x;
+  return p.candidates.count > 0 ? number_of_candidate(s, p.candidates.order_of_tile[place])
+                                : p.slot_of_tile[place];
 }
 
 /// Brings the row table of the tile before to shared memory, on the way while this
@@ -131,9 +139,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
     wait = (slot & TileLinks::kSameLaunch) && !p.tables_known;
     if (slot != kNone) slot &= ~TileLinks::kSameLaunch;
   } else if (inside) {
-    slot = p.slot_of_tile[(static_cast<std::int64_t>(item.z - dz) * p.tiles[1] + (item.y - dy)) *
-                              p.tiles[0] +
-                          (item.x - dx)];
+    slot = slot_of(s, p, item.x - dx, item.y - dy, item.z - dz);
   }
   if (slot != kNone) {
     RowTable& table = p.row_tables[slot];
@@ -144,8 +150,8 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
     s.neighbour_base[n] = 0;
   }
   __syncwarp();
-  const auto slot_of = [&](int neighbour) { return __shfl_sync(kAll, slot, neighbour); };
-  const std::uint32_t before = slot_of(1);
+  const auto slot_of_neighbour = [&](int n) { return __shfl_sync(kAll, slot, n); };
+  const std::uint32_t before = slot_of_neighbour(1);
   // Where the cells' rows are needed again, the table is read where it is.
   const bool copied = before != kNone && s.all_cells <= kListed;
   if (copied) copy_before(s, p.row_tables[before]);
@@ -153,7 +159,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
     s.before = before == kNone ? nullptr : copied ? &s.before_copy : &p.row_tables[before];
   // All on their way before the first is waited for.
   const auto fetch = [&](int neighbour, unsigned row) {
-    const std::uint32_t from = slot_of(neighbour);
+    const std::uint32_t from = slot_of_neighbour(neighbour);
     return from == kNone ? 0 : p.row_tables[from].rows[row];
   };
   const std::uint32_t y = fetch(2, 33 * n + 32), xy = fetch(3, 33 * n + 33),

@@ -54,9 +54,50 @@ struct SurfaceTotals {
   unsigned long long vertices, triangles;
 };
 
+/// How a search knows which tiles an isovalue stabs.
+enum class TileTest : std::uint8_t {
+  ranges,         ///< compares the range of each
+  mask_by_order,  ///< bit i of the mask: tile i in Morton order
+  mask_by_place,  ///< bit i of the mask: tile i in C order [z, y, x]
+  all             ///< takes them all
+};
+
+/// Tiles of volumes that are so small that every block searches them all by itself.
+inline constexpr std::uint32_t kMostSearchedByBlock = 1024;
+
+/// All tiles of a volume in Morton order.
+struct TileCandidates {
+  TileTest test;
+  bool uncut;  ///< the region of interest is the whole volume
+  const std::uint32_t* mask;
+  const std::int32_t* tiles;           ///< x, y, z of each
+  const std::uint32_t* order_of_tile;  ///< [z, y, x] of the volume: its place in that order
+  const void* ranges;                  ///< min and max of each, of the sample type
+  std::uint32_t count;
+};
+
+/// What a launch tells the host, in the host's memory.
+struct LaunchReport {
+  SurfaceTotals made;
+  std::uint32_t found;   ///< active tiles
+  std::uint32_t launch;  ///< written last: which launch this is about
+};
+
+/// What the last block of a launch does when all others are done.
+struct LaunchEnd {
+  LaunchReport* report;        ///< or null: nothing
+  std::uint32_t launch;        ///< goes into the report
+  const std::uint32_t* found;  ///< active tiles, where a search has counted them
+  std::uint32_t* done;         ///< zeroed
+  std::uint32_t* zero;         ///< words that the next launch needs zeroed, also `done`
+  std::uint32_t zero_words;
+};
+
 struct TileParams {
+  /// The tiles, where blocks do not search them themselves: then there are candidates.
   const TileItem* items;
   const std::uint32_t* item_count;
+  TileCandidates candidates;
   const void* pages;
   const std::uint32_t* page_of_tile;  ///< [z, y, x] of `tiles`; kNone: all fill value
   const std::uint32_t* slot_of_tile;  ///< the same; kNone: not active
@@ -81,6 +122,7 @@ struct TileParams {
   Triangle* triangles;
   std::uint64_t vertex_capacity, triangle_capacity;
   SurfaceTotals* totals;
+  LaunchEnd end;
 };
 
 }  // namespace isobrick::gpu

@@ -94,8 +94,14 @@ struct alignas(256) TileShared {
   LowerRows lower;
   const RowTable* before;  ///< of the tile one lower along x, or null
   std::uint32_t item;      ///< the number of the tile that is worked on
+  std::uint32_t items;     ///< how many there are
+  std::uint32_t all_triangles;
+  std::uint32_t done_before;  ///< blocks that were done before this one
   TileItem tile;
   Shape shape;
+  /// The active tiles as bits and how many come before each 32, where the block has
+  /// searched them.
+  std::uint32_t active[kMostSearchedByBlock / 32], active_before[kMostSearchedByBlock / 32];
 
   /// Row + 1 where a row's cells begin, else 0; then x | row << 5 | ten times the
   /// case << 16 | triangles << 28. kListed of them, behind everything else.
@@ -105,15 +111,20 @@ struct alignas(256) TileShared {
   }
 };
 
-/// What each warp has for itself, after the cells.
-struct WarpShared {
-  /// Triangles not yet written, cell | triangle << 12: fewer than 32 wait while
-  /// those of 32 cells come.
-  std::uint16_t pending[32 + 32 * 5];
-};
-
 __device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }
 __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
+
+/// Barriers of a team beside that of __syncthreads: who only arrives goes on at once.
+enum class TeamBarrier : int { vertex_base = 1, cells = 2 };
+template <int N, TeamBarrier Barrier>
+__device__ inline void arrive() {
+  __syncwarp();
+  asm volatile("barrier.cta.arrive %0, %1;" ::"n"(static_cast<int>(Barrier)), "n"(N) : "memory");
+}
+template <int N, TeamBarrier Barrier>
+__device__ inline void wait() {
+  asm volatile("barrier.cta.sync %0, %1;" ::"n"(static_cast<int>(Barrier)), "n"(N) : "memory");
+}
 /// What all threads of a warp have alike, so that the compiler knows it too: loops
 /// and branches on it then need no care for threads that part.
 __device__ inline std::uint32_t uniform(std::uint32_t v) { return __shfl_sync(kAll, v, 0); }

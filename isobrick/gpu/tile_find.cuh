@@ -1,0 +1,43 @@
+#pragma once
+
+#include "isobrick/gpu/tile_count.cuh"
+#include "isobrick/gpu/tile_test.cuh"
+
+// Small volumes need no launch of their own to find active tiles: every block looks at
+// all of them.
+
+namespace isobrick::gpu {
+
+/// Finds the active ones among the candidates. All threads; ends with a barrier.
+template <int N, class T>
+__device__ inline void find_candidates(TileShared& s, const TileParams& p) {
+  for (std::uint32_t i = threadIdx.x; i < kMostSearchedByBlock; i += N) {
+    const unsigned word =
+        __ballot_sync(kAll, i < p.candidates.count && is_active<T>(p, p.tiles, i));
+    if (lane_id() == 0) s.active[i / 32] = word;
+  }
+  __syncthreads();
+  static_assert(kMostSearchedByBlock == 32 * 32);
+  if (warp_id() == 0) {
+    const auto own = static_cast<std::uint32_t>(__popc(s.active[lane_id()]));
+    const std::uint32_t sum = warp_inclusive_sum(own);
+    s.active_before[lane_id()] = sum - own;
+    if (lane_id() == 31) s.items = sum;
+  }
+  __syncthreads();
+}
+
+/// The number of a candidate among the active ones, or kNone.
+__device__ inline std::uint32_t number_of_candidate(const TileShared& s, std::uint32_t i) {
+  const std::uint32_t word = s.active[i / 32], bit = 1u << (i % 32);
+  return word & bit ? s.active_before[i / 32] + __popc(word & (bit - 1)) : kNone;
+}
+
+/// The active candidate with that number. One warp.
+__device__ inline std::uint32_t candidate_of_number(const TileShared& s, std::uint32_t number) {
+  const unsigned begun = __ballot_sync(kAll, s.active_before[lane_id()] <= number);
+  const auto word = static_cast<std::uint32_t>(31 - __clz(static_cast<int>(begun)));
+  return 32 * word + nth_bit(s.active[word], number - s.active_before[word]);
+}
+
+}  // namespace isobrick::gpu
