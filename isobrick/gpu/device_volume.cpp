@@ -35,7 +35,6 @@ void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_val
   const Int3 grid = lattice.tiles();
   const std::size_t page_bytes = kPageSamples * lattice.sample_bytes();
   pages = DeviceBuffer<std::byte>((std::size_t{tile_count} + 1) * page_bytes, stream);
-  page_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
   const std::size_t batch = std::max<std::size_t>(1, kStagingBytes / page_bytes);
   PinnedBuffer<std::byte> staging[2] = {PinnedBuffer<std::byte>(batch * page_bytes),
                                         PinnedBuffer<std::byte>(batch * page_bytes)};
@@ -60,8 +59,11 @@ void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_val
                           cudaMemcpyHostToDevice, stream.get()));
     copied[turn].record(stream);
   }
-  check(cudaMemcpyAsync(page_of_tile.data(), table.data(), page_of_tile.bytes(),
-                        cudaMemcpyHostToDevice, stream.get()));
+  if (std::find(table.begin(), table.end(), kNone) != table.end()) {
+    page_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
+    check(cudaMemcpyAsync(page_of_tile.data(), table.data(), page_of_tile.bytes(),
+                          cudaMemcpyHostToDevice, stream.get()));
+  }
   stream.wait();
 }
 

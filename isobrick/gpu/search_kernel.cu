@@ -82,11 +82,10 @@ __global__ void __launch_bounds__(kThreads)
     if (t[0] * 32 + x >= p.extent[0] || t[1] * 32 + y >= p.extent[1] ||
         t[2] * 32 + z >= p.extent[2])
       continue;
-    const std::uint32_t own =
-        p.page_of_tile[(static_cast<std::size_t>(t[2] + (z >> 5)) * p.tiles[1] + t[1] + (y >> 5)) *
-                           p.tiles[0] +
-                       t[0] + (x >> 5)];
-    const std::size_t page = own == kNone ? p.fill_page : own;
+    const std::int64_t place =
+        (static_cast<std::int64_t>(t[2] + (z >> 5)) * p.tiles[1] + t[1] + (y >> 5)) * p.tiles[0] +
+        t[0] + (x >> 5);
+    const std::size_t page = page_of_place(p, place);
     range.include(static_cast<const T*>(
         p.pages)[page * kPageSamples + ((z & 31) << 10 | (y & 31) << 5 | (x & 31))]);
   }

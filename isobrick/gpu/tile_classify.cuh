@@ -90,7 +90,7 @@ __device__ inline const T* sample_at(const TileShared& s, int page, int place) {
 template <int N, class T>
 __device__ inline void classify_rows(TileShared& s, const Classifier<T>& classifier) {
 #pragma unroll 2
-  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
+  for (int row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const int z = static_cast<int>(z_of_row(row)), y = row - 33 * z;
     const int page = page_of(0, y, z), start = row_start(row, z);
     const T last = __ldg(sample_at<T>(s, page + 1, start + 32));
@@ -135,9 +135,9 @@ __device__ inline void classify(TileShared& s, const Classifier<T>& classifier) 
 template <int N>
 __device__ inline void clear_lists(TileShared& s) {
   const uint4 zero{0, 0, 0, 0};
-  for (unsigned i = threadIdx.x; i < kListed / 4; i += N)
+  for (unsigned i = own_thread(); i < kListed / 4; i += N)
     reinterpret_cast<uint4*>(s.cells())[i] = zero;
-  for (unsigned i = threadIdx.x; i < kListed / 8; i += N)
+  for (unsigned i = own_thread(); i < kListed / 8; i += N)
     reinterpret_cast<uint4*>(s.vertex_marks)[i] = zero;
 }
 

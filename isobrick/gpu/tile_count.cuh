@@ -72,9 +72,10 @@ struct RowCounts {
 
 template <int N>
 __device__ inline void count_rows(TileShared& s, RowCounts<N>& counts) {
+  const auto thread = static_cast<int>(own_thread());
 #pragma unroll
   for (int step = 0; step < Team<N>::kSteps; ++step) {
-    const int row = step * N + static_cast<int>(threadIdx.x);
+    const int row = step * N + thread;
     RowCount& count = counts.of_step[step];
     count = {0, 0};
     std::uint32_t sum = 0;
@@ -111,6 +112,7 @@ __device__ inline void sum_steps(TileShared& s) {
   s.step_cells[i] = c - ca - cb;
   s.step_cells[i + 1] = c - cb;
   if (lane_id() == 31) {
+    s.next_cells = s.next_vertices = 0;
     s.all_vertices = v;
     s.all_cells = c;
   }
@@ -138,9 +140,10 @@ inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
 /// shared memory, and marks the first vertices and cells.
 template <int N>
 __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, RowTable& table) {
+  const auto thread = static_cast<int>(own_thread());
 #pragma unroll
   for (int step = 0; step < Team<N>::kSteps; ++step) {
-    const int row = step * N + static_cast<int>(threadIdx.x);
+    const int row = step * N + thread;
     if (row >= kRowsOfTile) break;
     const RowCount& count = counts.of_step[step];
     const unsigned sum = step * Team<N>::kWarps + warp_id();
@@ -167,9 +170,10 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, R
 /// at a time. Between barriers.
 template <int N>
 __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
-  for (unsigned i = threadIdx.x; i < kListed; i += N) s.vertex_marks[i] = 0;
+  for (unsigned i = own_thread(); i < kListed; i += N) s.vertex_marks[i] = 0;
+  if (threadIdx.x == 0) s.next_vertices = 0;
   __syncthreads();
-  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
+  for (int row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.number[0][row];
     const std::uint32_t end = row + 1 < kRowsOfTile ? s.number[0][row + 1] : s.all_vertices;
     mark_row<kMostVerticesOfRow>(s.vertex_marks, s.vertex_groups, static_cast<int>(begin - first),
@@ -180,9 +184,10 @@ __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
 
 template <int N>
 __device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
-  for (unsigned i = threadIdx.x; i < kListed; i += N) s.cells()[i] = 0;
+  for (unsigned i = own_thread(); i < kListed; i += N) s.cells()[i] = 0;
+  if (threadIdx.x == 0) s.next_cells = 0;
   __syncthreads();
-  for (int row = static_cast<int>(threadIdx.x); row < kRowsOfTile; row += N) {
+  for (int row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
     mark_row<kMostCellsOfRow>(s.cells(), s.cell_groups, static_cast<int>(begin - first),
                               static_cast<int>(end - begin), row);
@@ -244,11 +249,23 @@ __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
   }
 }
 
+/// Calls f(begin) for groups of 32 out of `listed`, each by the warp that is free first;
+/// `next` is 0 before the first.
+template <class F>
+__device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed, F&& f) {
+  const auto take = [&] { return lane_id() == 0 ? atomicAdd(&next, 1u) : 0u; };
+  std::uint32_t taken = take();
+  for (;;) {
+    const std::uint32_t begin = 32 * uniform(taken);
+    if (begin >= listed) return;
+    taken = take();  // on the way while f works
+    f(begin);
+  }
+}
+
 /// Finds the marked cells and their cases, and how many triangles each 32 have.
-template <int N>
 __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
-  const WarpPart part = part_beside_first<N, 1, 2>(listed);
-  for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
+  for_each_group(s.next_cells, listed, [&](std::uint32_t begin) {
     const std::uint32_t i = begin + lane_id();
     const PlaceInRow place = place_of_lane(s.cells()[i], s.cell_groups[begin / 32]);
     const std::uint32_t x = nth_bit(s.mixed[place.row], place.rank);
@@ -257,11 +274,11 @@ __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
       return __funnelshift_r(bits.at, bits.last, x) & 3u;
     };
     const std::uint32_t index = pair(0) | pair(1) << 2 | pair(33) << 4 | pair(34) << 6;
-    const std::uint32_t count = i < part.end ? s.triangle_count[index] : 0;
-    if (i < part.end) s.cells()[i] = x | place.row << 5 | 10 * index << 16 | count << 28;
+    const std::uint32_t count = i < listed ? s.triangle_count[index] : 0;
+    if (i < listed) s.cells()[i] = x | place.row << 5 | 10 * index << 16 | count << 28;
     const std::uint32_t all = warp_sum(count);
     if (lane_id() == 0) s.group_triangles[begin / 32] = static_cast<std::uint16_t>(all);
-  }
+  });
 }
 
 /// The triangles of the first `groups` groups of cells. For whole warps.

@@ -111,23 +111,22 @@ struct VertexMaker {
 };
 
 /// Writes the marked vertices, the first of which has number `first` in the tile.
-template <int N, class T, bool Normals>
-__device__ inline void emit_vertices(const TileShared& s, const TileParams& p, std::uint32_t first,
+template <class T, bool Normals>
+__device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::uint32_t first,
                                      std::uint32_t listed) {
   using Maker = VertexMaker<T>;
   const Maker maker{s, p, p.crossing};
-  const WarpPart part = part_beside_first<N, 0, 1>(listed);
-  for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
+  for_each_group(s.next_vertices, listed, [&](std::uint32_t begin) {
     const std::uint32_t i = begin + lane_id();
     const std::uint32_t row = place_of_lane(s.vertex_marks[i], s.vertex_groups[begin / 32]).row;
-    if (i >= listed) continue;
+    if (i >= listed) return;
     const typename Maker::Edge edge = maker.load(row, find_edge(s, row, first + i));
     Vec3f position, normal;
     maker.template make<Normals>(edge, position, normal);
     const std::uint64_t to = s.vertex_base + first + i;
     p.positions[to] = position;
     if constexpr (Normals) p.normals[to] = normal;
-  }
+  });
 }
 
 /// How far behind a row's word its number lies, in bytes.
@@ -226,7 +225,7 @@ struct PendingTriangles {
 template <int N>
 __device__ inline void emit_triangles(const TileShared& s, const TileParams& p,
                                       std::uint32_t listed, std::uint64_t base) {
-  const WarpPart part = part_of_warp<N>(listed);
+  const WarpPart part = part_beside_first<N, 3, 4>(listed);  // it takes the next tile
   Triangle* to = p.triangles + base + triangles_before(s, part.begin / 32) + lane_id();
   PendingTriangles pending{part.begin, 0, 0};
   std::uint32_t waiting = 0;

@@ -31,12 +31,9 @@ __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& i
     const int x = item.x + dx, y = item.y + dy, z = item.z + dz;
     const bool exists =
         x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] && z < p.tiles[2];
-    std::uint32_t page = p.fill_page;
-    if (exists) {
-      const std::uint32_t own =
-          p.page_of_tile[(static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x];
-      if (own != kNone) page = own;
-    }
+    const std::uint32_t page =
+        exists ? page_of_place(p, (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x)
+               : p.fill_page;
     start = static_cast<std::int64_t>(page) * kPageSamples;
   }
   const int before = dx * 32 + dy * 1024 + dz * 32768;  // samples of the pages between
@@ -80,13 +77,13 @@ __device__ void prefetch_tile(const TileShared& s, const TileParams& p, std::uin
     from += streamed_page(number, kOwnPage) * static_cast<std::int64_t>(sizeof(T));
   } else {
     const TileItem item = item_of(s, p, number);
-    const std::uint32_t page =
-        p.page_of_tile[(static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] +
-                       item.x];
-    if (page == kNone) return;
+    const std::int64_t place =
+        (static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] + item.x;
+    const std::uint32_t page = page_of_place(p, place);
+    if (page == p.fill_page) return;
     from += page * bytes;
   }
-  for (std::size_t at = threadIdx.x * 128; at < bytes; at += N * 128)
+  for (std::size_t at = own_thread() * 128; at < bytes; at += N * 128)
     asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
 }
 
@@ -120,7 +117,7 @@ __device__ std::uint32_t count_in_turns(TileShared& s) {
   for (std::uint32_t first = 0; first < cells; first += kListed) {
     if (first > 0) mark_cells<N>(s, first);
     const std::uint32_t listed = ::min(cells - first, kListed);
-    find_cells<N>(s, listed);
+    find_cells(s, listed);
     __syncthreads();
     triangles += triangles_before(s, (listed + 31) / 32);
     __syncthreads();
@@ -139,7 +136,7 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
   }
   std::uint32_t triangles = 0;
   if (cells <= kListed) {
-    find_cells<N>(s, cells);
+    find_cells(s, cells);
   } else {
     triangles = count_in_turns<N>(s);
   }
@@ -164,7 +161,7 @@ __device__ void emit_all_vertices(TileShared& s, const TileParams& p) {
   if (s.vertex_base + vertices > p.vertex_capacity) return;
   for (std::uint32_t first = 0; first < vertices; first += kListed) {
     if (first > 0) mark_vertices<N>(s, first);
-    emit_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
+    emit_vertices<T, Normals>(s, p, first, ::min(vertices - first, kListed));
     if (vertices > kListed) __syncthreads();
   }
 }
@@ -178,7 +175,7 @@ __device__ void emit_all_triangles(TileShared& s, const TileParams& p) {
     const std::uint32_t listed = ::min(cells - first, kListed);
     if (cells > kListed) {
       mark_cells<N>(s, first);
-      find_cells<N>(s, listed);
+      find_cells(s, listed);
       __syncthreads();
     }
     emit_triangles<N>(s, p, listed, base);
@@ -206,9 +203,9 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
     cuda::atomic_ref<std::uint32_t, cuda::thread_scope_system>(report.launch)
         .store(end.launch, cuda::memory_order_release);
   }
-  for (std::uint32_t i = threadIdx.x; i < end.zero_words; i += N) end.zero[i] = 0;
+  for (std::uint32_t i = own_thread(); i < end.zero_words; i += N) end.zero[i] = 0;
   if (p.candidates.count == 0) return;
-  for (std::uint32_t i = threadIdx.x; i < s.items; i += N) p.order[i] = {0, 0};
+  for (std::uint32_t i = own_thread(); i < s.items; i += N) p.order[i] = {0, 0};
 }
 
 template <int N, class T, bool Normals>

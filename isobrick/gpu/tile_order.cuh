@@ -188,7 +188,7 @@ __device__ inline void number_at_0(TileShared& s) {
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
 #pragma unroll 3
-  for (unsigned row = threadIdx.x; row < kRowsOfTile; row += N) {
+  for (unsigned row = own_thread(); row < kRowsOfTile; row += N) {
     // The rows on the lower planes are borrowed.
     const bool keep_y = own_z || row >= 33, keep_z = own_y || row % 33 != 0;
     std::uint32_t y = 0, z = 0;
@@ -237,7 +237,7 @@ __device__ inline void borrow_rows(TileShared& s) {
     const std::uint32_t corner = s.lower.xz[y];
     s.at_0[0][row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
   };
-  for (int t = static_cast<int>(threadIdx.x); t < 128; t += N) {
+  for (int t = static_cast<int>(own_thread()); t < 128; t += N) {
     if (t < 33 && !fy) row_0_of(t);
     if (t >= 64 && t < 97 && !fz) row_of_plane_0(t - 64);
   }
@@ -247,7 +247,7 @@ __device__ inline void borrow_rows(TileShared& s) {
 /// y and z are counted by the mask of its upper ones, so one too many.
 template <int N>
 __device__ inline void place_numbers(TileShared& s) {
-  for (unsigned t = threadIdx.x; t < 24; t += N) {
+  for (unsigned t = own_thread(); t < 24; t += N) {
     const unsigned e = t % 12, at_0 = t / 12;
     const bool lower = e >= 4 && (e & 1u) == 0;
     s.places[at_0][e].addend = s.number_base - (lower && !at_0 ? 1u : 0u);

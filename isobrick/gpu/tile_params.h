@@ -99,7 +99,8 @@ struct TileParams {
   const std::uint32_t* item_count;
   TileCandidates candidates;
   const void* pages;
-  const std::uint32_t* page_of_tile;  ///< [z, y, x] of `tiles`; kNone: all fill value
+  /// [z, y, x] of `tiles`; kNone: all fill value. Null where page i + 1 is that of tile i.
+  const std::uint32_t* page_of_tile;
   const std::uint32_t* slot_of_tile;  ///< the same; kNone: not active
   const TileLinks* links;             ///< one an item, instead of the two tables; or null
   bool tables_known;  ///< with links: a launch before has left all row tables as they will be

@@ -96,7 +96,8 @@ struct alignas(256) TileShared {
   std::uint32_t item;      ///< the number of the tile that is worked on
   std::uint32_t items;     ///< how many there are
   std::uint32_t all_triangles;
-  std::uint32_t done_before;  ///< blocks that were done before this one
+  std::uint32_t next_cells, next_vertices;  ///< groups of 32 that a warp has taken
+  std::uint32_t done_before;                ///< blocks that were done before this one
   TileItem tile;
   Shape shape;
   /// The active tiles as bits and how many come before each 32, where the block has
@@ -112,6 +113,13 @@ struct alignas(256) TileShared {
 };
 
 __device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }
+/// The thread's number, read again wherever it is asked for: what follows from it is not
+/// kept in registers throughout a tile.
+__device__ inline unsigned own_thread() {
+  unsigned thread;
+  asm volatile("mov.u32 %0, %%tid.x;" : "=r"(thread));
+  return thread;
+}
 __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
 
 /// Barriers of a team beside that of __syncthreads: who only arrives goes on at once.

@@ -6,6 +6,13 @@
 
 namespace isobrick::gpu {
 
+/// The page of the tile that lies at `place` in C order [z, y, x] of a resident volume.
+__device__ inline std::uint32_t page_of_place(const TileParams& p, std::int64_t place) {
+  const std::uint32_t page =
+      p.page_of_tile ? p.page_of_tile[place] : static_cast<std::uint32_t>(place + 1);
+  return page == kNone ? p.fill_page : page;
+}
+
 /// Where tile (t[0], t[1], t[2]) lies in C order [z, y, x].
 __device__ inline std::size_t place_of(const std::int32_t* t, const std::int32_t (&grid)[3]) {
   return (static_cast<std::size_t>(t[2]) * grid[1] + t[1]) * grid[0] + t[0];
