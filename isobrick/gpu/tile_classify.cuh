@@ -135,10 +135,11 @@ __device__ inline void classify(TileShared& s, const Classifier<T>& classifier) 
 template <int N>
 __device__ inline void clear_lists(TileShared& s) {
   const uint4 zero{0, 0, 0, 0};
-  for (unsigned i = own_thread(); i < kListed / 4; i += N)
-    reinterpret_cast<uint4*>(s.cells())[i] = zero;
-  for (unsigned i = own_thread(); i < kListed / 8; i += N)
-    reinterpret_cast<uint4*>(s.vertex_marks)[i] = zero;
+  auto& lists = lists_of<N>(s);
+  for (unsigned i = own_thread(); i < lists.kListed / 4; i += N)
+    reinterpret_cast<uint4*>(lists.cells)[i] = zero;
+  for (unsigned i = own_thread(); i < lists.kListed / 8; i += N)
+    reinterpret_cast<uint4*>(lists.vertex_marks)[i] = zero;
 }
 
 }  // namespace isobrick::gpu

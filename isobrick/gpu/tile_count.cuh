@@ -120,11 +120,12 @@ __device__ inline void sum_steps(TileShared& s) {
 
 /// Marks a row with `count` things from `place` on, counted from the first that
 /// is listed now; it may lie before that. A row has at most `Most` things.
-template <int Most, class Mark>
-__device__ inline void mark_row(Mark* marks, FirstOfGroup* groups, int place, int count, int row) {
-  constexpr int kGroups = kListed / 32;
+template <int Most, std::uint32_t Listed, class Mark>
+__device__ inline void mark_row(Mark (&marks)[Listed], FirstOfGroup* groups, int place, int count,
+                                int row) {
+  constexpr int kGroups = Listed / 32;
   if (count == 0) return;
-  if (place >= 0 && place < static_cast<int>(kListed)) marks[place] = static_cast<Mark>(row + 1);
+  if (place >= 0 && place < static_cast<int>(Listed)) marks[place] = static_cast<Mark>(row + 1);
   int group = ::max((place + 31) >> 5, 0);
   // Hardly any row reaches from one group to the next.
 #pragma unroll 1
@@ -140,6 +141,7 @@ inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
 /// shared memory, and marks the first vertices and cells.
 template <int N>
 __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, RowTable& table) {
+  auto& lists = lists_of<N>(s);
   const auto thread = static_cast<int>(own_thread());
 #pragma unroll
   for (int step = 0; step < Team<N>::kSteps; ++step) {
@@ -155,9 +157,9 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, R
     s.number[1][row] = base + y + count.y_at_0();
     s.number[2][row] = base + z + count.z_at_0();
     s.cell_base[row] = static_cast<std::uint16_t>(cell);
-    mark_row<kMostVerticesOfRow>(s.vertex_marks, s.vertex_groups, static_cast<int>(base),
+    mark_row<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups, static_cast<int>(base),
                                  static_cast<int>(count.vertices()), row);
-    mark_row<kMostCellsOfRow>(s.cells(), s.cell_groups, static_cast<int>(cell),
+    mark_row<kMostCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(cell),
                               static_cast<int>(count.cells()), row);
   }
   if (threadIdx.x == 0) {
@@ -170,26 +172,29 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, R
 /// at a time. Between barriers.
 template <int N>
 __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
-  for (unsigned i = own_thread(); i < kListed; i += N) s.vertex_marks[i] = 0;
+  auto& lists = lists_of<N>(s);
+  for (unsigned i = own_thread(); i < lists.kListed; i += N) lists.vertex_marks[i] = 0;
   if (threadIdx.x == 0) s.next_vertices = 0;
   __syncthreads();
   for (int row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.number[0][row];
     const std::uint32_t end = row + 1 < kRowsOfTile ? s.number[0][row + 1] : s.all_vertices;
-    mark_row<kMostVerticesOfRow>(s.vertex_marks, s.vertex_groups, static_cast<int>(begin - first),
-                                 static_cast<int>(end - begin), row);
+    mark_row<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups,
+                                 static_cast<int>(begin - first), static_cast<int>(end - begin),
+                                 row);
   }
   __syncthreads();
 }
 
 template <int N>
 __device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
-  for (unsigned i = own_thread(); i < kListed; i += N) s.cells()[i] = 0;
+  auto& lists = lists_of<N>(s);
+  for (unsigned i = own_thread(); i < lists.kListed; i += N) lists.cells[i] = 0;
   if (threadIdx.x == 0) s.next_cells = 0;
   __syncthreads();
   for (int row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
-    mark_row<kMostCellsOfRow>(s.cells(), s.cell_groups, static_cast<int>(begin - first),
+    mark_row<kMostCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(begin - first),
                               static_cast<int>(end - begin), row);
   }
   __syncthreads();
@@ -253,7 +258,14 @@ __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
 /// `next` is 0 before the first.
 template <class F>
 __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed, F&& f) {
-  const auto take = [&] { return lane_id() == 0 ? atomicAdd(&next, 1u) : 0u; };
+  const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(&next));
+  // One thread of the warp counts. atomicAdd() would be compiled for any number of them.
+  const auto take = [address] {
+    std::uint32_t before = 0;
+    if (lane_id() == 0)
+      asm volatile("atom.shared.add.u32 %0, [%1], 1;" : "=r"(before) : "r"(address) : "memory");
+    return before;
+  };
   std::uint32_t taken = take();
   for (;;) {
     const std::uint32_t begin = 32 * uniform(taken);
@@ -264,10 +276,12 @@ __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed,
 }
 
 /// Finds the marked cells and their cases, and how many triangles each 32 have.
+template <int N>
 __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
+  auto& lists = lists_of<N>(s);
   for_each_group(s.next_cells, listed, [&](std::uint32_t begin) {
     const std::uint32_t i = begin + lane_id();
-    const PlaceInRow place = place_of_lane(s.cells()[i], s.cell_groups[begin / 32]);
+    const PlaceInRow place = place_of_lane(lists.cells[i], lists.cell_groups[begin / 32]);
     const std::uint32_t x = nth_bit(s.mixed[place.row], place.rank);
     const auto pair = [&](int step) {
       const RowBits bits = s.rows[place.row + step];
@@ -275,18 +289,18 @@ __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
     };
     const std::uint32_t index = pair(0) | pair(1) << 2 | pair(33) << 4 | pair(34) << 6;
     const std::uint32_t count = i < listed ? s.triangle_count[index] : 0;
-    if (i < listed) s.cells()[i] = x | place.row << 5 | 10 * index << 16 | count << 28;
+    if (i < listed) lists.cells[i] = x | place.row << 5 | 10 * index << 16 | count << 28;
     const std::uint32_t all = warp_sum(count);
-    if (lane_id() == 0) s.group_triangles[begin / 32] = static_cast<std::uint16_t>(all);
+    if (lane_id() == 0) lists.group_triangles[begin / 32] = static_cast<std::uint16_t>(all);
   });
 }
 
 /// The triangles of the first `groups` groups of cells. For whole warps.
-__device__ inline std::uint32_t triangles_before(const TileShared& s, std::uint32_t groups) {
+template <int N>
+__device__ inline std::uint32_t triangles_before(TileShared& s, std::uint32_t groups) {
+  const auto& lists = lists_of<N>(s);
   std::uint32_t sum = 0;
-#pragma unroll
-  for (std::uint32_t i = 0; i < (kListed / 32 + 31) / 32; ++i)
-    if (lane_id() + 32 * i < groups) sum += s.group_triangles[lane_id() + 32 * i];
+  for (std::uint32_t i = lane_id(); i < groups; i += 32) sum += lists.group_triangles[i];
   return warp_sum(sum);
 }
 

@@ -32,7 +32,7 @@ __device__ inline EdgeOfVertex find_edge(const TileShared& s, std::uint32_t row,
     if (e.y_at_0 && number + 1 == y_first) return {0, 1};
   }
   const std::uint32_t axis = std::uint32_t{number >= y_first} + (number >= z_first);
-  const std::uint32_t place = row + axis * kRowsOfTile;
+  const std::uint32_t place = row + axis * kRowPitch;
   const std::uint32_t rank = number - s.number[0][place];
   return {nth_bit(s.crossing[0][place], rank) + (axis > 0), axis};
 }
@@ -111,14 +111,16 @@ struct VertexMaker {
 };
 
 /// Writes the marked vertices, the first of which has number `first` in the tile.
-template <class T, bool Normals>
+template <int N, class T, bool Normals>
 __device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::uint32_t first,
                                      std::uint32_t listed) {
   using Maker = VertexMaker<T>;
   const Maker maker{s, p, p.crossing};
+  const auto& lists = lists_of<N>(s);
   for_each_group(s.next_vertices, listed, [&](std::uint32_t begin) {
     const std::uint32_t i = begin + lane_id();
-    const std::uint32_t row = place_of_lane(s.vertex_marks[i], s.vertex_groups[begin / 32]).row;
+    const std::uint32_t row =
+        place_of_lane(lists.vertex_marks[i], lists.vertex_groups[begin / 32]).row;
     if (i >= listed) return;
     const typename Maker::Edge edge = maker.load(row, find_edge(s, row, first + i));
     Vec3f position, normal;
@@ -149,8 +151,8 @@ __device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles
     const std::size_t array = offsetof(TileShared, at_0) - kNumberOfWord;
     s.places[at_0][e].offset = static_cast<std::uint32_t>(
         axis > 0 && at_0 && first == 0
-            ? array + 4 * (kRowsOfTile * (axis - 1) + row)
-            : offsetof(TileShared, crossing) + 4 * (kRowsOfTile * axis + row));
+            ? array + 4 * (kRowPitch * (axis - 1) + row)
+            : offsetof(TileShared, crossing) + 4 * (kRowPitch * axis + row));
   }
 }
 
@@ -162,13 +164,12 @@ __device__ inline std::uint32_t low_bits(std::uint32_t x) {
 }
 
 /// Writes triangle `number` of a listed cell.
-__device__ inline void emit_triangle(const TileShared& s, std::uint32_t listed_cell,
-                                     std::uint32_t number, Triangle& to) {
+__device__ inline void emit_triangle(const TileShared& s, std::uint32_t cell, std::uint32_t number,
+                                     Triangle& to) {
   const char* base = reinterpret_cast<const char*>(&s);
   const auto word = [base](std::uint32_t at) {
     return *reinterpret_cast<const std::uint32_t*>(base + at);
   };
-  const std::uint32_t cell = s.cells()[listed_cell];
   const std::uint32_t x = cell & 31u, row = cell >> 3 & 0x1ffcu, mask = low_bits(x);
   const std::uint32_t edges = *reinterpret_cast<const std::uint16_t*>(
       reinterpret_cast<const char*>(s.triangles) + (cell >> 16 & 0xfffu) + 2 * number);
@@ -209,10 +210,11 @@ struct PendingTriangles {
   std::uint32_t starts;  ///< bit i: with triangle i a cell begins
 
   /// One a lane.
-  __device__ void emit(const TileShared& s, Triangle& to) const {
+  __device__ void emit(const TileShared& s, const std::uint32_t* cells, Triangle& to) const {
     const std::uint32_t begun = starts & (lanes_below() << 1 | 1u);
     const auto from = static_cast<std::uint32_t>(31 - __clz(static_cast<int>(begun)));
-    emit_triangle(s, cell + __popc(begun) - 1, begun ? lane_id() - from : lane_id() + into, to);
+    emit_triangle(s, cells[cell + __popc(begun) - 1], begun ? lane_id() - from : lane_id() + into,
+                  to);
   }
   __device__ void pass_32() {
     into = starts ? 1 + static_cast<std::uint32_t>(__clz(static_cast<int>(starts))) : into + 32;
@@ -223,15 +225,16 @@ struct PendingTriangles {
 /// Writes the triangles of the listed cells; `base` is the number of the first of
 /// them in the mesh.
 template <int N>
-__device__ inline void emit_triangles(const TileShared& s, const TileParams& p,
-                                      std::uint32_t listed, std::uint64_t base) {
+__device__ inline void emit_triangles(TileShared& s, const TileParams& p, std::uint32_t listed,
+                                      std::uint64_t base) {
   const WarpPart part = part_beside_first<N, 3, 4>(listed);  // it takes the next tile
-  Triangle* to = p.triangles + base + triangles_before(s, part.begin / 32) + lane_id();
+  const std::uint32_t* cells = lists_of<N>(s).cells;
+  Triangle* to = p.triangles + base + triangles_before<N>(s, part.begin / 32) + lane_id();
   PendingTriangles pending{part.begin, 0, 0};
   std::uint32_t waiting = 0;
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
-    const std::uint32_t count = i < part.end ? s.cells()[i] >> 28 : 0;
+    const std::uint32_t count = i < part.end ? cells[i] >> 28 : 0;
     // The sum before each lane from the bits of the counts: three votes.
     const unsigned ones = __ballot_sync(kAll, count & 1u), twos = __ballot_sync(kAll, count & 2u),
                    fours = __ballot_sync(kAll, count & 4u), below = lanes_below();
@@ -240,13 +243,13 @@ __device__ inline void emit_triangles(const TileShared& s, const TileParams& p,
     waiting += __popc(ones) + 2 * __popc(twos) + 4 * __popc(fours);
     pending.starts |= warp_or(bit_at(place));
     for (; waiting >= 32; waiting -= 32, to += 32) {
-      pending.emit(s, *to);
+      pending.emit(s, cells, *to);
       pending.pass_32();
       place -= 32;
       pending.starts = warp_or(bit_at(place));
     }
   }
-  if (lane_id() < waiting) pending.emit(s, *to);
+  if (lane_id() < waiting) pending.emit(s, cells, *to);
 }
 
 }  // namespace isobrick::gpu

@@ -12,11 +12,6 @@
 namespace isobrick::gpu {
 namespace {
 
-/// How many teams of so many threads a multiprocessor has registers for.
-constexpr int teams_of_multiprocessor(int threads) {
-  return threads <= 384 ? 3 : threads <= 640 ? 2 : 1;
-}
-
 /// Pages of the tiles around one; where there is none, any that is.
 template <class T>
 __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,
@@ -87,11 +82,10 @@ __device__ void prefetch_tile(const TileShared& s, const TileParams& p, std::uin
     asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
 }
 
-constexpr std::size_t shared_bytes(std::uint32_t listed) {
-  return sizeof(TileShared) + listed * sizeof(std::uint32_t);
-}
+template <std::uint32_t Listed>
+constexpr std::size_t kSharedBytes = sizeof(TileShared) + sizeof(Lists<Listed>);
 
-static_assert(shared_bytes(kListedBeforeAmpere) <= 64 << 10, "what Turing has");
+static_assert(kSharedBytes<kListedBeforeAmpere> <= 64 << 10, "what Turing has");
 
 /// Counts a tile's crossing edges and active cells, and leaves their places.
 template <int N>
@@ -109,17 +103,18 @@ __device__ void count_tile(TileShared& s, const TileParams& p) {
 }
 
 /// The triangles of a tile with more cells than are listed at a time. The last
-/// kListed cells stay listed.
+/// cells stay listed.
 template <int N>
 __device__ std::uint32_t count_in_turns(TileShared& s) {
+  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
   std::uint32_t triangles = 0;
   for (std::uint32_t first = 0; first < cells; first += kListed) {
     if (first > 0) mark_cells<N>(s, first);
     const std::uint32_t listed = ::min(cells - first, kListed);
-    find_cells(s, listed);
+    find_cells<N>(s, listed);
     __syncthreads();
-    triangles += triangles_before(s, (listed + 31) / 32);
+    triangles += triangles_before<N>(s, (listed + 31) / 32);
     __syncthreads();
   }
   return triangles;
@@ -129,6 +124,7 @@ __device__ std::uint32_t count_in_turns(TileShared& s) {
 /// what other tiles know; the others wait for no more than the place of the vertices.
 template <int N>
 __device__ void find_places(TileShared& s, const TileParams& p) {
+  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
   if (warp_id() == 0) {
     find_vertex_base(s, p);
@@ -136,7 +132,7 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
   }
   std::uint32_t triangles = 0;
   if (cells <= kListed) {
-    find_cells(s, cells);
+    find_cells<N>(s, cells);
   } else {
     triangles = count_in_turns<N>(s);
   }
@@ -146,28 +142,31 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
     return;
   }
   wait<N, TeamBarrier::cells>();
-  if (cells <= kListed) triangles = triangles_before(s, (cells + 31) / 32);
+  if (cells <= kListed) triangles = triangles_before<N>(s, (cells + 31) / 32);
   if (lane_id() == 0) {
     s.all_triangles = triangles;
     publish_sum(p.order[s.item].triangles, s.item, triangles);
   }
   find_triangle_base(s, p, triangles);
-  ask_neighbours(s, p);
+  ask_neighbours<N>(s, p);
+  arrive<N, TeamBarrier::neighbours>();
 }
 
 template <int N, class T, bool Normals>
 __device__ void emit_all_vertices(TileShared& s, const TileParams& p) {
+  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t vertices = s.all_vertices;
   if (s.vertex_base + vertices > p.vertex_capacity) return;
   for (std::uint32_t first = 0; first < vertices; first += kListed) {
     if (first > 0) mark_vertices<N>(s, first);
-    emit_vertices<T, Normals>(s, p, first, ::min(vertices - first, kListed));
+    emit_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
     if (vertices > kListed) __syncthreads();
   }
 }
 
 template <int N>
 __device__ void emit_all_triangles(TileShared& s, const TileParams& p) {
+  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
   std::uint64_t base = s.triangle_base;
   if (base + s.all_triangles > p.triangle_capacity) return;
@@ -175,12 +174,12 @@ __device__ void emit_all_triangles(TileShared& s, const TileParams& p) {
     const std::uint32_t listed = ::min(cells - first, kListed);
     if (cells > kListed) {
       mark_cells<N>(s, first);
-      find_cells(s, listed);
+      find_cells<N>(s, listed);
       __syncthreads();
     }
     emit_triangles<N>(s, p, listed, base);
     if (cells > kListed) {
-      base += triangles_before(s, (listed + 31) / 32);
+      base += triangles_before<N>(s, (listed + 31) / 32);
       __syncthreads();
     }
   }
@@ -209,7 +208,7 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
 }
 
 template <int N, class T, bool Normals>
-__global__ void __launch_bounds__(N, teams_of_multiprocessor(N))
+__global__ void __launch_bounds__(N, Team<N>::kTeams)
     extract_tiles(const __grid_constant__ TileParams p, const T threshold,
                   const std::uint16_t* __restrict__ case_entries) {
   extern __shared__ __align__(256) unsigned char bytes[];
@@ -232,8 +231,9 @@ __global__ void __launch_bounds__(N, teams_of_multiprocessor(N))
     find_places<N>(s, p);
     prefetch_tile<N, T>(s, p, s.item + gridDim.x);
     emit_all_vertices<N, T, Normals>(s, p);
-    __syncthreads();
+    if (warp_id() != 0) wait<N, TeamBarrier::neighbours>();
     number_at_0<N>(s);
+    __syncthreads();
     borrow_rows<N>(s);
     place_numbers<N>(s);
     __syncthreads();
@@ -257,7 +257,7 @@ template <int N, class T, bool Normals>
 struct Launcher {
   static std::size_t shared() {
     const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
-    return shared_bytes(before_ampere ? kListedBeforeAmpere : kMostListed);
+    return before_ampere ? kSharedBytes<kListedBeforeAmpere> : kSharedBytes<Team<N>::kMostListed>;
   }
   /// 0 where the device has too little shared memory for one.
   static int blocks() {

@@ -125,6 +125,7 @@ __device__ inline void copy_before(TileShared& s, const RowTable& table) {
 /// One warp: waits for the numbers of the lower neighbours, which from now on count
 /// from this tile's first vertex, and fetches what this tile needs of their rows.
 /// A neighbour that is not active shares no vertex with this tile.
+template <int N>
 __device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
   const TileItem& item = s.tile;
   const Shape& shape = s.shape;
@@ -153,7 +154,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
   const auto slot_of_neighbour = [&](int n) { return __shfl_sync(kAll, slot, n); };
   const std::uint32_t before = slot_of_neighbour(1);
   // Where the cells' rows are needed again, the table is read where it is.
-  const bool copied = before != kNone && s.all_cells <= kListed;
+  const bool copied = before != kNone && s.all_cells <= ListsOf<N>::kListed;
   if (copied) copy_before(s, p.row_tables[before]);
   if (n == 0)
     s.before = before == kNone ? nullptr : copied ? &s.before_copy : &p.row_tables[before];

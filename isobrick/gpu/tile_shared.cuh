@@ -9,23 +9,32 @@
 
 namespace isobrick::gpu {
 
-/// Vertices or cells that are found at a time; tiles with more take several turns.
-/// A multiprocessor before Ampere has 64 KiB of shared memory.
-inline constexpr std::uint32_t kMostListed = 2560, kListedBeforeAmpere = 512;
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
-inline constexpr std::uint32_t kListed = kListedBeforeAmpere;
-#else
-inline constexpr std::uint32_t kListed = kMostListed;
-#endif
 inline constexpr unsigned kAll = 0xffffffffu;
+/// What lies between the words of a row along x, y and z. The cells of a warp lie in rows
+/// close to each other: like this, the three are in different banks.
+inline constexpr int kRowPitch = kRowsOfTile + 10;
+static_assert(kRowPitch % 32 == 11);
 
 /// How many threads share a tile, and how its rows are dealt out to them.
 template <int N>
 struct Team {
   static constexpr int kWarps = N / 32;
   static constexpr int kSteps = (kRowsOfTile + N - 1) / N;
+  /// How many teams a multiprocessor has room for.
+  static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
+  /// Vertices or cells that are found at a time; tiles with more take several turns.
+  /// A multiprocessor before Ampere has 64 KiB of shared memory.
+  static constexpr std::uint32_t kMostListed = kTeams == 3 ? 2560 : 7680;
 };
-
+inline constexpr std::uint32_t kListedBeforeAmpere = 512;
+template <int N>
+__host__ __device__ constexpr std::uint32_t listed_at_a_time() {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+  return kListedBeforeAmpere;
+#else
+  return Team<N>::kMostListed;
+#endif
+}
 /// A row of inside bits: samples 0 … 31, and sample 32 in the lowest bit.
 struct RowBits {
   std::uint32_t at, last;
@@ -38,12 +47,6 @@ struct RowBits {
 /// TileShared::crossing for a cell in row 0, as bytes, and what else is added.
 struct EdgePlace {
   std::uint32_t offset, addend;
-};
-
-/// The row that the first of 32 listed things lies in, and how many of the row
-/// come before it.
-struct FirstOfGroup {
-  std::uint16_t row, before;
 };
 
 /// A tile cut to the region of interest; see TileShape of the CPU.
@@ -65,18 +68,14 @@ struct alignas(256) TileShared {
   /// The crossing edges of each row along x, y and z, the tile's own and those of
   /// lower tiles, and the number of the first. Bit x stands for the edge between
   /// samples x and x + 1 along x, for the one at sample x + 1 along y and z.
-  std::uint32_t crossing[3][kRowsOfTile], number[3][kRowsOfTile];
+  std::uint32_t crossing[3][kRowPitch], number[3][kRowPitch];
   union {
     std::uint32_t mixed[kRowsOfTile];  ///< cells with corners on both sides
     alignas(16) RowTable before_copy;
   };
   std::uint16_t cell_base[kRowsOfTile + 1];
-  union {
-    alignas(16) std::uint16_t vertex_marks[kMostListed];  ///< row + 1 where a row's vertices begin
-    /// Numbers of the vertices at sample 0 on edges along y and along z.
-    std::uint32_t at_0[2][kRowsOfTile];
-  };
-  FirstOfGroup vertex_groups[kMostListed / 32], cell_groups[kMostListed / 32];
+  /// Numbers of the vertices at sample 0 on edges along y and along z.
+  std::uint32_t at_0[2][kRowPitch];
   /// Three edges times 8, 4 bits apart, a triangle.
   std::uint16_t triangles[256 * 5];
   std::uint8_t triangle_count[256];
@@ -87,7 +86,6 @@ struct alignas(256) TileShared {
   std::uint32_t step_sums[64];                      ///< of 32 rows each: vertices | cells << 16
   std::uint32_t step_vertices[64], step_cells[64];  ///< before them
   std::uint32_t all_vertices, all_cells;
-  std::uint16_t group_triangles[kMostListed / 32];  ///< of 32 listed cells each
   unsigned long long vertex_base, triangle_base;
   std::uint32_t number_base;        ///< mesh number of the tile's first vertex
   std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis
@@ -103,14 +101,31 @@ struct alignas(256) TileShared {
   /// The active tiles as bits and how many come before each 32, where the block has
   /// searched them.
   std::uint32_t active[kMostSearchedByBlock / 32], active_before[kMostSearchedByBlock / 32];
-
-  /// Row + 1 where a row's cells begin, else 0; then x | row << 5 | ten times the
-  /// case << 16 | triangles << 28. kListed of them, behind everything else.
-  __device__ std::uint32_t* cells() { return reinterpret_cast<std::uint32_t*>(this + 1); }
-  __device__ const std::uint32_t* cells() const {
-    return reinterpret_cast<const std::uint32_t*>(this + 1);
-  }
 };
+
+/// The row that the first of 32 listed things lies in, and how many of the row
+/// come before it.
+struct FirstOfGroup {
+  std::uint16_t row, before;
+};
+
+/// The vertices and cells that are listed now, behind everything else.
+template <std::uint32_t Listed>
+struct alignas(16) Lists {
+  static constexpr std::uint32_t kListed = Listed;
+  /// Row + 1 where a row's cells begin, else 0; then x | row << 5 | ten times the
+  /// case << 16 | triangles << 28.
+  std::uint32_t cells[Listed];
+  std::uint16_t vertex_marks[Listed];  ///< row + 1 where a row's vertices begin
+  FirstOfGroup vertex_groups[Listed / 32], cell_groups[Listed / 32];
+  std::uint16_t group_triangles[Listed / 32];  ///< of 32 listed cells each
+};
+template <int N>
+using ListsOf = Lists<listed_at_a_time<N>()>;
+template <int N>
+__device__ inline ListsOf<N>& lists_of(TileShared& s) {
+  return *reinterpret_cast<ListsOf<N>*>(&s + 1);
+}
 
 __device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }
 /// The thread's number, read again wherever it is asked for: what follows from it is not
@@ -123,7 +138,7 @@ __device__ inline unsigned own_thread() {
 __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
 
 /// Barriers of a team beside that of __syncthreads: who only arrives goes on at once.
-enum class TeamBarrier : int { vertex_base = 1, cells = 2 };
+enum class TeamBarrier : int { vertex_base = 1, cells = 2, neighbours = 3 };
 template <int N, TeamBarrier Barrier>
 __device__ inline void arrive() {
   __syncwarp();
