@@ -213,8 +213,9 @@ struct ResidentExtractor::Impl {
       launch();
       const LaunchReport seen = wait_for_report();
       active = seen.found;
-      if (seen.found > row_tables.size()) make_row_tables(seen.found);
-      if (seen.found > 0 && positions.size() == 0) {
+      const bool begun = seen.found <= row_tables.size();
+      make_row_tables(seen.found);
+      if (!begun || (seen.found > 0 && positions.size() == 0)) {
         make_room(kVerticesOfTile * seen.found, kTrianglesOfTile * seen.found);
         continue;
       }

@@ -259,11 +259,14 @@ __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
 template <class F>
 __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed, F&& f) {
   const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(&next));
-  // One thread of the warp counts. atomicAdd() would be compiled for any number of them.
+  // One thread of the warp counts; an addition would be compiled for any number of them.
   const auto take = [address] {
     std::uint32_t before = 0;
     if (lane_id() == 0)
-      asm volatile("atom.shared.add.u32 %0, [%1], 1;" : "=r"(before) : "r"(address) : "memory");
+      asm volatile("atom.shared.inc.u32 %0, [%1], 0xffffffff;"
+                   : "=r"(before)
+                   : "r"(address)
+                   : "memory");
     return before;
   };
   std::uint32_t taken = take();

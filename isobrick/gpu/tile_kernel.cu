@@ -86,6 +86,7 @@ template <std::uint32_t Listed>
 constexpr std::size_t kSharedBytes = sizeof(TileShared) + sizeof(Lists<Listed>);
 
 static_assert(kSharedBytes<kListedBeforeAmpere> <= 64 << 10, "what Turing has");
+static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later device has");
 
 /// Counts a tile's crossing edges and active cells, and leaves their places.
 template <int N>

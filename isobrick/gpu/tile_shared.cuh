@@ -24,7 +24,7 @@ struct Team {
   static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
   /// Vertices or cells that are found at a time; tiles with more take several turns.
   /// A multiprocessor before Ampere has 64 KiB of shared memory.
-  static constexpr std::uint32_t kMostListed = kTeams == 3 ? 2560 : 7680;
+  static constexpr std::uint32_t kMostListed = kTeams == 3 ? 2560 : 7168;
 };
 inline constexpr std::uint32_t kListedBeforeAmpere = 512;
 template <int N>

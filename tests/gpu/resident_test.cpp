@@ -46,6 +46,15 @@ TYPED_TEST(GpuResident, SmoothFieldOfOddExtents) {
   compare(this->waves({131, 70, 97}), {mid - 40, mid, mid + 0.5, mid + 30}, {}, 32);
 }
 
+TYPED_TEST(GpuResident, ManyTilesAreFoundByALaunchOfTheirOwn) {
+  const double mid = this->lowest() + 100;
+  const auto field = this->waves({3, 1030, 1060});  // 33 × 34 tiles
+  compare(field, {mid + 70, mid, this->lowest(), mid - 40}, {});
+  SurfaceOptions options;
+  options.roi = {{0, 31, 100}, {2, 500, 1060}};
+  compare(field, {mid}, options);
+}
+
 TYPED_TEST(GpuResident, NoiseIsTheHardestInput) {
   const double mid = this->lowest() + 100;
   compare(this->noise({67, 41, 75}, 1), {mid, mid + 0.5, mid - 90}, {}, 16);
