@@ -46,6 +46,7 @@ std::unique_ptr<VolumeSource> open_input(const Arguments& arguments) {
   }
   VolumeRequest volume = arguments.volume;
   volume.memory = arguments.store.memory;
+  volume.threads = arguments.store.threads;
   return open_source(arguments.in, volume);
 }
 

@@ -48,7 +48,7 @@ class Hdf5Source final : public VolumeSource {
 std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::string& dataset,
                                         const VolumeRequest& said) {
   refuse_raw_description(file, "an HDF5 file", said);
-  auto opened = std::make_unique<Hdf5Dataset>(file, dataset);
+  auto opened = std::make_unique<Hdf5Dataset>(file, dataset, said.threads);
   std::vector<ArrayAxis> axes = opened->axes();
   if (!opened->labelled() && !guess_roles(axes, said.selection))
     throw UsageError(

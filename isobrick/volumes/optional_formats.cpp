@@ -3,22 +3,13 @@
 #include <fmt/format.h>
 
 #include "isobrick/core/error.h"
-
+#include "isobrick/volumes/module_loader.h"
+#include "isobrick/volumes/vdb_writer.h"
 #ifdef ISOBRICK_WITH_EXPAT
 #include "isobrick/volumes/vti_volume.h"
 #endif
 #ifdef ISOBRICK_WITH_TIFF
 #include "isobrick/volumes/tiff_volume.h"
-#endif
-#ifdef ISOBRICK_WITH_HDF5
-#include "isobrick/volumes/hdf5_volume.h"
-#endif
-#ifdef ISOBRICK_WITH_OPENVDB
-#include "isobrick/volumes/vdb_module.h"
-#endif
-#include "isobrick/volumes/vdb_writer.h"
-#ifdef ISOBRICK_WITH_DICOM
-#include "isobrick/volumes/dicom_volume.h"
 #endif
 
 namespace isobrick {
@@ -57,7 +48,7 @@ std::unique_ptr<VolumeSource> open_hdf5_if_built(const std::string& file,
                                                  [[maybe_unused]] const std::string& dataset,
                                                  [[maybe_unused]] const VolumeRequest& said) {
 #ifdef ISOBRICK_WITH_HDF5
-  return open_hdf5(file, dataset, said);
+  return hdf5_module().open(file, dataset, said);
 #else
   built_without(file, "an HDF5 file", "libhdf5-dev");
 #endif
@@ -87,7 +78,7 @@ std::unique_ptr<VolumeSource> open_dicom_if_built(
     const std::string& name, [[maybe_unused]] const std::vector<std::string>& files,
     [[maybe_unused]] const VolumeRequest& said) {
 #ifdef ISOBRICK_WITH_DICOM
-  return open_dicom(name, files, said);
+  return dicom_module().open(name, files, said);
 #else
   built_without(name, "a DICOM series", "libdcmtk-dev");
 #endif

@@ -1,9 +1,7 @@
-#include "isobrick/volumes/vdb_module.h"
-
+#include "isobrick/volumes/module_loader.h"
 #include "isobrick/volumes/vdb_volume.h"
 
-extern "C" __attribute__((visibility("default"))) const isobrick::VdbModule*
-isobrick_openvdb_module() {
+extern "C" __attribute__((visibility("default"))) const isobrick::VdbModule* isobrick_module() {
   static constexpr isobrick::VdbModule module{ISOBRICK_VERSION, isobrick::open_vdb,
                                               isobrick::make_vdb_writer};
   return &module;

@@ -39,6 +39,7 @@ struct VolumeRequest {
   /// Bytes that a source may take for itself: one that holds its samples in
   /// memory refuses when it needs more; nothing: as many as it likes.
   std::optional<std::uint64_t> memory;
+  int threads = 0;  ///< with which a source may decode by itself; 0: all cores
 };
 
 /// What a file and the caller together say of a volume. Throws UsageError for

@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <functional>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "damaged_files.h"
+#include "isobrick/core/error.h"
 #include "isobrick/volumes/open_source.h"
 
 namespace isobrick {
@@ -51,7 +55,159 @@ TEST_F(Hdf5, AnyBoxOfPlainAndChunkedData) {
       EXPECT_EQ(source->memory() > 0, chunk > 0);
     }
   }
-  EXPECT_TRUE(contains(message_of<Error>([&] { open_source(dir / "v.data:/w", {}); }), "'/w'"));
+  for (const char* name : {"w", "w/v", "v/v"})
+    EXPECT_TRUE(contains(
+        message_of<UsageError>([&] { open_source(dir / (std::string("v.data:/") + name), {}); }),
+        "it has /v"));
+}
+
+/// One dataset /v of 5 × 17 × 19 samples in chunks of 2 × 5 × 6, made by `set` of its
+/// properties; `write` puts the samples.
+template <class Set, class Write>
+void create(const std::string& path, hid_t stored, Set&& set, Write&& write) {
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hsize_t sizes[3] = {5, 17, 19}, chunks[3] = {2, 5, 6};
+  const hid_t space = H5Screate_simple(3, sizes, nullptr), how = H5Pcreate(H5P_DATASET_CREATE);
+  H5Pset_chunk(how, 3, chunks);
+  set(how);
+  const hid_t data = H5Dcreate2(file, "v", stored, space, H5P_DEFAULT, how, H5P_DEFAULT);
+  ASSERT_GE(data, 0);
+  write(data);
+  H5Dclose(data);
+  H5Pclose(how);
+  H5Sclose(space);
+  H5Fclose(file);
+}
+
+/// Slabs, as a conversion asks for them, then a box across chunks.
+void expect_samples(const std::string& path, ScalarType type, int threads) {
+  VolumeRequest said;
+  said.threads = threads;
+  const auto source = open_source(path, said);
+  ASSERT_EQ(source->info().type, type);
+  for (const Index planes : {1, 3, 5}) {
+    Box3 box = kWhole;
+    for (box.lo.z = 0; box.lo.z < kExtent.z; box.lo.z = box.hi.z) {
+      box.hi.z = std::min(box.lo.z + planes, kExtent.z);
+      ASSERT_EQ(read_box(*source, box), sample_bytes(type, box, kExtent)) << planes;
+    }
+  }
+  const Box3 inner{{5, 4, 1}, {13, 16, 4}}, one{{7, 8, 2}, {8, 9, 3}};
+  EXPECT_EQ(read_box(*source, inner), sample_bytes(type, inner, kExtent));
+  EXPECT_EQ(read_box(*source, one), sample_bytes(type, one, kExtent));
+}
+
+TEST_F(Hdf5, FiltersOfAllKinds) {
+  struct Case {
+    ScalarType type;
+    hid_t native, little, big;
+  };
+  const Case types[] = {
+      {ScalarType::u8, H5T_NATIVE_UINT8, H5T_STD_U8LE, H5T_STD_U8BE},
+      {ScalarType::u16, H5T_NATIVE_UINT16, H5T_STD_U16LE, H5T_STD_U16BE},
+      {ScalarType::i32, H5T_NATIVE_INT32, H5T_STD_I32LE, H5T_STD_I32BE},
+      {ScalarType::f32, H5T_NATIVE_FLOAT, H5T_IEEE_F32LE, H5T_IEEE_F32BE},
+      {ScalarType::f64, H5T_NATIVE_DOUBLE, H5T_IEEE_F64LE, H5T_IEEE_F64BE},
+  };
+  const std::pair<const char*, std::function<void(hid_t)>> filters[] = {
+      {"none", [](hid_t) {}},
+      {"deflate", [](hid_t how) { H5Pset_deflate(how, 6); }},
+      {"stored", [](hid_t how) { H5Pset_deflate(how, 0); }},
+      {"shuffle", [](hid_t how) { H5Pset_shuffle(how); }},
+      {"checksum", [](hid_t how) { H5Pset_fletcher32(how); }},
+      {"all",
+       [](hid_t how) {
+         H5Pset_shuffle(how);
+         H5Pset_deflate(how, 6);
+         H5Pset_fletcher32(how);
+       }},
+      {"checksum first",
+       [](hid_t how) {
+         H5Pset_fletcher32(how);
+         H5Pset_shuffle(how);
+         H5Pset_deflate(how, 6);
+       }},
+      {"twice",  // is left to the library
+       [](hid_t how) {
+         H5Pset_deflate(how, 6);
+         H5Pset_deflate(how, 6);
+       }},
+  };
+  for (const Case& type : types)
+    for (const hid_t stored : {type.little, type.big})
+      for (const auto& [name, set] : filters) {
+        SCOPED_TRACE(std::string(name) + " of " + std::to_string(size_of(type.type)) + " bytes");
+        const std::string samples = sample_bytes(type.type, kWhole, kExtent);
+        create(dir / "v.h5", stored, set, [&](hid_t data) {
+          ASSERT_GE(H5Dwrite(data, type.native, H5S_ALL, H5S_ALL, H5P_DEFAULT, samples.data()), 0);
+        });
+        for (const int threads : {1, 4}) expect_samples(dir / "v.h5", type.type, threads);
+      }
+}
+
+TEST_F(Hdf5, ChunksThatWereNeverWritten) {
+  const std::int16_t fill = -7;
+  const auto set = [&](hid_t how) {
+    H5Pset_deflate(how, 6);
+    H5Pset_fill_value(how, H5T_NATIVE_INT16, &fill);
+  };
+  // Only the first plane of the second layer of chunks.
+  const std::vector<std::int16_t> plane(17 * 19, 1000);
+  create(dir / "v.h5", H5T_STD_I16BE, set, [&](hid_t data) {
+    const hsize_t at[3] = {2, 0, 0}, size[3] = {1, 17, 19};
+    const hid_t there = H5Dget_space(data), here = H5Screate_simple(3, size, nullptr);
+    H5Sselect_hyperslab(there, H5S_SELECT_SET, at, nullptr, size, nullptr);
+    ASSERT_GE(H5Dwrite(data, H5T_NATIVE_INT16, here, there, H5P_DEFAULT, plane.data()), 0);
+    H5Sclose(there);
+    H5Sclose(here);
+  });
+  const auto source = open_source(dir / "v.h5", {});
+  const std::string bytes = read_box(*source, kWhole);
+  const auto* samples = reinterpret_cast<const std::int16_t*>(bytes.data());
+  for_each_point(kWhole, [&](Int3 p) {
+    ASSERT_EQ(samples[linear_index(p, kExtent)], p.z == 2 ? 1000 : fill) << p.x << p.y << p.z;
+  });
+}
+
+TEST_F(Hdf5, ChunksThatSkippedAFilter) {
+  std::vector<std::uint8_t> chunk(2 * 5 * 6);
+  for (std::size_t i = 0; i < chunk.size(); ++i) chunk[i] = static_cast<std::uint8_t>(i);
+  create(
+      dir / "v.h5", H5T_STD_U8LE, [](hid_t how) { H5Pset_deflate(how, 6); },
+      [&](hid_t data) {
+        const hsize_t at[3] = {2, 5, 6};
+        ASSERT_GE(H5Dwrite_chunk(data, H5P_DEFAULT, 1, at, chunk.size(), chunk.data()), 0);
+      });
+  const auto source = open_source(dir / "v.h5", {});
+  const std::string read = read_box(*source, {{6, 5, 2}, {12, 10, 4}});
+  EXPECT_EQ(read, std::string(chunk.begin(), chunk.end()));
+}
+
+TEST_F(Hdf5, DamagedChunksAreNamed) {
+  const std::string samples = sample_bytes(ScalarType::u8, kWhole, kExtent);
+  const std::pair<const char*, std::function<void(hid_t)>> filters[] = {
+      {"unpack", [](hid_t how) { H5Pset_deflate(how, 6); }},
+      {"checksum", [](hid_t how) { H5Pset_fletcher32(how); }}};
+  for (const auto& [what, set] : filters) {
+    haddr_t place = 0;
+    create(dir / "v.h5", H5T_STD_U8LE, set, [&](hid_t data) {
+      ASSERT_GE(H5Dwrite(data, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, samples.data()), 0);
+      const hsize_t at[3] = {2, 5, 6};
+      unsigned skipped = 0;
+      hsize_t size = 0;
+      ASSERT_GE(H5Dflush(data), 0);
+      ASSERT_GE(H5Dget_chunk_info_by_coord(data, at, &skipped, &place, &size), 0);
+    });
+    std::string bytes = dir.read("v.h5");
+    for (std::size_t i = 0; i < 8; ++i) bytes[place + i] = static_cast<char>(~bytes[place + i]);
+    const auto source = open_source(dir.write("d.h5", bytes), {});
+    const std::string message = message_of<DamageError>([&] { read_box(*source, kWhole); });
+    EXPECT_TRUE(contains(message, "the chunk at [2, 5, 6]")) << message;
+    EXPECT_TRUE(contains(message, what)) << message;
+    // What does not touch it can be read, also after the failure.
+    const Box3 first{{0, 0, 0}, {19, 17, 2}};
+    EXPECT_EQ(read_box(*source, first), sample_bytes(ScalarType::u8, first, kExtent));
+  }
 }
 
 TEST_F(Hdf5, SourcesOfSeveralThreads) {
@@ -74,6 +230,11 @@ TEST_F(Hdf5, TruncatedFiles) {
     EXPECT_TRUE(contains(
         message_of<Error>([&] { open_source(dir.write("d.h5", bytes.substr(0, size)), {}); }),
         "d.h5"));
+}
+
+TEST_F(Hdf5, DamagedFiles) {
+  write("v.h5", 3);
+  expect_damage_is_no_crash(dir, "d.h5", dir.read("v.h5"), 41);
 }
 
 }  // namespace

@@ -1,0 +1,7 @@
+#include "isobrick/volumes/dicom_volume.h"
+#include "isobrick/volumes/module_loader.h"
+
+extern "C" __attribute__((visibility("default"))) const isobrick::DicomModule* isobrick_module() {
+  static constexpr isobrick::DicomModule module{ISOBRICK_VERSION, isobrick::open_dicom};
+  return &module;
+}

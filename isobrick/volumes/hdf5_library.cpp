@@ -1,0 +1,41 @@
+#include "isobrick/volumes/hdf5_library.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+
+std::mutex& hdf5_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+std::string hdf5_printable(const std::string& text) {
+  std::string shown = text.substr(0, 200);
+  for (char& c : shown)
+    if (c < 0x20 || c >= 0x7f) c = '?';
+  return shown;
+}
+
+void hdf5_fail(const std::string& path, const std::string& what) {
+  std::string text;
+  const auto keep = [](unsigned, const H5E_error2_t* error, void* to) -> herr_t {
+    std::string& kept = *static_cast<std::string*>(to);
+    if (kept.empty() && error->desc != nullptr) kept = error->desc;
+    return 0;
+  };
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep, &text);
+  if (!text.empty()) text = fmt::format(" ({})", hdf5_printable(text));
+  throw DamageError(fmt::format("'{}': {}{}", path, what, text));
+}
+
+Hdf5Handle hdf5_access(hid_t access_class) {
+  const auto refuse = [](const char*, const char*, const char*, const char*, unsigned*, hid_t,
+                         void*) -> herr_t { return -1; };
+  Hdf5Handle access(H5Pcreate(access_class), H5Pclose);
+  H5Pset_elink_cb(access, refuse, nullptr);
+  return access;
+}
+
+}  // namespace isobrick

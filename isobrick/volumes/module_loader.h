@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "isobrick/volumes/vdb_writer.h"
+#include "isobrick/volumes/volume_request.h"
+
+namespace isobrick {
+
+// Libraries of formats that take longer to link than most commands take are known
+// only to modules, shared objects that are loaded when they are first needed. Each
+// has one function, isobrick_module(), that returns the address of one of these
+// structures. Every one begins with the version of isobrick that it belongs to.
+
+/// lib/isobrick/isobrick_hdf5.so
+struct Hdf5Module {
+  const char* version;
+  std::unique_ptr<VolumeSource> (*open)(const std::string& file, const std::string& dataset,
+                                        const VolumeRequest& said);
+};
+
+/// lib/isobrick/isobrick_dicom.so
+struct DicomModule {
+  const char* version;
+  std::unique_ptr<VolumeSource> (*open)(const std::string& name,
+                                        const std::vector<std::string>& files,
+                                        const VolumeRequest& said);
+};
+
+/// lib/isobrick/isobrick_openvdb.so
+struct VdbModule {
+  const char* version;
+  std::unique_ptr<VolumeSource> (*open)(const std::string& file, const VolumeRequest& said);
+  std::unique_ptr<VdbWriter> (*make_writer)(const VolumeInfo& info, const std::string& name);
+};
+
+// Each is loaded once. They throw Error when a module is not where it belongs or is
+// of another version.
+const Hdf5Module& hdf5_module();
+const DicomModule& dicom_module();
+const VdbModule& vdb_module();
+
+}  // namespace isobrick
