@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 
 #include "isobrick/core/lattice.h"
@@ -46,6 +48,17 @@ void for_each_needed_box(const Lattice& lattice, const TileWork& work, Index rea
       const Index y = (i & 1) * kBlockEdge, z = (i >> 1) * kBlockEdge;
       emit(pairs[i], y, y + kBlockEdge, z, z + kBlockEdge);
     }
+}
+
+/// Bricks that the samples of one tile, with `reach` layers around, can lie in.
+constexpr std::size_t max_bricks_of_tile(const Lattice& lattice, Index reach) {
+  Index bricks = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index samples = std::min(kTileEdge + 1 + 2 * reach, lattice.extent[axis]);
+    bricks *= std::min((samples - 2 + lattice.brick[axis]) / lattice.brick[axis] + 1,
+                       lattice.bricks()[axis]);
+  }
+  return static_cast<std::size_t>(bricks);
 }
 
 }  // namespace isobrick

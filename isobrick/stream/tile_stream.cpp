@@ -79,14 +79,4 @@ bool BatchPlanner::next(TileBatch& batch) {
   return !batch.tiles.empty();
 }
 
-std::size_t max_bricks_of_tile(const Lattice& lattice, Index reach) {
-  Index bricks = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Index samples = std::min(kTileEdge + 1 + 2 * reach, lattice.extent[axis]);
-    bricks *= std::min((samples - 2 + lattice.brick[axis]) / lattice.brick[axis] + 1,
-                       lattice.bricks()[axis]);
-  }
-  return static_cast<std::size_t>(bricks);
-}
-
 }  // namespace isobrick

@@ -74,7 +74,4 @@ class BatchPlanner {
   std::optional<TileWork> held_;  ///< did not fit the batch before
 };
 
-/// Bricks that the samples of one tile, with `reach` layers around, can lie in.
-std::size_t max_bricks_of_tile(const Lattice& lattice, Index reach);
-
 }  // namespace isobrick

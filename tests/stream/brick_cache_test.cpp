@@ -1,49 +1,16 @@
 #include "isobrick/stream/brick_cache.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
 
-#include "isobrick/pipeline/convert.h"
 #include "isobrick/stream/tile_stream.h"
-#include "tests/pipeline/convert_doubles.h"
+#include "tests/stream/stored_volume.h"
 
 namespace isobrick::test {
 namespace {
 
-namespace fs = std::filesystem;
-
-class Stream : public ::testing::Test {
- protected:
-  void SetUp() override {
-    path_ = fs::temp_directory_path() / ("isobrick-stream-" + std::to_string(::getpid()) + ".zarr");
-    fs::remove_all(path_);
-    samples_ = make_samples<std::uint16_t>(extent_, 5);
-    // One brick that equals the fill value, hence absent.
-    for_each_point({{32, 0, 0}, {64, 32, 32}}, [&](Int3 p) { samples_[index(p)] = 0; });
-    MemorySource source(extent_, ScalarType::u16, as_bytes(samples_));
-    NoProgress silent;
-    convert(source, path_, {.brick = 32, .shard = 64}, silent);
-  }
-  void TearDown() override { fs::remove_all(path_); }
-
-  std::size_t index(Int3 p) const { return static_cast<std::size_t>(linear_index(p, extent_)); }
-
-  void expect_samples(const BrickCache& cache, Int3 brick) const {
-    const auto* found = reinterpret_cast<const std::uint16_t*>(cache.find(brick));
-    const Lattice lattice{extent_, {32, 32, 32}, ScalarType::u16};
-    for_each_point(lattice.brick_box(brick), [&](Int3 p) {
-      const Int3 local = p - brick * lattice.brick;
-      ASSERT_EQ(found ? found[linear_index(local, lattice.brick)] : 0, samples_[index(p)]);
-    });
-  }
-
-  Int3 extent_{150, 100, 70};
-  fs::path path_;
-  std::vector<std::uint16_t> samples_;
-};
+class Stream : public StoredVolume {};
 
 TEST_F(Stream, CacheKeepsWhatWasNeededLastAndNoMoreThanItsCapacity) {
   const StoreReader store(path_);

@@ -1,0 +1,127 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/stream/brick_slots.h"
+#include "isobrick/stream/tile_stream.h"
+
+namespace isobrick {
+
+class BatchDecoder;
+
+/// Tiles and their decoded bricks, which stay where they are until this is destroyed (by any
+/// thread, but before the decoder).
+class DecodedBatch final : public BrickLookup {
+ public:
+  DecodedBatch(BatchDecoder& decoder, TileBatch batch)
+      : decoder_(decoder), batch_(std::move(batch)) {}
+  DecodedBatch(const DecodedBatch&) = delete;
+  DecodedBatch& operator=(const DecodedBatch&) = delete;
+  ~DecodedBatch() override;
+
+  std::span<const TileWork> tiles() const { return batch_.tiles; }
+  const std::byte* find(Int3 brick) const override;
+
+ private:
+  friend class BatchDecoder;
+  BatchDecoder& decoder_;
+  TileBatch batch_;
+  Int3 grid_;
+  std::unordered_map<std::uint64_t, const std::byte*> samples_;
+  std::size_t held_ = 0;     ///< of its bricks, the first so many
+  std::size_t missing_ = 0;  ///< bricks to decode for it, not done
+  std::size_t loads_ = 0;    ///< all bricks to decode for it
+  bool begun_ = false;       ///< all of its bricks are held
+};
+
+/// Memory for bricks, given back when nothing points to it any more.
+using GetBrickMemory = std::function<std::shared_ptr<std::byte>(std::size_t bytes)>;
+
+/// Decodes the bricks of batch after batch, some batches ahead of whoever takes them, so
+/// that no core waits at the end of one. Planning and decoding have threads of their own.
+class BatchDecoder {
+ public:
+  /// So many threads decode; at most `capacity` bricks are held at a time, which must be
+  /// enough for any batch. Their memory comes from `memory`, in pieces of slab_bricks(),
+  /// when it is needed. The planner is used by one thread only, not the caller's.
+  BatchDecoder(const StoreReader& store, int level, BatchPlanner& planner, Index reach,
+               std::size_t capacity, int threads, GetBrickMemory memory);
+  /// Stops; all batches have been destroyed.
+  ~BatchDecoder();
+
+  /// The next batch, decoded; null at the end. Waits for it, and throws what went wrong
+  /// in reading, decoding or planning.
+  std::shared_ptr<const DecodedBatch> next();
+
+  /// Memory for bricks that there is. After the end.
+  std::uint64_t memory_bytes() const { return slots_count_ * lattice_.brick_bytes(); }
+  /// Bricks read and decoded, and how many different ones. After the end.
+  std::uint64_t reads() const { return reads_; }
+  std::uint64_t bricks_read() const { return bricks_read_; }
+
+  /// Bricks whose memory is got at a time: large pieces are quicker to get, but they
+  /// are not to be all of a small capacity.
+  static std::size_t slab_bricks(const Lattice& lattice, std::size_t capacity);
+
+ private:
+  friend class DecodedBatch;
+  using Batch = std::shared_ptr<DecodedBatch>;
+  struct Load {
+    Int3 brick;
+    std::byte* samples;
+  };
+  using Job = std::function<void()>;
+
+  void plan();
+  bool next_planned(TileBatch& batch);
+  void begin(const Batch& batch);
+  void load(const Batch& batch, std::vector<Load>& loads);
+  std::byte* place(Int3 brick);
+  void hint(const TileBatch& batch);
+  void grow_if_short();
+  void grow();
+  void run();
+  void decode(const Batch& batch, const std::vector<Load>& loads);
+  void release(const DecodedBatch& batch);
+  void fail(std::exception_ptr error);
+  template <class Ready>
+  void wait(std::unique_lock<std::mutex>& lock, const Ready& ready);
+
+  const StoreReader& store_;
+  const int level_;
+  const Lattice lattice_;
+  BatchPlanner& planner_;
+  const std::size_t capacity_;
+  const int threads_count_;
+  const std::size_t bricks_of_job_;
+  const GetBrickMemory memory_;
+
+  std::mutex mutex_;
+  std::condition_variable work_, changed_;
+  std::deque<Job> jobs_;
+  BrickSlots slots_;
+  std::deque<Batch> batches_;    ///< begun or about to be, not taken
+  std::size_t ahead_ = 0;        ///< bricks decoded for those, or being so
+  std::size_t slots_count_ = 0;  ///< bricks that there is memory for, or soon
+  bool growing_ = false, planned_ = false, stop_ = false;
+  std::exception_ptr error_;
+  std::vector<std::shared_ptr<std::byte>> slabs_;
+  std::vector<bool> seen_;
+  std::uint64_t reads_ = 0, bricks_read_ = 0;
+
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace isobrick

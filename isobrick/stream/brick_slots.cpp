@@ -1,0 +1,94 @@
+#include "isobrick/stream/brick_slots.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "isobrick/core/morton.h"
+
+namespace isobrick {
+namespace {
+
+Int3 point_of(std::uint64_t key, Int3 grid) {
+  const auto k = static_cast<Index>(key);
+  return {k % grid.x, k / grid.x % grid.y, k / (grid.x * grid.y)};
+}
+
+}  // namespace
+
+std::uint64_t next_use(const Lattice& lattice, Index reach, Int3 brick, std::uint64_t code) {
+  // Tile t looks at samples 32·t − reach … 32·t + 32 + reach.
+  Box3 tiles;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index first = brick[axis] * lattice.brick[axis], end = first + lattice.brick[axis];
+    tiles.lo[axis] = ceil_div(std::max<Index>(first - kTileEdge - reach, 0), kTileEdge);
+    tiles.hi[axis] = std::min((end - 1 + reach) / kTileEdge + 1, lattice.tiles()[axis]);
+  }
+  std::uint64_t next = kNever;
+  for_each_point(tiles, [&](Int3 t) {
+    const std::uint64_t of_tile = morton_encode(t);
+    if (of_tile >= code) next = std::min(next, of_tile);
+  });
+  return next;
+}
+
+void BrickSlots::add_slots(std::byte* memory, std::size_t count) {
+  // The slot that was freed last is taken first, and these in their order.
+  const std::size_t bytes = lattice_.brick_bytes();
+  std::vector<std::byte*> slots;
+  for (std::size_t i = count; i > 0; --i) slots.push_back(memory + (i - 1) * bytes);
+  free_.insert(free_.begin(), slots.begin(), slots.end());
+}
+
+void BrickSlots::advance(std::uint64_t code) {
+  now_ = code;
+  while (!idle_.empty() && idle_.begin()->first < now_) {
+    const std::uint64_t key = idle_.begin()->second;
+    idle_.erase(idle_.begin());
+    set_idle(key, entries_.at(key));
+  }
+}
+
+bool BrickSlots::hold(Int3 brick) {
+  const auto found = entries_.find(key(brick));
+  if (found == entries_.end()) return false;
+  Entry& entry = found->second;
+  if (entry.holds++ == 0) idle_.erase({entry.next, found->first});
+  return true;
+}
+
+std::byte* BrickSlots::place(Int3 brick) {
+  while (free_.empty()) {
+    if (idle_.empty()) return nullptr;
+    drop(std::prev(idle_.end())->second);
+  }
+  std::byte* slot = free_.back();
+  free_.pop_back();
+  entries_[key(brick)] = {slot, 1};
+  return slot;
+}
+
+void BrickSlots::set_absent(Int3 brick) {
+  Entry& entry = entries_.at(key(brick));
+  free_.push_back(entry.slot);
+  entry.slot = nullptr;
+}
+
+void BrickSlots::release(Int3 brick) {
+  const auto found = entries_.find(key(brick));
+  if (--found->second.holds == 0) set_idle(found->first, found->second);
+}
+
+void BrickSlots::set_idle(std::uint64_t key, Entry& entry) {
+  entry.next = next_use(lattice_, reach_, point_of(key, lattice_.bricks()), now_);
+  idle_.insert({entry.next, key});
+  if (entry.next == kNever) drop(key);
+}
+
+void BrickSlots::drop(std::uint64_t key) {
+  const auto found = entries_.find(key);
+  idle_.erase({found->second.next, key});
+  if (found->second.slot) free_.push_back(found->second.slot);
+  entries_.erase(found);
+}
+
+}  // namespace isobrick

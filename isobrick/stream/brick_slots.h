@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+
+namespace isobrick {
+
+/// Comes after the code of every tile.
+inline constexpr std::uint64_t kNever = ~std::uint64_t{0};
+
+/// Morton code of the first tile at or after `code` whose samples, `reach` layers around
+/// its 33³ included, lie in `brick`; kNever when there is none.
+std::uint64_t next_use(const Lattice& lattice, Index reach, Int3 brick, std::uint64_t code);
+
+/// Which decoded brick lies in which slot of memory. As tiles come in Morton order, it is
+/// known when a brick will be needed next: where room is short, the brick goes that is not
+/// needed for the longest time. Books only; not thread-safe.
+class BrickSlots {
+ public:
+  BrickSlots(const Lattice& lattice, Index reach) : lattice_(lattice), reach_(reach) {}
+
+  /// Takes over memory for `count` bricks, one after the other.
+  void add_slots(std::byte* memory, std::size_t count);
+  /// All tiles before `code` have had their bricks held: what nobody holds and only they need
+  /// goes.
+  void advance(std::uint64_t code);
+
+  /// Keeps a brick until release(). False when it is not here.
+  bool hold(Int3 brick);
+  /// Puts a brick that is not here into a slot, and holds it. Null when all slots are held.
+  std::byte* place(Int3 brick);
+  /// The brick, which is here, has no samples of its own: its slot is free again.
+  void set_absent(Int3 brick);
+  void release(Int3 brick);
+
+  bool contains(Int3 brick) const { return entries_.count(key(brick)) > 0; }
+  /// The samples of a brick that is held; null when it is absent.
+  const std::byte* find(Int3 brick) const { return entries_.at(key(brick)).slot; }
+  /// Slots that nothing is lost by using.
+  std::size_t free_slots() const { return free_.size(); }
+
+ private:
+  struct Entry {
+    std::byte* slot = nullptr;
+    std::uint32_t holds = 0;
+    std::uint64_t next = kNever;  ///< while nobody holds it: code of the next tile to need it
+  };
+  std::uint64_t key(Int3 brick) const {
+    return static_cast<std::uint64_t>(linear_index(brick, lattice_.bricks()));
+  }
+  void set_idle(std::uint64_t key, Entry& entry);
+  void drop(std::uint64_t key);
+
+  Lattice lattice_;
+  Index reach_;
+  std::uint64_t now_ = 0;
+  std::unordered_map<std::uint64_t, Entry> entries_;
+  std::set<std::pair<std::uint64_t, std::uint64_t>> idle_;  ///< held by nobody: next use, key
+  std::vector<std::byte*> free_;
+};
+
+}  // namespace isobrick

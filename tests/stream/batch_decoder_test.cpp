@@ -1,0 +1,128 @@
+#include "isobrick/stream/batch_decoder.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <deque>
+#include <fstream>
+
+#include "isobrick/core/error.h"
+#include "tests/stream/stored_volume.h"
+
+namespace isobrick::test {
+namespace {
+
+class Decoder : public StoredVolume {
+ protected:
+  struct Way {
+    Index reach = 0;
+    std::size_t tiles = 4, capacity = 1000;
+    int threads = 3;
+    std::size_t held = 1;  ///< batches that are in use at a time
+  };
+  struct Seen {
+    std::vector<Int3> tiles;
+    std::uint64_t reads = 0, bricks_read = 0;
+    std::size_t bytes = 0;
+  };
+
+  /// Decodes the whole volume and compares all bricks that tiles need.
+  Seen decode(const Way& way) const {
+    const StoreReader store(path_);
+    const Lattice& lattice = store.info().levels[0].lattice;
+    TileStream stream(store, 0, 20000, lattice.box());
+    BatchPlanner planner(stream, lattice, way.reach, false, way.tiles, way.capacity / way.held);
+    Seen seen;
+    std::atomic<std::size_t> bytes = 0;
+    BatchDecoder decoder(store, 0, planner, way.reach, way.capacity, way.threads,
+                         [&](std::size_t size) {
+                           bytes += size;
+                           return std::shared_ptr<std::byte>(new std::byte[size],
+                                                             std::default_delete<std::byte[]>());
+                         });
+    std::deque<std::shared_ptr<const DecodedBatch>> held;
+    while (auto batch = decoder.next()) {
+      held.push_back(std::move(batch));
+      for (const TileWork& work : held.back()->tiles()) {
+        seen.tiles.push_back(work.tile);
+        for_each_needed_box(lattice, work, way.reach, [&](Box3 box) {
+          const Int3 last = box.hi - Int3{1, 1, 1};
+          const Box3 bricks{{box.lo.x / 32, box.lo.y / 32, box.lo.z / 32},
+                            {last.x / 32 + 1, last.y / 32 + 1, last.z / 32 + 1}};
+          // What is held longest would be what is overwritten first.
+          for_each_point(bricks, [&](Int3 b) { expect_samples(*held.back(), b); });
+        });
+      }
+      for_each_needed_box(lattice, held.front()->tiles().front(), way.reach, [&](Box3 box) {
+        expect_samples(*held.front(), {box.lo.x / 32, box.lo.y / 32, box.lo.z / 32});
+      });
+      if (held.size() == way.held) held.pop_front();
+    }
+    seen.reads = decoder.reads();
+    seen.bricks_read = decoder.bricks_read();
+    seen.bytes = bytes;
+    return seen;
+  }
+};
+
+TEST_F(Decoder, EveryTileComesOnceWithItsBricksHoweverShortRoomIs) {
+  const StoreReader store(path_);
+  const Lattice& lattice = store.info().levels[0].lattice;
+  std::vector<Int3> expected;
+  TileStream all(store, 0, 20000, lattice.box());
+  while (const auto work = all.next()) expected.push_back(work->tile);
+  ASSERT_GT(expected.size(), 20u);
+  for (const Index reach : {0, 1}) {
+    const std::size_t least = max_bricks_of_tile(lattice, reach);
+    for (const Way& way : {Way{reach}, Way{reach, 1, least, 1}, Way{reach, 7, least + 3, 4},
+                           Way{reach, 3, 3 * least, 2, 3}, Way{reach, 1000, 1000, 5}}) {
+      const Seen seen = decode(way);
+      EXPECT_EQ(seen.tiles, expected);
+      EXPECT_LE(seen.bytes, way.capacity * lattice.brick_bytes());
+      EXPECT_GE(seen.reads, seen.bricks_read);
+      if (way.capacity == 1000) {
+        EXPECT_EQ(seen.reads, seen.bricks_read);
+      }
+    }
+  }
+}
+
+TEST_F(Decoder, WhoeverTakesBatchesMayStopEarly) {
+  const StoreReader store(path_);
+  const Lattice& lattice = store.info().levels[0].lattice;
+  TileStream stream(store, 0, 20000, lattice.box());
+  BatchPlanner planner(stream, lattice, 0, false, 2, 50);
+  BatchDecoder decoder(store, 0, planner, 0, 50, 2, [](std::size_t size) {
+    return std::shared_ptr<std::byte>(new std::byte[size], std::default_delete<std::byte[]>());
+  });
+  EXPECT_NE(decoder.next(), nullptr);
+  EXPECT_NE(decoder.next(), nullptr);
+}
+
+TEST_F(Decoder, DamageAndWantOfMemoryReachWhoeverTakesBatches) {
+  const auto decode_all = [&](const GetBrickMemory& memory) {
+    const StoreReader store(path_);
+    TileStream stream(store, 0, 20000, store.info().levels[0].lattice.box());
+    BatchPlanner planner(stream, store.info().levels[0].lattice, 0, false, 2, 50);
+    BatchDecoder decoder(store, 0, planner, 0, 50, 2, memory);
+    while (decoder.next()) {
+    }
+  };
+  EXPECT_THROW(
+      decode_all([](std::size_t) -> std::shared_ptr<std::byte> { throw Error("no memory"); }),
+      Error);
+  for (const auto& file : std::filesystem::recursive_directory_iterator(path_ / "0"))
+    if (file.is_regular_file() && file.file_size() > 4096) {
+      std::fstream damaged(file.path(), std::ios::in | std::ios::out | std::ios::binary);
+      damaged.seekp(1000);
+      damaged.write("damaged", 7);
+    }
+  EXPECT_THROW(decode_all([](std::size_t size) {
+                 return std::shared_ptr<std::byte>(new std::byte[size],
+                                                   std::default_delete<std::byte[]>());
+               }),
+               DamageError);
+}
+
+}  // namespace
+}  // namespace isobrick::test
