@@ -5,7 +5,8 @@
 //
 // What the stages do alone is measured in the same run: reading the encoded bricks (from
 // the page cache, where they fit it), reading and decoding them on all cores, copies of
-// the same bytes up and down. --check compares the mesh with the CPU's by a hash.
+// the same bytes up and down. --check compares the mesh with the CPU's by a hash. With --cold
+// the store is dropped from the page cache before each extraction, and before the reads alone.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -74,7 +76,7 @@ struct Arguments {
   std::string store;
   ExtractOptions options;
   int runs = 3;
-  bool check = false, json = false;
+  bool check = false, cold = false, json = false;
 };
 
 std::vector<Int3> needed_bricks(const StoreReader& store, const ExtractOptions& options) {
@@ -91,6 +93,18 @@ std::vector<Int3> needed_bricks(const StoreReader& store, const ExtractOptions& 
       is_seen = true;
     }
   return bricks;
+}
+
+/// Drops the store's files from the page cache.
+void drop_from_cache(const std::string& store) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(store)) {
+    if (!entry.is_regular_file()) continue;
+    const int file = open(entry.path().c_str(), O_RDONLY | O_CLOEXEC);
+    const bool dropped =
+        file >= 0 && fsync(file) == 0 && posix_fadvise(file, 0, 0, POSIX_FADV_DONTNEED) == 0;
+    if (file >= 0) close(file);
+    if (!dropped) throw Error("'" + entry.path().string() + "' cannot be dropped from the cache");
+  }
 }
 
 /// Reading alone, on all cores.
@@ -144,6 +158,7 @@ int run(Arguments a) {
   std::vector<ExtractReport> reports;
   for (int i = 0; i < a.runs; ++i) {
     HashSink sink(false);
+    if (a.cold) drop_from_cache(a.store);
     reports.push_back(extract(store, a.options, sink, silent));
   }
   const auto best =
@@ -153,6 +168,7 @@ int run(Arguments a) {
 
   std::map<std::string, double> alone;
   Workers workers(a.options.threads);
+  if (a.cold) drop_from_cache(a.store);
   workers.execute([&] {
     alone["read"] = read_alone(store, a.options.level, bricks);
     alone["decode"] = decode_alone(store, a.options.level, bricks);
@@ -160,18 +176,19 @@ int run(Arguments a) {
   const std::uint64_t launches = std::max<std::uint64_t>(r.launches, 1);
   alone["upload"] = copy_seconds(r.upload.bytes, r.upload.bytes / launches, true);
   alone["download"] = copy_seconds(r.download.bytes, r.download.bytes / launches, false);
-  alone["kernel"] = r.kernel.seconds;  // by events: nothing else runs on the multiprocessors
+  // By events: nothing else runs on the multiprocessors.
+  alone["kernel"] = r.gather.seconds + r.kernel.seconds;
   const auto slowest = std::max_element(
       alone.begin(), alone.end(), [](const auto& l, const auto& n) { return l.second < n.second; });
-  // Reading, decoding again what was dropped and gathering share the cores.
-  const double cores = alone["decode"] * static_cast<double>(r.brick_reads) /
-                           static_cast<double>(std::max<std::uint64_t>(r.bricks_read, 1)) +
-                       r.gather.seconds;
-  const double prediction = std::max(cores, slowest->second) + r.plan_seconds;
+  // What was dropped is decoded again.
+  const double decode = alone["decode"] * static_cast<double>(r.brick_reads) /
+                        static_cast<double>(std::max<std::uint64_t>(r.bricks_read, 1));
+  const double prediction = std::max(decode, slowest->second) + r.plan_seconds;
 
   out["seconds"] = r.seconds;
   out["first_seconds"] = reports.front().seconds;
   out["plan_seconds"] = r.plan_seconds;
+  out["wait_seconds"] = {{"bricks", r.decode_seconds}, {"gpu", r.surface_seconds}};
   out["prediction"] = prediction;
   out["slowest_alone"] = slowest->first;
   out["ratio"] = slowest->second / r.seconds;
@@ -203,10 +220,11 @@ int run(Arguments a) {
         r.triangles, r.seconds, reports.front().seconds, prediction, slowest->first,
         slowest->second, slowest->second / r.seconds);
     fmt::print(
-        "  of that {:.3f} s to plan; {} bricks read {} times; {} launches; {:.1f} MiB of device "
+        "  of that {:.3f} s to plan, {:.3f} waiting for bricks, {:.3f} for the GPU to take them; "
+        "{} bricks read {} times; {} launches; {:.1f} MiB of device "
         "memory, {:.1f} page-locked{}\n",
-        r.plan_seconds, r.bricks_read, r.brick_reads, r.launches, mebibytes(r.device_bytes),
-        mebibytes(r.pinned_bytes),
+        r.plan_seconds, r.decode_seconds, r.surface_seconds, r.bricks_read, r.brick_reads,
+        r.launches, mebibytes(r.device_bytes), mebibytes(r.pinned_bytes),
         a.check ? fmt::format("; the CPU alone {:.3f} s, {}", out["cpu_seconds"].get<double>(),
                               out["same_as_cpu"].get<bool>() ? "same mesh" : "OTHER MESH")
                 : "");
@@ -233,6 +251,7 @@ int main(int argc, char** argv) {
   app.add_flag("--normals", a.options.normals);
   app.add_option("--runs", a.runs);
   app.add_flag("--check", a.check, "compare with the CPU's mesh");
+  app.add_flag("--cold", a.cold, "drop the store from the page cache before each run");
   app.add_flag("--json", a.json);
   CLI11_PARSE(app, argc, argv);
   try {

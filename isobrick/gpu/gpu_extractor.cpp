@@ -1,20 +1,15 @@
 #include "isobrick/gpu/gpu_extractor.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/gpu/brick_table.h"
 #include "isobrick/gpu/row_slots.h"
 #include "isobrick/gpu/stream_collector.h"
 #include "isobrick/gpu/stream_device.h"
 #include "isobrick/gpu/supported.h"
-#include "isobrick/surface/tile_gather.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -33,6 +28,8 @@ int current(int device) {
   return device;
 }
 
+std::size_t ceil_div(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
+
 Int3 tile_of(Int3 p) { return {p.x / kTileEdge, p.y / kTileEdge, p.z / kTileEdge}; }
 
 }  // namespace
@@ -44,7 +41,6 @@ struct GpuExtractor::Impl {
   Int3 first_tile;
   StreamDevice device;
   RowSlots slots;
-  StreamStage gather;
   std::uint64_t launches = 0;
   StreamCollector collector;  // ends first: its thread uses the device
 
@@ -84,33 +80,28 @@ struct GpuExtractor::Impl {
     if (welded()) slots.end_launch(tiles.back().tile, lane.unused_slots);
   }
 
-  /// Counts the time of each thread, for the cores may have other work as well.
-  void gather_all(Lane& lane, std::span<const TileWork> tiles, const BrickLookup& bricks) {
-    using Clock = std::chrono::steady_clock;
-    const int reach = reach_of(options.normals);
-    const Index edge = 33 + 2 * reach, origin = reach * (1 + edge + edge * edge);
-    const std::size_t bytes = device.sizes().block_bytes;
-    std::atomic<Clock::rep> ticks = 0;
-    tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-      const auto start = Clock::now();
-      std::byte* block = lane.at(device.layout().blocks + i * bytes);
-      gather_tile(lattice, bricks, options.fill_value, reach, tiles[i],
-                  {block, origin, edge, edge * edge});
-      ticks += (Clock::now() - start).count();
-    });
-    const std::chrono::duration<double> took = Clock::duration(ticks);
-    gather.seconds += took.count() / tbb::this_task_arena::max_concurrency();
-    gather.bytes += tiles.size() * bytes;
+  /// Where the launch finds its bricks.
+  BrickUse find_bricks(Lane& lane, std::span<const TileWork> tiles, const BrickLookup& bricks) {
+    const StreamSizes& sizes = device.sizes();
+    const BrickTable table{
+        {reinterpret_cast<BrickBox*>(lane.at(device.layout().boxes)), sizes.tiles},
+        {reinterpret_cast<std::uint64_t*>(lane.at(device.layout().bricks)),
+         std::size_t{sizes.tiles} * sizes.tile_bricks}};
+    return use_bricks(lattice, reach_of(options.normals), tiles, bricks, sizes.sent_bricks,
+                      lane.bricks, table);
   }
 
-  void launch(std::span<const TileWork> tiles, const BrickLookup& bricks) {
+  void launch(std::span<const TileWork> tiles, const BrickLookup& bricks,
+              std::shared_ptr<const void> samples) {
     Lane& lane = device.lane(launches);
     slots.recycle(lane.unused_slots);
     lane.count = static_cast<std::uint32_t>(tiles.size());
+    lane.samples = std::move(samples);
     *reinterpret_cast<LaunchHeader*>(lane.at(0)) = {.item_count = lane.count};
     std::fill_n(reinterpret_cast<OrderState*>(lane.at(device.layout().order)), tiles.size(),
                 OrderState{0, 0});
-    tbb::parallel_invoke([&] { gather_all(lane, tiles, bricks); }, [&] { link_all(lane, tiles); });
+    lane.use = find_bricks(lane, tiles, bricks);
+    link_all(lane, tiles);
     device.submit(lane, launches++);
     collector.submitted(lane);
   }
@@ -121,13 +112,15 @@ GpuExtractor::GpuExtractor(int device, const Lattice& lattice, const SurfaceOpti
     : impl_(std::make_unique<Impl>(device, lattice, options, sizes, std::move(take))) {}
 GpuExtractor::~GpuExtractor() = default;
 
-void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks) {
-  // The caller may come from any thread of an arena.
+void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
+                           const std::shared_ptr<const void>& samples) {
+  // Calls may come from any thread.
   current(impl_->cuda_device);
   while (!tiles.empty()) {
     impl_->collector.wait_for_lane();
-    const std::size_t n = std::min<std::size_t>(tiles.size(), impl_->collector.good_tiles());
-    impl_->launch(tiles.first(n), bricks);
+    const std::size_t parts = ceil_div(tiles.size(), impl_->collector.good_tiles());
+    const std::size_t n = ceil_div(tiles.size(), parts);
+    impl_->launch(tiles.first(n), bricks, samples);
     tiles = tiles.subspan(n);
   }
 }
@@ -137,7 +130,6 @@ void GpuExtractor::finish() { impl_->collector.finish(); }
 StreamReport GpuExtractor::report() const {
   StreamReport report = impl_->collector.report();
   const StreamSizes& sizes = impl_->device.sizes();
-  report.gather = impl_->gather;
   report.tiles_of_launch = sizes.tiles;
   report.device_bytes = sizes.device_bytes;
   report.pinned_bytes = sizes.pinned_bytes;

@@ -25,7 +25,8 @@ struct StreamStage {
 /// What a streaming extraction did.
 struct StreamReport {
   std::uint64_t vertices = 0, triangles = 0;
-  StreamStage gather, upload, kernel, download;
+  /// gather: kernels that lay samples out, and what they read in host memory.
+  StreamStage upload, gather, kernel, download;
   std::uint64_t launches = 0, repeats = 0;  ///< repeats: parts of launches whose mesh was too large
   std::uint32_t tiles_of_launch = 0;        ///< at most
   std::uint64_t device_bytes = 0;           ///< device memory held
@@ -33,8 +34,8 @@ struct StreamReport {
 };
 
 /// Marching cubes on a device, for volumes that need not fit it: tiles in, the CPU's mesh
-/// out, byte for byte. Gathering, upload, kernels, download and whoever takes the mesh
-/// work at the same time, on some hundred tiles each. docs/gpu.md says how.
+/// out, byte for byte. Upload, kernels, download and whoever takes the mesh work at the same
+/// time, on some hundred tiles each. docs/gpu.md says how.
 class GpuExtractor {
  public:
   /// Buffers of the given sizes on the device, which open_device has made ready; of smaller
@@ -47,10 +48,12 @@ class GpuExtractor {
   ~GpuExtractor();
 
   /// Sends the tiles off. Over all calls tiles come in Morton order, none twice; `bricks`
-  /// holds what for_each_needed_box says, and is not looked at any more afterwards. Gathers in
-  /// the caller's TBB arena. Throws what went wrong on the device or in `take`, also of
-  /// earlier tiles, and Error when a welded mesh gets more vertices than 32 bits number.
-  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks);
+  /// holds what for_each_needed_box says, in memory from host_memory(). It is not looked up any
+  /// more afterwards, but its samples are read until `samples` is let go. Throws what went wrong on
+  /// the device or in `take`, also of earlier tiles, and Error when a welded mesh gets more
+  /// vertices than 32 bits number.
+  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
+               const std::shared_ptr<const void>& samples);
   /// Waits until all of the mesh was taken.
   void finish();
 

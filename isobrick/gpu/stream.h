@@ -114,7 +114,8 @@ class MappedHost {
 };
 
 /// Owns page-locked host memory, for copies that run beside everything else. Mapped in
-/// large pages, which are locked three times as fast as those of cudaMallocHost.
+/// large pages, which are locked three times as fast as those of cudaMallocHost. Kernels may
+/// read it under the same address.
 class PinnedMemory {
  public:
   PinnedMemory() = default;

@@ -113,9 +113,11 @@ std::optional<StreamCollector::Pending> StreamCollector::collect(Lane& lane) {
   const SurfaceTotals size = lane.totals[0];
   ++report_.launches;
   report_.upload.seconds += seconds_between(lane.upload_begin, lane.uploaded);
-  report_.upload.bytes += device_.layout().blocks + lane.count * sizes.block_bytes;
-  report_.kernel.seconds += seconds_between(lane.kernel_begin, lane.extracted);
-  report_.kernel.bytes += lane.count * sizes.block_bytes + mesh_bytes(size, normals_);
+  report_.upload.bytes += device_.sent_bytes(lane);
+  report_.gather.seconds += seconds_between(lane.unpack_begin, lane.unpacked);
+  report_.gather.bytes += lane.use.read_bytes;
+  report_.kernel.seconds += seconds_between(lane.unpacked, lane.extracted);
+  report_.kernel.bytes += lane.count * device_.page_bytes() + mesh_bytes(size, normals_);
   check_numbers(size.vertices);
   std::optional<Pending> next;
   if (size.vertices > sizes.vertices || size.triangles > sizes.triangles) {
@@ -125,6 +127,7 @@ std::optional<StreamCollector::Pending> StreamCollector::collect(Lane& lane) {
   } else if (size.vertices + size.triangles > 0) {
     next = start_download(lane, size);
   }
+  lane.samples.reset();
   free_lane(lane.count, size);
   return next;
 }
@@ -143,7 +146,8 @@ void StreamCollector::repeat_in_parts(Lane& lane) {
     device_.submit_part(lane, first, end - first, start + before.vertices);
     lane.extracted.wait();
     ++report_.repeats;
-    report_.kernel.seconds += seconds_between(lane.kernel_begin, lane.extracted);
+    report_.gather.seconds += seconds_between(lane.unpack_begin, lane.unpacked);
+    report_.kernel.seconds += seconds_between(lane.unpacked, lane.extracted);
     const SurfaceTotals size = lane.totals[0];
     if (size.vertices + size.triangles > 0) deliver(start_download(lane, size));
     before = sums[end - 1];

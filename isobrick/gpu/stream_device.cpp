@@ -24,11 +24,24 @@ DeviceArena::~DeviceArena() {
   if (data_) (void)cudaFree(data_);
 }
 
+namespace {
+
+/// Kernels read bricks where they lie in host memory, under the address that the host knows.
+void check_reads_host_memory() {
+  int device = 0, same = 0;
+  check(cudaGetDevice(&device));
+  check(cudaDeviceGetAttribute(&same, cudaDevAttrCanUseHostPointerForRegisteredMem, device));
+  if (!same) throw Error("the GPU cannot read the host's memory in place; use --backend cpu");
+}
+
+}  // namespace
+
 Lane::Lane(const StreamSizes& sizes) : staging(sizes.staging_bytes) {}
 
 StreamDevice::StreamDevice(const Lattice& lattice, const SurfaceOptions& options,
                            const StreamSizes& sizes)
     : lattice_(lattice), options_(options) {
+  check_reads_host_memory();
   for (StreamSizes s = sizes; !allocate(s); s = stream_sizes(lattice, options, s.tiles / 2))
     if (s.tiles == 1)
       throw Error(fmt::format(
@@ -47,10 +60,11 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   if (!*arena) return false;
   arena_ = std::move(arena);
   sizes_ = sizes;
-  layout_ = StagingLayout(sizes.tiles, sizes.block_bytes);
+  layout_ = StagingLayout(sizes.tiles, sizes.tile_bricks);
   for (int i = 0; i < kLanes; ++i) {
     auto lane = std::make_unique<Lane>(sizes);
     lane->device = arena_->take<std::byte>(sizes.staging_bytes);
+    lane->bricks = arena_->take<std::byte>(sizes.sent_bricks * lattice_.brick_bytes());
     lane->positions = arena_->take<Vec3f>(sizes.vertices);
     if (options_.normals) lane->normals = arena_->take<Vec3f>(sizes.vertices);
     lane->triangles = arena_->take<Triangle>(sizes.triangles);
@@ -103,16 +117,24 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   p.positions = lane.positions;
   p.normals = lane.normals;
   p.triangles = lane.triangles;
-  UnpackParams u{p.items,
-                 p.links,
-                 count,
-                 lane.device + layout_.blocks + first * sizes_.block_bytes,
-                 sizes_.block_bytes,
-                 reach_of(options_.normals),
-                 {},
-                 pages_};
-  for (int axis = 0; axis < 3; ++axis) u.extent[axis] = p.extent[axis];
+  UnpackParams u{};
+  u.items = p.items;
+  u.links = p.links;
+  u.count = count;
+  u.boxes = reinterpret_cast<const BrickBox*>(lane.device + layout_.boxes) + first;
+  u.bricks = reinterpret_cast<const std::uint64_t*>(lane.device + layout_.bricks) +
+             std::size_t{first} * sizes_.tile_bricks;
+  u.tile_bricks = sizes_.tile_bricks;
+  u.reach = reach_of(options_.normals);
+  for (int axis = 0; axis < 3; ++axis) {
+    u.brick[axis] = static_cast<std::int32_t>(lattice_.brick[axis]);
+    u.extent[axis] = p.extent[axis];
+  }
+  u.fill_value = options_.fill_value;
+  u.pages = pages_;
+  lane.unpack_begin.record(kernel_);
   launch_unpack(lattice_.type, u, kernel_.get());
+  lane.unpacked.record(kernel_);
   launch_extraction(lattice_.type, options_.normals, p, case_entries_, shapes_.of(count),
                     kernel_.get());
   check(cudaMemcpyAsync(lane.totals.data(), &header->totals, sizeof(SurfaceTotals),
@@ -120,16 +142,26 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   lane.extracted.record(kernel_);
 }
 
+/// Neighbours in host memory are sent together.
+void StreamDevice::send(Lane& lane) {
+  const std::size_t bytes = lattice_.brick_bytes();
+  const std::vector<SentBrick>& sent = lane.use.sent;
+  for (std::size_t first = 0, end = 0; first < sent.size(); first = end) {
+    for (++end; end < sent.size() && sent[end].from == sent[end - 1].from + bytes;) ++end;
+    check(cudaMemcpyAsync(lane.bricks + first * bytes, sent[first].from, (end - first) * bytes,
+                          cudaMemcpyHostToDevice, upload_.get()));
+  }
+  check(cudaMemcpyAsync(lane.device, lane.staging.data(), used_staging(lane),
+                        cudaMemcpyHostToDevice, upload_.get()));
+}
+
 void StreamDevice::submit(Lane& lane, std::uint64_t launch_number) {
   const std::lock_guard lock(launching_);
   lane.upload_begin.record(upload_);
-  check(cudaMemcpyAsync(lane.device, lane.staging.data(),
-                        layout_.blocks + lane.count * sizes_.block_bytes, cudaMemcpyHostToDevice,
-                        upload_.get()));
+  send(lane);
   lane.uploaded.record(upload_);
   check(cudaStreamWaitEvent(kernel_.get(), lane.uploaded.get()));
   check(cudaStreamWaitEvent(kernel_.get(), lane.downloaded.get()));
-  lane.kernel_begin.record(kernel_);
   launch(lane, 0, lane.count, number_ends_ + launch_number % kEnds,
          number_ends_ + (launch_number + 1) % kEnds, false);
 }
@@ -144,7 +176,6 @@ void StreamDevice::submit_part(Lane& lane, std::uint32_t first, std::uint32_t co
   sent.number_start = number_start;
   check(cudaMemcpyAsync(header, &sent, sizeof sent, cudaMemcpyHostToDevice, kernel_.get()));
   check(cudaMemsetAsync(lane.device + layout_.order, 0, count * sizeof(OrderState), kernel_.get()));
-  lane.kernel_begin.record(kernel_);
   launch(lane, first, count, &header->number_start, &header->number_end, true);
 }
 

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <vector>
 
+#include "isobrick/gpu/brick_table.h"
 #include "isobrick/gpu/stream.h"
 #include "isobrick/gpu/stream_layout.h"
 #include "isobrick/gpu/stream_sizes.h"
@@ -41,12 +42,16 @@ struct Lane {
 
   PinnedBuffer<std::byte> staging;
   std::byte* device = nullptr;  ///< the same, on the device
+  std::byte* bricks = nullptr;  ///< those that are sent, likewise
+  BrickUse use;
+  std::shared_ptr<const void> samples;  ///< owns the bricks in host memory
   Vec3f *positions = nullptr, *normals = nullptr;
   Triangle* triangles = nullptr;
   PinnedBuffer<SurfaceTotals> totals{1};
   Event upload_begin{cudaEventBlockingSync}, uploaded{cudaEventBlockingSync},
-      kernel_begin{cudaEventBlockingSync}, extracted{cudaEventBlockingSync},
-      download_begin{cudaEventBlockingSync}, downloaded{cudaEventBlockingSync};
+      unpack_begin{cudaEventBlockingSync}, unpacked{cudaEventBlockingSync},
+      extracted{cudaEventBlockingSync}, download_begin{cudaEventBlockingSync},
+      downloaded{cudaEventBlockingSync};
   std::uint32_t count = 0;                  ///< tiles
   std::vector<std::uint32_t> unused_slots;  ///< once this launch is not repeated any more
 
@@ -72,9 +77,14 @@ class StreamDevice {
 
   const StreamSizes& sizes() const { return sizes_; }
   const StagingLayout& layout() const { return layout_; }
+  /// What is uploaded for a lane, and the samples of a tile.
+  std::uint64_t sent_bytes(const Lane& lane) const {
+    return used_staging(lane) + lane.use.sent.size() * lattice_.brick_bytes();
+  }
+  std::uint64_t page_bytes() const { return kPageSamples * lattice_.sample_bytes(); }
   Lane& lane(std::uint64_t launch) { return *lanes_[launch % kLanes]; }
 
-  /// Uploads a lane and extracts it, as launch number `launch`; waits for nothing.
+  /// Uploads a lane with its bricks and extracts it, as launch number `launch`; waits for nothing.
   void submit(Lane& lane, std::uint64_t launch);
   /// Extracts tiles [first, first + count) of a lane that has been extracted once more, its
   /// vertices numbered from `number_start`. May be called beside submit().
@@ -90,6 +100,10 @@ class StreamDevice {
               const unsigned long long* number_start, unsigned long long* number_end,
               bool tables_known);
   bool allocate(const StreamSizes& sizes);
+  void send(Lane& lane);
+  std::size_t used_staging(const Lane& lane) const {
+    return layout_.bricks + lane.count * sizes_.tile_bricks * sizeof(std::uint64_t);
+  }
 
   Lattice lattice_;
   SurfaceOptions options_;

@@ -6,7 +6,7 @@
 #include "isobrick/gpu/tile_params.h"
 
 // What the host sends for a launch, in one piece: the header, the items, their links,
-// their zeroed running totals, their samples.
+// their zeroed running totals, where the bricks of each lie. Bricks that are sent follow.
 
 namespace isobrick::gpu {
 
@@ -18,29 +18,30 @@ struct LaunchHeader {
   SurfaceTotals totals;
 };
 
+/// The bricks that a tile's samples lie in: the first along each axis, and how many.
+struct BrickBox {
+  std::int32_t first[3], count[3];
+};
+
 /// Where the parts of such a piece begin, in bytes.
 struct StagingLayout {
-  std::size_t items, links, order, blocks, end;
+  std::size_t items, links, order, boxes, bricks, end;
 
-  constexpr StagingLayout(std::size_t tiles, std::size_t block_bytes)
+  /// A tile has at most `tile_bricks` bricks.
+  constexpr StagingLayout(std::size_t tiles, std::size_t tile_bricks)
       : items(aligned(sizeof(LaunchHeader))),
         links(items + aligned(tiles * sizeof(TileItem))),
         order(links + aligned(tiles * sizeof(TileLinks))),
-        blocks(order + aligned(tiles * sizeof(OrderState))),
-        end(blocks + tiles * block_bytes) {}
+        boxes(order + aligned(tiles * sizeof(OrderState))),
+        bricks(boxes + aligned(tiles * sizeof(BrickBox))),
+        end(bricks + aligned(tiles * tile_bricks * sizeof(std::uint64_t))) {}
 
   static constexpr std::size_t aligned(std::size_t bytes) {
     return (bytes + 255) & ~std::size_t{255};
   }
 };
 
-/// Layers of samples around the 33³ of a tile that are sent along.
+/// Layers of samples around the 33³ of a tile that are looked at.
 constexpr int reach_of(bool normals) { return normals ? 1 : 0; }
-
-/// Bytes from the samples of one tile to those of the next.
-constexpr std::size_t block_bytes(bool normals, std::size_t sample_bytes) {
-  const auto edge = static_cast<std::size_t>(33 + 2 * reach_of(normals));
-  return (edge * edge * edge * sample_bytes + 15) & ~std::size_t{15};
-}
 
 }  // namespace isobrick::gpu

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/tile.h"
 #include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/stream_layout.h"
 
@@ -18,6 +19,8 @@ constexpr std::uint64_t kMostVertices = std::uint64_t{3} * 33 * 33 * 33,
                         kMostTriangles = std::uint64_t{5} * 32 * 32 * 32;
 /// Case table, ends of the numbering, and the rounding of buffers.
 constexpr std::uint64_t kSmallBuffers = 64 << 10;
+/// Bricks of fewer bytes are not sent: a copy has a price of its own.
+constexpr std::uint64_t kLeastSent = std::uint64_t{128} << 10;
 /// A row table in the host's books: its slot, its tile, its expiry.
 constexpr std::uint64_t kBytesOfSlot = 96;
 
@@ -28,6 +31,13 @@ std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles
   const Int3 t = lattice.tiles();
   const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
   return std::min(static_cast<std::uint64_t>(volume(t)), faces + (kLanes + 1) * tiles);
+}
+
+/// Bricks that hold as many samples as the tiles of a launch and a quarter more, for tiles
+/// that do not fill theirs.
+std::uint64_t bricks_to_send(const Lattice& lattice, std::uint64_t tiles) {
+  if (lattice.brick_bytes() < kLeastSent) return 0;
+  return tiles * kPageSamples * lattice.sample_bytes() * 5 / 4 / lattice.brick_bytes();
 }
 
 std::string too_small(const char* option, std::uint64_t budget, std::uint64_t least) {
@@ -46,14 +56,17 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
   s.triangles = std::max(kMostTriangles, tiles * kTrianglesOfTile);
   s.slots =
       static_cast<std::uint32_t>(slots_for(lattice, options.indexing == Indexing::welded, tiles));
-  s.block_bytes = block_bytes(options.normals, lattice.sample_bytes());
-  s.staging_bytes = StagingLayout(tiles, s.block_bytes).end;
+  s.tile_bricks =
+      static_cast<std::uint32_t>(max_bricks_of_tile(lattice, reach_of(options.normals)));
+  s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
+  s.staging_bytes = StagingLayout(tiles, s.tile_bricks).end;
   s.output_bytes =
       s.vertices * sizeof(Vec3f) * (options.normals ? 2 : 1) + s.triangles * sizeof(Triangle);
   const std::uint64_t groups = (tiles + kTilesOfPageGroup - 1) / kTilesOfPageGroup;
   s.page_bytes = groups * kPageGroupSamples * lattice.sample_bytes();
-  s.device_bytes = kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.page_bytes +
-                   kLanes * (s.staging_bytes + s.output_bytes);
+  s.device_bytes =
+      kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.page_bytes +
+      kLanes * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
   s.pinned_bytes = kSmallBuffers + kLanes * s.staging_bytes + kOutputs * s.output_bytes;
   s.host_bytes = kBytesOfSlot * s.slots + std::uint64_t{kLanes} * tiles * sizeof(OrderState);
   return s;

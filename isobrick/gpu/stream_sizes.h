@@ -12,8 +12,9 @@ struct StreamSizes {
   std::uint32_t tiles = 0;                    ///< a launch takes at most
   std::uint64_t vertices = 0, triangles = 0;  ///< that the output of a launch has room for
   std::uint32_t slots = 0;                    ///< row tables
-  std::uint64_t block_bytes = 0;              ///< samples of a tile as the host sends them
-  std::uint64_t staging_bytes = 0;            ///< all that the host sends for a launch
+  std::uint32_t tile_bricks = 0;              ///< bricks that a tile's samples can lie in
+  std::uint32_t sent_bricks = 0;              ///< that a launch can take along whole
+  std::uint64_t staging_bytes = 0;            ///< all else that the host sends for a launch
   std::uint64_t output_bytes = 0;             ///< mesh of a launch
   std::uint64_t page_bytes = 0;               ///< samples of a launch as the kernel reads them
   std::uint64_t device_bytes = 0;             ///< device memory, all in all
@@ -21,8 +22,8 @@ struct StreamSizes {
   std::uint64_t host_bytes = 0;               ///< other host memory
 };
 
-/// Launches that are under way at a time: one is gathered and uploaded while the one
-/// before is extracted or downloaded.
+/// Launches that are under way at a time: one is uploaded while the one before is
+/// extracted or downloaded.
 inline constexpr int kLanes = 2;
 /// Meshes in host memory at a time: one is downloaded, one written, one waits.
 inline constexpr int kOutputs = 3;
@@ -35,7 +36,8 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
                          std::uint32_t tiles);
 
 /// The largest launches within both budgets; of the host's `other_host_bytes` are taken,
-/// and they leave half of the rest. Throws UsageError naming the least `--gpu-memory` or
+/// and they leave half of the rest, for bricks. Throws UsageError naming the least `--gpu-memory`
+/// or
 /// `--memory` that works.
 StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
                              std::uint64_t device_budget, std::uint64_t host_budget,

@@ -3,19 +3,22 @@
 #include <cuda_runtime_api.h>
 
 #include "isobrick/core/scalar.h"
-#include "isobrick/gpu/tile_params.h"
+#include "isobrick/gpu/stream_layout.h"
 
 namespace isobrick::gpu {
 
-/// Tiles as they come from the host, and where the extraction wants them.
+/// The tiles of a launch, where their bricks lie, and where the extraction wants the samples.
 struct UnpackParams {
   const TileItem* items;
   const TileLinks* links;
   std::uint32_t count;
-  const void* blocks;       ///< (33 + 2 · reach)³ samples of each tile, C order [z, y, x]
-  std::size_t block_bytes;  ///< from one to the next
-  int reach;                ///< layers of samples around a tile's 33³: 0 or 1
-  std::int32_t extent[3];   ///< samples
+  const BrickBox* boxes;
+  const std::uint64_t* bricks;  ///< `tile_bricks` addresses a tile, on the device or in host memory
+  std::uint32_t tile_bricks;
+  int reach;               ///< layers of samples around a tile's 33³: 0 or 1
+  std::int32_t brick[3];   ///< samples of a brick
+  std::int32_t extent[3];  ///< samples of the volume
+  double fill_value;       ///< of bricks without an address
   void* pages;
 };
 

@@ -12,7 +12,8 @@ class CpuSurface final : public SurfaceExtractor {
   CpuSurface(const ExtractRequest& request, const ExtractorLimits& limits, MeshSink& sink)
       : extractor_(request.level->lattice, request.surface, limits), writer_(sink) {}
 
-  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks) override {
+  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
+               const std::shared_ptr<const void>&) override {
     const auto start = std::chrono::steady_clock::now();
     extractor_.extract(tiles, bricks, mesh_, [&](MeshBuffer& mesh, std::uint64_t first) {
       bytes_ += mesh.positions.span().size_bytes() + mesh.normals.span().size_bytes() +

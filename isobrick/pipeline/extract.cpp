@@ -1,11 +1,6 @@
 #include "isobrick/pipeline/extract.h"
 
-#include <tbb/global_control.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -17,6 +12,7 @@
 #include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
 #include "isobrick/pipeline/workers.h"
+#include "isobrick/stream/batch_decoder.h"
 #include "isobrick/stream/brick_cache.h"
 #include "isobrick/stream/tile_stream.h"
 
@@ -54,64 +50,73 @@ MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface) {
   return header;
 }
 
-/// Surface and bricks of an extraction that is under way.
-struct Stages {
-  BrickCache& cache;
-  BatchPlanner& batches;
-  SurfaceExtractor& surface;
-  ExtractReport& report;
+/// Called with the tiles that are done.
+using Done = std::function<void(std::span<const TileWork>)>;
 
-  void decode(const TileBatch& batch) const {
-    Stopwatch watch(report.decode_seconds);
-    cache.require(batch.bricks);
-  }
-  void extract(const TileBatch& batch, const BrickLookup& bricks) const {
-    Stopwatch watch(report.surface_seconds);
-    surface.extract(batch.tiles, bricks);
-  }
+/// An extraction that is under way.
+struct Work {
+  const StoreReader& store;
+  const ExtractOptions& options;
+  const ExtractRequest& request;
+  const ExtractPlan& plan;
+  BatchPlanner& batches;
+  ExtractReport& report;
+  Done done;
 };
 
-/// Batch after batch, each decoded and then extracted: for a surface that keeps all cores
-/// busy itself. Calls done(batch) after each.
-template <class F>
-void extract_in_turn(const Stages& stages, const F& done) {
-  TileBatch batch, following;
-  for (bool more = stages.batches.next(batch); more; std::swap(batch, following)) {
-    stages.decode(batch);
-    // The disk works on the next batch while the processors work on this one.
-    more = stages.batches.next(following);
-    stages.cache.will_need(following.bricks);
-    stages.extract(batch, stages.cache);
-    done(batch);
-  }
+/// Batch after batch, each decoded and then extracted, for the surface keeps all cores
+/// busy itself.
+void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
+  BrickCache cache(work.store, work.options.level, work.plan.cache_bricks);
+  Workers workers(work.request.threads);
+  workers.execute([&] {
+    TileBatch batch, following;
+    for (bool more = work.batches.next(batch); more; std::swap(batch, following)) {
+      {
+        Stopwatch watch(work.report.decode_seconds);
+        cache.require(batch.bricks);
+      }
+      // The disk works on the next batch while the processors work on this one.
+      more = work.batches.next(following);
+      cache.will_need(following.bricks);
+      {
+        Stopwatch watch(work.report.surface_seconds);
+        surface.extract(batch.tiles, cache, nullptr);
+      }
+      work.done(batch.tiles);
+    }
+  });
+  surface.finish();
+  surface.report(work.report);
+  work.report.bricks_read = cache.bricks_read();
+  work.report.brick_reads = cache.reads();
 }
 
-/// A batch is extracted while the next is decoded, the disk reads the one after that, and
-/// the one behind is planned. The cores prefer what the extraction asks of them: it is short,
-/// others wait for it, and decoding fills the time between.
-template <class F>
-void extract_overlapped(const Stages& stages, int threads, const F& done) {
-  tbb::task_arena first(threads, 1, tbb::task_arena::priority::high);
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                  static_cast<std::size_t>(threads));
-  std::array<TileBatch, 4> batches;
-  stages.batches.next(batches[0]);
-  tbb::parallel_invoke([&] { stages.decode(batches[0]); },
-                       [&] {
-                         stages.batches.next(batches[1]);
-                         stages.batches.next(batches[2]);
-                       });
-  stages.cache.will_need(batches[1].bricks);
-  stages.cache.will_need(batches[2].bricks);
-  while (!batches[0].tiles.empty()) {
-    const BrickView bricks = stages.cache.view(batches[0].bricks);
-    tbb::parallel_invoke([&] { first.execute([&] { stages.extract(batches[0], bricks); }); },
-                         [&] { stages.decode(batches[1]); },
-                         [&] { stages.batches.next(batches[3]); });
-    stages.cache.will_need(batches[3].bricks);
-    done(batches[0]);
-    std::rotate(batches.begin(), batches.begin() + 1, batches.end());
+/// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.
+void extract_on_gpu(const Work& work, GpuSession& gpu, std::unique_ptr<SurfaceExtractor> made) {
+  BatchDecoder decoder(work.store, work.options.level, work.batches,
+                       sample_reach(work.request.surface), work.plan.cache_bricks,
+                       work.request.threads,
+                       [&](std::size_t bytes) { return gpu.brick_memory(bytes); });
+  const auto surface = std::move(made);  // ends first: it holds batches
+  for (;;) {
+    std::shared_ptr<const DecodedBatch> batch;
+    {
+      Stopwatch watch(work.report.decode_seconds);
+      batch = decoder.next();
+    }
+    if (!batch) break;
+    {
+      Stopwatch watch(work.report.surface_seconds);
+      surface->extract(batch->tiles(), *batch, batch);
+    }
+    work.done(batch->tiles());
   }
+  surface->finish();
+  surface->report(work.report);
+  work.report.pinned_bytes += decoder.memory_bytes();
+  work.report.bricks_read = decoder.bricks_read();
+  work.report.brick_reads = decoder.reads();
 }
 
 /// Counts what is active and sets up who makes the surface. A device takes some tenths of a
@@ -136,8 +141,8 @@ ChosenBackend choose_backend(const ExtractRequest& request, const ExtractOptions
 std::vector<std::pair<std::string_view, StageReport>> stages_of(const ExtractReport& r) {
   if (r.backend == "cpu")
     return {{"read", r.read}, {"decode", r.decode}, {"surface", r.surface}, {"sink", r.sink}};
-  return {{"read", r.read},     {"decode", r.decode}, {"gather", r.gather},
-          {"upload", r.upload}, {"kernel", r.kernel}, {"download", r.download},
+  return {{"read", r.read},     {"decode", r.decode}, {"upload", r.upload},
+          {"gather", r.gather}, {"kernel", r.kernel}, {"download", r.download},
           {"sink", r.sink}};
 }
 
@@ -175,34 +180,28 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
     BatchPlanner batches(tiles, lattice, reach, request.surface.may_have_nan, plan.limits.tiles,
                          plan.batch_bricks);
-    BrickCache cache(store, options.level, plan.cache_bricks);
     progress.begin("extracting", active.active_bricks * lattice.brick_bytes());
     const double bytes_per_block = static_cast<double>(active.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /
                                    std::max(1.0, static_cast<double>(active.active_blocks));
-    const auto done = [&](const TileBatch& batch) {
+    const auto done = [&](std::span<const TileWork> of_batch) {
       double blocks = 0;
-      for (const TileWork& work : batch.tiles)
-        blocks += static_cast<double>(std::popcount(work.active_blocks));
+      for (const TileWork& tile : of_batch)
+        blocks += static_cast<double>(std::popcount(tile.active_blocks));
       progress.advance(static_cast<std::uint64_t>(blocks * bytes_per_block));
     };
-    const Stages stages{cache, batches, *backend.surface, report};
-    Workers workers(request.threads);
-    workers.execute([&] {
-      plan.overlap ? extract_overlapped(stages, request.threads, done)
-                   : extract_in_turn(stages, done);
-    });
-    backend.surface->finish();
+    const Work work{store, options, request, plan, batches, report, done};
+    if (backend.gpu)
+      extract_on_gpu(work, *backend.gpu, std::move(backend.surface));
+    else
+      extract_on_cpu(work, *backend.surface);
     sink.finish();
     progress.end();
-    backend.surface->report(report);
     report.index = request.search.kind;
     report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
     // Once for the plan and once for the surface; the index has files of its own.
     report.bytes_read = 2 * tiles.index_bytes();
     report.search_seconds = tiles.seconds();
-    report.bricks_read = cache.bricks_read();
-    report.brick_reads = cache.reads();
     const BrickTimes times = store.brick_times();
     report.read = {(times.read_seconds - times_before.read_seconds) / request.threads,
                    times.bytes_read - times_before.bytes_read};

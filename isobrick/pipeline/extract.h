@@ -36,8 +36,8 @@ struct ExtractOptions {
   int device = 0;                ///< of the CUDA devices, the first is 0
 };
 
-/// How long a stage was busy, and with how many bytes. What all cores share (read, decode,
-/// gather) counts the time of every thread, divided by their number.
+/// How long a stage was busy, and with how many bytes. What all cores share (read and
+/// decode) counts the time of every thread, divided by their number.
 struct StageReport {
   double seconds = 0;
   std::uint64_t bytes = 0;
@@ -55,9 +55,10 @@ struct ExtractReport {
   std::string device;              ///< its name, of the latter
   /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.
   std::string gpu_refusal;
-  /// Encoded bricks, decoded ones; samples for the device and there; the mesh. The GPU has
-  /// no stage `surface` and the CPU only that one between decode and sink.
-  StageReport read, decode, gather, upload, kernel, download, surface, sink;
+  /// Encoded bricks, decoded ones; bricks sent to the device, samples read by it where they
+  /// lie, samples there; the mesh. The GPU has no stage `surface` and the CPU only that one
+  /// between decode and sink.
+  StageReport read, decode, upload, gather, kernel, download, surface, sink;
   std::uint64_t device_bytes = 0;         ///< device memory that was held, within gpu_memory
   std::uint64_t device_bytes_in_use = 0;  ///< the same as the driver counts it
   std::uint64_t pinned_bytes = 0;         ///< page-locked host memory, within memory

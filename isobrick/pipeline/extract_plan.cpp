@@ -139,8 +139,8 @@ ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions&
   ExtractPlan plan;
   plan.limits.tiles = gpu.good_batch();
   plan.cache_bricks = fit_cache(lattice, options.memory - used, tile_bricks, active_bricks);
-  plan.overlap = plan.cache_bricks >= 2 * tile_bricks;
-  plan.batch_bricks = plan.overlap ? plan.cache_bricks / 2 : plan.cache_bricks;
+  // Two batches are on their way through the GPU while others are decoded.
+  plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 4);
   plan.bytes = used + plan.cache_bricks * brick_bytes;
   return plan;
 }

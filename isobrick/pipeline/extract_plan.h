@@ -14,7 +14,6 @@ struct ExtractPlan {
   ExtractorLimits limits;  ///< of the CPU's extractor; tiles: of a batch on any
   std::size_t cache_bricks = 0;
   std::size_t batch_bricks = 0;  ///< that a batch may need
-  bool overlap = false;          ///< a batch is decoded while the one before is extracted
   std::uint64_t bytes = 0;       ///< all of it, the program itself included
 };
 

@@ -5,15 +5,16 @@
 
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/gpu_extractor.h"
+#include "isobrick/gpu/host_memory.h"
 #include "isobrick/pipeline/chunk_writer.h"
 
 namespace isobrick {
 namespace {
 
-class GpuSurface final : public SurfaceExtractor {
+class CudaSurface final : public SurfaceExtractor {
  public:
-  GpuSurface(int device, const gpu::DeviceInfo& info, const ExtractRequest& request,
-             const gpu::StreamSizes& sizes, MeshSink& sink)
+  CudaSurface(int device, const gpu::DeviceInfo& info, const ExtractRequest& request,
+              const gpu::StreamSizes& sizes, MeshSink& sink)
       : info_(info),
         writer_(sink),
         extractor_(device, request.level->lattice, request.surface, sizes,
@@ -24,8 +25,9 @@ class GpuSurface final : public SurfaceExtractor {
     bytes_in_use_ = info_.free_bytes - std::min(free, info_.free_bytes);
   }
 
-  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks) override {
-    extractor_.extract(tiles, bricks);
+  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
+               const std::shared_ptr<const void>& samples) override {
+    extractor_.extract(tiles, bricks, samples);
   }
 
   void finish() override {
@@ -70,14 +72,15 @@ class CudaSession final : public GpuSession {
     return sizes_.pinned_bytes + sizes_.host_bytes;
   }
 
-  std::size_t good_batch() const override {
-    constexpr std::size_t launches = 8;  // so that all cores find bricks enough to share
-    return launches * sizes_.tiles;
+  std::size_t good_batch() const override { return sizes_.tiles; }
+
+  std::shared_ptr<std::byte> brick_memory(std::size_t bytes) const override {
+    return gpu::host_memory(device_, bytes);
   }
 
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
                                                  MeshSink& sink) override {
-    return std::make_unique<GpuSurface>(device_, info_, request, sizes_, sink);
+    return std::make_unique<CudaSurface>(device_, info_, request, sizes_, sink);
   }
 
  private:

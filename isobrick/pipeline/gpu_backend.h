@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 
@@ -28,6 +29,8 @@ class GpuSession {
                              std::uint64_t host_budget, std::uint64_t other_host_bytes) = 0;
   /// Tiles to hand to its surface at a time, as planned.
   virtual std::size_t good_batch() const = 0;
+  /// Memory for the bricks that its surface is given. From any thread.
+  virtual std::shared_ptr<std::byte> brick_memory(std::size_t bytes) const = 0;
   /// As planned. Session and sink must outlive it.
   virtual std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
                                                          MeshSink& sink) = 0;

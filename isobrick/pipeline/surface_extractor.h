@@ -16,9 +16,11 @@ class SurfaceExtractor {
   virtual ~SurfaceExtractor() = default;
 
   /// Over all calls, tiles come in Morton order, none twice; `bricks` holds what
-  /// for_each_needed_box says, and is not looked at any more afterwards. Called in the TBB
-  /// arena that does the work.
-  virtual void extract(std::span<const TileWork> tiles, const BrickLookup& bricks) = 0;
+  /// for_each_needed_box says. It is not looked up any more afterwards, but its samples may be
+  /// read until `samples`, which owns them, is let go. Called in the TBB arena that does the
+  /// work.
+  virtual void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
+                       const std::shared_ptr<const void>& samples) = 0;
   /// Waits until the sink has taken all of the mesh.
   virtual void finish() = 0;
   /// Adds counts and stages; after finish().

@@ -88,20 +88,6 @@ void BrickCache::require(std::span<const Int3> bricks) {
   }
 }
 
-BrickView BrickCache::view(std::span<const Int3> bricks) const {
-  BrickView view;
-  view.grid_ = lattice_.bricks();
-  view.samples_.reserve(bricks.size());
-  for (const Int3 b : bricks) view.samples_[key(b)] = find(b);
-  return view;
-}
-
-const std::byte* BrickView::find(Int3 brick) const {
-  const auto found = samples_.find(static_cast<std::uint64_t>(linear_index(brick, grid_)));
-  assert(found != samples_.end());
-  return found->second;
-}
-
 void BrickCache::will_need(std::span<const Int3> bricks) const {
   // A hint is a call of the system: in sum they would hold a fast disk up.
   tbb::parallel_for_each(bricks.begin(), bricks.end(), [&](Int3 b) {

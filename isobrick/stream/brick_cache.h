@@ -13,17 +13,6 @@
 
 namespace isobrick {
 
-/// Some bricks of a cache, looked up without it: it may take in others meanwhile.
-class BrickView final : public BrickLookup {
- public:
-  const std::byte* find(Int3 brick) const override;
-
- private:
-  friend class BrickCache;
-  Int3 grid_;
-  std::unordered_map<std::uint64_t, const std::byte*> samples_;
-};
-
 /// Decoded bricks of one level, the least recently needed of them dropped when
 /// more than `capacity` would be held.
 class BrickCache final : public BrickLookup {
@@ -32,12 +21,8 @@ class BrickCache final : public BrickLookup {
 
   /// Makes these bricks (no more than the capacity, none twice) resident,
   /// reading and decoding in parallel in the caller's TBB arena. Their samples stay where
-  /// they are until the next call, and during it as well when both calls together name no
-  /// more bricks than the capacity.
+  /// they are until the next call.
   void require(std::span<const Int3> bricks);
-
-  /// Bricks that were required by the last call.
-  BrickView view(std::span<const Int3> bricks) const;
 
   /// Hints that these bricks are required next: starts the disk for those that
   /// are not resident.

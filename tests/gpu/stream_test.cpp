@@ -4,6 +4,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/gpu_extractor.h"
+#include "isobrick/gpu/host_memory.h"
 #include "tests/gpu/compare.h"
 
 // The streamed mesh is the CPU's, byte for byte, however it is cut into launches.
@@ -25,10 +26,37 @@ struct Way {
   Index brick = 64;
 };
 
+/// Bricks in memory that the device reads.
+class DeviceBricks final : public BrickLookup {
+ public:
+  DeviceBricks(const BrickLookup& bricks, const Lattice& lattice)
+      : bricks_(bricks),
+        lattice_(lattice),
+        memory_(gpu::host_memory(
+            0, static_cast<std::size_t>(volume(lattice.bricks())) * lattice.brick_bytes())) {
+    for_each_point({{0, 0, 0}, lattice.bricks()}, [&](Int3 b) {
+      if (const std::byte* from = bricks.find(b))
+        std::copy_n(from, lattice.brick_bytes(), place_of(b));
+    });
+  }
+  const std::byte* find(Int3 b) const override { return bricks_.find(b) ? place_of(b) : nullptr; }
+  /// Whoever holds it keeps the samples.
+  const std::shared_ptr<std::byte>& memory() const { return memory_; }
+
+ private:
+  std::byte* place_of(Int3 b) const {
+    return memory_.get() +
+           static_cast<std::size_t>(linear_index(b, lattice_.bricks())) * lattice_.brick_bytes();
+  }
+  const BrickLookup& bricks_;
+  Lattice lattice_;
+  std::shared_ptr<std::byte> memory_;
+};
+
 /// Only what the active tiles need may be looked at: other bricks are poison.
 class NeededBricks final : public BrickLookup {
  public:
-  NeededBricks(const DenseBricks& all, const Lattice& lattice, std::span<const TileWork> tiles,
+  NeededBricks(const BrickLookup& all, const Lattice& lattice, std::span<const TileWork> tiles,
                Index reach)
       : all_(all), grid_(lattice.bricks()), needed_(static_cast<std::size_t>(volume(grid_))) {
     const Int3 one{1, 1, 1};
@@ -47,7 +75,7 @@ class NeededBricks final : public BrickLookup {
   }
 
  private:
-  const DenseBricks& all_;
+  const BrickLookup& all_;
   Int3 grid_;
   std::vector<char> needed_;
 };
@@ -57,9 +85,11 @@ struct Streamed {
   gpu::StreamReport report;
 };
 
-Streamed stream(const Lattice& lattice, const BrickLookup& bricks, const SurfaceOptions& options,
+Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOptions& options,
                 std::span<const TileWork> tiles, const Way& way) {
   Streamed result;
+  const DeviceBricks on_device(all, lattice);
+  const NeededBricks bricks(on_device, lattice, tiles, sample_reach(options));
   const auto take = [&](const MeshChunk& chunk, const std::function<void()>& release) {
     EXPECT_EQ(chunk.first_vertex, result.mesh.positions.size());
     append(result.mesh.positions, chunk.positions);
@@ -77,8 +107,10 @@ Streamed stream(const Lattice& lattice, const BrickLookup& bricks, const Surface
   gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, way.tiles),
                               take);
   for (std::size_t i = 0; i < tiles.size(); i += std::min(way.call, tiles.size()))
-    extractor.extract(tiles.subspan(i, std::min(way.call, tiles.size() - i)), bricks);
+    extractor.extract(tiles.subspan(i, std::min(way.call, tiles.size() - i)), bricks,
+                      on_device.memory());
   extractor.finish();
+  EXPECT_EQ(on_device.memory().use_count(), 1) << "samples are let go";
   result.report = extractor.report();
   return result;
 }
@@ -98,8 +130,7 @@ void compare(const Field<T>& field, double isovalue, SurfaceOptions options,
       const DenseBricks all(lattice, field.samples.data());
       if (!expected) expected = on_cpu(field, lattice, all, options);
       const std::vector<TileWork> tiles = active_tiles(field, isovalue);
-      const NeededBricks bricks(all, lattice, tiles, sample_reach(options));
-      const Streamed made = stream(lattice, bricks, options, tiles, way);
+      const Streamed made = stream(lattice, all, options, tiles, way);
       expect_same(*expected, made.mesh);
       EXPECT_EQ(made.report.vertices, expected->positions.size());
       EXPECT_EQ(made.report.triangles, expected->triangles.size());
@@ -180,7 +211,8 @@ TYPED_TEST(GpuStream, AbsentBricksAreTheFillValue) {
 TYPED_TEST(GpuStream, WhoTakesTheMeshMayFail) {
   const auto field = this->waves({131, 70, 97});
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
-  const DenseBricks bricks(lattice, field.samples.data());
+  const DenseBricks all(lattice, field.samples.data());
+  const DeviceBricks bricks(all, lattice);
   SurfaceOptions options;
   options.isovalue = this->lowest() + 100;
   options.roi = lattice.box();
@@ -193,7 +225,7 @@ TYPED_TEST(GpuStream, WhoTakesTheMeshMayFail) {
   gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, 2), take);
   EXPECT_THROW(
       {
-        extractor.extract(tiles, bricks);
+        extractor.extract(tiles, bricks, bricks.memory());
         extractor.finish();
       },
       Error);

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isobrick/core/tile.h"
+#include "isobrick/gpu/stream_layout.h"
+
+namespace isobrick::gpu {
+
+/// A brick that a launch takes along as a whole.
+struct SentBrick {
+  const std::byte* from;
+};
+
+/// Where a launch finds the samples of its tiles.
+struct BrickTable {
+  std::span<BrickBox> boxes;           ///< one a tile
+  std::span<std::uint64_t> addresses;  ///< as many a tile as there can be, x fastest; 0: absent
+};
+
+/// How a launch reads its bricks.
+struct BrickUse {
+  std::vector<SentBrick> sent;   ///< in the order of their places on the device
+  std::uint64_t read_bytes = 0;  ///< of samples that the device reads in host memory
+};
+
+/// Fills the table for these tiles. A brick of which they need a good part is sent, as long
+/// as one of `places` on the device is left, and the table names that place, counted from
+/// `device`; of the others the device reads what it needs where they lie.
+BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWork> tiles,
+                    const BrickLookup& bricks, std::size_t places, const std::byte* device,
+                    const BrickTable& table);
+
+}  // namespace isobrick::gpu
