@@ -46,7 +46,7 @@ StreamCollector::~StreamCollector() {
 
 void StreamCollector::wait_for_lane() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return error_ || busy_lanes_ < kLanes; });
+  changed_.wait(lock, [&] { return error_ || busy_lanes_ < device_.sizes().lanes; });
   if (error_) std::rethrow_exception(error_);
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/unpack_kernel.h"
@@ -42,8 +44,9 @@ StreamDevice::StreamDevice(const Lattice& lattice, const SurfaceOptions& options
                            const StreamSizes& sizes)
     : lattice_(lattice), options_(options) {
   check_reads_host_memory();
-  for (StreamSizes s = sizes; !allocate(s); s = stream_sizes(lattice, options, s.tiles / 2))
-    if (s.tiles == 1)
+  for (StreamSizes s = sizes; !allocate(s);
+       s = stream_sizes(lattice, options, std::max(1u, s.tiles / 2)))
+    if (s.tiles == 1 && s.lanes == kLeastLanes)
       throw Error(fmt::format(
           "the GPU has no {} bytes of free memory, which a single tile takes; use --backend cpu",
           s.device_bytes));
@@ -61,7 +64,8 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   arena_ = std::move(arena);
   sizes_ = sizes;
   layout_ = StagingLayout(sizes.tiles, sizes.tile_bricks);
-  for (int i = 0; i < kLanes; ++i) {
+  lanes_.clear();
+  for (int i = 0; i < sizes.lanes; ++i) {
     auto lane = std::make_unique<Lane>(sizes);
     lane->device = arena_->take<std::byte>(sizes.staging_bytes);
     lane->bricks = arena_->take<std::byte>(sizes.sent_bricks * lattice_.brick_bytes());

@@ -82,7 +82,7 @@ class StreamDevice {
     return used_staging(lane) + lane.use.sent.size() * lattice_.brick_bytes();
   }
   std::uint64_t page_bytes() const { return kPageSamples * lattice_.sample_bytes(); }
-  Lane& lane(std::uint64_t launch) { return *lanes_[launch % kLanes]; }
+  Lane& lane(std::uint64_t launch) { return *lanes_[launch % lanes_.size()]; }
 
   /// Uploads a lane with its bricks and extracts it, as launch number `launch`; waits for nothing.
   void submit(Lane& lane, std::uint64_t launch);

@@ -26,11 +26,12 @@ constexpr std::uint64_t kBytesOfSlot = 96;
 
 /// Row tables that are needed at a time: as with the CPU's boundaries those on the upper
 /// faces of what is finished, and those of the launches under way.
-std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles) {
+std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles, int lanes) {
   if (!welded) return tiles;
   const Int3 t = lattice.tiles();
   const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
-  return std::min(static_cast<std::uint64_t>(volume(t)), faces + (kLanes + 1) * tiles);
+  return std::min(static_cast<std::uint64_t>(volume(t)),
+                  faces + (static_cast<std::uint64_t>(lanes) + 1) * tiles);
 }
 
 /// Bricks that hold as many samples as the tiles of a launch and a quarter more, for tiles
@@ -48,14 +49,16 @@ std::string too_small(const char* option, std::uint64_t budget, std::uint64_t le
 
 }  // namespace
 
-StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
-                         std::uint32_t tiles) {
+StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
+                         int lanes) {
   StreamSizes s;
+  const auto of_lanes = static_cast<std::uint64_t>(lanes);
   s.tiles = tiles;
+  s.lanes = lanes;
   s.vertices = std::max(kMostVertices, tiles * kVerticesOfTile);
   s.triangles = std::max(kMostTriangles, tiles * kTrianglesOfTile);
-  s.slots =
-      static_cast<std::uint32_t>(slots_for(lattice, options.indexing == Indexing::welded, tiles));
+  s.slots = static_cast<std::uint32_t>(
+      slots_for(lattice, options.indexing == Indexing::welded, tiles, lanes));
   s.tile_bricks =
       static_cast<std::uint32_t>(max_bricks_of_tile(lattice, reach_of(options.normals)));
   s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
@@ -66,9 +69,9 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
   s.page_bytes = groups * kPageGroupSamples * lattice.sample_bytes();
   s.device_bytes =
       kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.page_bytes +
-      kLanes * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
-  s.pinned_bytes = kSmallBuffers + kLanes * s.staging_bytes + kOutputs * s.output_bytes;
-  s.host_bytes = kBytesOfSlot * s.slots + std::uint64_t{kLanes} * tiles * sizeof(OrderState);
+      of_lanes * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
+  s.pinned_bytes = kSmallBuffers + of_lanes * s.staging_bytes + kOutputs * s.output_bytes;
+  s.host_bytes = kBytesOfSlot * s.slots + of_lanes * tiles * sizeof(OrderState);
   return s;
 }
 
@@ -77,13 +80,18 @@ StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& optio
                              std::uint64_t other_host_bytes) {
   const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
   auto tiles = static_cast<std::uint32_t>(std::min<std::uint64_t>(kMostTilesOfLaunch, all));
-  for (;; tiles /= 2) {
-    const StreamSizes s = stream_sizes(lattice, options, tiles);
+  for (int lanes = kMostLanes;; --lanes) {
+    if (lanes < kLeastLanes) {
+      lanes = kMostLanes;
+      tiles /= 2;
+    }
+    const StreamSizes s = stream_sizes(lattice, options, tiles, lanes);
     const std::uint64_t own = s.pinned_bytes + s.host_bytes, host = own + other_host_bytes;
-    // Launches of more than a tile leave half to the bricks.
-    const std::uint64_t wanted = tiles > 1 ? host + own : host;
+    const bool least = tiles == 1 && lanes == kLeastLanes;
+    // But for the least they leave half to the bricks.
+    const std::uint64_t wanted = least ? host : host + own;
     if (s.device_bytes <= device_budget && wanted <= host_budget) return s;
-    if (tiles > 1) continue;
+    if (!least) continue;
     if (s.device_bytes > device_budget)
       throw UsageError(too_small("--gpu-memory", device_budget, s.device_bytes));
     throw UsageError(too_small("--memory", host_budget, host));

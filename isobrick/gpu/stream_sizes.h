@@ -10,6 +10,7 @@ namespace isobrick::gpu {
 /// How large the buffers of a streaming extraction are.
 struct StreamSizes {
   std::uint32_t tiles = 0;                    ///< a launch takes at most
+  int lanes = 0;                              ///< launches under way at a time
   std::uint64_t vertices = 0, triangles = 0;  ///< that the output of a launch has room for
   std::uint32_t slots = 0;                    ///< row tables
   std::uint32_t tile_bricks = 0;              ///< bricks that a tile's samples can lie in
@@ -23,8 +24,8 @@ struct StreamSizes {
 };
 
 /// Launches that are under way at a time: one is uploaded while the one before is
-/// extracted or downloaded.
-inline constexpr int kLanes = 2;
+/// extracted or downloaded. More hide how long busy cores take to notice that one is over.
+inline constexpr int kLeastLanes = 2, kMostLanes = 4;
 /// Meshes in host memory at a time: one is downloaded, one written, one waits.
 inline constexpr int kOutputs = 3;
 /// More tiles a launch gain little, for a device is faster than what feeds it, and cost
@@ -32,8 +33,8 @@ inline constexpr int kOutputs = 3;
 inline constexpr std::uint32_t kMostTilesOfLaunch = 256;
 
 /// The sizes for launches of `tiles` tiles.
-StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
-                         std::uint32_t tiles);
+StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
+                         int lanes = kLeastLanes);
 
 /// The largest launches within both budgets; of the host's `other_host_bytes` are taken,
 /// and they leave half of the rest, for bricks. Throws UsageError naming the least `--gpu-memory`

@@ -10,6 +10,8 @@
 namespace isobrick::testing {
 namespace {
 
+constexpr std::size_t kLanes = 2;
+
 // The worst case: the surface passes every tile.
 TEST(RowSlots, StreamSizesHaveEnoughForEveryGrid) {
   for (const Int3 grid : {Int3{32, 32, 32}, Int3{33, 33, 33}, Int3{17, 17, 17}, Int3{64, 64, 8},
@@ -20,15 +22,15 @@ TEST(RowSlots, StreamSizesHaveEnoughForEveryGrid) {
                    std::to_string(grid.z) + ", launches of " + std::to_string(tiles));
       const Lattice lattice{grid * kTileEdge, {64, 64, 64}, ScalarType::u8};
       gpu::RowSlots slots(gpu::stream_sizes(lattice, {.roi = lattice.box()}, tiles).slots, grid);
-      std::array<std::vector<std::uint32_t>, gpu::kLanes> unused;
+      std::array<std::vector<std::uint32_t>, kLanes> unused;
       std::size_t launch = 0;
       std::uint32_t in_launch = 0;
       Int3 last{};
       const auto end_launch = [&] {
-        slots.end_launch(last, unused[launch % gpu::kLanes]);
+        slots.end_launch(last, unused[launch % kLanes]);
         in_launch = 0;
         ++launch;
-        slots.recycle(unused[launch % gpu::kLanes]);
+        slots.recycle(unused[launch % kLanes]);
       };
       ASSERT_NO_THROW(for_each_morton(grid, [&](Int3 tile) {
         slots.add(tile);
