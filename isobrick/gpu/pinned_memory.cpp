@@ -28,6 +28,8 @@ PinnedMemory::PinnedMemory(std::size_t bytes) {
   const auto first = reinterpret_cast<std::uintptr_t>(mapping_);
   void* data = reinterpret_cast<void*>((first + align - 1) / align * align);
   if (align == kLargePage) (void)madvise(data, locked, MADV_HUGEPAGE);
+  // Touched before: while the driver locks pages, others wait for the driver.
+  for (std::size_t at = 0; at < locked; at += kPage) static_cast<volatile char*>(data)[at] = 0;
   const cudaError_t result = cudaHostRegister(data, locked, cudaHostRegisterMapped);
   if (result != cudaSuccess) {
     (void)munmap(mapping_, mapped_);

@@ -1,10 +1,12 @@
 #include "isobrick/pipeline/estimate.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <mutex>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -43,29 +45,92 @@ std::uint64_t active_cells(const TileWork& work, Box3 samples) {
   return cells;
 }
 
+/// Adds a tile's active cells and blocks; calls brick(number) for the brick of each.
+template <class F>
+void count_tile(const ExtractRequest& request, const TileWork& work, ActiveParts& parts,
+                F&& brick) {
+  const Lattice& lattice = request.level->lattice;
+  parts.active_cells += active_cells(work, request.surface.roi);
+  for (int i = 0; i < 8; ++i) {
+    if (!(work.active_blocks >> i & 1)) continue;
+    ++parts.active_blocks;
+    const Int3 corner = block_box(work.tile, i).lo, edge = lattice.brick;
+    brick(static_cast<std::size_t>(
+        linear_index({corner.x / edge.x, corner.y / edge.y, corner.z / edge.z}, lattice.bricks())));
+  }
+}
+
+/// Bricks that were seen.
+class BrickSet {
+ public:
+  explicit BrickSet(const Lattice& lattice)
+      : seen_(static_cast<std::size_t>(volume(lattice.bricks()))) {}
+  void add(std::size_t brick) {
+    auto seen = seen_[brick];
+    size_ += !seen;
+    seen = true;
+  }
+  std::uint64_t size() const { return size_; }
+  std::uint64_t of() const { return seen_.size(); }
+
+ private:
+  std::vector<bool> seen_;
+  std::uint64_t size_ = 0;
+};
+
 /// Counts what is active and calls visit(TileWork) for every active tile, in order.
 template <class F>
 ActiveParts visit_active(const StoreReader& store, const ExtractRequest& request,
                          const ExtractOptions& options, F&& visit) {
-  const Lattice& lattice = request.level->lattice;
   ActiveParts parts;
-  parts.bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
+  BrickSet bricks(request.level->lattice);
   TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
-  std::vector<bool> active(static_cast<std::size_t>(parts.bricks));
   Workers workers(request.threads);  // an index is searched in parallel
   while (const auto work = workers.execute([&] { return tiles.next(); })) {
     visit(*work);
-    parts.active_cells += active_cells(*work, request.surface.roi);
-    for (int i = 0; i < 8; ++i) {
-      if (!(work->active_blocks >> i & 1)) continue;
-      ++parts.active_blocks;
-      const Int3 corner = block_box(work->tile, i).lo;
-      const Int3 brick = lattice.brick_of(corner);
-      auto seen = active[static_cast<std::size_t>(linear_index(brick, lattice.bricks()))];
-      parts.active_bricks += !seen;
-      seen = true;
-    }
+    count_tile(request, *work, parts, [&](std::size_t brick) { bricks.add(brick); });
   }
+  parts.bricks = bricks.of();
+  parts.active_bricks = bricks.size();
+  return parts;
+}
+
+/// The region's parts of the range chunks, each with the samples where its last cells end.
+std::vector<Box3> range_chunks(const ExtractRequest& request) {
+  constexpr Index edge = StoreReader::kRangeChunk * kBlockEdge;
+  constexpr Int3 one{1, 1, 1};
+  std::vector<Box3> chunks;
+  for_each_point({{0, 0, 0}, ceil_div(request.level->lattice.extent, one * edge)}, [&](Int3 c) {
+    const Box3 part = intersect({c * edge, (c + one) * edge + one}, request.surface.roi);
+    if (!part.empty()) chunks.push_back(part);
+  });
+  return chunks;
+}
+
+/// Counts what is active by the ranges alone, several range chunks at a time.
+ActiveParts count_in_ranges(const StoreReader& store, const ExtractRequest& request,
+                            const ExtractOptions& options) {
+  ActiveParts parts;
+  BrickSet bricks(request.level->lattice);
+  std::mutex adding;
+  Workers workers(request.threads);
+  workers.execute([&] {
+    tbb::parallel_for_each(range_chunks(request), [&](const Box3& chunk) {
+      TileStream tiles(store, options.level, options.isovalue, chunk);
+      ActiveParts own;
+      std::vector<std::size_t> own_bricks;
+      while (const auto work = tiles.next())
+        count_tile(request, *work, own, [&](std::size_t brick) {
+          if (own_bricks.empty() || own_bricks.back() != brick) own_bricks.push_back(brick);
+        });
+      const std::lock_guard lock(adding);
+      parts.active_blocks += own.active_blocks;
+      parts.active_cells += own.active_cells;
+      for (const std::size_t brick : own_bricks) bricks.add(brick);
+    });
+  });
+  parts.bricks = bricks.of();
+  parts.active_bricks = bricks.size();
   return parts;
 }
 
@@ -178,8 +243,9 @@ void scale(std::span<const Sampled> sampled, std::uint64_t cells, ExtractEstimat
 }  // namespace
 
 ActiveParts count_active(const StoreReader& store, const ExtractOptions& options) {
-  return visit_active(store, check_request(store, options, Indexing::welded), options,
-                      [](const TileWork&) {});
+  const ExtractRequest request = check_request(store, options, Indexing::welded);
+  if (!request.search.kind) return count_in_ranges(store, request, options);
+  return visit_active(store, request, options, [](const TileWork&) {});
 }
 
 MeshSize largest_mesh(const ActiveParts& active) {

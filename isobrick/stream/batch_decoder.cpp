@@ -15,6 +15,8 @@ namespace {
 constexpr std::size_t kBytesOfJob = std::size_t{128} << 10;
 /// Memory that is got at a time.
 constexpr std::size_t kBytesOfSlab = std::size_t{16} << 20;
+/// Pieces of it that are got before they are needed.
+constexpr std::size_t kSlabsAhead = 3;
 /// Bricks a thread that are decoded ahead: enough for all to be busy while a batch ends.
 constexpr std::size_t kBricksAhead = 6;
 /// Batches that are decoded ahead in any case: one to take, one to work on.
@@ -157,11 +159,11 @@ void BatchDecoder::load(const Batch& batch, std::vector<Load>& loads) {
   work_.notify_one();
 }
 
-/// Null when there is no room now.
+/// Null when there is no room now. A brick that is not needed for long goes rather than that
+/// more memory is waited for.
 std::byte* BatchDecoder::place(Int3 brick) {
   grow_if_short();
-  // Rather than to drop a brick, more memory is waited for.
-  return growing_ && slots_.free_slots() == 0 ? nullptr : slots_.place(brick);
+  return slots_.place(brick);
 }
 
 void BatchDecoder::hint(const TileBatch& batch) {
@@ -178,20 +180,24 @@ void BatchDecoder::hint(const TileBatch& batch) {
 /// Gets more memory beforehand, for that takes a while.
 void BatchDecoder::grow_if_short() {
   const std::size_t piece = slab_bricks(lattice_, capacity_);
-  if (growing_ || slots_count_ == capacity_ || slots_.free_slots() > piece / 2) return;
-  growing_ = true;
-  jobs_.push_front([this] { grow(); });
-  work_.notify_one();
+  const std::size_t enough =
+      std::max(kSlabsAhead * piece, static_cast<std::size_t>(threads_count_));
+  while (slots_count_ < capacity_ && slots_.free_slots() + coming_ < enough) {
+    const std::size_t count = std::min(piece, capacity_ - slots_count_);
+    slots_count_ += count;
+    coming_ += count;
+    jobs_.push_front([this, count] { grow(count); });
+    work_.notify_one();
+  }
 }
 
-void BatchDecoder::grow() {
-  const std::size_t piece = std::min(slab_bricks(lattice_, capacity_), capacity_ - slots_count_);
-  auto slab = memory_(piece * lattice_.brick_bytes());
+void BatchDecoder::grow(std::size_t count) {
+  auto slab = memory_(count * lattice_.brick_bytes());
   const std::lock_guard lock(mutex_);
-  slots_.add_slots(slab.get(), piece);
+  slots_.add_slots(slab.get(), count);
   slabs_.push_back(std::move(slab));
-  slots_count_ += piece;
-  growing_ = false;
+  memory_bytes_ += count * lattice_.brick_bytes();
+  coming_ -= count;
   changed_.notify_all();
 }
 

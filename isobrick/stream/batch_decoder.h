@@ -66,7 +66,7 @@ class BatchDecoder {
   std::shared_ptr<const DecodedBatch> next();
 
   /// Memory for bricks that there is. After the end.
-  std::uint64_t memory_bytes() const { return slots_count_ * lattice_.brick_bytes(); }
+  std::uint64_t memory_bytes() const { return memory_bytes_; }
   /// Bricks read and decoded, and how many different ones. After the end.
   std::uint64_t reads() const { return reads_; }
   std::uint64_t bricks_read() const { return bricks_read_; }
@@ -91,7 +91,7 @@ class BatchDecoder {
   std::byte* place(Int3 brick);
   void hint(const TileBatch& batch);
   void grow_if_short();
-  void grow();
+  void grow(std::size_t count);
   void run();
   void decode(const Batch& batch, const std::vector<Load>& loads);
   void release(const DecodedBatch& batch);
@@ -115,7 +115,9 @@ class BatchDecoder {
   std::deque<Batch> batches_;    ///< begun or about to be, not taken
   std::size_t ahead_ = 0;        ///< bricks decoded for those, or being so
   std::size_t slots_count_ = 0;  ///< bricks that there is memory for, or soon
-  bool growing_ = false, planned_ = false, stop_ = false;
+  std::size_t coming_ = 0;       ///< of those, not there yet
+  std::uint64_t memory_bytes_ = 0;
+  bool planned_ = false, stop_ = false;
   std::exception_ptr error_;
   std::vector<std::shared_ptr<std::byte>> slabs_;
   std::vector<bool> seen_;

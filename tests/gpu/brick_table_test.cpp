@@ -98,7 +98,7 @@ TEST(BrickTable, EveryNeededSampleIsWhereTheTableSays) {
 }
 
 TEST(BrickTable, BricksOfWhichLittleIsNeededAreNotSent) {
-  EXPECT_GT(look_up_all({{32, 32, 32}, 0, 1000, 0xff}).sent.size(), 4u);
+  EXPECT_GE(look_up_all({{32, 32, 32}, 0, 1000, 0xff}).sent.size(), 4u);
   EXPECT_TRUE(look_up_all({{64, 64, 64}, 0, 1000, 0x01}).sent.empty());
 }
 

@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
+#include <utility>
+#include <vector>
 
 #include "isobrick/core/morton.h"
 #include "isobrick/gpu/stream_sizes.h"
@@ -10,27 +11,26 @@
 namespace isobrick::testing {
 namespace {
 
-constexpr std::size_t kLanes = 2;
-
 // The worst case: the surface passes every tile.
 TEST(RowSlots, StreamSizesHaveEnoughForEveryGrid) {
   for (const Int3 grid : {Int3{32, 32, 32}, Int3{33, 33, 33}, Int3{17, 17, 17}, Int3{64, 64, 8},
                           Int3{8, 64, 64}, Int3{64, 8, 64}, Int3{100, 3, 50}, Int3{1, 1, 200},
                           Int3{200, 2, 2}, Int3{40, 70, 20}, Int3{1, 90, 90}})
-    for (const std::uint32_t tiles : {1u, 7u, 256u}) {
+    for (const auto& [tiles, lanes] : {std::pair{1u, 2}, std::pair{7u, 2}, std::pair{256u, 4}}) {
       SCOPED_TRACE(std::to_string(grid.x) + "x" + std::to_string(grid.y) + "x" +
                    std::to_string(grid.z) + ", launches of " + std::to_string(tiles));
       const Lattice lattice{grid * kTileEdge, {64, 64, 64}, ScalarType::u8};
-      gpu::RowSlots slots(gpu::stream_sizes(lattice, {.roi = lattice.box()}, tiles).slots, grid);
-      std::array<std::vector<std::uint32_t>, kLanes> unused;
+      gpu::RowSlots slots(gpu::stream_sizes(lattice, {.roi = lattice.box()}, tiles, lanes).slots,
+                          grid);
+      std::vector<std::vector<std::uint32_t>> unused(static_cast<std::size_t>(lanes));
       std::size_t launch = 0;
       std::uint32_t in_launch = 0;
       Int3 last{};
       const auto end_launch = [&] {
-        slots.end_launch(last, unused[launch % kLanes]);
+        slots.end_launch(last, unused[launch % unused.size()]);
         in_launch = 0;
         ++launch;
-        slots.recycle(unused[launch % kLanes]);
+        slots.recycle(unused[launch % unused.size()]);
       };
       ASSERT_NO_THROW(for_each_morton(grid, [&](Int3 tile) {
         slots.add(tile);
