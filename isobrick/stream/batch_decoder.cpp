@@ -17,10 +17,15 @@ constexpr std::size_t kBytesOfJob = std::size_t{128} << 10;
 constexpr std::size_t kBytesOfSlab = std::size_t{16} << 20;
 /// Pieces of it that are got before they are needed.
 constexpr std::size_t kSlabsAhead = 3;
-/// Bricks a thread that are decoded ahead: enough for all to be busy while a batch ends.
-constexpr std::size_t kBricksAhead = 6;
+/// Bricks a thread that are decoded ahead: enough for all to be busy while whoever takes
+/// batches does something else.
+constexpr std::size_t kBricksAhead = 12;
 /// Batches that are decoded ahead in any case: one to take, one to work on.
 constexpr std::size_t kBatchesAhead = 2;
+
+/// What reads faster than this, in seconds a byte, comes from memory and needs no hints: each
+/// is a call of the system.
+constexpr double kFastRead = 1e-9;
 
 std::uint64_t key_of(Int3 brick, Int3 grid) {
   return static_cast<std::uint64_t>(linear_index(brick, grid));
@@ -167,6 +172,10 @@ std::byte* BatchDecoder::place(Int3 brick) {
 }
 
 void BatchDecoder::hint(const TileBatch& batch) {
+  const BrickTimes times = store_.brick_times();
+  if (times.bytes_read > 0 &&
+      times.read_seconds < kFastRead * static_cast<double>(times.bytes_read))
+    return;
   std::vector<Int3> missing;
   const std::lock_guard lock(mutex_);
   std::copy_if(batch.bricks.begin(), batch.bricks.end(), std::back_inserter(missing),
