@@ -13,17 +13,12 @@ struct Need {
   std::uint64_t address = 0;
 };
 
-Box3 bricks_of(const Lattice& lattice, Box3 samples) {
-  const Int3 b = lattice.brick;
-  return {{samples.lo.x / b.x, samples.lo.y / b.y, samples.lo.z / b.z}, ceil_div(samples.hi, b)};
-}
-
 /// The bricks that the tile's samples, `reach` layers around included, lie in.
 Box3 bricks_around(const Lattice& lattice, Index reach, Int3 tile) {
   const Index edge = kTileEdge + 1 + reach;
   const Int3 lo = tile * kTileEdge;
-  return bricks_of(lattice, intersect({lo - Int3{reach, reach, reach}, lo + Int3{edge, edge, edge}},
-                                      lattice.box()));
+  return lattice.bricks_of(
+      intersect({lo - Int3{reach, reach, reach}, lo + Int3{edge, edge, edge}}, lattice.box()));
 }
 
 /// Collects the bricks of a launch, each once.
@@ -63,10 +58,10 @@ BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWor
       table.boxes[i].count[axis] = static_cast<std::int32_t>(grid[axis]);
     }
     for_each_needed_box(lattice, tiles[i], reach, [&](Box3 box) {
-      for_each_point(bricks_of(lattice, box), [&](Int3 b) {
+      for_each_point(lattice.bricks_of(box), [&](Int3 b) {
         const std::byte* brick = bricks.find(b);
         if (!brick) return;
-        const Box3 part = intersect(box, {b * lattice.brick, (b + Int3{1, 1, 1}) * lattice.brick});
+        const Box3 part = intersect(box, lattice.full_brick_box(b));
         addresses[linear_index(b - around.lo, grid)] =
             1 + needs.add(brick, static_cast<std::uint64_t>(volume(part.extent())));
       });

@@ -54,9 +54,8 @@ void count_tile(const ExtractRequest& request, const TileWork& work, ActiveParts
   for (int i = 0; i < 8; ++i) {
     if (!(work.active_blocks >> i & 1)) continue;
     ++parts.active_blocks;
-    const Int3 corner = block_box(work.tile, i).lo, edge = lattice.brick;
-    brick(static_cast<std::size_t>(
-        linear_index({corner.x / edge.x, corner.y / edge.y, corner.z / edge.z}, lattice.bricks())));
+    const Int3 of_block = lattice.brick_of(block_box(work.tile, i).lo);
+    brick(static_cast<std::size_t>(linear_index(of_block, lattice.bricks())));
   }
 }
 
