@@ -21,7 +21,8 @@ class NoSink final : public MeshSink {
 
 class NoSurface final : public SurfaceExtractor {
  public:
-  void extract(std::span<const TileWork>, const BrickLookup&) override {}
+  void extract(std::span<const TileWork>, const BrickLookup&,
+               const std::shared_ptr<const void>&) override {}
   void finish() override {}
   void report(ExtractReport&) const override {}
 };
@@ -37,6 +38,7 @@ class FakeGpu final : public GpuSession {
     return pinned_;
   }
   std::size_t good_batch() const override { return 8; }
+  std::shared_ptr<std::byte> brick_memory(std::size_t) const override { return nullptr; }
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, MeshSink&) override {
     if (full_) throw Error("no device memory is left");
     return std::make_unique<NoSurface>();
