@@ -1,6 +1,7 @@
 #include "isobrick/viewer/scene.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace isobrick {
@@ -31,8 +32,10 @@ Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
 }
 
 void Scene::update(const std::vector<double>& isovalues, const View& view, CutBudget budget) {
+  // A cut at the limit of its budget must not follow every mesh that is made.
   const double measured = stream_->counters().triangles_per_block;
-  if (measured > 0) budget.triangles_per_block = measured;
+  if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
+  if (per_block_ > 0) budget.triangles_per_block = per_block_;
   Cut cut = selector_.select(isovalues, view, budget);
   if (same_cut(cut, cut_)) return;
   cut_ = std::move(cut);

@@ -35,6 +35,7 @@ class Scene {
   CutSelector selector_;
   Cut cut_;
   std::unique_ptr<SceneStream> stream_;
+  double per_block_ = 0;  ///< triangles, as cuts are estimated with
 };
 
 /// World space of a volume's middle.
