@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -25,15 +26,25 @@ int thread_count(int asked) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()) - 1);
 }
 
-/// Work that a thread is at.
+/// Work that a thread is at: a mesh, or the slice of a place.
 class Running final : public Wanted {
  public:
   explicit Running(MeshJob j) : job(std::move(j)) {}
+  Running(int place, const SliceRequest& r) : slot(place), request(r) {}
   void check() const override {
     if (abandoned.load(std::memory_order_relaxed)) throw Abandoned();
   }
   MeshJob job;
+  std::optional<int> slot;
+  SliceRequest request;
   std::atomic<bool> abandoned = false;
+};
+
+/// A place for a slice.
+struct Slot {
+  std::optional<SliceRequest> wanted;  ///< and not yet being read
+  std::shared_ptr<Running> running;
+  std::shared_ptr<const SliceImage> image;
 };
 
 }  // namespace
@@ -62,6 +73,7 @@ struct SceneStream::Shared {
   std::uint64_t version = 0;
   std::shared_ptr<const Drawable> drawn;  ///< null: out of date
   std::uint64_t drawn_version = 0;
+  std::map<int, Slot> slots;
   StreamCounters counters;
   std::uint64_t triangles_made = 0, blocks_made = 0;
   std::vector<std::vector<DrawnNode>> shown;  ///< what each isovalue's place shows
@@ -77,6 +89,12 @@ struct SceneStream::Shared {
   void plan();
   void run();
   std::shared_ptr<Running> take(std::unique_lock<std::mutex>& lock);
+  std::shared_ptr<Running> take_slice();
+  bool has_work() const;
+  bool idle() const;
+  bool make_mesh(NodeMesher& mesher, const Running& r, const std::optional<MeshJob>& next,
+                 std::unique_lock<std::mutex>& lock);
+  bool make_slice(const std::shared_ptr<Running>& r, std::unique_lock<std::mutex>& lock);
   void publish(const Running& done, NodeMesh&& mesh, double seconds);
   void make_room();
   void count_wanted();
@@ -88,6 +106,7 @@ void SceneStream::Shared::plan() {
   meshes.begin_use();
   std::vector<MeshJob> wanted = plan_jobs(*tree, cut, meshes, bricks, planner);
   for (const auto& r : running) {
+    if (r->slot) continue;
     const auto same = [&](const MeshJob& job) { return job.same_mesh(r->job); };
     const auto found = std::find_if(wanted.begin(), wanted.end(), same);
     if (found == wanted.end())
@@ -119,12 +138,34 @@ void SceneStream::Shared::make_room() {
   counters.mesh_budget_full = full && !jobs.empty();
 }
 
+bool SceneStream::Shared::has_work() const {
+  return (!jobs.empty() && !full) ||
+         std::any_of(slots.begin(), slots.end(), [](const auto& s) { return s.second.wanted; });
+}
+
+/// Needs the lock.
+bool SceneStream::Shared::idle() const { return !has_work() && running.empty(); }
+
+std::shared_ptr<Running> SceneStream::Shared::take_slice() {
+  for (auto& [number, slot] : slots)
+    if (slot.wanted) {
+      slot.running = std::make_shared<Running>(number, *slot.wanted);
+      slot.wanted.reset();
+      return slot.running;
+    }
+  return nullptr;
+}
+
 std::shared_ptr<Running> SceneStream::Shared::take(std::unique_lock<std::mutex>& lock) {
-  work.wait(lock, [&] { return stop || (!jobs.empty() && !full); });
+  work.wait(lock, [&] { return stop || has_work(); });
   if (stop) return nullptr;
-  running.push_back(std::make_shared<Running>(jobs.back()));
-  jobs.pop_back();
-  return running.back();
+  std::shared_ptr<Running> next = take_slice();
+  if (!next) {
+    next = std::make_shared<Running>(jobs.back());
+    jobs.pop_back();
+  }
+  running.push_back(next);
+  return next;
 }
 
 void SceneStream::Shared::publish(const Running& done, NodeMesh&& mesh, double seconds) {
@@ -138,40 +179,66 @@ void SceneStream::Shared::publish(const Running& done, NodeMesh&& mesh, double s
   ++version;
 }
 
+/// Gives the lock up meanwhile. False when it was abandoned.
+bool SceneStream::Shared::make_mesh(NodeMesher& mesher, const Running& r,
+                                    const std::optional<MeshJob>& next,
+                                    std::unique_lock<std::mutex>& lock) {
+  lock.unlock();
+  const double before = mesher.seconds();
+  std::optional<NodeMesh> mesh;
+  try {
+    if (next) {
+      const NodeMesher::Needs needs = mesher.needs(next->key);
+      bricks.will_need(needs.stored, needs.bricks);
+    }
+  } catch (const Error&) {  // whoever reads it will say so
+  }
+  try {
+    mesh = mesher.mesh(r.job.key, r.job.isovalue, r.job.coarser, r);
+  } catch (const Abandoned&) {
+  } catch (const std::exception& e) {
+    mesh.emplace();
+    mesh->key = r.job.key;
+    mesh->isovalue = r.job.isovalue;
+    mesh->coarser = r.job.coarser;
+    mesh->damage = e.what();
+  }
+  lock.lock();
+  if (mesh) publish(r, std::move(*mesh), mesher.seconds() - before);
+  return mesh.has_value();
+}
+
+/// Gives the lock up meanwhile. False when it was abandoned.
+bool SceneStream::Shared::make_slice(const std::shared_ptr<Running>& r,
+                                     std::unique_lock<std::mutex>& lock) {
+  lock.unlock();
+  std::shared_ptr<SliceImage> image;
+  try {
+    image = std::make_shared<SliceImage>(read_slice(bricks, r->request, *r));
+  } catch (const Abandoned&) {
+  } catch (const std::exception& e) {
+    image = std::make_shared<SliceImage>();
+    image->request = r->request;
+    image->damage = e.what();
+  }
+  lock.lock();
+  Slot& slot = slots[*r->slot];
+  if (slot.running != r) return false;
+  slot.running.reset();
+  if (image) slot.image = std::move(image);
+  return true;
+}
+
 void SceneStream::Shared::run() {
   NodeMesher mesher(tree->grid(), bricks, options.origin);
   std::unique_lock lock(mutex);
   while (const std::shared_ptr<Running> r = take(lock)) {
     std::optional<MeshJob> next;
     if (!jobs.empty()) next = jobs.back();
-    lock.unlock();
-    const double before = mesher.seconds();
-    std::optional<NodeMesh> mesh;
-    const auto damaged = [&](const char* what) {
-      mesh.emplace();
-      mesh->key = r->job.key;
-      mesh->isovalue = r->job.isovalue;
-      mesh->coarser = r->job.coarser;
-      mesh->damage = what;
-    };
-    try {
-      if (next) {
-        const NodeMesher::Needs needs = mesher.needs(next->key);
-        bricks.will_need(needs.stored, needs.bricks);
-      }
-    } catch (const Error&) {  // whoever reads it will say so
-    }
-    try {
-      mesh = mesher.mesh(r->job.key, r->job.isovalue, r->job.coarser, *r);
-    } catch (const Abandoned&) {
-    } catch (const std::exception& e) {
-      damaged(e.what());
-    }
-    lock.lock();
+    const bool done = r->slot ? make_slice(r, lock) : make_mesh(mesher, *r, next, lock);
     std::erase(running, r);
-    if (mesh) publish(*r, std::move(*mesh), mesher.seconds() - before);
     change.notify_all();
-    if (mesh && options.on_change && !stop) {
+    if (done && options.on_change && !stop) {
       lock.unlock();
       options.on_change();
       lock.lock();
@@ -250,16 +317,38 @@ std::shared_ptr<const Drawable> SceneStream::drawable() {
   return shared_->drawn;
 }
 
+void SceneStream::set_slice(int slot, const std::optional<SliceRequest>& request) {
+  const std::lock_guard lock(shared_->mutex);
+  Slot& place = shared_->slots[slot];
+  const bool running = place.running && request && place.running->request == *request;
+  const bool there = place.image && request && place.image->request == *request;
+  if (place.running && !running) {
+    place.running->abandoned = true;
+    place.running.reset();
+  }
+  place.wanted.reset();
+  if (!request)
+    place.image.reset();
+  else if (!running && !there)
+    place.wanted = request;
+  shared_->work.notify_one();
+}
+
+std::shared_ptr<const SliceImage> SceneStream::slice(int slot) const {
+  const std::lock_guard lock(shared_->mutex);
+  const auto found = shared_->slots.find(slot);
+  return found == shared_->slots.end() ? nullptr : found->second.image;
+}
+
 bool SceneStream::idle() const {
   const std::lock_guard lock(shared_->mutex);
-  return (shared_->jobs.empty() || shared_->full) && shared_->running.empty();
+  return shared_->idle();
 }
 
 bool SceneStream::wait_idle(double seconds) const {
   std::unique_lock lock(shared_->mutex);
-  return shared_->change.wait_for(lock, std::chrono::duration<double>(seconds), [&] {
-    return (shared_->jobs.empty() || shared_->full) && shared_->running.empty();
-  });
+  return shared_->change.wait_for(lock, std::chrono::duration<double>(seconds),
+                                  [&] { return shared_->idle(); });
 }
 
 StreamCounters SceneStream::counters() const {

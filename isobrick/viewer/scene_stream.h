@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "isobrick/viewer/cut.h"
 #include "isobrick/viewer/drawable.h"
 #include "isobrick/viewer/resident_bricks.h"
+#include "isobrick/viewer/slice_image.h"
 
 namespace isobrick {
 
@@ -54,7 +56,13 @@ class SceneStream {
   /// has nothing to show yet, what the one in its place showed before is kept.
   std::shared_ptr<const Drawable> drawable();
 
-  /// Whether nothing is left to be done for the cut, or nothing can be.
+  /// From now on this slice is wanted in place `slot`, or none; before all meshes.
+  void set_slice(int slot, const std::optional<SliceRequest>& request);
+  /// The image of that place: the last one that is finished, until the wanted one is.
+  /// Null while there is none.
+  std::shared_ptr<const SliceImage> slice(int slot) const;
+
+  /// Whether nothing is left to be done, or nothing can be.
   bool idle() const;
   /// Waits for that at most so long.
   bool wait_idle(double seconds) const;
