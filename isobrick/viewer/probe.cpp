@@ -8,12 +8,6 @@
 namespace isobrick {
 namespace {
 
-double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-Vec3d cross(Vec3d a, Vec3d b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
 
 /// Components along the volume's axes, in samples of a level.

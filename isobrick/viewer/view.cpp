@@ -9,12 +9,6 @@ namespace {
 /// How much larger the picture is in which nodes that were refined stay so.
 constexpr double kWider = 1.15;
 
-double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-Vec3d cross(Vec3d a, Vec3d b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 Vec3d unit(Vec3d v) { return v * (1 / std::sqrt(dot(v, v))); }
 
 }  // namespace
