@@ -7,13 +7,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/meshes/preview_sink.h"
 #include "isobrick/pipeline/estimate.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/mesh_output.h"
 #include "tools/mesh_space.h"
 #include "tools/options.h"
+#include "tools/pictures.h"
 #include "tools/store_region.h"
 
 namespace isobrick::tools {
@@ -70,8 +70,9 @@ MeshForm form_of(const Arguments& arguments) {
 
 /// What the picture may take of the memory, so that the extraction keeps most.
 void check_picture(const Arguments& arguments) {
-  const std::uint64_t bytes = PreviewSink::memory(arguments.picture), most = arguments.memory / 4;
-  if (!arguments.preview.empty() && bytes > most)
+  if (arguments.preview.empty()) return;
+  const std::uint64_t bytes = preview_memory(arguments.picture), most = arguments.memory / 4;
+  if (bytes > most)
     throw UsageError(fmt::format(
         "a picture of {} x {} pixels takes {} while it is drawn, more than a quarter of the memory "
         "of {}; choose a smaller --preview-size or a larger --memory",
@@ -267,8 +268,7 @@ std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Argume
     if (!surface.output.empty())
       of_surface.mesh = open_mesh(surface.output, surface.form, force, arguments.threads);
     if (!surface.preview.empty())
-      of_surface.preview =
-          std::make_unique<PreviewSink>(surface.preview.string(), force, arguments.picture);
+      of_surface.preview = open_preview(surface.preview.string(), force, arguments.picture);
   }
   return sinks;
 }
@@ -280,7 +280,7 @@ ExtractReport make(const Surface& surface, const Sinks& sinks, const Arguments& 
   if (sinks.preview) {
     ExtractOptions shaded = surface.options;
     shaded.normals = true;
-    shaded.memory -= PreviewSink::memory(arguments.picture);
+    shaded.memory -= preview_memory(arguments.picture);
     const ExtractReport drawn = extract(store, shaded, *sinks.preview, console.progress());
     if (!sinks.mesh) report = drawn;
   }

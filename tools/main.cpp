@@ -42,6 +42,7 @@ void define(Program& program) {
   add_verify(program);
   add_extract(program);
   add_export(program);
+  add_render(program);
   add_synth(program);
   add_completion(program);
   add_man(program);

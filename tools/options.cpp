@@ -69,6 +69,11 @@ void add_path(CLI::App* app, const std::string& name, std::string& target,
   add_text(app, {name, "", help, "", true}, [&target](const std::string& text) { target = text; });
 }
 
+void add_paths(CLI::App* app, const std::string& name, std::vector<std::string>& targets,
+               const std::string& help) {
+  describe(app->add_option(name, targets, help)->expected(1, 1 << 20), {name, "", help, "", true});
+}
+
 void add_dims(CLI::App* app, std::optional<Int3>& dims) {
   add_parsed(app, dims, parse_dims, {"--dims", "X,Y,Z", "Samples along x, y and z"});
 }

@@ -39,6 +39,7 @@ void add_verify(Program& program);
 void add_extract(Program& program);
 void add_export(Program& program);
 void add_synth(Program& program);
+void add_render(Program& program);
 void add_completion(Program& program);
 void add_man(Program& program);
 
@@ -79,6 +80,10 @@ void add_parsed(CLI::App* app, T& target, Parse parse, const OptionText& option)
 
 /// A required positional path.
 void add_path(CLI::App* app, const std::string& name, std::string& target, const std::string& help);
+
+/// One or more of them.
+void add_paths(CLI::App* app, const std::string& name, std::vector<std::string>& targets,
+               const std::string& help);
 
 void add_dims(CLI::App* app, std::optional<Int3>& dims);
 void add_type(CLI::App* app, std::optional<ScalarType>& type);

@@ -96,11 +96,27 @@ Vec3d parse_vector(std::string_view text) {
 }
 
 PictureSize parse_picture_size(std::string_view text) {
-  const auto comma = text.find(',');
+  const auto comma = text.find_first_of(",x");
   if (comma == std::string_view::npos)
     throw UsageError(fmt::format("'{}' is not of the form WIDTH,HEIGHT", text));
   return {parse_int(text.substr(0, comma), 16, 16384),
           parse_int(text.substr(comma + 1), 16, 16384)};
+}
+
+Vec3f parse_colour(std::string_view text) {
+  constexpr std::string_view digits = "0123456789abcdef";
+  if (text == "white") return {1, 1, 1};
+  if (text == "black") return {0, 0, 0};
+  Vec3f colour;
+  bool good = text.size() == 7 && text[0] == '#';
+  for (std::size_t i = 0; good && i < 6; ++i) {
+    const char c = text[i + 1];
+    const auto digit = digits.find(c >= 'A' && c <= 'F' ? static_cast<char>(c + 32) : c);
+    good = digit != digits.npos;
+    colour[static_cast<int>(i / 2)] += static_cast<float>(i % 2 ? digit : 16 * digit) / 255;
+  }
+  if (good) return colour;
+  throw UsageError(fmt::format("'{}' is no colour; it is #RRGGBB, white or black", text));
 }
 
 ScalarType parse_type(std::string_view text) {

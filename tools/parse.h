@@ -37,11 +37,14 @@ Int3 parse_dims(std::string_view text);
 /// "X,Y,Z", finite numbers.
 Vec3d parse_vector(std::string_view text);
 
-/// Pixels "WIDTH,HEIGHT".
+/// Pixels "WIDTH,HEIGHT" or "WIDTHxHEIGHT".
 struct PictureSize {
   int width, height;
 };
 PictureSize parse_picture_size(std::string_view text);
+
+/// "#RRGGBB", "white" or "black": sRGB in [0, 1].
+Vec3f parse_colour(std::string_view text);
 
 /// "u8" or "uint8", ….
 ScalarType parse_type(std::string_view text);

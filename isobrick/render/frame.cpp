@@ -98,8 +98,8 @@ vec3 lit(vec3 normal, vec3 eye, vec3 colour) {
   const vec3 sky = vec3(0.97, 0.99, 1.05), ground = vec3(0.62, 0.57, 0.53);
   float facing = clamp(dot(normal, eye), 0.0, 1.0);
   float wrapped = (dot(normal, key) + 0.15) / 1.15;
-  vec3 light = mix(ground, sky, 0.5 + 0.5 * normal.y) * 0.30;
-  light += vec3(1.0, 0.985, 0.95) * 0.72 * max(wrapped, 0.0);
+  vec3 light = mix(ground, sky, 0.5 + 0.5 * normal.y) * 0.26;
+  light += vec3(1.0, 0.985, 0.95) * 0.80 * max(wrapped, 0.0);
   light += vec3(0.92, 0.96, 1.0) * (0.10 * max(dot(normal, fill), 0.0) + 0.08 * facing);
   vec3 halfway = normalize(key + eye);
   float gloss = pow(max(dot(normal, halfway), 0.0), 48.0);

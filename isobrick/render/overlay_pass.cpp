@@ -191,7 +191,7 @@ void OverlayPass::add_axes() {
       {{0.80f, 0.20f, 0.18f}, {0.16f, 0.56f, 0.22f}, {0.16f, 0.34f, 0.78f}}};
   static constexpr std::array<const char*, 3> names{"x", "y", "z"};
   const double height = unit_height(), size = 2.6 * height;
-  const Vec3d centre{1.35 * size, height_ - 1.35 * size, 0};
+  const Vec3d centre{1.5 * size, height_ - 1.5 * size, 0};
   std::array<int, 3> order{0, 1, 2};  // the farthest first
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return camera_.back[a] < camera_.back[b]; });

@@ -299,4 +299,11 @@ std::optional<Picked> Renderer::pick(int x, int y) const {
   return picked;
 }
 
+std::vector<std::uint8_t> without_alpha(std::vector<std::uint8_t> rgba) {
+  const std::size_t pixels = rgba.size() / 4;
+  for (std::size_t i = 0; i < pixels; ++i) std::memmove(&rgba[3 * i], &rgba[4 * i], 3);
+  rgba.resize(3 * pixels);
+  return rgba;
+}
+
 }  // namespace isobrick

@@ -129,4 +129,7 @@ class Renderer {
   std::unique_ptr<State> state_;
 };
 
+/// The colours of RGBA pixels alone, as write_png takes them.
+std::vector<std::uint8_t> without_alpha(std::vector<std::uint8_t> rgba);
+
 }  // namespace isobrick

@@ -94,7 +94,7 @@ void main() {
   float shorter = min(viewport.x, viewport.y);
   float fine = closed_within(at, p, n, turn, max(0.018 * shorter, 4));
   float coarse = closed_within(at, p, n, turn + 1.2, max(0.085 * shorter, 12));
-  open = 1 / ((1 + 1.1 * fine) * (1 + 1.5 * coarse));
+  open = 1 / ((1 + 1.6 * fine) * (1 + 3.2 * coarse));
 }
 )";
 

@@ -3,28 +3,24 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isobrick/io/output_file.h"
-#include "isobrick/meshes/preview_camera.h"
-#include "isobrick/meshes/preview_raster.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/render/preview_options.h"
+#include "isobrick/render/renderer.h"
 #include "isobrick/surface/mesh.h"
 
 namespace isobrick {
 
-struct PreviewOptions {
-  int width = 1280, height = 960;      ///< pixels, 16 … 16384
-  Vec3f colour{0.87f, 0.80f, 0.70f};   ///< of the surface, sRGB in [0, 1]
-  Vec3d towards_eye{0.55, -1.0, 0.5};  ///< from the volume's centre, world space
-  Vec3d up{0, 0, 1};
-};
-
-/// Draws the mesh into a PNG picture. Memory: `memory`, from begin to
+/// Draws the mesh into a PNG picture, off-screen. Memory: `memory`, from begin to
 /// finish, however large the mesh. Looks best with normals; without them facets show.
 class PreviewSink final : public MeshSink {
  public:
-  /// Throws UsageError for a size that makes no sense; see OutputFile for what
-  /// `path` and `force` may throw.
+  /// Throws UsageError for a size that makes no sense, Error where there is no OpenGL;
+  /// see OutputFile for what `path` and `force` may throw.
   PreviewSink(std::string path, bool force, const PreviewOptions& options = {});
+  ~PreviewSink() override;
 
   /// Bytes that a picture of this size takes while it is drawn.
   static std::uint64_t memory(const PreviewOptions& options);
@@ -36,10 +32,15 @@ class PreviewSink final : public MeshSink {
   std::uint64_t bytes() const override { return out_.writer().size(); }
 
  private:
+  void draw_batch();
+
   PreviewOptions options_;
   OutputFile out_;
-  std::optional<PreviewRaster> raster_;  ///< two points a pixel along each axis
-  std::optional<PreviewCamera> camera_;
+  GlContext context_;  ///< current only within a call: they may come from any thread
+  std::optional<Renderer> renderer_;
+  Vec3d origin_;
+  std::vector<Vec3f> positions_, normals_;
+  std::vector<Triangle> triangles_;
 };
 
 }  // namespace isobrick

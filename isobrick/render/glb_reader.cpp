@@ -1,0 +1,348 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/render/mesh_parts_reader.h"
+#include "isobrick/render/mesh_readers.h"
+#include "isobrick/render/vectors.h"
+
+namespace isobrick {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
+constexpr std::size_t kMostJson = std::size_t{64} << 20;
+constexpr int kMostDepth = 64;
+
+std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, bytes.data() + at, sizeof(word));
+  return word;
+}
+
+/// "a%20b" → "a b".
+std::string percent_decoded(std::string_view text) {
+  const auto digit = [](char c) {
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+  };
+  std::string decoded;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '%' && i + 2 < text.size() && digit(text[i + 1]) >= 0 &&
+        digit(text[i + 2]) >= 0) {
+      decoded += static_cast<char>(16 * digit(text[i + 1]) + digit(text[i + 2]));
+      i += 2;
+    } else {
+      decoded += text[i];
+    }
+  }
+  return decoded;
+}
+
+/// Three indices after the other.
+class GlbTriangles final : public TriangleReader {
+ public:
+  GlbTriangles(const std::byte* first, NumberKind kind, std::uint64_t triangles)
+      : at_(first), kind_(kind), left_(triangles) {}
+
+  bool next(std::array<std::uint64_t, 3>& triangle) override {
+    if (left_ == 0) return false;
+    --left_;
+    for (std::uint64_t& vertex : triangle) {
+      vertex = static_cast<std::uint64_t>(load_number(at_, kind_, false));
+      at_ += size_of(kind_);
+    }
+    return true;
+  }
+
+ private:
+  const std::byte* at_;
+  NumberKind kind_;
+  std::uint64_t left_;
+};
+
+/// Vertices in their own order, where there are no indices.
+class PlainTriangles final : public TriangleReader {
+ public:
+  explicit PlainTriangles(std::uint64_t triangles) : triangles_(triangles) {}
+  bool next(std::array<std::uint64_t, 3>& triangle) override {
+    if (done_ == triangles_) return false;
+    triangle = {3 * done_, 3 * done_ + 1, 3 * done_ + 2};
+    ++done_;
+    return true;
+  }
+
+ private:
+  std::uint64_t triangles_, done_ = 0;
+};
+
+WorldMatrix product(const WorldMatrix& a, const WorldMatrix& b) {
+  WorldMatrix m;
+  for (std::size_t i = 0; i < 3; ++i) m.columns[i] = a.turn(b.columns[i]);
+  m.columns[3] = a.move(b.columns[3]);
+  return m;
+}
+
+class GlbReader {
+ public:
+  GlbReader(const std::string& path, std::shared_ptr<MappedFile> file)
+      : path_(path), bytes_(file->bytes()) {
+    keep_.push_back(std::move(file));
+  }
+
+  std::unique_ptr<MeshFile> read() {
+    try {
+      read_chunks();
+      if (root_.contains("extensionsRequired"))
+        for (const json& name : root_.at("extensionsRequired"))
+          if (name != "KHR_mesh_quantization")
+            fail(fmt::format("it needs the extension {}, which is not read", name.dump()));
+      if (root_.contains("scenes")) {
+        const json& scene = item("scenes", root_.value("scene", std::uint64_t{0}));
+        if (scene.contains("nodes"))
+          for (const json& node : scene.at("nodes")) add_node(index(node), {}, 0);
+      }
+    } catch (const json::exception& error) {
+      fail(fmt::format("its scene: {}", error.what()));
+    }
+    return std::make_unique<IndexedMeshFile>(path_, std::move(parts_), std::move(keep_));
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(fmt::format("'{}' is no GLB file that can be drawn: {}", path_, what));
+  }
+
+  void read_chunks() {
+    constexpr std::size_t start = 12, head = 8;
+    if (bytes_.size() < start + head) fail("it ends within its header");
+    if (word_at(bytes_, 4) != 2) fail(fmt::format("its version is {}", word_at(bytes_, 4)));
+    for (std::size_t at = start; at + head <= bytes_.size();) {
+      const std::size_t size = word_at(bytes_, at), kind = word_at(bytes_, at + 4);
+      if (size > bytes_.size() - at - head)
+        fail(fmt::format("its part at offset {} goes beyond its end", at));
+      const auto chunk = bytes_.subspan(at + head, size);
+      if (at == start) {
+        if (kind != kJsonChunk) fail("it does not begin with a scene");
+        if (size > kMostJson) fail(fmt::format("its scene takes {} bytes", size));
+        const auto* text = reinterpret_cast<const char*>(chunk.data());
+        root_ = json::parse(text, text + chunk.size());
+      } else if (kind == kBinaryChunk && binary_.empty()) {
+        binary_ = chunk;
+      }
+      at += head + (size + 3) / 4 * 4;
+    }
+    if (!root_.is_object()) fail("its scene is no object");
+  }
+
+  /// A whole number that counts or numbers something.
+  std::uint64_t index(const json& value) const {
+    if (!value.is_number_unsigned())
+      fail(fmt::format("'{}' is no number of an item", value.dump()));
+    return value.get<std::uint64_t>();
+  }
+  std::uint64_t whole(const json& object, const char* key, std::uint64_t otherwise) const {
+    return object.contains(key) ? index(object.at(key)) : otherwise;
+  }
+  const json& item(const char* list, std::uint64_t number) const {
+    const json& all = root_.at(list);
+    if (!all.is_array() || number >= all.size())
+      fail(fmt::format("{} {} is not there", list, number));
+    return all[static_cast<std::size_t>(number)];
+  }
+
+  std::array<double, 16> numbers(const json& list, std::size_t count) const {
+    std::array<double, 16> values{};
+    if (!list.is_array() || list.size() != count) fail("a node's place is damaged");
+    for (std::size_t i = 0; i < count; ++i) {
+      values[i] = list[i].get<double>();
+      if (!std::isfinite(values[i])) fail("a node's place is damaged");
+    }
+    return values;
+  }
+
+  WorldMatrix matrix_of(const json& node) const {
+    WorldMatrix m;
+    if (node.contains("matrix")) {
+      const auto v = numbers(node.at("matrix"), 16);
+      for (std::size_t c = 0; c < 4; ++c) m.columns[c] = {v[4 * c], v[4 * c + 1], v[4 * c + 2]};
+      return m;
+    }
+    if (node.contains("rotation")) {
+      const auto q = numbers(node.at("rotation"), 4);
+      const Vec3d axis{q[0], q[1], q[2]};
+      const double w = q[3];
+      for (std::size_t c = 0; c < 3; ++c) {
+        Vec3d& v = m.columns[c];
+        const Vec3d t = cross(axis, v) * 2.0;
+        v = v + t * w + cross(axis, t);
+      }
+    }
+    if (node.contains("scale")) {
+      const auto s = numbers(node.at("scale"), 3);
+      for (std::size_t c = 0; c < 3; ++c) m.columns[c] = m.columns[c] * s[c];
+    }
+    if (node.contains("translation")) {
+      const auto t = numbers(node.at("translation"), 3);
+      m.columns[3] = {t[0], t[1], t[2]};
+    }
+    return m;
+  }
+
+  void add_node(std::uint64_t number, const WorldMatrix& parent, int depth) {
+    // A tree cannot be deeper than it has nodes; a ring would have no end.
+    if (depth > kMostDepth || ++nodes_seen_ > root_.at("nodes").size())
+      fail("its nodes are no tree");
+    const json& node = item("nodes", number);
+    const WorldMatrix here = product(parent, matrix_of(node));
+    if (node.contains("mesh"))
+      for (const json& primitive : item("meshes", index(node.at("mesh"))).at("primitives"))
+        add_primitive(primitive, here);
+    if (node.contains("children"))
+      for (const json& child : node.at("children")) add_node(index(child), here, depth + 1);
+  }
+
+  void add_primitive(const json& primitive, const WorldMatrix& to_world) {
+    if (const auto mode = whole(primitive, "mode", 4); mode != 4)
+      fail(fmt::format("it has primitives of mode {}; only triangles (4) are drawn", mode));
+    if (primitive.contains("extensions") &&
+        primitive.at("extensions").contains("KHR_draco_mesh_compression"))
+      fail("its meshes are compressed");
+    const json& attributes = primitive.at("attributes");
+    IndexedPart part{.to_world = to_world};
+    const auto positions = vertex_field(index(attributes.at("POSITION")));
+    part.positions = positions.first;
+    part.vertices = positions.second;
+    if (attributes.contains("NORMAL")) {
+      const auto normals = vertex_field(index(attributes.at("NORMAL")));
+      if (normals.second != part.vertices) fail("a mesh has more positions than normals, or fewer");
+      part.normals = normals.first;
+    }
+    if (primitive.contains("indices"))
+      add_indices(part, index(primitive.at("indices")));
+    else {
+      part.triangles = part.vertices / 3;
+      part.open_triangles = [count = part.triangles] {
+        return std::make_unique<PlainTriangles>(count);
+      };
+    }
+    parts_.push_back(std::move(part));
+  }
+
+  void add_indices(IndexedPart& part, std::uint64_t number) {
+    const json& accessor = item("accessors", number);
+    const NumberKind kind = kind_of(accessor);
+    if (kind != NumberKind::u8 && kind != NumberKind::u16 && kind != NumberKind::u32)
+      fail("its triangles are no whole numbers");
+    const Place place = place_of(accessor, size_of(kind));
+    if (place.stride != size_of(kind)) fail("its triangles do not lie side by side");
+    part.triangles = place.count / 3;
+    part.open_triangles = [first = place.first, kind, count = part.triangles] {
+      return std::make_unique<GlbTriangles>(first, kind, count);
+    };
+  }
+
+  NumberKind kind_of(const json& accessor) const {
+    switch (index(accessor.at("componentType"))) {
+      case 5120: return NumberKind::i8;
+      case 5121: return NumberKind::u8;
+      case 5122: return NumberKind::i16;
+      case 5123: return NumberKind::u16;
+      case 5125: return NumberKind::u32;
+      case 5126: return NumberKind::f32;
+      default: fail("it has numbers of an unknown kind");
+    }
+  }
+
+  std::pair<VertexField, std::uint64_t> vertex_field(std::uint64_t number) {
+    const json& accessor = item("accessors", number);
+    if (accessor.at("type") != "VEC3") fail("its vertices are no triples");
+    const NumberKind kind = kind_of(accessor);
+    const auto size = static_cast<std::uint32_t>(size_of(kind));
+    const Place place = place_of(accessor, 3 * size);
+    VertexField field{.first = place.first,
+                      .stride = place.stride,
+                      .offsets = {0, size, 2 * size},
+                      .kinds = {kind, kind, kind}};
+    if (accessor.value("normalized", false) && kind != NumberKind::f32) {
+      const bool is_signed = kind == NumberKind::i8 || kind == NumberKind::i16;
+      field.scale = 1 / (std::ldexp(1.0, static_cast<int>(8 * size) - (is_signed ? 1 : 0)) - 1);
+    }
+    return {field, place.count};
+  }
+
+  struct Place {
+    const std::byte* first;
+    std::uint64_t stride, count;
+  };
+
+  /// Where an accessor's items of `size` bytes are, all of them within their buffer.
+  Place place_of(const json& accessor, std::uint64_t size) {
+    if (accessor.contains("sparse")) fail("it has sparse accessors, which are not read");
+    const std::uint64_t count = index(accessor.at("count"));
+    const json& view = item("bufferViews", index(accessor.at("bufferView")));
+    const std::span<const std::byte> buffer = buffer_of(index(view.at("buffer")));
+    const std::uint64_t offset = whole(view, "byteOffset", 0),
+                        inner = whole(accessor, "byteOffset", 0);
+    const std::uint64_t length = index(view.at("byteLength"));
+    const std::uint64_t stride = whole(view, "byteStride", size);
+    if (offset > buffer.size() || length > buffer.size() - offset)
+      fail("a view goes beyond its buffer");
+    if (stride < size || stride > 1024)
+      fail(fmt::format("a view has a stride of {} bytes", stride));
+    if (count > 0 &&
+        (inner > length || size > length - inner || (length - inner - size) / stride < count - 1))
+      fail(fmt::format("an accessor of {} items goes beyond its view of {} bytes", count, length));
+    return {buffer.data() + offset + inner, stride, count};
+  }
+
+  std::span<const std::byte> buffer_of(std::uint64_t number) {
+    const json& buffer = item("buffers", number);
+    if (!buffer.contains("uri")) {
+      if (number != 0) fail(fmt::format("buffer {} is nowhere", number));
+      return binary_;
+    }
+    if (const auto known = external_.find(number); known != external_.end())
+      return known->second->bytes();
+    const auto uri = buffer.at("uri").get<std::string>();
+    if (uri.starts_with("data:")) fail("its buffers are text, which is not read");
+    const std::filesystem::path name = percent_decoded(uri);
+    bool leads_away = name.is_absolute() || uri.find("://") != uri.npos;
+    for (const auto& part : name) leads_away |= part == "..";
+    if (leads_away) fail(fmt::format("its buffer '{}' is not below its folder", uri));
+    auto file =
+        std::make_shared<MappedFile>((std::filesystem::path(path_).parent_path() / name).string());
+    keep_.push_back(file);
+    external_.emplace(number, file);
+    return file->bytes();
+  }
+
+  const std::string& path_;
+  std::span<const std::byte> bytes_, binary_;
+  json root_;
+  std::size_t nodes_seen_ = 0;
+  std::map<std::uint64_t, std::shared_ptr<MappedFile>> external_;
+  std::vector<IndexedPart> parts_;
+  std::vector<std::shared_ptr<const void>> keep_;
+};
+
+}  // namespace
+
+std::unique_ptr<MeshFile> read_glb(const std::string& path, std::shared_ptr<MappedFile> file) {
+  return GlbReader(path, std::move(file)).read();
+}
+
+}  // namespace isobrick

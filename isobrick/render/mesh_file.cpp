@@ -1,0 +1,32 @@
+#include "isobrick/render/mesh_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <string_view>
+
+#include "isobrick/core/error.h"
+#include "isobrick/render/mesh_readers.h"
+
+namespace isobrick {
+
+std::unique_ptr<MeshFile> open_mesh_file(const std::string& path) {
+  auto file = std::make_shared<MappedFile>(path);
+  const auto bytes = file->bytes();
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("ply\n") || text.starts_with("ply\r")) return read_ply(path, file);
+  if (text.starts_with("glTF")) return read_glb(path, file);
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  if (extension == ".stl") return read_stl(path, file);
+  if (extension == ".obj") return read_obj(path, file);
+  throw UsageError(
+      fmt::format("'{}' is no mesh that can be drawn: neither PLY nor GLB, and not named .stl or "
+                  ".obj",
+                  path));
+}
+
+}  // namespace isobrick

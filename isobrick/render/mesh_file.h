@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "isobrick/core/vec.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// What a mesh file says of itself.
+struct MeshFileInfo {
+  std::uint64_t vertices = 0, triangles = 0;
+  bool has_normals = false;
+};
+
+/// A mesh file that is read in batches. It is mapped, not loaded: memory is that of
+/// a batch. One thread at a time.
+class MeshFile {
+ public:
+  virtual ~MeshFile() = default;
+
+  /// A batch; its triangles count from its first vertex, its coordinates from `origin`.
+  using Take = std::function<void(const MeshChunk&, Vec3d origin)>;
+
+  virtual MeshFileInfo info() const = 0;
+  /// Bounds of all vertices; looks at each. Empty files: two equal corners. Throws
+  /// Error for a coordinate that is not finite.
+  virtual void bounds(Vec3d& lo, Vec3d& hi) const = 0;
+  /// Gives out every triangle, as coordinates relative to `origin`. Throws Error for one that
+  /// names a vertex that is not there.
+  virtual void read(Vec3d origin, const Take& take) const = 0;
+
+  static constexpr std::size_t kBatch = std::size_t{1} << 18;  ///< triangles
+};
+
+/// Opens a PLY (binary), STL (binary), GLB or OBJ file, told apart by their content.
+/// Throws Error for one that is damaged or has what is not read here.
+std::unique_ptr<MeshFile> open_mesh_file(const std::string& path);
+
+}  // namespace isobrick

@@ -1,0 +1,161 @@
+#include "isobrick/render/mesh_parts_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/byte_order.h"
+#include "isobrick/render/vectors.h"
+
+namespace isobrick {
+namespace {
+
+template <class T>
+double load(const std::byte* at, bool swapped) {
+  std::array<std::byte, sizeof(T)> bytes;
+  std::memcpy(bytes.data(), at, sizeof(T));
+  if (swapped) swap_byte_order(bytes.data(), 1, sizeof(T));
+  T value;
+  std::memcpy(&value, bytes.data(), sizeof(T));
+  return static_cast<double>(value);
+}
+
+/// Gathers the vertices of a batch of triangles. A vertex that is named again soon is
+/// found again, so that batches are little larger than what they are made from.
+class Batch {
+ public:
+  Batch(const IndexedPart& part, Vec3d origin, const MeshFile::Take& take)
+      : part_(part), origin_(origin), take_(take), recent_(kRecent) {}
+
+  void add(const std::array<std::uint64_t, 3>& triangle) {
+    triangles_.push_back({number_of(triangle[0]), number_of(triangle[1]), number_of(triangle[2])});
+    if (triangles_.size() == MeshFile::kBatch) flush();
+  }
+
+  void flush() {
+    if (triangles_.empty()) return;
+    take_({0, positions_, normals_, triangles_}, origin_);
+    positions_.clear();
+    normals_.clear();
+    triangles_.clear();
+    std::fill(recent_.begin(), recent_.end(), Recent{});
+  }
+
+ private:
+  static constexpr std::size_t kRecent = 1 << 16;
+  struct Recent {
+    std::uint64_t vertex = ~std::uint64_t{0};
+    std::uint32_t number = 0;
+  };
+
+  std::uint32_t number_of(std::uint64_t vertex) {
+    Recent& recent = recent_[vertex % kRecent];
+    if (recent.vertex != vertex) {
+      recent = {vertex, static_cast<std::uint32_t>(positions_.size())};
+      const Vec3d p = part_.to_world.move(part_.positions.at(vertex));
+      positions_.push_back(to_float(p - origin_));
+      // Lengths do not matter here, so turning and scaling alike are enough.
+      if (part_.normals)
+        normals_.push_back(to_float(part_.to_world.turn(part_.normals->at(vertex))));
+    }
+    return recent.number;
+  }
+
+  const IndexedPart& part_;
+  Vec3d origin_;
+  const MeshFile::Take& take_;
+  std::vector<Recent> recent_;
+  std::vector<Vec3f> positions_, normals_;
+  std::vector<Triangle> triangles_;
+};
+
+}  // namespace
+
+std::size_t size_of(NumberKind kind) {
+  constexpr std::array<std::size_t, 8> sizes{1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[static_cast<std::size_t>(kind)];
+}
+
+double load_number(const std::byte* at, NumberKind kind, bool swapped) {
+  switch (kind) {
+    case NumberKind::i8: return load<std::int8_t>(at, swapped);
+    case NumberKind::u8: return load<std::uint8_t>(at, swapped);
+    case NumberKind::i16: return load<std::int16_t>(at, swapped);
+    case NumberKind::u16: return load<std::uint16_t>(at, swapped);
+    case NumberKind::i32: return load<std::int32_t>(at, swapped);
+    case NumberKind::u32: return load<std::uint32_t>(at, swapped);
+    case NumberKind::f32: return load<float>(at, swapped);
+    case NumberKind::f64: return load<double>(at, swapped);
+  }
+  return 0;
+}
+
+Vec3d VertexField::at(std::uint64_t vertex) const {
+  const std::byte* row = first + vertex * stride;
+  Vec3d v;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    v[axis] = load_number(row + offsets[i], kinds[i], swapped) * scale;
+  }
+  return v;
+}
+
+void BoundsOf::include(Vec3d p, std::uint64_t vertex) {
+  if (!std::isfinite(p.x + p.y + p.z))
+    throw Error(
+        fmt::format("'{}' is damaged: vertex {} is at ({}, {}, {})", path_, vertex, p.x, p.y, p.z));
+  if (!std::exchange(any_, true)) lo_ = hi_ = p;
+  for (int axis = 0; axis < 3; ++axis) {
+    lo_[axis] = std::min(lo_[axis], p[axis]);
+    hi_[axis] = std::max(hi_[axis], p[axis]);
+  }
+}
+
+void BoundsOf::get(Vec3d& lo, Vec3d& hi) const {
+  lo = lo_;
+  hi = hi_;
+}
+
+IndexedMeshFile::IndexedMeshFile(std::string path, std::vector<IndexedPart> parts,
+                                 std::vector<std::shared_ptr<const void>> keep)
+    : path_(std::move(path)), parts_(std::move(parts)), keep_(std::move(keep)) {}
+
+MeshFileInfo IndexedMeshFile::info() const {
+  MeshFileInfo info;
+  for (const IndexedPart& part : parts_) {
+    info.vertices += part.vertices;
+    info.triangles += part.triangles;
+    info.has_normals |= part.normals.has_value();
+  }
+  return info;
+}
+
+void IndexedMeshFile::bounds(Vec3d& lo, Vec3d& hi) const {
+  BoundsOf bounds(path_);
+  for (const IndexedPart& part : parts_)
+    for (std::uint64_t i = 0; i < part.vertices; ++i)
+      bounds.include(part.to_world.move(part.positions.at(i)), i);
+  bounds.get(lo, hi);
+}
+
+void IndexedMeshFile::read(Vec3d origin, const Take& take) const {
+  for (const IndexedPart& part : parts_) {
+    Batch batch(part, origin, take);
+    const std::unique_ptr<TriangleReader> triangles = part.open_triangles();
+    std::array<std::uint64_t, 3> triangle{};
+    for (std::uint64_t i = 0; triangles->next(triangle); ++i) {
+      for (const std::uint64_t vertex : triangle)
+        if (vertex >= part.vertices)
+          throw Error(fmt::format("'{}' is damaged: triangle {} names vertex {} of {}", path_, i,
+                                  vertex, part.vertices));
+      batch.add(triangle);
+    }
+    batch.flush();
+  }
+}
+
+}  // namespace isobrick

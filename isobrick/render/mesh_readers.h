@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "isobrick/io/mapped_file.h"
+#include "isobrick/render/mesh_file.h"
+
+namespace isobrick {
+
+// One a format; `path` is for messages. Each throws Error for a file that is damaged
+// or has what is not read.
+std::unique_ptr<MeshFile> read_ply(const std::string& path, std::shared_ptr<MappedFile> file);
+std::unique_ptr<MeshFile> read_stl(const std::string& path, std::shared_ptr<MappedFile> file);
+std::unique_ptr<MeshFile> read_glb(const std::string& path, std::shared_ptr<MappedFile> file);
+std::unique_ptr<MeshFile> read_obj(const std::string& path, std::shared_ptr<MappedFile> file);
+
+}  // namespace isobrick

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "isobrick/core/vec.h"
+
+namespace isobrick {
+
+/// How PreviewSink draws.
+struct PreviewOptions {
+  int width = 1280, height = 960;      ///< pixels, 16 … 16384
+  Vec3f colour{0.87f, 0.80f, 0.70f};   ///< of the surface, sRGB in [0, 1]
+  Vec3d towards_eye{0.55, -1.0, 0.5};  ///< from the volume's centre, world space
+  Vec3d up{0, 0, 1};
+};
+
+}  // namespace isobrick

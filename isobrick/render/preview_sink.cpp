@@ -1,0 +1,94 @@
+#include "isobrick/render/preview_sink.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
+#include "isobrick/io/png_file.h"
+#include "isobrick/render/camera_request.h"
+#include "isobrick/render/vectors.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kLeast = 16, kMost = 16384;
+constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that are drawn at once
+
+const PreviewOptions& checked(const PreviewOptions& options) {
+  for (const int edge : {options.width, options.height})
+    if (edge < kLeast || edge > kMost)
+      throw UsageError(fmt::format("a picture of {}x{} pixels: each edge must be {} to {}",
+                                   options.width, options.height, kLeast, kMost));
+  return options;
+}
+
+/// The context belongs to the thread of the call at hand.
+class Current {
+ public:
+  explicit Current(GlContext& context) : context_(context) { context_.make_current(); }
+  ~Current() { context_.release_current(); }
+  Current(const Current&) = delete;
+  Current& operator=(const Current&) = delete;
+
+ private:
+  GlContext& context_;
+};
+
+}  // namespace
+
+PreviewSink::PreviewSink(std::string path, bool force, const PreviewOptions& options)
+    : options_(checked(options)), out_(std::move(path), force) {
+  context_.release_current();
+}
+
+PreviewSink::~PreviewSink() {
+  const Current current(context_);
+  renderer_.reset();
+}
+
+std::uint64_t PreviewSink::memory(const PreviewOptions& options) {
+  // The batch, also on the way to the device, and the pixels on the way to the file.
+  constexpr std::uint64_t batch = 2 * kBatch * (sizeof(Triangle) + 2 * 2 * sizeof(Vec3f));
+  const auto pixels =
+      static_cast<std::uint64_t>(options.width) * static_cast<std::uint64_t>(options.height);
+  return Renderer::memory(options.width, options.height, {}, false) + pixels * (4 + 3 + 4) + batch;
+}
+
+void PreviewSink::begin(const MeshHeader& header) {
+  const Current current(context_);
+  renderer_.emplace();
+  const CameraRequest request{.up = options_.up, .from = options_.towards_eye};
+  const double aspect = static_cast<double>(options_.width) / options_.height;
+  origin_ = (header.world_lo + header.world_hi) * 0.5;
+  renderer_->begin(make_camera(request, header.world_lo, header.world_hi, aspect), options_.width,
+                   options_.height, {});
+}
+
+void PreviewSink::write(const MeshChunk& chunk) {
+  // A batch has normals or has none.
+  const bool other_kind = !positions_.empty() && normals_.empty() != chunk.normals.empty();
+  if (other_kind || triangles_.size() + chunk.triangles.size() > kBatch) draw_batch();
+  const auto first = static_cast<std::uint32_t>(positions_.size());
+  for (const Vec3f& p : chunk.positions) positions_.push_back(to_float(to_double(p) - origin_));
+  normals_.insert(normals_.end(), chunk.normals.begin(), chunk.normals.end());
+  for (const Triangle& t : chunk.triangles)
+    triangles_.push_back({t[0] + first, t[1] + first, t[2] + first});
+}
+
+void PreviewSink::draw_batch() {
+  if (triangles_.empty()) return;
+  const Current current(context_);
+  renderer_->draw({0, positions_, normals_, triangles_}, {.colour = options_.colour}, origin_);
+  positions_.clear();
+  normals_.clear();
+  triangles_.clear();
+}
+
+void PreviewSink::finish() {
+  draw_batch();
+  const Current current(context_);
+  renderer_->end();
+  write_png(out_, options_.width, options_.height, without_alpha(renderer_->read_pixels()));
+  renderer_.reset();
+}
+
+}  // namespace isobrick

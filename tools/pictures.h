@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "isobrick/render/preview_options.h"
+#include "isobrick/surface/mesh.h"
+
+// Pictures, or their refusal in a program that was built without OpenGL.
+namespace isobrick::tools {
+
+/// The sink behind --preview. Throws UsageError in a program without pictures.
+std::unique_ptr<MeshSink> open_preview(const std::string& path, bool force,
+                                       const PreviewOptions& options);
+
+/// What the sink takes of the memory while it draws. Throws as open_preview does.
+std::uint64_t preview_memory(const PreviewOptions& options);
+
+}  // namespace isobrick::tools
