@@ -76,8 +76,9 @@ float closed_within(ivec2 at, vec3 p, vec3 n, float turn, float pixels) {
     if (depth <= 0) continue;
     vec3 v = view_position(vec2(there) + 0.5, depth) - p;
     float vv = dot(v, v), vn = dot(v, n);
-    float near = max(1 - vv / radius2, 0.0);
-    sum += near * near * max(vn - 0.02 * radius, 0.0) * inversesqrt(vv + 1e-4 * radius2);
+    // What is far in front closes a deep hollow a little, too.
+    float near = 1 / (1 + vv / (1.5 * radius2));
+    sum += near * max(vn - 0.02 * radius, 0.0) * inversesqrt(vv + 1e-4 * radius2);
   }
   return sum * 2.6 / float(count);
 }
@@ -94,7 +95,7 @@ void main() {
   float shorter = min(viewport.x, viewport.y);
   float fine = closed_within(at, p, n, turn, max(0.018 * shorter, 4));
   float coarse = closed_within(at, p, n, turn + 1.2, max(0.085 * shorter, 12));
-  open = 1 / ((1 + 1.6 * fine) * (1 + 3.2 * coarse));
+  open = 1 / ((1 + 0.8 * fine) * (1 + 1.8 * coarse));
 }
 )";
 
