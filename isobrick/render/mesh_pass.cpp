@@ -39,13 +39,18 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) in uint number;
 out vec3 from_eye;
 centroid out vec3 world_normal;
-flat out uint look;
+// Fragments get the look from here and not from the buffer: Mesa's llvmpipe draws them
+// when the buffer may hold the next mesh's already.
+flat out vec4 outer_colour, inner_colour;
+flat out uvec2 mesh;  // id, has normals
 out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[8]; };
 
 void main() {
   from_eye = position + looks[number].offset.xyz;
   world_normal = normal;
-  look = number;
+  outer_colour = looks[number].colour;
+  inner_colour = looks[number].inside;
+  mesh = uvec2(looks[number].id.x, looks[number].offset.w > 0.5 ? 1 : 0);
   gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
   for (int i = 0; i < 8; ++i)
     gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
@@ -55,7 +60,8 @@ void main() {
 const char* const kFragment = R"(
 in vec3 from_eye;
 centroid in vec3 world_normal;
-flat in uint look;
+flat in vec4 outer_colour, inner_colour;
+flat in uvec2 mesh;
 
 struct Seen { vec3 position, normal, eye, light; };
 
@@ -70,7 +76,7 @@ Seen see() {
   if (dot(facet, s.eye) < 0) facet = -facet;
   s.normal = mat3(rotation) * world_normal;
   float size = dot(s.normal, s.normal);
-  if (looks[look].offset.w < 0.5 || !(size > 1e-12) || isinf(size))
+  if (mesh.y == 0u || !(size > 1e-12) || isinf(size))
     s.normal = facet;
   else
     s.normal *= inversesqrt(size);
@@ -79,7 +85,7 @@ Seen see() {
   float facing = dot(s.normal, s.eye);
   if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
   bool cut = counts.y > 0 && !gl_FrontFacing;
-  s.light = lit(s.normal, s.eye, cut ? looks[look].inside.rgb : looks[look].colour.rgb);
+  s.light = lit(s.normal, s.eye, cut ? inner_colour.rgb : outer_colour.rgb);
   return s;
 }
 )";
@@ -93,7 +99,7 @@ void main() {
   Seen s = see();
   colour = vec4(min(s.light, vec3(4)), 1);
   normal = s.normal.xy;
-  id = looks[look].id.x;
+  id = mesh.x;
 }
 )";
 
@@ -105,7 +111,7 @@ void main() {
   Seen s = see();
   // Slanting rays have a longer way through it.
   float facing = max(dot(s.normal, s.eye), 0.12);
-  float alpha = 1 - pow(1 - looks[look].colour.a, 1 / facing);
+  float alpha = 1 - pow(1 - outer_colour.a, 1 / facing);
   // What is near counts more; half floats hold these weights.
   float far = clamp((-s.position.z - depth_range.x) * depth_range.w, 0.0, 1.0);
   float weight = 64 * exp2(-12 * far);
@@ -139,10 +145,10 @@ MeshPass::MeshPass()
       positions_(make_stream_buffer()),
       normals_(make_stream_buffer()),
       triangles_(make_stream_buffer()) {
-  const std::string common = std::string(kFrameGlsl) + kLooks;
-  const std::string fragment = common + kLightGlsl + kFragment;
-  opaque_ = make_program(common + kVertex, fragment + kOpaque, "meshes");
-  transparent_ = make_program(common + kVertex, fragment + kTransparent, "transparent meshes");
+  const std::string frame = kFrameGlsl;
+  const std::string vertex = frame + kLooks + kVertex, fragment = frame + kLightGlsl + kFragment;
+  opaque_ = make_program(vertex, fragment + kOpaque, "meshes");
+  transparent_ = make_program(vertex, fragment + kTransparent, "transparent meshes");
   const unsigned array = vertices_.get();
   for (unsigned attribute : {0u, 1u}) {
     glEnableVertexArrayAttrib(array, attribute);

@@ -6,12 +6,6 @@
 
 namespace isobrick {
 
-inline double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-inline Vec3d cross(Vec3d a, Vec3d b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 inline double length(Vec3d v) { return std::sqrt(dot(v, v)); }
 
 /// v at unit length, or `otherwise` if it has none.

@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <thread>
+
+#include "isobrick/core/error.h"
+#include "isobrick/render/camera_request.h"
+#include "tests/io/temp_dir.h"
+#include "tests/meshes/test_meshes.h"
+#include "tests/render/pictures.h"
+
+namespace isobrick {
+namespace {
+
+std::size_t open_files() {
+  std::size_t count = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
+    ++count;
+  return count;
+}
+
+class Context : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!GlContext::available()) GTEST_SKIP() << "no OpenGL 4.5 without a window here";
+  }
+};
+
+TEST_F(Context, FiftyLeaveNothingOpen) {
+  const std::size_t before = open_files();
+  for (int i = 0; i < 50; ++i) {
+    const GlContext context;
+    EXPECT_FALSE(current_gl_device().renderer.empty());
+  }
+  EXPECT_LE(open_files(), before + 1);
+}
+
+TEST_F(Context, TwoLiveBesideEachOther) {
+  GlContext first;
+  { const GlContext second; }
+  first.make_current();
+  EXPECT_FALSE(current_gl_device().version.empty());
+}
+
+TEST_F(Context, MovesToAnotherThread) {
+  GlContext context;
+  context.release_current();
+  std::thread([&] {
+    context.make_current();
+    EXPECT_FALSE(current_gl_device().version.empty());
+    context.release_current();
+  }).join();
+}
+
+TEST_F(Context, SizesAndPlanesAreChecked) {
+  const GlContext context;
+  Renderer renderer;
+  EXPECT_THROW(renderer.begin({}, 0, 10, {}), UsageError);
+  EXPECT_THROW(renderer.begin({}, renderer.largest_edge() + 1, 10, {}), UsageError);
+  PictureSettings settings;
+  settings.planes.resize(7);
+  EXPECT_THROW(renderer.begin({}, 16, 16, settings), UsageError);
+}
+
+TEST_F(Context, APoolReusesItsRoom) {
+  const GlContext context;
+  MeshPool pool(4096);
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 20);
+  std::vector<PooledMesh> meshes;
+  for (int i = 0; i < 4; ++i) meshes.push_back(pool.add(ball.chunk()));
+  const std::uint64_t all = pool.bytes(), room = pool.capacity();
+  EXPECT_EQ(all, 4 * meshes[0].bytes());
+  for (int round = 0; round < 20; ++round) {
+    meshes[static_cast<std::size_t>(round % 4)].reset();
+    meshes[static_cast<std::size_t>(round % 4)] = pool.add(ball.chunk());
+  }
+  EXPECT_EQ(pool.bytes(), all);
+  EXPECT_EQ(pool.capacity(), room);
+  meshes.clear();
+  EXPECT_EQ(pool.bytes(), 0u);
+  TestMesh wrong = ball;
+  wrong.triangles[5][1] = 1 << 20;
+  EXPECT_THROW(pool.add(wrong.chunk()), Error);
+}
+
+TEST_F(Context, AMappedMeshIsDrawn) {
+  const GlContext context;
+  Renderer renderer;
+  MeshPool pool;
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 20);
+  const PooledMesh mesh = pool.reserve(static_cast<std::uint32_t>(ball.positions.size()),
+                                       static_cast<std::uint32_t>(ball.triangles.size()), true);
+  const MeshPool::Mapping mapping = MeshPool::map(mesh);
+  std::copy(ball.positions.begin(), ball.positions.end(), mapping.positions.begin());
+  std::copy(ball.normals.begin(), ball.normals.end(), mapping.normals.begin());
+  std::copy(ball.triangles.begin(), ball.triangles.end(), mapping.triangles.begin());
+  MeshPool::unmap(mesh);
+  renderer.begin(make_camera({}, {-1, -1, -1}, {1, 1, 1}, 1), 64, 64, {});
+  renderer.draw(mesh, {});
+  renderer.end();
+  EXPECT_TRUE(Pixels(renderer).surface(32, 32));
+}
+
+TEST(CameraText, Parts) {
+  const CameraRequest request =
+      parse_camera("azimuth=90,elevation=0,zoom=2,fov=40,orthographic,up=0:0:1");
+  const Camera camera = make_camera(request, {-1, -1, -1}, {1, 1, 1}, 1);
+  EXPECT_NEAR(camera.back.x, 1, 1e-12);
+  EXPECT_TRUE(camera.orthographic);
+  EXPECT_NEAR(camera.extent_at(1), 1 / 0.92, 1e-9);  // half of 2 / 0.92
+  const Camera placed =
+      make_camera(parse_camera("eye=5:0:0,target=0:1:0"), {-1, -1, -1}, {1, 1, 1}, 1);
+  EXPECT_EQ(placed.eye, (Vec3d{5, 0, 0}));
+  EXPECT_EQ(placed.target, (Vec3d{0, 1, 0}));
+}
+
+TEST(CameraText, NonsenseIsRefused) {
+  for (const char* text :
+       {"", "azimut=3", "azimuth", "azimuth=x", "zoom=0", "zoom=-1", "fov=180", "up=0:0:0",
+        "up=1:2", "eye=1:2:3,from=1:0:0", "elevation=91", "azimuth=30,", "azimuth=nan"})
+    message_of([&] { parse_camera(text); });
+}
+
+TEST(CameraMoves, OrbitKeepsDistanceAndAxes) {
+  Camera camera({0, -5, 1}, {0, 0, 0}, {0, 0, 1});
+  const double away = camera.distance();
+  for (int i = 0; i < 1000; ++i) camera.orbit(0.1, 0.07, {0, 0, 1});
+  EXPECT_NEAR(camera.distance(), away, 1e-9);
+  EXPECT_NEAR(dot(camera.up, camera.back), 0, 1e-12);
+  EXPECT_NEAR(dot(camera.right, camera.right), 1, 1e-12);
+  // A ray through where a point is seen meets it.
+  const Vec3d point{0.3, 0.2, -0.4}, seen = camera.project(point, 300, 200);
+  const WorldRay ray = camera.ray(seen.x, seen.y, 300, 200);
+  const Vec3d v = point - ray.origin;
+  EXPECT_NEAR(dot(v, v) - dot(v, ray.direction) * dot(v, ray.direction), 0, 1e-9);
+}
+
+}  // namespace
+}  // namespace isobrick

@@ -1,0 +1,212 @@
+#include "isobrick/render/mesh_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+
+#include "isobrick/meshes/glb_sink.h"
+#include "isobrick/meshes/obj_sink.h"
+#include "isobrick/meshes/ply_sink.h"
+#include "isobrick/meshes/stl_sink.h"
+#include "tests/io/temp_dir.h"
+#include "tests/meshes/test_meshes.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::uint32_t kRings = 20;
+
+void write(MeshSink& sink, bool normals = true) {
+  const TestMesh ball = make_ball({1, 2, 3}, 1, kRings);
+  sink.begin({normals, {0, 1, 2}, {2, 3, 4}});
+  sink.write(ball.chunk(0, normals));
+  sink.finish();
+}
+
+/// All corners of all triangles in the world, in the file's order.
+std::vector<Vec3d> corners_of(const std::string& path, Vec3d origin = {1, 2, 3}) {
+  std::vector<Vec3d> corners;
+  open_mesh_file(path)->read(origin, [&](const MeshChunk& chunk, Vec3d from) {
+    for (const Triangle& t : chunk.triangles)
+      for (const std::uint32_t i : t) {
+        const Vec3f p = chunk.positions[i];
+        corners.push_back(Vec3d{p.x, p.y, p.z} + from);
+      }
+  });
+  return corners;
+}
+
+void expect_ball(const std::string& path, bool normals, double tolerance) {
+  const TestMesh ball = make_ball({1, 2, 3}, 1, kRings);
+  const std::unique_ptr<MeshFile> file = open_mesh_file(path);
+  EXPECT_EQ(file->info().triangles, ball.triangles.size()) << path;
+  EXPECT_EQ(file->info().has_normals, normals) << path;
+  Vec3d lo, hi;
+  file->bounds(lo, hi);
+  EXPECT_NEAR(lo.z, 2, 1e-4);
+  EXPECT_NEAR(hi.z, 4, 1e-4);
+  const std::vector<Vec3d> corners = corners_of(path);
+  ASSERT_EQ(corners.size(), 3 * ball.triangles.size()) << path;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vec3f p = ball.positions[ball.triangles[i / 3][i % 3]];
+    EXPECT_NEAR(corners[i].x, p.x, tolerance) << path;
+    EXPECT_NEAR(corners[i].y, p.y, tolerance) << path;
+    EXPECT_NEAR(corners[i].z, p.z, tolerance) << path;
+  }
+}
+
+TEST(MeshFile, ReadsWhatTheSinksWrite) {
+  const TempDir dir;
+  {
+    PlySink ply(dir / "a.ply", false), plain(dir / "plain.ply", false);
+    write(ply);
+    write(plain, false);
+    GlbSink glb(dir / "a.glb", false), small(dir / "q.glb", false, GlbOptions{.quantize = true});
+    write(glb);
+    write(small);
+    ObjSink obj(dir / "a.obj", false, 1);
+    write(obj);
+  }
+  expect_ball(dir / "a.ply", true, 1e-6);
+  expect_ball(dir / "plain.ply", false, 1e-6);
+  expect_ball(dir / "a.glb", true, 1e-6);
+  expect_ball(dir / "q.glb", true, 2.1 / 65535);
+  expect_ball(dir / "a.obj", true, 1e-6);
+}
+
+TEST(MeshFile, ReadsStl) {
+  const TempDir dir;
+  const TestMesh ball = make_ball({1, 2, 3}, 1, kRings);
+  StlSink stl(dir / "a.stl", false);
+  write(stl);
+  EXPECT_EQ(open_mesh_file(dir / "a.stl")->info().triangles, ball.triangles.size());
+  EXPECT_EQ(corners_of(dir / "a.stl").size(), 3 * ball.triangles.size());
+}
+
+TEST(MeshFile, BigEndianPlyWithOtherProperties) {
+  const TempDir dir;
+  std::string text =
+      "ply\nformat binary_big_endian 1.0\nelement vertex 4\nproperty uchar mark\nproperty double "
+      "x\n"
+      "property double y\nproperty double z\nelement face 1\nproperty list uchar int "
+      "vertex_indices\nproperty uchar mark\nend_header\n";
+  const auto add = [&](auto value) {
+    char bytes[sizeof(value)];
+    std::memcpy(bytes, &value, sizeof(value));
+    for (std::size_t i = sizeof(value); i-- > 0;) text += bytes[i];
+  };
+  for (int i = 0; i < 4; ++i) {
+    text += 'm';
+    add(static_cast<double>(i & 1));
+    add(static_cast<double>(i / 2));
+    add(7.0);
+  }
+  text += '\x04';
+  for (const int i : {0, 1, 3, 2}) add(i);
+  text += 'm';
+  const std::vector<Vec3d> corners = corners_of(dir.write("a.ply", text));
+  ASSERT_EQ(corners.size(), 6u);  // a fan
+  EXPECT_EQ(corners[2], (Vec3d{1, 1, 7}));
+  EXPECT_EQ(corners[5], (Vec3d{0, 1, 7}));
+}
+
+/// Everything that reading takes: opening, bounds, triangles.
+void read_all(const std::string& path) {
+  const std::unique_ptr<MeshFile> file = open_mesh_file(path);
+  Vec3d lo, hi;
+  file->bounds(lo, hi);
+  file->read(lo, [](const MeshChunk&, Vec3d) {});
+}
+
+TEST(MeshFile, DamageIsSaid) {
+  const TempDir dir;
+  const std::string head = "ply\nformat binary_little_endian 1.0\n";
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
+  const std::string list = "property list uchar uint vertex_indices\nend_header\n";
+  const std::string zeros(36, '\0');
+  const std::vector<std::pair<std::string, std::string>> files{
+      {"no_end.ply", head + "element vertex 3\n" + xyz},
+      {"text.ply", "ply\nformat ascii 1.0\nend_header\n"},
+      {"many.ply",
+       head + "element vertex 18446744073709551615\n" + xyz + "element face 1\n" + list},
+      {"faces.ply", head + "element vertex 3\n" + xyz + "element face 4000000000\n" + list + zeros},
+      {"index.ply", head + "element vertex 3\n" + xyz + "element face 1\n" + list + zeros +
+                        std::string("\x03\x00\x00\x00\x00\x01\x00\x00\x00\x09\x00\x00\x00", 13)},
+      {"long.ply", head + "element vertex 3\n" + xyz + "element face 1\n" + list + zeros +
+                       std::string("\xff\x00\x00\x00\x00", 5)},
+      {"nan.ply", head + "element vertex 3\n" + xyz + "element face 0\n" + list +
+                      std::string("\x00\x00\xc0\x7f", 4) + std::string(32, '\0')},
+      {"none.ply", head + "element vertex 1\nproperty float x\nend_header\n" + zeros},
+      {"short.stl", std::string(20, 'a')},
+      {"count.stl", std::string(80, 'a') + std::string("\xff\xff\xff\xff", 4)},
+      {"text.stl", "solid a\nfacet normal 0 0 1\n" + std::string(100, ' ')},
+      {"number.obj", "v 1 2 x\n"},
+      {"index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"},
+      {"back.obj", "v 0 0 0\nf -1 -2 -3\n"},
+      {"zero.obj", "v 0 0 0\nf 0 1 1\n"},
+      {"short.glb", "glTF"},
+  };
+  for (const auto& [name, bytes] : files) {
+    const std::string path = dir.write(name, bytes);
+    const std::string message = message_of<Error>([&] { read_all(path); });
+    EXPECT_TRUE(contains(message, name)) << message;
+  }
+  message_of([&] { open_mesh_file(dir.write("a.txt", "hello")); });
+}
+
+std::string glb(const std::string& json, std::string binary) {
+  std::string scene = json;
+  scene.resize((scene.size() + 3) / 4 * 4, ' ');
+  std::string bytes = "glTF";
+  const auto add = [&](std::uint32_t word) {
+    bytes.append(reinterpret_cast<const char*>(&word), sizeof(word));
+  };
+  add(2);
+  add(static_cast<std::uint32_t>(28 + scene.size() + binary.size()));
+  add(static_cast<std::uint32_t>(scene.size()));
+  bytes += "JSON" + scene;
+  add(static_cast<std::uint32_t>(binary.size()));
+  return bytes + std::string("BIN\0", 4) + binary;
+}
+
+TEST(MeshFile, DamagedScenesAreSaid) {
+  const TempDir dir;
+  const std::string good =
+      R"({"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],)"
+      R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},{"bufferView":1,"componentType":5125,"count":3,"type":"SCALAR"}],)"
+      R"("bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12}],"buffers":[{"byteLength":48}]})";
+  const std::string binary(48, '\0');
+  read_all(dir.write("good.glb", glb(good, binary)));
+  const std::vector<std::pair<std::string, std::string>> changes{
+      {R"("count":3,"type":"VEC3")", R"("count":4,"type":"VEC3")"},
+      {R"("count":3,"type":"VEC3")", R"("count":18446744073709551615,"type":"VEC3")"},
+      {R"("count":3,"type":"VEC3")", R"("count":-1,"type":"VEC3")"},
+      {R"("byteOffset":36)", R"("byteOffset":18446744073709551600)"},
+      {R"("byteOffset":36)", R"("byteOffset":40)"},
+      {R"("nodes":[{"mesh":0}])", R"("nodes":[{"children":[0]}])"},
+      {R"("nodes":[{"mesh":0}])", R"("nodes":[{"mesh":5}])"},
+      {R"("nodes":[{"mesh":0}])", R"("nodes":[{"mesh":0,"scale":[1,1]}])"},
+      {R"("buffers":[{"byteLength":48}])", R"("buffers":[{"byteLength":48,"uri":"../x.bin"}])"},
+      {R"("buffers":[{"byteLength":48}])", R"("buffers":[{"byteLength":48,"uri":"gone.bin"}])"},
+      {R"("componentType":5125)", R"("componentType":5126)"},
+      {R"("componentType":5125)", R"("componentType":7)"},
+      {R"("indices":1)", R"("indices":1,"mode":5)"},
+      {R"("type":"VEC3")", R"("type":"VEC2")"},
+      {R"("scenes")", R"("extensionsRequired":["EXT_x"],"scenes")"},
+      {R"("scenes")", R"("scenes)"},
+  };
+  for (const auto& [from, to] : changes) {
+    std::string json = good;
+    json.replace(json.find(from), from.size(), to);
+    const std::string path = dir.write("bad.glb", glb(json, binary));
+    EXPECT_FALSE(message_of<Error>([&] { read_all(path); }).empty()) << to;
+  }
+  std::string far = binary;
+  far[44] = 9;
+  message_of<Error>([&] { read_all(dir.write("far.glb", glb(good, far))); });
+}
+
+}  // namespace
+}  // namespace isobrick
