@@ -8,6 +8,7 @@
 
 #include "tools/format.h"
 #include "tools/options.h"
+#include "tools/parse.h"
 #include "tools/store_region.h"
 
 namespace isobrick::tools {
@@ -17,6 +18,7 @@ struct Arguments {
   std::string store, out;
   std::optional<ExportFormat> format;  ///< nothing: by the name
   std::optional<RoiText> roi;
+  std::optional<int> half_band;
   Selection selection;
   ExportOptions options;
 };
@@ -40,22 +42,32 @@ int run(const Arguments& arguments, Console& console) {
   const Box3 box = store_region(store, options.level, arguments.roi);
   options.roi = box;
   options.format = arguments.format.value_or(format_by_name(arguments.out));
+  if (arguments.half_band && !options.isovalue)
+    throw UsageError("--half-band is the width of a level set: say its --isovalue, too");
+  options.half_band = arguments.half_band.value_or(options.half_band);
   export_volume(store, arguments.out, options, console.progress());
   const std::uint64_t bytes = std::filesystem::file_size(arguments.out);
   const ScalarType type = store.info().type;
-  const nlohmann::ordered_json object{{"command", "export"},
-                                      {"store", arguments.store},
-                                      {"output", arguments.out},
-                                      {"format", name_of(options.format)},
-                                      {"level", options.level},
-                                      {"extent", to_json(box.extent())},
-                                      {"type", zarr_name(type)},
-                                      {"bytes_out", bytes},
-                                      {"peak_resident_bytes", peak_resident_bytes()}};
-  console.result(object, fmt::format("{}: {} samples of {}{}, {}\n", arguments.out,
-                                     human_extent(box.extent()), zarr_name(type),
-                                     options.format == ExportFormat::vdb ? "" : ", little endian",
-                                     human_bytes(bytes)));
+  nlohmann::ordered_json object{{"command", "export"},
+                                {"store", arguments.store},
+                                {"output", arguments.out},
+                                {"format", name_of(options.format)},
+                                {"level", options.level},
+                                {"extent", to_json(box.extent())},
+                                {"type", zarr_name(type)},
+                                {"bytes_out", bytes},
+                                {"peak_resident_bytes", peak_resident_bytes()}};
+  if (options.isovalue) {
+    object["isovalue"] = *options.isovalue;
+    object["half_band"] = options.half_band;
+  }
+  const std::string what =
+      options.isovalue
+          ? fmt::format("level set of isovalue {} over {} samples", *options.isovalue,
+                        human_extent(box.extent()))
+          : fmt::format("{} samples of {}{}", human_extent(box.extent()), zarr_name(type),
+                        options.format == ExportFormat::vdb ? "" : ", little endian");
+  console.result(object, fmt::format("{}: {}, {}\n", arguments.out, what, human_bytes(bytes)));
   return 0;
 }
 
@@ -69,9 +81,11 @@ ExportFormat parse_format(const std::string& text) {
 
 void add_export(Program& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* app =
-      add_subcommand(program, "export", "Write the samples of a store as a file, value for value.",
-                     "isobrick export head.zarr jaw.nrrd --roi :,:,0:40");
+  CLI::App* app = add_subcommand(
+      program, "export",
+      "Write the samples of a store as a file, or its isosurface as an OpenVDB level set.",
+      "isobrick export head.zarr jaw.nrrd --roi :,:,0:40\n"
+      "  isobrick export head.zarr skull.vdb --isovalue 700");
   add_path(app, "STORE", arguments->store, "Store to read");
   add_path(app, "OUT", arguments->out,
            "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb, raw otherwise (C order "
@@ -81,6 +95,13 @@ void add_export(Program& program) {
              {"--format", "raw|nrrd|vdb",
               "Format of the file; NRRD and OpenVDB keep spacing, origin and direction",
               "by its extension"});
+  add_parsed(app, arguments->options.isovalue, parse_number,
+             {"--isovalue", "V",
+              "OpenVDB only: write a level set of this isosurface, negative where samples are at "
+              "least V, in place of the samples"});
+  add_parsed(app, arguments->half_band,
+             [](const std::string& text) { return parse_int(text, 1, kWidestHalfBand); },
+             {"--half-band", "N", "Voxels with distances on either side of a level set", "3"});
   add_level(app, arguments->options.level);
   add_roi(app, arguments->roi);
   add_selection(app, arguments->selection);

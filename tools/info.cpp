@@ -152,6 +152,7 @@ ordered_json json_of(const StoreInfo& info, const Facts& facts) {
                       {"codec", info.codec},
                       {"fill_value", info.fill_value},
                       {"grid_class", info.grid_class},
+                      {"grid_name", info.grid_name},
                       {"levels", levels_json(info, facts)},
                       {"bytes", facts.bytes},
                       {"raw_bytes", facts.raw_bytes},
@@ -201,6 +202,7 @@ std::string text_of(const StoreInfo& info, const Facts& facts) {
   text += fmt::format("spacing      {:g} x {:g} x {:g} {}\n", spacing.x, spacing.y, spacing.z,
                       transform.unit.empty() ? "(no unit)" : transform.unit);
   text += fmt::format("origin       {:g}, {:g}, {:g}\n", origin.x, origin.y, origin.z);
+  if (!info.grid_name.empty()) text += fmt::format("grid         {}\n", info.grid_name);
   if (!info.grid_class.empty()) text += fmt::format("grid class   {}\n", info.grid_class);
   text += levels_text(info, facts);
   text += fmt::format("codec        {}\n", info.codec);

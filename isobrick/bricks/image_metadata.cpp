@@ -133,6 +133,7 @@ void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
         kStoreVersion));
   if (ours.has("may_have_nan")) image.may_have_nan = ours.at("may_have_nan").boolean();
   if (ours.has("grid_class")) image.grid_class = ours.string_at("grid_class");
+  if (ours.has("grid_name")) image.grid_name = ours.string_at("grid_name");
   if (ours.has("direction")) {
     const CheckedJson direction = ours.at("direction");
     if (direction.array_size() != 9) direction.damaged("must have 9 numbers");
@@ -187,6 +188,7 @@ std::string to_json(const ImageMetadata& image) {
   ours["version"] = kStoreVersion;
   if (!finest.axis_aligned()) ours["direction"] = finest.direction;
   if (!image.grid_class.empty()) ours["grid_class"] = image.grid_class;
+  if (!image.grid_name.empty()) ours["grid_name"] = image.grid_name;
   if (image.may_have_nan) ours["may_have_nan"] = *image.may_have_nan;
   if (image.checksum) ours[kChecksumKey] = *image.checksum;
 

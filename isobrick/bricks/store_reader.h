@@ -43,6 +43,7 @@ struct StoreInfo {
   ScalarType type = ScalarType::u8;
   double fill_value = 0;   ///< of absent bricks; exact for every type
   std::string grid_class;  ///< of the OpenVDB grid that it came from ("level set"), or empty
+  std::string grid_name;   ///< of that grid, or empty
   std::string codec;       ///< "zstd:3" or "none"
   /// Whether level 0 may hold NaN (always false for integers).
   bool may_have_nan = false;

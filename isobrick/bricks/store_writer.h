@@ -22,6 +22,7 @@ struct StoreLayout {
   bool may_have_nan = false;
   std::string name;
   std::string grid_class;  ///< as OpenVDB calls it, or empty
+  std::string grid_name;   ///< of the OpenVDB grid, or empty
 };
 
 /// Writes a store into a directory: bricks into shard files under temporary

@@ -61,6 +61,7 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
   layout.zstd_level = options.zstd_level;
   layout.fill_value = volume.fill_value;
   layout.grid_class = volume.grid_class;
+  layout.grid_name = volume.grid_name;
   layout.name = std::filesystem::path(volume.name).filename().string();
   const Index shard = options.shard / options.brick * options.brick;
   LevelInfo level;

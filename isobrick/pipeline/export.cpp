@@ -8,6 +8,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_file.h"
+#include "isobrick/pipeline/export_level_set.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
@@ -105,7 +106,8 @@ void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& op
   VolumeInfo grid_info = info;
   grid_info.fill_value = in.store.info().fill_value;
   grid_info.grid_class = in.store.info().grid_class;
-  const auto grid = make_vdb_writer_if_built(grid_info, "density");
+  const std::string& name = in.store.info().grid_name;
+  const auto grid = make_vdb_writer_if_built(grid_info, name.empty() ? "density" : name);
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
   const std::uint64_t others =
       fixed_bytes(in.store.info(), in.level, workers.threads()) + lattice.brick_bytes();
@@ -128,6 +130,8 @@ void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& op
 
 void export_volume(const StoreReader& store, const std::filesystem::path& out,
                    const ExportOptions& options, Progress& progress) {
+  if (options.isovalue && options.format != ExportFormat::vdb)
+    throw UsageError("a level set can only be written as an OpenVDB file");
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   const Lattice& lattice = level.lattice;
@@ -135,6 +139,12 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   const Int3 piece = piece_within(lattice, box.extent(), options.memory,
                                   fixed_bytes(store.info(), options.level, workers.threads()));
   OutputFile output(out.string(), options.force);
+  if (options.isovalue) {
+    export_level_set(store, box, describe(level, box, out.string()), options,
+                     output.temporary_path(), progress);
+    output.publish();
+    return;
+  }
   if (options.format == ExportFormat::vdb) {
     progress.begin("export",
                    static_cast<std::uint64_t>(volume(box.extent())) * lattice.sample_bytes());

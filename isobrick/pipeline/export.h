@@ -12,8 +12,14 @@ namespace isobrick {
 /// The files that samples can become.
 enum class ExportFormat : std::uint8_t { raw, nrrd, vdb };
 
+/// Wider bands of a level set are of no use.
+inline constexpr int kWidestHalfBand = 100;
+
 struct ExportOptions {
   ExportFormat format = ExportFormat::raw;
+  /// Of OpenVDB: a level set of this isosurface in place of the samples.
+  std::optional<double> isovalue;
+  int half_band = 3;  ///< voxels with distances on either side of that, 1 … kWidestHalfBand
   int level = 0;
   std::optional<Box3> roi;  ///< samples of that level; nothing: all
   bool force = false;       ///< replace a file that exists, once the new one is whole
@@ -24,7 +30,7 @@ struct ExportOptions {
 /// Writes the samples of one level (or of a region) bit for bit, C order [z, y, x],
 /// little endian; as NRRD behind a header that keeps their place in world space.
 /// As OpenVDB: a sparse grid with the same samples and place; smaller integers
-/// become int32, u32 becomes int64.
+/// become int32, u32 becomes int64. With an isovalue a level set (export_level_set.h).
 /// Memory: one row of bricks at a time, within the budget; for OpenVDB also the
 /// grid, which must be whole before it can be written: its samples that are not
 /// the fill value, or a UsageError once they exceed the budget. Nothing appears under

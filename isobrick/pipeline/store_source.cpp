@@ -22,6 +22,7 @@ class StoreSource final : public VolumeSource {
         describe_volume(path, finest.lattice.extent, finest.lattice.type, finest.transform, said);
     info_.fill_value = store_.info().fill_value;
     info_.grid_class = store_.info().grid_class;
+    info_.grid_name = store_.info().grid_name;
   }
 
   const VolumeInfo& info() const override { return info_; }

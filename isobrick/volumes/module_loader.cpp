@@ -34,8 +34,8 @@ const Module& load(std::string_view name, std::string_view format) {
   for (const fs::path& folder : folders()) {
     const fs::path path = folder / file;
     if (!fs::exists(path, ignored)) continue;
-    // It stays until the program ends.
-    void* library = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+    // It stays until the program ends. Lazily: few of its libraries' functions are called.
+    void* library = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
     if (library == nullptr) throw Error(fmt::format("cannot load {}: {}", file, ::dlerror()));
     using Get = const Module* (*)();
     const auto get = reinterpret_cast<Get>(::dlsym(library, "isobrick_module"));

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "isobrick/volumes/vdb_level_set.h"
 #include "isobrick/volumes/vdb_writer.h"
 #include "isobrick/volumes/volume_request.h"
 
@@ -34,6 +35,8 @@ struct VdbModule {
   const char* version;
   std::unique_ptr<VolumeSource> (*open)(const std::string& file, const VolumeRequest& said);
   std::unique_ptr<VdbWriter> (*make_writer)(const VolumeInfo& info, const std::string& name);
+  std::unique_ptr<VdbLevelSet> (*make_level_set)(const VolumeInfo& info, const std::string& name,
+                                                 int half_band, int threads);
 };
 
 // Each is loaded once. They throw Error when a module is not where it belongs or is

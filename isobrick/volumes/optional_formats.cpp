@@ -4,6 +4,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/volumes/module_loader.h"
+#include "isobrick/volumes/vdb_level_set.h"
 #include "isobrick/volumes/vdb_writer.h"
 #ifdef ISOBRICK_WITH_EXPAT
 #include "isobrick/volumes/vti_volume.h"
@@ -20,6 +21,12 @@ namespace {
   throw UsageError(
       fmt::format("'{}' is {}, which this isobrick cannot read: it was built without {}", name,
                   format, library));
+}
+
+[[noreturn, maybe_unused]] void cannot_write_vdb() {
+  throw UsageError(
+      "this isobrick cannot write OpenVDB files: it was built without "
+      "libopenvdb-dev and libboost-dev");
 }
 
 }  // namespace
@@ -68,9 +75,18 @@ std::unique_ptr<VdbWriter> make_vdb_writer_if_built([[maybe_unused]] const Volum
 #ifdef ISOBRICK_WITH_OPENVDB
   return vdb_module().make_writer(info, name);
 #else
-  throw UsageError(
-      "this isobrick cannot write OpenVDB files: it was built without "
-      "libopenvdb-dev and libboost-dev");
+  cannot_write_vdb();
+#endif
+}
+
+std::unique_ptr<VdbLevelSet> make_vdb_level_set_if_built([[maybe_unused]] const VolumeInfo& info,
+                                                         [[maybe_unused]] const std::string& name,
+                                                         [[maybe_unused]] int half_band,
+                                                         [[maybe_unused]] int threads) {
+#ifdef ISOBRICK_WITH_OPENVDB
+  return vdb_module().make_level_set(info, name, half_band, threads);
+#else
+  cannot_write_vdb();
 #endif
 }
 

@@ -12,6 +12,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/volumes/text_header.h"
 #include "isobrick/volumes/vdb_archive.h"
+#include "isobrick/volumes/vdb_grid.h"
 #include "isobrick/volumes/vdb_header.h"
 #include "isobrick/volumes/vdb_tree.h"
 
@@ -117,10 +118,13 @@ struct Opening {
 template <class Out, class Tree>
 std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::ConstPtr tree) {
   const Box3 box = region_of(in.grid, in.path, *in.read, in.said.region);
-  VolumeInfo info = describe_volume(in.path, box.extent(), scalar_type_of<Out>,
-                                    transform_of(in.path, in.read->transform(), box.lo), in.said);
+  Transform transform = transform_of(in.path, in.read->transform(), box.lo);
+  if (const auto unit = in.read->template getMetadata<openvdb::StringMetadata>(kVdbUnit))
+    transform.unit = unit->value();
+  VolumeInfo info = describe_volume(in.path, box.extent(), scalar_type_of<Out>, transform, in.said);
   info.fill_value = static_cast<double>(tree->background());
   info.grid_class = in.grid.grid_class;
+  info.grid_name = in.read->getName();
   return std::make_unique<VdbSource<Tree, Out>>(std::move(info), std::move(tree), box.lo);
 }
 

@@ -1,14 +1,12 @@
 #include "isobrick/volumes/vdb_writer.h"
 
-#include <fmt/format.h>
 #include <openvdb/openvdb.h>
 
 #include <cstdint>
-#include <cstring>
 #include <type_traits>
-#include <utility>
 
-#include "isobrick/core/error.h"
+#include "isobrick/volumes/vdb_grid.h"
+#include "isobrick/volumes/vdb_tree.h"
 
 namespace isobrick {
 namespace {
@@ -16,29 +14,17 @@ namespace {
 /// Edge of OpenVDB's leaves.
 constexpr int kLeaf = 8;
 
-openvdb::math::Transform::Ptr grid_transform(const Transform& t) {
-  openvdb::Mat4d m = openvdb::Mat4d::identity();
-  for (int axis = 0; axis < 3; ++axis)
-    for (int row = 0; row < 3; ++row)
-      m(axis, row) = t.direction[static_cast<std::size_t>(3 * row + axis)] * t.spacing[axis];
-  for (int row = 0; row < 3; ++row) m(3, row) = t.origin[row];
-  return openvdb::math::Transform::createLinearTransform(m);
-}
-
 template <class Sample, class Grid>
 class TypedVdbWriter final : public VdbWriter {
  public:
   TypedVdbWriter(const VolumeInfo& info, const std::string& name)
-      : extent_(info.extent), grid_(Grid::create(static_cast<Value>(info.fill_value))) {
-    grid_->setName(name);
-    grid_->setTransform(grid_transform(info.transform));
+      : grid_(Grid::create(static_cast<Value>(info.fill_value))), counted_(grid_->tree()) {
+    describe_vdb_grid(*grid_, info, name);
     grid_->setGridClass(info.grid_class.empty()
                             ? openvdb::GRID_FOG_VOLUME
                             : openvdb::GridBase::stringToGridClass(info.grid_class));
-    if (!info.transform.unit.empty())
-      grid_->insertMeta("unit", openvdb::StringMetadata(info.transform.unit));
     activate({0, 0, 0});
-    activate(extent_ - Int3{1, 1, 1});
+    activate(info.extent - Int3{1, 1, 1});
   }
 
   void put(Box3 box, const std::byte* samples) override {
@@ -48,37 +34,16 @@ class TypedVdbWriter final : public VdbWriter {
     });
   }
 
-  std::uint64_t memory() const override { return bytes_; }
+  std::uint64_t memory() const override { return counted_.bytes(); }
 
-  void write(const std::string& path) override {
-    try {
-      openvdb::io::File file(path);
-      file.write({grid_});
-    } catch (const std::exception& error) {
-      throw Error(fmt::format("cannot write '{}': {}", path, error.what()));
-    }
-  }
+  void write(const std::string& path) override { write_vdb_grid(path, grid_); }
 
  private:
   using Value = typename Grid::ValueType;
-  using Tree = typename Grid::TreeType;
-  using Leaf = typename Tree::LeafNodeType;
 
-  static openvdb::Coord coordinate(Int3 p) {
-    return {static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z)};
-  }
-  static bool same(Value a, Value b) { return std::memcmp(&a, &b, sizeof(Value)) == 0; }
-
-  void activate(Int3 p) { grid_->tree().setActiveState(coordinate(p), true); }
-
-  /// The leaf there; new nodes are counted, which is quicker than to ask the tree.
-  Leaf* touch_leaf(const openvdb::Coord& at) {
-    using Parent = typename Tree::RootNodeType::ChildNodeType::ChildNodeType;
-    Tree& tree = grid_->tree();
-    if (Leaf* leaf = tree.probeLeaf(at)) return leaf;
-    bytes_ += sizeof(Leaf) + Leaf::SIZE * sizeof(Value);
-    if (tree.template probeConstNode<Parent>(at) == nullptr) bytes_ += sizeof(Parent);
-    return tree.touchLeaf(at);
+  void activate(Int3 p) {
+    const openvdb::Coord at = vdb_coordinate(p);
+    counted_.touch_leaf(at)->setActiveState(at, true);
   }
 
   /// What `box` has of the 8³ voxels from `corner` on.
@@ -92,24 +57,23 @@ class TypedVdbWriter final : public VdbWriter {
     bool constant = true, background_only = true;
     for_each_point(part, [&](Int3 p) {
       const Value value = value_at(p);
-      constant = constant && same(value, first);
-      background_only = background_only && same(value, background);
+      constant = constant && same_bits(value, first);
+      background_only = background_only && same_bits(value, background);
     });
     if (background_only) return;
-    Tree& tree = grid_->tree();
+    const openvdb::Coord at = vdb_coordinate(corner);
     if (constant && volume(part.extent()) == kLeaf * kLeaf * kLeaf &&
-        tree.probeLeaf(coordinate(corner)) == nullptr)
-      return tree.addTile(1, coordinate(corner), first, true);
-    Leaf* leaf = touch_leaf(coordinate(corner));
+        counted_.probe_leaf(at) == nullptr)
+      return counted_.add_tile(at, first, true);
+    auto* leaf = counted_.touch_leaf(at);
     for_each_point(part, [&](Int3 p) {
       const Value value = value_at(p);
-      if (!same(value, background)) leaf->setValueOn(coordinate(p), value);
+      if (!same_bits(value, background)) leaf->setValueOn(vdb_coordinate(p), value);
     });
   }
 
-  Int3 extent_;
   typename Grid::Ptr grid_;
-  std::uint64_t bytes_ = 0;
+  CountedTree<typename Grid::TreeType> counted_;
 };
 
 }  // namespace

@@ -17,6 +17,7 @@ struct VolumeInfo {
   std::string name;        ///< for messages and metadata: the path, "standard input", "gyroid"
   double fill_value = 0;   ///< what absent bricks hold: the value of empty space
   std::string grid_class;  ///< what OpenVDB calls it: "level set", "fog volume", …; or empty
+  std::string grid_name;   ///< of the OpenVDB grid that it is, or empty
 };
 
 /// A volume that can be read piece by piece. Never holds the whole of it.

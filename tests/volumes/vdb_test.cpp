@@ -151,6 +151,7 @@ TEST_F(Vdb, WritesWhatItReads) {
     info.transform.spacing = {0.5, 2, 3};
     info.transform.origin = {1, -2, 3};
     info.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+    info.transform.unit = "millimeter";
     info.grid_class = "unknown";
     const auto value = [&](Int3 p) {
       if (p.x >= 8 && p.x < 24 && p.y < 16 && p.z < 8) return static_cast<T>(7);
@@ -169,6 +170,8 @@ TEST_F(Vdb, WritesWhatItReads) {
     const auto source = open_source(dir / "out.vdb", {});
     EXPECT_EQ(source->info().extent, info.extent);
     EXPECT_EQ(source->info().grid_class, "unknown");
+    EXPECT_EQ(source->info().grid_name, "density");
+    EXPECT_EQ(source->info().transform.unit, "millimeter");
     EXPECT_EQ(source->info().fill_value, info.fill_value);
     for (const Vec3d p : {Vec3d{0, 0, 0}, Vec3d{1, 0, 0}, Vec3d{0, 10, 20}}) {
       const Vec3d a = source->info().transform.apply(p), b = info.transform.apply(p);
@@ -194,6 +197,24 @@ TEST_F(Vdb, WritesWhatItReads) {
   EXPECT_EQ(round_trip(std::uint8_t{0}), ScalarType::i32);
   EXPECT_EQ(round_trip(std::int16_t{3}), ScalarType::i32);
   round_trip(std::uint32_t{9});
+}
+
+TEST_F(Vdb, CountsTheNodesThatItMakes) {
+  VolumeInfo info;
+  info.extent = {5000, 16, 16};  // two of the largest nodes
+  info.type = ScalarType::f32;
+  const auto writer = make_vdb_writer_if_built(info, "v");
+  const std::uint64_t before = writer->memory();
+  EXPECT_GT(before, 2 * 32 * 32 * 32 * sizeof(void*));
+  const std::vector<float> ones(512, 1);
+  const auto put = [&](Index x) {
+    writer->put({{x, 0, 0}, {x + 8, 8, 8}}, reinterpret_cast<const std::byte*>(ones.data()));
+  };
+  put(2048);  // a constant leaf is a tile, which needs the node that it is in
+  const std::uint64_t tile = writer->memory();
+  EXPECT_GE(tile - before, 16 * 16 * 16 * sizeof(void*));
+  put(2056);
+  EXPECT_EQ(writer->memory(), tile);
 }
 
 TEST_F(Vdb, DamagedFiles) {

@@ -1,0 +1,149 @@
+#include "isobrick/pipeline/export_level_set.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/core/threshold.h"
+#include "isobrick/pipeline/extract.h"
+#include "isobrick/pipeline/slab_reader.h"
+#include "isobrick/pipeline/workers.h"
+#include "isobrick/volumes/vdb_level_set.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+/// The extraction is not much faster with more.
+constexpr std::uint64_t kExtractBytes = 256 * kMiB;
+
+/// Throws when the grid has outgrown its part of the budget.
+class Room {
+ public:
+  Room(std::uint64_t budget, std::uint64_t other) : budget_(budget), other_(other) {}
+  void check(const VdbLevelSet& set) const {
+    if (other_ + set.memory() > budget_)
+      throw UsageError(
+          fmt::format("the level set takes more than the memory budget of {} MiB leaves ({} MiB), "
+                      "and OpenVDB holds it whole: give more, or export a region or a coarser "
+                      "level",
+                      budget_ / kMiB, (budget_ - std::min(budget_, other_)) / kMiB));
+  }
+
+ private:
+  std::uint64_t budget_, other_;
+};
+
+/// Measures distances from the triangles of a mesh.
+class DistanceSink final : public MeshSink {
+ public:
+  DistanceSink(VdbLevelSet& set, const Room& room) : set_(set), room_(room) {}
+
+  Indexing indexing() const override { return Indexing::chunk_local; }
+  void begin(const MeshHeader&) override {}
+  void write(const MeshChunk& chunk) override {
+    set_.add(chunk.positions, chunk.triangles);
+    room_.check(set_);
+  }
+  void finish() override {}
+  std::uint64_t bytes() const override { return 0; }
+
+ private:
+  VdbLevelSet& set_;
+  const Room& room_;
+};
+
+/// Says which samples are inside, brick by brick; only bricks of both kinds are read.
+class Signs {
+ public:
+  Signs(const StoreReader& store, Box3 box, const ExportOptions& options, VdbLevelSet& set)
+      : store_(store),
+        level_(options.level),
+        lattice_(store.info().levels[static_cast<std::size_t>(options.level)].lattice),
+        box_(box),
+        isovalue_(*options.isovalue),
+        set_(set),
+        samples_(lattice_.brick_bytes()),
+        inside_(static_cast<std::size_t>(volume(lattice_.brick))) {}
+
+  /// The bricks of `bricks` that the box touches, whose ranges are read together.
+  void put(Box3 bricks, Workers& workers) {
+    const RangeTable ranges = store_.brick_ranges(level_, bricks);
+    for_each_point(bricks, [&](Int3 b) {
+      const ValueRange<double>& range = ranges.at(b);
+      if (range.empty() || range.hi < isovalue_) return;
+      const Box3 part = intersect(lattice_.brick_box(b), box_);
+      const Box3 out{part.lo - box_.lo, part.hi - box_.lo};
+      // Ranges say nothing of samples that are no numbers; those are outside.
+      if (range.lo >= isovalue_ && !store_.info().may_have_nan) return set_.put_all_inside(out);
+      workers.execute([&] { read_slab(store_, level_, part, samples_.data()); });
+      compare(static_cast<std::size_t>(volume(part.extent())));
+      set_.put_inside(out, inside_.data());
+    });
+  }
+
+ private:
+  void compare(std::size_t count) {
+    visit_scalar(lattice_.type, [&](auto tag) {
+      using T = typename decltype(tag)::type;
+      const Threshold<T> least(isovalue_);
+      const T* samples = reinterpret_cast<const T*>(samples_.data());
+      for (std::size_t i = 0; i < count; ++i)
+        inside_[i] = !least.none && samples[i] >= least.value ? 1 : 0;
+    });
+  }
+
+  const StoreReader& store_;
+  int level_;
+  Lattice lattice_;
+  Box3 box_;
+  double isovalue_;
+  VdbLevelSet& set_;
+  std::vector<std::byte> samples_;
+  std::vector<std::uint8_t> inside_;
+};
+
+}  // namespace
+
+void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info,
+                      const ExportOptions& options, const std::string& path, Progress& progress) {
+  if (options.half_band < 1 || options.half_band > kWidestHalfBand)
+    throw UsageError(fmt::format("a band of {} samples on either side: 1 to {} are possible",
+                                 options.half_band, kWidestHalfBand));
+  const std::uint64_t for_extraction = std::min(options.memory / 2, kExtractBytes);
+  const auto set = make_vdb_level_set_if_built(info, "surface", options.half_band, options.threads);
+  const Room room(options.memory, for_extraction);
+  DistanceSink sink(*set, room);
+  ExtractOptions extraction;
+  extraction.isovalue = *options.isovalue;
+  extraction.level = options.level;
+  extraction.roi = box;
+  extraction.memory = for_extraction;
+  extraction.threads = options.threads;
+  extraction.backend = Backend::cpu;
+  extract(store, extraction, sink, progress);
+
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(options.level)].lattice;
+  Workers workers(options.threads);
+  Signs signs(store, box, options, *set);
+  // As many bricks as there are in a file of ranges, or at least one.
+  const Int3 edge = lattice.brick;
+  const Index file = std::max<Index>(1, StoreReader::kRangeChunk * kBlockEdge / edge.x);
+  const Int3 first{box.lo.x / edge.x, box.lo.y / edge.y, box.lo.z / edge.z};
+  const Int3 end = ceil_div(box.hi, edge), step{file, file, file};
+  const Int3 groups = ceil_div(end - first, step);
+  progress.begin("signs", static_cast<std::uint64_t>(volume(groups)));
+  for_each_point({{0, 0, 0}, groups}, [&](Int3 group) {
+    const Int3 lo = first + group * step;
+    signs.put({lo, min(lo + step, end)}, workers);
+    room.check(*set);
+    progress.advance(1);
+  });
+  progress.end();
+  set->write(path);
+}
+
+}  // namespace isobrick

@@ -1,0 +1,69 @@
+#pragma once
+
+// Making OpenVDB grids. Only for the writers, which see OpenVDB anyway.
+
+#include <openvdb/openvdb.h>
+
+#include <cstdint>
+#include <string>
+
+#include "isobrick/volumes/volume_source.h"
+
+namespace isobrick {
+
+/// The item of a grid's metadata that keeps the unit of world space.
+inline constexpr const char* kVdbUnit = "unit";
+
+/// Gives a grid the volume's place, unit and name.
+void describe_vdb_grid(openvdb::GridBase& grid, const VolumeInfo& info, const std::string& name);
+
+/// Throws Error when that fails.
+void write_vdb_grid(const std::string& path, const openvdb::GridBase::Ptr& grid);
+
+inline openvdb::Coord vdb_coordinate(Int3 p) {
+  return {static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z)};
+}
+
+/// Makes leaves and tiles of leaves in a tree and counts the bytes of the nodes that
+/// come into being, which is quicker than to ask the tree.
+template <class Tree>
+class CountedTree {
+ public:
+  using Value = typename Tree::ValueType;
+  using Leaf = typename Tree::LeafNodeType;
+
+  explicit CountedTree(Tree& tree) : tree_(tree) {}
+
+  Tree& tree() { return tree_; }
+  std::uint64_t bytes() const { return bytes_; }
+
+  Leaf* probe_leaf(const openvdb::Coord& at) { return tree_.probeLeaf(at); }
+
+  Leaf* touch_leaf(const openvdb::Coord& at) {
+    if (Leaf* leaf = tree_.probeLeaf(at)) return leaf;
+    bytes_ += sizeof(Leaf) + Leaf::SIZE * sizeof(Value);
+    count_parents(at);
+    return tree_.touchLeaf(at);
+  }
+
+  /// In place of the leaf there, of which there is none.
+  void add_tile(const openvdb::Coord& at, const Value& value, bool active) {
+    count_parents(at);
+    tree_.addTile(1, at, value, active);
+  }
+
+ private:
+  using Upper = typename Tree::RootNodeType::ChildNodeType;
+  using Lower = typename Upper::ChildNodeType;
+
+  void count_parents(const openvdb::Coord& at) {
+    if (tree_.template probeConstNode<Lower>(at) != nullptr) return;
+    bytes_ += sizeof(Lower);
+    if (tree_.template probeConstNode<Upper>(at) == nullptr) bytes_ += sizeof(Upper);
+  }
+
+  Tree& tree_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "isobrick/volumes/volume_source.h"
+
+namespace isobrick {
+
+/// An OpenVDB level set of a surface: near it distances from its triangles, negative
+/// inside, and elsewhere the largest of them. First come all triangles, in any
+/// pieces and order, which never shows in the result; then the inside is said.
+class VdbLevelSet {
+ public:
+  virtual ~VdbLevelSet() = default;
+
+  /// Triangles in world space, which name their corners among `positions`.
+  virtual void add(std::span<const Vec3f> positions,
+                   std::span<const std::array<std::uint32_t, 3>> triangles) = 0;
+
+  /// Which samples of `box` are inside: one byte each, C order [z, y, x], not 0 for
+  /// inside; or all of them. Boxes do not overlap; what is never said is outside.
+  virtual void put_inside(Box3 box, const std::uint8_t* inside) = 0;
+  virtual void put_all_inside(Box3 box) = 0;
+
+  /// Bytes that the grid takes by now, and the triangles of one add().
+  virtual std::uint64_t memory() const = 0;
+
+  /// Writes the grid as `path`. Throws Error when that fails.
+  virtual void write(const std::string& path) = 0;
+};
+
+/// A float grid named `name` of the class "level set" over the volume. Its band is
+/// `half_band` of the largest spacing wide on either side. `threads` 0: all cores.
+std::unique_ptr<VdbLevelSet> make_vdb_level_set(const VolumeInfo& info, const std::string& name,
+                                                int half_band, int threads);
+
+/// The same where OpenVDB was missing when this was built: throws UsageError.
+std::unique_ptr<VdbLevelSet> make_vdb_level_set_if_built(const VolumeInfo& info,
+                                                         const std::string& name, int half_band,
+                                                         int threads);
+
+}  // namespace isobrick
