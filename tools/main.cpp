@@ -43,6 +43,7 @@ void define(Program& program) {
   add_extract(program);
   add_export(program);
   add_render(program);
+  add_view(program);
   add_synth(program);
   add_completion(program);
   add_man(program);

@@ -8,14 +8,22 @@ namespace isobrick::tools {
 namespace {
 
 [[noreturn]] void refuse(const std::string& what) {
-  throw UsageError(what +
-                   " needs OpenGL, which this program was built without; build it where libepoxy, "
-                   "GLM, stb and the font DejaVu Sans are installed (ISOBRICK_VIEWER)");
+  throw UsageError(
+      what +
+      " needs OpenGL, which this program was built without; build it where libepoxy, "
+      "GLM, GLFW, Dear ImGui, stb and the font DejaVu Sans are installed (ISOBRICK_VIEWER)");
 }
 
 struct Arguments {};
 
-int run(const Arguments&, Console&) { refuse("'isobrick render'"); }
+int run(const Arguments&, Console&) { refuse("this subcommand"); }
+
+void add_refused(Program& program, const std::string& name, const std::string& description,
+                 const std::string& example) {
+  CLI::App* app = add_subcommand(program, name, description + " (not in this program).", example);
+  app->allow_extras();
+  add_run(program, app, std::make_shared<Arguments>(), run);
+}
 
 }  // namespace
 
@@ -26,10 +34,11 @@ std::unique_ptr<MeshSink> open_preview(const std::string&, bool, const PreviewOp
 std::uint64_t preview_memory(const PreviewOptions&) { refuse("--preview"); }
 
 void add_render(Program& program) {
-  CLI::App* app = add_subcommand(program, "render", "Draw mesh files (not in this program).",
-                                 "isobrick render bone.ply -o bone.png");
-  app->allow_extras();
-  add_run(program, app, std::make_shared<Arguments>(), run);
+  add_refused(program, "render", "Draw mesh files", "isobrick render bone.ply -o bone.png");
+}
+
+void add_view(Program& program) {
+  add_refused(program, "view", "Look at a store", "isobrick view engine.zarr");
 }
 
 }  // namespace isobrick::tools

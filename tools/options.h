@@ -40,6 +40,7 @@ void add_extract(Program& program);
 void add_export(Program& program);
 void add_synth(Program& program);
 void add_render(Program& program);
+void add_view(Program& program);
 void add_completion(Program& program);
 void add_man(Program& program);
 

@@ -177,4 +177,11 @@ Box3 resolve_roi(const RoiText& roi, Int3 extent) {
   return box;
 }
 
+float parse_opacity(std::string_view text) {
+  const double opacity = parse_number(text);
+  if (!(opacity > 0 && opacity <= 1))
+    throw UsageError(fmt::format("'{}' is no opacity; it is above 0, at most 1", text));
+  return static_cast<float>(opacity);
+}
+
 }  // namespace isobrick::tools

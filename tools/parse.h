@@ -46,6 +46,9 @@ PictureSize parse_picture_size(std::string_view text);
 /// "#RRGGBB", "white" or "black": sRGB in [0, 1].
 Vec3f parse_colour(std::string_view text);
 
+/// Above 0, at most 1.
+float parse_opacity(std::string_view text);
+
 /// "u8" or "uint8", ….
 ScalarType parse_type(std::string_view text);
 

@@ -64,13 +64,6 @@ int run(const Arguments& arguments, Console& console) {
   return 0;
 }
 
-float parse_opacity(const std::string& text) {
-  const double opacity = parse_number(text);
-  if (!(opacity > 0 && opacity <= 1))
-    throw UsageError(fmt::format("'{}' is no opacity; it is above 0, at most 1", text));
-  return static_cast<float>(opacity);
-}
-
 /// "COLOUR" or "TOP,BOTTOM".
 void parse_background(const std::string& text, PictureSettings& settings) {
   const auto comma = text.find(',');

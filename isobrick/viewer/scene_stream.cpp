@@ -44,7 +44,7 @@ class Running final : public Wanted {
 struct Slot {
   std::optional<SliceRequest> wanted;  ///< and not yet being read
   std::shared_ptr<Running> running;
-  std::shared_ptr<const SliceImage> image;
+  std::shared_ptr<const SliceSamples> image;
 };
 
 }  // namespace
@@ -212,12 +212,12 @@ bool SceneStream::Shared::make_mesh(NodeMesher& mesher, const Running& r,
 bool SceneStream::Shared::make_slice(const std::shared_ptr<Running>& r,
                                      std::unique_lock<std::mutex>& lock) {
   lock.unlock();
-  std::shared_ptr<SliceImage> image;
+  std::shared_ptr<SliceSamples> image;
   try {
-    image = std::make_shared<SliceImage>(read_slice(bricks, r->request, *r));
+    image = std::make_shared<SliceSamples>(read_slice(bricks, r->request, *r));
   } catch (const Abandoned&) {
   } catch (const std::exception& e) {
-    image = std::make_shared<SliceImage>();
+    image = std::make_shared<SliceSamples>();
     image->request = r->request;
     image->damage = e.what();
   }
@@ -334,7 +334,7 @@ void SceneStream::set_slice(int slot, const std::optional<SliceRequest>& request
   shared_->work.notify_one();
 }
 
-std::shared_ptr<const SliceImage> SceneStream::slice(int slot) const {
+std::shared_ptr<const SliceSamples> SceneStream::slice(int slot) const {
   const std::lock_guard lock(shared_->mutex);
   const auto found = shared_->slots.find(slot);
   return found == shared_->slots.end() ? nullptr : found->second.image;

@@ -60,7 +60,7 @@ class SceneStream {
   void set_slice(int slot, const std::optional<SliceRequest>& request);
   /// The image of that place: the last one that is finished, until the wanted one is.
   /// Null while there is none.
-  std::shared_ptr<const SliceImage> slice(int slot) const;
+  std::shared_ptr<const SliceSamples> slice(int slot) const;
 
   /// Whether nothing is left to be done, or nothing can be.
   bool idle() const;

@@ -40,7 +40,7 @@ void copy_pixels(const From* brick, Int3 strides, const Plane& plane, Int3 lo, I
 /// Writes the pixels of one brick; a null one is the fill value.
 template <class From>
 void write_brick(const std::byte* brick, double fill, const Lattice& lattice, const Plane& plane,
-                 Int3 b, SliceImage& image) {
+                 Int3 b, SliceSamples& image) {
   using To =
       std::conditional_t<std::is_same_v<From, std::uint8_t> || std::is_same_v<From, std::uint16_t>,
                          From, float>;
@@ -57,7 +57,7 @@ void write_brick(const std::byte* brick, double fill, const Lattice& lattice, co
                 static_cast<To>(fill));
 }
 
-void lay_out(const LevelInfo& level, const Plane& plane, SliceImage& image) {
+void lay_out(const LevelInfo& level, const Plane& plane, SliceSamples& image) {
   Vec3d corner{-0.5, -0.5, -0.5}, wide, high;
   corner[plane.normal] = static_cast<double>(plane.at);
   wide = high = corner;
@@ -70,12 +70,12 @@ void lay_out(const LevelInfo& level, const Plane& plane, SliceImage& image) {
 
 }  // namespace
 
-SliceImage read_slice(ResidentBricks& bricks, const SliceRequest& request, const Wanted& wanted) {
+SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request, const Wanted& wanted) {
   const StoreInfo& info = bricks.source().info();
   const auto levels = static_cast<int>(info.levels.size());
   if (request.axis < 0 || request.axis > 2 || request.stored < 0 || request.stored >= levels)
     throw UsageError("a slice of an axis or a level that there is not");
-  SliceImage image;
+  SliceSamples image;
   image.request = request;
   image.stored = request.stored;
   const auto level_of = [&](int stored) -> const LevelInfo& {

@@ -22,7 +22,7 @@ struct SliceRequest {
 
 /// Samples of the plane nearest to a position, of the finest level that is allowed
 /// and fits.
-struct SliceImage {
+struct SliceSamples {
   SliceRequest request;
   int stored = 0;
   /// u8 and u16 as they are stored; all others as f32.
@@ -38,6 +38,6 @@ struct SliceImage {
 
 /// Reads it through resident bricks. Throws Abandoned, and UsageError for an axis
 /// or level that there is not; a damaged brick does not stop it.
-SliceImage read_slice(ResidentBricks& bricks, const SliceRequest& request, const Wanted& wanted);
+SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request, const Wanted& wanted);
 
 }  // namespace isobrick

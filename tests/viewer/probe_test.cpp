@@ -117,11 +117,11 @@ TEST(IsovalueCounts, BricksAreExactAndBlocksNearlySo) {
   check(whole, {-1.0, 0.0, 0.5, 1.0, 90.0, 127.5, 128.0, 180.0, 254.5, 255.0, 256.0}, 0);
 }
 
-TEST(SliceImage, HasTheSamplesOfThePlane) {
+TEST(SliceSamples, HasTheSamplesOfThePlane) {
   const auto source = turned_ball();
   ResidentBricks bricks(source, 100 << 20);
   for (int axis = 0; axis < 3; ++axis) {
-    const SliceImage image = read_slice(bricks, {.axis = axis, .position = 33.2}, Always());
+    const SliceSamples image = read_slice(bricks, {.axis = axis, .position = 33.2}, Always());
     EXPECT_EQ(image.stored, 0);
     EXPECT_EQ(image.type, ScalarType::f32);
     ASSERT_EQ(image.width, kEdge);
@@ -143,12 +143,12 @@ TEST(SliceImage, HasTheSamplesOfThePlane) {
     const Vec3d end = image.corner + image.along_width + image.along_height;
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(end[i], corner[i], 1e-9);
   }
-  const SliceImage small = read_slice(bricks, {.axis = 1, .position = 60, .bytes = 5000}, Always());
+  const SliceSamples small = read_slice(bricks, {.axis = 1, .position = 60, .bytes = 5000}, Always());
   EXPECT_GT(small.stored, 0);
   EXPECT_LE(small.pixels.size(), 5000u);
 }
 
-TEST(SliceImage, ComesFromTheStreamAndSurvivesDamage) {
+TEST(SliceSamples, ComesFromTheStreamAndSurvivesDamage) {
   const auto source = turned_ball();
   source->damage(0, {1, 1, 1});
   const auto tree = std::make_shared<const NodeTree>(*source);

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <algorithm>
+
+namespace isobrick {
+
+/// Keeps pictures fluent while something moves by asking for simpler ones: first
+/// without occlusion and multisampling, then with longer cells. Not thread-safe.
+class FramePacer {
+ public:
+  /// `target`: how long a picture may take while something moves, seconds.
+  explicit FramePacer(double target = 1.0 / 20) : target_(target) {}
+
+  /// A picture that took `seconds` to draw as plain() and coarser() say now.
+  void drawn(double seconds) {
+    const double ratio = seconds / target_;
+    if (ratio > 1 && !plain_) {
+      plain_ = true;
+      full_seconds_ = seconds;
+      return;
+    }
+    if (ratio > 1) {
+      // Triangles, and so times, go with the inverse square of a cell's length: the root
+      // of the ratio would do at once, but single pictures are off.
+      coarser_ = std::min(coarser_ * (1 + 0.5 * (std::min(ratio, 4.0) - 1)), kCoarsest);
+    } else if (ratio < 0.6 && coarser_ > 1) {
+      coarser_ = std::max(coarser_ * (0.7 + 0.5 * ratio), 1.0);
+    } else if (ratio < 0.6 && plain_) {
+      // What the rest costs is known from when it was left out.
+      full_seconds_ *= 0.98;
+      if (full_seconds_ < target_ * 0.8) plain_ = false;
+    }
+  }
+
+  /// Whether to leave occlusion and multisampling out while something moves.
+  bool plain() const { return plain_; }
+  /// Factor on the error in pixels while something moves. At rest: 1.
+  double coarser() const { return coarser_; }
+
+ private:
+  static constexpr double kCoarsest = 32;
+  double target_, coarser_ = 1, full_seconds_ = 0;
+  bool plain_ = false;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,104 @@
+#include "isobrick/window/import_job.h"
+
+#include <unistd.h>
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/metadata_files.h"
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/store_source.h"
+#include "isobrick/volumes/open_source.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::unique_ptr<VolumeSource> open_any(const fs::path& input, const ConvertOptions& options) {
+  VolumeRequest request;
+  if (is_zarr(input.string())) return open_store_source(input.string(), request, options.threads);
+  request.memory = options.memory;
+  return open_source(input.string(), request);
+}
+
+}  // namespace
+
+/// Tells the window how far it is, and throws where the window does not want it any more.
+class ImportJob::Reporter final : public Progress {
+ public:
+  explicit Reporter(ImportJob& job) : job_(job) {}
+
+  void begin(std::string_view stage, std::uint64_t total) override {
+    check();
+    const std::scoped_lock lock(job_.mutex_);
+    job_.state_.stage = stage;
+    job_.state_.done = 0;
+    job_.state_.total = total;
+  }
+  void advance(std::uint64_t done) override {
+    check();
+    const std::scoped_lock lock(job_.mutex_);
+    job_.state_.done += done;
+  }
+  void end() override {}
+
+ private:
+  void check() const {
+    if (job_.cancel_) throw Cancelled("cancelled");
+  }
+  ImportJob& job_;
+};
+
+ImportJob::ImportJob(fs::path input, fs::path store, ConvertOptions options)
+    : input_(std::move(input)), store_(std::move(store)), options_(options) {
+  thread_ = std::thread([this] { run(); });
+}
+
+ImportJob::~ImportJob() {
+  cancel();
+  thread_.join();
+}
+
+void ImportJob::run() {
+  std::string failure;
+  bool cancelled = false;
+  try {
+    Reporter reporter(*this);
+    const auto source = open_any(input_, options_);
+    convert(*source, store_, options_, reporter);
+  } catch (const Cancelled&) {
+    cancelled = true;
+  } catch (const std::exception& e) {
+    failure = e.what();
+  }
+  // A conversion keeps what it has so that it can be resumed; a cancelled drop is not.
+  std::error_code ignored;
+  if (cancelled || !failure.empty()) fs::remove_all(store_.string() + ".partial", ignored);
+  const std::scoped_lock lock(mutex_);
+  state_.finished = true;
+  state_.cancelled = cancelled;
+  state_.failure = std::move(failure);
+}
+
+ImportJob::State ImportJob::state() const {
+  const std::scoped_lock lock(mutex_);
+  return state_;
+}
+
+fs::path store_for(const fs::path& input) {
+  const fs::path full = fs::absolute(input);
+  const fs::path folder = access(full.parent_path().c_str(), W_OK) == 0 ? full.parent_path()
+                                                                        : fs::temp_directory_path();
+  const std::string stem = full.stem().string();
+  fs::path store = folder / (stem + ".zarr");
+  const auto taken = [](const fs::path& path) {
+    return fs::exists(path) || fs::exists(path.string() + ".partial");
+  };
+  for (int number = 2; taken(store); ++number)
+    store = folder / fmt::format("{}-{}.zarr", stem, number);
+  return store;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "isobrick/pipeline/convert.h"
+
+namespace isobrick {
+
+/// A conversion in a thread of its own, for a window that goes on meanwhile. The
+/// destructor cancels it and waits until nothing unfinished is left.
+class ImportJob {
+ public:
+  /// Converts `input` (any format that open_source or a store can be) to `store`.
+  ImportJob(std::filesystem::path input, std::filesystem::path store, ConvertOptions options);
+  ~ImportJob();
+
+  struct State {
+    std::string stage;                  ///< what goes on
+    std::uint64_t done = 0, total = 0;  ///< bytes of the stage; total 0: unknown
+    bool finished = false;              ///< well, cancelled or not
+    std::string failure;                ///< empty when all went well or was cancelled
+    bool cancelled = false;
+  };
+  State state() const;
+  void cancel() { cancel_ = true; }
+
+  const std::filesystem::path& input() const { return input_; }
+  const std::filesystem::path& store() const { return store_; }
+
+ private:
+  class Reporter;
+  void run();
+
+  std::filesystem::path input_, store_;
+  ConvertOptions options_;
+  mutable std::mutex mutex_;
+  State state_;
+  std::atomic<bool> cancel_ = false;
+  std::thread thread_;  ///< last: it uses the others
+};
+
+/// Where a dropped file's store goes: beside it if its folder can be written to, else
+/// among temporary files; a name that is not taken.
+std::filesystem::path store_for(const std::filesystem::path& input);
+
+}  // namespace isobrick

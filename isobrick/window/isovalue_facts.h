@@ -1,0 +1,36 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "isobrick/pipeline/histogram.h"
+#include "isobrick/viewer/isovalue_counts.h"
+
+namespace isobrick {
+
+/// What is known about the isovalues of a store: how its samples spread, counted in a
+/// thread of its own, and how much surface there is, from the ranges.
+class IsovalueFacts {
+ public:
+  explicit IsovalueFacts(std::shared_ptr<const StoreReader> store);
+  /// Ends the count.
+  ~IsovalueFacts();
+
+  /// The histogram, once it is counted. Null before and when it failed.
+  std::shared_ptr<const Histogram> histogram() const;
+
+  /// Of level 0.
+  const IsovalueCounts& counts() const { return counts_; }
+
+ private:
+  IsovalueCounts counts_;
+  std::atomic<bool> stop_ = false;
+  mutable std::mutex mutex_;
+  std::shared_ptr<const Histogram> histogram_;
+  std::thread thread_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,296 @@
+#include "isobrick/window/panels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include "isobrick/core/error.h"
+#include "isobrick/render/vectors.h"
+#include "isobrick/window/unit_symbol.h"
+
+namespace isobrick {
+namespace {
+
+constexpr float kPanelWidth = 390;
+constexpr std::size_t kMostSurfaces = 16;
+constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
+
+void text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
+
+std::string mebibytes(std::uint64_t bytes) {
+  return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+void surfaces_panel(ViewerState& state) {
+  auto& surfaces = state.settings.surfaces;
+  draw_isovalue_slider(state, ImGui::GetContentRegionAvail().x, 90);
+  std::optional<std::size_t> removed;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    SurfaceSettings& s = surfaces[i];
+    ImGui::PushID(static_cast<int>(i));
+    if (ImGui::RadioButton("##selected", state.selected == i)) state.selected = i;
+    ImGui::SameLine();
+    ImGui::Checkbox("##shown", &s.shown);
+    ImGui::SameLine();
+    ImGui::ColorEdit3("##colour", &s.colour.x, ImGuiColorEditFlags_NoInputs);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(90);
+    ImGui::InputDouble("##isovalue", &s.isovalue, 0, 0, "%.6g",
+                       ImGuiInputTextFlags_EnterReturnsTrue);
+    if (!std::isfinite(s.isovalue)) s.isovalue = 0;
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(70);
+    ImGui::SliderFloat("##opacity", &s.opacity, 0.05f, 1, "%.2f");
+    ImGui::SameLine();
+    if (ImGui::SmallButton("x") && surfaces.size() > 1) removed = i;
+    ImGui::PopID();
+  }
+  if (removed) {
+    surfaces.erase(surfaces.begin() + static_cast<std::ptrdiff_t>(*removed));
+    state.selected = std::min(state.selected, surfaces.size() - 1);
+  }
+  if (surfaces.size() < kMostSurfaces && ImGui::SmallButton("Add a surface")) {
+    SurfaceSettings added = surfaces[state.selected];
+    added.colour = surface_colour(surfaces.size());
+    surfaces.push_back(added);
+    state.selected = surfaces.size() - 1;
+  }
+}
+
+void cuts_panel(ViewSettings& settings) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    CutSettings& cut = settings.cuts[axis];
+    ImGui::PushID(kAxes[axis]);
+    ImGui::Checkbox(kAxes[axis], &cut.on);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(150);
+    ImGui::SliderFloat("##place", &cut.place, 0, 1, "%.3f");
+    ImGui::SameLine();
+    if (ImGui::SmallButton(cut.beyond ? "above" : "below")) cut.beyond = !cut.beyond;
+    ImGui::PopID();
+  }
+  ImGui::Checkbox("Region", &settings.region_on);
+  if (!settings.region_on) return;
+  ImGui::DragFloatRange2("x##r", &settings.region_lo.x, &settings.region_hi.x, 0.002f, 0, 1);
+  ImGui::DragFloatRange2("y##r", &settings.region_lo.y, &settings.region_hi.y, 0.002f, 0, 1);
+  ImGui::DragFloatRange2("z##r", &settings.region_lo.z, &settings.region_hi.z, 0.002f, 0, 1);
+}
+
+void slices_panel(ViewerState& state) {
+  ViewSettings& settings = state.settings;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    SliceSettings& slice = settings.slices[axis];
+    ImGui::PushID(kAxes[axis]);
+    ImGui::Checkbox(kAxes[axis], &slice.shown);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(200);
+    ImGui::SliderFloat("##place", &slice.place, 0, 1, "%.3f");
+    ImGui::PopID();
+  }
+  const auto range = state.facts->counts().range();
+  if (range.empty()) return;
+  const auto lo = static_cast<float>(range.lo), hi = static_cast<float>(range.hi);
+  ImGui::DragFloatRange2("Window", &settings.window_lo, &settings.window_hi, (hi - lo) / 500, lo,
+                         hi, "%.5g");
+}
+
+void look_panel(ViewerState& state) {
+  ViewSettings& s = state.settings;
+  Navigator& n = state.navigator;
+  int mode = static_cast<int>(n.mode);
+  ImGui::RadioButton("Orbit", &mode, 0);
+  ImGui::SameLine();
+  ImGui::RadioButton("Trackball", &mode, 1);
+  ImGui::SameLine();
+  ImGui::RadioButton("Fly", &mode, 2);
+  n.mode = static_cast<NavigationMode>(mode);
+  ImGui::Checkbox("Orthographic", &n.camera.orthographic);
+  ImGui::SameLine();
+  if (ImGui::SmallButton("Whole volume")) state.requests.fit = true;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double sign : {1.0, -1.0}) {
+      if (axis + (sign < 0) > 0) ImGui::SameLine();
+      if (!ImGui::SmallButton(fmt::format("{}{}", sign > 0 ? '+' : '-', kAxes[axis]).c_str()))
+        continue;
+      Vec3d along;
+      along[axis] = -sign;
+      state.requests.look_along = along;
+    }
+  auto angle = static_cast<float>(n.camera.field_of_view);
+  if (ImGui::SliderFloat("Field of view", &angle, 5, 100, "%.0f\u00b0"))
+    n.camera.field_of_view = angle;
+  ImGui::SliderFloat("Cell, pixels", &s.pixel_error, 0.5f, 8, "%.1f");
+  ImGui::Checkbox("Occlusion", &s.occlusion);
+  ImGui::SameLine();
+  ImGui::Checkbox("Edges", &s.edges);
+  ImGui::SameLine();
+  ImGui::Checkbox("Smooth", &s.multisample);
+  ImGui::Checkbox("Box", &s.box);
+  ImGui::SameLine();
+  ImGui::Checkbox("Axes", &s.axes);
+  ImGui::SameLine();
+  ImGui::Checkbox("Scale bar", &s.scale_bar);
+  ImGui::ColorEdit3("Above", &s.background_top.x, ImGuiColorEditFlags_NoInputs);
+  ImGui::SameLine();
+  ImGui::ColorEdit3("Below", &s.background_bottom.x, ImGuiColorEditFlags_NoInputs);
+}
+
+void picking_panel(ViewerState& state) {
+  const std::string unit = unit_symbol(state.picture->scene().tree().grid().transform().unit);
+  if (const auto& p = state.picked) {
+    text(fmt::format("Position {:.6g}, {:.6g}, {:.6g} {}", p->world.x, p->world.y, p->world.z,
+                     unit));
+    text(fmt::format("Sample {:.2f}, {:.2f}, {:.2f}", p->index.x, p->index.y, p->index.z));
+    if (p->value) text(fmt::format("Value {:.6g}", *p->value));
+    if (p->normal)
+      text(fmt::format("Normal {:.3f}, {:.3f}, {:.3f}", p->normal->x, p->normal->y, p->normal->z));
+  } else {
+    ImGui::TextDisabled("Click on a surface.");
+  }
+  if (ImGui::Checkbox("Measure a distance", &state.measuring)) state.measured.clear();
+  if (state.measured.size() == 2)
+    text(fmt::format("Distance {:.6g} {}", length(state.measured[1] - state.measured[0]), unit));
+  else if (state.measuring)
+    ImGui::TextDisabled(state.measured.empty() ? "Click on its first end."
+                                               : "Click on its other end.");
+}
+
+/// Runs what may fail; a failure is shown.
+template <class F>
+void attempt(ViewerState& state, F&& f) {
+  try {
+    f();
+  } catch (const std::exception& e) {
+    state.say(e.what());
+  }
+}
+
+void bookmarks_panel(ViewerState& state) {
+  if (state.bookmarks == nullptr) return;
+  const auto& list = state.bookmarks->list();
+  std::optional<std::size_t> removed;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    ImGui::PushID(static_cast<int>(i));
+    if (ImGui::Selectable(list[i].name.c_str(), false, 0, {kPanelWidth - 60, 0})) {
+      const WorldBall scene = state.navigator.camera.scene;
+      state.navigator.stop();
+      state.navigator.camera = list[i].camera;
+      state.navigator.camera.scene = scene;
+      state.settings = list[i].settings;
+      state.selected = 0;
+    }
+    ImGui::SameLine();
+    if (ImGui::SmallButton("x")) removed = i;
+    ImGui::PopID();
+  }
+  if (removed) attempt(state, [&] { state.bookmarks->remove(*removed); });
+  std::string& name = state.new_bookmark;
+  ImGui::SetNextItemWidth(180);
+  ImGui::InputText("##name", &name);
+  ImGui::SameLine();
+  if (ImGui::SmallButton("Keep this view") && !name.empty())
+    attempt(state, [&] {
+      state.bookmarks->add({name, state.navigator.camera, state.settings});
+      name.clear();
+    });
+}
+
+void status_panel(const ViewerState& state) {
+  const StreamCounters c = state.picture->scene().stream().counters();
+  const PictureState& p = state.picture->state();
+  ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
+                   static_cast<int>(state.frame_number % state.frame_times.size()), nullptr, 0, 50,
+                   {ImGui::GetContentRegionAvail().x, 36});
+  text(fmt::format("{:.0f} frames/s, drawn in {:.1f} ms{}",
+                   state.frame_seconds > 0 ? 1 / state.frame_seconds : 0, state.draw_seconds * 1e3,
+                   state.pacer.coarser() > 1
+                       ? fmt::format(", {:.1f} x coarser while moving", state.pacer.coarser())
+                       : ""));
+  text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
+                   mebibytes(p.device_bytes)));
+  text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
+                   mebibytes(c.brick_bytes), c.bricks_wanted));
+  text(fmt::format("read {} in {:.2f} s, decode {:.2f} s, mesh {:.2f} s", mebibytes(c.bytes_read),
+                   c.read_seconds, c.decode_seconds, c.mesh_seconds));
+  text(fmt::format("{} meshes ({}), {} wait, {} in work", c.meshes, mebibytes(c.mesh_bytes),
+                   c.queue, c.working));
+  if (p.limited_by_budget) text("as fine as the memory allows");
+  if (c.damaged > 0) text(fmt::format("{} parts cannot be shown", c.damaged));
+  ImGui::TextDisabled(p.complete ? "complete" : "refining \u2026");
+}
+
+void import_panel(ViewerState& state) {
+  if (state.import == nullptr) return;
+  const ImportJob::State s = state.import->state();
+  ImGui::OpenPopup("Converting");
+  if (!ImGui::BeginPopupModal("Converting", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
+  text(
+      fmt::format("{}\n\u2192 {}", state.import->input().string(), state.import->store().string()));
+  const float part = s.total > 0 ? static_cast<float>(s.done) / static_cast<float>(s.total) : 0;
+  ImGui::ProgressBar(std::min(part, 1.f), {400, 0}, s.stage.c_str());
+  if (ImGui::Button("Cancel")) state.import->cancel();
+  ImGui::EndPopup();
+}
+
+void messages_panel(ViewerState& state) {
+  if (state.messages.empty()) return;
+  const ImGuiViewport* viewport = ImGui::GetMainViewport();
+  ImGui::SetNextWindowPos({viewport->Size.x / 2, viewport->Size.y - 20}, ImGuiCond_Always,
+                          {0.5f, 1});
+  ImGui::SetNextWindowSizeConstraints({300, 0}, {viewport->Size.x * 0.8f, viewport->Size.y * 0.4f});
+  ImGui::Begin("Messages", nullptr,
+               ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_AlwaysAutoResize |
+                   ImGuiWindowFlags_NoSavedSettings);
+  ImGui::PushTextWrapPos(viewport->Size.x * 0.75f);
+  for (const std::string& message : state.messages) text(message);
+  ImGui::PopTextWrapPos();
+  if (ImGui::Button("Dismiss")) state.messages.clear();
+  ImGui::End();
+}
+
+void main_panel(ViewerState& state) {
+  const ImGuiViewport* viewport = ImGui::GetMainViewport();
+  ImGui::SetNextWindowPos({10, 10}, ImGuiCond_FirstUseEver);
+  ImGui::SetNextWindowSize({kPanelWidth, std::min(760.f, viewport->Size.y - 20)},
+                           ImGuiCond_FirstUseEver);
+  ImGui::Begin(fmt::format("{}###panel", state.path.filename().string()).c_str());
+  const auto section = [](const char* name, bool open) {
+    return ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+  };
+  if (section("Surfaces", true)) surfaces_panel(state);
+  if (section("Camera and look", false)) look_panel(state);
+  if (section("Cuts and region", false)) cuts_panel(state.settings);
+  if (section("Slices", false)) slices_panel(state);
+  if (section("Point and measure", false)) picking_panel(state);
+  if (section("Bookmarks", false)) bookmarks_panel(state);
+  if (section("Streaming", true)) status_panel(state);
+  if (ImGui::SmallButton("Picture")) state.requests.screenshot = "isobrick.png";
+  ImGui::End();
+}
+
+void welcome_panel() {
+  const ImGuiViewport* viewport = ImGui::GetMainViewport();
+  ImGui::SetNextWindowPos({viewport->Size.x / 2, viewport->Size.y / 2}, ImGuiCond_Always,
+                          {0.5f, 0.5f});
+  ImGui::Begin("Isobrick", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                   ImGuiWindowFlags_NoSavedSettings);
+  ImGui::TextUnformatted("Drop a store or a volume of any format here.");
+  ImGui::End();
+}
+
+}  // namespace
+
+void draw_panels(ViewerState& state) {
+  import_panel(state);
+  messages_panel(state);
+  if (state.picture == nullptr)
+    welcome_panel();
+  else if (state.panels)
+    main_panel(state);
+}
+
+}  // namespace isobrick

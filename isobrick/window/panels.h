@@ -1,0 +1,15 @@
+#pragma once
+
+#include "isobrick/window/viewer_state.h"
+
+namespace isobrick {
+
+/// Draws all panels into the current frame of Dear ImGui and does to `state` what its
+/// user does to them.
+void draw_panels(ViewerState& state);
+
+/// Isovalue over the histogram: a drag moves the selected surface, the pointer tells how
+/// much surface there is. True while it is dragged.
+bool draw_isovalue_slider(ViewerState& state, float width, float height);
+
+}  // namespace isobrick

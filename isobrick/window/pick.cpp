@@ -1,0 +1,59 @@
+#include "isobrick/window/pick.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include "isobrick/render/vectors.h"
+#include "isobrick/viewer/probe.h"
+#include "isobrick/window/unit_symbol.h"
+
+namespace isobrick {
+namespace {
+
+constexpr ImU32 kInk = IM_COL32(20, 20, 20, 255), kPaper = IM_COL32(255, 230, 90, 255);
+
+}  // namespace
+
+std::optional<PickedPoint> pick_point(StorePicture& picture, int x, int y) {
+  const auto hit = picture.renderer().pick(x, y);
+  if (!hit) return std::nullopt;
+  PickedPoint point;
+  point.world = hit->position;
+  point.surface = hit->id;
+  const NodeGrid& grid = picture.scene().tree().grid();
+  point.index = to_index_space(grid, hit->position);
+  if (const auto field = probe(grid, picture.scene().stream().bricks(), hit->position)) {
+    point.value = field->value;
+    point.normal = to_double(field->normal);
+  }
+  return point;
+}
+
+void draw_measure(const ViewerState& state, int width, int height) {
+  if (state.measured.empty() || state.picture == nullptr || width <= 0 || height <= 0) return;
+  const ImVec2 size = ImGui::GetIO().DisplaySize;
+  const auto place = [&](Vec3d world) {
+    const Vec3d p = state.navigator.camera.project(world, width, height);
+    return ImVec2(static_cast<float>(p.x) * size.x / static_cast<float>(width),
+                  static_cast<float>(p.y) * size.y / static_cast<float>(height));
+  };
+  ImDrawList& draw = *ImGui::GetBackgroundDrawList();
+  const ImVec2 first = place(state.measured[0]);
+  if (state.measured.size() == 2) {
+    const ImVec2 second = place(state.measured[1]);
+    draw.AddLine(first, second, kInk, 4);
+    draw.AddLine(first, second, kPaper, 2);
+    const std::string text =
+        fmt::format("{:.6g} {}", length(state.measured[1] - state.measured[0]),
+                    unit_symbol(state.picture->scene().tree().grid().transform().unit));
+    const ImVec2 middle((first.x + second.x) / 2 + 8, (first.y + second.y) / 2);
+    draw.AddText({middle.x + 1, middle.y + 1}, kInk, text.c_str());
+    draw.AddText(middle, kPaper, text.c_str());
+  }
+  for (const Vec3d& point : state.measured) {
+    draw.AddCircleFilled(place(point), 6, kInk);
+    draw.AddCircleFilled(place(point), 4, kPaper);
+  }
+}
+
+}  // namespace isobrick

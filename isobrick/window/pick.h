@@ -1,0 +1,16 @@
+#pragma once
+
+#include <optional>
+
+#include "isobrick/window/viewer_state.h"
+
+namespace isobrick {
+
+/// What the picture shows at a pixel, rows from the top; nothing on the background.
+std::optional<PickedPoint> pick_point(StorePicture& picture, int x, int y);
+
+/// Draws the points and the line of a measurement over the picture, with Dear ImGui.
+/// `width`, `height`: of the picture, pixels.
+void draw_measure(const ViewerState& state, int width, int height);
+
+}  // namespace isobrick

@@ -1,0 +1,338 @@
+#include "isobrick/window/store_picture.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/gtc/type_ptr.hpp>
+
+#include "isobrick/render/vectors.h"
+#include "isobrick/window/unit_symbol.h"
+
+namespace isobrick {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Meshes that are new to the device, in a picture while others wait.
+constexpr double kUploadSeconds = 0.008;
+constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
+constexpr double kMarginOfWait = 0.05;
+
+Vec3d last_sample(const StoreReader& store) {
+  const Int3 extent = store.info().levels.front().lattice.extent;
+  return {static_cast<double>(extent.x - 1), static_cast<double>(extent.y - 1),
+          static_cast<double>(extent.z - 1)};
+}
+
+/// The corners of a box of level-0 index space, in world space: bit 0 is x.
+std::array<Vec3d, 8> corners(const Transform& transform, Vec3d lo, Vec3d hi) {
+  std::array<Vec3d, 8> c;
+  for (std::size_t i = 0; i < 8; ++i)
+    c[i] = transform.apply(
+        {(i & 1) != 0 ? hi.x : lo.x, (i & 2) != 0 ? hi.y : lo.y, (i & 4) != 0 ? hi.z : lo.z});
+  return c;
+}
+
+std::vector<WorldLine> edges(const std::array<Vec3d, 8>& c) {
+  std::vector<WorldLine> lines;
+  for (std::size_t i = 0; i < 8; ++i)
+    for (const std::size_t bit : {std::size_t{1}, std::size_t{2}, std::size_t{4}})
+      if ((i & bit) == 0) lines.push_back({c[i], c[i | bit]});
+  return lines;
+}
+
+StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change) {
+  StreamOptions options;
+  options.threads = budgets.threads;
+  options.brick_bytes = budgets.memory / 2;
+  options.mesh_bytes = budgets.memory - options.brick_bytes;
+  options.on_change = std::move(on_change);
+  return options;
+}
+
+/// Of the coarsest level's nodes: their own ranges or those with all below.
+template <class RangeOf>
+ValueRange<float> range_of_all(const NodeTree& tree, RangeOf&& range_of) {
+  const int top = tree.grid().levels() - 1;
+  ValueRange<float> all;
+  for_each_point({{0, 0, 0}, tree.grid().level(top).nodes}, [&](Int3 p) {
+    const ValueRange<float> r = range_of(NodeKey{top, p});
+    if (r.empty()) return;
+    all.lo = std::min(all.lo, r.lo);
+    all.hi = std::max(all.hi, r.hi);
+  });
+  return all;
+}
+
+template <class T>
+void append_floats(const std::vector<std::byte>& pixels, std::vector<float>& samples) {
+  samples.resize(pixels.size() / sizeof(T));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    T value;
+    std::memcpy(&value, pixels.data() + i * sizeof(T), sizeof(T));
+    samples[i] = static_cast<float>(value);
+  }
+}
+
+std::vector<float> floats_of(const SliceSamples& slice) {
+  std::vector<float> samples;
+  if (slice.type == ScalarType::u8)
+    append_floats<std::uint8_t>(slice.pixels, samples);
+  else if (slice.type == ScalarType::u16)
+    append_floats<std::uint16_t>(slice.pixels, samples);
+  else
+    append_floats<float>(slice.pixels, samples);
+  return samples;
+}
+
+}  // namespace
+
+void choose_values(ViewSettings& settings, const NodeTree& tree) {
+  if (settings.surfaces.empty()) settings.surfaces.push_back({.colour = surface_colour(0)});
+  const auto own = range_of_all(tree, [&](const NodeKey& n) { return tree.range(n); });
+  for (SurfaceSettings& surface : settings.surfaces)
+    if (std::isnan(surface.isovalue))
+      surface.isovalue = own.empty() ? 0 : (static_cast<double>(own.lo) + own.hi) / 2;
+  if (settings.window_lo < settings.window_hi) return;
+  const auto all = range_of_all(tree, [&](const NodeKey& n) { return tree.range_below(n); });
+  settings.window_lo = all.empty() ? 0 : all.lo;
+  settings.window_hi = all.empty() ? 1 : all.hi;
+}
+
+ShownBox shown_box(const ViewSettings& settings) {
+  ShownBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (settings.region_on) {
+      box.lo[axis] = std::clamp<double>(settings.region_lo[axis], 0, 1);
+      box.hi[axis] = std::clamp<double>(settings.region_hi[axis], 0, 1);
+    }
+    const CutSettings& cut = settings.cuts[static_cast<std::size_t>(axis)];
+    if (!cut.on) continue;
+    if (cut.beyond)
+      box.hi[axis] = std::min<double>(box.hi[axis], cut.place);
+    else
+      box.lo[axis] = std::max<double>(box.lo[axis], cut.place);
+  }
+  return box;
+}
+
+View view_of(const Camera& camera, int width, int height, double pixel_error) {
+  View view;
+  view.eye = camera.eye;
+  const glm::dmat4 to_camera =
+      glm::translate(glm::dmat4(camera.rotation()), {-camera.eye.x, -camera.eye.y, -camera.eye.z});
+  const glm::dmat4 m = camera.projection(static_cast<double>(width) / height) * to_camera;
+  std::copy_n(glm::value_ptr(m), 16, view.view_projection.begin());
+  view.width = width;
+  view.height = height;
+  view.pixel_error = pixel_error;
+  return view;
+}
+
+StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
+                           std::function<void()> on_change)
+    : store_(std::move(store)),
+      budgets_(budgets),
+      scene_(std::make_unique<Scene>(store_bricks(store_),
+                                     stream_options(budgets, std::move(on_change)))) {}
+
+StorePicture::~StorePicture() = default;
+
+WorldBox StorePicture::bounds() const {
+  const auto c = corners(scene_->tree().grid().transform(), {0, 0, 0}, last_sample(*store_));
+  WorldBox box{c[0], c[0]};
+  for (const Vec3d& p : c)
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lo[axis] = std::min(box.lo[axis], p[axis]);
+      box.hi[axis] = std::max(box.hi[axis], p[axis]);
+    }
+  return box;
+}
+
+void StorePicture::update_scene(const Camera& camera, int width, int height,
+                                const ViewSettings& settings, double coarser) {
+  std::vector<double> isovalues;
+  shown_surfaces_.clear();
+  for (std::size_t i = 0; i < settings.surfaces.size(); ++i)
+    if (settings.surfaces[i].shown) {
+      isovalues.push_back(settings.surfaces[i].isovalue);
+      shown_surfaces_.push_back(i);
+    }
+  View view = view_of(camera, width, height, settings.pixel_error * coarser);
+  const ShownBox box = shown_box(settings);
+  if (!box.whole()) {
+    const Vec3d last = last_sample(*store_);
+    view.clip = IndexBox{box.lo * last, box.hi * last};
+  }
+  CutBudget budget;
+  // What stands in until the cut is there takes room beside it.
+  budget.mesh_bytes = std::min(budgets_.device_memory, budgets_.memory / 2) / 2;
+  scene_->update(isovalues, view, budget);
+}
+
+void StorePicture::upload() {
+  const auto newest = scene_->drawable();
+  if (next_ == nullptr || next_ == shown_) next_ = newest;
+  const auto start = Clock::now();
+  for (const DrawnNode& node : next_->nodes) {
+    Upload& upload = uploads_[node.mesh.get()];
+    upload.used = frame_;
+    if (upload.mesh != nullptr) continue;
+    upload.mesh = node.mesh;
+    if (!node.mesh->empty()) upload.place = pool_.add(node.mesh->mesh.chunk(0), scene_->origin());
+    const std::chrono::duration<double> spent = Clock::now() - start;
+    if (shown_ != nullptr && spent.count() > kUploadSeconds)
+      return;  // the rest with the next picture
+  }
+  shown_ = next_;
+  next_ = newest;
+}
+
+void StorePicture::drop_unused() {
+  if (shown_ != nullptr)
+    for (const DrawnNode& node : shown_->nodes) uploads_[node.mesh.get()].used = frame_;
+  if (pool_.bytes() <= budgets_.device_memory) return;
+  std::vector<std::pair<std::uint64_t, const NodeMesh*>> oldest;
+  for (const auto& [key, upload] : uploads_)
+    if (upload.used != frame_) oldest.emplace_back(upload.used, key);
+  std::sort(oldest.begin(), oldest.end());
+  for (const auto& [used, key] : oldest) {
+    if (pool_.bytes() <= budgets_.device_memory) break;
+    uploads_.erase(key);
+  }
+}
+
+PictureSettings StorePicture::picture_settings(const ViewSettings& settings) const {
+  PictureSettings picture;
+  picture.background_top = settings.background_top;
+  picture.background_bottom = settings.background_bottom;
+  picture.occlusion = settings.occlusion;
+  picture.edges = settings.edges;
+  picture.multisample = settings.multisample;
+  picture.picking = true;
+  const ShownBox box = shown_box(settings);
+  const Transform& transform = scene_->tree().grid().transform();
+  const Vec3d last = last_sample(*store_), zero = transform.apply({0, 0, 0});
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3d step;
+    step[axis] = 1;
+    const Vec3d inward = unit(transform.apply(step) - zero, step);
+    Vec3d place;
+    place[axis] = box.lo[axis] * last[axis];
+    if (box.lo[axis] > 0) picture.planes.push_back({transform.apply(place), inward});
+    place[axis] = box.hi[axis] * last[axis];
+    if (box.hi[axis] < 1) picture.planes.push_back({transform.apply(place), inward * -1.0});
+  }
+  return picture;
+}
+
+void StorePicture::draw_surfaces(const ViewSettings& settings) {
+  state_.triangles = state_.nodes = 0;
+  state_.damage.clear();
+  if (shown_ == nullptr) return;
+  for (const DrawnNode& node : shown_->nodes) {
+    if (!node.mesh->damage.empty()) {
+      state_.damage.push_back(node.mesh->damage);
+      continue;
+    }
+    const auto number = static_cast<std::size_t>(node.isovalue);
+    const auto upload = uploads_.find(node.mesh.get());
+    if (number >= shown_surfaces_.size() || upload == uploads_.end() ||
+        upload->second.place.empty())
+      continue;
+    const SurfaceSettings& surface = settings.surfaces[shown_surfaces_[number]];
+    MeshStyle style;
+    style.colour = surface.colour;
+    style.opacity = surface.opacity;
+    style.id = static_cast<std::uint32_t>(shown_surfaces_[number] + 1);
+    renderer_.draw(upload->second.place, style);
+    state_.triangles += node.mesh->mesh.triangles.size();
+    ++state_.nodes;
+  }
+}
+
+void StorePicture::draw_slices(const ViewSettings& settings) {
+  const Vec3d last = last_sample(*store_);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto slot = static_cast<std::size_t>(axis);
+    ShownSlice& shown = slices_[slot];
+    if (!settings.slices[slot].shown) {
+      scene_->stream().set_slice(axis, std::nullopt);
+      shown = {};
+      continue;
+    }
+    SliceRequest request;
+    request.axis = axis;
+    request.position = settings.slices[slot].place * last[axis];
+    scene_->stream().set_slice(axis, request);
+    // Until it is there the last one stays.
+    if (const auto slice = scene_->stream().slice(axis); slice != nullptr && slice != shown.from)
+      shown = {slice, floats_of(*slice)};
+    if (shown.from == nullptr) continue;
+    const SliceSamples& from = *shown.from;
+    if (!from.damage.empty()) state_.damage.push_back(from.damage);
+    SliceImage image;
+    image.corner = from.corner;
+    image.along_x = from.along_width;
+    image.along_y = from.along_height;
+    image.width = static_cast<int>(from.width);
+    image.height = static_cast<int>(from.height);
+    image.samples = shown.samples;
+    image.window_lo = settings.window_lo;
+    image.window_hi = settings.window_hi;
+    renderer_.draw(image);
+  }
+}
+
+void StorePicture::draw_marks(const ViewSettings& settings) {
+  const NodeGrid& grid = scene_->tree().grid();
+  const Transform& transform = grid.transform();
+  if (shown_ != nullptr)
+    for (const DrawnNode& node : shown_->nodes) {
+      if (node.mesh->damage.empty()) continue;
+      const IndexBox box = grid.box(node.mesh->key);
+      const auto c = corners(transform, box.lo, box.hi);
+      std::vector<WorldLine> lines = edges(c);
+      for (std::size_t i = 0; i < 4; ++i) lines.push_back({c[i], c[7 - i]});  // a cross inside
+      renderer_.draw_lines(lines, kMarkColour, 2);
+    }
+  if (settings.box)
+    renderer_.draw_lines(edges(corners(transform, {0, 0, 0}, last_sample(*store_))), kBoxColour);
+  if (settings.axes) renderer_.draw_axes();
+  if (settings.scale_bar) renderer_.draw_scale_bar(unit_symbol(transform.unit));
+}
+
+void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
+                        double coarser) {
+  ++frame_;
+  update_scene(camera, width, height, settings, coarser);
+  upload();
+  renderer_.begin(camera, width, height, picture_settings(settings));
+  draw_surfaces(settings);
+  draw_slices(settings);
+  draw_marks(settings);
+  renderer_.end();
+  drop_unused();
+  state_.device_bytes = pool_.bytes();
+  state_.limited_by_budget = scene_->cut().limited_by_budget;
+  state_.complete = shown_ != nullptr && shown_ == scene_->drawable() &&
+                    (shown_->complete || scene_->stream().idle());
+}
+
+void StorePicture::draw_complete(const Camera& camera, int width, int height,
+                                 const ViewSettings& settings, const std::function<void()>& wait) {
+  for (;;) {
+    draw(camera, width, height, settings);
+    // The cut depends on what meshes were like; once more, it may be another.
+    if (state_.complete) {
+      draw(camera, width, height, settings);
+      if (state_.complete) return;
+    }
+    wait();
+    scene_->stream().wait_idle(kMarginOfWait);
+  }
+}
+
+}  // namespace isobrick

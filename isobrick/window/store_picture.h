@@ -1,0 +1,114 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "isobrick/render/mesh_pool.h"
+#include "isobrick/render/renderer.h"
+#include "isobrick/viewer/scene.h"
+#include "isobrick/window/view_settings.h"
+
+namespace isobrick {
+
+/// What a picture of a store may use.
+struct PictureBudgets {
+  std::uint64_t memory = std::uint64_t{2} << 30;         ///< host: decoded bricks and meshes
+  std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes on the device
+  int threads = 0;                                       ///< 0: all cores but one
+};
+
+/// What a picture shows and what it still lacks.
+struct PictureState {
+  bool complete = false;  ///< nothing finer, nothing else is on its way
+  std::uint64_t triangles = 0, nodes = 0, levels_finest = 0;
+  std::uint64_t device_bytes = 0;   ///< of meshes
+  bool limited_by_budget = false;   ///< with more memory it would be finer
+  std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
+};
+
+/// Draws a store: chooses nodes for a view, takes their meshes from the scene to the
+/// device, and makes the picture. The same for windows and off-screen. One thread, with
+/// the context current that it was made in.
+class StorePicture {
+ public:
+  /// Reads the ranges. `on_change` is called from worker threads when a new
+  /// picture would show more. Throws what Scene and Renderer do.
+  StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
+               std::function<void()> on_change);
+  ~StorePicture();
+
+  const StoreReader& store() const { return *store_; }
+  Scene& scene() { return *scene_; }
+  Renderer& renderer() { return renderer_; }
+
+  /// The box around the volume, axis by axis of world space.
+  WorldBox bounds() const;
+
+  /// Makes the picture in the renderer, of what is there by now. `coarser`: factor on
+  /// settings.pixel_error.
+  void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
+            double coarser = 1);
+  const PictureState& state() const { return state_; }
+
+  /// Draws again and again until the picture is complete. Calls `wait` between, at
+  /// least ten times a second, which may throw.
+  void draw_complete(const Camera& camera, int width, int height, const ViewSettings& settings,
+                     const std::function<void()>& wait);
+
+ private:
+  struct Upload {
+    MeshPtr mesh;  ///< keeps the key from being used anew
+    PooledMesh place;
+    std::uint64_t used = 0;
+  };
+
+  void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
+                    double coarser);
+  /// Takes meshes of the newest drawable to the device; shows it once all are there.
+  void upload();
+  void drop_unused();
+  void draw_surfaces(const ViewSettings& settings);
+  void draw_slices(const ViewSettings& settings);
+  void draw_marks(const ViewSettings& settings);
+  PictureSettings picture_settings(const ViewSettings& settings) const;
+
+  std::shared_ptr<const StoreReader> store_;
+  PictureBudgets budgets_;
+  Renderer renderer_;
+  MeshPool pool_;
+  std::unique_ptr<Scene> scene_;
+  std::shared_ptr<const Drawable> shown_, next_;
+  std::vector<std::size_t> shown_surfaces_;  ///< which surface each isovalue of the scene is
+  std::unordered_map<const NodeMesh*, Upload> uploads_;
+  /// What slices show, as the renderer takes it.
+  struct ShownSlice {
+    std::shared_ptr<const SliceSamples> from;
+    std::vector<float> samples;
+  };
+  std::array<ShownSlice, 3> slices_;
+  std::uint64_t frame_ = 0;
+  PictureState state_;
+};
+
+/// Gives a surface to settings that have none, an isovalue to surfaces that have none
+/// (in the middle of the coarsest level's values, which single far-off samples do not
+/// move), and the volume's range to a window that is empty.
+void choose_values(ViewSettings& settings, const NodeTree& tree);
+
+/// The part of a volume that cuts and region leave, in parts of the volume (0 … 1).
+struct ShownBox {
+  Vec3d lo{0, 0, 0}, hi{1, 1, 1};
+  bool whole() const { return lo == Vec3d{0, 0, 0} && hi == Vec3d{1, 1, 1}; }
+};
+ShownBox shown_box(const ViewSettings& settings);
+
+/// The camera's view of nodes.
+View view_of(const Camera& camera, int width, int height, double pixel_error);
+
+}  // namespace isobrick

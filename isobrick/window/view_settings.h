@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "isobrick/render/camera.h"
+#include "isobrick/render/renderer.h"
+#include "isobrick/window/navigation.h"
+
+namespace isobrick {
+
+/// One isosurface.
+struct SurfaceSettings {
+  double isovalue = std::numeric_limits<double>::quiet_NaN();  ///< NaN: for choose_values()
+  Vec3f colour{0.87f, 0.80f, 0.70f};                           ///< sRGB in [0, 1]
+  float opacity = 1;
+  bool shown = true;
+};
+
+/// A plane across an axis of the volume that cuts away what lies beyond it.
+struct CutSettings {
+  bool on = false;
+  float place = 0.5f;  ///< between the volume's first sample (0) and its last (1)
+  bool beyond = true;  ///< what lies at larger places goes; else at smaller ones
+};
+
+/// A picture of the samples across an axis of the volume.
+struct SliceSettings {
+  bool shown = false;
+  float place = 0.5f;
+};
+
+/// Everything that a picture of a store depends on besides the camera, the store and
+/// what of it has been loaded.
+struct ViewSettings {
+  std::vector<SurfaceSettings> surfaces;
+  std::array<CutSettings, 3> cuts;      ///< across x, y, z
+  std::array<SliceSettings, 3> slices;  ///< across x, y, z
+  float window_lo = 0,
+        window_hi = 0;  ///< samples that slices show black and white; equal: for choose_values()
+  bool region_on = false;
+  Vec3f region_lo{0, 0, 0}, region_hi{1, 1, 1};  ///< box shown, in parts of the volume
+  bool occlusion = true, edges = false, multisample = true;
+  bool box = true, axes = true, scale_bar = true;
+  float pixel_error = 1.5f;  ///< how long a cell may be on the picture
+  Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
+};
+
+/// Colours for the first surfaces of a scene, told apart in any order.
+Vec3f surface_colour(std::size_t number);
+
+// As JSON, for bookmarks. Reading throws Error for what is missing or makes no sense.
+nlohmann::ordered_json to_json(const ViewSettings& settings);
+ViewSettings view_settings_from(const nlohmann::ordered_json& json);
+nlohmann::ordered_json to_json(const Camera& camera);
+Camera camera_from(const nlohmann::ordered_json& json);
+
+}  // namespace isobrick

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isobrick/window/bookmarks.h"
+#include "isobrick/window/frame_pacer.h"
+#include "isobrick/window/import_job.h"
+#include "isobrick/window/isovalue_facts.h"
+#include "isobrick/window/navigation.h"
+#include "isobrick/window/store_picture.h"
+#include "isobrick/window/view_settings.h"
+
+namespace isobrick {
+
+/// A place that somebody pointed at.
+struct PickedPoint {
+  Vec3d world, index;           ///< index: of level 0's samples
+  std::uint32_t surface = 0;    ///< its number from 1; 0: none
+  std::optional<double> value;  ///< on the finest level that is decoded there
+  std::optional<Vec3d> normal;  ///< of unit length, towards smaller samples
+};
+
+/// What panels may ask of the window.
+struct Requests {
+  bool fit = false, close = false;
+  std::optional<Vec3d> look_along;  ///< world direction
+  std::optional<std::filesystem::path> screenshot;
+};
+
+/// What a window shows and how; panels change it. Not thread-safe.
+struct ViewerState {
+  std::filesystem::path path;             ///< of the store; empty: none is open
+  std::unique_ptr<StorePicture> picture;  ///< of the store; null: none is open
+  std::unique_ptr<IsovalueFacts> facts;   ///< of the store
+  ViewSettings settings;
+  std::size_t selected = 0;  ///< the surface that slider and keys move
+  Navigator navigator;
+  FramePacer pacer;
+  std::unique_ptr<Bookmarks> bookmarks;
+  std::string new_bookmark;  ///< the name that is being typed
+  std::unique_ptr<ImportJob> import;
+  std::vector<std::string> messages;  ///< what went wrong, the latest last
+  std::optional<PickedPoint> picked;
+  bool measuring = false;
+  std::vector<Vec3d> measured;  ///< world positions, two at most
+  bool panels = true;
+  Requests requests;
+  double frame_seconds = 0, draw_seconds = 0;  ///< of the last picture
+  std::array<float, 120> frame_times{};        ///< milliseconds, a ring
+  std::size_t frame_number = 0;
+
+  void say(std::string message) { messages.push_back(std::move(message)); }
+};
+
+}  // namespace isobrick

@@ -1,0 +1,262 @@
+#include "isobrick/window/viewer_window.h"
+
+#include <epoxy/gl.h>
+// After OpenGL's.
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/metadata_files.h"
+#include "isobrick/core/error.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/render/vectors.h"
+#include "isobrick/window/panels.h"
+#include "isobrick/window/pick.h"
+#include "isobrick/window/screenshot.h"
+#include "isobrick/window/window_events.h"
+
+namespace isobrick {
+namespace {
+
+/// Above it a frame is no frame but a pause.
+constexpr double kLongestStep = 0.1;
+/// Moving pictures may be coarser for so long after the last motion.
+constexpr double kSettleSeconds = 0.25;
+
+std::string glfw_message(const char* what) {
+  const char* why = nullptr;
+  glfwGetError(&why);
+  return fmt::format("{}: {}", what, why != nullptr ? why : "for an unknown reason");
+}
+
+GLFWwindow* make_window(const WindowOptions& options) {
+  if (glfwInit() == GLFW_FALSE)
+    throw Error(glfw_message("cannot open a window") +
+                " (without a display: --screenshot OUT.png draws into a file)");
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  glfwWindowHint(GLFW_DEPTH_BITS, 0);  // the renderer has its own
+  GLFWwindow* window =
+      glfwCreateWindow(options.width, options.height, "Isobrick", nullptr, nullptr);
+  if (window == nullptr) {
+    const std::string message = glfw_message("cannot open a window with OpenGL 4.5");
+    glfwTerminate();
+    throw Error(message);
+  }
+  return window;
+}
+
+void set_up_imgui(GLFWwindow* window) {
+  ImGui::CreateContext();
+  ImGui::GetIO().IniFilename = nullptr;  // nothing is left in whatever folder this is
+  ImGui::StyleColorsDark();
+  ImGui::GetStyle().WindowRounding = 4;
+  float scale = 1, other = 1;
+  glfwGetWindowContentScale(window, &scale, &other);
+  ImGui::GetStyle().ScaleAllSizes(scale);
+  ImGui::GetIO().FontGlobalScale = scale;
+  ImGui_ImplGlfw_InitForOpenGL(window, true);
+  ImGui_ImplOpenGL3_Init("#version 450");
+}
+
+}  // namespace
+
+ViewerWindow::ViewerWindow(WindowOptions options)
+    : options_(std::move(options)), window_(make_window(options_)) {
+  glfwMakeContextCurrent(window_);
+  glfwSwapInterval(1);
+  // Before ImGui's, which calls those that it finds.
+  events_ = std::make_unique<Events>(*this);
+  set_up_imgui(window_);
+  last_time_ = glfwGetTime();
+}
+
+ViewerWindow::~ViewerWindow() {
+  glfwMakeContextCurrent(window_);
+  state_.import.reset();
+  state_.facts.reset();
+  state_.picture.reset();
+  ImGui_ImplOpenGL3_Shutdown();
+  ImGui_ImplGlfw_Shutdown();
+  ImGui::DestroyContext();
+  glfwDestroyWindow(window_);
+  glfwTerminate();
+}
+
+double ViewerWindow::aspect() const {
+  int width = 1, height = 1;
+  glfwGetFramebufferSize(window_, &width, &height);
+  return static_cast<double>(std::max(width, 1)) / std::max(height, 1);
+}
+
+void ViewerWindow::open(const std::filesystem::path& path) {
+  auto store = std::make_shared<const StoreReader>(path);
+  auto picture =
+      std::make_unique<StorePicture>(store, options_.budgets, [] { glfwPostEmptyEvent(); });
+  auto facts = std::make_unique<IsovalueFacts>(store);
+  state_.facts = std::move(facts);
+  state_.picture = std::move(picture);
+  state_.path = path;
+  state_.selected = 0;
+  state_.settings = options_.settings;
+  // In software four samples a pixel take longer than anything else.
+  if (current_gl_device().software) state_.settings.multisample = false;
+  choose_values(state_.settings, state_.picture->scene().tree());
+  state_.picked.reset();
+  state_.measured.clear();
+  const WorldBox box = state_.picture->bounds();
+  state_.navigator.stop();
+  state_.navigator.vertical = options_.camera.up;
+  state_.navigator.camera = make_camera(options_.camera, box.lo, box.hi, aspect());
+  state_.bookmarks.reset();
+  try {
+    state_.bookmarks = std::make_unique<Bookmarks>(
+        options_.bookmarks.empty() ? Bookmarks::default_file() : options_.bookmarks, path);
+  } catch (const std::exception& e) {
+    state_.say(e.what());
+  }
+  glfwSetWindowTitle(window_, fmt::format("{} - Isobrick", path.filename().string()).c_str());
+  // The next store is seen whole and with its own isovalue.
+  options_.camera = {};
+  options_.settings.surfaces.clear();
+  changed_ = true;
+}
+
+void ViewerWindow::drop(const std::filesystem::path& path) {
+  try {
+    if (is_zarr(path)) return open(path);
+    if (state_.import != nullptr) throw Error("another file is being converted");
+    state_.import = std::make_unique<ImportJob>(path, store_for(path), ConvertOptions{});
+  } catch (const std::exception& e) {
+    state_.say(e.what());
+  }
+}
+
+void ViewerWindow::handle_import() {
+  if (state_.import == nullptr) return;
+  const ImportJob::State now = state_.import->state();
+  if (!now.finished) return;
+  const std::filesystem::path store = state_.import->store();
+  state_.import.reset();
+  if (now.cancelled) return;
+  if (!now.failure.empty()) return state_.say(now.failure);
+  drop(store);
+}
+
+void ViewerWindow::look_along(Vec3d direction) {
+  Navigator& n = state_.navigator;
+  n.stop();
+  const double distance = n.camera.distance();
+  const bool vertical = std::abs(dot(direction, n.vertical)) > 0.99;
+  Camera camera(n.camera.target - direction * distance, n.camera.target,
+                vertical ? Vec3d{0, 1, 0} : n.vertical);
+  camera.field_of_view = n.camera.field_of_view;
+  camera.orthographic = n.camera.orthographic;
+  camera.scene = n.camera.scene;
+  n.camera = camera;
+}
+
+void ViewerWindow::handle_requests() {
+  const Requests asked = std::exchange(state_.requests, {});
+  if (asked.close) glfwSetWindowShouldClose(window_, GLFW_TRUE);
+  if (state_.picture == nullptr) return;
+  if (asked.look_along) look_along(*asked.look_along);
+  if (asked.fit) {
+    const WorldBox box = state_.picture->bounds();
+    state_.navigator.camera.fit(box.lo, box.hi, aspect());
+    state_.navigator.stop();
+  }
+  if (asked.screenshot) save_picture(*asked.screenshot);
+}
+
+void ViewerWindow::save_picture(const std::filesystem::path& file) {
+  try {
+    write_picture(state_.picture->renderer(), file.string(), true);
+    state_.say(fmt::format("wrote '{}'", std::filesystem::absolute(file).string()));
+  } catch (const std::exception& e) {
+    state_.say(e.what());
+  }
+}
+
+void ViewerWindow::click(double x, double y) {
+  if (state_.picture == nullptr) return;
+  state_.picked = pick_point(*state_.picture, static_cast<int>(x), static_cast<int>(y));
+  if (!state_.measuring || !state_.picked) return;
+  if (state_.measured.size() == 2) state_.measured.clear();
+  state_.measured.push_back(state_.picked->world);
+}
+
+bool ViewerWindow::moving() const {
+  return state_.navigator.moving() || events_->dragging() ||
+         glfwGetTime() - events_->last_motion() < kSettleSeconds;
+}
+
+void ViewerWindow::draw_frame() {
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window_, &width, &height);
+  if (width == 0 || height == 0) return;  // minimised
+  glClearColor(0.2f, 0.21f, 0.23f, 1);
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, width, height);
+  glClear(GL_COLOR_BUFFER_BIT);
+  if (state_.picture != nullptr) {
+    const double begin = glfwGetTime();
+    const bool fluent = moving();
+    ViewSettings settings = state_.settings;
+    if (fluent && state_.pacer.plain()) settings.occlusion = settings.multisample = false;
+    try {
+      state_.picture->draw(state_.navigator.camera, width, height, settings,
+                           fluent ? state_.pacer.coarser() : 1);
+      state_.picture->renderer().copy_to(0, 0, 0);
+    } catch (const std::exception& e) {
+      if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
+    }
+    glFinish();
+    state_.draw_seconds = glfwGetTime() - begin;
+    if (fluent) state_.pacer.drawn(state_.draw_seconds);
+  }
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  ImGui::NewFrame();
+  draw_panels(state_);
+  draw_measure(state_, width, height);
+  ImGui::Render();
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  glfwSwapBuffers(window_);
+}
+
+bool ViewerWindow::step(double most_seconds) {
+  const bool still = state_.picture == nullptr || (!moving() && state_.picture->state().complete);
+  if (still && !changed_)
+    glfwWaitEventsTimeout(most_seconds);
+  else
+    glfwPollEvents();
+  if (glfwWindowShouldClose(window_)) return false;
+  changed_ = false;
+  const double now = glfwGetTime();
+  state_.frame_seconds = now - last_time_;
+  state_.frame_times[state_.frame_number++ % state_.frame_times.size()] =
+      static_cast<float>(state_.frame_seconds * 1e3);
+  last_time_ = now;
+  state_.navigator.update(std::min(state_.frame_seconds, kLongestStep));
+  handle_import();
+  handle_requests();
+  draw_frame();
+  return true;
+}
+
+void ViewerWindow::run() {
+  while (step()) {
+  }
+}
+
+}  // namespace isobrick

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "isobrick/render/camera_request.h"
+#include "isobrick/window/viewer_state.h"
+
+struct GLFWwindow;
+
+namespace isobrick {
+
+/// How a window is opened.
+struct WindowOptions {
+  int width = 1280, height = 800;
+  PictureBudgets budgets;
+  CameraRequest camera;             ///< for the first store
+  ViewSettings settings;            ///< for the first store
+  std::filesystem::path bookmarks;  ///< file; empty: the user's own
+};
+
+/// A window that shows a store: mouse, keys, panels, files dropped on it. All functions
+/// are for the thread that made it; one window at a time.
+class ViewerWindow {
+ public:
+  /// Throws Error when there is no display or no OpenGL 4.5.
+  explicit ViewerWindow(WindowOptions options);
+  ~ViewerWindow();
+  ViewerWindow(const ViewerWindow&) = delete;
+  ViewerWindow& operator=(const ViewerWindow&) = delete;
+
+  /// Shows a store. Throws what opening it throws; what was shown before stays then.
+  void open(const std::filesystem::path& store);
+  /// Shows a store, or converts another format and shows that; failures are shown.
+  void drop(const std::filesystem::path& path);
+
+  /// Waits for something to happen, at most so long and not at all while anything moves,
+  /// and shows the next picture. False once the window is closed.
+  bool step(double most_seconds = 0.1);
+  /// Until the window is closed.
+  void run();
+
+  ViewerState& state() { return state_; }
+  GLFWwindow* handle() { return window_; }
+
+ private:
+  class Events;
+
+  void draw_frame();
+  void handle_requests();
+  void handle_import();
+  void look_along(Vec3d direction);
+  void click(double x, double y);
+  void save_picture(const std::filesystem::path& file);
+  bool moving() const;
+  double aspect() const;
+
+  WindowOptions options_;
+  GLFWwindow* window_ = nullptr;
+  std::unique_ptr<Events> events_;
+  ViewerState state_;
+  double last_time_ = 0;
+  bool changed_ = true;  ///< the next picture may differ from the last
+};
+
+}  // namespace isobrick

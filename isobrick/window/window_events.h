@@ -1,0 +1,34 @@
+#pragma once
+
+#include "isobrick/window/viewer_window.h"
+
+namespace isobrick {
+
+/// What mouse, keys and dropped files do to a window.
+class ViewerWindow::Events {
+ public:
+  /// Sets the window's callbacks, for its lifetime.
+  explicit Events(ViewerWindow& owner);
+
+  /// A button is down that moves the camera.
+  bool dragging() const { return button_ >= 0; }
+  /// When the camera or an isovalue moved last, GLFW's time.
+  double last_motion() const { return last_motion_; }
+
+ private:
+  void on_button(int button, int action, int mods);
+  void on_pointer(double x, double y);
+  void on_wheel(double steps);
+  void on_key(int key, int action, int mods);
+  void on_press(int key, int mods);
+  void move_isovalue(double steps);
+  void next_mode();
+  FlyKeys fly_keys() const;
+
+  ViewerWindow& owner_;
+  int button_ = -1, mods_ = 0;  ///< of the drag; −1: none
+  double x_ = 0, y_ = 0, pressed_x_ = 0, pressed_y_ = 0, time_ = 0;
+  double last_motion_ = -1e9;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,65 @@
+#include "isobrick/window/import_job.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "isobrick/bricks/store_reader.h"
+#include "tests/io/temp_dir.h"
+
+namespace isobrick {
+namespace {
+
+ImportJob::State finished(const ImportJob& job) {
+  for (int i = 0; i < 3000 && !job.state().finished; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  return job.state();
+}
+
+std::string ramp(std::size_t n) {
+  std::string samples(n, '\0');
+  for (std::size_t i = 0; i < n; ++i) samples[i] = static_cast<char>(i / 999 % 256);
+  return samples;
+}
+
+TEST(ImportJob, ConvertsWhatItIsGiven) {
+  const TempDir dir;
+  dir.write("ramp_40x30x20_uint8.raw", ramp(40 * 30 * 20));
+  const ImportJob job(dir / "ramp_40x30x20_uint8.raw", dir / "ramp.zarr", {});
+  const ImportJob::State state = finished(job);
+  EXPECT_TRUE(state.finished);
+  EXPECT_EQ(state.failure, "");
+  EXPECT_EQ(StoreReader(dir / "ramp.zarr").info().levels[0].lattice.extent, (Int3{40, 30, 20}));
+}
+
+TEST(ImportJob, SaysWhatIsWrong) {
+  const TempDir dir;
+  dir.write("ramp_40x30x20_uint8.raw", ramp(100));
+  const ImportJob job(dir / "ramp_40x30x20_uint8.raw", dir / "ramp.zarr", {});
+  EXPECT_NE(finished(job).failure.find("ramp_40x30x20_uint8.raw"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(dir / "ramp.zarr"));
+}
+
+TEST(ImportJob, LeavesNothingWhenItIsCancelled) {
+  const TempDir dir;
+  dir.write("ramp_512x512x256_uint8.raw", ramp(512 * 512 * 256));
+  {
+    ImportJob job(dir / "ramp_512x512x256_uint8.raw", dir / "ramp.zarr", {});
+    while (job.state().done == 0 && !job.state().finished) std::this_thread::yield();
+  }
+  EXPECT_EQ(dir.list().size(), 1u);
+}
+
+TEST(StoreFor, TakesANameThatIsFree) {
+  const TempDir dir;
+  EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a.zarr");
+  dir.write("a.zarr", "");
+  EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a-2.zarr");
+  std::filesystem::create_directory(dir / "a-2.zarr.partial");
+  EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a-3.zarr");
+}
+
+}  // namespace
+}  // namespace isobrick

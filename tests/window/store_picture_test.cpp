@@ -1,0 +1,178 @@
+#include "isobrick/window/store_picture.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "isobrick/pipeline/convert.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/render/vectors.h"
+#include "isobrick/volumes/synth_source.h"
+#include "isobrick/window/pick.h"
+#include "isobrick/window/screenshot.h"
+#include "tests/io/temp_dir.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kWidth = 320, kHeight = 240;
+
+class Picture : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!GlContext::available()) GTEST_SKIP() << "there is no OpenGL 4.5";
+    context_ = std::make_unique<GlContext>();
+  }
+
+  /// A picture of a synthetic volume, from the front.
+  void open(SynthKind kind, Int3 extent, PictureBudgets budgets = {}) {
+    const auto source = make_synth({.kind = kind, .extent = extent});
+    NoProgress progress;
+    convert(*source, dir_ / "store.zarr", {.brick = 32, .force = true}, progress);
+    show(budgets);
+    settings_.surfaces = {{default_isovalue(ScalarType::u8), surface_colour(0), 1, true}};
+    settings_.box = settings_.axes = settings_.scale_bar = false;
+  }
+  void show(PictureBudgets budgets = {}) {
+    picture_.reset();
+    picture_ = std::make_unique<StorePicture>(
+        std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {});
+    const WorldBox box = picture_->bounds();
+    camera_.fit(box.lo, box.hi, static_cast<double>(kWidth) / kHeight);
+  }
+  void draw() {
+    picture_->draw_complete(camera_, kWidth, kHeight, settings_, [] {});
+  }
+  std::vector<std::uint8_t> pixels() {
+    draw();
+    return picture_->renderer().read_pixels();
+  }
+
+  TempDir dir_;
+  std::unique_ptr<GlContext> context_;
+  std::unique_ptr<StorePicture> picture_;
+  Camera camera_{{0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1}};
+  ViewSettings settings_;
+};
+
+TEST_F(Picture, ShowsTheSurfaceWhereItIs) {
+  open(SynthKind::sphere, {96, 96, 96});
+  draw();
+  const auto point = pick_point(*picture_, kWidth / 2, kHeight / 2);
+  ASSERT_TRUE(point);
+  EXPECT_EQ(point->surface, 1u);
+  // The sphere's surface is half way between isovalue and both ends of its field; all
+  // its points are equally far from the middle.
+  const Vec3d middle{47.5, 47.5, 47.5};
+  const double radius = length(point->world - middle);
+  for (const auto& [x, y] : {std::pair{130, 110}, {190, 130}, {160, 90}}) {
+    const auto other = pick_point(*picture_, x, y);
+    ASSERT_TRUE(other) << x << ' ' << y;
+    EXPECT_NEAR(length(other->world - middle), radius, 1.0) << x << ' ' << y;
+  }
+  EXPECT_FALSE(pick_point(*picture_, 1, 1));
+}
+
+TEST_F(Picture, IsTheSameTwice) {
+  open(SynthKind::gyroid, {128, 128, 128});
+  const auto first = pixels();
+  show();
+  EXPECT_EQ(pixels(), first);
+}
+
+TEST_F(Picture, CoarseOnesLookLikeFineOnes) {
+  open(SynthKind::sphere, {160, 160, 160});
+  settings_.occlusion = false;
+  settings_.pixel_error = 0.5f;
+  const auto fine = pixels();
+  const auto fine_triangles = picture_->state().triangles;
+  settings_.pixel_error = 3;
+  const auto coarse = pixels();
+  EXPECT_LT(picture_->state().triangles, fine_triangles / 2);
+  double difference = 0;
+  for (std::size_t i = 0; i < fine.size(); ++i) difference += std::abs(fine[i] - coarse[i]);
+  EXPECT_LT(difference / static_cast<double>(fine.size()), 2.0);
+}
+
+TEST_F(Picture, CutsAndRegionsLeaveWhatTheySay) {
+  open(SynthKind::sphere, {96, 96, 96});
+  settings_.cuts[1] = {true, 0.5f, false};  // the half in front goes
+  draw();
+  const auto point = pick_point(*picture_, kWidth / 2, kHeight / 2);
+  ASSERT_TRUE(point);
+  EXPECT_GE(point->world.y, 47);
+  settings_.cuts[1].on = false;
+  settings_.region_on = true;
+  settings_.region_lo = {0, 0, 0};
+  settings_.region_hi = {0.001f, 1, 1};
+  draw();
+  EXPECT_FALSE(pick_point(*picture_, kWidth / 2, kHeight / 2));
+}
+
+TEST_F(Picture, SeveralSurfacesAreToldApart) {
+  open(SynthKind::sphere, {96, 96, 96});
+  const double isovalue = settings_.surfaces[0].isovalue;
+  settings_.surfaces = {{isovalue + 60, surface_colour(0), 1, true},
+                        {isovalue, surface_colour(1), 1, true}};
+  draw();
+  EXPECT_EQ(pick_point(*picture_, kWidth / 2, kHeight / 2)->surface, 2u);
+  settings_.surfaces[1].shown = false;
+  draw();
+  EXPECT_EQ(pick_point(*picture_, kWidth / 2, kHeight / 2)->surface, 1u);
+}
+
+TEST_F(Picture, KeepsItsBudgets) {
+  const PictureBudgets budgets{.memory = 48u << 20, .device_memory = 4u << 20};
+  open(SynthKind::gyroid, {256, 256, 256}, budgets);
+  settings_.pixel_error = 0.25f;
+  draw();
+  EXPECT_TRUE(picture_->state().limited_by_budget);
+  EXPECT_LE(picture_->state().device_bytes, budgets.device_memory);
+  EXPECT_LE(picture_->scene().stream().counters().brick_bytes_peak, budgets.memory / 2);
+}
+
+TEST_F(Picture, ADamagedBrickIsMarkedAndTheRestIsShown) {
+  open(SynthKind::sphere, {96, 96, 96});
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(dir_ / "store.zarr/0")) {
+    if (!entry.is_regular_file() || entry.path().extension() == ".json" || entry.file_size() < 4096)
+      continue;
+    std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(entry.file_size() / 3));
+    file.write("damage", 6);
+  }
+  show();
+  settings_.pixel_error = 0.5f;
+  draw();
+  EXPECT_FALSE(picture_->state().damage.empty());
+  EXPECT_GT(picture_->state().triangles, 100u);
+}
+
+TEST_F(Picture, SlicesShowSamples) {
+  open(SynthKind::sphere, {96, 96, 96});
+  settings_.occlusion = settings_.multisample = false;
+  settings_.surfaces[0].shown = false;
+  settings_.slices[1] = {true, 0.5f};
+  choose_values(settings_, picture_->scene().tree());
+  camera_ = Camera({0, -1, 0}, {0, 0, 0}, {0, 0, 1});
+  const WorldBox box = picture_->bounds();
+  camera_.fit(box.lo, box.hi, static_cast<double>(kWidth) / kHeight);
+  const auto rgba = pixels();
+  const auto grey = [&](int x, int y) {
+    return rgba[static_cast<std::size_t>(y * kWidth + x) * 4];
+  };
+  // The field is largest in the middle and falls off to all sides alike.
+  EXPECT_GT(grey(kWidth / 2, kHeight / 2), grey(kWidth / 2, kHeight / 2 - 60) + 20);
+  EXPECT_NEAR(grey(kWidth / 2, kHeight / 2 - 50), grey(kWidth / 2 + 50, kHeight / 2), 6);
+}
+
+TEST_F(Picture, TurntablesTurn) {
+  open(SynthKind::gyroid, {48, 48, 48});
+  write_turntable(*picture_, camera_, 64, 48, settings_, 3, dir_ / "turn", false, [] {});
+  EXPECT_TRUE(std::filesystem::exists(dir_ / "turn/0002.png"));
+  EXPECT_NE(dir_.read("turn/0000.png"), dir_.read("turn/0001.png"));
+}
+
+}  // namespace
+}  // namespace isobrick

@@ -1,0 +1,229 @@
+#include "isobrick/window/viewer_window.h"
+
+#include <gtest/gtest.h>
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <X11/keysym.h>
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/convert.h"
+#include "isobrick/render/vectors.h"
+#include "isobrick/volumes/synth_source.h"
+#include "tests/io/temp_dir.h"
+#include "tests/window/virtual_display.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kWidth = 640, kHeight = 480;
+
+/// A window with a sphere, and hands.
+class Window : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!VirtualDisplay::available()) GTEST_SKIP() << "there is no Xvfb";
+    display_ = std::make_unique<VirtualDisplay>(kWidth, kHeight);
+    make_store("sphere.zarr", {96, 96, 96});
+  }
+
+  void make_store(const std::string& name, Int3 extent) {
+    const auto source = make_synth({.kind = SynthKind::sphere, .extent = extent});
+    NoProgress progress;
+    convert(*source, dir_ / name, {.brick = 32}, progress);
+  }
+
+  ViewerWindow& open(WindowOptions options = {}) {
+    options.width = kWidth;
+    options.height = kHeight;
+    options.bookmarks = dir_ / "bookmarks.json";
+    options.settings.occlusion = options.settings.multisample = false;  // slow in software
+    window_ = std::make_unique<ViewerWindow>(options);
+    window_->open(dir_ / "sphere.zarr");
+    window_->state().panels = false;
+    until([&] { return window_->state().picture->state().complete; });
+    glfwSetWindowPos(window_->handle(), 0, 0);
+    display_->move_pointer(kWidth / 2, kHeight / 2);
+    display_->focus_under_pointer();
+    steps(3);
+    return *window_;
+  }
+
+  /// Steps until it holds. A test that waits for nothing fails.
+  void until(const std::function<bool()>& holds) {
+    const auto start = std::chrono::steady_clock::now();
+    while (!holds()) {
+      ASSERT_TRUE(window_->step(0.02));
+      ASSERT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+    }
+  }
+  void steps(int n) {
+    for (int i = 0; i < n; ++i) ASSERT_TRUE(window_->step(0.02));
+  }
+
+  void drag(int button, int from_x, int from_y, int to_x, int to_y) {
+    display_->move_pointer(from_x, from_y);
+    steps(2);
+    display_->button(button, true);
+    steps(2);
+    for (int i = 1; i <= 5; ++i) {
+      display_->move_pointer(from_x + (to_x - from_x) * i / 5, from_y + (to_y - from_y) * i / 5);
+      steps(2);
+    }
+    display_->button(button, false);
+    steps(2);
+  }
+  void click(int x, int y) {
+    display_->move_pointer(x, y);
+    steps(2);
+    display_->button(1, true);
+    steps(2);
+    display_->button(1, false);
+    steps(3);
+  }
+
+  TempDir dir_;
+  std::unique_ptr<VirtualDisplay> display_;
+  std::unique_ptr<ViewerWindow> window_;
+};
+
+TEST_F(Window, ShowsAStore) {
+  ViewerWindow& window = open();
+  EXPECT_GT(window.state().picture->state().triangles, 1000u);
+  EXPECT_TRUE(window.state().messages.empty());
+  // The middle of the picture shows the sphere, its corner nothing.
+  Renderer& renderer = window.state().picture->renderer();
+  EXPECT_TRUE(renderer.pick(renderer.width() / 2, renderer.height() / 2));
+  EXPECT_FALSE(renderer.pick(2, 2));
+}
+
+TEST_F(Window, DragsMoveTheCameraAndSpinsRunOut) {
+  ViewerWindow& window = open();
+  const Vec3d eye = window.state().navigator.camera.eye;
+  drag(1, 300, 240, 400, 260);
+  EXPECT_GT(length(window.state().navigator.camera.eye - eye), 1);
+  until([&] { return !window.state().navigator.moving(); });
+  const double distance = window.state().navigator.camera.distance();
+  display_->button(4, true);
+  display_->button(4, false);
+  steps(4);
+  EXPECT_LT(window.state().navigator.camera.distance(), distance * 0.95);
+  const Vec3d target = window.state().navigator.camera.target;
+  drag(2, 300, 240, 350, 240);
+  EXPECT_GT(length(window.state().navigator.camera.target - target), 1);
+}
+
+TEST_F(Window, KeysMoveTheIsovalueAndThePictureFollows) {
+  ViewerWindow& window = open();
+  const double before = window.state().settings.surfaces[0].isovalue;
+  const auto triangles = window.state().picture->state().triangles;
+  for (int i = 0; i < 8; ++i) {
+    display_->tap(XK_bracketright);
+    steps(1);
+  }
+  until([&] {
+    return window.state().settings.surfaces[0].isovalue > before &&
+           window.state().picture->state().complete;
+  });
+  EXPECT_NE(window.state().picture->state().triangles, triangles);
+}
+
+TEST_F(Window, TheSliderMovesTheIsovalue) {
+  ViewerWindow& window = open();
+  window.state().panels = true;
+  until([&] { return window.state().facts->histogram() != nullptr; });
+  steps(3);
+  const double before = window.state().settings.surfaces[0].isovalue;
+  drag(1, 100, 80, 220, 80);  // within the histogram, on the panel
+  EXPECT_NE(window.state().settings.surfaces[0].isovalue, before);
+}
+
+TEST_F(Window, KeysCutTheVolume) {
+  ViewerWindow& window = open();
+  const Renderer& renderer = window.state().picture->renderer();
+  const auto whole = renderer.read_pixels();
+  display_->tap(XK_1);
+  until([&] { return window.state().settings.cuts[0].on; });
+  until([&] { return window.state().picture->state().complete; });
+  steps(2);
+  EXPECT_NE(renderer.read_pixels(), whole);
+}
+
+TEST_F(Window, ClicksPickAndMeasure) {
+  ViewerWindow& window = open();
+  click(kWidth / 2, kHeight / 2);
+  ASSERT_TRUE(window.state().picked);
+  // On the sphere around the middle of the volume.
+  EXPECT_EQ(window.state().picked->surface, 1u);
+  display_->tap(XK_m);
+  until([&] { return window.state().measuring; });
+  click(kWidth / 2 - 30, kHeight / 2);
+  click(kWidth / 2 + 30, kHeight / 2);
+  ASSERT_EQ(window.state().measured.size(), 2u);
+  EXPECT_GT(length(window.state().measured[1] - window.state().measured[0]), 1);
+  click(3, 3);  // the background is no point
+  EXPECT_EQ(window.state().measured.size(), 2u);
+}
+
+TEST_F(Window, SurvivesOtherSizesAndNone) {
+  ViewerWindow& window = open();
+  for (const auto& [width, height] : {std::pair{300, 200}, {611, 97}, {1, 1}, {kWidth, kHeight}}) {
+    glfwSetWindowSize(window.handle(), width, height);
+    steps(6);
+  }
+  until([&] { return window.state().picture->renderer().width() == kWidth; });
+  glfwHideWindow(window.handle());
+  steps(5);
+  glfwShowWindow(window.handle());
+  until([&] { return window.state().picture->state().complete; });
+}
+
+TEST_F(Window, ClosesAtOnceWhileItStreams) {
+  make_store("big.zarr", {320, 320, 320});
+  ViewerWindow& window = open();
+  window.open(dir_ / "big.zarr");
+  steps(2);
+  EXPECT_FALSE(window.state().picture->state().complete);
+  const auto start = std::chrono::steady_clock::now();
+  window_.reset();
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+  EXPECT_LT(spent.count(), 0.5);  // of that at most 0.1 for the stream; Mesa takes its time, too
+}
+
+TEST_F(Window, OpensWhatIsDroppedOnIt) {
+  ViewerWindow& window = open();
+  make_store("other.zarr", {40, 40, 40});
+  window.drop(dir_ / "other.zarr");
+  EXPECT_EQ(window.state().path, dir_ / "other.zarr");
+  std::string samples(64 * 64 * 64, '\0');
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<char>(i / 4096);
+  dir_.write("ramp_64x64x64_uint8.raw", samples);
+  window.drop(dir_ / "ramp_64x64x64_uint8.raw");
+  until([&] { return window.state().path == dir_ / "ramp_64x64x64_uint8.zarr"; });
+  EXPECT_TRUE(window.state().messages.empty());
+}
+
+TEST_F(Window, ShowsWhatIsWrongAndGoesOn) {
+  ViewerWindow& window = open();
+  window.drop(dir_ / "nothing.zarr");
+  dir_.write("nonsense.nrrd", "NRRD0004\ntype: what\n");
+  window.drop(dir_ / "nonsense.nrrd");
+  until([&] { return window.state().import == nullptr; });
+  EXPECT_GE(window.state().messages.size(), 1u);
+  EXPECT_EQ(window.state().path, dir_ / "sphere.zarr");
+  EXPECT_TRUE(window.step(0));
+}
+
+TEST(ViewerWindow, SaysThatThereIsNoDisplay) {
+  if (std::getenv("DISPLAY") != nullptr && *std::getenv("DISPLAY") != '\0')
+    GTEST_SKIP() << "there is a display";
+  EXPECT_TRUE(message_of<Error>([] { ViewerWindow window({}); }).find("--screenshot") !=
+              std::string::npos);
+}
+
+}  // namespace
+}  // namespace isobrick

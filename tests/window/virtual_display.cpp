@@ -1,0 +1,78 @@
+#include "tests/window/virtual_display.h"
+
+#include <X11/Xlib.h>
+#include <X11/extensions/XTest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <stdexcept>
+
+namespace isobrick {
+
+struct VirtualDisplay::State {
+  pid_t server = -1;
+  Display* display = nullptr;
+  std::string before;
+
+  ~State() {
+    if (display != nullptr) XCloseDisplay(display);
+    if (server > 0) {
+      kill(server, SIGTERM);
+      waitpid(server, nullptr, 0);
+    }
+    setenv("DISPLAY", before.c_str(), 1);
+  }
+};
+
+bool VirtualDisplay::available() { return std::system("command -v Xvfb >/dev/null 2>&1") == 0; }
+
+VirtualDisplay::VirtualDisplay(int width, int height) : state_(std::make_unique<State>()) {
+  if (const char* display = std::getenv("DISPLAY")) state_->before = display;
+  int pipes[2];
+  if (pipe(pipes) != 0) throw std::runtime_error("no pipe");
+  const std::string screen = std::to_string(width) + "x" + std::to_string(height) + "x24";
+  const std::string number = std::to_string(pipes[1]);
+  state_->server = fork();
+  if (state_->server == 0) {
+    close(pipes[0]);
+    execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", screen.c_str(),
+           "-nolisten", "tcp", "+extension", "GLX", static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  close(pipes[1]);
+  std::string name = ":";
+  for (char c = 0; read(pipes[0], &c, 1) == 1 && c != '\n';) name += c;
+  close(pipes[0]);
+  if (name == ":") throw std::runtime_error("Xvfb did not start");
+  setenv("DISPLAY", name.c_str(), 1);
+  state_->display = XOpenDisplay(nullptr);
+  if (state_->display == nullptr) throw std::runtime_error("no connection to Xvfb");
+}
+
+VirtualDisplay::~VirtualDisplay() = default;
+
+void VirtualDisplay::focus_under_pointer() {
+  XSetInputFocus(state_->display, PointerRoot, RevertToPointerRoot, CurrentTime);
+  XSync(state_->display, False);
+}
+
+void VirtualDisplay::move_pointer(int x, int y) {
+  XTestFakeMotionEvent(state_->display, -1, x, y, CurrentTime);
+  XSync(state_->display, False);
+}
+
+void VirtualDisplay::button(int number, bool down) {
+  XTestFakeButtonEvent(state_->display, static_cast<unsigned>(number), down ? True : False,
+                       CurrentTime);
+  XSync(state_->display, False);
+}
+
+void VirtualDisplay::key(unsigned long keysym, bool down) {
+  XTestFakeKeyEvent(state_->display, XKeysymToKeycode(state_->display, keysym), down ? True : False,
+                    CurrentTime);
+  XSync(state_->display, False);
+}
+
+}  // namespace isobrick

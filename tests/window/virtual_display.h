@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+namespace isobrick {
+
+/// A display without a screen (Xvfb) and hands for it (the XTEST extension). DISPLAY names it
+/// while it lives.
+class VirtualDisplay {
+ public:
+  /// Throws std::runtime_error when Xvfb does not start.
+  VirtualDisplay(int width, int height);
+  ~VirtualDisplay();
+  VirtualDisplay(const VirtualDisplay&) = delete;
+  VirtualDisplay& operator=(const VirtualDisplay&) = delete;
+
+  /// Whether there is an Xvfb program.
+  static bool available();
+
+  /// Keys go to the window under the pointer from now on, as there is no window manager.
+  void focus_under_pointer();
+  void move_pointer(int x, int y);
+  void button(int number, bool down);  ///< 1 left, 2 middle, 3 right, 4 and 5 the wheel
+  void key(unsigned long keysym, bool down);
+  void tap(unsigned long keysym) {
+    key(keysym, true);
+    key(keysym, false);
+  }
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace isobrick

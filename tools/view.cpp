@@ -1,0 +1,178 @@
+#include <algorithm>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "isobrick/render/camera_request.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/window/screenshot.h"
+#include "isobrick/window/viewer_window.h"
+#include "tools/format.h"
+#include "tools/options.h"
+
+namespace isobrick::tools {
+namespace {
+
+struct Arguments {
+  std::string store, screenshot, turntable;
+  std::vector<double> isovalues;
+  std::vector<Vec3f> colours;
+  std::vector<float> opacities;
+  ViewSettings settings;
+  CameraRequest camera;
+  PictureSize size{1280, 800};
+  int frames = 120;
+  bool plain = false, no_occlusion = false, force = false;
+  PictureBudgets budgets;
+};
+
+ViewSettings settings_of(const Arguments& arguments) {
+  ViewSettings settings = arguments.settings;
+  const std::size_t count = std::max<std::size_t>(arguments.isovalues.size(), 1);
+  if (arguments.colours.size() > count || arguments.opacities.size() > count)
+    throw UsageError("there are more colours or opacities than isovalues");
+  for (std::size_t i = 0; i < count; ++i) {
+    SurfaceSettings surface{.colour = surface_colour(i)};
+    if (i < arguments.isovalues.size()) surface.isovalue = arguments.isovalues[i];
+    if (i < arguments.colours.size()) surface.colour = arguments.colours[i];
+    if (i < arguments.opacities.size()) surface.opacity = arguments.opacities[i];
+    settings.surfaces.push_back(surface);
+  }
+  settings.occlusion = !arguments.no_occlusion;
+  if (arguments.plain) settings.box = settings.axes = settings.scale_bar = false;
+  return settings;
+}
+
+/// Draws into files.
+int draw(const Arguments& arguments, Console& console) {
+  const auto store = std::make_shared<const StoreReader>(arguments.store);
+  const GlContext context;
+  StorePicture picture(store, arguments.budgets, {});
+  ViewSettings settings = settings_of(arguments);
+  choose_values(settings, picture.scene().tree());
+  const WorldBox box = picture.bounds();
+  const auto [width, height] = arguments.size;
+  const Camera camera =
+      make_camera(arguments.camera, box.lo, box.hi, static_cast<double>(width) / height);
+  Progress& progress = console.progress();
+  const int frames = arguments.turntable.empty() ? 0 : arguments.frames;
+  progress.begin("draw", 0);
+  const auto wait = [&] { progress.advance(0); };
+  if (!arguments.screenshot.empty()) {
+    picture.draw_complete(camera, width, height, settings, wait);
+    write_picture(picture.renderer(), arguments.screenshot, arguments.force);
+  }
+  if (frames > 0)
+    write_turntable(picture, camera, width, height, settings, frames, arguments.turntable,
+                    arguments.force, wait);
+  progress.end();
+  const PictureState& state = picture.state();
+  for (const std::string& message : state.damage) console.note(message);
+  nlohmann::ordered_json isovalues = nlohmann::ordered_json::array();
+  for (const SurfaceSettings& surface : settings.surfaces) isovalues.push_back(surface.isovalue);
+  const std::string output =
+      arguments.screenshot.empty() ? arguments.turntable : arguments.screenshot;
+  console.result({{"command", "view"},
+                  {"store", arguments.store},
+                  {"isovalues", isovalues},
+                  {"screenshot", arguments.screenshot},
+                  {"turntable", arguments.turntable},
+                  {"frames", frames},
+                  {"width", width},
+                  {"height", height},
+                  {"triangles", state.triangles},
+                  {"damaged_parts", state.damage.size()},
+                  {"limited_by_budget", state.limited_by_budget},
+                  {"renderer", current_gl_device().renderer},
+                  {"peak_resident_bytes", peak_resident_bytes()}},
+                 fmt::format("{}: {} triangles, drawn by {}\n", output,
+                             human_count(state.triangles), current_gl_device().renderer));
+  return state.damage.empty() ? 0 : 1;
+}
+
+int run(const Arguments& arguments, Console& console) {
+  if (!arguments.screenshot.empty() || !arguments.turntable.empty())
+    return draw(arguments, console);
+  WindowOptions options;
+  options.width = arguments.size.width;
+  options.height = arguments.size.height;
+  options.budgets = arguments.budgets;
+  options.camera = arguments.camera;
+  options.settings = settings_of(arguments);
+  ViewerWindow window(options);
+  window.open(arguments.store);
+  window.run();
+  console.result({{"command", "view"}, {"store", arguments.store}}, "");
+  return 0;
+}
+
+double parse_pixel_error(const std::string& text) {
+  const double pixels = parse_number(text);
+  if (!(pixels >= 0.1 && pixels <= 1000))
+    throw UsageError(fmt::format("'{}' is no pixel error; it lies within 0.1 and 1000", text));
+  return pixels;
+}
+
+/// "x:PART": a slice across an axis, its place in parts of the volume.
+void parse_slice(const std::string& text, ViewSettings& settings) {
+  const auto axis = std::string_view("xyz").find(text.empty() ? '?' : text[0]);
+  const double place = text.size() > 2 && text[1] == ':' ? parse_number(text.substr(2)) : -1;
+  if (axis == std::string_view::npos || !(place >= 0 && place <= 1))
+    throw UsageError(
+        fmt::format("'{}' is no slice; one is x:0.5 or y:… or z:…, within 0 and 1", text));
+  settings.slices[axis] = {true, static_cast<float>(place)};
+}
+
+void add_picture_options(CLI::App* app, Arguments& arguments) {
+  add_text(app, {"--screenshot", "PNG", "Draw into this file, without a window or a display"},
+           [&](const std::string& text) { arguments.screenshot = text; });
+  add_text(app, {"--turntable", "DIR", "Draw a full turn into DIR/0000.png …, without a window"},
+           [&](const std::string& text) { arguments.turntable = text; });
+  add_parsed(app, arguments.frames,
+             [](const std::string& text) { return parse_int(text, 1, 100'000); },
+             {"--frames", "N", "Pictures of the turn", "120"});
+  add_parsed(app, arguments.size, parse_picture_size,
+             {"--size", "WxH", "Size of window or picture, pixels", "1280x800"});
+  add_parsed(app, arguments.camera, parse_camera,
+             {"--camera", "PARTS",
+              "azimuth=DEG,elevation=DEG,roll=DEG,zoom=X,fov=DEG,orthographic,up=X:Y:Z,from=X:Y:Z, "
+              "or eye=X:Y:Z,target=X:Y:Z",
+              "azimuth=30,elevation=20"});
+  add_repeated(app, {"--colour", "#RRGGBB", "Of the first surface, the second and so on"},
+               [&](const std::string& text) { arguments.colours.push_back(parse_colour(text)); });
+  add_repeated(
+      app, {"--opacity", "A", "Of the first surface, the second and so on", "1"},
+      [&](const std::string& text) { arguments.opacities.push_back(parse_opacity(text)); });
+  add_repeated(app, {"--slice", "AXIS:PART", "Show the samples across an axis, such as z:0.5"},
+               [&](const std::string& text) { parse_slice(text, arguments.settings); });
+  add_flag(app, "--edges", arguments.settings.edges, "Dark lines where the surface breaks off");
+  add_flag(app, "--no-occlusion", arguments.no_occlusion, "Do not darken hollows");
+  add_flag(app, "--plain", arguments.plain, "No box, axes or scale bar");
+}
+
+}  // namespace
+
+void add_view(Program& program) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* app = add_subcommand(
+      program, "view", "Look at a store: move the isovalue, fly through it, take pictures.",
+      "isobrick view engine.zarr --isovalue 90");
+  add_path(app, "STORE", arguments->store, "Store to look at");
+  add_repeated(app, {"--isovalue", "V", "Surface to begin with; may be repeated", "in the middle"},
+               [&values = arguments->isovalues](const std::string& text) {
+                 values.push_back(parse_number(text));
+               });
+  add_picture_options(app, *arguments);
+  add_parsed(app, arguments->settings.pixel_error,
+             [](const std::string& text) { return static_cast<float>(parse_pixel_error(text)); },
+             {"--pixel-error", "PIXELS", "How long a cell may be on the picture", "1.5"});
+  add_memory(app, arguments->budgets.memory);
+  add_parsed(app, arguments->budgets.device_memory, parse_bytes,
+             {"--gpu-memory", "BYTES", "For meshes on the graphics device", "1G"});
+  add_threads(app, arguments->budgets.threads);
+  add_force(app, arguments->force);
+  add_run(program, app, arguments, run);
+}
+
+}  // namespace isobrick::tools
