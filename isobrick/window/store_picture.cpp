@@ -4,8 +4,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+
+#include <fmt/format.h>
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/gtc/type_ptr.hpp>
+#include <nlohmann/json.hpp>
 
 #include "isobrick/render/vectors.h"
 #include "isobrick/window/unit_symbol.h"
@@ -253,8 +256,9 @@ void StorePicture::draw_surfaces(const ViewSettings& settings) {
   }
 }
 
-void StorePicture::draw_slices(const ViewSettings& settings) {
+bool StorePicture::update_slices(const ViewSettings& settings) {
   const Vec3d last = last_sample(*store_);
+  bool changed = false;
   for (int axis = 0; axis < 3; ++axis) {
     const auto slot = static_cast<std::size_t>(axis);
     ShownSlice& shown = slices_[slot];
@@ -268,8 +272,16 @@ void StorePicture::draw_slices(const ViewSettings& settings) {
     request.position = settings.slices[slot].place * last[axis];
     scene_->stream().set_slice(axis, request);
     // Until it is there the last one stays.
-    if (const auto slice = scene_->stream().slice(axis); slice != nullptr && slice != shown.from)
-      shown = {slice, floats_of(*slice)};
+    const auto slice = scene_->stream().slice(axis);
+    if (slice == nullptr || slice == shown.from) continue;
+    shown = {slice, floats_of(*slice)};
+    changed = true;
+  }
+  return changed;
+}
+
+void StorePicture::draw_slices(const ViewSettings& settings) {
+  for (const ShownSlice& shown : slices_) {
     if (shown.from == nullptr) continue;
     const SliceSamples& from = *shown.from;
     if (!from.damage.empty()) state_.damage.push_back(from.damage);
@@ -308,12 +320,20 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
                         double coarser) {
   ++frame_;
   update_scene(camera, width, height, settings, coarser);
+  const auto before = shown_;
   upload();
-  renderer_.begin(camera, width, height, picture_settings(settings));
-  draw_surfaces(settings);
-  draw_slices(settings);
-  draw_marks(settings);
-  renderer_.end();
+  const bool other_slices = update_slices(settings);
+  std::string shows =
+      fmt::format("{} {} {} {}", width, height, to_json(camera).dump(), to_json(settings).dump());
+  // A pointer that moves over panels must not cost a picture.
+  if (other_slices || shown_ != before || shows != shows_) {
+    renderer_.begin(camera, width, height, picture_settings(settings));
+    draw_surfaces(settings);
+    draw_slices(settings);
+    draw_marks(settings);
+    renderer_.end();
+    shows_ = std::move(shows);
+  }
   drop_unused();
   state_.device_bytes = pool_.bytes();
   state_.limited_by_budget = scene_->cut().limited_by_budget;

@@ -74,6 +74,8 @@ class StorePicture {
   void upload();
   void drop_unused();
   void draw_surfaces(const ViewSettings& settings);
+  /// Takes new samples of slices. Whether there are any.
+  bool update_slices(const ViewSettings& settings);
   void draw_slices(const ViewSettings& settings);
   void draw_marks(const ViewSettings& settings);
   PictureSettings picture_settings(const ViewSettings& settings) const;
@@ -92,6 +94,7 @@ class StorePicture {
     std::vector<float> samples;
   };
   std::array<ShownSlice, 3> slices_;
+  std::string shows_;  ///< camera, size and settings of the picture in the renderer
   std::uint64_t frame_ = 0;
   PictureState state_;
 };
