@@ -123,34 +123,40 @@ __device__ std::uint32_t count_in_turns(TileShared& s) {
 
 /// Finds the tile's cells and where its vertices and triangles go. The first warp asks
 /// what other tiles know; the others wait for no more than the place of the vertices.
+/// In tiles that take turns, the turns' barriers are between them anyway.
 template <int N>
 __device__ void find_places(TileShared& s, const TileParams& p) {
   constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
+  const bool at_once = cells <= kListed;
   if (warp_id() == 0) {
     find_vertex_base(s, p);
-    arrive<N, TeamBarrier::vertex_base>();
+    if (at_once) arrive<N, TeamBarrier::vertex_base>();
   }
   std::uint32_t triangles = 0;
-  if (cells <= kListed) {
+  if (at_once) {
     find_cells<N>(s, cells);
   } else {
     triangles = count_in_turns<N>(s);
   }
   if (warp_id() != 0) {
-    arrive<N, TeamBarrier::cells>();
-    wait<N, TeamBarrier::vertex_base>();
+    if (at_once) {
+      arrive<N, TeamBarrier::cells>();
+      wait<N, TeamBarrier::vertex_base>();
+    }
     return;
   }
-  wait<N, TeamBarrier::cells>();
-  if (cells <= kListed) triangles = triangles_before<N>(s, (cells + 31) / 32);
+  if (at_once) {
+    wait<N, TeamBarrier::cells>();
+    triangles = triangles_before<N>(s, (cells + 31) / 32);
+  }
   if (lane_id() == 0) {
     s.all_triangles = triangles;
     publish_sum(p.order[s.item].triangles, s.item, triangles);
   }
   find_triangle_base(s, p, triangles);
   ask_neighbours<N>(s, p);
-  arrive<N, TeamBarrier::neighbours>();
+  if (s.all_vertices <= kListed) arrive<N, TeamBarrier::neighbours>();
 }
 
 template <int N, class T, bool Normals>
@@ -232,7 +238,10 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
     find_places<N>(s, p);
     prefetch_tile<N, T>(s, p, s.item + gridDim.x);
     emit_all_vertices<N, T, Normals>(s, p);
-    if (warp_id() != 0) wait<N, TeamBarrier::neighbours>();
+    if (s.all_vertices > ListsOf<N>::kListed)
+      __syncthreads();
+    else if (warp_id() != 0)
+      wait<N, TeamBarrier::neighbours>();
     number_at_0<N>(s);
     __syncthreads();
     borrow_rows<N>(s);
