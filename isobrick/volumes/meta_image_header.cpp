@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/core/printable.h"
 
 namespace isobrick {

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/core/printable.h"
 
 namespace isobrick {

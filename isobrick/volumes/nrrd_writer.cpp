@@ -2,26 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <utility>
+#include "isobrick/core/length_unit.h"
 
 namespace isobrick {
 namespace {
-
-/// As other programs write lengths; others keep their name.
-std::string unit_symbol(const std::string& unit) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 7> symbols{
-      {{"meter", "m"},
-       {"centimeter", "cm"},
-       {"millimeter", "mm"},
-       {"micrometer", "um"},
-       {"nanometer", "nm"},
-       {"picometer", "pm"},
-       {"kilometer", "km"}}};
-  for (const auto& [name, symbol] : symbols)
-    if (unit == name) return std::string(symbol);
-  return unit;
-}
 
 std::string vector_text(Vec3d v) { return fmt::format("({},{},{})", v.x, v.y, v.z); }
 
@@ -38,7 +22,7 @@ std::string nrrd_header_text(const VolumeInfo& info) {
       info.extent.x, info.extent.y, info.extent.z, vector_text(t.step(0)), vector_text(t.step(1)),
       vector_text(t.step(2)), vector_text(t.origin));
   if (!t.unit.empty())
-    text += fmt::format("space units: \"{0}\" \"{0}\" \"{0}\"\n", unit_symbol(t.unit));
+    text += fmt::format("space units: \"{0}\" \"{0}\" \"{0}\"\n", ascii_unit_symbol(t.unit));
   return text + "endian: little\nencoding: raw\n\n";
 }
 

@@ -176,42 +176,4 @@ void set_axes(const std::string& path, Transform& transform, const Vec3d (&axes)
   square(transform.direction);
 }
 
-namespace {
-
-/// A unit of length; picometers make the factors between them exact.
-struct LengthUnit {
-  std::string_view symbol, name;
-  double picometers;
-};
-constexpr LengthUnit kLengthUnits[] = {
-    {"m", "meter", 1e12},      {"cm", "centimeter", 1e10}, {"mm", "millimeter", 1e9},
-    {"um", "micrometer", 1e6}, {"µm", "micrometer", 1e6},  {"μm", "micrometer", 1e6},
-    {"nm", "nanometer", 1e3},  {"pm", "picometer", 1},     {"km", "kilometer", 1e15},
-    {"in", "inch", 2.54e10},   {"ft", "foot", 3.048e11},   {"å", "angstrom", 100},
-    {"Å", "angstrom", 100},
-};
-
-}  // namespace
-
-std::string unit_name(std::string_view unit) {
-  for (const LengthUnit& known : kLengthUnits)
-    if (unit == known.symbol || unit == known.name) return std::string(known.name);
-  if (unit == "micron" || unit == "microns") return "micrometer";
-  // Lengths that OME-Zarr names and hardly anybody uses.
-  const bool length =
-      unit.ends_with("meter") || unit == "yard" || unit == "mile" || unit == "parsec";
-  return length ? std::string(unit) : std::string();
-}
-
-std::optional<double> unit_ratio(std::string_view unit, std::string_view other) {
-  if (unit == other) return 1;
-  const auto find = [](std::string_view name) {
-    return std::find_if(std::begin(kLengthUnits), std::end(kLengthUnits),
-                        [&](const LengthUnit& known) { return known.name == name; });
-  };
-  const auto *const a = find(unit), *const b = find(other);
-  if (a == std::end(kLengthUnits) || b == std::end(kLengthUnits)) return std::nullopt;
-  return a->picometers / b->picometers;
-}
-
 }  // namespace isobrick

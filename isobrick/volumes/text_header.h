@@ -82,10 +82,4 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
 /// index axis, which must be at right angles.
 void set_axes(const std::string& path, Transform& transform, const Vec3d (&axes)[3]);
 
-/// "mm" → "millimeter" and so on; what is not known becomes empty.
-std::string unit_name(std::string_view unit);
-/// How many of `other` are one of `unit`, both as unit_name() has them; nothing where that is
-/// not known.
-std::optional<double> unit_ratio(std::string_view unit, std::string_view other);
-
 }  // namespace isobrick

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string_view>
 
+#include "isobrick/core/length_unit.h"
 #include "isobrick/core/printable.h"
 #include "isobrick/volumes/text_header.h"
 

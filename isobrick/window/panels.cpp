@@ -8,8 +8,8 @@
 #include <imgui_stdlib.h>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/render/vectors.h"
-#include "isobrick/window/unit_symbol.h"
 
 namespace isobrick {
 namespace {

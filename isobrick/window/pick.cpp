@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include "isobrick/core/length_unit.h"
 #include "isobrick/render/vectors.h"
 #include "isobrick/viewer/probe.h"
-#include "isobrick/window/unit_symbol.h"
 
 namespace isobrick {
 namespace {

@@ -10,8 +10,8 @@
 #include <glm/gtc/type_ptr.hpp>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/core/length_unit.h"
 #include "isobrick/render/vectors.h"
-#include "isobrick/window/unit_symbol.h"
 
 namespace isobrick {
 namespace {
