@@ -1,6 +1,7 @@
 #include "isobrick/viewer/cut.h"
 
 #include <algorithm>
+#include <array>
 #include <queue>
 #include <tuple>
 
@@ -23,31 +24,56 @@ struct Candidate {
   }
 };
 
+constexpr int kAround = 27;  ///< a node and its neighbours; bit (z + 1) · 9 + (y + 1) · 3 + x + 1
+
+/// For a child at each place of its parent, and each direction from the child: the bit of the
+/// parent's neighbour (or of the parent itself) that lies there. A place on an axis: the first of
+/// two children, the second, or the only one.
+using BitTable = std::array<std::array<std::uint8_t, kDirections>, kAround>;
+
+constexpr BitTable make_bits() {
+  constexpr int steps[3][3] = {{-1, 0, 0}, {0, 0, 1}, {-1, 0, 1}};  // by place, then direction
+  BitTable table{};
+  for (std::size_t place = 0; place < kAround; ++place)
+    for (int i = 0; i < kDirections; ++i) {
+      const Int3 d = direction(i);
+      const int x = steps[place % 3][d.x + 1], y = steps[place / 3 % 3][d.y + 1],
+                z = steps[place / 9][d.z + 1];
+      table[place][static_cast<std::size_t>(i)] =
+          static_cast<std::uint8_t>((z + 1) * 9 + (y + 1) * 3 + x + 1);
+    }
+  return table;
+}
+constexpr BitTable kBits = make_bits();
+
+/// The row of kBits for a child.
+std::size_t place_of(Int3 child, Int3 ratio, Int3 nodes) {
+  const auto one = [](Index at, Index children, Index count) {
+    // At the volume's border the second child may be missing.
+    const bool only = children == 1 || (at % 2 == 0 && at + 1 == count);
+    return static_cast<std::size_t>(only ? 2 : at & 1);
+  };
+  return one(child.x, ratio.x, nodes.x) + 3 * one(child.y, ratio.y, nodes.y) +
+         9 * one(child.z, ratio.z, nodes.z);
+}
+
 }  // namespace
 
-CutSelector::CutSelector(const NodeTree& tree) : tree_(tree) { restart(); }
+CutSelector::CutSelector(const NodeTree& tree)
+    : tree_(tree), refined_(tree.grid(), 1), before_(tree.grid(), 1), wanted_(tree.grid(), 1) {}
 
 void CutSelector::restart() {
-  for (Flags* flags : {&refined_, &before_, &wanted_}) {
-    flags->clear();
-    for (int v = 0; v < tree_.grid().levels(); ++v)
-      flags->emplace_back(static_cast<std::size_t>(volume(tree_.grid().level(v).nodes)));
-  }
+  refined_.clear();
+  before_.clear();
 }
 
-std::uint8_t& CutSelector::flag(Flags& flags, const NodeKey& n) const {
-  return flags[static_cast<std::size_t>(n.level)]
-              [static_cast<std::size_t>(linear_index(n.node, tree_.grid().level(n.level).nodes))];
-}
-
-double CutSelector::urgency(const NodeKey& n, std::span<const double> isovalues,
-                            const NodeView& view) {
+double CutSelector::urgency(const NodeKey& n, const NodeSight& sight,
+                            std::span<const double> isovalues) {
+  const bool before = before_(n) != 0;
+  if (!(before ? sight.nearly_visible : sight.visible)) return 0;
   const bool active = std::any_of(isovalues.begin(), isovalues.end(),
                                   [&](double iso) { return tree_.active_below(n, iso); });
-  if (n.level == 0 || !active) return 0;
-  const bool before = flag(before_, n) != 0;
-  if (!(before ? view.nearly_visible(n) : view.visible(n))) return 0;
-  return view.pixels(n) * (before ? kHysteresis : 1);
+  return active ? sight.pixels * (before ? kHysteresis : 1) : 0;
 }
 
 double CutSelector::triangles(const NodeKey& n, std::span<const double> isovalues,
@@ -57,17 +83,37 @@ double CutSelector::triangles(const NodeKey& n, std::span<const double> isovalue
   return blocks * per_block;
 }
 
+/// How many more triangles there are when these nodes become their children.
+double CutSelector::added_triangles(std::span<const NodeKey> refined,
+                                    std::span<const double> isovalues, double per_block) const {
+  double more = 0;
+  for (const NodeKey& r : refined) {
+    more -= triangles(r, isovalues, per_block);
+    for_each_point(tree_.grid().children(r), [&](Int3 c) {
+      more += triangles({r.level - 1, c}, isovalues, per_block);
+    });
+  }
+  return more;
+}
+
 /// `n` after all nodes that must be refined before it, so that no two neighbours
-/// are more than a level apart.
+/// are more than a level apart: those that lie around it a level above.
 void CutSelector::collect(const NodeKey& n, std::vector<NodeKey>& needed) {
-  if (refined(n) || flag(wanted_, n)) return;
-  flag(wanted_, n) = 1;
+  if (refined_(n) || wanted_(n)) return;
+  wanted_(n) = 1;
   const NodeGrid& grid = tree_.grid();
-  if (grid.has_parent(n))
-    for (int i = 0; i < kDirections; ++i) {
-      const NodeKey neighbour{n.level, n.node + direction(i)};
-      if (grid.contains(neighbour)) collect(grid.parent(neighbour), needed);
+  if (grid.has_parent(n)) {
+    const Int3 ratio = grid.ratio(n.level);
+    const NodeKey parent = grid.parent(n);
+    // Of two children each touches what lies on its own side.
+    Box3 around{parent.node, parent.node + Int3{1, 1, 1}};
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool two = ratio[axis] == 2, second = (n.node[axis] & 1) != 0;
+      if (!two || !second) --around.lo[axis];
+      if (!two || second) ++around.hi[axis];
     }
+    for_each_point(around, [&](Int3 p) { collect({parent.level, p}, needed); });
+  }
   needed.push_back(n);
 }
 
@@ -76,18 +122,22 @@ Cut CutSelector::select(std::span<const double> isovalues, const View& view,
   const NodeGrid& grid = tree_.grid();
   const NodeView node_view(view, grid);
   std::swap(refined_, before_);
-  for (auto& level : refined_) std::fill(level.begin(), level.end(), std::uint8_t{0});
+  refined_.clear();
   std::priority_queue<Candidate> queue;
   const double most =
       static_cast<double>(std::min(budget.triangles, budget.mesh_bytes / kBytesPerTriangle));
   double used = 0;
   const auto enter = [&](const NodeKey& n) {
-    used += triangles(n, isovalues, budget.triangles_per_block);
-    const double pixels = urgency(n, isovalues, node_view);
+    if (n.level == 0) return;
+    const double pixels = urgency(n, node_view.see(n), isovalues);
     if (pixels > view.pixel_error) queue.push({pixels, n});
   };
   const int top = grid.levels() - 1;
-  for_each_point({{0, 0, 0}, grid.level(top).nodes}, [&](Int3 p) { enter({top, p}); });
+  const Box3 top_nodes{{0, 0, 0}, grid.level(top).nodes};
+  for_each_point(top_nodes, [&](Int3 p) {
+    used += triangles({top, p}, isovalues, budget.triangles_per_block);
+    enter({top, p});
+  });
 
   Cut cut;
   cut.isovalues.assign(isovalues.begin(), isovalues.end());
@@ -95,52 +145,53 @@ Cut CutSelector::select(std::span<const double> isovalues, const View& view,
   while (!queue.empty()) {
     const NodeKey n = queue.top().key;
     queue.pop();
-    if (refined(n)) continue;
+    if (refined_(n)) continue;
     needed.clear();
     collect(n, needed);
-    double more = 0;
-    for (const NodeKey& r : needed) {
-      flag(wanted_, r) = 0;
-      more -= triangles(r, isovalues, budget.triangles_per_block);
-      for_each_point(grid.children(r), [&](Int3 c) {
-        more += triangles({r.level - 1, c}, isovalues, budget.triangles_per_block);
-      });
-    }
+    for (const NodeKey& r : needed) wanted_(r) = 0;
+    const double more = added_triangles(needed, isovalues, budget.triangles_per_block);
     if (used + more > most) {
       cut.limited_by_budget = true;
       break;
     }
+    used += more;
     for (const NodeKey& r : needed) {
-      flag(refined_, r) = 1;
-      used -= triangles(r, isovalues, budget.triangles_per_block);
+      refined_(r) = 1;
       for_each_point(grid.children(r), [&](Int3 c) { enter({r.level - 1, c}); });
     }
   }
   cut.triangles = static_cast<std::uint64_t>(std::max(used, 0.0));
-  for_each_point({{0, 0, 0}, grid.level(top).nodes}, [&](Int3 p) {
-    append({top, p}, node_view, cut);
-  });
+  for_each_point(top_nodes, [&](Int3 p) { append({top, p}, 0, node_view, cut); });
   return cut;
 }
 
-std::uint32_t CutSelector::coarser_neighbours(const NodeKey& n) {
-  const NodeGrid& grid = tree_.grid();
-  if (!grid.has_parent(n)) return 0;
-  std::uint32_t mask = 0;
-  for (int i = 0; i < kDirections; ++i) {
-    const NodeKey neighbour{n.level, n.node + direction(i)};
-    if (grid.contains(neighbour) && !refined(grid.parent(neighbour))) mask |= 1u << i;
-  }
-  return mask;
+/// Which of a node and its neighbours are not refined.
+std::uint32_t CutSelector::coarse_around(const NodeKey& n) {
+  std::uint32_t coarse = 0;
+  std::uint32_t bit = 1;
+  for_each_point({n.node - Int3{1, 1, 1}, n.node + Int3{2, 2, 2}}, [&](Int3 p) {
+    if (!refined_({n.level, p})) coarse |= bit;
+    bit <<= 1;
+  });
+  return coarse;
 }
 
-void CutSelector::append(const NodeKey& n, const NodeView& view, Cut& cut) {
-  if (refined(n)) {
-    for_each_point(tree_.grid().children(n), [&](Int3 c) { append({n.level - 1, c}, view, cut); });
+void CutSelector::append(const NodeKey& n, std::uint32_t coarser, const NodeView& view, Cut& cut) {
+  if (n.level == 0 || !refined_(n)) {
+    const NodeSight sight = view.see(n);
+    cut.nodes.push_back({n, coarser, static_cast<float>(sight.pixels),
+                         static_cast<float>(sight.distance), sight.visible});
     return;
   }
-  cut.nodes.push_back({n, coarser_neighbours(n), static_cast<float>(view.pixels(n)),
-                       static_cast<float>(view.distance(n)), view.visible(n)});
+  const std::uint32_t coarse = coarse_around(n);
+  const Int3 ratio = tree_.grid().ratio(n.level - 1), nodes = tree_.grid().level(n.level - 1).nodes;
+  for_each_point(tree_.grid().children(n), [&](Int3 c) {
+    std::uint32_t mask = 0;
+    const auto& bits = kBits[place_of(c, ratio, nodes)];
+    for (std::size_t i = 0; coarse != 0 && i < bits.size(); ++i)
+      mask |= (coarse >> bits[i] & 1u) << i;
+    append({n.level - 1, c}, mask, view, cut);
+  });
 }
 
 }  // namespace isobrick

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "isobrick/viewer/node_flags.h"
 #include "isobrick/viewer/node_tree.h"
 #include "isobrick/viewer/view.h"
 
@@ -15,6 +16,8 @@ struct CutBudget {
   std::uint64_t triangles = 20'000'000;
   std::uint64_t mesh_bytes = std::uint64_t{2} << 30;
   double triangles_per_block = 600;
+
+  friend bool operator==(const CutBudget&, const CutBudget&) = default;
 };
 
 /// Bytes of mesh for each triangle: its corners, and half a vertex with a normal.
@@ -55,18 +58,17 @@ class CutSelector {
   void restart();
 
  private:
-  using Flags = std::vector<std::vector<std::uint8_t>>;
-
-  std::uint8_t& flag(Flags& flags, const NodeKey& n) const;
-  bool refined(const NodeKey& n) { return flag(refined_, n) != 0; }
-  double urgency(const NodeKey& n, std::span<const double> isovalues, const NodeView& view);
+  double urgency(const NodeKey& n, const NodeSight& sight, std::span<const double> isovalues);
   double triangles(const NodeKey& n, std::span<const double> isovalues, double per_block) const;
+  double added_triangles(std::span<const NodeKey> refined, std::span<const double> isovalues,
+                         double per_block) const;
   void collect(const NodeKey& n, std::vector<NodeKey>& needed);
-  std::uint32_t coarser_neighbours(const NodeKey& n);
-  void append(const NodeKey& n, const NodeView& view, Cut& cut);
+  std::uint32_t coarse_around(const NodeKey& n);
+  void append(const NodeKey& n, std::uint32_t coarser, const NodeView& view, Cut& cut);
 
   const NodeTree& tree_;
-  Flags refined_, before_, wanted_;
+  // Nodes beside the volume count as refined: nothing is to be done there.
+  NodeFlags refined_, before_, wanted_;
 };
 
 }  // namespace isobrick

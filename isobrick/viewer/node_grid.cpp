@@ -53,7 +53,9 @@ void NodeGrid::add_levels(const StoreInfo& info, int source, Int3& exponents) {
   const Int3 target = max(exponents_of(transform_, t), exponents);
   if (source > 0 && target == exponents) return;
   do {
+    const Int3 below = exponents;
     exponents = min(target, exponents + Int3{1, 1, 1});
+    if (!levels_.empty()) halvings_.push_back(exponents - below);
     Level level;
     level.source = exponents == target ? source : source - 1;
     const Transform& s = info.levels[static_cast<std::size_t>(level.source)].transform;
@@ -87,17 +89,6 @@ IndexBox NodeGrid::box(const NodeKey& n) const {
     box.hi[axis] = static_cast<double>(position(n.level, axis, (n.node[axis] + 1) * kNodeEdge));
   }
   return box;
-}
-
-Int3 NodeGrid::ratio(int v) const {
-  Int3 r;
-  for (int axis = 0; axis < 3; ++axis) r[axis] = level(v + 1).step[axis] / level(v).step[axis];
-  return r;
-}
-
-NodeKey NodeGrid::parent(const NodeKey& n) const {
-  const Int3 r = ratio(n.level);
-  return {n.level + 1, {n.node.x / r.x, n.node.y / r.y, n.node.z / r.z}};
 }
 
 Box3 NodeGrid::children(const NodeKey& n) const {

@@ -42,6 +42,7 @@ constexpr Int3 direction(int i) {
 /// Box in level-0 index space, whose cells lie between 0 and extent − 1.
 struct IndexBox {
   Vec3d lo, hi;
+  friend bool operator==(const IndexBox&, const IndexBox&) = default;
 };
 
 /// How nodes lie over a volume.
@@ -86,11 +87,17 @@ class NodeGrid {
   Index position(int v, int axis, Index point) const;
 
   bool has_parent(const NodeKey& n) const { return n.level + 1 < levels(); }
-  NodeKey parent(const NodeKey& n) const;
+  NodeKey parent(const NodeKey& n) const {
+    const Int3& halvings = halvings_[static_cast<std::size_t>(n.level)];
+    return {n.level + 1, {n.node.x >> halvings.x, n.node.y >> halvings.y, n.node.z >> halvings.z}};
+  }
   /// Positions of a node's children at the next finer level.
   Box3 children(const NodeKey& n) const;
   /// Grid points of level v between two of level v + 1 along each axis: 1 or 2.
-  Int3 ratio(int v) const;
+  Int3 ratio(int v) const {
+    const Int3& halvings = halvings_[static_cast<std::size_t>(v)];
+    return {Index{1} << halvings.x, Index{1} << halvings.y, Index{1} << halvings.z};
+  }
 
   /// Samples of the stored level that the node's values come from.
   Box3 samples(const NodeKey& n) const;
@@ -110,6 +117,7 @@ class NodeGrid {
   Int3 cells_;
   std::vector<Int3> stored_extents_;
   std::vector<Level> levels_;
+  std::vector<Int3> halvings_;  ///< axes that the level above a level halves: 1, others 0
 };
 
 }  // namespace isobrick

@@ -36,6 +36,9 @@ void Scene::update(const std::vector<double>& isovalues, const View& view, CutBu
   const double measured = stream_->counters().triangles_per_block;
   if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
   if (per_block_ > 0) budget.triangles_per_block = per_block_;
+  if (view_ == view && budget_ == budget && cut_.isovalues == isovalues) return;
+  view_ = view;
+  budget_ = budget;
   Cut cut = selector_.select(isovalues, view, budget);
   if (same_cut(cut, cut_)) return;
   cut_ = std::move(cut);

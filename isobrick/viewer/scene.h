@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "isobrick/viewer/scene_stream.h"
@@ -34,6 +35,8 @@ class Scene {
   Vec3d origin_;
   CutSelector selector_;
   Cut cut_;
+  std::optional<View> view_;  ///< of the last cut
+  CutBudget budget_;
   std::unique_ptr<SceneStream> stream_;
   double per_block_ = 0;  ///< triangles, as cuts are estimated with
 };

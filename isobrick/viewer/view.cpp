@@ -11,6 +11,12 @@ constexpr double kWider = 1.15;
 
 Vec3d unit(Vec3d v) { return v * (1 / std::sqrt(dot(v, v))); }
 
+bool touch(const IndexBox& a, const IndexBox& b) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (a.hi[axis] < b.lo[axis] || b.hi[axis] < a.lo[axis]) return false;
+  return true;
+}
+
 }  // namespace
 
 std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
@@ -69,21 +75,25 @@ NodeView::NodeView(const View& view, const NodeGrid& grid) : grid_(grid), clip_(
   pixels_per_length_ = view.height / 2.0 * std::sqrt(dot(second, second)) / (parallel_ ? 1 : w);
 }
 
-bool NodeView::visible(const NodeKey& n, const Planes& planes) const {
+NodeSight NodeView::see(const NodeKey& n) const {
   const IndexBox box = grid_.box(n);
-  if (clip_)
-    for (int axis = 0; axis < 3; ++axis)
-      if (box.hi[axis] < clip_->lo[axis] || clip_->hi[axis] < box.lo[axis]) return false;
-  return std::all_of(planes.begin(), planes.end(), [&](const Plane& plane) {
+  NodeSight sight;
+  sight.distance = distance(box);
+  sight.pixels = pixels(n.level, sight.distance);
+  if (clip_ && !touch(box, *clip_)) return sight;
+  const auto inside = [&](const auto& plane) {
     double most = plane.offset;
     for (int axis = 0; axis < 3; ++axis)
       most += plane.normal[axis] * (plane.normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
     return most >= 0;
-  });
+  };
+  sight.nearly_visible = std::all_of(wider_.begin(), wider_.end(), inside);
+  // The wider picture holds the other one.
+  sight.visible = sight.nearly_visible && std::all_of(planes_.begin(), planes_.end(), inside);
+  return sight;
 }
 
-double NodeView::distance(const NodeKey& n) const {
-  const IndexBox box = grid_.box(n);
+double NodeView::distance(const IndexBox& box) const {
   Vec3d apart;
   for (int axis = 0; axis < 3; ++axis) {
     const double lo = box.lo[axis] * spacing_[axis], hi = box.hi[axis] * spacing_[axis];
@@ -92,12 +102,12 @@ double NodeView::distance(const NodeKey& n) const {
   return std::sqrt(dot(apart, apart));
 }
 
-double NodeView::pixels(const NodeKey& n) const {
-  const double cell = grid_.level(n.level).spacing;
+double NodeView::pixels(int level, double distance) const {
+  const double cell = grid_.level(level).spacing;
   if (parallel_) return cell * pixels_per_length_;
   // Inside a node its surface may be as near as one likes; finer than the finest
   // cell at the distance of one makes no sense.
-  return cell * pixels_per_length_ / std::max(distance(n), grid_.level(0).spacing);
+  return cell * pixels_per_length_ / std::max(distance, grid_.level(0).spacing);
 }
 
 }  // namespace isobrick

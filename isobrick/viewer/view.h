@@ -18,6 +18,8 @@ struct View {
   double pixel_error = 1.5;   ///< how long a cell's edge may be on the picture, pixels
   /// What is shown of the volume, in level-0 index space; nothing: all.
   std::optional<IndexBox> clip;
+
+  friend bool operator==(const View&, const View&) = default;
 };
 
 /// A camera that looks from `eye` at `target`: the matrix for View. `fov_y` in
@@ -26,20 +28,22 @@ struct View {
 std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
                                         double aspect, double near, double far);
 
+/// How a node looks in a view.
+struct NodeSight {
+  /// Length of one of the node's cells on the picture, pixels, where the node is
+  /// nearest. The direction of the view does not enter it.
+  double pixels = 0;
+  double distance = 0;          ///< from the eye to the node, world length
+  bool visible = false;         ///< false: outside of the picture or the clip box for certain
+  bool nearly_visible = false;  ///< the same for a picture that is a little larger
+};
+
 /// A view in the volume's own axes: what nodes are tested against.
 class NodeView {
  public:
   NodeView(const View& view, const NodeGrid& grid);
 
-  /// False when the node lies outside of the picture or of the clip box for certain.
-  bool visible(const NodeKey& n) const { return visible(n, planes_); }
-  /// The same for a picture that is a little larger.
-  bool nearly_visible(const NodeKey& n) const { return visible(n, wider_); }
-  /// Length of one of the node's cells on the picture, pixels, where the node is
-  /// nearest. The direction of the view does not enter it.
-  double pixels(const NodeKey& n) const;
-  /// From the eye to the node, world length.
-  double distance(const NodeKey& n) const;
+  NodeSight see(const NodeKey& n) const;
 
  private:
   struct Plane {
@@ -47,7 +51,9 @@ class NodeView {
     double offset;  ///< inside: normal · p + offset >= 0
   };
   using Planes = std::array<Plane, 6>;
-  bool visible(const NodeKey& n, const Planes& planes) const;
+
+  double pixels(int level, double distance) const;
+  double distance(const IndexBox& box) const;
 
   const NodeGrid& grid_;
   Vec3d spacing_, eye_;  ///< the eye in lengths along the volume's axes, from its origin

@@ -100,8 +100,9 @@ TEST_F(CutTest, NearNodesAreFinerAndWhatIsNotSeenStaysCoarse) {
   const NodeView seen(view, tree().grid());
   for (const CutNode& node : cut.nodes) {
     const bool active = tree().active_below(node.key, 128);
-    if (node.key.level > 0 && active && seen.visible(node.key)) {
-      EXPECT_LE(seen.pixels(node.key), 3.0);
+    const NodeSight sight = seen.see(node.key);
+    if (node.key.level > 0 && active && sight.visible) {
+      EXPECT_LE(sight.pixels, 3.0);
     }
   }
   const Cut away =
@@ -203,16 +204,16 @@ TEST(LargeCut, TakesMilliseconds) {
   double best = 1e9;
   std::size_t nodes = 0;
   for (int i = 0; i < 10; ++i) {
-    const View view = look({1024.0 + 10 * i, 1100, 2300}, {1024, 1024, 1024}, 1.5);
+    const View view = look({1024.0 + 10 * i, 1100, 2300}, {1024, 1024, 1024}, 0.5);
     const auto start = std::chrono::steady_clock::now();
     const Cut cut = selector.select(isovalues, view, {.triangles = 100'000'000});
     best = std::min(
         best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     nodes = cut.nodes.size();
   }
-  EXPECT_GT(nodes, 1000u);
+  EXPECT_GT(nodes, 4000u);
   RecordProperty("milliseconds", std::to_string(best * 1e3));
-  EXPECT_LT(best, 0.1) << "of a busy machine";
+  EXPECT_LT(best, 0.025) << "of a busy machine";
 }
 
 }  // namespace

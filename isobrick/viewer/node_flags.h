@@ -1,0 +1,52 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "isobrick/viewer/node_grid.h"
+
+namespace isobrick {
+
+/// A byte for each node above the finest level. Around each level lies a border one
+/// node wide, so that neighbours need no test of whether they are there.
+class NodeFlags {
+ public:
+  /// All 0; the border is `border`.
+  NodeFlags(const NodeGrid& grid, std::uint8_t border) {
+    for (int v = 1; v < grid.levels(); ++v) {
+      const Int3 n = grid.level(v).nodes;
+      levels_.push_back({n, n.x + 2, (n.x + 2) * (n.y + 2), {}});
+      Level& level = levels_.back();
+      level.flags.assign(static_cast<std::size_t>(level.slab * (n.z + 2)), border);
+    }
+    clear();
+  }
+
+  /// Sets all to 0.
+  void clear() {
+    for (Level& level : levels_)
+      for (Index z = 0; z < level.nodes.z; ++z)
+        for (Index y = 0; y < level.nodes.y; ++y)
+          std::fill_n(level.flags.begin() + level.place({0, y, z}), level.nodes.x, std::uint8_t{0});
+  }
+
+  /// n.level >= 1; a node or one beside.
+  std::uint8_t& operator()(const NodeKey& n) {
+    Level& level = levels_[static_cast<std::size_t>(n.level - 1)];
+    return level.flags[static_cast<std::size_t>(level.place(n.node))];
+  }
+
+ private:
+  struct Level {
+    Int3 nodes;
+    Index row, slab;
+    std::vector<std::uint8_t> flags;
+
+    Index place(Int3 p) const { return (p.z + 1) * slab + (p.y + 1) * row + p.x + 1; }
+  };
+
+  std::vector<Level> levels_;
+};
+
+}  // namespace isobrick
