@@ -108,6 +108,18 @@ void add_force(CLI::App* app, bool& force) {
   add_flag(app, "--force", force, "Replace an output that exists, once the new one is whole");
 }
 
+void add_clip(CLI::App* app, std::vector<HalfSpace>& planes) {
+  add_repeated(app,
+               {"--clip", "NX,NY,NZ,D",
+                fmt::format("Show only where NX·x + NY·y + NZ·z >= D, world units; up to {} times",
+                            kMostClipPlanes)},
+               [&planes](const std::string& text) {
+                 planes.push_back(parse_half_space(text));
+                 if (planes.size() > kMostClipPlanes)
+                   throw UsageError(fmt::format("{} planes at most", kMostClipPlanes));
+               });
+}
+
 void add_selection(CLI::App* app, Selection& selection) {
   const auto place = [](const std::string& text) {
     return std::optional(parse_whole(text, 0, std::numeric_limits<Index>::max()));

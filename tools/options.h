@@ -93,6 +93,8 @@ void add_roi(CLI::App* app, std::optional<RoiText>& roi);
 void add_memory(CLI::App* app, std::uint64_t& memory);
 void add_threads(CLI::App* app, int& threads);
 void add_force(CLI::App* app, bool& force);
+/// --clip, up to kMostClipPlanes times.
+void add_clip(CLI::App* app, std::vector<HalfSpace>& planes);
 /// --channel and --time.
 void add_selection(CLI::App* app, Selection& selection);
 

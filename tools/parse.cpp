@@ -95,6 +95,16 @@ Vec3d parse_vector(std::string_view text) {
   return {parse_number((*parts)[0]), parse_number((*parts)[1]), parse_number((*parts)[2])};
 }
 
+HalfSpace parse_half_space(std::string_view text) {
+  const auto comma = text.rfind(',');
+  const auto normal = split3(text.substr(0, comma == text.npos ? 0 : comma));
+  if (!normal) throw UsageError(fmt::format("'{}' is not of the form NX,NY,NZ,D", text));
+  const HalfSpace half{parse_vector(text.substr(0, comma)), parse_number(text.substr(comma + 1))};
+  if (half.normal == Vec3d{})
+    throw UsageError(fmt::format("the plane '{}' has no direction", text));
+  return half;
+}
+
 PictureSize parse_picture_size(std::string_view text) {
   const auto comma = text.find_first_of(",x");
   if (comma == std::string_view::npos)

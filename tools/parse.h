@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "isobrick/core/half_space.h"
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/vec.h"
 #include "isobrick/volumes/open_source.h"
@@ -36,6 +37,9 @@ Int3 parse_dims(std::string_view text);
 
 /// "X,Y,Z", finite numbers.
 Vec3d parse_vector(std::string_view text);
+
+/// "NX,NY,NZ,D": what lies where NX·x + NY·y + NZ·z >= D.
+HalfSpace parse_half_space(std::string_view text);
 
 /// Pixels "WIDTH,HEIGHT" or "WIDTHxHEIGHT".
 struct PictureSize {

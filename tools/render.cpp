@@ -72,18 +72,6 @@ void parse_background(const std::string& text, PictureSettings& settings) {
       comma == text.npos ? settings.background_top : parse_colour(text.substr(comma + 1));
 }
 
-/// "X:Y:Z,NX:NY:NZ".
-ClipPlane parse_plane(std::string text) {
-  const auto comma = text.find(',');
-  for (char& c : text)
-    if (c == ':') c = ',';
-  if (comma == text.npos)
-    throw UsageError(fmt::format("'{}' is not of the form X:Y:Z,NX:NY:NZ", text));
-  const ClipPlane plane{parse_vector(text.substr(0, comma)), parse_vector(text.substr(comma + 1))};
-  if (plane.inward == Vec3d{}) throw UsageError("a plane's direction is 0:0:0");
-  return plane;
-}
-
 /// "X0:X1,Y0:Y1,Z0:Z1".
 WorldBox parse_box(const std::string& text) {
   std::array<double, 6> v{};
@@ -99,11 +87,7 @@ WorldBox parse_box(const std::string& text) {
 }
 
 void add_cut_options(CLI::App* app, PictureSettings& settings) {
-  add_repeated(
-      app,
-      {"--clip", "X:Y:Z,NX:NY:NZ",
-       "Cut by the plane through a point; what its direction points to stays; up to 6"},
-      [&settings](const std::string& text) { settings.planes.push_back(parse_plane(text)); });
+  add_clip(app, settings.planes);
   add_parsed(app, settings.region,
              [](const std::string& text) { return std::optional(parse_box(text)); },
              {"--region", "X0:X1,Y0:Y1,Z0:Z1", "Draw only what is in this box, world units"});

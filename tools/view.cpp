@@ -20,6 +20,7 @@ struct Arguments {
   std::vector<Vec3f> colours;
   std::vector<float> opacities;
   ViewSettings settings;
+  std::vector<HalfSpace> clip;
   CameraRequest camera;
   PictureSize size{1280, 800};
   int frames = 120;
@@ -39,6 +40,7 @@ ViewSettings settings_of(const Arguments& arguments) {
     if (i < arguments.opacities.size()) surface.opacity = arguments.opacities[i];
     settings.surfaces.push_back(surface);
   }
+  for (const HalfSpace& half : arguments.clip) settings.planes.push_back({true, half});
   settings.occlusion = !arguments.no_occlusion;
   if (arguments.plain) settings.box = settings.axes = settings.scale_bar = false;
   return settings;
@@ -146,6 +148,7 @@ void add_picture_options(CLI::App* app, Arguments& arguments) {
       [&](const std::string& text) { arguments.opacities.push_back(parse_opacity(text)); });
   add_repeated(app, {"--slice", "AXIS:PART", "Show the samples across an axis, such as z:0.5"},
                [&](const std::string& text) { parse_slice(text, arguments.settings); });
+  add_clip(app, arguments.clip);
   add_flag(app, "--edges", arguments.settings.edges, "Dark lines where the surface breaks off");
   add_flag(app, "--no-occlusion", arguments.no_occlusion, "Do not darken hollows");
   add_flag(app, "--plain", arguments.plain, "No box, axes or scale bar");

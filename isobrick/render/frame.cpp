@@ -15,10 +15,10 @@ float to_linear(float v) {
 }
 
 /// In double up to the eye, so that far from the world's origin nothing jitters.
-glm::vec4 half_space(Vec3d point, Vec3d inward, Vec3d eye) {
-  const Vec3d n = unit(inward, {0, 0, 1});
-  const Vec3f f = to_float(n);
-  return {f.x, f.y, f.z, static_cast<float>(dot(n, eye - point))};
+glm::vec4 from_eye(const HalfSpace& half, Vec3d eye) {
+  const double size = length(half.normal);
+  const Vec3f n = to_float(half.normal * (1 / size));
+  return {n.x, n.y, n.z, static_cast<float>((dot(half.normal, eye) - half.least) / size)};
 }
 
 }  // namespace
@@ -35,18 +35,16 @@ FrameBlock make_frame(const Camera& camera, int width, int height,
   frame.rotation = glm::mat4(glm::mat3(camera.rotation()));
 
   int count = 0;
-  for (const ClipPlane& plane : settings.planes)
-    frame.half_spaces[static_cast<std::size_t>(count++)] =
-        half_space(plane.point, plane.inward, camera.eye);
-  if (settings.region)
-    for (int axis = 0; axis < 3; ++axis) {
-      Vec3d inward;
-      inward[axis] = 1;
-      frame.half_spaces[static_cast<std::size_t>(count++)] =
-          half_space(settings.region->lo, inward, camera.eye);
-      frame.half_spaces[static_cast<std::size_t>(count++)] =
-          half_space(settings.region->hi, inward * -1.0, camera.eye);
-    }
+  const auto add = [&](const HalfSpace& half) {
+    frame.half_spaces[static_cast<std::size_t>(count++)] = from_eye(half, camera.eye);
+  };
+  for (const HalfSpace& half : settings.planes) add(half);
+  for (int axis = 0; settings.region && axis < 3; ++axis) {
+    Vec3d inward;
+    inward[axis] = 1;
+    add(half_space_at(settings.region->lo, inward));
+    add(half_space_at(settings.region->hi, inward * -1.0));
+  }
   frame.counts = {std::min(count, kClipDistances), count, 0, 0};
 
   const double near = camera.near_depth(), far = camera.far_depth();

@@ -23,7 +23,6 @@ namespace isobrick {
 namespace {
 
 constexpr int kSamples = 4;
-constexpr std::size_t kMostPlanes = 6;
 
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
 
@@ -114,9 +113,11 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   if (width < 1 || height < 1 || width > largest_edge || height > largest_edge)
     throw UsageError(fmt::format("a picture of {} x {} pixels: {} draws 1 to {} along an edge",
                                  width, height, device.renderer, largest_edge));
-  if (new_settings.planes.size() > kMostPlanes)
-    throw UsageError(fmt::format("{} clipping planes: a picture can have {}",
-                                 new_settings.planes.size(), kMostPlanes));
+  const std::size_t planes = new_settings.planes.size() + (new_settings.region ? 6 : 0);
+  if (planes > kMostHalfSpaces)
+    throw UsageError(
+        fmt::format("{} clipping planes, of which a region is 6: a picture can have {}", planes,
+                    kMostHalfSpaces));
   camera = new_camera;
   settings = new_settings;
   frame = make_frame(camera, width, height, settings);

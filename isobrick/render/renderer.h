@@ -7,16 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "isobrick/core/half_space.h"
 #include "isobrick/core/vec.h"
 #include "isobrick/render/camera.h"
 #include "isobrick/render/mesh_pool.h"
 
 namespace isobrick {
-
-/// Keeps what lies on the side of `point` that `inward` points to, world space.
-struct ClipPlane {
-  Vec3d point, inward;
-};
 
 /// A box of world space, axis by axis.
 struct WorldBox {
@@ -30,8 +26,8 @@ struct PictureSettings {
   bool occlusion = true;           ///< less light where the surroundings are near
   bool edges = false;              ///< dark lines where depth or direction break off
   bool picking = false;            ///< keep which mesh each pixel shows
-  std::vector<ClipPlane> planes;   ///< up to 6: what lies within all of them is drawn
-  std::optional<WorldBox> region;  ///< and within this box
+  std::vector<HalfSpace> planes;   ///< what lies within all of them is drawn
+  std::optional<WorldBox> region;  ///< and within this box, which counts as 6 planes of at most 12
 };
 
 /// How a mesh is drawn.

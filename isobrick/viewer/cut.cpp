@@ -180,7 +180,7 @@ void CutSelector::append(const NodeKey& n, std::uint32_t coarser, const NodeView
   if (n.level == 0 || !refined_(n)) {
     const NodeSight sight = view.see(n);
     cut.nodes.push_back({n, coarser, static_cast<float>(sight.pixels),
-                         static_cast<float>(sight.distance), sight.visible});
+                         static_cast<float>(sight.distance), sight.visible, sight.cut_away});
     return;
   }
   const std::uint32_t coarse = coarse_around(n);

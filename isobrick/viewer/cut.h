@@ -31,6 +31,7 @@ struct CutNode {
   float pixels = 0;    ///< a cell's length on the picture
   float distance = 0;  ///< from the eye, world length
   bool visible = false;
+  bool cut_away = false;  ///< nothing of it is shown: it needs no mesh
 };
 
 /// A set of nodes that covers the volume once. Face, edge and corner neighbours

@@ -16,7 +16,8 @@ class Cover {
         complete_(complete) {}
 
   bool cover(const NodeKey& n) {
-    if (const CutNode* in_cut = cut_.find(n)) return cover_cut(n, in_cut->coarser);
+    if (const CutNode* in_cut = cut_.find(n))
+      return in_cut->cut_away || cover_cut(n, in_cut->coarser);
     if (!tree_.active_below(n, isovalue_)) return cover_border(n);
     const std::size_t mark = nodes_.size();
     bool all = true;

@@ -158,7 +158,8 @@ Vec3d to_index_space(const NodeGrid& grid, Vec3d world) {
 }
 
 std::optional<SurfaceHit> pick(const Drawable& drawn, const NodeGrid& grid, Vec3d origin,
-                               Vec3d from, Vec3d along, const std::optional<IndexBox>& clip) {
+                               Vec3d from, Vec3d along, const std::optional<IndexBox>& clip,
+                               std::span<const HalfSpace> planes) {
   const Ray ray{to_index_space(grid, from), turned(grid.transform(), along)};
   const Vec3d start = from - origin;
   std::optional<SurfaceHit> best;
@@ -172,6 +173,9 @@ std::optional<SurfaceHit> pick(const Drawable& drawn, const NodeGrid& grid, Vec3
       if (!met || (best && met->distance >= best->distance)) continue;
       const Vec3d position = from + along * met->distance;
       if (clip && !inside(*clip, to_index_space(grid, position))) continue;
+      if (!std::all_of(planes.begin(), planes.end(),
+                       [&](const HalfSpace& half) { return half.contains(position); }))
+        continue;
       const Vec3d n = to_double(mesh.normals[t[0]]) * (1 - met->u - met->v) +
                       to_double(mesh.normals[t[1]]) * met->u +
                       to_double(mesh.normals[t[2]]) * met->v;

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
+#include "isobrick/core/half_space.h"
 #include "isobrick/viewer/drawable.h"
 #include "isobrick/viewer/resident_bricks.h"
 
@@ -17,10 +19,11 @@ struct SurfaceHit {
 };
 
 /// The first hit of a ray with what is drawn, both in world space; ribbons do not
-/// count. `origin`: what the meshes' positions are relative to. `clip`: what lies
-/// outside (level-0 index space) is not hit.
+/// count. `origin`: what the meshes' positions are relative to. What lies outside of
+/// `clip` (level-0 index space) or of one of `planes` is not hit.
 std::optional<SurfaceHit> pick(const Drawable& drawn, const NodeGrid& grid, Vec3d origin,
-                               Vec3d from, Vec3d along, const std::optional<IndexBox>& clip = {});
+                               Vec3d from, Vec3d along, const std::optional<IndexBox>& clip = {},
+                               std::span<const HalfSpace> planes = {});
 
 /// The field at a point.
 struct FieldValue {

@@ -11,7 +11,8 @@ bool same_cut(const Cut& a, const Cut& b) {
   return a.isovalues == b.isovalues &&
          std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
                     [](const CutNode& p, const CutNode& q) {
-                      return p.key == q.key && p.coarser == q.coarser && p.visible == q.visible;
+                      return p.key == q.key && p.coarser == q.coarser && p.visible == q.visible &&
+                             p.cut_away == q.cut_away;
                     });
 }
 

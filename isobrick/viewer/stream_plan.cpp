@@ -21,7 +21,7 @@ class Planner {
       : tree_(tree), meshes_(meshes), jobs_(jobs) {}
 
   void add(const CutNode& node, double isovalue) {
-    if (!tree_.may_hold_surface(node.key, isovalue, node.coarser) ||
+    if (node.cut_away || !tree_.may_hold_surface(node.key, isovalue, node.coarser) ||
         meshes_.find(node.key, isovalue, node.coarser))
       return;
     const bool bare = !meshes_.has_any(node.key, isovalue);

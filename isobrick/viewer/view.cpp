@@ -44,35 +44,48 @@ std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, doubl
 NodeView::NodeView(const View& view, const NodeGrid& grid) : grid_(grid), clip_(view.clip) {
   const Transform& t = grid.transform();
   const auto& m = view.view_projection;
-  const auto axis = [&](std::size_t i) {
-    return Vec3d{t.direction[i], t.direction[3 + i], t.direction[6 + i]};
-  };
   for (int i = 0; i < 3; ++i) {
     spacing_[i] = std::abs(t.spacing[i]);
-    eye_[i] = dot(axis(static_cast<std::size_t>(i)), view.eye - t.origin) *
-              std::copysign(1.0, t.spacing[i]);
+    eye_[i] = dot(t.step(i), view.eye - t.origin) / spacing_[i];
   }
-  Vec3d rows[4];
-  double offsets[4];
-  for (std::size_t r = 0; r < 4; ++r) {
-    const Vec3d world{m[r], m[4 + r], m[8 + r]};
-    for (int i = 0; i < 3; ++i)
-      rows[r][i] = dot(world, axis(static_cast<std::size_t>(i))) * t.spacing[i];
-    offsets[r] = dot(world, t.origin) + m[12 + r];
-  }
+  Plane rows[4];
+  for (std::size_t r = 0; r < 4; ++r)
+    rows[r] = to_index_space({m[r], m[4 + r], m[8 + r]}, m[12 + r]);
   for (std::size_t i = 0; i < 6; ++i) {
     const double sign = i % 2 ? -1 : 1;
     const auto plane = [&](double width) {
-      return Plane{rows[3] * width + rows[i / 2] * sign,
-                   offsets[3] * width + sign * offsets[i / 2]};
+      return Plane{rows[3].normal * width + rows[i / 2].normal * sign,
+                   rows[3].offset * width + sign * rows[i / 2].offset};
     };
-    planes_[i] = plane(1);
+    picture_[i] = plane(1);
     wider_[i] = plane(i < 4 ? kWider : 1);
   }
+  for (const HalfSpace& half : view.planes)
+    planes_.push_back(to_index_space(half.normal, -half.least));
   const Vec3d second{m[1], m[5], m[9]}, fourth{m[3], m[7], m[11]};
   const double w = std::sqrt(dot(fourth, fourth));
   parallel_ = w == 0;
   pixels_per_length_ = view.height / 2.0 * std::sqrt(dot(second, second)) / (parallel_ ? 1 : w);
+}
+
+/// The plane of world space where normal · p + offset is 0.
+NodeView::Plane NodeView::to_index_space(Vec3d normal, double offset) const {
+  const Transform& t = grid_.transform();
+  return {{dot(normal, t.step(0)), dot(normal, t.step(1)), dot(normal, t.step(2))},
+          dot(normal, t.origin) + offset};
+}
+
+bool NodeView::Plane::meets(const IndexBox& box) const {
+  double most = offset;
+  for (int axis = 0; axis < 3; ++axis)
+    most += normal[axis] * (normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
+  return most >= 0;
+}
+
+bool NodeView::cut_away(const IndexBox& box) const {
+  return (clip_ && !touch(box, *clip_)) ||
+         !std::all_of(planes_.begin(), planes_.end(),
+                      [&](const Plane& plane) { return plane.meets(box); });
 }
 
 NodeSight NodeView::see(const NodeKey& n) const {
@@ -80,16 +93,12 @@ NodeSight NodeView::see(const NodeKey& n) const {
   NodeSight sight;
   sight.distance = distance(box);
   sight.pixels = pixels(n.level, sight.distance);
-  if (clip_ && !touch(box, *clip_)) return sight;
-  const auto inside = [&](const auto& plane) {
-    double most = plane.offset;
-    for (int axis = 0; axis < 3; ++axis)
-      most += plane.normal[axis] * (plane.normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
-    return most >= 0;
-  };
+  sight.cut_away = cut_away(box);
+  if (sight.cut_away) return sight;
+  const auto inside = [&](const Plane& plane) { return plane.meets(box); };
   sight.nearly_visible = std::all_of(wider_.begin(), wider_.end(), inside);
   // The wider picture holds the other one.
-  sight.visible = sight.nearly_visible && std::all_of(planes_.begin(), planes_.end(), inside);
+  sight.visible = sight.nearly_visible && std::all_of(picture_.begin(), picture_.end(), inside);
   return sight;
 }
 

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <optional>
+#include <vector>
 
+#include "isobrick/core/half_space.h"
 #include "isobrick/viewer/node_grid.h"
 
 namespace isobrick {
@@ -18,6 +20,7 @@ struct View {
   double pixel_error = 1.5;   ///< how long a cell's edge may be on the picture, pixels
   /// What is shown of the volume, in level-0 index space; nothing: all.
   std::optional<IndexBox> clip;
+  std::vector<HalfSpace> planes;  ///< what lies within all of them is shown
 
   friend bool operator==(const View&, const View&) = default;
 };
@@ -34,7 +37,8 @@ struct NodeSight {
   /// nearest. The direction of the view does not enter it.
   double pixels = 0;
   double distance = 0;          ///< from the eye to the node, world length
-  bool visible = false;         ///< false: outside of the picture or the clip box for certain
+  bool cut_away = false;        ///< nothing of the node lies within the clip box and all planes
+  bool visible = false;         ///< false: cut away or outside of the picture for certain
   bool nearly_visible = false;  ///< the same for a picture that is a little larger
 };
 
@@ -49,16 +53,22 @@ class NodeView {
   struct Plane {
     Vec3d normal;
     double offset;  ///< inside: normal · p + offset >= 0
+
+    /// Whether any of the box lies inside.
+    bool meets(const IndexBox& box) const;
   };
   using Planes = std::array<Plane, 6>;
 
+  Plane to_index_space(Vec3d normal, double offset) const;
+  bool cut_away(const IndexBox& box) const;
   double pixels(int level, double distance) const;
   double distance(const IndexBox& box) const;
 
   const NodeGrid& grid_;
   Vec3d spacing_, eye_;  ///< the eye in lengths along the volume's axes, from its origin
-  Planes planes_, wider_;
+  Planes picture_, wider_;
   std::optional<IndexBox> clip_;
+  std::vector<Plane> planes_;
   double pixels_per_length_ = 0;  ///< at distance 1, or anywhere
   bool parallel_ = false;
 };

@@ -15,7 +15,6 @@ namespace isobrick {
 namespace {
 
 constexpr float kPanelWidth = 390;
-constexpr std::size_t kMostSurfaces = 16;
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
 void text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
@@ -58,25 +57,6 @@ void surfaces_panel(ViewerState& state) {
     surfaces.push_back(added);
     state.selected = surfaces.size() - 1;
   }
-}
-
-void cuts_panel(ViewSettings& settings) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    CutSettings& cut = settings.cuts[axis];
-    ImGui::PushID(kAxes[axis]);
-    ImGui::Checkbox(kAxes[axis], &cut.on);
-    ImGui::SameLine();
-    ImGui::SetNextItemWidth(150);
-    ImGui::SliderFloat("##place", &cut.place, 0, 1, "%.3f");
-    ImGui::SameLine();
-    if (ImGui::SmallButton(cut.beyond ? "above" : "below")) cut.beyond = !cut.beyond;
-    ImGui::PopID();
-  }
-  ImGui::Checkbox("Region", &settings.region_on);
-  if (!settings.region_on) return;
-  ImGui::DragFloatRange2("x##r", &settings.region_lo.x, &settings.region_hi.x, 0.002f, 0, 1);
-  ImGui::DragFloatRange2("y##r", &settings.region_lo.y, &settings.region_hi.y, 0.002f, 0, 1);
-  ImGui::DragFloatRange2("z##r", &settings.region_lo.z, &settings.region_hi.z, 0.002f, 0, 1);
 }
 
 void slices_panel(ViewerState& state) {
@@ -262,7 +242,7 @@ void main_panel(ViewerState& state) {
   };
   if (section("Surfaces", true)) surfaces_panel(state);
   if (section("Camera and look", false)) look_panel(state);
-  if (section("Cuts and region", false)) cuts_panel(state.settings);
+  if (section("Cuts and region", false)) draw_cuts_panel(state);
   if (section("Slices", false)) slices_panel(state);
   if (section("Point and measure", false)) picking_panel(state);
   if (section("Bookmarks", false)) bookmarks_panel(state);

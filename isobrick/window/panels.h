@@ -12,4 +12,7 @@ void draw_panels(ViewerState& state);
 /// much surface there is. True while it is dragged.
 bool draw_isovalue_slider(ViewerState& state, float width, float height);
 
+/// What is cut away: across axes, by planes at any angle, outside of a region.
+void draw_cuts_panel(ViewerState& state);
+
 }  // namespace isobrick

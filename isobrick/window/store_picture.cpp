@@ -121,6 +121,13 @@ ShownBox shown_box(const ViewSettings& settings) {
   return box;
 }
 
+std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings) {
+  std::vector<HalfSpace> kept;
+  for (const PlaneSettings& plane : settings.planes)
+    if (plane.on) kept.push_back(plane.kept);
+  return kept;
+}
+
 View view_of(const Camera& camera, int width, int height, double pixel_error) {
   View view;
   view.eye = camera.eye;
@@ -169,6 +176,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
     const Vec3d last = last_sample(*store_);
     view.clip = IndexBox{box.lo * last, box.hi * last};
   }
+  view.planes = shown_half_spaces(settings);
   CutBudget budget;
   // What stands in until the cut is there takes room beside it.
   budget.mesh_bytes = std::min(budgets_.device_memory, budgets_.memory / 2) / 2;
@@ -215,6 +223,7 @@ PictureSettings StorePicture::picture_settings(const ViewSettings& settings) con
   picture.edges = settings.edges;
   picture.multisample = settings.multisample;
   picture.picking = true;
+  picture.planes = shown_half_spaces(settings);
   const ShownBox box = shown_box(settings);
   const Transform& transform = scene_->tree().grid().transform();
   const Vec3d last = last_sample(*store_), zero = transform.apply({0, 0, 0});
@@ -224,9 +233,10 @@ PictureSettings StorePicture::picture_settings(const ViewSettings& settings) con
     const Vec3d inward = unit(transform.apply(step) - zero, step);
     Vec3d place;
     place[axis] = box.lo[axis] * last[axis];
-    if (box.lo[axis] > 0) picture.planes.push_back({transform.apply(place), inward});
+    if (box.lo[axis] > 0) picture.planes.push_back(half_space_at(transform.apply(place), inward));
     place[axis] = box.hi[axis] * last[axis];
-    if (box.hi[axis] < 1) picture.planes.push_back({transform.apply(place), inward * -1.0});
+    if (box.hi[axis] < 1)
+      picture.planes.push_back(half_space_at(transform.apply(place), inward * -1.0));
   }
   return picture;
 }

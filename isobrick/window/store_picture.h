@@ -111,6 +111,9 @@ struct ShownBox {
 };
 ShownBox shown_box(const ViewSettings& settings);
 
+/// What planes that are on leave.
+std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings);
+
 /// The camera's view of nodes.
 View view_of(const Camera& camera, int width, int height, double pixel_error);
 

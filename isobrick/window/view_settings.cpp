@@ -60,8 +60,6 @@ class Fields {
   const Json& json_;
 };
 
-constexpr std::size_t kMostSurfaces = 16;
-
 }  // namespace
 
 Vec3f surface_colour(std::size_t number) {
@@ -75,7 +73,8 @@ Vec3f surface_colour(std::size_t number) {
 }
 
 nlohmann::ordered_json to_json(const ViewSettings& s) {
-  Json surfaces = Json::array(), cuts = Json::array(), slices = Json::array();
+  Json surfaces = Json::array(), cuts = Json::array(), planes = Json::array(),
+       slices = Json::array();
   for (const SurfaceSettings& surface : s.surfaces)
     surfaces.push_back({{"isovalue", surface.isovalue},
                         {"colour", list(surface.colour)},
@@ -83,10 +82,14 @@ nlohmann::ordered_json to_json(const ViewSettings& s) {
                         {"shown", surface.shown}});
   for (const CutSettings& cut : s.cuts)
     cuts.push_back({{"on", cut.on}, {"place", cut.place}, {"beyond", cut.beyond}});
+  for (const PlaneSettings& plane : s.planes)
+    planes.push_back(
+        {{"on", plane.on}, {"normal", list(plane.kept.normal)}, {"least", plane.kept.least}});
   for (const SliceSettings& slice : s.slices)
     slices.push_back({{"shown", slice.shown}, {"place", slice.place}});
   return {{"surfaces", surfaces},
           {"cuts", cuts},
+          {"planes", planes},
           {"slices", slices},
           {"window", {s.window_lo, s.window_hi}},
           {"region", {{"on", s.region_on}, {"lo", list(s.region_lo)}, {"hi", list(s.region_hi)}}},
@@ -114,6 +117,12 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
     const Fields cut(cuts[axis]), slice(slices[axis]);
     s.cuts[axis] = {cut.flag("on"), cut.real("place"), cut.flag("beyond")};
     s.slices[axis] = {slice.flag("shown"), slice.real("place")};
+  }
+  for (const Json& item : in.array("planes", 0, kMostClipPlanes)) {
+    const Fields plane(item);
+    s.planes.push_back({plane.flag("on"), {plane.vector("normal"), plane.number("least")}});
+    if (s.planes.back().kept.normal == Vec3d{})
+      throw Error("bookmark with a plane of no direction");
   }
   const Json& window = in.array("window", 2, 2);
   const Json& background = in.array("background", 2, 2);

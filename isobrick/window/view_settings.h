@@ -28,6 +28,12 @@ struct CutSettings {
   bool beyond = true;  ///< what lies at larger places goes; else at smaller ones
 };
 
+/// A plane at any angle that cuts away one side.
+struct PlaneSettings {
+  bool on = true;
+  HalfSpace kept;
+};
+
 /// A picture of the samples across an axis of the volume.
 struct SliceSettings {
   bool shown = false;
@@ -39,6 +45,7 @@ struct SliceSettings {
 struct ViewSettings {
   std::vector<SurfaceSettings> surfaces;
   std::array<CutSettings, 3> cuts;      ///< across x, y, z
+  std::vector<PlaneSettings> planes;    ///< kMostClipPlanes at most
   std::array<SliceSettings, 3> slices;  ///< across x, y, z
   float window_lo = 0,
         window_hi = 0;  ///< samples that slices show black and white; equal: for choose_values()
@@ -49,6 +56,8 @@ struct ViewSettings {
   float pixel_error = 1.5f;  ///< how long a cell may be on the picture
   Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
 };
+
+inline constexpr std::size_t kMostSurfaces = 16;
 
 /// Colours for the first surfaces of a scene, told apart in any order.
 Vec3f surface_colour(std::size_t number);

@@ -99,14 +99,14 @@ TEST_F(Shading, AnOpaqueMeshHidesTransparentOnesBehindIt) {
 TEST_F(Shading, PlanesCutAndShowAnotherTone) {
   const TestMesh ball = make_ball({0, 0, 0}, 1, 60);
   PictureSettings settings;
-  settings.planes = {{{0, 0, 0}, {-1, 0, 0}}};  // the left half stays
+  settings.planes = {{{-1, 0, 0}, 0}};  // the left half stays
   renderer().begin(front_camera(), kWidth, kHeight, settings);
   renderer().draw(ball.chunk(), {});
   renderer().end();
   const Pixels half(renderer());
   EXPECT_TRUE(half.surface(80, 80));
   EXPECT_FALSE(half.surface(103, 80));
-  settings.planes = {{{0, 0, 0}, {0, 1, 0}}};  // the back half stays: its inside is seen
+  settings.planes = {{{0, 1, 0}, 0}};  // the back half stays: its inside is seen
   renderer().begin(front_camera(), kWidth, kHeight, settings);
   renderer().draw(ball.chunk(), {.colour = {0.8f, 0.8f, 0.8f}, .inside = Vec3f{0, 0, 1}});
   renderer().end();
@@ -119,7 +119,7 @@ TEST_F(Shading, ARegionCutsAllSixSides) {
   PictureSettings settings;
   settings.region = WorldBox{{-0.5, -0.5, -0.25}, {0.5, 0.5, 0.25}};
   // More half spaces than OpenGL clips by itself.
-  for (int i = 0; i < 4; ++i) settings.planes.push_back({{0, 5, 0}, {0, -1, 0}});
+  for (int i = 0; i < 4; ++i) settings.planes.push_back({{0, -1, 0}, -5});
   Camera camera = front_camera();
   camera.orthographic = true;
   renderer().begin(camera, kWidth, kHeight, settings);
@@ -136,7 +136,7 @@ TEST_F(Shading, HollowsAreDarkerWithOcclusion) {
   int brightness[2];
   for (const bool occlusion : {false, true}) {
     PictureSettings settings{.occlusion = occlusion};
-    settings.planes = {{{0, 0, 0}, {0, 1, 0}}};
+    settings.planes = {{{0, 1, 0}, 0}};
     renderer().begin(front_camera(), kWidth, kHeight, settings);
     renderer().draw(ball.chunk(), {});
     renderer().end();

@@ -38,6 +38,12 @@ TEST(Parse, Vector) {
     EXPECT_THROW(parse_vector(text), UsageError) << text;
 }
 
+TEST(Parse, HalfSpace) {
+  EXPECT_EQ(parse_half_space("0,-1,0.5,+20"), (HalfSpace{{0, -1, 0.5}, 20}));
+  for (const char* text : {"", "1,2,3", "1,2,3,", "1,2,3,4,5", "0,0,0,1", "1,2,x,4", "1,2,3,inf"})
+    EXPECT_THROW(parse_half_space(text), UsageError) << text;
+}
+
 TEST(Parse, Types) {
   EXPECT_EQ(parse_type("i16"), ScalarType::i16);
   EXPECT_EQ(parse_type("float64"), ScalarType::f64);

@@ -160,6 +160,27 @@ TEST_F(CutTest, AClipBoxHidesNodes) {
     EXPECT_EQ(node.visible && tree().grid().box(node.key).lo.z > 60, false);
 }
 
+TEST_F(CutTest, WhatPlanesCutAwayIsNotWanted) {
+  const std::vector<double> isovalues{128};
+  View view = look({150, 150, 420}, {150, 150, 150}, 2);
+  const HalfSpace kept{{1, 2, 0}, 500};  // a corner is left
+  const Cut whole = CutSelector(tree()).select(isovalues, view, {});
+  view.planes = {kept, {{0, 0, 1}, 20}};
+  const Cut cut = CutSelector(tree()).select(isovalues, view, {});
+  expect_sound(tree().grid(), cut);
+  EXPECT_LT(cut.nodes.size(), whole.nodes.size());
+  std::size_t away = 0;
+  for (const CutNode& node : cut.nodes) {
+    const IndexBox box = tree().grid().box(node.key);
+    bool any = box.hi.z >= 20;
+    any &= kept.contains({box.hi.x, box.hi.y, 0});
+    EXPECT_EQ(node.cut_away, !any);
+    EXPECT_FALSE(node.cut_away && node.visible);
+    away += node.cut_away;
+  }
+  EXPECT_GT(away, cut.nodes.size() / 4);
+}
+
 /// Ranges of a field that is known without samples: a store of 2048³ in no memory.
 class LargeBall final : public BrickSource {
  public:

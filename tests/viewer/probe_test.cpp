@@ -56,6 +56,15 @@ TEST(Probe, ARayMeetsTheBallWhereItIs) {
   ASSERT_TRUE(hit);
   EXPECT_NEAR(hit->distance, 90 + radius, 0.02);
   EXPECT_LT(to_index_space(scene.tree().grid(), hit->position).z, index_middle.z);
+  // Or behind a plane at any angle; and nothing is where all is cut away.
+  const std::vector<HalfSpace> planes{half_space_at(middle, {0.5, 0, -1})};
+  const auto behind = pick(*drawn, scene.tree().grid(), middle, middle + Vec3d{0.3, 0.2, 90},
+                           {0, 0, -1}, {}, planes);
+  ASSERT_TRUE(behind);
+  EXPECT_NEAR(behind->distance, 90 + radius, 0.02);
+  const std::vector<HalfSpace> none{half_space_at(middle + Vec3d{0, 0, 100}, {0, 0, 1})};
+  EXPECT_FALSE(pick(*drawn, scene.tree().grid(), middle, middle + Vec3d{0.3, 0.2, 90}, {0, 0, -1},
+                    {}, none));
 }
 
 TEST(Probe, TellsTheFieldOfTheFinestLevelThatIsThere) {
@@ -143,7 +152,8 @@ TEST(SliceSamples, HasTheSamplesOfThePlane) {
     const Vec3d end = image.corner + image.along_width + image.along_height;
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(end[i], corner[i], 1e-9);
   }
-  const SliceSamples small = read_slice(bricks, {.axis = 1, .position = 60, .bytes = 5000}, Always());
+  const SliceSamples small =
+      read_slice(bricks, {.axis = 1, .position = 60, .bytes = 5000}, Always());
   EXPECT_GT(small.stored, 0);
   EXPECT_LE(small.pixels.size(), 5000u);
 }

@@ -116,6 +116,23 @@ TEST(SceneStream, CoarseNodesComeFirst) {
   EXPECT_TRUE(stream.drawable()->complete);
 }
 
+TEST(SceneStream, WhatIsCutAwayIsNeitherReadNorMeshed) {
+  const auto source = make_source(150);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  SceneStream stream(source, tree, {.threads = 2});
+  Cut cut = RandomCut(tree->grid(), 2, 3).cut({0.0});
+  for (CutNode& node : cut.nodes) {
+    node.cut_away = tree->grid().box(node.key).lo.x > 0;
+    node.visible = !node.cut_away;
+  }
+  stream.set_cut(cut);
+  ASSERT_TRUE(stream.wait_idle(60));
+  const auto drawn = stream.drawable();
+  EXPECT_TRUE(drawn->complete);
+  EXPECT_FALSE(drawn->nodes.empty());
+  for (const DrawnNode& node : drawn->nodes) EXPECT_EQ(node.mesh->key.node.x, 0);
+}
+
 TEST(SceneStream, AnotherIsovalueNeedsNoBrickAgain) {
   const auto source = make_source(150);
   const auto tree = std::make_shared<const NodeTree>(*source);

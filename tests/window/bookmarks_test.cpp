@@ -16,6 +16,7 @@ Bookmark jaw() {
   b.camera.orthographic = true;
   b.settings.surfaces = {{127.25, {0.1f, 0.2f, 0.3f}, 0.5f, true}, {-3e-7, {1, 1, 1}, 1, false}};
   b.settings.cuts[1] = {true, 0.25f, false};
+  b.settings.planes = {{true, {{1, -2, 0.5}, 12.5}}, {false, {{0, 0, 1}, -3}}};
   b.settings.slices[2] = {true, 0.75f};
   b.settings.region_on = true;
   b.settings.region_hi = {0.5f, 1, 0.75f};
@@ -56,7 +57,7 @@ TEST(Bookmarks, RefuseWhatIsNone) {
     EXPECT_THROW(Bookmarks(dir / "b.json", dir / "a.zarr"), Error) << text;
   }
   nlohmann::ordered_json json = to_json(jaw().settings);
-  for (const char* field : {"surfaces", "cuts", "window", "region", "pixel_error"}) {
+  for (const char* field : {"surfaces", "cuts", "planes", "window", "region", "pixel_error"}) {
     nlohmann::ordered_json broken = json;
     broken[field] = "x";
     EXPECT_THROW(view_settings_from(broken), Error) << field;

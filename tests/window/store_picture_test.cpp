@@ -111,6 +111,39 @@ TEST_F(Picture, CutsAndRegionsLeaveWhatTheySay) {
   EXPECT_FALSE(pick_point(*picture_, kWidth / 2, kHeight / 2));
 }
 
+TEST_F(Picture, PlanesCutAtAnyAngleAndHideWhatIsBehindThem) {
+  open(SynthKind::sphere, {160, 160, 160});
+  draw();
+  const auto front = pick_point(*picture_, kWidth / 2, kHeight / 2);
+  ASSERT_TRUE(front);
+  const auto triangles = picture_->state().triangles;
+  const Vec3d middle{79.5, 79.5, 79.5};
+  // The half that faces the camera goes: the back of the sphere's inside is seen.
+  const HalfSpace kept = half_space_at(middle, camera_.back * -1.0);
+  settings_.planes = {{true, kept}};
+  draw();
+  EXPECT_LT(picture_->state().triangles, triangles) << "nodes in front are not wanted";
+  const auto behind = pick_point(*picture_, kWidth / 2, kHeight / 2);
+  ASSERT_TRUE(behind);
+  EXPECT_TRUE(kept.contains(behind->world));
+  EXPECT_FALSE(kept.contains(front->world));
+  // Six at once, beside a cut and a region: a small piece of the other half.
+  settings_.planes[0].kept = {kept.normal * -1.0, -kept.least};
+  for (int i = 0; i < 5; ++i) settings_.planes.push_back({true, {{0, 0, 1.0 + i}, -1e6}});
+  settings_.cuts = {{{true, 0.99f, true}, {true, 0.99f, true}, {true, 0.01f, false}}};
+  settings_.region_on = true;
+  settings_.region_lo = {0.02f, 0.02f, 0.02f};
+  settings_.region_hi = {0.98f, 0.98f, 0.98f};
+  draw();
+  const auto again = pick_point(*picture_, kWidth / 2, kHeight / 2);
+  ASSERT_TRUE(again);
+  EXPECT_LT(length(again->world - front->world), 1e-3);
+  // A plane that is off does nothing.
+  settings_ = {.surfaces = settings_.surfaces, .planes = {{false, kept}}};
+  draw();
+  EXPECT_EQ(picture_->state().triangles, triangles);
+}
+
 TEST_F(Picture, SeveralSurfacesAreToldApart) {
   open(SynthKind::sphere, {96, 96, 96});
   const double isovalue = settings_.surfaces[0].isovalue;

@@ -1,0 +1,102 @@
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <imgui.h>
+
+#include "isobrick/render/vectors.h"
+#include "isobrick/window/panels.h"
+
+namespace isobrick {
+namespace {
+
+constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
+
+void across_axes(ViewSettings& settings) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    CutSettings& cut = settings.cuts[axis];
+    ImGui::PushID(kAxes[axis]);
+    ImGui::Checkbox(kAxes[axis], &cut.on);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(150);
+    ImGui::SliderFloat("##place", &cut.place, 0, 1, "%.3f");
+    ImGui::SameLine();
+    if (ImGui::SmallButton(cut.beyond ? "above" : "below")) cut.beyond = !cut.beyond;
+    ImGui::PopID();
+  }
+}
+
+/// Where planes across `normal` meet the box: the least and the largest of a HalfSpace's `least`.
+std::pair<double, double> places(const WorldBox& box, Vec3d normal) {
+  double lo = 0, hi = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = normal[axis] * box.lo[axis], b = normal[axis] * box.hi[axis];
+    lo += std::min(a, b);
+    hi += std::max(a, b);
+  }
+  return {lo, hi};
+}
+
+/// Turns a plane about the place where it goes through the box, so that what lies along
+/// `normal` stays.
+void turn(HalfSpace& kept, const WorldBox& box, Vec3d normal) {
+  const auto [old_lo, old_hi] = places(box, kept.normal);
+  const double part = old_hi > old_lo ? (kept.least - old_lo) / (old_hi - old_lo) : 0.5;
+  kept.normal = normal;
+  const auto [lo, hi] = places(box, normal);
+  kept.least = lo + std::clamp(part, 0.0, 1.0) * (hi - lo);
+}
+
+/// False when its user removes it.
+bool one_plane(PlaneSettings& plane, const WorldBox& box, Vec3d ahead) {
+  HalfSpace& kept = plane.kept;
+  ImGui::Checkbox("##on", &plane.on);
+  ImGui::SameLine();
+  const auto [lo, hi] = places(box, kept.normal);
+  ImGui::SetNextItemWidth(150);
+  ImGui::SliderScalar("##place", ImGuiDataType_Double, &kept.least, &lo, &hi, "%.4g");
+  ImGui::SameLine();
+  if (ImGui::SmallButton("Flip")) kept = {kept.normal * -1.0, -kept.least};
+  ImGui::SameLine();
+  if (ImGui::SmallButton("Face me")) turn(kept, box, ahead);
+  ImGui::SameLine();
+  const bool stays = !ImGui::SmallButton("x");
+  std::array<double, 3> normal{kept.normal.x, kept.normal.y, kept.normal.z};
+  ImGui::SetNextItemWidth(220);
+  if (ImGui::InputScalarN("direction", ImGuiDataType_Double, normal.data(), 3, nullptr, nullptr,
+                          "%.3f", ImGuiInputTextFlags_EnterReturnsTrue))
+    turn(kept, box, unit({normal[0], normal[1], normal[2]}, kept.normal));
+  return stays;
+}
+
+void planes(ViewerState& state) {
+  auto& list = state.settings.planes;
+  const WorldBox box = state.picture->bounds();
+  const Vec3d ahead = state.navigator.camera.back * -1.0;
+  for (std::size_t i = 0; i < list.size();) {
+    ImGui::PushID(static_cast<int>(i));
+    const bool stays = one_plane(list[i], box, ahead);
+    ImGui::PopID();
+    if (stays)
+      ++i;
+    else
+      list.erase(list.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  if (list.size() < kMostClipPlanes && ImGui::SmallButton("Add a plane"))
+    list.push_back({true, half_space_at((box.lo + box.hi) * 0.5, ahead)});
+}
+
+}  // namespace
+
+void draw_cuts_panel(ViewerState& state) {
+  ViewSettings& settings = state.settings;
+  across_axes(settings);
+  planes(state);
+  ImGui::Checkbox("Region", &settings.region_on);
+  if (!settings.region_on) return;
+  ImGui::DragFloatRange2("x##r", &settings.region_lo.x, &settings.region_hi.x, 0.002f, 0, 1);
+  ImGui::DragFloatRange2("y##r", &settings.region_lo.y, &settings.region_hi.y, 0.002f, 0, 1);
+  ImGui::DragFloatRange2("z##r", &settings.region_lo.z, &settings.region_hi.z, 0.002f, 0, 1);
+}
+
+}  // namespace isobrick
