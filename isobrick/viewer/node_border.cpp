@@ -1,63 +1,11 @@
 #include "isobrick/viewer/node_border.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+
+#include "isobrick/surface/coarse_face.h"
 
 namespace isobrick {
 namespace {
-
-/// A cell of a face: corners (0,0), (1,0), (0,1), (1,1), edges bottom, right,
-/// top, left. Values are differences from the isovalue.
-struct FaceCell {
-  float v[4];
-  bool inside(int corner) const { return v[corner] >= 0; }
-  bool crosses(int edge) const { return inside(kEnds[edge][0]) != inside(kEnds[edge][1]); }
-  bool ambiguous() const {
-    return inside(0) == inside(3) && inside(1) == inside(2) && inside(0) != inside(1);
-  }
-  /// Where the contour crosses an edge.
-  std::array<double, 2> crossing(int edge) const {
-    const double a = v[kEnds[edge][0]], b = v[kEnds[edge][1]];
-    const double t = std::isinf(a - b) ? 0.5 : a / (a - b);
-    switch (edge) {
-      case 0: return {t, 0};
-      case 1: return {1, t};
-      case 2: return {t, 1};
-      default: return {0, t};
-    }
-  }
-  /// The edge at the other end of the contour that crosses `edge`: around an
-  /// outside corner where there are two (the inside stays connected).
-  int partner(int edge) const {
-    if (!ambiguous()) {
-      for (int other = 0; other < 4; ++other)
-        if (other != edge && crosses(other)) return other;
-      return edge;
-    }
-    constexpr int kAround[4][2] = {{0, 3}, {0, 1}, {2, 3}, {1, 2}};  // edges at a corner
-    for (int corner = 0; corner < 4; ++corner)
-      if (!inside(corner)) {
-        if (kAround[corner][0] == edge) return kAround[corner][1];
-        if (kAround[corner][1] == edge) return kAround[corner][0];
-      }
-    return edge;
-  }
-  static constexpr int kEnds[4][2] = {{0, 1}, {1, 3}, {2, 3}, {0, 2}};
-};
-
-/// The point of the segment nearest to p, and its distance squared.
-struct Nearest {
-  std::array<double, 2> point;
-  double distance2;
-};
-Nearest nearest_on(std::array<double, 2> a, std::array<double, 2> b, std::array<double, 2> p) {
-  const double dx = b[0] - a[0], dy = b[1] - a[1], length2 = dx * dx + dy * dy;
-  const double t =
-      length2 > 0 ? std::clamp(((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length2, 0.0, 1.0) : 0;
-  const std::array<double, 2> q{a[0] + t * dx, a[1] + t * dy};
-  return {q, (q[0] - p[0]) * (q[0] - p[0]) + (q[1] - p[1]) * (q[1] - p[1])};
-}
 
 /// The axes along a face.
 constexpr int first_axis(int normal) { return normal == 0 ? 1 : 0; }
@@ -149,7 +97,7 @@ void NodeBorder::connect_inside(int face, GridValues& field) const {
   const GridValues& coarse = *faces_[static_cast<std::size_t>(face)];
   for (Index j = coarse.points.lo[v]; j + 1 < coarse.points.hi[v]; ++j)
     for (Index i = coarse.points.lo[u]; i + 1 < coarse.points.hi[u]; ++i) {
-      FaceCell cell{};
+      coarse::Cell cell{};
       for (int c = 0; c < 4; ++c) {
         Int3 p = coarse.points.lo;
         p[u] = i + (c & 1);
@@ -168,48 +116,26 @@ void NodeBorder::connect_inside(int face, GridValues& field) const {
     }
 }
 
-/// Whether a coordinate lies strictly between two coarse grid points.
-bool NodeBorder::interior(int axis, Index below, double part) const {
-  return part > 0 || between(axis, below).weight > 0;
-}
-
-Vec3d NodeBorder::moved(int face, Int3 below, Vec3d part, Vec3d place) const {
-  const auto& coarse = faces_[static_cast<std::size_t>(face)];
-  const int normal = face / 2, axes[2] = {first_axis(normal), second_axis(normal)};
-  if (!coarse || !interior(axes[0], below[axes[0]], part[axes[0]]) ||
-      !interior(axes[1], below[axes[1]], part[axes[1]]))
-    return place;
-  Int3 corner = coarse->points.lo;
-  std::array<double, 2> at{}, from{}, length{};
-  int half[2] = {-1, -1};  // on which side of a cell's middle, along the axis of the vertex's edge
-  for (std::size_t k = 0; k < 2; ++k) {
-    const int axis = axes[k];
-    corner[axis] = below[axis] / ratio_[axis];
-    from[k] = static_cast<double>(grid_.position(key_.level + 1, axis, corner[axis]));
-    length[k] =
-        static_cast<double>(grid_.position(key_.level + 1, axis, corner[axis] + 1)) - from[k];
-    at[k] = (place[axis] - from[k]) / length[k];
-    if (part[axis] > 0 && ratio_[axis] == 2) half[k] = static_cast<int>(below[axis] % 2);
+void NodeBorder::describe(GridView& view) {
+  for (int f = 0; f < 6; ++f) {
+    const auto& coarse = faces_[static_cast<std::size_t>(f)];
+    if (!coarse) continue;
+    const Int3 n = coarse->points.extent();
+    view.faces[f] = {
+        coarse->values.data(),
+        {static_cast<int>(n[first_axis(f / 2)]), static_cast<int>(n[second_axis(f / 2)])}};
   }
-  FaceCell cell{};
-  for (int c = 0; c < 4; ++c) {
-    Int3 p = corner;
-    p[axes[0]] += c & 1;
-    p[axes[1]] += c >> 1;
-    cell.v[c] = coarse->at(p);
+  for (int axis = 0; axis < 3; ++axis) {
+    auto& places = places_[static_cast<std::size_t>(axis)];
+    places.clear();
+    const Between last = between(axis, hi_[axis]);
+    const Index end = last.first + (last.weight > 0 ? 2 : 1);
+    for (Index p = lo_[axis] / ratio_[axis]; p < end; ++p)
+      places.push_back(static_cast<double>(grid_.position(key_.level + 1, axis, p)));
+    view.ratio[axis] = static_cast<int>(ratio_[axis]);
+    view.coarse_place[axis] = places.data();
+    view.coarse_n[axis] = static_cast<int>(places.size());
   }
-  // The vertex's edge goes from the cell's middle to that of one of its edges; the
-  // contour that crosses it ends on that edge where there is a choice.
-  int near = half[1] >= 0 ? (half[1] ? 2 : 0) : half[0] >= 0 ? (half[0] ? 1 : 3) : -1;
-  if (!cell.ambiguous()) near = -1;
-  Nearest best{at, std::numeric_limits<double>::infinity()};
-  for (int edge = 0; edge < 4; ++edge) {
-    if (!cell.crosses(edge) || (near >= 0 && edge != near)) continue;
-    const Nearest found = nearest_on(cell.crossing(edge), cell.crossing(cell.partner(edge)), at);
-    if (found.distance2 < best.distance2) best = found;
-  }
-  for (std::size_t k = 0; k < 2; ++k) place[axes[k]] = from[k] + best.point[k] * length[k];
-  return place;
 }
 
 }  // namespace isobrick

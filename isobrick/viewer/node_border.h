@@ -3,13 +3,14 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
+#include "isobrick/surface/grid_view.h"
 #include "isobrick/viewer/node_samples.h"
 
 namespace isobrick {
 
-/// Where a node meets coarser neighbours: values on its border, and places on
-/// the coarser side's contours.
+/// Where a node meets coarser neighbours: the values on its border.
 class NodeBorder {
  public:
   NodeBorder(const NodeGrid& grid, NodeSamples& samples) : grid_(grid), samples_(samples) {}
@@ -19,19 +20,13 @@ class NodeBorder {
   void apply(const NodeKey& key, std::uint32_t coarser, double isovalue, const Wanted& wanted,
              GridValues& field);
 
-  /// Whether the neighbour over a face (2 · axis + side) is a coarser one.
-  bool meets(int face) const { return faces_[static_cast<std::size_t>(face)].has_value(); }
-
-  /// A vertex of the finer side on face `face` (2 · axis + side), given as grid
-  /// point below (global), part of the way to the next, and place (level-0 index
-  /// space): moved onto the contour of the coarser side, if it is not on an edge
-  /// of the coarser grid anyway.
-  Vec3d moved(int face, Int3 below, Vec3d part, Vec3d place) const;
+  /// After apply(): what a mesh of the node has to know of the coarser side. Valid until
+  /// the next apply().
+  void describe(GridView& view);
 
  private:
   void take_values(int i, double isovalue, const Wanted& wanted, GridValues& field);
   void connect_inside(int face, GridValues& field) const;
-  bool interior(int axis, Index below, double part) const;
   float interpolated(const GridValues& coarse, Int3 point) const;
   /// The two coarse grid points around a grid point, and how far it is from the first.
   struct Between {
@@ -45,6 +40,7 @@ class NodeBorder {
   NodeKey key_;
   Int3 ratio_, lo_, hi_;                            ///< grid points of the node, both inclusive
   std::array<std::optional<GridValues>, 6> faces_;  ///< the coarser side's values
+  std::array<std::vector<double>, 3> places_;       ///< of the coarser grid's points
   GridValues scratch_;
 };
 

@@ -15,7 +15,7 @@ struct GridValues {
   float& at(Int3 p) {
     return values[static_cast<std::size_t>(linear_index(p - points.lo, points.extent()))];
   }
-  float at(Int3 p) const {
+  const float& at(Int3 p) const {
     return values[static_cast<std::size_t>(linear_index(p - points.lo, points.extent()))];
   }
 };
