@@ -1,12 +1,28 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "isobrick/surface/surface_options.h"
 #include "isobrick/viewer/node_grid.h"
 
 namespace isobrick {
+
+/// What a node's mesh is a function of: two meshes with one id are the same.
+struct MeshId {
+  NodeKey key;
+  double isovalue = 0;
+  std::uint32_t coarser = 0;
+  friend bool operator==(const MeshId&, const MeshId&) = default;
+};
+
+struct MeshIdHash {
+  std::size_t operator()(const MeshId& id) const {
+    return NodeKeyHash()(id.key) ^ std::hash<double>()(id.isovalue) ^
+           std::size_t{id.coarser} * 0x9e3779b97f4a7c15ULL;
+  }
+};
 
 /// The surface in one node. Immutable once it is made.
 struct NodeMesh {
@@ -23,6 +39,7 @@ struct NodeMesh {
   /// What is wrong with the samples; empty when all is well. The mesh is empty otherwise.
   std::string damage;
 
+  MeshId id() const { return {key, isovalue, coarser}; }
   bool empty() const { return mesh.triangles.size() == 0; }
   std::uint64_t bytes() const {
     return sizeof(NodeMesh) + mesh.positions.capacity() * sizeof(Vec3f) +

@@ -188,10 +188,10 @@ void StorePicture::upload() {
   if (next_ == nullptr || next_ == shown_) next_ = newest;
   const auto start = Clock::now();
   for (const DrawnNode& node : next_->nodes) {
-    Upload& upload = uploads_[node.mesh.get()];
+    Upload& upload = uploads_[node.mesh->id()];
     upload.used = frame_;
-    if (upload.mesh != nullptr) continue;
-    upload.mesh = node.mesh;
+    if (upload.there) continue;
+    upload.there = true;
     if (!node.mesh->empty()) upload.place = pool_.add(node.mesh->mesh.chunk(0), scene_->origin());
     const std::chrono::duration<double> spent = Clock::now() - start;
     if (shown_ != nullptr && spent.count() > kUploadSeconds)
@@ -203,15 +203,16 @@ void StorePicture::upload() {
 
 void StorePicture::drop_unused() {
   if (shown_ != nullptr)
-    for (const DrawnNode& node : shown_->nodes) uploads_[node.mesh.get()].used = frame_;
+    for (const DrawnNode& node : shown_->nodes) uploads_[node.mesh->id()].used = frame_;
   if (pool_.bytes() <= budgets_.device_memory) return;
-  std::vector<std::pair<std::uint64_t, const NodeMesh*>> oldest;
-  for (const auto& [key, upload] : uploads_)
-    if (upload.used != frame_) oldest.emplace_back(upload.used, key);
-  std::sort(oldest.begin(), oldest.end());
-  for (const auto& [used, key] : oldest) {
+  std::vector<std::pair<std::uint64_t, MeshId>> oldest;
+  for (const auto& [id, upload] : uploads_)
+    if (upload.used != frame_) oldest.emplace_back(upload.used, id);
+  std::sort(oldest.begin(), oldest.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [used, id] : oldest) {
     if (pool_.bytes() <= budgets_.device_memory) break;
-    uploads_.erase(key);
+    uploads_.erase(id);
   }
 }
 
@@ -251,7 +252,7 @@ void StorePicture::draw_surfaces(const ViewSettings& settings) {
       continue;
     }
     const auto number = static_cast<std::size_t>(node.isovalue);
-    const auto upload = uploads_.find(node.mesh.get());
+    const auto upload = uploads_.find(node.mesh->id());
     if (number >= shown_surfaces_.size() || upload == uploads_.end() ||
         upload->second.place.empty())
       continue;

@@ -62,8 +62,10 @@ class StorePicture {
                      const std::function<void()>& wait);
 
  private:
+  /// A mesh on the device. It may outlive the one in host memory, which made again
+  /// would be the same.
   struct Upload {
-    MeshPtr mesh;  ///< keeps the key from being used anew
+    bool there = false;
     PooledMesh place;
     std::uint64_t used = 0;
   };
@@ -87,7 +89,7 @@ class StorePicture {
   std::unique_ptr<Scene> scene_;
   std::shared_ptr<const Drawable> shown_, next_;
   std::vector<std::size_t> shown_surfaces_;  ///< which surface each isovalue of the scene is
-  std::unordered_map<const NodeMesh*, Upload> uploads_;
+  std::unordered_map<MeshId, Upload, MeshIdHash> uploads_;
   /// What slices show, as the renderer takes it.
   struct ShownSlice {
     std::shared_ptr<const SliceSamples> from;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/render/gl_context.h"
@@ -164,6 +165,31 @@ TEST_F(Picture, KeepsItsBudgets) {
   EXPECT_TRUE(picture_->state().limited_by_budget);
   EXPECT_LE(picture_->state().device_bytes, budgets.device_memory);
   EXPECT_LE(picture_->scene().stream().counters().brick_bytes_peak, budgets.memory / 2);
+}
+
+TEST_F(Picture, MeshesOnTheDeviceKeepNoneInHostMemory) {
+  const PictureBudgets budgets{.memory = 16u << 20, .device_memory = 512u << 20};
+  open(SynthKind::gyroid, {128, 128, 128}, budgets);
+  settings_.pixel_error = 0.5f;
+  settings_.occlusion = settings_.multisample = false;
+  std::map<std::weak_ptr<const NodeMesh>, std::uint64_t, std::owner_less<>> seen;
+  std::uint64_t shown = 0, all = 0;
+  for (int i = 0; i < 12; ++i) {
+    settings_.surfaces[0].isovalue = 90.5 + 5 * i;
+    draw();
+    shown = 0;
+    for (const DrawnNode& node : picture_->scene().drawable()->nodes) {
+      shown += node.mesh->bytes();
+      all += node.mesh->bytes();
+      seen[node.mesh] = node.mesh->bytes();
+    }
+  }
+  std::uint64_t alive = 0;
+  for (const auto& [mesh, bytes] : seen)
+    if (!mesh.expired()) alive += bytes;
+  EXPECT_GT(all, budgets.memory) << "the test has too few meshes";
+  EXPECT_LE(alive, std::max(budgets.memory / 2, shown));
+  EXPECT_GT(picture_->state().device_bytes, alive);
 }
 
 TEST_F(Picture, ADamagedBrickIsMarkedAndTheRestIsShown) {
