@@ -26,6 +26,7 @@ struct Arguments {
   int frames = 120;
   bool plain = false, no_occlusion = false, force = false;
   PictureBudgets budgets;
+  IndexKind index = IndexKind::linear;
 };
 
 ViewSettings settings_of(const Arguments& arguments) {
@@ -46,11 +47,22 @@ ViewSettings settings_of(const Arguments& arguments) {
   return settings;
 }
 
+nlohmann::ordered_json to_json(const NodeSearch::State& search) {
+  return {{"kind", name_of(search.kind)},          {"bytes", search.bytes},
+          {"build_seconds", search.build_seconds}, {"search_seconds", search.search_seconds},
+          {"active_nodes", search.active},         {"nodes", search.nodes}};
+}
+
 /// Draws into files.
 int draw(const Arguments& arguments, Console& console) {
   const auto store = std::make_shared<const StoreReader>(arguments.store);
   const GlContext context;
   StorePicture picture(store, arguments.budgets, {});
+  NodeSearch& search = picture.scene().search();
+  search.use(arguments.index);
+  search.wait();
+  if (const std::string refused = search.state().refused; !refused.empty())
+    console.note(refused + ": a linear scan is used");
   ViewSettings settings = settings_of(arguments);
   choose_values(settings, picture.scene().tree());
   const WorldBox box = picture.bounds();
@@ -84,6 +96,7 @@ int draw(const Arguments& arguments, Console& console) {
                   {"width", width},
                   {"height", height},
                   {"triangles", state.triangles},
+                  {"index", to_json(search.state())},
                   {"damaged_parts", state.damage.size()},
                   {"limited_by_budget", state.limited_by_budget},
                   {"renderer", current_gl_device().renderer},
@@ -100,6 +113,7 @@ int run(const Arguments& arguments, Console& console) {
   options.width = arguments.size.width;
   options.height = arguments.size.height;
   options.budgets = arguments.budgets;
+  options.index = arguments.index;
   options.camera = arguments.camera;
   options.settings = settings_of(arguments);
   ViewerWindow window(options);
@@ -114,6 +128,12 @@ double parse_pixel_error(const std::string& text) {
   if (!(pixels >= 0.1 && pixels <= 1000))
     throw UsageError(fmt::format("'{}' is no pixel error; it lies within 0.1 and 1000", text));
   return pixels;
+}
+
+IndexKind parse_search(const std::string& text) {
+  if (const auto kind = parse_index_kind(text)) return *kind;
+  throw UsageError(
+      fmt::format("unknown index '{}'; it is linear, interval, kdtree, quadtree or octree", text));
 }
 
 /// "x:PART": a slice across an axis, its place in parts of the volume.
@@ -170,6 +190,9 @@ void add_view(Program& program) {
   add_parsed(app, arguments->settings.pixel_error,
              [](const std::string& text) { return static_cast<float>(parse_pixel_error(text)); },
              {"--pixel-error", "PIXELS", "How long a cell may be on the picture", "1.5"});
+  add_parsed(app, arguments->index, parse_search,
+             {"--index", "linear|interval|kdtree|quadtree|octree",
+              "What finds the parts that an isovalue crosses", "linear"});
   add_memory(app, arguments->budgets.memory);
   add_parsed(app, arguments->budgets.device_memory, parse_bytes,
              {"--gpu-memory", "BYTES", "For meshes on the graphics device", "1G"});

@@ -67,13 +67,10 @@ void CutSelector::restart() {
   before_.clear();
 }
 
-double CutSelector::urgency(const NodeKey& n, const NodeSight& sight,
-                            std::span<const double> isovalues) {
+double CutSelector::urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active) {
   const bool before = before_(n) != 0;
-  if (!(before ? sight.nearly_visible : sight.visible)) return 0;
-  const bool active = std::any_of(isovalues.begin(), isovalues.end(),
-                                  [&](double iso) { return tree_.active_below(n, iso); });
-  return active ? sight.pixels * (before ? kHysteresis : 1) : 0;
+  if (!(before ? sight.nearly_visible : sight.visible) || !active.below(n)) return 0;
+  return sight.pixels * (before ? kHysteresis : 1);
 }
 
 double CutSelector::triangles(const NodeKey& n, std::span<const double> isovalues,
@@ -117,8 +114,8 @@ void CutSelector::collect(const NodeKey& n, std::vector<NodeKey>& needed) {
   needed.push_back(n);
 }
 
-Cut CutSelector::select(std::span<const double> isovalues, const View& view,
-                        const CutBudget& budget) {
+Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBudget& budget) {
+  const std::vector<double>& isovalues = active.isovalues();
   const NodeGrid& grid = tree_.grid();
   const NodeView node_view(view, grid);
   std::swap(refined_, before_);
@@ -129,7 +126,7 @@ Cut CutSelector::select(std::span<const double> isovalues, const View& view,
   double used = 0;
   const auto enter = [&](const NodeKey& n) {
     if (n.level == 0) return;
-    const double pixels = urgency(n, node_view.see(n), isovalues);
+    const double pixels = urgency(n, node_view.see(n), active);
     if (pixels > view.pixel_error) queue.push({pixels, n});
   };
   const int top = grid.levels() - 1;
@@ -140,7 +137,7 @@ Cut CutSelector::select(std::span<const double> isovalues, const View& view,
   });
 
   Cut cut;
-  cut.isovalues.assign(isovalues.begin(), isovalues.end());
+  cut.isovalues = isovalues;
   std::vector<NodeKey> needed;
   while (!queue.empty()) {
     const NodeKey n = queue.top().key;

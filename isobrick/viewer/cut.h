@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "isobrick/viewer/active_nodes.h"
 #include "isobrick/viewer/node_flags.h"
 #include "isobrick/viewer/node_tree.h"
 #include "isobrick/viewer/view.h"
@@ -51,15 +52,15 @@ class CutSelector {
 
   /// The cut for a view: nodes are refined, the longest cells on the picture first,
   /// while these are longer than the view's pixel error, visible, and not without
-  /// any surface below, and while the budget lasts. A function of its arguments
-  /// and of the cut before.
-  Cut select(std::span<const double> isovalues, const View& view, const CutBudget& budget);
+  /// any surface (of active.isovalues()) below, and while the budget lasts. A function
+  /// of its arguments and of the cut before.
+  Cut select(const ActiveNodes& active, const View& view, const CutBudget& budget);
 
   /// Forgets the cut before.
   void restart();
 
  private:
-  double urgency(const NodeKey& n, const NodeSight& sight, std::span<const double> isovalues);
+  double urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active);
   double triangles(const NodeKey& n, std::span<const double> isovalues, double per_block) const;
   double added_triangles(std::span<const NodeKey> refined, std::span<const double> isovalues,
                          double per_block) const;

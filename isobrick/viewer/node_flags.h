@@ -36,6 +36,16 @@ class NodeFlags {
     Level& level = levels_[static_cast<std::size_t>(n.level - 1)];
     return level.flags[static_cast<std::size_t>(level.place(n.node))];
   }
+  std::uint8_t operator()(const NodeKey& n) const {
+    const Level& level = levels_[static_cast<std::size_t>(n.level - 1)];
+    return level.flags[static_cast<std::size_t>(level.place(n.node))];
+  }
+
+  /// The flags of the nodes (0, y, z), (1, y, z), … of a level.
+  std::uint8_t* row(int v, Index y, Index z) {
+    Level& level = levels_[static_cast<std::size_t>(v - 1)];
+    return level.flags.data() + level.place({0, y, z});
+  }
 
  private:
   struct Level {

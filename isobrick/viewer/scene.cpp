@@ -29,6 +29,10 @@ Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
       origin_(middle_of(tree_->grid())),
       selector_(*tree_) {
   options.origin = origin_;
+  const auto nodes = static_cast<std::uint64_t>(volume(tree_->grid().level(0).nodes));
+  const std::uint64_t index = std::min(NodeSearch::building_bytes(nodes), options.brick_bytes / 4);
+  options.brick_bytes -= index;
+  search_ = std::make_unique<NodeSearch>(tree_, source->info().type, index, options.on_change);
   stream_ = std::make_unique<SceneStream>(std::move(source), tree_, std::move(options));
 }
 
@@ -37,10 +41,11 @@ void Scene::update(const std::vector<double>& isovalues, const View& view, CutBu
   const double measured = stream_->counters().triangles_per_block;
   if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
   if (per_block_ > 0) budget.triangles_per_block = per_block_;
+  const ActiveNodes& active = search_->find(isovalues);
   if (view_ == view && budget_ == budget && cut_.isovalues == isovalues) return;
   view_ = view;
   budget_ = budget;
-  Cut cut = selector_.select(isovalues, view, budget);
+  Cut cut = selector_.select(active, view, budget);
   if (same_cut(cut, cut_)) return;
   cut_ = std::move(cut);
   stream_->set_cut(cut_);

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "isobrick/viewer/node_search.h"
 #include "isobrick/viewer/scene_stream.h"
 
 namespace isobrick {
@@ -13,7 +14,8 @@ namespace isobrick {
 class Scene {
  public:
   /// Reads the ranges of all levels. options.origin is set to the volume's middle
-  /// (see origin()). Throws what NodeTree does.
+  /// (see origin()); an index of active nodes takes up to a quarter of
+  /// options.brick_bytes. Throws what NodeTree does.
   Scene(std::shared_ptr<const BrickSource> source, StreamOptions options);
 
   /// World space; positions of meshes are relative to it.
@@ -25,6 +27,10 @@ class Scene {
   /// happens when neither the view nor the isovalues have changed.
   void update(const std::vector<double>& isovalues, const View& view, CutBudget budget);
 
+  /// What finds the nodes that isovalues cross.
+  NodeSearch& search() { return *search_; }
+  const NodeSearch& search() const { return *search_; }
+
   const Cut& cut() const { return cut_; }
   std::shared_ptr<const Drawable> drawable() { return stream_->drawable(); }
   SceneStream& stream() { return *stream_; }
@@ -33,6 +39,7 @@ class Scene {
  private:
   std::shared_ptr<const NodeTree> tree_;
   Vec3d origin_;
+  std::unique_ptr<NodeSearch> search_;
   CutSelector selector_;
   Cut cut_;
   std::optional<View> view_;  ///< of the last cut

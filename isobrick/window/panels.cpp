@@ -246,7 +246,10 @@ void main_panel(ViewerState& state) {
   if (section("Slices", false)) slices_panel(state);
   if (section("Point and measure", false)) picking_panel(state);
   if (section("Bookmarks", false)) bookmarks_panel(state);
-  if (section("Streaming", true)) status_panel(state);
+  if (section("Streaming", true)) {
+    draw_search_panel(state);
+    status_panel(state);
+  }
   if (ImGui::SmallButton("Picture")) state.requests.screenshot = "isobrick.png";
   ImGui::End();
 }

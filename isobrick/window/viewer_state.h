@@ -38,6 +38,7 @@ struct ViewerState {
   std::filesystem::path path;             ///< of the store; empty: none is open
   std::unique_ptr<StorePicture> picture;  ///< of the store; null: none is open
   std::unique_ptr<IsovalueFacts> facts;   ///< of the store
+  IndexKind index = IndexKind::linear;    ///< what finds active nodes, of the next store too
   ViewSettings settings;
   std::size_t selected = 0;  ///< the surface that slider and keys move
   Navigator navigator;

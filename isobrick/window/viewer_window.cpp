@@ -77,6 +77,7 @@ ViewerWindow::ViewerWindow(WindowOptions options)
   events_ = std::make_unique<Events>(*this);
   set_up_imgui(window_);
   last_time_ = glfwGetTime();
+  state_.index = options_.index;
 }
 
 ViewerWindow::~ViewerWindow() {
@@ -101,6 +102,7 @@ void ViewerWindow::open(const std::filesystem::path& path) {
   auto store = std::make_shared<const StoreReader>(path);
   auto picture =
       std::make_unique<StorePicture>(store, options_.budgets, [] { glfwPostEmptyEvent(); });
+  picture->scene().search().use(state_.index);
   auto facts = std::make_unique<IsovalueFacts>(store);
   state_.facts = std::move(facts);
   state_.picture = std::move(picture);

@@ -15,9 +15,10 @@ namespace isobrick {
 struct WindowOptions {
   int width = 1280, height = 800;
   PictureBudgets budgets;
-  CameraRequest camera;             ///< for the first store
-  ViewSettings settings;            ///< for the first store
-  std::filesystem::path bookmarks;  ///< file; empty: the user's own
+  IndexKind index = IndexKind::linear;  ///< what finds active nodes
+  CameraRequest camera;                 ///< for the first store
+  ViewSettings settings;                ///< for the first store
+  std::filesystem::path bookmarks;      ///< file; empty: the user's own
 };
 
 /// A window that shows a store: mouse, keys, panels, files dropped on it. All functions

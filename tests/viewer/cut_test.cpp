@@ -24,6 +24,20 @@ View look(Vec3d eye, Vec3d target, double pixel_error) {
   return view;
 }
 
+/// By the nodes' ranges, one after the other.
+ActiveNodes active_of(const NodeTree& tree, std::span<const double> isovalues) {
+  const Int3 nodes = tree.grid().level(0).nodes;
+  std::vector<std::uint64_t> finest(static_cast<std::size_t>(volume(nodes) + 63) / 64);
+  for_each_point({{0, 0, 0}, nodes}, [&](Int3 p) {
+    const auto id = static_cast<std::size_t>(linear_index(p, nodes));
+    for (const double iso : isovalues)
+      if (tree.active({0, p}, iso)) finest[id / 64] |= std::uint64_t{1} << id % 64;
+  });
+  ActiveNodes active(tree);
+  active.set(isovalues, std::move(finest));
+  return active;
+}
+
 class CutTest : public ::testing::Test {
  protected:
   static constexpr Index kEdge = 300;
@@ -81,11 +95,11 @@ void expect_sound(const NodeGrid& grid, const Cut& cut) {
 
 TEST_F(CutTest, CoversTheVolumeOnceAndIsBalanced) {
   CutSelector selector(tree());
-  const std::vector<double> isovalues{128};
+  const ActiveNodes active = active_of(tree(), std::vector<double>{128});
   std::set<int> levels;
   for (const double pixel_error : {1000.0, 100.0, 10.0, 4.0, 1.0})
     for (const Vec3d eye : {Vec3d{-200, -150, 400}, Vec3d{150, 20, 150}, Vec3d{290, 290, 5}}) {
-      const Cut cut = selector.select(isovalues, look(eye, {150, 150, 150}, pixel_error), {});
+      const Cut cut = selector.select(active, look(eye, {150, 150, 150}, pixel_error), {});
       expect_sound(tree().grid(), cut);
       for (const CutNode& node : cut.nodes) levels.insert(node.key.level);
     }
@@ -94,41 +108,41 @@ TEST_F(CutTest, CoversTheVolumeOnceAndIsBalanced) {
 
 TEST_F(CutTest, NearNodesAreFinerAndWhatIsNotSeenStaysCoarse) {
   CutSelector selector(tree());
-  const std::vector<double> isovalues{128};
+  const ActiveNodes active = active_of(tree(), std::vector<double>{128});
   const View view = look({150, 150, 320}, {150, 150, 150}, 3);
-  const Cut cut = selector.select(isovalues, view, {});
+  const Cut cut = selector.select(active, view, {});
   const NodeView seen(view, tree().grid());
   for (const CutNode& node : cut.nodes) {
-    const bool active = tree().active_below(node.key, 128);
+    const bool crossed = active.below(node.key);
     const NodeSight sight = seen.see(node.key);
-    if (node.key.level > 0 && active && sight.visible) {
+    if (node.key.level > 0 && crossed && sight.visible) {
       EXPECT_LE(sight.pixels, 3.0);
     }
   }
   const Cut away =
-      CutSelector(tree()).select(isovalues, look({150, 150, 320}, {150, 150, 1000}, 3), {});
+      CutSelector(tree()).select(active, look({150, 150, 320}, {150, 150, 1000}, 3), {});
   EXPECT_EQ(away.nodes.size(), static_cast<std::size_t>(
                                    volume(tree().grid().level(tree().grid().levels() - 1).nodes)));
 }
 
 TEST_F(CutTest, KeepsTheBudgetAndSaysSo) {
-  const std::vector<double> isovalues{128};
+  const ActiveNodes active = active_of(tree(), std::vector<double>{128});
   const View view = look({150, 150, 320}, {150, 150, 150}, 0.5);
-  const Cut all = CutSelector(tree()).select(isovalues, view, {});
+  const Cut all = CutSelector(tree()).select(active, view, {});
   EXPECT_FALSE(all.limited_by_budget);
   for (const std::uint64_t budget : {all.triangles / 2, all.triangles / 8}) {
-    const Cut less = CutSelector(tree()).select(isovalues, view, {.triangles = budget});
+    const Cut less = CutSelector(tree()).select(active, view, {.triangles = budget});
     EXPECT_TRUE(less.limited_by_budget);
     EXPECT_LE(less.triangles, budget);
     expect_sound(tree().grid(), less);
   }
   const Cut bytes =
-      CutSelector(tree()).select(isovalues, view, {.mesh_bytes = all.triangles * 24 / 4});
+      CutSelector(tree()).select(active, view, {.mesh_bytes = all.triangles * 24 / 4});
   EXPECT_LE(bytes.triangles * 24, all.triangles * 24 / 4);
 }
 
 TEST_F(CutTest, IsTheSameEveryTimeAndStaysWhenTheCameraTrembles) {
-  const std::vector<double> isovalues{128};
+  const ActiveNodes active = active_of(tree(), std::vector<double>{128});
   const auto keys = [](const Cut& cut) {
     std::vector<std::tuple<int, Index, Index, Index, std::uint32_t>> all;
     for (const CutNode& n : cut.nodes)
@@ -136,15 +150,15 @@ TEST_F(CutTest, IsTheSameEveryTimeAndStaysWhenTheCameraTrembles) {
     return all;
   };
   const View view = look({150, 150, 420}, {150, 150, 150}, 2);
-  EXPECT_EQ(keys(CutSelector(tree()).select(isovalues, view, {})),
-            keys(CutSelector(tree()).select(isovalues, view, {})));
+  EXPECT_EQ(keys(CutSelector(tree()).select(active, view, {})),
+            keys(CutSelector(tree()).select(active, view, {})));
   CutSelector selector(tree());
-  Cut last = selector.select(isovalues, look({150, 150, 500}, {150, 150, 150}, 2), {});
+  Cut last = selector.select(active, look({150, 150, 500}, {150, 150, 150}, 2), {});
   int changes = 0;
   // There and back a little: without memory each distance has its own cut.
   for (int i = 0; i < 40; ++i) {
     const double z = 440 + (i % 2 ? 5 : -5);
-    const Cut cut = selector.select(isovalues, look({150, 150, z}, {150, 150, 150}, 2), {});
+    const Cut cut = selector.select(active, look({150, 150, z}, {150, 150, 150}, 2), {});
     if (i > 1) changes += keys(cut) != keys(last);
     last = cut;
   }
@@ -152,21 +166,21 @@ TEST_F(CutTest, IsTheSameEveryTimeAndStaysWhenTheCameraTrembles) {
 }
 
 TEST_F(CutTest, AClipBoxHidesNodes) {
-  const std::vector<double> isovalues{128};
+  const ActiveNodes active = active_of(tree(), std::vector<double>{128});
   View view = look({150, 150, 420}, {150, 150, 150}, 2);
   view.clip = IndexBox{{0, 0, 0}, {299, 299, 60}};
-  const Cut cut = CutSelector(tree()).select(isovalues, view, {});
+  const Cut cut = CutSelector(tree()).select(active, view, {});
   for (const CutNode& node : cut.nodes)
     EXPECT_EQ(node.visible && tree().grid().box(node.key).lo.z > 60, false);
 }
 
 TEST_F(CutTest, WhatPlanesCutAwayIsNotWanted) {
-  const std::vector<double> isovalues{128};
+  const ActiveNodes active = active_of(tree(), std::vector<double>{128});
   View view = look({150, 150, 420}, {150, 150, 150}, 2);
   const HalfSpace kept{{1, 2, 0}, 500};  // a corner is left
-  const Cut whole = CutSelector(tree()).select(isovalues, view, {});
+  const Cut whole = CutSelector(tree()).select(active, view, {});
   view.planes = {kept, {{0, 0, 1}, 20}};
-  const Cut cut = CutSelector(tree()).select(isovalues, view, {});
+  const Cut cut = CutSelector(tree()).select(active, view, {});
   expect_sound(tree().grid(), cut);
   EXPECT_LT(cut.nodes.size(), whole.nodes.size());
   std::size_t away = 0;
@@ -221,13 +235,13 @@ TEST(LargeCut, TakesMilliseconds) {
   const NodeTree tree(source);
   EXPECT_LT(tree.bytes(), 2u << 20);
   CutSelector selector(tree);
-  const std::vector<double> isovalues{0.0};
+  const ActiveNodes active = active_of(tree, std::vector<double>{0});
   double best = 1e9;
   std::size_t nodes = 0;
   for (int i = 0; i < 10; ++i) {
     const View view = look({1024.0 + 10 * i, 1100, 2300}, {1024, 1024, 1024}, 0.5);
     const auto start = std::chrono::steady_clock::now();
-    const Cut cut = selector.select(isovalues, view, {.triangles = 100'000'000});
+    const Cut cut = selector.select(active, view, {.triangles = 100'000'000});
     best = std::min(
         best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     nodes = cut.nodes.size();

@@ -1,0 +1,171 @@
+#include "isobrick/viewer/node_search.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isobrick/index/span_index.h"
+
+namespace isobrick {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// The index of the finest nodes' ranges. These are in float; T holds them exactly.
+template <class T>
+std::vector<std::byte> build_as(IndexKind kind, const NodeTree& tree) {
+  const Int3 nodes = tree.grid().level(0).nodes;
+  std::vector<ValueRange<T>> ranges;
+  ranges.reserve(static_cast<std::size_t>(volume(nodes)));
+  for_each_point({{0, 0, 0}, nodes}, [&](Int3 p) {
+    const ValueRange<float> r = tree.range({0, p});
+    ranges.push_back(r.empty() ? ValueRange<T>{}
+                               : ValueRange<T>{static_cast<T>(r.lo), static_cast<T>(r.hi)});
+  });
+  return build_index<T>(kind, ranges, nodes);
+}
+
+}  // namespace
+
+NodeSearch::NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type,
+                       std::uint64_t most_bytes, std::function<void()> on_change)
+    : tree_(std::move(tree)),
+      type_(type),
+      most_bytes_(most_bytes),
+      on_change_(std::move(on_change)),
+      active_(*tree_) {
+  state_.nodes = static_cast<std::uint64_t>(volume(tree_->grid().level(0).nodes));
+  const auto start = Clock::now();
+  Bytes bytes = build(IndexKind::linear);
+  set_index(IndexKind::linear, std::move(bytes), seconds_since(start));
+  builder_ = std::thread([this] { build_what_is_wanted(); });
+}
+
+NodeSearch::~NodeSearch() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  change_.notify_all();
+  builder_.join();
+}
+
+/// Measured with floats of which no two are alike, the ranges that it is made of included.
+std::uint64_t NodeSearch::building_bytes(IndexKind kind, std::uint64_t nodes) {
+  switch (kind) {
+    case IndexKind::interval: return nodes * 60;
+    case IndexKind::kdtree: return nodes * 60;
+    case IndexKind::quadtree: return nodes * 72;
+    case IndexKind::octree:
+    case IndexKind::linear: break;
+  }
+  return nodes * 20;
+}
+
+std::uint64_t NodeSearch::building_bytes(std::uint64_t nodes) {
+  std::uint64_t most = 0;
+  for (const IndexKind kind : kIndexKinds) most = std::max(most, building_bytes(kind, nodes));
+  // The one before answers until then, and has given back what it was built with.
+  return most + nodes * 25;
+}
+
+std::vector<std::byte> NodeSearch::build(IndexKind kind) const {
+  return visit_scalar(type_, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    // Wider ones were rounded outwards to float.
+    if constexpr (sizeof(T) <= 2)
+      return build_as<T>(kind, *tree_);
+    else
+      return build_as<float>(kind, *tree_);
+  });
+}
+
+void NodeSearch::set_index(IndexKind kind, Bytes bytes, double seconds) {
+  state_.kind = kind;
+  state_.bytes = bytes.size();
+  state_.build_seconds = seconds;
+  state_.refused.clear();
+  index_ = std::make_shared<const Bytes>(std::move(bytes));
+}
+
+void NodeSearch::use(IndexKind kind) {
+  {
+    const std::lock_guard lock(mutex_);
+    wanted_ = kind;
+    state_.refused.clear();
+    state_.building = wanted_ != state_.kind;
+  }
+  change_.notify_all();
+}
+
+void NodeSearch::wait() {
+  std::unique_lock lock(mutex_);
+  change_.wait(lock, [&] { return !state_.building; });
+}
+
+void NodeSearch::build_what_is_wanted() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    change_.wait(lock, [&] { return stop_ || state_.building; });
+    if (stop_) return;
+    const IndexKind kind = wanted_;
+    const std::uint64_t need = building_bytes(kind, state_.nodes) + state_.bytes;
+    std::string refused;
+    if (need > most_bytes_) {
+      constexpr double mib = 1 << 20;
+      refused = fmt::format("the {} index of {} nodes takes {:.0f} MiB to build, of {:.0f}",
+                            name_of(kind), state_.nodes, static_cast<double>(need) / mib,
+                            static_cast<double>(most_bytes_) / mib);
+    } else {
+      lock.unlock();
+      const auto start = Clock::now();
+      Bytes bytes = build(kind);
+      const double seconds = seconds_since(start);
+      lock.lock();
+      set_index(kind, std::move(bytes), seconds);
+    }
+    if (wanted_ != kind) continue;  // yet another one
+    state_.building = false;
+    state_.refused = std::move(refused);
+    change_.notify_all();
+    if (!on_change_) continue;
+    lock.unlock();
+    on_change_();
+    lock.lock();
+  }
+}
+
+const ActiveNodes& NodeSearch::find(std::span<const double> isovalues) {
+  std::shared_ptr<const Bytes> index;
+  {
+    const std::lock_guard lock(mutex_);
+    index = index_;
+  }
+  if (index == searched_ && std::equal(isovalues.begin(), isovalues.end(),
+                                       active_.isovalues().begin(), active_.isovalues().end()))
+    return active_;
+  const IndexView view = view_index(*index);
+  std::vector<std::uint64_t> finest(mask_words(view.items()));
+  const auto start = Clock::now();
+  for (const double iso : isovalues) mark(view, iso, finest);
+  const double seconds = seconds_since(start);
+  active_.set(isovalues, std::move(finest));
+  searched_ = std::move(index);
+  const std::lock_guard lock(mutex_);
+  state_.search_seconds = seconds;
+  state_.active = active_.count();
+  return active_;
+}
+
+NodeSearch::State NodeSearch::state() const {
+  const std::lock_guard lock(mutex_);
+  return state_;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/index/index_kind.h"
+#include "isobrick/viewer/active_nodes.h"
+#include "isobrick/viewer/node_tree.h"
+
+namespace isobrick {
+
+/// Finds the active nodes of isovalues through an index of the finest nodes' ranges, of
+/// any kind; all kinds find the same. Another kind is built by a thread of its own while
+/// the one before goes on answering. find() is for one thread, the rest is thread-safe.
+class NodeSearch {
+ public:
+  /// Begins with a linear scan. `type` is that of the samples. Indices that need more
+  /// than `most_bytes`, what stays and what building takes, are refused. `on_change` is
+  /// called from the building thread when there is another index, or it was refused.
+  NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type, std::uint64_t most_bytes,
+             std::function<void()> on_change);
+  /// Waits for an index that is being built.
+  ~NodeSearch();
+
+  /// The most that any kind takes while it is built for so many nodes.
+  static std::uint64_t building_bytes(std::uint64_t nodes);
+
+  /// Searches through this kind from when it is built.
+  void use(IndexKind kind);
+  /// Until the kind that was asked for last is built or refused.
+  void wait();
+
+  /// The nodes that any of the isovalues crosses. Until the next call.
+  const ActiveNodes& find(std::span<const double> isovalues);
+
+  struct State {
+    IndexKind kind = IndexKind::linear;  ///< what answers now
+    bool building = false;               ///< another one is on its way
+    std::uint64_t bytes = 0;             ///< of the index
+    double build_seconds = 0;
+    double search_seconds = 0;            ///< of the last search, through all its isovalues
+    std::uint64_t active = 0, nodes = 0;  ///< found by it, of so many of the finest level
+    std::string refused;                  ///< why the kind that was asked for is not used
+  };
+  State state() const;
+
+ private:
+  using Bytes = std::vector<std::byte>;
+
+  static std::uint64_t building_bytes(IndexKind kind, std::uint64_t nodes);
+  Bytes build(IndexKind kind) const;
+  void set_index(IndexKind kind, Bytes bytes, double seconds);
+  void build_what_is_wanted();
+
+  std::shared_ptr<const NodeTree> tree_;
+  ScalarType type_;
+  std::uint64_t most_bytes_;
+  std::function<void()> on_change_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable change_;
+  bool stop_ = false;
+  IndexKind wanted_ = IndexKind::linear;
+  std::shared_ptr<const Bytes> index_;
+  State state_;
+
+  // Of find() alone.
+  ActiveNodes active_;
+  std::shared_ptr<const Bytes> searched_;  ///< the index that active_ comes from
+
+  std::thread builder_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,40 @@
+#include <array>
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include "isobrick/window/panels.h"
+
+namespace isobrick {
+namespace {
+
+/// In the order of kIndexKinds.
+constexpr std::array<const char*, std::size(kIndexKinds)> kNames{"linear scan", "interval tree",
+                                                                 "k-d tree", "quadtree", "octree"};
+
+std::string size_text(std::uint64_t bytes) {
+  const auto kib = static_cast<double>(bytes) / 1024;
+  return kib < 1024 ? fmt::format("{:.1f} KiB", kib) : fmt::format("{:.1f} MiB", kib / 1024);
+}
+
+}  // namespace
+
+void draw_search_panel(ViewerState& state) {
+  NodeSearch& search = state.picture->scene().search();
+  const NodeSearch::State now = search.state();
+  int chosen = static_cast<int>(state.index);
+  ImGui::SetNextItemWidth(130);
+  if (ImGui::Combo("finds active nodes", &chosen, kNames.data(), static_cast<int>(kNames.size()))) {
+    state.index = kIndexKinds[chosen];
+    search.use(state.index);
+  }
+  const std::string line =
+      fmt::format("{} of {} nodes in {:.1f} \u00b5s, {}{}", now.active, now.nodes,
+                  now.search_seconds * 1e6, size_text(now.bytes),
+                  now.building ? ", building \u2026"
+                               : fmt::format(" built in {:.1f} ms", now.build_seconds * 1e3));
+  ImGui::TextUnformatted(line.c_str());
+  if (!now.refused.empty()) ImGui::TextWrapped("%s", now.refused.c_str());
+}
+
+}  // namespace isobrick
