@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 #include "isobrick/volumes/text_header.h"
 
 namespace isobrick {
@@ -33,7 +34,7 @@ std::string list_of(const std::vector<std::string>& names) {
   constexpr std::size_t kMost = 10;
   std::string list;
   for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i)
-    list += (i ? ", /" : "/") + hdf5_printable(names[i].substr(0, 60));
+    list += (i ? ", /" : "/") + printable(names[i], 60);
   return names.size() > kMost ? list + ", …" : list;
 }
 
@@ -92,7 +93,7 @@ void check_filters(const std::string& path, hid_t creation) {
     throw UsageError(
         fmt::format("'{}': the filter {} ('{}') is not there; HDF5_PLUGIN_PATH says "
                     "where libhdf5 looks for others' filters",
-                    path, filter, hdf5_printable(name)));
+                    path, filter, printable(name, kHdf5MostShown)));
   }
 }
 
@@ -109,7 +110,7 @@ std::string choose_hdf5_dataset(const std::string& path, hid_t file, const std::
 }
 
 void refuse_hdf5_dataset(const std::string& path, hid_t file, const std::string& name) {
-  const std::string shown = hdf5_printable(name);
+  const std::string shown = printable(name, kHdf5MostShown);
   const Hdf5Handle group(H5Gopen2(file, name.c_str(), hdf5_access(H5P_GROUP_ACCESS)), H5Gclose);
   if (!group.valid() && H5Lexists(file, name.c_str(), hdf5_access(H5P_LINK_ACCESS)) > 0)
     hdf5_fail(path, fmt::format("'/{}' cannot be opened as a dataset", shown));

@@ -3,19 +3,13 @@
 #include <fmt/format.h>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/printable.h"
 
 namespace isobrick {
 
 std::mutex& hdf5_mutex() {
   static std::mutex mutex;
   return mutex;
-}
-
-std::string hdf5_printable(const std::string& text) {
-  std::string shown = text.substr(0, 200);
-  for (char& c : shown)
-    if (c < 0x20 || c >= 0x7f) c = '?';
-  return shown;
 }
 
 void hdf5_fail(const std::string& path, const std::string& what) {
@@ -26,7 +20,7 @@ void hdf5_fail(const std::string& path, const std::string& what) {
     return 0;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep, &text);
-  if (!text.empty()) text = fmt::format(" ({})", hdf5_printable(text));
+  if (!text.empty()) text = fmt::format(" ({})", printable(text, kHdf5MostShown));
   throw DamageError(fmt::format("'{}': {}{}", path, what, text));
 }
 

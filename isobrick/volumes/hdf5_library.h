@@ -4,6 +4,7 @@
 
 #include <hdf5.h>
 
+#include <cstddef>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -16,8 +17,8 @@ std::mutex& hdf5_mutex();
 /// Throws DamageError that names the file and adds what the library complains of.
 [[noreturn]] void hdf5_fail(const std::string& path, const std::string& what);
 
-/// Fit for one line of a message: what a file says of itself may be anything.
-std::string hdf5_printable(const std::string& text);
+/// As much of what a file says of itself as is shown.
+inline constexpr std::size_t kHdf5MostShown = 200;
 
 /// Owns a handle of any kind.
 class Hdf5Handle {
