@@ -47,6 +47,11 @@ std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeR
     return open_raw(path, said);
   }
   const VolumeFormat format = recognise_format(file);
+  if (format == VolumeFormat::nanovdb)
+    throw UsageError(fmt::format(
+        "'{}' is a NanoVDB file, which cannot be read: make an OpenVDB file of it (nanovdb_convert "
+        "IN.nvdb OUT.vdb) and convert that",
+        file));
   if (format != VolumeFormat::vdb) refuse_grid(file, said);
   if (format == VolumeFormat::vti) return open_vti_if_built(file, inner, said);
   if (format == VolumeFormat::hdf5) return open_hdf5_if_built(file, inner, said);

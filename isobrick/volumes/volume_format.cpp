@@ -68,6 +68,7 @@ std::optional<VolumeFormat> by_content(const std::string& path, std::string_view
       return VolumeFormat::hdf5;
   if (head.size() >= 132 && head.substr(128, 4) == "DICM") return VolumeFormat::dicom;
   if (head.starts_with(" BDV\0\0\0\0"sv)) return VolumeFormat::vdb;
+  if (head.starts_with("NanoVDB")) return VolumeFormat::nanovdb;
   if (head.starts_with("# vtk DataFile")) return VolumeFormat::legacy_vtk;
   if (head.starts_with("<") && head.substr(0, 1024).find("<VTKFile") != std::string_view::npos)
     return VolumeFormat::vti;
@@ -85,6 +86,7 @@ VolumeFormat format_of_extension(const std::string& path) {
       {".tif", VolumeFormat::tiff},       {".tiff", VolumeFormat::tiff},
       {".h5", VolumeFormat::hdf5},        {".hdf5", VolumeFormat::hdf5},
       {".dcm", VolumeFormat::dicom},      {".vdb", VolumeFormat::vdb},
+      {".nvdb", VolumeFormat::nanovdb},
   };
   if (lower(path).ends_with(".nii.gz")) return VolumeFormat::nifti;
   const std::string extension = lower(std::filesystem::path(path).extension().string());

@@ -15,7 +15,8 @@ enum class VolumeFormat : std::uint8_t {
   tiff,
   hdf5,
   dicom,
-  vdb,  ///< OpenVDB
+  vdb,      ///< OpenVDB
+  nanovdb,  ///< recognised to be refused
 };
 
 /// The format of a file: by its first bytes, else by its extension. Throws Error

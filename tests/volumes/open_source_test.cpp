@@ -122,6 +122,19 @@ TEST(OpenSource, SaysWhatIsNotKnown) {
   EXPECT_TRUE(contains(message_of([&] { open_source(dir.write("v_1x1x1.raw", ""), {}); }), "type"));
 }
 
+TEST(OpenSource, NanoVdbIsRefusedWithWhatToDo) {
+  const TempDir dir;
+  // By its name and, of whatever name, by what files and single grids begin with.
+  for (const auto& path : {dir.write("v.nvdb", "?"), dir.write("v.raw", "NanoVDB0 and more"),
+                           dir.write("v.bin", "NanoVDB2 and more")}) {
+    const std::string message = message_of<UsageError>([&] { open_source(path, {}); });
+    EXPECT_TRUE(contains(message, path)) << message;
+    EXPECT_TRUE(contains(message, "nanovdb_convert")) << message;
+  }
+  EXPECT_EQ(open_source(dir.write("r_2x2x2_uint8.raw", "RawBytes"), {})->info().extent,
+            (Int3{2, 2, 2}));
+}
+
 TEST(OpenSource, RefusesWhatIsNoFile) {
   const TempDir dir;
   const VolumeRequest said = describe(kExtent, ScalarType::u8);
