@@ -1,17 +1,56 @@
 #pragma once
 
 #include <openvdb/Grid.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/io.h>
 
+#include <istream>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "isobrick/core/error.h"
 #include "isobrick/volumes/vdb_header.h"
+#include "isobrick/volumes/vdb_stream.h"
 
 namespace isobrick {
 
-/// Reads a whole grid; it is then independent of the file. Throws Error for
-/// damaged files.
-openvdb::GridBase::Ptr read_vdb_grid(const std::string& path, const std::vector<VdbGrid>& grids,
-                                     const VdbGrid& chosen);
+/// An OpenVDB file whose grids are read step by step. OpenVDB's own File neither notices
+/// that a file ends early nor can be told to; the stream here throws. OpenVDB's delayed
+/// loading is not used.
+class VdbArchive final : private openvdb::io::Archive {
+ public:
+  explicit VdbArchive(const std::string& path);
+
+  /// The grid with its metadata and transform, but no tree. stream() is then where the tree
+  /// begins: for a grid that shares another one's, at that one's.
+  openvdb::GridBase::Ptr read_grid(const std::vector<VdbGrid>& grids, const VdbGrid& chosen);
+
+  /// Throws std::ios_base::failure where the file ends.
+  std::istream& stream() { return in_; }
+
+ private:
+  openvdb::GridBase::Ptr read_description(const VdbGrid& grid);
+
+  std::string path_;
+  VdbFileBuffer buffer_;
+  openvdb::io::StreamMetadata::Ptr metadata_;  // the stream refers to this very pointer
+  std::istream in_;
+};
+
+/// The Error for what went wrong with OpenVDB while a grid was read; call it in a handler.
+/// An Error of our own passes.
+[[noreturn]] void rethrow_vdb_damage(const std::string& path, std::string_view grid);
+
+/// Calls f(), whose exceptions become Errors that name the grid.
+template <class F>
+decltype(auto) with_vdb_errors(const std::string& path, std::string_view grid, F&& f) {
+  try {
+    return std::forward<F>(f)();
+  } catch (...) {
+    rethrow_vdb_damage(path, grid);
+  }
+}
 
 }  // namespace isobrick

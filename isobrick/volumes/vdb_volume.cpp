@@ -14,6 +14,7 @@
 #include "isobrick/volumes/vdb_archive.h"
 #include "isobrick/volumes/vdb_grid.h"
 #include "isobrick/volumes/vdb_header.h"
+#include "isobrick/volumes/vdb_leaves.h"
 #include "isobrick/volumes/vdb_tree.h"
 
 namespace isobrick {
@@ -21,20 +22,41 @@ namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 
-template <class Tree, class Out>
+/// `Leaves` knows the values of the tree's leaves: VdbLeaves or VdbLoadedLeaves.
+template <class Tree, class Leaves, class Out>
 class VdbSource final : public VolumeSource {
  public:
-  VdbSource(VolumeInfo info, typename Tree::ConstPtr tree, Int3 corner)
-      : info_(std::move(info)), tree_(std::move(tree)), corner_(corner) {}
+  VdbSource(VolumeInfo info, std::string grid, typename Tree::ConstPtr tree,
+            std::shared_ptr<const Leaves> leaves, std::size_t memory, Int3 corner)
+      : info_(std::move(info)),
+        grid_(std::move(grid)),
+        tree_(std::move(tree)),
+        leaves_(std::move(leaves)),
+        memory_(memory),
+        corner_(corner) {}
 
   const VolumeInfo& info() const override { return info_; }
   bool random_access() const override { return true; }
   bool sparse() const override { return true; }
-  std::size_t memory() const override { return tree_->memUsage(); }
+  std::size_t memory() const override { return memory_; }
 
   bool is_fill(Box3 box) const override { return box_is_background(*tree_, coordinates(box)); }
+
+  std::optional<std::uint64_t> constant(Box3 box) const override {
+    const auto value = constant_value(*tree_, coordinates(box));
+    if (!value) return std::nullopt;
+    const Out sample = to_sample<Out>(*value);
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &sample, sizeof sample);
+    return bits;
+  }
+
   void read(Box3 box, std::byte* out) override {
-    if (!box.empty()) read_tree(*tree_, coordinates(box), reinterpret_cast<Out*>(out));
+    if (box.empty()) return;
+    with_vdb_errors(info_.name, grid_, [&] {
+      read_tree(*tree_, typename Leaves::Reader(*leaves_), coordinates(box),
+                reinterpret_cast<Out*>(out));
+    });
   }
 
  private:
@@ -47,7 +69,10 @@ class VdbSource final : public VolumeSource {
   }
 
   VolumeInfo info_;
+  std::string grid_;  ///< its name, for messages
   typename Tree::ConstPtr tree_;
+  std::shared_ptr<const Leaves> leaves_;
+  std::size_t memory_;
   Int3 corner_;  ///< of the volume, in the grid's index coordinates
 };
 
@@ -93,10 +118,10 @@ Box3 region_of(const VdbGrid& grid, const std::string& path, const openvdb::Grid
   return box;
 }
 
-/// The type that holds every value of a grid of 64-bit integers exactly.
+/// The type that holds every number from lo to hi exactly.
 ScalarType type_of_int64(const std::string& path, const VdbGrid& grid,
-                         const openvdb::Int64Tree& tree) {
-  const auto [lo, hi] = value_range(tree);
+                         std::pair<std::int64_t, std::int64_t> range) {
+  const auto [lo, hi] = range;
   if (lo >= std::numeric_limits<std::int32_t>::min() &&
       hi <= std::numeric_limits<std::int32_t>::max())
     return ScalarType::i32;
@@ -108,15 +133,28 @@ ScalarType type_of_int64(const std::string& path, const VdbGrid& grid,
                   path, grid.name, lo, hi));
 }
 
+void check_memory(const std::string& path, const VdbGrid& grid, std::uint64_t needed,
+                  const std::optional<std::uint64_t>& room) {
+  if (room && needed > *room)
+    throw UsageError(fmt::format(
+        "'{}': grid '{}' takes {} MiB in memory, more than the budget of {} MiB leaves: say "
+        "--memory {}M",
+        path, grid.name, needed / kMiB + 1, *room / kMiB, needed / kMiB * 5 / 4 + 256));
+}
+
+/// A grid that is being opened.
 struct Opening {
   const std::string& path;
   const VolumeRequest& said;
   const VdbGrid& grid;
-  openvdb::GridBase::Ptr read;
+  VdbArchive& archive;
+  openvdb::GridBase::Ptr read;  ///< without its tree, at first
 };
 
-template <class Out, class Tree>
-std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::ConstPtr tree) {
+template <class Out, class Tree, class Leaves>
+std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::ConstPtr tree,
+                                          std::shared_ptr<const Leaves> leaves,
+                                          std::size_t memory) {
   const Box3 box = region_of(in.grid, in.path, *in.read, in.said.region);
   Transform transform = transform_of(in.path, in.read->transform(), box.lo);
   if (const auto unit = in.read->template getMetadata<openvdb::StringMetadata>(kVdbUnit))
@@ -125,33 +163,56 @@ std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::Cons
   info.fill_value = static_cast<double>(tree->background());
   info.grid_class = in.grid.grid_class;
   info.grid_name = in.read->getName();
-  return std::make_unique<VdbSource<Tree, Out>>(std::move(info), std::move(tree), box.lo);
+  return std::make_unique<VdbSource<Tree, Leaves, Out>>(
+      std::move(info), in.grid.name, std::move(tree), std::move(leaves), memory, box.lo);
 }
 
-template <class Grid, class Out>
-std::unique_ptr<VolumeSource> try_type(const Opening& in) {
+/// A grid of numbers, the values of whose leaves stay in the file.
+template <class Grid>
+std::unique_ptr<VolumeSource> open_numbers(const Opening& in) {
+  using Tree = typename Grid::TreeType;
+  using Leaves = VdbLeaves<Tree>;
   const auto grid = openvdb::gridPtrCast<Grid>(in.read);
-  return grid ? make_source<Out, typename Grid::TreeType>(in, grid->constTreePtr()) : nullptr;
-}
-
-std::unique_ptr<VolumeSource> try_int64(const Opening& in) {
-  using Tree = openvdb::Int64Tree;
-  const auto grid = openvdb::gridPtrCast<openvdb::Int64Grid>(in.read);
   if (!grid) return nullptr;
-  switch (type_of_int64(in.path, in.grid, grid->tree())) {
-    case ScalarType::i32: return make_source<std::int32_t, Tree>(in, grid->constTreePtr());
-    case ScalarType::u32: return make_source<std::uint32_t, Tree>(in, grid->constTreePtr());
-    default: return make_source<double, Tree>(in, grid->constTreePtr());
+  const bool as_half = grid->saveFloatAsHalf();
+  std::istream& stream = in.archive.stream();
+  const VdbNodeCounts nodes = count_vdb_nodes<Tree>(stream, as_half);
+  const std::size_t memory = nodes.bytes + Leaves::memory(nodes.leaves);
+  check_memory(in.path, in.grid, memory, in.said.memory);
+  grid->readTopology(stream);
+  const auto leaves = std::make_shared<const Leaves>(in.path, stream, grid->tree(), as_half);
+  const auto as = [&]<class Out>(Out) {
+    return make_source<Out, Tree, Leaves>(in, grid->constTreePtr(), leaves, memory);
+  };
+  using Value = typename Tree::ValueType;
+  if constexpr (!std::is_same_v<Value, std::int64_t>) {
+    return as(Value{});
+  } else {
+    const auto range = value_range(grid->constTree(), typename Leaves::Reader(*leaves));
+    switch (type_of_int64(in.path, in.grid, range)) {
+      case ScalarType::i32: return as(std::int32_t{});
+      case ScalarType::u32: return as(std::uint32_t{});
+      default: return as(double{});
+    }
   }
 }
 
-void check_memory(const std::string& path, const VdbGrid& grid, std::uint64_t needed,
-                  const std::optional<std::uint64_t>& room) {
-  if (room && needed > *room)
-    throw UsageError(fmt::format(
-        "'{}': grid '{}' takes {} MiB in memory, more than the budget of {} MiB leaves: say "
-        "--memory {}M",
-        path, grid.name, needed / kMiB + 1, *room / kMiB, needed / kMiB * 5 / 4 + 256));
+/// A grid of bits, which is held whole.
+template <class Grid>
+std::unique_ptr<VolumeSource> open_bits(const Opening& in) {
+  using Tree = typename Grid::TreeType;
+  using Leaves = VdbLoadedLeaves<Tree>;
+  const auto grid = openvdb::gridPtrCast<Grid>(in.read);
+  if (!grid) return nullptr;
+  // What the file says of its size in memory, or what its bytes at least become.
+  check_memory(in.path, in.grid, std::max(in.grid.memory.value_or(0), in.grid.end - in.grid.begin),
+               in.said.memory);
+  grid->readTopology(in.archive.stream());
+  grid->readBuffers(in.archive.stream());
+  const std::size_t memory = grid->memUsage();
+  check_memory(in.path, in.grid, memory, in.said.memory);
+  return make_source<std::uint8_t, Tree, Leaves>(in, grid->constTreePtr(),
+                                                 std::make_shared<const Leaves>(), memory);
 }
 
 void check_transform(const std::string& path, const VdbGrid& grid) {
@@ -173,19 +234,19 @@ std::unique_ptr<VolumeSource> open_vdb(const std::string& file, const VolumeRequ
                       {"Tree_float_5_4_3", "Tree_double_5_4_3", "Tree_int32_5_4_3",
                        "Tree_int64_5_4_3", "Tree_bool_5_4_3", "Tree_mask_5_4_3"});
   check_transform(file, grid);
-  // What the file says of its size in memory, or what its bytes at least become.
-  check_memory(file, grid, std::max(grid.memory.value_or(0), grid.end - grid.begin), said.memory);
-  const Opening in{file, said, grid, read_vdb_grid(file, grids, grid)};
-  check_memory(file, grid, in.read->memUsage(), said.memory);
-  std::unique_ptr<VolumeSource> source = try_type<openvdb::FloatGrid, float>(in);
-  if (!source) source = try_type<openvdb::DoubleGrid, double>(in);
-  if (!source) source = try_type<openvdb::Int32Grid, std::int32_t>(in);
-  if (!source) source = try_int64(in);
-  if (!source) source = try_type<openvdb::BoolGrid, std::uint8_t>(in);
-  if (!source) source = try_type<openvdb::MaskGrid, std::uint8_t>(in);
-  if (!source)
-    throw Error(fmt::format("'{}': grid '{}' is not of the type it says", file, grid.name));
-  return source;
+  return with_vdb_errors(file, grid.name, [&] {
+    VdbArchive archive(file);
+    const Opening in{file, said, grid, archive, archive.read_grid(grids, grid)};
+    std::unique_ptr<VolumeSource> source = open_numbers<openvdb::FloatGrid>(in);
+    if (!source) source = open_numbers<openvdb::DoubleGrid>(in);
+    if (!source) source = open_numbers<openvdb::Int32Grid>(in);
+    if (!source) source = open_numbers<openvdb::Int64Grid>(in);
+    if (!source) source = open_bits<openvdb::BoolGrid>(in);
+    if (!source) source = open_bits<openvdb::MaskGrid>(in);
+    if (!source)
+      throw Error(fmt::format("'{}': grid '{}' is not of the type it says", file, grid.name));
+    return source;
+  });
 }
 
 }  // namespace isobrick

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "isobrick/core/scalar.h"
@@ -46,6 +48,11 @@ class VolumeSource {
   /// True when every sample of `box` is known, without looking at each, to be
   /// the fill value; false says nothing. Thread-safe.
   virtual bool is_fill(Box3) const { return false; }
+
+  /// The value of all samples of `box`, when it is known, without looking at each, that
+  /// they have the same: one sample of the volume's type, in the first of eight bytes, the
+  /// rest zero. Nothing says nothing. Thread-safe.
+  virtual std::optional<std::uint64_t> constant(Box3) const { return std::nullopt; }
 
   /// Copies the samples of `box` to `out`, C order [z, y, x], native byte
   /// order. `box` lies inside the extent; `out` has room for it.

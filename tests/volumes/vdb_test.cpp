@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
+#include <bit>
+
 #include "damaged_files.h"
 #include "isobrick/volumes/open_source.h"
 #include "isobrick/volumes/vdb_writer.h"
@@ -133,6 +135,74 @@ TEST_F(Vdb, KnowsWhereNothingIs) {
   EXPECT_FALSE(source->is_fill({{8300, 8300, 8300}, {8400, 8400, 8400}}));
   EXPECT_TRUE(source->is_fill({{8320, 0, 0}, {40000, 50000, 60000}}));
   EXPECT_FALSE(source->is_fill({{0, 0, 0}, {1, 1, 1}}));
+}
+
+TEST_F(Vdb, KnowsWhatIsOfOneValue) {
+  const auto grid = openvdb::FloatGrid::create(2);
+  auto accessor = grid->getAccessor();
+  accessor.setValue({0, 0, 0}, 1);
+  accessor.setValue({40000, 50000, 60000}, 1);
+  grid->tree().fill(openvdb::CoordBBox({8192, 8192, 8192}, {8447, 8447, 8319}), 5);
+  const auto source = open_source(write({grid}), {});
+  const auto value = [&](Int3 lo, Index edge) {
+    const auto bits = source->constant({lo, lo + Int3{edge, edge, edge}});
+    return bits ? std::optional(std::bit_cast<float>(static_cast<std::uint32_t>(*bits)))
+                : std::nullopt;
+  };
+  EXPECT_EQ(value({8192, 8192, 8192}, 128), 5);
+  EXPECT_EQ(value({8200, 8300, 8250}, 64), 5);  // across a border of nodes
+  EXPECT_EQ(value({8191, 8192, 8192}, 64), std::nullopt);
+  EXPECT_EQ(value({8192, 8192, 8300}, 64), std::nullopt);
+  EXPECT_EQ(value({8, 0, 0}, 64), 2);
+  EXPECT_EQ(value({12000, 12000, 12000}, 4096), 2);  // across a border of the root's children
+  EXPECT_EQ(value({0, 0, 0}, 4), std::nullopt);      // a leaf
+  EXPECT_EQ(value({8, 8, 8}, 39000), std::nullopt);
+}
+
+TEST_F(Vdb, ReadsEveryWayOfStoringLeaves) {
+  namespace io = openvdb::io;
+  const auto round_trip = [&](const openvdb::GridBase::Ptr& grid, std::uint32_t compression) {
+    io::File file(dir / "v.vdb");
+    file.setCompression(compression);
+    file.write({grid});
+    return std::string(dir / "v.vdb");
+  };
+  for (const bool as_half : {false, true})
+    for (const std::uint32_t values : {io::COMPRESS_NONE, io::COMPRESS_ZIP, io::COMPRESS_BLOSC})
+      for (const std::uint32_t mask : {std::uint32_t{0}, std::uint32_t{io::COMPRESS_ACTIVE_MASK}}) {
+        const auto f = make_grid<openvdb::FloatGrid>(-2.5F);
+        f->setSaveFloatAsHalf(as_half);
+        expect_same<float>(*f, round_trip(f, values | mask));
+        const auto i = make_grid<openvdb::Int32Grid>(-7);
+        expect_same<std::int32_t>(*i, round_trip(i, values | mask));
+      }
+}
+
+TEST_F(Vdb, ValuesOfLeavesStayInTheFile) {
+  const auto grid = openvdb::DoubleGrid::create(0);
+  auto accessor = grid->getAccessor();
+  for (int z = 0; z < 128; z += 4)
+    for (int y = 0; y < 128; y += 4)
+      for (int x = 0; x < 128; x += 4) accessor.setValue({x, y, z}, x + 0.5 * y - z);
+  const auto source = open_source(write({grid}), {});
+  // Of 4096 leaves with 4 KiB of values each, the masks and the nodes above.
+  EXPECT_GT(grid->memUsage(), std::size_t{16} << 20);
+  EXPECT_LT(source->memory(), std::size_t{3} << 20);
+  EXPECT_GT(source->memory(), std::size_t{4096} * 64);
+}
+
+TEST_F(Vdb, DamagedValuesAreNamedWhenTheyAreRead) {
+  const auto grid = openvdb::FloatGrid::create(0);
+  for (int i = 0; i < 512; ++i)
+    grid->getAccessor().setValue({i >> 6, i >> 3 & 7, i & 7}, static_cast<float>(i % 7));
+  const std::string path = write({grid});
+  std::string bytes = dir.read("v.vdb");
+  for (std::size_t at = bytes.size() - 40; at < bytes.size(); ++at) bytes[at] = '\xff';
+  std::filesystem::remove(path);
+  const auto source = open_source(dir.write("v.vdb", bytes), {});
+  const Box3 all{{0, 0, 0}, source->info().extent};
+  const std::string message = message_of<Error>([&] { read_box(*source, all); });
+  EXPECT_TRUE(contains(message, "v.vdb': grid ")) << message;
 }
 
 TEST_F(Vdb, RefusesWhatDoesNotFit) {
