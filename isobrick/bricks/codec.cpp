@@ -138,15 +138,18 @@ bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_v
 }
 
 void fill_box(ScalarType type, double fill_value, BoxSamples<std::byte> samples, Box3 part) {
+  set_box(type, fill_bits(type, fill_value), samples, part);
+}
+
+void set_box(ScalarType type, std::uint64_t bits, BoxSamples<std::byte> samples, Box3 part) {
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    const std::uint64_t bits = fill_bits(type, fill_value);
-    T fill;
-    std::memcpy(&fill, &bits, sizeof fill);
+    T value;
+    std::memcpy(&value, &bits, sizeof value);
     for (Index z = part.lo.z; z < part.hi.z; ++z)
       for (Index y = part.lo.y; y < part.hi.y; ++y)
         std::fill_n(reinterpret_cast<T*>(samples.at({part.lo.x, y, z}, sizeof(T))),
-                    part.hi.x - part.lo.x, fill);
+                    part.hi.x - part.lo.x, value);
   });
 }
 

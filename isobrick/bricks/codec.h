@@ -45,6 +45,9 @@ bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_v
 /// Sets the samples of `part`, which lies in the box, to the fill value.
 void fill_box(ScalarType type, double fill_value, BoxSamples<std::byte> samples, Box3 part);
 
+/// Sets them to a sample of `bits`, as fill_bits() returns them.
+void set_box(ScalarType type, std::uint64_t bits, BoxSamples<std::byte> samples, Box3 part);
+
 /// Sets the samples of brick `b` that lie outside the volume to the fill value:
 /// what bricks at the border are padded with before they are encoded.
 void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* brick);

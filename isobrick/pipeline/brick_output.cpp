@@ -1,5 +1,7 @@
 #include "isobrick/pipeline/brick_output.h"
 
+#include <utility>
+
 #include "isobrick/bricks/codec.h"
 #include "isobrick/core/copy_box.h"
 #include "isobrick/core/pod_buffer.h"
@@ -18,15 +20,46 @@ BrickOutput::BrickOutput(StoreWriter& store, const StoreLayout& layout, int leve
 PackedBrick BrickOutput::pack(Int3 brick, Box3 box, const std::byte* samples, bool kept) const {
   PackedBrick packed{.brick = brick, .kept = kept};
   if (kept && journal_ == nullptr) return packed;
+  const Box3 full = lattice_.full_brick_box(brick);
+  if (box == full) {
+    encode(packed, {samples, lattice_.brick_bytes()});
+    return packed;
+  }
   thread_local PodBuffer<std::byte> whole;
   whole.resize(lattice_.brick_bytes());
-  copy_box({samples, box}, {whole.data(), lattice_.full_brick_box(brick)},
-           lattice_.brick_box(brick), lattice_.sample_bytes());
+  copy_box({samples, box}, {whole.data(), full}, lattice_.brick_box(brick),
+           lattice_.sample_bytes());
   pad_brick(lattice_, brick, layout_.fill_value, whole.data());
-  if (journal_ != nullptr) packed.crc = crc32c(whole.span());
-  if (!kept)
-    packed.encoded =
-        encode_brick(lattice_.type, whole.span(), layout_.fill_value, layout_.zstd_level);
+  encode(packed, whole.span());
+  return packed;
+}
+
+void BrickOutput::encode(PackedBrick& packed, std::span<const std::byte> samples) const {
+  if (journal_ != nullptr) packed.crc = crc32c(samples);
+  if (!packed.kept)
+    packed.encoded = encode_brick(lattice_.type, samples, layout_.fill_value, layout_.zstd_level);
+}
+
+PackedBrick BrickOutput::pack_constant(Int3 brick, std::uint64_t bits, bool kept) {
+  PackedBrick packed{.brick = brick, .kept = kept};
+  std::shared_ptr<const Constant> constant;
+  {
+    const std::lock_guard lock(mutex_);
+    constant = constant_;
+  }
+  if (!constant || constant->bits != bits) {
+    PodBuffer<std::byte> samples;
+    samples.resize(lattice_.brick_bytes());
+    const Box3 full = lattice_.full_brick_box(brick);
+    set_box(lattice_.type, bits, {samples.data(), full}, full);
+    PackedBrick made;
+    encode(made, samples.span());
+    constant = std::make_shared<const Constant>(bits, made.crc, std::move(made.encoded));
+    const std::lock_guard lock(mutex_);
+    constant_ = constant;
+  }
+  packed.crc = constant->crc;
+  if (!kept) packed.encoded = constant->encoded;
   return packed;
 }
 

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "isobrick/bricks/store_writer.h"
@@ -35,6 +38,9 @@ class BrickOutput {
   /// Encodes a brick of the samples of `box`, dense, in which it lies. `kept`: it is on disk
   /// already, and only the journal asks for it. Thread-safe.
   PackedBrick pack(Int3 brick, Box3 box, const std::byte* samples, bool kept) const;
+  /// The same of a brick all of whose samples are `bits` (see VolumeSource::constant); its box
+  /// must be a full brick. Bricks of one value that come one after the other are encoded once.
+  PackedBrick pack_constant(Int3 brick, std::uint64_t bits, bool kept);
   /// From one thread, in the order that the bricks of a shard will have.
   void deliver(const PackedBrick& packed);
   /// Bricks that are known to be the fill value and are not delivered.
@@ -43,6 +49,15 @@ class BrickOutput {
   const BrickCounts& counts() const { return counts_; }
 
  private:
+  /// A brick of one value.
+  struct Constant {
+    std::uint64_t bits;
+    std::uint32_t crc;
+    std::optional<std::vector<std::byte>> encoded;
+  };
+
+  void encode(PackedBrick& packed, std::span<const std::byte> samples) const;
+
   StoreWriter& store_;
   const StoreLayout& layout_;
   int level_;
@@ -50,6 +65,8 @@ class BrickOutput {
   ConvertJournal* journal_;
   Progress& progress_;
   BrickCounts counts_;
+  std::mutex mutex_;
+  std::shared_ptr<const Constant> constant_;  ///< the last one; guarded by mutex_
 };
 
 }  // namespace isobrick

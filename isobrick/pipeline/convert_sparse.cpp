@@ -194,7 +194,7 @@ class SparsePyramid::Level {
   }
 
   std::shared_ptr<Parcel> pack(std::span<const SparseBrick> family, VolumeSource& source,
-                               const BrickSpool* spool, const BrickSpool* next) const {
+                               const BrickSpool* spool, const BrickSpool* next) {
     const Lattice& lattice = info_.lattice;
     auto parcel = std::make_shared<Parcel>();
     parcel->parent = parent_of(family.front().brick);
@@ -213,9 +213,14 @@ class SparsePyramid::Level {
   }
 
   Parcel::Brick pack_brick(const SparseBrick& item, VolumeSource& source, const BrickSpool* spool,
-                           Parcel* parcel) const {
+                           Parcel* parcel) {
     const Lattice& lattice = info_.lattice;
     const Box3 box = lattice.brick_box(item.brick);
+    const bool kept = shard_at(floor_div(item.brick, bricks_per_shard_))->whole;
+    // Padding at the volume's border is of another value.
+    if (spool == nullptr && box == lattice.full_brick_box(item.brick))
+      if (const auto bits = source.constant(box))
+        return pack_constant(item.brick, *bits, kept, parcel);
     const std::size_t sample = lattice.sample_bytes();
     thread_local PodBuffer<std::byte> samples, half;
     samples.resize(lattice.brick_bytes());
@@ -235,9 +240,18 @@ class SparsePyramid::Level {
       copy_box({half.data(), halves},
                {parcel->average.data(), lattice.full_brick_box(parcel->parent)}, halves, sample);
     }
-    const bool kept = shard_at(floor_div(item.brick, bricks_per_shard_))->whole;
     brick.packed = output_.pack(item.brick, box, samples.data(), kept);
     return brick;
+  }
+
+  /// A full brick of one value, which is its average, too.
+  Parcel::Brick pack_constant(Int3 place, std::uint64_t bits, bool kept, Parcel* parcel) {
+    const Lattice& lattice = info_.lattice;
+    const Box3 box = lattice.brick_box(place);
+    if (parcel != nullptr)
+      set_box(lattice.type, bits, {parcel->average.data(), lattice.full_brick_box(parcel->parent)},
+              {half_extent(box.lo), half_extent(box.hi)});
+    return {output_.pack_constant(place, bits, kept), constant_brick(lattice, box, bits)};
   }
 
   void put(const Parcel& parcel) {

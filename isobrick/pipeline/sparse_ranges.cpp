@@ -126,6 +126,24 @@ BrickBlocks scan_brick(const Lattice& lattice, Box3 box, const std::byte* sample
   return result;
 }
 
+BrickBlocks constant_brick(const Lattice& lattice, Box3 box, std::uint64_t bits) {
+  return visit_scalar(lattice.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    T value;
+    std::memcpy(&value, &bits, sizeof value);
+    ValueRange<T> range;
+    range.include(static_cast<T>(value + T{0}));  // -0 is 0 in a range
+    BrickBlocks result;
+    result.blocks = {floor_div(max(box.lo - kBlock, {0, 0, 0}), kBlock), ceil_div(box.hi, kBlock)};
+    const std::vector<ValueRange<T>> ranges(
+        static_cast<std::size_t>(volume(result.blocks.extent())), range);
+    const auto bytes = std::as_bytes(std::span(ranges));
+    result.pairs.assign(bytes.begin(), bytes.end());
+    result.has_nan = value != value;
+    return result;
+  });
+}
+
 bool sparse_ranges_possible(const Lattice& lattice) {
   const Index edge = lattice.brick.x;
   return edge % kBlockEdge == 0 && kChunkSamples % edge == 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
@@ -21,6 +22,9 @@ struct BrickBlocks {
 
 /// Scans the samples of a brick's `box`, dense in C order. Thread-safe.
 BrickBlocks scan_brick(const Lattice& lattice, Box3 box, const std::byte* samples);
+
+/// The same of a brick all of whose samples are `bits` (see VolumeSource::constant).
+BrickBlocks constant_brick(const Lattice& lattice, Box3 box, std::uint64_t bits);
 
 /// Ranges of a level of which few bricks are there; all others are the fill
 /// value. Memory: chunks of ranges that some brick touches, a layer or two.

@@ -19,13 +19,28 @@ class SparseMemory final : public VolumeSource {
   bool random_access() const override { return true; }
   bool sparse() const override { return true; }
   bool is_fill(Box3 box) const override { return intersect(box, there_).empty(); }
-  void read(Box3 box, std::byte* out) override { dense_.read(box, out); }
+  std::optional<std::uint64_t> constant(Box3 box) const override {
+    return intersect(box, solid_) == box ? std::optional(bits_) : std::nullopt;
+  }
+  void read(Box3 box, std::byte* out) override {
+    EXPECT_FALSE(asks_about_constants_ && constant(box).has_value());
+    dense_.read(box, out);
+  }
 
   MemorySource& dense() { return dense_; }
+  /// All samples of `solid` are `bits`. `full`: no brick of it is to be read.
+  void set_solid(Box3 solid, std::uint64_t bits, bool full) {
+    solid_ = solid;
+    bits_ = bits;
+    asks_about_constants_ = full;
+  }
 
  private:
   MemorySource dense_;
   Box3 there_;
+  Box3 solid_;
+  std::uint64_t bits_ = 0;
+  bool asks_about_constants_ = false;
 };
 
 /// Noise in a box, the fill value elsewhere.
@@ -75,6 +90,45 @@ TEST(ConvertSparse, TheStoreIsThatOfTheDenseVolume) {
     expect_dense_store<std::uint8_t>(extent, there, 7, options);
     expect_dense_store<float>(extent, there, -2.5, options);
   }
+}
+
+/// Bricks of one value that is not the fill value are neither read nor encoded one by one.
+template <class T>
+void expect_solid_bricks(T value, Box3 solid, bool full) {
+  const Int3 extent{131, 90, 150};
+  const Box3 there{{32, 0, 32}, {131, 90, 150}};
+  auto samples = make_samples<T>(extent, 9, true);
+  std::size_t i = 0;
+  for_each_point({{0, 0, 0}, extent}, [&](Int3 p) {
+    if (!there.contains(p)) samples[i] = T{3};
+    if (solid.contains(p)) samples[i] = value;
+    ++i;
+  });
+  MemorySource dense(extent, scalar_type_of<T>, as_bytes(samples));
+  dense.mutable_info().fill_value = 3;
+  SparseMemory sparse(dense, there);
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof value);
+  sparse.set_solid(solid, bits, full);
+  TemporaryFolder folder;
+  const ConvertOptions options{.brick = 16, .shard = 64, .memory = 200 * kMiB, .threads = 3};
+  convert_quietly(dense, folder / "dense", options);
+  convert_quietly(sparse, folder / "sparse", options);
+  EXPECT_EQ(without_shards(tree_of(folder / "dense")), without_shards(tree_of(folder / "sparse")));
+  const StoreReader dense_store(folder / "dense"), store(folder / "sparse");
+  for (int level = 0; level < 4; ++level)
+    EXPECT_EQ(samples_of(store, level), samples_of(dense_store, level)) << level;
+}
+
+TEST(ConvertSparse, BricksOfOneValue) {
+  const Box3 aligned{{48, 16, 48}, {112, 80, 112}};
+  expect_solid_bricks<std::uint8_t>(200, aligned, true);
+  expect_solid_bricks<float>(-3, aligned, true);
+  expect_solid_bricks<float>(-0.0F, aligned, true);
+  expect_solid_bricks<double>(std::numeric_limits<double>::max(), aligned, true);
+  expect_solid_bricks<double>(std::numeric_limits<double>::quiet_NaN(), aligned, true);
+  // To the volume's border, where bricks are padded with the fill value.
+  expect_solid_bricks<std::int16_t>(-5, {{40, 10, 40}, {131, 90, 150}}, false);
 }
 
 /// Ranges in chunks of 512³ samples: bricks on both sides of a border between them.
