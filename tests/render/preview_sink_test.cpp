@@ -1,37 +1,18 @@
 #include "isobrick/render/preview_sink.h"
 
 #include <gtest/gtest.h>
-#include <png.h>
 
 #include <limits>
 
 #include "isobrick/io/png_file.h"
 #include "tests/io/temp_dir.h"
 #include "tests/meshes/test_meshes.h"
+#include "tests/render/png_picture.h"
 
 namespace isobrick {
 namespace {
 
-struct Picture {
-  int width = 0, height = 0;
-  std::vector<std::uint8_t> rgb;
-
-  const std::uint8_t* at(int x, int y) const { return rgb.data() + 3 * (y * width + x); }
-  /// The background is bluish, the surface reddish.
-  bool surface(int x, int y) const { return at(x, y)[0] > at(x, y)[2] + 8; }
-  int brightness(int x, int y) const { return at(x, y)[0] + at(x, y)[1] + at(x, y)[2]; }
-};
-
-Picture read_png(const std::string& path) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  EXPECT_NE(png_image_begin_read_from_file(&image, path.c_str()), 0);
-  image.format = PNG_FORMAT_RGB;
-  Picture picture{static_cast<int>(image.width), static_cast<int>(image.height), {}};
-  picture.rgb.resize(PNG_IMAGE_SIZE(image));
-  EXPECT_NE(png_image_finish_read(&image, nullptr, picture.rgb.data(), 0, nullptr), 0);
-  return picture;
-}
+using Picture = test::PngPicture;
 
 PreviewOptions small() {
   PreviewOptions options;
@@ -49,7 +30,7 @@ Picture draw(const std::vector<MeshChunk>& chunks, const PreviewOptions& options
   for (const MeshChunk& chunk : chunks) sink.write(chunk);
   sink.finish();
   EXPECT_EQ(dir.list(), std::vector<std::string>{"a.png"});
-  return read_png(dir / "a.png");
+  return test::read_png(dir / "a.png");
 }
 
 TEST(PreviewSink, ABallIsARoundSpotInTheMiddle) {
@@ -165,7 +146,7 @@ TEST(Png, RoundTrip) {
   std::vector<std::uint8_t> rgb;
   for (int i = 0; i < 3 * 5 * 7; ++i) rgb.push_back(static_cast<std::uint8_t>(i * 37));
   write_png(dir / "a.png", 5, 7, rgb, false);
-  const Picture picture = read_png(dir / "a.png");
+  const Picture picture = test::read_png(dir / "a.png");
   EXPECT_EQ(picture.width, 5);
   EXPECT_EQ(picture.rgb, rgb);
   message_of([&] { write_png(dir / "a.png", 5, 7, rgb, false); });
