@@ -21,8 +21,10 @@ struct DrawnNode {
 /// over the same place. Meshes without triangles are left out unless they are damaged.
 struct Drawable {
   std::vector<DrawnNode> nodes;
-  std::uint64_t version = 0;  ///< differs when the nodes do
-  bool complete = false;      ///< the whole cut, nothing stands in
+  std::uint64_t version = 0;      ///< differs when the nodes do
+  bool complete = false;          ///< the whole cut, nothing stands in
+  std::vector<double> isovalues;  ///< that the cut asks for
+  bool covers = false;            ///< each of them is shown, without holes
   std::uint64_t triangles = 0;
 };
 

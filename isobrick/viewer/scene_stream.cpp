@@ -99,6 +99,7 @@ struct SceneStream::Shared {
   void make_room();
   void count_wanted();
   void rebuild_drawable();
+  void show_before(std::size_t place);
 };
 
 /// Needs the lock. Abandons what is not wanted any more.
@@ -248,11 +249,21 @@ void SceneStream::Shared::run() {
   change.notify_all();
 }
 
+/// Needs the lock. Shows the isovalue that a place shows already, as this cut wants it.
+void SceneStream::Shared::show_before(std::size_t place) {
+  std::vector<DrawnNode> nodes;
+  bool complete = true;
+  if (append_drawable(*tree, *index, shown[place].front().mesh->isovalue, static_cast<int>(place),
+                      meshes, nodes, complete))
+    shown[place] = std::move(nodes);
+}
+
 /// Needs the lock.
 void SceneStream::Shared::rebuild_drawable() {
   auto next = std::make_shared<Drawable>();
   next->version = version;
-  next->complete = true;
+  next->complete = next->covers = true;
+  next->isovalues = cut.isovalues;
   meshes.begin_use();
   shown.resize(cut.isovalues.size());
   for (std::size_t i = 0; index && i < cut.isovalues.size(); ++i) {
@@ -260,9 +271,13 @@ void SceneStream::Shared::rebuild_drawable() {
     const bool covers = append_drawable(*tree, *index, cut.isovalues[i], static_cast<int>(i),
                                         meshes, nodes, next->complete);
     next->complete &= covers;
+    next->covers &= covers;
     // The isovalue before is shown for as long as the new one has holes.
     const bool old = !shown[i].empty() && shown[i].front().mesh->isovalue != cut.isovalues[i];
-    if (covers || !old) shown[i] = std::move(nodes);
+    if (covers || !old)
+      shown[i] = std::move(nodes);
+    else
+      show_before(i);
     next->nodes.insert(next->nodes.end(), shown[i].begin(), shown[i].end());
   }
   for (const DrawnNode& node : next->nodes) next->triangles += node.mesh->mesh.triangles.size();
@@ -303,6 +318,9 @@ SceneStream::~SceneStream() {
 void SceneStream::set_cut(const Cut& cut) {
   CutIndex index(shared_->tree->grid(), cut);
   const std::lock_guard lock(shared_->mutex);
+  // An isovalue that moves on with every picture must not leave what was shown before the
+  // first one: the last that covers stays.
+  if (shared_->cut.isovalues != cut.isovalues) shared_->rebuild_drawable();
   shared_->cut = cut;
   shared_->index.emplace(std::move(index));
   shared_->plan();

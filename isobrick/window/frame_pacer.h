@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 namespace isobrick {
 
@@ -10,6 +11,26 @@ class FramePacer {
  public:
   /// `target`: how long a picture may take while something moves, seconds.
   explicit FramePacer(double target = 1.0 / 20) : target_(target) {}
+
+  /// For a store that has just been opened: 20 pictures a second in software, which begins with
+  /// simple ones; as many as displays show where a device draws.
+  static FramePacer for_device(bool software) {
+    FramePacer pacer(software ? 1.0 / 20 : 1.0 / 80);
+    if (!software) return pacer;
+    pacer.plain_ = true;
+    pacer.coarser_ = kFirstInSoftware;
+    return pacer;
+  }
+
+  /// A picture in full that took `seconds`, while nothing moved: the first one that
+  /// moves is then fluent as well.
+  void drawn_still(double seconds) {
+    if (seconds < kNothingDrawn) return;
+    const double ratio = seconds / target_;
+    plain_ = ratio > 1;
+    if (plain_) full_seconds_ = seconds;
+    coarser_ = std::clamp(kMargin * std::sqrt(ratio), 1.0, kCoarsest);
+  }
 
   /// A picture that took `seconds` to draw as plain() and coarser() say now.
   void drawn(double seconds) {
@@ -38,7 +59,8 @@ class FramePacer {
   double coarser() const { return coarser_; }
 
  private:
-  static constexpr double kCoarsest = 32;
+  static constexpr double kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 8;
+  static constexpr double kNothingDrawn = 1e-3;  ///< seconds: the picture was the one before
   double target_, coarser_ = 1, full_seconds_ = 0;
   bool plain_ = false;
 };

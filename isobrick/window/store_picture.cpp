@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include <fmt/format.h>
 #include <glm/ext/matrix_transform.hpp>
@@ -88,6 +89,14 @@ std::vector<float> floats_of(const SliceSamples& slice) {
   else
     append_floats<float>(slice.pixels, samples);
   return samples;
+}
+
+/// What a picture depends on beside the meshes and slices that there are. An isovalue
+/// shows when meshes of it are there, and not before.
+std::string what_shows(const Camera& camera, int width, int height, ViewSettings settings) {
+  for (SurfaceSettings& surface : settings.surfaces) surface.isovalue = 0;
+  return fmt::format("{} {} {} {}", width, height, to_json(camera).dump(),
+                     to_json(settings).dump());
 }
 
 }  // namespace
@@ -245,6 +254,7 @@ PictureSettings StorePicture::picture_settings(const ViewSettings& settings) con
 void StorePicture::draw_surfaces(const ViewSettings& settings) {
   state_.triangles = state_.nodes = 0;
   state_.damage.clear();
+  state_.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
   if (shown_ == nullptr) return;
   for (const DrawnNode& node : shown_->nodes) {
     if (!node.mesh->damage.empty()) {
@@ -257,6 +267,7 @@ void StorePicture::draw_surfaces(const ViewSettings& settings) {
         upload->second.place.empty())
       continue;
     const SurfaceSettings& surface = settings.surfaces[shown_surfaces_[number]];
+    state_.isovalues[shown_surfaces_[number]] = node.mesh->isovalue;
     MeshStyle style;
     style.colour = surface.colour;
     style.opacity = surface.opacity;
@@ -334,8 +345,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   const auto before = shown_;
   upload();
   const bool other_slices = update_slices(settings);
-  std::string shows =
-      fmt::format("{} {} {} {}", width, height, to_json(camera).dump(), to_json(settings).dump());
+  std::string shows = what_shows(camera, width, height, settings);
   // A pointer that moves over panels must not cost a picture.
   if (other_slices || shown_ != before || shows != shows_) {
     renderer_.begin(camera, width, height, picture_settings(settings));
@@ -348,6 +358,8 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   drop_unused();
   state_.device_bytes = pool_.bytes();
   state_.limited_by_budget = scene_->cut().limited_by_budget;
+  state_.covers =
+      shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;
   state_.complete = shown_ != nullptr && shown_ == scene_->drawable() &&
                     (shown_->complete || scene_->stream().idle());
 }

@@ -26,6 +26,10 @@ struct PictureBudgets {
 /// What a picture shows and what it still lacks.
 struct PictureState {
   bool complete = false;  ///< nothing finer, nothing else is on its way
+  /// Of each surface that is drawn, by its number: at first, and while the one that was asked
+  /// for does not cover the view, not the settings'. NaN: nothing of it is drawn.
+  std::vector<double> isovalues;
+  bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
   std::uint64_t triangles = 0, nodes = 0, levels_finest = 0;
   std::uint64_t device_bytes = 0;   ///< of meshes
   bool limited_by_budget = false;   ///< with more memory it would be finer

@@ -110,7 +110,10 @@ void ViewerWindow::open(const std::filesystem::path& path) {
   state_.selected = 0;
   state_.settings = options_.settings;
   // In software four samples a pixel take longer than anything else.
-  if (current_gl_device().software) state_.settings.multisample = false;
+  const bool software = current_gl_device().software;
+  if (software) state_.settings.multisample = false;
+  state_.pacer = FramePacer::for_device(software);
+  opened_ = glfwGetTime();
   choose_values(state_.settings, state_.picture->scene().tree());
   state_.picked.reset();
   state_.measured.clear();
@@ -198,7 +201,7 @@ void ViewerWindow::click(double x, double y) {
 
 bool ViewerWindow::moving() const {
   return state_.navigator.moving() || events_->dragging() ||
-         glfwGetTime() - events_->last_motion() < kSettleSeconds;
+         glfwGetTime() - std::max(events_->last_motion(), opened_) < kSettleSeconds;
 }
 
 void ViewerWindow::draw_frame() {
@@ -211,7 +214,8 @@ void ViewerWindow::draw_frame() {
   glClear(GL_COLOR_BUFFER_BIT);
   if (state_.picture != nullptr) {
     const double begin = glfwGetTime();
-    const bool fluent = moving();
+    // The first picture of a surface should not wait for a good one.
+    const bool fluent = moving() || !state_.picture->state().covers;
     ViewSettings settings = state_.settings;
     if (fluent && state_.pacer.plain()) settings.occlusion = settings.multisample = false;
     try {
@@ -223,7 +227,10 @@ void ViewerWindow::draw_frame() {
     }
     glFinish();
     state_.draw_seconds = glfwGetTime() - begin;
-    if (fluent) state_.pacer.drawn(state_.draw_seconds);
+    if (fluent)
+      state_.pacer.drawn(state_.draw_seconds);
+    else
+      state_.pacer.drawn_still(state_.draw_seconds);
   }
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();

@@ -62,6 +62,7 @@ class ViewerWindow {
   std::unique_ptr<Events> events_;
   ViewerState state_;
   double last_time_ = 0;
+  double opened_ = 0;    ///< when the store was
   bool changed_ = true;  ///< the next picture may differ from the last
 };
 

@@ -1,0 +1,331 @@
+// What somebody at the viewer waits for, off-screen, through the code of its window: the
+// first surface after opening and after each jump of the isovalue, how long pictures take while
+// meshes come in, while the isovalue slides and while the camera turns, and the full
+// refinement of a region beside the batch extraction of the same region.
+//
+//   isobrick synth gyroid g.zarr --dims 512,512,512
+//   bench_viewer_stream g.zarr --isovalue 127.5 --to 160.5 --json
+//
+// A picture's time ends with glFinish. Pictures are started at most 60 times a second, as a
+// display would.
+
+#include <epoxy/gl.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/extract.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/window/frame_pacer.h"
+#include "isobrick/window/store_picture.h"
+
+namespace isobrick::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::string store;
+  double isovalue = 127.5, to = 160.5;
+  int width = 1280, height = 800, jumps = 4, region = 256;
+  double seconds = 4;  ///< of sliding, of turning
+  double memory_gib = 2, gpu_memory_gib = 2;
+  int threads = 0;
+  bool json = false;
+};
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::uint64_t bytes_of(double gib) { return static_cast<std::uint64_t>(gib * (1 << 30)); }
+
+/// Milliseconds of many pictures.
+class Times {
+ public:
+  void add(double seconds) { ms_.push_back(seconds * 1e3); }
+  Json summary() {
+    std::sort(ms_.begin(), ms_.end());
+    if (ms_.empty()) return {{"pictures", 0}};
+    const auto part = [&](double p) {
+      return ms_[std::min(ms_.size() - 1,
+                          static_cast<std::size_t>(p * static_cast<double>(ms_.size())))];
+    };
+    double sum = 0;
+    for (const double ms : ms_) sum += ms;
+    return {{"pictures", ms_.size()},
+            {"median_ms", part(0.5)},
+            {"p99_ms", part(0.99)},
+            {"max_ms", ms_.back()},
+            {"per_second_if_unpaced", 1e3 * static_cast<double>(ms_.size()) / sum}};
+  }
+
+ private:
+  std::vector<double> ms_;
+};
+
+/// A store on a screen of no window.
+class Session {
+ public:
+  Session(const Arguments& arguments, const PictureBudgets& budgets)
+      : arguments_(arguments),
+        opened_(Clock::now()),
+        store_(std::make_shared<const StoreReader>(arguments.store)) {
+    read_seconds = seconds_since(opened_);
+    picture_ = std::make_unique<StorePicture>(store_, budgets, [] {});
+    set_up_seconds = seconds_since(opened_);
+    settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
+    settings.multisample = !current_gl_device().software;
+    choose_values(settings, picture_->scene().tree());
+    const WorldBox box = picture_->bounds();
+    camera.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
+  }
+
+  StorePicture& picture() { return *picture_; }
+  double since_opened() const { return seconds_since(opened_); }
+
+  /// One picture as the window makes it. `moving`: it may be a simpler one. Its time.
+  double draw(bool moving) {
+    const auto start = Clock::now();
+    ViewSettings now = settings;
+    if (moving && pacer_.plain()) now.occlusion = now.multisample = false;
+    picture_->draw(camera, arguments_.width, arguments_.height, now, moving ? pacer_.coarser() : 1);
+    glFinish();
+    const double seconds = seconds_since(start);
+    if (moving)
+      pacer_.drawn(seconds);
+    else
+      pacer_.drawn_still(seconds);
+    device_peak = std::max(device_peak, picture_->state().device_bytes);
+    return seconds;
+  }
+  /// At most 60 times a second until `done`; false when that takes longer than two minutes.
+  template <class F>
+  bool draw_until(bool moving, Times& times, F&& done) {
+    const auto start = Clock::now();
+    while (seconds_since(start) < 120) {
+      const auto next = Clock::now() + std::chrono::microseconds(16'667);
+      times.add(draw(moving));
+      if (done()) return true;
+      std::this_thread::sleep_until(next);
+    }
+    return false;
+  }
+
+  ViewSettings settings;
+  Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
+  double read_seconds = 0, set_up_seconds = 0;
+  std::uint64_t device_peak = 0;
+
+ private:
+  const Arguments& arguments_;
+  Clock::time_point opened_;
+  std::shared_ptr<const StoreReader> store_;
+  std::unique_ptr<StorePicture> picture_;
+  FramePacer pacer_ = FramePacer::for_device(current_gl_device().software);
+};
+
+/// Takes a mesh and keeps nothing.
+class NoSink final : public MeshSink {
+ public:
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader&) override {}
+  void write(const MeshChunk& chunk) override {
+    bytes_ +=
+        chunk.positions.size_bytes() + chunk.normals.size_bytes() + chunk.triangles.size_bytes();
+  }
+  void finish() override {}
+  std::uint64_t bytes() const override { return bytes_; }
+
+ private:
+  std::uint64_t bytes_ = 0;
+};
+
+Json stream_json(const StreamCounters& c) {
+  return {{"meshes_made", c.meshes_made},       {"bricks_read", c.bricks_read},
+          {"decode_seconds", c.decode_seconds}, {"mesh_seconds", c.mesh_seconds},
+          {"mesh_bytes", c.mesh_bytes},         {"brick_bytes_peak", c.brick_bytes_peak}};
+}
+
+/// The isovalue goes to and fro, another one with every picture.
+Json slide(Session& session, const Arguments& arguments) {
+  Times times, behind;
+  std::map<double, Clock::time_point> asked;
+  const auto start = Clock::now();
+  session.draw_until(true, times, [&] {
+    const std::vector<double>& shown = session.picture().state().isovalues;
+    const auto found = shown.empty() ? asked.end() : asked.find(shown[0]);
+    if (found != asked.end()) behind.add(seconds_since(found->second));
+    const double turn = seconds_since(start) / arguments.seconds;
+    const double part = 0.5 + 0.5 * std::cos(turn * 2 * 3.14159265358979);
+    const double isovalue = arguments.isovalue + part * (arguments.to - arguments.isovalue);
+    session.settings.surfaces[0].isovalue = isovalue;
+    asked.emplace(isovalue, Clock::now());
+    return turn >= 1;
+  });
+  Json result = times.summary();
+  // From asking for an isovalue to the end of a picture of its surface.
+  result["surface_behind_slider"] = behind.summary();
+  return result;
+}
+
+/// Opening until the whole volume is refined as far as picture and budget go; jumps;
+/// sliding; turning.
+Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
+  Session session(arguments, budgets);
+  Json result;
+  Times streaming;
+  const auto covers = [&] { return session.picture().state().covers; };
+  const auto complete = [&] { return session.picture().state().complete; };
+  session.draw_until(true, streaming, covers);
+  result["open"] = {{"store_ms", session.read_seconds * 1e3},
+                    {"set_up_ms", session.set_up_seconds * 1e3},
+                    {"first_surface_ms", session.since_opened() * 1e3}};
+  session.draw_until(false, streaming, complete);
+  result["open"]["complete_ms"] = session.since_opened() * 1e3;
+  result["open"]["triangles"] = session.picture().state().triangles;
+  result["open"]["nodes"] = session.picture().state().nodes;
+  result["open"]["limited_by_budget"] = session.picture().state().limited_by_budget;
+  Json jumps = Json::array();
+  for (int i = 1; i <= arguments.jumps; ++i) {
+    const double part = static_cast<double>(i) / arguments.jumps;
+    session.settings.surfaces[0].isovalue =
+        arguments.isovalue + part * (arguments.to - arguments.isovalue);
+    const auto start = Clock::now();
+    Json jump{{"isovalue", session.settings.surfaces[0].isovalue}};
+    // As the window does: simpler pictures until there is one of the new surface.
+    session.draw(true);
+    session.draw_until(true, streaming, covers);
+    jump["first_surface_ms"] = seconds_since(start) * 1e3;
+    session.draw_until(false, streaming, complete);
+    jump["complete_ms"] = seconds_since(start) * 1e3;
+    jumps.push_back(jump);
+  }
+  result["jumps"] = jumps;
+  result["while_streaming"] = streaming.summary();
+
+  result["while_sliding"] = slide(session, arguments);
+
+  Times turning;
+  const auto orbit = Clock::now();
+  const Vec3d middle = session.camera.target, arm = session.camera.eye - middle;
+  session.draw_until(true, turning, [&] {
+    const double turn = seconds_since(orbit) / arguments.seconds;
+    const double a = turn * 2 * 3.14159265358979, c = std::cos(a), s = std::sin(a);
+    session.camera.eye = middle + Vec3d{c * arm.x - s * arm.y, s * arm.x + c * arm.y, arm.z};
+    return turn >= 1;
+  });
+  result["while_turning"] = turning.summary();
+  result["stream"] = stream_json(session.picture().scene().stream().counters());
+  result["device_bytes_peak"] = session.device_peak;
+  return result;
+}
+
+/// A region in the middle, all of level 0, from nothing to complete, beside the extraction of
+/// the same samples.
+Json refinement(const Arguments& arguments, const PictureBudgets& budgets) {
+  Json result;
+  const StoreReader store(arguments.store);
+  const Int3 extent = store.info().levels.front().lattice.extent;
+  Box3 roi;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index edge = std::min<Index>(arguments.region, extent[axis] - 1);
+    roi.lo[axis] = (extent[axis] - 1 - edge) / 2 / 64 * 64;
+    roi.hi[axis] = roi.lo[axis] + edge + 1;
+  }
+  const auto extract_with = [&](Backend backend, const char* name) {
+    ExtractOptions options;
+    options.isovalue = arguments.isovalue;
+    options.roi = roi;
+    options.normals = true;
+    options.memory = budgets.memory;
+    options.threads = budgets.threads;
+    options.backend = backend;
+    NoSink sink;
+    NoProgress progress;
+    const auto start = Clock::now();
+    const ExtractReport report = extract(store, options, sink, progress);
+    result[name] = {{"seconds", seconds_since(start)}, {"triangles", report.triangles}};
+  };
+  extract_with(Backend::cpu, "first_extract_cpu");  // reads the store into the page cache
+  extract_with(Backend::cpu, "extract_cpu");
+
+  Session session(arguments, budgets);
+  session.settings.region_on = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto last = static_cast<double>(extent[axis] - 1);
+    // Neighbours that only touch it stay out.
+    session.settings.region_lo[axis] =
+        static_cast<float>((static_cast<double>(roi.lo[axis]) + 0.5) / last);
+    session.settings.region_hi[axis] =
+        static_cast<float>((static_cast<double>(roi.hi[axis]) - 1.5) / last);
+  }
+  session.settings.pixel_error = 0.02f;
+  const auto start = Clock::now();
+  Times times;
+  session.draw_until(false, times, [&] { return session.picture().state().complete; });
+  result["refine"] = {{"seconds", seconds_since(start)},
+                      {"triangles", session.picture().state().triangles},
+                      {"nodes", session.picture().state().nodes},
+                      {"limited_by_budget", session.picture().state().limited_by_budget},
+                      {"pictures", times.summary()},
+                      {"stream", stream_json(session.picture().scene().stream().counters())}};
+  return result;
+}
+
+int run(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"What somebody at the viewer waits for"};
+  app.add_option("store", arguments.store)->required();
+  app.add_option("--isovalue", arguments.isovalue);
+  app.add_option("--to", arguments.to, "Where jumps and sliding end");
+  app.add_option("--jumps", arguments.jumps);
+  app.add_option("--seconds", arguments.seconds, "Of sliding, of turning");
+  app.add_option("--region", arguments.region, "Edge, in cells, of what is refined fully");
+  app.add_option("--width", arguments.width);
+  app.add_option("--height", arguments.height);
+  app.add_option("--memory", arguments.memory_gib, "GiB of host memory");
+  app.add_option("--gpu-memory", arguments.gpu_memory_gib, "GiB for meshes on the device");
+  app.add_option("--threads", arguments.threads);
+  app.add_flag("--json", arguments.json, "On one line");
+  CLI11_PARSE(app, argc, argv);
+
+  const GlContext context;
+  PictureBudgets budgets;
+  budgets.memory = bytes_of(arguments.memory_gib);
+  budgets.device_memory = bytes_of(arguments.gpu_memory_gib);
+  budgets.threads = arguments.threads;
+  Json result{{"store", arguments.store},
+              {"renderer", current_gl_device().renderer},
+              {"cores", std::thread::hardware_concurrency()},
+              {"size", fmt::format("{}x{}", arguments.width, arguments.height)}};
+  result["refinement"] = refinement(arguments, budgets);
+  result["interactive"] = interactive(arguments, budgets);
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  result["peak_resident_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+  std::cout << result.dump(arguments.json ? -1 : 2) << '\n';
+  return 0;
+}
+
+}  // namespace
+}  // namespace isobrick::bench
+
+int main(int argc, char** argv) {
+  try {
+    return isobrick::bench::run(argc, argv);
+  } catch (const std::exception& e) {
+    std::cerr << "bench_viewer_stream: " << e.what() << '\n';
+    return 1;
+  }
+}
