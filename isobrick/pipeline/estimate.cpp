@@ -188,7 +188,7 @@ std::vector<Sampled> look_at_all(const StoreReader& store, const ExtractOptions&
                                  const ExtractRequest& request, std::span<const TileWork> tiles,
                                  std::size_t cache_bricks) {
   const Lattice& lattice = request.level->lattice;
-  BrickCache cache(store, options.level, cache_bricks);
+  BrickCache cache(store, options.level, sample_reach(request.surface), cache_bricks);
   std::vector<Sampled> sampled(tiles.size());
   std::vector<Int3> bricks;
   for (std::size_t begin = 0, end = 0; begin < tiles.size(); begin = end) {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "isobrick/core/morton.h"
 #include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
@@ -67,13 +68,15 @@ struct Work {
 /// Batch after batch, each decoded and then extracted, for the surface keeps all cores
 /// busy itself.
 void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
-  BrickCache cache(work.store, work.options.level, work.plan.cache_bricks);
+  BrickCache cache(work.store, work.options.level, sample_reach(work.request.surface),
+                   work.plan.cache_bricks);
   Workers workers(work.request.threads);
   workers.execute([&] {
     TileBatch batch, following;
     for (bool more = work.batches.next(batch); more; std::swap(batch, following)) {
       {
         Stopwatch watch(work.report.decode_seconds);
+        cache.drop_before(morton_encode(batch.tiles.front().tile));
         cache.require(batch.bricks);
       }
       // The disk works on the next batch while the processors work on this one.

@@ -7,14 +7,16 @@
 #include <cassert>
 #include <new>
 
+#include "isobrick/stream/brick_slots.h"
+
 namespace isobrick {
 
-BrickCache::BrickCache(const StoreReader& store, int level, std::size_t capacity)
+BrickCache::BrickCache(const StoreReader& store, int level, Index reach, std::size_t capacity)
     : store_(store),
       level_(level),
+      reach_(reach),
       lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
-      capacity_(capacity),
-      seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {}
+      capacity_(capacity) {}
 
 std::uint64_t BrickCache::key(Int3 brick) const {
   return static_cast<std::uint64_t>(linear_index(brick, lattice_.bricks()));
@@ -29,10 +31,12 @@ BrickCache::Samples BrickCache::take_buffer() {
   if (buffers_ < capacity_) return new_buffer();
   // What is required now was moved to the front, so the back is free to go.
   for (;;) {
-    Samples buffer = order_.back().samples;
-    entries_.erase(order_.back().key);
+    const Entry gone = order_.back();
+    entries_.erase(gone.key);
     order_.pop_back();
-    if (buffer) return buffer;
+    if (!gone.samples) continue;
+    cut_.emplace(gone.key, gone.last_use);
+    return gone.samples;
   }
 }
 
@@ -80,12 +84,23 @@ void BrickCache::require(std::span<const Int3> bricks) {
     if (!load.present) spare_.push_back(load.samples);
     if (load.present) {
       ++reads_;
-      bricks_read_ += !seen_[key(load.brick)];
-      seen_[key(load.brick)] = true;
+      bricks_read_ += cut_.erase(key(load.brick)) == 0;
     }
-    order_.push_front({key(load.brick), load.present ? load.samples : nullptr});
+    order_.push_front({key(load.brick), load.present ? load.samples : nullptr,
+                       last_use(lattice_, reach_, load.brick)});
     entries_[key(load.brick)] = order_.begin();
   }
+}
+
+void BrickCache::drop_before(std::uint64_t code) {
+  for (auto at = order_.begin(); at != order_.end();) {
+    const auto entry = at++;
+    if (entry->last_use >= code) continue;
+    if (entry->samples) spare_.push_back(entry->samples);
+    entries_.erase(entry->key);
+    order_.erase(entry);
+  }
+  std::erase_if(cut_, [&](const auto& cut) { return cut.second < code; });
 }
 
 void BrickCache::will_need(std::span<const Int3> bricks) const {

@@ -13,22 +13,31 @@ Int3 point_of(std::uint64_t key, Int3 grid) {
   return {k % grid.x, k / grid.x % grid.y, k / (grid.x * grid.y)};
 }
 
-}  // namespace
-
-std::uint64_t next_use(const Lattice& lattice, Index reach, Int3 brick, std::uint64_t code) {
-  // Tile t looks at samples 32·t − reach … 32·t + 32 + reach.
+/// The tiles that look at samples of a brick: tile t does at 32·t − reach … 32·t + 32 + reach.
+Box3 tiles_using(const Lattice& lattice, Index reach, Int3 brick) {
   Box3 tiles;
   for (int axis = 0; axis < 3; ++axis) {
     const Index first = brick[axis] * lattice.brick[axis], end = first + lattice.brick[axis];
     tiles.lo[axis] = ceil_div(std::max<Index>(first - kTileEdge - reach, 0), kTileEdge);
     tiles.hi[axis] = std::min((end - 1 + reach) / kTileEdge + 1, lattice.tiles()[axis]);
   }
+  return tiles;
+}
+
+}  // namespace
+
+std::uint64_t next_use(const Lattice& lattice, Index reach, Int3 brick, std::uint64_t code) {
   std::uint64_t next = kNever;
-  for_each_point(tiles, [&](Int3 t) {
+  for_each_point(tiles_using(lattice, reach, brick), [&](Int3 t) {
     const std::uint64_t of_tile = morton_encode(t);
     if (of_tile >= code) next = std::min(next, of_tile);
   });
   return next;
+}
+
+std::uint64_t last_use(const Lattice& lattice, Index reach, Int3 brick) {
+  // The code grows with every coordinate.
+  return morton_encode(tiles_using(lattice, reach, brick).hi - Int3{1, 1, 1});
 }
 
 void BrickSlots::add_slots(std::byte* memory, std::size_t count) {

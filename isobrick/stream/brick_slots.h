@@ -18,6 +18,9 @@ inline constexpr std::uint64_t kNever = ~std::uint64_t{0};
 /// its 33³ included, lie in `brick`; kNever when there is none.
 std::uint64_t next_use(const Lattice& lattice, Index reach, Int3 brick, std::uint64_t code);
 
+/// Morton code of the last tile whose samples, as above, lie in `brick`.
+std::uint64_t last_use(const Lattice& lattice, Index reach, Int3 brick);
+
 /// Which decoded brick lies in which slot of memory. As tiles come in Morton order, it is
 /// known when a brick will be needed next: where room is short, the brick goes that is not
 /// needed for the longest time. Books only; not thread-safe.

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
+#include "isobrick/core/morton.h"
 #include "isobrick/stream/tile_stream.h"
 #include "tests/stream/stored_volume.h"
 
@@ -14,7 +16,7 @@ class Stream : public StoredVolume {};
 
 TEST_F(Stream, CacheKeepsWhatWasNeededLastAndNoMoreThanItsCapacity) {
   const StoreReader store(path_);
-  BrickCache cache(store, 0, 4);
+  BrickCache cache(store, 0, 0, 4);
   const std::vector<Int3> first{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}},
       second{{2, 0, 0}, {3, 0, 0}, {4, 0, 0}};
   cache.require(first);
@@ -30,6 +32,33 @@ TEST_F(Stream, CacheKeepsWhatWasNeededLastAndNoMoreThanItsCapacity) {
   cache.require(first);
   for (const Int3 b : first) expect_samples(cache, b);
   EXPECT_GT(cache.reads(), cache.bricks_read());
+}
+
+TEST_F(Stream, CacheDropsWhatNoLaterTileNeedsAndReusesItsMemory) {
+  const StoreReader store(path_);
+  const Lattice& lattice = store.info().levels[0].lattice;
+  for (const Index reach : {0, 1}) {
+    const std::size_t capacity = static_cast<std::size_t>(volume(lattice.bricks()));
+    TileStream stream(store, 0, 20000, lattice.box());
+    BatchPlanner planner(stream, lattice, reach, false, 1, capacity);
+    BrickCache cache(store, 0, reach, capacity), keeps_all(store, 0, reach, capacity);
+    std::set<const std::byte*> places, all_places;
+    TileBatch batch;
+    while (planner.next(batch)) {
+      cache.drop_before(morton_encode(batch.tiles.front().tile));
+      cache.require(batch.bricks);
+      keeps_all.require(batch.bricks);
+      for (const Int3 b : batch.bricks) {
+        expect_samples(cache, b);
+        places.insert(cache.find(b));
+        all_places.insert(keeps_all.find(b));
+      }
+    }
+    // Nothing is read twice.
+    EXPECT_EQ(cache.reads(), keeps_all.reads());
+    EXPECT_EQ(cache.bricks_read(), cache.reads());
+    EXPECT_LT(places.size(), all_places.size());
+  }
 }
 
 TEST_F(Stream, BatchesHoldEveryActiveTileOnceInMortonOrderWithItsBricks) {
