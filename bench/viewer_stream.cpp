@@ -21,9 +21,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <utility>
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/extract.h"
+#include "isobrick/pipeline/gpu_backend.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/window/frame_pacer.h"
 #include "isobrick/window/store_picture.h"
@@ -41,6 +43,7 @@ struct Arguments {
   double seconds = 4;  ///< of sliding, of turning
   double memory_gib = 2, gpu_memory_gib = 2;
   int threads = 0;
+  std::string backend = "auto";
   bool json = false;
 };
 
@@ -100,6 +103,7 @@ class Session {
     ViewSettings now = settings;
     if (moving && pacer_.plain()) now.occlusion = now.multisample = false;
     picture_->draw(camera, arguments_.width, arguments_.height, now, moving ? pacer_.coarser() : 1);
+    submitting.add(seconds_since(start));
     glFinish();
     const double seconds = seconds_since(start);
     if (moving)
@@ -126,6 +130,7 @@ class Session {
   Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   double read_seconds = 0, set_up_seconds = 0;
   std::uint64_t device_peak = 0;
+  Times submitting;  ///< of pictures, without what the device still had to do
 
  private:
   const Arguments& arguments_;
@@ -152,9 +157,10 @@ class NoSink final : public MeshSink {
 };
 
 Json stream_json(const StreamCounters& c) {
-  return {{"meshes_made", c.meshes_made},       {"bricks_read", c.bricks_read},
-          {"decode_seconds", c.decode_seconds}, {"mesh_seconds", c.mesh_seconds},
-          {"mesh_bytes", c.mesh_bytes},         {"brick_bytes_peak", c.brick_bytes_peak}};
+  return {{"meshes_made", c.meshes_made},        {"meshes_made_by_device", c.device_meshes_made},
+          {"device_mesh_bytes", c.device_bytes}, {"bricks_read", c.bricks_read},
+          {"decode_seconds", c.decode_seconds},  {"mesh_seconds", c.mesh_seconds},
+          {"mesh_bytes", c.mesh_bytes},          {"brick_bytes_peak", c.brick_bytes_peak}};
 }
 
 /// The isovalue goes to and fro, another one with every picture.
@@ -174,6 +180,7 @@ Json slide(Session& session, const Arguments& arguments) {
     return turn >= 1;
   });
   Json result = times.summary();
+  result["submitting"] = std::exchange(session.submitting, {}).summary();
   // From asking for an isovalue to the end of a picture of its surface.
   result["surface_behind_slider"] = behind.summary();
   return result;
@@ -213,6 +220,7 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
   }
   result["jumps"] = jumps;
   result["while_streaming"] = streaming.summary();
+  result["while_streaming"]["submitting"] = std::exchange(session.submitting, {}).summary();
 
   result["while_sliding"] = slide(session, arguments);
 
@@ -226,6 +234,8 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
     return turn >= 1;
   });
   result["while_turning"] = turning.summary();
+  result["while_turning"]["submitting"] = std::exchange(session.submitting, {}).summary();
+  result["meshes_by"] = session.picture().device().describe();
   result["stream"] = stream_json(session.picture().scene().stream().counters());
   result["device_bytes_peak"] = session.device_peak;
   return result;
@@ -259,6 +269,10 @@ Json refinement(const Arguments& arguments, const PictureBudgets& budgets) {
   };
   extract_with(Backend::cpu, "first_extract_cpu");  // reads the store into the page cache
   extract_with(Backend::cpu, "extract_cpu");
+  if (budgets.backend != Backend::cpu && cuda_device_count() > 0) {
+    extract_with(Backend::cuda, "first_extract_cuda");  // sets the device up
+    extract_with(Backend::cuda, "extract_cuda");
+  }
 
   Session session(arguments, budgets);
   session.settings.region_on = true;
@@ -297,6 +311,7 @@ int run(int argc, char** argv) {
   app.add_option("--memory", arguments.memory_gib, "GiB of host memory");
   app.add_option("--gpu-memory", arguments.gpu_memory_gib, "GiB for meshes on the device");
   app.add_option("--threads", arguments.threads);
+  app.add_option("--backend", arguments.backend)->check(CLI::IsMember({"auto", "cpu", "cuda"}));
   app.add_flag("--json", arguments.json, "On one line");
   CLI11_PARSE(app, argc, argv);
 
@@ -305,6 +320,9 @@ int run(int argc, char** argv) {
   budgets.memory = bytes_of(arguments.memory_gib);
   budgets.device_memory = bytes_of(arguments.gpu_memory_gib);
   budgets.threads = arguments.threads;
+  budgets.backend = arguments.backend == "cpu"    ? Backend::cpu
+                    : arguments.backend == "cuda" ? Backend::cuda
+                                                  : Backend::automatic;
   Json result{{"store", arguments.store},
               {"renderer", current_gl_device().renderer},
               {"cores", std::thread::hardware_concurrency()},

@@ -2,6 +2,8 @@
 
 #include <cuda_runtime_api.h>
 
+#include <cstring>
+
 #include "isobrick/gpu/cuda_check.h"
 
 namespace isobrick::gpu {
@@ -9,6 +11,15 @@ namespace isobrick::gpu {
 int device_count() noexcept {
   int count = 0;
   return cudaGetDeviceCount(&count) == cudaSuccess ? count : 0;
+}
+
+std::array<std::uint8_t, 16> device_id(int device) {
+  cudaDeviceProp properties{};
+  check(cudaGetDeviceProperties(&properties, device));
+  std::array<std::uint8_t, 16> id{};
+  static_assert(sizeof properties.uuid.bytes == sizeof id);
+  std::memcpy(id.data(), properties.uuid.bytes, sizeof id);
+  return id;
 }
 
 DeviceInfo open_device(int device) {

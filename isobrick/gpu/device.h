@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -15,6 +16,10 @@ struct DeviceInfo {
   std::string name;
   std::uint64_t free_bytes = 0, total_bytes = 0;  ///< of its memory, now
 };
+
+/// 16 bytes by which drivers of all kinds tell devices apart. Throws Error for a device that
+/// does not exist.
+std::array<std::uint8_t, 16> device_id(int device);
 
 /// Sets the device up for this process (some tenths of a second the first time) and
 /// makes it the calling thread's. Throws Error when that fails.

@@ -10,50 +10,12 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/free_list.h"
 
 namespace isobrick {
 namespace {
 
 static_assert(sizeof(Vec3f) == 12 && sizeof(Triangle) == 12);
-
-/// Which parts of [0, size) are free; the first that is large enough is taken.
-class FreeList {
- public:
-  explicit FreeList(std::uint32_t size) { free_.push_back({0, size}); }
-
-  std::optional<std::uint32_t> take(std::uint32_t size) {
-    for (std::size_t i = 0; i < free_.size(); ++i) {
-      if (free_[i].size < size) continue;
-      const std::uint32_t at = free_[i].at;
-      free_[i].at += size;
-      free_[i].size -= size;
-      if (free_[i].size == 0) free_.erase(free_.begin() + static_cast<std::ptrdiff_t>(i));
-      return at;
-    }
-    return std::nullopt;
-  }
-
-  void give_back(std::uint32_t at, std::uint32_t size) {
-    if (size == 0) return;
-    auto next = std::lower_bound(free_.begin(), free_.end(), at,
-                                 [](const Range& range, std::uint32_t v) { return range.at < v; });
-    next = free_.insert(next, {at, size});
-    if (next + 1 != free_.end() && at + size == (next + 1)->at) {
-      next->size += (next + 1)->size;
-      free_.erase(next + 1);
-    }
-    if (next != free_.begin() && (next - 1)->at + (next - 1)->size == at) {
-      (next - 1)->size += next->size;
-      free_.erase(next);
-    }
-  }
-
- private:
-  struct Range {
-    std::uint32_t at, size;
-  };
-  std::vector<Range> free_;  ///< ascending, never touching
-};
 
 std::uint64_t bytes_of(std::uint64_t vertices, std::uint64_t triangles) {
   return vertices * 2 * sizeof(Vec3f) + triangles * sizeof(Triangle);
@@ -188,6 +150,14 @@ PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
   if (mesh.has_normals()) upload(place.normals, place.first_vertex, chunk.normals);
   upload(place.triangles, place.first_triangle, triangles);
   check_gl("a mesh");
+  return mesh;
+}
+
+PooledMesh MeshPool::borrow(const MeshPlace& place, Vec3d origin) {
+  PooledMesh mesh;
+  mesh.place_ = place;
+  mesh.origin_ = origin;
+  mesh.has_normals_ = true;
   return mesh;
 }
 

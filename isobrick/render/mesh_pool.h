@@ -13,8 +13,7 @@ namespace isobrick {
 
 struct MeshBlock;
 
-/// Where a mesh lies in the buffers that it shares with others, for who fills it
-/// from CUDA (cudaGraphicsGLRegisterBuffer) or draws it himself.
+/// Where a mesh lies in the buffers that it shares with others.
 struct MeshPlace {
   unsigned positions = 0, normals = 0, triangles = 0;  ///< names of OpenGL buffers
   std::uint32_t first_vertex = 0, vertices = 0;        ///< of 12 bytes each
@@ -67,6 +66,9 @@ class MeshPool {
   /// Room for a mesh that the caller fills before it is drawn.
   PooledMesh reserve(std::uint32_t vertices, std::uint32_t triangles, bool normals,
                      Vec3d origin = {});
+
+  /// A mesh with normals in buffers that somebody else owns, and keeps while it is drawn.
+  static PooledMesh borrow(const MeshPlace& place, Vec3d origin = {});
 
   /// Room in memory to write a reserved mesh to; it must be unmapped before drawing.
   struct Mapping {

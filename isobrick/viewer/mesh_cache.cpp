@@ -39,26 +39,33 @@ bool MeshCache::has_any(const NodeKey& key, double isovalue) const {
 void MeshCache::put(MeshPtr mesh) {
   if (find(mesh->key, mesh->isovalue, mesh->coarser)) return;
   bytes_ += mesh->bytes();
+  device_bytes_ += mesh->device_bytes;
   ++meshes_;
   nodes_[mesh->key].push_back({std::move(mesh), now_});
 }
 
 bool MeshCache::shrink() {
-  if (bytes_ <= budget_) return true;
+  const auto keeps_budgets = [&] { return bytes_ <= budget_ && device_bytes_ <= device_budget_; };
+  if (keeps_budgets()) return true;
   std::vector<std::pair<std::uint64_t, const NodeMesh*>> old;
   for (const auto& [key, entries] : nodes_)
     for (const Entry& entry : entries)
       if (entry.used < now_) old.emplace_back(entry.used, entry.mesh.get());
   std::sort(old.begin(), old.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  // Not for each mesh that is made anew.
+  const std::uint64_t enough = budget_ - budget_ / 8, there = device_budget_ - device_budget_ / 8;
   for (const auto& [used, mesh] : old) {
-    if (bytes_ <= budget_) return true;
+    const bool here_too_many = bytes_ > enough, there_too_many = device_bytes_ > there;
+    if (!here_too_many && !there_too_many) break;
+    if (!here_too_many && mesh->device_bytes == 0) continue;
     const auto found = nodes_.find(mesh->key);
     bytes_ -= mesh->bytes();
+    device_bytes_ -= mesh->device_bytes;
     --meshes_;
     std::erase_if(found->second, [&](const Entry& entry) { return entry.mesh.get() == mesh; });
     if (found->second.empty()) nodes_.erase(found);
   }
-  return bytes_ <= budget_;
+  return keeps_budgets();
 }
 
 }  // namespace isobrick

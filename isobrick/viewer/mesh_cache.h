@@ -15,7 +15,9 @@ using MeshPtr = std::shared_ptr<const NodeMesh>;
 /// used dropped first. Not thread-safe.
 class MeshCache {
  public:
-  explicit MeshCache(std::uint64_t budget) : budget_(budget) {}
+  /// In bytes of host memory, and of a device's for meshes that lie there.
+  MeshCache(std::uint64_t budget, std::uint64_t device_budget)
+      : budget_(budget), device_budget_(device_budget) {}
 
   /// The node's mesh with exactly these coarser neighbours, or null.
   MeshPtr find(const NodeKey& key, double isovalue, std::uint32_t coarser);
@@ -27,11 +29,14 @@ class MeshCache {
 
   /// What is found from now on is kept by the next shrink().
   void begin_use() { ++now_; }
-  /// Drops what was not used since begin_use() until the budget is kept. False
-  /// when that does not do.
+  /// When a budget is exceeded, drops what was not used since begin_use() until there is
+  /// some room again. False when the budgets are exceeded all the same.
   bool shrink();
 
+  void set_device_budget(std::uint64_t bytes) { device_budget_ = bytes; }
+
   std::uint64_t bytes() const { return bytes_; }
+  std::uint64_t device_bytes() const { return device_bytes_; }
   std::uint64_t meshes() const { return meshes_; }
 
  private:
@@ -40,7 +45,7 @@ class MeshCache {
     std::uint64_t used = 0;
   };
 
-  std::uint64_t budget_, bytes_ = 0, meshes_ = 0, now_ = 1;
+  std::uint64_t budget_, device_budget_, bytes_ = 0, device_bytes_ = 0, meshes_ = 0, now_ = 1;
   std::unordered_map<NodeKey, std::vector<Entry>, NodeKeyHash> nodes_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "isobrick/surface/surface_options.h"
@@ -24,6 +25,8 @@ struct MeshIdHash {
   }
 };
 
+class DeviceMesh;
+
 /// The surface in one node. Immutable once it is made.
 struct NodeMesh {
   NodeKey key;
@@ -33,6 +36,9 @@ struct NodeMesh {
   /// smaller samples; triangles number the mesh's own vertices, counter-clockwise
   /// from that side.
   MeshBuffer mesh;
+  /// The same on a device, instead; see device_mesher.h.
+  std::shared_ptr<const DeviceMesh> device;
+  std::uint64_t device_triangles = 0, device_bytes = 0;  ///< of that
   /// How many of the triangles, the last ones, are the ribbons along the borders to coarser
   /// neighbours: a small part of a cell wide, across the surface, seen from both sides.
   std::uint32_t ribbon_triangles = 0;
@@ -40,7 +46,9 @@ struct NodeMesh {
   std::string damage;
 
   MeshId id() const { return {key, isovalue, coarser}; }
-  bool empty() const { return mesh.triangles.size() == 0; }
+  std::uint64_t triangles() const { return mesh.triangles.size() + device_triangles; }
+  bool empty() const { return triangles() == 0; }
+  /// Of host memory.
   std::uint64_t bytes() const {
     return sizeof(NodeMesh) + mesh.positions.capacity() * sizeof(Vec3f) +
            mesh.normals.capacity() * sizeof(Vec3f) + mesh.triangles.capacity() * sizeof(Triangle);

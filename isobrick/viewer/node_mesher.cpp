@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 #include <vector>
 
+#include "isobrick/core/error.h"
 #include "isobrick/surface/grid_extractor.h"
 #include "isobrick/surface/world_map.h"
 #include "isobrick/viewer/node_border.h"
@@ -30,6 +32,8 @@ struct NodeMesher::Impl {
   std::vector<float> inverse[3];
   GridExtractor extractor;
   MeshBuffer work;
+  std::unique_ptr<GridWorker> worker;
+  std::string failure;
   Clock::duration busy{};
 
   Impl(const NodeGrid& g, ResidentBricks& b, Vec3d origin)
@@ -105,6 +109,18 @@ struct NodeMesher::Impl {
     return v;
   }
 
+  bool make_on_device(const GridView& v, NodeMesh& out) {
+    if (!worker) return false;
+    try {
+      worker->make(v, out);
+      return true;
+    } catch (const Error& e) {
+      failure = e.what();
+      worker.reset();
+      return false;
+    }
+  }
+
   void make(NodeMesh& out, const Wanted& wanted) {
     samples.read(out.key.level, points_around(out.key), out.isovalue, wanted, around);
     if (out.coarser) {
@@ -112,8 +128,11 @@ struct NodeMesher::Impl {
       border.apply(out.key, out.coarser, out.isovalue, wanted, field);
     }
     const auto start = Clock::now();
-    out.ribbon_triangles = extractor.extract(view_of(out.key, out.coarser != 0), work);
-    shrink(work, out.mesh);
+    const GridView grid_of_node = view_of(out.key, out.coarser != 0);
+    if (!make_on_device(grid_of_node, out)) {
+      out.ribbon_triangles = extractor.extract(grid_of_node, work);
+      shrink(work, out.mesh);
+    }
     busy += Clock::now() - start;
   }
 
@@ -143,6 +162,13 @@ NodeMesh NodeMesher::mesh(const NodeKey& key, double isovalue, std::uint32_t coa
   impl_->make(out, wanted);
   return out;
 }
+
+void NodeMesher::set_worker(std::unique_ptr<GridWorker> worker) {
+  impl_->worker = std::move(worker);
+  impl_->failure.clear();
+}
+
+const std::string& NodeMesher::failure() const { return impl_->failure; }
 
 NodeMesher::Needs NodeMesher::needs(const NodeKey& key) const {
   return {impl_->grid.level(key.level).source,

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 
+#include "isobrick/viewer/device_mesher.h"
 #include "isobrick/viewer/node_mesh.h"
 #include "isobrick/viewer/node_samples.h"
 
@@ -24,6 +26,11 @@ class NodeMesher {
   /// The mesh of a node whose neighbours in `coarser` (directions) lie one level
   /// above. Throws Abandoned, DamageError and what else reading bricks throws.
   NodeMesh mesh(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
+
+  /// From now on a device makes the meshes of what is read; null: this thread. The same
+  /// meshes. When the device fails, this thread goes on alone: failure() says why.
+  void set_worker(std::unique_ptr<GridWorker> worker);
+  const std::string& failure() const;
 
   /// The bricks that this needs, by stored level.
   struct Needs {

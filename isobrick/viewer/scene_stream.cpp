@@ -38,6 +38,7 @@ class Running final : public Wanted {
   std::optional<int> slot;
   SliceRequest request;
   std::atomic<bool> abandoned = false;
+  bool by_device = false;
 };
 
 /// A place for a slice.
@@ -68,6 +69,7 @@ struct SceneStream::Shared {
   std::optional<CutIndex> index;
   std::vector<MeshJob> jobs;  ///< the most urgent last
   std::vector<std::shared_ptr<Running>> running;
+  std::shared_ptr<DeviceMesher> device;
   MeshCache meshes;
   bool full = false;
   std::uint64_t version = 0;
@@ -84,7 +86,7 @@ struct SceneStream::Shared {
         options(std::move(o)),
         bricks(source, options.brick_bytes),
         planner(tree->grid(), bricks, options.origin),
-        meshes(options.mesh_bytes) {}
+        meshes(options.mesh_bytes, options.device_bytes) {}
 
   void plan();
   void run();
@@ -95,6 +97,8 @@ struct SceneStream::Shared {
   bool make_mesh(NodeMesher& mesher, const Running& r, const std::optional<MeshJob>& next,
                  std::unique_lock<std::mutex>& lock);
   bool make_slice(const std::shared_ptr<Running>& r, std::unique_lock<std::mutex>& lock);
+  void follow_device(NodeMesher& mesher, std::shared_ptr<DeviceMesher>& used,
+                     std::unique_lock<std::mutex>& lock);
   void publish(const Running& done, NodeMesh&& mesh, double seconds);
   void make_room();
   void count_wanted();
@@ -172,8 +176,9 @@ std::shared_ptr<Running> SceneStream::Shared::take(std::unique_lock<std::mutex>&
 void SceneStream::Shared::publish(const Running& done, NodeMesh&& mesh, double seconds) {
   counters.mesh_seconds += seconds;
   ++counters.meshes_made;
+  if (done.by_device) ++counters.device_meshes_made;
   if (!mesh.damage.empty()) ++counters.damaged;
-  triangles_made += mesh.mesh.triangles.size();
+  triangles_made += mesh.triangles();
   blocks_made += static_cast<std::uint64_t>(tree->active_blocks(done.job.key, done.job.isovalue));
   meshes.put(std::make_shared<const NodeMesh>(std::move(mesh)));
   make_room();
@@ -230,13 +235,39 @@ bool SceneStream::Shared::make_slice(const std::shared_ptr<Running>& r,
   return true;
 }
 
+/// Gives the lock up meanwhile: setting a device up takes its time.
+void SceneStream::Shared::follow_device(NodeMesher& mesher, std::shared_ptr<DeviceMesher>& used,
+                                        std::unique_lock<std::mutex>& lock) {
+  used = device;
+  lock.unlock();
+  std::string failure;
+  try {
+    mesher.set_worker(used ? used->worker() : nullptr);
+  } catch (const Error& e) {
+    mesher.set_worker(nullptr);
+    failure = e.what();
+  }
+  lock.lock();
+  if (failure.empty()) return;
+  counters.device_failure = failure;
+  if (used == device) device.reset();
+  used.reset();
+}
+
 void SceneStream::Shared::run() {
   NodeMesher mesher(tree->grid(), bricks, options.origin);
+  std::shared_ptr<DeviceMesher> used;
   std::unique_lock lock(mutex);
   while (const std::shared_ptr<Running> r = take(lock)) {
+    if (used != device) follow_device(mesher, used, lock);
+    r->by_device = used != nullptr;
     std::optional<MeshJob> next;
     if (!jobs.empty()) next = jobs.back();
     const bool done = r->slot ? make_slice(r, lock) : make_mesh(mesher, *r, next, lock);
+    if (!mesher.failure().empty() && used == device) {
+      counters.device_failure = mesher.failure();
+      device.reset();
+    }
     std::erase(running, r);
     change.notify_all();
     if (done && options.on_change && !stop) {
@@ -280,7 +311,7 @@ void SceneStream::Shared::rebuild_drawable() {
       show_before(i);
     next->nodes.insert(next->nodes.end(), shown[i].begin(), shown[i].end());
   }
-  for (const DrawnNode& node : next->nodes) next->triangles += node.mesh->mesh.triangles.size();
+  for (const DrawnNode& node : next->nodes) next->triangles += node.mesh->triangles();
   // What the cut still waits for is kept as well.
   for (const CutNode& node : cut.nodes)
     for (const double isovalue : cut.isovalues) meshes.find(node.key, isovalue, node.coarser);
@@ -335,6 +366,20 @@ std::shared_ptr<const Drawable> SceneStream::drawable() {
   return shared_->drawn;
 }
 
+void SceneStream::set_device(std::shared_ptr<DeviceMesher> device) {
+  const std::lock_guard lock(shared_->mutex);
+  shared_->device = std::move(device);
+  shared_->counters.device_failure.clear();
+}
+
+void SceneStream::set_device_budget(std::uint64_t bytes) {
+  const std::lock_guard lock(shared_->mutex);
+  shared_->meshes.set_device_budget(bytes);
+  const bool was_full = shared_->full;
+  shared_->make_room();
+  if (was_full && !shared_->full) shared_->work.notify_all();
+}
+
 void SceneStream::set_slice(int slot, const std::optional<SliceRequest>& request) {
   const std::lock_guard lock(shared_->mutex);
   Slot& place = shared_->slots[slot];
@@ -383,6 +428,7 @@ StreamCounters SceneStream::counters() const {
   c.bricks_read = bricks.reads;
   c.meshes = shared_->meshes.meshes();
   c.mesh_bytes = shared_->meshes.bytes();
+  c.device_bytes = shared_->meshes.device_bytes();
   c.queue = shared_->jobs.size();
   c.working = shared_->running.size();
   if (shared_->blocks_made > 0)

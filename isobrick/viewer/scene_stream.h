@@ -4,8 +4,10 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "isobrick/viewer/cut.h"
+#include "isobrick/viewer/device_mesher.h"
 #include "isobrick/viewer/drawable.h"
 #include "isobrick/viewer/resident_bricks.h"
 #include "isobrick/viewer/slice_image.h"
@@ -14,8 +16,9 @@ namespace isobrick {
 
 struct StreamOptions {
   int threads = 0;  ///< that read, decode and mesh; 0: all cores but one
-  std::uint64_t brick_bytes = std::uint64_t{1} << 30;  ///< budget of decoded bricks
-  std::uint64_t mesh_bytes = std::uint64_t{1} << 30;   ///< budget of node meshes
+  std::uint64_t brick_bytes = std::uint64_t{1} << 30;   ///< budget of decoded bricks
+  std::uint64_t mesh_bytes = std::uint64_t{1} << 30;    ///< budget of node meshes
+  std::uint64_t device_bytes = std::uint64_t{1} << 30;  ///< budget of those on a device
   Vec3d origin;  ///< world space; subtracted from all positions
   /// Called from a worker's thread whenever drawable() may give something new. Must
   /// not call the stream.
@@ -31,6 +34,9 @@ struct StreamCounters {
   std::uint64_t meshes = 0, mesh_bytes = 0, meshes_made = 0;
   std::uint64_t queue = 0, working = 0;  ///< meshes that wait, that are being made
   std::uint64_t damaged = 0;             ///< nodes that cannot be shown
+  std::uint64_t device_meshes_made = 0;  ///< of meshes_made, by a device
+  std::uint64_t device_bytes = 0;        ///< of meshes on a device
+  std::string device_failure;            ///< why the device makes no more meshes; or empty
   double triangles_per_block = 0;        ///< of the meshes made; 0: none yet
   bool mesh_budget_full = false;         ///< meshes are not made for lack of room
 };
@@ -55,6 +61,12 @@ class SceneStream {
   /// What to draw now. The same object until something changes. While an isovalue
   /// has nothing to show yet, what the one in its place showed before is kept.
   std::shared_ptr<const Drawable> drawable();
+
+  /// From now on this device makes meshes; null: the threads do. What has been made stays.
+  void set_device(std::shared_ptr<DeviceMesher> device);
+
+  /// Another budget of meshes on a device.
+  void set_device_budget(std::uint64_t bytes);
 
   /// From now on this slice is wanted in place `slot`, or none; before all meshes.
   void set_slice(int slot, const std::optional<SliceRequest>& request);

@@ -47,11 +47,22 @@ std::vector<WorldLine> edges(const std::array<Vec3d, 8>& c) {
   return lines;
 }
 
+/// Of what the device has for meshes: the part for those that it makes itself.
+std::uint64_t device_mesh_bytes(const PictureBudgets& budgets) {
+  return budgets.device_memory / 4 * 3;
+}
+
+/// What of that is in meshes; the rest falls between them.
+std::uint64_t device_cache_bytes(const PictureBudgets& budgets) {
+  return device_mesh_bytes(budgets) / 8 * 7;
+}
+
 StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change) {
   StreamOptions options;
   options.threads = budgets.threads;
   options.brick_bytes = budgets.memory / 2;
   options.mesh_bytes = budgets.memory - options.brick_bytes;
+  options.device_bytes = device_cache_bytes(budgets);
   options.on_change = std::move(on_change);
   return options;
 }
@@ -154,8 +165,11 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
                            std::function<void()> on_change)
     : store_(std::move(store)),
       budgets_(budgets),
-      scene_(std::make_unique<Scene>(store_bricks(store_),
-                                     stream_options(budgets, std::move(on_change)))) {}
+      scene_(std::make_unique<Scene>(store_bricks(store_), stream_options(budgets, on_change))),
+      device_(std::make_unique<DeviceMeshes>(scene_->stream(), device_mesh_bytes(budgets),
+                                             std::move(on_change))) {
+  device_->use(budgets.backend);
+}
 
 StorePicture::~StorePicture() = default;
 
@@ -197,6 +211,7 @@ void StorePicture::upload() {
   if (next_ == nullptr || next_ == shown_) next_ = newest;
   const auto start = Clock::now();
   for (const DrawnNode& node : next_->nodes) {
+    if (node.mesh->device) continue;
     Upload& upload = uploads_[node.mesh->id()];
     upload.used = frame_;
     if (upload.there) continue;
@@ -212,15 +227,22 @@ void StorePicture::upload() {
 
 void StorePicture::drop_unused() {
   if (shown_ != nullptr)
-    for (const DrawnNode& node : shown_->nodes) uploads_[node.mesh->id()].used = frame_;
-  if (pool_.bytes() <= budgets_.device_memory) return;
+    for (const DrawnNode& node : shown_->nodes)
+      if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
+        upload->second.used = frame_;
+  // What was uploaded and what the device makes itself share its memory.
+  const std::uint64_t uploaded = std::min(pool_.bytes(), budgets_.device_memory);
+  scene_->stream().set_device_budget(
+      std::min(device_cache_bytes(budgets_), budgets_.device_memory - uploaded));
+  const std::uint64_t made_there = scene_->stream().counters().device_bytes;
+  if (pool_.bytes() + made_there <= budgets_.device_memory) return;
   std::vector<std::pair<std::uint64_t, MeshId>> oldest;
   for (const auto& [id, upload] : uploads_)
     if (upload.used != frame_) oldest.emplace_back(upload.used, id);
   std::sort(oldest.begin(), oldest.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [used, id] : oldest) {
-    if (pool_.bytes() <= budgets_.device_memory) break;
+    if (pool_.bytes() + made_there <= budgets_.device_memory) break;
     uploads_.erase(id);
   }
 }
@@ -263,17 +285,18 @@ void StorePicture::draw_surfaces(const ViewSettings& settings) {
     }
     const auto number = static_cast<std::size_t>(node.isovalue);
     const auto upload = uploads_.find(node.mesh->id());
-    if (number >= shown_surfaces_.size() || upload == uploads_.end() ||
-        upload->second.place.empty())
-      continue;
+    const bool uploaded = upload != uploads_.end() && !upload->second.place.empty();
+    if (number >= shown_surfaces_.size() || (!uploaded && !node.mesh->device)) continue;
     const SurfaceSettings& surface = settings.surfaces[shown_surfaces_[number]];
     state_.isovalues[shown_surfaces_[number]] = node.mesh->isovalue;
     MeshStyle style;
     style.colour = surface.colour;
     style.opacity = surface.opacity;
     style.id = static_cast<std::uint32_t>(shown_surfaces_[number] + 1);
-    renderer_.draw(upload->second.place, style);
-    state_.triangles += node.mesh->mesh.triangles.size();
+    renderer_.draw(
+        node.mesh->device ? device_->drawn(*node.mesh, scene_->origin()) : upload->second.place,
+        style);
+    state_.triangles += node.mesh->triangles();
     ++state_.nodes;
   }
 }
@@ -341,9 +364,11 @@ void StorePicture::draw_marks(const ViewSettings& settings) {
 void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
                         double coarser) {
   ++frame_;
+  device_->update();
   update_scene(camera, width, height, settings, coarser);
   const auto before = shown_;
   upload();
+  device_->retire(shown_ != before ? before : nullptr);
   const bool other_slices = update_slices(settings);
   std::string shows = what_shows(camera, width, height, settings);
   // A pointer that moves over panels must not cost a picture.
@@ -353,10 +378,11 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     draw_slices(settings);
     draw_marks(settings);
     renderer_.end();
+    device_->forget();
     shows_ = std::move(shows);
   }
   drop_unused();
-  state_.device_bytes = pool_.bytes();
+  state_.device_bytes = pool_.bytes() + scene_->stream().counters().device_bytes;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;

@@ -12,6 +12,7 @@
 #include "isobrick/render/mesh_pool.h"
 #include "isobrick/render/renderer.h"
 #include "isobrick/viewer/scene.h"
+#include "isobrick/window/device_meshes.h"
 #include "isobrick/window/view_settings.h"
 
 namespace isobrick {
@@ -21,6 +22,7 @@ struct PictureBudgets {
   std::uint64_t memory = std::uint64_t{2} << 30;         ///< host: decoded bricks and meshes
   std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes on the device
   int threads = 0;                                       ///< 0: all cores but one
+  Backend backend = Backend::automatic;                  ///< what makes meshes; see DeviceMeshes
 };
 
 /// What a picture shows and what it still lacks.
@@ -42,7 +44,7 @@ struct PictureState {
 class StorePicture {
  public:
   /// Reads the ranges. `on_change` is called from worker threads when a new
-  /// picture would show more. Throws what Scene and Renderer do.
+  /// picture would show more. Throws what Scene, Renderer and DeviceMeshes::use() do.
   StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
                std::function<void()> on_change);
   ~StorePicture();
@@ -50,6 +52,7 @@ class StorePicture {
   const StoreReader& store() const { return *store_; }
   Scene& scene() { return *scene_; }
   Renderer& renderer() { return renderer_; }
+  DeviceMeshes& device() { return *device_; }
 
   /// The box around the volume, axis by axis of world space.
   WorldBox bounds() const;
@@ -91,6 +94,7 @@ class StorePicture {
   Renderer renderer_;
   MeshPool pool_;
   std::unique_ptr<Scene> scene_;
+  std::unique_ptr<DeviceMeshes> device_;
   std::shared_ptr<const Drawable> shown_, next_;
   std::vector<std::size_t> shown_surfaces_;  ///< which surface each isovalue of the scene is
   std::unordered_map<MeshId, Upload, MeshIdHash> uploads_;

@@ -7,7 +7,9 @@
 #include <fstream>
 #include <map>
 
+#include "isobrick/core/error.h"
 #include "isobrick/pipeline/convert.h"
+#include "isobrick/pipeline/gpu_backend.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/render/vectors.h"
 #include "isobrick/volumes/synth_source.h"
@@ -190,6 +192,52 @@ TEST_F(Picture, MeshesOnTheDeviceKeepNoneInHostMemory) {
   EXPECT_GT(all, budgets.memory) << "the test has too few meshes";
   EXPECT_LE(alive, std::max(budgets.memory / 2, shown));
   EXPECT_GT(picture_->state().device_bytes, alive);
+}
+
+TEST_F(Picture, IsTheSameWhoeverMakesTheMeshes) {
+  open(SynthKind::gyroid, {200, 150, 170}, {.backend = Backend::cpu});
+  settings_.pixel_error = 1;
+  if (cuda_device_count() == 0) {
+    EXPECT_THROW(picture_->device().use(Backend::cuda), Error);
+    GTEST_SKIP() << "there is no CUDA device";
+  }
+  const std::vector<double> isovalues{110.5, 127.5, 140};
+  std::vector<std::vector<std::uint8_t>> expected;
+  for (const double isovalue : isovalues) {
+    settings_.surfaces[0].isovalue = isovalue;
+    expected.push_back(pixels());
+  }
+  EXPECT_EQ(picture_->scene().stream().counters().device_meshes_made, 0u);
+  show({.backend = Backend::cuda});
+  EXPECT_EQ(picture_->device().shares_memory(), !current_gl_device().software);
+  for (std::size_t i = 0; i < isovalues.size(); ++i) {
+    settings_.surfaces[0].isovalue = isovalues[i];
+    EXPECT_EQ(pixels(), expected[i]) << isovalues[i];
+  }
+  const StreamCounters made = picture_->scene().stream().counters();
+  EXPECT_EQ(made.device_meshes_made, made.meshes_made);
+  EXPECT_EQ(made.device_failure, "");
+  EXPECT_EQ(made.device_bytes > 0, picture_->device().shares_memory());
+  // Switched while running, some of the meshes here and some there.
+  show({.backend = Backend::cuda});
+  for (std::size_t i = 0; i < isovalues.size(); ++i) {
+    picture_->device().use(i % 2 ? Backend::cuda : Backend::cpu);
+    settings_.surfaces[0].isovalue = isovalues[i];
+    EXPECT_EQ(pixels(), expected[i]) << isovalues[i];
+  }
+}
+
+TEST_F(Picture, KeepsTheBudgetOfADeviceThatMakesMeshes) {
+  const PictureBudgets budgets{
+      .memory = 256u << 20, .device_memory = 32u << 20, .backend = Backend::automatic};
+  open(SynthKind::gyroid, {192, 192, 192}, budgets);
+  settings_.pixel_error = 0.5f;
+  for (int i = 0; i < 12; ++i) {
+    settings_.surfaces[0].isovalue = 90.5 + 5 * i;
+    draw();
+    EXPECT_TRUE(picture_->state().covers);
+    EXPECT_LE(picture_->state().device_bytes, budgets.device_memory);
+  }
 }
 
 TEST_F(Picture, ADamagedBrickIsMarkedAndTheRestIsShown) {

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstdint>
+
+#include "isobrick/surface/case_rule.h"
+#include "isobrick/surface/grid_view.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick::gpu {
+
+inline constexpr int kGridRows = kGridPoints * kGridPoints;
+
+/// A row of a grid's points: which are inside, which are numbers (the last of kGridPoints
+/// points has a word of its own); which edges from its points cross, along x, y, z, and the
+/// number of the first vertex on each of them; the number of the first triangle of the cells
+/// above it.
+struct GridRow {
+  std::uint64_t inside[2], number[2];
+  std::uint64_t crossing[3][2];
+  std::uint32_t first_vertex[3], first_triangle;
+  std::uint32_t border_vertices, ribbon_sides;  ///< in rows before
+};
+
+/// How large a grid's mesh is, ribbons apart.
+struct GridTotals {
+  std::uint32_t vertices, triangles;
+  std::uint32_t border_vertices, ribbon_sides;  ///< two vertices, two triangles each
+};
+
+/// A grid on the device, and the work space of its mesh there.
+struct GridWork {
+  GridView grid;
+  const CaseTables* tables;
+  GridRow* rows;               ///< kGridRows
+  std::uint32_t* counts;       ///< 4 · kGridRows
+  std::uint8_t* faces;         ///< of each vertex; only where coarser grids meet this one
+  std::uint32_t* ribbon_of;    ///< of each vertex, likewise
+  GridTotals* totals;          ///< read by the host
+  Vec3f *positions, *normals;  ///< the mesh, from here on for launch_grid_mesh() only
+  Triangle* triangles;
+};
+
+/// Finds the size of the mesh, into `totals`.
+void launch_grid_count(const GridWork& work, bool meets_coarser, cudaStream_t stream);
+/// Writes the mesh; `totals` as counted.
+void launch_grid_mesh(const GridWork& work, const GridTotals& totals, bool meets_coarser,
+                      cudaStream_t stream);
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,177 @@
+#include "isobrick/gpu/mesh_memory.h"
+
+#include <cuda.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <mutex>
+#include <vector>
+
+#include "isobrick/core/error.h"
+#include "isobrick/core/free_list.h"
+#include "isobrick/gpu/cuda_check.h"
+
+namespace isobrick::gpu {
+namespace {
+
+constexpr std::uint32_t kMostVertices = 1u << 20, kFewestVertices = 1u << 17;
+constexpr std::uint64_t kVertexBytes = 4 * sizeof(Vec3f);  // with a normal and two triangles
+
+/// A function of the driver; the program is not linked to it.
+template <class F>
+F driver_function(const char* name) {
+  void* function = nullptr;
+  cudaDriverEntryPointQueryResult found{};
+  check(cudaGetDriverEntryPointByVersion(name, &function, 12000, cudaEnableDefault, &found));
+  if (found != cudaDriverEntryPointSuccess || function == nullptr)
+    throw Error(fmt::format("the CUDA driver has no {}", name));
+  return reinterpret_cast<F>(function);
+}
+
+struct Driver {
+  decltype(&cuMemCreate) create = driver_function<decltype(&cuMemCreate)>("cuMemCreate");
+  decltype(&cuMemRelease) release = driver_function<decltype(&cuMemRelease)>("cuMemRelease");
+  decltype(&cuMemExportToShareableHandle) export_handle =
+      driver_function<decltype(&cuMemExportToShareableHandle)>("cuMemExportToShareableHandle");
+  decltype(&cuMemAddressReserve) reserve =
+      driver_function<decltype(&cuMemAddressReserve)>("cuMemAddressReserve");
+  decltype(&cuMemAddressFree) free =
+      driver_function<decltype(&cuMemAddressFree)>("cuMemAddressFree");
+  decltype(&cuMemMap) map = driver_function<decltype(&cuMemMap)>("cuMemMap");
+  decltype(&cuMemUnmap) unmap = driver_function<decltype(&cuMemUnmap)>("cuMemUnmap");
+  decltype(&cuMemSetAccess) set_access =
+      driver_function<decltype(&cuMemSetAccess)>("cuMemSetAccess");
+};
+
+void check_driver(CUresult result, const char* what) {
+  if (result != CUDA_SUCCESS)
+    throw Error(fmt::format("CUDA: memory to share with OpenGL: {} failed with error {}", what,
+                            static_cast<int>(result)));
+}
+
+/// A block with its bookkeeping.
+class Block final : public MeshBlock {
+ public:
+  Block(const Driver& driver, int device, std::uint32_t vertex_room)
+      : free_vertices(vertex_room), free_triangles(2 * vertex_room), driver_(driver) {
+    vertices = vertex_room;
+    triangles = 2 * vertex_room;
+    bytes = kVertexBytes * vertex_room;
+    CUmemAllocationProp properties{};
+    properties.type = CU_MEM_ALLOCATION_TYPE_PINNED;
+    properties.requestedHandleTypes = CU_MEM_HANDLE_TYPE_POSIX_FILE_DESCRIPTOR;
+    properties.location = {CU_MEM_LOCATION_TYPE_DEVICE, {device}};
+    check_driver(driver_.create(&memory_, bytes, &properties, 0), "cuMemCreate");
+    try {
+      check_driver(driver_.reserve(&address_, bytes, 0, 0, 0), "cuMemAddressReserve");
+      check_driver(driver_.map(address_, bytes, 0, memory_, 0), "cuMemMap");
+      mapped_ = true;
+      CUmemAccessDesc access{};
+      access.location = properties.location;
+      access.flags = CU_MEM_ACCESS_FLAGS_PROT_READWRITE;
+      check_driver(driver_.set_access(address_, bytes, &access, 1), "cuMemSetAccess");
+      check_driver(
+          driver_.export_handle(&file, memory_, CU_MEM_HANDLE_TYPE_POSIX_FILE_DESCRIPTOR, 0),
+          "cuMemExportToShareableHandle");
+    } catch (...) {
+      end();
+      throw;
+    }
+  }
+  ~Block() { end(); }
+  Block(const Block&) = delete;
+  Block& operator=(const Block&) = delete;
+
+  GridMeshPlace place(std::uint32_t first_vertex, std::uint32_t first_triangle) const {
+    auto* positions = reinterpret_cast<Vec3f*>(address_);
+    Vec3f* normals = positions + vertices;
+    auto* first = reinterpret_cast<Triangle*>(normals + vertices);
+    return {positions + first_vertex, normals + first_vertex, first + first_triangle};
+  }
+
+  FreeList free_vertices, free_triangles;
+
+ private:
+  void end() {
+    if (file >= 0) (void)close(file);
+    if (mapped_) (void)driver_.unmap(address_, bytes);
+    if (address_ != 0) (void)driver_.free(address_, bytes);
+    (void)driver_.release(memory_);
+  }
+
+  Driver driver_;
+  CUmemGenericAllocationHandle memory_ = 0;
+  CUdeviceptr address_ = 0;
+  bool mapped_ = false;
+};
+
+std::uint32_t block_vertices(std::uint64_t budget) {
+  std::uint32_t vertices = kMostVertices;
+  while (vertices > kFewestVertices && vertices * kVertexBytes > budget / 4) vertices /= 2;
+  return vertices;
+}
+
+}  // namespace
+
+struct MeshMemory::Impl {
+  int device;
+  std::uint64_t budget;
+  Driver driver;
+  std::uint32_t room;
+  mutable std::mutex mutex;
+  std::vector<std::shared_ptr<Block>> blocks;
+
+  Impl(int d, std::uint64_t b) : device(d), budget(b), room(block_vertices(b)) { add(); }
+
+  void add() { blocks.push_back(std::make_shared<Block>(driver, device, room)); }
+
+  static std::optional<MeshSpan> take_from(const std::shared_ptr<Block>& block,
+                                           std::uint32_t vertices, std::uint32_t triangles) {
+    const auto vertex = block->free_vertices.take(vertices);
+    if (!vertex) return std::nullopt;
+    const auto triangle = block->free_triangles.take(triangles);
+    if (triangle)
+      return MeshSpan{block,     *vertex,   vertices,
+                      *triangle, triangles, block->place(*vertex, *triangle)};
+    block->free_vertices.give_back(*vertex, vertices);
+    return std::nullopt;
+  }
+};
+
+MeshMemory::MeshMemory(int device, std::uint64_t budget)
+    : impl_(std::make_unique<Impl>(device, budget)) {}
+MeshMemory::~MeshMemory() = default;
+
+std::optional<MeshSpan> MeshMemory::take(std::uint32_t vertices, std::uint32_t triangles) {
+  const std::lock_guard lock(impl_->mutex);
+  for (const std::shared_ptr<Block>& block : impl_->blocks)
+    if (auto span = Impl::take_from(block, vertices, triangles)) return span;
+  const std::uint64_t each = impl_->blocks.front()->bytes;
+  if (vertices > impl_->room || triangles > 2 * impl_->room ||
+      (impl_->blocks.size() + 1) * each > impl_->budget)
+    return std::nullopt;
+  impl_->add();
+  return Impl::take_from(impl_->blocks.back(), vertices, triangles);
+}
+
+void MeshMemory::give_back(const MeshSpan& span) {
+  const std::lock_guard lock(impl_->mutex);
+  for (const std::shared_ptr<Block>& block : impl_->blocks)
+    if (block == span.block) {
+      block->free_vertices.give_back(span.first_vertex, span.vertices);
+      block->free_triangles.give_back(span.first_triangle, span.triangles);
+    }
+}
+
+std::shared_ptr<const MeshBlock> MeshMemory::first_block() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->blocks.front();
+}
+
+std::uint64_t MeshMemory::bytes() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->blocks.size() * impl_->blocks.front()->bytes;
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "isobrick/gpu/grid_extractor.h"
+
+namespace isobrick::gpu {
+
+/// A large piece of device memory that other interfaces (OpenGL) can import: an array of
+/// positions, one of as many normals, one of twice as many triangles.
+struct MeshBlock {
+  int file = -1;                              ///< descriptor to import it by; closed with the block
+  std::uint64_t bytes = 0;                    ///< all arrays, one behind the other without gaps
+  std::uint32_t vertices = 0, triangles = 0;  ///< room
+};
+
+/// A mesh's place in a block.
+struct MeshSpan {
+  std::shared_ptr<const MeshBlock> block;
+  std::uint32_t first_vertex = 0, vertices = 0;
+  std::uint32_t first_triangle = 0, triangles = 0;
+  GridMeshPlace place;  ///< on the device
+};
+
+/// Device memory for many meshes, in blocks that stay until the end. Thread-safe.
+class MeshMemory {
+ public:
+  /// Takes the first block at once; never more than `budget` bytes of blocks in all. Throws
+  /// Error where the device's memory cannot be exported, or is short.
+  MeshMemory(int device, std::uint64_t budget);
+  ~MeshMemory();
+
+  /// Room for a mesh; nothing where there is none.
+  std::optional<MeshSpan> take(std::uint32_t vertices, std::uint32_t triangles);
+  /// The place is free for others: nobody reads or writes it any more.
+  void give_back(const MeshSpan& span);
+
+  std::shared_ptr<const MeshBlock> first_block() const;
+  /// Of blocks.
+  std::uint64_t bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,9 @@
+#include "isobrick/viewer/device_mesher.h"
+
+namespace isobrick {
+
+std::shared_ptr<DeviceMesher> open_device_mesher(const std::optional<DeviceId>&, std::uint64_t) {
+  return nullptr;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,119 @@
+#include "isobrick/window/device_meshes.h"
+
+#include <epoxy/gl.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/gpu_backend.h"
+
+namespace isobrick {
+
+/// What may still be in use by drawing calls that were made before.
+struct DeviceMeshes::Retired {
+  explicit Retired(std::shared_ptr<const Drawable> d)
+      : drawn(std::move(d)), end(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)) {}
+  ~Retired() { glDeleteSync(end); }
+  Retired(const Retired&) = delete;
+  Retired& operator=(const Retired&) = delete;
+  bool over() const {
+    const GLenum state = glClientWaitSync(end, 0, 0);
+    return state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED;
+  }
+
+  std::shared_ptr<const Drawable> drawn;
+  GLsync end;
+};
+
+DeviceMeshes::DeviceMeshes(SceneStream& stream, std::uint64_t budget,
+                           std::function<void()> on_change)
+    : stream_(stream), budget_(budget), on_change_(std::move(on_change)) {}
+
+DeviceMeshes::~DeviceMeshes() {
+  // Memory that is drawn from must not be given to others meanwhile.
+  if (!retired_.empty()) glFinish();
+}
+
+void DeviceMeshes::use(Backend backend) {
+  const bool must = backend == Backend::cuda;
+  if (must && !built_with_cuda())
+    throw Error("--backend cuda: this isobrick was built without CUDA; use --backend cpu");
+  backend_ = backend;
+  if (backend == Backend::cpu) return stream_.set_device(nullptr);
+  if (!opened_ && !opening_.valid())
+    opening_ = std::async(std::launch::async,
+                          [id = current_gl_device_id(), budget = budget_, changed = on_change_] {
+                            auto mesher = open_device_mesher(id, budget);
+                            if (changed) changed();
+                            return mesher;
+                          });
+  if (must && opening_.valid()) opening_.wait();
+  if (opened_)
+    stream_.set_device(mesher_);
+  else
+    update();
+  if (!must || mesher_) return;
+  backend_ = Backend::cpu;
+  throw Error(failure_.empty() ? "--backend cuda: there is no CUDA device here; use --backend cpu"
+                               : failure_);
+}
+
+void DeviceMeshes::update() {
+  if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return;
+  opened_ = true;
+  try {
+    mesher_ = opening_.get();
+  } catch (const Error& e) {
+    failure_ = e.what();
+  }
+  if (!mesher_) return;
+  if (const auto block = mesher_->shared_block()) {
+    try {
+      buffers_of(*block);
+    } catch (const Error&) {
+      mesher_->share_nothing();
+    }
+  }
+  if (backend_ != Backend::cpu) stream_.set_device(mesher_);
+}
+
+bool DeviceMeshes::shares_memory() const { return mesher_ && mesher_->shared_block(); }
+
+std::string DeviceMeshes::describe() const {
+  const std::string failure = stream_.counters().device_failure;
+  if (!failure.empty()) return fmt::format("CPU ({})", failure);
+  if (backend_ == Backend::cpu) return "CPU";
+  if (mesher_)
+    return fmt::format("{}{}", mesher_->name(),
+                       shares_memory() ? ", into OpenGL's buffers" : ", through host memory");
+  if (!failure_.empty()) return fmt::format("CPU ({})", failure_);
+  return opened_ ? "CPU (there is no CUDA device)" : "CPU";
+}
+
+const ImportedBuffers& DeviceMeshes::buffers_of(const DeviceBlock& block) {
+  Imported& imported = imported_[block.owner.get()];
+  if (!imported.buffers) {
+    imported.buffers =
+        std::make_unique<ImportedBuffers>(block.file, block.bytes, block.vertices, block.triangles);
+    imported.owner = block.owner;
+  }
+  return *imported.buffers;
+}
+
+const PooledMesh& DeviceMeshes::drawn(const NodeMesh& mesh, Vec3d origin) {
+  const DeviceMesh& there = *mesh.device;
+  const MeshPlace place =
+      buffers_of(there.block)
+          .place(there.first_vertex, there.vertices, there.first_triangle, there.triangles);
+  return borrowed_.emplace_back(MeshPool::borrow(place, origin));
+}
+
+void DeviceMeshes::retire(std::shared_ptr<const Drawable> drawn) {
+  while (!retired_.empty() && retired_.front()->over()) retired_.pop_front();
+  if (drawn != nullptr && mesher_) retired_.push_back(std::make_unique<Retired>(std::move(drawn)));
+}
+
+}  // namespace isobrick

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <unordered_map>
+
+#include "isobrick/pipeline/extract.h"
+#include "isobrick/render/imported_buffers.h"
+#include "isobrick/viewer/scene_stream.h"
+
+namespace isobrick {
+
+/// The device that makes a picture's meshes, and its memory as OpenGL sees it. For the thread
+/// of the picture's context.
+class DeviceMeshes {
+ public:
+  /// `budget`: of the device's memory for meshes. `on_change`: as of a stream.
+  DeviceMeshes(SceneStream& stream, std::uint64_t budget, std::function<void()> on_change);
+  ~DeviceMeshes();
+
+  /// From now on: Backend::automatic takes a CUDA device where there is one, as soon as it is
+  /// open, without waiting for it. Backend::cuda waits, and throws Error where there is none.
+  void use(Backend backend);
+  Backend backend() const { return backend_; }
+  /// Takes over a device that has been opened meanwhile.
+  void update();
+
+  /// Who makes meshes now, in a line: a device's name and how meshes get into pictures, or
+  /// "CPU" and why.
+  std::string describe() const;
+  /// Whether what a device makes is drawn from where it made it.
+  bool shares_memory() const;
+
+  /// A mesh on the device, to be drawn until the next forget().
+  const PooledMesh& drawn(const NodeMesh& mesh, Vec3d origin);
+  void forget() { borrowed_.clear(); }
+  /// These are not drawn from here on; kept until the device has drawn what it was told.
+  void retire(std::shared_ptr<const Drawable> drawn);
+
+ private:
+  struct Retired;
+  const ImportedBuffers& buffers_of(const DeviceBlock& block);
+
+  SceneStream& stream_;
+  std::uint64_t budget_;
+  std::function<void()> on_change_;
+  Backend backend_ = Backend::cpu;
+  std::future<std::shared_ptr<DeviceMesher>> opening_;
+  std::shared_ptr<DeviceMesher> mesher_;
+  bool opened_ = false;  ///< or tried in vain
+  std::string failure_;
+  struct Imported {
+    std::shared_ptr<const void> owner;
+    std::unique_ptr<ImportedBuffers> buffers;
+  };
+  std::unordered_map<const void*, Imported> imported_;
+  std::deque<PooledMesh> borrowed_;
+  std::deque<std::unique_ptr<Retired>> retired_;
+};
+
+}  // namespace isobrick

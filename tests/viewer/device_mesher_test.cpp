@@ -1,0 +1,109 @@
+#include "isobrick/viewer/device_mesher.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "isobrick/viewer/node_mesher.h"
+#include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/random_cut.h"
+
+namespace isobrick::test {
+namespace {
+
+class Always final : public Wanted {
+ public:
+  void check() const override {}
+};
+
+template <class T>
+bool same_bytes(const PodBuffer<T>& a, const PodBuffer<T>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
+/// Meshes of a device are those of this thread, byte for byte.
+class Device : public testing::Test {
+ protected:
+  void SetUp() override {
+    device_ = open_device_mesher(std::nullopt, std::uint64_t{64} << 20);
+    if (!device_) GTEST_SKIP() << "there is no CUDA device";
+  }
+
+  void expect_same(std::shared_ptr<const BrickSource> source, const Cut& cut) {
+    const NodeGrid grid(source->info());
+    ResidentBricks bricks(source, std::uint64_t{1} << 30);
+    NodeMesher here(grid, bricks, {1, 2, 3}), there(grid, bricks, {1, 2, 3});
+    there.set_worker(device_->worker());
+    for (const CutNode& node : cut.nodes) {
+      const auto make = [&](NodeMesher& mesher) {
+        return mesher.mesh(node.key, cut.isovalues.front(), node.coarser, Always());
+      };
+      const NodeMesh a = make(here), b = make(there);
+      ASSERT_EQ(there.failure(), "");
+      EXPECT_TRUE(same_bytes(a.mesh.positions, b.mesh.positions) &&
+                  same_bytes(a.mesh.normals, b.mesh.normals) &&
+                  same_bytes(a.mesh.triangles, b.mesh.triangles))
+          << "node " << node.key.node.x << ' ' << node.key.node.y << ' ' << node.key.node.z
+          << " of level " << node.key.level << ", " << a.mesh.triangles.size() << " and "
+          << b.mesh.triangles.size() << " triangles";
+      EXPECT_EQ(a.ribbon_triangles, b.ribbon_triangles);
+      triangles_ += a.triangles();
+      ribbons_ += a.ribbon_triangles;
+    }
+  }
+
+  std::shared_ptr<DeviceMesher> device_;
+  std::uint64_t triangles_ = 0, ribbons_ = 0;
+};
+
+template <class T>
+std::shared_ptr<MemoryBricks> volume_of(Int3 extent, const std::function<T(Int3)>& f,
+                                        const MemoryBricks::Options& options = {}) {
+  return std::make_shared<MemoryBricks>(extent, f, options);
+}
+
+TEST_F(Device, MakesTheSameMeshesInCutsOfManyLevels) {
+  const Index n = 171;
+  for (const auto& field : {ball, gyroid_ball, blobs}) {
+    const auto source =
+        volume_of<float>({n, n, n}, [&](Int3 p) { return static_cast<float>(field(p, n)); });
+    const NodeGrid grid(source->info());
+    for (unsigned seed = 1; seed < 4; ++seed)
+      expect_same(source, RandomCut(grid, seed, 3).cut({0.013}));
+  }
+  EXPECT_GT(triangles_, 100'000u);
+  EXPECT_GT(ribbons_, 1'000u);
+}
+
+TEST_F(Device, MakesTheSameMeshesWhereTheVolumeEndsAndAxesDiffer) {
+  MemoryBricks::Options options;
+  options.transform.spacing = {0.5, 1, 2.25};
+  options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, -1};  // mirrored
+  const auto source = volume_of<std::uint8_t>(
+      {150, 67, 93},
+      [](Int3 p) {
+        return static_cast<std::uint8_t>((p.x * 7 + p.y * 13 + p.z * p.x * 3) / 16 % 97 + 60);
+      },
+      options);
+  const NodeGrid grid(source->info());
+  for (unsigned seed = 1; seed < 3; ++seed) {
+    expect_same(source, RandomCut(grid, seed, 3).cut({100}));  // samples that are it
+    expect_same(source, RandomCut(grid, seed, 3).cut({100.25}));
+  }
+  EXPECT_GT(triangles_, 100'000u);
+}
+
+TEST_F(Device, MakesTheSameMeshesAroundWhatIsNoNumber) {
+  const Index n = 100;
+  const auto source = volume_of<float>({n, n, n}, [&](Int3 p) -> float {
+    if (p.x > 60 && p.y > 60) return std::numeric_limits<float>::quiet_NaN();
+    if (p.x == 20) return std::numeric_limits<float>::infinity();
+    return static_cast<float>(blobs(p, n));
+  });
+  const NodeGrid grid(source->info());
+  for (unsigned seed = 1; seed < 3; ++seed) expect_same(source, RandomCut(grid, seed, 3).cut({0}));
+  EXPECT_GT(triangles_, 10'000u);
+}
+
+}  // namespace
+}  // namespace isobrick::test
