@@ -12,6 +12,7 @@
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
+#include "isobrick/pipeline/stored_bricks.h"
 #include "isobrick/pipeline/workers.h"
 #include "isobrick/volumes/nrrd_writer.h"
 #include "isobrick/volumes/vdb_writer.h"
@@ -92,14 +93,6 @@ struct Piece {
   }
 };
 
-/// Whether all bricks that `part` touches are absent.
-bool is_absent(const Piece& in, Box3 part) {
-  bool absent = true;
-  for_each_point(in.lattice().bricks_of(part),
-                 [&](Int3 b) { absent = absent && !in.store.locate(in.level, b); });
-  return absent;
-}
-
 void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& options,
                 Workers& workers, OutputFile& output, Progress& progress) {
   const Lattice& lattice = in.lattice();
@@ -111,10 +104,8 @@ void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& op
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
   const std::uint64_t others =
       fixed_bytes(in.store.info(), in.level, workers.threads()) + lattice.brick_bytes();
-  for_each_piece(in.box, lattice.brick, lattice.brick, [&](Box3 part) {
-    const auto bytes = static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes();
-    progress.advance(bytes);
-    if (is_absent(in, part)) return;
+  for_each_stored_brick(in.store, in.level, in.box, [&](Int3 brick) {
+    const Box3 part = intersect(lattice.brick_box(brick), in.box);
     workers.execute([&] { read_slab(in.store, in.level, part, buffer.get()); });
     grid->put({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
     if (grid->memory() + others > options.memory)
@@ -122,6 +113,7 @@ void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& op
           "the grid takes more than the memory budget of {} MiB, and OpenVDB holds it whole: "
           "give more, or export a region or a coarser level",
           options.memory / kMiB));
+    progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
   });
   grid->write(output.temporary_path());
 }

@@ -129,16 +129,13 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(options.level)].lattice;
   Workers workers(options.threads);
   Signs signs(store, box, options, *set);
-  // As many bricks as there are in a file of ranges, or at least one.
-  const Int3 edge = lattice.brick;
-  const Index file = std::max<Index>(1, StoreReader::kRangeChunk * kBlockEdge / edge.x);
-  const Int3 first{box.lo.x / edge.x, box.lo.y / edge.y, box.lo.z / edge.z};
-  const Int3 end = ceil_div(box.hi, edge), step{file, file, file};
-  const Int3 groups = ceil_div(end - first, step);
-  progress.begin("signs", static_cast<std::uint64_t>(volume(groups)));
-  for_each_point({{0, 0, 0}, groups}, [&](Int3 group) {
-    const Int3 lo = first + group * step;
-    signs.put({lo, min(lo + step, end)}, workers);
+  // As many bricks at a time as there are in a file of ranges.
+  const Box3 bricks = lattice.bricks_of(box);
+  constexpr Int3 file{StoreReader::kRangeChunk, StoreReader::kRangeChunk, StoreReader::kRangeChunk};
+  const Box3 files{floor_div(bricks.lo, file), ceil_div(bricks.hi, file)};
+  progress.begin("signs", static_cast<std::uint64_t>(volume(files.extent())));
+  for_each_point(files, [&](Int3 f) {
+    signs.put(intersect({f * file, (f + Int3{1, 1, 1}) * file}, bricks), workers);
     room.check(*set);
     progress.advance(1);
   });

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "isobrick/pipeline/stored_bricks.h"
 #include "isobrick/pipeline/verify.h"
 #include "tests/pipeline/convert_store.h"
 
@@ -167,6 +168,63 @@ class Endless final : public VolumeSource {
  private:
   VolumeInfo info_;
 };
+
+/// Two samples in a large box, the fill value elsewhere.
+class TwoSamples final : public VolumeSource {
+ public:
+  TwoSamples() {
+    info_.extent = {3000, 2500, 2100};
+    info_.type = ScalarType::f32;
+    info_.name = "two";
+    info_.fill_value = 1;
+  }
+  const VolumeInfo& info() const override { return info_; }
+  bool random_access() const override { return true; }
+  bool sparse() const override { return true; }
+  bool is_fill(Box3 box) const override { return !box.contains(kA) && !box.contains(kB); }
+  void read(Box3 box, std::byte* out) override {
+    auto* samples = reinterpret_cast<float*>(out);
+    std::fill_n(samples, volume(box.extent()), 1.0F);
+    for (const Int3 p : {kA, kB})
+      if (box.contains(p)) samples[linear_index(p - box.lo, box.extent())] = -1;
+  }
+
+  static constexpr Int3 kA{5, 5, 5}, kB{2816, 1000, 2000};
+
+ private:
+  VolumeInfo info_;
+};
+
+TEST(StoredBricks, OfALargeEmptyBoxOnlyThoseWithSamplesAreLookedUp) {
+  TwoSamples source;
+  TemporaryFolder folder;
+  convert_quietly(source, folder / "a", {.levels = 1});
+  const StoreReader store(folder / "a");
+  std::vector<Int3> found;
+  const auto find = [&](const StoreReader& in, Box3 box) {
+    found.clear();
+    return for_each_stored_brick(in, 0, box, [&](Int3 b) { found.push_back(b); });
+  };
+  // The first sample of B's brick along x is in the range of the brick before it, too.
+  EXPECT_EQ(find(store, {{0, 0, 0}, source.info().extent}), 3u);
+  EXPECT_EQ(found, (std::vector<Int3>{{0, 0, 0}, {44, 15, 31}}));
+  EXPECT_EQ(find(store, {{100, 0, 0}, source.info().extent}), 2u);
+  EXPECT_EQ(found, (std::vector<Int3>{{44, 15, 31}}));
+  EXPECT_EQ(find(store, {{64, 64, 64}, {2000, 2000, 2000}}), 0u);
+}
+
+TEST(StoredBricks, WithoutRangesAllAreLookedUp) {
+  SparseMemory source = make_sparse<float>({100, 90, 70}, {{40, 40, 40}, {60, 60, 60}}, 3);
+  TemporaryFolder folder;
+  convert_quietly(source, folder / "a", {.brick = 32, .shard = 64, .levels = 1});
+  std::filesystem::remove_all(folder / "a/isobrick");
+  const StoreReader store(folder / "a");
+  std::vector<Int3> found;
+  EXPECT_EQ(for_each_stored_brick(store, 0, {{0, 0, 0}, {100, 90, 70}},
+                                  [&](Int3 b) { found.push_back(b); }),
+            4u * 3 * 3);
+  EXPECT_EQ(found, (std::vector<Int3>{{1, 1, 1}}));
+}
 
 TEST(ConvertSparse, WhatIsRememberedOfEachBrickIsPartOfTheBudget) {
   Endless source({2048, 2048, 2048});  // 2 million bricks
