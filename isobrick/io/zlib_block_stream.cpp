@@ -41,7 +41,17 @@ class ZlibBlockStream final : public ByteStream {
   std::size_t read(std::byte* out, std::size_t size) override {
     std::size_t done = 0;
     while (done < size) {
-      if (at_ == end_ && !next_block()) break;
+      if (at_ == end_) {
+        if (index_ == table_.blocks) break;
+        // A whole block that is wanted goes straight to where it is wanted.
+        const std::size_t bytes = next_bytes();
+        const bool whole = size - done >= bytes;
+        next_block(whole ? out + done : block_.data());
+        at_ = whole ? bytes : 0;
+        end_ = bytes;
+        if (whole) done += bytes;
+        continue;
+      }
       const std::size_t count = std::min(size - done, end_ - at_);
       std::memcpy(out + done, block_.data() + at_, count);
       at_ += count;
@@ -69,31 +79,33 @@ class ZlibBlockStream final : public ByteStream {
     return size;
   }
 
-  bool next_block() {
-    if (index_ == table_.blocks) return false;
-    const std::uint64_t packed = next_size();
-    end_ = static_cast<std::size_t>(index_ + 1 == table_.blocks ? table_.last_bytes
+  /// Of the next block, unpacked.
+  std::size_t next_bytes() const {
+    return static_cast<std::size_t>(index_ + 1 == table_.blocks ? table_.last_bytes
                                                                 : table_.block_bytes);
+  }
+
+  void next_block(std::byte* out) {
+    const std::uint64_t packed = next_size();
+    const std::size_t bytes = next_bytes();
     if (packed > input_.size())
       throw DamageError(
           fmt::format("{}: compressed block {} would have {} bytes, more than any of "
                       "{} unpacked",
-                      name(), index_, packed, end_));
+                      name(), index_, packed, bytes));
     packed_->read_exactly(input_.data(), static_cast<std::size_t>(packed));
     inflate_state state;
     isal_inflate_init(&state);
     state.crc_flag = ISAL_ZLIB;
     state.next_in = reinterpret_cast<std::uint8_t*>(input_.data());
     state.avail_in = static_cast<std::uint32_t>(packed);
-    state.next_out = reinterpret_cast<std::uint8_t*>(block_.data());
-    state.avail_out = static_cast<std::uint32_t>(end_);
-    const int result = isal_inflate(&state);
+    state.next_out = reinterpret_cast<std::uint8_t*>(out);
+    state.avail_out = static_cast<std::uint32_t>(bytes);
+    const int result = isal_inflate_stateless(&state);
     if (result != ISAL_DECOMP_OK || state.avail_out != 0 || state.block_state != ISAL_BLOCK_FINISH)
       throw DamageError(
           fmt::format("{}: compressed block {} is damaged (code {})", name(), index_, result));
-    at_ = 0;
     ++index_;
-    return true;
   }
 
   BlockTable table_;

@@ -62,7 +62,7 @@ void undo_deflate(Hdf5ChunkBuffers& buffers, std::size_t size) {
   state.avail_in = static_cast<std::uint32_t>(buffers.bytes.size());
   state.next_out = reinterpret_cast<std::uint8_t*>(buffers.other.data());
   state.avail_out = static_cast<std::uint32_t>(size);
-  const int result = isal_inflate(&state);
+  const int result = isal_inflate_stateless(&state);
   if (result != ISAL_DECOMP_OK || state.avail_out != 0 || state.block_state != ISAL_BLOCK_FINISH)
     throw DamageError(fmt::format("it does not unpack to {} bytes (code {})", size, result));
   std::swap(buffers.bytes, buffers.other);
