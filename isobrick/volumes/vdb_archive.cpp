@@ -30,8 +30,9 @@ openvdb::GridBase::Ptr VdbArchive::read_description(const VdbGrid& from) {
   const openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(from.type);
   in_.seekg(static_cast<std::streamoff>(from.begin));
   readGridCompression(in_);
-  grid->readMeta(in_);
+  // Metadata were read with the header: OpenVDB takes any length of them for true.
   grid->setSaveFloatAsHalf(from.half);
+  in_.seekg(static_cast<std::streamoff>(from.transform));
   grid->readTransform(in_);
   return grid;
 }

@@ -23,7 +23,7 @@ class VdbArchive final : private openvdb::io::Archive {
  public:
   explicit VdbArchive(const std::string& path);
 
-  /// The grid with its metadata and transform, but no tree. stream() is then where the tree
+  /// The grid with its transform, but neither metadata nor a tree. stream() is then where the tree
   /// begins: for a grid that shares another one's, at that one's.
   openvdb::GridBase::Ptr read_grid(const std::vector<VdbGrid>& grids, const VdbGrid& chosen);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <utility>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/printable.h"
@@ -25,7 +26,13 @@ constexpr std::size_t kUuidBytes = 36;
 constexpr std::uint32_t kMostText = 1 << 20;
 constexpr std::uint32_t kMostItems = 1 << 16;
 
-using Metadata = std::map<std::string, std::string>;
+/// A type and the bytes of a value, by name.
+using Metadata = std::map<std::string, std::pair<std::string, std::string>>;
+
+std::string text_of(const Metadata& metadata, const std::string& name) {
+  const auto found = metadata.find(name);
+  return found != metadata.end() && found->second.first == "string" ? found->second.second : "";
+}
 
 /// Walks through the fields of a file.
 class Fields {
@@ -70,9 +77,8 @@ class Fields {
     if (count > kMostItems) damaged(fmt::format("{} items of metadata", count));
     Metadata items;
     for (std::uint32_t i = 0; i < count; ++i) {
-      const std::string name = text();
-      text();  // the type
-      items[name] = text();
+      const std::string name = text(), type = text();
+      items[name] = {type, text()};
     }
     return items;
   }
@@ -98,12 +104,15 @@ void read_own_header(Fields& in, VdbGrid& grid) {
   const std::uint64_t next = in.at();
   in.seek(grid.begin);
   in.number<std::uint32_t>();  // how it is compressed
-  Metadata metadata = in.metadata();
-  grid.grid_class = shown(metadata["class"]);
+  const Metadata metadata = in.metadata();
+  grid.own_name = text_of(metadata, "name");
+  grid.unit = text_of(metadata, "unit");
+  grid.grid_class = shown(text_of(metadata, "class"));
+  grid.transform = in.at();
   grid.map = shown(in.text());
-  if (const std::string& memory = metadata["file_mem_bytes"];
-      memory.size() == sizeof(std::uint64_t))
-    std::memcpy(&grid.memory.emplace(), memory.data(), sizeof(std::uint64_t));
+  if (const auto memory = metadata.find("file_mem_bytes");
+      memory != metadata.end() && memory->second.second.size() == sizeof(std::uint64_t))
+    std::memcpy(&grid.memory.emplace(), memory->second.second.data(), sizeof(std::uint64_t));
   in.seek(next);
 }
 

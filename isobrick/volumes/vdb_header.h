@@ -13,10 +13,12 @@ namespace isobrick {
 struct VdbGrid {
   std::string unique_name;           ///< as the file keeps it, with the number of a repeated name
   std::string name;                  ///< as users say it: "density", "density[1]"
+  std::string own_name, unit;        ///< of its metadata: its name, and the unit of world space
   std::string type;                  ///< "Tree_float_5_4_3"
   bool half = false;                 ///< floats have 16 bits in the file
   std::string parent;                ///< unique name of the grid whose tree it shares, or empty
   std::uint64_t begin = 0, end = 0;  ///< bytes of the file that are the grid's
+  std::uint64_t transform = 0;       ///< where its transform begins, behind its metadata
   std::string grid_class;            ///< "level set", "fog volume", …, or empty
   std::string map;                   ///< kind of its transform: "UniformScaleMap"
   std::optional<std::uint64_t> memory;  ///< bytes of the tree, as its writer counted them

@@ -59,6 +59,7 @@ VdbNodeCounts count_vdb_nodes(std::istream& in, bool as_half) {
   const auto begin = in.tellg();
   Count buffers = 0, tiles = 0, children = 0;
   in.read(reinterpret_cast<char*>(&buffers), sizeof(Count));
+  if (buffers != 1) throw std::runtime_error("its tree has several buffers");
   in.seekg(sizeof(Value), std::ios_base::cur);  // the background
   in.read(reinterpret_cast<char*>(&tiles), sizeof(Count));
   in.read(reinterpret_cast<char*>(&children), sizeof(Count));

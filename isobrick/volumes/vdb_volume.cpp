@@ -157,12 +157,11 @@ std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::Cons
                                           std::size_t memory) {
   const Box3 box = region_of(in.grid, in.path, *in.read, in.said.region);
   Transform transform = transform_of(in.path, in.read->transform(), box.lo);
-  if (const auto unit = in.read->template getMetadata<openvdb::StringMetadata>(kVdbUnit))
-    transform.unit = unit->value();
+  if (!in.grid.unit.empty()) transform.unit = in.grid.unit;
   VolumeInfo info = describe_volume(in.path, box.extent(), scalar_type_of<Out>, transform, in.said);
   info.fill_value = static_cast<double>(tree->background());
   info.grid_class = in.grid.grid_class;
-  info.grid_name = in.read->getName();
+  info.grid_name = in.grid.own_name;
   return std::make_unique<VdbSource<Tree, Leaves, Out>>(
       std::move(info), in.grid.name, std::move(tree), std::move(leaves), memory, box.lo);
 }
