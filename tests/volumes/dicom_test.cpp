@@ -91,6 +91,13 @@ TEST_F(Dicom, DamagedFiles) {
   expect_damage_is_no_crash(dir, "d.dcm", bytes, 11);
 }
 
+TEST_F(Dicom, Mutations) {
+  write("v", 0, 2);
+  const std::string bytes = dir.read("v");
+  std::filesystem::remove(dir / "v");
+  expect_mutations_are_no_crash(dir, "m.dcm", bytes);
+}
+
 TEST_F(Dicom, NothingButOtherFiles) {
   dir.write("notes.txt", "nothing");
   EXPECT_TRUE(contains(message_of([&] { open_source(dir / ".", {}); }), "without TIFF or DICOM"));

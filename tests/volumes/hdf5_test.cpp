@@ -237,5 +237,10 @@ TEST_F(Hdf5, DamagedFiles) {
   expect_damage_is_no_crash(dir, "d.h5", dir.read("v.h5"), 41);
 }
 
+TEST_F(Hdf5, Mutations) {
+  write("v.h5", 3);
+  expect_mutations_are_no_crash(dir, "m.h5", dir.read("v.h5"));
+}
+
 }  // namespace
 }  // namespace isobrick

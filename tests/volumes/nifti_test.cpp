@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "damaged_files.h"
 #include "isobrick/io/byte_order.h"
 #include "isobrick/volumes/open_source.h"
 #include "test_samples.h"
@@ -225,6 +226,15 @@ TEST_F(Nifti, HostileHeaders) {
     } catch (const Error& error) {
       EXPECT_TRUE(contains(error.what(), path)) << error.what();
     }
+  }
+}
+
+TEST_F(Nifti, Mutations) {
+  for (const int version : {1, 2}) {
+    const std::string bytes =
+        Header(version).scale(2, 1).qform(1).real(76, 104, {1, 1, 2, 3}).bytes() + samples();
+    expect_mutations_are_no_crash(dir, "m.nii", bytes);
+    expect_mutations_are_no_crash(dir, "m.nii.gz", gzip(bytes));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "damaged_files.h"
 #include "isobrick/volumes/open_source.h"
 #include "test_samples.h"
 #include "tests/io/packed.h"
@@ -276,6 +277,22 @@ TEST_F(TextVolume, AxesThatFewDigitsLeftAskewAreSquare) {
   const auto& d = t.direction;
   EXPECT_NEAR(d[0] * d[1] + d[3] * d[4] + d[6] * d[7], 0, 1e-15);
   EXPECT_NEAR(d[3], 0.0005, 1e-9);
+}
+
+TEST_F(TextVolume, Mutations) {
+  const std::string samples = whole(ScalarType::i16);
+  const std::string about =
+      "space: right-anterior-superior\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n"
+      "space units: \"mm\" \"mm\" \"mm\"\nkinds: domain domain domain\nendian: little\n";
+  expect_mutations_are_no_crash(dir, "m.nrrd", nrrd(about + "encoding: raw\n\n") + samples);
+  expect_mutations_are_no_crash(dir, "m.nrrd", nrrd(about + "encoding: gzip\n\n") + gzip(samples));
+  const std::string meta =
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
+      "DimSize = 7 5 4\nElementSpacing = 1 2 3\nElementType = MET_SHORT\n";
+  expect_mutations_are_no_crash(dir, "m.mha", meta + "ElementDataFile = LOCAL\n" + samples);
+  expect_mutations_are_no_crash(
+      dir, "m.mha",
+      meta + "CompressedData = True\nElementDataFile = LOCAL\n" + pack(samples, false));
 }
 
 }  // namespace

@@ -177,5 +177,13 @@ TEST_F(Tiff, DamagedFiles) {
         dir.read(std::filesystem::path(write("v.tif", layout, 0, 2)).filename().string()), 7);
 }
 
+TEST_F(Tiff, Mutations) {
+  for (const Layout& layout :
+       {Layout{"wl", true, COMPRESSION_ADOBE_DEFLATE}, Layout{"wb8", false, COMPRESSION_NONE}})
+    expect_mutations_are_no_crash(
+        dir, "m.tif",
+        dir.read(std::filesystem::path(write("v.tif", layout, 0, 2)).filename().string()));
+}
+
 }  // namespace
 }  // namespace isobrick

@@ -302,5 +302,25 @@ TEST_F(Vdb, DamagedFiles) {
   }
 }
 
+TEST_F(Vdb, Mutations) {
+  const auto small = openvdb::FloatGrid::create(2);
+  for (int i = 0; i < 60; ++i)
+    small->getAccessor().setValue({i, i / 2, i % 9}, static_cast<float>(i) / 3);
+  const auto mask = openvdb::MaskGrid::create();
+  mask->tree().topologyUnion(small->tree());
+  const auto expect_no_crash = [&](const openvdb::GridBase::Ptr& grid, std::uint32_t compression) {
+    openvdb::io::File file(dir / "v.vdb");
+    file.setCompression(compression);
+    file.write({grid});
+    const std::string bytes = dir.read("v.vdb");
+    std::filesystem::remove(dir / "v.vdb");
+    expect_mutations_are_no_crash(dir, "m.vdb", bytes);
+  };
+  expect_no_crash(small, openvdb::io::COMPRESS_NONE);
+  expect_no_crash(small, openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+  expect_no_crash(small, openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+  expect_no_crash(mask, openvdb::io::COMPRESS_NONE);
+}
+
 }  // namespace
 }  // namespace isobrick

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "damaged_files.h"
 #include "isobrick/volumes/open_source.h"
 #include "test_samples.h"
 #include "tests/io/packed.h"
@@ -226,6 +227,18 @@ TEST_F(Vtk, HostileLegacyFiles) {
   refuse(ascii + std::string(600, 'x'));
   for (std::size_t size = 14; size < kLegacy.size(); ++size) refuse(kLegacy.substr(0, size));
   refuse(kLegacy + samples().substr(1));
+}
+
+TEST_F(VtkXml, Mutations) {
+  expect_mutations_are_no_crash(dir, "m.vti", parts.text());
+  const auto [sizes, packed] = blocks(samples(), 64);
+  parts.data = base64(sizes) + base64(packed);
+  parts.appended = "base64\">_";
+  expect_mutations_are_no_crash(dir, "m.vti", parts.text());
+}
+
+TEST_F(Vtk, LegacyMutations) {
+  expect_mutations_are_no_crash(dir, "m.vtk", kLegacy + samples(true));
 }
 
 }  // namespace
