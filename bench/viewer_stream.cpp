@@ -102,7 +102,9 @@ class Session {
     const auto start = Clock::now();
     ViewSettings now = settings;
     if (moving && pacer_.plain()) now.occlusion = now.multisample = false;
-    picture_->draw(camera, arguments_.width, arguments_.height, now, moving ? pacer_.coarser() : 1);
+    const int smaller = moving ? pacer_.smaller() : 1;
+    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, now,
+                   moving ? pacer_.coarser() : 1);
     submitting.add(seconds_since(start));
     glFinish();
     const double seconds = seconds_since(start);

@@ -273,10 +273,11 @@ std::vector<std::uint8_t> Renderer::read_pixels() const {
 
 unsigned Renderer::texture() const { return state_->targets->picture.get(); }
 
-void Renderer::copy_to(unsigned framebuffer, int x, int y) const {
+void Renderer::copy_to(unsigned framebuffer, int to_width, int to_height) const {
+  const bool same = to_width == width() && to_height == height();
   glBlitNamedFramebuffer(state_->targets->picture_target.get(), framebuffer, 0, 0, width(),
-                         height(), x, y, x + width(), y + height(), GL_COLOR_BUFFER_BIT,
-                         GL_NEAREST);
+                         height(), 0, 0, to_width, to_height, GL_COLOR_BUFFER_BIT,
+                         same ? GL_NEAREST : GL_LINEAR);
   check_gl("showing the picture");
 }
 

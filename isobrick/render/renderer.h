@@ -114,8 +114,9 @@ class Renderer {
   std::vector<std::uint8_t> read_pixels() const;
   /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for ImGui::Image say.
   unsigned texture() const;
-  /// Copies it into a framebuffer (0: the window's), lower left corner at (x, y).
-  void copy_to(unsigned framebuffer, int x, int y) const;
+  /// Copies it into a framebuffer (0: the window's), lower left corner at (0, 0), enlarged or
+  /// reduced to this size.
+  void copy_to(unsigned framebuffer, int to_width, int to_height) const;
 
   /// What the picture shows at pixel (x, y), rows from the top; nothing on the background.
   std::optional<Picked> pick(int x, int y) const;

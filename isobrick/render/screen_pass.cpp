@@ -133,7 +133,6 @@ layout(binding = 3) uniform PICTURE seens;
 layout(binding = 4) uniform sampler2D near_depths;
 layout(binding = 5) uniform sampler2D near_normals;
 layout(binding = 6) uniform sampler2D opens;
-layout(location = 0) uniform bvec3 has;  // occlusion, edges, transparent meshes
 layout(location = 0) out vec4 picture;
 
 vec3 normal_at(ivec2 at) {
@@ -174,8 +173,10 @@ vec3 to_srgb(vec3 v) {
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec3 behind = mix(background_bottom.rgb, background_top.rgb, gl_FragCoord.y / viewport.y);
-  float open = has.x ? texelFetch(opens, at, 0).r : 1.0;
-  if (has.y) open *= 1 - 0.8 * edge_at(at);
+  float open = OCCLUSION ? texelFetch(opens, at, 0).r : 1.0;
+#if EDGES
+  open *= 1 - 0.8 * edge_at(at);
+#endif
   vec3 mean = vec3(0);
   for (int i = 0; i < SAMPLES; ++i) {
     vec3 colour = behind;
@@ -183,11 +184,11 @@ void main() {
       vec4 surface = texelFetch(colours, at, AT(i));
       colour = surface.rgb * mix(1.0, open, surface.a);
     }
-    if (has.z) {
-      float seen = texelFetch(seens, at, AT(i)).r;
-      vec4 sum = texelFetch(sums, at, AT(i));
-      if (seen < 1 && sum.a > 0) colour = mix(sum.rgb / sum.a, colour, seen);
-    }
+#if TRANSPARENT
+    float seen = texelFetch(seens, at, AT(i)).r;
+    vec4 sum = texelFetch(sums, at, AT(i));
+    if (seen < 1 && sum.a > 0) colour = mix(sum.rgb / sum.a, colour, seen);
+#endif
     // Bright spots are cut before they are averaged, or edges beside them would be jagged.
     mean += min(colour, vec3(1));
   }
@@ -204,7 +205,22 @@ ScreenPass::ScreenPass(int samples) : samples_(samples), nothing_(make_vertex_ar
   nearest_ = make_program(kVertex, variant + frame + kNearest, "the nearest samples");
   occlusion_ = make_program(kVertex, frame + kOcclusion, "occlusion");
   smooth_ = make_program(kVertex, frame + kSmooth, "smooth occlusion");
-  compose_ = make_program(kVertex, variant + frame + kCompose, "the picture");
+}
+
+const GlProgram& ScreenPass::compose(const PictureSettings& settings, bool transparent) {
+  const std::size_t number =
+      (settings.occlusion ? 1u : 0u) + (settings.edges ? 2u : 0u) + (transparent ? 4u : 0u);
+  GlProgram& program = compose_[number];
+  // Software runs through both sides of a condition: what is not wanted is left out.
+  if (!program)
+    program = make_program(
+        kVertex,
+        sampled(samples_) +
+            fmt::format("#define OCCLUSION {}\n#define EDGES {}\n#define TRANSPARENT {}\n",
+                        settings.occlusion, settings.edges ? 1 : 0, transparent ? 1 : 0) +
+            kFrameGlsl + kCompose,
+        "the picture");
+  return program;
 }
 
 void ScreenPass::draw(const GlProgram& program, const GlFramebuffer& target) {
@@ -243,8 +259,7 @@ void ScreenPass::run(const PictureTargets& targets, const PictureSettings& setti
   bind(4, targets.near_depth);
   bind(5, targets.near_normal);
   bind(6, targets.open);
-  glProgramUniform3i(compose_.get(), 0, settings.occlusion, settings.edges, transparent);
-  draw(compose_, targets.picture_target);
+  draw(compose(settings, transparent), targets.picture_target);
   check_gl("making the picture");
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "isobrick/render/gl_objects.h"
 #include "isobrick/render/picture_targets.h"
 #include "isobrick/render/renderer.h"
@@ -17,11 +19,13 @@ class ScreenPass {
   void run(const PictureTargets& targets, const PictureSettings& settings, bool transparent);
 
  private:
+  const GlProgram& compose(const PictureSettings& settings, bool transparent);
   void draw(const GlProgram& program, const GlFramebuffer& target);
 
   int samples_;
   GlVertexArray nothing_;  ///< the triangle over all comes from its vertices' numbers
-  GlProgram nearest_, occlusion_, smooth_, compose_;
+  GlProgram nearest_, occlusion_, smooth_;
+  std::array<GlProgram, 8> compose_;  ///< by what they do; made when first wanted
 };
 
 }  // namespace isobrick

@@ -6,7 +6,9 @@
 namespace isobrick {
 
 /// Keeps pictures fluent while something moves by asking for simpler ones: first
-/// without occlusion and multisampling, then with longer cells. Not thread-safe.
+/// without occlusion and multisampling, then with cells up to four times as long, then
+/// smaller, which is what helps where OpenGL is software, at last with cells still
+/// longer. Not thread-safe.
 class FramePacer {
  public:
   /// `target`: how long a picture may take while something moves, seconds.
@@ -32,24 +34,16 @@ class FramePacer {
     coarser_ = std::clamp(kMargin * std::sqrt(ratio), 1.0, kCoarsest);
   }
 
-  /// A picture that took `seconds` to draw as plain() and coarser() say now.
+  /// A picture that took `seconds` to draw as plain(), coarser() and smaller() say now.
   void drawn(double seconds) {
     const double ratio = seconds / target_;
     if (ratio > 1 && !plain_) {
       plain_ = true;
       full_seconds_ = seconds;
-      return;
-    }
-    if (ratio > 1) {
-      // Triangles, and so times, go with the inverse square of a cell's length: the root
-      // of the ratio would do at once, but single pictures are off.
-      coarser_ = std::min(coarser_ * (1 + 0.5 * (std::min(ratio, 4.0) - 1)), kCoarsest);
-    } else if (ratio < 0.6 && coarser_ > 1) {
-      coarser_ = std::max(coarser_ * (0.7 + 0.5 * ratio), 1.0);
-    } else if (ratio < 0.6 && plain_) {
-      // What the rest costs is known from when it was left out.
-      full_seconds_ *= 0.98;
-      if (full_seconds_ < target_ * 0.8) plain_ = false;
+    } else if (ratio > 1) {
+      simplify(std::min(ratio, 4.0));
+    } else if (ratio < kLeisure) {
+      refine(ratio);
     }
   }
 
@@ -57,11 +51,41 @@ class FramePacer {
   bool plain() const { return plain_; }
   /// Factor on the error in pixels while something moves. At rest: 1.
   double coarser() const { return coarser_; }
+  /// Divisor of the picture's width and height while something moves. At rest: 1.
+  int smaller() const { return smaller_; }
 
  private:
-  static constexpr double kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 8;
+  static constexpr double kFirstCoarser = 4, kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 8;
   static constexpr double kNothingDrawn = 1e-3;  ///< seconds: the picture was the one before
+  static constexpr double kLeisure = 0.6;        ///< of the target: less is time for more
+  static constexpr int kSmallest = 4;
+
+  void simplify(double ratio) {
+    if (coarser_ >= kFirstCoarser && smaller_ < kSmallest) {
+      smaller_ = std::min(static_cast<int>(std::ceil(smaller_ * std::sqrt(ratio))), kSmallest);
+      return;
+    }
+    // Triangles, and so times, go with the inverse square of a cell's length: the root
+    // of the ratio would do at once, but single pictures are off.
+    const double most = smaller_ < kSmallest ? kFirstCoarser : kCoarsest;
+    coarser_ = std::min(coarser_ * (1 + 0.5 * (ratio - 1)), most);
+  }
+
+  void refine(double ratio) {
+    if (coarser_ > 1) {
+      coarser_ = std::max(coarser_ * (0.7 + 0.5 * ratio), 1.0);
+    } else if (smaller_ > 1) {
+      const double larger = static_cast<double>(smaller_) / (smaller_ - 1);
+      if (ratio * larger * larger < kLeisure) --smaller_;
+    } else if (plain_) {
+      // What the rest costs is known from when it was left out.
+      full_seconds_ *= 0.98;
+      if (full_seconds_ < target_ * 0.8) plain_ = false;
+    }
+  }
+
   double target_, coarser_ = 1, full_seconds_ = 0;
+  int smaller_ = 1;
   bool plain_ = false;
 };
 

@@ -184,11 +184,12 @@ void status_panel(const ViewerState& state) {
   ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
                    static_cast<int>(state.frame_number % state.frame_times.size()), nullptr, 0, 50,
                    {ImGui::GetContentRegionAvail().x, 36});
-  text(fmt::format("{:.0f} frames/s, drawn in {:.1f} ms{}",
-                   state.frame_seconds > 0 ? 1 / state.frame_seconds : 0, state.draw_seconds * 1e3,
-                   state.pacer.coarser() > 1
-                       ? fmt::format(", {:.1f} x coarser while moving", state.pacer.coarser())
-                       : ""));
+  text(fmt::format("{:.0f} frames/s, drawn in {:.1f} ms",
+                   state.frame_seconds > 0 ? 1 / state.frame_seconds : 0,
+                   state.draw_seconds * 1e3));
+  if (state.pacer.coarser() > 1 || state.pacer.smaller() > 1)
+    text(fmt::format("while moving: cells {:.1f} x as long, 1/{} of the size",
+                     state.pacer.coarser(), state.pacer.smaller()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
   text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,

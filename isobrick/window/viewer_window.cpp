@@ -193,14 +193,20 @@ void ViewerWindow::save_picture(const std::filesystem::path& file) {
 
 void ViewerWindow::click(double x, double y) {
   if (state_.picture == nullptr) return;
-  state_.picked = pick_point(*state_.picture, static_cast<int>(x), static_cast<int>(y));
+  int width = 1, height = 1;
+  glfwGetFramebufferSize(window_, &width, &height);
+  // While something moves the picture may be smaller than the window.
+  const Renderer& renderer = state_.picture->renderer();
+  state_.picked = pick_point(*state_.picture, static_cast<int>(x * renderer.width() / width),
+                             static_cast<int>(y * renderer.height() / height));
   if (!state_.measuring || !state_.picked) return;
   if (state_.measured.size() == 2) state_.measured.clear();
   state_.measured.push_back(state_.picked->world);
 }
 
 bool ViewerWindow::moving() const {
-  return state_.navigator.moving() || events_->dragging() ||
+  const bool sliding = ImGui::IsAnyItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+  return state_.navigator.moving() || events_->dragging() || sliding ||
          glfwGetTime() - std::max(events_->last_motion(), opened_) < kSettleSeconds;
 }
 
@@ -218,10 +224,12 @@ void ViewerWindow::draw_frame() {
     const bool fluent = moving() || !state_.picture->state().covers;
     ViewSettings settings = state_.settings;
     if (fluent && state_.pacer.plain()) settings.occlusion = settings.multisample = false;
+    const int smaller = fluent ? state_.pacer.smaller() : 1;
     try {
-      state_.picture->draw(state_.navigator.camera, width, height, settings,
+      state_.picture->draw(state_.navigator.camera, std::max(width / smaller, 1),
+                           std::max(height / smaller, 1), settings,
                            fluent ? state_.pacer.coarser() : 1);
-      state_.picture->renderer().copy_to(0, 0, 0);
+      state_.picture->renderer().copy_to(0, width, height);
     } catch (const std::exception& e) {
       if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
     }

@@ -108,11 +108,28 @@ TEST(FramePacer, SettlesWherePicturesAreFastEnough) {
   FramePacer pacer(0.05);
   double seconds = 0;
   for (int i = 0; i < 40; ++i) {
-    seconds = 0.4 / (pacer.coarser() * pacer.coarser());
+    seconds = 0.4 / std::pow(pacer.coarser() * pacer.smaller(), 2);
     pacer.drawn(seconds);
   }
   EXPECT_LT(seconds, 0.055);
   EXPECT_GT(seconds, 0.02);
+}
+
+TEST(FramePacer, MakesPicturesSmallerWhereTheirPixelsTakeTheTime) {
+  // As llvmpipe: 70 ms for the pixels of a plain picture, 60 ms more for its triangles.
+  FramePacer pacer(0.05);
+  double seconds = 0, longest_after = 0;
+  for (int i = 0; i < 60; ++i) {
+    const double s = pacer.smaller();
+    seconds = 0.07 / (s * s) + 0.06 / std::pow(s * pacer.coarser(), 2) + (pacer.plain() ? 0 : 0.2);
+    if (i > 10) longest_after = std::max(longest_after, seconds);
+    pacer.drawn(seconds);
+  }
+  EXPECT_LT(longest_after, 0.1);
+  EXPECT_LE(pacer.smaller(), 2);
+  EXPECT_LT(pacer.coarser(), 4) << "there is time for longer cells";
+  for (int i = 0; i < 300; ++i) pacer.drawn(0.002);
+  EXPECT_EQ(pacer.smaller(), 1);
 }
 
 TEST(FramePacer, LeavesOcclusionOutBeforeDetail) {
@@ -131,6 +148,7 @@ TEST(FramePacer, LeavesFastPicturesAlone) {
   EXPECT_FALSE(pacer.plain());
   for (int i = 0; i < 10; ++i) pacer.drawn(0.2);
   EXPECT_GT(pacer.coarser(), 1);
+  EXPECT_GT(pacer.smaller(), 1);
   for (int i = 0; i < 200; ++i) pacer.drawn(0.004);
   EXPECT_EQ(pacer.coarser(), 1);
   EXPECT_FALSE(pacer.plain());
