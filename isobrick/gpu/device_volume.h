@@ -59,8 +59,8 @@ struct DeviceCounts {
 class ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Throws UsageError for what the
-  /// device cannot do yet: volumes that may hold NaN, dropping degenerate
-  /// triangles, meshes that are not welded; and for threads that have no kernels.
+  /// device cannot do yet: dropping degenerate triangles, meshes that are not welded;
+  /// and for threads that have no kernels.
   ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
                     const ResidentTuning& tuning = {});
   ~ResidentExtractor();

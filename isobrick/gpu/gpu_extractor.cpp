@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/brick_table.h"
@@ -10,12 +11,14 @@
 #include "isobrick/gpu/stream_collector.h"
 #include "isobrick/gpu/stream_device.h"
 #include "isobrick/gpu/supported.h"
+#include "isobrick/surface/cpu_extractor.h"
 
 namespace isobrick::gpu {
 namespace {
 
 SurfaceOptions checked(const Lattice& lattice, SurfaceOptions options) {
   check_supported(lattice.type, options);
+  options.may_have_nan = options.may_have_nan && is_floating(lattice.type);
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   options.roi = intersect(options.roi, lattice.box());
   if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
@@ -42,6 +45,7 @@ struct GpuExtractor::Impl {
   StreamDevice device;
   RowSlots slots;
   std::uint64_t launches = 0;
+  std::vector<TileWork> whole;
   StreamCollector collector;  // ends first: its thread uses the device
 
   Impl(int id, const Lattice& l, const SurfaceOptions& o, const StreamSizes& sizes, TakeChunk take)
@@ -52,6 +56,14 @@ struct GpuExtractor::Impl {
         device(l, options, sizes),
         slots(device.sizes().slots, l.tiles()),
         collector(id, device, welded(), options.normals, std::move(take)) {}
+
+  /// Where there may be NaN all of an active tile is looked at, because ranges leave NaN out.
+  std::span<const TileWork> all_to_look_at(std::span<const TileWork> tiles) {
+    if (!options.may_have_nan) return tiles;
+    whole.assign(tiles.begin(), tiles.end());
+    for (TileWork& tile : whole) tile.active_blocks = 0xff;
+    return whole;
+  }
 
   bool welded() const { return options.indexing == Indexing::welded; }
 
@@ -87,8 +99,8 @@ struct GpuExtractor::Impl {
         {reinterpret_cast<BrickBox*>(lane.at(device.layout().boxes)), sizes.tiles},
         {reinterpret_cast<std::uint64_t*>(lane.at(device.layout().bricks)),
          std::size_t{sizes.tiles} * sizes.tile_bricks}};
-    return use_bricks(lattice, reach_of(options.normals), tiles, bricks, sizes.sent_bricks,
-                      lane.bricks, table);
+    return use_bricks(lattice, sample_reach(options), tiles, bricks, sizes.sent_bricks, lane.bricks,
+                      table);
   }
 
   void launch(std::span<const TileWork> tiles, const BrickLookup& bricks,
@@ -116,6 +128,7 @@ void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& b
                            const std::shared_ptr<const void>& samples) {
   // Calls may come from any thread.
   current(impl_->cuda_device);
+  tiles = impl_->all_to_look_at(tiles);
   while (!tiles.empty()) {
     impl_->collector.wait_for_lane();
     const std::size_t parts = ceil_div(tiles.size(), impl_->collector.good_tiles());

@@ -10,6 +10,6 @@ namespace isobrick::gpu {
 /// and what they share for the samples around them (streamed_pages.cuh).
 inline constexpr std::uint32_t kTilesOfPageGroup = 8;
 inline constexpr std::uint32_t kPageGroupSamples =
-    (kTilesOfPageGroup + 4) * kPageSamples + 3 * 2048;
+    (kTilesOfPageGroup + 4) * kPageSamples + 3 * 4096;
 
 }  // namespace isobrick::gpu

@@ -58,7 +58,7 @@ struct ResidentExtractor::Impl {
   Impl(DeviceVolume& v, const SurfaceOptions& o, const ResidentTuning& tuning)
       : volume(v.impl()),
         options(o),
-        shapes(launch_shapes(volume.lattice.type, o.normals, tuning.threads)),
+        shapes(launch_shapes(kernel_of(volume.lattice.type, o), tuning.threads)),
         case_entries(kCaseEntries, volume.stream),
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
@@ -163,7 +163,7 @@ struct ResidentExtractor::Impl {
     p.end.zero = &counters()->search_ticket;
     p.end.zero_words = static_cast<std::uint32_t>(
         (words.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
-    launch_extraction(volume.lattice.type, options.normals, p, case_entries.data(),
+    launch_extraction(kernel_of(volume.lattice.type, options), p, case_entries.data(),
                       shapes.of(active), volume.stream.get());
   }
 

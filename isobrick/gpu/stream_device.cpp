@@ -7,6 +7,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/unpack_kernel.h"
+#include "isobrick/surface/cpu_extractor.h"
 #include "isobrick/surface/world_map.h"
 
 namespace isobrick::gpu {
@@ -50,7 +51,7 @@ StreamDevice::StreamDevice(const Lattice& lattice, const SurfaceOptions& options
       throw Error(fmt::format(
           "the GPU has no {} bytes of free memory, which a single tile takes; use --backend cpu",
           s.device_bytes));
-  shapes_ = launch_shapes(lattice.type, options.normals);
+  shapes_ = launch_shapes(kernel_of(lattice.type, options));
 }
 
 StreamDevice::~StreamDevice() {
@@ -129,7 +130,8 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   u.bricks = reinterpret_cast<const std::uint64_t*>(lane.device + layout_.bricks) +
              std::size_t{first} * sizes_.tile_bricks;
   u.tile_bricks = sizes_.tile_bricks;
-  u.reach = reach_of(options_.normals);
+  u.reach = static_cast<int>(sample_reach(options_));
+  u.corners = options_.may_have_nan;
   for (int axis = 0; axis < 3; ++axis) {
     u.brick[axis] = static_cast<std::int32_t>(lattice_.brick[axis]);
     u.extent[axis] = p.extent[axis];
@@ -139,7 +141,7 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   lane.unpack_begin.record(kernel_);
   launch_unpack(lattice_.type, u, kernel_.get());
   lane.unpacked.record(kernel_);
-  launch_extraction(lattice_.type, options_.normals, p, case_entries_, shapes_.of(count),
+  launch_extraction(kernel_of(lattice_.type, options_), p, case_entries_, shapes_.of(count),
                     kernel_.get());
   check(cudaMemcpyAsync(lane.totals.data(), &header->totals, sizeof(SurfaceTotals),
                         cudaMemcpyDeviceToHost, kernel_.get()));

@@ -41,7 +41,4 @@ struct StagingLayout {
   }
 };
 
-/// Layers of samples around the 33³ of a tile that are looked at.
-constexpr int reach_of(bool normals) { return normals ? 1 : 0; }
-
 }  // namespace isobrick::gpu

@@ -8,6 +8,7 @@
 #include "isobrick/core/tile.h"
 #include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/stream_layout.h"
+#include "isobrick/surface/cpu_extractor.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -60,7 +61,7 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
   s.slots = static_cast<std::uint32_t>(
       slots_for(lattice, options.indexing == Indexing::welded, tiles, lanes));
   s.tile_bricks =
-      static_cast<std::uint32_t>(max_bricks_of_tile(lattice, reach_of(options.normals)));
+      static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
   s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
   s.staging_bytes = StagingLayout(tiles, s.tile_bricks).end;
   s.output_bytes =

@@ -7,7 +7,8 @@
 // Where the samples of a streamed tile lie. A tile is read as if 27 pages of 32³
 // samples lay around it, but of the 26 that are not its own only the samples within one
 // step of its 33³ are ever looked at. Eight tiles share the pages for those: each has
-// four columns, rows or planes of them for itself. docs/gpu.md has the picture.
+// four columns, rows or planes of them for itself (of the edges and corners, four by four).
+// docs/gpu.md has the picture.
 
 namespace isobrick::gpu {
 
@@ -17,33 +18,28 @@ inline constexpr int kOwnPage = 13;
 /// Where page `n` of the streamed tile `number` begins, in samples from the first
 /// tile's page. It may lie before that: only the places that are looked at do not.
 __device__ inline std::int64_t streamed_page(std::uint32_t number, int n) {
-  constexpr std::int64_t page = kPageSamples, tiles = kTilesOfPageGroup;
+  constexpr std::int64_t page = kPageSamples, tiles = kTilesOfPageGroup, patch = 4096;
   constexpr std::int64_t of_axis[3] = {tiles * page, (tiles + 1) * page, (tiles + 2) * page};
-  constexpr std::int64_t of_edge_xy = (tiles + 3) * page, of_edge_xz = (tiles + 4) * page,
-                         of_edge_yz = of_edge_xz + 2048, of_corner = of_edge_yz + 2048;
-  static_assert(of_corner + 2048 == kPageGroupSamples);
+  constexpr std::int64_t of_edge_xy = (tiles + 3) * page, of_edge_xz = of_edge_xy + page,
+                         of_edge_yz = of_edge_xz + patch, of_corner = of_edge_yz + patch;
+  static_assert(of_corner + patch == kPageGroupSamples);
   const std::int64_t group =
       static_cast<std::int64_t>(number / kTilesOfPageGroup) * kPageGroupSamples;
-  const int tile = static_cast<int>(number % kTilesOfPageGroup), place = 4 * tile;
+  const int tile = static_cast<int>(number % kTilesOfPageGroup);
   const int x = n % 3 - 1, y = n / 3 % 3 - 1, z = n / 9 - 1;
-  // Towards lower neighbours only the last column is looked at: place 2 of the four.
-  const auto along = [&](int direction) { return direction > 0 ? place : place + 2 - 31; };
-  // Along an edge between two pages; a and b are steps along its axes.
-  const auto between = [&](int da, int a, int db, int b) {
-    if (db > 0) return along(da) * a;
-    return (place + 3) * a - 31 * b;
-  };
-  const int negative = (x < 0) + (y < 0) + (z < 0);
-  // Of those behind two lower planes nothing is looked at.
-  if (negative > 1 || (x == 0 && y == 0 && z == 0)) return group + tile * page;
-  if (y == 0 && z == 0) return group + of_axis[0] + along(x);
-  if (x == 0 && z == 0) return group + of_axis[1] + along(y) * 32;
-  if (x == 0 && y == 0) return group + of_axis[2] + along(z) * 1024;
-  if (z == 0) return group + of_edge_xy + between(x, 1, y, 32);
-  if (y == 0) return group + of_edge_xz + between(x, 1, z, 1024);
-  if (x == 0) return group + of_edge_yz + between(y, 32, z, 1024);
-  if (z < 0) return group + of_corner + place + 2 + 32 - 31 * 1024;
-  return group + of_corner + between(x, 1, y, 32);
+  // Of an upper neighbour the samples 0 and 1 are looked at, of a lower one 31: they are
+  // three of four places.
+  const auto place = [](int direction) { return direction > 0 ? 0 : 2 - 31; };
+  if (x == 0 && y == 0 && z == 0) return group + tile * page;
+  // The first axis on which the page is another than the tile's has the fours of all tiles.
+  const int first = 4 * tile;
+  if (y == 0 && z == 0) return group + of_axis[0] + first + place(x);
+  if (x == 0 && z == 0) return group + of_axis[1] + (first + place(y)) * 32;
+  if (x == 0 && y == 0) return group + of_axis[2] + (first + place(z)) * 1024;
+  if (z == 0) return group + of_edge_xy + first + place(x) + place(y) * 32;
+  if (y == 0) return group + of_edge_xz + first + place(x) + place(z) * 1024;
+  if (x == 0) return group + of_edge_yz + (first + place(y)) * 32 + place(z) * 1024;
+  return group + of_corner + first + place(x) + place(y) * 32 + place(z) * 1024;
 }
 
 }  // namespace isobrick::gpu

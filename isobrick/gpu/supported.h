@@ -14,8 +14,6 @@ inline std::optional<std::string> why_unsupported(ScalarType type, const Surface
   if (!is_device_scalar(type))
     return "samples of type " + std::string(short_name(type)) +
            " have no CUDA kernels; use --backend cpu";
-  if (options.may_have_nan && is_floating(type))
-    return "volumes that may hold NaN have no CUDA kernels; use --backend cpu";
   if (options.drop_degenerate)
     return "degenerate triangles cannot be left out on a GPU; use --backend cpu";
   return std::nullopt;

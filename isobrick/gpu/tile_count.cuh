@@ -9,7 +9,7 @@
 namespace isobrick::gpu {
 
 /// The crossing edges that start in a row, as words of EdgeRow, and those at sample
-/// 0, which only the first tiles have. Not all belong to the tile.
+/// 0, where only the first tiles look. Not all belong to the tile.
 struct RowEdges {
   std::uint32_t x, y, z, y_at_0, z_at_0;
   std::uint32_t cells;
@@ -18,6 +18,8 @@ struct RowEdges {
   __device__ std::uint32_t xs() const { return own_y && own_z ? __popc(x) : 0; }
   __device__ std::uint32_t ys() const { return own_z ? __popc(y) : 0; }
   __device__ std::uint32_t zs() const { return own_y ? __popc(z) : 0; }
+  __device__ std::uint32_t ys_at_0() const { return own_z ? y_at_0 : 0; }
+  __device__ std::uint32_t zs_at_0() const { return own_y ? z_at_0 : 0; }
 };
 
 __device__ inline std::uint32_t mixed_cells(const RowBits& a, const RowBits& b, const RowBits& c,
@@ -39,8 +41,8 @@ __device__ inline RowEdges edges_of_row(const TileShared& s, int row, int y, int
   e.x = (here.at ^ here.next()) & shape.cell_mask;
   e.y = (here.next() ^ above.next()) & shape.sample_mask;
   e.z = (here.next() ^ behind.next()) & shape.sample_mask;
-  if (e.own_z) e.y_at_0 = (here.at ^ above.at) & shape.at_0;
-  if (e.own_y) e.z_at_0 = (here.at ^ behind.at) & shape.at_0;
+  e.y_at_0 = (here.at ^ above.at) & shape.at_0;
+  e.z_at_0 = (here.at ^ behind.at) & shape.at_0;
   if (up_y && up_z) e.cells = mixed_cells(here, above, behind, s.rows[row + 34]) & shape.cell_mask;
   return e;
 }
@@ -51,11 +53,11 @@ struct RowCount {
   std::uint32_t packed;
 
   __device__ static RowCount of(const RowEdges& e) {
-    const std::uint32_t y_start = e.xs(), z_start = y_start + e.y_at_0 + e.ys();
-    const std::uint32_t all = z_start + e.z_at_0 + e.zs();
+    const std::uint32_t y_at_0 = e.ys_at_0(), z_at_0 = e.zs_at_0();
+    const std::uint32_t y_start = e.xs(), z_start = y_start + y_at_0 + e.ys();
+    const std::uint32_t all = z_start + z_at_0 + e.zs();
     return {0, y_start | z_start << 6 | all << 13 |
-                   static_cast<std::uint32_t>(__popc(e.cells)) << 20 | e.y_at_0 << 26 |
-                   e.z_at_0 << 27};
+                   static_cast<std::uint32_t>(__popc(e.cells)) << 20 | y_at_0 << 26 | z_at_0 << 27};
   }
   __device__ std::uint32_t y_start() const { return packed & 63u; }
   __device__ std::uint32_t z_start() const { return packed >> 6 & 127u; }
@@ -70,8 +72,9 @@ struct RowCounts {
   RowCount of_step[Team<N>::kSteps];
 };
 
-template <int N>
-__device__ inline void count_rows(TileShared& s, RowCounts<N>& counts) {
+/// `leave_out(y, z, edges)` may take something of a row away.
+template <int N, class LeaveOut>
+__device__ inline void count_rows(TileShared& s, RowCounts<N>& counts, LeaveOut&& leave_out) {
   const auto thread = static_cast<int>(own_thread());
 #pragma unroll
   for (int step = 0; step < Team<N>::kSteps; ++step) {
@@ -82,7 +85,11 @@ __device__ inline void count_rows(TileShared& s, RowCounts<N>& counts) {
     if ((row & ~31) < kRowsOfTile) {
       if (row < kRowsOfTile) {
         const int z = static_cast<int>(z_of_row(row));
-        const RowEdges edges = edges_of_row(s, row, row - 33 * z, z);
+        const int y = row - 33 * z;
+        RowEdges edges = edges_of_row(s, row, y, z);
+        leave_out(y, z, edges);
+        if (y == 0) s.plane_at_0[0][z] = static_cast<std::uint8_t>(edges.z_at_0);
+        if (z == 0) s.plane_at_0[1][y] = static_cast<std::uint8_t>(edges.y_at_0);
         s.crossing[0][row] = edges.x;
         s.crossing[1][row] = edges.y;
         s.crossing[2][row] = edges.z;

@@ -25,11 +25,14 @@ __device__ inline EdgeOfVertex find_edge(const TileShared& s, std::uint32_t row,
                                          std::uint32_t number) {
   const std::uint32_t y_first = s.number[1][row], z_first = s.number[2][row];
   if (s.shape.at_0) {
-    // The vertices at sample 0 stand before the others along y and along z.
-    const auto z = static_cast<int>(z_of_row(row));
-    const RowEdges e = edges_of_row(s, static_cast<int>(row), static_cast<int>(row) - 33 * z, z);
-    if (e.z_at_0 && number + 1 == z_first) return {0, 2};
-    if (e.y_at_0 && number + 1 == y_first) return {0, 1};
+    // The vertices at sample 0 stand before the others along y and along z: between them
+    // and what lies before there is one number more than edges.
+    const std::uint32_t z = z_of_row(row), y = row - 33 * z;
+    const bool own_y = y > 0 || s.shape.first[1], own_z = z > 0 || s.shape.first[2];
+    const std::uint32_t xs = own_y && own_z ? __popc(s.crossing[0][row]) : 0;
+    const std::uint32_t ys = own_z ? __popc(s.crossing[1][row]) : 0;
+    if (number + 1 == z_first && number == y_first + ys) return {0, 2};
+    if (number + 1 == y_first && number == s.number[0][row] + xs) return {0, 1};
   }
   const std::uint32_t axis = std::uint32_t{number >= y_first} + (number >= z_first);
   const std::uint32_t place = row + axis * kRowPitch;

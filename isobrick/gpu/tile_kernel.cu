@@ -6,6 +6,7 @@
 #include "isobrick/gpu/device_scalar.h"
 #include "isobrick/gpu/streamed_pages.cuh"
 #include "isobrick/gpu/tile_emit.cuh"
+#include "isobrick/gpu/tile_nan.cuh"
 #include "isobrick/gpu/tile_order.cuh"
 #include "isobrick/surface/case_tables.h"
 
@@ -82,18 +83,23 @@ __device__ void prefetch_tile(const TileShared& s, const TileParams& p, std::uin
     asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
 }
 
-template <std::uint32_t Listed>
-constexpr std::size_t kSharedBytes = sizeof(TileShared) + sizeof(Lists<Listed>);
+template <std::uint32_t Listed, bool Nan = false>
+constexpr std::size_t kSharedBytes = sizeof(TileShared) +
+                                     (Nan ? std::max(sizeof(Lists<Listed>), sizeof(NanRows))
+                                          : sizeof(Lists<Listed>));
 
-static_assert(kSharedBytes<kListedBeforeAmpere> <= 64 << 10, "what Turing has");
+static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later device has");
 
 /// Counts a tile's crossing edges and active cells, and leaves their places.
-template <int N>
+template <int N, bool Nan>
 __device__ void count_tile(TileShared& s, const TileParams& p) {
   RowCounts<N> counts;
-  count_rows<N>(s, counts);
+  count_rows<N>(s, counts, [&](int y, int z, RowEdges& edges) {
+    if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
+  });
   __syncthreads();
+  if constexpr (Nan) clear_lists<N>(s);
   if (warp_id() == 0) {
     sum_steps<N>(s);
     if (lane_id() == 31) publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
@@ -214,7 +220,7 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
   for (std::uint32_t i = own_thread(); i < s.items; i += N) p.order[i] = {0, 0};
 }
 
-template <int N, class T, bool Normals>
+template <int N, class T, bool Normals, bool Nan>
 __global__ void __launch_bounds__(N, Team<N>::kTeams)
     extract_tiles(const __grid_constant__ TileParams p, const T threshold,
                   const std::uint16_t* __restrict__ case_entries) {
@@ -231,10 +237,13 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   take_tile<T>(s, p, first);
   __syncthreads();
   while (s.item < s.items) {
-    clear_lists<N>(s);
+    if constexpr (Nan)
+      find_nan<N, T>(s, p);
+    else
+      clear_lists<N>(s);
     classify<N>(s, classifier);
     __syncthreads();
-    count_tile<N>(s, p);
+    count_tile<N, Nan>(s, p);
     find_places<N>(s, p);
     prefetch_tile<N, T>(s, p, s.item + gridDim.x);
     emit_all_vertices<N, T, Normals>(s, p);
@@ -263,29 +272,29 @@ int device_attribute(cudaDeviceAttr attribute) {
 }
 
 /// How many blocks fill the device, and how they are launched.
-template <int N, class T, bool Normals>
+template <int N, class T, bool Normals, bool Nan = false>
 struct Launcher {
+  static constexpr auto kKernel = extract_tiles<N, T, Normals, Nan>;
   static std::size_t shared() {
     const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
-    return before_ampere ? kSharedBytes<kListedBeforeAmpere> : kSharedBytes<Team<N>::kMostListed>;
+    return before_ampere ? kSharedBytes<kListedBeforeAmpere, Nan>
+                         : kSharedBytes<Team<N>::kMostListed, Nan>;
   }
   /// 0 where the device has too little shared memory for one.
   static int blocks() {
     const std::size_t bytes = shared();
     if (static_cast<std::size_t>(device_attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin)) < bytes)
       return 0;
-    check(cudaFuncSetAttribute(extract_tiles<N, T, Normals>,
-                               cudaFuncAttributeMaxDynamicSharedMemorySize,
+    check(cudaFuncSetAttribute(kKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                static_cast<int>(bytes)));
     int each = 0;
-    check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, extract_tiles<N, T, Normals>, N,
-                                                        bytes));
+    check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kKernel, N, bytes));
     return each * device_attribute(cudaDevAttrMultiProcessorCount);
   }
   static void launch(const TileParams& params, const std::uint16_t* case_entries, int blocks,
                      cudaStream_t stream) {
-    extract_tiles<N, T, Normals><<<blocks, N, shared(), stream>>>(
-        params, Threshold<T>(params.isovalue).value, case_entries);
+    kKernel<<<blocks, N, shared(), stream>>>(params, Threshold<T>(params.isovalue).value,
+                                             case_entries);
     check_launch("extract_tiles");
   }
 };
@@ -298,13 +307,18 @@ auto visit_launcher_of(ScalarType type, bool normals, F&& f) {
   });
 }
 
-/// Numbers of threads that have kernels for everything, and others for bytes without
-/// normals only.
+/// Numbers of threads that have kernels for everything but NaN, and others for bytes
+/// without normals only.
 constexpr int kTeams[3] = {1024, 640, 384}, kByteTeams[5] = {32, 64, 128, 256, 512};
+constexpr int kNanTeam = 384;
 
 template <class F>
-auto visit_launcher(ScalarType type, bool normals, int threads, F&& f) {
+auto visit_launcher(const TileKernel& kernel, int threads, F&& f) {
+  const auto [type, normals, nan] = kernel;
   using Byte = std::uint8_t;
+  if (nan)
+    return normals ? f(Launcher<kNanTeam, float, true, true>())
+                   : f(Launcher<kNanTeam, float, false, true>());
   switch (threads) {
     case 32: return f(Launcher<32, Byte, false>());
     case 64: return f(Launcher<64, Byte, false>());
@@ -317,14 +331,14 @@ auto visit_launcher(ScalarType type, bool normals, int threads, F&& f) {
   }
 }
 
-void check_threads(ScalarType type, bool normals, int threads) {
+void check_threads(const TileKernel& kernel, int threads) {
   for (const int known : kTeams)
-    if (threads == known) return;
+    if (threads == known && (!kernel.may_have_nan || known == kNanTeam)) return;
   for (const int known : kByteTeams)
-    if (threads == known && type == ScalarType::u8 && !normals) return;
+    if (threads == known && kernel.type == ScalarType::u8 && !kernel.normals) return;
   throw UsageError(
-      "384, 640 or 1024 threads share a tile, and for u8 without normals also 32, 64, 128, 256 or "
-      "512");
+      "384, 640 or 1024 threads share a tile, where there may be NaN 384, and for u8 without "
+      "normals also 32, 64, 128, 256 or 512");
 }
 
 }  // namespace
@@ -340,13 +354,12 @@ void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]) {
     }
 }
 
-LaunchShapes launch_shapes(ScalarType type, bool normals, int threads) {
-  if (threads > 0) check_threads(type, normals, threads);
+LaunchShapes launch_shapes(const TileKernel& kernel, int threads) {
+  if (threads > 0) check_threads(kernel, threads);
   LaunchShapes shapes;
   for (int i = 0; i < 3; ++i) {
-    const int team = threads > 0 ? threads : kTeams[i];
-    shapes.shapes[i] = {visit_launcher(type, normals, team, [](auto l) { return l.blocks(); }),
-                        team};
+    const int team = threads > 0 ? threads : kernel.may_have_nan ? kNanTeam : kTeams[i];
+    shapes.shapes[i] = {visit_launcher(kernel, team, [](auto l) { return l.blocks(); }), team};
   }
   if (shapes.shapes[2].blocks == 0)
     throw Error("the device has too little shared memory for the extraction kernel");
@@ -364,9 +377,9 @@ LaunchShape LaunchShapes::of(std::uint32_t tiles) const {
   return *best;
 }
 
-void launch_extraction(ScalarType type, bool normals, const TileParams& params,
+void launch_extraction(const TileKernel& kernel, const TileParams& params,
                        const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream) {
-  visit_launcher(type, normals, shape.threads,
+  visit_launcher(kernel, shape.threads,
                  [&](auto l) { l.launch(params, case_entries, shape.blocks, stream); });
 }
 

@@ -4,6 +4,7 @@
 
 #include "isobrick/core/scalar.h"
 #include "isobrick/gpu/tile_params.h"
+#include "isobrick/surface/surface_options.h"
 
 namespace isobrick::gpu {
 
@@ -12,6 +13,16 @@ namespace isobrick::gpu {
 /// the first entry are the number of triangles.
 inline constexpr std::size_t kCaseEntries = 256 * 5;
 void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]);
+
+/// Which kernel makes a surface.
+struct TileKernel {
+  ScalarType type;
+  bool normals = false;
+  bool may_have_nan = false;  ///< of f32 only
+};
+inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& options) {
+  return {type, options.normals, options.may_have_nan && is_floating(type)};
+}
 
 /// How many blocks, and how many threads each; no blocks where one does not fit.
 struct LaunchShape {
@@ -29,11 +40,11 @@ struct LaunchShapes {
 
 /// `threads` that share a tile: 0 chooses. Throws UsageError for numbers that have no
 /// kernels, Error where no kernel fits the device.
-LaunchShapes launch_shapes(ScalarType type, bool normals, int threads = 0);
+LaunchShapes launch_shapes(const TileKernel& kernel, int threads = 0);
 
 /// Launches the extraction of all items on `stream`: one block takes one tile
 /// after the other, in their order.
-void launch_extraction(ScalarType type, bool normals, const TileParams& params,
+void launch_extraction(const TileKernel& kernel, const TileParams& params,
                        const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream);
 
 }  // namespace isobrick::gpu

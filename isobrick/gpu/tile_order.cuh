@@ -220,9 +220,7 @@ __device__ inline void borrow_rows(TileShared& s) {
     const std::uint32_t e = s.lower.y[z];
     const int from_x = own_z ? 2 : 6;
     s.number[0][row] = base_of(from_x, own_z ? e : s.lower.yz);
-    std::uint32_t at_0 = 0;
-    if (z < 32) at_0 = (s.rows[row].at ^ s.rows[row + 33].at) & shape.at_0;
-    const std::uint32_t number = base_of(2, e) + (e >> 23) + at_0;
+    const std::uint32_t number = base_of(2, e) + (e >> 23) + s.plane_at_0[0][z];
     s.number[2][row] = number;
     s.at_0[1][row] = fx ? number - 1 : base_of(3, s.lower.xy[z]) - 1;
   };
@@ -231,9 +229,7 @@ __device__ inline void borrow_rows(TileShared& s) {
     const bool own_y = y > 0 || fy;
     const std::uint32_t e = s.lower.z[y];
     if (own_y) s.number[0][row] = base_of(4, e);
-    std::uint32_t at_0 = 0;
-    if (y < 32) at_0 = (s.rows[row].at ^ s.rows[row + 1].at) & shape.at_0;
-    const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + at_0;
+    const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + s.plane_at_0[1][y];
     s.number[1][row] = number;
     const std::uint32_t corner = s.lower.xz[y];
     s.at_0[0][row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;

@@ -90,6 +90,8 @@ struct alignas(256) TileShared {
   std::uint32_t number_base;        ///< mesh number of the tile's first vertex
   std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis
   LowerRows lower;
+  /// Crossing edges at sample 0 of the lower planes: along z at y = 0, along y at z = 0.
+  std::uint8_t plane_at_0[2][33];
   const RowTable* before;  ///< of the tile one lower along x, or null
   std::uint32_t item;      ///< the number of the tile that is worked on
   std::uint32_t items;     ///< how many there are

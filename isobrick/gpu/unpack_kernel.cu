@@ -101,13 +101,13 @@ __global__ void __launch_bounds__(kThreads) unpack_tiles(const __grid_constant__
 #pragma unroll 4
   for (int row = static_cast<int>(threadIdx.x / 32); row < edge * edge; row += kWarps) {
     const int y = low + row % edge, z = low + row / edge;
-    if (!(outside(y) && outside(z))) tile.copy(x, y, z, fill);
+    if (p.corners || !(outside(y) && outside(z))) tile.copy(x, y, z, fill);
   }
   for (int i = static_cast<int>(threadIdx.x); i < (edge - 32) * edge * edge; i += kThreads) {
     const int column = i / (edge * edge), row = i % (edge * edge);
     const int beside = column < p.reach ? low + column : 32 + column - p.reach;
     const int y = low + row % edge, z = low + row / edge;
-    if (outside(beside) + outside(y) + outside(z) <= 1) tile.copy(beside, y, z, fill);
+    if (p.corners || outside(beside) + outside(y) + outside(z) <= 1) tile.copy(beside, y, z, fill);
   }
 }
 

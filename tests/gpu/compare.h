@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -106,6 +108,16 @@ class DeviceTest : public ::testing::Test {
     });
   }
 };
+
+/// A field with NaN: here and there and as a box over the corner of eight tiles.
+inline Field<float> with_nan(Field<float> field, unsigned seed, int one_in) {
+  std::mt19937 random(seed);
+  for (float& v : field.samples)
+    if (random() % static_cast<unsigned>(one_in) == 0) v = NAN;
+  for_each_point(intersect({{30, 29, 31}, {34, 50, 33}}, field.box()),
+                 [&](Int3 p) { field.at(p) = NAN; });
+  return field;
+}
 
 using DeviceTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float>;
 

@@ -189,19 +189,39 @@ TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {
   gpu::DeviceVolume volume(lattice, bricks, 0);
   SurfaceOptions good;
   good.roi = lattice.box();
-  SurfaceOptions dropping = good, local = good, nan = good, nowhere = good;
+  SurfaceOptions dropping = good, local = good, nowhere = good;
   dropping.drop_degenerate = true;
   local.indexing = Indexing::chunk_local;
-  nan.may_have_nan = true;
   nowhere.roi = {{1000, 0, 0}, {1001, 1, 1}};
   EXPECT_THROW(gpu::ResidentExtractor(volume, dropping), UsageError);
   EXPECT_THROW(gpu::ResidentExtractor(volume, local), UsageError);
   EXPECT_THROW(gpu::ResidentExtractor(volume, nowhere), UsageError);
-  if (std::is_floating_point_v<TypeParam>) {
-    EXPECT_THROW(gpu::ResidentExtractor(volume, nan), UsageError);
-  }
   gpu::ResidentExtractor extractor(volume, good);
   EXPECT_THROW(extractor.extract(std::nan("")), UsageError);
+}
+
+using GpuResidentWithNaN = DeviceTest<float>;
+
+TEST_F(GpuResidentWithNaN, IsTheMeshOfTheCpu) {
+  SurfaceOptions options;
+  options.may_have_nan = true;
+  compare(waves({131, 70, 97}), {0, 30}, options);
+  compare(with_nan(waves({131, 70, 97}), 1, 300), {0, -40}, options, 32);
+  compare(with_nan(noise({67, 41, 75}, 2), 3, 20), {0}, options, 16);
+  compare(with_nan(noise({33, 32, 34}, 5), 4, 3), {0}, options);
+  compare(with_nan(waves({3, 1030, 1060}), 5, 50), {0}, options);
+}
+
+TEST_F(GpuResidentWithNaN, RegionsAndMirrors) {
+  const auto field = with_nan(noise({67, 41, 75}, 7), 8, 15);
+  for (const Box3 roi : {Box3{{5, 3, 7}, {60, 40, 70}}, Box3{{33, 0, 31}, {66, 39, 75}},
+                         Box3{{31, 31, 31}, {34, 34, 34}}}) {
+    SurfaceOptions options;
+    options.may_have_nan = true;
+    options.roi = roi;
+    options.transform.spacing = {-1, 2, 1};
+    compare(field, {0}, options);
+  }
 }
 
 TYPED_TEST(GpuResident, IsovaluesBeyondTheRangeGiveNothing) {

@@ -89,7 +89,10 @@ Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOpt
                 std::span<const TileWork> tiles, const Way& way) {
   Streamed result;
   const DeviceBricks on_device(all, lattice);
-  const NeededBricks bricks(on_device, lattice, tiles, sample_reach(options));
+  std::vector<TileWork> looked_at(tiles.begin(), tiles.end());
+  if (options.may_have_nan)
+    for (TileWork& tile : looked_at) tile.active_blocks = 0xff;
+  const NeededBricks bricks(on_device, lattice, looked_at, sample_reach(options));
   const auto take = [&](const MeshChunk& chunk, const std::function<void()>& release) {
     EXPECT_EQ(chunk.first_vertex, result.mesh.positions.size());
     append(result.mesh.positions, chunk.positions);
@@ -183,6 +186,21 @@ TYPED_TEST(GpuStream, RegionsOfInterest) {
   }
 }
 
+using GpuStreamWithNaN = DeviceTest<float>;
+
+TEST_F(GpuStreamWithNaN, IsTheMeshOfTheCpu) {
+  SurfaceOptions options;
+  options.may_have_nan = true;
+  compare(with_nan(waves({131, 70, 97}), 1, 300), 0, options, kManyWays);
+  compare(with_nan(noise({67, 41, 75}, 2), 3, 20), 0, options, kManyWays);
+  for (const Int3 extent : {Int3{2, 2, 2}, Int3{33, 33, 33}, Int3{34, 35, 65}})
+    compare(with_nan(noise(extent, 4), 5, 8), 0, options, {{512}, {1, 1, 16}});
+  options.roi = {{31, 2, 30}, {66, 39, 75}};
+  compare(with_nan(noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {2, 3, 20}});
+  options.indexing = Indexing::chunk_local;
+  compare(with_nan(noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {8, 5, 20}});
+}
+
 TYPED_TEST(GpuStream, EveryTileAloneForFormatsWithoutSharing) {
   SurfaceOptions options;
   options.indexing = Indexing::chunk_local;
@@ -268,7 +286,6 @@ TEST(GpuStreamSizes, WhatHasNoKernelsIsRefused) {
   };
   refused(ScalarType::f64, [](SurfaceOptions&) {});
   refused(ScalarType::i32, [](SurfaceOptions&) {});
-  refused(ScalarType::f32, [](SurfaceOptions& o) { o.may_have_nan = true; });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.drop_degenerate = true; });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.isovalue = std::nan(""); });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.roi = {{99, 0, 0}, {100, 1, 1}}; });

@@ -1,0 +1,78 @@
+#pragma once
+
+#include "isobrick/gpu/tile_classify.cuh"
+#include "isobrick/gpu/tile_count.cuh"
+
+// Volumes that may hold NaN: cells with such a corner are left out, and edges with no
+// other cell around them.
+
+namespace isobrick::gpu {
+
+/// Which samples around a tile are not numbers or outside of the region of interest. Lies
+/// where the lists will be, until the rows are counted.
+struct NanRows {
+  static constexpr int kEdge = 35;  ///< samples −1 … 33
+  /// Bit x + 1 of row (y + 1) + kEdge · (z + 1).
+  unsigned long long rows[kEdge * kEdge];
+
+  __device__ unsigned long long at(int y, int z) const { return rows[(z + 1) * kEdge + y + 1]; }
+};
+
+__device__ inline NanRows& nan_rows_of(TileShared& s) {
+  return *reinterpret_cast<NanRows*>(&s + 1);
+}
+
+/// Beside classify(): a row a warp.
+template <int N, class T>
+__device__ inline void find_nan(TileShared& s, const TileParams& p) {
+  constexpr int kEdge = NanRows::kEdge;
+  NanRows& nan = nan_rows_of(s);
+  const auto lane = static_cast<int>(lane_id());
+  const auto exists = [&](int axis, int at) {
+    const int global = s.shape.origin[axis] + at;
+    return global >= p.roi_lo[axis] && global < p.roi_hi[axis];
+  };
+  const auto is_nan = [&](int x, int y, int z) {
+    const T v = __ldg(sample_at<T>(s, page_of(x, y, z), x + 32 * y + 1024 * z));
+    return v != v;
+  };
+  const int beside = lane == 0 ? -1 : 31 + lane;  // lanes 0, 1, 2: the samples beside the 32
+  const bool row_exists = exists(0, lane), beside_exists = lane < 3 && exists(0, beside);
+  for (auto row = static_cast<int>(warp_id()); row < kEdge * kEdge; row += Team<N>::kWarps) {
+    const int y = row % kEdge - 1, z = row / kEdge - 1;
+    const bool here = exists(1, y) && exists(2, z);
+    const unsigned inner = __ballot_sync(kAll, !(here && row_exists) || is_nan(lane, y, z));
+    const unsigned outer = __ballot_sync(kAll, !(here && beside_exists) || is_nan(beside, y, z));
+    if (lane == 0)
+      nan.rows[row] = (outer & 1u) | static_cast<unsigned long long>(inner) << 1 |
+                      static_cast<unsigned long long>(outer >> 1 & 3u) << 33;
+  }
+}
+
+/// Leaves out what touches NaN of a row's edges and cells.
+__device__ inline void leave_out_nan(const NanRows& nan, int y, int z, RowEdges& e) {
+  unsigned long long pair[3][2];  // samples y − 1 + j and the next, at z − 1 + k: or'ed
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const unsigned long long middle = nan.at(y, z - 1 + k);
+    pair[k][0] = nan.at(y - 1, z - 1 + k) | middle;
+    pair[k][1] = middle | nan.at(y + 1, z - 1 + k);
+  }
+  // Bit x + 1: cell (x, y − 1 + j, z − 1 + k) has no such corner.
+  const auto good = [&](int j, int k) {
+    const unsigned long long any = pair[k][j] | pair[k + 1][j];
+    return ~(any | any >> 1);
+  };
+  const unsigned long long g00 = good(0, 0), g10 = good(1, 0), g01 = good(0, 1), g11 = good(1, 1);
+  const unsigned long long along_y = g10 | g11, along_z = g01 | g11;
+  // Bit x: a cell on either side of sample x.
+  const unsigned long long at_y = along_y >> 1 | along_y, at_z = along_z >> 1 | along_z;
+  e.x &= static_cast<std::uint32_t>((g00 | g10 | g01 | g11) >> 1);
+  e.y &= static_cast<std::uint32_t>(at_y >> 1);
+  e.z &= static_cast<std::uint32_t>(at_z >> 1);
+  e.y_at_0 &= static_cast<std::uint32_t>(at_y & 1u);
+  e.z_at_0 &= static_cast<std::uint32_t>(at_z & 1u);
+  e.cells &= static_cast<std::uint32_t>(g11 >> 1);
+}
+
+}  // namespace isobrick::gpu
