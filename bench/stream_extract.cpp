@@ -202,6 +202,7 @@ int run(Arguments a) {
   out["device_bytes"] = r.device_bytes;
   out["device_bytes_in_use"] = r.device_bytes_in_use;
   out["pinned_bytes"] = r.pinned_bytes;
+  out["pool_bricks"] = r.pool_bricks;
   if (a.check) {
     HashSink gpu(true), cpu(true);
     extract(store, a.options, gpu, silent);

@@ -204,6 +204,7 @@ void add_backend(ordered_json& object, const ExtractReport& r) {
   object["device_bytes"] = r.device_bytes;
   object["device_bytes_in_use"] = r.device_bytes_in_use;
   object["pinned_bytes"] = r.pinned_bytes;
+  object["pool_bricks"] = r.pool_bricks;
 }
 
 ordered_json report_json(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {

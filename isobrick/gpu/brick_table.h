@@ -24,7 +24,7 @@ struct BrickTable {
 /// How a launch reads its bricks.
 struct BrickUse {
   std::vector<SentBrick> sent;   ///< in the order of their places on the device
-  std::uint64_t read_bytes = 0;  ///< of samples that the device reads in host memory
+  std::uint64_t read_bytes = 0;  ///< of samples that the device reads where they lie
 };
 
 /// Fills the table for these tiles. A brick of which they need a good part is sent, as long

@@ -42,18 +42,21 @@ struct GpuExtractor::Impl {
   Lattice lattice;
   SurfaceOptions options;
   Int3 first_tile;
+  std::shared_ptr<BrickPool> pool;
   StreamDevice device;
   RowSlots slots;
   std::uint64_t launches = 0;
   std::vector<TileWork> whole;
   StreamCollector collector;  // ends first: its thread uses the device
 
-  Impl(int id, const Lattice& l, const SurfaceOptions& o, const StreamSizes& sizes, TakeChunk take)
+  Impl(int id, const Lattice& l, const SurfaceOptions& o, const StreamSizes& sizes, TakeChunk take,
+       std::shared_ptr<BrickPool> brick_pool)
       : cuda_device(current(id)),
         lattice(l),
         options(checked(l, o)),
         first_tile(tile_of(options.roi.lo)),
-        device(l, options, sizes),
+        pool(std::move(brick_pool)),
+        device(l, options, sizes, pool.get()),
         slots(device.sizes().slots, l.tiles()),
         collector(id, device, welded(), options.normals, std::move(take)) {}
 
@@ -120,8 +123,9 @@ struct GpuExtractor::Impl {
 };
 
 GpuExtractor::GpuExtractor(int device, const Lattice& lattice, const SurfaceOptions& options,
-                           const StreamSizes& sizes, TakeChunk take)
-    : impl_(std::make_unique<Impl>(device, lattice, options, sizes, std::move(take))) {}
+                           const StreamSizes& sizes, TakeChunk take,
+                           const std::shared_ptr<BrickPool>& pool)
+    : impl_(std::make_unique<Impl>(device, lattice, options, sizes, std::move(take), pool)) {}
 GpuExtractor::~GpuExtractor() = default;
 
 void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
@@ -142,6 +146,10 @@ void GpuExtractor::finish() { impl_->collector.finish(); }
 
 StreamReport GpuExtractor::report() const {
   StreamReport report = impl_->collector.report();
+  if (impl_->pool) {
+    report.upload.seconds += impl_->pool->seconds();
+    report.upload.bytes += impl_->pool->bytes();
+  }
   const StreamSizes& sizes = impl_->device.sizes();
   report.tiles_of_launch = sizes.tiles;
   report.device_bytes = sizes.device_bytes;

@@ -12,6 +12,8 @@
 
 namespace isobrick::gpu {
 
+class BrickPool;
+
 /// Takes a piece of the mesh. It stays as it is until `release` is called, once, from any
 /// thread. When it throws, it has not taken the piece.
 using TakeChunk = std::function<void(const MeshChunk& chunk, std::function<void()> release)>;
@@ -25,7 +27,7 @@ struct StreamStage {
 /// What a streaming extraction did.
 struct StreamReport {
   std::uint64_t vertices = 0, triangles = 0;
-  /// gather: kernels that lay samples out, and what they read in host memory.
+  /// gather: kernels that lay samples out, and what they read in the pool or in host memory.
   StreamStage upload, gather, kernel, download;
   std::uint64_t launches = 0, repeats = 0;  ///< repeats: parts of launches whose mesh was too large
   std::uint32_t tiles_of_launch = 0;        ///< at most
@@ -42,16 +44,18 @@ class GpuExtractor {
   /// launches where the device has no room for them. `take` is called from a thread of
   /// the extractor's own. Throws UsageError for what has no kernels (supported.h), an
   /// isovalue that is not a number or an empty region, Error where a single tile does not fit.
+  /// Sizes with a pool of bricks are for that pool.
   GpuExtractor(int device, const Lattice& lattice, const SurfaceOptions& options,
-               const StreamSizes& sizes, TakeChunk take);
+               const StreamSizes& sizes, TakeChunk take,
+               const std::shared_ptr<BrickPool>& pool = nullptr);
   /// Stops; waits for pieces that were taken and not released.
   ~GpuExtractor();
 
   /// Sends the tiles off. Over all calls tiles come in Morton order, none twice; `bricks`
-  /// holds what for_each_needed_box says (of whole tiles where there may be NaN), in memory from
-  /// host_memory(). It is not looked up any more afterwards, but its samples are read until
-  /// `samples` is let go. Throws what went wrong on the device or in `take`, also of earlier tiles,
-  /// and Error when a welded mesh gets more vertices than 32 bits number.
+  /// holds what for_each_needed_box says (of whole tiles where there may be NaN), in the pool or in
+  /// memory from host_memory(). It is not looked up any more afterwards, but its samples are read
+  /// until `samples` is let go. Throws what went wrong on the device or in `take`, also of earlier
+  /// tiles, and Error when a welded mesh gets more vertices than 32 bits number.
   void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                const std::shared_ptr<const void>& samples);
   /// Waits until all of the mesh was taken.

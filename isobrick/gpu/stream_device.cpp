@@ -42,11 +42,11 @@ void check_reads_host_memory() {
 Lane::Lane(const StreamSizes& sizes) : staging(sizes.staging_bytes) {}
 
 StreamDevice::StreamDevice(const Lattice& lattice, const SurfaceOptions& options,
-                           const StreamSizes& sizes)
-    : lattice_(lattice), options_(options) {
-  check_reads_host_memory();
+                           const StreamSizes& sizes, BrickPool* pool)
+    : lattice_(lattice), options_(options), pool_(pool) {
+  if (!pool_) check_reads_host_memory();
   for (StreamSizes s = sizes; !allocate(s);
-       s = stream_sizes(lattice, options, std::max(1u, s.tiles / 2)))
+       s = stream_sizes(lattice, options, std::max(1u, s.tiles / 2), kLeastLanes, s.pool))
     if (s.tiles == 1 && s.lanes == kLeastLanes)
       throw Error(fmt::format(
           "the GPU has no {} bytes of free memory, which a single tile takes; use --backend cpu",
@@ -60,7 +60,8 @@ StreamDevice::~StreamDevice() {
 }
 
 bool StreamDevice::allocate(const StreamSizes& sizes) {
-  auto arena = std::make_unique<DeviceArena>(sizes.device_bytes);
+  auto arena = std::make_unique<DeviceArena>(sizes.device_bytes -
+                                             sizes.pool.bricks * lattice_.brick_bytes());
   if (!*arena) return false;
   arena_ = std::move(arena);
   sizes_ = sizes;
@@ -167,6 +168,7 @@ void StreamDevice::submit(Lane& lane, std::uint64_t launch_number) {
   send(lane);
   lane.uploaded.record(upload_);
   check(cudaStreamWaitEvent(kernel_.get(), lane.uploaded.get()));
+  if (pool_) pool_->wait_on(kernel_);
   check(cudaStreamWaitEvent(kernel_.get(), lane.downloaded.get()));
   launch(lane, 0, lane.count, number_ends_ + launch_number % kEnds,
          number_ends_ + (launch_number + 1) % kEnds, false);

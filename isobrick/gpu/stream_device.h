@@ -5,6 +5,7 @@
 #include <mutex>
 #include <vector>
 
+#include "isobrick/gpu/brick_pool.h"
 #include "isobrick/gpu/brick_table.h"
 #include "isobrick/gpu/stream.h"
 #include "isobrick/gpu/stream_layout.h"
@@ -71,8 +72,10 @@ struct HostOutput {
 /// The device's side of a streaming extraction: its memory, its streams, its launches.
 class StreamDevice {
  public:
-  /// Halves the launches until the device has room. Throws Error when one tile has none.
-  StreamDevice(const Lattice& lattice, const SurfaceOptions& options, const StreamSizes& sizes);
+  /// Halves the launches until the device has room. Throws Error when one tile has none. With
+  /// a pool that is where bricks lie, else they lie in host memory.
+  StreamDevice(const Lattice& lattice, const SurfaceOptions& options, const StreamSizes& sizes,
+               BrickPool* pool);
   ~StreamDevice();
 
   const StreamSizes& sizes() const { return sizes_; }
@@ -107,6 +110,7 @@ class StreamDevice {
 
   Lattice lattice_;
   SurfaceOptions options_;
+  BrickPool* pool_;
   StreamSizes sizes_;
   StagingLayout layout_{0, 0};
   // Streams end before the memory that they work on.

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/tile.h"
+#include "isobrick/gpu/brick_pool.h"
 #include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/stream_layout.h"
 #include "isobrick/surface/cpu_extractor.h"
@@ -22,6 +24,8 @@ constexpr std::uint64_t kMostVertices = std::uint64_t{3} * 33 * 33 * 33,
 constexpr std::uint64_t kSmallBuffers = 64 << 10;
 /// Bricks of fewer bytes are not sent: a copy has a price of its own.
 constexpr std::uint64_t kLeastSent = std::uint64_t{128} << 10;
+/// Smaller launches are not worth a pool.
+constexpr std::uint64_t kLeastTilesWithPool = 128;
 /// A row table in the host's books: its slot, its tile, its expiry.
 constexpr std::uint64_t kBytesOfSlot = 96;
 
@@ -51,8 +55,9 @@ std::string too_small(const char* option, std::uint64_t budget, std::uint64_t le
 }  // namespace
 
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
-                         int lanes) {
+                         int lanes, PoolSizes pool) {
   StreamSizes s;
+  s.pool = pool;
   const auto of_lanes = static_cast<std::uint64_t>(lanes);
   s.tiles = tiles;
   s.lanes = lanes;
@@ -60,9 +65,8 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
   s.triangles = std::max(kMostTriangles, tiles * kTrianglesOfTile);
   s.slots = static_cast<std::uint32_t>(
       slots_for(lattice, options.indexing == Indexing::welded, tiles, lanes));
-  s.tile_bricks =
-      static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
-  s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
+  s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
+  if (pool.bricks == 0) s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
   s.staging_bytes = StagingLayout(tiles, s.tile_bricks).end;
   s.output_bytes =
       s.vertices * sizeof(Vec3f) * (options.normals ? 2 : 1) + s.triangles * sizeof(Triangle);
@@ -70,15 +74,55 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
   s.page_bytes = groups * kPageGroupSamples * lattice.sample_bytes();
   s.device_bytes =
       kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.page_bytes +
+      pool.bricks * lattice.brick_bytes() +
       of_lanes * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
-  s.pinned_bytes = kSmallBuffers + of_lanes * s.staging_bytes + kOutputs * s.output_bytes;
+  s.pinned_bytes = kSmallBuffers + of_lanes * s.staging_bytes + kOutputs * s.output_bytes +
+                   BrickPool::pinned_bytes(lattice.brick_bytes(), pool.threads);
   s.host_bytes = kBytesOfSlot * s.slots + of_lanes * tiles * sizeof(OrderState);
   return s;
 }
 
+std::uint64_t good_pool(const Lattice& lattice, int threads) {
+  // In Morton order about half of the bricks on the three upper faces of the grid live at a
+  // time; some more a thread are decoded ahead, are being decoded or belong to launches.
+  const Int3 b = lattice.bricks();
+  const auto faces = static_cast<std::uint64_t>(b.x * b.y + b.y * b.z + b.x * b.z);
+  return std::min(static_cast<std::uint64_t>(volume(b)),
+                  faces / 2 + 24 * static_cast<std::uint64_t>(threads));
+}
+
+namespace {
+
+/// Launches beside a pool of at least 70 % of what is wanted.
+std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions& options,
+                                    std::uint64_t device_budget, std::uint64_t host_budget,
+                                    std::uint64_t other_host_bytes, PoolSizes wanted) {
+  if (wanted.bricks == 0 || lattice.brick_bytes() < kLeastSent) return std::nullopt;
+  const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
+  for (std::uint64_t tiles = std::min<std::uint64_t>(kMostTilesOfLaunch, all);
+       tiles >= std::min<std::uint64_t>(kLeastTilesWithPool, all); tiles /= 2)
+    for (int lanes = kMostLanes; lanes >= kLeastLanes; --lanes) {
+      PoolSizes pool{0, wanted.threads};
+      const auto count = static_cast<std::uint32_t>(tiles);
+      const std::uint64_t launches =
+          stream_sizes(lattice, options, count, lanes, pool).device_bytes;
+      if (launches > device_budget) continue;
+      pool.bricks = std::min(wanted.bricks, (device_budget - launches) / lattice.brick_bytes());
+      if (10 * pool.bricks < 7 * wanted.bricks) continue;
+      const StreamSizes s = stream_sizes(lattice, options, count, lanes, pool);
+      if (s.pinned_bytes + s.host_bytes + other_host_bytes <= host_budget) return s;
+    }
+  return std::nullopt;
+}
+
+}  // namespace
+
 StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
                              std::uint64_t device_budget, std::uint64_t host_budget,
-                             std::uint64_t other_host_bytes) {
+                             std::uint64_t other_host_bytes, PoolSizes wanted) {
+  if (const auto s =
+          fit_pool(lattice, options, device_budget, host_budget, other_host_bytes, wanted))
+    return *s;
   const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
   auto tiles = static_cast<std::uint32_t>(std::min<std::uint64_t>(kMostTilesOfLaunch, all));
   for (int lanes = kMostLanes;; --lanes) {
@@ -90,8 +134,8 @@ StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& optio
     const std::uint64_t own = s.pinned_bytes + s.host_bytes, host = own + other_host_bytes;
     const bool least = tiles == 1 && lanes == kLeastLanes;
     // But for the least they leave half to the bricks.
-    const std::uint64_t wanted = least ? host : host + own;
-    if (s.device_bytes <= device_budget && wanted <= host_budget) return s;
+    const std::uint64_t needed = least ? host : host + own;
+    if (s.device_bytes <= device_budget && needed <= host_budget) return s;
     if (!least) continue;
     if (s.device_bytes > device_budget)
       throw UsageError(too_small("--gpu-memory", device_budget, s.device_bytes));

@@ -7,8 +7,15 @@
 
 namespace isobrick::gpu {
 
+/// A pool of bricks on the device (brick_pool.h), filled by so many threads.
+struct PoolSizes {
+  std::uint64_t bricks = 0;  ///< 0: there is none, the device reads bricks in host memory
+  int threads = 0;
+};
+
 /// How large the buffers of a streaming extraction are.
 struct StreamSizes {
+  PoolSizes pool;
   std::uint32_t tiles = 0;                    ///< a launch takes at most
   int lanes = 0;                              ///< launches under way at a time
   std::uint64_t vertices = 0, triangles = 0;  ///< that the output of a launch has room for
@@ -34,14 +41,18 @@ inline constexpr std::uint32_t kMostTilesOfLaunch = 256;
 
 /// The sizes for launches of `tiles` tiles.
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
-                         int lanes = kLeastLanes);
+                         int lanes = kLeastLanes, PoolSizes pool = {});
 
-/// The largest launches within both budgets; of the host's `other_host_bytes` are taken,
-/// and they leave half of the rest, for bricks. Throws UsageError naming the least `--gpu-memory`
-/// or
-/// `--memory` that works.
+/// Bricks that a pool should have room for when so many threads decode for launches of a
+/// whole volume.
+std::uint64_t good_pool(const Lattice& lattice, int threads);
+
+/// The largest launches within both budgets, of the host's `other_host_bytes` being taken.
+/// With a pool of `wanted.bricks` where the device has room for most of it; else they leave
+/// half of the rest of the host's memory, for bricks. Throws UsageError naming the least
+/// `--gpu-memory` or `--memory` that works.
 StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
                              std::uint64_t device_budget, std::uint64_t host_budget,
-                             std::uint64_t other_host_bytes);
+                             std::uint64_t other_host_bytes, PoolSizes wanted = {});
 
 }  // namespace isobrick::gpu

@@ -127,14 +127,19 @@ __device__ std::uint32_t count_in_turns(TileShared& s) {
   return triangles;
 }
 
+/// Whether warps that have so many things to list wait for each other by named barriers. In
+/// tiles that take turns, the turns' barriers are between them anyway.
+template <int N, bool Nan>
+__device__ bool wait_by_name(std::uint32_t count) {
+  return !Nan && count <= ListsOf<N>::kListed;
+}
+
 /// Finds the tile's cells and where its vertices and triangles go. The first warp asks
 /// what other tiles know; the others wait for no more than the place of the vertices.
-/// In tiles that take turns, the turns' barriers are between them anyway.
-template <int N>
+template <int N, bool Nan>
 __device__ void find_places(TileShared& s, const TileParams& p) {
-  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
-  const bool at_once = cells <= kListed;
+  const bool at_once = wait_by_name<N, Nan>(cells);
   if (warp_id() == 0) {
     find_vertex_base(s, p);
     if (at_once) arrive<N, TeamBarrier::vertex_base>();
@@ -144,6 +149,8 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
     find_cells<N>(s, cells);
   } else {
     triangles = count_in_turns<N>(s);
+    // A tile may have vertices of cells of others only.
+    if constexpr (Nan) __syncthreads();
   }
   if (warp_id() != 0) {
     if (at_once) {
@@ -162,7 +169,7 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
   }
   find_triangle_base(s, p, triangles);
   ask_neighbours<N>(s, p);
-  if (s.all_vertices <= kListed) arrive<N, TeamBarrier::neighbours>();
+  if (wait_by_name<N, Nan>(s.all_vertices)) arrive<N, TeamBarrier::neighbours>();
 }
 
 template <int N, class T, bool Normals>
@@ -244,10 +251,10 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
     classify<N>(s, classifier);
     __syncthreads();
     count_tile<N, Nan>(s, p);
-    find_places<N>(s, p);
+    find_places<N, Nan>(s, p);
     prefetch_tile<N, T>(s, p, s.item + gridDim.x);
     emit_all_vertices<N, T, Normals>(s, p);
-    if (s.all_vertices > ListsOf<N>::kListed)
+    if (!wait_by_name<N, Nan>(s.all_vertices))
       __syncthreads();
     else if (warp_id() != 0)
       wait<N, TeamBarrier::neighbours>();

@@ -99,8 +99,7 @@ void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
 void extract_on_gpu(const Work& work, GpuSession& gpu, std::unique_ptr<SurfaceExtractor> made) {
   BatchDecoder decoder(work.store, work.options.level, work.batches,
                        sample_reach(work.request.surface), work.plan.cache_bricks,
-                       work.request.threads,
-                       [&](std::size_t bytes) { return gpu.brick_memory(bytes); });
+                       work.request.threads, gpu.bricks());
   const auto surface = std::move(made);  // ends first: it holds batches
   for (;;) {
     std::shared_ptr<const DecodedBatch> batch;
@@ -117,7 +116,7 @@ void extract_on_gpu(const Work& work, GpuSession& gpu, std::unique_ptr<SurfaceEx
   }
   surface->finish();
   surface->report(work.report);
-  work.report.pinned_bytes += decoder.memory_bytes();
+  if (gpu.pool_bricks() == 0) work.report.pinned_bytes += decoder.memory_bytes();
   work.report.bricks_read = decoder.bricks_read();
   work.report.brick_reads = decoder.reads();
 }

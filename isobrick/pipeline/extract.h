@@ -62,9 +62,10 @@ struct ExtractReport {
   std::uint64_t device_bytes = 0;         ///< device memory that was held, within gpu_memory
   std::uint64_t device_bytes_in_use = 0;  ///< the same as the driver counts it
   std::uint64_t pinned_bytes = 0;         ///< page-locked host memory, within memory
-  std::uint64_t launches = 0;             ///< of kernels
-  std::uint64_t search_bytes = 0;         ///< read to find them, once
-  double search_seconds = 0;              ///< to find them, once
+  std::uint64_t pool_bricks = 0;   ///< that the device has room for; 0: bricks lie in host memory
+  std::uint64_t launches = 0;      ///< of kernels
+  std::uint64_t search_bytes = 0;  ///< read to find them, once
+  double search_seconds = 0;       ///< to find them, once
 };
 
 /// The stages that there were, by name.

@@ -56,12 +56,15 @@ std::uint64_t fixed_bytes(const ExtractRequest& request) {
          request.search_memory;
 }
 
-/// Neighbours come on top of the active bricks.
+/// Bricks that a cache can use: neighbours come on top of the active ones.
+std::uint64_t most_useful(std::size_t tile_bricks, std::uint64_t active_bricks) {
+  return std::max<std::uint64_t>(tile_bricks, 8 * active_bricks);
+}
+
 std::size_t fit_cache(const Lattice& lattice, std::uint64_t bytes, std::size_t tile_bricks,
                       std::uint64_t active_bricks) {
-  return static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(bytes / lattice.brick_bytes(), tile_bricks,
-                                std::max<std::uint64_t>(tile_bricks, 8 * active_bricks)));
+  return static_cast<std::size_t>(std::clamp<std::uint64_t>(
+      bytes / lattice.brick_bytes(), tile_bricks, most_useful(tile_bricks, active_bricks)));
 }
 
 }  // namespace
@@ -134,10 +137,17 @@ ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions&
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
   const std::uint64_t fixed = fixed_bytes(request) + kCudaDriver + other_bytes;
-  const std::uint64_t used = fixed + gpu.plan(request, options.gpu_memory, options.memory,
-                                              fixed + tile_bricks * brick_bytes);
+  const std::uint64_t used =
+      fixed + gpu.plan(request, options.gpu_memory, options.memory,
+                       fixed + tile_bricks * brick_bytes, most_useful(tile_bricks, active_bricks));
   ExtractPlan plan;
   plan.limits.tiles = gpu.good_batch();
+  if (const std::size_t pool = gpu.pool_bricks()) {
+    plan.cache_bricks = pool;
+    plan.batch_bricks = std::max(tile_bricks, pool / 4);
+    plan.bytes = used;
+    return plan;
+  }
   plan.cache_bricks = fit_cache(lattice, options.memory - used, tile_bricks, active_bricks);
   // Two batches are on their way through the GPU while others are decoded.
   plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 4);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "isobrick/core/error.h"
+#include "isobrick/gpu/brick_pool.h"
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/gpu_extractor.h"
 #include "isobrick/gpu/host_memory.h"
@@ -14,13 +16,17 @@ namespace {
 class CudaSurface final : public SurfaceExtractor {
  public:
   CudaSurface(int device, const gpu::DeviceInfo& info, const ExtractRequest& request,
-              const gpu::StreamSizes& sizes, MeshSink& sink)
+              const gpu::StreamSizes& sizes, const std::shared_ptr<gpu::BrickPool>& pool,
+              MeshSink& sink)
       : info_(info),
+        pool_bricks_(sizes.pool.bricks),
         writer_(sink),
-        extractor_(device, request.level->lattice, request.surface, sizes,
-                   [this](const MeshChunk& chunk, std::function<void()> release) {
-                     writer_.write(chunk, std::move(release));
-                   }) {
+        extractor_(
+            device, request.level->lattice, request.surface, sizes,
+            [this](const MeshChunk& chunk, std::function<void()> release) {
+              writer_.write(chunk, std::move(release));
+            },
+            pool) {
     const std::uint64_t free = gpu::open_device(device).free_bytes;
     bytes_in_use_ = info_.free_bytes - std::min(free, info_.free_bytes);
   }
@@ -50,14 +56,45 @@ class CudaSurface final : public SurfaceExtractor {
     report.device_bytes = r.device_bytes;
     report.device_bytes_in_use = bytes_in_use_;
     report.pinned_bytes = r.pinned_bytes;
+    report.pool_bricks = pool_bricks_;
     report.launches = r.launches + r.repeats;
   }
 
  private:
   gpu::DeviceInfo info_;
-  std::uint64_t bytes_in_use_ = 0;
+  std::uint64_t pool_bricks_, bytes_in_use_ = 0;
   ChunkWriter writer_;
   gpu::GpuExtractor extractor_;  // ends first: its thread hands chunks to the writer
+};
+
+/// Bricks in host memory, which the device reads.
+class HostBricks final : public BrickMemory {
+ public:
+  explicit HostBricks(int device) : device_(device) {}
+  std::shared_ptr<std::byte> room(std::size_t bytes) override {
+    return gpu::host_memory(device_, bytes);
+  }
+
+ private:
+  int device_;
+};
+
+/// Bricks on the device.
+class DeviceBricks final : public BrickMemory {
+ public:
+  DeviceBricks(std::shared_ptr<gpu::BrickPool> pool, std::size_t brick_bytes)
+      : pool_(std::move(pool)), job_(gpu::BrickPool::bricks_of_group(brick_bytes) * brick_bytes) {}
+  std::shared_ptr<std::byte> room(std::size_t bytes) override {
+    return {pool_, pool_->take(bytes)};
+  }
+  std::byte* begin(int thread, std::byte*) override { return pool_->begin(thread); }
+  void end(int thread, std::byte* place) override { pool_->end(thread, place); }
+  void send(int thread) override { pool_->send(thread); }
+  std::size_t good_job() const override { return job_; }
+
+ private:
+  std::shared_ptr<gpu::BrickPool> pool_;
+  std::size_t job_;
 };
 
 class CudaSession final : public GpuSession {
@@ -65,28 +102,47 @@ class CudaSession final : public GpuSession {
   explicit CudaSession(int device) : device_(device), info_(gpu::open_device(device)) {}
 
   std::uint64_t plan(const ExtractRequest& request, std::uint64_t device_budget,
-                     std::uint64_t host_budget, std::uint64_t other_host_bytes) override {
+                     std::uint64_t host_budget, std::uint64_t other_host_bytes,
+                     std::uint64_t most_bricks) override {
+    const Lattice& lattice = request.level->lattice;
     if (device_budget == 0) device_budget = info_.free_bytes - info_.free_bytes / 10;
-    sizes_ = gpu::fit_stream_sizes(request.level->lattice, request.surface, device_budget,
-                                   host_budget, other_host_bytes);
+    const auto fit = [&](std::uint64_t bricks) {
+      sizes_ = gpu::fit_stream_sizes(lattice, request.surface, device_budget, host_budget,
+                                     other_host_bytes, {bricks, request.threads});
+    };
+    fit(std::min(most_bricks, gpu::good_pool(lattice, request.threads)));
+    bricks_ = std::make_unique<HostBricks>(device_);
+    if (sizes_.pool.bricks > 0 && !make_pool(lattice)) fit(0);
     return sizes_.pinned_bytes + sizes_.host_bytes;
   }
 
   std::size_t good_batch() const override { return sizes_.tiles; }
-
-  std::shared_ptr<std::byte> brick_memory(std::size_t bytes) const override {
-    return gpu::host_memory(device_, bytes);
-  }
+  std::size_t pool_bricks() const override { return sizes_.pool.bricks; }
+  BrickMemory& bricks() override { return *bricks_; }
 
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
                                                  MeshSink& sink) override {
-    return std::make_unique<CudaSurface>(device_, info_, request, sizes_, sink);
+    return std::make_unique<CudaSurface>(device_, info_, request, sizes_, pool_, sink);
   }
 
  private:
+  /// False when the device has less room than it said.
+  bool make_pool(const Lattice& lattice) {
+    try {
+      pool_ = std::make_shared<gpu::BrickPool>(device_, lattice.brick_bytes(), sizes_.pool.bricks,
+                                               sizes_.pool.threads);
+    } catch (const Error&) {
+      return false;
+    }
+    bricks_ = std::make_unique<DeviceBricks>(pool_, lattice.brick_bytes());
+    return true;
+  }
+
   int device_;
   gpu::DeviceInfo info_;
   gpu::StreamSizes sizes_;
+  std::shared_ptr<gpu::BrickPool> pool_;
+  std::unique_ptr<BrickMemory> bricks_;
 };
 
 }  // namespace

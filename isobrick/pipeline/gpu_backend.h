@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "isobrick/pipeline/surface_extractor.h"
+#include "isobrick/stream/brick_memory.h"
 
 // The CUDA backend as the pipeline sees it: gpu_backend.cpp where it is built, else
 // no_gpu_backend.cpp.
@@ -23,14 +24,17 @@ class GpuSession {
   virtual ~GpuSession() = default;
 
   /// Chooses buffers within `device_budget` (0: what is free less 10 %) and within
-  /// `host_budget`, of which `other_host_bytes` are taken. The host memory that they take.
-  /// Throws UsageError naming the least that works.
+  /// `host_budget`, of which `other_host_bytes` are taken, for at most `most_bricks` bricks.
+  /// The host memory that they take. Throws UsageError naming the least that works.
   virtual std::uint64_t plan(const ExtractRequest& request, std::uint64_t device_budget,
-                             std::uint64_t host_budget, std::uint64_t other_host_bytes) = 0;
+                             std::uint64_t host_budget, std::uint64_t other_host_bytes,
+                             std::uint64_t most_bricks) = 0;
   /// Tiles to hand to its surface at a time, as planned.
   virtual std::size_t good_batch() const = 0;
-  /// Memory for the bricks that its surface is given. From any thread.
-  virtual std::shared_ptr<std::byte> brick_memory(std::size_t bytes) const = 0;
+  /// Bricks that the device has room for, as planned; 0: they lie in host memory.
+  virtual std::size_t pool_bricks() const = 0;
+  /// Where the bricks that its surface is given lie.
+  virtual BrickMemory& bricks() = 0;
   /// As planned. Session and sink must outlive it.
   virtual std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
                                                          MeshSink& sink) = 0;

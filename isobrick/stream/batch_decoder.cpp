@@ -11,8 +11,6 @@
 namespace isobrick {
 namespace {
 
-/// What a decoder takes on at a time: small bricks come in groups.
-constexpr std::size_t kBytesOfJob = std::size_t{128} << 10;
 /// Memory that is got at a time.
 constexpr std::size_t kBytesOfSlab = std::size_t{16} << 20;
 /// Pieces of it that are got before they are needed.
@@ -46,22 +44,22 @@ std::size_t BatchDecoder::slab_bricks(const Lattice& lattice, std::size_t capaci
 }
 
 BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& planner, Index reach,
-                           std::size_t capacity, int threads, GetBrickMemory memory)
+                           std::size_t capacity, int threads, BrickMemory& memory)
     : store_(store),
       level_(level),
       lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
       planner_(planner),
       capacity_(capacity),
       threads_count_(threads),
-      bricks_of_job_(std::clamp<std::size_t>(kBytesOfJob / lattice_.brick_bytes(), 1, 64)),
-      memory_(std::move(memory)),
+      bricks_of_job_(std::clamp<std::size_t>(memory.good_job() / lattice_.brick_bytes(), 1, 64)),
+      memory_(memory),
       slots_(lattice_, reach),
       seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {
   {
     const std::lock_guard lock(mutex_);
     grow_if_short();
   }
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { run(); });
+  for (int i = 0; i < threads; ++i) threads_.emplace_back([this, i] { run(i); });
   threads_.emplace_back([this] { plan(); });
 }
 
@@ -160,7 +158,8 @@ void BatchDecoder::begin(const Batch& batch) {
 
 void BatchDecoder::load(const Batch& batch, std::vector<Load>& loads) {
   if (loads.empty()) return;
-  jobs_.push_back([this, batch, mine = std::exchange(loads, {})] { decode(batch, mine); });
+  jobs_.push_back(
+      [this, batch, mine = std::exchange(loads, {})](int thread) { decode(thread, batch, mine); });
   work_.notify_one();
 }
 
@@ -180,7 +179,7 @@ void BatchDecoder::hint(const TileBatch& batch) {
   const std::lock_guard lock(mutex_);
   std::copy_if(batch.bricks.begin(), batch.bricks.end(), std::back_inserter(missing),
                [&](Int3 b) { return !slots_.contains(b); });
-  jobs_.push_front([this, missing = std::move(missing)] {
+  jobs_.push_front([this, missing = std::move(missing)](int) {
     for (const Int3 b : missing) store_.will_need(level_, b);
   });
   work_.notify_one();
@@ -195,13 +194,13 @@ void BatchDecoder::grow_if_short() {
     const std::size_t count = std::min(piece, capacity_ - slots_count_);
     slots_count_ += count;
     coming_ += count;
-    jobs_.push_front([this, count] { grow(count); });
+    jobs_.push_front([this, count](int) { grow(count); });
     work_.notify_one();
   }
 }
 
 void BatchDecoder::grow(std::size_t count) {
-  auto slab = memory_(count * lattice_.brick_bytes());
+  auto slab = memory_.room(count * lattice_.brick_bytes());
   const std::lock_guard lock(mutex_);
   slots_.add_slots(slab.get(), count);
   slabs_.push_back(std::move(slab));
@@ -210,7 +209,7 @@ void BatchDecoder::grow(std::size_t count) {
   changed_.notify_all();
 }
 
-void BatchDecoder::run() {
+void BatchDecoder::run(int thread) {
   try {
     for (;;) {
       Job job;
@@ -221,17 +220,21 @@ void BatchDecoder::run() {
         job = std::move(jobs_.front());
         jobs_.pop_front();
       }
-      job();
+      job(thread);
     }
   } catch (...) {
     fail(std::current_exception());
   }
 }
 
-void BatchDecoder::decode(const Batch& batch, const std::vector<Load>& loads) {
+void BatchDecoder::decode(int thread, const Batch& batch, const std::vector<Load>& loads) {
   std::vector<char> present;
-  for (const Load& load : loads)
-    present.push_back(store_.read_brick(level_, load.brick, load.samples));
+  for (const Load& load : loads) {
+    std::byte* to = memory_.begin(thread, load.samples);
+    present.push_back(store_.read_brick(level_, load.brick, to));
+    if (present.back()) memory_.end(thread, load.samples);
+  }
+  memory_.send(thread);
   const std::lock_guard lock(mutex_);
   for (std::size_t i = 0; i < loads.size(); ++i) {
     if (!present[i]) {

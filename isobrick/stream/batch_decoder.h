@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/stream/brick_memory.h"
 #include "isobrick/stream/brick_slots.h"
 #include "isobrick/stream/tile_stream.h"
 
@@ -46,18 +47,15 @@ class DecodedBatch final : public BrickLookup {
   bool begun_ = false;       ///< all of its bricks are held
 };
 
-/// Memory for bricks, given back when nothing points to it any more.
-using GetBrickMemory = std::function<std::shared_ptr<std::byte>(std::size_t bytes)>;
-
 /// Decodes the bricks of batch after batch, some batches ahead of whoever takes them, so
 /// that no core waits at the end of one. Planning and decoding have threads of their own.
 class BatchDecoder {
  public:
   /// So many threads decode; at most `capacity` bricks are held at a time, which must be
-  /// enough for any batch. Their memory comes from `memory`, in pieces of slab_bricks(),
-  /// when it is needed. The planner is used by one thread only, not the caller's.
+  /// enough for any batch. They lie in `memory`, of which pieces of slab_bricks() are asked
+  /// for when they are needed. The planner is used by one thread only, not the caller's.
   BatchDecoder(const StoreReader& store, int level, BatchPlanner& planner, Index reach,
-               std::size_t capacity, int threads, GetBrickMemory memory);
+               std::size_t capacity, int threads, BrickMemory& memory);
   /// Stops; all batches have been destroyed.
   ~BatchDecoder();
 
@@ -82,7 +80,7 @@ class BatchDecoder {
     Int3 brick;
     std::byte* samples;
   };
-  using Job = std::function<void()>;
+  using Job = std::function<void(int thread)>;
 
   void plan();
   bool next_planned(TileBatch& batch);
@@ -92,8 +90,8 @@ class BatchDecoder {
   void hint(const TileBatch& batch);
   void grow_if_short();
   void grow(std::size_t count);
-  void run();
-  void decode(const Batch& batch, const std::vector<Load>& loads);
+  void run(int thread);
+  void decode(int thread, const Batch& batch, const std::vector<Load>& loads);
   void release(const DecodedBatch& batch);
   void fail(std::exception_ptr error);
   template <class Ready>
@@ -106,7 +104,7 @@ class BatchDecoder {
   const std::size_t capacity_;
   const int threads_count_;
   const std::size_t bricks_of_job_;
-  const GetBrickMemory memory_;
+  BrickMemory& memory_;
 
   std::mutex mutex_;
   std::condition_variable work_, changed_;

@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "isobrick/core/error.h"
+#include "isobrick/gpu/brick_pool.h"
 #include "isobrick/gpu/gpu_extractor.h"
 #include "isobrick/gpu/host_memory.h"
 #include "tests/gpu/compare.h"
@@ -24,6 +25,7 @@ struct Way {
   std::uint32_t tiles = 512;           ///< a launch
   std::size_t call = ~std::size_t{0};  ///< tiles a call
   Index brick = 64;
+  bool pool = false;  ///< bricks lie on the device
 };
 
 /// Bricks in memory that the device reads.
@@ -51,6 +53,42 @@ class DeviceBricks final : public BrickLookup {
   const BrickLookup& bricks_;
   Lattice lattice_;
   std::shared_ptr<std::byte> memory_;
+};
+
+/// Bricks in a pool on the device.
+class PooledBricks final : public BrickLookup {
+ public:
+  PooledBricks(const BrickLookup& bricks, const Lattice& lattice)
+      : lattice_(lattice),
+        places_(static_cast<std::size_t>(volume(lattice.bricks()))),
+        pool_(std::make_shared<gpu::BrickPool>(0, lattice.brick_bytes(), places_.size(), 2)) {
+    int thread = 0;
+    std::size_t since = 0;
+    for_each_point({{0, 0, 0}, lattice.bricks()}, [&](Int3 b) {
+      const std::byte* from = bricks.find(b);
+      if (!from) return;
+      std::byte*& place = places_[static_cast<std::size_t>(linear_index(b, lattice_.bricks()))];
+      place = pool_->take(lattice.brick_bytes());
+      std::copy_n(from, lattice.brick_bytes(), pool_->begin(thread));
+      pool_->end(thread, place);
+      if (++since == gpu::BrickPool::bricks_of_group(lattice.brick_bytes())) {
+        pool_->send(thread);
+        thread = 1 - thread;
+        since = 0;
+      }
+    });
+    pool_->send(thread);
+  }
+  const std::byte* find(Int3 b) const override {
+    return places_[static_cast<std::size_t>(linear_index(b, lattice_.bricks()))];
+  }
+  const std::shared_ptr<gpu::BrickPool>& pool() const { return pool_; }
+  gpu::PoolSizes sizes() const { return {places_.size(), 2}; }
+
+ private:
+  Lattice lattice_;
+  std::vector<std::byte*> places_;
+  std::shared_ptr<gpu::BrickPool> pool_;
 };
 
 /// Only what the active tiles need may be looked at: other bricks are poison.
@@ -88,7 +126,10 @@ struct Streamed {
 Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOptions& options,
                 std::span<const TileWork> tiles, const Way& way) {
   Streamed result;
-  const DeviceBricks on_device(all, lattice);
+  const DeviceBricks in_host_memory(all, lattice);
+  std::optional<PooledBricks> pooled;
+  if (way.pool) pooled.emplace(all, lattice);
+  const BrickLookup& on_device = pooled ? static_cast<const BrickLookup&>(*pooled) : in_host_memory;
   std::vector<TileWork> looked_at(tiles.begin(), tiles.end());
   if (options.may_have_nan)
     for (TileWork& tile : looked_at) tile.active_blocks = 0xff;
@@ -107,13 +148,15 @@ Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOpt
         }
     release();
   };
-  gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, way.tiles),
-                              take);
+  gpu::GpuExtractor extractor(0, lattice, options,
+                              gpu::stream_sizes(lattice, options, way.tiles, gpu::kLeastLanes,
+                                                pooled ? pooled->sizes() : gpu::PoolSizes{}),
+                              take, pooled ? pooled->pool() : nullptr);
   for (std::size_t i = 0; i < tiles.size(); i += std::min(way.call, tiles.size()))
     extractor.extract(tiles.subspan(i, std::min(way.call, tiles.size() - i)), bricks,
-                      on_device.memory());
+                      in_host_memory.memory());
   extractor.finish();
-  EXPECT_EQ(on_device.memory().use_count(), 1) << "samples are let go";
+  EXPECT_EQ(in_host_memory.memory().use_count(), 1) << "samples are let go";
   result.report = extractor.report();
   return result;
 }
@@ -146,7 +189,8 @@ const std::vector<Way> kManyWays{{512, ~std::size_t{0}, 64},
                                  {1, ~std::size_t{0}, 16},
                                  {3, 4, 48},
                                  {8, ~std::size_t{0}, 20},
-                                 {20, 7, 32}};
+                                 {20, 7, 32},
+                                 {4, 6, 48, true}};
 
 template <class T>
 class GpuStream : public DeviceTest<T> {};
@@ -273,6 +317,36 @@ TEST(GpuStreamSizes, TheLeastBudgetWorksAndLessIsRefusedByName) {
   EXPECT_NE(refusal(much, host - 1).find("at least " + std::to_string(host) + " bytes (--memory "),
             std::string::npos);
   EXPECT_LT(least.device_bytes, std::uint64_t{32} << 20);
+}
+
+TEST(GpuStreamSizes, APoolIsTakenWhereMostOfItFits) {
+  const Lattice lattice{{1024, 1024, 1024}, {64, 64, 64}, ScalarType::u16};
+  const SurfaceOptions options{.roi = lattice.box()};
+  constexpr std::uint64_t mebi = std::uint64_t{1} << 20, much = mebi << 20;
+  const gpu::PoolSizes wanted{gpu::good_pool(lattice, 16), 16};
+  EXPECT_GE(wanted.bricks, 384u);
+  EXPECT_LT(wanted.bricks, 1024u);
+  const auto fit = [&](std::uint64_t device, std::uint64_t host) {
+    const gpu::StreamSizes s = gpu::fit_stream_sizes(lattice, options, device, host, 0, wanted);
+    EXPECT_LE(s.device_bytes, device);
+    EXPECT_LE(s.pinned_bytes + s.host_bytes, host);
+    return s;
+  };
+  const gpu::StreamSizes whole = fit(1024 * mebi, much), most = fit(400 * mebi, much),
+                         none = fit(200 * mebi, much), little_host = fit(1024 * mebi, 20 * mebi);
+  EXPECT_EQ(whole.pool.bricks, wanted.bricks);
+  EXPECT_EQ(whole.tiles, gpu::kMostTilesOfLaunch);
+  EXPECT_EQ(whole.sent_bricks, 0u);
+  EXPECT_LT(most.pool.bricks, wanted.bricks);
+  EXPECT_GE(10 * most.pool.bricks, 7 * wanted.bricks);
+  EXPECT_EQ(none.pool.bricks, 0u);
+  EXPECT_GT(none.sent_bricks, 0u);
+  EXPECT_EQ(little_host.pool.bricks, 0u);
+  // Small bricks would be many copies.
+  EXPECT_EQ(gpu::fit_stream_sizes({{256, 256, 256}, {32, 32, 32}, ScalarType::u8}, options, much,
+                                  much, 0, {100, 4})
+                .pool.bricks,
+            0u);
 }
 
 TEST(GpuStreamSizes, WhatHasNoKernelsIsRefused) {

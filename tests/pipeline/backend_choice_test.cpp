@@ -33,12 +33,13 @@ class FakeGpu final : public GpuSession {
   FakeGpu(std::uint64_t pinned, bool full) : pinned_(pinned), full_(full) {}
 
   std::uint64_t plan(const ExtractRequest&, std::uint64_t, std::uint64_t host_budget,
-                     std::uint64_t other) override {
+                     std::uint64_t other, std::uint64_t) override {
     if (host_budget < other + pinned_) throw UsageError("--memory is too small for the GPU");
     return pinned_;
   }
   std::size_t good_batch() const override { return 8; }
-  std::shared_ptr<std::byte> brick_memory(std::size_t) const override { return nullptr; }
+  std::size_t pool_bricks() const override { return 0; }
+  BrickMemory& bricks() override { throw Error("nobody asks for bricks"); }
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, MeshSink&) override {
     if (full_) throw Error("no device memory is left");
     return std::make_unique<NoSurface>();

@@ -12,13 +12,56 @@
 namespace isobrick::test {
 namespace {
 
+class HeapMemory : public BrickMemory {
+ public:
+  std::shared_ptr<std::byte> room(std::size_t size) override {
+    bytes += size;
+    return {new std::byte[size], std::default_delete<std::byte[]>()};
+  }
+  std::atomic<std::size_t> bytes = 0;
+};
+
+/// As a device has it: a thread decodes some bricks to buffers of its own, which are then sent.
+class ElsewhereMemory final : public HeapMemory {
+ public:
+  ElsewhereMemory(std::size_t brick, int threads)
+      : brick_(brick), writers_(static_cast<std::size_t>(threads)) {}
+  std::byte* begin(int thread, std::byte*) override {
+    Writer& w = writer(thread);
+    w.samples.resize((w.places.size() + 1) * brick_);
+    return w.samples.data() + w.places.size() * brick_;
+  }
+  void end(int thread, std::byte* place) override { writer(thread).places.push_back(place); }
+  void send(int thread) override {
+    Writer& w = writer(thread);
+    for (std::size_t i = 0; i < w.places.size(); ++i)
+      std::copy_n(w.samples.data() + i * brick_, brick_, w.places[i]);
+    w.places.clear();
+  }
+  std::size_t good_job() const override { return 3 * brick_; }
+
+ private:
+  struct Writer {
+    std::vector<std::byte> samples;
+    std::vector<std::byte*> places;
+  };
+  Writer& writer(int thread) { return writers_.at(static_cast<std::size_t>(thread)); }
+  std::size_t brick_;
+  std::vector<Writer> writers_;
+};
+
+class NoMemory final : public BrickMemory {
+  std::shared_ptr<std::byte> room(std::size_t) override { throw Error("no memory"); }
+};
+
 class Decoder : public StoredVolume {
  protected:
   struct Way {
     Index reach = 0;
     std::size_t tiles = 4, capacity = 1000;
     int threads = 3;
-    std::size_t held = 1;  ///< batches that are in use at a time
+    std::size_t held = 1;    ///< batches that are in use at a time
+    bool elsewhere = false;  ///< bricks are decoded elsewhere than where they lie
   };
   struct Seen {
     std::vector<Int3> tiles;
@@ -33,13 +76,10 @@ class Decoder : public StoredVolume {
     TileStream stream(store, 0, 20000, lattice.box());
     BatchPlanner planner(stream, lattice, way.reach, false, way.tiles, way.capacity / way.held);
     Seen seen;
-    std::atomic<std::size_t> bytes = 0;
-    BatchDecoder decoder(store, 0, planner, way.reach, way.capacity, way.threads,
-                         [&](std::size_t size) {
-                           bytes += size;
-                           return std::shared_ptr<std::byte>(new std::byte[size],
-                                                             std::default_delete<std::byte[]>());
-                         });
+    const std::unique_ptr<HeapMemory> memory =
+        way.elsewhere ? std::make_unique<ElsewhereMemory>(lattice.brick_bytes(), way.threads)
+                      : std::make_unique<HeapMemory>();
+    BatchDecoder decoder(store, 0, planner, way.reach, way.capacity, way.threads, *memory);
     std::deque<std::shared_ptr<const DecodedBatch>> held;
     while (auto batch = decoder.next()) {
       held.push_back(std::move(batch));
@@ -60,7 +100,7 @@ class Decoder : public StoredVolume {
     }
     seen.reads = decoder.reads();
     seen.bricks_read = decoder.bricks_read();
-    seen.bytes = bytes;
+    seen.bytes = memory->bytes;
     return seen;
   }
 };
@@ -75,7 +115,8 @@ TEST_F(Decoder, EveryTileComesOnceWithItsBricksHoweverShortRoomIs) {
   for (const Index reach : {0, 1}) {
     const std::size_t least = max_bricks_of_tile(lattice, reach);
     for (const Way& way : {Way{reach}, Way{reach, 1, least, 1}, Way{reach, 7, least + 3, 4},
-                           Way{reach, 3, 3 * least, 2, 3}, Way{reach, 1000, 1000, 5}}) {
+                           Way{reach, 3, 3 * least, 2, 3}, Way{reach, 1000, 1000, 5},
+                           Way{reach, 3, 3 * least, 2, 3, true}}) {
       const Seen seen = decode(way);
       EXPECT_EQ(seen.tiles, expected);
       EXPECT_LE(seen.bytes, way.capacity * lattice.brick_bytes());
@@ -92,15 +133,14 @@ TEST_F(Decoder, WhoeverTakesBatchesMayStopEarly) {
   const Lattice& lattice = store.info().levels[0].lattice;
   TileStream stream(store, 0, 20000, lattice.box());
   BatchPlanner planner(stream, lattice, 0, false, 2, 50);
-  BatchDecoder decoder(store, 0, planner, 0, 50, 2, [](std::size_t size) {
-    return std::shared_ptr<std::byte>(new std::byte[size], std::default_delete<std::byte[]>());
-  });
+  HeapMemory memory;
+  BatchDecoder decoder(store, 0, planner, 0, 50, 2, memory);
   EXPECT_NE(decoder.next(), nullptr);
   EXPECT_NE(decoder.next(), nullptr);
 }
 
 TEST_F(Decoder, DamageAndWantOfMemoryReachWhoeverTakesBatches) {
-  const auto decode_all = [&](const GetBrickMemory& memory) {
+  const auto decode_all = [&](BrickMemory&& memory) {
     const StoreReader store(path_);
     TileStream stream(store, 0, 20000, store.info().levels[0].lattice.box());
     BatchPlanner planner(stream, store.info().levels[0].lattice, 0, false, 2, 50);
@@ -108,20 +148,14 @@ TEST_F(Decoder, DamageAndWantOfMemoryReachWhoeverTakesBatches) {
     while (decoder.next()) {
     }
   };
-  EXPECT_THROW(
-      decode_all([](std::size_t) -> std::shared_ptr<std::byte> { throw Error("no memory"); }),
-      Error);
+  EXPECT_THROW(decode_all(NoMemory()), Error);
   for (const auto& file : std::filesystem::recursive_directory_iterator(path_ / "0"))
     if (file.is_regular_file() && file.file_size() > 4096) {
       std::fstream damaged(file.path(), std::ios::in | std::ios::out | std::ios::binary);
       damaged.seekp(1000);
       damaged.write("damaged", 7);
     }
-  EXPECT_THROW(decode_all([](std::size_t size) {
-                 return std::shared_ptr<std::byte>(new std::byte[size],
-                                                   std::default_delete<std::byte[]>());
-               }),
-               DamageError);
+  EXPECT_THROW(decode_all(HeapMemory()), DamageError);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <vector>
 
 #include "tests/tools/program.h"
 
@@ -103,11 +105,6 @@ TEST_F(Backend, WhatHasNoKernelsIsRefusedAndAutoTakesTheCpu) {
   check(make_store("a"), {"--drop-degenerate"}, "degenerate");
   check(waves("f64", {"--levels", "1"}), {}, "f64");
   check(waves("u32", {"--levels", "1"}), {}, "u32");
-  const float samples[] = {std::numeric_limits<float>::quiet_NaN(), 0, 255, 0, 0, 0, 255, 255};
-  write_file(path("nan_2x2x2_float32.raw"),
-             std::string(reinterpret_cast<const char*>(samples), sizeof samples));
-  ASSERT_EQ(run({"convert", path("nan_2x2x2_float32.raw"), path("nan.zarr")}).exit_code, 0);
-  check(path("nan.zarr"), {}, "NaN");
 }
 
 TEST_F(Backend, WithoutADeviceCudaIsRefusedAndAutoTakesTheCpu) {
@@ -161,6 +158,31 @@ TEST_F(Cuda, FilesAreThoseOfTheCpu) {
   compare(store, ".ply", {"--level", "1"});
   compare(store, ".ply", {"--roi", "11:99,40:,:77"});
   compare(store, ".stl", {"--roi", "11:99,40:,:77", "--normals", "gradient"});
+}
+
+TEST_F(Cuda, VolumesWithSamplesThatAreNoNumbers) {
+  std::vector<float> samples;
+  for (int i = 0; i < 70 * 65 * 90; ++i)
+    samples.push_back(i % 97 == 0 ? std::numeric_limits<float>::quiet_NaN()
+                                  : static_cast<float>(std::sin(i * 0.1) + std::sin(i / 70 * 0.2)));
+  write_file(path("nan_70x65x90_float32.raw"),
+             std::string(reinterpret_cast<const char*>(samples.data()), samples.size() * 4));
+  const std::string store = path("f32.zarr");
+  ASSERT_EQ(run({"convert", path("nan_70x65x90_float32.raw"), store, "--brick", "32"}).exit_code,
+            0);
+  compare(store, ".ply", {"--normals", "gradient"});
+  compare(store, ".stl", {"--roi", "11:,0:40,:77"});
+}
+
+TEST_F(Cuda, ABudgetDecidesWhereBricksLie) {
+  const std::string store = waves("u16");  // bricks of 512 KiB
+  const auto pool_with = [&](const char* budget) {
+    return compare(store, ".ply", {"--normals", "gradient"},
+                   {"--gpu-memory", budget})["pool_bricks"]
+        .get<int>();
+  };
+  EXPECT_GT(pool_with("256M"), 0);
+  EXPECT_EQ(pool_with("16M"), 0);
 }
 
 TEST_F(Cuda, ReportsItsStages) {

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+namespace isobrick {
+
+/// Where decoded bricks lie, and how they come there. Called from any thread.
+class BrickMemory {
+ public:
+  virtual ~BrickMemory() = default;
+
+  /// Room for bricks, one after the other; given back when nothing points to it any more.
+  virtual std::shared_ptr<std::byte> room(std::size_t bytes) = 0;
+  /// Where decoder `thread`, counted from 0, is to decode the brick of a place in that room,
+  /// which need not be memory that a processor writes.
+  virtual std::byte* begin(int /*thread*/, std::byte* place) { return place; }
+  /// The samples that were begun last are whole and belong to `place`.
+  virtual void end(int /*thread*/, std::byte* /*place*/) {}
+  /// What the thread has ended is to be there for whoever reads that memory.
+  virtual void send(int /*thread*/) {}
+  /// Bytes of bricks that a decoder should begin before it sends them: small bricks come in
+  /// groups.
+  virtual std::size_t good_job() const { return std::size_t{128} << 10; }
+};
+
+}  // namespace isobrick
