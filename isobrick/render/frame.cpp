@@ -85,6 +85,35 @@ float pixel_length(float depth) { return depth_range.z > 0.5 ? pixel.x : pixel.x
 vec3 towards_eye(vec3 position) {
   return depth_range.z > 0.5 ? vec3(0, 0, 1) : normalize(-position);
 }
+// A direction towards the eye, of which only x and y are kept.
+vec3 normal_of(vec2 xy) { return vec3(xy, sqrt(max(1 - dot(xy, xy), 0.0))); }
+// How much a transparent fragment counts at a depth: near ones more. Half floats hold it.
+float weight_at(float depth) {
+  return 64 * exp2(-12 * clamp((depth - depth_range.x) * depth_range.w, 0.0, 1.0));
+}
+)";
+
+const char* const kCutVertexGlsl = R"(
+out vec3 from_eye;
+out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[8]; };
+
+// Sets where the vertex is.
+void place(vec3 position_from_eye) {
+  from_eye = position_from_eye;
+  gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
+  for (int i = 0; i < 8; ++i)
+    gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
+}
+)";
+
+const char* const kCutFragmentGlsl = R"(
+in vec3 from_eye;
+
+// Those that clip distances leave.
+void cut() {
+  for (int i = 8; i < counts.y; ++i)
+    if (dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w < 0) discard;
+}
 )";
 
 const char* const kLightGlsl = R"(

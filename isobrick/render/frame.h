@@ -30,6 +30,9 @@ FrameBlock make_frame(const Camera& camera, int width, int height, const Picture
 
 /// GLSL: the block Frame and functions of depth and camera space.
 extern const char* const kFrameGlsl;
+/// GLSL: cutting by the half spaces, in vertex and in fragment shaders; after kFrameGlsl.
+extern const char* const kCutVertexGlsl;
+extern const char* const kCutFragmentGlsl;
 /// GLSL: light on a surface, after kFrameGlsl.
 extern const char* const kLightGlsl;
 

@@ -37,28 +37,22 @@ const char* const kVertex = R"(
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in uint number;
-out vec3 from_eye;
 centroid out vec3 world_normal;
 // Fragments get the look from here and not from the buffer: Mesa's llvmpipe draws them
 // when the buffer may hold the next mesh's already.
 flat out vec4 outer_colour, inner_colour;
 flat out uvec2 mesh;  // id, has normals
-out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[8]; };
 
 void main() {
-  from_eye = position + looks[number].offset.xyz;
+  place(position + looks[number].offset.xyz);
   world_normal = normal;
   outer_colour = looks[number].colour;
   inner_colour = looks[number].inside;
   mesh = uvec2(looks[number].id.x, looks[number].offset.w > 0.5 ? 1 : 0);
-  gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
-  for (int i = 0; i < 8; ++i)
-    gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
 }
 )";
 
 const char* const kFragment = R"(
-in vec3 from_eye;
 centroid in vec3 world_normal;
 flat in vec4 outer_colour, inner_colour;
 flat in uvec2 mesh;
@@ -66,8 +60,7 @@ flat in uvec2 mesh;
 struct Seen { vec3 position, normal, eye, light; };
 
 Seen see() {
-  for (int i = 8; i < counts.y; ++i)
-    if (dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w < 0) discard;
+  cut();
   Seen s;
   s.position = mat3(rotation) * from_eye;
   s.eye = towards_eye(s.position);
@@ -84,8 +77,8 @@ Seen see() {
   if (dot(s.normal, facet) < 0) s.normal = -s.normal;
   float facing = dot(s.normal, s.eye);
   if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
-  bool cut = counts.y > 0 && !gl_FrontFacing;
-  s.light = lit(s.normal, s.eye, cut ? inner_colour.rgb : outer_colour.rgb);
+  bool opened = counts.y > 0 && !gl_FrontFacing;
+  s.light = lit(s.normal, s.eye, opened ? inner_colour.rgb : outer_colour.rgb);
   return s;
 }
 )";
@@ -112,10 +105,7 @@ void main() {
   // Slanting rays have a longer way through it.
   float facing = max(dot(s.normal, s.eye), 0.12);
   float alpha = 1 - pow(1 - outer_colour.a, 1 / facing);
-  // What is near counts more; half floats hold these weights.
-  float far = clamp((-s.position.z - depth_range.x) * depth_range.w, 0.0, 1.0);
-  float weight = 64 * exp2(-12 * far);
-  sum = vec4(min(s.light, vec3(2)), 1) * alpha * weight;
+  sum = vec4(min(s.light, vec3(2)), 1) * alpha * weight_at(-s.position.z);
   hidden = alpha;
 }
 )";
@@ -146,7 +136,8 @@ MeshPass::MeshPass()
       normals_(make_stream_buffer()),
       triangles_(make_stream_buffer()) {
   const std::string frame = kFrameGlsl;
-  const std::string vertex = frame + kLooks + kVertex, fragment = frame + kLightGlsl + kFragment;
+  const std::string vertex = frame + kCutVertexGlsl + kLooks + kVertex,
+                    fragment = frame + kCutFragmentGlsl + kLightGlsl + kFragment;
   opaque_ = make_program(vertex, fragment + kOpaque, "meshes");
   transparent_ = make_program(vertex, fragment + kTransparent, "transparent meshes");
   const unsigned array = vertices_.get();

@@ -172,9 +172,7 @@ void Renderer::State::draw_slices(const Switches& switches, bool blended) {
 void Renderer::State::draw_blocks(const Switches& switches, std::vector<MeshDraw>& list,
                                   bool blended) {
   if (list.empty()) return;
-  if (blended) clear_transparent();
-  glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets->transparent.get() : targets->opaque.get());
-  switches.meshes(frame.counts.x, true, blended);
+  bind_target(switches, blended);
   std::stable_sort(list.begin(), list.end(), before);
   for (auto first = list.begin(); first != list.end();) {
     const auto last = std::upper_bound(first, list.end(), *first, before);

@@ -89,8 +89,7 @@ void main() {
   open = 1;
   if (depth <= 0) return;
   vec3 p = view_position(gl_FragCoord.xy, depth);
-  vec2 xy = texelFetch(normals, at, 0).rg;
-  vec3 n = vec3(xy, sqrt(max(1 - dot(xy, xy), 0.0)));
+  vec3 n = normal_of(texelFetch(normals, at, 0).rg);
   float turn = 6.2831853 * fract(52.9829189 * fract(dot(vec2(at), vec2(0.06711056, 0.00583715))));
   float shorter = min(viewport.x, viewport.y);
   float fine = closed_within(at, p, n, turn, max(0.018 * shorter, 4));
@@ -135,10 +134,7 @@ layout(binding = 5) uniform sampler2D near_normals;
 layout(binding = 6) uniform sampler2D opens;
 layout(location = 0) out vec4 picture;
 
-vec3 normal_at(ivec2 at) {
-  vec2 xy = texelFetch(near_normals, at, 0).rg;
-  return vec3(xy, sqrt(max(1 - dot(xy, xy), 0.0)));
-}
+vec3 normal_at(ivec2 at) { return normal_of(texelFetch(near_normals, at, 0).rg); }
 
 // How much of an edge goes through the pixel: something farther begins beside it, or
 // the surface breaks off.

@@ -17,16 +17,11 @@ const char* const kVertex = R"(
 layout(location = 0) uniform vec3 corner;
 layout(location = 1) uniform vec3 along_x;
 layout(location = 2) uniform vec3 along_y;
-out vec3 from_eye;
 out vec2 uv;
-out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[8]; };
 
 void main() {
   uv = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-  from_eye = corner + along_x * uv.x + along_y * uv.y;
-  gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
-  for (int i = 0; i < 8; ++i)
-    gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
+  place(corner + along_x * uv.x + along_y * uv.y);
 }
 )";
 
@@ -34,12 +29,10 @@ const char* const kColour = R"(
 layout(binding = 0) uniform sampler2D samples;
 layout(binding = 1) uniform sampler2D colours;
 layout(location = 3) uniform vec3 window_opacity;  // first value, 1 / width, opacity
-in vec3 from_eye;
 in vec2 uv;
 
 vec3 shown() {
-  for (int i = 8; i < counts.y; ++i)
-    if (dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w < 0) discard;
+  cut();
   float value = texture(samples, uv).r;
   if (isnan(value)) discard;
   float part = clamp((value - window_opacity.x) * window_opacity.y, 0.0, 1.0);
@@ -71,8 +64,7 @@ layout(location = 1) out float hidden;
 void main() {
   vec3 colour = shown();
   float depth = -(mat3(rotation) * from_eye).z;
-  float far = clamp((depth - depth_range.x) * depth_range.w, 0.0, 1.0);
-  sum = vec4(colour, 1) * window_opacity.z * 64 * exp2(-12 * far);
+  sum = vec4(colour, 1) * window_opacity.z * weight_at(depth);
   hidden = window_opacity.z;
 }
 )";
@@ -86,9 +78,10 @@ void set(const GlProgram& program, int location, Vec3f v) {
 }  // namespace
 
 SlicePass::SlicePass() : nothing_(make_vertex_array()) {
-  const std::string frame = kFrameGlsl;
-  opaque_ = make_program(frame + kVertex, frame + kColour + kOpaque, "slices");
-  transparent_ = make_program(frame + kVertex, frame + kColour + kTransparent, "slices");
+  const std::string frame = kFrameGlsl, vertex = frame + kCutVertexGlsl + kVertex,
+                    fragment = frame + kCutFragmentGlsl + kColour;
+  opaque_ = make_program(vertex, fragment + kOpaque, "slices");
+  transparent_ = make_program(vertex, fragment + kTransparent, "slices");
 }
 
 void SlicePass::add(const SliceImage& image) {

@@ -4,20 +4,12 @@
 
 #include "isobrick/core/error.h"
 #include "tests/pipeline/convert_store.h"
+#include "tests/pipeline/no_sink.h"
 
 namespace isobrick::test {
 namespace {
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
-
-class NoSink final : public MeshSink {
- public:
-  Indexing indexing() const override { return Indexing::welded; }
-  void begin(const MeshHeader&) override {}
-  void write(const MeshChunk&) override {}
-  void finish() override {}
-  std::uint64_t bytes() const override { return 0; }
-};
 
 class NoSurface final : public SurfaceExtractor {
  public:

@@ -8,19 +8,10 @@
 #include "isobrick/core/morton.h"
 #include "isobrick/pipeline/tile_sample.h"
 #include "tests/pipeline/convert_store.h"
+#include "tests/pipeline/no_sink.h"
 
 namespace isobrick::test {
 namespace {
-
-/// Takes a mesh and keeps nothing of it.
-class NoSink final : public MeshSink {
- public:
-  Indexing indexing() const override { return Indexing::welded; }
-  void begin(const MeshHeader&) override {}
-  void write(const MeshChunk&) override {}
-  void finish() override {}
-  std::uint64_t bytes() const override { return 0; }
-};
 
 MeshSize extracted(const StoreReader& store, const ExtractOptions& options) {
   NoSink sink;

@@ -64,9 +64,7 @@ TEST_F(Stream, CacheDropsWhatNoLaterTileNeedsAndReusesItsMemory) {
 TEST_F(Stream, BatchesHoldEveryActiveTileOnceInMortonOrderWithItsBricks) {
   const StoreReader store(path_);
   const Lattice& lattice = store.info().levels[0].lattice;
-  std::vector<Int3> expected;
-  TileStream all(store, 0, 20000, lattice.box());
-  while (const auto work = all.next()) expected.push_back(work->tile);
+  const std::vector<Int3> expected = active_tiles(store, 20000);
   ASSERT_GT(expected.size(), 20u);
   for (const Index reach : {0, 1}) {
     const std::size_t least = max_bricks_of_tile(lattice, reach);

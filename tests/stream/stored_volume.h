@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isobrick/pipeline/convert.h"
+#include "isobrick/stream/tile_stream.h"
 #include "tests/pipeline/convert_doubles.h"
 
 namespace isobrick::test {
@@ -37,6 +38,14 @@ class StoredVolume : public ::testing::Test {
       const Int3 local = p - brick * lattice.brick;
       ASSERT_EQ(found ? found[linear_index(local, lattice.brick)] : 0, samples_[index(p)]);
     });
+  }
+
+  /// Tiles of level 0 that an isovalue touches, in their order.
+  static std::vector<Int3> active_tiles(const StoreReader& store, double isovalue) {
+    std::vector<Int3> tiles;
+    TileStream all(store, 0, isovalue, store.info().levels[0].lattice.box());
+    while (const auto work = all.next()) tiles.push_back(work->tile);
+    return tiles;
   }
 
   Int3 extent_{150, 100, 70};
