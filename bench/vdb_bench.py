@@ -5,7 +5,9 @@
 
 A level set of a sphere of RADIUS voxels (400):
   convert  `isobrick convert`          | read the grid, copy its box to a dense array
-  extract  `isobrick extract` to PLY   | volumeToMesh at adaptivity 0, grid read beforehand
+  extract  `isobrick extract`: the whole process, from the store to a PLY file
+                                       | volumeToMesh at adaptivity 0 alone: grid read before,
+                                         nothing written
 
 Wall and processor seconds, medians of three, and peak memory. Both use all cores.
 """
