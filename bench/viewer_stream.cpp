@@ -101,7 +101,8 @@ class Session {
   double draw(bool moving) {
     const auto start = Clock::now();
     ViewSettings now = settings;
-    if (moving && pacer_.plain()) now.occlusion = now.multisample = false;
+    const bool plain = pacer_.plain() && (moving || !picture_->state().complete);
+    if (plain) now.occlusion = now.multisample = false;
     const int smaller = moving ? pacer_.smaller() : 1;
     picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, now,
                    moving ? pacer_.coarser() : 1);
@@ -110,7 +111,7 @@ class Session {
     const double seconds = seconds_since(start);
     if (moving)
       pacer_.drawn(seconds);
-    else
+    else if (!plain)
       pacer_.drawn_still(seconds);
     device_peak = std::max(device_peak, picture_->state().device_bytes);
     return seconds;
@@ -201,6 +202,7 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
                     {"set_up_ms", session.set_up_seconds * 1e3},
                     {"first_surface_ms", session.since_opened() * 1e3}};
   session.draw_until(false, streaming, complete);
+  streaming.add(session.draw(false));
   result["open"]["complete_ms"] = session.since_opened() * 1e3;
   result["open"]["triangles"] = session.picture().state().triangles;
   result["open"]["nodes"] = session.picture().state().nodes;
@@ -217,6 +219,7 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
     session.draw_until(true, streaming, covers);
     jump["first_surface_ms"] = seconds_since(start) * 1e3;
     session.draw_until(false, streaming, complete);
+    streaming.add(session.draw(false));
     jump["complete_ms"] = seconds_since(start) * 1e3;
     jumps.push_back(jump);
   }

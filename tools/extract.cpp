@@ -345,13 +345,6 @@ bool parse_normals(const std::string& text) {
   throw UsageError(fmt::format("'{}' is no kind of normals; it is gradient or none", text));
 }
 
-Backend parse_backend(const std::string& text) {
-  if (text == "auto") return Backend::automatic;
-  if (text == "cpu") return Backend::cpu;
-  if (text == "cuda") return Backend::cuda;
-  throw UsageError(fmt::format("'{}' is no backend; it is auto, cpu or cuda", text));
-}
-
 void add_backend_options(CLI::App* app, Arguments& arguments) {
   add_parsed(
       app, arguments.backend, parse_backend,

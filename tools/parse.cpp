@@ -105,6 +105,13 @@ HalfSpace parse_half_space(std::string_view text) {
   return half;
 }
 
+Backend parse_backend(std::string_view text) {
+  if (text == "auto") return Backend::automatic;
+  if (text == "cpu") return Backend::cpu;
+  if (text == "cuda") return Backend::cuda;
+  throw UsageError(fmt::format("'{}' is no backend; it is auto, cpu or cuda", text));
+}
+
 PictureSize parse_picture_size(std::string_view text) {
   const auto comma = text.find_first_of(",x");
   if (comma == std::string_view::npos)

@@ -9,6 +9,7 @@
 #include "isobrick/core/half_space.h"
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/vec.h"
+#include "isobrick/pipeline/extract.h"
 #include "isobrick/volumes/open_source.h"
 
 // The values of the command line: text to meaning. Every function throws
@@ -46,6 +47,9 @@ struct PictureSize {
   int width, height;
 };
 PictureSize parse_picture_size(std::string_view text);
+
+/// "auto", "cpu" or "cuda".
+Backend parse_backend(std::string_view text);
 
 /// "#RRGGBB", "white" or "black": sRGB in [0, 1].
 Vec3f parse_colour(std::string_view text);

@@ -99,6 +99,7 @@ int draw(const Arguments& arguments, Console& console) {
                   {"index", to_json(search.state())},
                   {"damaged_parts", state.damage.size()},
                   {"limited_by_budget", state.limited_by_budget},
+                  {"meshes_by", picture.device().describe()},
                   {"renderer", current_gl_device().renderer},
                   {"peak_resident_bytes", peak_resident_bytes()}},
                  fmt::format("{}: {} triangles, drawn by {}\n", output,
@@ -193,6 +194,9 @@ void add_view(Program& program) {
   add_parsed(app, arguments->index, parse_search,
              {"--index", "linear|interval|kdtree|quadtree|octree",
               "What finds the parts that an isovalue crosses", "linear"});
+  add_parsed(app, arguments->budgets.backend, parse_backend,
+             {"--backend", "auto|cpu|cuda",
+              "What makes the meshes, the same on either; auto: a GPU where there is one", "auto"});
   add_memory(app, arguments->budgets.memory);
   add_parsed(app, arguments->budgets.device_memory, parse_bytes,
              {"--gpu-memory", "BYTES", "For meshes on the graphics device", "1G"});

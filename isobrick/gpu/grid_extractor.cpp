@@ -35,10 +35,11 @@ class Cutter {
   std::size_t used_ = 0;
 };
 
-constexpr std::size_t kWorkBytes = aligned(sizeof(CaseTables)) +
-                                   aligned(sizeof(GridRow) * kGridRows) +
-                                   aligned(4 * 4 * std::size_t{kGridRows}) + aligned(kVertices) +
-                                   aligned(4 * kVertices) + aligned(kSent);
+/// All that work on the device takes.
+constexpr std::size_t kWorkBytes =
+    aligned(sizeof(CaseTables)) + aligned(sizeof(GridTotals)) +
+    aligned(kGridRows * sizeof(GridRow)) + aligned(4 * kGridRows * sizeof(std::uint32_t)) +
+    aligned(kVertices) + aligned(kVertices * sizeof(std::uint32_t)) + aligned(kSent);
 
 }  // namespace
 
@@ -60,8 +61,9 @@ struct GridExtractor::Impl {
     work.counts = cut.take<std::uint32_t>(4 * kGridRows);
     work.faces = cut.take<std::uint8_t>(kVertices);
     work.ribbon_of = cut.take<std::uint32_t>(kVertices);
+    work.totals = cut.take<GridTotals>(1);
     sent = cut.take<std::byte>(kSent);
-    work.totals = totals.on_device();
+    work.host_totals = totals.on_device();
   }
 
   void send_tables(bool left_handed) {
@@ -79,6 +81,16 @@ struct GridExtractor::Impl {
     const auto* at = reinterpret_cast<const T*>(sent + used);
     used += aligned(count * sizeof(T));
     return at;
+  }
+
+  void launch_mesh(const GridMeshPlace& place) {
+    if (place.vertices == 0) return;
+    work.positions = place.positions;
+    work.normals = place.normals;
+    work.triangles = place.triangles;
+    work.vertex_room = place.vertices;
+    work.triangle_room = place.triangle_count;
+    launch_grid_mesh(work, meets_coarser, stream.get());
   }
 
   void send(const GridView& g) {
@@ -115,38 +127,35 @@ GridExtractor::GridExtractor(int device) {
 }
 GridExtractor::~GridExtractor() = default;
 
-GridExtractor::Size GridExtractor::count(const GridView& grid) {
+GridExtractor::Size GridExtractor::make(const GridView& grid, const GridMeshPlace& place) {
   Impl& i = *impl_;
   i.meets_coarser = grid.meets_coarser();
   i.send_tables(grid.map.mirrored);
   i.send(grid);
   launch_grid_count(i.work, i.meets_coarser, i.stream.get());
+  i.launch_mesh(place);
   i.stream.wait();
   const GridTotals& t = *i.totals;
   return {t.vertices + 2 * t.border_vertices, t.triangles + 2 * t.ribbon_sides, 2 * t.ribbon_sides};
 }
 
 void GridExtractor::write(const GridMeshPlace& place) {
-  Impl& i = *impl_;
-  i.work.positions = place.positions;
-  i.work.normals = place.normals;
-  i.work.triangles = place.triangles;
-  launch_grid_mesh(i.work, *i.totals, i.meets_coarser, i.stream.get());
-  i.stream.wait();
+  impl_->launch_mesh(place);
+  impl_->stream.wait();
 }
 
 void GridExtractor::download(MeshBuffer& out) {
   Impl& i = *impl_;
   const GridTotals& t = *i.totals;
-  const std::size_t vertices = t.vertices + 2 * std::size_t{t.border_vertices};
-  const std::size_t triangles = t.triangles + 2 * std::size_t{t.ribbon_sides};
+  const std::uint32_t vertices = t.vertices + 2 * t.border_vertices;
+  const std::uint32_t triangles = t.triangles + 2 * t.ribbon_sides;
   out.positions.resize(vertices);
   out.normals.resize(vertices);
   out.triangles.resize(triangles);
   if (vertices == 0) return;
   const DeviceBuffer<Vec3f> positions(vertices, i.stream), normals(vertices, i.stream);
   const DeviceBuffer<Triangle> faces(triangles, i.stream);
-  write({positions.data(), normals.data(), faces.data()});
+  write({positions.data(), normals.data(), faces.data(), vertices, triangles});
   const auto copy = [&](void* to, const auto& from) {
     check(cudaMemcpyAsync(to, from.data(), from.bytes(), cudaMemcpyDeviceToHost, i.stream.get()));
   };

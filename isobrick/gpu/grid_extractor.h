@@ -8,10 +8,15 @@
 
 namespace isobrick::gpu {
 
-/// Device memory for a grid's mesh.
+/// Device memory for a grid's mesh, and how much there is.
 struct GridMeshPlace {
   Vec3f *positions = nullptr, *normals = nullptr;
   Triangle* triangles = nullptr;
+  std::uint32_t vertices = 0, triangle_count = 0;
+
+  bool holds(std::uint32_t v, std::uint32_t t) const {
+    return v <= vertices && t <= triangle_count;
+  }
 };
 
 /// Marching cubes over one small grid on a device: the mesh of the CPU's GridExtractor, byte
@@ -27,10 +32,11 @@ class GridExtractor {
   struct Size {
     std::uint32_t vertices = 0, triangles = 0, ribbon_triangles = 0;
   };
-  /// Takes the grid to the device and finds the size of its mesh. The view's arrays lie in
-  /// host memory and are not read any more afterwards.
-  Size count(const GridView& grid);
-  /// Writes the mesh of the grid counted last, and waits for it.
+  /// Takes the grid to the device, finds the size of its mesh and, where `place` holds it,
+  /// writes it there; waits once. The view's arrays lie in host memory and are not read any
+  /// more afterwards.
+  Size make(const GridView& grid, const GridMeshPlace& place);
+  /// Writes the mesh of the grid made last to a place that holds it.
   void write(const GridMeshPlace& place);
   /// The same, into host memory.
   void download(MeshBuffer& out);

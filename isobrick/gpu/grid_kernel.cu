@@ -150,7 +150,7 @@ __global__ void __launch_bounds__(kScanThreads) number_rows(const __grid_constan
                                 }
                                 row.first_triangle = triangles;
                               });
-  if (threadIdx.x == 0) *w.totals = {all.x, all.y, 0, 0};
+  if (threadIdx.x == 0) *w.host_totals = *w.totals = {all.x, all.y, 0, 0};
 }
 
 /// Calls f(here, x, number) for the edges along `axis` from a row's points, by one warp: all
@@ -247,15 +247,21 @@ __global__ void __launch_bounds__(kScanThreads) number_ribbons(const __grid_cons
   if (threadIdx.x == 0) {
     w.totals->border_vertices = all.x;
     w.totals->ribbon_sides = all.y;
+    *w.host_totals = *w.totals;
   }
 }
 
+__device__ bool fits(const GridWork& w) {
+  const GridTotals& t = *w.totals;
+  return t.vertices + 2 * t.border_vertices <= w.vertex_room &&
+         t.triangles + 2 * t.ribbon_sides <= w.triangle_room;
+}
+
 template <bool kBorders>
-__global__ void __launch_bounds__(kThreads)
-    emit_vertices(const __grid_constant__ GridWork w, std::uint32_t vertices) {
+__global__ void __launch_bounds__(kThreads) emit_vertices(const __grid_constant__ GridWork w) {
   const Warp warp;
   const GridView& g = w.grid;
-  if (warp.row >= rows_of(g)) return;
+  if (warp.row >= rows_of(g) || !fits(w)) return;
   const int y = warp.row % g.n[1], z = warp.row / g.n[1];
   const GridRow& row = w.rows[warp.row];
   unsigned border = kBorders ? row.border_vertices : 0;
@@ -269,7 +275,7 @@ __global__ void __launch_bounds__(kThreads)
       const unsigned mask = __ballot_sync(kAll, on);
       if (on) {
         const auto before = static_cast<unsigned>(__popc(mask & ((1u << warp.lane) - 1)));
-        const unsigned beside = vertices + 2 * (border + before);
+        const unsigned beside = w.totals->vertices + 2 * (border + before);
         w.ribbon_of[number] = beside;
         w.positions[beside] = grid::beside(vertex.position, vertex.normal, g.ribbon);
         w.positions[beside + 1] = grid::beside(vertex.position, vertex.normal, -g.ribbon);
@@ -290,10 +296,9 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 template <bool kBorders>
-__global__ void __launch_bounds__(kThreads)
-    emit_triangles(const __grid_constant__ GridWork w, std::uint32_t triangles) {
+__global__ void __launch_bounds__(kThreads) emit_triangles(const __grid_constant__ GridWork w) {
   const Warp warp;
-  if (warp.row >= rows_of(w.grid)) return;
+  if (warp.row >= rows_of(w.grid) || !fits(w)) return;
   const Cells cells(w, warp.row);
   if (cells.active == 0) return;
   const GridRow& row = w.rows[warp.row];
@@ -307,7 +312,7 @@ __global__ void __launch_bounds__(kThreads)
     unsigned ribbon = 0;
     if constexpr (kBorders) {
       const unsigned sides = here ? sides_of(w, warp.row, x, index) : 0;
-      ribbon = triangles + 2 * (side + sum_before(sides, warp.lane, all));
+      ribbon = w.totals->triangles + 2 * (side + sum_before(sides, warp.lane, all));
       side += all;
     }
     for (int t = 0; t < static_cast<int>(count); ++t) {
@@ -342,15 +347,14 @@ void launch_grid_count(const GridWork& w, bool meets_coarser, cudaStream_t strea
   check_launch("counting a grid's mesh");
 }
 
-void launch_grid_mesh(const GridWork& w, const GridTotals& totals, bool meets_coarser,
-                      cudaStream_t stream) {
+void launch_grid_mesh(const GridWork& w, bool meets_coarser, cudaStream_t stream) {
   const int blocks = warp_blocks(w.grid);
   if (meets_coarser) {
-    emit_vertices<true><<<blocks, kThreads, 0, stream>>>(w, totals.vertices);
-    emit_triangles<true><<<blocks, kThreads, 0, stream>>>(w, totals.triangles);
+    emit_vertices<true><<<blocks, kThreads, 0, stream>>>(w);
+    emit_triangles<true><<<blocks, kThreads, 0, stream>>>(w);
   } else {
-    emit_vertices<false><<<blocks, kThreads, 0, stream>>>(w, totals.vertices);
-    emit_triangles<false><<<blocks, kThreads, 0, stream>>>(w, totals.triangles);
+    emit_vertices<false><<<blocks, kThreads, 0, stream>>>(w);
+    emit_triangles<false><<<blocks, kThreads, 0, stream>>>(w);
   }
   check_launch("a grid's mesh");
 }

@@ -33,19 +33,21 @@ struct GridTotals {
 struct GridWork {
   GridView grid;
   const CaseTables* tables;
-  GridRow* rows;               ///< kGridRows
-  std::uint32_t* counts;       ///< 4 · kGridRows
-  std::uint8_t* faces;         ///< of each vertex; only where coarser grids meet this one
-  std::uint32_t* ribbon_of;    ///< of each vertex, likewise
-  GridTotals* totals;          ///< read by the host
-  Vec3f *positions, *normals;  ///< the mesh, from here on for launch_grid_mesh() only
+  GridRow* rows;             ///< kGridRows
+  std::uint32_t* counts;     ///< 4 · kGridRows
+  std::uint8_t* faces;       ///< of each vertex; only where coarser grids meet this one
+  std::uint32_t* ribbon_of;  ///< of each vertex, likewise
+  GridTotals* totals;        ///< on the device
+  GridTotals* host_totals;   ///< the same, where the host reads it
+  /// The mesh, and the room there is; a mesh that does not fit is not written.
+  Vec3f *positions, *normals;
   Triangle* triangles;
+  std::uint32_t vertex_room, triangle_room;
 };
 
 /// Finds the size of the mesh, into `totals`.
 void launch_grid_count(const GridWork& work, bool meets_coarser, cudaStream_t stream);
-/// Writes the mesh; `totals` as counted.
-void launch_grid_mesh(const GridWork& work, const GridTotals& totals, bool meets_coarser,
-                      cudaStream_t stream);
+/// Writes the mesh that was counted, if there is room for it.
+void launch_grid_mesh(const GridWork& work, bool meets_coarser, cudaStream_t stream);
 
 }  // namespace isobrick::gpu

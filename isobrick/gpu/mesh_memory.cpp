@@ -83,11 +83,13 @@ class Block final : public MeshBlock {
   Block(const Block&) = delete;
   Block& operator=(const Block&) = delete;
 
-  GridMeshPlace place(std::uint32_t first_vertex, std::uint32_t first_triangle) const {
+  GridMeshPlace place(std::uint32_t first_vertex, std::uint32_t vertex_count,
+                      std::uint32_t first_triangle, std::uint32_t triangle_count) const {
     auto* positions = reinterpret_cast<Vec3f*>(address_);
     Vec3f* normals = positions + vertices;
     auto* first = reinterpret_cast<Triangle*>(normals + vertices);
-    return {positions + first_vertex, normals + first_vertex, first + first_triangle};
+    return {positions + first_vertex, normals + first_vertex, first + first_triangle, vertex_count,
+            triangle_count};
   }
 
   FreeList free_vertices, free_triangles;
@@ -133,7 +135,7 @@ struct MeshMemory::Impl {
     const auto triangle = block->free_triangles.take(triangles);
     if (triangle)
       return MeshSpan{block,     *vertex,   vertices,
-                      *triangle, triangles, block->place(*vertex, *triangle)};
+                      *triangle, triangles, block->place(*vertex, vertices, *triangle, triangles)};
     block->free_vertices.give_back(*vertex, vertices);
     return std::nullopt;
   }
@@ -153,6 +155,17 @@ std::optional<MeshSpan> MeshMemory::take(std::uint32_t vertices, std::uint32_t t
     return std::nullopt;
   impl_->add();
   return Impl::take_from(impl_->blocks.back(), vertices, triangles);
+}
+
+void MeshMemory::trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t triangles) {
+  MeshSpan rest = span;
+  rest.first_vertex += vertices;
+  rest.vertices -= vertices;
+  rest.first_triangle += triangles;
+  rest.triangles -= triangles;
+  give_back(rest);
+  span.vertices = span.place.vertices = vertices;
+  span.triangles = span.place.triangle_count = triangles;
 }
 
 void MeshMemory::give_back(const MeshSpan& span) {

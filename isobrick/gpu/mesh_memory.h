@@ -34,6 +34,8 @@ class MeshMemory {
 
   /// Room for a mesh; nothing where there is none.
   std::optional<MeshSpan> take(std::uint32_t vertices, std::uint32_t triangles);
+  /// Gives back what is behind the first so many.
+  void trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t triangles);
   /// The place is free for others: nobody reads or writes it any more.
   void give_back(const MeshSpan& span);
 

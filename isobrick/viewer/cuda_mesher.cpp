@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <atomic>
+#include <optional>
 #include <utility>
 
 #include "isobrick/core/error.h"
@@ -25,7 +27,6 @@ class SharedMesh final : public DeviceMesh {
     triangles = span_.triangles;
   }
   ~SharedMesh() override { memory_->give_back(span_); }
-  const gpu::GridMeshPlace& place() const { return span_.place; }
 
  private:
   std::shared_ptr<gpu::MeshMemory> memory_;
@@ -45,25 +46,47 @@ class Worker final : public GridWorker {
   explicit Worker(std::shared_ptr<const Shared> shared)
       : shared_(std::move(shared)), extractor_(shared_->device) {}
 
+  /// Room is taken for what meshes were like before, so that the device is waited for once.
   void make(const GridView& grid, NodeMesh& out) override {
-    const gpu::GridExtractor::Size size = extractor_.count(grid);
+    std::optional<gpu::MeshSpan> span;
+    if (shared_->sharing) span = shared_->memory->take(likely_vertices_, likely_triangles_);
+    const SpanOwner owner{shared_->memory.get(), span};
+    const auto size = extractor_.make(grid, span ? span->place : gpu::GridMeshPlace{});
     out.ribbon_triangles = size.ribbon_triangles;
     if (size.triangles == 0) return;
-    if (shared_->sharing)
-      if (auto span = shared_->memory->take(size.vertices, size.triangles)) {
-        const auto mesh = std::make_shared<SharedMesh>(shared_->memory, std::move(*span));
-        extractor_.write(mesh->place());
-        out.device = mesh;
-        out.device_triangles = size.triangles;
-        out.device_bytes = size.vertices * 2 * sizeof(Vec3f) + size.triangles * sizeof(Triangle);
-        return;
-      }
-    extractor_.download(out.mesh);
+    likely_vertices_ = std::max(size.vertices + size.vertices / 4, likely_vertices_ / 8 * 7);
+    likely_triangles_ = std::max(size.triangles + size.triangles / 4, likely_triangles_ / 8 * 7);
+    if (span && span->place.holds(size.vertices, size.triangles)) {
+      shared_->memory->trim(*span, size.vertices, size.triangles);
+      return hand_out(*std::exchange(span, std::nullopt), out);
+    }
+    owner.give_back();
+    if (shared_->sharing) span = shared_->memory->take(size.vertices, size.triangles);
+    if (!span) return extractor_.download(out.mesh);
+    extractor_.write(span->place);
+    hand_out(*std::exchange(span, std::nullopt), out);
   }
 
  private:
+  /// Gives room back that no mesh has got.
+  struct SpanOwner {
+    gpu::MeshMemory* memory;
+    std::optional<gpu::MeshSpan>& span;
+    ~SpanOwner() { give_back(); }
+    void give_back() const {
+      if (span) memory->give_back(*std::exchange(span, std::nullopt));
+    }
+  };
+
+  void hand_out(gpu::MeshSpan&& span, NodeMesh& out) {
+    out.device_triangles = span.triangles;
+    out.device_bytes = span.vertices * 2 * sizeof(Vec3f) + span.triangles * sizeof(Triangle);
+    out.device = std::make_shared<SharedMesh>(shared_->memory, std::move(span));
+  }
+
   std::shared_ptr<const Shared> shared_;
   gpu::GridExtractor extractor_;
+  std::uint32_t likely_vertices_ = 1u << 14, likely_triangles_ = 1u << 15;
 };
 
 class CudaMesher final : public DeviceMesher {

@@ -249,6 +249,7 @@ void main_panel(ViewerState& state) {
   if (section("Bookmarks", false)) bookmarks_panel(state);
   if (section("Streaming", true)) {
     draw_search_panel(state);
+    draw_backend_panel(state);
     status_panel(state);
   }
   if (ImGui::SmallButton("Picture")) state.requests.screenshot = "isobrick.png";

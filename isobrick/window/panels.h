@@ -15,6 +15,9 @@ bool draw_isovalue_slider(ViewerState& state, float width, float height);
 /// What is cut away: across axes, by planes at any angle, outside of a region.
 void draw_cuts_panel(ViewerState& state);
 
+/// What makes meshes.
+void draw_backend_panel(ViewerState& state);
+
 /// Which index finds the nodes that isovalues cross, and what that takes.
 void draw_search_panel(ViewerState& state);
 

@@ -223,7 +223,10 @@ void ViewerWindow::draw_frame() {
     // The first picture of a surface should not wait for a good one.
     const bool fluent = moving() || !state_.picture->state().covers;
     ViewSettings settings = state_.settings;
-    if (fluent && state_.pacer.plain()) settings.occlusion = settings.multisample = false;
+    // Nor should those that follow while meshes come in.
+    const bool plain = state_.pacer.plain() && (fluent || !state_.picture->state().complete);
+    if (plain) settings.occlusion = settings.multisample = false;
+    changed_ |= plain;  // there is a better one to come
     const int smaller = fluent ? state_.pacer.smaller() : 1;
     try {
       state_.picture->draw(state_.navigator.camera, std::max(width / smaller, 1),
@@ -237,7 +240,7 @@ void ViewerWindow::draw_frame() {
     state_.draw_seconds = glfwGetTime() - begin;
     if (fluent)
       state_.pacer.drawn(state_.draw_seconds);
-    else
+    else if (!plain)
       state_.pacer.drawn_still(state_.draw_seconds);
   }
   ImGui_ImplOpenGL3_NewFrame();

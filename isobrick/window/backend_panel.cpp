@@ -1,0 +1,24 @@
+#include <imgui.h>
+
+#include "isobrick/core/error.h"
+#include "isobrick/window/panels.h"
+
+namespace isobrick {
+
+void draw_backend_panel(ViewerState& state) {
+  DeviceMeshes& device = state.picture->device();
+  // In the order of Backend.
+  const char* const names[] = {"auto", "cpu", "cuda"};
+  int chosen = static_cast<int>(device.backend());
+  ImGui::SetNextItemWidth(130);
+  if (ImGui::Combo("makes meshes", &chosen, names, 3)) {
+    try {
+      device.use(static_cast<Backend>(chosen));
+    } catch (const Error& e) {
+      state.say(e.what());
+    }
+  }
+  ImGui::TextWrapped("%s", device.describe().c_str());
+}
+
+}  // namespace isobrick
