@@ -19,8 +19,8 @@ struct SurfaceHit {
 };
 
 /// The first hit of a ray with what is drawn, both in world space; ribbons do not
-/// count. `origin`: what the meshes' positions are relative to. What lies outside of
-/// `clip` (level-0 index space) or of one of `planes` is not hit.
+/// count, nor do meshes that lie on a device. `origin`: what the meshes' positions are relative to.
+/// What lies outside of `clip` (level-0 index space) or of one of `planes` is not hit.
 std::optional<SurfaceHit> pick(const Drawable& drawn, const NodeGrid& grid, Vec3d origin,
                                Vec3d from, Vec3d along, const std::optional<IndexBox>& clip = {},
                                std::span<const HalfSpace> planes = {});
