@@ -203,13 +203,11 @@ std::unique_ptr<VolumeSource> open_bits(const Opening& in) {
   using Leaves = VdbLoadedLeaves<Tree>;
   const auto grid = openvdb::gridPtrCast<Grid>(in.read);
   if (!grid) return nullptr;
-  // What the file says of its size in memory, or what its bytes at least become.
-  check_memory(in.path, in.grid, std::max(in.grid.memory.value_or(0), in.grid.end - in.grid.begin),
-               in.said.memory);
-  grid->readTopology(in.archive.stream());
-  grid->readBuffers(in.archive.stream());
-  const std::size_t memory = grid->memUsage();
+  std::istream& stream = in.archive.stream();
+  const std::size_t memory = count_vdb_nodes<Tree>(stream, false).bytes;
   check_memory(in.path, in.grid, memory, in.said.memory);
+  grid->readTopology(stream);
+  grid->readBuffers(stream);
   return make_source<std::uint8_t, Tree, Leaves>(in, grid->constTreePtr(),
                                                  std::make_shared<const Leaves>(), memory);
 }
