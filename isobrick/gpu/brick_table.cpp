@@ -21,22 +21,31 @@ Box3 bricks_around(const Lattice& lattice, Index reach, Int3 tile) {
       intersect({lo - Int3{reach, reach, reach}, lo + Int3{edge, edge, edge}}, lattice.box()));
 }
 
-/// Collects the bricks of a launch, each once.
+/// Collects the bricks of a launch, each looked up once.
 class Needs {
  public:
-  explicit Needs(std::size_t tiles) { numbers_.reserve(tiles); }
+  Needs(const BrickLookup& bricks, Int3 grid, std::size_t tiles) : bricks_(bricks), grid_(grid) {
+    numbers_.reserve(tiles);
+  }
 
-  /// The number of a brick.
-  std::size_t add(const std::byte* brick, std::uint64_t samples) {
-    const auto [at, added] = numbers_.try_emplace(brick, all_.size());
-    if (added) all_.push_back({brick, 0, reinterpret_cast<std::uint64_t>(brick)});
-    all_[at->second].samples += samples;
+  /// The number of a brick, counted from 1; 0 when it is absent.
+  std::size_t add(Int3 b, std::uint64_t samples) {
+    const auto [at, added] = numbers_.try_emplace(linear_index(b, grid_), 0);
+    if (added) {
+      if (const std::byte* brick = bricks_.find(b)) {
+        all_.push_back({brick, 0, reinterpret_cast<std::uint64_t>(brick)});
+        at->second = all_.size();
+      }
+    }
+    if (at->second > 0) all_[at->second - 1].samples += samples;
     return at->second;
   }
   std::vector<Need>& all() { return all_; }
 
  private:
-  std::unordered_map<const std::byte*, std::size_t> numbers_;
+  const BrickLookup& bricks_;
+  Int3 grid_;
+  std::unordered_map<Index, std::size_t> numbers_;
   std::vector<Need> all_;
 };
 
@@ -46,8 +55,8 @@ BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWor
                     const BrickLookup& bricks, std::size_t places, const std::byte* device,
                     const BrickTable& table) {
   const std::size_t of_tile = max_bricks_of_tile(lattice, reach);
-  Needs needs(tiles.size());
-  // Until it is known which bricks are sent, the table holds their numbers, counted from 1.
+  Needs needs(bricks, lattice.bricks(), tiles.size());
+  // Until it is known which bricks are sent, the table holds their numbers.
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const Box3 around = bricks_around(lattice, reach, tiles[i].tile);
     const Int3 grid = around.extent();
@@ -59,11 +68,9 @@ BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWor
     }
     for_each_needed_box(lattice, tiles[i], reach, [&](Box3 box) {
       for_each_point(lattice.bricks_of(box), [&](Int3 b) {
-        const std::byte* brick = bricks.find(b);
-        if (!brick) return;
         const Box3 part = intersect(box, lattice.full_brick_box(b));
         addresses[linear_index(b - around.lo, grid)] =
-            1 + needs.add(brick, static_cast<std::uint64_t>(volume(part.extent())));
+            needs.add(b, static_cast<std::uint64_t>(volume(part.extent())));
       });
     });
   }
