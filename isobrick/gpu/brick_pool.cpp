@@ -99,11 +99,7 @@ struct BrickPool::Impl {
 
 BrickPool::BrickPool(int device, std::size_t brick_bytes, std::size_t bricks, int threads)
     : impl_(std::make_unique<Impl>(device, brick_bytes, bricks)) {
-  for (int i = 0; i < threads; ++i) {
-    impl_->writers.push_back(std::make_unique<Writer>());
-    for (Group& group : impl_->writers.back()->groups)
-      group.from = PinnedBuffer<std::byte>(bricks_of_group(brick_bytes) * brick_bytes);
-  }
+  for (int i = 0; i < threads; ++i) impl_->writers.push_back(std::make_unique<Writer>());
 }
 
 BrickPool::~BrickPool() = default;
@@ -123,6 +119,11 @@ std::byte* BrickPool::begin(int thread) {
     current(impl_->device);
     group.over.wait();
     group.under_way = false;
+  }
+  if (group.from.size() == 0) {
+    // Page-locking takes a while: each thread for itself.
+    current(impl_->device);
+    group.from = PinnedBuffer<std::byte>(bricks_of_group(impl_->brick_bytes) * impl_->brick_bytes);
   }
   return group.from.data() + group.places.size() * impl_->brick_bytes;
 }

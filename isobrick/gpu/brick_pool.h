@@ -14,14 +14,15 @@ class Stream;
 /// the next one is filled.
 class BrickPool {
  public:
-  /// Throws Error where the device or the host has no room.
+  /// Throws Error where the device has no room.
   BrickPool(int device, std::size_t brick_bytes, std::size_t bricks, int threads);
   ~BrickPool();
 
   /// The next so many bytes, of all its bricks' once. From any thread.
   std::byte* take(std::size_t bytes);
 
-  /// Where `thread` is to put the samples of a brick. Waits until a group has been copied.
+  /// Where `thread` is to put the samples of a brick. Waits until a group has been copied;
+  /// makes the thread's buffers at first. Throws Error where the host has no room for them.
   std::byte* begin(int thread);
   /// What begin() was given back for belongs to `place`; at most bricks_of_group() between
   /// two calls of send().
@@ -41,6 +42,8 @@ class BrickPool {
   static std::size_t bricks_of_group(std::size_t brick_bytes) {
     return std::clamp<std::size_t>((std::size_t{2} << 20) / brick_bytes, 1, 4);
   }
+  /// Bricks a thread that should be decoded ahead: bricks that wait take no host memory here.
+  static constexpr std::size_t kBricksAhead = 24;
   /// Page-locked host memory that it takes.
   static std::uint64_t pinned_bytes(std::size_t brick_bytes, int threads) {
     return std::uint64_t{2} * static_cast<std::uint64_t>(threads) * bricks_of_group(brick_bytes) *

@@ -88,7 +88,7 @@ std::uint64_t good_pool(const Lattice& lattice, int threads) {
   const Int3 b = lattice.bricks();
   const auto faces = static_cast<std::uint64_t>(b.x * b.y + b.y * b.z + b.x * b.z);
   return std::min(static_cast<std::uint64_t>(volume(b)),
-                  faces / 2 + 24 * static_cast<std::uint64_t>(threads));
+                  faces / 2 + (BrickPool::kBricksAhead + 8) * static_cast<std::uint64_t>(threads));
 }
 
 namespace {

@@ -91,6 +91,7 @@ class DeviceBricks final : public BrickMemory {
   void end(int thread, std::byte* place) override { pool_->end(thread, place); }
   void send(int thread) override { pool_->send(thread); }
   std::size_t good_job() const override { return job_; }
+  std::size_t bricks_ahead() const override { return gpu::BrickPool::kBricksAhead; }
 
  private:
   std::shared_ptr<gpu::BrickPool> pool_;

@@ -15,9 +15,6 @@ namespace {
 constexpr std::size_t kBytesOfSlab = std::size_t{16} << 20;
 /// Pieces of it that are got before they are needed.
 constexpr std::size_t kSlabsAhead = 3;
-/// Bricks a thread that are decoded ahead: enough for all to be busy while whoever takes
-/// batches does something else.
-constexpr std::size_t kBricksAhead = 12;
 /// Batches that are decoded ahead in any case: one to take, one to work on.
 constexpr std::size_t kBatchesAhead = 2;
 
@@ -126,7 +123,7 @@ void BatchDecoder::begin(const Batch& batch) {
   batch->grid_ = lattice_.bricks();
   wait(lock, [&] {
     return batches_.size() < kBatchesAhead ||
-           ahead_ < kBricksAhead * static_cast<std::size_t>(threads_count_);
+           ahead_ < memory_.bricks_ahead() * static_cast<std::size_t>(threads_count_);
   });
   if (stop_) return;
   batches_.push_back(batch);

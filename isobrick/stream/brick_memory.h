@@ -22,6 +22,9 @@ class BrickMemory {
   /// Bytes of bricks that a decoder should begin before it sends them: small bricks come in
   /// groups.
   virtual std::size_t good_job() const { return std::size_t{128} << 10; }
+  /// Bricks a thread that should be decoded ahead: enough for all to be busy while whoever
+  /// takes batches does something else.
+  virtual std::size_t bricks_ahead() const { return 12; }
 };
 
 }  // namespace isobrick
