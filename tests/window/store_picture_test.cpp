@@ -170,7 +170,8 @@ TEST_F(Picture, KeepsItsBudgets) {
 }
 
 TEST_F(Picture, MeshesOnTheDeviceKeepNoneInHostMemory) {
-  const PictureBudgets budgets{.memory = 16u << 20, .device_memory = 512u << 20};
+  const PictureBudgets budgets{
+      .memory = 16u << 20, .device_memory = 512u << 20, .backend = Backend::cpu};
   open(SynthKind::gyroid, {128, 128, 128}, budgets);
   settings_.pixel_error = 0.5f;
   settings_.occlusion = settings_.multisample = false;
