@@ -110,9 +110,6 @@ void read_own_header(Fields& in, VdbGrid& grid) {
   grid.grid_class = shown(text_of(metadata, "class"));
   grid.transform = in.at();
   grid.map = shown(in.text());
-  if (const auto memory = metadata.find("file_mem_bytes");
-      memory != metadata.end() && memory->second.second.size() == sizeof(std::uint64_t))
-    std::memcpy(&grid.memory.emplace(), memory->second.second.data(), sizeof(std::uint64_t));
   in.seek(next);
 }
 

@@ -21,7 +21,6 @@ struct VdbGrid {
   std::uint64_t transform = 0;       ///< where its transform begins, behind its metadata
   std::string grid_class;            ///< "level set", "fog volume", …, or empty
   std::string map;                   ///< kind of its transform: "UniformScaleMap"
-  std::optional<std::uint64_t> memory;  ///< bytes of the tree, as its writer counted them
 
   /// "float", "vec3s", …
   std::string value_type() const;
