@@ -248,7 +248,7 @@ TEST(LargeCut, TakesMilliseconds) {
   }
   EXPECT_GT(nodes, 4000u);
   RecordProperty("milliseconds", std::to_string(best * 1e3));
-  EXPECT_LT(best, 0.025) << "of a busy machine";
+  EXPECT_LT(best, 0.1) << "of a busy machine";
 }
 
 }  // namespace
