@@ -8,7 +8,7 @@ const char* __asan_default_options() { return "allocator_may_return_null=1"; }
 /// DCMTK and libhdf5 keep lists of codecs and of free blocks until the program ends. Where a
 /// tree is damaged, OpenVDB forgets the node that it was reading.
 const char* __lsan_default_suppressions() {
-  return "leak:libdcmdata\nleak:libhdf5\nleak:readTopology\n";
+  return "leak:libdcmdata\nleak:libhdf5\nleak:libopenvdb\nleak:readTopology\n";
 }
 
 }  // extern "C"
