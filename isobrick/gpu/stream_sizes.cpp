@@ -102,12 +102,12 @@ std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions
   for (std::uint64_t tiles = std::min<std::uint64_t>(kMostTilesOfLaunch, all);
        tiles >= std::min<std::uint64_t>(kLeastTilesWithPool, all); tiles /= 2)
     for (int lanes = kMostLanes; lanes >= kLeastLanes; --lanes) {
-      PoolSizes pool{0, wanted.threads};
+      PoolSizes pool{1, wanted.threads};
       const auto count = static_cast<std::uint32_t>(tiles);
       const std::uint64_t launches =
           stream_sizes(lattice, options, count, lanes, pool).device_bytes;
       if (launches > device_budget) continue;
-      pool.bricks = std::min(wanted.bricks, (device_budget - launches) / lattice.brick_bytes());
+      pool.bricks = std::min(wanted.bricks, 1 + (device_budget - launches) / lattice.brick_bytes());
       if (10 * pool.bricks < 7 * wanted.bricks) continue;
       const StreamSizes s = stream_sizes(lattice, options, count, lanes, pool);
       if (s.pinned_bytes + s.host_bytes + other_host_bytes <= host_budget) return s;

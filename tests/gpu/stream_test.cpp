@@ -338,6 +338,7 @@ TEST(GpuStreamSizes, APoolIsTakenWhereMostOfItFits) {
   EXPECT_EQ(whole.tiles, gpu::kMostTilesOfLaunch);
   EXPECT_EQ(whole.sent_bricks, 0u);
   EXPECT_LT(most.pool.bricks, wanted.bricks);
+  EXPECT_GT(most.device_bytes + lattice.brick_bytes(), 400 * mebi) << "all of the room is used";
   EXPECT_GE(10 * most.pool.bricks, 7 * wanted.bricks);
   EXPECT_EQ(none.pool.bricks, 0u);
   EXPECT_GT(none.sent_bricks, 0u);
