@@ -13,12 +13,6 @@ namespace {
 /// One group of so many is timed: events with times between copies slow all of them down.
 constexpr std::uint64_t kTimedOf = 16;
 
-/// Makes the device the calling thread's.
-int current(int device) {
-  check(cudaSetDevice(device));
-  return device;
-}
-
 /// Bricks that are copied together.
 struct Group {
   PinnedBuffer<std::byte> from;
@@ -69,7 +63,10 @@ struct BrickPool::Impl {
   std::uint64_t timed_bricks = 0;
 
   Impl(int id, std::size_t of_brick, std::size_t bricks)
-      : device(current(id)), brick_bytes(of_brick), size(bricks * of_brick), memory(size, stream) {
+      : device(make_current(id)),
+        brick_bytes(of_brick),
+        size(bricks * of_brick),
+        memory(size, stream) {
     stream.wait();
   }
   /// Copies end before their buffers.
@@ -116,13 +113,13 @@ std::byte* BrickPool::begin(int thread) {
   Writer& writer = impl_->writer(thread);
   Group& group = writer.groups[writer.filled];
   if (group.under_way) {
-    current(impl_->device);
+    make_current(impl_->device);
     group.over.wait();
     group.under_way = false;
   }
   if (group.from.size() == 0) {
     // Page-locking takes a while: each thread for itself.
-    current(impl_->device);
+    make_current(impl_->device);
     group.from = PinnedBuffer<std::byte>(bricks_of_group(impl_->brick_bytes) * impl_->brick_bytes);
   }
   return group.from.data() + group.places.size() * impl_->brick_bytes;
@@ -137,7 +134,7 @@ void BrickPool::send(int thread) {
   Writer& writer = impl_->writer(thread);
   Group& group = writer.groups[writer.filled];
   if (group.places.empty()) return;
-  current(impl_->device);
+  make_current(impl_->device);
   if (impl_->groups_sent++ % kTimedOf == 0)
     impl_->copy_timed(group);
   else

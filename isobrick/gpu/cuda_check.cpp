@@ -18,6 +18,11 @@ void check(cudaError_t result, const std::source_location& where) {
   if (result != cudaSuccess) fail(result, "call failed", where);
 }
 
+int make_current(int device) {
+  check(cudaSetDevice(device));
+  return device;
+}
+
 void check_launch(const char* kernel, const std::source_location& where) {
   const cudaError_t result = cudaGetLastError();
   if (result != cudaSuccess) fail(result, kernel, where);

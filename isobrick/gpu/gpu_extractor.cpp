@@ -25,12 +25,6 @@ SurfaceOptions checked(const Lattice& lattice, SurfaceOptions options) {
   return options;
 }
 
-/// Makes the device the calling thread's.
-int current(int device) {
-  check(cudaSetDevice(device));
-  return device;
-}
-
 std::size_t ceil_div(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
 
 Int3 tile_of(Int3 p) { return {p.x / kTileEdge, p.y / kTileEdge, p.z / kTileEdge}; }
@@ -51,7 +45,7 @@ struct GpuExtractor::Impl {
 
   Impl(int id, const Lattice& l, const SurfaceOptions& o, const StreamSizes& sizes, TakeChunk take,
        std::shared_ptr<BrickPool> brick_pool)
-      : cuda_device(current(id)),
+      : cuda_device(make_current(id)),
         lattice(l),
         options(checked(l, o)),
         first_tile(tile_of(options.roi.lo)),
@@ -131,7 +125,7 @@ GpuExtractor::~GpuExtractor() = default;
 void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                            const std::shared_ptr<const void>& samples) {
   // Calls may come from any thread.
-  current(impl_->cuda_device);
+  make_current(impl_->cuda_device);
   tiles = impl_->all_to_look_at(tiles);
   while (!tiles.empty()) {
     impl_->collector.wait_for_lane();

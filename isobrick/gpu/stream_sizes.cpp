@@ -110,6 +110,8 @@ std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions
       pool.bricks = std::min(wanted.bricks, 1 + (device_budget - launches) / lattice.brick_bytes());
       if (10 * pool.bricks < 7 * wanted.bricks) continue;
       const StreamSizes s = stream_sizes(lattice, options, count, lanes, pool);
+      // Any tile's bricks must fit, however few bricks there are.
+      if (pool.bricks < s.tile_bricks) continue;
       if (s.pinned_bytes + s.host_bytes + other_host_bytes <= host_budget) return s;
     }
   return std::nullopt;

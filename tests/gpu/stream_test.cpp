@@ -343,6 +343,13 @@ TEST(GpuStreamSizes, APoolIsTakenWhereMostOfItFits) {
   EXPECT_EQ(none.pool.bricks, 0u);
   EXPECT_GT(none.sent_bricks, 0u);
   EXPECT_EQ(little_host.pool.bricks, 0u);
+  // Eight bricks, all of which one tile needs.
+  const Lattice small{{128, 128, 128}, {64, 64, 64}, ScalarType::u16};
+  for (std::uint64_t device = 24 * mebi; device <= 128 * mebi; device += mebi / 4) {
+    const gpu::StreamSizes s =
+        gpu::fit_stream_sizes(small, {.roi = small.box()}, device, much, 0, {8, 4});
+    EXPECT_TRUE(s.pool.bricks == 0 || s.pool.bricks >= s.tile_bricks) << device;
+  }
   // Small bricks would be many copies.
   EXPECT_EQ(gpu::fit_stream_sizes({{256, 256, 256}, {32, 32, 32}, ScalarType::u8}, options, much,
                                   much, 0, {100, 4})
