@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace isobrick {
 namespace {
@@ -63,7 +64,12 @@ void lay_bins(Histogram& h, bool whole_numbers, int most_bins) {
 
 std::size_t bin_of(const Histogram& h, double value) {
   if (h.counts.size() == 1) return 0;
-  const double at = value / h.bin_width - h.lo / h.bin_width;
+  // The difference of whole numbers is exact, and so are their bins' bounds; that of doubles
+  // may itself be no finite number.
+  const double span = value - h.lo;
+  const double at = span <= std::numeric_limits<double>::max()
+                        ? span / h.bin_width
+                        : value / h.bin_width - h.lo / h.bin_width;
   return std::min(static_cast<std::size_t>(std::max(at, 0.0)), h.counts.size() - 1);
 }
 
