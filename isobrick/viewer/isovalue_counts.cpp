@@ -79,7 +79,7 @@ void IsovalueCounts::read_blocks(const BrickSource& source, int level) {
       items, [&](Box3 box) { return source.block_ranges(level, box); },
       [&](const RangeTable& table) {
         for (const ValueRange<double>& r : table.ranges) {
-          if (r.empty()) continue;
+          if (r.empty() || edges_.empty()) continue;
           ++lo_below_[place(r.lo)];
           ++hi_below_[place(r.hi)];
         }

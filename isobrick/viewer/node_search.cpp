@@ -128,9 +128,9 @@ void NodeSearch::build_what_is_wanted() {
       Bytes bytes = build(kind);
       const double seconds = seconds_since(start);
       lock.lock();
+      if (wanted_ != kind) continue;  // yet another one, or that which there was
       set_index(kind, std::move(bytes), seconds);
     }
-    if (wanted_ != kind) continue;  // yet another one
     state_.building = false;
     state_.refused = std::move(refused);
     change_.notify_all();

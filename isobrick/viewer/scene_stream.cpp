@@ -394,7 +394,7 @@ void SceneStream::set_slice(int slot, const std::optional<SliceRequest>& request
     place.image.reset();
   else if (!running && !there)
     place.wanted = request;
-  shared_->work.notify_one();
+  if (place.wanted) shared_->work.notify_one();
 }
 
 std::shared_ptr<const SliceSamples> SceneStream::slice(int slot) const {

@@ -133,6 +133,17 @@ TEST(NodeSearch, GoesOnAnsweringWhileItIsSwitched) {
   }
   search.use(IndexKind::quadtree);
   search.wait();
+  // What is taken back while it is built does not come after all.
+  for (int i = 0; i < 20; ++i) {
+    search.use(IndexKind::kdtree);
+    std::this_thread::sleep_for(std::chrono::microseconds(20 * i));
+    const IndexKind there = search.state().kind;
+    search.use(there);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_EQ(search.state().kind, there);
+    search.use(IndexKind::quadtree);
+    search.wait();
+  }
   EXPECT_EQ(search.state().kind, IndexKind::quadtree);
   EXPECT_FALSE(search.state().building);
   EXPECT_EQ(search.find(std::vector<double>{0.1}).count(), count);
