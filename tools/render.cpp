@@ -83,6 +83,8 @@ WorldBox parse_box(const std::string& text) {
     v[i] = parse_number(text.substr(at, end - at));
     at = end + 1;
   }
+  for (std::size_t i = 0; i < 6; i += 2)
+    if (!(v[i] < v[i + 1])) throw UsageError(fmt::format("the box '{}' is empty", text));
   return {{v[0], v[2], v[4]}, {v[1], v[3], v[5]}};
 }
 

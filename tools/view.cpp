@@ -78,8 +78,8 @@ int draw(const Arguments& arguments, Console& console) {
     write_picture(picture.renderer(), arguments.screenshot, arguments.force);
   }
   if (frames > 0)
-    write_turntable(picture, camera, width, height, settings, frames, arguments.turntable,
-                    arguments.force, wait);
+    write_turntable(picture, camera, width, height, settings, arguments.camera.up, frames,
+                    arguments.turntable, arguments.force, wait);
   progress.end();
   const PictureState& state = picture.state();
   for (const std::string& message : state.damage) console.note(message);

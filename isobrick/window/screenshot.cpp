@@ -15,14 +15,14 @@ void write_picture(const Renderer& renderer, const std::string& file, bool force
 }
 
 void write_turntable(StorePicture& picture, Camera camera, int width, int height,
-                     const ViewSettings& settings, int frames, const std::string& folder,
-                     bool force, const std::function<void()>& each) {
+                     const ViewSettings& settings, Vec3d vertical, int frames,
+                     const std::string& folder, bool force, const std::function<void()>& each) {
   std::filesystem::create_directories(folder);
   for (int frame = 0; frame < frames; ++frame) {
     picture.draw_complete(camera, width, height, settings, each);
     write_picture(picture.renderer(), fmt::format("{}/{:04}.png", folder, frame), force);
     each();
-    camera.orbit(2 * std::numbers::pi / frames, 0, {0, 0, 1});
+    camera.orbit(2 * std::numbers::pi / frames, 0, vertical);
   }
 }
 

@@ -277,7 +277,10 @@ TEST_F(Picture, SlicesShowSamples) {
 
 TEST_F(Picture, TurntablesTurn) {
   open(SynthKind::gyroid, {48, 48, 48});
-  write_turntable(*picture_, camera_, 64, 48, settings_, 3, dir_ / "turn", false, [] {});
+  write_turntable(*picture_, camera_, 64, 48, settings_, {0, 0, 1}, 3, dir_ / "turn", false, [] {});
+  write_turntable(*picture_, camera_, 64, 48, settings_, {0, 1, 0}, 3, dir_ / "y", false, [] {});
+  EXPECT_EQ(dir_.read("turn/0000.png"), dir_.read("y/0000.png"));
+  EXPECT_NE(dir_.read("turn/0001.png"), dir_.read("y/0001.png"));
   EXPECT_TRUE(std::filesystem::exists(dir_ / "turn/0002.png"));
   EXPECT_NE(dir_.read("turn/0000.png"), dir_.read("turn/0001.png"));
 }
