@@ -96,7 +96,7 @@ class ObjTriangles final : public TriangleReader {
         text_.fail(fmt::format("'{}' names no vertex", word));
       // They count from 1, or back from the last; beyond either end is found out later.
       corners_.push_back(vertex > 0 ? static_cast<std::uint64_t>(vertex) - 1
-                                    : vertices_ - static_cast<std::uint64_t>(-vertex));
+                                    : vertices_ + static_cast<std::uint64_t>(vertex));
     }
   }
 

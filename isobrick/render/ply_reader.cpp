@@ -212,8 +212,8 @@ class PlyTriangles final : public TriangleReader {
   std::uint64_t vertex(std::uint64_t corner) const {
     const double number = load_number(list_ + corner * size_of(kind_), kind_, swapped_);
     // Negative ones are no vertex of any file.
-    return number >= 0 ? static_cast<std::uint64_t>(number)
-                       : std::numeric_limits<std::uint64_t>::max();
+    return number >= 0 && number < 0x1p53 ? static_cast<std::uint64_t>(number)
+                                          : std::numeric_limits<std::uint64_t>::max();
   }
 
   std::string path_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/core/printable.h"
 #include "isobrick/io/file.h"
 
@@ -106,7 +107,7 @@ void read_own_header(Fields& in, VdbGrid& grid) {
   in.number<std::uint32_t>();  // how it is compressed
   const Metadata metadata = in.metadata();
   grid.own_name = text_of(metadata, "name");
-  grid.unit = text_of(metadata, "unit");
+  grid.unit = unit_name(text_of(metadata, "unit"));
   grid.grid_class = shown(text_of(metadata, "class"));
   grid.transform = in.at();
   grid.map = shown(in.text());

@@ -59,7 +59,9 @@ inline void expect_damage_is_no_crash(const TempDir& dir, const std::string& nam
 /// long run under sanitizers.
 inline int mutation_count() {
   const char* said = std::getenv("ISOBRICK_MUTATIONS");
-  return said != nullptr ? std::atoi(said) : 150;
+  const int count = said != nullptr ? std::atoi(said) : 150;
+  EXPECT_GT(count, 0) << "ISOBRICK_MUTATIONS";
+  return count;
 }
 
 /// One to a few changes of `bytes`: bytes of other or of extreme values, runs that are
