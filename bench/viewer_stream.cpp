@@ -116,17 +116,17 @@ class Session {
     device_peak = std::max(device_peak, picture_->state().device_bytes);
     return seconds;
   }
-  /// At most 60 times a second until `done`; false when that takes longer than two minutes.
+  /// At most 60 times a second until `done`. Throws Error when that takes longer than two minutes.
   template <class F>
-  bool draw_until(bool moving, Times& times, F&& done) {
+  void draw_until(bool moving, Times& times, F&& done) {
     const auto start = Clock::now();
     while (seconds_since(start) < 120) {
       const auto next = Clock::now() + std::chrono::microseconds(16'667);
       times.add(draw(moving));
-      if (done()) return true;
+      if (done()) return;
       std::this_thread::sleep_until(next);
     }
-    return false;
+    throw Error("what is waited for is not there after 120 s");
   }
 
   ViewSettings settings;
