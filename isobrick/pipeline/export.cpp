@@ -93,28 +93,26 @@ struct Piece {
   }
 };
 
-void export_vdb(const Piece& in, const VolumeInfo& info, const ExportOptions& options,
-                Workers& workers, OutputFile& output, Progress& progress) {
+void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, Workers& workers,
+                OutputFile& output, Progress& progress) {
   const Lattice& lattice = in.lattice();
   VolumeInfo grid_info = info;
   grid_info.fill_value = in.store.info().fill_value;
   grid_info.grid_class = in.store.info().grid_class;
   const std::string& name = in.store.info().grid_name;
-  const auto grid = make_vdb_writer_if_built(grid_info, name.empty() ? "density" : name);
-  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
   const std::uint64_t others =
       fixed_bytes(in.store.info(), in.level, workers.threads()) + lattice.brick_bytes();
-  for_each_stored_brick(in.store, in.level, in.box, [&](Int3 brick) {
+  const auto grid = make_vdb_writer_if_built(grid_info, name.empty() ? "density" : name,
+                                             memory - std::min(memory, others));
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
+  progress.begin("export", static_cast<std::uint64_t>(volume(lattice.bricks_of(in.box).extent())) *
+                               lattice.brick_bytes());
+  for_each_stored_brick(in.store, in.level, in.box, progress, [&](Int3 brick) {
     const Box3 part = intersect(lattice.brick_box(brick), in.box);
     workers.execute([&] { read_slab(in.store, in.level, part, buffer.get()); });
     grid->put({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
-    if (grid->memory() + others > options.memory)
-      throw UsageError(fmt::format(
-          "the grid takes more than the memory budget of {} MiB, and OpenVDB holds it whole: "
-          "give more, or export a region or a coarser level",
-          options.memory / kMiB));
-    progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
   });
+  progress.end();
   grid->write(output.temporary_path());
 }
 
@@ -127,9 +125,6 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   const Lattice& lattice = level.lattice;
-  Workers workers(options.threads);
-  const Int3 piece = piece_within(lattice, box.extent(), options.memory,
-                                  fixed_bytes(store.info(), options.level, workers.threads()));
   OutputFile output(out.string(), options.force);
   if (options.isovalue) {
     export_level_set(store, box, describe(level, box, out.string()), options,
@@ -137,12 +132,12 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
     output.publish();
     return;
   }
+  Workers workers(options.threads);
+  const Int3 piece = piece_within(lattice, box.extent(), options.memory,
+                                  fixed_bytes(store.info(), options.level, workers.threads()));
   if (options.format == ExportFormat::vdb) {
-    progress.begin("export",
-                   static_cast<std::uint64_t>(volume(box.extent())) * lattice.sample_bytes());
-    export_vdb({store, options.level, box}, describe(level, box, out.string()), options, workers,
-               output, progress);
-    progress.end();
+    export_vdb({store, options.level, box}, describe(level, box, out.string()), options.memory,
+               workers, output, progress);
     output.publish();
     return;
   }

@@ -10,6 +10,7 @@
 #include "isobrick/core/threshold.h"
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/pipeline/slab_reader.h"
+#include "isobrick/pipeline/stored_bricks.h"
 #include "isobrick/pipeline/workers.h"
 #include "isobrick/volumes/vdb_level_set.h"
 
@@ -20,40 +21,19 @@ constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 /// The extraction is not much faster with more.
 constexpr std::uint64_t kExtractBytes = 256 * kMiB;
 
-/// Throws when the grid has outgrown its part of the budget.
-class Room {
- public:
-  Room(std::uint64_t budget, std::uint64_t other) : budget_(budget), other_(other) {}
-  void check(const VdbLevelSet& set) const {
-    if (other_ + set.memory() > budget_)
-      throw UsageError(
-          fmt::format("the level set takes more than the memory budget of {} MiB leaves ({} MiB), "
-                      "and OpenVDB holds it whole: give more, or export a region or a coarser "
-                      "level",
-                      budget_ / kMiB, (budget_ - std::min(budget_, other_)) / kMiB));
-  }
-
- private:
-  std::uint64_t budget_, other_;
-};
-
 /// Measures distances from the triangles of a mesh.
 class DistanceSink final : public MeshSink {
  public:
-  DistanceSink(VdbLevelSet& set, const Room& room) : set_(set), room_(room) {}
+  explicit DistanceSink(VdbLevelSet& set) : set_(set) {}
 
   Indexing indexing() const override { return Indexing::chunk_local; }
   void begin(const MeshHeader&) override {}
-  void write(const MeshChunk& chunk) override {
-    set_.add(chunk.positions, chunk.triangles);
-    room_.check(set_);
-  }
+  void write(const MeshChunk& chunk) override { set_.add(chunk.positions, chunk.triangles); }
   void finish() override {}
   std::uint64_t bytes() const override { return 0; }
 
  private:
   VdbLevelSet& set_;
-  const Room& room_;
 };
 
 /// Says which samples are inside, brick by brick; only bricks of both kinds are read.
@@ -114,9 +94,9 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
     throw UsageError(fmt::format("a band of {} samples on either side: 1 to {} are possible",
                                  options.half_band, kWidestHalfBand));
   const std::uint64_t for_extraction = std::min(options.memory / 2, kExtractBytes);
-  const auto set = make_vdb_level_set_if_built(info, "surface", options.half_band, options.threads);
-  const Room room(options.memory, for_extraction);
-  DistanceSink sink(*set, room);
+  const auto set = make_vdb_level_set_if_built(info, "surface", options.half_band, options.threads,
+                                               options.memory - for_extraction);
+  DistanceSink sink(*set);
   ExtractOptions extraction;
   extraction.isovalue = *options.isovalue;
   extraction.level = options.level;
@@ -129,15 +109,14 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(options.level)].lattice;
   Workers workers(options.threads);
   Signs signs(store, box, options, *set);
-  // As many bricks at a time as there are in a file of ranges.
   const Box3 bricks = lattice.bricks_of(box);
-  constexpr Int3 file{StoreReader::kRangeChunk, StoreReader::kRangeChunk, StoreReader::kRangeChunk};
-  const Box3 files{floor_div(bricks.lo, file), ceil_div(bricks.hi, file)};
-  progress.begin("signs", static_cast<std::uint64_t>(volume(files.extent())));
-  for_each_point(files, [&](Int3 f) {
-    signs.put(intersect({f * file, (f + Int3{1, 1, 1}) * file}, bricks), workers);
-    room.check(*set);
-    progress.advance(1);
+  const auto bytes = [&](Box3 b) {
+    return static_cast<std::uint64_t>(volume(b.extent())) * lattice.brick_bytes();
+  };
+  progress.begin("signs", bytes(bricks));
+  for_each_range_file(bricks, [&](Box3 part) {
+    signs.put(part, workers);
+    progress.advance(bytes(part));
   });
   progress.end();
   set->write(path);

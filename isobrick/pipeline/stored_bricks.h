@@ -4,14 +4,20 @@
 #include <functional>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/progress.h"
 
 namespace isobrick {
 
+/// Calls f(part) for the parts of `bricks`, a box of a level's bricks, whose ranges lie in one
+/// file each.
+void for_each_range_file(Box3 bricks, const std::function<void(Box3 part)>& f);
+
 /// Calls f(brick) for the bricks of a level that hold samples of `box` (in samples) and are
 /// stored. Where there are ranges, these tell in which bricks there can be anything but the
-/// fill value, a file of them for 32³ bricks, and only those are looked up; else all are.
-/// Returns how many were looked up.
+/// fill value, and only those are looked up; else all are, as they are where the fill value is
+/// a zero of two signs, which ranges do not tell apart. Every brick of the box advances
+/// `progress` by its bytes. Returns how many were looked up.
 std::uint64_t for_each_stored_brick(const StoreReader& store, int level, Box3 box,
-                                    const std::function<void(Int3 brick)>& f);
+                                    Progress& progress, const std::function<void(Int3 brick)>& f);
 
 }  // namespace isobrick

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -34,9 +35,10 @@ struct DicomModule {
 struct VdbModule {
   const char* version;
   std::unique_ptr<VolumeSource> (*open)(const std::string& file, const VolumeRequest& said);
-  std::unique_ptr<VdbWriter> (*make_writer)(const VolumeInfo& info, const std::string& name);
+  std::unique_ptr<VdbWriter> (*make_writer)(const VolumeInfo& info, const std::string& name,
+                                            std::uint64_t budget);
   std::unique_ptr<VdbLevelSet> (*make_level_set)(const VolumeInfo& info, const std::string& name,
-                                                 int half_band, int threads);
+                                                 int half_band, int threads, std::uint64_t budget);
 };
 
 // Each is loaded once. They throw Error when a module is not where it belongs or is

@@ -71,9 +71,10 @@ std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file,
 }
 
 std::unique_ptr<VdbWriter> make_vdb_writer_if_built([[maybe_unused]] const VolumeInfo& info,
-                                                    [[maybe_unused]] const std::string& name) {
+                                                    [[maybe_unused]] const std::string& name,
+                                                    [[maybe_unused]] std::uint64_t budget) {
 #ifdef ISOBRICK_WITH_OPENVDB
-  return vdb_module().make_writer(info, name);
+  return vdb_module().make_writer(info, name, budget);
 #else
   cannot_write_vdb();
 #endif
@@ -82,9 +83,10 @@ std::unique_ptr<VdbWriter> make_vdb_writer_if_built([[maybe_unused]] const Volum
 std::unique_ptr<VdbLevelSet> make_vdb_level_set_if_built([[maybe_unused]] const VolumeInfo& info,
                                                          [[maybe_unused]] const std::string& name,
                                                          [[maybe_unused]] int half_band,
-                                                         [[maybe_unused]] int threads) {
+                                                         [[maybe_unused]] int threads,
+                                                         [[maybe_unused]] std::uint64_t budget) {
 #ifdef ISOBRICK_WITH_OPENVDB
-  return vdb_module().make_level_set(info, name, half_band, threads);
+  return vdb_module().make_level_set(info, name, half_band, threads, budget);
 #else
   cannot_write_vdb();
 #endif

@@ -25,6 +25,13 @@ void describe_vdb_grid(openvdb::GridBase& grid, const VolumeInfo& info, const st
     grid.insertMeta(kVdbUnit, openvdb::StringMetadata(info.transform.unit));
 }
 
+void throw_vdb_budget(std::uint64_t budget) {
+  throw UsageError(
+      fmt::format("the grid takes more than the {} MiB that the memory budget leaves for it, and "
+                  "OpenVDB holds it whole: give more, or export a region or a coarser level",
+                  budget >> 20));
+}
+
 void write_vdb_grid(const std::string& path, const openvdb::GridBase::Ptr& grid) {
   try {
     openvdb::io::File file(path);

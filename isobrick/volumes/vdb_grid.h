@@ -24,24 +24,42 @@ inline openvdb::Coord vdb_coordinate(Int3 p) {
   return {static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z)};
 }
 
+/// Edge of OpenVDB's leaves.
+inline constexpr Index kVdbLeaf = 8;
+inline constexpr Int3 kVdbLeafExtent{kVdbLeaf, kVdbLeaf, kVdbLeaf};
+
+/// Calls f(corner) for the leaves that have voxels of `box`, x fastest.
+template <class F>
+void for_each_vdb_leaf(Box3 box, F&& f) {
+  for_each_point({floor_div(box.lo, kVdbLeafExtent), ceil_div(box.hi, kVdbLeafExtent)},
+                 [&](Int3 leaf) { f(leaf * kVdbLeafExtent); });
+}
+
+/// Throws the UsageError of a grid that would take more than `budget` bytes.
+[[noreturn]] void throw_vdb_budget(std::uint64_t budget);
+
 /// Makes leaves and tiles of leaves in a tree and counts the bytes of the nodes that
-/// come into being, which is quicker than to ask the tree.
+/// come into being, which is quicker than to ask the tree. Throws UsageError before
+/// they, and what else is said to be held, take more than `budget`.
 template <class Tree>
 class CountedTree {
  public:
   using Value = typename Tree::ValueType;
   using Leaf = typename Tree::LeafNodeType;
 
-  explicit CountedTree(Tree& tree) : tree_(tree) {}
+  CountedTree(Tree& tree, std::uint64_t budget) : tree_(tree), budget_(budget) {}
 
-  Tree& tree() { return tree_; }
-  std::uint64_t bytes() const { return bytes_; }
+  /// Says how many bytes its owner holds beside the tree.
+  void hold(std::uint64_t bytes) {
+    held_ = bytes;
+    add(0);
+  }
 
   Leaf* probe_leaf(const openvdb::Coord& at) { return tree_.probeLeaf(at); }
 
   Leaf* touch_leaf(const openvdb::Coord& at) {
     if (Leaf* leaf = tree_.probeLeaf(at)) return leaf;
-    bytes_ += sizeof(Leaf) + Leaf::SIZE * sizeof(Value);
+    add(sizeof(Leaf) + Leaf::SIZE * sizeof(Value));
     count_parents(at);
     return tree_.touchLeaf(at);
   }
@@ -58,12 +76,17 @@ class CountedTree {
 
   void count_parents(const openvdb::Coord& at) {
     if (tree_.template probeConstNode<Lower>(at) != nullptr) return;
-    bytes_ += sizeof(Lower);
-    if (tree_.template probeConstNode<Upper>(at) == nullptr) bytes_ += sizeof(Upper);
+    add(sizeof(Lower));
+    if (tree_.template probeConstNode<Upper>(at) == nullptr) add(sizeof(Upper));
+  }
+
+  void add(std::uint64_t bytes) {
+    bytes_ += bytes;
+    if (bytes_ + held_ > budget_) throw_vdb_budget(budget_);
   }
 
   Tree& tree_;
-  std::uint64_t bytes_ = 0;
+  std::uint64_t budget_, bytes_ = 0, held_ = 0;
 };
 
 }  // namespace isobrick

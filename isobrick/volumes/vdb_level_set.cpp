@@ -19,9 +19,9 @@
 namespace isobrick {
 namespace {
 
-/// Edge of OpenVDB's leaves.
-constexpr int kLeaf = 8;
-constexpr Int3 kLeafExtent{kLeaf, kLeaf, kLeaf};
+/// So many pairs of a leaf and a triangle that comes near it are listed at a time: of wide
+/// bands there are thousands for each triangle.
+constexpr std::size_t kListed = std::size_t{1} << 20;
 
 /// Bounds are compared with so much to spare that what is left out has no influence:
 /// the result must not depend on what came first.
@@ -43,16 +43,17 @@ class LevelSet final : public VdbLevelSet {
   using Leaf = Tree::LeafNodeType;
 
  public:
-  LevelSet(const VolumeInfo& info, const std::string& name, int half_band, int threads)
+  LevelSet(const VolumeInfo& info, const std::string& name, int half_band, int threads,
+           std::uint64_t budget)
       : extent_(info.extent),
-        leaves_extent_(ceil_div(info.extent, kLeafExtent)),
+        leaves_extent_(ceil_div(info.extent, kVdbLeafExtent)),
         unit_(std::max(
             {info.transform.spacing.x, info.transform.spacing.y, info.transform.spacing.z})),
         spacing_(info.transform.spacing * (1 / unit_)),
         band_(static_cast<float>(half_band * unit_)),
         reach_(half_band * static_cast<double>(kSpare)),
         grid_(openvdb::FloatGrid::create(band_)),
-        counted_(grid_->tree()),
+        counted_(grid_->tree(), budget),
         arena_(threads > 0 ? threads : tbb::info::default_concurrency()) {
     describe_vdb_grid(*grid_, info, name);
     grid_->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -66,38 +67,21 @@ class LevelSet final : public VdbLevelSet {
       points_.push_back(Vec3d{index.x(), index.y(), index.z()} * spacing_);
     }
     near_.clear();
-    for (std::size_t i = 0; i < triangles.size(); ++i) find_leaves(triangles, i);
-    std::sort(near_.begin(), near_.end(),
-              [](const Near& a, const Near& b) { return a.leaf < b.leaf; });
-    leaves_.clear();
-    for (std::size_t i = 0; i < near_.size(); ++i)
-      if (i == 0 || near_[i].leaf != near_[i - 1].leaf) {
-        const Index x = near_[i].leaf % leaves_extent_.x, rest = near_[i].leaf / leaves_extent_.x;
-        const Int3 leaf{x, rest % leaves_extent_.y, rest / leaves_extent_.y};
-        leaves_.push_back({leaf, counted_.touch_leaf(vdb_coordinate(leaf * kLeafExtent)), i});
-      }
-    arena_.execute([&] {
-      tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
-        const std::size_t end = i + 1 < leaves_.size() ? leaves_[i + 1].first : near_.size();
-        for (std::size_t k = leaves_[i].first; k < end; ++k)
-          measure(*leaves_[i].leaf, leaves_[i].position, triangles[near_[k].triangle]);
-      });
-    });
-    held_ = points_.capacity() * sizeof(Vec3d) + near_.capacity() * sizeof(Near) +
-            leaves_.capacity() * sizeof(Touched);
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      find_leaves(triangles, i);
+      if (near_.size() >= kListed || i + 1 == triangles.size()) measure_listed(triangles);
+    }
   }
 
   void put_inside(Box3 box, const std::uint8_t* inside) override {
-    for_each_leaf(box, [&](Int3 corner) {
+    for_each_vdb_leaf(box, [&](Int3 corner) {
       put_leaf(box, corner,
                [&](Int3 p) { return inside[linear_index(p - box.lo, box.extent())] != 0; });
     });
   }
   void put_all_inside(Box3 box) override {
-    for_each_leaf(box, [&](Int3 corner) { put_leaf(box, corner, [](Int3) { return true; }); });
+    for_each_vdb_leaf(box, [&](Int3 corner) { put_leaf(box, corner, [](Int3) { return true; }); });
   }
-
-  std::uint64_t memory() const override { return counted_.bytes() + held_; }
 
   void write(const std::string& path) override {
     openvdb::tools::pruneLevelSet(grid_->tree());
@@ -111,11 +95,27 @@ class LevelSet final : public VdbLevelSet {
     std::size_t first;  ///< of its triangles in near_
   };
 
-  template <class F>
-  static void for_each_leaf(Box3 box, F&& f) {
-    const Int3 first{box.lo.x / kLeaf, box.lo.y / kLeaf, box.lo.z / kLeaf};
-    for_each_point({first, ceil_div(box.hi, kLeafExtent)},
-                   [&](Int3 leaf) { f(leaf * kLeafExtent); });
+  /// Makes the leaves that are listed, takes their voxels' distances and clears the list.
+  void measure_listed(std::span<const std::array<std::uint32_t, 3>> triangles) {
+    counted_.hold(points_.capacity() * sizeof(Vec3d) + near_.capacity() * sizeof(Near) +
+                  leaves_.capacity() * sizeof(Touched));
+    std::sort(near_.begin(), near_.end(),
+              [](const Near& a, const Near& b) { return a.leaf < b.leaf; });
+    leaves_.clear();
+    for (std::size_t i = 0; i < near_.size(); ++i)
+      if (i == 0 || near_[i].leaf != near_[i - 1].leaf) {
+        const Index x = near_[i].leaf % leaves_extent_.x, rest = near_[i].leaf / leaves_extent_.x;
+        const Int3 leaf{x, rest % leaves_extent_.y, rest / leaves_extent_.y};
+        leaves_.push_back({leaf, counted_.touch_leaf(vdb_coordinate(leaf * kVdbLeafExtent)), i});
+      }
+    arena_.execute([&] {
+      tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
+        const std::size_t end = i + 1 < leaves_.size() ? leaves_[i + 1].first : near_.size();
+        for (std::size_t k = leaves_[i].first; k < end; ++k)
+          measure(*leaves_[i].leaf, leaves_[i].position, triangles[near_[k].triangle]);
+      });
+    });
+    near_.clear();
   }
 
   /// The voxels along an axis that a triangle between lo and hi comes near.
@@ -133,8 +133,8 @@ class LevelSet final : public VdbLevelSet {
       const auto [first, last] = voxels(std::min({a[axis], b[axis], c[axis]}),
                                         std::max({a[axis], b[axis], c[axis]}), axis);
       if (first > last) return;
-      leaves.lo[axis] = first / kLeaf;
-      leaves.hi[axis] = last / kLeaf + 1;
+      leaves.lo[axis] = first / kVdbLeaf;
+      leaves.hi[axis] = last / kVdbLeaf + 1;
     }
     const Vec3d middle = (a + b + c) * (1.0 / 3);
     const double reach =
@@ -143,8 +143,8 @@ class LevelSet final : public VdbLevelSet {
     for_each_point(leaves, [&](Int3 leaf) {
       Vec3d nearest;
       for (int axis = 0; axis < 3; ++axis) {
-        const double lo = static_cast<double>(leaf[axis] * kLeaf) * spacing_[axis];
-        nearest[axis] = std::clamp(middle[axis], lo, lo + (kLeaf - 1) * spacing_[axis]);
+        const double lo = static_cast<double>(leaf[axis] * kVdbLeaf) * spacing_[axis];
+        nearest[axis] = std::clamp(middle[axis], lo, lo + (kVdbLeaf - 1) * spacing_[axis]);
       }
       if (distance2(nearest, middle) <= reach * reach)
         near_.push_back({linear_index(leaf, leaves_extent_), static_cast<std::uint32_t>(i)});
@@ -161,7 +161,7 @@ class LevelSet final : public VdbLevelSet {
     // Near the leaf's corner floats are exact enough.
     const Vec3d corner = Vec3d{static_cast<double>(position.x), static_cast<double>(position.y),
                                static_cast<double>(position.z)} *
-                         spacing_ * static_cast<double>(kLeaf);
+                         spacing_ * static_cast<double>(kVdbLeaf);
     Vec3f corners[3];
     for (int k = 0; k < 3; ++k) {
       const Vec3d p = points_[triangle[static_cast<std::size_t>(k)]] - corner;
@@ -177,8 +177,8 @@ class LevelSet final : public VdbLevelSet {
       const auto [lo, hi] =
           voxels(corner[axis] + static_cast<double>(std::min({a[axis], b[axis], c[axis]})),
                  corner[axis] + static_cast<double>(std::max({a[axis], b[axis], c[axis]})), axis);
-      first[axis] = static_cast<int>(std::max(lo - position[axis] * kLeaf, Index{0}));
-      last[axis] = static_cast<int>(std::min(hi - position[axis] * kLeaf, Index{kLeaf - 1}));
+      first[axis] = static_cast<int>(std::max(lo - position[axis] * kVdbLeaf, Index{0}));
+      last[axis] = static_cast<int>(std::min(hi - position[axis] * kVdbLeaf, kVdbLeaf - 1));
     }
     const TriangleDistance triangle_distance(a, b, c);
     const auto unit = static_cast<float>(unit_), units = static_cast<float>(1 / unit_);
@@ -203,7 +203,7 @@ class LevelSet final : public VdbLevelSet {
   /// Signs of what `box` has of the 8³ voxels from `corner` on.
   template <class Inside>
   void put_leaf(Box3 box, Int3 corner, Inside&& is_inside) {
-    const Box3 part = intersect({corner, corner + kLeafExtent}, box);
+    const Box3 part = intersect({corner, corner + kVdbLeafExtent}, box);
     const openvdb::Coord at = vdb_coordinate(corner);
     Leaf* leaf = counted_.probe_leaf(at);
     if (leaf == nullptr) {
@@ -214,7 +214,7 @@ class LevelSet final : public VdbLevelSet {
         any = any || in;
       });
       if (!any) return;
-      if (all && part.extent() == kLeafExtent) return counted_.add_tile(at, -band_, false);
+      if (all && part.extent() == kVdbLeafExtent) return counted_.add_tile(at, -band_, false);
       leaf = counted_.touch_leaf(at);
     }
     float* values = leaf->buffer().data();
@@ -237,15 +237,14 @@ class LevelSet final : public VdbLevelSet {
   std::vector<Vec3d> points_;  ///< in index space, times spacing_
   std::vector<Near> near_;
   std::vector<Touched> leaves_;
-  std::uint64_t held_ = 0;
 };
 
 }  // namespace
 
 std::unique_ptr<VdbLevelSet> make_vdb_level_set(const VolumeInfo& info, const std::string& name,
-                                                int half_band, int threads) {
+                                                int half_band, int threads, std::uint64_t budget) {
   openvdb::initialize();
-  return std::make_unique<LevelSet>(info, name, half_band, threads);
+  return std::make_unique<LevelSet>(info, name, half_band, threads, budget);
 }
 
 }  // namespace isobrick

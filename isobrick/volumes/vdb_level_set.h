@@ -18,7 +18,8 @@ class VdbLevelSet {
  public:
   virtual ~VdbLevelSet() = default;
 
-  /// Triangles in world space, which name their corners among `positions`.
+  /// Triangles in world space, which name their corners among `positions`. Throws
+  /// UsageError when the grid outgrows its budget, as the others do.
   virtual void add(std::span<const Vec3f> positions,
                    std::span<const std::array<std::uint32_t, 3>> triangles) = 0;
 
@@ -27,21 +28,19 @@ class VdbLevelSet {
   virtual void put_inside(Box3 box, const std::uint8_t* inside) = 0;
   virtual void put_all_inside(Box3 box) = 0;
 
-  /// Bytes that the grid takes by now, and the triangles of one add().
-  virtual std::uint64_t memory() const = 0;
-
   /// Writes the grid as `path`. Throws Error when that fails.
   virtual void write(const std::string& path) = 0;
 };
 
 /// A float grid named `name` of the class "level set" over the volume. Its band is
-/// `half_band` of the largest spacing wide on either side. `threads` 0: all cores.
+/// `half_band` of the largest spacing wide on either side. `threads` 0: all cores. With
+/// what it keeps of the triangles of one add() it may take `budget` bytes.
 std::unique_ptr<VdbLevelSet> make_vdb_level_set(const VolumeInfo& info, const std::string& name,
-                                                int half_band, int threads);
+                                                int half_band, int threads, std::uint64_t budget);
 
 /// The same where OpenVDB was missing when this was built: throws UsageError.
 std::unique_ptr<VdbLevelSet> make_vdb_level_set_if_built(const VolumeInfo& info,
                                                          const std::string& name, int half_band,
-                                                         int threads);
+                                                         int threads, std::uint64_t budget);
 
 }  // namespace isobrick

@@ -11,14 +11,11 @@
 namespace isobrick {
 namespace {
 
-/// Edge of OpenVDB's leaves.
-constexpr int kLeaf = 8;
-
 template <class Sample, class Grid>
 class TypedVdbWriter final : public VdbWriter {
  public:
-  TypedVdbWriter(const VolumeInfo& info, const std::string& name)
-      : grid_(Grid::create(static_cast<Value>(info.fill_value))), counted_(grid_->tree()) {
+  TypedVdbWriter(const VolumeInfo& info, const std::string& name, std::uint64_t budget)
+      : grid_(Grid::create(static_cast<Value>(info.fill_value))), counted_(grid_->tree(), budget) {
     describe_vdb_grid(*grid_, info, name);
     grid_->setGridClass(info.grid_class.empty()
                             ? openvdb::GRID_FOG_VOLUME
@@ -28,13 +25,9 @@ class TypedVdbWriter final : public VdbWriter {
   }
 
   void put(Box3 box, const std::byte* samples) override {
-    const Int3 first{box.lo.x / kLeaf, box.lo.y / kLeaf, box.lo.z / kLeaf};
-    for_each_point({first, ceil_div(box.hi, {kLeaf, kLeaf, kLeaf})}, [&](Int3 leaf) {
-      put_leaf(leaf * Index{kLeaf}, box, reinterpret_cast<const Sample*>(samples));
-    });
+    for_each_vdb_leaf(
+        box, [&](Int3 leaf) { put_leaf(leaf, box, reinterpret_cast<const Sample*>(samples)); });
   }
-
-  std::uint64_t memory() const override { return counted_.bytes(); }
 
   void write(const std::string& path) override { write_vdb_grid(path, grid_); }
 
@@ -48,7 +41,7 @@ class TypedVdbWriter final : public VdbWriter {
 
   /// What `box` has of the 8³ voxels from `corner` on.
   void put_leaf(Int3 corner, Box3 box, const Sample* samples) {
-    const Box3 part = intersect({corner, corner + Int3{kLeaf, kLeaf, kLeaf}}, box);
+    const Box3 part = intersect({corner, corner + kVdbLeafExtent}, box);
     const Value background = grid_->background();
     const auto value_at = [&](Int3 p) {
       return static_cast<Value>(samples[linear_index(p - box.lo, box.extent())]);
@@ -62,8 +55,7 @@ class TypedVdbWriter final : public VdbWriter {
     });
     if (background_only) return;
     const openvdb::Coord at = vdb_coordinate(corner);
-    if (constant && volume(part.extent()) == kLeaf * kLeaf * kLeaf &&
-        counted_.probe_leaf(at) == nullptr)
+    if (constant && part.extent() == kVdbLeafExtent && counted_.probe_leaf(at) == nullptr)
       return counted_.add_tile(at, first, true);
     auto* leaf = counted_.touch_leaf(at);
     for_each_point(part, [&](Int3 p) {
@@ -78,7 +70,8 @@ class TypedVdbWriter final : public VdbWriter {
 
 }  // namespace
 
-std::unique_ptr<VdbWriter> make_vdb_writer(const VolumeInfo& info, const std::string& name) {
+std::unique_ptr<VdbWriter> make_vdb_writer(const VolumeInfo& info, const std::string& name,
+                                           std::uint64_t budget) {
   openvdb::initialize();
   return visit_scalar(info.type, [&](auto tag) -> std::unique_ptr<VdbWriter> {
     using T = typename decltype(tag)::type;
@@ -87,7 +80,7 @@ std::unique_ptr<VdbWriter> make_vdb_writer(const VolumeInfo& info, const std::st
         std::conditional_t<std::is_same_v<T, double>, openvdb::DoubleGrid,
                            std::conditional_t<std::is_same_v<T, std::uint32_t>, openvdb::Int64Grid,
                                               openvdb::Int32Grid>>>;
-    return std::make_unique<TypedVdbWriter<T, Grid>>(info, name);
+    return std::make_unique<TypedVdbWriter<T, Grid>>(info, name, budget);
   });
 }
 

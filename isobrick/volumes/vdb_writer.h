@@ -16,11 +16,8 @@ class VdbWriter {
   virtual ~VdbWriter() = default;
 
   /// The samples of `box`, dense in C order; boxes do not overlap. What is never
-  /// put is the fill value.
+  /// put is the fill value. Throws UsageError when the grid outgrows its budget.
   virtual void put(Box3 box, const std::byte* samples) = 0;
-
-  /// Bytes that the grid takes by now.
-  virtual std::uint64_t memory() const = 0;
 
   /// Writes the grid as `path`. Throws Error when that fails.
   virtual void write(const std::string& path) = 0;
@@ -29,11 +26,12 @@ class VdbWriter {
 /// A grid named `name` of the volume's type (integers of less than 32 bits become
 /// int32, u32 becomes int64), with its transform and class. Samples that are not
 /// the fill value are active, and so are the volume's first and last one: the
-/// box of active voxels is the volume's.
-std::unique_ptr<VdbWriter> make_vdb_writer(const VolumeInfo& info, const std::string& name);
+/// box of active voxels is the volume's. It may take `budget` bytes.
+std::unique_ptr<VdbWriter> make_vdb_writer(const VolumeInfo& info, const std::string& name,
+                                           std::uint64_t budget);
 
 /// The same where OpenVDB was missing when this was built: throws UsageError.
-std::unique_ptr<VdbWriter> make_vdb_writer_if_built(const VolumeInfo& info,
-                                                    const std::string& name);
+std::unique_ptr<VdbWriter> make_vdb_writer_if_built(const VolumeInfo& info, const std::string& name,
+                                                    std::uint64_t budget);
 
 }  // namespace isobrick

@@ -201,9 +201,10 @@ TEST(StoredBricks, OfALargeEmptyBoxOnlyThoseWithSamplesAreLookedUp) {
   convert_quietly(source, folder / "a", {.levels = 1});
   const StoreReader store(folder / "a");
   std::vector<Int3> found;
+  NoProgress none;
   const auto find = [&](const StoreReader& in, Box3 box) {
     found.clear();
-    return for_each_stored_brick(in, 0, box, [&](Int3 b) { found.push_back(b); });
+    return for_each_stored_brick(in, 0, box, none, [&](Int3 b) { found.push_back(b); });
   };
   // The first sample of B's brick along x is in the range of the brick before it, too.
   EXPECT_EQ(find(store, {{0, 0, 0}, source.info().extent}), 3u);
@@ -220,7 +221,8 @@ TEST(StoredBricks, WithoutRangesAllAreLookedUp) {
   std::filesystem::remove_all(folder / "a/isobrick");
   const StoreReader store(folder / "a");
   std::vector<Int3> found;
-  EXPECT_EQ(for_each_stored_brick(store, 0, {{0, 0, 0}, {100, 90, 70}},
+  NoProgress none;
+  EXPECT_EQ(for_each_stored_brick(store, 0, {{0, 0, 0}, {100, 90, 70}}, none,
                                   [&](Int3 b) { found.push_back(b); }),
             4u * 3 * 3);
   EXPECT_EQ(found, (std::vector<Int3>{{1, 1, 1}}));

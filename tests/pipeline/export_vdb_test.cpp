@@ -8,6 +8,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/export.h"
 #include "isobrick/pipeline/extract.h"
+#include "isobrick/volumes/vdb_level_set.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick {
@@ -201,6 +202,51 @@ TEST_F(ExportVdb, RefusesWhatMakesNoSense) {
   EXPECT_THROW(write({.format = ExportFormat::vdb, .isovalue = 0, .memory = 42 * kMiB}),
                UsageError);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "x.vdb"));
+}
+
+TEST_F(ExportVdb, WideBandsListAFewTrianglesAtATime) {
+  // 25³ leaves near each triangle: 33 MiB, and of all triangles 33 MiB of pairs.
+  VolumeInfo info;
+  info.extent = {200, 200, 200};
+  std::vector<Vec3f> positions;
+  std::vector<Triangle> triangles;
+  for (std::uint32_t i = 0; i < 140; ++i) {
+    const auto at = 100 + 0.01F * static_cast<float>(i);
+    for (const Vec3f p : {Vec3f{0, 0, 0}, Vec3f{1, 0, 0}, Vec3f{0, 1, 0}})
+      positions.push_back(p + Vec3f{at, at, at});
+    triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  make_vdb_level_set_if_built(info, "a", 100, 2, 80 * kMiB)->add(positions, triangles);
+  const auto small = make_vdb_level_set_if_built(info, "a", 100, 2, 30 * kMiB);
+  try {
+    small->add(positions, triangles);
+    FAIL() << "the budget was not kept";
+  } catch (const UsageError& e) {
+    EXPECT_NE(std::string(e.what()).find("more than the 30 MiB"), std::string::npos) << e.what();
+  }
+}
+
+TEST_F(ExportVdb, ZerosKeepTheirSigns) {
+  const Int3 extent{40, 20, 20};
+  std::vector<float> samples(static_cast<std::size_t>(volume(extent)), 0.0F);
+  samples[3] = -0.0F;                                       // beside zeros
+  for_each_point({{16, 0, 0}, {32, 16, 16}}, [&](Int3 p) {  // a whole brick
+    samples[static_cast<std::size_t>(linear_index(p, extent))] = -0.0F;
+  });
+  MemorySource source(extent, ScalarType::f32, as_bytes(samples));
+  convert_to(source, "a", 16);
+  NoProgress none;
+  export_volume(StoreReader(folder_ / "a"), folder_ / "x.vdb", {.format = ExportFormat::vdb}, none);
+  openvdb::io::File file((folder_ / "x.vdb").string());
+  file.open();
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("density"));
+  const auto accessor = grid->getConstAccessor();
+  for_each_point({{0, 0, 0}, extent}, [&](Int3 p) {
+    const openvdb::Coord at(static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z));
+    ASSERT_EQ(std::signbit(accessor.getValue(at)),
+              std::signbit(samples[static_cast<std::size_t>(linear_index(p, extent))]))
+        << p.x << ' ' << p.y << ' ' << p.z;
+  });
 }
 
 TEST_F(ExportVdb, KeepsTheNameOfAGrid) {
