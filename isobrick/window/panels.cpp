@@ -203,16 +203,21 @@ void status_panel(const ViewerState& state) {
   ImGui::TextDisabled(p.complete ? "complete" : "refining \u2026");
 }
 
-void import_panel(ViewerState& state) {
-  if (state.import == nullptr) return;
-  const ImportJob::State s = state.import->state();
-  ImGui::OpenPopup("Converting");
-  if (!ImGui::BeginPopupModal("Converting", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
-  text(
-      fmt::format("{}\n\u2192 {}", state.import->input().string(), state.import->store().string()));
+void import_progress(ImportJob& import) {
+  const ImportJob::State s = import.state();
+  text(fmt::format("{}\n\u2192 {}", import.input().string(), import.store().string()));
   const float part = s.total > 0 ? static_cast<float>(s.done) / static_cast<float>(s.total) : 0;
   ImGui::ProgressBar(std::min(part, 1.f), {400, 0}, s.stage.c_str());
-  if (ImGui::Button("Cancel")) state.import->cancel();
+  if (ImGui::Button("Cancel")) import.cancel();
+}
+
+void import_panel(ViewerState& state) {
+  if (state.import != nullptr) ImGui::OpenPopup("Converting");
+  if (!ImGui::BeginPopupModal("Converting", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
+  if (state.import == nullptr)
+    ImGui::CloseCurrentPopup();
+  else
+    import_progress(*state.import);
   ImGui::EndPopup();
 }
 
@@ -270,12 +275,14 @@ void welcome_panel() {
 }  // namespace
 
 void draw_panels(ViewerState& state) {
-  import_panel(state);
   messages_panel(state);
   if (state.picture == nullptr)
     welcome_panel();
   else if (state.panels)
     main_panel(state);
+  // ImGui 1.86 stops at a window that is new after a modal one that is new, too, and at one
+  // that comes while a modal one is open but no more begun.
+  import_panel(state);
 }
 
 }  // namespace isobrick

@@ -219,6 +219,24 @@ TEST_F(Window, ShowsWhatIsWrongAndGoesOn) {
   EXPECT_TRUE(window.step(0));
 }
 
+TEST_F(Window, MessagesMayComeWithAConversion) {
+  ViewerWindow& window = open();
+  dir_.write("a_1024x1024x1024_uint8.raw", "");
+  std::filesystem::resize_file(dir_ / "a_1024x1024x1024_uint8.raw", std::uintmax_t{1} << 30);
+  window.drop(dir_ / "a_1024x1024x1024_uint8.raw");
+  window.drop(dir_ / "b_1024x1024x1024_uint8.raw");  // is refused meanwhile
+  ASSERT_NE(window.state().import, nullptr);
+  ASSERT_EQ(window.state().messages.size(), 1u);
+  steps(3);
+  ASSERT_NE(window.state().import, nullptr);
+  window.state().messages.clear();
+  window.state().import->cancel();
+  until([&] { return window.state().import == nullptr; });
+  steps(3);
+  window.state().say("some time after the conversion");
+  steps(3);
+}
+
 TEST(ViewerWindow, SaysThatThereIsNoDisplay) {
   if (std::getenv("DISPLAY") != nullptr && *std::getenv("DISPLAY") != '\0')
     GTEST_SKIP() << "there is a display";

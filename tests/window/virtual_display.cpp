@@ -3,6 +3,7 @@
 #include <X11/Xlib.h>
 #include <X11/extensions/XTest.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -37,6 +38,7 @@ VirtualDisplay::VirtualDisplay(int width, int height) : state_(std::make_unique<
   state_->server = fork();
   if (state_->server == 0) {
     close(pipes[0]);
+    prctl(PR_SET_PDEATHSIG, SIGTERM);  // a test that crashes leaves no server behind
     execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", screen.c_str(),
            "-nolisten", "tcp", "+extension", "GLX", static_cast<char*>(nullptr));
     _exit(127);
