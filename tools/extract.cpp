@@ -361,7 +361,7 @@ void add_preview_options(CLI::App* app, Arguments& arguments) {
   PreviewOptions& picture = arguments.picture;
   add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface"},
            [&preview = arguments.preview](const std::string& text) { preview = text; });
-  add_text(app, {"--preview-size", "W,H", "Size of the picture, pixels", "1280,960"},
+  add_text(app, {"--preview-size", "WxH", "Size of the picture, pixels", "1280x960"},
            [&picture](const std::string& text) {
              const PictureSize size = parse_picture_size(text);
              picture.width = size.width;

@@ -1,5 +1,6 @@
 #include "tools/parse.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -8,6 +9,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/lattice.h"
+#include "isobrick/render/preview_options.h"
 
 namespace isobrick::tools {
 namespace {
@@ -29,6 +31,12 @@ std::optional<std::array<std::string_view, 3>> split3(std::string_view text) {
     return std::nullopt;
   return {
       {text.substr(0, first), text.substr(first + 1, second - first - 1), text.substr(second + 1)}};
+}
+
+/// The three parts of "X0:X1,Y0:Y1,Z0:Z1".
+std::array<std::string_view, 3> split_box(std::string_view text) {
+  if (const auto parts = split3(text)) return *parts;
+  throw UsageError(fmt::format("'{}' is not of the form X0:X1,Y0:Y1,Z0:Z1", text));
 }
 
 /// The power of two that a unit stands for, or nothing: "", K, M, G, T with "B" or "iB".
@@ -113,11 +121,11 @@ Backend parse_backend(std::string_view text) {
 }
 
 PictureSize parse_picture_size(std::string_view text) {
-  const auto comma = text.find_first_of(",x");
-  if (comma == std::string_view::npos)
-    throw UsageError(fmt::format("'{}' is not of the form WIDTH,HEIGHT", text));
-  return {parse_int(text.substr(0, comma), 16, 16384),
-          parse_int(text.substr(comma + 1), 16, 16384)};
+  const auto by = text.find('x');
+  if (by == std::string_view::npos)
+    throw UsageError(fmt::format("'{}' is not of the form WIDTHxHEIGHT", text));
+  return {parse_int(text.substr(0, by), kLeastPictureEdge, kMostPictureEdge),
+          parse_int(text.substr(by + 1), kLeastPictureEdge, kMostPictureEdge)};
 }
 
 Vec3f parse_colour(std::string_view text) {
@@ -163,12 +171,11 @@ std::optional<int> parse_levels(std::string_view text) {
 }
 
 RoiText parse_roi(std::string_view text) {
-  const auto parts = split3(text);
-  if (!parts) throw UsageError(fmt::format("'{}' is not of the form X0:X1,Y0:Y1,Z0:Z1", text));
+  const auto parts = split_box(text);
   constexpr Index most = Index{1} << 32;
   RoiText roi;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::string_view part = (*parts)[axis];
+    const std::string_view part = parts[axis];
     if (part.empty()) continue;
     const auto colon = part.find(':');
     if (colon == std::string_view::npos)
@@ -177,6 +184,20 @@ RoiText parse_roi(std::string_view text) {
     if (colon + 1 < part.size()) roi.hi[axis] = parse_whole(part.substr(colon + 1), -most, most);
   }
   return roi;
+}
+
+std::array<Vec3d, 2> parse_world_box(std::string_view text) {
+  const auto parts = split_box(text);
+  std::array<Vec3d, 2> corners;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string_view part = parts[static_cast<std::size_t>(axis)];
+    const auto colon = std::min(part.find(':'), part.size());
+    corners[0][axis] = parse_number(part.substr(0, colon));
+    corners[1][axis] = parse_number(part.substr(std::min(colon + 1, part.size())));
+    if (!(corners[0][axis] < corners[1][axis]))
+      throw UsageError(fmt::format("the box '{}' is empty", text));
+  }
+  return corners;
 }
 
 Box3 resolve_roi(const RoiText& roi, Int3 extent) {

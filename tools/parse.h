@@ -42,7 +42,11 @@ Vec3d parse_vector(std::string_view text);
 /// "NX,NY,NZ,D": what lies where NX·x + NY·y + NZ·z >= D.
 HalfSpace parse_half_space(std::string_view text);
 
-/// Pixels "WIDTH,HEIGHT" or "WIDTHxHEIGHT".
+/// The lower and the upper corner of "X0:X1,Y0:Y1,Z0:Z1", a box of world space that has an
+/// inside.
+std::array<Vec3d, 2> parse_world_box(std::string_view text);
+
+/// Pixels, "WIDTHxHEIGHT".
 struct PictureSize {
   int width, height;
 };

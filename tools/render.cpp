@@ -7,40 +7,31 @@
 #include "isobrick/io/png_file.h"
 #include "isobrick/render/mesh_picture.h"
 #include "tools/format.h"
-#include "tools/options.h"
+#include "tools/picture_options.h"
 
 namespace isobrick::tools {
 namespace {
 
 struct Arguments {
   std::vector<std::string> meshes;
-  std::vector<Vec3f> colours;
-  std::vector<float> opacities;
   std::string output;
+  PictureOptions picture{.size = {1280, 960}};
   MeshPictureRequest request;
-  bool no_occlusion = false, force = false;
+  bool force = false;
 };
 
-/// Told apart well, also by those who see red and green alike.
-constexpr std::array<Vec3f, 6> kColours{{{0.87f, 0.80f, 0.70f},
-                                         {0.80f, 0.36f, 0.28f},
-                                         {0.33f, 0.55f, 0.80f},
-                                         {0.90f, 0.70f, 0.27f},
-                                         {0.36f, 0.66f, 0.57f},
-                                         {0.66f, 0.45f, 0.66f}}};
-
 MeshPictureRequest request_of(const Arguments& arguments) {
+  const PictureOptions& picture = arguments.picture;
   MeshPictureRequest request = arguments.request;
-  const std::size_t count = arguments.meshes.size();
-  if (arguments.colours.size() > count || arguments.opacities.size() > count)
-    throw UsageError("there are more colours or opacities than meshes");
-  for (std::size_t i = 0; i < count; ++i) {
-    MeshStyle style{.colour = kColours[i % kColours.size()]};
-    if (i < arguments.colours.size()) style.colour = arguments.colours[i];
-    if (i < arguments.opacities.size()) style.opacity = arguments.opacities[i];
-    request.meshes.push_back({arguments.meshes[i], style});
-  }
-  request.settings.occlusion = !arguments.no_occlusion;
+  const std::vector<MeshStyle> styles = styles_of(picture, arguments.meshes.size(), "meshes");
+  for (std::size_t i = 0; i < styles.size(); ++i)
+    request.meshes.push_back({arguments.meshes[i], styles[i]});
+  request.width = picture.size.width;
+  request.height = picture.size.height;
+  request.camera = picture.camera;
+  request.settings.planes = picture.planes;
+  request.settings.edges = picture.edges;
+  request.settings.occlusion = !picture.no_occlusion;
   return request;
 }
 
@@ -72,29 +63,6 @@ void parse_background(const std::string& text, PictureSettings& settings) {
       comma == text.npos ? settings.background_top : parse_colour(text.substr(comma + 1));
 }
 
-/// "X0:X1,Y0:Y1,Z0:Z1".
-WorldBox parse_box(const std::string& text) {
-  std::array<double, 6> v{};
-  std::size_t at = 0;
-  for (std::size_t i = 0; i < 6; ++i) {
-    const std::size_t end = i == 5 ? text.size() : text.find(i % 2 ? ',' : ':', at);
-    if (end == text.npos)
-      throw UsageError(fmt::format("'{}' is not of the form X0:X1,Y0:Y1,Z0:Z1", text));
-    v[i] = parse_number(text.substr(at, end - at));
-    at = end + 1;
-  }
-  for (std::size_t i = 0; i < 6; i += 2)
-    if (!(v[i] < v[i + 1])) throw UsageError(fmt::format("the box '{}' is empty", text));
-  return {{v[0], v[2], v[4]}, {v[1], v[3], v[5]}};
-}
-
-void add_cut_options(CLI::App* app, PictureSettings& settings) {
-  add_clip(app, settings.planes);
-  add_parsed(app, settings.region,
-             [](const std::string& text) { return std::optional(parse_box(text)); },
-             {"--region", "X0:X1,Y0:Y1,Z0:Z1", "Draw only what is in this box, world units"});
-}
-
 void add_overlay_options(CLI::App* app, MeshPictureRequest& request) {
   add_flag(app, "--box", request.box, "Draw the box around all meshes");
   add_flag(app, "--axes", request.axes, "Draw the directions of x, y and z");
@@ -116,32 +84,17 @@ void add_render(Program& program) {
   add_paths(app, "MESH", arguments->meshes, "Meshes to draw: PLY, STL, GLB or OBJ");
   add_text(app, {"-o,--output", "PNG", "Picture to write", "", true},
            [&output = arguments->output](const std::string& text) { output = text; });
-  add_text(app, {"--size", "WxH", "Size of the picture, pixels", "1280x960"},
-           [&request](const std::string& text) {
-             const PictureSize size = parse_picture_size(text);
-             request.width = size.width;
-             request.height = size.height;
-           });
-  add_parsed(app, request.camera, parse_camera,
-             {"--camera", "PARTS",
-              "azimuth=DEG,elevation=DEG,roll=DEG,zoom=X,fov=DEG,orthographic,up=X:Y:Z,from=X:Y:Z, "
-              "or eye=X:Y:Z,target=X:Y:Z",
-              "azimuth=30,elevation=20"});
-  add_repeated(app, {"--colour", "#RRGGBB", "Of the first mesh, the second and so on"},
-               [&colours = arguments->colours](const std::string& text) {
-                 colours.push_back(parse_colour(text));
-               });
-  add_repeated(app, {"--opacity", "A", "Of the first mesh, the second and so on", "1"},
-               [&opacities = arguments->opacities](const std::string& text) {
-                 opacities.push_back(parse_opacity(text));
-               });
-  add_flag(app, "--edges", request.settings.edges, "Dark lines where the surface breaks off");
-  add_flag(app, "--no-occlusion", arguments->no_occlusion, "Do not darken hollows");
+  add_picture_options(app, arguments->picture, "mesh");
   add_text(
       app,
       {"--background", "COLOUR[,BOTTOM]", "Behind the meshes, from top to bottom", "a light grey"},
       [&request](const std::string& text) { parse_background(text, request.settings); });
-  add_cut_options(app, request.settings);
+  add_parsed(app, request.settings.region,
+             [](const std::string& text) {
+               const auto [lo, hi] = parse_world_box(text);
+               return std::optional(WorldBox{lo, hi});
+             },
+             {"--region", "X0:X1,Y0:Y1,Z0:Z1", "Draw only what is in this box, world units"});
   add_overlay_options(app, request);
   add_force(app, arguments->force);
   add_run(program, app, arguments, run);

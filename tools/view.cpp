@@ -1,15 +1,18 @@
 #include <algorithm>
+#include <filesystem>
 #include <memory>
+#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/io/output_file.h"
 #include "isobrick/render/camera_request.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/window/screenshot.h"
 #include "isobrick/window/viewer_window.h"
 #include "tools/format.h"
-#include "tools/options.h"
+#include "tools/picture_options.h"
 
 namespace isobrick::tools {
 namespace {
@@ -17,14 +20,10 @@ namespace {
 struct Arguments {
   std::string store, screenshot, turntable;
   std::vector<double> isovalues;
-  std::vector<Vec3f> colours;
-  std::vector<float> opacities;
+  PictureOptions picture{.size = {1280, 800}};
   ViewSettings settings;
-  std::vector<HalfSpace> clip;
-  CameraRequest camera;
-  PictureSize size{1280, 800};
   int frames = 120;
-  bool plain = false, no_occlusion = false, force = false;
+  bool plain = false, force = false;
   PictureBudgets budgets;
   IndexKind index = IndexKind::linear;
 };
@@ -32,17 +31,15 @@ struct Arguments {
 ViewSettings settings_of(const Arguments& arguments) {
   ViewSettings settings = arguments.settings;
   const std::size_t count = std::max<std::size_t>(arguments.isovalues.size(), 1);
-  if (arguments.colours.size() > count || arguments.opacities.size() > count)
-    throw UsageError("there are more colours or opacities than isovalues");
-  for (std::size_t i = 0; i < count; ++i) {
-    SurfaceSettings surface{.colour = surface_colour(i)};
+  for (const MeshStyle& style : styles_of(arguments.picture, count, "isovalues")) {
+    const std::size_t i = settings.surfaces.size();
+    SurfaceSettings surface{.colour = style.colour, .opacity = style.opacity};
     if (i < arguments.isovalues.size()) surface.isovalue = arguments.isovalues[i];
-    if (i < arguments.colours.size()) surface.colour = arguments.colours[i];
-    if (i < arguments.opacities.size()) surface.opacity = arguments.opacities[i];
     settings.surfaces.push_back(surface);
   }
-  for (const HalfSpace& half : arguments.clip) settings.planes.push_back({true, half});
-  settings.occlusion = !arguments.no_occlusion;
+  for (const HalfSpace& half : arguments.picture.planes) settings.planes.push_back({true, half});
+  settings.edges = arguments.picture.edges;
+  settings.occlusion = !arguments.picture.no_occlusion;
   if (arguments.plain) settings.box = settings.axes = settings.scale_bar = false;
   return settings;
 }
@@ -53,11 +50,54 @@ nlohmann::ordered_json to_json(const NodeSearch::State& search) {
           {"active_nodes", search.active},         {"nodes", search.nodes}};
 }
 
+/// The pictures that are asked for, of which none may be there already.
+std::vector<Shot> shots_of(const Arguments& arguments, const Camera& camera) {
+  std::vector<Shot> shots;
+  if (!arguments.turntable.empty()) {
+    std::filesystem::create_directories(arguments.turntable);
+    shots = turntable(camera, arguments.picture.camera.up, arguments.frames, arguments.turntable);
+  }
+  if (!arguments.screenshot.empty()) shots.insert(shots.begin(), {arguments.screenshot, camera});
+  for (const Shot& shot : shots) check_output(shot.file, arguments.force);
+  // Also shows that there is such a folder, and that it can be written to.
+  for (const Shot* shot : {&shots.front(), &shots.back()}) OutputFile(shot->file, arguments.force);
+  return shots;
+}
+
+/// What all pictures have come to.
+struct Drawn {
+  std::set<std::string> damage;
+  std::uint64_t most_triangles = 0;
+  bool limited_by_budget = false;
+};
+
+Drawn draw_shots(StorePicture& picture, const std::vector<Shot>& shots, PictureSize size,
+                 const ViewSettings& settings, bool force, Progress& progress) {
+  Drawn drawn;
+  progress.begin("draw", 0);
+  for (const Shot& shot : shots) {
+    picture.draw_complete(shot.camera, size.width, size.height, settings,
+                          [&] { progress.advance(0); });
+    write_picture(picture.renderer(), shot.file, force);
+    const PictureState& state = picture.state();
+    drawn.damage.insert(state.damage.begin(), state.damage.end());
+    drawn.most_triangles = std::max(drawn.most_triangles, state.triangles);
+    drawn.limited_by_budget |= state.limited_by_budget;
+  }
+  progress.end();
+  return drawn;
+}
+
 /// Draws into files.
 int draw(const Arguments& arguments, Console& console) {
   const auto store = std::make_shared<const StoreReader>(arguments.store);
   const GlContext context;
   StorePicture picture(store, arguments.budgets, {});
+  const WorldBox box = picture.bounds();
+  const auto [width, height] = arguments.picture.size;
+  const std::vector<Shot> shots = shots_of(
+      arguments,
+      make_camera(arguments.picture.camera, box.lo, box.hi, static_cast<double>(width) / height));
   NodeSearch& search = picture.scene().search();
   search.use(arguments.index);
   search.wait();
@@ -65,57 +105,46 @@ int draw(const Arguments& arguments, Console& console) {
     console.note(refused + ": a linear scan is used");
   ViewSettings settings = settings_of(arguments);
   choose_values(settings, picture.scene().tree());
-  const WorldBox box = picture.bounds();
-  const auto [width, height] = arguments.size;
-  const Camera camera =
-      make_camera(arguments.camera, box.lo, box.hi, static_cast<double>(width) / height);
-  Progress& progress = console.progress();
-  const int frames = arguments.turntable.empty() ? 0 : arguments.frames;
-  progress.begin("draw", 0);
-  const auto wait = [&] { progress.advance(0); };
-  if (!arguments.screenshot.empty()) {
-    picture.draw_complete(camera, width, height, settings, wait);
-    write_picture(picture.renderer(), arguments.screenshot, arguments.force);
-  }
-  if (frames > 0)
-    write_turntable(picture, camera, width, height, settings, arguments.camera.up, frames,
-                    arguments.turntable, arguments.force, wait);
-  progress.end();
-  const PictureState& state = picture.state();
-  for (const std::string& message : state.damage) console.note(message);
+  const Drawn drawn = draw_shots(picture, shots, arguments.picture.size, settings, arguments.force,
+                                 console.progress());
+  for (const std::string& message : drawn.damage) console.note(message);
   nlohmann::ordered_json isovalues = nlohmann::ordered_json::array();
   for (const SurfaceSettings& surface : settings.surfaces) isovalues.push_back(surface.isovalue);
-  const std::string output =
-      arguments.screenshot.empty() ? arguments.turntable : arguments.screenshot;
+  const std::string text =
+      fmt::format("{} triangles{}, drawn by {}\n", human_count(drawn.most_triangles),
+                  shots.size() > 1 ? " at most" : "", current_gl_device().renderer);
+  std::string outputs = arguments.screenshot;
+  if (!arguments.turntable.empty())
+    outputs += fmt::format("{}{} pictures in {}", outputs.empty() ? "" : ", ", arguments.frames,
+                           arguments.turntable);
   console.result({{"command", "view"},
                   {"store", arguments.store},
                   {"isovalues", isovalues},
                   {"screenshot", arguments.screenshot},
                   {"turntable", arguments.turntable},
-                  {"frames", frames},
+                  {"pictures", shots.size()},
                   {"width", width},
                   {"height", height},
-                  {"triangles", state.triangles},
+                  {"most_triangles", drawn.most_triangles},
                   {"index", to_json(search.state())},
-                  {"damaged_parts", state.damage.size()},
-                  {"limited_by_budget", state.limited_by_budget},
+                  {"damaged_parts", drawn.damage.size()},
+                  {"limited_by_budget", drawn.limited_by_budget},
                   {"meshes_by", picture.device().describe()},
                   {"renderer", current_gl_device().renderer},
                   {"peak_resident_bytes", peak_resident_bytes()}},
-                 fmt::format("{}: {} triangles, drawn by {}\n", output,
-                             human_count(state.triangles), current_gl_device().renderer));
-  return state.damage.empty() ? 0 : 1;
+                 fmt::format("{}: {}", outputs, text));
+  return drawn.damage.empty() ? 0 : 1;
 }
 
 int run(const Arguments& arguments, Console& console) {
   if (!arguments.screenshot.empty() || !arguments.turntable.empty())
     return draw(arguments, console);
   WindowOptions options;
-  options.width = arguments.size.width;
-  options.height = arguments.size.height;
+  options.width = arguments.picture.size.width;
+  options.height = arguments.picture.size.height;
   options.budgets = arguments.budgets;
   options.index = arguments.index;
-  options.camera = arguments.camera;
+  options.camera = arguments.picture.camera;
   options.settings = settings_of(arguments);
   ViewerWindow window(options);
   window.open(arguments.store);
@@ -147,7 +176,7 @@ void parse_slice(const std::string& text, ViewSettings& settings) {
   settings.slices[axis] = {true, static_cast<float>(place)};
 }
 
-void add_picture_options(CLI::App* app, Arguments& arguments) {
+void add_what_to_draw(CLI::App* app, Arguments& arguments) {
   add_text(app, {"--screenshot", "PNG", "Draw into this file, without a window or a display"},
            [&](const std::string& text) { arguments.screenshot = text; });
   add_text(app, {"--turntable", "DIR", "Draw a full turn into DIR/0000.png …, without a window"},
@@ -155,23 +184,8 @@ void add_picture_options(CLI::App* app, Arguments& arguments) {
   add_parsed(app, arguments.frames,
              [](const std::string& text) { return parse_int(text, 1, 100'000); },
              {"--frames", "N", "Pictures of the turn", "120"});
-  add_parsed(app, arguments.size, parse_picture_size,
-             {"--size", "WxH", "Size of window or picture, pixels", "1280x800"});
-  add_parsed(app, arguments.camera, parse_camera,
-             {"--camera", "PARTS",
-              "azimuth=DEG,elevation=DEG,roll=DEG,zoom=X,fov=DEG,orthographic,up=X:Y:Z,from=X:Y:Z, "
-              "or eye=X:Y:Z,target=X:Y:Z",
-              "azimuth=30,elevation=20"});
-  add_repeated(app, {"--colour", "#RRGGBB", "Of the first surface, the second and so on"},
-               [&](const std::string& text) { arguments.colours.push_back(parse_colour(text)); });
-  add_repeated(
-      app, {"--opacity", "A", "Of the first surface, the second and so on", "1"},
-      [&](const std::string& text) { arguments.opacities.push_back(parse_opacity(text)); });
   add_repeated(app, {"--slice", "AXIS:PART", "Show the samples across an axis, such as z:0.5"},
                [&](const std::string& text) { parse_slice(text, arguments.settings); });
-  add_clip(app, arguments.clip);
-  add_flag(app, "--edges", arguments.settings.edges, "Dark lines where the surface breaks off");
-  add_flag(app, "--no-occlusion", arguments.no_occlusion, "Do not darken hollows");
   add_flag(app, "--plain", arguments.plain, "No box, axes or scale bar");
 }
 
@@ -187,7 +201,8 @@ void add_view(Program& program) {
                [&values = arguments->isovalues](const std::string& text) {
                  values.push_back(parse_number(text));
                });
-  add_picture_options(app, *arguments);
+  add_picture_options(app, arguments->picture, "surface");
+  add_what_to_draw(app, *arguments);
   add_parsed(app, arguments->settings.pixel_error,
              [](const std::string& text) { return static_cast<float>(parse_pixel_error(text)); },
              {"--pixel-error", "PIXELS", "How long a cell may be on the picture", "1.5"});

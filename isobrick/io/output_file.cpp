@@ -16,17 +16,6 @@
 namespace isobrick {
 namespace {
 
-void check_target(const std::string& path, bool force) {
-  if (path.empty()) throw UsageError("the output has no name");
-  struct stat status {};
-  if (::lstat(path.c_str(), &status) != 0) return;  // whatever is wrong shows when it is created
-  if (S_ISDIR(status.st_mode)) throw UsageError(fmt::format("'{}' is a directory", path));
-  // Renaming over a device or a pipe would replace it by a file.
-  if (!S_ISREG(status.st_mode) && !S_ISLNK(status.st_mode))
-    throw UsageError(fmt::format("'{}' is not a regular file", path));
-  if (!force) throw UsageError(fmt::format("'{}' exists already; say --force to replace it", path));
-}
-
 struct Temporary {
   UniqueFd fd;
   std::string path;
@@ -136,9 +125,20 @@ UniqueFd FileWriter::share() const {
   return fd;
 }
 
+void check_output(const std::string& path, bool force) {
+  if (path.empty()) throw UsageError("the output has no name");
+  struct stat status {};
+  if (::lstat(path.c_str(), &status) != 0) return;  // whatever is wrong shows when it is created
+  if (S_ISDIR(status.st_mode)) throw UsageError(fmt::format("'{}' is a directory", path));
+  // Renaming over a device or a pipe would replace it by a file.
+  if (!S_ISREG(status.st_mode) && !S_ISLNK(status.st_mode))
+    throw UsageError(fmt::format("'{}' is not a regular file", path));
+  if (!force) throw UsageError(fmt::format("'{}' exists already; say --force to replace it", path));
+}
+
 OutputFile::OutputFile(std::string path, bool force)
     : path_(std::move(path)), force_(force), writer_([this] {
-        check_target(path_, force_);
+        check_output(path_, force_);
         Temporary temporary = create_beside(path_);
         temporary_ = std::move(temporary.path);
         return FileWriter(std::move(temporary.fd), path_);
@@ -154,10 +154,10 @@ void OutputFile::publish() {
                            force_ ? 0 : RENAME_NOREPLACE);
   if (result != 0 && !force_ && (errno == EINVAL || errno == ENOSYS)) {
     // The file system cannot refuse to replace by itself.
-    check_target(path_, force_);
+    check_output(path_, force_);
     result = ::rename(temporary_.c_str(), path_.c_str());
   }
-  if (result != 0 && errno == EEXIST) check_target(path_, force_);
+  if (result != 0 && errno == EEXIST) check_output(path_, force_);
   if (result != 0) throw system_error("rename the finished file to", path_, errno);
   temporary_.clear();
 }

@@ -56,6 +56,10 @@ class FileWriter {
   std::uint64_t written_ = 0;
 };
 
+/// Throws UsageError when `path` exists and `force` is not set, and when it is not a regular
+/// file.
+void check_output(const std::string& path, bool force);
+
 /// A file that appears under its name only when it is whole: it is written
 /// beside it under a temporary name, which the destructor removes unless
 /// `publish` was called.
@@ -64,8 +68,7 @@ class FileWriter {
 /// and a sync would cost more than the writing.
 class OutputFile {
  public:
-  /// Throws UsageError when `path` exists and `force` is not set (or when it
-  /// is not a regular file), Error when its folder cannot be written to.
+  /// Throws as check_output() does, and Error when its folder cannot be written to.
   OutputFile(std::string path, bool force);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;

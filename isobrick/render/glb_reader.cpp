@@ -234,8 +234,8 @@ class GlbReader {
     if (primitive.contains("indices"))
       add_indices(part, index(primitive.at("indices")));
     else {
-      part.triangles = part.vertices / 3;
-      part.open_triangles = [count = part.triangles] {
+      part.faces = part.vertices / 3;
+      part.open_triangles = [count = part.faces] {
         return std::make_unique<PlainTriangles>(count);
       };
     }
@@ -249,8 +249,8 @@ class GlbReader {
       fail("its triangles are no whole numbers");
     const Place place = place_of(accessor, size_of(kind));
     if (place.stride != size_of(kind)) fail("its triangles do not lie side by side");
-    part.triangles = place.count / 3;
-    part.open_triangles = [first = place.first, kind, count = part.triangles] {
+    part.faces = place.count / 3;
+    part.open_triangles = [first = place.first, kind, count = part.faces] {
       return std::make_unique<GlbTriangles>(first, kind, count);
     };
   }

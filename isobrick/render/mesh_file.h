@@ -12,17 +12,18 @@ namespace isobrick {
 
 /// What a mesh file says of itself.
 struct MeshFileInfo {
-  std::uint64_t vertices = 0, triangles = 0;
-  bool has_normals = false;
+  /// Faces of PLY may have more than three corners: several triangles each.
+  std::uint64_t vertices = 0, faces = 0;
 };
 
-/// A mesh file that is read in batches. It is mapped, not loaded: memory is that of
-/// a batch. One thread at a time.
+/// A mesh file that is read in batches. It is mapped, not loaded (OBJ's positions go through
+/// a nameless file): memory is that of a batch. One thread at a time.
 class MeshFile {
  public:
   virtual ~MeshFile() = default;
 
-  /// A batch; its triangles count from its first vertex, its coordinates from `origin`.
+  /// A batch; its triangles count from its first vertex, its coordinates from `origin`. Normals
+  /// are of any length.
   using Take = std::function<void(const MeshChunk&, Vec3d origin)>;
 
   virtual MeshFileInfo info() const = 0;

@@ -29,7 +29,11 @@ double load(const std::byte* at, bool swapped) {
 class Batch {
  public:
   Batch(const IndexedPart& part, Vec3d origin, const MeshFile::Take& take)
-      : part_(part), origin_(origin), take_(take), recent_(kRecent) {}
+      : part_(part),
+        to_world_of_normals_(part.to_world.of_normals()),
+        origin_(origin),
+        take_(take),
+        recent_(kRecent) {}
 
   void add(const std::array<std::uint64_t, 3>& triangle) {
     triangles_.push_back({number_of(triangle[0]), number_of(triangle[1]), number_of(triangle[2])});
@@ -58,14 +62,14 @@ class Batch {
       recent = {vertex, static_cast<std::uint32_t>(positions_.size())};
       const Vec3d p = part_.to_world.move(part_.positions.at(vertex));
       positions_.push_back(to_float(p - origin_));
-      // Lengths do not matter here, so turning and scaling alike are enough.
       if (part_.normals)
-        normals_.push_back(to_float(part_.to_world.turn(part_.normals->at(vertex))));
+        normals_.push_back(to_float(to_world_of_normals_.turn(part_.normals->at(vertex))));
     }
     return recent.number;
   }
 
   const IndexedPart& part_;
+  WorldMatrix to_world_of_normals_;
   Vec3d origin_;
   const MeshFile::Take& take_;
   std::vector<Recent> recent_;
@@ -128,8 +132,7 @@ MeshFileInfo IndexedMeshFile::info() const {
   MeshFileInfo info;
   for (const IndexedPart& part : parts_) {
     info.vertices += part.vertices;
-    info.triangles += part.triangles;
-    info.has_normals |= part.normals.has_value();
+    info.faces += part.faces;
   }
   return info;
 }

@@ -47,11 +47,19 @@ struct WorldMatrix {
 
   Vec3d turn(Vec3d v) const { return columns[0] * v.x + columns[1] * v.y + columns[2] * v.z; }
   Vec3d move(Vec3d p) const { return turn(p) + columns[3]; }
+  /// The matrix of normals, which stay across the surface where axes are scaled differently:
+  /// the inverse, transposed, but for a positive factor.
+  WorldMatrix of_normals() const {
+    const Vec3d yz = cross(columns[1], columns[2]);
+    const double side = dot(columns[0], yz) < 0 ? -1 : 1;
+    return {{yz * side, cross(columns[2], columns[0]) * side, cross(columns[0], columns[1]) * side,
+             Vec3d{}}};
+  }
 };
 
 /// Vertices and the triangles between them.
 struct IndexedPart {
-  std::uint64_t vertices = 0, triangles = 0;
+  std::uint64_t vertices = 0, faces = 0;
   VertexField positions;
   std::optional<VertexField> normals;
   WorldMatrix to_world;

@@ -36,11 +36,12 @@ void find_bounds(const std::vector<Opened>& meshes, Vec3d& lo, Vec3d& hi) {
 MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progress) {
   MeshPicture picture;
   std::vector<Opened> meshes;
+  std::uint64_t faces = 0;
   for (const PicturedMesh& mesh : request.meshes) {
     meshes.push_back({open_mesh_file(mesh.path), mesh.style});
     const MeshFileInfo info = meshes.back().file->info();
     picture.vertices += info.vertices;
-    picture.triangles += info.triangles;
+    faces += info.faces;
   }
   // Those that are seen through come last.
   std::stable_sort(meshes.begin(), meshes.end(), [](const Opened& a, const Opened& b) {
@@ -55,10 +56,11 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
   renderer.begin(make_camera(request.camera, picture.lo, picture.hi, aspect), request.width,
                  request.height, request.settings);
   const Vec3d origin = (picture.lo + picture.hi) * 0.5;
-  progress.begin("draw", picture.triangles * sizeof(Triangle));
+  progress.begin("draw", faces * sizeof(Triangle));
   for (const Opened& mesh : meshes)
     mesh.file->read(origin, [&](const MeshChunk& chunk, Vec3d from) {
       renderer.draw(chunk, mesh.style, from);
+      picture.triangles += chunk.triangles.size();
       progress.advance(chunk.triangles.size_bytes());
     });
   progress.end();

@@ -142,7 +142,7 @@ std::unique_ptr<MeshFile> read_obj(const std::string& path, std::shared_ptr<Mapp
     if (kind != "f") continue;
     std::uint64_t corners = 0;
     while (!lines.word().empty()) ++corners;
-    part.triangles += corners < 3 ? 0 : corners - 2;
+    part.faces += corners < 3 ? 0 : corners - 2;
   }
   part.vertices = positions.count();
   std::vector<std::shared_ptr<const void>> keep{file};

@@ -247,7 +247,7 @@ std::unique_ptr<MeshFile> read_ply(const std::string& path, std::shared_ptr<Mapp
       // Every face takes a byte at least, which also bounds what is claimed.
       if (element.count > rest.size())
         damaged(path, fmt::format("{} faces cannot be in {} bytes", element.count, rest.size()));
-      part.triangles = element.count;
+      part.faces = element.count;
       part.open_triangles = [path, element, rest, swapped = header.swapped] {
         return std::make_unique<PlyTriangles>(path, element, rest, swapped);
       };

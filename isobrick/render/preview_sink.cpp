@@ -10,14 +10,14 @@
 namespace isobrick {
 namespace {
 
-constexpr int kLeast = 16, kMost = 16384;
 constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that are drawn at once
 
 const PreviewOptions& checked(const PreviewOptions& options) {
   for (const int edge : {options.width, options.height})
-    if (edge < kLeast || edge > kMost)
+    if (edge < kLeastPictureEdge || edge > kMostPictureEdge)
       throw UsageError(fmt::format("a picture of {}x{} pixels: each edge must be {} to {}",
-                                   options.width, options.height, kLeast, kMost));
+                                   options.width, options.height, kLeastPictureEdge,
+                                   kMostPictureEdge));
   return options;
 }
 

@@ -41,8 +41,14 @@ std::vector<Vec3d> corners_of(const std::string& path, Vec3d origin = {1, 2, 3})
 void expect_ball(const std::string& path, bool normals, double tolerance) {
   const TestMesh ball = make_ball({1, 2, 3}, 1, kRings);
   const std::unique_ptr<MeshFile> file = open_mesh_file(path);
-  EXPECT_EQ(file->info().triangles, ball.triangles.size()) << path;
-  EXPECT_EQ(file->info().has_normals, normals) << path;
+  EXPECT_EQ(file->info().faces, ball.triangles.size()) << path;
+  file->read({1, 2, 3}, [&](const MeshChunk& chunk, Vec3d) {
+    ASSERT_EQ(chunk.normals.size(), normals ? chunk.positions.size() : 0) << path;
+    for (std::size_t i = 0; i < chunk.normals.size(); ++i) {
+      const Vec3f p = chunk.positions[i], n = chunk.normals[i];
+      EXPECT_NEAR(dot(p, n), std::sqrt(dot(p, p) * dot(n, n)), 1e-4) << path;
+    }
+  });
   Vec3d lo, hi;
   file->bounds(lo, hi);
   EXPECT_NEAR(lo.z, 2, 1e-4);
@@ -81,7 +87,7 @@ TEST(MeshFile, ReadsStl) {
   const TestMesh ball = make_ball({1, 2, 3}, 1, kRings);
   StlSink stl(dir / "a.stl", false);
   write(stl);
-  EXPECT_EQ(open_mesh_file(dir / "a.stl")->info().triangles, ball.triangles.size());
+  EXPECT_EQ(open_mesh_file(dir / "a.stl")->info().faces, ball.triangles.size());
   EXPECT_EQ(corners_of(dir / "a.stl").size(), 3 * ball.triangles.size());
 }
 
@@ -169,6 +175,31 @@ std::string glb(const std::string& json, std::string binary) {
   bytes += "JSON" + scene;
   add(static_cast<std::uint32_t>(binary.size()));
   return bytes + std::string("BIN\0", 4) + binary;
+}
+
+TEST(MeshFile, NormalsStayAcrossTheSurfaceWhereAxesAreScaledDifferently) {
+  const TempDir dir;
+  for (const bool mirrored : {false, true}) {
+    const std::string json =
+        std::string(R"({"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"scale":)") +
+        (mirrored ? "[-1,2,4]" : "[1,2,4]") +
+        R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1}}]}],)"
+        R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},{"bufferView":1,"componentType":5126,"count":3,"type":"VEC3"}],)"
+        R"("bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":36}],"buffers":[{"byteLength":72}]})";
+    const Vec3f normal{1, 1, 1};  // of x + y + z = 1
+    const std::array<Vec3f, 6> numbers{Vec3f{1, 0, 0}, {0, 1, 0}, {0, 0, 1},
+                                       normal,         normal,    normal};
+    const std::string binary(reinterpret_cast<const char*>(numbers.data()), sizeof(numbers));
+    open_mesh_file(dir.write("a.glb", glb(json, binary)))->read({}, [&](const MeshChunk& c, Vec3d) {
+      ASSERT_EQ(c.normals.size(), 3U);
+      for (const Vec3f n : c.normals) {
+        EXPECT_NEAR(dot(n, c.positions[1] - c.positions[0]), 0, 1e-6);
+        EXPECT_NEAR(dot(n, c.positions[2] - c.positions[0]), 0, 1e-6);
+        EXPECT_GT(n.z, 0);
+        EXPECT_EQ(n.x > 0, !mirrored);
+      }
+    });
+  }
 }
 
 TEST(MeshFile, DamagedScenesAreSaid) {

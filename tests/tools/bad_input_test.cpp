@@ -234,7 +234,7 @@ TEST_F(BadInput, TwoOutputsOfOneName) {
 TEST_F(BadInput, APictureTooLargeForTheMemory) {
   const std::string store = make_store("a");
   expect_refused(run({"extract", store, "--isovalue", "127.5", "--preview", path("a.png"),
-                      "--preview-size", "16384,16384"}),
+                      "--preview-size", "16384x16384"}),
                  2, {"16384 x 16384", "1.00 GiB", "--preview-size"});
   EXPECT_EQ(files(), Arguments{"a.zarr"});
 }

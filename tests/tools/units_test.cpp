@@ -75,6 +75,22 @@ TEST(Parse, Roi) {
     EXPECT_THROW(box(text), UsageError) << text;
 }
 
+TEST(Parse, BoxesOfWorldSpace) {
+  const auto [lo, hi] = parse_world_box("-1.5:2,3:4e1,5:6");
+  EXPECT_EQ(lo, (Vec3d{-1.5, 3, 5}));
+  EXPECT_EQ(hi, (Vec3d{2, 40, 6}));
+  for (const char* text : {"", "1:2,3:4", "1:2,3:4,5", "1:2,3:4,:6", "1:2,3:4,5:", "1:2,3:4,6:6",
+                           "1:2,4:3,5:6", "1:2,3:4,5:6,7:8", "1:2,3:4,5:x", "1:2,3:4,5:nan"})
+    EXPECT_THROW(parse_world_box(text), UsageError) << text;
+}
+
+TEST(Parse, SizesOfPictures) {
+  EXPECT_EQ(parse_picture_size("640x16").width, 640);
+  EXPECT_EQ(parse_picture_size("640x16").height, 16);
+  for (const char* text : {"", "x", "640", "640x", "640,480", "640x15", "16385x16", "640x480x2"})
+    EXPECT_THROW(parse_picture_size(text), UsageError) << text;
+}
+
 TEST(Format, Figures) {
   EXPECT_EQ(human_bytes(std::uint64_t{999}), "999 B");
   EXPECT_EQ(human_bytes(std::uint64_t{1536}), "1.50 KiB");

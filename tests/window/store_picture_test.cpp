@@ -277,12 +277,18 @@ TEST_F(Picture, SlicesShowSamples) {
 
 TEST_F(Picture, TurntablesTurn) {
   open(SynthKind::gyroid, {48, 48, 48});
-  write_turntable(*picture_, camera_, 64, 48, settings_, {0, 0, 1}, 3, dir_ / "turn", false, [] {});
-  write_turntable(*picture_, camera_, 64, 48, settings_, {0, 1, 0}, 3, dir_ / "y", false, [] {});
-  EXPECT_EQ(dir_.read("turn/0000.png"), dir_.read("y/0000.png"));
-  EXPECT_NE(dir_.read("turn/0001.png"), dir_.read("y/0001.png"));
-  EXPECT_TRUE(std::filesystem::exists(dir_ / "turn/0002.png"));
-  EXPECT_NE(dir_.read("turn/0000.png"), dir_.read("turn/0001.png"));
+  const std::vector<Shot> turn = turntable(camera_, {0, 0, 1}, 3, "turn"),
+                          other = turntable(camera_, {0, 1, 0}, 3, "y");
+  ASSERT_EQ(turn.size(), 3U);
+  EXPECT_EQ(turn[2].file, "turn/0002.png");
+  const auto pixels_of = [&](const Shot& shot) {
+    camera_ = shot.camera;
+    return pixels();
+  };
+  const auto first = pixels_of(turn[0]), second = pixels_of(turn[1]);
+  EXPECT_EQ(first, pixels_of(other[0]));
+  EXPECT_NE(second, pixels_of(other[1]));
+  EXPECT_NE(first, second);
 }
 
 }  // namespace

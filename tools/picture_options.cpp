@@ -1,0 +1,44 @@
+#include "tools/picture_options.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/window/view_settings.h"
+
+namespace isobrick::tools {
+
+void add_picture_options(CLI::App* app, PictureOptions& options, const std::string& thing) {
+  add_parsed(app, options.size, parse_picture_size,
+             {"--size", "WxH", "Size of the picture, pixels",
+              fmt::format("{}x{}", options.size.width, options.size.height)});
+  add_parsed(app, options.camera, parse_camera,
+             {"--camera", "PARTS",
+              "azimuth=DEG,elevation=DEG,roll=DEG,zoom=X,fov=DEG,orthographic,up=X:Y:Z,from=X:Y:Z, "
+              "or eye=X:Y:Z,target=X:Y:Z",
+              "azimuth=30,elevation=20"});
+  const std::string each = fmt::format("Of the first {}, the second and so on", thing);
+  add_repeated(app, {"--colour", "#RRGGBB", each}, [&options](const std::string& text) {
+    options.colours.push_back(parse_colour(text));
+  });
+  add_repeated(app, {"--opacity", "A", each, "1"}, [&options](const std::string& text) {
+    options.opacities.push_back(parse_opacity(text));
+  });
+  add_clip(app, options.planes);
+  add_flag(app, "--edges", options.edges, "Dark lines where the surface breaks off");
+  add_flag(app, "--no-occlusion", options.no_occlusion, "Do not darken hollows");
+}
+
+std::vector<MeshStyle> styles_of(const PictureOptions& options, std::size_t count,
+                                 const std::string& things) {
+  if (options.colours.size() > count || options.opacities.size() > count)
+    throw UsageError(fmt::format("there are more colours or opacities than {}", things));
+  std::vector<MeshStyle> styles;
+  for (std::size_t i = 0; i < count; ++i) {
+    MeshStyle style{.colour = surface_colour(i)};
+    if (i < options.colours.size()) style.colour = options.colours[i];
+    if (i < options.opacities.size()) style.opacity = options.opacities[i];
+    styles.push_back(style);
+  }
+  return styles;
+}
+
+}  // namespace isobrick::tools
