@@ -153,10 +153,11 @@ int run(const Arguments& arguments, Console& console) {
   return 0;
 }
 
-double parse_pixel_error(const std::string& text) {
-  const double pixels = parse_number(text);
-  if (!(pixels >= 0.1 && pixels <= 1000))
-    throw UsageError(fmt::format("'{}' is no pixel error; it lies within 0.1 and 1000", text));
+float parse_pixel_error(const std::string& text) {
+  const auto pixels = static_cast<float>(parse_number(text));
+  if (!(pixels >= kLeastPixelError && pixels <= kMostPixelError))
+    throw UsageError(fmt::format("'{}' is no pixel error; it lies within {} and {}", text,
+                                 kLeastPixelError, kMostPixelError));
   return pixels;
 }
 
@@ -203,8 +204,7 @@ void add_view(Program& program) {
                });
   add_picture_options(app, arguments->picture, "surface");
   add_what_to_draw(app, *arguments);
-  add_parsed(app, arguments->settings.pixel_error,
-             [](const std::string& text) { return static_cast<float>(parse_pixel_error(text)); },
+  add_parsed(app, arguments->settings.pixel_error, parse_pixel_error,
              {"--pixel-error", "PIXELS", "How long a cell may be on the picture", "1.5"});
   add_parsed(app, arguments->index, parse_search,
              {"--index", "linear|interval|kdtree|quadtree|octree",

@@ -65,31 +65,34 @@ Bookmarks::Bookmarks(fs::path file, const fs::path& store)
 }
 
 void Bookmarks::add(Bookmark bookmark) {
-  const auto same = std::find_if(list_.begin(), list_.end(),
+  std::vector<Bookmark> list = list_;
+  const auto same = std::find_if(list.begin(), list.end(),
                                  [&](const Bookmark& b) { return b.name == bookmark.name; });
-  if (same == list_.end())
-    list_.push_back(std::move(bookmark));
+  if (same == list.end())
+    list.push_back(std::move(bookmark));
   else
     *same = std::move(bookmark);
-  save();
+  save(std::move(list));
 }
 
 void Bookmarks::remove(std::size_t number) {
-  list_.erase(list_.begin() + static_cast<std::ptrdiff_t>(number));
-  save();
+  std::vector<Bookmark> list = list_;
+  list.erase(list.begin() + static_cast<std::ptrdiff_t>(number));
+  save(std::move(list));
 }
 
-void Bookmarks::save() const {
+void Bookmarks::save(std::vector<Bookmark> list) {
   fs::create_directories(file_.parent_path());
   Json all = read(file_);  // others may have written since
   Json mine = Json::array();
-  for (const Bookmark& b : list_)
+  for (const Bookmark& b : list)
     mine.push_back(
         {{"name", b.name}, {"camera", to_json(b.camera)}, {"settings", to_json(b.settings)}});
   all[store_] = std::move(mine);
   OutputFile out(file_.string(), true);
   out.writer().append(all.dump(1) + "\n");
   out.publish();
+  list_ = std::move(list);
 }
 
 }  // namespace isobrick

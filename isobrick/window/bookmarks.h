@@ -27,12 +27,13 @@ class Bookmarks {
   Bookmarks(std::filesystem::path file, const std::filesystem::path& store);
 
   const std::vector<Bookmark>& list() const { return list_; }
-  /// Adds it, in place of one of the same name, and writes the file.
+  // Both write the file; when that fails they throw Error and nothing has changed.
+  /// Adds it, in place of one of the same name.
   void add(Bookmark bookmark);
   void remove(std::size_t number);
 
  private:
-  void save() const;
+  void save(std::vector<Bookmark> list);
 
   std::filesystem::path file_;
   std::string store_;

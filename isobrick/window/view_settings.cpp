@@ -29,6 +29,11 @@ class Fields {
   }
   double number(const char* name) const { return number(at(name), name); }
   float real(const char* name) const { return static_cast<float>(number(name)); }
+  float real(const char* name, float least, float most) const {
+    const float value = real(name);
+    if (!(value >= least && value <= most)) wrong(name);
+    return value;
+  }
   bool flag(const char* name) const {
     if (!at(name).is_boolean()) wrong(name);
     return at(name).get<bool>();
@@ -41,6 +46,13 @@ class Fields {
   Vec3f vector_f(const char* name) const {
     const Vec3d v = vector(name);
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+  }
+  /// Parts of a whole.
+  Vec3f parts(const char* name) const {
+    const Vec3f v = vector_f(name);
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(v[axis] >= 0 && v[axis] <= 1)) wrong(name);
+    return v;
   }
   const Json& array(const char* name, std::size_t least, std::size_t most) const {
     const Json& v = at(name);
@@ -109,14 +121,14 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   for (const Json& item : in.array("surfaces", 0, kMostSurfaces)) {
     const Fields f(item);
     s.surfaces.push_back(
-        {f.number("isovalue"), f.vector_f("colour"), f.real("opacity"), f.flag("shown")});
+        {f.number("isovalue"), f.parts("colour"), f.real("opacity", 0, 1), f.flag("shown")});
   }
   const Json& cuts = in.array("cuts", 3, 3);
   const Json& slices = in.array("slices", 3, 3);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Fields cut(cuts[axis]), slice(slices[axis]);
-    s.cuts[axis] = {cut.flag("on"), cut.real("place"), cut.flag("beyond")};
-    s.slices[axis] = {slice.flag("shown"), slice.real("place")};
+    s.cuts[axis] = {cut.flag("on"), cut.real("place", 0, 1), cut.flag("beyond")};
+    s.slices[axis] = {slice.flag("shown"), slice.real("place", 0, 1)};
   }
   for (const Json& item : in.array("planes", 0, kMostClipPlanes)) {
     const Fields plane(item);
@@ -131,18 +143,18 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   const Fields pair(pairs), region(in.at("region"));
   s.window_lo = pair.real("lo");
   s.window_hi = pair.real("hi");
-  s.background_top = pair.vector_f("top");
-  s.background_bottom = pair.vector_f("bottom");
+  s.background_top = pair.parts("top");
+  s.background_bottom = pair.parts("bottom");
   s.region_on = region.flag("on");
-  s.region_lo = region.vector_f("lo");
-  s.region_hi = region.vector_f("hi");
+  s.region_lo = region.parts("lo");
+  s.region_hi = region.parts("hi");
   s.occlusion = in.flag("occlusion");
   s.edges = in.flag("edges");
   s.multisample = in.flag("multisample");
   s.box = in.flag("box");
   s.axes = in.flag("axes");
   s.scale_bar = in.flag("scale_bar");
-  s.pixel_error = in.real("pixel_error");
+  s.pixel_error = in.real("pixel_error", kLeastPixelError, kMostPixelError);
   return s;
 }
 

@@ -58,6 +58,7 @@ struct ViewSettings {
 };
 
 inline constexpr std::size_t kMostSurfaces = 16;
+inline constexpr float kLeastPixelError = 0.1f, kMostPixelError = 1000;
 
 /// Colours for the first surfaces of a scene, told apart in any order.
 Vec3f surface_colour(std::size_t number);

@@ -139,7 +139,10 @@ void ViewerWindow::drop(const std::filesystem::path& path) {
   try {
     if (is_zarr(path)) return open(path);
     if (state_.import != nullptr) throw Error("another file is being converted");
-    state_.import = std::make_unique<ImportJob>(path, store_for(path), ConvertOptions{});
+    ConvertOptions options;
+    options.memory = options_.budgets.memory;
+    options.threads = options_.budgets.threads;
+    state_.import = std::make_unique<ImportJob>(path, store_for(path), options);
   } catch (const std::exception& e) {
     state_.say(e.what());
   }

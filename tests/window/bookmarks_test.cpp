@@ -64,7 +64,31 @@ TEST(Bookmarks, RefuseWhatIsNone) {
     broken.erase(field);
     EXPECT_THROW(view_settings_from(broken), Error) << field;
   }
+  const auto refuse = [&](const char* place, const char* value) {
+    nlohmann::ordered_json broken = json;
+    broken[nlohmann::ordered_json::json_pointer(place)] = nlohmann::ordered_json::parse(value);
+    EXPECT_THROW(view_settings_from(broken), Error) << place << ' ' << value;
+  };
+  refuse("/surfaces/0/opacity", "1.5");
+  refuse("/surfaces/0/colour", "[0, -1, 0]");
+  refuse("/cuts/1/place", "2");
+  refuse("/slices/2/place", "-0.5");
+  refuse("/region/hi", "[1, 1, 1e30]");
+  refuse("/pixel_error", "0");
   EXPECT_THROW(camera_from(nlohmann::ordered_json::object()), Error);
+}
+
+TEST(Bookmarks, StayAsTheyAreWhenTheyCannotBeWritten) {
+  const TempDir dir;
+  Bookmarks bookmarks(dir / "b.json", dir / "a.zarr");
+  bookmarks.add(jaw());
+  dir.write("b.json", "nonsense");
+  Bookmark other = jaw();
+  other.name = "brow";
+  EXPECT_THROW(bookmarks.add(other), Error);
+  EXPECT_THROW(bookmarks.remove(0), Error);
+  ASSERT_EQ(bookmarks.list().size(), 1u);
+  EXPECT_EQ(bookmarks.list()[0].name, "jaw");
 }
 
 }  // namespace
