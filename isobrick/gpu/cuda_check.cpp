@@ -2,14 +2,18 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
+#include "isobrick/gpu/device.h"
 
 namespace isobrick::gpu {
 namespace {
 
 void fail(cudaError_t result, const char* what, const std::source_location& where) {
-  throw Error(fmt::format("CUDA: {}: {} ({}), at {}:{}", what, cudaGetErrorString(result),
-                          cudaGetErrorName(result), where.file_name(), where.line()));
+  const std::string message =
+      fmt::format("CUDA: {}: {} ({}), at {}:{}", what, cudaGetErrorString(result),
+                  cudaGetErrorName(result), where.file_name(), where.line());
+  if (result != cudaErrorMemoryAllocation) throw Error(message);
+  (void)cudaGetLastError();  // or the next launch would report it
+  throw OutOfDeviceMemory(message);
 }
 
 }  // namespace

@@ -6,7 +6,8 @@
 
 namespace isobrick::gpu {
 
-/// Throws Error with the name of the CUDA error and where it was noticed.
+/// Throws Error with the name of the CUDA error and where it was noticed, OutOfDeviceMemory when
+/// it is that.
 void check(cudaError_t result, const std::source_location& where = std::source_location::current());
 
 /// Makes the device the calling thread's; returns it.

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "isobrick/core/error.h"
+
 namespace isobrick::gpu {
 
 /// CUDA devices that this program can use; 0 also where there is no driver.
@@ -15,6 +17,11 @@ inline bool device_available() noexcept { return device_count() > 0; }
 struct DeviceInfo {
   std::string name;
   std::uint64_t free_bytes = 0, total_bytes = 0;  ///< of its memory, now
+};
+
+/// The device has less memory left than was asked for.
+class OutOfDeviceMemory : public Error {
+  using Error::Error;
 };
 
 /// 16 bytes by which drivers of all kinds tell devices apart. Throws Error for a device that

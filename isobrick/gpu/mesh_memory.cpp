@@ -124,7 +124,14 @@ struct MeshMemory::Impl {
   mutable std::mutex mutex;
   std::vector<std::shared_ptr<Block>> blocks;
 
-  Impl(int d, std::uint64_t b) : device(d), budget(b), room(block_vertices(b)) { add(); }
+  Impl(int d, std::uint64_t b) : device(d), budget(b), room(block_vertices(b)) {
+    if (room * kVertexBytes > budget)
+      throw Error(
+          fmt::format("a budget of {} bytes is too small for meshes on the device: {} are "
+                      "needed at least",
+                      budget, room * kVertexBytes));
+    add();
+  }
 
   void add() { blocks.push_back(std::make_shared<Block>(driver, device, room)); }
 

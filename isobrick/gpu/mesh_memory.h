@@ -28,7 +28,7 @@ struct MeshSpan {
 class MeshMemory {
  public:
   /// Takes the first block at once; never more than `budget` bytes of blocks in all. Throws
-  /// Error where the device's memory cannot be exported, or is short.
+  /// Error for less than a block, and where the device's memory cannot be exported or is short.
   MeshMemory(int device, std::uint64_t budget);
   ~MeshMemory();
 

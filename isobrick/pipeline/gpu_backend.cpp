@@ -132,7 +132,7 @@ class CudaSession final : public GpuSession {
     try {
       pool_ = std::make_shared<gpu::BrickPool>(device_, lattice.brick_bytes(), sizes_.pool.bricks,
                                                sizes_.pool.threads);
-    } catch (const Error&) {
+    } catch (const gpu::OutOfDeviceMemory&) {
       return false;
     }
     bricks_ = std::make_unique<DeviceBricks>(pool_, lattice.brick_bytes());

@@ -127,11 +127,13 @@ std::optional<FieldValue> value_at(const StoreInfo& info, int stored, Vec3d worl
   Vec3d gradient;
   for (int axis = 0; axis < 3; ++axis) {
     Vec3d a = p, b = p;
-    a[axis] -= 0.5;
-    b[axis] += 0.5;
+    const double last = static_cast<double>(level.lattice.extent[axis] - 1);
+    a[axis] = std::clamp(p[axis] - 0.5, 0.0, last);
+    b[axis] = std::clamp(p[axis] + 0.5, 0.0, last);
+    if (a[axis] == b[axis]) continue;  // one sample thick
     const auto va = field.at(a), vb = field.at(b);
     if (!va || !vb) return out;
-    gradient[axis] = (*vb - *va) / t.spacing[axis];
+    gradient[axis] = (*vb - *va) / ((b[axis] - a[axis]) * t.spacing[axis]);
   }
   const auto& d = t.direction;
   const Vec3d n{-(d[0] * gradient.x + d[1] * gradient.y + d[2] * gradient.z),

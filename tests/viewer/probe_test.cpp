@@ -90,6 +90,15 @@ TEST(Probe, TellsTheFieldOfTheFinestLevelThatIsThere) {
   const double length = std::sqrt(out.x * out.x + out.y * out.y + out.z * out.z);
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(now->normal[axis], out[axis] / length, 0.01);
   EXPECT_FALSE(probe(grid, bricks, t.apply({-1, 5, 5}))) << "outside";
+  // At the border only half a step is inside.
+  const Vec3d border = t.apply({0, 59.5, 90});
+  probe_level(grid, bricks, border, 0, Always());
+  const Vec3d from_centre = border - t.apply({59.5, 59.5, 59.5});
+  const double far = std::sqrt(dot(from_centre, from_centre));
+  const auto at_border = probe(grid, bricks, border);
+  ASSERT_TRUE(at_border);
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(at_border->normal[axis], from_centre[axis] / far, 0.02);
   EXPECT_EQ(probe_level(grid, bricks, t.apply({3, 4, 5}), 0, Always())->value,
             source->value(0, {3, 4, 5}));
 }
