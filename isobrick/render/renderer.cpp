@@ -203,8 +203,6 @@ std::uint64_t Renderer::memory(int width, int height, const PictureSettings& set
   return PictureTargets::bytes(width, height, samples_of(settings), settings.picking, transparent);
 }
 
-int Renderer::largest_edge() const { return state_->largest_edge; }
-
 void Renderer::begin(const Camera& camera, int width, int height, const PictureSettings& settings) {
   state_->start(camera, width, height, settings);
 }
@@ -246,10 +244,6 @@ void Renderer::draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float line_width) {
 
 void Renderer::draw_axes() { state_->overlays.add_axes(); }
 void Renderer::draw_scale_bar(const std::string& unit) { state_->overlays.add_scale_bar(unit); }
-void Renderer::draw_text(const std::string& text, double x, double y, double line_height,
-                         Vec3f colour) {
-  state_->overlays.add_text(text, x, y, line_height, colour);
-}
 
 void Renderer::end() { state_->finish(); }
 

@@ -78,8 +78,6 @@ class Renderer {
   /// Device memory of a picture of this size while it is made. With transparent meshes: more.
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
-  /// Pixels along an edge that the device allows.
-  int largest_edge() const;
 
   /// Starts a picture. Throws UsageError for a size that cannot be.
   void begin(const Camera& camera, int width, int height, const PictureSettings& settings);
@@ -102,8 +100,6 @@ class Renderer {
   /// A bar of a round length at the target's depth in the lower right corner, such as
   /// "20 mm". `unit` may be empty.
   void draw_scale_bar(const std::string& unit);
-  /// A line of text, its top left corner at a pixel; `height` of a line in pixels.
-  void draw_text(const std::string& text, double x, double y, double height, Vec3f colour);
 
   /// Finishes the picture.
   void end();

@@ -92,6 +92,8 @@ class Fields {
 
 /// As much of what a file says of itself as is shown.
 constexpr std::size_t kMostShown = 100;
+/// Of the name that a store keeps.
+constexpr std::size_t kMostKept = 1000;
 std::string shown(std::string_view text) { return printable(text, kMostShown); }
 
 std::string shown_name(const std::string& unique, bool repeated) {
@@ -106,7 +108,7 @@ void read_own_header(Fields& in, VdbGrid& grid) {
   in.seek(grid.begin);
   in.number<std::uint32_t>();  // how it is compressed
   const Metadata metadata = in.metadata();
-  grid.own_name = text_of(metadata, "name");
+  grid.own_name = printable(text_of(metadata, "name"), kMostKept);
   grid.unit = unit_name(text_of(metadata, "unit"));
   grid.grid_class = shown(text_of(metadata, "class"));
   grid.transform = in.at();

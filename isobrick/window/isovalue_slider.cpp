@@ -65,12 +65,12 @@ void tell(const ViewerState& state, double isovalue) {
 
 }  // namespace
 
-bool draw_isovalue_slider(ViewerState& state, float width, float height) {
+void draw_isovalue_slider(ViewerState& state, float width, float height) {
   const auto range = state.facts->counts().range();
   if (!(range.lo < range.hi)) {
     ImGui::TextUnformatted(range.empty() ? "There are no samples but NaN."
                                          : "All samples are equal.");
-    return false;
+    return;
   }
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   ImGui::InvisibleButton("isovalue", {width, height});
@@ -90,9 +90,8 @@ bool draw_isovalue_slider(ViewerState& state, float width, float height) {
     draw.AddLine({pointer, top}, {pointer, bottom}, kCursor);
     tell(state, axis.value(pointer));
   }
-  if (!ImGui::IsItemActive() || state.settings.surfaces.empty()) return false;
+  if (!ImGui::IsItemActive() || state.settings.surfaces.empty()) return;
   state.settings.surfaces[state.selected].isovalue = axis.value(pointer);
-  return true;
 }
 
 }  // namespace isobrick

@@ -9,8 +9,8 @@ namespace isobrick {
 void draw_panels(ViewerState& state);
 
 /// Isovalue over the histogram: a drag moves the selected surface, the pointer tells how
-/// much surface there is. True while it is dragged.
-bool draw_isovalue_slider(ViewerState& state, float width, float height);
+/// much surface there is.
+void draw_isovalue_slider(ViewerState& state, float width, float height);
 
 /// What is cut away: across axes, by planes at any angle, outside of a region.
 void draw_cuts_panel(ViewerState& state);

@@ -56,7 +56,7 @@ TEST_F(Context, SizesAndPlanesAreChecked) {
   const GlContext context;
   Renderer renderer;
   EXPECT_THROW(renderer.begin({}, 0, 10, {}), UsageError);
-  EXPECT_THROW(renderer.begin({}, renderer.largest_edge() + 1, 10, {}), UsageError);
+  EXPECT_THROW(renderer.begin({}, 1 << 24, 10, {}), UsageError);
   PictureSettings settings;
   settings.planes.resize(13);
   EXPECT_THROW(renderer.begin({}, 16, 16, settings), UsageError);
