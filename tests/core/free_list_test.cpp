@@ -45,7 +45,7 @@ TEST(FreeList, NothingIsGivenTwiceOrLost) {
       taken.erase(one);
       continue;
     }
-    const std::uint32_t size = 1 + random() % 60;
+    const auto size = static_cast<std::uint32_t>(1 + random() % 60);
     if (const auto at = list.take(size)) taken.insert({*at, size});
     std::uint32_t end = 0;
     for (const auto& [at, length] : taken) {
