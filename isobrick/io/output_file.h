@@ -85,6 +85,9 @@ class OutputFile {
   void publish();
 
  private:
+  bool exchange_and_remove();
+  void rename();
+
   std::string path_;
   bool force_;
   std::string temporary_;  ///< empty once published

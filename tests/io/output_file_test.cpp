@@ -52,6 +52,32 @@ TEST(OutputFile, KeepsWhatExistsUnlessForced) {
   EXPECT_EQ(dir.list(), Names{"a"});
 }
 
+TEST(OutputFile, ReplacesALinkButNotWhatItNames) {
+  const TempDir dir;
+  dir.write("named", "old");
+  std::filesystem::create_symlink("named", dir / "a");
+  OutputFile out(dir / "a", true);
+  out.writer().append("new");
+  out.publish();
+  EXPECT_EQ(dir.read("a"), "new");
+  EXPECT_FALSE(std::filesystem::is_symlink(dir / "a"));
+  EXPECT_EQ(dir.read("named"), "old");
+  EXPECT_EQ(dir.list().size(), 2u);
+}
+
+TEST(OutputFile, LeavesAFolderThatAppearedInTheMeantime) {
+  const TempDir dir;
+  dir.write("a", "old");
+  {
+    OutputFile out(dir / "a", true);
+    std::filesystem::remove(dir / "a");
+    std::filesystem::create_directory(dir / "a");
+    message_of<Error>([&] { out.publish(); });
+  }
+  EXPECT_TRUE(std::filesystem::is_directory(dir / "a"));
+  EXPECT_EQ(dir.list(), Names{"a"});
+}
+
 TEST(OutputFile, KeepsWhatAppearedInTheMeantime) {
   const TempDir dir;
   {
