@@ -201,9 +201,10 @@ std::vector<Sampled> look_at_all(const StoreReader& store, const ExtractOptions&
       if (end > begin && bricks.size() + more.size() > cache_bricks) break;
       bricks.insert(bricks.end(), more.begin(), more.end());
     }
-    cache.require(bricks);
+    const auto cached = cache.begin(bricks, tiles[end - 1].tile);
+    cached->wait();
     tbb::parallel_for(begin, end,
-                      [&](std::size_t i) { sampled[i] = look_at(tiles[i], request, cache); });
+                      [&](std::size_t i) { sampled[i] = look_at(tiles[i], request, *cached); });
   }
   return sampled;
 }

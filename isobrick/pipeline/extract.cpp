@@ -65,34 +65,73 @@ struct Work {
   Done done;
 };
 
-/// Batch after batch, each decoded and then extracted, for the surface keeps all cores
-/// busy itself.
+/// Tiles whose bricks are there or on their way; none at the end.
+struct CpuBatch {
+  TileBatch batch;
+  std::unique_ptr<CachedBricks> bricks;
+};
+
+/// Hands the batches of an extraction out, and their bricks.
+class CpuBatches {
+ public:
+  explicit CpuBatches(const Work& work)
+      : planner_(work.batches),
+        cache_(work.store, work.options.level, sample_reach(work.request.surface),
+               work.plan.cache_bricks) {
+    planner_.next(planned_);
+  }
+
+  CpuBatch next() {
+    CpuBatch next{.batch = std::exchange(planned_, {})};
+    if (!next.batch.tiles.empty()) planner_.next(planned_);
+    return next;
+  }
+
+  /// Begins to decode a batch's bricks; the disk works on those of the batch after it.
+  void begin(CpuBatch& batch) {
+    if (batch.batch.tiles.empty()) return;
+    batch.bricks = cache_.begin(batch.batch.bricks, batch.batch.tiles.back().tile);
+    cache_.will_need(*batch.bricks, planned_.bricks);
+  }
+
+  const BrickCache& cache() const { return cache_; }
+
+ private:
+  BatchPlanner& planner_;
+  BrickCache cache_;
+  TileBatch planned_;
+};
+
+/// While the surface of one batch is made the bricks of the next are decoded, by the same
+/// threads: where the one has nothing to do for them just then, the other has.
 void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
-  BrickCache cache(work.store, work.options.level, sample_reach(work.request.surface),
-                   work.plan.cache_bricks);
+  const bool room_for_two = work.plan.cache_bricks >= 2 * work.plan.batch_bricks;
   Workers workers(work.request.threads);
   workers.execute([&] {
-    TileBatch batch, following;
-    for (bool more = work.batches.next(batch); more; std::swap(batch, following)) {
+    CpuBatches batches(work);
+    CpuBatch now = batches.next();
+    batches.begin(now);
+    while (now.bricks) {
+      CpuBatch next = batches.next();
+      if (room_for_two) batches.begin(next);
       {
         Stopwatch watch(work.report.decode_seconds);
-        cache.drop_before(morton_encode(batch.tiles.front().tile));
-        cache.require(batch.bricks);
+        now.bricks->wait();
       }
-      // The disk works on the next batch while the processors work on this one.
-      more = work.batches.next(following);
-      cache.will_need(following.bricks);
       {
         Stopwatch watch(work.report.surface_seconds);
-        surface.extract(batch.tiles, cache, nullptr);
+        surface.extract(now.batch.tiles, *now.bricks, nullptr);
       }
-      work.done(batch.tiles);
+      work.done(now.batch.tiles);
+      now.bricks.reset();
+      if (!room_for_two) batches.begin(next);
+      now = std::move(next);
     }
+    work.report.bricks_read = batches.cache().bricks_read();
+    work.report.brick_reads = batches.cache().reads();
   });
   surface.finish();
   surface.report(work.report);
-  work.report.bricks_read = cache.bricks_read();
-  work.report.brick_reads = cache.reads();
 }
 
 /// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.

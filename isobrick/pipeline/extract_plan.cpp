@@ -125,7 +125,8 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
       tile_output + spare / 12, tile_output, std::max(tile_output, std::uint64_t{32} << 20));
   const std::uint64_t used = fixed + plan.limits.tiles * workspace + 2 * plan.limits.output_bytes;
   plan.cache_bricks = fit_cache(lattice, budget - used, tile_bricks, active_bricks);
-  plan.batch_bricks = plan.cache_bricks;
+  // The next batch is decoded beside the one that is worked on.
+  plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 2);
   plan.bytes = used + plan.cache_bricks * brick_bytes;
   return plan;
 }

@@ -1,119 +1,103 @@
 #include "isobrick/stream/brick_cache.h"
 
 #include <sys/mman.h>
-#include <tbb/parallel_for_each.h>
 
 #include <algorithm>
 #include <cassert>
 #include <new>
+#include <utility>
 
-#include "isobrick/stream/brick_slots.h"
+#include "isobrick/core/morton.h"
 
 namespace isobrick {
+
+CachedBricks::CachedBricks(BrickCache& cache, std::vector<Int3> bricks)
+    : cache_(cache), bricks_(std::move(bricks)) {}
+
+CachedBricks::~CachedBricks() noexcept {
+  tasks_.cancel();
+  try {
+    tasks_.wait();
+  } catch (...) {
+    // Nobody waits for these bricks any more.
+  }
+  for (const Int3 b : bricks_) cache_.slots_.release(b);
+}
+
+void CachedBricks::wait() {
+  tasks_.wait();
+  for (const Load& load : loads_) cache_.finish(load);
+  loads_.clear();
+  for (const Int3 b : bricks_) samples_[cache_.key(b)] = cache_.slots_.find(b);
+}
+
+const std::byte* CachedBricks::find(Int3 brick) const {
+  const auto found = samples_.find(cache_.key(brick));
+  assert(found != samples_.end());
+  return found->second;
+}
 
 BrickCache::BrickCache(const StoreReader& store, int level, Index reach, std::size_t capacity)
     : store_(store),
       level_(level),
-      reach_(reach),
       lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
-      capacity_(capacity) {}
+      capacity_(capacity),
+      slots_(lattice_, reach),
+      seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {}
 
-std::uint64_t BrickCache::key(Int3 brick) const {
-  return static_cast<std::uint64_t>(linear_index(brick, lattice_.bricks()));
+std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, Int3 last) {
+  auto begun =
+      std::make_unique<CachedBricks>(*this, std::vector<Int3>(bricks.begin(), bricks.end()));
+  std::vector<Int3> missing;
+  // First what is here: it must not go as needed by nobody later, nor for what is missing.
+  for (const Int3 b : bricks)
+    if (!slots_.hold(b)) missing.push_back(b);
+  slots_.advance(morton_encode(last) + 1);
+  for (const Int3 b : missing) begun->loads_.push_back({b, place(b)});
+  for (CachedBricks::Load& load : begun->loads_)
+    begun->tasks_.run(
+        [this, &load] { load.present = store_.read_brick(level_, load.brick, load.samples); });
+  return begun;
 }
 
-BrickCache::Samples BrickCache::take_buffer() {
-  if (!spare_.empty()) {
-    Samples buffer = spare_.back();
-    spare_.pop_back();
-    return buffer;
-  }
-  if (buffers_ < capacity_) return new_buffer();
-  // What is required now was moved to the front, so the back is free to go.
-  for (;;) {
-    const Entry gone = order_.back();
-    entries_.erase(gone.key);
-    order_.pop_back();
-    if (!gone.samples) continue;
-    cut_.emplace(gone.key, gone.last_use);
-    return gone.samples;
-  }
+std::byte* BrickCache::place(Int3 brick) {
+  if (slots_.free_slots() == 0 && places_ < capacity_) grow();
+  std::byte* const samples = slots_.place(brick);
+  assert(samples);
+  return samples;
 }
 
 /// Memory comes in large pages, for the first touch of a small one costs as much as the
 /// decoding of what it holds.
-BrickCache::Samples BrickCache::new_buffer() {
+void BrickCache::grow() {
   constexpr std::size_t page = std::size_t{2} << 20, good = 16 * page;
   const std::size_t brick = lattice_.brick_bytes();
-  if (slab_buffers_ == 0) {
-    slab_buffers_ = std::clamp<std::size_t>(good / brick, 1, capacity_ - buffers_);
-    const std::size_t bytes = slab_buffers_ * brick;
-    const bool large = bytes >= page;
-    const std::size_t align = large ? page : 64;
-    auto* slab =
-        static_cast<std::byte*>(std::aligned_alloc(align, (bytes + align - 1) / align * align));
-    if (!slab) throw std::bad_alloc();
-    slabs_.emplace_back(slab);
-    if (large) (void)madvise(slab, bytes, MADV_HUGEPAGE);
-  }
-  ++buffers_;
-  return slabs_.back().get() + --slab_buffers_ * brick;
+  const std::size_t count = std::clamp<std::size_t>(good / brick, 1, capacity_ - places_);
+  const std::size_t bytes = count * brick;
+  const bool large = bytes >= page;
+  const std::size_t align = large ? page : 64;
+  auto* slab =
+      static_cast<std::byte*>(std::aligned_alloc(align, (bytes + align - 1) / align * align));
+  if (!slab) throw std::bad_alloc();
+  slabs_.emplace_back(slab);
+  if (large) (void)madvise(slab, bytes, MADV_HUGEPAGE);
+  slots_.add_slots(slab, count);
+  places_ += count;
 }
 
-void BrickCache::require(std::span<const Int3> bricks) {
-  assert(bricks.size() <= capacity_);
-  std::vector<Int3> missing;
-  for (const Int3 b : bricks) {
-    const auto found = entries_.find(key(b));
-    if (found == entries_.end())
-      missing.push_back(b);
-    else
-      order_.splice(order_.begin(), order_, found->second);
-  }
-  struct Load {
-    Int3 brick;
-    Samples samples = nullptr;
-    bool present = false;
-  };
-  std::vector<Load> loads;
-  for (const Int3 b : missing) loads.push_back({b, take_buffer()});
-  tbb::parallel_for_each(loads, [&](Load& load) {
-    load.present = store_.read_brick(level_, load.brick, load.samples);
+void BrickCache::finish(const CachedBricks::Load& load) {
+  if (!load.present) return slots_.set_absent(load.brick);
+  auto is_seen = seen_[key(load.brick)];
+  ++reads_;
+  bricks_read_ += !is_seen;
+  is_seen = true;
+}
+
+void BrickCache::will_need(CachedBricks& begun, std::vector<Int3> bricks) {
+  std::erase_if(bricks, [&](Int3 b) { return slots_.contains(b); });
+  begun.tasks_.run([this, bricks = std::move(bricks)] {
+    for (const Int3 b : bricks) store_.will_need(level_, b);
   });
-  for (Load& load : loads) {
-    if (!load.present) spare_.push_back(load.samples);
-    if (load.present) {
-      ++reads_;
-      bricks_read_ += cut_.erase(key(load.brick)) == 0;
-    }
-    order_.push_front({key(load.brick), load.present ? load.samples : nullptr,
-                       last_use(lattice_, reach_, load.brick)});
-    entries_[key(load.brick)] = order_.begin();
-  }
-}
-
-void BrickCache::drop_before(std::uint64_t code) {
-  for (auto at = order_.begin(); at != order_.end();) {
-    const auto entry = at++;
-    if (entry->last_use >= code) continue;
-    if (entry->samples) spare_.push_back(entry->samples);
-    entries_.erase(entry->key);
-    order_.erase(entry);
-  }
-  std::erase_if(cut_, [&](const auto& cut) { return cut.second < code; });
-}
-
-void BrickCache::will_need(std::span<const Int3> bricks) const {
-  // A hint is a call of the system: in sum they would hold a fast disk up.
-  tbb::parallel_for_each(bricks.begin(), bricks.end(), [&](Int3 b) {
-    if (!entries_.count(key(b))) store_.will_need(level_, b);
-  });
-}
-
-const std::byte* BrickCache::find(Int3 brick) const {
-  const auto found = entries_.find(key(brick));
-  assert(found != entries_.end());
-  return found->second->samples;
 }
 
 }  // namespace isobrick

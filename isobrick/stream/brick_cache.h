@@ -1,74 +1,98 @@
 #pragma once
 
+#include <tbb/task_group.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <list>
 #include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/tile.h"
+#include "isobrick/stream/brick_slots.h"
 
 namespace isobrick {
 
-/// Decoded bricks of one level. Dropped are those that no later tile needs, and the least
-/// recently needed ones when more than `capacity` would be held.
-class BrickCache final : public BrickLookup {
+class BrickCache;
+
+/// The bricks of tiles that are worked on together, which stay where they are until this is
+/// destroyed (by the cache's thread, and before the cache). They are waited for in the order in
+/// which they were begun; once that failed or was given up, the cache is of no use any more.
+class CachedBricks final : public BrickLookup {
  public:
-  /// For tiles that look at `reach` samples around them.
-  BrickCache(const StoreReader& store, int level, Index reach, std::size_t capacity);
+  CachedBricks(BrickCache& cache, std::vector<Int3> bricks);
+  CachedBricks(const CachedBricks&) = delete;
+  CachedBricks& operator=(const CachedBricks&) = delete;
+  /// Decodes nothing more, but waits for what is being decoded.
+  ~CachedBricks() noexcept override;
 
-  /// Makes these bricks (no more than the capacity, none twice) resident,
-  /// reading and decoding in parallel in the caller's TBB arena. Their samples stay where
-  /// they are until the next call.
-  void require(std::span<const Int3> bricks);
-
-  /// All tiles before Morton code `code` are done: what only they needed goes, and its memory,
-  /// which the processor has at hand, is taken first for what comes next.
-  void drop_before(std::uint64_t code);
-
-  /// Hints that these bricks are required next: starts the disk for those that
-  /// are not resident.
-  void will_need(std::span<const Int3> bricks) const;
+  /// Decodes, along with the other threads, until all is there: find() is for afterwards.
+  /// Throws what went wrong in reading or decoding.
+  void wait();
 
   const std::byte* find(Int3 brick) const override;
 
-  std::size_t capacity() const { return capacity_; }
+ private:
+  friend class BrickCache;
+  struct Load {
+    Int3 brick;
+    std::byte* samples = nullptr;
+    bool present = false;
+  };
+
+  BrickCache& cache_;
+  std::vector<Int3> bricks_;
+  std::vector<Load> loads_;  ///< what was not there
+  std::unordered_map<std::uint64_t, const std::byte*> samples_;
+  tbb::task_group tasks_;
+};
+
+/// Decoded bricks of a level, for batches of tiles in Morton order. Decoding is done by the
+/// threads of the TBB arena that all calls come from, beside whatever else they have to do; so
+/// the bricks of one batch may be begun while those of another are used. For one thread.
+class BrickCache {
+ public:
+  /// At most `capacity` bricks are held at a time. They are used by tiles with `reach` layers of
+  /// samples around them. Memory is got when it is needed.
+  BrickCache(const StoreReader& store, int level, Index reach, std::size_t capacity);
+
+  /// Begins to decode what is missing of `bricks`, which must fit beside those that are in use;
+  /// no brick is there twice. `last` is the last of the tiles that they are for: what neither it
+  /// nor a later tile needs goes when it is not used any more. Where there is no room, what is
+  /// needed last goes first.
+  std::unique_ptr<CachedBricks> begin(std::span<const Int3> bricks, Int3 last);
+
+  /// Hints that these bricks come after those that were begun: starts the disk for what is not
+  /// here. Not waited for.
+  void will_need(CachedBricks& begun, std::vector<Int3> bricks);
+
   /// Bricks read and decoded so far, and how many different ones.
   std::uint64_t reads() const { return reads_; }
   std::uint64_t bricks_read() const { return bricks_read_; }
 
  private:
-  using Samples = std::byte*;
-  struct Entry {
-    std::uint64_t key = 0;
-    Samples samples = nullptr;   ///< null: the brick is absent
-    std::uint64_t last_use = 0;  ///< Morton code of a tile
-  };
-  using Order = std::list<Entry>;
-
-  std::uint64_t key(Int3 brick) const;
-  Samples take_buffer();
-  Samples new_buffer();
+  friend class CachedBricks;
+  std::uint64_t key(Int3 brick) const {
+    return static_cast<std::uint64_t>(linear_index(brick, lattice_.bricks()));
+  }
+  std::byte* place(Int3 brick);
+  void grow();
+  void finish(const CachedBricks::Load& load);
 
   const StoreReader& store_;
-  int level_;
-  Index reach_;
-  Lattice lattice_;
-  std::size_t capacity_;
-  std::size_t buffers_ = 0;  ///< allocated, in entries or spare
-  Order order_;              ///< most recently needed first
-  std::unordered_map<std::uint64_t, Order::iterator> entries_;
-  std::vector<Samples> spare_;
+  const int level_;
+  const Lattice lattice_;
+  const std::size_t capacity_;
+  BrickSlots slots_;
   struct Free {
     void operator()(std::byte* slab) const { std::free(slab); }
   };
   std::vector<std::unique_ptr<std::byte, Free>> slabs_;  ///< memory of many bricks each
-  std::size_t slab_buffers_ = 0;                         ///< not yet used in the last one
-  /// Key and last use of those that went for want of room and may come back.
-  std::unordered_map<std::uint64_t, std::uint64_t> cut_;
+  std::size_t places_ = 0;                               ///< that there is memory for
+  std::vector<bool> seen_;
   std::uint64_t reads_ = 0, bricks_read_ = 0;
 };
 

@@ -18,9 +18,9 @@
 namespace isobrick {
 namespace {
 
-/// Tiles that a thread takes between two hand-offs: about a million cells, so
-/// that a hand-off costs nothing, and some 3 MB of work space for u8.
-constexpr std::size_t kTilesPerThread = 32;
+/// Tiles that a thread takes between two hand-offs: enough for a hand-off to cost little, and
+/// few enough for their samples and work spaces to stay in a core's cache.
+constexpr std::size_t kTilesPerThread = 8;
 
 /// A tile takes some 50 µs and a hand-off some 10: fewer tiles stay on one thread.
 constexpr std::size_t kWorthThreads = 6;

@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
 #include <set>
 
-#include "isobrick/core/morton.h"
+#include "isobrick/core/error.h"
 #include "isobrick/stream/tile_stream.h"
 #include "tests/stream/stored_volume.h"
 
@@ -14,24 +15,81 @@ namespace {
 
 class Stream : public StoredVolume {};
 
-TEST_F(Stream, CacheKeepsWhatWasNeededLastAndNoMoreThanItsCapacity) {
+/// Bricks for a tile after which all of the volume is still to come.
+constexpr Int3 kFirstTile{0, 0, 0};
+
+TEST_F(Stream, CacheKeepsWhatIsNeededNextAndNoMoreThanItsCapacity) {
   const StoreReader store(path_);
   BrickCache cache(store, 0, 0, 4);
   const std::vector<Int3> first{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}},
       second{{2, 0, 0}, {3, 0, 0}, {4, 0, 0}};
-  cache.require(first);
-  for (const Int3 b : first) expect_samples(cache, b);
-  EXPECT_EQ(cache.find({1, 0, 0}), nullptr) << "absent";
+  const auto expect_all = [&](const std::vector<Int3>& bricks) {
+    const auto cached = cache.begin(bricks, kFirstTile);
+    cached->wait();
+    for (const Int3 b : bricks) expect_samples(*cached, b);
+    return cached->find(bricks[1]);
+  };
+  EXPECT_EQ(expect_all(first), nullptr) << "absent";
   EXPECT_EQ(cache.reads(), 2u);
-  cache.require(second);
-  for (const Int3 b : second) expect_samples(cache, b);
+  expect_all(second);
   EXPECT_EQ(cache.reads(), 4u);
-  cache.require(std::vector<Int3>{{4, 0, 0}, {2, 0, 0}});
+  expect_all({{4, 0, 0}, {2, 0, 0}});
   EXPECT_EQ(cache.reads(), 4u) << "both were there";
-  cache.require(std::vector<Int3>{{0, 1, 0}, {1, 1, 0}, {2, 1, 0}, {3, 1, 0}});
-  cache.require(first);
-  for (const Int3 b : first) expect_samples(cache, b);
+  expect_all({{0, 1, 0}, {1, 1, 0}, {2, 1, 0}, {3, 1, 0}});
+  expect_all(first);
   EXPECT_GT(cache.reads(), cache.bricks_read());
+}
+
+TEST_F(Stream, CacheDecodesTheNextBricksWhileOthersAreUsed) {
+  const StoreReader store(path_);
+  BrickCache cache(store, 0, 0, 5);
+  const std::vector<Int3> first{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}},
+      second{{2, 0, 0}, {3, 0, 0}, {4, 0, 0}};
+  auto now = cache.begin(first, kFirstTile);
+  now->wait();
+  auto next = cache.begin(second, kFirstTile);
+  cache.will_need(*next, {{0, 1, 0}, {2, 0, 0}});
+  for (const Int3 b : first) expect_samples(*now, b);
+  next->wait();
+  for (const Int3 b : first) expect_samples(*now, b);
+  for (const Int3 b : second) expect_samples(*next, b);
+  EXPECT_EQ(now->find({2, 0, 0}), next->find({2, 0, 0}));
+  now.reset();
+  for (const Int3 b : second) expect_samples(*next, b);
+  EXPECT_EQ(cache.reads(), cache.bricks_read());
+}
+
+TEST_F(Stream, CacheGivesUpBricksThatNobodyWaitsFor) {
+  const StoreReader store(path_);
+  for (int i = 0; i < 20; ++i) {
+    BrickCache cache(store, 0, 0, 4);
+    const std::vector<Int3> bricks{{0, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}};
+    const auto begun = cache.begin(bricks, kFirstTile);
+  }
+  EXPECT_LE(store.brick_times().bytes_decoded, 20u * 4 * 32 * 32 * 32 * 2);
+}
+
+TEST_F(Stream, CacheSaysWhichBrickIsDamaged) {
+  {
+    const StoreReader store(path_);
+    const auto place = store.locate(0, {3, 0, 0});
+    ASSERT_TRUE(place);
+    std::fstream file(place->file, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(place->offset + place->size / 2));
+    file.put('x').put('y').put('z');
+  }
+  const StoreReader store(path_);
+  BrickCache cache(store, 0, 0, 4);
+  const auto whole = cache.begin(std::vector<Int3>{{2, 0, 0}}, kFirstTile);
+  const auto damaged = cache.begin(std::vector<Int3>{{2, 0, 0}, {3, 0, 0}}, kFirstTile);
+  whole->wait();
+  try {
+    damaged->wait();
+    FAIL() << "no error";
+  } catch (const DamageError& e) {
+    EXPECT_NE(std::string(e.what()).find("(3, 0, 0)"), std::string::npos) << e.what();
+  }
+  expect_samples(*whole, {2, 0, 0});
 }
 
 TEST_F(Stream, CacheDropsWhatNoLaterTileNeedsAndReusesItsMemory) {
@@ -45,13 +103,14 @@ TEST_F(Stream, CacheDropsWhatNoLaterTileNeedsAndReusesItsMemory) {
     std::set<const std::byte*> places, all_places;
     TileBatch batch;
     while (planner.next(batch)) {
-      cache.drop_before(morton_encode(batch.tiles.front().tile));
-      cache.require(batch.bricks);
-      keeps_all.require(batch.bricks);
+      const auto cached = cache.begin(batch.bricks, batch.tiles.back().tile);
+      const auto kept = keeps_all.begin(batch.bricks, kFirstTile);
+      cached->wait();
+      kept->wait();
       for (const Int3 b : batch.bricks) {
-        expect_samples(cache, b);
-        places.insert(cache.find(b));
-        all_places.insert(keeps_all.find(b));
+        expect_samples(*cached, b);
+        places.insert(cached->find(b));
+        all_places.insert(kept->find(b));
       }
     }
     // Nothing is read twice.
