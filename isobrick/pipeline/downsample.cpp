@@ -44,35 +44,63 @@ T mean_of_unusual(const Rows<T>& r, Index x0, Index x1) {
 }
 
 template <class T>
-double plain_sum(const Rows<T>& r, Index x0, Index x1) {
-  const auto column = [&](Index x) {
-    return (static_cast<double>(r.a[x]) + static_cast<double>(r.b[x])) +
-           (static_cast<double>(r.c[x]) + static_cast<double>(r.d[x]));
-  };
-  return column(x0) + column(x1);
+double plain_sum(T a, T b, T c, T d) {
+  return (static_cast<double>(a) + static_cast<double>(b)) +
+         (static_cast<double>(c) + static_cast<double>(d));
+}
+
+/// Averages the pairs of a row of `width` floats, as plain_sum() does: first columns, then
+/// pairs of them, which the compiler turns into vectors of any width. False where a mean is not
+/// finite.
+template <class T>
+[[gnu::always_inline]] inline bool average_pairs(const Rows<T>& r, Index pairs, T* __restrict out) {
+  constexpr Index kAtOnce = 64;
+  double columns[2 * kAtOnce];
+  std::uint64_t unusual = 0;
+  for (Index first = 0; first < pairs; first += kAtOnce) {
+    const Index count = std::min(kAtOnce, pairs - first);
+    const T *a = r.a + 2 * first, *b = r.b + 2 * first, *c = r.c + 2 * first, *d = r.d + 2 * first;
+    for (Index x = 0; x < 2 * count; ++x) columns[x] = plain_sum(a[x], b[x], c[x], d[x]);
+    for (Index i = 0; i < count; ++i) {
+      const double mean = (columns[2 * i] + columns[2 * i + 1]) * 0.125;
+      out[first + i] = static_cast<T>(mean);
+      unusual |= !(std::abs(mean) <= std::numeric_limits<double>::max());
+    }
+  }
+  return !unusual;
+}
+
+#ifdef __x86_64__
+/// The same with longer vectors: every operation stays what it is.
+template <class T>
+[[gnu::target("avx2")]] bool average_pairs_avx2(const Rows<T>& r, Index pairs, T* __restrict out) {
+  return average_pairs(r, pairs, out);
+}
+#endif
+
+template <class T>
+bool average_pairs_fast(const Rows<T>& r, Index pairs, T* out) {
+#ifdef __x86_64__
+  static const bool avx2 = __builtin_cpu_supports("avx2");
+  if (avx2) return average_pairs_avx2(r, pairs, out);
+#endif
+  return average_pairs(r, pairs, out);
 }
 
 /// Averages the pairs of a row of `width` samples.
 template <class T>
 void average_row(const Rows<T>& r, Index width, T* __restrict out) {
-  const Index pairs = width / 2;
+  const Index pairs = width / 2, x = width - 1;
   if constexpr (std::is_floating_point_v<T>) {
-    bool finite = true;
-    for (Index i = 0; i < pairs; ++i) {
-      const double mean = plain_sum(r, 2 * i, 2 * i + 1) * 0.125;
-      out[i] = static_cast<T>(mean);
-      finite &= std::abs(mean) <= std::numeric_limits<double>::max();
-    }
-    if (!finite)
+    if (!average_pairs_fast(r, pairs, out))
       for (Index i = 0; i < pairs; ++i)
         if (!std::isfinite(out[i])) out[i] = mean_of_unusual(r, 2 * i, 2 * i + 1);
     if (width % 2 == 0) return;
-    const double sum = plain_sum(r, width - 1, width - 1);
-    out[pairs] =
-        std::isfinite(sum) ? static_cast<T>(sum * 0.125) : mean_of_unusual(r, width - 1, width - 1);
+    const double sum = 2 * plain_sum(r.a[x], r.b[x], r.c[x], r.d[x]);
+    out[pairs] = std::isfinite(sum) ? static_cast<T>(sum * 0.125) : mean_of_unusual(r, x, x);
   } else {
     for (Index i = 0; i < pairs; ++i) out[i] = mean_of_integers(r, 2 * i, 2 * i + 1);
-    if (width % 2 != 0) out[pairs] = mean_of_integers(r, width - 1, width - 1);
+    if (width % 2 != 0) out[pairs] = mean_of_integers(r, x, x);
   }
 }
 
