@@ -299,7 +299,7 @@ SparsePyramid::SparsePyramid(VolumeSource& source, const StoreLayout& layout,
     : source_(source),
       layout_(layout),
       threads_(threads),
-      in_flight_(static_cast<std::size_t>(threads) + 1) {
+      in_flight_(2 * static_cast<std::size_t>(threads)) {
   const Lattice& finest = layout.levels.front().lattice;
   const std::size_t count = count_sparse_bricks(source, finest);
   const std::size_t fixed = kProgramBytes + source.memory() + count * kBytesPerBrick;
