@@ -7,7 +7,9 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <cstring>
 #include <istream>
 #include <limits>
 #include <span>
@@ -99,6 +101,10 @@ class VdbLeaves {
     void read(std::span<const Leaf* const> leaves, const F& f);
 
    private:
+    using Mask = typename Leaf::NodeMaskType;
+    void read_leaf(std::span<char> bytes, const Mask& active, Value* values);
+    void restore(const char* said, const Mask& active, const Value* kept, Value* values) const;
+
     const VdbLeaves& leaves_;
     std::vector<char> bytes_;
     VdbMemoryBuffer buffer_;
@@ -149,6 +155,54 @@ VdbLeaves<Tree>::Reader::Reader(const VdbLeaves& leaves)
   openvdb::io::setStreamMetadataPtr(in_, how_, true);
 }
 
+/// Where only active values are kept, OpenVDB reads them, but the others are put between them by
+/// restore(): OpenVDB asks for each voxel anew whether it is active, and guesses wrong half the
+/// time.
+template <class Tree>
+void VdbLeaves<Tree>::Reader::read_leaf(std::span<char> bytes, const Mask& active, Value* values) {
+  buffer_.assign(bytes);
+  Mask again;
+  again.load(in_);
+  const bool only_active = (how_->compression() & openvdb::io::COMPRESS_ACTIVE_MASK) != 0 &&
+                           bytes.size() > sizeof(Mask) &&
+                           bytes[sizeof(Mask)] != openvdb::io::NO_MASK_AND_ALL_VALS;
+  const openvdb::Index count = only_active ? active.countOn() : Leaf::SIZE;
+  if (count == Leaf::SIZE)
+    return openvdb::io::readCompressedValues(in_, values, Leaf::SIZE, active, leaves_.as_half_);
+  Value kept[Leaf::SIZE];
+  openvdb::io::readCompressedValues(in_, kept, count, active, leaves_.as_half_);
+  restore(bytes.data() + sizeof(Mask), active, kept, values);
+}
+
+/// `said` is what says of the inactive values which two they are, and which is which. It has been
+/// read once: it is whole.
+template <class Tree>
+void VdbLeaves<Tree>::Reader::restore(const char* said, const Mask& active, const Value* kept,
+                                      Value* values) const {
+  using namespace openvdb::io;
+  const int kind = *said++;
+  const Value background = *static_cast<const Value*>(how_->backgroundPtr());
+  Value inactive[2] = {
+      kind == NO_MASK_OR_INACTIVE_VALS ? background : openvdb::math::negative(background),
+      background};
+  const auto take = [&said](auto& what) {
+    std::memcpy(&what, said, sizeof what);
+    said += sizeof what;
+  };
+  const bool two = kind == MASK_AND_TWO_INACTIVE_VALS;
+  if (kind == NO_MASK_AND_ONE_INACTIVE_VAL || kind == MASK_AND_ONE_INACTIVE_VAL || two)
+    take(inactive[0]);
+  if (two) take(inactive[1]);
+  std::uint64_t second[Leaf::SIZE / 64] = {};  // bit i: inactive[1], if voxel i is inactive
+  static_assert(sizeof second == sizeof(Mask));
+  if (kind == MASK_AND_NO_INACTIVE_VALS || kind == MASK_AND_ONE_INACTIVE_VAL || two) take(second);
+  for (openvdb::Index word = 0; word < Leaf::SIZE / 64; ++word, values += 64) {
+    for (int i = 0; i < 64; ++i) values[i] = inactive[second[word] >> i & 1];
+    for (auto on = active.template getWord<std::uint64_t>(word); on != 0; on &= on - 1)
+      values[std::countr_zero(on)] = *kept++;
+  }
+}
+
 template <class Tree>
 template <class F>
 void VdbLeaves<Tree>::Reader::read(std::span<const Leaf* const> leaves, const F& f) {
@@ -163,11 +217,8 @@ void VdbLeaves<Tree>::Reader::read(std::span<const Leaf* const> leaves, const F&
     read_at(leaves_.file_.fd.get(), leaves_.path_, begin[0],
             reinterpret_cast<std::byte*>(bytes_.data()), bytes_.size());
     for (std::size_t i = 0; i < count; ++i) {
-      buffer_.assign(std::span(bytes_).subspan(begin[i] - begin[0], begin[i + 1] - begin[i]));
-      typename Leaf::NodeMaskType mask;
-      mask.load(in_);
-      openvdb::io::readCompressedValues(in_, values, Leaf::SIZE, leaves[i]->valueMask(),
-                                        leaves_.as_half_);
+      read_leaf(std::span(bytes_).subspan(begin[i] - begin[0], begin[i + 1] - begin[i]),
+                leaves[i]->valueMask(), values);
       f(*leaves[i], [&](openvdb::Index at) { return values[at]; });
     }
     leaves = leaves.subspan(count);

@@ -28,6 +28,30 @@ typename Grid::Ptr make_grid(typename Grid::ValueType background) {
   return grid;
 }
 
+/// A leaf for each way in which OpenVDB stores inactive values: none but the background, its
+/// negative, another one; two of these; more.
+template <class Grid>
+void add_inactive_values(Grid& grid) {
+  using Value = typename Grid::ValueType;
+  const Value background = grid.background(), minus = -background;
+  const Value five = 5, six = 6, seven = 7;
+  const std::vector<Value> ways[] = {
+      {background}, {minus},           {five}, {background, minus}, {five, background},
+      {five, six},  {five, six, seven}};
+  auto accessor = grid.getAccessor();
+  int x = 64;
+  for (const std::vector<Value>& way : ways) {
+    for (int i = 0; i < 512; ++i) {
+      const openvdb::Coord at{x + (i >> 6), i >> 3 & 7, i & 7};
+      if (i % 3 == 0)
+        accessor.setValue(at, static_cast<Value>(i));
+      else
+        accessor.setValueOff(at, way[static_cast<std::size_t>(i * 7 % 11) % way.size()]);
+    }
+    x += 8;
+  }
+}
+
 class Vdb : public ::testing::Test {
  protected:
   Vdb() { openvdb::initialize(); }
@@ -174,8 +198,10 @@ TEST_F(Vdb, ReadsEveryWayOfStoringLeaves) {
       for (const std::uint32_t mask : {std::uint32_t{0}, std::uint32_t{io::COMPRESS_ACTIVE_MASK}}) {
         const auto f = make_grid<openvdb::FloatGrid>(-2.5F);
         f->setSaveFloatAsHalf(as_half);
+        add_inactive_values(*f);
         expect_same<float>(*f, round_trip(f, values | mask));
         const auto i = make_grid<openvdb::Int32Grid>(-7);
+        add_inactive_values(*i);
         expect_same<std::int32_t>(*i, round_trip(i, values | mask));
       }
 }
