@@ -9,7 +9,10 @@ and processor seconds, medians; on a busy machine the latter say more.
 
     bench/format_bench.py build/release/bin/isobrick bonsai_256x256x256_uint8.raw
 
-Needs Debian's numpy, and of nibabel, vtkmodules, tifffile, h5py, pydicom what is to be
+Of Zarr it is timed, too, how long `isobrick index` takes in place, which reads all and writes
+ranges and a search structure only.
+
+Needs Debian's numpy, and of nibabel, vtkmodules, tifffile, h5py, pydicom, zarr what is to be
 compared.
 """
 
@@ -98,6 +101,47 @@ def dicom(path, samples):
         data.save_as(path / f"{z}.dcm", write_like_original=False)
 
 
+def zarr_v2(path, samples, codec):
+    import zarr
+    array = zarr.open_array(str(path), mode="w", shape=samples.shape, chunks=(64, 64, 64), dtype="<u2",
+                            compressor=codec, zarr_version=2)
+    array[:] = samples
+
+
+def zarr_blosc(path, samples):
+    import numcodecs
+    zarr_v2(path, samples, numcodecs.Blosc())  # zarr-python's own choice: LZ4, shuffled
+
+
+def zarr_gzip(path, samples):
+    import numcodecs
+    zarr_v2(path, samples, numcodecs.GZip(6))
+
+
+def zarr_v3(path, samples):
+    """Chunks of 64³ by zstd. Debian's zarr-python knows no version 3 as it was published, so that
+    its numcodecs encodes and what is said of the array is written here."""
+    import itertools
+    import json
+    import numcodecs
+    path.mkdir()
+    (path / "zarr.json").write_text(json.dumps({
+        "zarr_format": 3, "node_type": "array", "shape": samples.shape, "data_type": "uint16",
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [64, 64, 64]}},
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
+        "codecs": [{"name": "bytes", "configuration": {"endian": "little"}},
+                   {"name": "zstd", "configuration": {"level": 3, "checksum": False}}],
+        "fill_value": 0, "attributes": {}}))
+    codec = numcodecs.Zstd(3)
+    for at in itertools.product(*(range(-(-size // 64)) for size in samples.shape)):
+        part = samples[tuple(slice(64 * i, 64 * i + 64) for i in at)]
+        chunk = numpy.zeros((64, 64, 64), "<u2")
+        chunk[tuple(map(slice, part.shape))] = part
+        name = path.joinpath("c", *map(str, at))
+        name.parent.mkdir(parents=True, exist_ok=True)
+        name.write_bytes(codec.encode(chunk))
+
+
 READERS = {
     "nrrd": "import gzip, numpy; f = open(path, 'rb').read(); "
             "numpy.frombuffer(gzip.decompress(f[f.index(b'\\n\\n') + 2:]), 'u2')",
@@ -108,13 +152,17 @@ READERS = {
     "hdf5": "import h5py; h5py.File(path)['v'][:]",
     "dicom": "import pathlib, pydicom; "
              "[pydicom.dcmread(p).pixel_array.copy() for p in pathlib.Path(path).iterdir()]",
+    "zarr": "import zarr; zarr.open_array(path, mode='r')[:]",
+    "chunks": "import pathlib, numcodecs; codec = numcodecs.Zstd(); "
+              "[codec.decode(p.read_bytes()) for p in pathlib.Path(path, 'c').glob('*/*/*')]",
 }
 CASES = {
     "nrrd gzip": (nrrd, "v.nrrd", "nrrd"), "nifti gzip": (nifti, "v.nii.gz", "nifti"),
     "nifti": (nifti, "v.nii", "nifti"), "vti zlib": (vti, "v.vti", "vti"),
     "vti base64": (vti_base64, "b.vti", "vti"), "tiff zlib": (tiff, "z.tif", "tiff"),
     "tiff": (tiff_plain, "v.tif", "tiff"), "hdf5 gzip": (hdf5, "v.h5", "hdf5"),
-    "dicom": (dicom, "series", "dicom"),
+    "dicom": (dicom, "series", "dicom"), "zarr2 blosc": (zarr_blosc, "b.zarr", "zarr"),
+    "zarr2 gzip": (zarr_gzip, "g.zarr", "zarr"), "zarr3 zstd": (zarr_v3, "z.zarr", "chunks"),
 }
 
 
@@ -129,12 +177,22 @@ def read_by_library(kind, path):
     return [float(number) for number in done.stdout.split()]
 
 
-def convert(program, path, store):
-    shutil.rmtree(store, ignore_errors=True)
+def run(words):
+    """Wall and processor seconds of a program."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-    subprocess.run([program, "convert", path, store, "--quiet"], check=True)
+    subprocess.run(words, check=True)
     wall, after = time.monotonic() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def convert(program, path, store):
+    shutil.rmtree(store, ignore_errors=True)
+    return run([program, "convert", path, store, "--quiet"])
+
+
+def index_in_place(program, path):
+    shutil.rmtree(path / "isobrick", ignore_errors=True)
+    return run([program, "index", path, "--kind", "octree", "--quiet"])
 
 
 def main():
@@ -168,6 +226,11 @@ def main():
                 print(f"  {name if i == 0 else '':11} {clock:4} library {library:7.3f} s   "
                       f"raw {plain:7.3f} s   convert {ours:7.3f} s   "
                       f"{ours / max(library, plain):5.2f} of the slower", flush=True)
+            if file.endswith(".zarr"):
+                runs = [index_in_place(arguments.isobrick, folder / file)
+                        for _ in range(arguments.repeat)]
+                wall, cpu = (statistics.median(clock) for clock in zip(*runs))
+                print(f"              index in place: wall {wall:.3f} s, cpu {cpu:.3f} s", flush=True)
 
 
 if __name__ == "__main__":
