@@ -146,8 +146,9 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<Surface>& surfaces, co
 }
 
 ExtractEstimate estimate_one(const Surface& surface, const StoreReader& store) {
-  return estimate(store, surface.options,
-                  mesh_memory(surface.form.format, surface.options.threads));
+  return estimate(
+      store, surface.options,
+      mesh_memory(surface.form.format, surface.options.threads, surface.options.memory));
 }
 
 /// Refuses meshes that cannot fit their disk, before anything is written.
@@ -267,7 +268,8 @@ std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Argume
   for (const Surface& surface : surfaces) {
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty())
-      of_surface.mesh = open_mesh(surface.output, surface.form, force, arguments.threads);
+      of_surface.mesh =
+          open_mesh(surface.output, surface.form, force, arguments.threads, arguments.memory);
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.picture);
   }

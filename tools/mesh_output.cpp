@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "isobrick/core/error.h"
@@ -30,6 +31,13 @@ constexpr std::array<NamedFormat, 6> kFormats{{{MeshFormat::ply, "ply", "PLY"},
                                                {MeshFormat::vtp, "vtp", "VTP"},
                                                {MeshFormat::pvtp, "pvtp", "PVTP"}}};
 
+/// What a PLY file's faces may take of a budget until they are written: nothing of a small one,
+/// which the extraction needs.
+std::size_t faces_memory(std::uint64_t memory) {
+  constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+  return memory < 512 * mib ? 0 : static_cast<std::size_t>(std::min(memory / 16, 64 * mib));
+}
+
 }  // namespace
 
 std::string_view name_of(MeshFormat format) {
@@ -54,10 +62,10 @@ MeshFormat parse_mesh_format(const std::string& text) {
 }
 
 std::unique_ptr<MeshSink> open_mesh(const fs::path& path, const MeshForm& form, bool force,
-                                    int threads) {
+                                    int threads, std::uint64_t memory) {
   const std::string name = path.string();
   switch (form.format) {
-    case MeshFormat::ply: return std::make_unique<PlySink>(name, force);
+    case MeshFormat::ply: return std::make_unique<PlySink>(name, force, faces_memory(memory));
     case MeshFormat::stl: return std::make_unique<StlSink>(name, force);
     case MeshFormat::obj: return std::make_unique<ObjSink>(name, force, threads);
     case MeshFormat::glb:
@@ -68,8 +76,9 @@ std::unique_ptr<MeshSink> open_mesh(const fs::path& path, const MeshForm& form, 
   throw UsageError("no such format of a mesh");
 }
 
-std::uint64_t mesh_memory(MeshFormat format, int threads) {
+std::uint64_t mesh_memory(MeshFormat format, int threads, std::uint64_t memory) {
   switch (format) {
+    case MeshFormat::ply: return faces_memory(memory);
     case MeshFormat::obj: return ObjSink::memory_with(threads);
     case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
     case MeshFormat::pvtp: return part_memory(PvtpSink::kPartTriangles);

@@ -28,12 +28,13 @@ MeshFormat mesh_format(const std::filesystem::path& path);
 /// By its name in lower case.
 MeshFormat parse_mesh_format(const std::string& text);
 
-/// `threads` may help to write, 0: all cores. Throws what the format's sink does.
+/// `threads` may help to write, 0: all cores; `memory` is the budget of the whole command.
+/// Throws what the format's sink does.
 std::unique_ptr<MeshSink> open_mesh(const std::filesystem::path& path, const MeshForm& form,
-                                    bool force, int threads);
+                                    bool force, int threads, std::uint64_t memory);
 
 /// What MeshSink::memory() of such a mesh is.
-std::uint64_t mesh_memory(MeshFormat format, int threads);
+std::uint64_t mesh_memory(MeshFormat format, int threads, std::uint64_t memory);
 
 /// Bytes of a finished mesh, its parts included.
 std::uint64_t mesh_bytes(const std::filesystem::path& path);

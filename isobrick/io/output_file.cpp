@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <stdio.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <new>
 
 #include "isobrick/core/error.h"
 
@@ -34,19 +36,26 @@ Temporary create_beside(const std::string& path) {
 
 }  // namespace
 
-FileWriter::FileWriter(UniqueFd fd, std::string path)
-    : fd_(std::move(fd)),
-      path_(std::move(path)),
-      buffer_(std::make_unique_for_overwrite<std::byte[]>(kBuffer)) {}
+FileWriter::FileWriter(UniqueFd fd, std::string path, std::size_t memory)
+    : fd_(std::move(fd)), path_(std::move(path)), capacity_(std::max(memory, kBuffer)) {
+  // The first touch of a small page takes as long as to write it.
+  constexpr std::size_t large_page = std::size_t{2} << 20;
+  const bool large = capacity_ >= large_page;
+  const std::size_t align = large ? large_page : 64;
+  const std::size_t bytes = (capacity_ + align - 1) / align * align;
+  buffer_.reset(static_cast<std::byte*>(std::aligned_alloc(align, bytes)));
+  if (!buffer_) throw std::bad_alloc();
+  if (large) (void)::madvise(buffer_.get(), bytes, MADV_HUGEPAGE);
+}
 
 std::byte* FileWriter::reserve(std::size_t size) {
-  if (used_ + size > kBuffer) flush();
+  if (used_ + size > capacity_) flush();
   return buffer_.get() + used_;
 }
 
 void FileWriter::append(std::span<const std::byte> bytes) {
-  if (bytes.size() > kBuffer) {
-    flush();
+  if (used_ + bytes.size() > capacity_) flush();
+  if (bytes.size() > capacity_) {
     write_all(bytes.data(), bytes.size());
   } else if (!bytes.empty()) {
     std::memcpy(reserve(bytes.size()), bytes.data(), bytes.size());
@@ -54,7 +63,11 @@ void FileWriter::append(std::span<const std::byte> bytes) {
   }
 }
 
-void FileWriter::flush() { write_all(buffer_.get(), std::exchange(used_, 0)); }
+void FileWriter::flush() {
+  write_all(buffer_.get(), std::exchange(used_, 0));
+  // What did not fit in memory goes into the file as it comes.
+  capacity_ = kBuffer;
+}
 
 void FileWriter::write_all(const std::byte* bytes, std::size_t size) {
   while (size > 0) {
@@ -73,6 +86,8 @@ void FileWriter::fail(int errno_value) const {
 
 void FileWriter::append_range(FileWriter& other, std::uint64_t offset, std::uint64_t size) {
   flush();
+  if (offset >= other.written_)
+    return write_all(other.buffer_.get() + (offset - other.written_), size);
   other.flush();
   auto from = static_cast<off_t>(offset);
   const auto end = static_cast<off_t>(offset + size);
@@ -183,10 +198,10 @@ void OutputFile::rename() {
   if (result != 0) throw system_error("rename the finished file to", path_, errno);
 }
 
-FileWriter open_scratch_beside(const std::string& path) {
+FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {
   Temporary temporary = create_beside(path);
   ::unlink(temporary.path.c_str());
-  return FileWriter(std::move(temporary.fd), path);
+  return FileWriter(std::move(temporary.fd), path, memory);
 }
 
 }  // namespace isobrick

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,8 +15,9 @@ namespace isobrick {
 /// Appends to a file through a large buffer.
 class FileWriter {
  public:
-  /// `path` is for messages.
-  FileWriter(UniqueFd fd, std::string path);
+  /// `path` is for messages. The first `memory` bytes stay in memory, as long as there are no
+  /// more and nothing asks for them to be in the file; at least kBuffer.
+  FileWriter(UniqueFd fd, std::string path, std::size_t memory = kBuffer);
 
   /// Room for `size` <= kBuffer bytes, to be filled in place and then committed.
   std::byte* reserve(std::size_t size);
@@ -49,9 +51,14 @@ class FileWriter {
   void write_all(const std::byte* bytes, std::size_t size);
   [[noreturn]] void fail(int errno_value) const;
 
+  struct Free {
+    void operator()(std::byte* buffer) const { std::free(buffer); }
+  };
+
   UniqueFd fd_;
   std::string path_;
-  std::unique_ptr<std::byte[]> buffer_;
+  std::size_t capacity_;  ///< of the buffer; kBuffer when something has been written
+  std::unique_ptr<std::byte, Free> buffer_;
   std::size_t used_ = 0;
   std::uint64_t written_ = 0;
 };
@@ -94,7 +101,8 @@ class OutputFile {
   FileWriter writer_;
 };
 
-/// A nameless file in the folder of `path`: gone when it is closed, whatever happens.
-FileWriter open_scratch_beside(const std::string& path);
+/// A nameless file in the folder of `path`: gone when it is closed, whatever happens. `memory`
+/// as FileWriter.
+FileWriter open_scratch_beside(const std::string& path, std::size_t memory = FileWriter::kBuffer);
 
 }  // namespace isobrick

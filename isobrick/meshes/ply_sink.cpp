@@ -35,8 +35,10 @@ void append_faces(FileWriter& out, std::span<const Triangle> triangles) {
 
 }  // namespace
 
-PlySink::PlySink(std::string path, bool force)
-    : out_(std::move(path), force), faces_(open_scratch_beside(out_.path())) {}
+PlySink::PlySink(std::string path, bool force, std::size_t memory)
+    : memory_(memory),
+      out_(std::move(path), force),
+      faces_(open_scratch_beside(out_.path(), memory)) {}
 
 /// Always of the same length, so that it can be replaced when the counts are
 /// known. Padding goes into a comment: some readers take a count with leading

@@ -13,8 +13,9 @@ namespace isobrick {
 /// int, because a mesh may have up to 2³² − 1 vertices.
 class PlySink final : public MeshSink {
  public:
-  /// See OutputFile for what `path` and `force` may throw.
-  PlySink(std::string path, bool force);
+  /// See OutputFile for what `path` and `force` may throw. The faces come behind all vertices:
+  /// so many bytes of them wait in memory, more in a file without a name.
+  PlySink(std::string path, bool force, std::size_t memory = 0);
 
   Indexing indexing() const override { return Indexing::welded; }
   void begin(const MeshHeader& header) override;
@@ -22,10 +23,12 @@ class PlySink final : public MeshSink {
   void write(const MeshChunk& chunk) override;
   void finish() override;
   std::uint64_t bytes() const override { return out_.writer().size() + faces_.size(); }
+  std::uint64_t memory() const override { return memory_; }
 
  private:
   std::string header_text() const;
 
+  std::size_t memory_;
   OutputFile out_;    ///< header and vertices; the faces at the end
   FileWriter faces_;  ///< waits until all vertices are known
   bool has_normals_ = false;

@@ -101,6 +101,32 @@ TEST(OutputFile, RefusesPlacesThatCannotBeWritten) {
   ::chmod((dir / ".").c_str(), 0700);
 }
 
+TEST(OutputFile, AppendsWhatWaitsInMemoryOrInAFile) {
+  const TempDir dir;
+  std::string bytes(std::size_t{10} << 20, 'x');
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * i >> 7);
+  for (const std::size_t memory : {0, 3, 16}) {
+    FileWriter scratch = open_scratch_beside(dir / "a", memory << 20);
+    OutputFile out(dir / "a", true);
+    // Pieces below and above what is kept in memory.
+    std::size_t at = 0;
+    for (std::size_t piece = 1; at < bytes.size(); at += piece, piece = piece * 3 / 2 + 1)
+      scratch.append(std::string_view(bytes).substr(at, piece));
+    ASSERT_EQ(scratch.size(), bytes.size());
+    out.writer().append("head");
+    out.writer().append_file(scratch);
+    out.writer().append_range(scratch, std::size_t{5} << 20, 1234);
+    out.writer().append_range(scratch, bytes.size() - 10, 10);
+    std::string end(1, ' ');
+    scratch.read_back(bytes.size() - 1, std::as_writable_bytes(std::span(end)));
+    EXPECT_EQ(end[0], bytes.back());
+    out.publish();
+    EXPECT_TRUE(dir.read("a") == "head" + bytes + bytes.substr(std::size_t{5} << 20, 1234) +
+                                     bytes.substr(bytes.size() - 10))
+        << memory;
+  }
+}
+
 TEST(OutputFile, AppendsAndPatches) {
   const TempDir dir;
   std::string expected;

@@ -103,13 +103,16 @@ TEST(Format, Figures) {
 }
 
 TEST(Mesh, ItsMemoryIsKnownBeforeItIsOpened) {
+  constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
   const TempDir dir;
   for (const MeshFormat format : {MeshFormat::ply, MeshFormat::stl, MeshFormat::obj,
                                   MeshFormat::glb, MeshFormat::vtp, MeshFormat::pvtp})
     for (const int threads : {0, 3})
-      EXPECT_EQ(mesh_memory(format, threads),
-                open_mesh(dir / "a", {.format = format}, true, threads)->memory())
-          << name_of(format);
+      for (const std::uint64_t memory : {64 * kMiB, 1024 * kMiB})
+        EXPECT_EQ(mesh_memory(format, threads, memory),
+                  open_mesh(dir / "a", {.format = format}, true, threads, memory)->memory())
+            << name_of(format);
+  EXPECT_EQ(mesh_memory(MeshFormat::ply, 0, 64 * kMiB), 0U);
 }
 
 TEST(Space, AMeshNeedsItsScratchFileToo) {
