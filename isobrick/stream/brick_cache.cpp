@@ -11,9 +11,6 @@
 
 namespace isobrick {
 
-CachedBricks::CachedBricks(BrickCache& cache, std::vector<Int3> bricks)
-    : cache_(cache), bricks_(std::move(bricks)) {}
-
 CachedBricks::~CachedBricks() noexcept {
   tasks_.cancel();
   try {
@@ -46,14 +43,16 @@ BrickCache::BrickCache(const StoreReader& store, int level, Index reach, std::si
       seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {}
 
 std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, Int3 last) {
-  auto begun =
-      std::make_unique<CachedBricks>(*this, std::vector<Int3>(bricks.begin(), bricks.end()));
+  auto begun = std::make_unique<CachedBricks>(*this);
+  begun->bricks_.reserve(bricks.size());
   std::vector<Int3> missing;
   // First what is here: it must not go as needed by nobody later, nor for what is missing.
-  for (const Int3 b : bricks)
-    if (!slots_.hold(b)) missing.push_back(b);
+  for (const Int3 b : bricks) (slots_.hold(b) ? begun->bricks_ : missing).push_back(b);
   slots_.advance(morton_encode(last) + 1);
-  for (const Int3 b : missing) begun->loads_.push_back({b, place(b)});
+  for (const Int3 b : missing) {
+    begun->loads_.push_back({b, place(b)});
+    begun->bricks_.push_back(b);
+  }
   for (CachedBricks::Load& load : begun->loads_)
     begun->tasks_.run(
         [this, &load] { load.present = store_.read_brick(level_, load.brick, load.samples); });

@@ -23,7 +23,7 @@ class BrickCache;
 /// which they were begun; once that failed or was given up, the cache is of no use any more.
 class CachedBricks final : public BrickLookup {
  public:
-  CachedBricks(BrickCache& cache, std::vector<Int3> bricks);
+  explicit CachedBricks(BrickCache& cache) : cache_(cache) {}
   CachedBricks(const CachedBricks&) = delete;
   CachedBricks& operator=(const CachedBricks&) = delete;
   /// Decodes nothing more, but waits for what is being decoded.
@@ -44,8 +44,8 @@ class CachedBricks final : public BrickLookup {
   };
 
   BrickCache& cache_;
-  std::vector<Int3> bricks_;
-  std::vector<Load> loads_;  ///< what was not there
+  std::vector<Int3> bricks_;  ///< held
+  std::vector<Load> loads_;   ///< what was not there
   std::unordered_map<std::uint64_t, const std::byte*> samples_;
   tbb::task_group tasks_;
 };
