@@ -23,6 +23,7 @@
 #include <thread>
 #include <utility>
 
+#include "bench/picture_times.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/pipeline/gpu_backend.h"
@@ -53,39 +54,17 @@ double seconds_since(Clock::time_point start) {
 
 std::uint64_t bytes_of(double gib) { return static_cast<std::uint64_t>(gib * (1 << 30)); }
 
-/// Milliseconds of many pictures.
-class Times {
- public:
-  void add(double seconds) { ms_.push_back(seconds * 1e3); }
-  Json summary() {
-    std::sort(ms_.begin(), ms_.end());
-    if (ms_.empty()) return {{"pictures", 0}};
-    const auto part = [&](double p) {
-      return ms_[std::min(ms_.size() - 1,
-                          static_cast<std::size_t>(p * static_cast<double>(ms_.size())))];
-    };
-    double sum = 0;
-    for (const double ms : ms_) sum += ms;
-    return {{"pictures", ms_.size()},
-            {"median_ms", part(0.5)},
-            {"p99_ms", part(0.99)},
-            {"max_ms", ms_.back()},
-            {"per_second_if_unpaced", 1e3 * static_cast<double>(ms_.size()) / sum}};
-  }
-
- private:
-  std::vector<double> ms_;
-};
-
 /// A store on a screen of no window.
 class Session {
  public:
-  Session(const Arguments& arguments, const PictureBudgets& budgets)
+  Session(const Arguments& arguments, const PictureBudgets& budgets,
+          const std::shared_ptr<PictureSetup>& setup)
       : arguments_(arguments),
         opened_(Clock::now()),
         store_(std::make_shared<const StoreReader>(arguments.store)) {
     read_seconds = seconds_since(opened_);
-    picture_ = std::make_unique<StorePicture>(store_, budgets, [] {});
+    picture_ = std::make_unique<StorePicture>(
+        store_, budgets, [] {}, setup);
     set_up_seconds = seconds_since(opened_);
     settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
     settings.multisample = !current_gl_device().software;
@@ -106,9 +85,10 @@ class Session {
     const int smaller = moving ? pacer_.smaller() : 1;
     picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, now,
                    moving ? pacer_.coarser() : 1);
-    submitting.add(seconds_since(start));
+    const double submitted = seconds_since(start);
     glFinish();
     const double seconds = seconds_since(start);
+    pictures.add(seconds, picture_->times(), seconds - submitted);
     if (moving)
       pacer_.drawn(seconds);
     else if (!plain)
@@ -118,11 +98,11 @@ class Session {
   }
   /// At most 60 times a second until `done`. Throws Error when that takes longer than two minutes.
   template <class F>
-  void draw_until(bool moving, Times& times, F&& done) {
+  void draw_until(bool moving, F&& done) {
     const auto start = Clock::now();
     while (seconds_since(start) < 120) {
       const auto next = Clock::now() + std::chrono::microseconds(16'667);
-      times.add(draw(moving));
+      draw(moving);
       if (done()) return;
       std::this_thread::sleep_until(next);
     }
@@ -133,7 +113,7 @@ class Session {
   Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   double read_seconds = 0, set_up_seconds = 0;
   std::uint64_t device_peak = 0;
-  Times submitting;  ///< of pictures, without what the device still had to do
+  PicturesTimes pictures;  ///< since somebody took them
 
  private:
   const Arguments& arguments_;
@@ -168,10 +148,10 @@ Json stream_json(const StreamCounters& c) {
 
 /// The isovalue goes to and fro, another one with every picture.
 Json slide(Session& session, const Arguments& arguments) {
-  Times times, behind;
+  Times behind;
   std::map<double, Clock::time_point> asked;
   const auto start = Clock::now();
-  session.draw_until(true, times, [&] {
+  session.draw_until(true, [&] {
     const std::vector<double>& shown = session.picture().state().isovalues;
     const auto found = shown.empty() ? asked.end() : asked.find(shown[0]);
     if (found != asked.end()) behind.add(seconds_since(found->second));
@@ -182,8 +162,7 @@ Json slide(Session& session, const Arguments& arguments) {
     asked.emplace(isovalue, Clock::now());
     return turn >= 1;
   });
-  Json result = times.summary();
-  result["submitting"] = std::exchange(session.submitting, {}).summary();
+  Json result = std::exchange(session.pictures, {}).summary();
   // From asking for an isovalue to the end of a picture of its surface.
   result["surface_behind_slider"] = behind.summary();
   return result;
@@ -191,18 +170,18 @@ Json slide(Session& session, const Arguments& arguments) {
 
 /// Opening until the whole volume is refined as far as picture and budget go; jumps;
 /// sliding; turning.
-Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
-  Session session(arguments, budgets);
+Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
+                 const std::shared_ptr<PictureSetup>& setup) {
+  Session session(arguments, budgets, setup);
   Json result;
-  Times streaming;
   const auto covers = [&] { return session.picture().state().covers; };
   const auto complete = [&] { return session.picture().state().complete; };
-  session.draw_until(true, streaming, covers);
+  session.draw_until(true, covers);
   result["open"] = {{"store_ms", session.read_seconds * 1e3},
                     {"set_up_ms", session.set_up_seconds * 1e3},
                     {"first_surface_ms", session.since_opened() * 1e3}};
-  session.draw_until(false, streaming, complete);
-  streaming.add(session.draw(false));
+  session.draw_until(false, complete);
+  session.draw(false);
   result["open"]["complete_ms"] = session.since_opened() * 1e3;
   result["open"]["triangles"] = session.picture().state().triangles;
   result["open"]["nodes"] = session.picture().state().nodes;
@@ -216,30 +195,27 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
     Json jump{{"isovalue", session.settings.surfaces[0].isovalue}};
     // As the window does: simpler pictures until there is one of the new surface.
     session.draw(true);
-    session.draw_until(true, streaming, covers);
+    session.draw_until(true, covers);
     jump["first_surface_ms"] = seconds_since(start) * 1e3;
-    session.draw_until(false, streaming, complete);
-    streaming.add(session.draw(false));
+    session.draw_until(false, complete);
+    session.draw(false);
     jump["complete_ms"] = seconds_since(start) * 1e3;
     jumps.push_back(jump);
   }
   result["jumps"] = jumps;
-  result["while_streaming"] = streaming.summary();
-  result["while_streaming"]["submitting"] = std::exchange(session.submitting, {}).summary();
+  result["while_streaming"] = std::exchange(session.pictures, {}).summary();
 
   result["while_sliding"] = slide(session, arguments);
 
-  Times turning;
   const auto orbit = Clock::now();
   const Vec3d middle = session.camera.target, arm = session.camera.eye - middle;
-  session.draw_until(true, turning, [&] {
+  session.draw_until(true, [&] {
     const double turn = seconds_since(orbit) / arguments.seconds;
     const double a = turn * 2 * 3.14159265358979, c = std::cos(a), s = std::sin(a);
     session.camera.eye = middle + Vec3d{c * arm.x - s * arm.y, s * arm.x + c * arm.y, arm.z};
     return turn >= 1;
   });
-  result["while_turning"] = turning.summary();
-  result["while_turning"]["submitting"] = std::exchange(session.submitting, {}).summary();
+  result["while_turning"] = std::exchange(session.pictures, {}).summary();
   result["meshes_by"] = session.picture().device().describe();
   result["stream"] = stream_json(session.picture().scene().stream().counters());
   result["device_bytes_peak"] = session.device_peak;
@@ -248,7 +224,8 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets) {
 
 /// A region in the middle, all of level 0, from nothing to complete, beside the extraction of
 /// the same samples.
-Json refinement(const Arguments& arguments, const PictureBudgets& budgets) {
+Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
+                const std::shared_ptr<PictureSetup>& setup) {
   Json result;
   const StoreReader store(arguments.store);
   const Int3 extent = store.info().levels.front().lattice.extent;
@@ -279,7 +256,8 @@ Json refinement(const Arguments& arguments, const PictureBudgets& budgets) {
     extract_with(Backend::cuda, "extract_cuda");
   }
 
-  Session session(arguments, budgets);
+  glFinish();  // the session before may still be giving memory back
+  Session session(arguments, budgets, setup);
   session.settings.region_on = true;
   for (int axis = 0; axis < 3; ++axis) {
     const auto last = static_cast<double>(extent[axis] - 1);
@@ -291,13 +269,12 @@ Json refinement(const Arguments& arguments, const PictureBudgets& budgets) {
   }
   session.settings.pixel_error = 0.02f;
   const auto start = Clock::now();
-  Times times;
-  session.draw_until(false, times, [&] { return session.picture().state().complete; });
+  session.draw_until(false, [&] { return session.picture().state().complete; });
   result["refine"] = {{"seconds", seconds_since(start)},
                       {"triangles", session.picture().state().triangles},
                       {"nodes", session.picture().state().nodes},
                       {"limited_by_budget", session.picture().state().limited_by_budget},
-                      {"pictures", times.summary()},
+                      {"pictures", session.pictures.summary()},
                       {"stream", stream_json(session.picture().scene().stream().counters())}};
   return result;
 }
@@ -332,8 +309,13 @@ int run(int argc, char** argv) {
               {"renderer", current_gl_device().renderer},
               {"cores", std::thread::hardware_concurrency()},
               {"size", fmt::format("{}x{}", arguments.width, arguments.height)}};
-  result["refinement"] = refinement(arguments, budgets);
-  result["interactive"] = interactive(arguments, budgets);
+  // As a window does when it is made, before any store is opened.
+  const auto start = Clock::now();
+  const auto setup = std::make_shared<PictureSetup>(budgets, [] {});
+  result["set_up_ms"] = seconds_since(start) * 1e3;
+  // First what is best measured in a process that has drawn nothing yet.
+  result["interactive"] = interactive(arguments, budgets, setup);
+  result["refinement"] = refinement(arguments, budgets, setup);
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   result["peak_resident_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;

@@ -83,6 +83,7 @@ struct Renderer::State {
   }
 
   void start(const Camera& new_camera, int width, int height, const PictureSettings& new_settings);
+  void choose_targets(int width, int height);
   void clear();
   void clear_transparent();
   void bind_frame() { glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.get()); }
@@ -97,8 +98,11 @@ struct Renderer::State {
   MeshPass meshes;
   SlicePass slices;
   OverlayPass overlays;
-  std::optional<ScreenPass> screen;
-  std::optional<PictureTargets> targets;
+  // One for each way to sample: switching to and fro while something moves costs nothing.
+  std::array<std::optional<ScreenPass>, 2> screens;
+  std::array<std::optional<PictureTargets>, 2> kept_targets;
+  ScreenPass* screen = nullptr;       ///< of this picture
+  PictureTargets* targets = nullptr;  ///< likewise
 
   Camera camera;
   PictureSettings settings;
@@ -126,15 +130,23 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   slices.clear();
   overlays.start(camera, width, height);
   any_transparent = false;
-  const int samples = samples_of(settings);
-  if (!screen || screen->samples() != samples) screen.emplace(samples);
-  if (!targets || targets->width != width || targets->height != height ||
-      targets->samples != samples || targets->ids != settings.picking) {
-    targets.reset();  // first, so that both are never there at once
-    targets.emplace(width, height, samples, settings.picking);
-  }
+  choose_targets(width, height);
   fill_buffer(frame_buffer, std::as_bytes(std::span(&frame, 1)));
   clear();
+}
+
+void Renderer::State::choose_targets(int width, int height) {
+  const int samples = samples_of(settings);
+  const std::size_t way = settings.multisample ? 1 : 0;
+  if (!screens[way]) screens[way].emplace(samples);
+  screen = &*screens[way];
+  targets = nullptr;
+  // What has another size goes first, so that it and the new are never there at once.
+  for (std::optional<PictureTargets>& kept : kept_targets)
+    if (kept && (kept->width != width || kept->height != height || kept->ids != settings.picking))
+      kept.reset();
+  if (!kept_targets[way]) kept_targets[way].emplace(width, height, samples, settings.picking);
+  targets = &*kept_targets[way];
 }
 
 void Renderer::State::clear() {
@@ -246,6 +258,22 @@ void Renderer::draw_axes() { state_->overlays.add_axes(); }
 void Renderer::draw_scale_bar(const std::string& unit) { state_->overlays.add_scale_bar(unit); }
 
 void Renderer::end() { state_->finish(); }
+
+void Renderer::prepare(const PictureSettings& settings) {
+  constexpr int edge = 16;
+  const std::array<Vec3f, 3> corners{Vec3f{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::array<Triangle, 1> triangle{Triangle{0, 1, 2}};
+  MeshChunk mesh;
+  mesh.positions = corners;
+  mesh.normals = corners;
+  mesh.triangles = triangle;
+  begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), edge, edge, settings);
+  draw(mesh, {}, {});
+  draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
+  draw_axes();
+  draw_scale_bar("");
+  end();
+}
 
 int Renderer::width() const { return state_->targets ? state_->targets->width : 0; }
 int Renderer::height() const { return state_->targets ? state_->targets->height : 0; }

@@ -75,9 +75,14 @@ class Renderer {
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;
 
-  /// Device memory of a picture of this size while it is made. With transparent meshes: more.
+  /// Device memory of a picture of this size while it is made. With transparent meshes: more; and
+  /// where pictures of one size are made with and without multisampling, both are kept.
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
+
+  /// Draws a few pixels as pictures with these settings are drawn: drivers compile shaders when
+  /// something is first drawn with them, and the next picture does not wait for that any more.
+  void prepare(const PictureSettings& settings);
 
   /// Starts a picture. Throws UsageError for a size that cannot be.
   void begin(const Camera& camera, int width, int height, const PictureSettings& settings);

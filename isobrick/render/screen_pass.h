@@ -15,7 +15,6 @@ class ScreenPass {
   /// For targets of this many samples.
   explicit ScreenPass(int samples);
 
-  int samples() const { return samples_; }
   void run(const PictureTargets& targets, const PictureSettings& settings, bool transparent);
 
  private:

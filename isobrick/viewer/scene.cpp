@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "isobrick/core/stopwatch.h"
+
 namespace isobrick {
 namespace {
 
@@ -41,14 +43,20 @@ void Scene::update(const std::vector<double>& isovalues, const View& view, CutBu
   const double measured = stream_->counters().triangles_per_block;
   if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
   if (per_block_ > 0) budget.triangles_per_block = per_block_;
+  times_ = {};
+  Stopwatch watch;
   const ActiveNodes& active = search_->find(isovalues);
+  times_.search = watch.lap();
   if (view_ == view && budget_ == budget && cut_.isovalues == isovalues) return;
   view_ = view;
   budget_ = budget;
   Cut cut = selector_.select(active, view, budget);
-  if (same_cut(cut, cut_)) return;
+  const bool same = same_cut(cut, cut_);
+  times_.cut = watch.lap();
+  if (same) return;
   cut_ = std::move(cut);
   stream_->set_cut(cut_);
+  times_.plan = watch.lap();
 }
 
 }  // namespace isobrick

@@ -31,6 +31,14 @@ class Scene {
   NodeSearch& search() { return *search_; }
   const NodeSearch& search() const { return *search_; }
 
+  /// Seconds that the steps of the last update() took.
+  struct Times {
+    double search = 0;  ///< finding the nodes that isovalues cross
+    double cut = 0;     ///< choosing nodes
+    double plan = 0;    ///< handing them to the stream
+  };
+  const Times& times() const { return times_; }
+
   const Cut& cut() const { return cut_; }
   std::shared_ptr<const Drawable> drawable() { return stream_->drawable(); }
   SceneStream& stream() { return *stream_; }
@@ -46,6 +54,7 @@ class Scene {
   CutBudget budget_;
   std::unique_ptr<SceneStream> stream_;
   double per_block_ = 0;  ///< triangles, as cuts are estimated with
+  Times times_;
 };
 
 /// World space of a volume's middle.

@@ -27,9 +27,22 @@ struct DeviceMeshes::Retired {
   GLsync end;
 };
 
-DeviceMeshes::DeviceMeshes(SceneStream& stream, std::uint64_t budget,
-                           std::function<void()> on_change)
-    : stream_(stream), budget_(budget), on_change_(std::move(on_change)) {}
+void DeviceOpening::begin() {
+  if (begun()) return;
+  mesher_ = std::async(std::launch::async, [id = current_gl_device_id(), budget = budget_,
+                                            changed = on_change_] {
+              auto mesher = open_device_mesher(id, budget);
+              if (changed) changed();
+              return mesher;
+            }).share();
+}
+
+bool DeviceOpening::over() const {
+  return begun() && mesher_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+DeviceMeshes::DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpening> opening)
+    : stream_(stream), opening_(std::move(opening)) {}
 
 DeviceMeshes::~DeviceMeshes() {
   // Memory that is drawn from must not be given to others meanwhile.
@@ -42,18 +55,11 @@ void DeviceMeshes::use(Backend backend) {
     throw Error("--backend cuda: this isobrick was built without CUDA; use --backend cpu");
   backend_ = backend;
   if (backend == Backend::cpu) return stream_.set_device(nullptr);
-  if (!opened_ && !opening_.valid())
-    opening_ = std::async(std::launch::async,
-                          [id = current_gl_device_id(), budget = budget_, changed = on_change_] {
-                            auto mesher = open_device_mesher(id, budget);
-                            if (changed) changed();
-                            return mesher;
-                          });
-  if (must && opening_.valid()) opening_.wait();
+  opening_->begin();
   if (opened_)
     stream_.set_device(mesher_);
-  else
-    update();
+  else if (must || opening_->over())
+    take_over();
   if (!must || mesher_) return;
   backend_ = Backend::cpu;
   throw Error(failure_.empty() ? "--backend cuda: there is no CUDA device here; use --backend cpu"
@@ -61,11 +67,13 @@ void DeviceMeshes::use(Backend backend) {
 }
 
 void DeviceMeshes::update() {
-  if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
-    return;
+  if (!opened_ && opening_->over()) take_over();
+}
+
+void DeviceMeshes::take_over() {
   opened_ = true;
   try {
-    mesher_ = opening_.get();
+    mesher_ = opening_->get();
   } catch (const Error& e) {
     failure_ = e.what();
   }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <unordered_map>
+#include <utility>
 
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/render/imported_buffers.h"
@@ -13,12 +14,32 @@
 
 namespace isobrick {
 
+/// The device that makes meshes, opened once and beside everything else. Not thread-safe.
+class DeviceOpening {
+ public:
+  /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
+  /// the device is there.
+  DeviceOpening(std::uint64_t budget, std::function<void()> on_change)
+      : budget_(budget), on_change_(std::move(on_change)) {}
+
+  /// Unless it has begun: that of the current OpenGL context, if possible.
+  void begin();
+  bool begun() const { return mesher_.valid(); }
+  bool over() const;
+  /// Waits for it. Null where there is no device; throws Error when it cannot be opened.
+  std::shared_ptr<DeviceMesher> get() const { return mesher_.get(); }
+
+ private:
+  std::uint64_t budget_;
+  std::function<void()> on_change_;
+  std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;
+};
+
 /// The device that makes a picture's meshes, and its memory as OpenGL sees it. For the thread
 /// of the picture's context.
 class DeviceMeshes {
  public:
-  /// `budget`: of the device's memory for meshes. `on_change`: as of a stream.
-  DeviceMeshes(SceneStream& stream, std::uint64_t budget, std::function<void()> on_change);
+  DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpening> opening);
   ~DeviceMeshes();
 
   /// From now on: Backend::automatic takes a CUDA device where there is one, as soon as it is
@@ -42,13 +63,12 @@ class DeviceMeshes {
 
  private:
   struct Retired;
+  void take_over();
   const ImportedBuffers& buffers_of(const DeviceBlock& block);
 
   SceneStream& stream_;
-  std::uint64_t budget_;
-  std::function<void()> on_change_;
+  std::shared_ptr<DeviceOpening> opening_;
   Backend backend_ = Backend::cpu;
-  std::future<std::shared_ptr<DeviceMesher>> opening_;
   std::shared_ptr<DeviceMesher> mesher_;
   bool opened_ = false;  ///< or tried in vain
   std::string failure_;

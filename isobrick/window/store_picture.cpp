@@ -7,11 +7,10 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <glm/ext/matrix_transform.hpp>
-#include <glm/gtc/type_ptr.hpp>
 #include <nlohmann/json.hpp>
 
 #include "isobrick/core/length_unit.h"
+#include "isobrick/core/stopwatch.h"
 #include "isobrick/render/vectors.h"
 
 namespace isobrick {
@@ -24,37 +23,9 @@ constexpr double kUploadSeconds = 0.008;
 constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
 constexpr double kMarginOfWait = 0.05;
 
-Vec3d last_sample(const StoreReader& store) {
-  const Int3 extent = store.info().levels.front().lattice.extent;
-  return {static_cast<double>(extent.x - 1), static_cast<double>(extent.y - 1),
-          static_cast<double>(extent.z - 1)};
-}
-
-/// The corners of a box of level-0 index space, in world space: bit 0 is x.
-std::array<Vec3d, 8> corners(const Transform& transform, Vec3d lo, Vec3d hi) {
-  std::array<Vec3d, 8> c;
-  for (std::size_t i = 0; i < 8; ++i)
-    c[i] = transform.apply(
-        {(i & 1) != 0 ? hi.x : lo.x, (i & 2) != 0 ? hi.y : lo.y, (i & 4) != 0 ? hi.z : lo.z});
-  return c;
-}
-
-std::vector<WorldLine> edges(const std::array<Vec3d, 8>& c) {
-  std::vector<WorldLine> lines;
-  for (std::size_t i = 0; i < 8; ++i)
-    for (const std::size_t bit : {std::size_t{1}, std::size_t{2}, std::size_t{4}})
-      if ((i & bit) == 0) lines.push_back({c[i], c[i | bit]});
-  return lines;
-}
-
-/// Of what the device has for meshes: the part for those that it makes itself.
-std::uint64_t device_mesh_bytes(const PictureBudgets& budgets) {
-  return budgets.device_memory / 4 * 3;
-}
-
-/// What of that is in meshes; the rest falls between them.
+/// Of the memory for meshes that the device makes: what is in them; the rest falls between.
 std::uint64_t device_cache_bytes(const PictureBudgets& budgets) {
-  return device_mesh_bytes(budgets) / 8 * 7;
+  return budgets.device_mesh_memory() / 8 * 7;
 }
 
 StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change) {
@@ -65,20 +36,6 @@ StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()
   options.device_bytes = device_cache_bytes(budgets);
   options.on_change = std::move(on_change);
   return options;
-}
-
-/// Of the coarsest level's nodes: their own ranges or those with all below.
-template <class RangeOf>
-ValueRange<float> range_of_all(const NodeTree& tree, RangeOf&& range_of) {
-  const int top = tree.grid().levels() - 1;
-  ValueRange<float> all;
-  for_each_point({{0, 0, 0}, tree.grid().level(top).nodes}, [&](Int3 p) {
-    const ValueRange<float> r = range_of(NodeKey{top, p});
-    if (r.empty()) return;
-    all.lo = std::min(all.lo, r.lo);
-    all.hi = std::max(all.hi, r.hi);
-  });
-  return all;
 }
 
 template <class T>
@@ -112,62 +69,18 @@ std::string what_shows(const Camera& camera, int width, int height, ViewSettings
 
 }  // namespace
 
-void choose_values(ViewSettings& settings, const NodeTree& tree) {
-  if (settings.surfaces.empty()) settings.surfaces.push_back({.colour = surface_colour(0)});
-  const auto own = range_of_all(tree, [&](const NodeKey& n) { return tree.range(n); });
-  for (SurfaceSettings& surface : settings.surfaces)
-    if (std::isnan(surface.isovalue))
-      surface.isovalue = own.empty() ? 0 : (static_cast<double>(own.lo) + own.hi) / 2;
-  if (settings.window_lo < settings.window_hi) return;
-  const auto all = range_of_all(tree, [&](const NodeKey& n) { return tree.range_below(n); });
-  settings.window_lo = all.empty() ? 0 : all.lo;
-  settings.window_hi = all.empty() ? 1 : all.hi;
-}
-
-ShownBox shown_box(const ViewSettings& settings) {
-  ShownBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (settings.region_on) {
-      box.lo[axis] = std::clamp<double>(settings.region_lo[axis], 0, 1);
-      box.hi[axis] = std::clamp<double>(settings.region_hi[axis], 0, 1);
-    }
-    const CutSettings& cut = settings.cuts[static_cast<std::size_t>(axis)];
-    if (!cut.on) continue;
-    if (cut.beyond)
-      box.hi[axis] = std::min<double>(box.hi[axis], cut.place);
-    else
-      box.lo[axis] = std::max<double>(box.lo[axis], cut.place);
-  }
-  return box;
-}
-
-std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings) {
-  std::vector<HalfSpace> kept;
-  for (const PlaneSettings& plane : settings.planes)
-    if (plane.on) kept.push_back(plane.kept);
-  return kept;
-}
-
-View view_of(const Camera& camera, int width, int height, double pixel_error) {
-  View view;
-  view.eye = camera.eye;
-  const glm::dmat4 to_camera =
-      glm::translate(glm::dmat4(camera.rotation()), {-camera.eye.x, -camera.eye.y, -camera.eye.z});
-  const glm::dmat4 m = camera.projection(static_cast<double>(width) / height) * to_camera;
-  std::copy_n(glm::value_ptr(m), 16, view.view_projection.begin());
-  view.width = width;
-  view.height = height;
-  view.pixel_error = pixel_error;
-  return view;
-}
-
 StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
-                           std::function<void()> on_change)
+                           std::function<void()> on_change, std::shared_ptr<PictureSetup> setup)
     : store_(std::move(store)),
       budgets_(budgets),
-      scene_(std::make_unique<Scene>(store_bricks(store_), stream_options(budgets, on_change))),
-      device_(std::make_unique<DeviceMeshes>(scene_->stream(), device_mesh_bytes(budgets),
-                                             std::move(on_change))) {
+      reading_(std::async(std::launch::async,
+                          [&] {
+                            return std::make_unique<Scene>(store_bricks(store_),
+                                                           stream_options(budgets_, on_change));
+                          })),
+      setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)) {
+  scene_ = reading_.get();
+  device_ = std::make_unique<DeviceMeshes>(scene_->stream(), setup_->device());
   device_->use(budgets.backend);
 }
 
@@ -206,8 +119,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
   scene_->update(isovalues, view, budget);
 }
 
-void StorePicture::upload() {
-  const auto newest = scene_->drawable();
+void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
   if (next_ == nullptr || next_ == shown_) next_ = newest;
   const auto start = Clock::now();
   for (const DrawnNode& node : next_->nodes) {
@@ -293,7 +205,7 @@ void StorePicture::draw_surfaces(const ViewSettings& settings) {
     style.colour = surface.colour;
     style.opacity = surface.opacity;
     style.id = static_cast<std::uint32_t>(shown_surfaces_[number] + 1);
-    renderer_.draw(
+    renderer().draw(
         node.mesh->device ? device_->drawn(*node.mesh, scene_->origin()) : upload->second.place,
         style);
     state_.triangles += node.mesh->triangles();
@@ -339,7 +251,7 @@ void StorePicture::draw_slices(const ViewSettings& settings) {
     image.samples = shown.samples;
     image.window_lo = settings.window_lo;
     image.window_hi = settings.window_hi;
-    renderer_.draw(image);
+    renderer().draw(image);
   }
 }
 
@@ -353,34 +265,44 @@ void StorePicture::draw_marks(const ViewSettings& settings) {
       const auto c = corners(transform, box.lo, box.hi);
       std::vector<WorldLine> lines = edges(c);
       for (std::size_t i = 0; i < 4; ++i) lines.push_back({c[i], c[7 - i]});  // a cross inside
-      renderer_.draw_lines(lines, kMarkColour, 2);
+      renderer().draw_lines(lines, kMarkColour, 2);
     }
   if (settings.box)
-    renderer_.draw_lines(edges(corners(transform, {0, 0, 0}, last_sample(*store_))), kBoxColour);
-  if (settings.axes) renderer_.draw_axes();
-  if (settings.scale_bar) renderer_.draw_scale_bar(unit_symbol(transform.unit));
+    renderer().draw_lines(edges(corners(transform, {0, 0, 0}, last_sample(*store_))), kBoxColour);
+  if (settings.axes) renderer().draw_axes();
+  if (settings.scale_bar) renderer().draw_scale_bar(unit_symbol(transform.unit));
 }
 
 void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
                         double coarser) {
   ++frame_;
+  Stopwatch watch;
   device_->update();
+  times_ = {.device = watch.lap()};
   update_scene(camera, width, height, settings, coarser);
+  times_.scene = scene_->times();
+  watch.lap();
   const auto before = shown_;
-  upload();
+  const auto newest = scene_->drawable();
+  times_.drawable = watch.lap();
+  upload(newest);
+  times_.upload = watch.lap();
   device_->retire(shown_ != before ? before : nullptr);
+  times_.device += watch.lap();
   const bool other_slices = update_slices(settings);
+  times_.slices = watch.lap();
   std::string shows = what_shows(camera, width, height, settings);
   // A pointer that moves over panels must not cost a picture.
   if (other_slices || shown_ != before || shows != shows_) {
-    renderer_.begin(camera, width, height, picture_settings(settings));
+    renderer().begin(camera, width, height, picture_settings(settings));
     draw_surfaces(settings);
     draw_slices(settings);
     draw_marks(settings);
-    renderer_.end();
+    renderer().end();
     device_->forget();
     shows_ = std::move(shows);
   }
+  times_.draw = watch.lap();
   drop_unused();
   state_.device_bytes = pool_.bytes() + scene_->stream().counters().device_bytes;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
@@ -388,6 +310,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;
   state_.complete = shown_ != nullptr && shown_ == scene_->drawable() &&
                     (shown_->complete || scene_->stream().idle());
+  times_.tidy = watch.lap();
 }
 
 void StorePicture::draw_complete(const Camera& camera, int width, int height,

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,17 +14,11 @@
 #include "isobrick/render/renderer.h"
 #include "isobrick/viewer/scene.h"
 #include "isobrick/window/device_meshes.h"
+#include "isobrick/window/picture_setup.h"
+#include "isobrick/window/shown_part.h"
 #include "isobrick/window/view_settings.h"
 
 namespace isobrick {
-
-/// What a picture of a store may use.
-struct PictureBudgets {
-  std::uint64_t memory = std::uint64_t{2} << 30;         ///< host: decoded bricks and meshes
-  std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes on the device
-  int threads = 0;                                       ///< 0: all cores but one
-  Backend backend = Backend::automatic;                  ///< what makes meshes; see DeviceMeshes
-};
 
 /// What a picture shows and what it still lacks.
 struct PictureState {
@@ -32,10 +27,22 @@ struct PictureState {
   /// for does not cover the view, not the settings'. NaN: nothing of it is drawn.
   std::vector<double> isovalues;
   bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
-  std::uint64_t triangles = 0, nodes = 0, levels_finest = 0;
+  std::uint64_t triangles = 0, nodes = 0;
   std::uint64_t device_bytes = 0;   ///< of meshes
   bool limited_by_budget = false;   ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
+};
+
+/// Seconds that the steps of a picture took this thread; what the device does afterwards is not
+/// in them.
+struct PictureTimes {
+  double device = 0;    ///< taking over a device, giving back what is not drawn any more
+  Scene::Times scene;   ///< choosing nodes
+  double drawable = 0;  ///< asking what can be drawn
+  double upload = 0;    ///< taking meshes to the device
+  double slices = 0;
+  double draw = 0;  ///< telling OpenGL what to draw, memory imported for it included
+  double tidy = 0;  ///< dropping meshes
 };
 
 /// Draws a store: chooses nodes for a view, takes their meshes from the scene to the
@@ -44,14 +51,15 @@ struct PictureState {
 class StorePicture {
  public:
   /// Reads the ranges. `on_change` is called from worker threads when a new
-  /// picture would show more. Throws what Scene, Renderer and DeviceMeshes::use() do.
+  /// picture would show more. `setup`: of the current context, for as long as this picture is
+  /// drawn; null: one of its own. Throws what Scene, PictureSetup and DeviceMeshes::use() do.
   StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
-               std::function<void()> on_change);
+               std::function<void()> on_change, std::shared_ptr<PictureSetup> setup = nullptr);
   ~StorePicture();
 
   const StoreReader& store() const { return *store_; }
   Scene& scene() { return *scene_; }
-  Renderer& renderer() { return renderer_; }
+  Renderer& renderer() { return setup_->renderer(); }
   DeviceMeshes& device() { return *device_; }
 
   /// The box around the volume, axis by axis of world space.
@@ -62,6 +70,8 @@ class StorePicture {
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
             double coarser = 1);
   const PictureState& state() const { return state_; }
+  /// Of the last draw().
+  const PictureTimes& times() const { return times_; }
 
   /// Draws again and again until the picture is complete. Calls `wait` between, at
   /// least ten times a second, which may throw.
@@ -80,7 +90,7 @@ class StorePicture {
   void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
                     double coarser);
   /// Takes meshes of the newest drawable to the device; shows it once all are there.
-  void upload();
+  void upload(const std::shared_ptr<const Drawable>& newest);
   void drop_unused();
   void draw_surfaces(const ViewSettings& settings);
   /// Takes new samples of slices. Whether there are any.
@@ -91,7 +101,8 @@ class StorePicture {
 
   std::shared_ptr<const StoreReader> store_;
   PictureBudgets budgets_;
-  Renderer renderer_;
+  std::future<std::unique_ptr<Scene>> reading_;  ///< beside the set-up
+  std::shared_ptr<PictureSetup> setup_;
   MeshPool pool_;
   std::unique_ptr<Scene> scene_;
   std::unique_ptr<DeviceMeshes> device_;
@@ -107,24 +118,7 @@ class StorePicture {
   std::string shows_;  ///< camera, size and settings of the picture in the renderer
   std::uint64_t frame_ = 0;
   PictureState state_;
+  PictureTimes times_;
 };
-
-/// Gives a surface to settings that have none, an isovalue to surfaces that have none
-/// (in the middle of the coarsest level's values, which single far-off samples do not
-/// move), and the volume's range to a window that is empty.
-void choose_values(ViewSettings& settings, const NodeTree& tree);
-
-/// The part of a volume that cuts and region leave, in parts of the volume (0 … 1).
-struct ShownBox {
-  Vec3d lo{0, 0, 0}, hi{1, 1, 1};
-  bool whole() const { return lo == Vec3d{0, 0, 0} && hi == Vec3d{1, 1, 1}; }
-};
-ShownBox shown_box(const ViewSettings& settings);
-
-/// What planes that are on leave.
-std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings);
-
-/// The camera's view of nodes.
-View view_of(const Camera& camera, int width, int height, double pixel_error);
 
 }  // namespace isobrick

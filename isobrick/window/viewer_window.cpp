@@ -73,6 +73,7 @@ ViewerWindow::ViewerWindow(WindowOptions options)
     : options_(std::move(options)), window_(make_window(options_)) {
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
+  setup_ = std::make_shared<PictureSetup>(options_.budgets, glfwPostEmptyEvent);
   // Before ImGui's, which calls those that it finds.
   events_ = std::make_unique<Events>(*this);
   set_up_imgui(window_);
@@ -85,6 +86,7 @@ ViewerWindow::~ViewerWindow() {
   state_.import.reset();
   state_.facts.reset();
   state_.picture.reset();
+  setup_.reset();
   ImGui_ImplOpenGL3_Shutdown();
   ImGui_ImplGlfw_Shutdown();
   ImGui::DestroyContext();
@@ -101,7 +103,7 @@ double ViewerWindow::aspect() const {
 void ViewerWindow::open(const std::filesystem::path& path) {
   auto store = std::make_shared<const StoreReader>(path);
   auto picture =
-      std::make_unique<StorePicture>(store, options_.budgets, [] { glfwPostEmptyEvent(); });
+      std::make_unique<StorePicture>(store, options_.budgets, glfwPostEmptyEvent, setup_);
   picture->scene().search().use(state_.index);
   auto facts = std::make_unique<IsovalueFacts>(store);
   state_.facts = std::move(facts);

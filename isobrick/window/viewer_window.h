@@ -59,6 +59,7 @@ class ViewerWindow {
 
   WindowOptions options_;
   GLFWwindow* window_ = nullptr;
+  std::shared_ptr<PictureSetup> setup_;
   std::unique_ptr<Events> events_;
   ViewerState state_;
   double last_time_ = 0;

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "isobrick/window/store_picture.h"
+
+namespace isobrick::bench {
+
+/// Milliseconds of many events.
+class Times {
+ public:
+  void add(double seconds) { ms_.push_back(seconds * 1e3); }
+  /// Ascending.
+  nlohmann::ordered_json summary() {
+    std::sort(ms_.begin(), ms_.end());
+    if (ms_.empty()) return {{"pictures", 0}};
+    double sum = 0;
+    for (const double ms : ms_) sum += ms;
+    return {{"pictures", ms_.size()},
+            {"median_ms", part(0.5)},
+            {"p99_ms", part(0.99)},
+            {"max_ms", ms_.back()},
+            {"per_second_if_unpaced", 1e3 * static_cast<double>(ms_.size()) / sum}};
+  }
+
+ private:
+  double part(double p) const {
+    return ms_[std::min(ms_.size() - 1,
+                        static_cast<std::size_t>(p * static_cast<double>(ms_.size())))];
+  }
+
+  std::vector<double> ms_;
+};
+
+/// How long pictures take, and what the slowest of them consist of.
+class PicturesTimes {
+ public:
+  /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds.
+  void add(double total, const PictureTimes& steps, double finish) {
+    total_.add(total);
+    pictures_.push_back({total, steps, finish});
+  }
+
+  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth.
+  nlohmann::ordered_json summary() {
+    auto json = total_.summary();
+    if (pictures_.empty()) return json;
+    std::sort(pictures_.begin(), pictures_.end(),
+              [](const Picture& a, const Picture& b) { return a.total > b.total; });
+    json["all"] = mean(pictures_.size());
+    json["slowest"] = mean((pictures_.size() + 99) / 100);
+    return json;
+  }
+
+ private:
+  struct Picture {
+    double total;
+    PictureTimes steps;
+    double finish;
+  };
+
+  nlohmann::ordered_json mean(std::size_t count) const {
+    nlohmann::ordered_json json;
+    const auto put = [&](const char* name, auto&& of) {
+      double sum = 0;
+      for (std::size_t i = 0; i < count; ++i) sum += of(pictures_[i]);
+      json[name] = sum / static_cast<double>(count) * 1e3;
+    };
+    json["pictures"] = count;
+    put("total_ms", [](const Picture& p) { return p.total; });
+    put("device_ms", [](const Picture& p) { return p.steps.device; });
+    put("search_ms", [](const Picture& p) { return p.steps.scene.search; });
+    put("cut_ms", [](const Picture& p) { return p.steps.scene.cut; });
+    put("plan_ms", [](const Picture& p) { return p.steps.scene.plan; });
+    put("drawable_ms", [](const Picture& p) { return p.steps.drawable; });
+    put("upload_ms", [](const Picture& p) { return p.steps.upload; });
+    put("slices_ms", [](const Picture& p) { return p.steps.slices; });
+    put("draw_ms", [](const Picture& p) { return p.steps.draw; });
+    put("tidy_ms", [](const Picture& p) { return p.steps.tidy; });
+    put("finish_ms", [](const Picture& p) { return p.finish; });
+    return json;
+  }
+
+  Times total_;
+  std::vector<Picture> pictures_;
+};
+
+}  // namespace isobrick::bench

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "isobrick/pipeline/extract.h"
+#include "isobrick/render/renderer.h"
+#include "isobrick/window/device_meshes.h"
+
+namespace isobrick {
+
+/// What a picture of a store may use.
+struct PictureBudgets {
+  std::uint64_t memory = std::uint64_t{2} << 30;         ///< host: decoded bricks and meshes
+  std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes on the device
+  int threads = 0;                                       ///< 0: all cores but one
+  Backend backend = Backend::automatic;                  ///< what makes meshes; see DeviceMeshes
+
+  /// Of device_memory: the part for meshes that the device makes itself.
+  std::uint64_t device_mesh_memory() const { return device_memory / 4 * 3; }
+};
+
+/// What pictures of stores need of a context and what takes time to set up: compiled shaders, and
+/// a device that makes meshes. Made with the context, so that stores open quickly; one
+/// picture after the other uses it. For the thread of the context, which must outlive it.
+class PictureSetup {
+ public:
+  /// Begins to open the device that budgets.backend may use, and does not wait for it; see
+  /// DeviceOpening. Throws what Renderer does.
+  PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change);
+
+  Renderer& renderer() { return renderer_; }
+  const std::shared_ptr<DeviceOpening>& device() const { return device_; }
+
+ private:
+  std::shared_ptr<DeviceOpening> device_;  ///< first: it opens beside the shaders' compilation
+  Renderer renderer_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,101 @@
+#include "isobrick/window/shown_part.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/gtc/type_ptr.hpp>
+
+#include "isobrick/render/vectors.h"
+
+namespace isobrick {
+namespace {
+
+/// Of the coarsest level's nodes: their own ranges or those with all below.
+template <class RangeOf>
+ValueRange<float> range_of_all(const NodeTree& tree, RangeOf&& range_of) {
+  const int top = tree.grid().levels() - 1;
+  ValueRange<float> all;
+  for_each_point({{0, 0, 0}, tree.grid().level(top).nodes}, [&](Int3 p) {
+    const ValueRange<float> r = range_of(NodeKey{top, p});
+    if (r.empty()) return;
+    all.lo = std::min(all.lo, r.lo);
+    all.hi = std::max(all.hi, r.hi);
+  });
+  return all;
+}
+
+}  // namespace
+
+Vec3d last_sample(const StoreReader& store) {
+  const Int3 extent = store.info().levels.front().lattice.extent;
+  return {static_cast<double>(extent.x - 1), static_cast<double>(extent.y - 1),
+          static_cast<double>(extent.z - 1)};
+}
+
+std::array<Vec3d, 8> corners(const Transform& transform, Vec3d lo, Vec3d hi) {
+  std::array<Vec3d, 8> c;
+  for (std::size_t i = 0; i < 8; ++i)
+    c[i] = transform.apply(
+        {(i & 1) != 0 ? hi.x : lo.x, (i & 2) != 0 ? hi.y : lo.y, (i & 4) != 0 ? hi.z : lo.z});
+  return c;
+}
+
+std::vector<WorldLine> edges(const std::array<Vec3d, 8>& c) {
+  std::vector<WorldLine> lines;
+  for (std::size_t i = 0; i < 8; ++i)
+    for (const std::size_t bit : {std::size_t{1}, std::size_t{2}, std::size_t{4}})
+      if ((i & bit) == 0) lines.push_back({c[i], c[i | bit]});
+  return lines;
+}
+
+void choose_values(ViewSettings& settings, const NodeTree& tree) {
+  if (settings.surfaces.empty()) settings.surfaces.push_back({.colour = surface_colour(0)});
+  const auto own = range_of_all(tree, [&](const NodeKey& n) { return tree.range(n); });
+  for (SurfaceSettings& surface : settings.surfaces)
+    if (std::isnan(surface.isovalue))
+      surface.isovalue = own.empty() ? 0 : (static_cast<double>(own.lo) + own.hi) / 2;
+  if (settings.window_lo < settings.window_hi) return;
+  const auto all = range_of_all(tree, [&](const NodeKey& n) { return tree.range_below(n); });
+  settings.window_lo = all.empty() ? 0 : all.lo;
+  settings.window_hi = all.empty() ? 1 : all.hi;
+}
+
+ShownBox shown_box(const ViewSettings& settings) {
+  ShownBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (settings.region_on) {
+      box.lo[axis] = std::clamp<double>(settings.region_lo[axis], 0, 1);
+      box.hi[axis] = std::clamp<double>(settings.region_hi[axis], 0, 1);
+    }
+    const CutSettings& cut = settings.cuts[static_cast<std::size_t>(axis)];
+    if (!cut.on) continue;
+    if (cut.beyond)
+      box.hi[axis] = std::min<double>(box.hi[axis], cut.place);
+    else
+      box.lo[axis] = std::max<double>(box.lo[axis], cut.place);
+  }
+  return box;
+}
+
+std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings) {
+  std::vector<HalfSpace> kept;
+  for (const PlaneSettings& plane : settings.planes)
+    if (plane.on) kept.push_back(plane.kept);
+  return kept;
+}
+
+View view_of(const Camera& camera, int width, int height, double pixel_error) {
+  View view;
+  view.eye = camera.eye;
+  const glm::dmat4 to_camera =
+      glm::translate(glm::dmat4(camera.rotation()), {-camera.eye.x, -camera.eye.y, -camera.eye.z});
+  const glm::dmat4 m = camera.projection(static_cast<double>(width) / height) * to_camera;
+  std::copy_n(glm::value_ptr(m), 16, view.view_projection.begin());
+  view.width = width;
+  view.height = height;
+  view.pixel_error = pixel_error;
+  return view;
+}
+
+}  // namespace isobrick

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/render/camera.h"
+#include "isobrick/render/renderer.h"
+#include "isobrick/viewer/node_tree.h"
+#include "isobrick/viewer/view.h"
+#include "isobrick/window/view_settings.h"
+
+// What settings and a camera mean for a volume.
+
+namespace isobrick {
+
+/// Gives a surface to settings that have none, an isovalue to surfaces that have none
+/// (in the middle of the coarsest level's values, which single far-off samples do not
+/// move), and the volume's range to a window that is empty.
+void choose_values(ViewSettings& settings, const NodeTree& tree);
+
+/// The part of a volume that cuts and region leave, in parts of the volume (0 … 1).
+struct ShownBox {
+  Vec3d lo{0, 0, 0}, hi{1, 1, 1};
+  bool whole() const { return lo == Vec3d{0, 0, 0} && hi == Vec3d{1, 1, 1}; }
+};
+ShownBox shown_box(const ViewSettings& settings);
+
+/// What planes that are on leave.
+std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings);
+
+/// The camera's view of nodes.
+View view_of(const Camera& camera, int width, int height, double pixel_error);
+
+/// The last sample of level 0, in its index space.
+Vec3d last_sample(const StoreReader& store);
+
+/// The corners of a box of level-0 index space, in world space: bit 0 is x.
+std::array<Vec3d, 8> corners(const Transform& transform, Vec3d lo, Vec3d hi);
+
+/// The edges of a box with these corners.
+std::vector<WorldLine> edges(const std::array<Vec3d, 8>& corners);
+
+}  // namespace isobrick
