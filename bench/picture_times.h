@@ -80,9 +80,10 @@ class PicturesTimes {
     put("drawable_ms", [](const Picture& p) { return p.steps.drawable; });
     put("upload_ms", [](const Picture& p) { return p.steps.upload; });
     put("slices_ms", [](const Picture& p) { return p.steps.slices; });
+    put("turn_ms", [](const Picture& p) { return p.steps.turn; });
     put("draw_ms", [](const Picture& p) { return p.steps.draw; });
     put("tidy_ms", [](const Picture& p) { return p.steps.tidy; });
-    put("finish_ms", [](const Picture& p) { return p.finish; });
+    put("finish_ms", [](const Picture& p) { return p.steps.finish + p.finish; });
     return json;
   }
 

@@ -269,11 +269,17 @@ Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
   }
   session.settings.pixel_error = 0.02f;
   const auto start = Clock::now();
-  session.draw_until(false, [&] { return session.picture().state().complete; });
+  Json ends = Json::array();  // of pictures, and how much each showed
+  session.draw_until(false, [&] {
+    const PictureState& state = session.picture().state();
+    ends.push_back({seconds_since(start) * 1e3, state.nodes, state.triangles});
+    return state.complete;
+  });
   result["refine"] = {{"seconds", seconds_since(start)},
                       {"triangles", session.picture().state().triangles},
                       {"nodes", session.picture().state().nodes},
                       {"limited_by_budget", session.picture().state().limited_by_budget},
+                      {"picture_ends_ms_nodes_triangles", ends},
                       {"pictures", session.pictures.summary()},
                       {"stream", stream_json(session.picture().scene().stream().counters())}};
   return result;

@@ -1,6 +1,7 @@
 #include "isobrick/gpu/grid_kernel.h"
 
 #include <cub/block/block_scan.cuh>
+#include <type_traits>
 
 #include "isobrick/gpu/cuda_check.h"
 #include "isobrick/surface/grid_math.h"
@@ -10,6 +11,22 @@ namespace {
 
 constexpr int kThreads = 256, kWarps = kThreads / 32, kScanThreads = 1024;
 constexpr unsigned kAll = 0xffffffffu;
+
+static_assert(sizeof(GridWork) % 4 == 0 && std::is_trivially_copyable_v<GridWork>);
+
+/// Memory of a block for the grid that it is for.
+struct WorkStorage {
+  alignas(GridWork) unsigned words[sizeof(GridWork) / 4];
+};
+
+/// The block's grid, copied: writing the mesh does not mean reading it again.
+__device__ const GridWork& load_work(const GridWork* works, WorkStorage& storage) {
+  const auto* from = reinterpret_cast<const unsigned*>(works + blockIdx.y);
+  for (unsigned i = threadIdx.x; i < sizeof(GridWork) / 4; i += blockDim.x)
+    storage.words[i] = from[i];
+  __syncthreads();
+  return *reinterpret_cast<const GridWork*>(storage.words);
+}
 
 __device__ std::uint64_t below(int count) {
   return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
@@ -38,7 +55,9 @@ __device__ void ballot(const float* values, int count, int lane, F&& pass,
   bits[1] = c;
 }
 
-__global__ void __launch_bounds__(kThreads) find_inside(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kThreads) find_inside(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
   const Warp warp;
   if (warp.row >= rows_of(w.grid)) return;
   const float* values = w.grid.at(0, warp.row % w.grid.n[1], warp.row / w.grid.n[1]);
@@ -90,7 +109,9 @@ struct Cells {
 };
 
 /// Crossing edges, and how many vertices and triangles that makes.
-__global__ void __launch_bounds__(kThreads) count_rows(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kThreads) count_rows(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
   const int at = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   const GridView& g = w.grid;
   if (at >= rows_of(g)) return;
@@ -138,7 +159,9 @@ __device__ uint2 scan_rows(int rows, const std::uint32_t* first, const std::uint
   return {static_cast<unsigned>(before), static_cast<unsigned>(before >> 32)};
 }
 
-__global__ void __launch_bounds__(kScanThreads) number_rows(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kScanThreads) number_rows(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
   const uint2 all = scan_rows(rows_of(w.grid), w.counts, w.counts + kGridRows,
                               [&](int at, unsigned vertices, unsigned triangles) {
                                 GridRow& row = w.rows[at];
@@ -167,10 +190,12 @@ __device__ void for_each_edge(const GridRow& row, int lane, int points, F&& f) {
 }
 
 /// On which faces with coarser grids vertices lie, and how many in each row lie on any.
-__global__ void __launch_bounds__(kThreads) find_borders(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kThreads) find_borders(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
   const Warp warp;
   const GridView& g = w.grid;
-  if (warp.row >= rows_of(g)) return;
+  if (!w.meets_coarser || warp.row >= rows_of(g)) return;
   const int y = warp.row % g.n[1], z = warp.row / g.n[1];
   const GridRow& row = w.rows[warp.row];
   unsigned count = 0;
@@ -226,9 +251,11 @@ __device__ unsigned sides_of(const GridWork& w, int row, int x, unsigned index) 
   return sides;
 }
 
-__global__ void __launch_bounds__(kThreads) count_ribbons(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kThreads) count_ribbons(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
   const Warp warp;
-  if (warp.row >= rows_of(w.grid)) return;
+  if (!w.meets_coarser || warp.row >= rows_of(w.grid)) return;
   const Cells cells(w, warp.row);
   unsigned sides = 0;
   for (int x = warp.lane; x < 64; x += 32)
@@ -238,7 +265,10 @@ __global__ void __launch_bounds__(kThreads) count_ribbons(const __grid_constant_
   if (warp.lane == 0) w.counts[3 * kGridRows + warp.row] = all;
 }
 
-__global__ void __launch_bounds__(kScanThreads) number_ribbons(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kScanThreads) number_ribbons(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
+  if (!w.meets_coarser) return;
   const uint2 all = scan_rows(rows_of(w.grid), w.counts + 2 * kGridRows, w.counts + 3 * kGridRows,
                               [&](int at, unsigned vertices, unsigned sides) {
                                 w.rows[at].border_vertices = vertices;
@@ -257,20 +287,21 @@ __device__ bool fits(const GridWork& w) {
          t.triangles + 2 * t.ribbon_sides <= w.triangle_room;
 }
 
-template <bool kBorders>
-__global__ void __launch_bounds__(kThreads) emit_vertices(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kThreads) emit_vertices(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
   const Warp warp;
   const GridView& g = w.grid;
   if (warp.row >= rows_of(g) || !fits(w)) return;
   const int y = warp.row % g.n[1], z = warp.row / g.n[1];
   const GridRow& row = w.rows[warp.row];
-  unsigned border = kBorders ? row.border_vertices : 0;
+  unsigned border = w.meets_coarser ? row.border_vertices : 0;
   const auto put = [&](bool here, unsigned number, const grid::Vertex& vertex) {
     if (here) {
       w.positions[number] = vertex.position;
       w.normals[number] = vertex.normal;
     }
-    if constexpr (kBorders) {
+    if (w.meets_coarser) {
       const bool on = here && vertex.faces != 0;
       const unsigned mask = __ballot_sync(kAll, on);
       if (on) {
@@ -295,14 +326,15 @@ __global__ void __launch_bounds__(kThreads) emit_vertices(const __grid_constant_
   });
 }
 
-template <bool kBorders>
-__global__ void __launch_bounds__(kThreads) emit_triangles(const __grid_constant__ GridWork w) {
+__global__ void __launch_bounds__(kThreads) emit_triangles(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridWork& w = load_work(works, storage);
   const Warp warp;
   if (warp.row >= rows_of(w.grid) || !fits(w)) return;
   const Cells cells(w, warp.row);
   if (cells.active == 0) return;
   const GridRow& row = w.rows[warp.row];
-  unsigned next = row.first_triangle, side = kBorders ? row.ribbon_sides : 0, all = 0;
+  unsigned next = row.first_triangle, side = w.meets_coarser ? row.ribbon_sides : 0, all = 0;
   for (int x = warp.lane; x < 64; x += 32) {
     const bool here = (cells.active >> x & 1) != 0;
     const unsigned index = here ? cells.index(x) : 0;
@@ -310,7 +342,7 @@ __global__ void __launch_bounds__(kThreads) emit_triangles(const __grid_constant
     unsigned at = next + sum_before(count, warp.lane, all);
     next += all;
     unsigned ribbon = 0;
-    if constexpr (kBorders) {
+    if (w.meets_coarser) {
       const unsigned sides = here ? sides_of(w, warp.row, x, index) : 0;
       ribbon = w.totals->triangles + 2 * (side + sum_before(sides, warp.lane, all));
       side += all;
@@ -318,7 +350,7 @@ __global__ void __launch_bounds__(kThreads) emit_triangles(const __grid_constant
     for (int t = 0; t < static_cast<int>(count); ++t) {
       const Triangle v = triangle_of(w, warp.row, x, index, t);
       w.triangles[at++] = v;
-      if constexpr (kBorders)
+      if (w.meets_coarser)
         for (int k = 0; k < 3; ++k) {
           const unsigned a = v[k], b = v[(k + 1) % 3];
           if ((w.faces[a] & w.faces[b]) == 0) continue;
@@ -330,33 +362,29 @@ __global__ void __launch_bounds__(kThreads) emit_triangles(const __grid_constant
   }
 }
 
-int warp_blocks(const GridView& g) { return (g.n[1] * g.n[2] + kWarps - 1) / kWarps; }
-
 }  // namespace
 
-void launch_grid_count(const GridWork& w, bool meets_coarser, cudaStream_t stream) {
-  const int blocks = warp_blocks(w.grid);
-  find_inside<<<blocks, kThreads, 0, stream>>>(w);
-  count_rows<<<(w.grid.n[1] * w.grid.n[2] + 127) / 128, 128, 0, stream>>>(w);
-  number_rows<<<1, kScanThreads, 0, stream>>>(w);
-  if (meets_coarser) {
-    find_borders<<<blocks, kThreads, 0, stream>>>(w);
-    count_ribbons<<<blocks, kThreads, 0, stream>>>(w);
-    number_ribbons<<<1, kScanThreads, 0, stream>>>(w);
+void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream) {
+  const auto grids = static_cast<unsigned>(batch.count);
+  const auto rows = static_cast<unsigned>(batch.most_rows);
+  const dim3 warps((rows + kWarps - 1) / kWarps, grids), threads((rows + 127) / 128, grids);
+  find_inside<<<warps, kThreads, 0, stream>>>(batch.works);
+  count_rows<<<threads, 128, 0, stream>>>(batch.works);
+  number_rows<<<dim3(1, grids), kScanThreads, 0, stream>>>(batch.works);
+  if (batch.any_meets_coarser) {
+    find_borders<<<warps, kThreads, 0, stream>>>(batch.works);
+    count_ribbons<<<warps, kThreads, 0, stream>>>(batch.works);
+    number_ribbons<<<dim3(1, grids), kScanThreads, 0, stream>>>(batch.works);
   }
-  check_launch("counting a grid's mesh");
+  check_launch("counting the meshes of grids");
 }
 
-void launch_grid_mesh(const GridWork& w, bool meets_coarser, cudaStream_t stream) {
-  const int blocks = warp_blocks(w.grid);
-  if (meets_coarser) {
-    emit_vertices<true><<<blocks, kThreads, 0, stream>>>(w);
-    emit_triangles<true><<<blocks, kThreads, 0, stream>>>(w);
-  } else {
-    emit_vertices<false><<<blocks, kThreads, 0, stream>>>(w);
-    emit_triangles<false><<<blocks, kThreads, 0, stream>>>(w);
-  }
-  check_launch("a grid's mesh");
+void launch_grid_mesh(const GridBatchWork& batch, cudaStream_t stream) {
+  const dim3 warps((static_cast<unsigned>(batch.most_rows) + kWarps - 1) / kWarps,
+                   static_cast<unsigned>(batch.count));
+  emit_vertices<<<warps, kThreads, 0, stream>>>(batch.works);
+  emit_triangles<<<warps, kThreads, 0, stream>>>(batch.works);
+  check_launch("the meshes of grids");
 }
 
 }  // namespace isobrick::gpu

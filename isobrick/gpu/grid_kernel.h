@@ -43,11 +43,20 @@ struct GridWork {
   Vec3f *positions, *normals;
   Triangle* triangles;
   std::uint32_t vertex_room, triangle_room;
+  bool meets_coarser;
 };
 
-/// Finds the size of the mesh, into `totals`.
-void launch_grid_count(const GridWork& work, bool meets_coarser, cudaStream_t stream);
-/// Writes the mesh that was counted, if there is room for it.
-void launch_grid_mesh(const GridWork& work, bool meets_coarser, cudaStream_t stream);
+/// Grids whose meshes are made together.
+struct GridBatchWork {
+  const GridWork* works = nullptr;  ///< on the device
+  int count = 0;
+  int most_rows = 0;               ///< rows of points in the largest of them
+  bool any_meets_coarser = false;  ///< whether any of them does
+};
+
+/// Finds the sizes of the meshes, into their `totals`.
+void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream);
+/// Writes the meshes that were counted, where there is room for them.
+void launch_grid_mesh(const GridBatchWork& batch, cudaStream_t stream);
 
 }  // namespace isobrick::gpu

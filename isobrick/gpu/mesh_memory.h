@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "isobrick/gpu/grid_extractor.h"
+#include "isobrick/gpu/grid_batch.h"
 
 namespace isobrick::gpu {
 

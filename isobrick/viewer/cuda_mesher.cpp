@@ -1,108 +1,261 @@
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <condition_variable>
+#include <mutex>
 #include <optional>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device.h"
-#include "isobrick/gpu/grid_extractor.h"
+#include "isobrick/gpu/grid_batch.h"
 #include "isobrick/gpu/mesh_memory.h"
 #include "isobrick/viewer/device_mesher.h"
 
 namespace isobrick {
 namespace {
 
+/// Grids that are being made or wait for it: while one half is on the device threads fill the
+/// other one.
+constexpr int kSlots = 16;
+
 DeviceBlock block_of(std::shared_ptr<const gpu::MeshBlock> block) {
   return {block->file, block->bytes, block->vertices, block->triangles, block};
 }
 
-class SharedMesh final : public DeviceMesh {
+/// A place for a mesh; gives it back when it is destroyed.
+class Place {
  public:
-  SharedMesh(std::shared_ptr<gpu::MeshMemory> memory, gpu::MeshSpan span)
-      : memory_(std::move(memory)), span_(std::move(span)) {
-    block = block_of(span_.block);
-    first_vertex = span_.first_vertex;
-    vertices = span_.vertices;
-    first_triangle = span_.first_triangle;
-    triangles = span_.triangles;
+  Place(std::shared_ptr<gpu::MeshMemory> memory, gpu::MeshSpan span)
+      : memory_(std::move(memory)), span_(std::move(span)) {}
+  Place(Place&& other) noexcept = default;
+  Place& operator=(Place&& other) noexcept {
+    std::swap(memory_, other.memory_);
+    std::swap(span_, other.span_);
+    return *this;
   }
-  ~SharedMesh() override { memory_->give_back(span_); }
+  ~Place() {
+    if (memory_) memory_->give_back(span_);
+  }
+
+  void trim(const gpu::GridMeshSize& size) { memory_->trim(span_, size.vertices, size.triangles); }
+  const gpu::MeshSpan& span() const { return span_; }
 
  private:
   std::shared_ptr<gpu::MeshMemory> memory_;
   gpu::MeshSpan span_;
 };
 
-/// What workers and meshes share.
-struct Shared {
-  int device = 0;
-  std::string name;
-  std::shared_ptr<gpu::MeshMemory> memory;  ///< null: meshes go through host memory
-  std::atomic<bool> sharing = false;
-};
-
-class Worker final : public GridWorker {
+class SharedMesh final : public DeviceMesh {
  public:
-  explicit Worker(std::shared_ptr<const Shared> shared)
-      : shared_(std::move(shared)), extractor_(shared_->device) {}
-
-  /// Room is taken for what meshes were like before, so that the device is waited for once.
-  void make(const GridView& grid, NodeMesh& out) override {
-    std::optional<gpu::MeshSpan> span;
-    if (shared_->sharing) span = shared_->memory->take(likely_vertices_, likely_triangles_);
-    const SpanOwner owner{shared_->memory.get(), span};
-    const auto size = extractor_.make(grid, span ? span->place : gpu::GridMeshPlace{});
-    out.ribbon_triangles = size.ribbon_triangles;
-    if (size.triangles == 0) return;
-    likely_vertices_ = std::max(size.vertices + size.vertices / 4, likely_vertices_ / 8 * 7);
-    likely_triangles_ = std::max(size.triangles + size.triangles / 4, likely_triangles_ / 8 * 7);
-    if (span && span->place.holds(size.vertices, size.triangles)) {
-      shared_->memory->trim(*span, size.vertices, size.triangles);
-      return hand_out(*std::exchange(span, std::nullopt), out);
-    }
-    owner.give_back();
-    if (shared_->sharing) span = shared_->memory->take(size.vertices, size.triangles);
-    if (!span) return extractor_.download(out.mesh);
-    extractor_.write(span->place);
-    hand_out(*std::exchange(span, std::nullopt), out);
+  explicit SharedMesh(Place&& place) : place_(std::move(place)) {
+    const gpu::MeshSpan& span = place_.span();
+    block = block_of(span.block);
+    first_vertex = span.first_vertex;
+    vertices = span.vertices;
+    first_triangle = span.first_triangle;
+    triangles = span.triangles;
   }
 
  private:
-  /// Gives room back that no mesh has got.
-  struct SpanOwner {
-    gpu::MeshMemory* memory;
-    std::optional<gpu::MeshSpan>& span;
-    ~SpanOwner() { give_back(); }
-    void give_back() const {
-      if (span) memory->give_back(*std::exchange(span, std::nullopt));
-    }
-  };
+  Place place_;
+};
 
-  void hand_out(gpu::MeshSpan&& span, NodeMesh& out) {
-    out.device_triangles = span.triangles;
-    out.device_bytes = span.vertices * 2 * sizeof(Vec3f) + span.triangles * sizeof(Triangle);
-    out.device = std::make_shared<SharedMesh>(shared_->memory, std::move(span));
+/// A grid that was taken.
+struct Job {
+  int slot;
+  NodeMesh mesh;
+  DeviceMesher::Done done;
+  std::optional<Place> place;
+
+  gpu::GridMeshJob on_device() const {
+    return {slot, place ? place->span().place : gpu::GridMeshPlace{}};
+  }
+};
+
+/// What the device's thread works with. It outlives the mesher while that thread does.
+class Work {
+ public:
+  Work(int index, std::string device_name, std::shared_ptr<gpu::MeshMemory> shared)
+      : device(index),
+        name(std::move(device_name)),
+        memory(std::move(shared)),
+        sharing(memory != nullptr),
+        batch_(index, kSlots) {
+    for (int i = 0; i < kSlots; ++i) free_.push_back(i);
   }
 
-  std::shared_ptr<const Shared> shared_;
-  gpu::GridExtractor extractor_;
+  bool take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done);
+  /// Until end(), and until all that was taken is done.
+  void run();
+  void end();
+
+  const int device;
+  const std::string name;
+  const std::shared_ptr<gpu::MeshMemory> memory;  ///< null: meshes go through host memory
+  std::atomic<bool> sharing;
+  Turns turns;
+
+ private:
+  std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
+  void make(std::vector<Job>& jobs);
+  void write_again(std::vector<Job*>& jobs);
+  void learn(const gpu::GridMeshSize& size);
+
+  gpu::GridBatch batch_;
+  /// Room that is taken for a mesh whose size is not known yet.
   std::uint32_t likely_vertices_ = 1u << 14, likely_triangles_ = 1u << 15;
+
+  std::mutex mutex_;
+  std::condition_variable freed_, taken_;
+  std::vector<int> free_;  ///< slots
+  std::vector<Job> jobs_;
+  bool failed_ = false, end_ = false;
 };
+
+bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done) {
+  int slot = 0;
+  {
+    std::unique_lock lock(mutex_);
+    freed_.wait(lock, [&] { return failed_ || !free_.empty(); });
+    if (failed_) return false;
+    slot = free_.back();
+    free_.pop_back();
+  }
+  batch_.stage(slot, grid);
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back({slot, std::move(mesh), std::move(done), {}});
+  }
+  taken_.notify_one();
+  return true;
+}
+
+void Work::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = true;
+  }
+  taken_.notify_one();
+}
+
+void Work::run() {
+  std::string failure;
+  try {
+    gpu::open_device(device);
+  } catch (const std::exception& e) {
+    failure = e.what();
+  }
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    taken_.wait(lock, [&] { return end_ || !jobs_.empty(); });
+    if (jobs_.empty()) return;
+    std::vector<Job> jobs = std::exchange(jobs_, {});
+    lock.unlock();
+    try {
+      if (failure.empty()) make(jobs);
+    } catch (const std::exception& e) {
+      failure = e.what();
+    }
+    lock.lock();
+    failed_ = !failure.empty();
+    for (const Job& job : jobs) free_.push_back(job.slot);
+    lock.unlock();
+    freed_.notify_all();
+    for (Job& job : jobs) job.done(std::move(job.mesh), failure);
+    jobs.clear();
+    lock.lock();
+  }
+}
+
+std::optional<Place> Work::place_for(std::uint32_t vertices, std::uint32_t triangles) const {
+  if (!sharing) return std::nullopt;
+  auto span = memory->take(vertices, triangles);
+  if (!span) return std::nullopt;
+  return Place(memory, *std::move(span));
+}
+
+void Work::learn(const gpu::GridMeshSize& size) {
+  if (size.triangles == 0) return;
+  likely_vertices_ = std::max(size.vertices + size.vertices / 4, likely_vertices_ / 8 * 7);
+  likely_triangles_ = std::max(size.triangles + size.triangles / 4, likely_triangles_ / 8 * 7);
+}
+
+/// Room is taken for what meshes were like before, so that the device is waited for once.
+void Work::make(std::vector<Job>& jobs) {
+  const Turn turn(&turns);
+  std::vector<gpu::GridMeshJob> all;
+  for (Job& job : jobs) {
+    job.place = place_for(likely_vertices_, likely_triangles_);
+    all.push_back(job.on_device());
+  }
+  batch_.make(all);
+  std::vector<Job*> again;
+  for (Job& job : jobs) {
+    const gpu::GridMeshSize size = batch_.size(job.slot);
+    learn(size);
+    job.mesh.ribbon_triangles = size.ribbon_triangles;
+    if (size.triangles == 0)
+      job.place.reset();
+    else if (job.place && job.place->span().place.holds(size.vertices, size.triangles))
+      job.place->trim(size);
+    else
+      again.push_back(&job);
+  }
+  write_again(again);
+  for (Job& job : jobs) {
+    if (!job.place) continue;
+    const gpu::MeshSpan& span = job.place->span();
+    job.mesh.device_triangles = span.triangles;
+    job.mesh.device_bytes = span.vertices * 2 * sizeof(Vec3f) + span.triangles * sizeof(Triangle);
+    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.place, std::nullopt));
+  }
+}
+
+/// Those that did not fit: now their sizes are known.
+void Work::write_again(std::vector<Job*>& jobs) {
+  std::vector<gpu::GridMeshJob> placed;
+  for (Job* job : jobs) job->place.reset();
+  for (Job* job : jobs) {
+    const gpu::GridMeshSize size = batch_.size(job->slot);
+    job->place = place_for(size.vertices, size.triangles);
+    if (job->place) placed.push_back(job->on_device());
+  }
+  batch_.write(placed);
+  for (Job* job : jobs)
+    if (!job->place) batch_.download(job->slot, job->mesh.mesh);
+}
 
 class CudaMesher final : public DeviceMesher {
  public:
-  explicit CudaMesher(std::shared_ptr<Shared> shared) : shared_(std::move(shared)) {}
-  std::unique_ptr<GridWorker> worker() override { return std::make_unique<Worker>(shared_); }
-  const std::string& name() const override { return shared_->name; }
-  std::optional<DeviceBlock> shared_block() const override {
-    if (!shared_->sharing) return std::nullopt;
-    return block_of(shared_->memory->first_block());
+  explicit CudaMesher(std::shared_ptr<Work> work)
+      : work_(std::move(work)), thread_([w = work_] { w->run(); }) {}
+  ~CudaMesher() override {
+    work_->end();
+    // The last one to hold it may be a mesh's receiver, in that thread.
+    if (thread_.get_id() == std::this_thread::get_id())
+      thread_.detach();
+    else
+      thread_.join();
   }
-  void share_nothing() override { shared_->sharing = false; }
-  std::uint64_t bytes() const override { return shared_->memory ? shared_->memory->bytes() : 0; }
+
+  bool make(const GridView& grid, NodeMesh mesh, Done done) override {
+    return work_->take(grid, std::move(mesh), std::move(done));
+  }
+  const std::string& name() const override { return work_->name; }
+  std::optional<DeviceBlock> shared_block() const override {
+    if (!work_->sharing) return std::nullopt;
+    return block_of(work_->memory->first_block());
+  }
+  void share_nothing() override { work_->sharing = false; }
+  std::uint64_t bytes() const override { return work_->memory ? work_->memory->bytes() : 0; }
+  Turns& turns() override { return work_->turns; }
 
  private:
-  std::shared_ptr<Shared> shared_;
+  std::shared_ptr<Work> work_;
+  std::thread thread_;
 };
 
 }  // namespace
@@ -111,22 +264,22 @@ std::shared_ptr<DeviceMesher> open_device_mesher(const std::optional<DeviceId>& 
                                                  std::uint64_t budget) {
   const int count = gpu::device_count();
   if (count == 0) return nullptr;
-  auto shared = std::make_shared<Shared>();
+  int device = 0;
   bool draws = false;
   for (int i = 0; drawing && i < count && !draws; ++i)
     if (gpu::device_id(i) == *drawing) {
-      shared->device = i;
+      device = i;
       draws = true;
     }
-  shared->name = gpu::open_device(shared->device).name;
+  const std::string name = gpu::open_device(device).name;
+  std::shared_ptr<gpu::MeshMemory> memory;
   if (draws) {
     try {
-      shared->memory = std::make_shared<gpu::MeshMemory>(shared->device, budget);
-      shared->sharing = true;
+      memory = std::make_shared<gpu::MeshMemory>(device, budget);
     } catch (const Error&) {  // through host memory, then
     }
   }
-  return std::make_shared<CudaMesher>(std::move(shared));
+  return std::make_shared<CudaMesher>(std::make_shared<Work>(device, name, std::move(memory)));
 }
 
 }  // namespace isobrick

@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "isobrick/core/turns.h"
 #include "isobrick/surface/grid_view.h"
 #include "isobrick/viewer/node_mesh.h"
 
@@ -33,21 +35,22 @@ class DeviceMesh {
   std::uint32_t first_triangle = 0, triangles = 0;
 };
 
-/// Makes meshes of grids on a device. Belongs to one thread.
-class GridWorker {
- public:
-  virtual ~GridWorker() = default;
-  /// The mesh of GridExtractor, byte for byte: in out.device, or in out.mesh where memory is
-  /// not shared or there is no room. Throws Error when the device fails.
-  virtual void make(const GridView& grid, NodeMesh& out) = 0;
-};
-
-/// A device that makes meshes. Thread-safe.
+/// A device that makes meshes of grids, several at a time, with a thread of its own. Thread-safe.
+/// Whoever holds one keeps it; meshes that are being made when nobody does are still made.
 class DeviceMesher {
  public:
   virtual ~DeviceMesher() = default;
-  /// For the calling thread. Throws Error when the device fails.
-  virtual std::unique_ptr<GridWorker> worker() = 0;
+
+  /// Gets the mesh that was asked for, or why there is none: the device failed, and makes no more.
+  /// Called once for each grid, by the device's thread. Must not throw.
+  using Done = std::function<void(NodeMesh&& mesh, const std::string& failure)>;
+
+  /// Has the mesh of GridExtractor made, byte for byte: in mesh.device, or in mesh.mesh where
+  /// memory is not shared or there is no room. `mesh` says which it is. The grid is not
+  /// looked at any more afterwards; waits only while as many as there is room for are being
+  /// made. False when the device has failed: nothing was taken.
+  virtual bool make(const GridView& grid, NodeMesh mesh, Done done) = 0;
+
   virtual const std::string& name() const = 0;
   /// Whether meshes lie in memory that can be imported, and a block to try that with.
   virtual std::optional<DeviceBlock> shared_block() const = 0;
@@ -55,6 +58,9 @@ class DeviceMesher {
   virtual void share_nothing() = 0;
   /// Device memory taken for meshes.
   virtual std::uint64_t bytes() const = 0;
+  /// The device's turns: it makes meshes in its own. A device that draws as well changes between
+  /// both slowly, so whoever draws with it takes turns.
+  virtual Turns& turns() = 0;
 };
 
 /// 16 bytes by which drivers tell devices apart.

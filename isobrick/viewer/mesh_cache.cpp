@@ -47,15 +47,24 @@ void MeshCache::put(MeshPtr mesh) {
 bool MeshCache::shrink() {
   const auto keeps_budgets = [&] { return bytes_ <= budget_ && device_bytes_ <= device_budget_; };
   if (keeps_budgets()) return true;
+  // Not for each mesh that is made anew.
+  drop_until(budget_ - budget_ / 8, device_budget_ - device_budget_ / 8);
+  return keeps_budgets();
+}
+
+void MeshCache::shrink_device(std::uint64_t bytes) {
+  drop_until(bytes_, device_bytes_ - std::min(bytes, device_bytes_));
+}
+
+/// Drops what was not used since begin_use(), the oldest first, down to this or as far as it goes.
+void MeshCache::drop_until(std::uint64_t bytes, std::uint64_t device_bytes) {
   std::vector<std::pair<std::uint64_t, const NodeMesh*>> old;
   for (const auto& [key, entries] : nodes_)
     for (const Entry& entry : entries)
       if (entry.used < now_) old.emplace_back(entry.used, entry.mesh.get());
   std::sort(old.begin(), old.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  // Not for each mesh that is made anew.
-  const std::uint64_t enough = budget_ - budget_ / 8, there = device_budget_ - device_budget_ / 8;
   for (const auto& [used, mesh] : old) {
-    const bool here_too_many = bytes_ > enough, there_too_many = device_bytes_ > there;
+    const bool here_too_many = bytes_ > bytes, there_too_many = device_bytes_ > device_bytes;
     if (!here_too_many && !there_too_many) break;
     if (!here_too_many && mesh->device_bytes == 0) continue;
     const auto found = nodes_.find(mesh->key);
@@ -65,7 +74,6 @@ bool MeshCache::shrink() {
     std::erase_if(found->second, [&](const Entry& entry) { return entry.mesh.get() == mesh; });
     if (found->second.empty()) nodes_.erase(found);
   }
-  return keeps_budgets();
 }
 
 }  // namespace isobrick

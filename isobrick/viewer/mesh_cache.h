@@ -32,6 +32,9 @@ class MeshCache {
   /// When a budget is exceeded, drops what was not used since begin_use() until there is
   /// some room again. False when the budgets are exceeded all the same.
   bool shrink();
+  /// Drops so many bytes of what lies on the device and was not used since begin_use(), or as much
+  /// as there is.
+  void shrink_device(std::uint64_t bytes);
 
   void set_device_budget(std::uint64_t bytes) { device_budget_ = bytes; }
 
@@ -44,6 +47,8 @@ class MeshCache {
     MeshPtr mesh;
     std::uint64_t used = 0;
   };
+
+  void drop_until(std::uint64_t bytes, std::uint64_t device_bytes);
 
   std::uint64_t budget_, device_budget_, bytes_ = 0, device_bytes_ = 0, meshes_ = 0, now_ = 1;
   std::unordered_map<NodeKey, std::vector<Entry>, NodeKeyHash> nodes_;

@@ -76,10 +76,6 @@ class NodeGrid {
   /// Cells of level 0: the volume.
   Int3 cells() const { return cells_; }
 
-  bool contains(const NodeKey& n) const {
-    return n.level >= 0 && n.level < levels() &&
-           Box3{{0, 0, 0}, level(n.level).nodes}.contains(n.node);
-  }
   /// Grid points of a node along each axis are node · kNodeEdge … + cells.
   Int3 node_cells(const NodeKey& n) const;
   IndexBox box(const NodeKey& n) const;

@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
 #include "isobrick/surface/grid_extractor.h"
 #include "isobrick/surface/world_map.h"
 #include "isobrick/viewer/node_border.h"
@@ -32,8 +31,6 @@ struct NodeMesher::Impl {
   std::vector<float> inverse[3];
   GridExtractor extractor;
   MeshBuffer work;
-  std::unique_ptr<GridWorker> worker;
-  std::string failure;
   Clock::duration busy{};
 
   Impl(const NodeGrid& g, ResidentBricks& b, Vec3d origin)
@@ -109,31 +106,13 @@ struct NodeMesher::Impl {
     return v;
   }
 
-  bool make_on_device(const GridView& v, NodeMesh& out) {
-    if (!worker) return false;
-    try {
-      worker->make(v, out);
-      return true;
-    } catch (const Error& e) {
-      failure = e.what();
-      worker.reset();
-      return false;
+  GridView read(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted) {
+    samples.read(key.level, points_around(key), isovalue, wanted, around);
+    if (coarser) {
+      copy_field(points(key));
+      border.apply(key, coarser, isovalue, wanted, field);
     }
-  }
-
-  void make(NodeMesh& out, const Wanted& wanted) {
-    samples.read(out.key.level, points_around(out.key), out.isovalue, wanted, around);
-    if (out.coarser) {
-      copy_field(points(out.key));
-      border.apply(out.key, out.coarser, out.isovalue, wanted, field);
-    }
-    const auto start = Clock::now();
-    const GridView grid_of_node = view_of(out.key, out.coarser != 0);
-    if (!make_on_device(grid_of_node, out)) {
-      out.ribbon_triangles = extractor.extract(grid_of_node, work);
-      shrink(work, out.mesh);
-    }
-    busy += Clock::now() - start;
+    return view_of(key, coarser != 0);
   }
 
   /// A copy without what growing left over: it is kept for long.
@@ -159,16 +138,18 @@ NodeMesh NodeMesher::mesh(const NodeKey& key, double isovalue, std::uint32_t coa
   out.key = key;
   out.isovalue = isovalue;
   out.coarser = coarser;
-  impl_->make(out, wanted);
+  const GridView grid = impl_->read(key, isovalue, coarser, wanted);
+  const auto start = Clock::now();
+  out.ribbon_triangles = impl_->extractor.extract(grid, impl_->work);
+  Impl::shrink(impl_->work, out.mesh);
+  impl_->busy += Clock::now() - start;
   return out;
 }
 
-void NodeMesher::set_worker(std::unique_ptr<GridWorker> worker) {
-  impl_->worker = std::move(worker);
-  impl_->failure.clear();
+GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coarser,
+                          const Wanted& wanted) {
+  return impl_->read(key, isovalue, coarser, wanted);
 }
-
-const std::string& NodeMesher::failure() const { return impl_->failure; }
 
 NodeMesher::Needs NodeMesher::needs(const NodeKey& key) const {
   return {impl_->grid.level(key.level).source,

@@ -2,9 +2,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
-#include "isobrick/viewer/device_mesher.h"
+#include "isobrick/surface/grid_view.h"
 #include "isobrick/viewer/node_mesh.h"
 #include "isobrick/viewer/node_samples.h"
 
@@ -27,10 +26,8 @@ class NodeMesher {
   /// above. Throws Abandoned, DamageError and what else reading bricks throws.
   NodeMesh mesh(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
 
-  /// From now on a device makes the meshes of what is read; null: this thread. The same
-  /// meshes. When the device fails, this thread goes on alone: failure() says why.
-  void set_worker(std::unique_ptr<GridWorker> worker);
-  const std::string& failure() const;
+  /// What that mesh is made of, for a device. Valid until the next call; throws the same.
+  GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
 
   /// The bricks that this needs, by stored level.
   struct Needs {
@@ -39,7 +36,7 @@ class NodeMesher {
   };
   Needs needs(const NodeKey& key) const;
 
-  /// Seconds spent on meshing so far, without waiting for bricks.
+  /// Seconds that this thread spent on meshing so far, without waiting for bricks or a device.
   double seconds() const;
 
  private:

@@ -203,11 +203,4 @@ std::optional<FieldValue> probe(const NodeGrid& grid, ResidentBricks& bricks, Ve
   return std::nullopt;
 }
 
-std::optional<FieldValue> probe_level(const NodeGrid& grid, ResidentBricks& bricks, Vec3d world,
-                                      int stored, const Wanted& wanted) {
-  if (!in_volume(grid, world)) return std::nullopt;
-  return value_at(bricks.source().info(), stored, world,
-                  [&](Int3 b) { return bricks.get(stored, b, wanted); });
-}
-
 }  // namespace isobrick

@@ -36,11 +36,6 @@ struct FieldValue {
 /// decoded. Nothing outside of the volume or where no level is. Waits for nothing.
 std::optional<FieldValue> probe(const NodeGrid& grid, ResidentBricks& bricks, Vec3d world);
 
-/// The same on one stored level; bricks that are not there are read by the calling
-/// thread. Throws what reading throws, and Abandoned.
-std::optional<FieldValue> probe_level(const NodeGrid& grid, ResidentBricks& bricks, Vec3d world,
-                                      int stored, const Wanted& wanted);
-
 /// From world space to level-0 index space.
 Vec3d to_index_space(const NodeGrid& grid, Vec3d world);
 

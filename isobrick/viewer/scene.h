@@ -23,8 +23,9 @@ class Scene {
   const NodeTree& tree() const { return *tree_; }
 
   /// Chooses the cut for a view and starts on it. `budget.triangles_per_block` is
-  /// replaced by what has been measured. Cheap enough for every frame; nothing
-  /// happens when neither the view nor the isovalues have changed.
+  /// replaced by what has been measured, as far as that has moved by a fifth. Cheap enough for
+  /// every frame; nothing happens when view, isovalues and budget are those of before, and the
+  /// stream goes on where the cut is the same.
   void update(const std::vector<double>& isovalues, const View& view, CutBudget budget);
 
   /// What finds the nodes that isovalues cross.

@@ -27,13 +27,14 @@ struct StreamOptions {
 
 /// What a stream has done so far and has before it.
 struct StreamCounters {
-  double read_seconds = 0, decode_seconds = 0, mesh_seconds = 0;  ///< summed over threads
-  std::uint64_t bytes_read = 0;                                   ///< encoded
+  double read_seconds = 0, decode_seconds = 0,
+         mesh_seconds = 0;       ///< summed over threads; no device
+  std::uint64_t bytes_read = 0;  ///< encoded
   std::uint64_t bricks_resident = 0, brick_bytes = 0, brick_bytes_peak = 0, bricks_read = 0;
   std::uint64_t bricks_wanted = 0;  ///< that waiting work needs and are not there
   std::uint64_t meshes = 0, mesh_bytes = 0, meshes_made = 0;
   std::uint64_t queue = 0, working = 0;  ///< meshes that wait, that are being made
-  std::uint64_t damaged = 0;             ///< nodes that cannot be shown
+  std::uint64_t damaged = 0;             ///< of meshes_made, without triangles for that reason
   std::uint64_t device_meshes_made = 0;  ///< of meshes_made, by a device
   std::uint64_t device_bytes = 0;        ///< of meshes on a device
   std::string device_failure;            ///< why the device makes no more meshes; or empty
@@ -58,11 +59,13 @@ class SceneStream {
   /// From now on this is wanted. Work that it does not need is abandoned at the next brick.
   void set_cut(const Cut& cut);
 
-  /// What to draw now. The same object until something changes. While an isovalue
-  /// has nothing to show yet, what the one in its place showed before is kept.
+  /// What to draw now. The same object until something changes. Until an isovalue covers the
+  /// view, what the one in its place showed before is kept.
   std::shared_ptr<const Drawable> drawable();
 
-  /// From now on this device makes meshes; null: the threads do. What has been made stays.
+  /// From now on this device makes meshes of what the threads read; null: the threads do. What
+  /// has been made stays. Where it fails the threads go on alone; see
+  /// StreamCounters::device_failure.
   void set_device(std::shared_ptr<DeviceMesher> device);
 
   /// Another budget of meshes on a device.

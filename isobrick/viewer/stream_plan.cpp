@@ -17,64 +17,81 @@ bool more_urgent(const MeshJob& a, const MeshJob& b) {
 
 class Planner {
  public:
-  Planner(const NodeTree& tree, MeshCache& meshes, std::vector<MeshJob>& jobs)
-      : tree_(tree), meshes_(meshes), jobs_(jobs) {}
+  Planner(const NodeTree& tree, const Cut& cut, MeshCache& meshes, MeshPlan& plan)
+      : tree_(tree), cut_(cut), meshes_(meshes), plan_(plan) {}
 
-  void add(const CutNode& node, double isovalue) {
-    if (node.cut_away || !tree_.may_hold_surface(node.key, isovalue, node.coarser) ||
-        meshes_.find(node.key, isovalue, node.coarser))
-      return;
-    const bool bare = !meshes_.has_any(node.key, isovalue);
-    jobs_.push_back(
-        {node.key, isovalue, node.coarser, node.visible, false, node.pixels, node.distance});
-    if (bare) add_ancestors(node, isovalue);
-  }
-  void next_isovalue() { ancestors_.clear(); }
-
- private:
-  void add_ancestors(const CutNode& node, double isovalue) {
-    for (NodeKey n = node.key; tree_.grid().has_parent(n);) {
-      n = tree_.grid().parent(n);
-      const auto [place, added] = ancestors_.try_emplace(n, jobs_.size());
-      if (!added) {
-        if (place->second < jobs_.size() && jobs_[place->second].key == n)
-          jobs_[place->second].visible |= node.visible;
-        continue;
-      }
-      if (meshes_.has_any(n, isovalue)) {
-        meshes_.find_any(n, isovalue, 0);  // is kept
-        place->second = ~std::size_t{0};
-        return;
-      }
-      if (tree_.active(n, isovalue))
-        jobs_.push_back({n, isovalue, 0, node.visible, false, node.pixels, node.distance});
-      else
-        place->second = ~std::size_t{0};
+  void run(double soon) {
+    for (const double isovalue : cut_.isovalues)
+      for (const CutNode& node : cut_.nodes) add(node, isovalue);
+    plan_.straight = 2 * bare_.size() > held_ && static_cast<double>(plan_.jobs.size()) <= soon;
+    for (const Bare& bare : bare_) {
+      if (bare.isovalue != ancestors_of_) ancestors_.clear();
+      ancestors_of_ = bare.isovalue;
+      add_ancestors(*bare.node, bare.isovalue);
     }
   }
 
+ private:
+  /// A node without any mesh.
+  struct Bare {
+    const CutNode* node;
+    double isovalue;
+  };
+
+  void add(const CutNode& node, double isovalue) {
+    if (node.cut_away || !tree_.may_hold_surface(node.key, isovalue, node.coarser)) return;
+    ++held_;
+    if (meshes_.find(node.key, isovalue, node.coarser)) return;
+    if (!meshes_.has_any(node.key, isovalue)) bare_.push_back({&node, isovalue});
+    plan_.jobs.push_back(
+        {node.key, isovalue, node.coarser, node.visible, false, node.pixels, node.distance});
+  }
+
+  void add_ancestors(const CutNode& node, double isovalue) {
+    std::vector<MeshJob>& jobs = plan_.jobs;
+    for (NodeKey n = node.key; tree_.grid().has_parent(n);) {
+      n = tree_.grid().parent(n);
+      const auto [place, added] = ancestors_.try_emplace(n, jobs.size());
+      if (!added) {
+        if (place->second != kNoJob) jobs[place->second].visible |= node.visible;
+        continue;
+      }
+      place->second = kNoJob;
+      if (meshes_.has_any(n, isovalue)) {
+        meshes_.find_any(n, isovalue, 0);  // is kept
+        return;
+      }
+      if (plan_.straight && tree_.grid().has_parent(n)) continue;
+      if (!tree_.active(n, isovalue)) continue;
+      place->second = jobs.size();
+      jobs.push_back({n, isovalue, 0, node.visible, false, node.pixels, node.distance});
+    }
+  }
+
+  static constexpr std::size_t kNoJob = ~std::size_t{0};
+
   const NodeTree& tree_;
+  const Cut& cut_;
   MeshCache& meshes_;
-  std::vector<MeshJob>& jobs_;
-  std::unordered_map<NodeKey, std::size_t, NodeKeyHash> ancestors_;
+  MeshPlan& plan_;
+  std::size_t held_ = 0;  ///< nodes of the cut with a surface, for each isovalue
+  std::vector<Bare> bare_;
+  std::unordered_map<NodeKey, std::size_t, NodeKeyHash> ancestors_;  ///< numbers of their jobs
+  double ancestors_of_ = 0;                                          ///< isovalue
 };
 
 }  // namespace
 
-std::vector<MeshJob> plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
-                               const ResidentBricks& bricks, const NodeMesher& mesher) {
-  std::vector<MeshJob> jobs;
-  Planner planner(tree, meshes, jobs);
-  for (const double isovalue : cut.isovalues) {
-    for (const CutNode& node : cut.nodes) planner.add(node, isovalue);
-    planner.next_isovalue();
-  }
-  for (MeshJob& job : jobs) {
+MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
+                   const ResidentBricks& bricks, const NodeMesher& mesher, double soon) {
+  MeshPlan plan;
+  Planner(tree, cut, meshes, plan).run(soon);
+  for (MeshJob& job : plan.jobs) {
     const NodeMesher::Needs needs = mesher.needs(job.key);
     job.resident = bricks.resident(needs.stored, needs.bricks);
   }
-  std::sort(jobs.begin(), jobs.end(), more_urgent);
-  return jobs;
+  std::sort(plan.jobs.begin(), plan.jobs.end(), more_urgent);
+  return plan;
 }
 
 }  // namespace isobrick

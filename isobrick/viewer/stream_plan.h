@@ -21,11 +21,19 @@ struct MeshJob {
   }
 };
 
-/// The meshes that a cut lacks, most urgent first: visible ones, of them those whose
-/// bricks are resident, of them coarse ones, then those with the longest cells on
-/// the picture, then near ones. Nodes without any mesh bring the ancestors along
-/// that will stand in for them.
-std::vector<MeshJob> plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
-                               const ResidentBricks& bricks, const NodeMesher& mesher);
+/// The meshes that a cut lacks.
+struct MeshPlan {
+  /// Most urgent first: visible ones, of them those whose bricks are resident, of them coarse
+  /// ones, then those with the longest cells on the picture, then near ones. Nodes without any
+  /// mesh bring the ancestors along that will stand in for them.
+  std::vector<MeshJob> jobs;
+  /// Of ancestors only the coarsest, because all the rest comes soon.
+  bool straight = false;
+};
+
+/// `soon`: how many meshes are made so quickly that nothing needs to stand in for them but the
+/// coarsest level; that is done where most of a cut is new.
+MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
+                   const ResidentBricks& bricks, const NodeMesher& mesher, double soon);
 
 }  // namespace isobrick

@@ -55,6 +55,9 @@ class DeviceMeshes {
   /// Whether what a device makes is drawn from where it made it.
   bool shares_memory() const;
 
+  /// The device's turns, where it makes meshes and draws; else null.
+  Turns* turns() const { return shares_memory() ? &mesher_->turns() : nullptr; }
+
   /// A mesh on the device, to be drawn until the next forget().
   const PooledMesh& drawn(const NodeMesh& mesh, Vec3d origin);
   void forget() { borrowed_.clear(); }

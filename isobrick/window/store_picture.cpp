@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include <epoxy/gl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -25,14 +26,24 @@ constexpr double kMarginOfWait = 0.05;
 
 /// Of the memory for meshes that the device makes: what is in them; the rest falls between.
 std::uint64_t device_cache_bytes(const PictureBudgets& budgets) {
-  return budgets.device_mesh_memory() / 8 * 7;
+  return budgets.device_mesh_memory() / 4 * 3;
+}
+
+/// Of host memory: what slices take, with what the renderer is given of them.
+std::uint64_t slice_memory(const PictureBudgets& budgets) { return budgets.memory / 8; }
+
+/// Most that the samples of one slice may take: beside them are as many floats.
+std::uint64_t slice_bytes(const PictureBudgets& budgets, ScalarType type) {
+  const std::uint64_t sample = std::min<std::uint64_t>(size_of(type), sizeof(float));
+  const std::uint64_t samples = slice_memory(budgets) / 3 / (sample + sizeof(float));
+  return std::min(SliceRequest{}.bytes, samples * sample);
 }
 
 StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change) {
   StreamOptions options;
   options.threads = budgets.threads;
-  options.brick_bytes = budgets.memory / 2;
-  options.mesh_bytes = budgets.memory - options.brick_bytes;
+  options.mesh_bytes = budgets.memory / 2;
+  options.brick_bytes = budgets.memory - options.mesh_bytes - slice_memory(budgets);
   options.device_bytes = device_cache_bytes(budgets);
   options.on_change = std::move(on_change);
   return options;
@@ -142,19 +153,21 @@ void StorePicture::drop_unused() {
     for (const DrawnNode& node : shown_->nodes)
       if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
         upload->second.used = frame_;
-  // What was uploaded and what the device makes itself share its memory.
-  const std::uint64_t uploaded = std::min(pool_.bytes(), budgets_.device_memory);
-  scene_->stream().set_device_budget(
-      std::min(device_cache_bytes(budgets_), budgets_.device_memory - uploaded));
+  // What was uploaded, what the device makes itself and slices share its memory.
+  std::uint64_t slices = 0;
+  for (const ShownSlice& slice : slices_) slices += slice.samples.size() * sizeof(float);
+  const std::uint64_t all = budgets_.device_memory - std::min(slices, budgets_.device_memory);
+  const std::uint64_t uploaded = std::min(pool_.bytes(), all);
+  scene_->stream().set_device_budget(std::min(device_cache_bytes(budgets_), all - uploaded));
   const std::uint64_t made_there = scene_->stream().counters().device_bytes;
-  if (pool_.bytes() + made_there <= budgets_.device_memory) return;
+  if (pool_.bytes() + made_there <= all) return;
   std::vector<std::pair<std::uint64_t, MeshId>> oldest;
   for (const auto& [id, upload] : uploads_)
     if (upload.used != frame_) oldest.emplace_back(upload.used, id);
   std::sort(oldest.begin(), oldest.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [used, id] : oldest) {
-    if (pool_.bytes() + made_there <= budgets_.device_memory) break;
+    if (pool_.bytes() + made_there <= all) break;
     uploads_.erase(id);
   }
 }
@@ -226,6 +239,7 @@ bool StorePicture::update_slices(const ViewSettings& settings) {
     }
     SliceRequest request;
     request.axis = axis;
+    request.bytes = slice_bytes(budgets_, store_->info().type);
     request.position = settings.slices[slot].place * last[axis];
     scene_->stream().set_slice(axis, request);
     // Until it is there the last one stays.
@@ -294,15 +308,22 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   std::string shows = what_shows(camera, width, height, settings);
   // A pointer that moves over panels must not cost a picture.
   if (other_slices || shown_ != before || shows != shows_) {
+    // Two contexts of one device are changed slowly and to and fro: one after the other is sooner
+    // done, for both.
+    Turns* const turns = device_->turns();
+    const Turn turn(turns);
+    times_.turn = watch.lap();
     renderer().begin(camera, width, height, picture_settings(settings));
     draw_surfaces(settings);
     draw_slices(settings);
     draw_marks(settings);
     renderer().end();
+    times_.draw = watch.lap();
+    if (turns != nullptr) glFinish();
+    times_.finish = watch.lap();
     device_->forget();
     shows_ = std::move(shows);
   }
-  times_.draw = watch.lap();
   drop_unused();
   state_.device_bytes = pool_.bytes() + scene_->stream().counters().device_bytes;
   state_.limited_by_budget = scene_->cut().limited_by_budget;

@@ -41,8 +41,10 @@ struct PictureTimes {
   double drawable = 0;  ///< asking what can be drawn
   double upload = 0;    ///< taking meshes to the device
   double slices = 0;
-  double draw = 0;  ///< telling OpenGL what to draw, memory imported for it included
-  double tidy = 0;  ///< dropping meshes
+  double turn = 0;    ///< waiting for a device that makes meshes as well
+  double draw = 0;    ///< telling OpenGL what to draw, memory imported for it included
+  double finish = 0;  ///< waiting for that device to draw it
+  double tidy = 0;    ///< dropping meshes
 };
 
 /// Draws a store: chooses nodes for a view, takes their meshes from the scene to the

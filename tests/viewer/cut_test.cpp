@@ -10,6 +10,7 @@
 
 #include "isobrick/pipeline/downsample.h"
 #include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {
 namespace {
@@ -84,7 +85,7 @@ void expect_sound(const NodeGrid& grid, const Cut& cut) {
     }
     for (int i = 0; i < kDirections; ++i) {
       const NodeKey beside{mine.level, mine.node + direction(i)};
-      if (!grid.contains(beside) || !grid.has_parent(beside)) continue;
+      if (!has_node(grid, beside) || !grid.has_parent(beside)) continue;
       const NodeKey above = grid.parent(beside);
       if (masks.contains({above.level, above.node.x, above.node.y, above.node.z}))
         expected[{mine.level, mine.node.x, mine.node.y, mine.node.z}] |= 1u << i;

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <future>
+#include <limits>
+#include <vector>
 
 #include "isobrick/viewer/node_mesher.h"
 #include "tests/viewer/memory_bricks.h"
@@ -32,14 +35,22 @@ class Device : public testing::Test {
   void expect_same(std::shared_ptr<const BrickSource> source, const Cut& cut) {
     const NodeGrid grid(source->info());
     ResidentBricks bricks(source, std::uint64_t{1} << 30);
-    NodeMesher here(grid, bricks, {1, 2, 3}), there(grid, bricks, {1, 2, 3});
-    there.set_worker(device_->worker());
-    for (const CutNode& node : cut.nodes) {
-      const auto make = [&](NodeMesher& mesher) {
-        return mesher.mesh(node.key, cut.isovalues.front(), node.coarser, Always());
-      };
-      const NodeMesh a = make(here), b = make(there);
-      ASSERT_EQ(there.failure(), "");
+    NodeMesher mesher(grid, bricks, {1, 2, 3});
+    const double isovalue = cut.isovalues.front();
+    // All at once, so that grids of all kinds meet in what is made together.
+    std::vector<std::promise<NodeMesh>> made(cut.nodes.size());
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      const CutNode& node = cut.nodes[i];
+      const GridView view = mesher.grid(node.key, isovalue, node.coarser, Always());
+      ASSERT_TRUE(device_->make(view, {}, [&, i](NodeMesh&& mesh, const std::string& failure) {
+        EXPECT_EQ(failure, "");
+        made[i].set_value(std::move(mesh));
+      }));
+    }
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      const CutNode& node = cut.nodes[i];
+      const NodeMesh a = mesher.mesh(node.key, isovalue, node.coarser, Always());
+      const NodeMesh b = made[i].get_future().get();
       EXPECT_TRUE(same_bytes(a.mesh.positions, b.mesh.positions) &&
                   same_bytes(a.mesh.normals, b.mesh.normals) &&
                   same_bytes(a.mesh.triangles, b.mesh.triangles))

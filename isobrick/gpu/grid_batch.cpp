@@ -1,0 +1,240 @@
+#include "isobrick/gpu/grid_batch.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <vector>
+
+#include "isobrick/gpu/grid_kernel.h"
+#include "isobrick/gpu/stream.h"
+#include "isobrick/surface/case_tables.h"
+
+namespace isobrick::gpu {
+namespace {
+
+/// With a layer of points on every side.
+constexpr std::size_t kAround = kGridPoints + 2,
+                      kVertices = 3 * kGridRows * std::size_t{kGridPoints};
+/// Of a grid that is sent: both kinds of values, faces, places of all kinds, and what
+/// aligning takes.
+constexpr std::size_t kSent = 4 * (kAround * kAround * kAround + kGridRows * kGridPoints) +
+                              4 * 6 * kGridRows + 3 * 20 * kAround + 32 * 64;
+
+constexpr std::size_t aligned(std::size_t bytes) { return (bytes + 63) / 64 * 64; }
+
+/// Memory that is cut from the front.
+class Cutter {
+ public:
+  explicit Cutter(std::byte* data) : data_(data) {}
+  template <class T>
+  T* take(std::size_t count) {
+    std::byte* at = data_ + used_;
+    used_ += aligned(count * sizeof(T));
+    return reinterpret_cast<T*>(at);
+  }
+
+ private:
+  std::byte* data_;
+  std::size_t used_ = 0;
+};
+
+/// What the work on one grid takes on the device.
+constexpr std::size_t kSlotBytes =
+    aligned(sizeof(GridTotals)) + aligned(kGridRows * sizeof(GridRow)) +
+    aligned(4 * kGridRows * sizeof(std::uint32_t)) + aligned(kVertices) +
+    aligned(kVertices * sizeof(std::uint32_t)) + aligned(kSent);
+
+GridMeshSize size_of(const GridTotals& t) {
+  return {t.vertices + 2 * t.border_vertices, t.triangles + 2 * t.ribbon_sides, 2 * t.ribbon_sides};
+}
+
+/// A cell with a triangle that meets a coarser grid, on all kinds of arrays.
+struct SmallGrid {
+  std::array<float, 8> values{-1, 1, 1, 1, 1, 1, 1, 1};
+  std::array<double, 2> places{0, 1};
+  std::array<float, 2> inverse{1, 1};
+  std::array<float, 4> face{-1, 1, 1, 1};
+  GridView view;
+
+  SmallGrid() {
+    view.values = view.around = values.data();
+    view.row = 2;
+    view.plane = 4;
+    for (int axis = 0; axis < 3; ++axis) {
+      view.n[axis] = view.around_n[axis] = view.coarse_n[axis] = 2;
+      view.place[axis] = view.coarse_place[axis] = places.data();
+      view.inverse[axis] = inverse.data();
+    }
+    view.faces[0] = {face.data(), {2, 2}};
+  }
+};
+
+}  // namespace
+
+struct GridBatch::Impl {
+  /// What is known of a grid that was staged.
+  struct Slot {
+    std::byte *staging = nullptr, *sent = nullptr;  ///< page-locked, and on the device
+    std::size_t used = 0;
+    GridWork work{};
+  };
+
+  Stream stream;
+  Event done{cudaEventBlockingSync | cudaEventDisableTiming};
+  DeviceBuffer<CaseTables> tables{2, stream};
+  DeviceBuffer<GridWork> works;
+  DeviceBuffer<std::byte> memory;
+  PinnedBuffer<std::byte> staging;
+  PinnedBuffer<GridWork> sent_works;
+  PinnedBuffer<GridTotals> totals;
+  std::vector<Slot> slots;
+
+  explicit Impl(std::size_t count)
+      : works(count, stream),
+        memory(count * kSlotBytes, stream),
+        staging(count * aligned(kSent)),
+        sent_works(count),
+        totals(count),
+        slots(count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      Slot& slot = slots[i];
+      Cutter cut(memory.data() + i * kSlotBytes);
+      slot.work.rows = cut.take<GridRow>(kGridRows);
+      slot.work.counts = cut.take<std::uint32_t>(4 * kGridRows);
+      slot.work.faces = cut.take<std::uint8_t>(kVertices);
+      slot.work.ribbon_of = cut.take<std::uint32_t>(kVertices);
+      slot.work.totals = cut.take<GridTotals>(1);
+      slot.sent = cut.take<std::byte>(kSent);
+      slot.work.host_totals = &totals[i];
+      slot.staging = staging.data() + i * aligned(kSent);
+    }
+    const auto send_tables = [&](const CaseTables& from, std::size_t at) {
+      check(cudaMemcpyAsync(tables.data() + at, &from, sizeof(CaseTables), cudaMemcpyHostToDevice,
+                            stream.get()));
+    };
+    send_tables(kCaseTables, 0);
+    send_tables(kMirroredCaseTables, 1);
+    wait();
+  }
+
+  Slot& at(int slot) { return slots[static_cast<std::size_t>(slot)]; }
+
+  void wait() {
+    done.record(stream);
+    done.wait();
+  }
+
+  /// Copies an array to the staging; where it will be on the device.
+  template <class T>
+  static const T* stage(Slot& slot, const T* from, std::size_t count) {
+    std::memcpy(slot.staging + slot.used, from, count * sizeof(T));
+    const auto* at = reinterpret_cast<const T*>(slot.sent + slot.used);
+    slot.used += aligned(count * sizeof(T));
+    return at;
+  }
+
+  void stage(Slot& slot, const GridView& g) const {
+    slot.used = 0;
+    slot.work.meets_coarser = g.meets_coarser();
+    slot.work.tables = tables.data() + (g.map.mirrored ? 1 : 0);
+    GridView& there = slot.work.grid;
+    there = g;
+    const auto points = [](const int(&n)[3]) {
+      return static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) *
+             static_cast<std::size_t>(n[2]);
+    };
+    const std::size_t around = points(g.around_n);
+    there.around = stage(slot, g.around, around);
+    const bool within = g.values >= g.around && g.values < g.around + around;
+    there.values =
+        within ? there.around + (g.values - g.around) : stage(slot, g.values, points(g.n));
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto n = static_cast<std::size_t>(g.around_n[axis]);
+      there.place[axis] = stage(slot, g.place[axis], n);
+      there.inverse[axis] = stage(slot, g.inverse[axis], n);
+      if (slot.work.meets_coarser)
+        there.coarse_place[axis] =
+            stage(slot, g.coarse_place[axis], static_cast<std::size_t>(g.coarse_n[axis]));
+    }
+    for (CoarseFace& face : there.faces)
+      if (face.values)
+        face.values = stage(slot, face.values, static_cast<std::size_t>(face.n[0] * face.n[1]));
+  }
+
+  GridBatchWork send_works(std::span<const GridMeshJob> jobs) {
+    GridBatchWork batch{works.data()};
+    for (const GridMeshJob& job : jobs) {
+      GridWork& work = at(job.slot).work;
+      work.positions = job.place.positions;
+      work.normals = job.place.normals;
+      work.triangles = job.place.triangles;
+      work.vertex_room = job.place.vertices;
+      work.triangle_room = job.place.triangle_count;
+      batch.most_rows = std::max(batch.most_rows, work.grid.n[1] * work.grid.n[2]);
+      batch.any_meets_coarser |= work.meets_coarser;
+      sent_works[static_cast<std::size_t>(batch.count++)] = work;
+    }
+    check(cudaMemcpyAsync(works.data(), sent_works.data(), jobs.size() * sizeof(GridWork),
+                          cudaMemcpyHostToDevice, stream.get()));
+    return batch;
+  }
+};
+
+GridBatch::GridBatch(int device, int slots) {
+  check(cudaSetDevice(device));
+  impl_ = std::make_unique<Impl>(static_cast<std::size_t>(slots));
+  // The first launch of a kernel loads its code, which takes long.
+  stage(0, SmallGrid().view);
+  make(std::array{GridMeshJob{0, {}}});
+  MeshBuffer mesh;
+  download(0, mesh);
+}
+GridBatch::~GridBatch() = default;
+
+int GridBatch::slots() const { return static_cast<int>(impl_->slots.size()); }
+
+void GridBatch::stage(int slot, const GridView& grid) { impl_->stage(impl_->at(slot), grid); }
+
+void GridBatch::make(std::span<const GridMeshJob> jobs) {
+  if (jobs.empty()) return;
+  Impl& i = *impl_;
+  for (const GridMeshJob& job : jobs) {
+    const Impl::Slot& slot = i.at(job.slot);
+    check(cudaMemcpyAsync(slot.sent, slot.staging, slot.used, cudaMemcpyHostToDevice,
+                          i.stream.get()));
+  }
+  const GridBatchWork batch = i.send_works(jobs);
+  launch_grid_count(batch, i.stream.get());
+  launch_grid_mesh(batch, i.stream.get());
+  i.wait();
+}
+
+GridMeshSize GridBatch::size(int slot) const { return size_of(*impl_->at(slot).work.host_totals); }
+
+void GridBatch::write(std::span<const GridMeshJob> jobs) {
+  if (jobs.empty()) return;
+  launch_grid_mesh(impl_->send_works(jobs), impl_->stream.get());
+  impl_->wait();
+}
+
+void GridBatch::download(int slot, MeshBuffer& out) {
+  Impl& i = *impl_;
+  const GridMeshSize size = this->size(slot);
+  out.positions.resize(size.vertices);
+  out.normals.resize(size.vertices);
+  out.triangles.resize(size.triangles);
+  if (size.vertices == 0) return;
+  const DeviceBuffer<Vec3f> positions(size.vertices, i.stream), normals(size.vertices, i.stream);
+  const DeviceBuffer<Triangle> faces(size.triangles, i.stream);
+  write(std::array{GridMeshJob{
+      slot, {positions.data(), normals.data(), faces.data(), size.vertices, size.triangles}}});
+  const auto copy = [&](void* to, const auto& from) {
+    check(cudaMemcpyAsync(to, from.data(), from.bytes(), cudaMemcpyDeviceToHost, i.stream.get()));
+  };
+  copy(out.positions.data(), positions);
+  copy(out.normals.data(), normals);
+  copy(out.triangles.data(), faces);
+  i.wait();
+}
+
+}  // namespace isobrick::gpu
