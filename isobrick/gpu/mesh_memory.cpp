@@ -15,7 +15,7 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr std::uint32_t kMostVertices = 1u << 20, kFewestVertices = 1u << 17;
+constexpr std::uint32_t kMostVertices = 1u << 22, kFewestVertices = 1u << 17;
 constexpr std::uint64_t kVertexBytes = 4 * sizeof(Vec3f);  // with a normal and two triangles
 
 /// A function of the driver; the program is not linked to it.
@@ -123,6 +123,7 @@ struct MeshMemory::Impl {
   std::uint32_t room;
   mutable std::mutex mutex;
   std::vector<std::shared_ptr<Block>> blocks;
+  std::uint64_t used_vertices = 0;
 
   Impl(int d, std::uint64_t b) : device(d), budget(b), room(block_vertices(b)) {
     if (room * kVertexBytes > budget)
@@ -133,16 +134,29 @@ struct MeshMemory::Impl {
     add();
   }
 
-  void add() { blocks.push_back(std::make_shared<Block>(driver, device, room)); }
+  std::shared_ptr<Block> make() const { return std::make_shared<Block>(driver, device, room); }
+  void add() { blocks.push_back(make()); }
+  bool may_add() const { return (blocks.size() + 1) * blocks.front()->bytes <= budget; }
 
-  static std::optional<MeshSpan> take_from(const std::shared_ptr<Block>& block,
-                                           std::uint32_t vertices, std::uint32_t triangles) {
+  void give_back(const MeshSpan& span) {
+    for (const std::shared_ptr<Block>& block : blocks)
+      if (block == span.block) {
+        block->free_vertices.give_back(span.first_vertex, span.vertices);
+        block->free_triangles.give_back(span.first_triangle, span.triangles);
+        used_vertices -= span.vertices;
+      }
+  }
+
+  std::optional<MeshSpan> take_from(const std::shared_ptr<Block>& block, std::uint32_t vertices,
+                                    std::uint32_t triangles) {
     const auto vertex = block->free_vertices.take(vertices);
     if (!vertex) return std::nullopt;
     const auto triangle = block->free_triangles.take(triangles);
-    if (triangle)
+    if (triangle) {
+      used_vertices += vertices;
       return MeshSpan{block,     *vertex,   vertices,
                       *triangle, triangles, block->place(*vertex, vertices, *triangle, triangles)};
+    }
     block->free_vertices.give_back(*vertex, vertices);
     return std::nullopt;
   }
@@ -155,13 +169,11 @@ MeshMemory::~MeshMemory() = default;
 std::optional<MeshSpan> MeshMemory::take(std::uint32_t vertices, std::uint32_t triangles) {
   const std::lock_guard lock(impl_->mutex);
   for (const std::shared_ptr<Block>& block : impl_->blocks)
-    if (auto span = Impl::take_from(block, vertices, triangles)) return span;
-  const std::uint64_t each = impl_->blocks.front()->bytes;
-  if (vertices > impl_->room || triangles > 2 * impl_->room ||
-      (impl_->blocks.size() + 1) * each > impl_->budget)
+    if (auto span = impl_->take_from(block, vertices, triangles)) return span;
+  if (vertices > impl_->room || triangles > 2 * impl_->room || !impl_->may_add())
     return std::nullopt;
   impl_->add();
-  return Impl::take_from(impl_->blocks.back(), vertices, triangles);
+  return impl_->take_from(impl_->blocks.back(), vertices, triangles);
 }
 
 void MeshMemory::trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t triangles) {
@@ -177,16 +189,24 @@ void MeshMemory::trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t tria
 
 void MeshMemory::give_back(const MeshSpan& span) {
   const std::lock_guard lock(impl_->mutex);
-  for (const std::shared_ptr<Block>& block : impl_->blocks)
-    if (block == span.block) {
-      block->free_vertices.give_back(span.first_vertex, span.vertices);
-      block->free_triangles.give_back(span.first_triangle, span.triangles);
-    }
+  impl_->give_back(span);
 }
 
-std::shared_ptr<const MeshBlock> MeshMemory::first_block() const {
+void MeshMemory::grow_ahead() {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    const std::uint64_t room = impl_->blocks.size() * std::uint64_t{impl_->room};
+    const bool enough = room - impl_->used_vertices > impl_->room / 2;
+    if (enough || !impl_->may_add()) return;
+  }
+  auto block = impl_->make();
   const std::lock_guard lock(impl_->mutex);
-  return impl_->blocks.front();
+  impl_->blocks.push_back(std::move(block));
+}
+
+std::vector<std::shared_ptr<const MeshBlock>> MeshMemory::blocks() const {
+  const std::lock_guard lock(impl_->mutex);
+  return {impl_->blocks.begin(), impl_->blocks.end()};
 }
 
 std::uint64_t MeshMemory::bytes() const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "isobrick/gpu/grid_batch.h"
 
@@ -39,7 +40,10 @@ class MeshMemory {
   /// The place is free for others: nobody reads or writes it any more.
   void give_back(const MeshSpan& span);
 
-  std::shared_ptr<const MeshBlock> first_block() const;
+  /// Takes another block where little is left, so that take() does not have to. For one thread.
+  void grow_ahead();
+
+  std::vector<std::shared_ptr<const MeshBlock>> blocks() const;
   /// Of blocks.
   std::uint64_t bytes() const;
 

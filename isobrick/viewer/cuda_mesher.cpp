@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/stopwatch.h"
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/grid_batch.h"
 #include "isobrick/gpu/mesh_memory.h"
@@ -91,6 +92,7 @@ class Work {
   /// Until end(), and until all that was taken is done.
   void run();
   void end();
+  DeviceMesher::Times times();
 
   const int device;
   const std::string name;
@@ -100,7 +102,8 @@ class Work {
 
  private:
   std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
-  void make(std::vector<Job>& jobs);
+  void make(std::vector<Job>& jobs, DeviceMesher::Times& now);
+  void add(const DeviceMesher::Times& now);
   void write_again(std::vector<Job*>& jobs);
   void learn(const gpu::GridMeshSize& size);
 
@@ -113,7 +116,13 @@ class Work {
   std::vector<int> free_;  ///< slots
   std::vector<Job> jobs_;
   bool failed_ = false, end_ = false;
+  DeviceMesher::Times times_;
 };
+
+DeviceMesher::Times Work::times() {
+  const std::lock_guard lock(mutex_);
+  return times_;
+}
 
 bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done) {
   int slot = 0;
@@ -150,12 +159,21 @@ void Work::run() {
   }
   std::unique_lock lock(mutex_);
   for (;;) {
+    if (jobs_.empty() && failure.empty() && sharing) {
+      lock.unlock();
+      try {
+        memory->grow_ahead();
+      } catch (const Error&) {  // what needs more will see
+      }
+      lock.lock();
+    }
     taken_.wait(lock, [&] { return end_ || !jobs_.empty(); });
     if (jobs_.empty()) return;
     std::vector<Job> jobs = std::exchange(jobs_, {});
     lock.unlock();
+    DeviceMesher::Times now{.launches = 1, .grids = jobs.size()};
     try {
-      if (failure.empty()) make(jobs);
+      if (failure.empty()) make(jobs, now);
     } catch (const std::exception& e) {
       failure = e.what();
     }
@@ -164,10 +182,22 @@ void Work::run() {
     for (const Job& job : jobs) free_.push_back(job.slot);
     lock.unlock();
     freed_.notify_all();
+    Stopwatch watch;
     for (Job& job : jobs) job.done(std::move(job.mesh), failure);
     jobs.clear();
+    now.hand_out = watch.lap();
     lock.lock();
+    add(now);
   }
+}
+
+void Work::add(const DeviceMesher::Times& now) {
+  times_.launches += now.launches;
+  times_.grids += now.grids;
+  times_.turn += now.turn;
+  times_.memory += now.memory;
+  times_.device += now.device;
+  times_.hand_out += now.hand_out;
 }
 
 std::optional<Place> Work::place_for(std::uint32_t vertices, std::uint32_t triangles) const {
@@ -184,13 +214,16 @@ void Work::learn(const gpu::GridMeshSize& size) {
 }
 
 /// Room is taken for what meshes were like before, so that the device is waited for once.
-void Work::make(std::vector<Job>& jobs) {
-  const Turn turn(&turns);
+void Work::make(std::vector<Job>& jobs, DeviceMesher::Times& now) {
+  Stopwatch watch;
   std::vector<gpu::GridMeshJob> all;
   for (Job& job : jobs) {
     job.place = place_for(likely_vertices_, likely_triangles_);
     all.push_back(job.on_device());
   }
+  now.memory = watch.lap();
+  const Turn turn(&turns);
+  now.turn = watch.lap();
   batch_.make(all);
   std::vector<Job*> again;
   for (Job& job : jobs) {
@@ -205,6 +238,7 @@ void Work::make(std::vector<Job>& jobs) {
       again.push_back(&job);
   }
   write_again(again);
+  now.device = watch.lap();
   for (Job& job : jobs) {
     if (!job.place) continue;
     const gpu::MeshSpan& span = job.place->span();
@@ -245,10 +279,13 @@ class CudaMesher final : public DeviceMesher {
     return work_->take(grid, std::move(mesh), std::move(done));
   }
   const std::string& name() const override { return work_->name; }
-  std::optional<DeviceBlock> shared_block() const override {
-    if (!work_->sharing) return std::nullopt;
-    return block_of(work_->memory->first_block());
+  std::vector<DeviceBlock> shared_blocks() const override {
+    std::vector<DeviceBlock> blocks;
+    if (work_->sharing)
+      for (auto& block : work_->memory->blocks()) blocks.push_back(block_of(std::move(block)));
+    return blocks;
   }
+  Times times() const override { return work_->times(); }
   void share_nothing() override { work_->sharing = false; }
   std::uint64_t bytes() const override { return work_->memory ? work_->memory->bytes() : 0; }
   Turns& turns() override { return work_->turns; }

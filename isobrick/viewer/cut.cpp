@@ -73,21 +73,22 @@ double CutSelector::urgency(const NodeKey& n, const NodeSight& sight, const Acti
   return sight.pixels * (before ? kHysteresis : 1);
 }
 
-double CutSelector::triangles(const NodeKey& n, std::span<const double> isovalues,
-                              double per_block) const {
+double CutSelector::triangles(const NodeKey& n, const NodeView& view,
+                              std::span<const double> isovalues, double per_block) const {
+  if (view.cuts_away(n)) return 0;
   int blocks = 0;
   for (const double iso : isovalues) blocks += tree_.active_blocks(n, iso);
   return blocks * per_block;
 }
 
 /// How many more triangles there are when these nodes become their children.
-double CutSelector::added_triangles(std::span<const NodeKey> refined,
+double CutSelector::added_triangles(std::span<const NodeKey> refined, const NodeView& view,
                                     std::span<const double> isovalues, double per_block) const {
   double more = 0;
   for (const NodeKey& r : refined) {
-    more -= triangles(r, isovalues, per_block);
+    more -= triangles(r, view, isovalues, per_block);
     for_each_point(tree_.grid().children(r), [&](Int3 c) {
-      more += triangles({r.level - 1, c}, isovalues, per_block);
+      more += triangles({r.level - 1, c}, view, isovalues, per_block);
     });
   }
   return more;
@@ -132,7 +133,7 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   const int top = grid.levels() - 1;
   const Box3 top_nodes{{0, 0, 0}, grid.level(top).nodes};
   for_each_point(top_nodes, [&](Int3 p) {
-    used += triangles({top, p}, isovalues, budget.triangles_per_block);
+    used += triangles({top, p}, node_view, isovalues, budget.triangles_per_block);
     enter({top, p});
   });
 
@@ -146,7 +147,7 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
     needed.clear();
     collect(n, needed);
     for (const NodeKey& r : needed) wanted_(r) = 0;
-    const double more = added_triangles(needed, isovalues, budget.triangles_per_block);
+    const double more = added_triangles(needed, node_view, isovalues, budget.triangles_per_block);
     if (used + more > most) {
       cut.limited_by_budget = true;
       break;

@@ -12,7 +12,7 @@
 namespace isobrick {
 
 /// What a cut may hold. Estimates: a node's triangles are its active blocks
-/// times `triangles_per_block`.
+/// times `triangles_per_block`; none where all of it is cut away.
 struct CutBudget {
   std::uint64_t triangles = 20'000'000;
   std::uint64_t mesh_bytes = std::uint64_t{2} << 30;
@@ -61,9 +61,10 @@ class CutSelector {
 
  private:
   double urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active);
-  double triangles(const NodeKey& n, std::span<const double> isovalues, double per_block) const;
-  double added_triangles(std::span<const NodeKey> refined, std::span<const double> isovalues,
-                         double per_block) const;
+  double triangles(const NodeKey& n, const NodeView& view, std::span<const double> isovalues,
+                   double per_block) const;
+  double added_triangles(std::span<const NodeKey> refined, const NodeView& view,
+                         std::span<const double> isovalues, double per_block) const;
   void collect(const NodeKey& n, std::vector<NodeKey>& needed);
   std::uint32_t coarse_around(const NodeKey& n);
   void append(const NodeKey& n, std::uint32_t coarser, const NodeView& view, Cut& cut);

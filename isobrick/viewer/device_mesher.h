@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isobrick/core/turns.h"
 #include "isobrick/surface/grid_view.h"
@@ -52,8 +53,8 @@ class DeviceMesher {
   virtual bool make(const GridView& grid, NodeMesh mesh, Done done) = 0;
 
   virtual const std::string& name() const = 0;
-  /// Whether meshes lie in memory that can be imported, and a block to try that with.
-  virtual std::optional<DeviceBlock> shared_block() const = 0;
+  /// The memory that meshes lie in, to be imported; nothing: meshes go to host memory.
+  virtual std::vector<DeviceBlock> shared_blocks() const = 0;
   /// From now on meshes go to host memory.
   virtual void share_nothing() = 0;
   /// Device memory taken for meshes.
@@ -61,6 +62,16 @@ class DeviceMesher {
   /// The device's turns: it makes meshes in its own. A device that draws as well changes between
   /// both slowly, so whoever draws with it takes turns.
   virtual Turns& turns() = 0;
+
+  /// What the device's thread has done so far.
+  struct Times {
+    std::uint64_t launches = 0, grids = 0;
+    double turn = 0;    ///< seconds of waiting for its turn
+    double memory = 0;  ///< of finding places for meshes
+    double device = 0;  ///< until the device was done
+    double hand_out = 0;
+  };
+  virtual Times times() const = 0;
 };
 
 /// 16 bytes by which drivers tell devices apart.

@@ -51,15 +51,14 @@ void NodeSamples::gather(int stored, Box3 box, double isovalue, const Wanted& wa
   gathered_.resize(static_cast<std::size_t>(volume(extent)));
   const Box3 cover{{box.lo.x / edge.x, box.lo.y / edge.y, box.lo.z / edge.z},
                    ceil_div(box.hi, edge)};
-  for_each_point(cover, [&](Int3 b) {
-    const auto brick = bricks_.get(stored, b, wanted);
+  const auto take = [&](Int3 b, const BrickSamples& brick) {
     const Int3 corner = b * edge;
     const Box3 part = intersect(box, {corner, corner + edge});
     float* to = gathered_.data() + linear_index(part.lo - box.lo, extent);
-    if (!brick->empty()) {
+    if (!brick.empty()) {
       visit_scalar(lattice.type, [&](auto tag) {
         copy_part<typename decltype(tag)::type>(
-            brick->data(), edge, {part.lo - corner, part.hi - corner}, isovalue, to, extent);
+            brick.data(), edge, {part.lo - corner, part.hi - corner}, isovalue, to, extent);
       });
       return;
     }
@@ -68,7 +67,17 @@ void NodeSamples::gather(int stored, Box3 box, double isovalue, const Wanted& wa
       for (Index y = 0; y < n.y; ++y)
         std::fill_n(to + (z * extent.y + y) * extent.x, n.x,
                     static_cast<float>(info.fill_value - isovalue));
+  };
+  // Threads at nodes beside each other want the same bricks: were each to wait for what another
+  // one is reading, all would read one brick after the other.
+  std::vector<Int3> busy;
+  for_each_point(cover, [&](Int3 b) {
+    if (const auto brick = bricks_.get_unless_busy(stored, b, wanted))
+      take(b, *brick);
+    else
+      busy.push_back(b);
   });
+  for (const Int3 b : busy) take(b, *bricks_.get(stored, b, wanted));
 }
 
 void NodeSamples::read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out) {

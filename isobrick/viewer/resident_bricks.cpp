@@ -54,7 +54,16 @@ std::shared_ptr<const BrickSamples> ResidentBricks::load(const Key& key) {
 
 std::shared_ptr<const BrickSamples> ResidentBricks::get(int level, Int3 brick,
                                                         const Wanted& wanted) {
-  const Key key{level, brick};
+  return get({level, brick}, wanted, true);
+}
+
+std::shared_ptr<const BrickSamples> ResidentBricks::get_unless_busy(int level, Int3 brick,
+                                                                    const Wanted& wanted) {
+  return get({level, brick}, wanted, false);
+}
+
+std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key, const Wanted& wanted,
+                                                        bool may_wait) {
   std::unique_lock lock(mutex_);
   for (;;) {
     wanted.check();
@@ -66,11 +75,18 @@ std::shared_ptr<const BrickSamples> ResidentBricks::get(int level, Int3 brick,
       if (entry.failure) std::rethrow_exception(entry.failure);
       return entry.samples;
     }
+    if (!may_wait) return nullptr;
     loaded_.wait_for(lock, kPatience);
   }
+  return read(key, lock);
+}
+
+/// Reads what is not there, and nobody else reads; gives the lock up meanwhile.
+std::shared_ptr<const BrickSamples> ResidentBricks::read(const Key& key,
+                                                         std::unique_lock<std::mutex>& lock) {
   entries_[key];
   const std::uint64_t bytes =
-      source_->info().levels[static_cast<std::size_t>(level)].lattice.brick_bytes();
+      source_->info().levels[static_cast<std::size_t>(key.level)].lattice.brick_bytes();
   make_room(bytes);
   // Counted before it is there: threads that load at once must not all find room.
   counters_.bytes += bytes;

@@ -40,6 +40,8 @@ class ResidentBricks {
   /// The brick, read and decoded by the caller's thread if need be. Throws
   /// Abandoned, or what reading throws: a brick that is damaged is not read twice.
   std::shared_ptr<const BrickSamples> get(int level, Int3 brick, const Wanted& wanted);
+  /// The same, but null at once where another thread is reading it.
+  std::shared_ptr<const BrickSamples> get_unless_busy(int level, Int3 brick, const Wanted& wanted);
   /// The brick if it is there.
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
   /// Whether all bricks of `box` (in bricks) are there.
@@ -72,6 +74,8 @@ class ResidentBricks {
     std::list<Key>::iterator order;
   };
 
+  std::shared_ptr<const BrickSamples> get(const Key& key, const Wanted& wanted, bool may_wait);
+  std::shared_ptr<const BrickSamples> read(const Key& key, std::unique_lock<std::mutex>& lock);
   std::shared_ptr<const BrickSamples> load(const Key& key);
   void make_room(std::uint64_t bytes);
 

@@ -1,7 +1,6 @@
 #include "isobrick/viewer/scene_stream.h"
 
 #include <algorithm>
-#include <unordered_set>
 
 #include "isobrick/viewer/stream_state.h"
 
@@ -18,6 +17,9 @@ constexpr std::chrono::milliseconds kLate{300};
 
 /// An isovalue that changes again within this time is being slid.
 constexpr std::chrono::milliseconds kSliding{300};
+
+/// From so many on the triangles of a block are told: a few coarse meshes are not like the rest.
+constexpr std::uint64_t kMeasuredBlocks = 512;
 
 int thread_count(int asked) {
   if (asked > 0) return asked;
@@ -47,7 +49,6 @@ void SceneStream::Shared::plan() {
   std::reverse(wanted.begin(), wanted.end());
   jobs = std::move(wanted);
   make_room();
-  count_wanted();
 }
 
 /// What is shown takes room, too, whatever is wanted now.
@@ -55,18 +56,6 @@ void SceneStream::Shared::keep_shown() {
   for (const auto& place : shown)
     for (const DrawnNode& node : place)
       meshes.find(node.mesh->key, node.mesh->isovalue, node.mesh->coarser);
-}
-
-void SceneStream::Shared::count_wanted() {
-  std::unordered_set<NodeKey, NodeKeyHash> missing;
-  for (const MeshJob& job : jobs) {
-    if (job.resident) continue;
-    const NodeMesher::Needs needs = planner.needs(job.key);
-    for_each_point(needs.bricks, [&](Int3 b) {
-      if (!bricks.resident(needs.stored, {b, b + Int3{1, 1, 1}})) missing.insert({needs.stored, b});
-    });
-  }
-  counters.bricks_wanted = missing.size();
 }
 
 void SceneStream::Shared::make_room() {
@@ -231,7 +220,10 @@ StreamCounters SceneStream::counters() const {
   c.device_bytes = shared_->meshes.device_bytes();
   c.queue = shared_->jobs.size();
   c.working = shared_->running.size();
-  if (shared_->blocks_made > 0)
+  c.without_bricks =
+      static_cast<std::uint64_t>(std::count_if(shared_->jobs.begin(), shared_->jobs.end(),
+                                               [](const MeshJob& job) { return !job.resident; }));
+  if (shared_->blocks_made >= kMeasuredBlocks)
     c.triangles_per_block =
         static_cast<double>(shared_->triangles_made) / static_cast<double>(shared_->blocks_made);
   return c;

@@ -31,14 +31,14 @@ struct StreamCounters {
          mesh_seconds = 0;       ///< summed over threads; no device
   std::uint64_t bytes_read = 0;  ///< encoded
   std::uint64_t bricks_resident = 0, brick_bytes = 0, brick_bytes_peak = 0, bricks_read = 0;
-  std::uint64_t bricks_wanted = 0;  ///< that waiting work needs and are not there
   std::uint64_t meshes = 0, mesh_bytes = 0, meshes_made = 0;
   std::uint64_t queue = 0, working = 0;  ///< meshes that wait, that are being made
+  std::uint64_t without_bricks = 0;      ///< of those that wait: bricks were missing when planned
   std::uint64_t damaged = 0;             ///< of meshes_made, without triangles for that reason
   std::uint64_t device_meshes_made = 0;  ///< of meshes_made, by a device
   std::uint64_t device_bytes = 0;        ///< of meshes on a device
   std::string device_failure;            ///< why the device makes no more meshes; or empty
-  double triangles_per_block = 0;        ///< of the meshes made; 0: none yet
+  double triangles_per_block = 0;        ///< of the meshes made; 0: too few yet
   bool mesh_budget_full = false;         ///< meshes are not made for lack of room
 };
 

@@ -93,7 +93,6 @@ struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
   void plan();  ///< abandons what is not wanted any more
   void keep_shown();
   void make_room();
-  void count_wanted();
   void rebuild_drawable();
   void show_before(std::size_t place);
 

@@ -87,7 +87,7 @@ void SceneStream::Shared::received(const std::shared_ptr<Running>& r, NodeMesh&&
   }
   ++counters.device_meshes_made;
   // What came here for want of room there has to be uploaded: older ones make room instead.
-  if (!mesh.device && !mesh.empty() && by->shared_block())
+  if (!mesh.device && !mesh.empty() && !by->shared_blocks().empty())
     meshes.shrink_device(by->bytes() / kPartForNew);
   publish(*r, std::move(mesh));
   finish(r, true, lock);

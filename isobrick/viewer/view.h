@@ -48,6 +48,10 @@ class NodeView {
   NodeView(const View& view, const NodeGrid& grid);
 
   NodeSight see(const NodeKey& n) const;
+  /// NodeSight::cut_away alone.
+  bool cuts_away(const NodeKey& n) const {
+    return (clip_ || !planes_.empty()) && cut_away(grid_.box(n));
+  }
 
  private:
   struct Plane {

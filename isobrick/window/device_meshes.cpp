@@ -67,7 +67,25 @@ void DeviceMeshes::use(Backend backend) {
 }
 
 void DeviceMeshes::update() {
-  if (!opened_ && opening_->over()) take_over();
+  if (!opened_ && opening_->over())
+    take_over();
+  else if (mesher_)
+    import_one();
+}
+
+/// Memory that has been added: before it is drawn from, and not much of it with one picture.
+void DeviceMeshes::import_one() {
+  for (const DeviceBlock& block : mesher_->shared_blocks()) {
+    if (imported_.contains(block.owner.get())) continue;
+    try {
+      buffers_of(block);
+    } catch (const Error&) {
+      imported_.erase(block.owner.get());
+      // Where the first one is refused, all are. Later ones say so where they are drawn.
+      if (imported_.empty()) mesher_->share_nothing();
+    }
+    return;
+  }
 }
 
 void DeviceMeshes::take_over() {
@@ -78,17 +96,11 @@ void DeviceMeshes::take_over() {
     failure_ = e.what();
   }
   if (!mesher_) return;
-  if (const auto block = mesher_->shared_block()) {
-    try {
-      buffers_of(*block);
-    } catch (const Error&) {
-      mesher_->share_nothing();
-    }
-  }
+  import_one();
   if (backend_ != Backend::cpu) stream_.set_device(mesher_);
 }
 
-bool DeviceMeshes::shares_memory() const { return mesher_ && mesher_->shared_block(); }
+bool DeviceMeshes::shares_memory() const { return mesher_ && !mesher_->shared_blocks().empty(); }
 
 std::string DeviceMeshes::describe() const {
   const std::string failure = stream_.counters().device_failure;

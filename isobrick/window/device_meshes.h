@@ -55,6 +55,8 @@ class DeviceMeshes {
   /// Whether what a device makes is drawn from where it made it.
   bool shares_memory() const;
 
+  /// What the device has done; nothing where there is none.
+  DeviceMesher::Times times() const { return mesher_ ? mesher_->times() : DeviceMesher::Times{}; }
   /// The device's turns, where it makes meshes and draws; else null.
   Turns* turns() const { return shares_memory() ? &mesher_->turns() : nullptr; }
 
@@ -67,6 +69,7 @@ class DeviceMeshes {
  private:
   struct Retired;
   void take_over();
+  void import_one();
   const ImportedBuffers& buffers_of(const DeviceBlock& block);
 
   SceneStream& stream_;

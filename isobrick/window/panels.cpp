@@ -192,12 +192,11 @@ void status_panel(const ViewerState& state) {
                      state.pacer.coarser(), state.pacer.smaller()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
-  text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
-                   mebibytes(c.brick_bytes), c.bricks_wanted));
+  text(fmt::format("{} bricks ({})", c.bricks_resident, mebibytes(c.brick_bytes)));
   text(fmt::format("read {} in {:.2f} s, decode {:.2f} s, mesh {:.2f} s", mebibytes(c.bytes_read),
                    c.read_seconds, c.decode_seconds, c.mesh_seconds));
-  text(fmt::format("{} meshes ({}), {} wait, {} in work", c.meshes, mebibytes(c.mesh_bytes),
-                   c.queue, c.working));
+  text(fmt::format("{} meshes ({}), {} wait, {} of them for bricks, {} in work", c.meshes,
+                   mebibytes(c.mesh_bytes), c.queue, c.without_bricks, c.working));
   if (p.limited_by_budget) text("as fine as the memory allows");
   if (c.damaged > 0) text(fmt::format("{} parts cannot be shown", c.damaged));
   ImGui::TextDisabled(p.complete ? "complete" : "refining \u2026");

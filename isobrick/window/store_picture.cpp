@@ -19,8 +19,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Meshes that are new to the device, in a picture while others wait.
-constexpr double kUploadSeconds = 0.008;
+/// While meshes come in and nothing else changes: seconds between pictures, which would keep the
+/// device that draws them from making meshes.
+constexpr double kRefiningSeconds = 0.04;
 constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
 constexpr double kMarginOfWait = 0.05;
 
@@ -131,28 +132,43 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
 }
 
 void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
-  if (next_ == nullptr || next_ == shown_) next_ = newest;
-  const auto start = Clock::now();
-  for (const DrawnNode& node : next_->nodes) {
+  UploadShare share;
+  // What was begun first, or nothing would be finished while there is always something newer.
+  if (next_ != nullptr && next_ != shown_ && !upload_all(*next_, share)) return;
+  if (next_ != nullptr) shown_ = next_;
+  next_ = newest;
+  if (upload_all(*next_, share)) shown_ = next_;
+}
+
+/// Whether what is new can be shown a little later.
+bool StorePicture::can_wait(const Drawable& newest) const {
+  return device_->turns() != nullptr && shown_ != nullptr && shown_->covers && !newest.complete &&
+         shown_->isovalues == newest.isovalues && !scene_->stream().idle() &&
+         std::chrono::duration<double>(Clock::now() - drawn_).count() < kRefiningSeconds;
+}
+
+bool StorePicture::upload_all(const Drawable& drawable, UploadShare& share) {
+  for (const DrawnNode& node : drawable.nodes) {
     if (node.mesh->device) continue;
     Upload& upload = uploads_[node.mesh->id()];
     upload.used = frame_;
     if (upload.there) continue;
+    if (shown_ != nullptr && share.spent()) return false;  // the rest with the next picture
     upload.there = true;
-    if (!node.mesh->empty()) upload.place = pool_.add(node.mesh->mesh.chunk(0), scene_->origin());
-    const std::chrono::duration<double> spent = Clock::now() - start;
-    if (shown_ != nullptr && spent.count() > kUploadSeconds)
-      return;  // the rest with the next picture
+    if (node.mesh->empty()) continue;
+    upload.place = pool_.add(node.mesh->mesh.chunk(0), scene_->origin());
+    share.bytes += upload.place.bytes();
   }
-  shown_ = next_;
-  next_ = newest;
+  return true;
 }
 
 void StorePicture::drop_unused() {
   if (shown_ != nullptr)
-    for (const DrawnNode& node : shown_->nodes)
+    for (const DrawnNode& node : shown_->nodes) {
+      if (node.mesh->device) continue;
       if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
         upload->second.used = frame_;
+    }
   // What was uploaded, what the device makes itself and slices share its memory.
   std::uint64_t slices = 0;
   for (const ShownSlice& slice : slices_) slices += slice.samples.size() * sizeof(float);
@@ -209,18 +225,19 @@ void StorePicture::draw_surfaces(const ViewSettings& settings) {
       continue;
     }
     const auto number = static_cast<std::size_t>(node.isovalue);
-    const auto upload = uploads_.find(node.mesh->id());
-    const bool uploaded = upload != uploads_.end() && !upload->second.place.empty();
-    if (number >= shown_surfaces_.size() || (!uploaded && !node.mesh->device)) continue;
+    const PooledMesh* mesh = nullptr;
+    if (node.mesh->device)
+      mesh = &device_->drawn(*node.mesh, scene_->origin());
+    else if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
+      mesh = &upload->second.place;
+    if (number >= shown_surfaces_.size() || mesh == nullptr || mesh->empty()) continue;
     const SurfaceSettings& surface = settings.surfaces[shown_surfaces_[number]];
     state_.isovalues[shown_surfaces_[number]] = node.mesh->isovalue;
     MeshStyle style;
     style.colour = surface.colour;
     style.opacity = surface.opacity;
     style.id = static_cast<std::uint32_t>(shown_surfaces_[number] + 1);
-    renderer().draw(
-        node.mesh->device ? device_->drawn(*node.mesh, scene_->origin()) : upload->second.place,
-        style);
+    renderer().draw(*mesh, style);
     state_.triangles += node.mesh->triangles();
     ++state_.nodes;
   }
@@ -299,13 +316,13 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   const auto before = shown_;
   const auto newest = scene_->drawable();
   times_.drawable = watch.lap();
-  upload(newest);
+  std::string shows = what_shows(camera, width, height, settings);
+  if (shows != shows_ || !can_wait(*newest)) upload(newest);
   times_.upload = watch.lap();
   device_->retire(shown_ != before ? before : nullptr);
   times_.device += watch.lap();
   const bool other_slices = update_slices(settings);
   times_.slices = watch.lap();
-  std::string shows = what_shows(camera, width, height, settings);
   // A pointer that moves over panels must not cost a picture.
   if (other_slices || shown_ != before || shows != shows_) {
     // Two contexts of one device are changed slowly and to and fro: one after the other is sooner
@@ -323,6 +340,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     times_.finish = watch.lap();
     device_->forget();
     shows_ = std::move(shows);
+    drawn_ = Clock::now();
   }
   drop_unused();
   state_.device_bytes = pool_.bytes() + scene_->stream().counters().device_bytes;

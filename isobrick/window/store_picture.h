@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <future>
@@ -89,10 +90,24 @@ class StorePicture {
     std::uint64_t used = 0;
   };
 
+  /// What may be taken to the device in a picture while others wait: copies that a driver puts
+  /// off take their time later.
+  struct UploadShare {
+    std::uint64_t bytes = 0;
+    std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+
+    bool spent() const {
+      return bytes > (16u << 20) || std::chrono::steady_clock::now() - begin > kMost;
+    }
+    static constexpr std::chrono::milliseconds kMost{6};
+  };
+
   void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
                     double coarser);
   /// Takes meshes of the newest drawable to the device; shows it once all are there.
   void upload(const std::shared_ptr<const Drawable>& newest);
+  bool upload_all(const Drawable& drawable, UploadShare& share);
+  bool can_wait(const Drawable& newest) const;
   void drop_unused();
   void draw_surfaces(const ViewSettings& settings);
   /// Takes new samples of slices. Whether there are any.
@@ -118,6 +133,7 @@ class StorePicture {
   };
   std::array<ShownSlice, 3> slices_;
   std::string shows_;  ///< camera, size and settings of the picture in the renderer
+  std::chrono::steady_clock::time_point drawn_;  ///< when that was
   std::uint64_t frame_ = 0;
   PictureState state_;
   PictureTimes times_;
