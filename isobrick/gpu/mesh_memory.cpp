@@ -15,7 +15,8 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr std::uint32_t kMostVertices = 1u << 22, kFewestVertices = 1u << 17;
+constexpr std::uint32_t kMostVertices = 1u << 20, kFewestVertices = 1u << 17;
+constexpr std::uint64_t kBlocksAhead = 2;
 constexpr std::uint64_t kVertexBytes = 4 * sizeof(Vec3f);  // with a normal and two triangles
 
 /// A function of the driver; the program is not linked to it.
@@ -192,16 +193,17 @@ void MeshMemory::give_back(const MeshSpan& span) {
   impl_->give_back(span);
 }
 
-void MeshMemory::grow_ahead() {
+bool MeshMemory::grow_ahead() {
   {
     const std::lock_guard lock(impl_->mutex);
     const std::uint64_t room = impl_->blocks.size() * std::uint64_t{impl_->room};
-    const bool enough = room - impl_->used_vertices > impl_->room / 2;
-    if (enough || !impl_->may_add()) return;
+    const bool enough = room - impl_->used_vertices > kBlocksAhead * std::uint64_t{impl_->room};
+    if (enough || !impl_->may_add()) return false;
   }
   auto block = impl_->make();
   const std::lock_guard lock(impl_->mutex);
   impl_->blocks.push_back(std::move(block));
+  return true;
 }
 
 std::vector<std::shared_ptr<const MeshBlock>> MeshMemory::blocks() const {

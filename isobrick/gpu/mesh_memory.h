@@ -40,8 +40,9 @@ class MeshMemory {
   /// The place is free for others: nobody reads or writes it any more.
   void give_back(const MeshSpan& span);
 
-  /// Takes another block where little is left, so that take() does not have to. For one thread.
-  void grow_ahead();
+  /// Takes another block where little is left, so that take() does not have to. Whether it did.
+  /// For one thread.
+  bool grow_ahead();
 
   std::vector<std::shared_ptr<const MeshBlock>> blocks() const;
   /// Of blocks.

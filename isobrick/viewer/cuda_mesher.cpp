@@ -104,6 +104,7 @@ class Work {
   std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
   void make(std::vector<Job>& jobs, DeviceMesher::Times& now);
   void add(const DeviceMesher::Times& now);
+  bool grow_ahead() const;
   void write_again(std::vector<Job*>& jobs);
   void learn(const gpu::GridMeshSize& size);
 
@@ -150,6 +151,14 @@ void Work::end() {
   taken_.notify_one();
 }
 
+bool Work::grow_ahead() const {
+  try {
+    return memory->grow_ahead();
+  } catch (const Error&) {  // whoever needs it will see
+    return false;
+  }
+}
+
 void Work::run() {
   std::string failure;
   try {
@@ -159,13 +168,11 @@ void Work::run() {
   }
   std::unique_lock lock(mutex_);
   for (;;) {
-    if (jobs_.empty() && failure.empty() && sharing) {
+    while (jobs_.empty() && !end_ && failure.empty() && sharing) {
       lock.unlock();
-      try {
-        memory->grow_ahead();
-      } catch (const Error&) {  // what needs more will see
-      }
+      const bool grown = grow_ahead();
       lock.lock();
+      if (!grown) break;
     }
     taken_.wait(lock, [&] { return end_ || !jobs_.empty(); });
     if (jobs_.empty()) return;

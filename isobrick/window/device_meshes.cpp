@@ -37,6 +37,14 @@ void DeviceOpening::begin() {
             }).share();
 }
 
+const ImportedBuffers& DeviceOpening::buffers_of(const DeviceBlock& block) {
+  if (const auto there = imported_.find(block.owner.get()); there != imported_.end())
+    return there->second->buffers;
+  auto imported = std::unique_ptr<Imported>(
+      new Imported{block.owner, {block.file, block.bytes, block.vertices, block.triangles}});
+  return imported_.emplace(block.owner.get(), std::move(imported)).first->second->buffers;
+}
+
 bool DeviceOpening::over() const {
   return begun() && mesher_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
@@ -76,13 +84,12 @@ void DeviceMeshes::update() {
 /// Memory that has been added: before it is drawn from, and not much of it with one picture.
 void DeviceMeshes::import_one() {
   for (const DeviceBlock& block : mesher_->shared_blocks()) {
-    if (imported_.contains(block.owner.get())) continue;
+    if (opening_->imported(block)) continue;
     try {
-      buffers_of(block);
+      opening_->buffers_of(block);
     } catch (const Error&) {
-      imported_.erase(block.owner.get());
       // Where the first one is refused, all are. Later ones say so where they are drawn.
-      if (imported_.empty()) mesher_->share_nothing();
+      if (!opening_->any_imported()) mesher_->share_nothing();
     }
     return;
   }
@@ -113,20 +120,10 @@ std::string DeviceMeshes::describe() const {
   return opened_ ? "CPU (there is no CUDA device)" : "CPU";
 }
 
-const ImportedBuffers& DeviceMeshes::buffers_of(const DeviceBlock& block) {
-  Imported& imported = imported_[block.owner.get()];
-  if (!imported.buffers) {
-    imported.buffers =
-        std::make_unique<ImportedBuffers>(block.file, block.bytes, block.vertices, block.triangles);
-    imported.owner = block.owner;
-  }
-  return *imported.buffers;
-}
-
 const PooledMesh& DeviceMeshes::drawn(const NodeMesh& mesh, Vec3d origin) {
   const DeviceMesh& there = *mesh.device;
   const MeshPlace place =
-      buffers_of(there.block)
+      opening_->buffers_of(there.block)
           .place(there.first_vertex, there.vertices, there.first_triangle, there.triangles);
   return borrowed_.emplace_back(MeshPool::borrow(place, origin));
 }

@@ -14,7 +14,8 @@
 
 namespace isobrick {
 
-/// The device that makes meshes, opened once and beside everything else. Not thread-safe.
+/// The device that makes meshes, opened once and beside everything else, and its memory as OpenGL
+/// sees it. For the thread of the context.
 class DeviceOpening {
  public:
   /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
@@ -29,10 +30,22 @@ class DeviceOpening {
   /// Waits for it. Null where there is no device; throws Error when it cannot be opened.
   std::shared_ptr<DeviceMesher> get() const { return mesher_.get(); }
 
+  /// Imported when it is first asked for, which takes some milliseconds. Throws Error when it
+  /// cannot be.
+  const ImportedBuffers& buffers_of(const DeviceBlock& block);
+  bool imported(const DeviceBlock& block) const { return imported_.contains(block.owner.get()); }
+  bool any_imported() const { return !imported_.empty(); }
+
  private:
+  struct Imported {
+    std::shared_ptr<const void> owner;
+    ImportedBuffers buffers;
+  };
+
   std::uint64_t budget_;
   std::function<void()> on_change_;
   std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;
+  std::unordered_map<const void*, std::unique_ptr<Imported>> imported_;
 };
 
 /// The device that makes a picture's meshes, and its memory as OpenGL sees it. For the thread
@@ -70,7 +83,6 @@ class DeviceMeshes {
   struct Retired;
   void take_over();
   void import_one();
-  const ImportedBuffers& buffers_of(const DeviceBlock& block);
 
   SceneStream& stream_;
   std::shared_ptr<DeviceOpening> opening_;
@@ -78,11 +90,6 @@ class DeviceMeshes {
   std::shared_ptr<DeviceMesher> mesher_;
   bool opened_ = false;  ///< or tried in vain
   std::string failure_;
-  struct Imported {
-    std::shared_ptr<const void> owner;
-    std::unique_ptr<ImportedBuffers> buffers;
-  };
-  std::unordered_map<const void*, Imported> imported_;
   std::deque<PooledMesh> borrowed_;
   std::deque<std::unique_ptr<Retired>> retired_;
 };

@@ -29,7 +29,8 @@ class FramePacer {
   void drawn_still(double seconds) {
     if (seconds < kNothingDrawn) return;
     const double ratio = seconds / target_;
-    plain_ = ratio > 1;
+    // While something changes there is more to do than to draw.
+    plain_ = ratio > kLeisure;
     if (plain_) full_seconds_ = seconds;
     coarser_ = std::clamp(kMargin * std::sqrt(ratio), 1.0, kCoarsest);
   }

@@ -71,6 +71,15 @@ std::vector<float> floats_of(const SliceSamples& slice) {
   return samples;
 }
 
+/// Whether both show the same.
+bool same_meshes(const Drawable* a, const Drawable* b) {
+  if (a == nullptr || b == nullptr || a == b) return a == b;
+  return std::equal(a->nodes.begin(), a->nodes.end(), b->nodes.begin(), b->nodes.end(),
+                    [](const DrawnNode& p, const DrawnNode& q) {
+                      return p.mesh == q.mesh && p.isovalue == q.isovalue;
+                    });
+}
+
 /// What a picture depends on beside the meshes and slices that there are. An isovalue
 /// shows when meshes of it are there, and not before.
 std::string what_shows(const Camera& camera, int width, int height, ViewSettings settings) {
@@ -174,8 +183,11 @@ void StorePicture::drop_unused() {
   for (const ShownSlice& slice : slices_) slices += slice.samples.size() * sizeof(float);
   const std::uint64_t all = budgets_.device_memory - std::min(slices, budgets_.device_memory);
   const std::uint64_t uploaded = std::min(pool_.bytes(), all);
-  scene_->stream().set_device_budget(std::min(device_cache_bytes(budgets_), all - uploaded));
+  const std::uint64_t for_device = std::min(device_cache_bytes(budgets_), all - uploaded);
+  if (std::exchange(device_budget_, for_device) != for_device)
+    scene_->stream().set_device_budget(for_device);
   const std::uint64_t made_there = scene_->stream().counters().device_bytes;
+  state_.device_bytes = pool_.bytes() + made_there;
   if (pool_.bytes() + made_there <= all) return;
   std::vector<std::pair<std::uint64_t, MeshId>> oldest;
   for (const auto& [id, upload] : uploads_)
@@ -185,6 +197,7 @@ void StorePicture::drop_unused() {
   for (const auto& [used, id] : oldest) {
     if (pool_.bytes() + made_there <= all) break;
     uploads_.erase(id);
+    state_.device_bytes = pool_.bytes() + made_there;
   }
 }
 
@@ -250,10 +263,12 @@ bool StorePicture::update_slices(const ViewSettings& settings) {
     const auto slot = static_cast<std::size_t>(axis);
     ShownSlice& shown = slices_[slot];
     if (!settings.slices[slot].shown) {
-      scene_->stream().set_slice(axis, std::nullopt);
+      if (shown.asked) scene_->stream().set_slice(axis, std::nullopt);
+      changed |= shown.from != nullptr;
       shown = {};
       continue;
     }
+    shown.asked = true;
     SliceRequest request;
     request.axis = axis;
     request.bytes = slice_bytes(budgets_, store_->info().type);
@@ -262,7 +277,7 @@ bool StorePicture::update_slices(const ViewSettings& settings) {
     // Until it is there the last one stays.
     const auto slice = scene_->stream().slice(axis);
     if (slice == nullptr || slice == shown.from) continue;
-    shown = {slice, floats_of(*slice)};
+    shown = {slice, floats_of(*slice), true};
     changed = true;
   }
   return changed;
@@ -323,8 +338,8 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   times_.device += watch.lap();
   const bool other_slices = update_slices(settings);
   times_.slices = watch.lap();
-  // A pointer that moves over panels must not cost a picture.
-  if (other_slices || shown_ != before || shows != shows_) {
+  // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
+  if (other_slices || !same_meshes(before.get(), shown_.get()) || shows != shows_) {
     // Two contexts of one device are changed slowly and to and fro: one after the other is sooner
     // done, for both.
     Turns* const turns = device_->turns();
@@ -343,7 +358,6 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     drawn_ = Clock::now();
   }
   drop_unused();
-  state_.device_bytes = pool_.bytes() + scene_->stream().counters().device_bytes;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;

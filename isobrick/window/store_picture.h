@@ -130,9 +130,11 @@ class StorePicture {
   struct ShownSlice {
     std::shared_ptr<const SliceSamples> from;
     std::vector<float> samples;
+    bool asked = false;
   };
   std::array<ShownSlice, 3> slices_;
-  std::string shows_;  ///< camera, size and settings of the picture in the renderer
+  std::string shows_;                ///< camera, size and settings of the picture in the renderer
+  std::uint64_t device_budget_ = 0;  ///< that the stream has been told
   std::chrono::steady_clock::time_point drawn_;  ///< when that was
   std::uint64_t frame_ = 0;
   PictureState state_;
