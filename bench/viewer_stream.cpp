@@ -77,25 +77,10 @@ class Session {
   double since_opened() const { return seconds_since(opened_); }
 
   /// One picture as the window makes it. `moving`: it may be a simpler one. Its time.
-  double draw(bool moving) {
-    const auto start = Clock::now();
-    ViewSettings now = settings;
-    const bool plain = pacer_.plain() && (moving || !picture_->state().complete);
-    if (plain) now.occlusion = now.multisample = false;
-    const int smaller = moving ? pacer_.smaller() : 1;
-    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, now,
-                   moving ? pacer_.coarser() : 1);
-    const double submitted = seconds_since(start);
-    glFinish();
-    const double seconds = seconds_since(start);
-    pictures.add(seconds, picture_->times(), seconds - submitted);
-    if (moving)
-      pacer_.drawn(seconds);
-    else if (!plain)
-      pacer_.drawn_still(seconds);
-    device_peak = std::max(device_peak, picture_->state().device_bytes);
-    return seconds;
-  }
+  double draw(bool moving) { return make_picture(moving, true); }
+  /// The picture in full that comes when nothing moves and nothing is missing. Its time; it does
+  /// not count among `pictures`.
+  double draw_at_rest() { return make_picture(false, false); }
   /// At most 60 times a second until `done`. Throws Error when that takes longer than two minutes.
   template <class F>
   void draw_until(bool moving, F&& done) {
@@ -113,9 +98,29 @@ class Session {
   Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   double read_seconds = 0, set_up_seconds = 0;
   std::uint64_t device_peak = 0;
-  PicturesTimes pictures;  ///< since somebody took them
+  PicturesTimes pictures;  ///< since somebody took them; none at rest
 
  private:
+  double make_picture(bool moving, bool counts) {
+    const auto start = Clock::now();
+    ViewSettings now = settings;
+    const bool plain = pacer_.plain() && (moving || !picture_->state().complete);
+    if (plain) now.occlusion = now.multisample = false;
+    const int smaller = moving ? pacer_.smaller() : 1;
+    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, now,
+                   moving ? pacer_.coarser() : 1);
+    const double submitted = seconds_since(start);
+    glFinish();
+    const double seconds = seconds_since(start);
+    if (counts) pictures.add(seconds, picture_->times(), seconds - submitted);
+    if (moving)
+      pacer_.drawn(seconds);
+    else if (!plain)
+      pacer_.drawn_still(seconds);
+    device_peak = std::max(device_peak, picture_->state().device_bytes);
+    return seconds;
+  }
+
   const Arguments& arguments_;
   Clock::time_point opened_;
   std::shared_ptr<const StoreReader> store_;
@@ -199,12 +204,13 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
   Json result;
   const auto covers = [&] { return session.picture().state().covers; };
   const auto complete = [&] { return session.picture().state().complete; };
+  Times at_rest;
   session.draw_until(true, covers);
   result["open"] = {{"store_ms", session.read_seconds * 1e3},
                     {"set_up_ms", session.set_up_seconds * 1e3},
                     {"first_surface_ms", session.since_opened() * 1e3}};
   session.draw_until(false, complete);
-  session.draw(false);
+  at_rest.add(session.draw_at_rest());
   result["open"]["complete_ms"] = session.since_opened() * 1e3;
   result["open"]["triangles"] = session.picture().state().triangles;
   result["open"]["nodes"] = session.picture().state().nodes;
@@ -221,12 +227,13 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
     session.draw_until(true, covers);
     jump["first_surface_ms"] = seconds_since(start) * 1e3;
     session.draw_until(false, complete);
-    session.draw(false);
+    at_rest.add(session.draw_at_rest());
     jump["complete_ms"] = seconds_since(start) * 1e3;
     jumps.push_back(jump);
   }
   result["jumps"] = jumps;
   result["while_streaming"] = std::exchange(session.pictures, {}).summary();
+  result["at_rest"] = at_rest.summary();
 
   result["while_sliding"] = slide(session, arguments);
 

@@ -194,6 +194,11 @@ TEST_F(CutTest, WhatPlanesCutAwayIsNotWanted) {
     away += node.cut_away;
   }
   EXPECT_GT(away, cut.nodes.size() / 4);
+  double triangles = 0;  // takes no part of the budget either
+  for (const CutNode& node : cut.nodes)
+    if (!node.cut_away)
+      triangles += tree().active_blocks(node.key, 128) * CutBudget{}.triangles_per_block;
+  EXPECT_NEAR(static_cast<double>(cut.triangles), triangles, 1);
 }
 
 /// Ranges of a field that is known without samples: a store of 2048³ in no memory.

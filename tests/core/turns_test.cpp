@@ -1,0 +1,40 @@
+#include "isobrick/core/turns.h"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+#include <vector>
+
+namespace isobrick {
+namespace {
+
+TEST(Turns, NobodyHasOneBesideAnotherOrComesTwiceWhileAnotherWaits) {
+  Turns turns;
+  constexpr int kRounds = 200;
+  std::vector<int> order;  // guarded by the turns themselves
+  const auto work = [&](int number) {
+    for (int i = 0; i < kRounds; ++i) {
+      const Turn turn(&turns);
+      order.push_back(number);
+      // Long enough for the other one to ask for the next.
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+  };
+  std::thread first(work, 1), second(work, 2);
+  first.join();
+  second.join();
+  ASSERT_EQ(order.size(), 2u * kRounds);
+  int changes = 0;
+  for (std::size_t i = 1; i < order.size(); ++i) changes += order[i] != order[i - 1];
+  EXPECT_GT(changes, kRounds) << "they take turns, but for when one was not there in time";
+}
+
+TEST(Turns, OfNothingAreNoTurns) {
+  const Turn one(nullptr), another(nullptr);
+  Turns turns;
+  { const Turn turn(&turns); }
+  const Turn again(&turns);
+}
+
+}  // namespace
+}  // namespace isobrick

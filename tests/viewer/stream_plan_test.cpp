@@ -1,0 +1,131 @@
+#include "isobrick/viewer/stream_plan.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/random_cut.h"
+
+namespace isobrick::test {
+namespace {
+
+class Always final : public Wanted {
+ public:
+  void check() const override {}
+};
+
+class PlanTest : public testing::Test {
+ protected:
+  MeshPlan plan(double soon) { return plan_jobs(tree_, cut_, meshes_, bricks_, mesher_, soon); }
+  /// Jobs that are no nodes of the cut.
+  std::size_t ancestors(const MeshPlan& plan, bool coarsest_only) const {
+    std::size_t count = 0;
+    for (const MeshJob& job : plan.jobs) {
+      const bool in_cut = std::any_of(cut_.nodes.begin(), cut_.nodes.end(),
+                                      [&](const CutNode& node) { return node.key == job.key; });
+      count += !in_cut && (!coarsest_only || !tree_.grid().has_parent(job.key));
+    }
+    return count;
+  }
+  void make(const MeshJob& job) {
+    auto mesh = std::make_shared<NodeMesh>();
+    mesh->key = job.key;
+    mesh->isovalue = job.isovalue;
+    mesh->coarser = job.coarser;
+    meshes_.put(std::move(mesh));
+  }
+
+  std::shared_ptr<MemoryBricks> source_ = std::make_shared<MemoryBricks>(
+      Int3{200, 200, 200},
+      std::function<float(Int3)>([](Int3 p) { return static_cast<float>(gyroid_ball(p, 200)); }),
+      MemoryBricks::Options{});
+  NodeTree tree_{*source_};
+  ResidentBricks bricks_{source_, 100 << 20};
+  NodeMesher mesher_{tree_.grid(), bricks_, {0, 0, 0}};
+  MeshCache meshes_{100 << 20, 0};
+  Cut cut_ = RandomCut(tree_.grid(), 1, 100).cut({0.0});
+};
+
+TEST_F(PlanTest, WhatComesSoonBringsTheCoarsestLevelAlone) {
+  ASSERT_GT(tree_.grid().levels(), 2);
+  const MeshPlan slow = plan(0), quick = plan(1e6);
+  EXPECT_FALSE(slow.straight);
+  EXPECT_TRUE(quick.straight);
+  EXPECT_GT(ancestors(slow, false), ancestors(slow, true));
+  EXPECT_EQ(ancestors(quick, false), ancestors(quick, true));
+  EXPECT_EQ(ancestors(quick, true), ancestors(slow, true));
+  EXPECT_GT(ancestors(quick, true), 0u);
+  EXPECT_EQ(quick.jobs.size() - ancestors(quick, false), slow.jobs.size() - ancestors(slow, false));
+  EXPECT_FALSE(tree_.grid().has_parent(quick.jobs.front().key)) << "the coarsest one first";
+}
+
+TEST_F(PlanTest, WhereMostIsThereAllLevelsStandIn) {
+  const MeshPlan all = plan(1e6);
+  std::size_t left = 3;
+  for (const MeshJob& job : all.jobs)
+    if (tree_.grid().has_parent(job.key) && (left == 0 || --left == 0)) make(job);
+  const MeshPlan rest = plan(1e6);
+  EXPECT_FALSE(rest.straight);
+  EXPECT_LT(rest.jobs.size(), all.jobs.size());
+}
+
+/// A source whose bricks are read only when they may be.
+class HeldUp final : public BrickSource {
+ public:
+  explicit HeldUp(std::shared_ptr<const BrickSource> from) : from_(std::move(from)) {}
+  const StoreInfo& info() const override { return from_->info(); }
+  RangeTable brick_ranges(int level, Box3 bricks) const override {
+    return from_->brick_ranges(level, bricks);
+  }
+  RangeTable block_ranges(int level, Box3 blocks) const override {
+    return from_->block_ranges(level, blocks);
+  }
+  bool read_brick(int level, Int3 brick, std::byte* samples) const override {
+    std::unique_lock lock(mutex_);
+    reading_ = true;
+    change_.notify_all();
+    change_.wait(lock, [&] { return open_; });
+    return from_->read_brick(level, brick, samples);
+  }
+
+  void wait_until_read() {
+    std::unique_lock lock(mutex_);
+    change_.wait(lock, [&] { return reading_; });
+  }
+  void open() {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+    change_.notify_all();
+  }
+
+ private:
+  std::shared_ptr<const BrickSource> from_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable change_;
+  mutable bool reading_ = false;
+  bool open_ = false;
+};
+
+TEST(ResidentBricks, WhatAnotherThreadReadsIsBusy) {
+  const auto memory = std::make_shared<MemoryBricks>(
+      Int3{40, 40, 40}, std::function<float(Int3)>([](Int3 p) { return static_cast<float>(p.x); }),
+      MemoryBricks::Options{});
+  const auto source = std::make_shared<HeldUp>(memory);
+  ResidentBricks bricks(source, 10 << 20);
+  std::shared_ptr<const BrickSamples> read;
+  std::thread reader([&] { read = bricks.get(0, {1, 0, 0}, Always()); });
+  source->wait_until_read();
+  EXPECT_EQ(bricks.get_unless_busy(0, {1, 0, 0}, Always()), nullptr);
+  source->open();
+  reader.join();
+  EXPECT_EQ(bricks.get_unless_busy(0, {1, 0, 0}, Always()), read);
+  EXPECT_NE(bricks.get_unless_busy(0, {0, 0, 0}, Always()), nullptr) << "read by this thread";
+  EXPECT_EQ(bricks.counters().reads, 2u);
+}
+
+}  // namespace
+}  // namespace isobrick::test
