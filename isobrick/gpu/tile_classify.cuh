@@ -2,7 +2,7 @@
 
 #include <type_traits>
 
-#include "isobrick/gpu/tile_shared.cuh"
+#include "isobrick/gpu/tile_pieces.cuh"
 
 // First step: the inside bits of a tile's 33 × 33 rows, from global memory.
 
@@ -55,23 +55,6 @@ struct Classifier {
   __device__ std::uint32_t one(T v) const { return v >= threshold ? 1u : 0u; }
 };
 
-/// The bits of 32 samples in a row.
-template <class T>
-__device__ inline std::uint32_t inside32(const Classifier<T>& classifier, const T* samples) {
-  constexpr int kVectors = static_cast<int>(sizeof(T)) * 2;
-  const uint4* from = reinterpret_cast<const uint4*>(samples);
-  std::uint32_t words[4 * kVectors];
-#pragma unroll
-  for (int i = 0; i < kVectors; ++i) {
-    const uint4 v = __ldg(from + i);
-    words[4 * i] = v.x;
-    words[4 * i + 1] = v.y;
-    words[4 * i + 2] = v.z;
-    words[4 * i + 3] = v.w;
-  }
-  return classifier.bits(words);
-}
-
 /// Where the samples of a row lie, counted from sample (0, 0, 0) of the tile.
 __device__ inline int row_start(int row, int z) { return (row - z) * 32; }
 
@@ -86,17 +69,33 @@ __device__ inline const T* sample_at(const TileShared& s, int page, int place) {
   return reinterpret_cast<const T*>(s.pages[page]) + place;
 }
 
-/// A row a thread: a row of narrow samples is a piece of memory or two.
+/// A row a thread. Rows of narrow samples are 32 or 64 bytes; two or four lanes read one,
+/// 16 bytes each, and give each other the bits.
 template <int N, class T>
 __device__ inline void classify_rows(TileShared& s, const Classifier<T>& classifier) {
-#pragma unroll 2
-  for (int row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
-    const int z = static_cast<int>(z_of_row(row)), y = row - 33 * z;
-    const int page = page_of(0, y, z), start = row_start(row, z);
-    const T last = __ldg(sample_at<T>(s, page + 1, start + 32));
-    const std::uint32_t word = inside32(classifier, sample_at<T>(s, page, start));
-    s.rows[row] = {word, classifier.one(last)};
-  }
+  constexpr int kLanes = 2 * static_cast<int>(sizeof(T)), kAtOnce = 32 / kLanes;
+  const auto lane = static_cast<int>(lane_id());
+  for_each_piece<N>([&](int, auto rows) {
+    std::uint32_t parts = 0;  // of row i · kAtOnce + lane / kLanes from bit i · kAtOnce on
+#pragma unroll
+    for (int i = 0; i < kLanes; ++i) {
+      const int r = i * kAtOnce + lane / kLanes, y = rows.y(r), z = ::min(rows.z(r), 32);
+      const T* from = sample_at<T>(s, page_of(0, y, z), 32 * y + 1024 * z);
+      const uint4 v = __ldg(reinterpret_cast<const uint4*>(from) + lane % kLanes);
+      const std::uint32_t words[4] = {v.x, v.y, v.z, v.w};
+      parts |= classifier.bits(words) << i * kAtOnce;
+    }
+    std::uint32_t word = 0;
+#pragma unroll
+    for (int i = 0; i < kLanes; ++i) {
+      const std::uint32_t part = __shfl_sync(kAll, parts, lane % kAtOnce * kLanes + i);
+      word |= (part >> lane / kAtOnce * kAtOnce & ((1u << kAtOnce) - 1u)) << i * kAtOnce;
+    }
+    const OwnRow at(rows);
+    if (!at.exists()) return;
+    const T last = __ldg(sample_at<T>(s, page_of(0, at.y, at.z) + 1, 32 * at.y + 1024 * at.z + 32));
+    s.rows[at.row()] = {word, classifier.one(last)};
+  });
 }
 
 /// A plane a warp and a sample a thread: rows of wide samples, read by one thread

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "isobrick/gpu/tile_shared.cuh"
+#include "isobrick/gpu/tile_pieces.cuh"
 
 // Second step: crossing edges and active cells of each row, numbered by prefix
-// sums. Where the vertices and cells of a row begin is marked, so that 32
-// threads that take 32 of them find their rows with a vote.
+// sums within planes and over planes. Where the vertices and cells of a row begin is marked, so
+// that 32 threads that take 32 of them find their rows with a vote.
 
 namespace isobrick::gpu {
 
@@ -30,20 +30,36 @@ __device__ inline std::uint32_t mixed_cells(const RowBits& a, const RowBits& b, 
   return any & ~all;
 }
 
-__device__ inline RowEdges edges_of_row(const TileShared& s, int row, int y, int z) {
-  const Shape& shape = s.shape;
-  RowEdges e{0, 0, 0, 0, 0, 0, y > 0 || shape.first[1], z > 0 || shape.first[2]};
-  if (z < shape.lo[2] || z > shape.hi[2] || y < shape.lo[1] || y > shape.hi[1]) return e;
-  const bool up_y = y < shape.hi[1], up_z = z < shape.hi[2];
-  const RowBits here = s.rows[row];
-  const RowBits above = up_y ? s.rows[row + 1] : here;
-  const RowBits behind = up_z ? s.rows[row + 33] : here;
-  e.x = (here.at ^ here.next()) & shape.cell_mask;
-  e.y = (here.next() ^ above.next()) & shape.sample_mask;
-  e.z = (here.next() ^ behind.next()) & shape.sample_mask;
-  e.y_at_0 = (here.at ^ above.at) & shape.at_0;
-  e.z_at_0 = (here.at ^ behind.at) & shape.at_0;
-  if (up_y && up_z) e.cells = mixed_cells(here, above, behind, s.rows[row + 34]) & shape.cell_mask;
+/// What of a row is in the region of interest, as far as its y says.
+struct RowLimits {
+  std::uint32_t edges_x, edges_yz, cells;  ///< bits
+  bool up, own;                            ///< there is a row above; it is no lower tile's
+
+  __device__ static RowLimits of(const Shape& shape, int y) {
+    const bool in = y >= shape.lo[1] && y <= shape.hi[1], up = y < shape.hi[1];
+    return {in ? shape.cell_mask : 0, in ? shape.sample_mask : 0, in && up ? shape.cell_mask : 0,
+            up, y > 0 || shape.first[1]};
+  }
+};
+
+__device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape,
+                                        const RowLimits& limits, int row, int z) {
+  const bool in = z >= shape.lo[2] && z <= shape.hi[2], up = z < shape.hi[2];
+  const RowBits* at = s.rows + row;
+  const int above_here = limits.up ? 1 : 0;
+  const RowBits here = at[0], above = at[above_here];
+  at += up ? 33 : 0;
+  const RowBits behind = at[0], opposite = at[above_here];
+  RowEdges e{0, 0, 0, 0, 0, 0, limits.own, z > 0 || shape.first[2]};
+  e.x = (here.at ^ here.next()) & (in ? limits.edges_x : 0);
+  e.y = (here.next() ^ above.next()) & (in ? limits.edges_yz : 0);
+  e.z = (here.next() ^ behind.next()) & (in ? limits.edges_yz : 0);
+  e.cells = mixed_cells(here, above, behind, opposite) & (in && up ? limits.cells : 0);
+  if (shape.at_0) {
+    const std::uint32_t first = in && limits.edges_yz ? 1 : 0;
+    e.y_at_0 = (here.at ^ above.at) & first;
+    e.z_at_0 = (here.at ^ behind.at) & first;
+  }
   return e;
 }
 
@@ -75,54 +91,70 @@ struct RowCounts {
 /// `leave_out(y, z, edges)` may take something of a row away.
 template <int N, class LeaveOut>
 __device__ inline void count_rows(TileShared& s, RowCounts<N>& counts, LeaveOut&& leave_out) {
-  const auto thread = static_cast<int>(own_thread());
-#pragma unroll
-  for (int step = 0; step < Team<N>::kSteps; ++step) {
-    const int row = step * N + thread;
+  const Shape shape = s.shape;
+  const RowLimits of_lane = RowLimits::of(shape, static_cast<int>(lane_id()));
+  for_each_piece<N>([&](int step, auto rows) {
+    const OwnRow at(rows);
     RowCount& count = counts.of_step[step];
     count = {0, 0};
-    std::uint32_t sum = 0;
-    if ((row & ~31) < kRowsOfTile) {
-      if (row < kRowsOfTile) {
-        const int z = static_cast<int>(z_of_row(row));
-        const int y = row - 33 * z;
-        RowEdges edges = edges_of_row(s, row, y, z);
-        leave_out(y, z, edges);
-        if (y == 0) s.plane_at_0[0][z] = static_cast<std::uint8_t>(edges.z_at_0);
-        if (z == 0) s.plane_at_0[1][y] = static_cast<std::uint8_t>(edges.y_at_0);
-        s.crossing[0][row] = edges.x;
-        s.crossing[1][row] = edges.y;
-        s.crossing[2][row] = edges.z;
-        s.mixed[row] = edges.cells;
-        count = RowCount::of(edges);
-      }
-      const std::uint32_t own = count.vertices() | count.cells() << 16;
-      sum = warp_inclusive_sum(own);
-      count.before = sum - own;
+    if (at.exists()) {
+      const int row = at.row(), y = at.y, z = at.z;
+      RowEdges edges =
+          edges_of_row(s, shape, rows.kPlane ? of_lane : RowLimits::of(shape, y), row, z);
+      leave_out(y, z, edges);
+      if (y == 0) s.plane_at_0[0][z] = static_cast<std::uint8_t>(edges.z_at_0);
+      if (z == 0) s.plane_at_0[1][y] = static_cast<std::uint8_t>(edges.y_at_0);
+      s.crossing[0][row] = edges.x;
+      s.crossing[1][row] = edges.y;
+      s.crossing[2][row] = edges.z;
+      s.mixed[row] = edges.cells;
+      count = RowCount::of(edges);
     }
-    if (lane_id() == 31) s.step_sums[step * Team<N>::kWarps + warp_id()] = sum;
-  }
+    const std::uint32_t own = count.vertices() | count.cells() << 16;
+    if constexpr (rows.kPlane) {
+      const std::uint32_t sum = warp_inclusive_sum(own);
+      count.before = sum - own;
+      if (lane_id() == 31) s.plane_sums[at.z] = sum;
+    } else if (at.exists()) {
+      s.last_row_sums[at.z] = own;
+    }
+  });
 }
 
-/// By one warp, between two barriers: the sums before each 32 rows, and of all.
-template <int N>
-__device__ inline void sum_steps(TileShared& s) {
-  constexpr unsigned kSums = Team<N>::kSteps * Team<N>::kWarps;
-  static_assert(kSums <= 64);
-  const unsigned i = 2 * lane_id();
-  const std::uint32_t a = i < kSums ? s.step_sums[i] : 0;
-  const std::uint32_t b = i + 1 < kSums ? s.step_sums[i + 1] : 0;
-  const std::uint32_t va = a & 0xffffu, vb = b & 0xffffu, ca = a >> 16, cb = b >> 16;
-  const std::uint32_t v = warp_inclusive_sum(va + vb), c = warp_inclusive_sum(ca + cb);
-  s.step_vertices[i] = v - va - vb;
-  s.step_vertices[i + 1] = v - vb;
-  s.step_cells[i] = c - ca - cb;
-  s.step_cells[i + 1] = c - cb;
-  if (lane_id() == 31) {
-    s.next_cells = s.next_vertices = 0;
-    s.all_vertices = v;
-    s.all_cells = c;
+/// Vertices and cells before each plane, found by every warp for itself once all rows are
+/// counted: each lane has those before one of the first 32 planes.
+struct PlaneBases {
+  std::uint32_t before;           ///< vertices | cells << 17, which holds what 31 planes have
+  std::uint32_t vertices, cells;  ///< of the first 32 planes
+  std::uint32_t own;              ///< of the plane without its last row: vertices | cells << 16
+
+  __device__ static PlaneBases of(const TileShared& s) {
+    PlaneBases b;
+    b.own = s.plane_sums[lane_id()];
+    const std::uint32_t last = s.last_row_sums[lane_id()];
+    const std::uint32_t v = (b.own & 0xffffu) + (last & 0xffffu), c = (b.own >> 16) + (last >> 16);
+    b.vertices = warp_sum(v);
+    b.cells = warp_sum(c);
+    const std::uint32_t packed = v | c << 17;
+    b.before = warp_inclusive_sum(packed) - packed;
+    return b;
   }
+};
+
+/// What lies before a thing: vertices and cells.
+struct Before {
+  std::uint32_t vertices, cells;
+};
+
+/// What lies before the rows of a piece; in a plane before its first row.
+__device__ inline Before before_piece(const TileShared& s, const PlaneBases& b, PlaneRows rows) {
+  if (rows.plane == 32) return {b.vertices, b.cells};
+  const std::uint32_t before = __shfl_sync(kAll, b.before, rows.plane);
+  return {before & 0x1ffffu, before >> 17};
+}
+__device__ inline Before before_piece(const TileShared& s, const PlaneBases& b, LastRows rows) {
+  if (rows.first > 0) return {b.vertices + (s.plane_sums[32] & 0xffffu), b.cells};
+  return {(b.before & 0x1ffffu) + (b.own & 0xffffu), (b.before >> 17) + (b.own >> 16)};
 }
 
 /// Marks a row with `count` things from `place` on, counted from the first that
@@ -130,16 +162,19 @@ __device__ inline void sum_steps(TileShared& s) {
 template <int Most, std::uint32_t Listed, class Mark>
 __device__ inline void mark_row(Mark (&marks)[Listed], FirstOfGroup* groups, int place, int count,
                                 int row) {
-  constexpr int kGroups = Listed / 32;
-  if (count == 0) return;
-  if (place >= 0 && place < static_cast<int>(Listed)) marks[place] = static_cast<Mark>(row + 1);
-  int group = ::max((place + 31) >> 5, 0);
-  // Hardly any row reaches from one group to the next.
+  if (count > 0 && place >= 0 && place < static_cast<int>(Listed))
+    marks[place] = static_cast<Mark>(row + 1);
+  const int end = ::min(place + count, static_cast<int>(Listed));
+  const auto mark_group = [&](int first) {
+    groups[first / 32] = {static_cast<std::uint16_t>(row),
+                          static_cast<std::uint16_t>(first - place)};
+  };
+  int first = ::max((place + 31) & ~31, 0);
+  if (first < end) mark_group(first);
+  if constexpr (Most > 32) {
+    if (count <= 32) return;  // hardly any row reaches further
 #pragma unroll 1
-  for (int reached = 0; reached < Most; reached += 32, ++group) {
-    if (group >= kGroups || 32 * group >= place + count) break;
-    groups[group] = {static_cast<std::uint16_t>(row),
-                     static_cast<std::uint16_t>(32 * group - place)};
+    for (first += 32; first < end; first += 32) mark_group(first);
   }
 }
 inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
@@ -147,17 +182,17 @@ inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
 /// Leaves the row table for later tiles and the numbers within the tile in
 /// shared memory, and marks the first vertices and cells.
 template <int N>
-__device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, RowTable& table) {
+__device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts,
+                                    const PlaneBases& bases, RowTable& table) {
   auto& lists = lists_of<N>(s);
-  const auto thread = static_cast<int>(own_thread());
-#pragma unroll
-  for (int step = 0; step < Team<N>::kSteps; ++step) {
-    const int row = step * N + thread;
-    if (row >= kRowsOfTile) break;
+  for_each_piece<N>([&](int step, auto rows) {
+    const Before before = before_piece(s, bases, rows);
+    const OwnRow at(rows);
+    if (!at.exists()) return;
+    const int row = at.row();
     const RowCount& count = counts.of_step[step];
-    const unsigned sum = step * Team<N>::kWarps + warp_id();
-    const std::uint32_t base = s.step_vertices[sum] + (count.before & 0xffffu);
-    const std::uint32_t cell = s.step_cells[sum] + (count.before >> 16);
+    const std::uint32_t base = before.vertices + (count.before & 0xffffu);
+    const std::uint32_t cell = before.cells + (count.before >> 16);
     const std::uint32_t y = count.y_start(), z = count.z_start();
     table.rows[row] = base | y << 17 | z << 23;
     s.number[0][row] = base;
@@ -168,7 +203,7 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts, R
                                  static_cast<int>(count.vertices()), row);
     mark_row<kMostCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(cell),
                               static_cast<int>(count.cells()), row);
-  }
+  });
   if (threadIdx.x == 0) {
     table.rows[kRowsOfTile] = s.all_vertices;
     s.cell_base[kRowsOfTile] = static_cast<std::uint16_t>(s.all_cells);
@@ -266,13 +301,16 @@ __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
 template <class F>
 __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed, F&& f) {
   const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(&next));
-  // One thread of the warp counts; an addition would be compiled for any number of them.
-  const auto take = [address] {
+  // One thread of the warp adds 1. The compiler must not know that: it would add up for any
+  // number of threads what they add.
+  std::uint32_t lane;
+  asm volatile("mov.u32 %0, %%laneid;" : "=r"(lane));
+  const auto take = [address, one = lane + 1] {
     std::uint32_t before = 0;
     if (lane_id() == 0)
-      asm volatile("atom.shared.inc.u32 %0, [%1], 0xffffffff;"
+      asm volatile("atom.shared.add.u32 %0, [%1], %2;"
                    : "=r"(before)
-                   : "r"(address)
+                   : "r"(address), "r"(one)
                    : "memory");
     return before;
   };
@@ -299,9 +337,9 @@ __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
     };
     const std::uint32_t index = pair(0) | pair(1) << 2 | pair(33) << 4 | pair(34) << 6;
     const std::uint32_t count = i < listed ? s.triangle_count[index] : 0;
-    if (i < listed) lists.cells[i] = x | place.row << 5 | 10 * index << 16 | count << 28;
-    const std::uint32_t all = warp_sum(count);
-    if (lane_id() == 0) lists.group_triangles[begin / 32] = static_cast<std::uint16_t>(all);
+    const std::uint32_t sum = warp_inclusive_sum(count);
+    if (i < listed) lists.cells[i] = x | place.row << 5 | index << 16 | (sum - count) << 24;
+    if (lane_id() == 31) lists.group_triangles[begin / 32] = static_cast<std::uint16_t>(sum);
   });
 }
 

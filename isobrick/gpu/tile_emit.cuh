@@ -7,6 +7,13 @@
 
 namespace isobrick::gpu {
 
+/// Writes what nobody reads soon: samples of tiles to come stay in the L2 cache instead.
+__device__ inline void store_once(Vec3f& to, const Vec3f& v) {
+  __stcs(&to.x, v.x);
+  __stcs(&to.y, v.y);
+  __stcs(&to.z, v.z);
+}
+
 /// The map of WorldMap::position where nothing lies off the diagonal: the
 /// terms left out are zeros.
 __device__ inline Vec3f position_of(const TileParams& p, Vec3f at) {
@@ -21,10 +28,10 @@ struct EdgeOfVertex {
   std::uint32_t x, axis;
 };
 
-__device__ inline EdgeOfVertex find_edge(const TileShared& s, std::uint32_t row,
+__device__ inline EdgeOfVertex find_edge(const TileShared& s, bool at_0, std::uint32_t row,
                                          std::uint32_t number) {
   const std::uint32_t y_first = s.number[1][row], z_first = s.number[2][row];
-  if (s.shape.at_0) {
+  if (at_0) {
     // The vertices at sample 0 stand before the others along y and along z: between them
     // and what lies before there is one number more than edges.
     const std::uint32_t z = z_of_row(row), y = row - 33 * z;
@@ -120,17 +127,19 @@ __device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::ui
   using Maker = VertexMaker<T>;
   const Maker maker{s, p, p.crossing};
   const auto& lists = lists_of<N>(s);
+  const bool at_0 = s.shape.at_0 != 0;
+  Vec3f* const positions = p.positions + s.vertex_base + first;
+  Vec3f* const normals = Normals ? p.normals + s.vertex_base + first : nullptr;
   for_each_group(s.next_vertices, listed, [&](std::uint32_t begin) {
     const std::uint32_t i = begin + lane_id();
     const std::uint32_t row =
         place_of_lane(lists.vertex_marks[i], lists.vertex_groups[begin / 32]).row;
     if (i >= listed) return;
-    const typename Maker::Edge edge = maker.load(row, find_edge(s, row, first + i));
+    const typename Maker::Edge edge = maker.load(row, find_edge(s, at_0, row, first + i));
     Vec3f position, normal;
     maker.template make<Normals>(edge, position, normal);
-    const std::uint64_t to = s.vertex_base + first + i;
-    p.positions[to] = position;
-    if constexpr (Normals) p.normals[to] = normal;
+    store_once(positions[i], position);
+    if constexpr (Normals) store_once(normals[i], normal);
   });
 }
 
@@ -174,8 +183,7 @@ __device__ inline void emit_triangle(const TileShared& s, std::uint32_t cell, st
     return *reinterpret_cast<const std::uint32_t*>(base + at);
   };
   const std::uint32_t x = cell & 31u, row = cell >> 3 & 0x1ffcu, mask = low_bits(x);
-  const std::uint32_t edges = *reinterpret_cast<const std::uint16_t*>(
-      reinterpret_cast<const char*>(s.triangles) + (cell >> 16 & 0xfffu) + 2 * number);
+  const std::uint32_t edges = s.triangles[5 * (cell >> 16 & 0xffu) + number];
   const std::uint32_t places = x == 0 ? static_cast<std::uint32_t>(sizeof s.places[0]) : 0;
   std::uint32_t corners[3];
 #pragma unroll
@@ -185,7 +193,8 @@ __device__ inline void emit_triangle(const TileShared& s, std::uint32_t cell, st
     const std::uint32_t at = row + place.offset;
     corners[c] = word(at + kNumberOfWord) + place.addend + __popc(word(at) & mask);
   }
-  to = {corners[0], corners[1], corners[2]};
+#pragma unroll
+  for (int c = 0; c < 3; ++c) __stcs(&to[static_cast<std::size_t>(c)], corners[c]);
 }
 
 /// 1 at that place; 0 where it is none of 0 … 31.
@@ -232,18 +241,15 @@ __device__ inline void emit_triangles(TileShared& s, const TileParams& p, std::u
                                       std::uint64_t base) {
   const WarpPart part = part_beside_first<N, 3, 4>(listed);  // it takes the next tile
   const std::uint32_t* cells = lists_of<N>(s).cells;
+  const std::uint16_t* group_triangles = lists_of<N>(s).group_triangles;
   Triangle* to = p.triangles + base + triangles_before<N>(s, part.begin / 32) + lane_id();
   PendingTriangles pending{part.begin, 0, 0};
   std::uint32_t waiting = 0;
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
     const std::uint32_t i = begin + lane_id();
-    const std::uint32_t count = i < part.end ? cells[i] >> 28 : 0;
-    // The sum before each lane from the bits of the counts: three votes.
-    const unsigned ones = __ballot_sync(kAll, count & 1u), twos = __ballot_sync(kAll, count & 2u),
-                   fours = __ballot_sync(kAll, count & 4u), below = lanes_below();
-    std::uint32_t place =
-        waiting + __popc(ones & below) + 2 * __popc(twos & below) + 4 * __popc(fours & below);
-    waiting += __popc(ones) + 2 * __popc(twos) + 4 * __popc(fours);
+    // Where among the waiting triangles the cell's begin.
+    std::uint32_t place = i < part.end ? waiting + (cells[i] >> 24) : kNone;
+    waiting += group_triangles[begin / 32];
     pending.starts |= warp_or(bit_at(place));
     for (; waiting >= 32; waiting -= 32, to += 32) {
       pending.emit(s, cells, *to);

@@ -100,12 +100,16 @@ __device__ void count_tile(TileShared& s, const TileParams& p) {
   });
   __syncthreads();
   if constexpr (Nan) clear_lists<N>(s);
-  if (warp_id() == 0) {
-    sum_steps<N>(s);
-    if (lane_id() == 31) publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
+  const PlaneBases bases = PlaneBases::of(s);
+  if (threadIdx.x == 0) {
+    s.next_cells = s.next_vertices = 0;
+    s.all_vertices =
+        bases.vertices + (s.plane_sums[32] & 0xffffu) + (s.last_row_sums[32] & 0xffffu);
+    s.all_cells = bases.cells;
+    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
   }
-  __syncthreads();
-  publish_rows<N>(s, counts, p.row_tables[s.tile.slot]);
+  if constexpr (Nan) __syncthreads();  // the lists are empty
+  publish_rows<N>(s, counts, bases, p.row_tables[s.tile.slot]);
   __syncthreads();
 }
 
@@ -134,15 +138,16 @@ __device__ bool wait_by_name(std::uint32_t count) {
   return !Nan && count <= ListsOf<N>::kListed;
 }
 
-/// Finds the tile's cells and where its vertices and triangles go. The first warp asks
-/// what other tiles know; the others wait for no more than the place of the vertices.
+/// Finds the tile's cells and where its vertices and triangles go. Two warps ask what other
+/// tiles know; the others wait for no more than the place of the vertices.
 template <int N, bool Nan>
 __device__ void find_places(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
   const bool at_once = wait_by_name<N, Nan>(cells);
-  if (warp_id() == 0) {
+  if (warp_id() == Team<N>::kSumming) {
     find_vertex_base(s, p);
     if (at_once) arrive<N, TeamBarrier::vertex_base>();
+    if (lane_id() == 0) release_rows(s, p);
   }
   std::uint32_t triangles = 0;
   if (at_once) {
@@ -152,24 +157,28 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
     // A tile may have vertices of cells of others only.
     if constexpr (Nan) __syncthreads();
   }
-  if (warp_id() != 0) {
-    if (at_once) {
-      arrive<N, TeamBarrier::cells>();
-      wait<N, TeamBarrier::vertex_base>();
-    }
-    return;
-  }
+  const bool sums = warp_id() == Team<N>::kSumming, asks = warp_id() == Team<N>::kAsking;
+  Neighbour neighbour{};
+  if (asks) neighbour = Neighbour::of_lane(s, p);
   if (at_once) {
-    wait<N, TeamBarrier::cells>();
-    triangles = triangles_before<N>(s, (cells + 31) / 32);
+    if (sums || asks)
+      wait<N, TeamBarrier::cells>();
+    else
+      arrive<N, TeamBarrier::cells>();
+    if (!sums) wait<N, TeamBarrier::vertex_base>();
   }
-  if (lane_id() == 0) {
-    s.all_triangles = triangles;
-    publish_sum(p.order[s.item].triangles, s.item, triangles);
+  if (sums) {
+    if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
+    if (lane_id() == 0) {
+      s.all_triangles = triangles;
+      publish_sum(p.order[s.item].triangles, s.item, triangles);
+    }
+    find_triangle_base(s, p, triangles);
   }
-  find_triangle_base(s, p, triangles);
-  ask_neighbours<N>(s, p);
-  if (wait_by_name<N, Nan>(s.all_vertices)) arrive<N, TeamBarrier::neighbours>();
+  if (asks) {
+    ask_neighbours<N>(s, p, neighbour);
+    if (wait_by_name<N, Nan>(s.all_vertices)) arrive<N, TeamBarrier::neighbours>();
+  }
 }
 
 template <int N, class T, bool Normals>
@@ -256,7 +265,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
     emit_all_vertices<N, T, Normals>(s, p);
     if (!wait_by_name<N, Nan>(s.all_vertices))
       __syncthreads();
-    else if (warp_id() != 0)
+    else if (warp_id() != Team<N>::kAsking)
       wait<N, TeamBarrier::neighbours>();
     number_at_0<N>(s);
     __syncthreads();
@@ -264,6 +273,10 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
     place_numbers<N>(s);
     __syncthreads();
     emit_all_triangles<N>(s, p);
+    if (s.items <= gridDim.x) {  // each block has one at most
+      __syncthreads();
+      break;
+    }
     // No earlier than this: a tile that is taken but not begun holds all later ones up.
     take_tile<T>(s, p, next_number(p));
     __syncthreads();

@@ -68,10 +68,9 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
   return sum;
 }
 
-/// Where the tile's vertices go; with that its row table is complete. One warp.
+/// Where the tile's vertices go. One warp.
 __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   const std::uint32_t item = s.item;
-  RowTable& table = p.row_tables[s.tile.slot];
   const unsigned long long start = *p.number_start;
   const auto base =
       sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
@@ -79,11 +78,17 @@ __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   if (lane_id() != 0) return;
   s.vertex_base = base;
   s.number_base = static_cast<std::uint32_t>(start + base);
-  table.number_base = s.number_base;
-  DeviceFlag(table.ready).store(p.epoch, cuda::memory_order_release);
   if (item + 1 < s.items) return;
   p.totals->vertices = base + s.all_vertices;
   *p.number_end = start + base + s.all_vertices;
+}
+
+/// Gives the tile's row table to later tiles, once it is known where its vertices go. One
+/// thread.
+__device__ inline void release_rows(const TileShared& s, const TileParams& p) {
+  DeviceWord(p.row_tables[s.tile.slot].base_and_epoch)
+      .store(s.number_base | static_cast<unsigned long long>(p.epoch) << 32,
+             cuda::memory_order_release);
 }
 
 /// Where the tile's triangles go. One warp.
@@ -122,31 +127,42 @@ __device__ inline void copy_before(TileShared& s, const RowTable& table) {
 #endif
 }
 
+/// The row table of the lower neighbour that lane 1 … 6 asks, where bits 0, 1, 2 of the lane
+/// say along which axes it is one lower.
+struct Neighbour {
+  std::uint32_t slot;  ///< or kNone
+  bool wait;           ///< the table may not be ready
+
+  __device__ static Neighbour of_lane(const TileShared& s, const TileParams& p) {
+    const TileItem& item = s.tile;
+    const unsigned n = lane_id();
+    const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
+    const bool inside = n >= 1 && n <= 6 && !(dx && s.shape.first[0]) &&
+                        !(dy && s.shape.first[1]) && !(dz && s.shape.first[2]);
+    if (!inside) return {kNone, false};
+    if (!p.links) return {slot_of(s, p, item.x - dx, item.y - dy, item.z - dz), true};
+    const std::uint32_t slot = p.links[s.item].before[n - 1];
+    if (slot == kNone) return {kNone, false};
+    return {slot & ~TileLinks::kSameLaunch, (slot & TileLinks::kSameLaunch) && !p.tables_known};
+  }
+};
+
 /// One warp: waits for the numbers of the lower neighbours, which from now on count
 /// from this tile's first vertex, and fetches what this tile needs of their rows.
 /// A neighbour that is not active shares no vertex with this tile.
 template <int N>
-__device__ inline void ask_neighbours(TileShared& s, const TileParams& p) {
-  const TileItem& item = s.tile;
-  const Shape& shape = s.shape;
+__device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
+                                      const Neighbour& neighbour) {
   const unsigned n = lane_id();
-  const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
-  const bool inside = n >= 1 && n <= 6 && !(dx && shape.first[0]) && !(dy && shape.first[1]) &&
-                      !(dz && shape.first[2]);
-  std::uint32_t slot = kNone;
-  bool wait = true;
-  if (inside && p.links) {
-    slot = p.links[s.item].before[n - 1];
-    wait = (slot & TileLinks::kSameLaunch) && !p.tables_known;
-    if (slot != kNone) slot &= ~TileLinks::kSameLaunch;
-  } else if (inside) {
-    slot = slot_of(s, p, item.x - dx, item.y - dy, item.z - dz);
-  }
+  const std::uint32_t slot = neighbour.slot;
   if (slot != kNone) {
-    RowTable& table = p.row_tables[slot];
-    DeviceFlag ready(table.ready);
-    while (wait && ready.load(cuda::memory_order_acquire) != p.epoch) __nanosleep(20);
-    s.neighbour_base[n] = table.number_base - s.number_base;
+    DeviceWord word(p.row_tables[slot].base_and_epoch);
+    unsigned long long seen = word.load(cuda::memory_order_acquire);
+    while (neighbour.wait && seen >> 32 != p.epoch) {
+      __nanosleep(20);
+      seen = word.load(cuda::memory_order_acquire);
+    }
+    s.neighbour_base[n] = static_cast<std::uint32_t>(seen) - s.number_base;
   } else if (n < 8) {
     s.neighbour_base[n] = 0;
   }
@@ -188,10 +204,12 @@ __device__ inline void number_at_0(TileShared& s) {
   const RowTable* before = s.before;
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
-#pragma unroll 3
-  for (unsigned row = own_thread(); row < kRowsOfTile; row += N) {
+  for_each_piece<N>([&](int, auto rows) {
+    const OwnRow at(rows);
+    if (!at.exists()) return;
+    const int row = at.row();
     // The rows on the lower planes are borrowed.
-    const bool keep_y = own_z || row >= 33, keep_z = own_y || row % 33 != 0;
+    const bool keep_y = own_z || at.z > 0, keep_z = own_y || at.y > 0;
     std::uint32_t y = 0, z = 0;
     if (before) {
       const std::uint32_t e = before->rows[row];
@@ -203,7 +221,7 @@ __device__ inline void number_at_0(TileShared& s) {
     }
     if (keep_y) s.at_0[0][row] = y;
     if (keep_z) s.at_0[1][row] = z;
-  }
+  });
 }
 
 /// The rows on the lower planes: their vertices belong to tiles before this one.

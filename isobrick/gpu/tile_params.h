@@ -28,8 +28,9 @@ inline constexpr std::uint32_t kNone = 0xffffffffu;
 /// ends the last row.
 struct alignas(16) RowTable {
   std::uint32_t rows[kRowsOfTile + 1];
-  std::uint32_t number_base;  ///< mesh number of the tile's first vertex
-  std::uint32_t ready;        ///< the epoch in which number_base was written
+  /// The mesh number of the tile's first vertex, and above it the epoch in which it was
+  /// written.
+  unsigned long long base_and_epoch;
 };
 
 /// What a launch of its own must know of an item, where no tables of the whole grid are

@@ -15,11 +15,17 @@ inline constexpr unsigned kAll = 0xffffffffu;
 inline constexpr int kRowPitch = kRowsOfTile + 10;
 static_assert(kRowPitch % 32 == 11);
 
+/// Rows are dealt out to warps in pieces of up to 32 (tile_pieces.cuh).
+inline constexpr int kPieces = 33 + 2;
+
 /// How many threads share a tile, and how its rows are dealt out to them.
 template <int N>
 struct Team {
   static constexpr int kWarps = N / 32;
-  static constexpr int kSteps = (kRowsOfTile + N - 1) / N;
+  /// Pieces of rows that a warp has, one after the other.
+  static constexpr int kSteps = (kPieces + kWarps - 1) / kWarps;
+  /// The warps that ask other tiles: for the sums before, and for numbers of vertices.
+  static constexpr unsigned kSumming = 0, kAsking = kWarps > 1 ? 1 : 0;
   /// How many teams a multiprocessor has room for.
   static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
   /// Vertices or cells that are found at a time; tiles with more take several turns.
@@ -76,15 +82,15 @@ struct alignas(256) TileShared {
   std::uint16_t cell_base[kRowsOfTile + 1];
   /// Numbers of the vertices at sample 0 on edges along y and along z.
   std::uint32_t at_0[2][kRowPitch];
-  /// Three edges times 8, 4 bits apart, a triangle.
+  /// Three edges times 8, 4 bits apart, a triangle: five a case.
   std::uint16_t triangles[256 * 5];
   std::uint8_t triangle_count[256];
   alignas(256) EdgePlace places[2][16];  ///< of cells with x > 0, of those with x = 0
   /// Of the tiles around, x + 3·y + 9·z, where their sample (0, 0, 0) of this tile's
   /// coordinates would be.
   std::uintptr_t pages[27];
-  std::uint32_t step_sums[64];                      ///< of 32 rows each: vertices | cells << 16
-  std::uint32_t step_vertices[64], step_cells[64];  ///< before them
+  /// Of each plane's first 32 rows and of its last: vertices | cells << 16.
+  std::uint32_t plane_sums[33], last_row_sums[33];
   std::uint32_t all_vertices, all_cells;
   unsigned long long vertex_base, triangle_base;
   std::uint32_t number_base;        ///< mesh number of the tile's first vertex
@@ -115,8 +121,8 @@ struct FirstOfGroup {
 template <std::uint32_t Listed>
 struct alignas(16) Lists {
   static constexpr std::uint32_t kListed = Listed;
-  /// Row + 1 where a row's cells begin, else 0; then x | row << 5 | ten times the
-  /// case << 16 | triangles << 28.
+  /// Row + 1 where a row's cells begin, else 0; then x | row << 5 | case << 16 | triangles
+  /// of its group before it << 24.
   std::uint32_t cells[Listed];
   std::uint16_t vertex_marks[Listed];  ///< row + 1 where a row's vertices begin
   FirstOfGroup vertex_groups[Listed / 32], cell_groups[Listed / 32];
@@ -167,11 +173,15 @@ __device__ inline std::uint32_t warp_sum(std::uint32_t v) {
 }
 
 __device__ inline std::uint32_t warp_inclusive_sum(std::uint32_t v) {
+  // The shuffle itself says whether there is a lane below.
 #pragma unroll
-  for (int d = 1; d < 32; d *= 2) {
-    const std::uint32_t below = __shfl_up_sync(kAll, v, d);
-    if (lane_id() >= d) v += below;
-  }
+  for (int d = 1; d < 32; d *= 2)
+    asm volatile(
+        "{.reg .pred there; .reg .u32 below;\n"
+        "shfl.sync.up.b32 below|there, %0, %1, 0, 0xffffffff;\n"
+        "@there add.u32 %0, %0, below;}"
+        : "+r"(v)
+        : "r"(d));
   return v;
 }
 

@@ -1,0 +1,53 @@
+#pragma once
+
+#include "isobrick/gpu/tile_shared.cuh"
+
+// How the 33 × 33 rows of a tile are dealt out to warps: the first 32 rows of each plane are
+// a piece, so that a thread has the same y in all of them; the last rows of all planes are
+// two more.
+
+namespace isobrick::gpu {
+
+/// The first 32 rows of a plane.
+struct PlaneRows {
+  static constexpr bool kPlane = true;
+  int plane;
+
+  /// Of row `i` of the piece, which is that of lane i.
+  __device__ int y(int i) const { return i; }
+  __device__ int z(int) const { return plane; }
+};
+/// The last rows of planes. There may be less than 32.
+struct LastRows {
+  static constexpr bool kPlane = false;
+  int first;
+
+  __device__ static constexpr int y(int) { return 32; }
+  __device__ int z(int i) const { return first + i; }
+};
+/// The row of the own lane.
+template <class Rows>
+struct OwnRow {
+  int y, z;
+
+  __device__ explicit OwnRow(Rows rows)
+      : y(rows.y(static_cast<int>(lane_id()))), z(rows.z(static_cast<int>(lane_id()))) {}
+  __device__ bool exists() const { return Rows::kPlane || z < 33; }
+  __device__ int row() const { return 33 * z + y; }
+};
+
+/// Calls f(step, PlaneRows or LastRows) for the pieces of this warp, which are neighbours.
+template <int N, class F>
+__device__ inline void for_each_piece(F&& f) {
+  const int first = static_cast<int>(uniform(warp_id())) * Team<N>::kSteps;
+#pragma unroll
+  for (int step = 0; step < Team<N>::kSteps; ++step) {
+    const int piece = first + step;
+    if (piece < 33)
+      f(step, PlaneRows{piece});
+    else if (piece < kPieces)
+      f(step, LastRows{32 * (piece - 33)});
+  }
+}
+
+}  // namespace isobrick::gpu
