@@ -144,7 +144,7 @@ template <int N, bool Nan>
 __device__ void find_places(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
   const bool at_once = wait_by_name<N, Nan>(cells);
-  if (warp_id() == Team<N>::kSumming) {
+  if (warp_id() == Team<N>::kVertices) {
     find_vertex_base(s, p);
     if (at_once) arrive<N, TeamBarrier::vertex_base>();
     if (lane_id() == 0) release_rows(s, p);
@@ -157,17 +157,20 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
     // A tile may have vertices of cells of others only.
     if constexpr (Nan) __syncthreads();
   }
-  const bool sums = warp_id() == Team<N>::kSumming, asks = warp_id() == Team<N>::kAsking;
+  const bool for_vertices = warp_id() == Team<N>::kVertices,
+             for_triangles = warp_id() == Team<N>::kTriangles;
   Neighbour neighbour{};
-  if (asks) neighbour = Neighbour::of_lane(s, p);
+  if (for_vertices) neighbour = Neighbour::of_lane(s, p);
   if (at_once) {
-    if (sums || asks)
+    // All wait for each other at this one, so nobody may do anything before it.
+    if (!for_vertices && for_triangles) wait<N, TeamBarrier::vertex_base>();
+    if (for_vertices || for_triangles)
       wait<N, TeamBarrier::cells>();
     else
       arrive<N, TeamBarrier::cells>();
-    if (!sums) wait<N, TeamBarrier::vertex_base>();
+    if (!for_vertices && !for_triangles) wait<N, TeamBarrier::vertex_base>();
   }
-  if (sums) {
+  if (for_triangles) {
     if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
     if (lane_id() == 0) {
       s.all_triangles = triangles;
@@ -175,7 +178,7 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
     }
     find_triangle_base(s, p, triangles);
   }
-  if (asks) {
+  if (for_vertices) {
     ask_neighbours<N>(s, p, neighbour);
     if (wait_by_name<N, Nan>(s.all_vertices)) arrive<N, TeamBarrier::neighbours>();
   }
@@ -265,7 +268,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
     emit_all_vertices<N, T, Normals>(s, p);
     if (!wait_by_name<N, Nan>(s.all_vertices))
       __syncthreads();
-    else if (warp_id() != Team<N>::kAsking)
+    else if (warp_id() != Team<N>::kVertices)
       wait<N, TeamBarrier::neighbours>();
     number_at_0<N>(s);
     __syncthreads();

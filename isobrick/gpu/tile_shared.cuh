@@ -24,8 +24,9 @@ struct Team {
   static constexpr int kWarps = N / 32;
   /// Pieces of rows that a warp has, one after the other.
   static constexpr int kSteps = (kPieces + kWarps - 1) / kWarps;
-  /// The warps that ask other tiles: for the sums before, and for numbers of vertices.
-  static constexpr unsigned kSumming = 0, kAsking = kWarps > 1 ? 1 : 0;
+  /// The warps that ask other tiles: where vertices go and what numbers those of neighbours
+  /// have, and where triangles go.
+  static constexpr unsigned kVertices = 0, kTriangles = kWarps > 1 ? 1 : 0;
   /// How many teams a multiprocessor has room for.
   static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
   /// Vertices or cells that are found at a time; tiles with more take several turns.
