@@ -7,9 +7,9 @@
 namespace isobrick::tools {
 
 void add_picture_options(CLI::App* app, PictureOptions& options, const std::string& thing) {
-  add_parsed(app, options.size, parse_picture_size,
-             {"--size", "WxH", "Size of the picture, pixels",
-              fmt::format("{}x{}", options.size.width, options.size.height)});
+  add_parsed(
+      app, options.size, parse_picture_size,
+      {"--size", "WxH", "Pixels", fmt::format("{}x{}", options.size.width, options.size.height)});
   add_parsed(app, options.camera, parse_camera,
              {"--camera", "PARTS",
               "azimuth=DEG,elevation=DEG,roll=DEG,zoom=X,fov=DEG,orthographic,up=X:Y:Z,from=X:Y:Z, "

@@ -144,6 +144,7 @@ RangeTable RangeArrayReader::read(Box3 box, std::atomic<std::uint64_t>& bytes_re
     // Chunks are written even where all ranges are alike, so none may be missing.
     if (!exists) throw DamageError(fmt::format("'{}' is missing", path.string()));
     bytes_read += encoded.size();
+    table.bytes_read += encoded.size();
     try {
       decode_bytes(metadata_.codecs, size_of(metadata_.type), std::as_bytes(std::span(encoded)),
                    decoded);

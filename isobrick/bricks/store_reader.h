@@ -71,6 +71,7 @@ struct BrickTimes {
 struct RangeTable {
   Box3 box;
   std::vector<ValueRange<double>> ranges;
+  std::uint64_t bytes_read = 0;  ///< from disk, for this table
   const ValueRange<double>& at(Int3 p) const {
     return ranges[static_cast<std::size_t>(linear_index(p - box.lo, box.extent()))];
   }

@@ -181,7 +181,7 @@ struct GridBatch::Impl {
 };
 
 GridBatch::GridBatch(int device, int slots) {
-  check(cudaSetDevice(device));
+  make_current(device);
   impl_ = std::make_unique<Impl>(static_cast<std::size_t>(slots));
   // The first launch of a kernel loads its code, which takes long.
   stage(0, SmallGrid().view);
@@ -190,8 +190,6 @@ GridBatch::GridBatch(int device, int slots) {
   download(0, mesh);
 }
 GridBatch::~GridBatch() = default;
-
-int GridBatch::slots() const { return static_cast<int>(impl_->slots.size()); }
 
 void GridBatch::stage(int slot, const GridView& grid) { impl_->stage(impl_->at(slot), grid); }
 

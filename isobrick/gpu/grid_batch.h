@@ -41,8 +41,6 @@ class GridBatch {
   GridBatch(int device, int slots);
   ~GridBatch();
 
-  int slots() const;
-
   /// Copies a grid into a slot; from any thread, while nothing else is done with the slot. The
   /// view's arrays are not read any more afterwards.
   void stage(int slot, const GridView& grid);

@@ -11,6 +11,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/core/free_list.h"
 #include "isobrick/gpu/cuda_check.h"
+#include "isobrick/gpu/device.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -46,9 +47,11 @@ struct Driver {
 };
 
 void check_driver(CUresult result, const char* what) {
-  if (result != CUDA_SUCCESS)
-    throw Error(fmt::format("CUDA: memory to share with OpenGL: {} failed with error {}", what,
-                            static_cast<int>(result)));
+  if (result == CUDA_SUCCESS) return;
+  const std::string message = fmt::format(
+      "CUDA: memory to share with OpenGL: {} failed with error {}", what, static_cast<int>(result));
+  if (result == CUDA_ERROR_OUT_OF_MEMORY) throw OutOfDeviceMemory(message);
+  throw Error(message);
 }
 
 /// A block with its bookkeeping.
@@ -173,7 +176,12 @@ std::optional<MeshSpan> MeshMemory::take(std::uint32_t vertices, std::uint32_t t
     if (auto span = impl_->take_from(block, vertices, triangles)) return span;
   if (vertices > impl_->room || triangles > 2 * impl_->room || !impl_->may_add())
     return std::nullopt;
-  impl_->add();
+  try {
+    impl_->add();
+  } catch (const OutOfDeviceMemory&) {
+    impl_->budget = 0;  // others have the rest: what is there must do
+    return std::nullopt;
+  }
   return impl_->take_from(impl_->blocks.back(), vertices, triangles);
 }
 

@@ -172,10 +172,11 @@ bool OutputFile::exchange_and_remove() {
     return ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(), RENAME_EXCHANGE);
   };
   if (exchange() != 0) return false;
-  if (::unlink(temporary_.c_str()) != 0) {
+  if (::unlink(temporary_.c_str()) != 0 && errno != ENOENT) {
     const int why = errno;
-    (void)exchange();  // a folder came there meanwhile
-    throw system_error("replace", path_, why);
+    if (exchange() == 0)
+      throw system_error("replace", path_, why);  // a folder came there meanwhile
+    throw system_error("remove what was replaced:", std::exchange(temporary_, {}), why);
   }
   return true;
 }

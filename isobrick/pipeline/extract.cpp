@@ -102,9 +102,16 @@ class CpuBatches {
   TileBatch planned_;
 };
 
+/// Threads' time of reading and decoding so far.
+double bricks_seconds(const StoreReader& store) {
+  const BrickTimes times = store.brick_times();
+  return times.read_seconds + times.decode_seconds;
+}
+
 /// While the surface of one batch is made the bricks of the next are decoded, by the same
 /// threads: where the one has nothing to do for them just then, the other has.
 void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
+  double decoded_beside = 0;  // of threads
   const bool room_for_two = work.plan.cache_bricks >= 2 * work.plan.batch_bricks;
   Workers workers(work.request.threads);
   workers.execute([&] {
@@ -118,10 +125,12 @@ void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
         Stopwatch watch(work.report.decode_seconds);
         now.bricks->wait();
       }
+      const double decoded_before = bricks_seconds(work.store);
       {
         Stopwatch watch(work.report.surface_seconds);
         surface.extract(now.batch.tiles, *now.bricks, nullptr);
       }
+      decoded_beside += bricks_seconds(work.store) - decoded_before;
       work.done(now.batch.tiles);
       now.bricks.reset();
       if (!room_for_two) batches.begin(next);
@@ -132,6 +141,8 @@ void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
   });
   surface.finish();
   surface.report(work.report);
+  double& seconds = work.report.surface.seconds;
+  seconds = std::max(0.0, seconds - decoded_beside / work.request.threads);
 }
 
 /// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.

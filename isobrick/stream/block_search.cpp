@@ -15,11 +15,10 @@ class RangeSearch final : public BlockSearch {
     const Lattice& lattice = store_.info().levels[static_cast<std::size_t>(level_)].lattice;
     constexpr Int3 edge{StoreReader::kRangeChunk, StoreReader::kRangeChunk,
                         StoreReader::kRangeChunk};
-    const std::uint64_t before = store_.bytes_read();
     const RangeTable table = store_.block_ranges(
         level_,
         intersect({chunk * edge, (chunk + Int3{1, 1, 1}) * edge}, {{0, 0, 0}, lattice.blocks()}));
-    bytes_read_ += store_.bytes_read() - before;
+    bytes_read_ += table.bytes_read;
     append_active_tiles<double>(table.box, table.ranges, isovalue, tiles);
     std::erase_if(tiles, [&](const TileWork& work) { return !box.contains(work.tile); });
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <new>
+#include <stdexcept>
 #include <utility>
 
 #include "isobrick/core/morton.h"
@@ -62,7 +63,7 @@ std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, In
 std::byte* BrickCache::place(Int3 brick) {
   if (slots_.free_slots() == 0 && places_ < capacity_) grow();
   std::byte* const samples = slots_.place(brick);
-  assert(samples);
+  if (!samples) throw std::logic_error("more bricks are in use than there is room for");
   return samples;
 }
 

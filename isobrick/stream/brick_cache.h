@@ -66,7 +66,8 @@ class BrickCache {
   std::unique_ptr<CachedBricks> begin(std::span<const Int3> bricks, Int3 last);
 
   /// Hints that these bricks come after those that were begun: starts the disk for what is not
-  /// here. Not waited for.
+  /// here. Where they are stored is looked up beside the decoding; begun.wait() throws what goes
+  /// wrong with it.
   void will_need(CachedBricks& begun, std::vector<Int3> bricks);
 
   /// Bricks read and decoded so far, and how many different ones.

@@ -10,7 +10,7 @@
 namespace isobrick {
 
 /// Marching cubes over one small grid, on the calling thread. The mesh is a function of the
-/// view alone, also in its order: gpu::GridExtractor makes the same bytes.
+/// view alone, also in its order: gpu::GridBatch makes the same bytes.
 ///
 /// Vertices, with normals: by row of points (z, then y), then by the axis of their edge, then
 /// by x; then two for each vertex on a face where the grid meets a coarser one, to either

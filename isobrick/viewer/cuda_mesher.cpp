@@ -93,6 +93,7 @@ class Work {
   void run();
   void end();
   DeviceMesher::Times times();
+  std::string failure();
 
   const int device;
   const std::string name;
@@ -116,7 +117,8 @@ class Work {
   std::condition_variable freed_, taken_;
   std::vector<int> free_;  ///< slots
   std::vector<Job> jobs_;
-  bool failed_ = false, end_ = false;
+  std::string failure_;  ///< empty: none
+  bool end_ = false;
   DeviceMesher::Times times_;
 };
 
@@ -125,12 +127,17 @@ DeviceMesher::Times Work::times() {
   return times_;
 }
 
+std::string Work::failure() {
+  const std::lock_guard lock(mutex_);
+  return failure_;
+}
+
 bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done) {
   int slot = 0;
   {
     std::unique_lock lock(mutex_);
-    freed_.wait(lock, [&] { return failed_ || !free_.empty(); });
-    if (failed_) return false;
+    freed_.wait(lock, [&] { return !failure_.empty() || !free_.empty(); });
+    if (!failure_.empty()) return false;
     slot = free_.back();
     free_.pop_back();
   }
@@ -185,7 +192,7 @@ void Work::run() {
       failure = e.what();
     }
     lock.lock();
-    failed_ = !failure.empty();
+    failure_ = failure;
     for (const Job& job : jobs) free_.push_back(job.slot);
     lock.unlock();
     freed_.notify_all();
@@ -285,6 +292,7 @@ class CudaMesher final : public DeviceMesher {
   bool make(const GridView& grid, NodeMesh mesh, Done done) override {
     return work_->take(grid, std::move(mesh), std::move(done));
   }
+  std::string failure() const override { return work_->failure(); }
   const std::string& name() const override { return work_->name; }
   std::vector<DeviceBlock> shared_blocks() const override {
     std::vector<DeviceBlock> blocks;

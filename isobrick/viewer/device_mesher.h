@@ -51,6 +51,8 @@ class DeviceMesher {
   /// looked at any more afterwards; waits only while as many as there is room for are being
   /// made. False when the device has failed: nothing was taken.
   virtual bool make(const GridView& grid, NodeMesh mesh, Done done) = 0;
+  /// Why the device makes no more; empty while it does.
+  virtual std::string failure() const = 0;
 
   virtual const std::string& name() const = 0;
   /// The memory that meshes lie in, to be imported; nothing: meshes go to host memory.

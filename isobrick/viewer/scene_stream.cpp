@@ -28,23 +28,28 @@ int thread_count(int asked) {
 
 }  // namespace
 
-void SceneStream::Shared::plan() {
+void SceneStream::Shared::plan(bool late) {
   meshes.begin_use();
   keep_shown();
+  const bool sliding = changed_twice && Clock::now() - *last_isovalue < kSliding;
   const double soon =
-      hurried ? 0 : kSoon.count() / seconds_per_job * static_cast<double>(threads.size());
+      late || sliding ? 0 : kSoon.count() / seconds_per_job * static_cast<double>(threads.size());
   MeshPlan next = plan_jobs(*tree, cut, meshes, bricks, planner, soon);
-  straight_until.reset();
-  if (next.straight) straight_until = Clock::now() + kLate;
+  if (!next.straight || next.jobs.empty())
+    straight_until.reset();
+  else if (!straight_until)
+    straight_until = Clock::now() + kLate;
   std::vector<MeshJob> wanted = std::move(next.jobs);
   for (const auto& r : running) {
     if (r->slot) continue;
     const auto same = [&](const MeshJob& job) { return job.same_mesh(r->job); };
     const auto found = std::find_if(wanted.begin(), wanted.end(), same);
-    if (found == wanted.end())
+    if (found == wanted.end()) {
       r->abandoned = true;
-    else if (!r->abandoned || r->sent)
+    } else if (!r->abandoned || r->sent) {
+      r->abandoned = false;  // what was sent comes anyway, and is wanted again
       wanted.erase(found);
+    }
   }
   std::reverse(wanted.begin(), wanted.end());
   jobs = std::move(wanted);
@@ -138,8 +143,9 @@ void SceneStream::set_cut(const Cut& cut) {
   if (shared_->cut.isovalues != cut.isovalues) {
     if (!shared_->drawn || shared_->drawn_version != shared_->version) shared_->rebuild_drawable();
     const auto now = Shared::Clock::now();
-    shared_->hurried = shared_->last_isovalue && now - *shared_->last_isovalue < kSliding;
+    shared_->changed_twice = shared_->last_isovalue && now - *shared_->last_isovalue < kSliding;
     shared_->last_isovalue = now;
+    shared_->straight_until.reset();
   }
   shared_->cut = cut;
   shared_->index.emplace(std::move(index));
@@ -157,8 +163,9 @@ std::shared_ptr<const Drawable> SceneStream::drawable() {
 
 void SceneStream::set_device(std::shared_ptr<DeviceMesher> device) {
   const std::lock_guard lock(shared_->mutex);
+  shared_->counters.device_failure = device ? device->failure() : std::string();
+  if (!shared_->counters.device_failure.empty()) device.reset();
   shared_->device = std::move(device);
-  shared_->counters.device_failure.clear();
 }
 
 void SceneStream::set_device_budget(std::uint64_t bytes) {

@@ -74,7 +74,7 @@ struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
   std::uint64_t triangles_made = 0, blocks_made = 0;
   double seconds_per_job = 0.003;                   ///< of a thread's time: a guess, then a mean
   std::optional<Clock::time_point> last_isovalue;   ///< when another one was last asked for
-  bool hurried = false;                             ///< the isovalue is being slid
+  bool changed_twice = false;                       ///< and another one shortly before
   std::optional<Clock::time_point> straight_until;  ///< then coarser levels are wanted after all
   std::vector<std::vector<DrawnNode>> shown;        ///< what each isovalue's place shows
 
@@ -90,7 +90,8 @@ struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
   // it up meanwhile.
 
   // scene_stream.cpp
-  void plan();  ///< abandons what is not wanted any more
+  /// Abandons what is not wanted any more. `late`: finer meshes have not come soon enough.
+  void plan(bool late = false);
   void keep_shown();
   void make_room();
   void rebuild_drawable();

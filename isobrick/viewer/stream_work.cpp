@@ -86,17 +86,21 @@ void SceneStream::Shared::received(const std::shared_ptr<Running>& r, NodeMesh&&
     return finish(r, false, lock);
   }
   ++counters.device_meshes_made;
-  // What came here for want of room there has to be uploaded: older ones make room instead.
-  if (!mesh.device && !mesh.empty() && !by->shared_blocks().empty())
-    meshes.shrink_device(by->bytes() / kPartForNew);
+  // What came here for want of room there has to be uploaded: older ones make room instead, once
+  // for all that came so.
+  const std::uint64_t there = by->bytes(), part = there / kPartForNew;
+  if (!mesh.device && !mesh.empty() && !by->shared_blocks().empty() &&
+      meshes.device_bytes() + part > there)
+    meshes.shrink_device(part);
   publish(*r, std::move(mesh));
   finish(r, true, lock);
 }
 
 void SceneStream::Shared::give_up(const std::shared_ptr<DeviceMesher>& failed,
                                   const std::string& failure) {
+  if (device != failed) return;
+  device.reset();
   counters.device_failure = failure;
-  if (device == failed) device.reset();
 }
 
 /// Without the lock. False when the device has failed.
@@ -147,11 +151,12 @@ void SceneStream::Shared::make_mesh(NodeMesher& mesher, const std::shared_ptr<Ru
   std::optional<NodeMesh> mesh = mesh_of(mesher, r, to);
   const double seconds = watch.lap();
   lock.lock();
+  if (to && !r->sent)
+    if (const std::string failure = to->failure(); !failure.empty()) give_up(to, failure);
   counters.mesh_seconds += mesher.seconds() - before;
   if (mesh || r->sent) seconds_per_job += (seconds - seconds_per_job) * kWeightOfJob;
   if (straight_until && Shared::Clock::now() > *straight_until && !jobs.empty()) {
-    hurried = true;
-    plan();
+    plan(true);
     work.notify_all();
   }
   if (r->sent) return;  // received() finishes it, perhaps has already

@@ -85,9 +85,11 @@ void Bookmarks::save(std::vector<Bookmark> list) {
   fs::create_directories(file_.parent_path());
   Json all = read(file_);  // others may have written since
   Json mine = Json::array();
-  for (const Bookmark& b : list)
+  for (const Bookmark& b : list) {
     mine.push_back(
         {{"name", b.name}, {"camera", to_json(b.camera)}, {"settings", to_json(b.settings)}});
+    bookmark_from(mine.back());  // one that cannot be read would hide all of them
+  }
   all[store_] = std::move(mine);
   OutputFile out(file_.string(), true);
   out.writer().append(all.dump(1) + "\n");

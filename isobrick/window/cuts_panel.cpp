@@ -19,7 +19,7 @@ void across_axes(ViewSettings& settings) {
     ImGui::Checkbox(kAxes[axis], &cut.on);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(150);
-    ImGui::SliderFloat("##place", &cut.place, 0, 1, "%.3f");
+    ImGui::SliderFloat("##place", &cut.place, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::SameLine();
     if (ImGui::SmallButton(cut.beyond ? "above" : "below")) cut.beyond = !cut.beyond;
     ImGui::PopID();
@@ -94,9 +94,12 @@ void draw_cuts_panel(ViewerState& state) {
   planes(state);
   ImGui::Checkbox("Region", &settings.region_on);
   if (!settings.region_on) return;
-  ImGui::DragFloatRange2("x##r", &settings.region_lo.x, &settings.region_hi.x, 0.002f, 0, 1);
-  ImGui::DragFloatRange2("y##r", &settings.region_lo.y, &settings.region_hi.y, 0.002f, 0, 1);
-  ImGui::DragFloatRange2("z##r", &settings.region_lo.z, &settings.region_hi.z, 0.002f, 0, 1);
+  ImGui::DragFloatRange2("x##r", &settings.region_lo.x, &settings.region_hi.x, 0.002f, 0, 1, "%.3f",
+                         nullptr, ImGuiSliderFlags_AlwaysClamp);
+  ImGui::DragFloatRange2("y##r", &settings.region_lo.y, &settings.region_hi.y, 0.002f, 0, 1, "%.3f",
+                         nullptr, ImGuiSliderFlags_AlwaysClamp);
+  ImGui::DragFloatRange2("z##r", &settings.region_lo.z, &settings.region_hi.z, 0.002f, 0, 1, "%.3f",
+                         nullptr, ImGuiSliderFlags_AlwaysClamp);
 }
 
 }  // namespace isobrick

@@ -68,7 +68,8 @@ void DeviceMeshes::use(Backend backend) {
     stream_.set_device(mesher_);
   else if (must || opening_->over())
     take_over();
-  if (!must || mesher_) return;
+  if (mesher_ && !mesher_->failure().empty()) failure_ = mesher_->failure();
+  if (!must || (mesher_ && failure_.empty())) return;
   backend_ = Backend::cpu;
   throw Error(failure_.empty() ? "--backend cuda: there is no CUDA device here; use --backend cpu"
                                : failure_);
@@ -105,6 +106,11 @@ void DeviceMeshes::take_over() {
   if (!mesher_) return;
   import_one();
   if (backend_ != Backend::cpu) stream_.set_device(mesher_);
+}
+
+Turns* DeviceMeshes::turns() const {
+  const bool makes = backend_ != Backend::cpu && shares_memory() && mesher_->failure().empty();
+  return makes ? &mesher_->turns() : nullptr;
 }
 
 bool DeviceMeshes::shares_memory() const { return mesher_ && !mesher_->shared_blocks().empty(); }

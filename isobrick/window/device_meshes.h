@@ -71,7 +71,7 @@ class DeviceMeshes {
   /// What the device has done; nothing where there is none.
   DeviceMesher::Times times() const { return mesher_ ? mesher_->times() : DeviceMesher::Times{}; }
   /// The device's turns, where it makes meshes and draws; else null.
-  Turns* turns() const { return shares_memory() ? &mesher_->turns() : nullptr; }
+  Turns* turns() const;
 
   /// A mesh on the device, to be drawn until the next forget().
   const PooledMesh& drawn(const NodeMesh& mesh, Vec3d origin);

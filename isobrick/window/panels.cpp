@@ -42,7 +42,7 @@ void surfaces_panel(ViewerState& state) {
     if (!std::isfinite(s.isovalue)) s.isovalue = 0;
     ImGui::SameLine();
     ImGui::SetNextItemWidth(70);
-    ImGui::SliderFloat("##opacity", &s.opacity, 0.05f, 1, "%.2f");
+    ImGui::SliderFloat("##opacity", &s.opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::SameLine();
     if (ImGui::SmallButton("x") && surfaces.size() > 1) removed = i;
     ImGui::PopID();
@@ -67,7 +67,7 @@ void slices_panel(ViewerState& state) {
     ImGui::Checkbox(kAxes[axis], &slice.shown);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(200);
-    ImGui::SliderFloat("##place", &slice.place, 0, 1, "%.3f");
+    ImGui::SliderFloat("##place", &slice.place, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::PopID();
   }
   const auto range = state.facts->counts().range();
@@ -100,9 +100,10 @@ void look_panel(ViewerState& state) {
       state.requests.look_along = along;
     }
   auto angle = static_cast<float>(n.camera.field_of_view);
-  if (ImGui::SliderFloat("Field of view", &angle, 5, 100, "%.0f\u00b0"))
+  if (ImGui::SliderFloat("Field of view", &angle, 5, 100, "%.0f\u00b0",
+                         ImGuiSliderFlags_AlwaysClamp))
     n.camera.field_of_view = angle;
-  ImGui::SliderFloat("Cell, pixels", &s.pixel_error, 0.5f, 8, "%.1f");
+  ImGui::SliderFloat("Cell, pixels", &s.pixel_error, 0.5f, 8, "%.1f", ImGuiSliderFlags_AlwaysClamp);
   ImGui::Checkbox("Occlusion", &s.occlusion);
   ImGui::SameLine();
   ImGui::Checkbox("Edges", &s.edges);

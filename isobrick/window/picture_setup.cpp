@@ -22,6 +22,7 @@ PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> 
   // Software compiles quickly and draws slowly.
   if (current_gl_device().software) return;
   PictureSettings settings;
+  settings.picking = true;  // as StorePicture's pictures
   renderer_.prepare(settings);
   settings.occlusion = settings.multisample = false;  // as while something moves
   renderer_.prepare(settings);

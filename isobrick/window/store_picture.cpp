@@ -345,11 +345,17 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     Turns* const turns = device_->turns();
     const Turn turn(turns);
     times_.turn = watch.lap();
-    renderer().begin(camera, width, height, picture_settings(settings));
-    draw_surfaces(settings);
-    draw_slices(settings);
-    draw_marks(settings);
-    renderer().end();
+    try {
+      renderer().begin(camera, width, height, picture_settings(settings));
+      draw_surfaces(settings);
+      draw_slices(settings);
+      draw_marks(settings);
+      renderer().end();
+    } catch (...) {
+      shows_.clear();  // half a picture is none
+      device_->forget();
+      throw;
+    }
     times_.draw = watch.lap();
     if (turns != nullptr) glFinish();
     times_.finish = watch.lap();

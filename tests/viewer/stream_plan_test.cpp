@@ -71,6 +71,7 @@ TEST_F(PlanTest, WhereMostIsThereAllLevelsStandIn) {
   const MeshPlan rest = plan(1e6);
   EXPECT_FALSE(rest.straight);
   EXPECT_LT(rest.jobs.size(), all.jobs.size());
+  EXPECT_GT(ancestors(rest, false), ancestors(rest, true));
 }
 
 /// A source whose bricks are read only when they may be.

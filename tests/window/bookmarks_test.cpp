@@ -89,6 +89,11 @@ TEST(Bookmarks, StayAsTheyAreWhenTheyCannotBeWritten) {
   EXPECT_THROW(bookmarks.remove(0), Error);
   ASSERT_EQ(bookmarks.list().size(), 1u);
   EXPECT_EQ(bookmarks.list()[0].name, "jaw");
+  std::filesystem::remove(dir / "b.json");
+  other.settings.surfaces[0].opacity = 1.5f;
+  EXPECT_THROW(bookmarks.add(other), Error);
+  EXPECT_EQ(bookmarks.list().size(), 1u);
+  EXPECT_FALSE(std::filesystem::exists(dir / "b.json"));
 }
 
 }  // namespace
