@@ -163,31 +163,8 @@ OutputFile::~OutputFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-/// Lets the file and the one at its place change places and removes that one. To rename over
-/// it would make ext4 allocate and send off all of the new one first, a tenth of the time that an
-/// extraction takes and more. False when there is nothing at that place, or no such call here.
-bool OutputFile::exchange_and_remove() {
-  check_output(path_, force_);
-  const auto exchange = [&] {
-    return ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(), RENAME_EXCHANGE);
-  };
-  if (exchange() != 0) return false;
-  if (::unlink(temporary_.c_str()) != 0 && errno != ENOENT) {
-    const int why = errno;
-    if (exchange() == 0)
-      throw system_error("replace", path_, why);  // a folder came there meanwhile
-    throw system_error("remove what was replaced:", std::exchange(temporary_, {}), why);
-  }
-  return true;
-}
-
 void OutputFile::publish() {
   writer_.flush();
-  if (!force_ || !exchange_and_remove()) rename();
-  temporary_.clear();
-}
-
-void OutputFile::rename() {
   int result = ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(),
                            force_ ? 0 : RENAME_NOREPLACE);
   if (result != 0 && !force_ && (errno == EINVAL || errno == ENOSYS)) {
@@ -197,6 +174,7 @@ void OutputFile::rename() {
   }
   if (result != 0 && errno == EEXIST) check_output(path_, force_);
   if (result != 0) throw system_error("rename the finished file to", path_, errno);
+  temporary_.clear();
 }
 
 FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {

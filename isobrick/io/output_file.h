@@ -72,9 +72,7 @@ void check_output(const std::string& path, bool force);
 /// `publish` was called.
 ///
 /// Nothing is synced: a mesh or a picture lost in a power cut is made again,
-/// and a sync would cost more than the writing. So with `force` a power cut may lose the
-/// new file and the one that it replaces; a program that is killed at that moment may leave
-/// the old one under the temporary name.
+/// and a sync would cost more than the writing.
 class OutputFile {
  public:
   /// Throws as check_output() does, and Error when its folder cannot be written to.
@@ -94,9 +92,6 @@ class OutputFile {
   void publish();
 
  private:
-  bool exchange_and_remove();
-  void rename();
-
   std::string path_;
   bool force_;
   std::string temporary_;  ///< empty once published
