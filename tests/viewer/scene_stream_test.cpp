@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
+#include <mutex>
 #include <set>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "isobrick/viewer/scene.h"
 #include "tests/viewer/memory_bricks.h"
@@ -194,6 +199,72 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
   EXPECT_GT(whole, 5);
   EXPECT_EQ(stream.counters().damaged, static_cast<std::uint64_t>(damaged));
   EXPECT_TRUE(drawable->complete);
+}
+
+/// Takes some grids and then says of all of them that it has failed.
+class FailingDevice final : public DeviceMesher {
+ public:
+  ~FailingDevice() override {
+    for (std::thread& thread : threads_) thread.join();
+  }
+  bool make(const GridView&, NodeMesh mesh, Done done) override {
+    const std::lock_guard lock(mutex_);
+    ++asked;
+    if (failed_) return false;
+    taken_.emplace_back(std::move(mesh), std::move(done));
+    if (taken_.size() < kTaken) return true;
+    failed_ = true;
+    threads_.emplace_back([taken = std::exchange(taken_, {})]() mutable {
+      for (auto& [of, tell] : taken) tell(std::move(of), "broken");
+    });
+    return true;
+  }
+  std::string failure() const override {
+    const std::lock_guard lock(mutex_);
+    return failed_ ? "broken" : "";
+  }
+  const std::string& name() const override { return name_; }
+  std::vector<DeviceBlock> shared_blocks() const override { return {}; }
+  void share_nothing() override {}
+  std::uint64_t bytes() const override { return 0; }
+  Turns& turns() override { return turns_; }
+  Times times() const override { return {}; }
+
+  static constexpr std::size_t kTaken = 3;
+  std::atomic<std::size_t> asked = 0;
+
+ private:
+  mutable std::mutex mutex_;
+  bool failed_ = false;
+  std::vector<std::pair<NodeMesh, Done>> taken_;
+  std::vector<std::thread> threads_;
+  std::string name_ = "failing";
+  Turns turns_;
+};
+
+TEST(SceneStream, WhatADeviceFailsToMakeIsMadeWithoutIt) {
+  const auto source = make_source(200);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  const Cut cut = RandomCut(tree->grid(), 1, 5).cut({0.0});
+  FailingDevice device;
+  const std::shared_ptr<DeviceMesher> shared(&device, [](DeviceMesher*) {});
+  // The second stream gets a device that has failed.
+  for (const bool first : {true, false}) {
+    SceneStream stream(source, tree, {.threads = 4});
+    stream.set_device(shared);
+    EXPECT_EQ(stream.counters().device_failure, first ? "" : "broken");
+    stream.set_cut(cut);
+    ASSERT_TRUE(stream.wait_idle(60));
+    const auto drawable = stream.drawable();
+    EXPECT_TRUE(drawable->complete);
+    EXPECT_TRUE(covers(*tree, *drawable, 0));
+    EXPECT_EQ(stream.counters().device_failure, "broken");
+    EXPECT_EQ(stream.counters().device_meshes_made, 0u);
+    if (first) {
+      EXPECT_GE(device.asked.exchange(0), FailingDevice::kTaken);
+    }
+  }
+  EXPECT_EQ(device.asked, 0u) << "nobody asks it in vain";
 }
 
 TEST(SceneStream, EndsAtOnceWhateverIsGoingOn) {
