@@ -238,11 +238,11 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
   result["while_sliding"] = slide(session, arguments);
 
   const auto orbit = Clock::now();
-  const Vec3d middle = session.camera.target, arm = session.camera.eye - middle;
+  const Camera from = session.camera;
   session.draw_until(true, [&] {
     const double turn = seconds_since(orbit) / arguments.seconds;
-    const double a = turn * 2 * 3.14159265358979, c = std::cos(a), s = std::sin(a);
-    session.camera.eye = middle + Vec3d{c * arm.x - s * arm.y, s * arm.x + c * arm.y, arm.z};
+    session.camera = from;
+    session.camera.orbit(turn * 2 * 3.14159265358979, 0, {0, 0, 1});
     return turn >= 1;
   });
   result["while_turning"] = std::exchange(session.pictures, {}).summary();

@@ -1,0 +1,159 @@
+// How many pictures a second a store gives while the camera flies around it, off-screen, as the
+// window draws them (simpler ones where full ones take too long): from opening on, when all of
+// it is there, and while the isovalue slides as well.
+//
+//   isobrick synth gyroid g.zarr --frequency 6 --dims 512,512,512 --type u8
+//   bench_viewer_orbit g.zarr --isovalue 127.5 --to 140
+//
+// Pictures follow each other at once; a picture's time ends with glFinish.
+
+#include <epoxy/gl.h>
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "bench/picture_times.h"
+#include "isobrick/core/stopwatch.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/window/frame_pacer.h"
+#include "isobrick/window/store_picture.h"
+
+namespace isobrick::bench {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kTurn = 2 * 3.14159265358979;
+
+struct Arguments {
+  std::string store;
+  double isovalue = 127.5, to = 140;
+  int width = 1280, height = 800;
+  double seconds = 8;  ///< of each phase, once around
+  double memory_gib = 2;
+  bool no_rest = false, pictures = false;
+};
+
+class Flight {
+ public:
+  explicit Flight(const Arguments& arguments) : arguments_(arguments) {
+    PictureBudgets budgets;
+    budgets.memory = static_cast<std::uint64_t>(arguments.memory_gib * (1 << 30));
+    budgets.device_memory = budgets.memory;
+    setup_ = std::make_shared<PictureSetup>(budgets, [] {});
+    picture_ = std::make_unique<StorePicture>(
+        std::make_shared<const StoreReader>(arguments.store), budgets, [] {}, setup_);
+    settings_.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
+    settings_.multisample = !current_gl_device().software;
+    choose_values(settings_, picture_->scene().tree());
+    const WorldBox box = picture_->bounds();
+    camera_.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
+    start_ = camera_;
+  }
+
+  /// Once around. `slide`: the isovalue goes to the other one and back.
+  Json around(bool slide) {
+    PicturesTimes times;
+    Json pictures = Json::array();
+    double spent = 0;
+    while (spent < arguments_.seconds) {
+      const double part = spent / arguments_.seconds;
+      camera_ = start_;
+      camera_.orbit(part * kTurn, 0, {0, 0, 1});
+      if (slide)
+        settings_.surfaces[0].isovalue =
+            arguments_.isovalue +
+            (0.5 - 0.5 * std::cos(part * kTurn)) * (arguments_.to - arguments_.isovalue);
+      Stopwatch watch;
+      const double submitted = draw(pacer_.plain(), pacer_.coarser(), pacer_.smaller());
+      const double seconds = watch.lap();
+      const PictureState& state = picture_->state();
+      pictures.push_back({seconds * 1e3, pacer_.coarser(), pacer_.smaller(), pacer_.plain(),
+                          state.nodes, state.triangles, state.covers});
+      pacer_.drawn(seconds);
+      times.add(seconds, picture_->times(), seconds - submitted);
+      spent += seconds;
+    }
+    Json result = times.summary();
+    if (arguments_.pictures)
+      result["pictures_ms_coarser_smaller_plain_nodes_triangles_covers"] = pictures;
+    return result;
+  }
+
+  /// As the window draws when nothing moves, until nothing is missing.
+  void rest() {
+    const auto draw_still = [&] {
+      const bool plain = pacer_.plain() && !picture_->state().complete;
+      Stopwatch watch;
+      draw(plain, 1, 1);
+      if (!plain) pacer_.drawn_still(watch.lap());
+    };
+    do draw_still();
+    while (!picture_->state().complete);
+    draw_still();
+  }
+
+ private:
+  /// Seconds until OpenGL was told.
+  double draw(bool plain, double coarser, int smaller) {
+    Stopwatch watch;
+    ViewSettings now = settings_;
+    if (plain) now.occlusion = now.multisample = false;
+    picture_->draw(camera_, arguments_.width / smaller, arguments_.height / smaller, now, coarser);
+    const double submitted = watch.lap();
+    glFinish();
+    return submitted;
+  }
+
+  const Arguments& arguments_;
+  std::shared_ptr<PictureSetup> setup_;
+  std::unique_ptr<StorePicture> picture_;
+  ViewSettings settings_;
+  Camera camera_{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
+  Camera start_;
+  FramePacer pacer_ = FramePacer::for_device(current_gl_device().software);
+};
+
+int run(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Pictures a second while the camera flies around a store"};
+  app.add_option("store", arguments.store)->required();
+  app.add_option("--isovalue", arguments.isovalue);
+  app.add_option("--to", arguments.to, "Where sliding turns round");
+  app.add_option("--seconds", arguments.seconds, "Once around");
+  app.add_option("--width", arguments.width);
+  app.add_option("--height", arguments.height);
+  app.add_option("--memory", arguments.memory_gib, "GiB");
+  app.add_flag("--no-rest", arguments.no_rest, "Do not wait until all is there");
+  app.add_flag("--pictures", arguments.pictures, "Tell of every picture");
+  CLI11_PARSE(app, argc, argv);
+
+  const GlContext context;
+  Json result{{"store", arguments.store}, {"renderer", current_gl_device().renderer}};
+  Flight flight(arguments);
+  result["from_opening_on"] = flight.around(false);
+  if (!arguments.no_rest) {
+    flight.rest();
+    result["all_there"] = flight.around(false);
+  }
+  result["sliding"] = flight.around(true);
+  std::cout << result.dump(2) << '\n';
+  return 0;
+}
+
+}  // namespace
+}  // namespace isobrick::bench
+
+int main(int argc, char** argv) {
+  try {
+    return isobrick::bench::run(argc, argv);
+  } catch (const std::exception& e) {
+    std::cerr << "bench_viewer_orbit: " << e.what() << '\n';
+    return 1;
+  }
+}
