@@ -34,6 +34,11 @@ Int3 exponents_of(const Transform& finest, const Transform& t) {
 
 constexpr Index power(Index e) { return Index{1} << e; }
 
+/// Along each axis, of the coarsest level of all.
+constexpr Index kFewCells = 16;
+/// Levels above a stored one read all of its samples: only where these are few.
+constexpr Index kFewSamples = Index{1} << 24;
+
 }  // namespace
 
 NodeGrid::NodeGrid(const StoreInfo& info) : transform_(info.levels.front().transform) {
@@ -43,6 +48,9 @@ NodeGrid::NodeGrid(const StoreInfo& info) : transform_(info.levels.front().trans
   add_levels(info, 0, exponents);
   for (std::size_t i = 1; i < info.levels.size(); ++i)
     add_levels(info, static_cast<int>(i), exponents);
+  coarsest_stored_ = levels() - 1;
+  const Int3 coarsest = stored_extents_[static_cast<std::size_t>(levels_.back().source)];
+  if (volume(coarsest) <= kFewSamples) add_levels_above(info, exponents);
 }
 
 /// Where a stored level is more than twice as coarse as the one before, levels
@@ -56,22 +64,37 @@ void NodeGrid::add_levels(const StoreInfo& info, int source, Int3& exponents) {
     const Int3 below = exponents;
     exponents = min(target, exponents + Int3{1, 1, 1});
     if (!levels_.empty()) halvings_.push_back(exponents - below);
-    Level level;
-    level.source = exponents == target ? source : source - 1;
-    const Transform& s = info.levels[static_cast<std::size_t>(level.source)].transform;
-    const Vec3d shift = turned_back(transform_, transform_.origin - s.origin);
-    for (int axis = 0; axis < 3; ++axis) {
-      level.step[axis] = power(exponents[axis]);
-      level.scale[axis] = transform_.spacing[axis] / s.spacing[axis];
-      level.offset[axis] = shift[axis] / s.spacing[axis];
-      level.spacing = std::max(level.spacing, std::abs(transform_.spacing[axis]) *
-                                                  static_cast<double>(level.step[axis]));
-    }
-    level.cells = ceil_div(cells_, level.step);
-    level.nodes = ceil_div(level.cells, {kNodeEdge, kNodeEdge, kNodeEdge});
-    if (volume(level.nodes) == 0) level.nodes = {};
-    levels_.push_back(level);
+    add_level(info, exponents == target ? source : source - 1, exponents);
   } while (exponents != target);
+}
+
+void NodeGrid::add_levels_above(const StoreInfo& info, Int3& exponents) {
+  for (;;) {
+    Int3 halved;
+    for (int axis = 0; axis < 3; ++axis) halved[axis] = levels_.back().cells[axis] > kFewCells;
+    if (halved == Int3{}) return;
+    exponents = exponents + halved;
+    halvings_.push_back(halved);
+    add_level(info, levels_.back().source, exponents);
+  }
+}
+
+void NodeGrid::add_level(const StoreInfo& info, int source, Int3 exponents) {
+  Level level;
+  level.source = source;
+  const Transform& s = info.levels[static_cast<std::size_t>(source)].transform;
+  const Vec3d shift = turned_back(transform_, transform_.origin - s.origin);
+  for (int axis = 0; axis < 3; ++axis) {
+    level.step[axis] = power(exponents[axis]);
+    level.scale[axis] = transform_.spacing[axis] / s.spacing[axis];
+    level.offset[axis] = shift[axis] / s.spacing[axis];
+    level.spacing = std::max(
+        level.spacing, std::abs(transform_.spacing[axis]) * static_cast<double>(level.step[axis]));
+  }
+  level.cells = ceil_div(cells_, level.step);
+  level.nodes = ceil_div(level.cells, {kNodeEdge, kNodeEdge, kNodeEdge});
+  if (volume(level.nodes) == 0) level.nodes = {};
+  levels_.push_back(level);
 }
 
 Int3 NodeGrid::node_cells(const NodeKey& n) const {

@@ -54,6 +54,9 @@ struct IndexBox {
 /// whatever the step. Points of a level are points of all finer ones, and nodes of
 /// adjacent levels share faces exactly. The values there are interpolated between
 /// the samples of the stored level; at level 0 they are the samples.
+///
+/// Above the coarsest stored level, unless that is large, are levels of every second of its
+/// samples, every fourth, … until few cells are left: for pictures that have to be quick.
 class NodeGrid {
  public:
   struct Level {
@@ -70,6 +73,8 @@ class NodeGrid {
   explicit NodeGrid(const StoreInfo& info);
 
   int levels() const { return static_cast<int>(levels_.size()); }
+  /// The coarsest level that has samples of its own.
+  int coarsest_stored() const { return coarsest_stored_; }
   const Level& level(int v) const { return levels_[static_cast<std::size_t>(v)]; }
   /// Level-0 index space to world space.
   const Transform& transform() const { return transform_; }
@@ -108,11 +113,14 @@ class NodeGrid {
 
  private:
   void add_levels(const StoreInfo& info, int source, Int3& exponents);
+  void add_levels_above(const StoreInfo& info, Int3& exponents);
+  void add_level(const StoreInfo& info, int source, Int3 exponents);
 
   Transform transform_;
   Int3 cells_;
   std::vector<Int3> stored_extents_;
   std::vector<Level> levels_;
+  int coarsest_stored_ = 0;
   std::vector<Int3> halvings_;  ///< axes that the level above a level halves: 1, others 0
 };
 

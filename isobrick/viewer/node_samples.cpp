@@ -2,71 +2,108 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 
 namespace isobrick {
 namespace {
-
-/// Writes isovalue-free values of part of a brick to their places.
-template <class T>
-void copy_part(const std::byte* brick, Int3 brick_extent, Box3 from, double isovalue, float* to,
-               Int3 to_extent) {
-  const Int3 n = from.extent();
-  for (Index z = 0; z < n.z; ++z)
-    for (Index y = 0; y < n.y; ++y) {
-      const auto* row =
-          reinterpret_cast<const T*>(brick) + linear_index(from.lo + Int3{0, y, z}, brick_extent);
-      float* out = to + (z * to_extent.y + y) * to_extent.x;
-      for (Index x = 0; x < n.x; ++x)
-        out[x] = static_cast<float>(static_cast<double>(row[x]) - isovalue);
-    }
-}
 
 /// Between a and b. An end is itself whatever the other one is, infinite or no number.
 float mix(float a, float b, float weight) { return a + weight * (b - a); }
 
 }  // namespace
 
-Box3 NodeSamples::samples(int v, Box3 points) const {
-  Box3 box;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto hi = grid_.between(v, axis, points.hi[axis] - 1);
-    box.lo[axis] = grid_.between(v, axis, points.lo[axis]).first;
-    box.hi[axis] = hi.first + (hi.weight > 0 ? 2 : 1);
-  }
-  return box;
+std::pair<Index, Index> NodeSamples::Axis::between(Index lo, Index hi) const {
+  const auto first = std::lower_bound(samples.begin(), samples.end(), lo);
+  return {first - samples.begin(), std::lower_bound(first, samples.end(), hi) - samples.begin()};
 }
 
 Box3 NodeSamples::bricks(int v, Box3 points) const {
   const Lattice& lattice =
       bricks_.source().info().levels[static_cast<std::size_t>(grid_.level(v).source)].lattice;
-  const Box3 box = samples(v, points);
-  const Int3 b = lattice.brick;
-  return {{box.lo.x / b.x, box.lo.y / b.y, box.lo.z / b.z}, ceil_div(box.hi, b)};
+  Box3 bricks;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto lo = grid_.between(v, axis, points.lo[axis]);
+    const auto hi = grid_.between(v, axis, points.hi[axis] - 1);
+    bricks.lo[axis] = lo.first / lattice.brick[axis];
+    bricks.hi[axis] = (hi.first + (hi.weight > 0)) / lattice.brick[axis] + 1;
+  }
+  return bricks;
 }
 
-void NodeSamples::gather(int stored, Box3 box, double isovalue, const Wanted& wanted) {
+/// Grid points may lie many samples apart: what is between is not looked at.
+void NodeSamples::find_axis(int v, int axis, Index lo, Index hi) {
+  Axis& a = axes_[static_cast<std::size_t>(axis)];
+  a.samples.clear();
+  a.points.clear();
+  const auto add = [&](Index sample) {
+    if (a.samples.empty() || a.samples.back() < sample) a.samples.push_back(sample);
+  };
+  for (Index p = lo; p < hi; ++p) {
+    const auto between = grid_.between(v, axis, p);
+    add(between.first);
+    a.points.push_back(
+        {a.count() - 1 - (a.samples.back() - between.first), static_cast<float>(between.weight)});
+    if (between.weight > 0) add(between.first + 1);
+  }
+}
+
+/// Calls f(offset in the brick, of the first sample, number of it in gathered_, places of the
+/// samples of a row).
+template <class F>
+void NodeSamples::for_each_row(Int3 corner, Int3 edge, F&& f) {
+  const auto [x0, x1] = axes_[0].between(corner.x, corner.x + edge.x);
+  const auto [y0, y1] = axes_[1].between(corner.y, corner.y + edge.y);
+  const auto [z0, z1] = axes_[2].between(corner.z, corner.z + edge.z);
+  if (x0 == x1) return;
+  const std::span places(axes_[0].samples.data() + x0, static_cast<std::size_t>(x1 - x0));
+  for (Index z = z0; z < z1; ++z)
+    for (Index y = y0; y < y1; ++y) {
+      const Int3 first{corner.x, axes_[1].samples[static_cast<std::size_t>(y)],
+                       axes_[2].samples[static_cast<std::size_t>(z)]};
+      f(linear_index(first - corner, edge),
+        gathered_.data() + (z * axes_[1].count() + y) * axes_[0].count() + x0, places);
+    }
+}
+
+template <class T>
+void NodeSamples::copy_part(const std::byte* brick, Int3 corner, Int3 edge, double isovalue) {
+  const auto value = [&](T sample) {
+    return static_cast<float>(static_cast<double>(sample) - isovalue);
+  };
+  for_each_row(corner, edge, [&](Index row, float* to, std::span<const Index> places) {
+    const T* from = reinterpret_cast<const T*>(brick) + row - corner.x;
+    const std::size_t n = places.size();
+    if (places.back() - places.front() + 1 == static_cast<Index>(n)) {
+      from += places.front();
+      for (std::size_t x = 0; x < n; ++x) to[x] = value(from[x]);
+    } else {
+      for (std::size_t x = 0; x < n; ++x) to[x] = value(from[places[x]]);
+    }
+  });
+}
+
+void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted) {
   const StoreInfo& info = bricks_.source().info();
   const Lattice& lattice = info.levels[static_cast<std::size_t>(stored)].lattice;
-  const Int3 extent = box.extent(), edge = lattice.brick;
-  gathered_.resize(static_cast<std::size_t>(volume(extent)));
-  const Box3 cover{{box.lo.x / edge.x, box.lo.y / edge.y, box.lo.z / edge.z},
-                   ceil_div(box.hi, edge)};
+  const Int3 edge = lattice.brick;
+  Box3 cover;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Axis& a = axes_[static_cast<std::size_t>(axis)];
+    cover.lo[axis] = a.samples.front() / edge[axis];
+    cover.hi[axis] = a.samples.back() / edge[axis] + 1;
+  }
+  gathered_.resize(
+      static_cast<std::size_t>(axes_[0].count() * axes_[1].count() * axes_[2].count()));
   const auto take = [&](Int3 b, const BrickSamples& brick) {
     const Int3 corner = b * edge;
-    const Box3 part = intersect(box, {corner, corner + edge});
-    float* to = gathered_.data() + linear_index(part.lo - box.lo, extent);
-    if (!brick.empty()) {
-      visit_scalar(lattice.type, [&](auto tag) {
-        copy_part<typename decltype(tag)::type>(
-            brick.data(), edge, {part.lo - corner, part.hi - corner}, isovalue, to, extent);
+    if (brick.empty())
+      for_each_row(corner, edge, [&](Index, float* to, std::span<const Index> places) {
+        std::fill_n(to, places.size(), static_cast<float>(info.fill_value - isovalue));
       });
-      return;
-    }
-    const Int3 n = part.extent();
-    for (Index z = 0; z < n.z; ++z)
-      for (Index y = 0; y < n.y; ++y)
-        std::fill_n(to + (z * extent.y + y) * extent.x, n.x,
-                    static_cast<float>(info.fill_value - isovalue));
+    else
+      visit_scalar(lattice.type, [&](auto tag) {
+        copy_part<typename decltype(tag)::type>(brick.data(), corner, edge, isovalue);
+      });
   };
   // Threads at nodes beside each other want the same bricks: were each to wait for what another
   // one is reading, all would read one brick after the other.
@@ -81,33 +118,24 @@ void NodeSamples::gather(int stored, Box3 box, double isovalue, const Wanted& wa
 }
 
 void NodeSamples::read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out) {
-  const Box3 box = samples(v, points);
-  gather(grid_.level(v).source, box, isovalue, wanted);
+  for (int axis = 0; axis < 3; ++axis) find_axis(v, axis, points.lo[axis], points.hi[axis]);
+  gather(grid_.level(v).source, isovalue, wanted);
   out.points = points;
-  const Int3 from = box.extent(), n = points.extent();
   if (v == 0) {  // grid points are samples
     out.values.swap(gathered_);
     return;
   }
-  struct Step {
-    Index first;
-    float weight;
-  };
-  std::vector<Step> steps[3];
-  for (int axis = 0; axis < 3; ++axis)
-    for (Index p = points.lo[axis]; p < points.hi[axis]; ++p) {
-      const auto between = grid_.between(v, axis, p);
-      steps[axis].push_back({between.first - box.lo[axis], static_cast<float>(between.weight)});
-    }
+  const Int3 from{axes_[0].count(), axes_[1].count(), axes_[2].count()}, n = points.extent();
   along_x_.resize(static_cast<std::size_t>(n.x * from.y * from.z));
   for (Index row = 0; row < from.y * from.z; ++row) {
     const float* in = gathered_.data() + row * from.x;
     float* to = along_x_.data() + row * n.x;
-    for (const Step& s : steps[0])
+    for (const Axis::Point& s : axes_[0].points)
       *to++ = s.weight > 0 ? mix(in[s.first], in[s.first + 1], s.weight) : in[s.first];
   }
   // Rows that are a whole step apart are mixed as rows.
-  const auto mix_rows = [](const float* a, const Step& s, Index stride, Index length, float* to) {
+  const auto mix_rows = [](const float* a, const Axis::Point& s, Index stride, Index length,
+                           float* to) {
     if (s.weight > 0)
       for (Index x = 0; x < length; ++x) to[x] = mix(a[x], a[stride + x], s.weight);
     else
@@ -116,13 +144,13 @@ void NodeSamples::read(int v, Box3 points, double isovalue, const Wanted& wanted
   along_y_.resize(static_cast<std::size_t>(n.x * n.y * from.z));
   for (Index z = 0; z < from.z; ++z)
     for (Index y = 0; y < n.y; ++y) {
-      const Step& s = steps[1][static_cast<std::size_t>(y)];
+      const Axis::Point& s = axes_[1].points[static_cast<std::size_t>(y)];
       mix_rows(along_x_.data() + (z * from.y + s.first) * n.x, s, n.x, n.x,
                along_y_.data() + (z * n.y + y) * n.x);
     }
   out.values.resize(static_cast<std::size_t>(volume(n)));
   for (Index z = 0; z < n.z; ++z) {
-    const Step& s = steps[2][static_cast<std::size_t>(z)];
+    const Axis::Point& s = axes_[2].points[static_cast<std::size_t>(z)];
     mix_rows(along_y_.data() + s.first * n.x * n.y, s, n.x * n.y, n.x * n.y,
              out.values.data() + z * n.x * n.y);
   }

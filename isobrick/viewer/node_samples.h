@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "isobrick/viewer/node_grid.h"
@@ -35,11 +38,30 @@ class NodeSamples {
   Box3 bricks(int v, Box3 points) const;
 
  private:
-  Box3 samples(int v, Box3 points) const;
-  void gather(int stored, Box3 box, double isovalue, const Wanted& wanted);
+  /// What is looked at along an axis, and where grid points lie among that.
+  struct Axis {
+    std::vector<Index> samples;  ///< ascending
+    struct Point {
+      Index first;  ///< of the two numbers in `samples` that it lies between
+      float weight;
+    };
+    std::vector<Point> points;
+
+    Index count() const { return static_cast<Index>(samples.size()); }
+    /// Which of the samples lie from `lo` on and before `hi`.
+    std::pair<Index, Index> between(Index lo, Index hi) const;
+  };
+
+  void find_axis(int v, int axis, Index lo, Index hi);
+  void gather(int stored, double isovalue, const Wanted& wanted);
+  template <class T>
+  void copy_part(const std::byte* brick, Int3 corner, Int3 edge, double isovalue);
+  template <class F>
+  void for_each_row(Int3 corner, Int3 edge, F&& f);
 
   const NodeGrid& grid_;
   ResidentBricks& bricks_;
+  std::array<Axis, 3> axes_;
   std::vector<float> gathered_, along_x_, along_y_;
 };
 

@@ -70,7 +70,7 @@ void NodeTree::read_nodes(const BrickSource& source, int v, Box3 nodes) {
   for_each_point(nodes, [&](Int3 p) {
     const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(v).nodes));
     nodes_[static_cast<std::size_t>(v)][i] =
-        summary(table, blocks_of(grid_.samples({v, p}), blocks));
+        summary(table, blocks_of(grid_.samples({v, p}), blocks), blocks_in({v, p}));
   });
 }
 
@@ -80,7 +80,14 @@ double NodeTree::part(const Node& node, double value) {
   return std::clamp((value - lo) / width * kParts, 0.0, static_cast<double>(kParts - 1));
 }
 
-NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks) const {
+/// Blocks of 16³ of the node's own cells: where grid points lie several samples apart, fewer than
+/// blocks of samples.
+std::uint8_t NodeTree::blocks_in(const NodeKey& n) const {
+  return static_cast<std::uint8_t>(
+      volume(ceil_div(grid_.node_cells(n), {kBlockEdge, kBlockEdge, kBlockEdge})));
+}
+
+NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks, std::uint8_t most) const {
   Node node;
   ValueRange<double> own;
   for_each_point(blocks, [&](Int3 b) { own.include(table.at(b)); });
@@ -91,7 +98,7 @@ NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks) const {
     const auto first = static_cast<std::size_t>(part(node, range.lo));
     const auto last = static_cast<std::size_t>(part(node, range.hi));
     for (std::size_t i = first; i <= last; ++i)
-      if (node.blocks[i] < 255) ++node.blocks[i];
+      if (node.blocks[i] < most) ++node.blocks[i];
   });
   return node;
 }

@@ -44,7 +44,7 @@ class NodeTree {
   static constexpr int kParts = 8;
   struct Node {
     ValueRange<float> own, below;
-    /// Blocks that are active in each part of the node's own range; 255: as many or more.
+    /// Blocks that are active in each part of the node's own range.
     std::array<std::uint8_t, kParts> blocks{};
   };
 
@@ -54,7 +54,8 @@ class NodeTree {
   }
   void read_level(const BrickSource& source, int v);
   void read_nodes(const BrickSource& source, int v, Box3 nodes);
-  Node summary(const RangeTable& table, Box3 blocks) const;
+  std::uint8_t blocks_in(const NodeKey& n) const;
+  Node summary(const RangeTable& table, Box3 blocks, std::uint8_t most) const;
   void merge_below(int v);
   static double part(const Node& node, double value);
 

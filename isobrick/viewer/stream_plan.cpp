@@ -49,7 +49,8 @@ class Planner {
 
   void add_ancestors(const CutNode& node, double isovalue) {
     std::vector<MeshJob>& jobs = plan_.jobs;
-    for (NodeKey n = node.key; tree_.grid().has_parent(n);) {
+    const int top = tree_.grid().coarsest_stored();
+    for (NodeKey n = node.key; n.level < top;) {
       n = tree_.grid().parent(n);
       const auto [place, added] = ancestors_.try_emplace(n, jobs.size());
       if (!added) {
@@ -61,7 +62,7 @@ class Planner {
         meshes_.find_any(n, isovalue, 0);  // is kept
         return;
       }
-      if (plan_.straight && tree_.grid().has_parent(n)) continue;
+      if (plan_.straight && n.level < top) continue;
       if (!tree_.active(n, isovalue)) continue;
       place->second = jobs.size();
       jobs.push_back({n, isovalue, 0, node.visible, false, node.pixels, node.distance});

@@ -25,9 +25,9 @@ struct MeshJob {
 struct MeshPlan {
   /// Most urgent first: visible ones, of them those whose bricks are resident, of them coarse
   /// ones, then those with the longest cells on the picture, then near ones. Nodes without any
-  /// mesh bring the ancestors along that will stand in for them.
+  /// mesh bring the ancestors along that will stand in for them, of levels that are stored.
   std::vector<MeshJob> jobs;
-  /// Of ancestors only the coarsest, because all the rest comes soon.
+  /// Of ancestors only the coarsest that are stored, because all the rest comes soon.
   bool straight = false;
 };
 

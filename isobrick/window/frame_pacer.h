@@ -56,7 +56,7 @@ class FramePacer {
   int smaller() const { return smaller_; }
 
  private:
-  static constexpr double kFirstCoarser = 4, kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 8;
+  static constexpr double kFirstCoarser = 4, kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 16;
   static constexpr double kNothingDrawn = 1e-3;  ///< seconds: the picture was the one before
   static constexpr double kLeisure = 0.6;        ///< of the target: less is time for more
   static constexpr int kSmallest = 4;

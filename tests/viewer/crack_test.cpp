@@ -16,6 +16,7 @@ class Always final : public Wanted {
 struct Shape {
   const char* name;
   std::function<double(Int3, Index)> field;
+  int levels = 0;  ///< that are stored; 0: until one brick holds the coarsest
 };
 
 constexpr Index kEdge = 150;
@@ -33,7 +34,7 @@ class Cracks : public ::testing::TestWithParam<Shape> {
             Int3{kEdge, kEdge, kEdge}, std::function<float(Int3)>([](Int3 p) {
               return static_cast<float>(GetParam().field(p, kEdge));
             }),
-            MemoryBricks::Options{.brick = 16})),
+            MemoryBricks::Options{.brick = 16, .levels = GetParam().levels})),
         grid_(source_->info()),
         bricks_(source_, std::uint64_t{1} << 30),
         mesher_(grid_, bricks_, {}) {}
@@ -111,10 +112,14 @@ TEST_P(Holes, AreNotInsideTheSilhouette) {
 
 INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Cracks,
                          ::testing::Values(Shape{"ball", ball}, Shape{"gyroid", gyroid_ball},
-                                           Shape{"blobs", blobs}),
+                                           Shape{"blobs", blobs},
+                                           Shape{"ball_of_one_level", ball, 1},
+                                           Shape{"blobs_of_one_level", blobs, 1}),
                          [](const auto& shape) { return shape.param.name; });
 
-INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Holes, ::testing::Values(Shape{"ball", ball}),
+INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Holes,
+                         ::testing::Values(Shape{"ball", ball},
+                                           Shape{"ball_of_one_level", ball, 1}),
                          [](const auto& shape) { return shape.param.name; });
 
 }  // namespace

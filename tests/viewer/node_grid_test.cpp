@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "isobrick/pipeline/downsample.h"
+#include "isobrick/viewer/node_samples.h"
 #include "isobrick/viewer/node_tree.h"
 #include "tests/viewer/memory_bricks.h"
 
@@ -25,18 +26,18 @@ StoreInfo halved(Int3 extent, int levels) {
 
 TEST(NodeGrid, PointsOfALevelArePointsOfAllFinerOnes) {
   const NodeGrid grid(halved({300, 201, 130}, 4));
-  ASSERT_EQ(grid.levels(), 4);
-  for (int v = 1; v < 4; ++v)
+  ASSERT_EQ(grid.coarsest_stored(), 3);
+  for (int v = 1; v < grid.levels(); ++v)
     for (int axis = 0; axis < 3; ++axis)
       for (Index p = 0; p <= grid.level(v).cells[axis]; ++p) {
-        const Index finer = std::min(2 * p, grid.level(v - 1).cells[axis]);
+        const Index finer = std::min(grid.ratio(v - 1)[axis] * p, grid.level(v - 1).cells[axis]);
         EXPECT_EQ(grid.position(v, axis, p), grid.position(v - 1, axis, finer));
       }
 }
 
 TEST(NodeGrid, ChildrenCoverTheirParentExactly) {
   const NodeGrid grid(halved({300, 201, 130}, 4));
-  for (int v = 1; v < 4; ++v) {
+  for (int v = 1; v < grid.levels(); ++v) {
     Index children = 0;
     for_each_point({{0, 0, 0}, grid.level(v).nodes}, [&](Int3 p) {
       const IndexBox box = grid.box({v, p});
@@ -86,7 +87,7 @@ TEST(NodeGrid, AnAxisThatIsNotHalvedKeepsItsStep) {
   half.lattice.extent = {25, 25, 50};
   info.levels.push_back(half);
   const NodeGrid grid(info);
-  ASSERT_EQ(grid.levels(), 4) << "one between the levels that are four times apart";
+  ASSERT_EQ(grid.coarsest_stored(), 3) << "one between the levels that are four times apart";
   EXPECT_EQ(grid.level(1).step, (Int3{2, 2, 1}));
   EXPECT_EQ(grid.level(1).source, 1);
   EXPECT_EQ(grid.level(2).step, (Int3{4, 4, 2}));
@@ -94,6 +95,48 @@ TEST(NodeGrid, AnAxisThatIsNotHalvedKeepsItsStep) {
   EXPECT_EQ(grid.level(3).step, (Int3{8, 8, 4}));
   EXPECT_EQ(grid.level(3).source, 2);
   EXPECT_EQ(grid.children({1, {0, 0, 1}}), (Box3{{0, 0, 1}, {2, 2, 2}}));
+}
+
+TEST(NodeGrid, LevelsAboveTheCoarsestStoredOneTakeItsSamples) {
+  const NodeGrid grid(halved({300, 201, 130}, 2));
+  EXPECT_EQ(grid.coarsest_stored(), 1);
+  ASSERT_EQ(grid.levels(), 6);
+  EXPECT_EQ(grid.level(2).step, (Int3{4, 4, 4}));
+  EXPECT_EQ(grid.level(3).step, (Int3{8, 8, 8}));
+  EXPECT_EQ(grid.level(4).step, (Int3{16, 16, 16}));
+  EXPECT_EQ(grid.level(5).step, (Int3{32, 16, 16})) << "until an axis has few cells";
+  EXPECT_EQ(grid.level(5).cells, (Int3{10, 13, 9}));
+  for (int v = 1; v < grid.levels(); ++v) EXPECT_EQ(grid.level(v).source, 1);
+  EXPECT_EQ(grid.samples({5, {0, 0, 0}}), (Box3{{0, 0, 0}, {150, 101, 65}}));
+  EXPECT_EQ(NodeGrid(halved({10, 17, 1}, 1)).levels(), 1);
+  EXPECT_EQ(NodeGrid(halved({2048, 2048, 2048}, 1)).levels(), 1) << "too much would be read";
+}
+
+TEST(NodeSamples, AreTheStoredOnesWhereGridPointsLieFarApart) {
+  class Always final : public Wanted {
+   public:
+    void check() const override {}
+  };
+  const auto source = std::make_shared<MemoryBricks>(
+      Int3{150, 140, 37},
+      std::function<float(Int3)>([&](Int3 p) { return static_cast<float>(blobs(p, 150)); }),
+      MemoryBricks::Options{.brick = 16, .levels = 1});
+  const NodeGrid grid(source->info());
+  ASSERT_EQ(grid.levels(), 5);
+  ResidentBricks bricks(source, 100 << 20);
+  NodeSamples samples(grid, bricks);
+  GridValues values;
+  for (int v = 0; v < grid.levels(); ++v) {
+    const Box3 points{{2, 1, 0}, grid.level(v).cells + Int3{1, 1, 1}};
+    samples.read(v, points, 0.25, Always(), values);
+    const Box3 needed = samples.bricks(v, points);
+    for_each_point(points, [&](Int3 p) {
+      Int3 sample;
+      for (int axis = 0; axis < 3; ++axis) sample[axis] = grid.position(v, axis, p[axis]);
+      ASSERT_EQ(values.at(p), static_cast<float>(source->value(0, sample) - 0.25));
+      ASSERT_TRUE(needed.contains({sample.x / 16, sample.y / 16, sample.z / 16}));
+    });
+  }
 }
 
 TEST(NodeTree, RangesHoldWhatTheNodesValuesTake) {
@@ -137,6 +180,19 @@ TEST(NodeTree, CountsNoFewerActiveBlocksThanThereAre) {
       EXPECT_GE(tree.active_blocks({0, p}, isovalue), active);
       EXPECT_LE(tree.active_blocks({0, p}, isovalue), 64);
     });
+}
+
+TEST(NodeTree, LevelsAboveStoredOnesHaveAsManyBlocksAsTheirOwnCells) {
+  const MemoryBricks source({129, 129, 129}, std::function<float(Int3)>([&](Int3 p) {
+                              return static_cast<float>((p.x + p.y + p.z) % 2);
+                            }),
+                            {.levels = 1});
+  const NodeTree tree(source);
+  ASSERT_EQ(tree.grid().levels(), 4);
+  EXPECT_EQ(tree.active_blocks({0, {0, 0, 0}}, 0.5), 64);
+  EXPECT_EQ(tree.active_blocks({1, {0, 0, 0}}, 0.5), 64);
+  EXPECT_EQ(tree.active_blocks({2, {0, 0, 0}}, 0.5), 8);
+  EXPECT_EQ(tree.active_blocks({3, {0, 0, 0}}, 0.5), 1);
 }
 
 }  // namespace

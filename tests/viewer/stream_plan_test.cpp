@@ -27,7 +27,8 @@ class PlanTest : public testing::Test {
     for (const MeshJob& job : plan.jobs) {
       const bool in_cut = std::any_of(cut_.nodes.begin(), cut_.nodes.end(),
                                       [&](const CutNode& node) { return node.key == job.key; });
-      count += !in_cut && (!coarsest_only || !tree_.grid().has_parent(job.key));
+      count += !in_cut && (!coarsest_only || job.key.level == tree_.grid().coarsest_stored());
+      EXPECT_LE(job.key.level, tree_.grid().coarsest_stored());
     }
     return count;
   }
@@ -51,7 +52,8 @@ class PlanTest : public testing::Test {
 };
 
 TEST_F(PlanTest, WhatComesSoonBringsTheCoarsestLevelAlone) {
-  ASSERT_GT(tree_.grid().levels(), 2);
+  ASSERT_GT(tree_.grid().coarsest_stored(), 1);
+  ASSERT_GT(tree_.grid().levels(), tree_.grid().coarsest_stored() + 1);
   const MeshPlan slow = plan(0), quick = plan(1e6);
   EXPECT_FALSE(slow.straight);
   EXPECT_TRUE(quick.straight);
@@ -60,18 +62,26 @@ TEST_F(PlanTest, WhatComesSoonBringsTheCoarsestLevelAlone) {
   EXPECT_EQ(ancestors(quick, true), ancestors(slow, true));
   EXPECT_GT(ancestors(quick, true), 0u);
   EXPECT_EQ(quick.jobs.size() - ancestors(quick, false), slow.jobs.size() - ancestors(slow, false));
-  EXPECT_FALSE(tree_.grid().has_parent(quick.jobs.front().key)) << "the coarsest one first";
+  EXPECT_EQ(quick.jobs.front().key.level, tree_.grid().coarsest_stored()) << "that one first";
 }
 
 TEST_F(PlanTest, WhereMostIsThereAllLevelsStandIn) {
   const MeshPlan all = plan(1e6);
   std::size_t left = 3;
   for (const MeshJob& job : all.jobs)
-    if (tree_.grid().has_parent(job.key) && (left == 0 || --left == 0)) make(job);
+    if (job.key.level < tree_.grid().coarsest_stored() && (left == 0 || --left == 0)) make(job);
   const MeshPlan rest = plan(1e6);
   EXPECT_FALSE(rest.straight);
   EXPECT_LT(rest.jobs.size(), all.jobs.size());
   EXPECT_GT(ancestors(rest, false), ancestors(rest, true));
+}
+
+TEST_F(PlanTest, LevelsThatAreNotStoredAreMadeWhereACutAsksForThem) {
+  cut_ = RandomCut(tree_.grid(), 1, 0).cut({0.0});
+  const MeshPlan plan = plan_jobs(tree_, cut_, meshes_, bricks_, mesher_, 0);
+  ASSERT_EQ(plan.jobs.size(), 1u);
+  EXPECT_FALSE(tree_.grid().has_parent(plan.jobs.front().key));
+  EXPECT_GT(plan.jobs.front().key.level, tree_.grid().coarsest_stored());
 }
 
 /// A source whose bricks are read only when they may be.
