@@ -4,6 +4,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
+#include <vector>
+
+#include "isobrick/viewer/node_mesher.h"
 
 namespace isobrick {
 namespace {
@@ -22,20 +26,26 @@ Vec3d turned(const Transform& t, Vec3d v) {
 struct Ray {
   Vec3d from, along;
 
-  bool meets(const IndexBox& box, double margin) const {
+  /// Where it enters a box, in lengths of `along`; nothing where it passes by.
+  std::optional<double> entry(const IndexBox& box, double margin) const {
     double near = 0, far = std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
       const double lo = box.lo[axis] - margin - from[axis], hi = box.hi[axis] + margin - from[axis];
       if (along[axis] == 0) {
-        if (lo > 0 || hi < 0) return false;
+        if (lo > 0 || hi < 0) return std::nullopt;
         continue;
       }
       const double a = lo / along[axis], b = hi / along[axis];
       near = std::max(near, std::min(a, b));
       far = std::min(far, std::max(a, b));
     }
-    return near <= far;
+    return near <= far ? std::optional(near) : std::nullopt;
   }
+};
+
+class Always final : public Wanted {
+ public:
+  void check() const override {}
 };
 
 /// Where a ray meets a triangle (Möller and Trumbore): distance and barycentric
@@ -153,42 +163,63 @@ bool in_volume(const NodeGrid& grid, Vec3d world) {
       to_index_space(grid, world));
 }
 
+/// Puts the first hit with a mesh where shown(position) into `best`, if it is nearer than that.
+template <class Shown>
+void hit_mesh(const NodeMesh& node, int isovalue, Vec3d origin, Vec3d from, Vec3d along,
+              const Shown& shown, std::optional<SurfaceHit>& best) {
+  const MeshBuffer& mesh = node.mesh;
+  for (std::size_t i = 0; i + node.ribbon_triangles < mesh.triangles.size(); ++i) {
+    const Triangle& t = mesh.triangles[i];
+    const auto corner = [&](std::size_t k) { return to_double(mesh.positions[t[k]]); };
+    const auto met = meet(from - origin, along, corner(0), corner(1), corner(2));
+    if (!met || (best && met->distance >= best->distance)) continue;
+    const Vec3d position = from + along * met->distance;
+    if (!shown(position)) continue;
+    const Vec3d n = to_double(mesh.normals[t[0]]) * (1 - met->u - met->v) +
+                    to_double(mesh.normals[t[1]]) * met->u + to_double(mesh.normals[t[2]]) * met->v;
+    const double size = std::sqrt(std::max(dot(n, n), 1e-30));
+    best = SurfaceHit{position,
+                      {static_cast<float>(n.x / size), static_cast<float>(n.y / size),
+                       static_cast<float>(n.z / size)},
+                      isovalue,
+                      node.key,
+                      met->distance};
+  }
+}
+
 }  // namespace
 
 Vec3d to_index_space(const NodeGrid& grid, Vec3d world) {
   return turned(grid.transform(), world - grid.transform().origin);
 }
 
-std::optional<SurfaceHit> pick(const Drawable& drawn, const NodeGrid& grid, Vec3d origin,
-                               Vec3d from, Vec3d along, const std::optional<IndexBox>& clip,
+std::optional<SurfaceHit> pick(const Drawable& drawn, const NodeGrid& grid, ResidentBricks& bricks,
+                               Vec3d origin, Vec3d from, Vec3d along,
+                               const std::optional<IndexBox>& clip,
                                std::span<const HalfSpace> planes) {
   const Ray ray{to_index_space(grid, from), turned(grid.transform(), along)};
-  const Vec3d start = from - origin;
+  std::vector<std::pair<double, const DrawnNode*>> met;
+  for (const DrawnNode& node : drawn.nodes)
+    if (const auto entry = ray.entry(grid.box(node.mesh->key), 0.5))
+      met.emplace_back(*entry, &node);
+  std::stable_sort(met.begin(), met.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  const auto shown = [&](Vec3d position) {
+    return (!clip || inside(*clip, to_index_space(grid, position))) &&
+           std::all_of(planes.begin(), planes.end(),
+                       [&](const HalfSpace& half) { return half.contains(position); });
+  };
   std::optional<SurfaceHit> best;
-  for (const DrawnNode& node : drawn.nodes) {
-    if (!ray.meets(grid.box(node.mesh->key), 0.5)) continue;
-    const MeshBuffer& mesh = node.mesh->mesh;
-    for (std::size_t i = 0; i + node.mesh->ribbon_triangles < mesh.triangles.size(); ++i) {
-      const Triangle& t = mesh.triangles[i];
-      const auto corner = [&](std::size_t k) { return to_double(mesh.positions[t[k]]); };
-      const auto met = meet(start, along, corner(0), corner(1), corner(2));
-      if (!met || (best && met->distance >= best->distance)) continue;
-      const Vec3d position = from + along * met->distance;
-      if (clip && !inside(*clip, to_index_space(grid, position))) continue;
-      if (!std::all_of(planes.begin(), planes.end(),
-                       [&](const HalfSpace& half) { return half.contains(position); }))
-        continue;
-      const Vec3d n = to_double(mesh.normals[t[0]]) * (1 - met->u - met->v) +
-                      to_double(mesh.normals[t[1]]) * met->u +
-                      to_double(mesh.normals[t[2]]) * met->v;
-      const double size = std::sqrt(std::max(dot(n, n), 1e-30));
-      best = SurfaceHit{position,
-                        {static_cast<float>(n.x / size), static_cast<float>(n.y / size),
-                         static_cast<float>(n.z / size)},
-                        node.isovalue,
-                        node.mesh->key,
-                        met->distance};
+  std::optional<NodeMesher> mesher;
+  for (const auto& [entry, node] : met) {
+    if (best && entry > best->distance) break;
+    const NodeMesh& mesh = *node->mesh;
+    std::optional<NodeMesh> again;
+    if (mesh.device) {
+      if (!mesher) mesher.emplace(grid, bricks, origin);
+      again = mesher->mesh(mesh.key, mesh.isovalue, mesh.coarser, Always());
     }
+    hit_mesh(again ? *again : mesh, node->isovalue, origin, from, along, shown, best);
   }
   return best;
 }
