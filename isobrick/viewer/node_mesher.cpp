@@ -138,12 +138,15 @@ NodeMesh NodeMesher::mesh(const NodeKey& key, double isovalue, std::uint32_t coa
   out.key = key;
   out.isovalue = isovalue;
   out.coarser = coarser;
-  const GridView grid = impl_->read(key, isovalue, coarser, wanted);
+  return extract(grid(key, isovalue, coarser, wanted), std::move(out));
+}
+
+NodeMesh NodeMesher::extract(const GridView& grid, NodeMesh mesh) {
   const auto start = Clock::now();
-  out.ribbon_triangles = impl_->extractor.extract(grid, impl_->work);
-  Impl::shrink(impl_->work, out.mesh);
+  mesh.ribbon_triangles = impl_->extractor.extract(grid, impl_->work);
+  Impl::shrink(impl_->work, mesh.mesh);
   impl_->busy += Clock::now() - start;
-  return out;
+  return mesh;
 }
 
 GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coarser,

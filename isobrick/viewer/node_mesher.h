@@ -29,6 +29,9 @@ class NodeMesher {
   /// What that mesh is made of, for a device. Valid until the next call; throws the same.
   GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
 
+  /// The mesh of what grid() gave last. `mesh` says which it is.
+  NodeMesh extract(const GridView& grid, NodeMesh mesh);
+
   /// The bricks that this needs, by stored level.
   struct Needs {
     int stored;

@@ -139,6 +139,12 @@ bool ResidentBricks::resident(int level, Box3 box) const {
   return true;
 }
 
+void ResidentBricks::close() {
+  const std::lock_guard lock(mutex_);
+  budget_ = 0;
+  make_room(0);
+}
+
 void ResidentBricks::will_need(int level, Box3 box) const {
   for_each_point(box, [&](Int3 b) {
     {

@@ -46,6 +46,8 @@ class ResidentBricks {
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
   /// Whether all bricks of `box` (in bricks) are there.
   bool resident(int level, Box3 box) const;
+  /// Drops what is there; from now on nothing is kept.
+  void close();
   /// Hints that bricks of `box` are read soon.
   void will_need(int level, Box3 box) const;
 

@@ -7,7 +7,7 @@
 namespace isobrick {
 namespace {
 
-/// How long the destructor waits for threads that are held up.
+/// How long the destructor waits for threads that are held up and for a device.
 constexpr std::chrono::milliseconds kPatience{50};
 
 /// Meshes that come within this time need no coarser ones in their place, but for the coarsest of
@@ -124,10 +124,19 @@ SceneStream::~SceneStream() {
   shared_->stop = true;
   for (const auto& r : shared_->running) r->abandoned = true;
   shared_->work.notify_all();
-  const bool ended = shared_->change.wait_for(
-      lock, kPatience, [&] { return shared_->alive == 0 && shared_->calls == 0; });
+  shared_->change.wait_for(lock, kPatience, [&] {
+    return shared_->alive == 0 && shared_->calls == 0 && shared_->running.empty();
+  });
+  const bool ended = shared_->alive == 0;
   std::vector<std::thread> threads = std::move(shared_->threads);
+  // Whoever comes later finds nothing, and keeps nothing: contexts may be gone by then.
+  const auto meshes = std::exchange(shared_->meshes, MeshCache(0, 0));
+  const auto shown = std::exchange(shared_->shown, {});
+  const auto drawn = std::exchange(shared_->drawn, nullptr);
+  const auto device = std::exchange(shared_->device, nullptr);
+  const auto slots = std::exchange(shared_->slots, {});
   lock.unlock();
+  shared_->bricks.close();
   for (std::thread& thread : threads)
     if (ended)
       thread.join();

@@ -46,8 +46,11 @@ struct StreamCounters {
 /// what can be drawn meanwhile.
 ///
 /// All functions may be called from any thread; none of them waits for a brick or a
-/// mesh. The destructor returns within 100 ms: a thread that is held up in a read
-/// then ends by itself when the read does, and keeps what it needs alive until then.
+/// mesh. The destructor gives back all bricks and meshes, those of a device included, but for
+/// those that others hold. It waits for its threads and for what a device makes for it, but no
+/// longer than 100 ms: a thread that is held up in a read then ends by itself when the read does,
+/// and keeps the source and the tree alive until then, nothing else; what a device makes
+/// meanwhile is dropped.
 class SceneStream {
  public:
   SceneStream(std::shared_ptr<const BrickSource> source, std::shared_ptr<const NodeTree> tree,

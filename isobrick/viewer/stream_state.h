@@ -41,7 +41,8 @@ struct Slot {
   std::shared_ptr<const SliceSamples> image;
 };
 
-/// Outlives the stream for as long as a thread is held up in a read.
+/// Outlives the stream for as long as a thread is held up in a read, or a device in making what it
+/// was sent; then `stop` is set, and neither meshes nor a device are here any more.
 struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
   using Clock = std::chrono::steady_clock;
 
@@ -106,12 +107,11 @@ struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
   void make_mesh(NodeMesher& mesher, const std::shared_ptr<Running>& r,
                  std::unique_lock<std::mutex>& lock);
   void make_slice(const std::shared_ptr<Running>& r, std::unique_lock<std::mutex>& lock);
-  std::optional<NodeMesh> mesh_of(NodeMesher& mesher, const std::shared_ptr<Running>& r,
-                                  const std::shared_ptr<DeviceMesher>& to);
-  bool send(NodeMesher& mesher, const std::shared_ptr<Running>& r,
-            const std::shared_ptr<DeviceMesher>& to);
+  std::optional<NodeMesh> mesh_of(NodeMesher& mesher, const std::shared_ptr<Running>& r);
+  bool send(const GridView& grid, const std::shared_ptr<Running>& r);
   void received(const std::shared_ptr<Running>& r, NodeMesh&& mesh, const std::string& failure,
-                const std::shared_ptr<DeviceMesher>& by);
+                std::shared_ptr<DeviceMesher> by);
+  void take_over(const Running& done, NodeMesh&& mesh, const DeviceMesher& by);
   void give_up(const std::shared_ptr<DeviceMesher>& failed, const std::string& failure);
   void publish(const Running& done, NodeMesh&& mesh);
   void finish(const std::shared_ptr<Running>& r, bool changed, std::unique_lock<std::mutex>& lock);

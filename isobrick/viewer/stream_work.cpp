@@ -76,24 +76,31 @@ void SceneStream::Shared::finish(const std::shared_ptr<Running>& r, bool changed
 }
 
 void SceneStream::Shared::received(const std::shared_ptr<Running>& r, NodeMesh&& mesh,
-                                   const std::string& failure,
-                                   const std::shared_ptr<DeviceMesher>& by) {
+                                   const std::string& failure, std::shared_ptr<DeviceMesher> by) {
   std::unique_lock lock(mutex);
-  if (!failure.empty()) {
+  if (!stop && failure.empty()) {
+    take_over(*r, std::move(mesh), *by);
+  } else if (!stop) {
     give_up(by, failure);
     if (!r->abandoned) jobs.push_back(r->job);
     work.notify_one();
-    return finish(r, false, lock);
   }
+  // Before anybody hears of it: this is the device's thread, which should not be the last to hold
+  // the device.
+  by.reset();
+  finish(r, !stop && failure.empty(), lock);
+}
+
+/// A mesh that a device has made.
+void SceneStream::Shared::take_over(const Running& done, NodeMesh&& mesh, const DeviceMesher& by) {
   ++counters.device_meshes_made;
   // What came here for want of room there has to be uploaded: older ones make room instead, once
   // for all that came so.
-  const std::uint64_t there = by->bytes(), part = there / kPartForNew;
-  if (!mesh.device && !mesh.empty() && !by->shared_blocks().empty() &&
+  const std::uint64_t there = by.bytes(), part = there / kPartForNew;
+  if (!mesh.device && !mesh.empty() && !by.shared_blocks().empty() &&
       meshes.device_bytes() + part > there)
     meshes.shrink_device(part);
-  publish(*r, std::move(mesh));
-  finish(r, true, lock);
+  publish(done, std::move(mesh));
 }
 
 void SceneStream::Shared::give_up(const std::shared_ptr<DeviceMesher>& failed,
@@ -103,27 +110,34 @@ void SceneStream::Shared::give_up(const std::shared_ptr<DeviceMesher>& failed,
   counters.device_failure = failure;
 }
 
-/// Without the lock. False when the device has failed.
-bool SceneStream::Shared::send(NodeMesher& mesher, const std::shared_ptr<Running>& r,
-                               const std::shared_ptr<DeviceMesher>& to) {
-  const GridView grid = mesher.grid(r->job.key, r->job.isovalue, r->job.coarser, *r);
+/// Without the lock. False where there is no device, or it has failed.
+bool SceneStream::Shared::send(const GridView& grid, const std::shared_ptr<Running>& r) {
+  std::unique_lock lock(mutex);
+  std::shared_ptr<DeviceMesher> to = device;
+  if (!to) return false;
+  lock.unlock();
   r->sent = true;
-  const bool taken =
-      to->make(grid, empty_mesh(r->job),
-               [shared = shared_from_this(), r, to](NodeMesh&& mesh, const std::string& failure) {
-                 shared->received(r, std::move(mesh), failure, to);
-               });
-  if (!taken) r->sent = false;
-  return taken;
+  const bool taken = to->make(
+      grid, empty_mesh(r->job),
+      [shared = shared_from_this(), r, to](NodeMesh&& mesh, const std::string& failure) mutable {
+        shared->received(r, std::move(mesh), failure, std::move(to));
+      });
+  if (taken) return true;
+  r->sent = false;
+  lock.lock();
+  give_up(to, to->failure());
+  return false;
 }
 
 /// Without the lock. What was made here; nothing when it was abandoned, or sent to a device.
 std::optional<NodeMesh> SceneStream::Shared::mesh_of(NodeMesher& mesher,
-                                                     const std::shared_ptr<Running>& r,
-                                                     const std::shared_ptr<DeviceMesher>& to) {
+                                                     const std::shared_ptr<Running>& r) {
   try {
-    if (to && send(mesher, r, to)) return std::nullopt;
-    return mesher.mesh(r->job.key, r->job.isovalue, r->job.coarser, *r);
+    // The device is asked for only now: a read that is held up keeps none.
+    const GridView grid = mesher.grid(r->job.key, r->job.isovalue, r->job.coarser, *r);
+    r->check();
+    if (send(grid, r)) return std::nullopt;
+    return mesher.extract(grid, empty_mesh(r->job));
   } catch (const Abandoned&) {
     return std::nullopt;
   } catch (const std::exception& e) {
@@ -137,7 +151,6 @@ void SceneStream::Shared::make_mesh(NodeMesher& mesher, const std::shared_ptr<Ru
                                     std::unique_lock<std::mutex>& lock) {
   std::optional<MeshJob> next;
   if (!jobs.empty()) next = jobs.back();
-  const std::shared_ptr<DeviceMesher> to = device;
   lock.unlock();
   try {
     if (next) {
@@ -148,19 +161,17 @@ void SceneStream::Shared::make_mesh(NodeMesher& mesher, const std::shared_ptr<Ru
   }
   const double before = mesher.seconds();
   Stopwatch watch;
-  std::optional<NodeMesh> mesh = mesh_of(mesher, r, to);
+  std::optional<NodeMesh> mesh = mesh_of(mesher, r);
   const double seconds = watch.lap();
   lock.lock();
-  if (to && !r->sent)
-    if (const std::string failure = to->failure(); !failure.empty()) give_up(to, failure);
   counters.mesh_seconds += mesher.seconds() - before;
   if (mesh || r->sent) seconds_per_job += (seconds - seconds_per_job) * kWeightOfJob;
-  if (straight_until && Shared::Clock::now() > *straight_until && !jobs.empty()) {
+  if (straight_until && Shared::Clock::now() > *straight_until && !jobs.empty() && !stop) {
     plan(true);
     work.notify_all();
   }
   if (r->sent) return;  // received() finishes it, perhaps has already
-  const bool made = mesh.has_value();
+  const bool made = mesh.has_value() && !stop;
   if (made) publish(*r, std::move(*mesh));
   finish(r, made, lock);
 }

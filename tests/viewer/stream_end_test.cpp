@@ -1,0 +1,206 @@
+// What closing a stream gives back, and when, whatever is going on.
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "isobrick/viewer/scene_stream.h"
+#include "tests/viewer/held_up.h"
+#include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/random_cut.h"
+
+namespace isobrick::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+/// Makes empty meshes on a thread of its own, some time after they are asked for.
+class SlowDevice final : public DeviceMesher {
+ public:
+  explicit SlowDevice(milliseconds time) : time_(time), thread_([this] { run(); }) {}
+  ~SlowDevice() override {
+    {
+      const std::lock_guard lock(mutex_);
+      end_ = true;
+    }
+    change_.notify_all();
+    thread_.join();
+  }
+  bool make(const GridView&, NodeMesh mesh, Done done) override {
+    {
+      const std::lock_guard lock(mutex_);
+      taken_.emplace_back(std::move(mesh), std::move(done));
+    }
+    change_.notify_all();
+    return true;
+  }
+  std::string failure() const override { return {}; }
+  const std::string& name() const override { return name_; }
+  std::vector<DeviceBlock> shared_blocks() const override { return {}; }
+  void share_nothing() override {}
+  std::uint64_t bytes() const override { return 0; }
+  Turns& turns() override { return turns_; }
+  Times times() const override { return {}; }
+
+  void wait_until_asked() {
+    std::unique_lock lock(mutex_);
+    change_.wait(lock, [&] { return !taken_.empty(); });
+  }
+  /// Meshes that somebody holds.
+  int held() const { return *held_; }
+  std::shared_ptr<const std::atomic<int>> held_count() const { return held_; }
+
+ private:
+  struct Counted final : DeviceMesh {
+    explicit Counted(std::shared_ptr<std::atomic<int>> c) : count(std::move(c)) { ++*count; }
+    ~Counted() override { --*count; }
+    std::shared_ptr<std::atomic<int>> count;
+  };
+
+  void run() {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      change_.wait(lock, [&] { return end_ || !taken_.empty(); });
+      if (taken_.empty()) return;
+      lock.unlock();
+      std::this_thread::sleep_for(time_);
+      lock.lock();
+      std::vector<std::pair<NodeMesh, Done>> made = std::exchange(taken_, {});
+      lock.unlock();
+      for (auto& [mesh, done] : made) {
+        mesh.device = std::make_shared<const Counted>(held_);
+        mesh.device_triangles = 1;
+        done(std::move(mesh), "");
+      }
+      made.clear();
+      lock.lock();
+    }
+  }
+
+  milliseconds time_;
+  std::shared_ptr<std::atomic<int>> held_ = std::make_shared<std::atomic<int>>(0);
+  std::mutex mutex_;
+  std::condition_variable change_;
+  std::vector<std::pair<NodeMesh, Done>> taken_;
+  bool end_ = false;
+  std::string name_ = "slow";
+  Turns turns_;
+  std::thread thread_;
+};
+
+class StreamEnd : public testing::Test {
+ protected:
+  void expect_quick_end() {
+    const auto start = Clock::now();
+    stream_.reset();
+    EXPECT_LT(Clock::now() - start, milliseconds(100));
+  }
+  void begin(int threads = 2) {
+    // Not all bricks fit: another isovalue has to read.
+    stream_ = std::make_unique<SceneStream>(
+        source_, tree_, StreamOptions{.threads = threads, .brick_bytes = 4 << 20});
+  }
+  void want(double isovalue) { stream_->set_cut(RandomCut(tree_->grid(), 1, 100).cut({isovalue})); }
+  /// Whether the stream's threads have ended: they hold the source.
+  bool threads_end() {
+    for (int i = 0; i < 1000 && source_.use_count() > 1; ++i)
+      std::this_thread::sleep_for(milliseconds(10));
+    return source_.use_count() == 1;
+  }
+
+  std::shared_ptr<HeldUp> source_ = std::make_shared<HeldUp>(std::make_shared<MemoryBricks>(
+      Int3{150, 150, 150},
+      std::function<float(Int3)>([](Int3 p) { return static_cast<float>(ball(p, 150)); }),
+      MemoryBricks::Options{.brick = 16}));
+  std::shared_ptr<const NodeTree> tree_ = std::make_shared<const NodeTree>(*source_);
+  std::unique_ptr<SceneStream> stream_;
+};
+
+TEST_F(StreamEnd, WhileAReadHangsAllElseIsGivenBack) {
+  const auto device = std::make_shared<SlowDevice>(milliseconds(0));
+  begin();
+  stream_->set_device(device);
+  source_->open();
+  want(0);
+  ASSERT_TRUE(stream_->wait_idle(60));
+  const std::weak_ptr<const NodeMesh> shown = stream_->drawable()->nodes.front().mesh;
+  const std::weak_ptr<const Drawable> drawn = stream_->drawable();
+  EXPECT_GT(device->held(), 5);
+  const auto brick = [&] {
+    std::weak_ptr<const BrickSamples> found;
+    for_each_point({{0, 0, 0}, {10, 10, 10}}, [&](Int3 b) {
+      if (auto there = stream_->bricks().find(0, b)) found = there;
+    });
+    return found;
+  }();
+  EXPECT_FALSE(brick.expired());
+  source_->shut();
+  want(3);
+  source_->wait_until_read();
+  expect_quick_end();
+  EXPECT_TRUE(shown.expired());
+  EXPECT_TRUE(drawn.expired());
+  EXPECT_TRUE(brick.expired());
+  EXPECT_EQ(device->held(), 0);
+  EXPECT_EQ(device.use_count(), 1);
+  EXPECT_GT(source_.use_count(), 1) << "the thread that reads needs it";
+  source_->open();
+  EXPECT_TRUE(threads_end());
+}
+
+TEST_F(StreamEnd, AThreadThatWasHeldUpMakesNothingAnyMore) {
+  const auto device = std::make_shared<SlowDevice>(milliseconds(0));
+  for (const bool with_device : {false, true}) {
+    begin(4);
+    if (with_device) stream_->set_device(device);
+    source_->shut();
+    want(0);
+    source_->wait_until_read();
+    expect_quick_end();
+    EXPECT_EQ(device.use_count(), 1);
+    source_->open();
+    EXPECT_TRUE(threads_end());
+    EXPECT_EQ(device->held(), 0);
+  }
+}
+
+TEST_F(StreamEnd, WaitsForWhatADeviceMakes) {
+  const auto device = std::make_shared<SlowDevice>(milliseconds(20));
+  begin();
+  stream_->set_device(device);
+  source_->open();
+  want(0);
+  device->wait_until_asked();
+  expect_quick_end();
+  EXPECT_EQ(device->held(), 0);
+  EXPECT_EQ(device.use_count(), 1);
+  EXPECT_TRUE(threads_end());
+}
+
+TEST_F(StreamEnd, WhatADeviceMakesTooLateIsDropped) {
+  auto device = std::make_shared<SlowDevice>(milliseconds(300));
+  const auto held = device->held_count();
+  begin();
+  stream_->set_device(device);
+  source_->open();
+  want(0);
+  device->wait_until_asked();
+  expect_quick_end();
+  EXPECT_GT(device.use_count(), 1) << "it makes what it was sent";
+  for (int i = 0; i < 1000 && device.use_count() > 1; ++i)
+    std::this_thread::sleep_for(milliseconds(10));
+  EXPECT_EQ(device.use_count(), 1);
+  EXPECT_TRUE(threads_end());
+  device.reset();
+  EXPECT_EQ(*held, 0);
+}
+
+}  // namespace
+}  // namespace isobrick::test
