@@ -66,11 +66,6 @@ void Camera::zoom(double factor) {
   if (factor > 0 && std::isfinite(factor)) eye = target + (eye - target) * (1 / factor);
 }
 
-void Camera::fly(double ahead) {
-  eye = eye - back * ahead;
-  target = target - back * ahead;
-}
-
 void Camera::fit(Vec3d lo, Vec3d hi, double aspect) {
   constexpr double filled = 0.92;  // of the picture
   scene = ball_around(lo, hi);

@@ -54,8 +54,6 @@ class Camera {
   void pan(double to_right, double to_top);
   /// Divides the distance from the target.
   void zoom(double factor);
-  /// Moves eye and target along the line of sight, world units.
-  void fly(double ahead);
   /// Moves the eye so that the box fills a picture of width / height `aspect` but for a
   /// margin, seen from the same direction; looks at its centre. Sets `scene` too.
   void fit(Vec3d lo, Vec3d hi, double aspect);

@@ -160,8 +160,6 @@ GlContext::GlContext() {
 }
 
 GlContext::~GlContext() = default;
-GlContext::GlContext(GlContext&&) noexcept = default;
-GlContext& GlContext::operator=(GlContext&&) noexcept = default;
 
 void GlContext::make_current() {
   if (!eglMakeCurrent(state_->display.get(), EGL_NO_SURFACE, EGL_NO_SURFACE, state_->context))

@@ -15,8 +15,6 @@ class GlContext {
   /// Throws Error, with what was tried, when there is no OpenGL 4.5 here.
   GlContext();
   ~GlContext();
-  GlContext(GlContext&&) noexcept;
-  GlContext& operator=(GlContext&&) noexcept;
 
   void make_current();
   /// For a move to another thread, which then calls make_current.

@@ -96,8 +96,6 @@ MeshPool::MeshPool(std::uint32_t block_vertices) : state_(std::make_unique<State
   state_->block_vertices = block_vertices;
 }
 MeshPool::~MeshPool() = default;
-MeshPool::MeshPool(MeshPool&&) noexcept = default;
-MeshPool& MeshPool::operator=(MeshPool&&) noexcept = default;
 
 PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bool normals,
                              Vec3d origin) {
@@ -159,33 +157,6 @@ PooledMesh MeshPool::borrow(const MeshPlace& place, Vec3d origin) {
   mesh.origin_ = origin;
   mesh.has_normals_ = true;
   return mesh;
-}
-
-MeshPool::Mapping MeshPool::map(const PooledMesh& mesh) {
-  const MeshPlace& place = mesh.place();
-  const auto span_of = [&]<class T>(unsigned buffer, std::uint32_t first, std::uint32_t count, T*) {
-    void* at = glMapNamedBufferRange(buffer, static_cast<GLintptr>(first * sizeof(T)),
-                                     static_cast<GLsizeiptr>(count * sizeof(T)),
-                                     GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT);
-    return std::span<T>(static_cast<T*>(at), at == nullptr ? 0 : count);
-  };
-  if (mesh.empty()) return {};
-  Mapping mapping;
-  mapping.positions = span_of(place.positions, place.first_vertex, place.vertices, (Vec3f*)nullptr);
-  if (mesh.has_normals())
-    mapping.normals = span_of(place.normals, place.first_vertex, place.vertices, (Vec3f*)nullptr);
-  mapping.triangles =
-      span_of(place.triangles, place.first_triangle, place.triangle_count, (Triangle*)nullptr);
-  check_gl("a mesh mapped");
-  return mapping;
-}
-
-void MeshPool::unmap(const PooledMesh& mesh) {
-  if (mesh.empty()) return;
-  glUnmapNamedBuffer(mesh.place().positions);
-  if (mesh.has_normals()) glUnmapNamedBuffer(mesh.place().normals);
-  glUnmapNamedBuffer(mesh.place().triangles);
-  check_gl("a mesh unmapped");
 }
 
 std::uint64_t MeshPool::bytes() const {

@@ -55,34 +55,23 @@ class MeshPool {
   /// meshes get a block of their own.
   explicit MeshPool(std::uint32_t block_vertices = 1u << 19);
   ~MeshPool();
-  MeshPool(MeshPool&&) noexcept;
-  MeshPool& operator=(MeshPool&&) noexcept;
 
   /// Copies a mesh whose triangles count from its own first vertex. Triangles with a
   /// coordinate that is not finite are left out. Throws Error for triangles
   /// that name other vertices, and when device memory is short.
   PooledMesh add(const MeshChunk& mesh, Vec3d origin = {});
 
-  /// Room for a mesh that the caller fills before it is drawn.
-  PooledMesh reserve(std::uint32_t vertices, std::uint32_t triangles, bool normals,
-                     Vec3d origin = {});
-
   /// A mesh with normals in buffers that somebody else owns, and keeps while it is drawn.
   static PooledMesh borrow(const MeshPlace& place, Vec3d origin = {});
-
-  /// Room in memory to write a reserved mesh to; it must be unmapped before drawing.
-  struct Mapping {
-    std::span<Vec3f> positions, normals;
-    std::span<Triangle> triangles;
-  };
-  static Mapping map(const PooledMesh& mesh);
-  static void unmap(const PooledMesh& mesh);
 
   /// Device memory in use by meshes, and taken for blocks.
   std::uint64_t bytes() const;
   std::uint64_t capacity() const;
 
  private:
+  /// Room for a mesh.
+  PooledMesh reserve(std::uint32_t vertices, std::uint32_t triangles, bool normals, Vec3d origin);
+
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -207,8 +207,6 @@ void Renderer::State::finish() {
 
 Renderer::Renderer() : state_(std::make_unique<State>()) {}
 Renderer::~Renderer() = default;
-Renderer::Renderer(Renderer&&) noexcept = default;
-Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 std::uint64_t Renderer::memory(int width, int height, const PictureSettings& settings,
                                bool transparent) {

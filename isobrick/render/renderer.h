@@ -72,8 +72,6 @@ class Renderer {
   /// Throws Error when the current context is older than OpenGL 4.5.
   Renderer();
   ~Renderer();
-  Renderer(Renderer&&) noexcept;
-  Renderer& operator=(Renderer&&) noexcept;
 
   /// Device memory of a picture of this size while it is made. With transparent meshes: more; and
   /// where pictures of one size are made with and without multisampling, both are kept.

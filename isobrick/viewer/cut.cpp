@@ -62,11 +62,6 @@ std::size_t place_of(Int3 child, Int3 ratio, Int3 nodes) {
 CutSelector::CutSelector(const NodeTree& tree)
     : tree_(tree), refined_(tree.grid(), 1), before_(tree.grid(), 1), wanted_(tree.grid(), 1) {}
 
-void CutSelector::restart() {
-  refined_.clear();
-  before_.clear();
-}
-
 double CutSelector::urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active) {
   const bool before = before_(n) != 0;
   if (!(before ? sight.nearly_visible : sight.visible) || !active.below(n)) return 0;

@@ -56,9 +56,6 @@ class CutSelector {
   /// of its arguments and of the cut before.
   Cut select(const ActiveNodes& active, const View& view, const CutBudget& budget);
 
-  /// Forgets the cut before.
-  void restart();
-
  private:
   double urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active);
   double triangles(const NodeKey& n, const NodeView& view, std::span<const double> isovalues,

@@ -91,15 +91,9 @@ class Cover {
 
 }  // namespace
 
-CutIndex::CutIndex(const NodeGrid& grid, const Cut& cut) {
+CutIndex::CutIndex(const Cut& cut) {
   nodes_.reserve(cut.nodes.size());
-  for (const CutNode& node : cut.nodes) {
-    nodes_.emplace(node.key, node);
-    for (NodeKey n = node.key; grid.has_parent(n);) {
-      n = grid.parent(n);
-      if (!refined_.insert(n).second) break;
-    }
-  }
+  for (const CutNode& node : cut.nodes) nodes_.emplace(node.key, node);
 }
 
 const CutNode* CutIndex::find(const NodeKey& key) const {

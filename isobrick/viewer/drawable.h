@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <memory>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "isobrick/viewer/cut.h"
@@ -31,15 +30,12 @@ struct Drawable {
 /// A cut that is looked up.
 class CutIndex {
  public:
-  CutIndex(const NodeGrid& grid, const Cut& cut);
+  explicit CutIndex(const Cut& cut);
   /// The node's neighbours one level above, or null when it is not in the cut.
   const CutNode* find(const NodeKey& key) const;
-  /// Whether nodes of the cut lie below.
-  bool refined(const NodeKey& key) const { return refined_.contains(key); }
 
  private:
   std::unordered_map<NodeKey, CutNode, NodeKeyHash> nodes_;
-  std::unordered_set<NodeKey, NodeKeyHash> refined_;
 };
 
 /// Appends the meshes that show one isovalue of a cut as far as they are there: a

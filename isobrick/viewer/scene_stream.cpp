@@ -145,7 +145,7 @@ SceneStream::~SceneStream() {
 }
 
 void SceneStream::set_cut(const Cut& cut) {
-  CutIndex index(shared_->tree->grid(), cut);
+  CutIndex index(cut);
   const std::lock_guard lock(shared_->mutex);
   // An isovalue that moves on with every picture must not leave what was shown before the
   // first one: the last that covers stays.

@@ -25,12 +25,6 @@ struct View {
   friend bool operator==(const View&, const View&) = default;
 };
 
-/// A camera that looks from `eye` at `target`: the matrix for View. `fov_y` in
-/// radians; near and far are distances. Where `up` is along the view another
-/// direction is taken.
-std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
-                                        double aspect, double near, double far);
-
 /// How a node looks in a view.
 struct NodeSight {
   /// Length of one of the node's cells on the picture, pixels, where the node is

@@ -83,24 +83,6 @@ TEST_F(Context, APoolReusesItsRoom) {
   EXPECT_THROW(pool.add(wrong.chunk()), Error);
 }
 
-TEST_F(Context, AMappedMeshIsDrawn) {
-  const GlContext context;
-  Renderer renderer;
-  MeshPool pool;
-  const TestMesh ball = make_ball({0, 0, 0}, 1, 20);
-  const PooledMesh mesh = pool.reserve(static_cast<std::uint32_t>(ball.positions.size()),
-                                       static_cast<std::uint32_t>(ball.triangles.size()), true);
-  const MeshPool::Mapping mapping = MeshPool::map(mesh);
-  std::copy(ball.positions.begin(), ball.positions.end(), mapping.positions.begin());
-  std::copy(ball.normals.begin(), ball.normals.end(), mapping.normals.begin());
-  std::copy(ball.triangles.begin(), ball.triangles.end(), mapping.triangles.begin());
-  MeshPool::unmap(mesh);
-  renderer.begin(make_camera({}, {-1, -1, -1}, {1, 1, 1}, 1), 64, 64, {});
-  renderer.draw(mesh, {});
-  renderer.end();
-  EXPECT_TRUE(Pixels(renderer).surface(32, 32));
-}
-
 TEST(CameraText, Parts) {
   const CameraRequest request =
       parse_camera("azimuth=90,elevation=0,zoom=2,fov=40,orthographic,up=0:0:1");

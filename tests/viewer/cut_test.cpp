@@ -10,6 +10,7 @@
 
 #include "isobrick/pipeline/downsample.h"
 #include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/perspective.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {

@@ -7,6 +7,7 @@
 
 #include "isobrick/viewer/scene.h"
 #include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/perspective.h"
 
 namespace isobrick::test {
 namespace {

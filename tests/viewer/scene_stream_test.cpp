@@ -12,6 +12,7 @@
 
 #include "isobrick/viewer/scene.h"
 #include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/perspective.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {
