@@ -22,6 +22,9 @@ using Clock = std::chrono::steady_clock;
 /// While meshes come in and nothing else changes: seconds between pictures, which would keep the
 /// device that draws them from making meshes.
 constexpr double kRefiningSeconds = 0.04;
+/// The same, in times of the last picture: pictures that are soon out of date, and may take
+/// seconds in software, take a third of the time at most.
+constexpr double kRefiningPause = 2;
 constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
 constexpr double kMarginOfWait = 0.05;
 
@@ -151,9 +154,12 @@ void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
 
 /// Whether what is new can be shown a little later.
 bool StorePicture::can_wait(const Drawable& newest) const {
-  return device_->turns() != nullptr && shown_ != nullptr && shown_->covers && !newest.complete &&
-         shown_->isovalues == newest.isovalues && !scene_->stream().idle() &&
-         std::chrono::duration<double>(Clock::now() - drawn_).count() < kRefiningSeconds;
+  if (shown_ == nullptr || !shown_->covers || newest.complete ||
+      shown_->isovalues != newest.isovalues || scene_->stream().idle())
+    return false;
+  const double pause = kRefiningPause * draw_seconds_;
+  return std::chrono::duration<double>(Clock::now() - drawn_).count() <
+         (device_->turns() != nullptr ? std::max(pause, kRefiningSeconds) : pause);
 }
 
 bool StorePicture::upload_all(const Drawable& drawable, UploadShare& share) {
@@ -362,6 +368,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     device_->forget();
     shows_ = std::move(shows);
     drawn_ = Clock::now();
+    draw_seconds_ = times_.draw + times_.finish;
   }
   drop_unused();
   state_.limited_by_budget = scene_->cut().limited_by_budget;

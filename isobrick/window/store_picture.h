@@ -136,6 +136,7 @@ class StorePicture {
   std::string shows_;                ///< camera, size and settings of the picture in the renderer
   std::uint64_t device_budget_ = 0;  ///< that the stream has been told
   std::chrono::steady_clock::time_point drawn_;  ///< when that was
+  double draw_seconds_ = 0;                      ///< how long it took
   std::uint64_t frame_ = 0;
   PictureState state_;
   PictureTimes times_;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -97,6 +98,38 @@ TEST_F(Picture, CoarseOnesLookLikeFineOnes) {
   double difference = 0;
   for (std::size_t i = 0; i < fine.size(); ++i) difference += std::abs(fine[i] - coarse[i]);
   EXPECT_LT(difference / static_cast<double>(fine.size()), 2.0);
+}
+
+TEST_F(Picture, WhileMeshesComeInMostOfTheTimeIsTheirs) {
+  open(SynthKind::gyroid, {200, 200, 200}, {.threads = 1, .backend = Backend::cpu});
+  settings_.pixel_error = 0.1f;
+  settings_.occlusion = settings_.multisample = false;
+  const auto seconds = [] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  };
+  int pictures = 0, left_out = 0;
+  // Where all meshes come within one picture there is nothing to be seen of it.
+  for (int round = 0; round < 20 && pictures == 0; ++round) {
+    show({.threads = 1, .backend = Backend::cpu});
+    double ended = 0, took = 0;
+    do {
+      const bool covered = picture_->state().covers;
+      picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_);
+      if (picture_->times().draw == 0) {
+        ++left_out;
+        continue;
+      }
+      if (covered && !picture_->state().complete) {
+        ++pictures;
+        EXPECT_GE(seconds() - ended, 2 * took);
+      }
+      ended = seconds();
+      took = picture_->times().draw;
+    } while (!picture_->state().complete);
+  }
+  EXPECT_GT(pictures, 0);
+  EXPECT_GT(left_out, pictures);
 }
 
 TEST_F(Picture, CutsAndRegionsLeaveWhatTheySay) {
