@@ -64,6 +64,9 @@ void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_val
     check(cudaMemcpyAsync(page_of_tile.data(), table.data(), page_of_tile.bytes(),
                           cudaMemcpyHostToDevice, stream.get()));
   }
+  columns = DeviceBuffer<std::byte>(
+      (std::size_t{tile_count} + 1) * kColumnSamples * lattice.sample_bytes(), stream);
+  launch_first_columns(lattice.type, pages.data(), tile_count + 1, columns.data(), stream.get());
   stream.wait();
 }
 
@@ -92,6 +95,7 @@ TileParams DeviceVolume::Impl::params() const {
   p.pages = pages.data();
   p.page_of_tile = page_of_tile.data();
   p.fill_page = 0;
+  p.columns = columns.data();
   for (int axis = 0; axis < 3; ++axis) {
     p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
     p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);
@@ -106,8 +110,8 @@ DeviceVolume::~DeviceVolume() = default;
 const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
 
 std::uint64_t DeviceVolume::bytes() const {
-  return impl_->pages.bytes() + impl_->page_of_tile.bytes() + impl_->tiles.bytes() +
-         impl_->order_of_tile.bytes() + impl_->ranges.bytes();
+  return impl_->pages.bytes() + impl_->columns.bytes() + impl_->page_of_tile.bytes() +
+         impl_->tiles.bytes() + impl_->order_of_tile.bytes() + impl_->ranges.bytes();
 }
 
 }  // namespace isobrick::gpu

@@ -11,6 +11,7 @@ struct DeviceVolume::Impl {
   Stream stream;
   std::uint32_t tile_count = 0;
   DeviceBuffer<std::byte> pages;
+  DeviceBuffer<std::byte> columns;            ///< of the pages: TileParams::columns
   DeviceBuffer<std::uint32_t> page_of_tile;   ///< [z, y, x]; empty where all tiles have pages
   DeviceBuffer<std::int32_t> tiles;           ///< x, y, z of all in Morton order
   DeviceBuffer<std::uint32_t> order_of_tile;  ///< [z, y, x]: its place in that order

@@ -105,6 +105,13 @@ __global__ void __launch_bounds__(kThreads)
   ranges[2 * static_cast<std::size_t>(blockIdx.x) + 1] = range.hi;
 }
 
+template <class T>
+__global__ void __launch_bounds__(kThreads) copy_first_columns(const T* pages, T* columns) {
+  const std::size_t page = blockIdx.x;
+  for (unsigned i = threadIdx.x; i < kColumnSamples; i += kThreads)
+    columns[page * kColumnSamples + i] = pages[page * kPageSamples + 32 * i];
+}
+
 }  // namespace
 
 void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream) {
@@ -134,6 +141,16 @@ void launch_tile_ranges(ScalarType type, const TileParams& params, const std::in
     find_tile_ranges<T><<<count, kThreads, 0, stream>>>(params, tiles, static_cast<T*>(ranges));
   });
   check_launch("find_tile_ranges");
+}
+
+void launch_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns,
+                          cudaStream_t stream) {
+  visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    copy_first_columns<<<count, kThreads, 0, stream>>>(static_cast<const T*>(pages),
+                                                       static_cast<T*>(columns));
+  });
+  check_launch("copy_first_columns");
 }
 
 }  // namespace isobrick::gpu

@@ -39,4 +39,8 @@ void launch_place_ranges(ScalarType type, const std::int32_t* tiles, std::uint32
 void launch_tile_ranges(ScalarType type, const TileParams& params, const std::int32_t* tiles,
                         std::uint32_t count, void* ranges, cudaStream_t stream);
 
+/// Copies the samples at x = 0 of so many pages, [z, y] of each.
+void launch_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns,
+                          cudaStream_t stream);
+
 }  // namespace isobrick::gpu

@@ -39,12 +39,18 @@ struct Classifier {
   template <int N>
   __device__ std::uint32_t bits(const std::uint32_t (&words)[N]) const {
     std::uint32_t result = 0;
+    if constexpr (sizeof(T) == 1) {
+      static_assert(N % 2 == 0);
 #pragma unroll
-    for (int i = N - 1; i >= 0; --i) {
-      if constexpr (sizeof(T) == 1) {
-        // The product lines the four bits up at the top; nothing carries.
-        result = __funnelshift_l(tops(words[i]) * 0x00204081u, result, 4);
-      } else {
+      for (int i = 0; i < N; i += 2) {
+        // Eight samples, each with its own power of two, times 128.
+        const std::uint32_t four = __dp4a(tops(words[i]), 0x08040201u, 0u);
+        const std::uint32_t eight = __dp4a(tops(words[i + 1]), 0x80402010u, four);
+        result |= i == 0 ? eight >> 7 : eight << (4 * i - 7);
+      }
+    } else {
+#pragma unroll
+      for (int i = N - 1; i >= 0; --i) {
         const std::uint32_t both = tops(words[i]);
         result = __funnelshift_l(both | both << 15, result, 2);
       }
@@ -69,39 +75,75 @@ __device__ inline const T* sample_at(const TileShared& s, int page, int place) {
   return reinterpret_cast<const T*>(s.pages[page]) + place;
 }
 
-/// A row a thread. Rows of narrow samples are 32 or 64 bytes; two or four lanes read one,
-/// 16 bytes each, and give each other the bits.
-template <int N, class T>
-__device__ inline void classify_rows(TileShared& s, const Classifier<T>& classifier) {
-  constexpr int kLanes = 2 * static_cast<int>(sizeof(T)), kAtOnce = 32 / kLanes;
-  const auto lane = static_cast<int>(lane_id());
-  for_each_piece<N>([&](int, auto rows) {
-    std::uint32_t parts = 0;  // of row i · kAtOnce + lane / kLanes from bit i · kAtOnce on
+/// The last sample of a row, which is the first of one of the next tile.
+template <class T>
+__device__ inline const T* column_at(const TileShared& s, const TileParams& p, int y, int z) {
+  const int step = p.columns ? 1 : 32;
+  return reinterpret_cast<const T*>(s.columns[(y >> 5) + 2 * (z >> 5)]) + (y + 32 * z) * step;
+}
+
+/// What a warp reads of a piece of rows of narrow samples. Such a row is 32 or 64 bytes; two or
+/// four lanes read one, 16 bytes each, and give each other the bits.
+template <class T>
+struct SamplesOfRows {
+  static constexpr int kLanes = 2 * static_cast<int>(sizeof(T)), kAtOnce = 32 / kLanes;
+  uint4 part[kLanes];  ///< of row i · kAtOnce + lane / kLanes
+  T last;              ///< of the own row
+
+  template <class Rows>
+  __device__ static SamplesOfRows read(const TileShared& s, const TileParams& p, Rows rows) {
+    const auto lane = static_cast<int>(lane_id());
+    const auto start_of = [&](int y, int z) {
+      return reinterpret_cast<const uint4*>(sample_at<T>(s, page_of(0, y, z), 32 * y + 1024 * z));
+    };
+    SamplesOfRows read;
+    const uint4* plane = Rows::kPlane ? start_of(0, rows.z(0)) + lane : nullptr;
 #pragma unroll
     for (int i = 0; i < kLanes; ++i) {
-      const int r = i * kAtOnce + lane / kLanes, y = rows.y(r), z = ::min(rows.z(r), 32);
-      const T* from = sample_at<T>(s, page_of(0, y, z), 32 * y + 1024 * z);
-      const uint4 v = __ldg(reinterpret_cast<const uint4*>(from) + lane % kLanes);
-      const std::uint32_t words[4] = {v.x, v.y, v.z, v.w};
+      const int row = i * kAtOnce + lane / kLanes;
+      // The rows of a plane follow one another.
+      read.part[i] =
+          __ldg(Rows::kPlane ? plane + 32 * i
+                             : start_of(rows.y(row), ::min(rows.z(row), 32)) + lane % kLanes);
+    }
+    const OwnRow own(rows);
+    read.last = __ldg(column_at<T>(s, p, own.y, ::min(own.z, 32)));
+    return read;
+  }
+
+  __device__ RowBits bits(const Classifier<T>& classifier) const {
+    const auto lane = static_cast<int>(lane_id());
+    std::uint32_t parts = 0, word = 0;
+#pragma unroll
+    for (int i = 0; i < kLanes; ++i) {
+      const std::uint32_t words[4] = {part[i].x, part[i].y, part[i].z, part[i].w};
       parts |= classifier.bits(words) << i * kAtOnce;
     }
-    std::uint32_t word = 0;
 #pragma unroll
     for (int i = 0; i < kLanes; ++i) {
       const std::uint32_t part = __shfl_sync(kAll, parts, lane % kAtOnce * kLanes + i);
       word |= (part >> lane / kAtOnce * kAtOnce & ((1u << kAtOnce) - 1u)) << i * kAtOnce;
     }
+    return {word, classifier.one(last)};
+  }
+};
+
+/// A row a thread.
+template <int N, class T>
+__device__ inline void classify_rows(TileShared& s, const TileParams& p,
+                                     const Classifier<T>& classifier) {
+  for_each_piece<N>([&](auto rows) {
     const OwnRow at(rows);
-    if (!at.exists()) return;
-    const T last = __ldg(sample_at<T>(s, page_of(0, at.y, at.z) + 1, 32 * at.y + 1024 * at.z + 32));
-    s.rows[at.row()] = {word, classifier.one(last)};
+    const RowBits bits = SamplesOfRows<T>::read(s, p, rows).bits(classifier);
+    if (at.exists()) s.rows[at.row()] = bits;
   });
 }
 
 /// A plane a warp and a sample a thread: rows of wide samples, read by one thread
 /// each, would be fetched in pieces again and again.
 template <int N, class T>
-__device__ inline void classify_planes(TileShared& s, const Classifier<T>& classifier) {
+__device__ inline void classify_planes(TileShared& s, const TileParams& p,
+                                       const Classifier<T>& classifier) {
   const int lane = static_cast<int>(lane_id());
   const auto inside = [&](T v) { return __ballot_sync(kAll, v >= classifier.threshold); };
   for (int z = static_cast<int>(warp_id()); z < 33; z += Team<N>::kWarps) {
@@ -113,21 +155,22 @@ __device__ inline void classify_planes(TileShared& s, const Classifier<T>& class
       const std::uint32_t row = inside(__ldg(from + 32 * y));
       if (lane == y) word = row;
     }
-    const T last = __ldg(sample_at<T>(s, page + 1, start + 32 * lane + 32));
+    const T last = __ldg(column_at<T>(s, p, lane, z));
     s.rows[33 * z + lane] = {word, classifier.one(last)};
     // The row at y = 32 lies in the tile above.
     const std::uint32_t top = inside(__ldg(sample_at<T>(s, page + 3, start + 1024 + lane)));
-    const T corner = __ldg(sample_at<T>(s, page + 4, start + 1024 + 32));
+    const T corner = __ldg(column_at<T>(s, p, 32, z));
     if (lane == 0) s.rows[33 * z + 32] = {top, classifier.one(corner)};
   }
 }
 
 template <int N, class T>
-__device__ inline void classify(TileShared& s, const Classifier<T>& classifier) {
+__device__ inline void classify(TileShared& s, const TileParams& p,
+                                const Classifier<T>& classifier) {
   if constexpr (sizeof(T) <= 2)
-    classify_rows<N>(s, classifier);
+    classify_rows<N>(s, p, classifier);
   else
-    classify_planes<N>(s, classifier);
+    classify_planes<N>(s, p, classifier);
 }
 
 /// Empties the lists of the tile before.

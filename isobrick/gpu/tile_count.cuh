@@ -30,7 +30,7 @@ __device__ inline std::uint32_t mixed_cells(const RowBits& a, const RowBits& b, 
   return any & ~all;
 }
 
-/// What of a row is in the region of interest, as far as its y says.
+/// What of a row is in the region of interest, as far as its y says. All of an inner tile is.
 struct RowLimits {
   std::uint32_t edges_x, edges_yz, cells;  ///< bits
   bool up, own;                            ///< there is a row above; it is no lower tile's
@@ -42,11 +42,13 @@ struct RowLimits {
   }
 };
 
+template <bool Inner, class Rows>
 __device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape,
-                                        const RowLimits& limits, int row, int z) {
-  const bool in = z >= shape.lo[2] && z <= shape.hi[2], up = z < shape.hi[2];
+                                        const RowLimits& limits, Rows, int row, int z) {
+  const bool in = Inner || (z >= shape.lo[2] && z <= shape.hi[2]);
+  const bool up = z < (Inner ? 32 : shape.hi[2]);
   const RowBits* at = s.rows + row;
-  const int above_here = limits.up ? 1 : 0;
+  const int above_here = (Inner ? Rows::kPlane : limits.up) ? 1 : 0;
   const RowBits here = at[0], above = at[above_here];
   at += up ? 33 : 0;
   const RowBits behind = at[0], opposite = at[above_here];
@@ -55,7 +57,7 @@ __device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape,
   e.y = (here.next() ^ above.next()) & (in ? limits.edges_yz : 0);
   e.z = (here.next() ^ behind.next()) & (in ? limits.edges_yz : 0);
   e.cells = mixed_cells(here, above, behind, opposite) & (in && up ? limits.cells : 0);
-  if (shape.at_0) {
+  if (!Inner && shape.at_0) {
     const std::uint32_t first = in && limits.edges_yz ? 1 : 0;
     e.y_at_0 = (here.at ^ above.at) & first;
     e.z_at_0 = (here.at ^ behind.at) & first;
@@ -63,17 +65,19 @@ __device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape,
   return e;
 }
 
-/// What a thread remembers of a row between counting and marking.
+/// What is remembered of a row between counting and marking: where its numbers will be.
 struct RowCount {
-  std::uint32_t before;  ///< of the 32 rows of its warp: vertices | cells << 16
+  std::uint32_t before;  ///< of the 32 rows of its piece: vertices | cells << 16
   std::uint32_t packed;
 
-  __device__ static RowCount of(const RowEdges& e) {
+  /// Of this row, with `own` for those of later ones.
+  __device__ static RowCount of(const RowEdges& e, std::uint32_t& own) {
     const std::uint32_t y_at_0 = e.ys_at_0(), z_at_0 = e.zs_at_0();
     const std::uint32_t y_start = e.xs(), z_start = y_start + y_at_0 + e.ys();
     const std::uint32_t all = z_start + z_at_0 + e.zs();
-    return {0, y_start | z_start << 6 | all << 13 |
-                   static_cast<std::uint32_t>(__popc(e.cells)) << 20 | y_at_0 << 26 | z_at_0 << 27};
+    const auto cells = static_cast<std::uint32_t>(__popc(e.cells));
+    own = all | cells << 16;
+    return {0, y_start | z_start << 6 | all << 13 | cells << 20 | y_at_0 << 26 | z_at_0 << 27};
   }
   __device__ std::uint32_t y_start() const { return packed & 63u; }
   __device__ std::uint32_t z_start() const { return packed >> 6 & 127u; }
@@ -83,42 +87,48 @@ struct RowCount {
   __device__ std::uint32_t z_at_0() const { return packed >> 27 & 1u; }
 };
 
-template <int N>
-struct RowCounts {
-  RowCount of_step[Team<N>::kSteps];
-};
-
 /// `leave_out(y, z, edges)` may take something of a row away.
-template <int N, class LeaveOut>
-__device__ inline void count_rows(TileShared& s, RowCounts<N>& counts, LeaveOut&& leave_out) {
+template <int N, bool Inner, class LeaveOut>
+__device__ inline void count_rows_of(TileShared& s, LeaveOut&& leave_out) {
   const Shape shape = s.shape;
   const RowLimits of_lane = RowLimits::of(shape, static_cast<int>(lane_id()));
-  for_each_piece<N>([&](int step, auto rows) {
+  for_each_piece<N>([&](auto rows) {
     const OwnRow at(rows);
-    RowCount& count = counts.of_step[step];
-    count = {0, 0};
+    const int row = at.row();
+    RowCount count{0, 0};
+    std::uint32_t own = 0;
     if (at.exists()) {
-      const int row = at.row(), y = at.y, z = at.z;
-      RowEdges edges =
-          edges_of_row(s, shape, rows.kPlane ? of_lane : RowLimits::of(shape, y), row, z);
+      const int y = at.y, z = at.z;
+      RowEdges edges = edges_of_row<Inner>(
+          s, shape, rows.kPlane ? of_lane : RowLimits::of(shape, y), rows, row, z);
       leave_out(y, z, edges);
-      if (y == 0) s.plane_at_0[0][z] = static_cast<std::uint8_t>(edges.z_at_0);
-      if (z == 0) s.plane_at_0[1][y] = static_cast<std::uint8_t>(edges.y_at_0);
+      if (!Inner && y == 0) s.plane_at_0[0][z] = static_cast<std::uint8_t>(edges.z_at_0);
+      if (!Inner && z == 0) s.plane_at_0[1][y] = static_cast<std::uint8_t>(edges.y_at_0);
       s.crossing[0][row] = edges.x;
       s.crossing[1][row] = edges.y;
       s.crossing[2][row] = edges.z;
       s.mixed[row] = edges.cells;
-      count = RowCount::of(edges);
+      count = RowCount::of(edges, own);
     }
-    const std::uint32_t own = count.vertices() | count.cells() << 16;
     if constexpr (rows.kPlane) {
       const std::uint32_t sum = warp_inclusive_sum(own);
       count.before = sum - own;
       if (lane_id() == 31) s.plane_sums[at.z] = sum;
-    } else if (at.exists()) {
-      s.last_row_sums[at.z] = own;
     }
+    if (!at.exists()) return;
+    if constexpr (!rows.kPlane) s.last_row_sums[at.z] = own;
+    s.number[0][row] = count.before;
+    s.number[1][row] = count.packed;
   });
+}
+
+/// The same for any tile.
+template <int N, class LeaveOut>
+__device__ inline void count_rows(TileShared& s, LeaveOut&& leave_out) {
+  if (s.shape.inner)
+    count_rows_of<N, true>(s, leave_out);
+  else
+    count_rows_of<N, false>(s, leave_out);
 }
 
 /// Vertices and cells before each plane, found by every warp for itself once all rows are
@@ -177,20 +187,38 @@ __device__ inline void mark_row(Mark (&marks)[Listed], FirstOfGroup* groups, int
     for (first += 32; first < end; first += 32) mark_group(first);
   }
 }
+/// The same where all things from 0 on are listed now.
+template <int Most, std::uint32_t Listed, class Mark>
+__device__ inline void mark_row_from_0(Mark (&marks)[Listed], FirstOfGroup* groups,
+                                       std::uint32_t place, std::uint32_t count, int row) {
+  if (count == 0 || place >= Listed) return;
+  marks[place] = static_cast<Mark>(row + 1);
+  const std::uint32_t end = ::min(place + count, Listed);
+  std::uint32_t first = (place + 31) & ~31u;
+  const auto mark_group = [&](std::uint32_t first) {
+    groups[first / 32] = {static_cast<std::uint16_t>(row),
+                          static_cast<std::uint16_t>(first - place)};
+  };
+  if (first < end) mark_group(first);
+  if constexpr (Most > 32) {
+    if (count <= 32) return;
+#pragma unroll 1
+    for (first += 32; first < end; first += 32) mark_group(first);
+  }
+}
 inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
 
 /// Leaves the row table for later tiles and the numbers within the tile in
 /// shared memory, and marks the first vertices and cells.
 template <int N>
-__device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts,
-                                    const PlaneBases& bases, RowTable& table) {
+__device__ inline void publish_rows(TileShared& s, const PlaneBases& bases, RowTable& table) {
   auto& lists = lists_of<N>(s);
-  for_each_piece<N>([&](int step, auto rows) {
+  for_each_piece<N>([&](auto rows) {
     const Before before = before_piece(s, bases, rows);
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();
-    const RowCount& count = counts.of_step[step];
+    const RowCount count{s.number[0][row], s.number[1][row]};
     const std::uint32_t base = before.vertices + (count.before & 0xffffu);
     const std::uint32_t cell = before.cells + (count.before >> 16);
     const std::uint32_t y = count.y_start(), z = count.z_start();
@@ -199,10 +227,9 @@ __device__ inline void publish_rows(TileShared& s, const RowCounts<N>& counts,
     s.number[1][row] = base + y + count.y_at_0();
     s.number[2][row] = base + z + count.z_at_0();
     s.cell_base[row] = static_cast<std::uint16_t>(cell);
-    mark_row<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups, static_cast<int>(base),
-                                 static_cast<int>(count.vertices()), row);
-    mark_row<kMostCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(cell),
-                              static_cast<int>(count.cells()), row);
+    mark_row_from_0<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups, base,
+                                        count.vertices(), row);
+    mark_row_from_0<kMostCellsOfRow>(lists.cells, lists.cell_groups, cell, count.cells(), row);
   });
   if (threadIdx.x == 0) {
     table.rows[kRowsOfTile] = s.all_vertices;
@@ -247,9 +274,10 @@ struct PlaceInRow {
   std::uint32_t row, rank;
 };
 
-/// From the marks of 32 things in a row.
-__device__ inline PlaceInRow place_of_lane(std::uint32_t mark, const FirstOfGroup& group) {
-  const unsigned begins = __ballot_sync(kAll, mark != 0) & (lanes_below() << 1 | 1u);
+/// From the marks of 32 things in a row. `lanes` are the own lane and those below.
+__device__ inline PlaceInRow place_of_lane(std::uint32_t mark, const FirstOfGroup& group,
+                                           std::uint32_t lanes) {
+  const unsigned begins = __ballot_sync(kAll, mark != 0) & lanes;
   const auto from = static_cast<unsigned>(31 - __clz(static_cast<int>(begins)));
   const std::uint32_t found = __shfl_sync(kAll, mark, from);
   if (begins) return {found - 1, lane_id() - from};
@@ -258,13 +286,13 @@ __device__ inline PlaceInRow place_of_lane(std::uint32_t mark, const FirstOfGrou
 
 /// The place of the set bit with `rank` set bits below it.
 __device__ inline std::uint32_t nth_bit(std::uint32_t word, std::uint32_t rank) {
-  std::uint32_t place = 0;
+  std::uint32_t shift = 32;  // leaves the lowest 32 - shift bits
 #pragma unroll
   for (std::uint32_t half = 16; half; half /= 2) {
-    const std::uint32_t upper = place + half;
-    if (static_cast<std::uint32_t>(__popc(word & ~(~0u << upper))) <= rank) place = upper;
+    const std::uint32_t less = shift - half;
+    if (static_cast<std::uint32_t>(__popc(word << less)) <= rank) shift = less;
   }
-  return place;
+  return 32 - shift;
 }
 
 /// The part of a list that a warp works on: whole groups of 32.
@@ -296,30 +324,28 @@ __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
   }
 }
 
-/// Calls f(begin) for groups of 32 out of `listed`, each by the warp that is free first;
+/// Calls f(group) for the groups of 32 out of `listed`, each by the warp that is free first;
 /// `next` is 0 before the first.
 template <class F>
 __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed, F&& f) {
-  const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(&next));
-  // One thread of the warp adds 1. The compiler must not know that: it would add up for any
-  // number of threads what they add.
-  std::uint32_t lane;
-  asm volatile("mov.u32 %0, %%laneid;" : "=r"(lane));
-  const auto take = [address, one = lane + 1] {
+  // As an addition that never comes round: the compiler would add up for any number of threads
+  // what one of them adds.
+  const auto take = [address = static_cast<std::uint32_t>(__cvta_generic_to_shared(&next))] {
     std::uint32_t before = 0;
     if (lane_id() == 0)
-      asm volatile("atom.shared.add.u32 %0, [%1], %2;"
+      asm volatile("atom.shared.inc.u32 %0, [%1], 0x7fffffff;"
                    : "=r"(before)
-                   : "r"(address), "r"(one)
+                   : "r"(address)
                    : "memory");
     return before;
   };
+  const std::uint32_t groups = uniform((listed + 31) / 32);
   std::uint32_t taken = take();
   for (;;) {
-    const std::uint32_t begin = 32 * uniform(taken);
-    if (begin >= listed) return;
+    const std::uint32_t group = uniform(taken);
+    if (group >= groups) return;
     taken = take();  // on the way while f works
-    f(begin);
+    f(group);
   }
 }
 
@@ -327,19 +353,21 @@ __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed,
 template <int N>
 __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
   auto& lists = lists_of<N>(s);
-  for_each_group(s.next_cells, listed, [&](std::uint32_t begin) {
-    const std::uint32_t i = begin + lane_id();
-    const PlaceInRow place = place_of_lane(lists.cells[i], lists.cell_groups[begin / 32]);
+  const std::uint32_t lanes = kept(lanes_below() << 1 | 1u);
+  for_each_group(s.next_cells, listed, [&](std::uint32_t group) {
+    const std::uint32_t i = 32 * group + lane_id();
+    const PlaceInRow place = place_of_lane(lists.cells[i], lists.cell_groups[group], lanes);
     const std::uint32_t x = nth_bit(s.mixed[place.row], place.rank);
     const auto pair = [&](int step) {
       const RowBits bits = s.rows[place.row + step];
       return __funnelshift_r(bits.at, bits.last, x) & 3u;
     };
     const std::uint32_t index = pair(0) | pair(1) << 2 | pair(33) << 4 | pair(34) << 6;
-    const std::uint32_t count = i < listed ? s.triangle_count[index] : 0;
+    std::uint32_t count = s.triangle_count[index];
+    if (i >= listed) count = 0;
     const std::uint32_t sum = warp_inclusive_sum(count);
     if (i < listed) lists.cells[i] = x | place.row << 5 | index << 16 | (sum - count) << 24;
-    if (lane_id() == 31) lists.group_triangles[begin / 32] = static_cast<std::uint16_t>(sum);
+    if (lane_id() == 31) lists.group_triangles[group] = static_cast<std::uint16_t>(sum);
   });
 }
 

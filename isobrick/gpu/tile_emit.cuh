@@ -28,7 +28,9 @@ struct EdgeOfVertex {
   std::uint32_t x, axis;
 };
 
-__device__ inline EdgeOfVertex find_edge(const TileShared& s, bool at_0, std::uint32_t row,
+/// `at_0`, a bool or known when compiled: the tile has vertices at sample 0.
+template <class At0>
+__device__ inline EdgeOfVertex find_edge(const TileShared& s, At0 at_0, std::uint32_t row,
                                          std::uint32_t number) {
   const std::uint32_t y_first = s.number[1][row], z_first = s.number[2][row];
   if (at_0) {
@@ -121,19 +123,19 @@ struct VertexMaker {
 };
 
 /// Writes the marked vertices, the first of which has number `first` in the tile.
-template <int N, class T, bool Normals>
-__device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::uint32_t first,
-                                     std::uint32_t listed) {
+template <int N, class T, bool Normals, class At0>
+__device__ inline void emit_vertices_of(TileShared& s, const TileParams& p, std::uint32_t first,
+                                        std::uint32_t listed, At0 at_0) {
   using Maker = VertexMaker<T>;
   const Maker maker{s, p, p.crossing};
   const auto& lists = lists_of<N>(s);
-  const bool at_0 = s.shape.at_0 != 0;
-  Vec3f* const positions = p.positions + s.vertex_base + first;
-  Vec3f* const normals = Normals ? p.normals + s.vertex_base + first : nullptr;
-  for_each_group(s.next_vertices, listed, [&](std::uint32_t begin) {
-    const std::uint32_t i = begin + lane_id();
+  Vec3f* const positions = kept(p.positions + s.vertex_base + first);
+  Vec3f* const normals = Normals ? kept(p.normals + s.vertex_base + first) : nullptr;
+  const std::uint32_t lanes = kept(lanes_below() << 1 | 1u);
+  for_each_group(s.next_vertices, listed, [&](std::uint32_t group) {
+    const std::uint32_t i = 32 * group + lane_id();
     const std::uint32_t row =
-        place_of_lane(lists.vertex_marks[i], lists.vertex_groups[begin / 32]).row;
+        place_of_lane(lists.vertex_marks[i], lists.vertex_groups[group], lanes).row;
     if (i >= listed) return;
     const typename Maker::Edge edge = maker.load(row, find_edge(s, at_0, row, first + i));
     Vec3f position, normal;
@@ -141,6 +143,19 @@ __device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::ui
     store_once(positions[i], position);
     if constexpr (Normals) store_once(normals[i], normal);
   });
+}
+
+/// The same for any tile.
+template <int N, class T, bool Normals>
+__device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::uint32_t first,
+                                     std::uint32_t listed) {
+  const bool at_0 = s.shape.at_0 != 0;
+  if (Normals)  // which leave no registers for what else would be kept
+    emit_vertices_of<N, T, Normals>(s, p, first, listed, at_0);
+  else if (at_0)
+    emit_vertices_of<N, T, Normals>(s, p, first, listed, std::true_type());
+  else
+    emit_vertices_of<N, T, Normals>(s, p, first, listed, std::false_type());
 }
 
 /// How far behind a row's word its number lies, in bytes.
@@ -175,21 +190,29 @@ __device__ inline std::uint32_t low_bits(std::uint32_t x) {
   return mask;
 }
 
-/// Writes triangle `number` of a listed cell.
-__device__ inline void emit_triangle(const TileShared& s, std::uint32_t cell, std::uint32_t number,
-                                     Triangle& to) {
+/// The place with that address in shared memory. Addresses in TileShared::places are put
+/// together by or, which the compiler would not do.
+__device__ inline EdgePlace place_at(std::uint32_t address) {
+  EdgePlace place;
+  asm("ld.shared.v2.u32 {%0, %1}, [%2];" : "=r"(place.offset), "=r"(place.addend) : "r"(address));
+  return place;
+}
+
+/// Writes triangle `number` of a listed cell. `places` is the address of the table.
+__device__ inline void emit_triangle(const TileShared& s, std::uint32_t places, std::uint32_t cell,
+                                     std::uint32_t number, Triangle& to) {
   const char* base = reinterpret_cast<const char*>(&s);
   const auto word = [base](std::uint32_t at) {
     return *reinterpret_cast<const std::uint32_t*>(base + at);
   };
   const std::uint32_t x = cell & 31u, row = cell >> 3 & 0x1ffcu, mask = low_bits(x);
-  const std::uint32_t edges = s.triangles[5 * (cell >> 16 & 0xffu) + number];
-  const std::uint32_t places = x == 0 ? static_cast<std::uint32_t>(sizeof s.places[0]) : 0;
+  const std::uint32_t edges = s.triangles[5 * __byte_perm(cell, 0, 0x4442) + number];
+  const std::uint32_t of_x =
+      x == 0 ? places + static_cast<std::uint32_t>(sizeof s.places[0]) : places;
   std::uint32_t corners[3];
 #pragma unroll
   for (int c = 0; c < 3; ++c) {
-    const EdgePlace place = *reinterpret_cast<const EdgePlace*>(
-        reinterpret_cast<const char*>(s.places) + ((edges >> 4 * c & 0x78u) | places));
+    const EdgePlace place = place_at((edges >> 4 * c & 0x78u) | of_x);
     const std::uint32_t at = row + place.offset;
     corners[c] = word(at + kNumberOfWord) + place.addend + __popc(word(at) & mask);
   }
@@ -221,12 +244,13 @@ struct PendingTriangles {
   std::uint32_t into;    ///< triangles of the last of those that are written
   std::uint32_t starts;  ///< bit i: with triangle i a cell begins
 
-  /// One a lane.
-  __device__ void emit(const TileShared& s, const std::uint32_t* cells, Triangle& to) const {
-    const std::uint32_t begun = starts & (lanes_below() << 1 | 1u);
+  /// One a lane. `lanes` are the own lane and those below.
+  __device__ void emit(const TileShared& s, std::uint32_t places, const std::uint32_t* cells,
+                       std::uint32_t lanes, Triangle& to) const {
+    const std::uint32_t begun = starts & lanes;
     const auto from = static_cast<std::uint32_t>(31 - __clz(static_cast<int>(begun)));
-    emit_triangle(s, cells[cell + __popc(begun) - 1], begun ? lane_id() - from : lane_id() + into,
-                  to);
+    emit_triangle(s, places, cells[cell + __popc(begun) - 1],
+                  begun ? lane_id() - from : lane_id() + into, to);
   }
   __device__ void pass_32() {
     into = starts ? 1 + static_cast<std::uint32_t>(__clz(static_cast<int>(starts))) : into + 32;
@@ -242,7 +266,10 @@ __device__ inline void emit_triangles(TileShared& s, const TileParams& p, std::u
   const WarpPart part = part_beside_first<N, 3, 4>(listed);  // it takes the next tile
   const std::uint32_t* cells = lists_of<N>(s).cells;
   const std::uint16_t* group_triangles = lists_of<N>(s).group_triangles;
-  Triangle* to = p.triangles + base + triangles_before<N>(s, part.begin / 32) + lane_id();
+  Triangle* const to = kept(p.triangles + base);
+  std::uint32_t number = triangles_before<N>(s, part.begin / 32) + lane_id();
+  const std::uint32_t lanes = kept(lanes_below() << 1 | 1u);
+  const auto places = kept(static_cast<std::uint32_t>(__cvta_generic_to_shared(s.places)));
   PendingTriangles pending{part.begin, 0, 0};
   std::uint32_t waiting = 0;
   for (std::uint32_t begin = part.begin; begin < part.end; begin += 32) {
@@ -251,14 +278,15 @@ __device__ inline void emit_triangles(TileShared& s, const TileParams& p, std::u
     std::uint32_t place = i < part.end ? waiting + (cells[i] >> 24) : kNone;
     waiting += group_triangles[begin / 32];
     pending.starts |= warp_or(bit_at(place));
-    for (; waiting >= 32; waiting -= 32, to += 32) {
-      pending.emit(s, cells, *to);
+#pragma unroll 1
+    for (; waiting >= 32; waiting -= 32, number += 32) {
+      pending.emit(s, places, cells, lanes, to[number]);
       pending.pass_32();
       place -= 32;
       pending.starts = warp_or(bit_at(place));
     }
   }
-  if (lane_id() < waiting) pending.emit(s, cells, *to);
+  if (lane_id() < waiting) pending.emit(s, places, cells, lanes, to[number]);
 }
 
 }  // namespace isobrick::gpu

@@ -13,28 +13,41 @@
 namespace isobrick::gpu {
 namespace {
 
-/// Pages of the tiles around one; where there is none, any that is.
+/// Pages of the tiles around one, and the first columns of those one higher along x; where
+/// there is none, any that is. The first warp.
 template <class T>
 __device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,
                            std::uint32_t number) {
-  if (threadIdx.x >= 27) return;
-  const int n = static_cast<int>(threadIdx.x);
+  if (threadIdx.x >= 31) return;
+  const int column = static_cast<int>(threadIdx.x) - 27;
+  const int n = column < 0 ? static_cast<int>(threadIdx.x)
+                           : page_of(32, 32 * (column & 1), 32 * (column >> 1));
   const int dx = n % 3 - 1, dy = n / 3 % 3 - 1, dz = n / 9 - 1;
   std::int64_t start = 0;
+  std::uint32_t page = 0;
   if (p.links) {
     start = streamed_page(number, n);
   } else {
     const int x = item.x + dx, y = item.y + dy, z = item.z + dz;
     const bool exists =
         x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] && z < p.tiles[2];
-    const std::uint32_t page =
-        exists ? page_of_place(p, (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x)
+    page = exists
+               ? page_of_place(p, (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x)
                : p.fill_page;
     start = static_cast<std::int64_t>(page) * kPageSamples;
   }
-  const int before = dx * 32 + dy * 1024 + dz * 32768;  // samples of the pages between
-  s.pages[n] = reinterpret_cast<std::uintptr_t>(p.pages) +
-               (start - before) * static_cast<std::int64_t>(sizeof(T));
+  const auto address = [](const void* from, std::int64_t samples) {
+    return reinterpret_cast<std::uintptr_t>(from) + samples * static_cast<std::int64_t>(sizeof(T));
+  };
+  // Samples of the pages, or columns, between.
+  const int before = dx * 32 + dy * 1024 + dz * 32768, columns_before = dy * 32 + dz * 1024;
+  if (column < 0)
+    s.pages[n] = address(p.pages, start - before);
+  else if (p.columns)
+    s.columns[column] =
+        address(p.columns, static_cast<std::int64_t>(page) * kColumnSamples - columns_before);
+  else
+    s.columns[column] = address(p.pages, start - before + 32);
 }
 
 __device__ TileItem item_of(const TileShared& s, const TileParams& p, std::uint32_t number) {
@@ -94,8 +107,7 @@ static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later
 /// Counts a tile's crossing edges and active cells, and leaves their places.
 template <int N, bool Nan>
 __device__ void count_tile(TileShared& s, const TileParams& p) {
-  RowCounts<N> counts;
-  count_rows<N>(s, counts, [&](int y, int z, RowEdges& edges) {
+  count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
     if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
   });
   __syncthreads();
@@ -109,7 +121,7 @@ __device__ void count_tile(TileShared& s, const TileParams& p) {
     publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
-  publish_rows<N>(s, counts, bases, p.row_tables[s.tile.slot]);
+  publish_rows<N>(s, bases, p.row_tables[s.tile.slot]);
   __syncthreads();
 }
 
@@ -260,12 +272,14 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
       find_nan<N, T>(s, p);
     else
       clear_lists<N>(s);
-    classify<N>(s, classifier);
+    classify<N>(s, p, classifier);
     __syncthreads();
     count_tile<N, Nan>(s, p);
     find_places<N, Nan>(s, p);
-    prefetch_tile<N, T>(s, p, s.item + gridDim.x);
     emit_all_vertices<N, T, Normals>(s, p);
+    // After the vertices, which read the tile's samples once more. Wider samples of the tiles
+    // in work fill the L2 cache alone, and would be driven out.
+    if constexpr (sizeof(T) == 1) prefetch_tile<N, T>(s, p, s.item + gridDim.x);
     if (!wait_by_name<N, Nan>(s.all_vertices))
       __syncthreads();
     else if (warp_id() != Team<N>::kVertices)

@@ -204,7 +204,7 @@ __device__ inline void number_at_0(TileShared& s) {
   const RowTable* before = s.before;
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
-  for_each_piece<N>([&](int, auto rows) {
+  for_each_piece<N>([&](auto rows) {
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();
@@ -232,13 +232,16 @@ __device__ inline void borrow_rows(TileShared& s) {
   const auto base_of = [&](int neighbour, std::uint32_t e) {
     return s.neighbour_base[neighbour] + (e & 0x1ffffu);
   };
+  const auto plane_at_0 = [&](int axis, int at) -> std::uint32_t {
+    return shape.at_0 ? s.plane_at_0[axis][at] : 0;
+  };
   const auto row_0_of = [&](int z) {
     const int row = 33 * z;
     const bool own_z = z > 0 || fz;
     const std::uint32_t e = s.lower.y[z];
     const int from_x = own_z ? 2 : 6;
     s.number[0][row] = base_of(from_x, own_z ? e : s.lower.yz);
-    const std::uint32_t number = base_of(2, e) + (e >> 23) + s.plane_at_0[0][z];
+    const std::uint32_t number = base_of(2, e) + (e >> 23) + plane_at_0(0, z);
     s.number[2][row] = number;
     s.at_0[1][row] = fx ? number - 1 : base_of(3, s.lower.xy[z]) - 1;
   };
@@ -247,7 +250,7 @@ __device__ inline void borrow_rows(TileShared& s) {
     const bool own_y = y > 0 || fy;
     const std::uint32_t e = s.lower.z[y];
     if (own_y) s.number[0][row] = base_of(4, e);
-    const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + s.plane_at_0[1][y];
+    const std::uint32_t number = base_of(4, e) + (e >> 17 & 63u) + plane_at_0(1, y);
     s.number[1][row] = number;
     const std::uint32_t corner = s.lower.xz[y];
     s.at_0[0][row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;

@@ -11,6 +11,8 @@ namespace isobrick::gpu {
 
 /// A page holds the samples of one tile: 32³, C order [z, y, x].
 inline constexpr std::uint32_t kPageSamples = 32 * 32 * 32;
+/// Samples of its first column, x = 0.
+inline constexpr std::uint32_t kColumnSamples = 32 * 32;
 /// Rows (y, z) of the 33³ samples that the cells of a tile touch.
 inline constexpr int kRowsOfTile = 33 * 33;
 
@@ -107,6 +109,9 @@ struct TileParams {
   bool tables_known;  ///< with links: a launch before has left all row tables as they will be
   bool alone;         ///< every tile owns all its edges
   std::uint32_t fill_page;
+  /// The samples at x = 0 of each page once more, [z, y], so that the last column of a tile
+  /// is not read from as many lines as it has rows; null: they are read from the pages.
+  const void* columns;
   std::int32_t tiles[3];
   std::int32_t extent[3], roi_lo[3], roi_hi[3];  ///< samples
   double isovalue;

@@ -36,18 +36,15 @@ struct OwnRow {
   __device__ int row() const { return 33 * z + y; }
 };
 
-/// Calls f(step, PlaneRows or LastRows) for the pieces of this warp, which are neighbours.
+/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp. Loops, so that the code of
+/// each kind is there once: warps in different steps share the instruction cache.
 template <int N, class F>
 __device__ inline void for_each_piece(F&& f) {
-  const int first = static_cast<int>(uniform(warp_id())) * Team<N>::kSteps;
-#pragma unroll
-  for (int step = 0; step < Team<N>::kSteps; ++step) {
-    const int piece = first + step;
-    if (piece < 33)
-      f(step, PlaneRows{piece});
-    else if (piece < kPieces)
-      f(step, LastRows{32 * (piece - 33)});
-  }
+  auto piece = static_cast<int>(uniform(warp_id()));
+#pragma unroll 1
+  for (; piece < 33; piece += Team<N>::kWarps) f(PlaneRows{piece});
+#pragma unroll 1
+  for (; piece < kPieces; piece += Team<N>::kWarps) f(LastRows{32 * (piece - 33)});
 }
 
 }  // namespace isobrick::gpu

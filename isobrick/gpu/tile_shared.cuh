@@ -22,8 +22,6 @@ inline constexpr int kPieces = 33 + 2;
 template <int N>
 struct Team {
   static constexpr int kWarps = N / 32;
-  /// Pieces of rows that a warp has, one after the other.
-  static constexpr int kSteps = (kPieces + kWarps - 1) / kWarps;
   /// The warps that ask other tiles: where vertices go and what numbers those of neighbours
   /// have, and where triangles go.
   static constexpr unsigned kVertices = 0, kTriangles = kWarps > 1 ? 1 : 0;
@@ -62,6 +60,7 @@ struct Shape {
   bool first[3], empty;
   std::uint32_t cell_mask, sample_mask;  ///< bits of x words; of y and z words
   std::uint32_t at_0;                    ///< 1 where the tile owns edges at sample 0
+  bool inner;                            ///< nothing is cut along y or z, and at_0 is 0
 };
 
 /// What a tile needs of the row tables of the tiles below; 0 where there is none.
@@ -90,6 +89,9 @@ struct alignas(256) TileShared {
   /// Of the tiles around, x + 3·y + 9·z, where their sample (0, 0, 0) of this tile's
   /// coordinates would be.
   std::uintptr_t pages[27];
+  /// Of the tiles one higher along x, y + 2·z: where their sample (32, 0, 0) of this tile's
+  /// coordinates would be in their first column (column_at).
+  std::uintptr_t columns[4];
   /// Of each plane's first 32 rows and of its last: vertices | cells << 16.
   std::uint32_t plane_sums[33], last_row_sums[33];
   std::uint32_t all_vertices, all_cells;
@@ -162,6 +164,14 @@ __device__ inline void wait() {
 __device__ inline std::uint32_t uniform(std::uint32_t v) { return __shfl_sync(kAll, v, 0); }
 __device__ inline unsigned lane_id() { return threadIdx.x & 31u; }
 __device__ inline std::uint32_t lanes_below() { return (1u << lane_id()) - 1u; }
+/// The value of this thread, which the compiler then keeps in a register instead of finding it
+/// again in each turn of a loop. Whole warps.
+__device__ inline std::uint32_t kept(std::uint32_t v) { return __shfl_sync(kAll, v, lane_id()); }
+template <class T>
+__device__ inline T* kept(T* p) {
+  return reinterpret_cast<T*>(
+      __shfl_sync(kAll, reinterpret_cast<unsigned long long>(p), lane_id()));
+}
 
 __device__ inline std::uint32_t warp_sum(std::uint32_t v) {
 #if __CUDA_ARCH__ >= 800
@@ -206,6 +216,7 @@ __device__ inline Shape shape_of(const TileParams& p, const TileItem& item) {
   s.cell_mask = s.empty ? 0 : static_cast<std::uint32_t>(bit_span(s.lo[0], s.hi[0] - 1));
   s.sample_mask = s.empty ? 0 : static_cast<std::uint32_t>(bit_span(s.lo[0], s.hi[0]) >> 1);
   s.at_0 = s.first[0] && s.lo[0] == 0 && !s.empty ? 1u : 0u;
+  s.inner = s.lo[1] == 0 && s.hi[1] == 32 && s.lo[2] == 0 && s.hi[2] == 32 && s.at_0 == 0;
   return s;
 }
 
