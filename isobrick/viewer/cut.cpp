@@ -158,12 +158,12 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   return cut;
 }
 
-/// Which of a node and its neighbours are not refined.
-std::uint32_t CutSelector::coarse_around(const NodeKey& n) {
+/// Which of a node and its neighbours are not refined and shown.
+std::uint32_t CutSelector::coarse_around(const NodeKey& n, const NodeView& view) {
   std::uint32_t coarse = 0;
   std::uint32_t bit = 1;
   for_each_point({n.node - Int3{1, 1, 1}, n.node + Int3{2, 2, 2}}, [&](Int3 p) {
-    if (!refined_({n.level, p})) coarse |= bit;
+    if (!refined_({n.level, p}) && !view.cuts_away({n.level, p})) coarse |= bit;
     bit <<= 1;
   });
   return coarse;
@@ -176,7 +176,7 @@ void CutSelector::append(const NodeKey& n, std::uint32_t coarser, const NodeView
                          static_cast<float>(sight.distance), sight.visible, sight.cut_away});
     return;
   }
-  const std::uint32_t coarse = coarse_around(n);
+  const std::uint32_t coarse = coarse_around(n, view);
   const Int3 ratio = tree_.grid().ratio(n.level - 1), nodes = tree_.grid().level(n.level - 1).nodes;
   for_each_point(tree_.grid().children(n), [&](Int3 c) {
     std::uint32_t mask = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -106,8 +107,21 @@ struct NodeMesher::Impl {
     return v;
   }
 
+  /// Nothing: all samples are needed, or their bricks are there anyway. With NaN between them two
+  /// sides may lie beside each other without any surface.
+  std::optional<NeededSamples> needed_of(const NodeKey& key, double isovalue,
+                                         std::uint32_t coarser) const {
+    if (key.level != 0 || view.may_have_nan) return std::nullopt;
+    if (bricks.resident(0, samples.bricks(0, points_around(key)))) return std::nullopt;
+    const Box3 own = points(key);
+    const Int3 first = floor_div(own.lo, {kBlockEdge, kBlockEdge, kBlockEdge});
+    return NeededSamples(own, *bricks.block_ranges(0, first), isovalue, coarser);
+  }
+
   GridView read(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted) {
-    samples.read(key.level, points_around(key), isovalue, wanted, around);
+    const std::optional<NeededSamples> needed = needed_of(key, isovalue, coarser);
+    samples.read(key.level, points_around(key), isovalue, wanted, around,
+                 needed ? &*needed : nullptr);
     if (coarser) {
       copy_field(points(key));
       border.apply(key, coarser, isovalue, wanted, field);
@@ -156,7 +170,7 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
 
 NodeMesher::Needs NodeMesher::needs(const NodeKey& key) const {
   return {impl_->grid.level(key.level).source,
-          impl_->samples.bricks(key.level, impl_->points_around(key))};
+          impl_->samples.bricks(key.level, impl_->points(key))};
 }
 
 double NodeMesher::seconds() const { return std::chrono::duration<double>(impl_->busy).count(); }

@@ -32,7 +32,7 @@ class NodeMesher {
   /// The mesh of what grid() gave last. `mesh` says which it is.
   NodeMesh extract(const GridView& grid, NodeMesh mesh);
 
-  /// The bricks that this needs, by stored level.
+  /// The bricks that hold a node's points, by stored level: what its mesh needs above all.
   struct Needs {
     int stored;
     Box3 bricks;

@@ -82,16 +82,23 @@ void NodeSamples::copy_part(const std::byte* brick, Int3 corner, Int3 edge, doub
   });
 }
 
-void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted) {
+/// Around all that is looked at.
+Box3 NodeSamples::box() const {
+  Box3 box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Axis& a = axes_[static_cast<std::size_t>(axis)];
+    box.lo[axis] = a.samples.front();
+    box.hi[axis] = a.samples.back() + 1;
+  }
+  return box;
+}
+
+void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted,
+                         const NeededSamples* needed) {
   const StoreInfo& info = bricks_.source().info();
   const Lattice& lattice = info.levels[static_cast<std::size_t>(stored)].lattice;
   const Int3 edge = lattice.brick;
-  Box3 cover;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Axis& a = axes_[static_cast<std::size_t>(axis)];
-    cover.lo[axis] = a.samples.front() / edge[axis];
-    cover.hi[axis] = a.samples.back() / edge[axis] + 1;
-  }
+  const Box3 box = this->box();
   gathered_.resize(
       static_cast<std::size_t>(axes_[0].count() * axes_[1].count() * axes_[2].count()));
   const auto take = [&](Int3 b, const BrickSamples& brick) {
@@ -105,21 +112,32 @@ void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted) {
         copy_part<typename decltype(tag)::type>(brick.data(), corner, edge, isovalue);
       });
   };
+  wanted_.clear();
+  for_each_point(lattice.bricks_of(box), [&](Int3 b) {
+    const Box3 part = intersect(box, lattice.full_brick_box(b));
+    if (needed == nullptr || needed->any(part))
+      wanted_.push_back(b);
+    else
+      needed->fill(
+          part, &gathered_[static_cast<std::size_t>(linear_index(part.lo - box.lo, box.extent()))],
+          box.extent());
+  });
+  bricks_.read_together(stored, wanted_, wanted);
   // Threads at nodes beside each other want the same bricks: were each to wait for what another
   // one is reading, all would read one brick after the other.
   std::vector<Int3> busy;
-  for_each_point(cover, [&](Int3 b) {
+  for (const Int3 b : wanted_)
     if (const auto brick = bricks_.get_unless_busy(stored, b, wanted))
       take(b, *brick);
     else
       busy.push_back(b);
-  });
   for (const Int3 b : busy) take(b, *bricks_.get(stored, b, wanted));
 }
 
-void NodeSamples::read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out) {
+void NodeSamples::read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out,
+                       const NeededSamples* needed) {
   for (int axis = 0; axis < 3; ++axis) find_axis(v, axis, points.lo[axis], points.hi[axis]);
-  gather(grid_.level(v).source, isovalue, wanted);
+  gather(grid_.level(v).source, isovalue, wanted, v == 0 ? needed : nullptr);
   out.points = points;
   if (v == 0) {  // grid points are samples
     out.values.swap(gathered_);

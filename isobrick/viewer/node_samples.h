@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "isobrick/viewer/needed_samples.h"
 #include "isobrick/viewer/node_grid.h"
 #include "isobrick/viewer/resident_bricks.h"
 
@@ -32,7 +33,9 @@ class NodeSamples {
   /// Sample − isovalue at the grid points `points` (of level v, all inside the
   /// volume), in float: the isosurface is where these cross 0. The subtraction is
   /// exact enough in double that no sample changes sides.
-  void read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out);
+  /// Of level 0, bricks that `needed` has no need of are not read, unless it is null.
+  void read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out,
+            const NeededSamples* needed = nullptr);
 
   /// Bricks of the stored level that read() looks at.
   Box3 bricks(int v, Box3 points) const;
@@ -53,7 +56,8 @@ class NodeSamples {
   };
 
   void find_axis(int v, int axis, Index lo, Index hi);
-  void gather(int stored, double isovalue, const Wanted& wanted);
+  Box3 box() const;
+  void gather(int stored, double isovalue, const Wanted& wanted, const NeededSamples* needed);
   template <class T>
   void copy_part(const std::byte* brick, Int3 corner, Int3 edge, double isovalue);
   template <class F>
@@ -62,6 +66,7 @@ class NodeSamples {
   const NodeGrid& grid_;
   ResidentBricks& bricks_;
   std::array<Axis, 3> axes_;
+  std::vector<Int3> wanted_;  ///< bricks
   std::vector<float> gathered_, along_x_, along_y_;
 };
 

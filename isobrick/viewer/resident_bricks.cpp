@@ -1,5 +1,6 @@
 #include "isobrick/viewer/resident_bricks.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -13,6 +14,11 @@ using Clock = std::chrono::steady_clock;
 /// How often a thread that waits for another's brick asks whether it is still wanted.
 constexpr std::chrono::milliseconds kPatience{5};
 
+/// Of a budget: what ranges take.
+std::uint64_t range_bytes(std::uint64_t budget) {
+  return std::min(budget / 16, std::uint64_t{32} << 20);
+}
+
 }  // namespace
 
 std::size_t ResidentBricks::KeyHash::operator()(const Key& k) const {
@@ -25,7 +31,9 @@ std::size_t ResidentBricks::KeyHash::operator()(const Key& k) const {
 }
 
 ResidentBricks::ResidentBricks(std::shared_ptr<const BrickSource> source, std::uint64_t budget)
-    : source_(std::move(source)), budget_(budget) {}
+    : source_(std::move(source)),
+      ranges_(source_, range_bytes(budget)),
+      budget_(budget - range_bytes(budget)) {}
 
 /// Drops what nobody uses until so many bytes fit, as far as that goes.
 void ResidentBricks::make_room(std::uint64_t bytes) {
@@ -47,7 +55,6 @@ std::shared_ptr<const BrickSamples> ResidentBricks::load(const Key& key) {
   auto samples = std::make_shared<BrickSamples>(lattice.brick_bytes());
   if (!source_->read_brick(key.level, key.brick, samples->data())) {
     samples->clear();
-    samples->shrink_to_fit();
   }
   return samples;
 }
@@ -78,12 +85,56 @@ std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key, const Wa
     if (!may_wait) return nullptr;
     loaded_.wait_for(lock, kPatience);
   }
-  return read(key, lock);
+  Read made = read(key, lock);
+  if (made.failure) std::rethrow_exception(made.failure);
+  return std::move(made.samples);
+}
+
+/// The next brick of the oldest request that has one which nobody reads.
+std::optional<ResidentBricks::Key> ResidentBricks::next_wanted() {
+  for (Request& request : requests_)
+    while (request.next < request.bricks.size()) {
+      const Key key{request.level, request.bricks[request.next++]};
+      if (!entries_.contains(key)) return key;
+    }
+  return std::nullopt;
+}
+
+bool ResidentBricks::over(const Request& request) const {
+  return request.next == request.bricks.size() &&
+         std::none_of(request.bricks.begin(), request.bricks.end(), [&](Int3 b) {
+           const auto found = entries_.find({request.level, b});
+           return found != entries_.end() && found->second.loading;
+         });
+}
+
+void ResidentBricks::read_together(int level, std::span<const Int3> bricks, const Wanted& wanted) {
+  const std::uint64_t bytes =
+      source_->info().levels[static_cast<std::size_t>(level)].lattice.brick_bytes();
+  std::unique_lock lock(mutex_);
+  const auto missing =
+      static_cast<std::uint64_t>(std::count_if(bricks.begin(), bricks.end(), [&](Int3 b) {
+        return !there({level, b});
+      }));
+  if (missing < 2 || missing * bytes > budget_ / 8) return;
+  const auto own = requests_.insert(requests_.end(), {level, bricks});
+  try {
+    while (!over(*own)) {
+      wanted.check();
+      if (const auto key = next_wanted())
+        (void)read(*key, lock);
+      else
+        loaded_.wait_for(lock, kPatience);
+    }
+  } catch (...) {
+    requests_.erase(own);
+    throw;
+  }
+  requests_.erase(own);
 }
 
 /// Reads what is not there, and nobody else reads; gives the lock up meanwhile.
-std::shared_ptr<const BrickSamples> ResidentBricks::read(const Key& key,
-                                                         std::unique_lock<std::mutex>& lock) {
+ResidentBricks::Read ResidentBricks::read(const Key& key, std::unique_lock<std::mutex>& lock) {
   entries_[key];
   const std::uint64_t bytes =
       source_->info().levels[static_cast<std::size_t>(key.level)].lattice.brick_bytes();
@@ -92,33 +143,30 @@ std::shared_ptr<const BrickSamples> ResidentBricks::read(const Key& key,
   counters_.bytes += bytes;
   counters_.peak_bytes = std::max(counters_.peak_bytes, counters_.bytes);
   lock.unlock();
-  std::shared_ptr<const BrickSamples> samples;
-  std::exception_ptr failure;
+  Read made;
   const auto start = Clock::now();
   try {
-    samples = load(key);
+    made.samples = load(key);
   } catch (...) {
-    failure = std::current_exception();
+    made.failure = std::current_exception();
   }
   lock.lock();
   counters_.read_seconds += std::chrono::duration<double>(Clock::now() - start).count();
   ++counters_.reads;
   counters_.bytes -= bytes;
-  if (samples) {
-    counters_.bytes += samples->size();
+  if (made.samples) {
+    counters_.bytes += made.samples->size();
     ++counters_.bricks;
   }
   Entry& entry = entries_[key];
   entry.loading = false;
-  entry.samples = samples;
-  entry.failure = failure;
+  entry.samples = made.samples;
+  entry.failure = made.failure;
   order_.push_front(key);
   entry.order = order_.begin();
   loaded_.notify_all();
   if (counters_.bytes > budget_) make_room(0);
-  lock.unlock();
-  if (failure) std::rethrow_exception(failure);
-  return samples;
+  return made;
 }
 
 std::shared_ptr<const BrickSamples> ResidentBricks::find(int level, Int3 brick) {
@@ -128,14 +176,17 @@ std::shared_ptr<const BrickSamples> ResidentBricks::find(int level, Int3 brick) 
   return found->second.samples;
 }
 
+bool ResidentBricks::there(const Key& key) const {
+  const auto found = entries_.find(key);
+  return found != entries_.end() && !found->second.loading;
+}
+
 bool ResidentBricks::resident(int level, Box3 box) const {
   const std::lock_guard lock(mutex_);
   for (Index z = box.lo.z; z < box.hi.z; ++z)
     for (Index y = box.lo.y; y < box.hi.y; ++y)
-      for (Index x = box.lo.x; x < box.hi.x; ++x) {
-        const auto found = entries_.find({level, {x, y, z}});
-        if (found == entries_.end() || found->second.loading) return false;
-      }
+      for (Index x = box.lo.x; x < box.hi.x; ++x)
+        if (!there({level, {x, y, z}})) return false;
   return true;
 }
 
@@ -143,6 +194,13 @@ void ResidentBricks::close() {
   const std::lock_guard lock(mutex_);
   budget_ = 0;
   make_room(0);
+}
+
+bool ResidentBricks::half_resident(int level, Box3 box) const {
+  const std::lock_guard lock(mutex_);
+  Index found = 0;
+  for_each_point(box, [&](Int3 b) { found += there({level, b}); });
+  return 2 * found >= volume(box.extent());
 }
 
 void ResidentBricks::will_need(int level, Box3 box) const {

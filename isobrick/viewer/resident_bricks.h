@@ -7,9 +7,11 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <span>
 #include <unordered_map>
-#include <vector>
 
+#include "isobrick/viewer/block_ranges.h"
 #include "isobrick/viewer/brick_source.h"
 
 namespace isobrick {
@@ -26,15 +28,33 @@ class Wanted {
 };
 
 /// A decoded brick, native byte order; empty when it is absent.
-using BrickSamples = std::vector<std::byte>;
+class BrickSamples {
+ public:
+  /// Of no particular value.
+  explicit BrickSamples(std::size_t bytes)
+      : bytes_(std::make_unique_for_overwrite<std::byte[]>(bytes)), size_(bytes) {}
+
+  void clear() {
+    bytes_.reset();
+    size_ = 0;
+  }
+  bool empty() const { return size_ == 0; }
+  std::size_t size() const { return size_; }
+  std::byte* data() { return bytes_.get(); }
+  const std::byte* data() const { return bytes_.get(); }
+
+ private:
+  std::unique_ptr<std::byte[]> bytes_;
+  std::size_t size_;
+};
 
 /// Decoded bricks of all levels under one budget, the least recently used dropped
 /// first. Thread-safe: threads that want the same brick wait for the one that
 /// reads it. (stream/brick_cache.h serves one caller and one level at a time.)
 class ResidentBricks {
  public:
-  /// `budget` in bytes; what is in use counts, too. A brick that does not fit beside
-  /// those in use is given out all the same and dropped at once afterwards.
+  /// `budget` in bytes; what is in use counts, too, and a small part is for ranges. A brick that
+  /// does not fit beside those in use is given out all the same and dropped at once afterwards.
   ResidentBricks(std::shared_ptr<const BrickSource> source, std::uint64_t budget);
 
   /// The brick, read and decoded by the caller's thread if need be. Throws
@@ -42,12 +62,23 @@ class ResidentBricks {
   std::shared_ptr<const BrickSamples> get(int level, Int3 brick, const Wanted& wanted);
   /// The same, but null at once where another thread is reading it.
   std::shared_ptr<const BrickSamples> get_unless_busy(int level, Int3 brick, const Wanted& wanted);
+  /// Reads those of these bricks that are missing. Threads that are in here at the same time read
+  /// one another's, whoever came first first, so that none of them waits while there is something
+  /// to read. Does nothing where the bricks would take much of the budget: then they would displace
+  /// one another. Throws Abandoned; what cannot be read says so when it is got.
+  void read_together(int level, std::span<const Int3> bricks, const Wanted& wanted);
   /// The brick if it is there.
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
   /// Whether all bricks of `box` (in bricks) are there.
   bool resident(int level, Box3 box) const;
   /// Drops what is there; from now on nothing is kept.
   void close();
+  /// Whether half of them are.
+  bool half_resident(int level, Box3 box) const;
+  /// The ranges of blocks around this one, those of its node of 64³ cells among them.
+  std::shared_ptr<const RangeTable> block_ranges(int level, Int3 block) {
+    return ranges_.around(level, block);
+  }
   /// Hints that bricks of `box` are read soon.
   void will_need(int level, Box3 box) const;
 
@@ -76,17 +107,34 @@ class ResidentBricks {
     std::list<Key>::iterator order;
   };
 
+  /// What a thread in read_together() wants.
+  struct Request {
+    int level;
+    std::span<const Int3> bricks;
+    std::size_t next = 0;  ///< the first so many are there, or being read
+  };
+  /// One of both.
+  struct Read {
+    std::shared_ptr<const BrickSamples> samples;
+    std::exception_ptr failure;
+  };
+
   std::shared_ptr<const BrickSamples> get(const Key& key, const Wanted& wanted, bool may_wait);
-  std::shared_ptr<const BrickSamples> read(const Key& key, std::unique_lock<std::mutex>& lock);
+  Read read(const Key& key, std::unique_lock<std::mutex>& lock);
+  std::optional<Key> next_wanted();
+  bool over(const Request& request) const;
   std::shared_ptr<const BrickSamples> load(const Key& key);
   void make_room(std::uint64_t bytes);
+  bool there(const Key& key) const;
 
   std::shared_ptr<const BrickSource> source_;
+  BlockRanges ranges_;
   std::uint64_t budget_;
   mutable std::mutex mutex_;
   std::condition_variable loaded_;
   std::unordered_map<Key, Entry, KeyHash> entries_;
   std::list<Key> order_;  ///< most recently used first; only what is loaded
+  std::list<Request> requests_;
   Counters counters_;
 };
 

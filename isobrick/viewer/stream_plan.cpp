@@ -89,7 +89,7 @@ MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
   Planner(tree, cut, meshes, plan).run(soon);
   for (MeshJob& job : plan.jobs) {
     const NodeMesher::Needs needs = mesher.needs(job.key);
-    job.resident = bricks.resident(needs.stored, needs.bricks);
+    job.resident = bricks.half_resident(needs.stored, needs.bricks);
   }
   std::sort(plan.jobs.begin(), plan.jobs.end(), more_urgent);
   return plan;

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstring>
 #include <map>
 
 #include "tests/surface/field.h"
@@ -185,6 +188,52 @@ TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
   ResidentBricks bricks(source, 1 << 20);
   NodeMesher mesher(grid, bricks, {});
   EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, Never()), Abandoned);
+}
+
+template <class T>
+bool same_bytes(const PodBuffer<T>& a, const PodBuffer<T>& b) {
+  return a.size() == b.size() &&
+         std::equal(a.begin(), a.end(), b.begin(),
+                    [](const T& p, const T& q) { return std::memcmp(&p, &q, sizeof(T)) == 0; });
+}
+
+TEST(NodeMesher, BricksThatNoBlockNeedsAreNotReadAndNeverShow) {
+  const Index n = 150;
+  for (const auto& field : {ball, gyroid_ball, blobs})
+    for (const Index brick : {16, 32}) {
+      const auto source = std::make_shared<MemoryBricks>(
+          Int3{n, n, n}, std::function<std::int16_t(Int3)>([&](Int3 p) {
+            return static_cast<std::int16_t>(std::lround(20 * field(p, n)));
+          }),
+          MemoryBricks::Options{.brick = brick});
+      const NodeGrid grid(source->info());
+      ResidentBricks all(source, std::uint64_t{1} << 30);
+      for_each_point({{0, 0, 0}, source->info().levels[0].lattice.bricks()},
+                     [&](Int3 b) { (void)all.get(0, b, Always()); });
+      NodeMesher whole(grid, all, {});
+      const double isovalue = 7.5;
+      for (const Cut& cut :
+           {uniform_cut(grid, 0, isovalue), RandomCut(grid, 3, 5).cut({isovalue})}) {
+        ResidentBricks some(source, std::uint64_t{1} << 30);
+        NodeMesher sparing(grid, some, {});
+        std::uint64_t triangles = 0;
+        for (const CutNode& node : cut.nodes) {
+          if (node.key.level > 0) continue;
+          const NodeMesh a = whole.mesh(node.key, isovalue, node.coarser, Always()),
+                         b = sparing.mesh(node.key, isovalue, node.coarser, Always());
+          EXPECT_TRUE(same_bytes(a.mesh.positions, b.mesh.positions) &&
+                      same_bytes(a.mesh.normals, b.mesh.normals) &&
+                      same_bytes(a.mesh.triangles, b.mesh.triangles));
+          triangles += a.triangles();
+        }
+        EXPECT_GT(triangles, 1'000u);
+        const bool all_fine = std::all_of(cut.nodes.begin(), cut.nodes.end(),
+                                          [](const CutNode& node) { return node.key.level == 0; });
+        if (field == ball && brick == 16 && all_fine) {
+          EXPECT_LT(some.counters().reads, all.counters().reads);
+        }
+      }
+    }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <thread>
+#include <vector>
 
 #include "tests/viewer/held_up.h"
 #include "tests/viewer/memory_bricks.h"
@@ -98,6 +99,41 @@ TEST(ResidentBricks, WhatAnotherThreadReadsIsBusy) {
   EXPECT_EQ(bricks.get_unless_busy(0, {1, 0, 0}, Always()), read);
   EXPECT_NE(bricks.get_unless_busy(0, {0, 0, 0}, Always()), nullptr) << "read by this thread";
   EXPECT_EQ(bricks.counters().reads, 2u);
+}
+
+TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
+  const auto source = std::make_shared<MemoryBricks>(
+      Int3{128, 128, 128},
+      std::function<float(Int3)>([](Int3 p) { return static_cast<float>(p.x); }),
+      MemoryBricks::Options{});
+  source->damage(0, {1, 1, 1});
+  source->set_delay(std::chrono::milliseconds(20));
+  ResidentBricks bricks(source, 100 << 20);
+  std::vector<Int3> many, one{{0, 0, 3}, {1, 0, 3}};
+  for_each_point({{0, 0, 0}, {4, 4, 2}}, [&](Int3 b) { many.push_back(b); });
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i)
+    threads.emplace_back([&, i] { bricks.read_together(0, i == 7 ? one : many, Always()); });
+  for (std::thread& thread : threads) thread.join();
+  // One after the other these would take 0.68 s.
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(500));
+  EXPECT_EQ(bricks.counters().reads, many.size() + one.size()) << "each once";
+  for (const Int3 b : many) {
+    if (b == Int3{1, 1, 1}) {
+      EXPECT_THROW((void)bricks.get(0, b, Always()), DamageError);
+    } else {
+      EXPECT_NE(bricks.find(0, b), nullptr);
+    }
+  }
+  class Never final : public Wanted {
+   public:
+    void check() const override { throw Abandoned(); }
+  };
+  const std::vector<Int3> others{{0, 1, 3}, {1, 1, 3}};
+  EXPECT_THROW(bricks.read_together(0, others, Never()), Abandoned);
+  bricks.read_together(0, one, Always());
+  EXPECT_EQ(bricks.find(0, others[0]), nullptr) << "nobody wants it any more";
 }
 
 }  // namespace
