@@ -66,7 +66,7 @@ struct MeshPool::State {
   std::vector<std::shared_ptr<MeshBlock>> blocks;
 
   /// One empty block stays for what comes next; more go back to the device.
-  void trim() {
+  void tidy() {
     bool kept = false;
     std::erase_if(blocks, [&](const std::shared_ptr<MeshBlock>& block) {
       return block->used == 0 && (block->vertex_room > block_vertices || std::exchange(kept, true));
@@ -110,7 +110,7 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
       break;
     }
   if (!at) {
-    state_->trim();
+    state_->tidy();
     const std::uint32_t room = state_->block_vertices;
     mesh.block_ =
         std::make_shared<MeshBlock>(std::max(room, vertices), std::max(2 * room, triangles));
@@ -157,6 +157,11 @@ PooledMesh MeshPool::borrow(const MeshPlace& place, Vec3d origin) {
   mesh.origin_ = origin;
   mesh.has_normals_ = true;
   return mesh;
+}
+
+void MeshPool::trim() {
+  std::erase_if(state_->blocks,
+                [](const std::shared_ptr<MeshBlock>& block) { return block->used == 0; });
 }
 
 std::uint64_t MeshPool::bytes() const {

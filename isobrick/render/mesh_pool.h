@@ -64,6 +64,9 @@ class MeshPool {
   /// A mesh with normals in buffers that somebody else owns, and keeps while it is drawn.
   static PooledMesh borrow(const MeshPlace& place, Vec3d origin = {});
 
+  /// Gives blocks back that no mesh lies in.
+  void trim();
+
   /// Device memory in use by meshes, and taken for blocks.
   std::uint64_t bytes() const;
   std::uint64_t capacity() const;
