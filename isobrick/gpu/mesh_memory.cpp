@@ -16,8 +16,7 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr std::uint32_t kMostVertices = 1u << 20, kFewestVertices = 1u << 17;
-constexpr std::uint64_t kBlocksAhead = 2;
+constexpr std::uint32_t kMostVertices = 1u << 22, kFewestVertices = 1u << 17;
 constexpr std::uint64_t kVertexBytes = 4 * sizeof(Vec3f);  // with a normal and two triangles
 
 /// A function of the driver; the program is not linked to it.
@@ -121,33 +120,30 @@ std::uint32_t block_vertices(std::uint64_t budget) {
 }  // namespace
 
 struct MeshMemory::Impl {
-  int device;
-  std::uint64_t budget;
-  Driver driver;
-  std::uint32_t room;
   mutable std::mutex mutex;
   std::vector<std::shared_ptr<Block>> blocks;
-  std::uint64_t used_vertices = 0;
 
-  Impl(int d, std::uint64_t b) : device(d), budget(b), room(block_vertices(b)) {
-    if (room * kVertexBytes > budget)
+  Impl(int device, std::uint64_t budget) {
+    const std::uint32_t room = block_vertices(budget);
+    const std::uint64_t count = budget / (room * kVertexBytes);
+    if (count == 0)
       throw Error(
           fmt::format("a budget of {} bytes is too small for meshes on the device: {} are "
                       "needed at least",
                       budget, room * kVertexBytes));
-    add();
+    const Driver driver;
+    try {
+      while (blocks.size() < count) blocks.push_back(std::make_shared<Block>(driver, device, room));
+    } catch (const OutOfDeviceMemory&) {
+      if (blocks.empty()) throw;  // others have the rest: what is there must do
+    }
   }
-
-  std::shared_ptr<Block> make() const { return std::make_shared<Block>(driver, device, room); }
-  void add() { blocks.push_back(make()); }
-  bool may_add() const { return (blocks.size() + 1) * blocks.front()->bytes <= budget; }
 
   void give_back(const MeshSpan& span) {
     for (const std::shared_ptr<Block>& block : blocks)
       if (block == span.block) {
         block->free_vertices.give_back(span.first_vertex, span.vertices);
         block->free_triangles.give_back(span.first_triangle, span.triangles);
-        used_vertices -= span.vertices;
       }
   }
 
@@ -156,11 +152,9 @@ struct MeshMemory::Impl {
     const auto vertex = block->free_vertices.take(vertices);
     if (!vertex) return std::nullopt;
     const auto triangle = block->free_triangles.take(triangles);
-    if (triangle) {
-      used_vertices += vertices;
+    if (triangle)
       return MeshSpan{block,     *vertex,   vertices,
                       *triangle, triangles, block->place(*vertex, vertices, *triangle, triangles)};
-    }
     block->free_vertices.give_back(*vertex, vertices);
     return std::nullopt;
   }
@@ -174,15 +168,7 @@ std::optional<MeshSpan> MeshMemory::take(std::uint32_t vertices, std::uint32_t t
   const std::lock_guard lock(impl_->mutex);
   for (const std::shared_ptr<Block>& block : impl_->blocks)
     if (auto span = impl_->take_from(block, vertices, triangles)) return span;
-  if (vertices > impl_->room || triangles > 2 * impl_->room || !impl_->may_add())
-    return std::nullopt;
-  try {
-    impl_->add();
-  } catch (const OutOfDeviceMemory&) {
-    impl_->budget = 0;  // others have the rest: what is there must do
-    return std::nullopt;
-  }
-  return impl_->take_from(impl_->blocks.back(), vertices, triangles);
+  return std::nullopt;
 }
 
 void MeshMemory::trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t triangles) {
@@ -201,17 +187,9 @@ void MeshMemory::give_back(const MeshSpan& span) {
   impl_->give_back(span);
 }
 
-bool MeshMemory::grow_ahead() {
-  {
-    const std::lock_guard lock(impl_->mutex);
-    const std::uint64_t room = impl_->blocks.size() * std::uint64_t{impl_->room};
-    const bool enough = room - impl_->used_vertices > kBlocksAhead * std::uint64_t{impl_->room};
-    if (enough || !impl_->may_add()) return false;
-  }
-  auto block = impl_->make();
+void MeshMemory::keep(std::size_t count) {
   const std::lock_guard lock(impl_->mutex);
-  impl_->blocks.push_back(std::move(block));
-  return true;
+  if (count < impl_->blocks.size()) impl_->blocks.resize(count);
 }
 
 std::vector<std::shared_ptr<const MeshBlock>> MeshMemory::blocks() const {
@@ -221,7 +199,7 @@ std::vector<std::shared_ptr<const MeshBlock>> MeshMemory::blocks() const {
 
 std::uint64_t MeshMemory::bytes() const {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->blocks.size() * impl_->blocks.front()->bytes;
+  return impl_->blocks.empty() ? 0 : impl_->blocks.size() * impl_->blocks.front()->bytes;
 }
 
 }  // namespace isobrick::gpu

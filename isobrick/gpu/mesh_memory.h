@@ -28,8 +28,9 @@ struct MeshSpan {
 /// Device memory for many meshes, in blocks that stay until the end. Thread-safe.
 class MeshMemory {
  public:
-  /// Takes the first block at once; never more than `budget` bytes of blocks in all. Throws
-  /// Error for less than a block, and where the device's memory cannot be exported or is short.
+  /// Takes all blocks at once, so that others can import them beforehand: as many as `budget` bytes
+  /// hold, fewer where the device's memory is short. Throws Error for less than a block, and where
+  /// not even one can be had or exported.
   MeshMemory(int device, std::uint64_t budget);
   ~MeshMemory();
 
@@ -40,9 +41,8 @@ class MeshMemory {
   /// The place is free for others: nobody reads or writes it any more.
   void give_back(const MeshSpan& span);
 
-  /// Takes another block where little is left, so that take() does not have to. Whether it did.
-  /// For one thread.
-  bool grow_ahead();
+  /// Gives all but the first so many blocks back. Before any of them is used.
+  void keep(std::size_t count);
 
   std::vector<std::shared_ptr<const MeshBlock>> blocks() const;
   /// Of blocks.

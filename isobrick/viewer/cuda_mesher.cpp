@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
@@ -83,7 +82,6 @@ class Work {
       : device(index),
         name(std::move(device_name)),
         memory(std::move(shared)),
-        sharing(memory != nullptr),
         batch_(index, kSlots) {
     for (int i = 0; i < kSlots; ++i) free_.push_back(i);
   }
@@ -98,14 +96,12 @@ class Work {
   const int device;
   const std::string name;
   const std::shared_ptr<gpu::MeshMemory> memory;  ///< null: meshes go through host memory
-  std::atomic<bool> sharing;
   Turns turns;
 
  private:
   std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
   void make(std::vector<Job>& jobs, DeviceMesher::Times& now);
   void add(const DeviceMesher::Times& now);
-  bool grow_ahead() const;
   void write_again(std::vector<Job*>& jobs);
   void learn(const gpu::GridMeshSize& size);
 
@@ -158,14 +154,6 @@ void Work::end() {
   taken_.notify_one();
 }
 
-bool Work::grow_ahead() const {
-  try {
-    return memory->grow_ahead();
-  } catch (const Error&) {  // whoever needs it will see
-    return false;
-  }
-}
-
 void Work::run() {
   std::string failure;
   try {
@@ -175,12 +163,6 @@ void Work::run() {
   }
   std::unique_lock lock(mutex_);
   for (;;) {
-    while (jobs_.empty() && !end_ && failure.empty() && sharing) {
-      lock.unlock();
-      const bool grown = grow_ahead();
-      lock.lock();
-      if (!grown) break;
-    }
     taken_.wait(lock, [&] { return end_ || !jobs_.empty(); });
     if (jobs_.empty()) return;
     std::vector<Job> jobs = std::exchange(jobs_, {});
@@ -215,7 +197,7 @@ void Work::add(const DeviceMesher::Times& now) {
 }
 
 std::optional<Place> Work::place_for(std::uint32_t vertices, std::uint32_t triangles) const {
-  if (!sharing) return std::nullopt;
+  if (memory == nullptr) return std::nullopt;
   auto span = memory->take(vertices, triangles);
   if (!span) return std::nullopt;
   return Place(memory, *std::move(span));
@@ -296,12 +278,14 @@ class CudaMesher final : public DeviceMesher {
   const std::string& name() const override { return work_->name; }
   std::vector<DeviceBlock> shared_blocks() const override {
     std::vector<DeviceBlock> blocks;
-    if (work_->sharing)
+    if (work_->memory)
       for (auto& block : work_->memory->blocks()) blocks.push_back(block_of(std::move(block)));
     return blocks;
   }
   Times times() const override { return work_->times(); }
-  void share_nothing() override { work_->sharing = false; }
+  void share_only(std::size_t blocks) override {
+    if (work_->memory) work_->memory->keep(blocks);
+  }
   std::uint64_t bytes() const override { return work_->memory ? work_->memory->bytes() : 0; }
   Turns& turns() override { return work_->turns; }
 

@@ -55,11 +55,12 @@ class DeviceMesher {
   virtual std::string failure() const = 0;
 
   virtual const std::string& name() const = 0;
-  /// The memory that meshes lie in, to be imported; nothing: meshes go to host memory.
+  /// The memory that meshes lie in, to be imported; nothing: meshes go to host memory. Always the
+  /// same, but for share_only().
   virtual std::vector<DeviceBlock> shared_blocks() const = 0;
-  /// From now on meshes go to host memory.
-  virtual void share_nothing() = 0;
-  /// Device memory taken for meshes.
+  /// Gives all but the first so many of these back. Before the first mesh.
+  virtual void share_only(std::size_t blocks) = 0;
+  /// Device memory of those blocks, whatever lies in them.
   virtual std::uint64_t bytes() const = 0;
   /// The device's turns: it makes meshes in its own. A device that draws as well changes between
   /// both slowly, so whoever draws with it takes turns.
@@ -79,8 +80,8 @@ class DeviceMesher {
 /// 16 bytes by which drivers tell devices apart.
 using DeviceId = std::array<std::uint8_t, 16>;
 
-/// Opens a CUDA device (some tenths of a second the first time): the one that draws, with memory
-/// shared up to `budget` bytes, or else the first one, whose meshes go through host memory. Null
+/// Opens a CUDA device (some tenths of a second the first time): the one that draws, with `budget`
+/// bytes of memory that is shared, or else the first one, whose meshes go through host memory. Null
 /// where there is none. Throws Error when it cannot be opened.
 std::shared_ptr<DeviceMesher> open_device_mesher(const std::optional<DeviceId>& drawing,
                                                  std::uint64_t budget);

@@ -5,57 +5,89 @@
 
 #include <chrono>
 #include <utility>
+#include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/gpu_backend.h"
+#include "isobrick/render/gl_context.h"
 
 namespace isobrick {
 
-/// What may still be in use by drawing calls that were made before.
-struct DeviceMeshes::Retired {
-  explicit Retired(std::shared_ptr<const Drawable> d)
-      : drawn(std::move(d)), end(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)) {}
-  ~Retired() { glDeleteSync(end); }
-  Retired(const Retired&) = delete;
-  Retired& operator=(const Retired&) = delete;
-  bool over() const {
-    const GLenum state = glClientWaitSync(end, 0, 0);
-    return state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED;
-  }
-
-  std::shared_ptr<const Drawable> drawn;
-  GLsync end;
-};
-
 void DeviceOpening::begin() {
   if (begun()) return;
-  mesher_ = std::async(std::launch::async, [id = current_gl_device_id(), budget = budget_,
-                                            changed = on_change_] {
-              auto mesher = open_device_mesher(id, budget);
-              if (changed) changed();
+  const auto id = current_gl_device_id();
+  auto sharing = id ? GlContext::sharing_current() : std::nullopt;
+  mesher_ = std::async(std::launch::async, [this, id, sharing = std::move(sharing)]() mutable {
+              std::optional<GlContext> context = std::move(sharing);
+              auto mesher = open_device_mesher(id, budget_);
+              if (mesher && context) {
+                context->make_current();
+                while (import_one(*mesher)) {
+                }
+                glFinish();
+              }
+              if (on_change_) on_change_();
               return mesher;
             }).share();
 }
 
-const ImportedBuffers& DeviceOpening::buffers_of(const DeviceBlock& block) {
-  if (const auto there = imported_.find(block.owner.get()); there != imported_.end())
-    return there->second->buffers;
-  auto imported = std::unique_ptr<Imported>(
-      new Imported{block.owner, {block.file, block.bytes, block.vertices, block.triangles}});
-  return imported_.emplace(block.owner.get(), std::move(imported)).first->second->buffers;
+/// Whether there was anything to import.
+bool DeviceOpening::import_one(DeviceMesher& mesher) {
+  const std::vector<DeviceBlock> blocks = mesher.shared_blocks();
+  const std::size_t done = imported_.size();
+  if (done == blocks.size()) return false;
+  const DeviceBlock& block = blocks[done];
+  try {
+    imported_.emplace(
+        block.owner.get(),
+        std::unique_ptr<Imported>(
+            new Imported{block.owner, {block.file, block.bytes, block.vertices, block.triangles}}));
+  } catch (const Error&) {  // what is there must do
+    mesher.share_only(done);
+  }
+  return true;
 }
 
-bool DeviceOpening::over() const {
+bool DeviceOpening::opened() const {
   return begun() && mesher_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
+/// Once it is open; null where there is none.
+DeviceMesher* DeviceOpening::mesher() const {
+  try {
+    return mesher_.get().get();
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
+bool DeviceOpening::over() const {
+  if (!opened()) return false;
+  const DeviceMesher* const device = mesher();
+  return device == nullptr || imported_.size() == device->shared_blocks().size();
+}
+
+void DeviceOpening::import_next() {
+  if (!opened()) return;
+  if (DeviceMesher* const device = mesher()) import_one(*device);
+}
+
+std::shared_ptr<DeviceMesher> DeviceOpening::get() {
+  const std::shared_ptr<DeviceMesher> device = mesher_.get();
+  while (device && import_one(*device)) {
+  }
+  return device;
+}
+
+std::uint64_t DeviceOpening::held() const {
+  const DeviceMesher* const device = opened() ? mesher() : nullptr;
+  return device == nullptr ? 0 : device->bytes();
+}
+
+std::uint64_t DeviceOpening::reserved() const { return begun() && !opened() ? budget_ : held(); }
+
 DeviceMeshes::DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpening> opening)
     : stream_(stream), opening_(std::move(opening)) {}
-
-DeviceMeshes::~DeviceMeshes() {
-  // Memory that is drawn from must not be given to others meanwhile.
-  if (!retired_.empty()) glFinish();
-}
 
 void DeviceMeshes::use(Backend backend) {
   const bool must = backend == Backend::cuda;
@@ -76,24 +108,11 @@ void DeviceMeshes::use(Backend backend) {
 }
 
 void DeviceMeshes::update() {
-  if (!opened_ && opening_->over())
+  if (opened_) return;
+  if (opening_->over())
     take_over();
-  else if (mesher_)
-    import_one();
-}
-
-/// Memory that has been added: before it is drawn from, and not much of it with one picture.
-void DeviceMeshes::import_one() {
-  for (const DeviceBlock& block : mesher_->shared_blocks()) {
-    if (opening_->imported(block)) continue;
-    try {
-      opening_->buffers_of(block);
-    } catch (const Error&) {
-      // Where the first one is refused, all are. Later ones say so where they are drawn.
-      if (!opening_->any_imported()) mesher_->share_nothing();
-    }
-    return;
-  }
+  else
+    opening_->import_next();
 }
 
 void DeviceMeshes::take_over() {
@@ -104,7 +123,7 @@ void DeviceMeshes::take_over() {
     failure_ = e.what();
   }
   if (!mesher_) return;
-  import_one();
+  stream_.set_device_budget(cache_bytes(mesher_->bytes()));
   if (backend_ != Backend::cpu) stream_.set_device(mesher_);
 }
 
@@ -132,11 +151,6 @@ const PooledMesh& DeviceMeshes::drawn(const NodeMesh& mesh, Vec3d origin) {
       opening_->buffers_of(there.block)
           .place(there.first_vertex, there.vertices, there.first_triangle, there.triangles);
   return borrowed_.emplace_back(MeshPool::borrow(place, origin));
-}
-
-void DeviceMeshes::retire(std::shared_ptr<const Drawable> drawn) {
-  while (!retired_.empty() && retired_.front()->over()) retired_.pop_front();
-  if (drawn != nullptr && mesher_) retired_.push_back(std::make_unique<Retired>(std::move(drawn)));
 }
 
 }  // namespace isobrick

@@ -15,7 +15,9 @@
 namespace isobrick {
 
 /// The device that makes meshes, opened once and beside everything else, and its memory as OpenGL
-/// sees it. For the thread of the context.
+/// sees it. All of that memory is taken and imported before the device makes any mesh, in a thread
+/// with a context of its own, since an import may take longer than a picture. For the thread of
+/// the context.
 class DeviceOpening {
  public:
   /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
@@ -26,15 +28,21 @@ class DeviceOpening {
   /// Unless it has begun: that of the current OpenGL context, if possible.
   void begin();
   bool begun() const { return mesher_.valid(); }
+  /// Whether the device is there with its memory, or is known not to come.
   bool over() const;
-  /// Waits for it. Null where there is no device; throws Error when it cannot be opened.
-  std::shared_ptr<DeviceMesher> get() const { return mesher_.get(); }
+  /// Waits for that. Null where there is no device; throws Error when it cannot be opened.
+  std::shared_ptr<DeviceMesher> get();
+  /// Where this context shares nothing with another thread's: imports one piece of the memory, so
+  /// that no picture waits for much of it.
+  void import_next();
 
-  /// Imported when it is first asked for, which takes some milliseconds. Throws Error when it
-  /// cannot be.
-  const ImportedBuffers& buffers_of(const DeviceBlock& block);
-  bool imported(const DeviceBlock& block) const { return imported_.contains(block.owner.get()); }
-  bool any_imported() const { return !imported_.empty(); }
+  /// Device memory for meshes: that is taken, and that may be taken.
+  std::uint64_t held() const;
+  std::uint64_t reserved() const;
+
+  const ImportedBuffers& buffers_of(const DeviceBlock& block) const {
+    return imported_.at(block.owner.get())->buffers;
+  }
 
  private:
   struct Imported {
@@ -42,10 +50,15 @@ class DeviceOpening {
     ImportedBuffers buffers;
   };
 
+  bool opened() const;
+  DeviceMesher* mesher() const;
+  bool import_one(DeviceMesher& mesher);
+
   std::uint64_t budget_;
   std::function<void()> on_change_;
-  std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;
+  /// Of the opening thread until it is done.
   std::unordered_map<const void*, std::unique_ptr<Imported>> imported_;
+  std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;  ///< last: ends before the others
 };
 
 /// The device that makes a picture's meshes, and its memory as OpenGL sees it. For the thread
@@ -53,7 +66,6 @@ class DeviceOpening {
 class DeviceMeshes {
  public:
   DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpening> opening);
-  ~DeviceMeshes();
 
   /// From now on: Backend::automatic takes a CUDA device where there is one, as soon as it is
   /// open, without waiting for it. Backend::cuda waits, and throws Error where there is none.
@@ -73,16 +85,21 @@ class DeviceMeshes {
   /// The device's turns, where it makes meshes and draws; else null.
   Turns* turns() const;
 
-  /// A mesh on the device, to be drawn until the next forget().
+  /// A mesh on the device, to be drawn until the next forget(). Where memory is shared, whoever
+  /// draws waits for the end of each picture: only then may meshes go, and their places be given
+  /// to others.
   const PooledMesh& drawn(const NodeMesh& mesh, Vec3d origin);
   void forget() { borrowed_.clear(); }
-  /// These are not drawn from here on; kept until the device has drawn what it was told.
-  void retire(std::shared_ptr<const Drawable> drawn);
+
+  /// Device memory for meshes that devices make: that is taken, and that may be taken.
+  std::uint64_t held() const { return opening_->held(); }
+  std::uint64_t reserved() const { return opening_->reserved(); }
+
+  /// Of that memory: what is in meshes; the rest falls between.
+  static std::uint64_t cache_bytes(std::uint64_t memory) { return memory / 4 * 3; }
 
  private:
-  struct Retired;
   void take_over();
-  void import_one();
 
   SceneStream& stream_;
   std::shared_ptr<DeviceOpening> opening_;
@@ -91,7 +108,6 @@ class DeviceMeshes {
   bool opened_ = false;  ///< or tried in vain
   std::string failure_;
   std::deque<PooledMesh> borrowed_;
-  std::deque<std::unique_ptr<Retired>> retired_;
 };
 
 }  // namespace isobrick

@@ -18,9 +18,10 @@ std::shared_ptr<DeviceOpening> begin_opening(const PictureBudgets& budgets,
 }  // namespace
 
 PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change)
-    : device_(begin_opening(budgets, std::move(on_change))) {
+    : device_(begin_opening(budgets, std::move(on_change))),
+      software_(current_gl_device().software) {
   // Software compiles quickly and draws slowly.
-  if (current_gl_device().software) return;
+  if (software_) return;
   PictureSettings settings;
   settings.picking = true;  // as StorePicture's pictures
   renderer_.prepare(settings);

@@ -13,11 +13,12 @@ namespace isobrick {
 /// What a picture of a store may use.
 struct PictureBudgets {
   std::uint64_t memory = std::uint64_t{2} << 30;         ///< host: decoded bricks and meshes
-  std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes on the device
+  std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes and slices on the device
   int threads = 0;                                       ///< 0: all cores but one
   Backend backend = Backend::automatic;                  ///< what makes meshes; see DeviceMeshes
 
-  /// Of device_memory: the part for meshes that the device makes itself.
+  /// Of device_memory: the part for meshes that the device makes itself. What is uploaded has the
+  /// rest, and all where no device makes meshes.
   std::uint64_t device_mesh_memory() const { return device_memory / 4 * 3; }
 };
 
@@ -32,10 +33,13 @@ class PictureSetup {
 
   Renderer& renderer() { return renderer_; }
   const std::shared_ptr<DeviceOpening>& device() const { return device_; }
+  /// Whether OpenGL is software.
+  bool software() const { return software_; }
 
  private:
   std::shared_ptr<DeviceOpening> device_;  ///< first: it opens beside the shaders' compilation
   Renderer renderer_;
+  bool software_;
 };
 
 }  // namespace isobrick

@@ -28,18 +28,14 @@ constexpr double kRefiningPause = 2;
 constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
 constexpr double kMarginOfWait = 0.05;
 
-/// Of the memory for meshes that the device makes: what is in them; the rest falls between.
-std::uint64_t device_cache_bytes(const PictureBudgets& budgets) {
-  return budgets.device_mesh_memory() / 4 * 3;
-}
-
 /// Of host memory: what slices take, with what the renderer is given of them.
 std::uint64_t slice_memory(const PictureBudgets& budgets) { return budgets.memory / 8; }
 
-/// Most that the samples of one slice may take: beside them are as many floats.
+/// Most that the samples of one slice may take: beside them are as many floats, and on the device.
 std::uint64_t slice_bytes(const PictureBudgets& budgets, ScalarType type) {
   const std::uint64_t sample = std::min<std::uint64_t>(size_of(type), sizeof(float));
-  const std::uint64_t samples = slice_memory(budgets) / 3 / (sample + sizeof(float));
+  const std::uint64_t samples = std::min(slice_memory(budgets) / 3 / (sample + sizeof(float)),
+                                         budgets.device_memory / 8 / 3 / sizeof(float));
   return std::min(SliceRequest{}.bytes, samples * sample);
 }
 
@@ -48,7 +44,7 @@ StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()
   options.threads = budgets.threads;
   options.mesh_bytes = budgets.memory / 2;
   options.brick_bytes = budgets.memory - options.mesh_bytes - slice_memory(budgets);
-  options.device_bytes = device_cache_bytes(budgets);
+  options.device_bytes = DeviceMeshes::cache_bytes(budgets.device_mesh_memory());
   options.on_change = std::move(on_change);
   return options;
 }
@@ -72,6 +68,14 @@ std::vector<float> floats_of(const SliceSamples& slice) {
   else
     append_floats<float>(slice.pixels, samples);
   return samples;
+}
+
+/// Room of a block of what is uploaded: little of the budget, so that little of it is idle. Meshes
+/// that are larger have blocks of their own.
+std::uint32_t pool_vertices(const PictureBudgets& budgets) {
+  constexpr std::uint64_t vertex = 4 * sizeof(Vec3f);  // with a normal and two triangles
+  return static_cast<std::uint32_t>(
+      std::clamp<std::uint64_t>(budgets.device_memory / 128 / vertex, 1u << 12, 1u << 19));
 }
 
 /// Whether both show the same.
@@ -102,7 +106,8 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
                             return std::make_unique<Scene>(store_bricks(store_),
                                                            stream_options(budgets_, on_change));
                           })),
-      setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)) {
+      setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)),
+      pool_(pool_vertices(budgets)) {
   scene_ = reading_.get();
   device_ = std::make_unique<DeviceMeshes>(scene_->stream(), setup_->device());
   device_->use(budgets.backend);
@@ -139,7 +144,9 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
   view.planes = shown_half_spaces(settings);
   CutBudget budget;
   // What stands in until the cut is there takes room beside it.
-  budget.mesh_bytes = std::min(budgets_.device_memory, budgets_.memory / 2) / 2;
+  const std::uint64_t there =
+      device_->turns() != nullptr ? DeviceMeshes::cache_bytes(device_->held()) : upload_memory();
+  budget.mesh_bytes = std::min(there, budgets_.memory / 2) / 2;
   scene_->update(isovalues, view, budget);
 }
 
@@ -160,6 +167,11 @@ bool StorePicture::can_wait(const Drawable& newest) const {
   const double pause = kRefiningPause * draw_seconds_;
   return std::chrono::duration<double>(Clock::now() - drawn_).count() <
          (device_->turns() != nullptr ? std::max(pause, kRefiningSeconds) : pause);
+}
+
+bool StorePicture::may_be_plain(const PictureWay& way, const Drawable& newest) const {
+  if (way.plain != PictureWay::Plain::until_complete) return way.plain == PictureWay::Plain::yes;
+  return setup_->software() ? !state_.complete : shown_.get() != &newest || !newest.complete;
 }
 
 bool StorePicture::upload_all(const Drawable& drawable, UploadShare& share) {
@@ -184,26 +196,34 @@ void StorePicture::drop_unused() {
       if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
         upload->second.used = frame_;
     }
-  // What was uploaded, what the device makes itself and slices share its memory.
-  std::uint64_t slices = 0;
-  for (const ShownSlice& slice : slices_) slices += slice.samples.size() * sizeof(float);
-  const std::uint64_t all = budgets_.device_memory - std::min(slices, budgets_.device_memory);
-  const std::uint64_t uploaded = std::min(pool_.bytes(), all);
-  const std::uint64_t for_device = std::min(device_cache_bytes(budgets_), all - uploaded);
-  if (std::exchange(device_budget_, for_device) != for_device)
-    scene_->stream().set_device_budget(for_device);
-  const std::uint64_t made_there = scene_->stream().counters().device_bytes;
-  state_.device_bytes = pool_.bytes() + made_there;
-  if (pool_.bytes() + made_there <= all) return;
+  drop_uploads(upload_memory());
+  state_.device_bytes = pool_.capacity() + device_->held() + slice_bytes_there();
+}
+
+std::uint64_t StorePicture::slice_bytes_there() const {
+  std::uint64_t bytes = 0;
+  for (const ShownSlice& slice : slices_) bytes += slice.samples.size() * sizeof(float);
+  return bytes;
+}
+
+/// What is uploaded, slices and the device's own meshes share its memory.
+std::uint64_t StorePicture::upload_memory() const {
+  const std::uint64_t others = device_->reserved() + slice_bytes_there();
+  return budgets_.device_memory - std::min(others, budgets_.device_memory);
+}
+
+/// Drops what is not drawn, the oldest first, until no more than this is held for uploads.
+void StorePicture::drop_uploads(std::uint64_t most) {
+  if (pool_.capacity() <= most) return;
   std::vector<std::pair<std::uint64_t, MeshId>> oldest;
   for (const auto& [id, upload] : uploads_)
     if (upload.used != frame_) oldest.emplace_back(upload.used, id);
   std::sort(oldest.begin(), oldest.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [used, id] : oldest) {
-    if (pool_.bytes() + made_there <= all) break;
     uploads_.erase(id);
-    state_.device_bytes = pool_.bytes() + made_there;
+    pool_.trim();
+    if (pool_.capacity() <= most) return;
   }
 }
 
@@ -325,27 +345,34 @@ void StorePicture::draw_marks(const ViewSettings& settings) {
   if (settings.scale_bar) renderer().draw_scale_bar(unit_symbol(transform.unit));
 }
 
-void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
-                        double coarser) {
+void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& asked,
+                        const PictureWay& way) {
   ++frame_;
   Stopwatch watch;
   device_->update();
   times_ = {.device = watch.lap()};
-  update_scene(camera, width, height, settings, coarser);
+  update_scene(camera, width, height, asked, way.coarser);
   times_.scene = scene_->times();
   watch.lap();
   const auto before = shown_;
   const auto newest = scene_->drawable();
   times_.drawable = watch.lap();
-  std::string shows = what_shows(camera, width, height, settings);
-  if (shows != shows_ || !can_wait(*newest)) upload(newest);
+  ViewSettings plain = asked;
+  plain.occlusion = plain.multisample = false;
+  const std::string shows_all = what_shows(camera, width, height, asked);
+  const std::string shows_plain = what_shows(camera, width, height, plain);
+  // A picture in full serves as a plain one.
+  const bool plain_serves = way.plain != PictureWay::Plain::no && shows_ == shows_plain;
+  if (!(shows_ == shows_all || plain_serves) || !can_wait(*newest)) upload(newest);
+  const bool be_plain = may_be_plain(way, *newest);
+  const ViewSettings& settings = be_plain ? plain : asked;
+  const std::string& shows = be_plain ? shows_plain : shows_all;
   times_.upload = watch.lap();
-  device_->retire(shown_ != before ? before : nullptr);
-  times_.device += watch.lap();
   const bool other_slices = update_slices(settings);
   times_.slices = watch.lap();
   // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
-  if (other_slices || !same_meshes(before.get(), shown_.get()) || shows != shows_) {
+  if (other_slices || !same_meshes(before.get(), shown_.get()) ||
+      (shows_ != shows && shows_ != shows_all)) {
     // Two contexts of one device are changed slowly and to and fro: one after the other is sooner
     // done, for both.
     Turns* const turns = device_->turns();
@@ -359,18 +386,20 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
       renderer().end();
     } catch (...) {
       shows_.clear();  // half a picture is none
+      if (device_->shares_memory()) glFinish();
       device_->forget();
       throw;
     }
     times_.draw = watch.lap();
-    if (turns != nullptr) glFinish();
+    if (device_->shares_memory()) glFinish();  // see DeviceMeshes::drawn()
     times_.finish = watch.lap();
     device_->forget();
-    shows_ = std::move(shows);
+    shows_ = shows;
     drawn_ = Clock::now();
     draw_seconds_ = times_.draw + times_.finish;
   }
   drop_unused();
+  state_.plain = shows_ != shows_all;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;

@@ -29,15 +29,24 @@ struct PictureState {
   std::vector<double> isovalues;
   bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
   std::uint64_t triangles = 0, nodes = 0;
-  std::uint64_t device_bytes = 0;   ///< of meshes
+  bool plain = false;               ///< drawn without occlusion and multisampling to be quick
+  std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
   bool limited_by_budget = false;   ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
+};
+
+/// How a picture may be simpler than its settings say.
+struct PictureWay {
+  double coarser = 1;  ///< factor on settings.pixel_error
+  /// Without occlusion and multisampling; `until_complete`: unless nothing finer is to come. In
+  /// software, which draws slowly, that is one picture later: first a plain one of all.
+  enum class Plain : std::uint8_t { no, until_complete, yes } plain = Plain::no;
 };
 
 /// Seconds that the steps of a picture took this thread; what the device does afterwards is not
 /// in them.
 struct PictureTimes {
-  double device = 0;    ///< taking over a device, giving back what is not drawn any more
+  double device = 0;    ///< taking over a device
   Scene::Times scene;   ///< choosing nodes
   double drawable = 0;  ///< asking what can be drawn
   double upload = 0;    ///< taking meshes to the device
@@ -68,10 +77,10 @@ class StorePicture {
   /// The box around the volume, axis by axis of world space.
   WorldBox bounds() const;
 
-  /// Makes the picture in the renderer, of what is there by now. `coarser`: factor on
-  /// settings.pixel_error.
+  /// Makes the picture in the renderer, of what is there by now; leaves the one before where that
+  /// would show the same.
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
-            double coarser = 1);
+            const PictureWay& way = {});
   const PictureState& state() const { return state_; }
   /// Of the last draw().
   const PictureTimes& times() const { return times_; }
@@ -108,7 +117,11 @@ class StorePicture {
   void upload(const std::shared_ptr<const Drawable>& newest);
   bool upload_all(const Drawable& drawable, UploadShare& share);
   bool can_wait(const Drawable& newest) const;
+  bool may_be_plain(const PictureWay& way, const Drawable& newest) const;
+  std::uint64_t slice_bytes_there() const;
+  std::uint64_t upload_memory() const;
   void drop_unused();
+  void drop_uploads(std::uint64_t most);
   void draw_surfaces(const ViewSettings& settings);
   /// Takes new samples of slices. Whether there are any.
   bool update_slices(const ViewSettings& settings);
@@ -133,8 +146,7 @@ class StorePicture {
     bool asked = false;
   };
   std::array<ShownSlice, 3> slices_;
-  std::string shows_;                ///< camera, size and settings of the picture in the renderer
-  std::uint64_t device_budget_ = 0;  ///< that the stream has been told
+  std::string shows_;  ///< camera, size and settings of the picture in the renderer
   std::chrono::steady_clock::time_point drawn_;  ///< when that was
   double draw_seconds_ = 0;                      ///< how long it took
   std::uint64_t frame_ = 0;

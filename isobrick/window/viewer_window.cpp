@@ -227,22 +227,22 @@ void ViewerWindow::draw_frame() {
     const double begin = glfwGetTime();
     // The first picture of a surface should not wait for a good one.
     const bool fluent = moving() || !state_.picture->state().covers;
-    ViewSettings settings = state_.settings;
+    PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1};
     // Nor should those that follow while meshes come in.
-    const bool plain = state_.pacer.plain() && (fluent || !state_.picture->state().complete);
-    if (plain) settings.occlusion = settings.multisample = false;
-    changed_ |= plain;  // there is a better one to come
+    if (state_.pacer.plain())
+      way.plain = fluent ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
     const int smaller = fluent ? state_.pacer.smaller() : 1;
     try {
       state_.picture->draw(state_.navigator.camera, std::max(width / smaller, 1),
-                           std::max(height / smaller, 1), settings,
-                           fluent ? state_.pacer.coarser() : 1);
+                           std::max(height / smaller, 1), state_.settings, way);
       state_.picture->renderer().copy_to(0, width, height);
     } catch (const std::exception& e) {
       if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
     }
     glFinish();
     state_.draw_seconds = glfwGetTime() - begin;
+    const bool plain = state_.picture->state().plain;
+    changed_ |= plain;  // there is a better one to come
     if (fluent)
       state_.pacer.drawn(state_.draw_seconds);
     else if (!plain)

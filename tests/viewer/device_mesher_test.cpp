@@ -80,7 +80,7 @@ TEST_F(Device, MakesTheSameMeshesInCutsOfManyLevels) {
         volume_of<float>({n, n, n}, [&](Int3 p) { return static_cast<float>(field(p, n)); });
     const NodeGrid grid(source->info());
     for (unsigned seed = 1; seed < 4; ++seed)
-      expect_same(source, RandomCut(grid, seed, 3).cut({0.013}));
+      expect_same(source, RandomCut(grid, seed, 8).cut({0.013}));
   }
   EXPECT_GT(triangles_, 100'000u);
   EXPECT_GT(ribbons_, 1'000u);

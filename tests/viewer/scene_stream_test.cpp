@@ -226,7 +226,7 @@ class FailingDevice final : public DeviceMesher {
   }
   const std::string& name() const override { return name_; }
   std::vector<DeviceBlock> shared_blocks() const override { return {}; }
-  void share_nothing() override {}
+  void share_only(std::size_t) override {}
   std::uint64_t bytes() const override { return 0; }
   Turns& turns() override { return turns_; }
   Times times() const override { return {}; }
@@ -266,6 +266,26 @@ TEST(SceneStream, WhatADeviceFailsToMakeIsMadeWithoutIt) {
     }
   }
   EXPECT_EQ(device.asked, 0u) << "nobody asks it in vain";
+}
+
+TEST(SceneStream, WhatAStraightPlanIsLateWithBringsTheLevelsBetween) {
+  const auto source = make_source(200);
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  source->set_delay(milliseconds(20));
+  SceneStream stream(source, tree, {.threads = 4});
+  stream.set_cut(RandomCut(tree->grid(), 1, 100).cut({0.0}));
+  const StreamCounters first = stream.counters();
+  const std::uint64_t planned = first.queue + first.working + first.meshes_made;
+  std::set<int> levels;
+  for (bool idle = false; !idle;) {
+    idle = stream.wait_idle(0.002);
+    for (const DrawnNode& node : stream.drawable()->nodes) levels.insert(node.mesh->key.level);
+  }
+  EXPECT_TRUE(stream.drawable()->complete);
+  EXPECT_GT(stream.counters().meshes_made, planned);
+  EXPECT_TRUE(std::any_of(levels.begin(), levels.end(), [&](int level) {
+    return level > 0 && level < tree->grid().coarsest_stored();
+  }));
 }
 
 TEST(SceneStream, EndsAtOnceWhateverIsGoingOn) {

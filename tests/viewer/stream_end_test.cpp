@@ -44,7 +44,7 @@ class SlowDevice final : public DeviceMesher {
   std::string failure() const override { return {}; }
   const std::string& name() const override { return name_; }
   std::vector<DeviceBlock> shared_blocks() const override { return {}; }
-  void share_nothing() override {}
+  void share_only(std::size_t) override {}
   std::uint64_t bytes() const override { return 0; }
   Turns& turns() override { return turns_; }
   Times times() const override { return {}; }

@@ -202,6 +202,23 @@ TEST_F(Picture, KeepsItsBudgets) {
   EXPECT_LE(picture_->scene().stream().counters().brick_bytes_peak, budgets.memory / 2);
 }
 
+TEST_F(Picture, SlicesAndUploadsShareTheDevicesBudget) {
+  const PictureBudgets budgets{
+      .memory = 64u << 20, .device_memory = 8u << 20, .backend = Backend::cpu};
+  open(SynthKind::gyroid, {192, 192, 192}, budgets);
+  settings_.pixel_error = 0.5f;
+  settings_.occlusion = settings_.multisample = false;
+  std::uint64_t most = 0;
+  for (int i = 0; i < 6; ++i) {
+    settings_.surfaces[0].isovalue = 100.5 + 5 * i;
+    for (std::size_t axis = 0; axis < 3; ++axis) settings_.slices[axis] = {i % 3 > 0, 0.5f};
+    draw();
+    EXPECT_LE(picture_->state().device_bytes, budgets.device_memory);
+    most = std::max(most, picture_->state().device_bytes);
+  }
+  EXPECT_GT(most, budgets.device_memory / 2) << "the test has too few meshes";
+}
+
 TEST_F(Picture, MeshesOnTheDeviceKeepNoneInHostMemory) {
   const PictureBudgets budgets{
       .memory = 16u << 20, .device_memory = 512u << 20, .backend = Backend::cpu};
@@ -271,6 +288,29 @@ TEST_F(Picture, KeepsTheBudgetOfADeviceThatMakesMeshes) {
     draw();
     EXPECT_TRUE(picture_->state().covers);
     EXPECT_LE(picture_->state().device_bytes, budgets.device_memory);
+  }
+}
+
+TEST_F(Picture, KeepsTheBudgetWhoeverMakesMeshesAndForEveryStore) {
+  const PictureBudgets budgets{
+      .memory = 256u << 20, .device_memory = 64u << 20, .backend = Backend::automatic};
+  const auto setup = std::make_shared<PictureSetup>(budgets, [] {});
+  open(SynthKind::gyroid, {192, 192, 192}, budgets);
+  settings_.pixel_error = 0.5f;
+  settings_.occlusion = settings_.multisample = false;
+  picture_.reset();
+  const auto store = std::make_shared<const StoreReader>(dir_ / "store.zarr");
+  for (int opened = 0; opened < 2; ++opened) {
+    picture_ = std::make_unique<StorePicture>(
+        store, budgets, [] {}, setup);
+    for (int i = 0; i < 6; ++i) {
+      picture_->device().use(i < 3 ? Backend::automatic : Backend::cpu);
+      settings_.surfaces[0].isovalue = 90.5 + 5 * i + 2.5 * opened;
+      draw();
+      EXPECT_TRUE(picture_->state().covers);
+      EXPECT_LE(picture_->state().device_bytes, budgets.device_memory) << opened << ' ' << i;
+      EXPECT_GE(picture_->state().device_bytes, picture_->device().held());
+    }
   }
 }
 
