@@ -15,6 +15,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -64,7 +65,7 @@ class Session {
         store_(std::make_shared<const StoreReader>(arguments.store)) {
     read_seconds = seconds_since(opened_);
     picture_ = std::make_unique<StorePicture>(
-        store_, budgets, [] {}, setup);
+        store_, budgets, [this] { changed_ = Clock::now(); }, setup);
     set_up_seconds = seconds_since(opened_);
     settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
     settings.multisample = !current_gl_device().software;
@@ -75,21 +76,25 @@ class Session {
 
   StorePicture& picture() { return *picture_; }
   double since_opened() const { return seconds_since(opened_); }
+  /// Seconds from `start` until the last mesh came.
+  double changed_after(Clock::time_point start) const {
+    return std::chrono::duration<double>(changed_.load() - start).count();
+  }
 
-  /// One picture as the window makes it. `moving`: it may be a simpler one. Its time.
-  double draw(bool moving) { return make_picture(moving, true); }
-  /// The picture in full that comes when nothing moves and nothing is missing. Its time; it does
-  /// not count among `pictures`.
-  double draw_at_rest() { return make_picture(false, false); }
-  /// At most 60 times a second until `done`. Throws Error when that takes longer than two minutes.
+  /// One picture as the window makes it. `moving`: it may be a simpler one.
+  void draw(bool moving) { make_picture(moving); }
+  /// At most 60 times a second until `done`, and when all is there without waiting for the
+  /// next turn of a display. Throws Error when that takes longer than two minutes.
   template <class F>
   void draw_until(bool moving, F&& done) {
     const auto start = Clock::now();
     while (seconds_since(start) < 120) {
-      const auto next = Clock::now() + std::chrono::microseconds(16'667);
+      const auto next = Clock::now() + kPeriod;
       draw(moving);
       if (done()) return;
-      std::this_thread::sleep_until(next);
+      const std::chrono::duration<double> left = next - Clock::now();
+      const bool all_there = !moving && picture_->scene().stream().wait_idle(left.count());
+      std::this_thread::sleep_until(all_there ? std::min(next, began_ + kPeriod) : next);
     }
     throw Error("what is waited for is not there after 120 s");
   }
@@ -99,30 +104,37 @@ class Session {
   double read_seconds = 0, set_up_seconds = 0;
   std::uint64_t device_peak = 0;
   PicturesTimes pictures;  ///< since somebody took them; none at rest
+  Times at_rest;           ///< pictures in full when nothing moves and nothing is missing
 
  private:
-  double make_picture(bool moving, bool counts) {
+  static constexpr auto kPeriod = std::chrono::microseconds(16'667);
+
+  void make_picture(bool moving) {
     const auto start = Clock::now();
-    ViewSettings now = settings;
-    const bool plain = pacer_.plain() && (moving || !picture_->state().complete);
-    if (plain) now.occlusion = now.multisample = false;
+    PictureWay way{.coarser = moving ? pacer_.coarser() : 1};
+    if (pacer_.plain())
+      way.plain = moving ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
     const int smaller = moving ? pacer_.smaller() : 1;
-    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, now,
-                   moving ? pacer_.coarser() : 1);
+    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, settings, way);
     const double submitted = seconds_since(start);
     glFinish();
     const double seconds = seconds_since(start);
-    if (counts) pictures.add(seconds, picture_->times(), seconds - submitted);
+    const PictureState& state = picture_->state();
+    if (!moving && state.complete && !state.plain)
+      at_rest.add(seconds);
+    else
+      pictures.add(seconds, picture_->times(), seconds - submitted);
+    if (picture_->times().draw > 0) began_ = start;
     if (moving)
       pacer_.drawn(seconds);
-    else if (!plain)
+    else if (!state.plain)
       pacer_.drawn_still(seconds);
-    device_peak = std::max(device_peak, picture_->state().device_bytes);
-    return seconds;
+    device_peak = std::max(device_peak, state.device_bytes);
   }
 
   const Arguments& arguments_;
-  Clock::time_point opened_;
+  Clock::time_point opened_, began_;  ///< the last picture that was really made
+  std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
   std::unique_ptr<StorePicture> picture_;
   FramePacer pacer_ = FramePacer::for_device(current_gl_device().software);
@@ -179,13 +191,19 @@ Json device_json(const DeviceMesher::Times& t) {
           {"device_seconds", t.device}, {"hand_out_seconds", t.hand_out}};
 }
 
+/// Whether the picture shows all that there is, as well as it can.
+bool complete_in_full(Session& session) {
+  const PictureState& state = session.picture().state();
+  return state.complete && !state.plain;
+}
+
 /// The first store of a process, beside the opening of the device.
 Json first_opening(const Arguments& arguments, const PictureBudgets& budgets,
                    const std::shared_ptr<PictureSetup>& setup) {
   Session session(arguments, budgets, setup);
   session.draw_until(true, [&] { return session.picture().state().covers; });
   Json result{{"first_surface_ms", session.since_opened() * 1e3}};
-  session.draw_until(false, [&] { return session.picture().state().complete; });
+  session.draw_until(false, [&] { return complete_in_full(session); });
   result["complete_ms"] = session.since_opened() * 1e3;
   // The device may be there only now.
   session.draw_until(false, [&] {
@@ -203,14 +221,12 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
   Session session(arguments, budgets, setup);
   Json result;
   const auto covers = [&] { return session.picture().state().covers; };
-  const auto complete = [&] { return session.picture().state().complete; };
-  Times at_rest;
+  const auto complete = [&] { return complete_in_full(session); };
   session.draw_until(true, covers);
   result["open"] = {{"store_ms", session.read_seconds * 1e3},
                     {"set_up_ms", session.set_up_seconds * 1e3},
                     {"first_surface_ms", session.since_opened() * 1e3}};
   session.draw_until(false, complete);
-  at_rest.add(session.draw_at_rest());
   result["open"]["complete_ms"] = session.since_opened() * 1e3;
   result["open"]["triangles"] = session.picture().state().triangles;
   result["open"]["nodes"] = session.picture().state().nodes;
@@ -227,13 +243,12 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
     session.draw_until(true, covers);
     jump["first_surface_ms"] = seconds_since(start) * 1e3;
     session.draw_until(false, complete);
-    at_rest.add(session.draw_at_rest());
     jump["complete_ms"] = seconds_since(start) * 1e3;
     jumps.push_back(jump);
   }
   result["jumps"] = jumps;
   result["while_streaming"] = std::exchange(session.pictures, {}).summary();
-  result["at_rest"] = at_rest.summary();
+  result["at_rest"] = session.at_rest.summary();
 
   result["while_sliding"] = slide(session, arguments);
 
@@ -304,14 +319,16 @@ Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
   session.draw_until(false, [&] {
     const PictureState& state = session.picture().state();
     ends.push_back({seconds_since(start) * 1e3, state.nodes, state.triangles});
-    return state.complete;
+    return complete_in_full(session);
   });
   result["refine"] = {{"seconds", seconds_since(start)},
                       {"triangles", session.picture().state().triangles},
                       {"nodes", session.picture().state().nodes},
                       {"limited_by_budget", session.picture().state().limited_by_budget},
                       {"picture_ends_ms_nodes_triangles", ends},
+                      {"last_mesh_seconds", session.changed_after(start)},
                       {"pictures", session.pictures.summary()},
+                      {"at_rest", session.at_rest.summary()},
                       {"device", device_json(session.picture().device().times())},
                       {"stream", stream_json(session.picture().scene().stream().counters())}};
   return result;
