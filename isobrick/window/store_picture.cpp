@@ -159,10 +159,10 @@ void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
   if (upload_all(*next_, share)) shown_ = next_;
 }
 
-/// Whether what is new can be shown a little later.
+/// Whether what is new can be shown a little later, since more is to come.
 bool StorePicture::can_wait(const Drawable& newest) const {
   if (shown_ == nullptr || !shown_->covers || newest.complete ||
-      shown_->isovalues != newest.isovalues || scene_->stream().idle())
+      shown_->isovalues != newest.isovalues)
     return false;
   const double pause = kRefiningPause * draw_seconds_;
   return std::chrono::duration<double>(Clock::now() - drawn_).count() <
@@ -355,6 +355,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   times_.scene = scene_->times();
   watch.lap();
   const auto before = shown_;
+  const bool idle = scene_->stream().idle();  // first: then the newest has everything
   const auto newest = scene_->drawable();
   times_.drawable = watch.lap();
   ViewSettings plain = asked;
@@ -363,7 +364,8 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   const std::string shows_plain = what_shows(camera, width, height, plain);
   // A picture in full serves as a plain one.
   const bool plain_serves = way.plain != PictureWay::Plain::no && shows_ == shows_plain;
-  if (!(shows_ == shows_all || plain_serves) || !can_wait(*newest)) upload(newest);
+  const bool other_view = shows_ != shows_all && !plain_serves;
+  if (other_view || idle || !can_wait(*newest)) upload(newest);
   const bool be_plain = may_be_plain(way, *newest);
   const ViewSettings& settings = be_plain ? plain : asked;
   const std::string& shows = be_plain ? shows_plain : shows_all;
