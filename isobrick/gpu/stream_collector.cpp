@@ -27,8 +27,8 @@ StreamCollector::StreamCollector(int cuda_device, StreamDevice& device, bool wel
       welded_(welded),
       normals_(normals),
       take_(std::move(take)),
-      good_tiles_(device.sizes().tiles),
-      outputs_(kOutputs) {
+      outputs_(cuda_device, std::vector<std::size_t>(kOutputs, device.sizes().output_bytes)),
+      good_tiles_(device.sizes().tiles) {
   for (std::size_t i = 0; i < kOutputs; ++i) free_outputs_.push_back(kOutputs - 1 - i);
   thread_ = std::thread([this] { run(); });
 }
@@ -164,7 +164,7 @@ void StreamCollector::check_numbers(std::uint64_t more) const {
 
 StreamCollector::Pending StreamCollector::start_download(Lane& lane, SurfaceTotals size) {
   Pending pending{&lane, take_output(), size, report_.vertices};
-  device_.download(lane, *outputs_[pending.output], size);
+  device_.download(lane, output(pending.output), size);
   report_.vertices += size.vertices;
   report_.triangles += size.triangles;
   return pending;
@@ -175,12 +175,12 @@ void StreamCollector::deliver(const Pending& pending) {
   report_.download.seconds +=
       seconds_between(pending.lane->download_begin, pending.lane->downloaded);
   report_.download.bytes += mesh_bytes(pending.size, normals_);
-  const HostOutput& output = *outputs_[pending.output];
+  const HostOutput from = output(pending.output);
   const auto vertices = static_cast<std::size_t>(pending.size.vertices);
   const MeshChunk chunk{pending.first_vertex,
-                        {output.positions.data(), vertices},
-                        {output.normals.data(), normals_ ? vertices : 0},
-                        {output.triangles.data(), pending.size.triangles}};
+                        {from.positions, vertices},
+                        {from.normals, normals_ ? vertices : 0},
+                        {from.triangles, pending.size.triangles}};
   {
     const std::lock_guard lock(mutex_);
     ++taken_outputs_;
@@ -198,10 +198,15 @@ std::size_t StreamCollector::take_output() {
   changed_.wait(lock, [&] { return !free_outputs_.empty(); });
   const std::size_t index = free_outputs_.back();
   free_outputs_.pop_back();
-  lock.unlock();
-  // Made when it is first needed: page-locking takes a while, and others work meanwhile.
-  if (!outputs_[index]) outputs_[index] = std::make_unique<HostOutput>(device_.sizes(), normals_);
   return index;
+}
+
+HostOutput StreamCollector::output(std::size_t index) {
+  const StreamSizes& sizes = device_.sizes();
+  auto* positions = reinterpret_cast<Vec3f*>(outputs_.locked(index));
+  Vec3f* const normals = positions + sizes.vertices;
+  return {positions, normals,
+          reinterpret_cast<Triangle*>(normals_ ? normals + sizes.vertices : normals)};
 }
 
 void StreamCollector::give_output(std::size_t output) {

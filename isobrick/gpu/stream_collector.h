@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "isobrick/gpu/gpu_extractor.h"
+#include "isobrick/gpu/pinned_region.h"
 #include "isobrick/gpu/stream_device.h"
 
 namespace isobrick::gpu {
@@ -51,6 +52,7 @@ class StreamCollector {
   void deliver(const Pending& pending);
   void check_numbers(std::uint64_t more) const;
   std::size_t take_output();
+  HostOutput output(std::size_t index);
   void give_output(std::size_t output);
   void free_lane(std::uint32_t tiles, SurfaceTotals size);
 
@@ -58,6 +60,7 @@ class StreamCollector {
   StreamDevice& device_;
   bool welded_, normals_;
   TakeChunk take_;
+  PinnedRegion outputs_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
@@ -66,7 +69,6 @@ class StreamCollector {
   bool closed_ = false, stop_ = false;
   std::exception_ptr error_;
   std::uint32_t good_tiles_;
-  std::vector<std::unique_ptr<HostOutput>> outputs_;
   std::vector<std::size_t> free_outputs_;
   int taken_outputs_ = 0;  ///< handed on, not released
 

@@ -12,21 +12,6 @@
 
 namespace isobrick::gpu {
 
-DeviceArena::DeviceArena(std::size_t bytes) : bytes_(bytes) {
-  void* data = nullptr;
-  const cudaError_t result = cudaMalloc(&data, bytes);
-  if (result == cudaErrorMemoryAllocation) {
-    (void)cudaGetLastError();  // or the next launch would report it
-    return;
-  }
-  check(result);
-  data_ = static_cast<std::byte*>(data);
-}
-
-DeviceArena::~DeviceArena() {
-  if (data_) (void)cudaFree(data_);
-}
-
 namespace {
 
 /// Kernels read bricks where they lie in host memory, under the address that the host knows.
@@ -38,8 +23,6 @@ void check_reads_host_memory() {
 }
 
 }  // namespace
-
-Lane::Lane(const StreamSizes& sizes) : staging(sizes.staging_bytes) {}
 
 StreamDevice::StreamDevice(const Lattice& lattice, const SurfaceOptions& options,
                            const StreamSizes& sizes, BrickPool* pool)
@@ -67,8 +50,15 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   sizes_ = sizes;
   layout_ = StagingLayout(sizes.tiles, sizes.tile_bricks);
   lanes_.clear();
-  for (int i = 0; i < sizes.lanes; ++i) {
-    auto lane = std::make_unique<Lane>(sizes);
+  const std::size_t of_lane =
+      StagingLayout::aligned(sizes.staging_bytes) + StagingLayout::aligned(sizeof(SurfaceTotals));
+  const auto lanes = static_cast<std::size_t>(sizes.lanes);
+  staging_ = PinnedBuffer<std::byte>(lanes * of_lane);
+  for (std::size_t i = 0; i < lanes; ++i) {
+    auto lane = std::make_unique<Lane>();
+    lane->staging = staging_.data() + i * of_lane;
+    lane->totals = reinterpret_cast<SurfaceTotals*>(lane->staging +
+                                                    StagingLayout::aligned(sizes.staging_bytes));
     lane->device = arena_->take<std::byte>(sizes.staging_bytes);
     lane->bricks = arena_->take<std::byte>(sizes.sent_bricks * lattice_.brick_bytes());
     lane->positions = arena_->take<Vec3f>(sizes.vertices);
@@ -144,8 +134,8 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   lane.unpacked.record(kernel_);
   launch_extraction(kernel_of(lattice_.type, options_), p, case_entries_, shapes_.of(count),
                     kernel_.get());
-  check(cudaMemcpyAsync(lane.totals.data(), &header->totals, sizeof(SurfaceTotals),
-                        cudaMemcpyDeviceToHost, kernel_.get()));
+  check(cudaMemcpyAsync(lane.totals, &header->totals, sizeof(SurfaceTotals), cudaMemcpyDeviceToHost,
+                        kernel_.get()));
   lane.extracted.record(kernel_);
 }
 
@@ -158,8 +148,8 @@ void StreamDevice::send(Lane& lane) {
     check(cudaMemcpyAsync(lane.bricks + first * bytes, sent[first].from, (end - first) * bytes,
                           cudaMemcpyHostToDevice, upload_.get()));
   }
-  check(cudaMemcpyAsync(lane.device, lane.staging.data(), used_staging(lane),
-                        cudaMemcpyHostToDevice, upload_.get()));
+  check(cudaMemcpyAsync(lane.device, lane.staging, used_staging(lane), cudaMemcpyHostToDevice,
+                        upload_.get()));
 }
 
 void StreamDevice::submit(Lane& lane, std::uint64_t launch_number) {
@@ -206,9 +196,9 @@ void StreamDevice::download(Lane& lane, const HostOutput& to, SurfaceTotals size
       check(cudaMemcpyAsync(host, device, bytes, cudaMemcpyDeviceToHost, download_.get()));
   };
   lane.download_begin.record(download_);
-  copy(to.positions.data(), lane.positions, size.vertices * sizeof(Vec3f));
-  if (options_.normals) copy(to.normals.data(), lane.normals, size.vertices * sizeof(Vec3f));
-  copy(to.triangles.data(), lane.triangles, size.triangles * sizeof(Triangle));
+  copy(to.positions, lane.positions, size.vertices * sizeof(Vec3f));
+  if (options_.normals) copy(to.normals, lane.normals, size.vertices * sizeof(Vec3f));
+  copy(to.triangles, lane.triangles, size.triangles * sizeof(Triangle));
   lane.downloaded.record(download_);
 }
 

@@ -7,6 +7,7 @@
 
 #include "isobrick/gpu/brick_pool.h"
 #include "isobrick/gpu/brick_table.h"
+#include "isobrick/gpu/device_arena.h"
 #include "isobrick/gpu/stream.h"
 #include "isobrick/gpu/stream_layout.h"
 #include "isobrick/gpu/stream_sizes.h"
@@ -14,41 +15,16 @@
 
 namespace isobrick::gpu {
 
-/// Device memory in one piece, cut from the front.
-class DeviceArena {
- public:
-  /// Empty when the device does not have so much.
-  explicit DeviceArena(std::size_t bytes);
-  DeviceArena(const DeviceArena&) = delete;
-  DeviceArena& operator=(const DeviceArena&) = delete;
-  ~DeviceArena();
-
-  explicit operator bool() const { return data_ != nullptr; }
-  std::size_t bytes() const { return bytes_; }
-  template <class T>
-  T* take(std::size_t count) {
-    std::byte* at = data_ + used_;
-    used_ += StagingLayout::aligned(count * sizeof(T));
-    return reinterpret_cast<T*>(at);
-  }
-
- private:
-  std::byte* data_ = nullptr;
-  std::size_t bytes_ = 0, used_ = 0;
-};
-
 /// A launch under way: what the host sends, and where its mesh goes on the device.
 struct Lane {
-  explicit Lane(const StreamSizes& sizes);
-
-  PinnedBuffer<std::byte> staging;
-  std::byte* device = nullptr;  ///< the same, on the device
-  std::byte* bricks = nullptr;  ///< those that are sent, likewise
+  std::byte* staging = nullptr;  ///< page-locked
+  std::byte* device = nullptr;   ///< the same, on the device
+  std::byte* bricks = nullptr;   ///< those that are sent, likewise
   BrickUse use;
   std::shared_ptr<const void> samples;  ///< owns the bricks in host memory
   Vec3f *positions = nullptr, *normals = nullptr;
   Triangle* triangles = nullptr;
-  PinnedBuffer<SurfaceTotals> totals{1};
+  SurfaceTotals* totals = nullptr;  ///< page-locked
   Event upload_begin{cudaEventBlockingSync}, uploaded{cudaEventBlockingSync},
       unpack_begin{cudaEventBlockingSync}, unpacked{cudaEventBlockingSync},
       extracted{cudaEventBlockingSync}, download_begin{cudaEventBlockingSync},
@@ -56,17 +32,13 @@ struct Lane {
   std::uint32_t count = 0;                  ///< tiles
   std::vector<std::uint32_t> unused_slots;  ///< once this launch is not repeated any more
 
-  std::byte* at(std::size_t offset) const { return staging.data() + offset; }
+  std::byte* at(std::size_t offset) const { return staging + offset; }
 };
 
 /// Page-locked memory for the mesh of a launch.
 struct HostOutput {
-  explicit HostOutput(const StreamSizes& sizes, bool with_normals)
-      : positions(sizes.vertices),
-        normals(with_normals ? sizes.vertices : 0),
-        triangles(sizes.triangles) {}
-  PinnedBuffer<Vec3f> positions, normals;
-  PinnedBuffer<Triangle> triangles;
+  Vec3f *positions = nullptr, *normals = nullptr;
+  Triangle* triangles = nullptr;
 };
 
 /// The device's side of a streaming extraction: its memory, its streams, its launches.
@@ -114,6 +86,7 @@ class StreamDevice {
   StreamSizes sizes_;
   StagingLayout layout_{0, 0};
   // Streams end before the memory that they work on.
+  PinnedBuffer<std::byte> staging_;  ///< of all lanes
   std::unique_ptr<DeviceArena> arena_;
   std::vector<std::unique_ptr<Lane>> lanes_;
   Stream upload_, kernel_, download_;

@@ -26,6 +26,9 @@ constexpr std::uint64_t kSmallBuffers = 64 << 10;
 constexpr std::uint64_t kLeastSent = std::uint64_t{128} << 10;
 /// Smaller launches are not worth a pool.
 constexpr std::uint64_t kLeastTilesWithPool = 128;
+/// Bricks a thread that are decoded ahead into a pool, and that are being decoded or belong to
+/// launches.
+constexpr std::uint64_t kLeastAhead = 24, kMostAhead = 40, kUnderWay = 8;
 /// A row table in the host's books: its slot, its tile, its expiry.
 constexpr std::uint64_t kBytesOfSlot = 96;
 
@@ -37,6 +40,12 @@ std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles
   const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
   return std::min(static_cast<std::uint64_t>(volume(t)),
                   faces + (static_cast<std::uint64_t>(lanes) + 1) * tiles);
+}
+
+/// In Morton order about half of the bricks on the three upper faces of the grid live at a time.
+std::uint64_t living_bricks(const Lattice& lattice) {
+  const Int3 b = lattice.bricks();
+  return static_cast<std::uint64_t>(b.x * b.y + b.y * b.z + b.x * b.z) / 2;
 }
 
 /// Bricks that hold as many samples as the tiles of a launch and a quarter more, for tiles
@@ -83,17 +92,22 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
 }
 
 std::uint64_t good_pool(const Lattice& lattice, int threads) {
-  // In Morton order about half of the bricks on the three upper faces of the grid live at a
-  // time; some more a thread are decoded ahead, are being decoded or belong to launches.
-  const Int3 b = lattice.bricks();
-  const auto faces = static_cast<std::uint64_t>(b.x * b.y + b.y * b.z + b.x * b.z);
-  return std::min(static_cast<std::uint64_t>(volume(b)),
-                  faces / 2 + (BrickPool::kBricksAhead + 8) * static_cast<std::uint64_t>(threads));
+  return std::min(
+      static_cast<std::uint64_t>(volume(lattice.bricks())),
+      living_bricks(lattice) + (kMostAhead + kUnderWay) * static_cast<std::uint64_t>(threads));
+}
+
+std::size_t bricks_ahead(const Lattice& lattice, const PoolSizes& pool) {
+  const std::uint64_t others =
+      living_bricks(lattice) + kUnderWay * static_cast<std::uint64_t>(pool.threads);
+  return static_cast<std::size_t>(std::clamp(
+      (pool.bricks - std::min(pool.bricks, others)) / static_cast<std::uint64_t>(pool.threads),
+      kLeastAhead, kMostAhead));
 }
 
 namespace {
 
-/// Launches beside a pool of at least 70 % of what is wanted.
+/// Launches beside a pool of at least 60 % of what is wanted.
 std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions& options,
                                     std::uint64_t device_budget, std::uint64_t host_budget,
                                     std::uint64_t other_host_bytes, PoolSizes wanted) {
@@ -108,7 +122,7 @@ std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions
           stream_sizes(lattice, options, count, lanes, pool).device_bytes;
       if (launches > device_budget) continue;
       pool.bricks = std::min(wanted.bricks, 1 + (device_budget - launches) / lattice.brick_bytes());
-      if (10 * pool.bricks < 7 * wanted.bricks) continue;
+      if (10 * pool.bricks < 6 * wanted.bricks) continue;
       const StreamSizes s = stream_sizes(lattice, options, count, lanes, pool);
       // Any tile's bricks must fit, however few bricks there are.
       if (pool.bricks < s.tile_bricks) continue;

@@ -47,6 +47,10 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
 /// whole volume.
 std::uint64_t good_pool(const Lattice& lattice, int threads);
 
+/// Bricks a thread that should be decoded ahead into such a pool: what waits for a thread that
+/// was held up takes no host memory here.
+std::size_t bricks_ahead(const Lattice& lattice, const PoolSizes& pool);
+
 /// The largest launches within both budgets, of the host's `other_host_bytes` being taken.
 /// With a pool of `wanted.bricks` where the device has room for most of it; else they leave
 /// half of the rest of the host's memory, for bricks. Throws UsageError naming the least

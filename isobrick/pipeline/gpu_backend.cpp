@@ -82,20 +82,18 @@ class HostBricks final : public BrickMemory {
 /// Bricks on the device.
 class DeviceBricks final : public BrickMemory {
  public:
-  DeviceBricks(std::shared_ptr<gpu::BrickPool> pool, std::size_t brick_bytes)
-      : pool_(std::move(pool)), job_(gpu::BrickPool::bricks_of_group(brick_bytes) * brick_bytes) {}
+  DeviceBricks(std::shared_ptr<gpu::BrickPool> pool, std::size_t ahead)
+      : pool_(std::move(pool)), ahead_(ahead) {}
   std::shared_ptr<std::byte> room(std::size_t bytes) override {
     return {pool_, pool_->take(bytes)};
   }
   std::byte* begin(int thread, std::byte*) override { return pool_->begin(thread); }
   void end(int thread, std::byte* place) override { pool_->end(thread, place); }
-  void send(int thread) override { pool_->send(thread); }
-  std::size_t good_job() const override { return job_; }
-  std::size_t bricks_ahead() const override { return gpu::BrickPool::kBricksAhead; }
+  std::size_t bricks_ahead() const override { return ahead_; }
 
  private:
   std::shared_ptr<gpu::BrickPool> pool_;
-  std::size_t job_;
+  std::size_t ahead_;
 };
 
 class CudaSession final : public GpuSession {
@@ -135,7 +133,7 @@ class CudaSession final : public GpuSession {
     } catch (const gpu::OutOfDeviceMemory&) {
       return false;
     }
-    bricks_ = std::make_unique<DeviceBricks>(pool_, lattice.brick_bytes());
+    bricks_ = std::make_unique<DeviceBricks>(pool_, gpu::bricks_ahead(lattice, sizes_.pool));
     return true;
   }
 

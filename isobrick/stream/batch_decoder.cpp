@@ -11,6 +11,8 @@
 namespace isobrick {
 namespace {
 
+/// Bricks that a thread takes at a time: small ones come in groups.
+constexpr std::size_t kBytesOfJob = std::size_t{128} << 10;
 /// Memory that is got at a time.
 constexpr std::size_t kBytesOfSlab = std::size_t{16} << 20;
 /// Pieces of it that are got before they are needed.
@@ -48,7 +50,7 @@ BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& pl
       planner_(planner),
       capacity_(capacity),
       threads_count_(threads),
-      bricks_of_job_(std::clamp<std::size_t>(memory.good_job() / lattice_.brick_bytes(), 1, 64)),
+      bricks_of_job_(std::clamp<std::size_t>(kBytesOfJob / lattice_.brick_bytes(), 1, 64)),
       memory_(memory),
       slots_(lattice_, reach),
       seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {
@@ -56,8 +58,8 @@ BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& pl
     const std::lock_guard lock(mutex_);
     grow_if_short();
   }
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this, i] { run(i); });
   threads_.emplace_back([this] { plan(); });
+  for (int i = 0; i < threads; ++i) threads_.emplace_back([this, i] { run(i); });
 }
 
 BatchDecoder::~BatchDecoder() {
@@ -231,7 +233,6 @@ void BatchDecoder::decode(int thread, const Batch& batch, const std::vector<Load
     present.push_back(store_.read_brick(level_, load.brick, to));
     if (present.back()) memory_.end(thread, load.samples);
   }
-  memory_.send(thread);
   const std::lock_guard lock(mutex_);
   for (std::size_t i = 0; i < loads.size(); ++i) {
     if (!present[i]) {

@@ -15,13 +15,9 @@ class BrickMemory {
   /// Where decoder `thread`, counted from 0, is to decode the brick of a place in that room,
   /// which need not be memory that a processor writes.
   virtual std::byte* begin(int /*thread*/, std::byte* place) { return place; }
-  /// The samples that were begun last are whole and belong to `place`.
+  /// The samples that were begun last are whole and belong to `place`: they are to be there for
+  /// whoever reads that memory.
   virtual void end(int /*thread*/, std::byte* /*place*/) {}
-  /// What the thread has ended is to be there for whoever reads that memory.
-  virtual void send(int /*thread*/) {}
-  /// Bytes of bricks that a decoder should begin before it sends them: small bricks come in
-  /// groups.
-  virtual std::size_t good_job() const { return std::size_t{128} << 10; }
   /// Bricks a thread that should be decoded ahead: enough for all to be busy while whoever
   /// takes batches does something else.
   virtual std::size_t bricks_ahead() const { return 12; }

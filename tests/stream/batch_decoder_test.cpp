@@ -21,33 +21,21 @@ class HeapMemory : public BrickMemory {
   std::atomic<std::size_t> bytes = 0;
 };
 
-/// As a device has it: a thread decodes some bricks to buffers of its own, which are then sent.
+/// As a device has it: a thread decodes a brick to a buffer of its own, which is then sent.
 class ElsewhereMemory final : public HeapMemory {
  public:
   ElsewhereMemory(std::size_t brick, int threads)
-      : brick_(brick), writers_(static_cast<std::size_t>(threads)) {}
-  std::byte* begin(int thread, std::byte*) override {
-    Writer& w = writer(thread);
-    w.samples.resize((w.places.size() + 1) * brick_);
-    return w.samples.data() + w.places.size() * brick_;
+      : buffers_(static_cast<std::size_t>(threads), std::vector<std::byte>(brick)) {}
+  std::byte* begin(int thread, std::byte*) override { return buffer(thread).data(); }
+  void end(int thread, std::byte* place) override {
+    std::copy(buffer(thread).begin(), buffer(thread).end(), place);
   }
-  void end(int thread, std::byte* place) override { writer(thread).places.push_back(place); }
-  void send(int thread) override {
-    Writer& w = writer(thread);
-    for (std::size_t i = 0; i < w.places.size(); ++i)
-      std::copy_n(w.samples.data() + i * brick_, brick_, w.places[i]);
-    w.places.clear();
-  }
-  std::size_t good_job() const override { return 3 * brick_; }
 
  private:
-  struct Writer {
-    std::vector<std::byte> samples;
-    std::vector<std::byte*> places;
-  };
-  Writer& writer(int thread) { return writers_.at(static_cast<std::size_t>(thread)); }
-  std::size_t brick_;
-  std::vector<Writer> writers_;
+  std::vector<std::byte>& buffer(int thread) {
+    return buffers_.at(static_cast<std::size_t>(thread));
+  }
+  std::vector<std::vector<std::byte>> buffers_;
 };
 
 class NoMemory final : public BrickMemory {

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+
+#include "isobrick/gpu/cuda_check.h"
+
+namespace isobrick::gpu {
+
+/// Device memory in one piece, cut from the front.
+class DeviceArena {
+ public:
+  /// Empty when the device does not have so much.
+  explicit DeviceArena(std::size_t bytes) {
+    void* data = nullptr;
+    const cudaError_t result = cudaMalloc(&data, bytes);
+    if (result == cudaErrorMemoryAllocation) {
+      (void)cudaGetLastError();  // or the next launch would report it
+      return;
+    }
+    check(result);
+    data_ = static_cast<std::byte*>(data);
+  }
+  DeviceArena(const DeviceArena&) = delete;
+  DeviceArena& operator=(const DeviceArena&) = delete;
+  ~DeviceArena() {
+    if (data_) (void)cudaFree(data_);
+  }
+
+  explicit operator bool() const { return data_ != nullptr; }
+  /// The next so many elements, at a multiple of 256 bytes.
+  template <class T>
+  T* take(std::size_t count) {
+    std::byte* at = data_ + used_;
+    used_ += (count * sizeof(T) + 255) & ~std::size_t{255};
+    return reinterpret_cast<T*>(at);
+  }
+
+ private:
+  std::byte* data_ = nullptr;
+  std::size_t used_ = 0;
+};
+
+}  // namespace isobrick::gpu
