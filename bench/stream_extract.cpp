@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -166,13 +167,15 @@ int run(Arguments a) {
                        [](const auto& l, const auto& r) { return l.seconds < r.seconds; });
   const ExtractReport& r = *best;
 
-  std::map<std::string, double> alone;
+  // The best of as many, as of the whole; reads from disk once, for then it is all in memory.
+  std::map<std::string, double> alone{{"read", HUGE_VAL}, {"decode", HUGE_VAL}};
   Workers workers(a.options.threads);
   if (a.cold) drop_from_cache(a.store);
-  workers.execute([&] {
-    alone["read"] = read_alone(store, a.options.level, bricks);
-    alone["decode"] = decode_alone(store, a.options.level, bricks);
-  });
+  for (int i = 0; i < (a.cold ? 1 : a.runs); ++i)
+    workers.execute([&] {
+      alone["read"] = std::min(alone["read"], read_alone(store, a.options.level, bricks));
+      alone["decode"] = std::min(alone["decode"], decode_alone(store, a.options.level, bricks));
+    });
   const std::uint64_t launches = std::max<std::uint64_t>(r.launches, 1);
   alone["upload"] = copy_seconds(r.upload.bytes, r.upload.bytes / launches, true);
   alone["download"] = copy_seconds(r.download.bytes, r.download.bytes / launches, false);

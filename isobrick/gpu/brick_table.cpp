@@ -1,7 +1,8 @@
 #include "isobrick/gpu/brick_table.h"
 
 #include <algorithm>
-#include <unordered_map>
+
+#include "isobrick/core/flat_map.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -24,28 +25,28 @@ Box3 bricks_around(const Lattice& lattice, Index reach, Int3 tile) {
 /// Collects the bricks of a launch, each looked up once.
 class Needs {
  public:
-  Needs(const BrickLookup& bricks, Int3 grid, std::size_t tiles) : bricks_(bricks), grid_(grid) {
-    numbers_.reserve(tiles);
-  }
+  Needs(const BrickLookup& bricks, Int3 grid, std::size_t tiles)
+      : bricks_(bricks), grid_(grid), numbers_(tiles) {}
 
   /// The number of a brick, counted from 1; 0 when it is absent.
   std::size_t add(Int3 b, std::uint64_t samples) {
-    const auto [at, added] = numbers_.try_emplace(linear_index(b, grid_), 0);
+    const auto [number, added] =
+        numbers_.insert(static_cast<std::uint64_t>(linear_index(b, grid_)));
     if (added) {
       if (const std::byte* brick = bricks_.find(b)) {
         all_.push_back({brick, 0, reinterpret_cast<std::uint64_t>(brick)});
-        at->second = all_.size();
+        number = all_.size();
       }
     }
-    if (at->second > 0) all_[at->second - 1].samples += samples;
-    return at->second;
+    if (number > 0) all_[number - 1].samples += samples;
+    return number;
   }
   std::vector<Need>& all() { return all_; }
 
  private:
   const BrickLookup& bricks_;
   Int3 grid_;
-  std::unordered_map<Index, std::size_t> numbers_;
+  FlatMap<std::size_t> numbers_;
   std::vector<Need> all_;
 };
 

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <queue>
-#include <unordered_map>
+#include <map>
 #include <vector>
 
+#include "isobrick/core/flat_map.h"
 #include "isobrick/core/vec.h"
 #include "isobrick/gpu/tile_params.h"
 
@@ -34,10 +34,13 @@ class RowSlots {
   };
   struct Expiry {
     std::uint64_t last_asker, key;
-    bool operator>(const Expiry& other) const { return last_asker > other.last_asker; }
   };
-  std::unordered_map<std::uint64_t, Entry> map_;
-  std::priority_queue<Expiry, std::vector<Expiry>, std::greater<>> expiries_;
+  void drop(const Expiry& expiry, std::vector<std::uint32_t>& unused);
+
+  FlatMap<Entry> map_;
+  /// By cubes of tiles that the last askers lie in: neighbours are added after one another.
+  std::map<std::uint64_t, std::vector<Expiry>> expiries_;
+  std::map<std::uint64_t, std::vector<Expiry>>::iterator added_last_ = expiries_.end();
   std::vector<std::uint32_t> free_;
   Int3 last_tile_;
   std::uint32_t launch_ = 0;

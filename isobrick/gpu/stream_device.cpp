@@ -132,8 +132,9 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   lane.unpack_begin.record(kernel_);
   launch_unpack(lattice_.type, u, kernel_.get());
   lane.unpacked.record(kernel_);
-  launch_extraction(kernel_of(lattice_.type, options_), p, case_entries_, shapes_.of(count),
-                    kernel_.get());
+  LaunchShape shape = shapes_.of(count);
+  shape.blocks = std::min(shape.blocks, static_cast<int>(count));
+  launch_extraction(kernel_of(lattice_.type, options_), p, case_entries_, shape, kernel_.get());
   check(cudaMemcpyAsync(lane.totals, &header->totals, sizeof(SurfaceTotals), cudaMemcpyDeviceToHost,
                         kernel_.get()));
   lane.extracted.record(kernel_);

@@ -33,9 +33,9 @@ std::uint64_t key_of(Int3 brick, Int3 grid) {
 DecodedBatch::~DecodedBatch() { decoder_.release(*this); }
 
 const std::byte* DecodedBatch::find(Int3 brick) const {
-  const auto found = samples_.find(key_of(brick, grid_));
-  assert(found != samples_.end());
-  return found->second;
+  const auto* found = samples_.find(key_of(brick, grid_));
+  assert(found);
+  return *found;
 }
 
 std::size_t BatchDecoder::slab_bricks(const Lattice& lattice, std::size_t capacity) {
@@ -90,8 +90,9 @@ std::shared_ptr<const DecodedBatch> BatchDecoder::next() {
   const Batch batch = std::move(batches_.front());
   batches_.pop_front();
   ahead_ -= batch->loads_;
+  batch->samples_ = FlatMap<const std::byte*>(batch->batch_.bricks.size());
   for (const Int3 b : batch->batch_.bricks)
-    batch->samples_[key_of(b, batch->grid_)] = slots_.find(b);
+    batch->samples_.insert(key_of(b, batch->grid_)).first = slots_.find(b);
   changed_.notify_all();
   return batch;
 }

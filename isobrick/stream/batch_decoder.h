@@ -10,10 +10,10 @@
 #include <mutex>
 #include <span>
 #include <thread>
-#include <unordered_map>
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/flat_map.h"
 #include "isobrick/stream/brick_memory.h"
 #include "isobrick/stream/brick_slots.h"
 #include "isobrick/stream/tile_stream.h"
@@ -40,7 +40,7 @@ class DecodedBatch final : public BrickLookup {
   BatchDecoder& decoder_;
   TileBatch batch_;
   Int3 grid_;
-  std::unordered_map<std::uint64_t, const std::byte*> samples_;
+  FlatMap<const std::byte*> samples_;
   std::size_t held_ = 0;     ///< of its bricks, the first so many
   std::size_t missing_ = 0;  ///< bricks to decode for it, not done
   std::size_t loads_ = 0;    ///< all bricks to decode for it

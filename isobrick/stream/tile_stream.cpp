@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "isobrick/core/flat_map.h"
 #include "isobrick/core/morton.h"
 
 namespace isobrick {
@@ -56,7 +57,7 @@ std::optional<TileWork> TileStream::next() {
 bool BatchPlanner::next(TileBatch& batch) {
   batch.tiles.clear();
   batch.bricks.clear();
-  std::unordered_set<std::uint64_t> needed;
+  FlatMap<char> needed(max_tiles_);
   std::vector<Int3> of_tile;
   while (batch.tiles.size() < max_tiles_) {
     if (!held_) held_ = stream_.next();
@@ -67,7 +68,7 @@ bool BatchPlanner::next(TileBatch& batch) {
     const auto key = [&](Int3 b) {
       return static_cast<std::uint64_t>(linear_index(b, lattice_.bricks()));
     };
-    std::erase_if(of_tile, [&](Int3 b) { return needed.count(key(b)) > 0; });
+    std::erase_if(of_tile, [&](Int3 b) { return needed.contains(key(b)); });
     if (!batch.tiles.empty() && batch.bricks.size() + of_tile.size() > max_bricks_) break;
     for (const Int3 b : of_tile) {
       needed.insert(key(b));
