@@ -64,6 +64,13 @@ struct BrickLocation {
 struct BrickTimes {
   double read_seconds = 0, decode_seconds = 0;
   std::uint64_t bytes_read = 0, bytes_decoded = 0;  ///< encoded and decoded
+
+  /// Whether reads come from memory, going by their speed: then hints to the disk (will_need)
+  /// gain nothing, and each is a call of the system.
+  bool from_memory() const {
+    constexpr double most_seconds_a_byte = 1e-9;
+    return bytes_read > 0 && read_seconds < most_seconds_a_byte * static_cast<double>(bytes_read);
+  }
 };
 
 /// Ranges of an aligned box of 16³ blocks (or of bricks), C order [z, y, x]

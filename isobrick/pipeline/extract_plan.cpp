@@ -8,6 +8,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/gpu_backend.h"
+#include "isobrick/stream/brick_slots.h"
 #include "isobrick/stream/tile_stream.h"
 
 namespace isobrick {
@@ -51,7 +52,7 @@ constexpr std::uint64_t kCudaDriver = std::uint64_t{128} << 20;
 /// What every extraction takes besides its surface and its bricks.
 std::uint64_t fixed_bytes(const ExtractRequest& request) {
   const Lattice& lattice = request.level->lattice;
-  return kBase + request.level->index_bytes +
+  return kBase + request.level->index_bytes + BrickSlots::bytes(lattice) +
          static_cast<std::uint64_t>(request.threads) * (kDecoder + lattice.brick_bytes()) +
          request.search_memory;
 }

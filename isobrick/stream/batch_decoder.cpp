@@ -20,10 +20,6 @@ constexpr std::size_t kSlabsAhead = 3;
 /// Batches that are decoded ahead in any case: one to take, one to work on.
 constexpr std::size_t kBatchesAhead = 2;
 
-/// What reads faster than this, in seconds a byte, comes from memory and needs no hints: each
-/// is a call of the system.
-constexpr double kFastRead = 1e-9;
-
 std::uint64_t key_of(Int3 brick, Int3 grid) {
   return static_cast<std::uint64_t>(linear_index(brick, grid));
 }
@@ -52,8 +48,7 @@ BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& pl
       threads_count_(threads),
       bricks_of_job_(std::clamp<std::size_t>(kBytesOfJob / lattice_.brick_bytes(), 1, 64)),
       memory_(memory),
-      slots_(lattice_, reach),
-      seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {
+      slots_(lattice_, reach) {
   {
     const std::lock_guard lock(mutex_);
     grow_if_short();
@@ -171,10 +166,7 @@ std::byte* BatchDecoder::place(Int3 brick) {
 }
 
 void BatchDecoder::hint(const TileBatch& batch) {
-  const BrickTimes times = store_.brick_times();
-  if (times.bytes_read > 0 &&
-      times.read_seconds < kFastRead * static_cast<double>(times.bytes_read))
-    return;
+  if (store_.brick_times().from_memory()) return;
   std::vector<Int3> missing;
   const std::lock_guard lock(mutex_);
   std::copy_if(batch.bricks.begin(), batch.bricks.end(), std::back_inserter(missing),
@@ -235,16 +227,7 @@ void BatchDecoder::decode(int thread, const Batch& batch, const std::vector<Load
     if (present.back()) memory_.end(thread, load.samples);
   }
   const std::lock_guard lock(mutex_);
-  for (std::size_t i = 0; i < loads.size(); ++i) {
-    if (!present[i]) {
-      slots_.set_absent(loads[i].brick);
-      continue;
-    }
-    auto is_seen = seen_[key_of(loads[i].brick, batch->grid_)];
-    ++reads_;
-    bricks_read_ += !is_seen;
-    is_seen = true;
-  }
+  for (std::size_t i = 0; i < loads.size(); ++i) slots_.decoded(loads[i].brick, present[i] != 0);
   batch->missing_ -= loads.size();
   if (batch->missing_ == 0) changed_.notify_all();
 }

@@ -66,8 +66,8 @@ class BatchDecoder {
   /// Memory for bricks that there is. After the end.
   std::uint64_t memory_bytes() const { return memory_bytes_; }
   /// Bricks read and decoded, and how many different ones. After the end.
-  std::uint64_t reads() const { return reads_; }
-  std::uint64_t bricks_read() const { return bricks_read_; }
+  std::uint64_t reads() const { return slots_.reads(); }
+  std::uint64_t bricks_read() const { return slots_.bricks_read(); }
 
   /// Bricks whose memory is got at a time: large pieces are quicker to get, but they
   /// are not to be all of a small capacity.
@@ -118,8 +118,6 @@ class BatchDecoder {
   bool planned_ = false, stop_ = false;
   std::exception_ptr error_;
   std::vector<std::shared_ptr<std::byte>> slabs_;
-  std::vector<bool> seen_;
-  std::uint64_t reads_ = 0, bricks_read_ = 0;
 
   std::vector<std::thread> threads_;
 };

@@ -24,7 +24,7 @@ CachedBricks::~CachedBricks() noexcept {
 
 void CachedBricks::wait() {
   tasks_.wait();
-  for (const Load& load : loads_) cache_.finish(load);
+  for (const Load& load : loads_) cache_.slots_.decoded(load.brick, load.present);
   loads_.clear();
   for (const Int3 b : bricks_) samples_[cache_.key(b)] = cache_.slots_.find(b);
 }
@@ -40,8 +40,7 @@ BrickCache::BrickCache(const StoreReader& store, int level, Index reach, std::si
       level_(level),
       lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
       capacity_(capacity),
-      slots_(lattice_, reach),
-      seen_(static_cast<std::size_t>(volume(lattice_.bricks()))) {}
+      slots_(lattice_, reach) {}
 
 std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, Int3 last) {
   auto begun = std::make_unique<CachedBricks>(*this);
@@ -85,15 +84,8 @@ void BrickCache::grow() {
   places_ += count;
 }
 
-void BrickCache::finish(const CachedBricks::Load& load) {
-  if (!load.present) return slots_.set_absent(load.brick);
-  auto is_seen = seen_[key(load.brick)];
-  ++reads_;
-  bricks_read_ += !is_seen;
-  is_seen = true;
-}
-
 void BrickCache::will_need(CachedBricks& begun, std::vector<Int3> bricks) {
+  if (store_.brick_times().from_memory()) return;
   std::erase_if(bricks, [&](Int3 b) { return slots_.contains(b); });
   begun.tasks_.run([this, bricks = std::move(bricks)] {
     for (const Int3 b : bricks) store_.will_need(level_, b);

@@ -71,8 +71,8 @@ class BrickCache {
   void will_need(CachedBricks& begun, std::vector<Int3> bricks);
 
   /// Bricks read and decoded so far, and how many different ones.
-  std::uint64_t reads() const { return reads_; }
-  std::uint64_t bricks_read() const { return bricks_read_; }
+  std::uint64_t reads() const { return slots_.reads(); }
+  std::uint64_t bricks_read() const { return slots_.bricks_read(); }
 
  private:
   friend class CachedBricks;
@@ -81,7 +81,6 @@ class BrickCache {
   }
   std::byte* place(Int3 brick);
   void grow();
-  void finish(const CachedBricks::Load& load);
 
   const StoreReader& store_;
   const int level_;
@@ -93,8 +92,6 @@ class BrickCache {
   };
   std::vector<std::unique_ptr<std::byte, Free>> slabs_;  ///< memory of many bricks each
   std::size_t places_ = 0;                               ///< that there is memory for
-  std::vector<bool> seen_;
-  std::uint64_t reads_ = 0, bricks_read_ = 0;
 };
 
 }  // namespace isobrick

@@ -76,10 +76,17 @@ std::byte* BrickSlots::place(Int3 brick) {
   return slot;
 }
 
-void BrickSlots::set_absent(Int3 brick) {
-  Entry& entry = entries_.at(key(brick));
-  free_.push_back(entry.slot);
-  entry.slot = nullptr;
+void BrickSlots::decoded(Int3 brick, bool present) {
+  if (!present) {
+    Entry& entry = entries_.at(key(brick));
+    free_.push_back(entry.slot);
+    entry.slot = nullptr;
+    return;
+  }
+  auto is_seen = seen_[static_cast<std::size_t>(key(brick))];
+  ++reads_;
+  bricks_read_ += !is_seen;
+  is_seen = true;
 }
 
 void BrickSlots::release(Int3 brick) {

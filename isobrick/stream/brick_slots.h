@@ -26,7 +26,10 @@ std::uint64_t last_use(const Lattice& lattice, Index reach, Int3 brick);
 /// needed for the longest time. Books only; not thread-safe.
 class BrickSlots {
  public:
-  BrickSlots(const Lattice& lattice, Index reach) : lattice_(lattice), reach_(reach) {}
+  BrickSlots(const Lattice& lattice, Index reach)
+      : lattice_(lattice),
+        reach_(reach),
+        seen_(static_cast<std::size_t>(volume(lattice.bricks()))) {}
 
   /// Takes over memory for `count` bricks, one after the other.
   void add_slots(std::byte* memory, std::size_t count);
@@ -38,8 +41,8 @@ class BrickSlots {
   bool hold(Int3 brick);
   /// Puts a brick that is not here into a slot, and holds it. Null when all slots are held.
   std::byte* place(Int3 brick);
-  /// The brick, which is here, has no samples of its own: its slot is free again.
-  void set_absent(Int3 brick);
+  /// The brick, which is here, was decoded, or it is absent and its slot free again.
+  void decoded(Int3 brick, bool present);
   void release(Int3 brick);
 
   bool contains(Int3 brick) const { return entries_.count(key(brick)) > 0; }
@@ -47,6 +50,13 @@ class BrickSlots {
   const std::byte* find(Int3 brick) const { return entries_.at(key(brick)).slot; }
   /// Slots that nothing is lost by using.
   std::size_t free_slots() const { return free_.size(); }
+  /// Bricks decoded so far, and how many different ones.
+  std::uint64_t reads() const { return reads_; }
+  std::uint64_t bricks_read() const { return bricks_read_; }
+  /// What telling those apart takes.
+  static std::uint64_t bytes(const Lattice& lattice) {
+    return static_cast<std::uint64_t>(volume(lattice.bricks())) / 8;
+  }
 
  private:
   struct Entry {
@@ -66,6 +76,8 @@ class BrickSlots {
   std::unordered_map<std::uint64_t, Entry> entries_;
   std::set<std::pair<std::uint64_t, std::uint64_t>> idle_;  ///< held by nobody: next use, key
   std::vector<std::byte*> free_;
+  std::vector<bool> seen_;
+  std::uint64_t reads_ = 0, bricks_read_ = 0;
 };
 
 }  // namespace isobrick

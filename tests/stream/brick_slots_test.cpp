@@ -60,7 +60,7 @@ TEST(BrickSlots, WhatNobodyNeedsAnyMoreIsFreed) {
   slots.add_slots(memory.data(), 2);
   slots.place({0, 0, 0});
   slots.place({1, 0, 0});
-  slots.set_absent({1, 0, 0});
+  slots.decoded({1, 0, 0}, false);
   EXPECT_EQ(slots.find({1, 0, 0}), nullptr);
   EXPECT_EQ(slots.free_slots(), 1u);
   slots.release({1, 0, 0});
@@ -73,6 +73,20 @@ TEST(BrickSlots, WhatNobodyNeedsAnyMoreIsFreed) {
   EXPECT_EQ(slots.free_slots(), 2u);
   slots.advance(morton_encode({7, 1, 1}) + 1);
   EXPECT_FALSE(slots.contains({1, 0, 0}));
+}
+
+TEST(BrickSlots, CountsWhatIsDecodedAgain) {
+  const Lattice lattice{{256, 64, 64}, {64, 64, 64}, ScalarType::u8};
+  std::vector<std::byte> memory(lattice.brick_bytes());
+  BrickSlots slots(lattice, 0);
+  slots.add_slots(memory.data(), 1);
+  for (const Index x : {0, 1, 0, 2, 0}) {
+    slots.place({x, 0, 0});
+    slots.decoded({x, 0, 0}, x != 2);
+    slots.release({x, 0, 0});
+  }
+  EXPECT_EQ(slots.reads(), 4u) << "absent bricks are none";
+  EXPECT_EQ(slots.bricks_read(), 2u);
 }
 
 }  // namespace
