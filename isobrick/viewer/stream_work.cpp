@@ -84,6 +84,8 @@ void SceneStream::Shared::received(const std::shared_ptr<Running>& r, NodeMesh&&
     give_up(by, failure);
     if (!r->abandoned) jobs.push_back(r->job);
     work.notify_one();
+  } else {
+    const NodeMesh dropped = std::move(mesh);  // not later, when nobody waits any more
   }
   // Before anybody hears of it: this is the device's thread, which should not be the last to hold
   // the device.
