@@ -70,7 +70,10 @@ class Flight {
             arguments_.isovalue +
             (0.5 - 0.5 * std::cos(part * kTurn)) * (arguments_.to - arguments_.isovalue);
       Stopwatch watch;
-      const double submitted = draw(pacer_.plain(), pacer_.coarser(), pacer_.smaller());
+      const double submitted =
+          draw({.coarser = pacer_.coarser(),
+                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no},
+               pacer_.smaller());
       const double seconds = watch.lap();
       const PictureState& state = picture_->state();
       pictures.push_back({seconds * 1e3, pacer_.coarser(), pacer_.smaller(), pacer_.plain(),
@@ -88,23 +91,22 @@ class Flight {
   /// As the window draws when nothing moves, until nothing is missing.
   void rest() {
     const auto draw_still = [&] {
-      const bool plain = pacer_.plain() && !picture_->state().complete;
+      PictureWay way;
+      if (pacer_.plain()) way.plain = PictureWay::Plain::until_complete;
       Stopwatch watch;
-      draw(plain, 1, 1);
-      if (!plain) pacer_.drawn_still(watch.lap());
+      draw(way, 1);
+      if (!picture_->state().plain) pacer_.drawn_still(watch.lap());
     };
     do draw_still();
-    while (!picture_->state().complete);
-    draw_still();
+    while (!picture_->state().complete || picture_->state().plain);
   }
 
  private:
   /// Seconds until OpenGL was told.
-  double draw(bool plain, double coarser, int smaller) {
+  double draw(const PictureWay& way, int smaller) {
     Stopwatch watch;
-    ViewSettings now = settings_;
-    if (plain) now.occlusion = now.multisample = false;
-    picture_->draw(camera_, arguments_.width / smaller, arguments_.height / smaller, now, coarser);
+    picture_->draw(camera_, arguments_.width / smaller, arguments_.height / smaller, settings_,
+                   way);
     const double submitted = watch.lap();
     glFinish();
     return submitted;
