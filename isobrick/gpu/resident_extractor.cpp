@@ -164,7 +164,7 @@ struct ResidentExtractor::Impl {
     p.end.zero_words = static_cast<std::uint32_t>(
         (words.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
     launch_extraction(kernel_of(volume.lattice.type, options), p, case_entries.data(),
-                      shapes.of(active), volume.stream.get());
+                      shapes.of(active), volume.stream.get(), !searched_by_blocks());
   }
 
   /// Buffers for a mesh of that size. What they held is lost.

@@ -17,6 +17,7 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   __shared__ std::uint32_t warp_sums[kWarps];
   __shared__ std::uint32_t block;
   __shared__ unsigned long long base;
+  let_next_launch_start();
   if (threadIdx.x == 0) block = atomicAdd(p.ticket, 1u);
   __syncthreads();
   const std::uint32_t first = block * kTilesOfSearchBlock + threadIdx.x * kTilesOfThread;

@@ -258,12 +258,11 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   extern __shared__ __align__(256) unsigned char bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(bytes);
   const std::uint32_t first = next_number(p);
-  if (p.candidates.count > 0)
-    find_candidates<N, T>(s, p);
-  else if (threadIdx.x == 0)
-    s.items = *p.item_count;
+  if (p.candidates.count > 0) find_candidates<N, T>(s, p);
   fill_tables<N>(s, case_entries);
   const Classifier<T> classifier(threshold);
+  wait_for_launch_before();
+  if (p.candidates.count == 0 && threadIdx.x == 0) s.items = *p.item_count;
   __syncthreads();
   take_tile<T>(s, p, first);
   __syncthreads();
@@ -329,9 +328,20 @@ struct Launcher {
     return each * device_attribute(cudaDevAttrMultiProcessorCount);
   }
   static void launch(const TileParams& params, const std::uint16_t* case_entries, int blocks,
-                     cudaStream_t stream) {
-    kKernel<<<blocks, N, shared(), stream>>>(params, Threshold<T>(params.isovalue).value,
-                                             case_entries);
+                     cudaStream_t stream, bool after_search) {
+    cudaLaunchAttribute early{};
+    early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    early.val.programmaticStreamSerializationAllowed = 1;
+    cudaLaunchConfig_t config{};
+    config.gridDim = static_cast<unsigned>(blocks);
+    config.blockDim = N;
+    config.dynamicSmemBytes = shared();
+    config.stream = stream;
+    config.attrs = &early;
+    config.numAttrs =
+        after_search && device_attribute(cudaDevAttrComputeCapabilityMajor) >= 9 ? 1 : 0;
+    check(cudaLaunchKernelEx(&config, kKernel, params, Threshold<T>(params.isovalue).value,
+                             case_entries));
     check_launch("extract_tiles");
   }
 };
@@ -415,9 +425,11 @@ LaunchShape LaunchShapes::of(std::uint32_t tiles) const {
 }
 
 void launch_extraction(const TileKernel& kernel, const TileParams& params,
-                       const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream) {
-  visit_launcher(kernel, shape.threads,
-                 [&](auto l) { l.launch(params, case_entries, shape.blocks, stream); });
+                       const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream,
+                       bool after_search) {
+  visit_launcher(kernel, shape.threads, [&](auto l) {
+    l.launch(params, case_entries, shape.blocks, stream, after_search);
+  });
 }
 
 }  // namespace isobrick::gpu

@@ -43,8 +43,10 @@ struct LaunchShapes {
 LaunchShapes launch_shapes(const TileKernel& kernel, int threads = 0);
 
 /// Launches the extraction of all items on `stream`: one block takes one tile
-/// after the other, in their order.
+/// after the other, in their order. After a search, which finds them, blocks start while it is
+/// at work.
 void launch_extraction(const TileKernel& kernel, const TileParams& params,
-                       const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream);
+                       const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream,
+                       bool after_search = false);
 
 }  // namespace isobrick::gpu

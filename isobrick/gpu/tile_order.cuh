@@ -15,6 +15,19 @@ inline constexpr unsigned long long kOwnSum = 1ull << 62, kFullSum = 2ull << 62,
 using DeviceWord = cuda::atomic_ref<unsigned long long, cuda::thread_scope_device>;
 using DeviceFlag = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>;
 
+/// Where a launch may start before the one before it on the stream has ended: the latter says
+/// so, and the former waits for what it writes. Before Hopper launches do not overlap.
+__device__ inline void let_next_launch_start() {
+#if __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.launch_dependents;");
+#endif
+}
+__device__ inline void wait_for_launch_before() {
+#if __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+
 __device__ inline unsigned long long warp_sum_64(unsigned long long v) {
 #pragma unroll
   for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kAll, v, d);
