@@ -35,7 +35,8 @@ struct Arguments {
   std::string raw, synth, type = "u8", write_raw;
   std::vector<Index> dims{512, 512, 512};
   double isovalue = 0;
-  bool has_isovalue = false, normals = false, check = false, cpu = false, json = false;
+  bool has_isovalue = false, normals = false, brute_force = false, check = false, cpu = false,
+       json = false;
   double frequency = 0, noise = 0;
   int runs = 25;
 };
@@ -100,7 +101,9 @@ int run(const Arguments& a) {
   options.roi = lattice.box();
 
   gpu::DeviceVolume resident(lattice, bricks, 0);
-  gpu::ResidentExtractor extractor(resident, options);
+  gpu::ResidentTuning tuning;
+  if (a.brute_force) tuning.search = gpu::TileSearch::none;
+  gpu::ResidentExtractor extractor(resident, options, tuning);
   const gpu::DeviceCounts counts = extractor.extract(options.isovalue);
   nlohmann::json out;
   if (a.check || a.cpu) {
@@ -132,6 +135,7 @@ int run(const Arguments& a) {
   out["type"] = short_name(v.type);
   out["isovalue"] = options.isovalue;
   out["normals"] = a.normals;
+  out["brute_force"] = a.brute_force;
   out["vertices"] = counts.vertices;
   out["triangles"] = counts.triangles;
   out["active_tiles"] = counts.active_tiles;
@@ -177,6 +181,7 @@ int main(int argc, char** argv) {
   app.add_option("--runs", a.runs);
   app.add_option("--write-raw", a.write_raw, "also writes the volume");
   app.add_flag("--normals", a.normals);
+  app.add_flag("--brute-force", a.brute_force, "take every tile instead of searching");
   app.add_flag("--check", a.check, "compare with the CPU's mesh");
   app.add_flag("--cpu", a.cpu, "time the CPU as well");
   app.add_flag("--json", a.json);

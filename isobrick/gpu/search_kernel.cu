@@ -12,6 +12,19 @@ namespace {
 constexpr int kThreads = 256, kWarps = kThreads / 32;
 constexpr int kTilesOfThread = static_cast<int>(kTilesOfSearchBlock) / kThreads;
 
+/// Of one value a warp: the sum before this warp and of all.
+struct SumOfWarps {
+  std::uint32_t before, all;
+};
+
+__device__ SumOfWarps sum_of_warps(const std::uint32_t* values) {
+  SumOfWarps sum;
+  const std::uint32_t v = lane_id() < kWarps ? values[lane_id()] : 0;
+  sum.all = warp_sum(v);
+  sum.before = warp_sum(lane_id() < warp_id() ? v : 0u);
+  return sum;
+}
+
 template <class T>
 __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__ SearchParams p) {
   __shared__ std::uint32_t warp_sums[kWarps];
@@ -31,7 +44,7 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   const std::uint32_t sum = warp_inclusive_sum(own);
   if (lane_id() == 31) warp_sums[threadIdx.x >> 5] = sum;
   __syncthreads();
-  const SumOfWarps warps = sum_of_warps<kThreads>(warp_sums);
+  const SumOfWarps warps = sum_of_warps(warp_sums);
   if (threadIdx.x < 32) {
     if (lane_id() == 0) publish_sum(p.sums[block], block, warps.all);
     const unsigned long long before = sum_before(

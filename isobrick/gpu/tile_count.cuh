@@ -380,18 +380,4 @@ __device__ inline std::uint32_t triangles_before(TileShared& s, std::uint32_t gr
   return warp_sum(sum);
 }
 
-/// Of one value a warp: the sum before this warp and of all.
-struct SumOfWarps {
-  std::uint32_t before, all;
-};
-
-template <int N>
-__device__ inline SumOfWarps sum_of_warps(const std::uint32_t* values) {
-  SumOfWarps sum;
-  const std::uint32_t v = lane_id() < Team<N>::kWarps ? values[lane_id()] : 0;
-  sum.all = warp_sum(v);
-  sum.before = warp_sum(lane_id() < warp_id() ? v : 0u);
-  return sum;
-}
-
 }  // namespace isobrick::gpu

@@ -4,97 +4,14 @@
 #include "isobrick/core/threshold.h"
 #include "isobrick/gpu/cuda_check.h"
 #include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/streamed_pages.cuh"
 #include "isobrick/gpu/tile_emit.cuh"
 #include "isobrick/gpu/tile_nan.cuh"
 #include "isobrick/gpu/tile_order.cuh"
+#include "isobrick/gpu/tile_take.cuh"
 #include "isobrick/surface/case_tables.h"
 
 namespace isobrick::gpu {
 namespace {
-
-/// Pages of the tiles around one, and the first columns of those one higher along x; where
-/// there is none, any that is. The first warp.
-template <class T>
-__device__ void find_pages(TileShared& s, const TileParams& p, const TileItem& item,
-                           std::uint32_t number) {
-  if (threadIdx.x >= 31) return;
-  const int column = static_cast<int>(threadIdx.x) - 27;
-  const int n = column < 0 ? static_cast<int>(threadIdx.x)
-                           : page_of(32, 32 * (column & 1), 32 * (column >> 1));
-  const int dx = n % 3 - 1, dy = n / 3 % 3 - 1, dz = n / 9 - 1;
-  std::int64_t start = 0;
-  std::uint32_t page = 0;
-  if (p.links) {
-    start = streamed_page(number, n);
-  } else {
-    const int x = item.x + dx, y = item.y + dy, z = item.z + dz;
-    const bool exists =
-        x >= 0 && y >= 0 && z >= 0 && x < p.tiles[0] && y < p.tiles[1] && z < p.tiles[2];
-    page = exists
-               ? page_of_place(p, (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x)
-               : p.fill_page;
-    start = static_cast<std::int64_t>(page) * kPageSamples;
-  }
-  const auto address = [](const void* from, std::int64_t samples) {
-    return reinterpret_cast<std::uintptr_t>(from) + samples * static_cast<std::int64_t>(sizeof(T));
-  };
-  // Samples of the pages, or columns, between.
-  const int before = dx * 32 + dy * 1024 + dz * 32768, columns_before = dy * 32 + dz * 1024;
-  if (column < 0)
-    s.pages[n] = address(p.pages, start - before);
-  else if (p.columns)
-    s.columns[column] =
-        address(p.columns, static_cast<std::int64_t>(page) * kColumnSamples - columns_before);
-  else
-    s.columns[column] = address(p.pages, start - before + 32);
-}
-
-__device__ TileItem item_of(const TileShared& s, const TileParams& p, std::uint32_t number) {
-  if (p.candidates.count == 0) return p.items[number];
-  const std::int32_t* tile = p.candidates.tiles + 3 * candidate_of_number(s, number);
-  return {tile[0], tile[1], tile[2], number};
-}
-
-/// Which tile is the next. The first thread; others get anything.
-__device__ std::uint32_t next_number(const TileParams& p) {
-  return threadIdx.x == 0 ? atomicAdd(p.ticket, 1u) : 0;
-}
-
-/// The first warp takes the tile with that number.
-template <class T>
-__device__ void take_tile(TileShared& s, const TileParams& p, std::uint32_t number) {
-  if (warp_id() != 0) return;
-  number = __shfl_sync(kAll, number, 0);
-  if (lane_id() == 0) s.item = number;
-  if (number >= s.items) return;
-  const TileItem tile = item_of(s, p, number);
-  find_pages<T>(s, p, tile, number);
-  if (lane_id() == 0) {
-    s.tile = tile;
-    s.shape = shape_of(p, tile);
-  }
-}
-
-/// Brings the samples of a tile that is about to be taken into the L2 cache.
-template <int N, class T>
-__device__ void prefetch_tile(const TileShared& s, const TileParams& p, std::uint32_t number) {
-  if (number >= s.items) return;
-  constexpr std::size_t bytes = kPageSamples * sizeof(T);
-  const char* from = static_cast<const char*>(p.pages);
-  if (p.links) {
-    from += streamed_page(number, kOwnPage) * static_cast<std::int64_t>(sizeof(T));
-  } else {
-    const TileItem item = item_of(s, p, number);
-    const std::int64_t place =
-        (static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] + item.x;
-    const std::uint32_t page = page_of_place(p, place);
-    if (page == p.fill_page) return;
-    from += page * bytes;
-  }
-  for (std::size_t at = own_thread() * 128; at < bytes; at += N * 128)
-    asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
-}
 
 template <std::uint32_t Listed, bool Nan = false>
 constexpr std::size_t kSharedBytes = sizeof(TileShared) +
