@@ -1,7 +1,8 @@
 #include "isobrick/pipeline/convert_level.h"
 
 #include <tbb/parallel_invoke.h>
-#include <tbb/parallel_pipeline.h>
+
+#include "isobrick/pipeline/in_order.h"
 
 namespace isobrick {
 LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int level,
@@ -29,23 +30,18 @@ void LevelWriter::write_bricks(Box3 box, const std::byte* samples) {
   const Box3 bricks = info_.lattice.bricks_of(box);
   const Int3 count = bricks.extent();
   Index next = 0;
-  const auto take = [&](tbb::flow_control& flow) {
-    if (next == volume(count)) flow.stop();
+  const auto take = [&](PackedBrick& packed) {
+    if (next == volume(count)) return false;
     const Index i = next++;
-    return bricks.lo + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
+    packed.brick = bricks.lo + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
+    return true;
   };
-  tbb::parallel_pipeline(
-      bricks_in_flight_,
-      tbb::make_filter<void, Int3>(tbb::filter_mode::serial_in_order, take) &
-          tbb::make_filter<Int3, PackedBrick>(tbb::filter_mode::parallel,
-                                              [&](Int3 brick) {
-                                                return output_.pack(
-                                                    brick, box, samples,
-                                                    is_kept(floor_div(brick, bricks_per_shard_)));
-                                              }) &
-          tbb::make_filter<PackedBrick, void>(
-              tbb::filter_mode::serial_in_order,
-              [&](const PackedBrick& packed) { output_.deliver(packed); }));
+  const auto pack = [&](PackedBrick& packed) {
+    const bool kept = is_kept(floor_div(packed.brick, bricks_per_shard_));
+    packed = output_.pack(packed.brick, box, samples, kept);
+  };
+  run_in_order<PackedBrick>(bricks_in_flight_, take, pack,
+                            [&](const PackedBrick& packed) { output_.deliver(packed); });
 }
 
 void LevelWriter::finish_shards(Index z1) {

@@ -1,7 +1,6 @@
 #include "isobrick/pipeline/convert_sparse.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -17,6 +16,7 @@
 #include "isobrick/io/output_file.h"
 #include "isobrick/pipeline/brick_output.h"
 #include "isobrick/pipeline/downsample.h"
+#include "isobrick/pipeline/in_order.h"
 
 namespace isobrick {
 namespace {
@@ -61,12 +61,13 @@ class BrickSpool {
   std::vector<SparseBrick> bricks_;
 };
 
-/// What has become of a family.
+/// A family, and what has become of it.
 struct Parcel {
   struct Brick {
     PackedBrick packed;
     BrickBlocks ranges;
   };
+  std::span<const SparseBrick> family;
   Int3 parent;
   std::vector<Brick> bricks;
   PodBuffer<std::byte> average;  ///< the parent's samples, a full brick; empty in the last level
@@ -122,29 +123,22 @@ class SparsePyramid::Level {
   /// leaves the next level's bricks in `next`.
   void write(VolumeSource& source, const BrickSpool* spool, BrickSpool* next,
              std::size_t in_flight) {
-    using Family = std::span<const SparseBrick>;
     std::size_t taken = 0;
-    const auto take = [&](tbb::flow_control& flow) {
-      const Family family = bricks_.family_at(taken);
-      if (family.empty()) flow.stop();
-      taken += family.size();
-      return family;
+    const auto take = [&](Parcel& parcel) {
+      parcel.family = bricks_.family_at(taken);
+      taken += parcel.family.size();
+      return !parcel.family.empty();
     };
     Index layer = 0;
-    const auto deliver = [&](const std::shared_ptr<Parcel>& parcel) {
-      for (; layer < parcel->parent.z; ++layer) close(2 * (layer + 1) * info_.lattice.brick.z);
-      put(*parcel);
+    const auto deliver = [&](const Parcel& parcel) {
+      for (; layer < parcel.parent.z; ++layer) close(2 * (layer + 1) * info_.lattice.brick.z);
+      put(parcel);
       if (next != nullptr &&
-          !all_fill(info_.lattice.type, parcel->average.span(), layout_.fill_value))
-        next->append(parcel->parent, parcel->average.span());
+          !all_fill(info_.lattice.type, parcel.average.span(), layout_.fill_value))
+        next->append(parcel.parent, parcel.average.span());
     };
-    tbb::parallel_pipeline(
-        in_flight, tbb::make_filter<void, Family>(tbb::filter_mode::serial_in_order, take) &
-                       tbb::make_filter<Family, std::shared_ptr<Parcel>>(
-                           tbb::filter_mode::parallel,
-                           [&](Family family) { return pack(family, source, spool, next); }) &
-                       tbb::make_filter<std::shared_ptr<Parcel>, void>(
-                           tbb::filter_mode::serial_in_order, deliver));
+    run_in_order<Parcel>(
+        in_flight, take, [&](Parcel& parcel) { pack(parcel, source, spool, next); }, deliver);
     close(info_.lattice.extent.z);
     if (next != nullptr) next->finish();
   }
@@ -193,23 +187,20 @@ class SparsePyramid::Level {
     });
   }
 
-  std::shared_ptr<Parcel> pack(std::span<const SparseBrick> family, VolumeSource& source,
-                               const BrickSpool* spool, const BrickSpool* next) {
+  void pack(Parcel& parcel, VolumeSource& source, const BrickSpool* spool, const BrickSpool* next) {
     const Lattice& lattice = info_.lattice;
-    auto parcel = std::make_shared<Parcel>();
-    parcel->parent = parent_of(family.front().brick);
+    parcel.parent = parent_of(parcel.family.front().brick);
     if (next != nullptr) {
-      parcel->average.resize(lattice.brick_bytes());
-      const Box3 whole = lattice.full_brick_box(parcel->parent);
-      fill_box(lattice.type, layout_.fill_value, {parcel->average.data(), whole}, whole);
+      parcel.average.resize(lattice.brick_bytes());
+      const Box3 whole = lattice.full_brick_box(parcel.parent);
+      fill_box(lattice.type, layout_.fill_value, {parcel.average.data(), whole}, whole);
     }
     // A thread that waits for a part of one family must not begin another one:
     // they would share its buffers.
     tbb::this_task_arena::isolate([&] {
-      for (const SparseBrick& brick : family)
-        parcel->bricks.push_back(pack_brick(brick, source, spool, next ? parcel.get() : nullptr));
+      for (const SparseBrick& brick : parcel.family)
+        parcel.bricks.push_back(pack_brick(brick, source, spool, next ? &parcel : nullptr));
     });
-    return parcel;
   }
 
   Parcel::Brick pack_brick(const SparseBrick& item, VolumeSource& source, const BrickSpool* spool,
