@@ -120,11 +120,13 @@ class Session {
     glFinish();
     const double seconds = seconds_since(start);
     const PictureState& state = picture_->state();
-    if (!moving && state.complete && !state.plain)
-      at_rest.add(seconds);
-    else
-      pictures.add(seconds, picture_->times(), seconds - submitted);
-    if (picture_->times().draw > 0) began_ = start;
+    if (picture_->times().draw > 0) {  // nothing is drawn that would look the same
+      began_ = start;
+      if (!moving && state.complete && !state.plain)
+        at_rest.add(seconds);
+      else
+        pictures.add(seconds, picture_->times(), seconds - submitted);
+    }
     if (moving)
       pacer_.drawn(seconds);
     else if (!state.plain)

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <exception>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -91,6 +92,7 @@ struct BrickPool::Impl {
   std::uint64_t timing = 0;  ///< bricks of the request that is being timed
   double timed_seconds = 0;
   std::uint64_t timed_bricks = 0;
+  std::exception_ptr failure;  ///< of a request: its bricks will never be there
 
   Impl(int id, std::size_t of_brick, std::size_t count, int threads)
       : device(make_current(id)),
@@ -138,6 +140,16 @@ struct BrickPool::Impl {
 
   /// Asks for the copies of what has ended; `requesting` is held.
   void request() {
+    if (failure) std::rethrow_exception(failure);
+    try {
+      request_all();
+    } catch (...) {
+      failure = std::current_exception();
+      throw;
+    }
+  }
+
+  void request_all() {
     std::vector<Piece> pieces;
     {
       const std::lock_guard lock(mutex);

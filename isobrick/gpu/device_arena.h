@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "isobrick/gpu/cuda_check.h"
+#include "isobrick/gpu/stream_layout.h"
 
 namespace isobrick::gpu {
 
@@ -33,7 +34,7 @@ class DeviceArena {
   template <class T>
   T* take(std::size_t count) {
     std::byte* at = data_ + used_;
-    used_ += (count * sizeof(T) + 255) & ~std::size_t{255};
+    used_ += StagingLayout::aligned(count * sizeof(T));
     return reinterpret_cast<T*>(at);
   }
 

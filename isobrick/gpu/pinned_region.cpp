@@ -1,43 +1,41 @@
 #include "isobrick/gpu/pinned_region.h"
 
-#include <sys/mman.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdint>
 
-#include "isobrick/core/error.h"
 #include "isobrick/gpu/cuda_check.h"
 
 namespace isobrick::gpu {
 namespace {
 
-constexpr std::size_t kPage = 4096, kLargePage = std::size_t{2} << 20;
-
-/// What pages are read as at first is written, a large page at a time on any core.
-void touch(std::byte* data, std::size_t bytes) {
-  tbb::parallel_for(std::size_t{0}, (bytes + kLargePage - 1) / kLargePage, [&](std::size_t i) {
-    const std::size_t end = std::min(bytes, (i + 1) * kLargePage);
-    for (std::size_t at = i * kLargePage; at < end; at += kPage)
-      *static_cast<volatile std::byte*>(data + at) = std::byte{0};
+/// Touches a large page at a time on any core of the arena.
+void touch(tbb::task_arena& arena, std::byte* data, std::size_t bytes) {
+  constexpr std::size_t kEach = MappedPages::kLargePage;
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, (bytes + kEach - 1) / kEach, [&](std::size_t i) {
+      MappedPages::touch(data + i * kEach, std::min(kEach, bytes - i * kEach));
+    });
   });
+}
+
+/// Where each piece begins, and the end.
+std::vector<std::size_t> offsets_of(const std::vector<std::size_t>& pieces) {
+  std::vector<std::size_t> offsets{0};
+  for (const std::size_t bytes : pieces)
+    offsets.push_back(offsets.back() + MappedPages::whole_pages(bytes));
+  return offsets;
 }
 
 }  // namespace
 
-PinnedRegion::PinnedRegion(int device, const std::vector<std::size_t>& pieces) : device_(device) {
-  offsets_.push_back(0);
-  for (const std::size_t bytes : pieces)
-    offsets_.push_back(offsets_.back() + (bytes + kPage - 1) / kPage * kPage);
-  mapped_ = offsets_.back() + kLargePage;
-  mapping_ = mmap(nullptr, mapped_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (mapping_ == MAP_FAILED) throw system_error("cannot get page-locked memory", "mmap", errno);
-  const auto first = reinterpret_cast<std::uintptr_t>(mapping_);
-  data_ = reinterpret_cast<std::byte*>((first + kLargePage - 1) / kLargePage * kLargePage);
-  (void)madvise(data_, offsets_.back(), MADV_HUGEPAGE);
-  thread_ = std::thread([this] { run(); });
-}
+PinnedRegion::PinnedRegion(int device, const std::vector<std::size_t>& pieces)
+    : device_(device),
+      threads_(tbb::this_task_arena::max_concurrency()),
+      offsets_(offsets_of(pieces)),
+      pages_(offsets_.back()),
+      thread_([this] { run(); }) {}
 
 PinnedRegion::~PinnedRegion() {
   {
@@ -46,19 +44,21 @@ PinnedRegion::~PinnedRegion() {
   }
   thread_.join();
   for (std::size_t piece = 0; piece < locked_; ++piece) (void)cudaHostUnregister(at(piece));
-  (void)munmap(mapping_, mapped_);
+}
+
+bool PinnedRegion::stopped() {
+  const std::lock_guard lock(mutex_);
+  return stop_;
 }
 
 void PinnedRegion::run() {
   try {
     make_current(device_);
-    for (std::size_t piece = 0; piece + 1 < offsets_.size(); ++piece) {
-      {
-        const std::lock_guard lock(mutex_);
-        if (stop_) return;
-      }
-      touch(at(piece), bytes(piece));
+    tbb::task_arena arena(threads_);
+    for (std::size_t piece = 0; piece + 1 < offsets_.size() && !stopped(); ++piece) {
+      touch(arena, at(piece), bytes(piece));
       advance(touched_);
+      if (stopped()) return;
       check(cudaHostRegister(at(piece), bytes(piece), cudaHostRegisterMapped));
       advance(locked_);
     }

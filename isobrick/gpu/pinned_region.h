@@ -7,10 +7,13 @@
 #include <thread>
 #include <vector>
 
+#include "isobrick/gpu/mapped_pages.h"
+
 namespace isobrick::gpu {
 
 /// Page-locked host memory in pieces, which a thread of its own gets one after the other while
-/// others begin to work: all cores touch a piece, then the driver locks it.
+/// others begin to work: as many cores as its maker has to itself touch a piece, then the driver
+/// locks it.
 class PinnedRegion {
  public:
   /// Pieces of so many bytes, in the order in which they are needed. Throws Error where there
@@ -28,16 +31,15 @@ class PinnedRegion {
 
  private:
   void run();
+  bool stopped();
   void advance(std::size_t& count);
   std::byte* wait_for(std::size_t piece, const std::size_t& count);
-  std::byte* at(std::size_t piece) const { return data_ + offsets_[piece]; }
+  std::byte* at(std::size_t piece) const { return pages_.data() + offsets_[piece]; }
   std::size_t bytes(std::size_t piece) const { return offsets_[piece + 1] - offsets_[piece]; }
 
-  int device_;
+  int device_, threads_;
   std::vector<std::size_t> offsets_;  ///< of the pieces, and the end
-  void* mapping_ = nullptr;
-  std::size_t mapped_ = 0;
-  std::byte* data_ = nullptr;
+  MappedPages pages_;
 
   std::mutex mutex_;
   std::condition_variable changed_;

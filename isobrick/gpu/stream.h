@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "isobrick/gpu/cuda_check.h"
+#include "isobrick/gpu/mapped_pages.h"
 
 // Owners of CUDA objects. Destructors wait for nothing and never throw, also
 // when the driver has already been shut down at exit.
@@ -122,19 +123,17 @@ class PinnedMemory {
   explicit PinnedMemory(std::size_t bytes);
   PinnedMemory(PinnedMemory&& other) noexcept { *this = std::move(other); }
   PinnedMemory& operator=(PinnedMemory&& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(mapping_, other.mapping_);
-    std::swap(mapped_, other.mapped_);
+    std::swap(pages_, other.pages_);
+    std::swap(locked_, other.locked_);
     return *this;
   }
   ~PinnedMemory();
 
-  void* data() const { return data_; }
+  void* data() const { return pages_.data(); }
 
  private:
-  void* data_ = nullptr;
-  void* mapping_ = nullptr;
-  std::size_t mapped_ = 0;
+  MappedPages pages_;
+  bool locked_ = false;
 };
 
 /// The same for `size` elements.

@@ -29,8 +29,9 @@ constexpr std::uint64_t kLeastTilesWithPool = 128;
 /// Bricks a thread that are decoded ahead into a pool, and that are being decoded or belong to
 /// launches.
 constexpr std::uint64_t kLeastAhead = 24, kMostAhead = 40, kUnderWay = 8;
-/// A row table in the host's books: its slot, its tile, its expiry.
-constexpr std::uint64_t kBytesOfSlot = 96;
+/// A row table in the host's books: its slot, its tile, its expiry. Maps are up to three
+/// quarters empty.
+constexpr std::uint64_t kBytesOfSlot = 192;
 
 /// Row tables that are needed at a time: as with the CPU's boundaries those on the upper
 /// faces of what is finished, and those of the launches under way.

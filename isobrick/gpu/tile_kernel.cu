@@ -244,8 +244,14 @@ struct Launcher {
     check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kKernel, N, bytes));
     return each * device_attribute(cudaDevAttrMultiProcessorCount);
   }
+  /// Code for older devices does not wait by itself (wait_for_launch_before).
+  static bool may_start_early() {
+    cudaFuncAttributes attributes{};
+    check(cudaFuncGetAttributes(&attributes, kKernel));
+    return attributes.ptxVersion >= 90;
+  }
   static void launch(const TileParams& params, const std::uint16_t* case_entries, int blocks,
-                     cudaStream_t stream, bool after_search) {
+                     cudaStream_t stream, bool start_early) {
     cudaLaunchAttribute early{};
     early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
     early.val.programmaticStreamSerializationAllowed = 1;
@@ -255,8 +261,7 @@ struct Launcher {
     config.dynamicSmemBytes = shared();
     config.stream = stream;
     config.attrs = &early;
-    config.numAttrs =
-        after_search && device_attribute(cudaDevAttrComputeCapabilityMajor) >= 9 ? 1 : 0;
+    config.numAttrs = start_early ? 1 : 0;
     check(cudaLaunchKernelEx(&config, kKernel, params, Threshold<T>(params.isovalue).value,
                              case_entries));
     check_launch("extract_tiles");
@@ -323,7 +328,9 @@ LaunchShapes launch_shapes(const TileKernel& kernel, int threads) {
   LaunchShapes shapes;
   for (int i = 0; i < 3; ++i) {
     const int team = threads > 0 ? threads : kernel.may_have_nan ? kNanTeam : kTeams[i];
-    shapes.shapes[i] = {visit_launcher(kernel, team, [](auto l) { return l.blocks(); }), team};
+    shapes.shapes[i] = visit_launcher(kernel, team, [&](auto l) {
+      return LaunchShape{l.blocks(), team, l.may_start_early()};
+    });
   }
   if (shapes.shapes[2].blocks == 0)
     throw Error("the device has too little shared memory for the extraction kernel");
@@ -345,7 +352,7 @@ void launch_extraction(const TileKernel& kernel, const TileParams& params,
                        const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream,
                        bool after_search) {
   visit_launcher(kernel, shape.threads, [&](auto l) {
-    l.launch(params, case_entries, shape.blocks, stream, after_search);
+    l.launch(params, case_entries, shape.blocks, stream, after_search && shape.may_start_early);
   });
 }
 

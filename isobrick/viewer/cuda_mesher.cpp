@@ -307,15 +307,16 @@ std::shared_ptr<DeviceMesher> open_device_mesher(const std::optional<DeviceId>& 
       device = i;
       draws = true;
     }
-  const std::string name = gpu::open_device(device).name;
+  const gpu::DeviceInfo info = gpu::open_device(device);
   std::shared_ptr<gpu::MeshMemory> memory;
   if (draws) {
     try {
-      memory = std::make_shared<gpu::MeshMemory>(device, budget);
+      // Half of what is free is for making meshes and for drawing them.
+      memory = std::make_shared<gpu::MeshMemory>(device, std::min(budget, info.free_bytes / 2));
     } catch (const Error&) {  // through host memory, then
     }
   }
-  return std::make_shared<CudaMesher>(std::make_shared<Work>(device, name, std::move(memory)));
+  return std::make_shared<CudaMesher>(std::make_shared<Work>(device, info.name, std::move(memory)));
 }
 
 }  // namespace isobrick

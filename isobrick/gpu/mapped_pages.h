@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <utility>
+
+namespace isobrick::gpu {
+
+/// Memory of whole pages that nobody else has, to be locked by the driver: large ones where it
+/// is as large as one. It is to be touched before: while the driver locks pages, others wait for
+/// the driver.
+class MappedPages {
+ public:
+  static constexpr std::size_t kPage = 4096, kLargePage = std::size_t{2} << 20;
+
+  MappedPages() = default;
+  /// Throws Error where there is no room.
+  explicit MappedPages(std::size_t bytes);
+  MappedPages(MappedPages&& other) noexcept { *this = std::move(other); }
+  MappedPages& operator=(MappedPages&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+    std::swap(mapping_, other.mapping_);
+    std::swap(mapped_, other.mapped_);
+    return *this;
+  }
+  ~MappedPages();
+
+  std::byte* data() const { return data_; }
+  /// A multiple of pages, as all that is locked.
+  std::size_t bytes() const { return bytes_; }
+  static constexpr std::size_t whole_pages(std::size_t bytes) {
+    return (bytes + kPage - 1) / kPage * kPage;
+  }
+  /// Writes what pages are read as at first.
+  static void touch(std::byte* data, std::size_t bytes) {
+    for (std::size_t at = 0; at < bytes; at += kPage)
+      *static_cast<volatile std::byte*>(data + at) = std::byte{0};
+  }
+
+ private:
+  std::byte* data_ = nullptr;
+  std::size_t bytes_ = 0;
+  void* mapping_ = nullptr;
+  std::size_t mapped_ = 0;
+};
+
+}  // namespace isobrick::gpu
