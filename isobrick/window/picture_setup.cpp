@@ -17,9 +17,10 @@ std::shared_ptr<DeviceOpening> begin_opening(const PictureBudgets& budgets,
 
 }  // namespace
 
-PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change)
+PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change,
+                           std::optional<bool> software)
     : device_(begin_opening(budgets, std::move(on_change))),
-      software_(current_gl_device().software) {
+      software_(software.value_or(current_gl_device().software)) {
   // Software compiles quickly and draws slowly.
   if (software_) return;
   PictureSettings settings;

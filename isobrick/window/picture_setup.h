@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/render/renderer.h"
@@ -28,8 +29,10 @@ struct PictureBudgets {
 class PictureSetup {
  public:
   /// Begins to open the device that budgets.backend may use, and does not wait for it; see
-  /// DeviceOpening. Throws what Renderer does.
-  PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change);
+  /// DeviceOpening. `software`: whether to take OpenGL for software; nothing: what it is. Throws
+  /// what Renderer does.
+  PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change,
+               std::optional<bool> software = std::nullopt);
 
   Renderer& renderer() { return renderer_; }
   const std::shared_ptr<DeviceOpening>& device() const { return device_; }

@@ -169,9 +169,11 @@ bool StorePicture::can_wait(const Drawable& newest) const {
          (device_->turns() != nullptr ? std::max(pause, kRefiningSeconds) : pause);
 }
 
-bool StorePicture::may_be_plain(const PictureWay& way, const Drawable& newest) const {
+/// `idle`: nothing finer than the newest is to come, though a full budget may leave it incomplete.
+bool StorePicture::may_be_plain(const PictureWay& way, const Drawable& newest, bool idle) const {
   if (way.plain != PictureWay::Plain::until_complete) return way.plain == PictureWay::Plain::yes;
-  return setup_->software() ? !state_.complete : shown_.get() != &newest || !newest.complete;
+  if (setup_->software()) return !state_.complete;
+  return shown_.get() != &newest || !(newest.complete || idle);
 }
 
 bool StorePicture::upload_all(const Drawable& drawable, UploadShare& share) {
@@ -366,7 +368,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   const bool plain_serves = way.plain != PictureWay::Plain::no && shows_ == shows_plain;
   const bool other_view = shows_ != shows_all && !plain_serves;
   if (other_view || idle || !can_wait(*newest)) upload(newest);
-  const bool be_plain = may_be_plain(way, *newest);
+  const bool be_plain = may_be_plain(way, *newest, idle);
   const ViewSettings& settings = be_plain ? plain : asked;
   const std::string& shows = be_plain ? shows_plain : shows_all;
   times_.upload = watch.lap();

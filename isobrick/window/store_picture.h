@@ -117,7 +117,7 @@ class StorePicture {
   void upload(const std::shared_ptr<const Drawable>& newest);
   bool upload_all(const Drawable& drawable, UploadShare& share);
   bool can_wait(const Drawable& newest) const;
-  bool may_be_plain(const PictureWay& way, const Drawable& newest) const;
+  bool may_be_plain(const PictureWay& way, const Drawable& newest, bool idle) const;
   std::uint64_t slice_bytes_there() const;
   std::uint64_t upload_memory() const;
   void drop_unused();

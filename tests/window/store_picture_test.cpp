@@ -202,6 +202,32 @@ TEST_F(Picture, KeepsItsBudgets) {
   EXPECT_LE(picture_->scene().stream().counters().brick_bytes_peak, budgets.memory / 2);
 }
 
+TEST_F(Picture, IsDrawnInFullWhenTheMeshBudgetIsFull) {
+  // Not even the coarsest meshes of three surfaces have room.
+  const PictureBudgets budgets{.memory = 256u << 10, .threads = 1, .backend = Backend::cpu};
+  open(SynthKind::gyroid, {200, 200, 200}, budgets);
+  for (const double step : {30, -30}) {
+    settings_.surfaces.push_back(settings_.surfaces[0]);
+    settings_.surfaces.back().isovalue += step;
+  }
+  const auto store = std::make_shared<const StoreReader>(dir_ / "store.zarr");
+  for (const bool software : {true, false}) {
+    picture_ = std::make_unique<StorePicture>(
+        store, budgets, [] {},
+        std::make_shared<PictureSetup>(
+            budgets, [] {}, software));
+    const PictureWay way{.plain = PictureWay::Plain::until_complete};
+    const auto draw = [&] {
+      picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, way);
+      picture_->scene().stream().wait_idle(1);
+    };
+    for (int i = 0; i < 60 && (i < 3 || picture_->state().plain); ++i) draw();
+    ASSERT_TRUE(picture_->scene().stream().idle());
+    EXPECT_FALSE(picture_->scene().drawable()->complete) << "the test has too few meshes";
+    EXPECT_FALSE(picture_->state().plain) << "software: " << software;
+  }
+}
+
 TEST_F(Picture, SlicesAndUploadsShareTheDevicesBudget) {
   const PictureBudgets budgets{
       .memory = 64u << 20, .device_memory = 8u << 20, .backend = Backend::cpu};
