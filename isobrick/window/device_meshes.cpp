@@ -13,22 +13,55 @@
 
 namespace isobrick {
 
+namespace {
+
+/// Nothing where there can be none: pictures then import what they need.
+std::optional<GlContext> sharing_context() {
+  try {
+    return GlContext::sharing_current();
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+bool becomes_current(GlContext& context) {
+  try {
+    context.make_current();
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace
+
 void DeviceOpening::begin() {
   if (begun()) return;
   const auto id = current_gl_device_id();
-  auto sharing = id ? GlContext::sharing_current() : std::nullopt;
-  mesher_ = std::async(std::launch::async, [this, id, sharing = std::move(sharing)]() mutable {
-              std::optional<GlContext> context = std::move(sharing);
-              auto mesher = open_device_mesher(id, budget_);
-              if (mesher && context) {
-                context->make_current();
-                while (import_one(*mesher)) {
-                }
-                glFinish();
-              }
-              if (on_change_) on_change_();
-              return mesher;
-            }).share();
+  auto sharing = id ? sharing_context() : std::nullopt;
+  std::promise<std::shared_ptr<DeviceMesher>> opened;
+  mesher_ = opened.get_future().share();
+  opener_ =
+      std::jthread([this, id, sharing = std::move(sharing), opened = std::move(opened)]() mutable {
+        try {
+          opened.set_value(open(id, std::exchange(sharing, std::nullopt)));
+        } catch (...) {
+          opened.set_exception(std::current_exception());
+        }
+        if (on_change_) on_change_();
+      });
+}
+
+/// In a thread of its own. `sharing` has ended when this returns.
+std::shared_ptr<DeviceMesher> DeviceOpening::open(std::optional<DeviceId> drawing,
+                                                  std::optional<GlContext> sharing) {
+  std::shared_ptr<DeviceMesher> mesher = open_device_mesher(drawing, budget_);
+  if (mesher && sharing && becomes_current(*sharing)) {
+    while (import_one(*mesher)) {
+    }
+    glFinish();
+  }
+  return mesher;
 }
 
 /// Whether there was anything to import.
@@ -67,9 +100,10 @@ bool DeviceOpening::over() const {
   return device == nullptr || imported_.size() == device->shared_blocks().size();
 }
 
-void DeviceOpening::import_next() {
-  if (!opened()) return;
-  if (DeviceMesher* const device = mesher()) import_one(*device);
+bool DeviceOpening::import_next() {
+  if (!opened()) return false;
+  DeviceMesher* const device = mesher();
+  return device != nullptr && import_one(*device) && !over();
 }
 
 std::shared_ptr<DeviceMesher> DeviceOpening::get() {
@@ -107,12 +141,11 @@ void DeviceMeshes::use(Backend backend) {
                                : failure_);
 }
 
-void DeviceMeshes::update() {
-  if (opened_) return;
-  if (opening_->over())
-    take_over();
-  else
-    opening_->import_next();
+bool DeviceMeshes::update() {
+  if (opened_) return false;
+  if (!opening_->over() && opening_->import_next()) return true;
+  if (opening_->over()) take_over();
+  return false;
 }
 
 void DeviceMeshes::take_over() {

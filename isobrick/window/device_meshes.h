@@ -4,11 +4,14 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
+#include <thread>
 #include <unordered_map>
 #include <utility>
 
 #include "isobrick/pipeline/extract.h"
+#include "isobrick/render/gl_context.h"
 #include "isobrick/render/imported_buffers.h"
 #include "isobrick/viewer/scene_stream.h"
 
@@ -21,7 +24,7 @@ namespace isobrick {
 class DeviceOpening {
  public:
   /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
-  /// the device is there.
+  /// the device is there, or is known not to come.
   DeviceOpening(std::uint64_t budget, std::function<void()> on_change)
       : budget_(budget), on_change_(std::move(on_change)) {}
 
@@ -33,8 +36,8 @@ class DeviceOpening {
   /// Waits for that. Null where there is no device; throws Error when it cannot be opened.
   std::shared_ptr<DeviceMesher> get();
   /// Where this context shares nothing with another thread's: imports one piece of the memory, so
-  /// that no picture waits for much of it.
-  void import_next();
+  /// that no picture waits for much of it. Whether there is another.
+  bool import_next();
 
   /// Device memory for meshes: that is taken, and that may be taken.
   std::uint64_t held() const;
@@ -50,6 +53,8 @@ class DeviceOpening {
     ImportedBuffers buffers;
   };
 
+  std::shared_ptr<DeviceMesher> open(std::optional<DeviceId> drawing,
+                                     std::optional<GlContext> sharing);
   bool opened() const;
   DeviceMesher* mesher() const;
   bool import_one(DeviceMesher& mesher);
@@ -58,7 +63,8 @@ class DeviceOpening {
   std::function<void()> on_change_;
   /// Of the opening thread until it is done.
   std::unordered_map<const void*, std::unique_ptr<Imported>> imported_;
-  std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;  ///< last: ends before the others
+  std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;
+  std::jthread opener_;  ///< last: ends before the others
 };
 
 /// The device that makes a picture's meshes, and its memory as OpenGL sees it. For the thread
@@ -71,8 +77,9 @@ class DeviceMeshes {
   /// open, without waiting for it. Backend::cuda waits, and throws Error where there is none.
   void use(Backend backend);
   Backend backend() const { return backend_; }
-  /// Takes over a device that has been opened meanwhile.
-  void update();
+  /// Takes over a device that has been opened meanwhile, or imports a piece of its memory before.
+  /// Whether there is another piece.
+  bool update();
 
   /// Who makes meshes now, in a line: a device's name and how meshes get into pictures, or
   /// "CPU" and why.

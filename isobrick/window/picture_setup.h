@@ -18,8 +18,8 @@ struct PictureBudgets {
   int threads = 0;                                       ///< 0: all cores but one
   Backend backend = Backend::automatic;                  ///< what makes meshes; see DeviceMeshes
 
-  /// Of device_memory: the part for meshes that the device makes itself. What is uploaded has the
-  /// rest, and all where no device makes meshes.
+  /// Of device_memory: the part for meshes that the device makes itself. Slices and what is
+  /// uploaded have the rest, and all where no device shares its memory.
   std::uint64_t device_mesh_memory() const { return device_memory / 4 * 3; }
 };
 
