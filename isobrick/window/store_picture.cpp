@@ -351,7 +351,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
                         const PictureWay& way) {
   ++frame_;
   Stopwatch watch;
-  device_->update();
+  state_.imports = device_->update();
   times_ = {.device = watch.lap()};
   update_scene(camera, width, height, asked, way.coarser);
   times_.scene = scene_->times();
@@ -390,12 +390,12 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
       renderer().end();
     } catch (...) {
       shows_.clear();  // half a picture is none
-      if (device_->shares_memory()) glFinish();
+      glFinish();
       device_->forget();
       throw;
     }
     times_.draw = watch.lap();
-    if (device_->shares_memory()) glFinish();  // see DeviceMeshes::drawn()
+    glFinish();  // see DeviceMeshes::drawn(); and drawing counts for the pause after it
     times_.finish = watch.lap();
     device_->forget();
     shows_ = shows;

@@ -31,6 +31,7 @@ struct PictureState {
   std::uint64_t triangles = 0, nodes = 0;
   bool plain = false;               ///< drawn without occlusion and multisampling to be quick
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
+  bool imports = false;             ///< the next draw() takes more of a device's memory over
   bool limited_by_budget = false;   ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
 };
@@ -43,17 +44,17 @@ struct PictureWay {
   enum class Plain : std::uint8_t { no, until_complete, yes } plain = Plain::no;
 };
 
-/// Seconds that the steps of a picture took this thread; what the device does afterwards is not
-/// in them.
+/// Seconds that the steps of a picture took this thread; where none was made, from `turn` to
+/// `finish` are 0.
 struct PictureTimes {
-  double device = 0;    ///< taking over a device
+  double device = 0;    ///< taking over a device, or a part of its memory
   Scene::Times scene;   ///< choosing nodes
   double drawable = 0;  ///< asking what can be drawn
   double upload = 0;    ///< taking meshes to the device
   double slices = 0;
   double turn = 0;    ///< waiting for a device that makes meshes as well
   double draw = 0;    ///< telling OpenGL what to draw, memory imported for it included
-  double finish = 0;  ///< waiting for that device to draw it
+  double finish = 0;  ///< waiting until OpenGL has drawn it
   double tidy = 0;    ///< dropping meshes
 };
 
@@ -82,6 +83,8 @@ class StorePicture {
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
             const PictureWay& way = {});
   const PictureState& state() const { return state_; }
+  /// Whether the last draw() made a picture, rather than to leave the one before.
+  bool drew() const { return times_.draw > 0; }
   /// Of the last draw().
   const PictureTimes& times() const { return times_; }
 

@@ -27,6 +27,9 @@ namespace {
 
 /// Above it a frame is no frame but a pause.
 constexpr double kLongestStep = 0.1;
+/// While meshes come in and nothing moves, from a step that has drawn nothing new to the next one:
+/// the cores are for meshes.
+constexpr double kNothingNew = 0.008;
 /// Moving pictures may be coarser for so long after the last motion.
 constexpr double kSettleSeconds = 0.25;
 
@@ -242,7 +245,8 @@ void ViewerWindow::draw_frame() {
     glFinish();
     state_.draw_seconds = glfwGetTime() - begin;
     const bool plain = state_.picture->state().plain;
-    changed_ |= plain;  // there is a better one to come
+    // There is a better one to come; or more of a device's memory to import.
+    changed_ |= plain || state_.picture->state().imports;
     if (fluent)
       state_.pacer.drawn(state_.draw_seconds);
     else if (!plain)
@@ -259,12 +263,22 @@ void ViewerWindow::draw_frame() {
   glfwSwapBuffers(window_);
 }
 
+void ViewerWindow::wait(double most_seconds) {
+  const bool there = state_.picture != nullptr;
+  if (there && moving()) return glfwPollEvents();
+  if (!changed_ && (!there || state_.picture->state().complete))
+    return glfwWaitEventsTimeout(most_seconds);
+  changed_ = false;
+  glfwPollEvents();
+  if (!there || state_.picture->drew()) return;
+  // Each mesh that comes in ends a wait, and is not worth a step; what a user does is.
+  const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
+  for (double now = glfwGetTime(); !changed_ && now < end; now = glfwGetTime())
+    glfwWaitEventsTimeout(end - now);
+}
+
 bool ViewerWindow::step(double most_seconds) {
-  const bool still = state_.picture == nullptr || (!moving() && state_.picture->state().complete);
-  if (still && !changed_)
-    glfwWaitEventsTimeout(most_seconds);
-  else
-    glfwPollEvents();
+  wait(most_seconds);
   if (glfwWindowShouldClose(window_)) return false;
   changed_ = false;
   const double now = glfwGetTime();

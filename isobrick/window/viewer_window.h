@@ -36,8 +36,9 @@ class ViewerWindow {
   /// Shows a store, or converts another format and shows that; failures are shown.
   void drop(const std::filesystem::path& path);
 
-  /// Waits for something to happen, at most so long and not at all while anything moves,
-  /// and shows the next picture. False once the window is closed.
+  /// Waits for something to happen, at most so long and not at all while anything moves (some
+  /// milliseconds while meshes come in), and shows the next picture. False once the window is
+  /// closed.
   bool step(double most_seconds = 0.1);
   /// Until the window is closed.
   void run();
@@ -48,6 +49,7 @@ class ViewerWindow {
  private:
   class Events;
 
+  void wait(double most_seconds);
   void draw_frame();
   void handle_requests();
   void handle_import();

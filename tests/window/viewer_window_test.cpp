@@ -196,6 +196,33 @@ TEST_F(Window, ClosesAtOnceWhileItStreams) {
   EXPECT_LT(spent.count(), 0.5);  // of that at most 0.1 for the stream; Mesa takes its time, too
 }
 
+TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
+  make_store("big.zarr", {320, 320, 320});
+  WindowOptions options;
+  options.budgets.threads = 1;
+  ViewerWindow& window = open(options);
+  window.open(dir_ / "big.zarr");
+  window.state().settings.pixel_error = 0.5f;
+  const StorePicture& picture = *window.state().picture;
+  until([&] { return picture.state().complete && !picture.drew(); });
+  steps(15);  // nothing moves any more
+  int pauses = 0;
+  for (int round = 0; round < 20 && pauses < 3; ++round) {
+    window.state().settings.surfaces[0].isovalue += 2;  // as nobody does who moves it
+    steps(1);
+    while (!picture.state().complete) {
+      const bool drew = picture.drew();
+      const auto start = std::chrono::steady_clock::now();
+      steps(1);
+      if (drew) continue;
+      ++pauses;
+      EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(7));
+    }
+    until([&] { return picture.state().complete && !picture.drew(); });
+  }
+  EXPECT_GE(pauses, 3);
+}
+
 TEST_F(Window, OpensWhatIsDroppedOnIt) {
   ViewerWindow& window = open();
   make_store("other.zarr", {40, 40, 40});
