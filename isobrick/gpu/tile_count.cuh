@@ -167,25 +167,32 @@ __device__ inline Before before_piece(const TileShared& s, const PlaneBases& b, 
   return {(b.before & 0x1ffffu) + (b.own & 0xffffu), (b.before >> 17) + (b.own >> 16)};
 }
 
-/// Marks a row with `count` things from `place` on, counted from the first that
-/// is listed now; it may lie before that. A row has at most `Most` things.
-template <int Most, std::uint32_t Listed, class Mark>
-__device__ inline void mark_row(Mark (&marks)[Listed], FirstOfGroup* groups, int place, int count,
-                                int row) {
-  if (count > 0 && place >= 0 && place < static_cast<int>(Listed))
-    marks[place] = static_cast<Mark>(row + 1);
-  const int end = ::min(place + count, static_cast<int>(Listed));
-  const auto mark_group = [&](int first) {
+/// Marks a row with things from `place` to `end` for each 32 listed ones that begin within it,
+/// `first` being the first of those. A row has `count` things, at most `Most`.
+template <int Most, class Int>
+__device__ inline void mark_groups(FirstOfGroup* groups, Int first, Int end, Int place, Int count,
+                                   int row) {
+  const auto mark_group = [&](Int first) {
     groups[first / 32] = {static_cast<std::uint16_t>(row),
                           static_cast<std::uint16_t>(first - place)};
   };
-  int first = ::max((place + 31) & ~31, 0);
   if (first < end) mark_group(first);
   if constexpr (Most > 32) {
     if (count <= 32) return;  // hardly any row reaches further
 #pragma unroll 1
     for (first += 32; first < end; first += 32) mark_group(first);
   }
+}
+
+/// Marks a row with `count` things from `place` on, counted from the first that
+/// is listed now; it may lie before that.
+template <int Most, std::uint32_t Listed, class Mark>
+__device__ inline void mark_row(Mark (&marks)[Listed], FirstOfGroup* groups, int place, int count,
+                                int row) {
+  if (count > 0 && place >= 0 && place < static_cast<int>(Listed))
+    marks[place] = static_cast<Mark>(row + 1);
+  const int end = ::min(place + count, static_cast<int>(Listed));
+  mark_groups<Most>(groups, ::max((place + 31) & ~31, 0), end, place, count, row);
 }
 /// The same where all things from 0 on are listed now.
 template <int Most, std::uint32_t Listed, class Mark>
@@ -194,17 +201,7 @@ __device__ inline void mark_row_from_0(Mark (&marks)[Listed], FirstOfGroup* grou
   if (count == 0 || place >= Listed) return;
   marks[place] = static_cast<Mark>(row + 1);
   const std::uint32_t end = ::min(place + count, Listed);
-  std::uint32_t first = (place + 31) & ~31u;
-  const auto mark_group = [&](std::uint32_t first) {
-    groups[first / 32] = {static_cast<std::uint16_t>(row),
-                          static_cast<std::uint16_t>(first - place)};
-  };
-  if (first < end) mark_group(first);
-  if constexpr (Most > 32) {
-    if (count <= 32) return;
-#pragma unroll 1
-    for (first += 32; first < end; first += 32) mark_group(first);
-  }
+  mark_groups<Most>(groups, (place + 31) & ~31u, end, place, count, row);
 }
 inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
 
