@@ -3,16 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
-#include <utility>
-#include <vector>
-
-#include "isobrick/viewer/node_mesher.h"
+#include <memory>
 
 namespace isobrick {
 namespace {
-
-Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
 
 /// Components along the volume's axes, in samples of a level.
 Vec3d turned(const Transform& t, Vec3d v) {
@@ -20,50 +14,6 @@ Vec3d turned(const Transform& t, Vec3d v) {
   return {(d[0] * v.x + d[3] * v.y + d[6] * v.z) / t.spacing.x,
           (d[1] * v.x + d[4] * v.y + d[7] * v.z) / t.spacing.y,
           (d[2] * v.x + d[5] * v.y + d[8] * v.z) / t.spacing.z};
-}
-
-/// A ray in level-0 index space.
-struct Ray {
-  Vec3d from, along;
-
-  /// Where it enters a box, in lengths of `along`; nothing where it passes by.
-  std::optional<double> entry(const IndexBox& box, double margin) const {
-    double near = 0, far = std::numeric_limits<double>::infinity();
-    for (int axis = 0; axis < 3; ++axis) {
-      const double lo = box.lo[axis] - margin - from[axis], hi = box.hi[axis] + margin - from[axis];
-      if (along[axis] == 0) {
-        if (lo > 0 || hi < 0) return std::nullopt;
-        continue;
-      }
-      const double a = lo / along[axis], b = hi / along[axis];
-      near = std::max(near, std::min(a, b));
-      far = std::min(far, std::max(a, b));
-    }
-    return near <= far ? std::optional(near) : std::nullopt;
-  }
-};
-
-class Always final : public Wanted {
- public:
-  void check() const override {}
-};
-
-/// Where a ray meets a triangle (Möller and Trumbore): distance and barycentric
-/// coordinates of the second and third corner.
-struct Meeting {
-  double distance, u, v;
-};
-std::optional<Meeting> meet(Vec3d from, Vec3d along, Vec3d a, Vec3d b, Vec3d c) {
-  const Vec3d ab = b - a, ac = c - a, p = cross(along, ac);
-  const double det = dot(ab, p);
-  if (det == 0) return std::nullopt;
-  const Vec3d s = from - a;
-  const double u = dot(s, p) / det;
-  if (!(u >= 0 && u <= 1)) return std::nullopt;
-  const Vec3d q = cross(s, ab);
-  const double v = dot(along, q) / det, t = dot(ac, q) / det;
-  if (!(v >= 0 && u + v <= 1 && t >= 0)) return std::nullopt;
-  return Meeting{t, u, v};
 }
 
 bool inside(const IndexBox& box, Vec3d p) {
@@ -163,65 +113,10 @@ bool in_volume(const NodeGrid& grid, Vec3d world) {
       to_index_space(grid, world));
 }
 
-/// Puts the first hit with a mesh where shown(position) into `best`, if it is nearer than that.
-template <class Shown>
-void hit_mesh(const NodeMesh& node, int isovalue, Vec3d origin, Vec3d from, Vec3d along,
-              const Shown& shown, std::optional<SurfaceHit>& best) {
-  const MeshBuffer& mesh = node.mesh;
-  for (std::size_t i = 0; i + node.ribbon_triangles < mesh.triangles.size(); ++i) {
-    const Triangle& t = mesh.triangles[i];
-    const auto corner = [&](std::size_t k) { return to_double(mesh.positions[t[k]]); };
-    const auto met = meet(from - origin, along, corner(0), corner(1), corner(2));
-    if (!met || (best && met->distance >= best->distance)) continue;
-    const Vec3d position = from + along * met->distance;
-    if (!shown(position)) continue;
-    const Vec3d n = to_double(mesh.normals[t[0]]) * (1 - met->u - met->v) +
-                    to_double(mesh.normals[t[1]]) * met->u + to_double(mesh.normals[t[2]]) * met->v;
-    const double size = std::sqrt(std::max(dot(n, n), 1e-30));
-    best = SurfaceHit{position,
-                      {static_cast<float>(n.x / size), static_cast<float>(n.y / size),
-                       static_cast<float>(n.z / size)},
-                      isovalue,
-                      node.key,
-                      met->distance};
-  }
-}
-
 }  // namespace
 
 Vec3d to_index_space(const NodeGrid& grid, Vec3d world) {
   return turned(grid.transform(), world - grid.transform().origin);
-}
-
-std::optional<SurfaceHit> pick(const Drawable& drawn, const NodeGrid& grid, ResidentBricks& bricks,
-                               Vec3d origin, Vec3d from, Vec3d along,
-                               const std::optional<IndexBox>& clip,
-                               std::span<const HalfSpace> planes) {
-  const Ray ray{to_index_space(grid, from), turned(grid.transform(), along)};
-  std::vector<std::pair<double, const DrawnNode*>> met;
-  for (const DrawnNode& node : drawn.nodes)
-    if (const auto entry = ray.entry(grid.box(node.mesh->key), 0.5))
-      met.emplace_back(*entry, &node);
-  std::stable_sort(met.begin(), met.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  const auto shown = [&](Vec3d position) {
-    return (!clip || inside(*clip, to_index_space(grid, position))) &&
-           std::all_of(planes.begin(), planes.end(),
-                       [&](const HalfSpace& half) { return half.contains(position); });
-  };
-  std::optional<SurfaceHit> best;
-  std::optional<NodeMesher> mesher;
-  for (const auto& [entry, node] : met) {
-    if (best && entry > best->distance) break;
-    const NodeMesh& mesh = *node->mesh;
-    std::optional<NodeMesh> again;
-    if (mesh.device) {
-      if (!mesher) mesher.emplace(grid, bricks, origin);
-      again = mesher->mesh(mesh.key, mesh.isovalue, mesh.coarser, Always());
-    }
-    hit_mesh(again ? *again : mesh, node->isovalue, origin, from, along, shown, best);
-  }
-  return best;
 }
 
 std::optional<FieldValue> probe(const NodeGrid& grid, ResidentBricks& bricks, Vec3d world) {

@@ -1,17 +1,13 @@
 #include <gtest/gtest.h>
 
 #include "isobrick/viewer/node_mesher.h"
+#include "tests/viewer/always.h"
 #include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 #include "tests/viewer/rasteriser.h"
 
 namespace isobrick::test {
 namespace {
-
-class Always final : public Wanted {
- public:
-  void check() const override {}
-};
 
 struct Shape {
   const char* name;

@@ -8,16 +8,12 @@
 #include <vector>
 
 #include "isobrick/viewer/node_mesher.h"
+#include "tests/viewer/always.h"
 #include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {
 namespace {
-
-class Always final : public Wanted {
- public:
-  void check() const override {}
-};
 
 template <class T>
 bool same_bytes(const PodBuffer<T>& a, const PodBuffer<T>& b) {

@@ -5,6 +5,7 @@
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/viewer/node_samples.h"
 #include "isobrick/viewer/node_tree.h"
+#include "tests/viewer/always.h"
 #include "tests/viewer/memory_bricks.h"
 
 namespace isobrick::test {
@@ -113,10 +114,6 @@ TEST(NodeGrid, LevelsAboveTheCoarsestStoredOneTakeItsSamples) {
 }
 
 TEST(NodeSamples, AreTheStoredOnesWhereGridPointsLieFarApart) {
-  class Always final : public Wanted {
-   public:
-    void check() const override {}
-  };
   const auto source = std::make_shared<MemoryBricks>(
       Int3{150, 140, 37},
       std::function<float(Int3)>([&](Int3 p) { return static_cast<float>(blobs(p, 150)); }),

@@ -7,16 +7,12 @@
 #include "isobrick/viewer/device_mesher.h"
 #include "isobrick/viewer/isovalue_counts.h"
 #include "isobrick/viewer/scene.h"
+#include "tests/viewer/always.h"
 #include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {
 namespace {
-
-class Always final : public Wanted {
- public:
-  void check() const override {}
-};
 
 constexpr Index kEdge = 120;
 
@@ -29,103 +25,6 @@ std::shared_ptr<MemoryBricks> turned_ball() {
       Int3{kEdge, kEdge, kEdge},
       std::function<float(Int3)>([](Int3 p) { return static_cast<float>(ball(p, kEdge)); }),
       options);
-}
-
-TEST(Probe, ARayMeetsTheBallWhereItIs) {
-  const auto source = turned_ball();
-  Scene scene(source, {.threads = 2});
-  const Vec3d middle = scene.origin();
-  scene.stream().set_cut(RandomCut(scene.tree().grid(), 1, 30).cut({0.0}));
-  ASSERT_TRUE(scene.stream().wait_idle(60));
-  const auto drawn = scene.drawable();
-  const double radius = 0.4 * kEdge * 0.5;
-  for (const Vec3d from : {Vec3d{80, 3, 7}, Vec3d{-60, 40, 2}, Vec3d{1, -2, 90}}) {
-    const double distance = std::sqrt(from.x * from.x + from.y * from.y + from.z * from.z);
-    const auto hit = pick(*drawn, scene.tree().grid(), scene.stream().bricks(), middle,
-                          middle + from, from * -1.0);
-    ASSERT_TRUE(hit);
-    EXPECT_NEAR(hit->distance * distance, distance - radius, 0.02);
-    const Vec3d out = hit->position - middle;
-    for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_NEAR(out[axis], from[axis] * radius / distance, 0.02);
-      EXPECT_NEAR(hit->normal[axis], from[axis] / distance, 0.03);
-    }
-    EXPECT_FALSE(
-        pick(*drawn, scene.tree().grid(), scene.stream().bricks(), middle, middle + from, from));
-  }
-  // Where the near side is clipped away the far one is hit.
-  const Vec3d index_middle{59.5, 59.5, 59.5};
-  IndexBox half{{0, 0, 0}, {119, 119, 59.5}};
-  const auto hit = pick(*drawn, scene.tree().grid(), scene.stream().bricks(), middle,
-                        middle + Vec3d{0.3, 0.2, 90}, {0, 0, -1}, half);
-  ASSERT_TRUE(hit);
-  EXPECT_NEAR(hit->distance, 90 + radius, 0.02);
-  EXPECT_LT(to_index_space(scene.tree().grid(), hit->position).z, index_middle.z);
-  // Or behind a plane at any angle; and nothing is where all is cut away.
-  const std::vector<HalfSpace> planes{half_space_at(middle, {0.5, 0, -1})};
-  const auto behind = pick(*drawn, scene.tree().grid(), scene.stream().bricks(), middle,
-                           middle + Vec3d{0.3, 0.2, 90}, {0, 0, -1}, {}, planes);
-  ASSERT_TRUE(behind);
-  EXPECT_NEAR(behind->distance, 90 + radius, 0.02);
-  const std::vector<HalfSpace> none{half_space_at(middle + Vec3d{0, 0, 100}, {0, 0, 1})};
-  EXPECT_FALSE(pick(*drawn, scene.tree().grid(), scene.stream().bricks(), middle,
-                    middle + Vec3d{0.3, 0.2, 90}, {0, 0, -1}, {}, none));
-}
-
-/// As a device makes it: only the header is here.
-std::shared_ptr<const NodeMesh> on_device(const NodeMesh& mesh) {
-  NodeMesh header;
-  header.key = mesh.key;
-  header.isovalue = mesh.isovalue;
-  header.coarser = mesh.coarser;
-  header.ribbon_triangles = mesh.ribbon_triangles;
-  header.device = std::make_shared<const DeviceMesh>();
-  header.device_triangles = mesh.triangles();
-  return std::make_shared<const NodeMesh>(std::move(header));
-}
-
-TEST(Probe, ARayMeetsTheSameTrianglesWhenTheyLieOnADevice) {
-  const auto source = turned_ball();
-  Scene scene(source, {.threads = 2});
-  const NodeGrid& grid = scene.tree().grid();
-  const Vec3d middle = scene.origin();
-  scene.stream().set_cut(RandomCut(grid, 2, 5).cut({0.0, -9.0}));
-  ASSERT_TRUE(scene.stream().wait_idle(60));
-  const auto drawn = scene.drawable();
-  ASSERT_GT(drawn->nodes.size(), 10u);
-  Drawable there = *drawn;
-  for (DrawnNode& node : there.nodes) node.mesh = on_device(*node.mesh);
-  ResidentBricks bricks(source, 100 << 20);
-  for (const Vec3d from : {Vec3d{80, 3, 7}, Vec3d{-60, 40, 2}, Vec3d{1, -2, 90}}) {
-    const auto here = pick(*drawn, grid, bricks, middle, middle + from, from * -1.0);
-    const auto hit = pick(there, grid, bricks, middle, middle + from, from * -1.0);
-    ASSERT_TRUE(here && hit);
-    EXPECT_EQ(hit->position, here->position);
-    EXPECT_EQ(hit->normal, here->normal);
-    EXPECT_EQ(hit->isovalue, here->isovalue);
-    EXPECT_EQ(hit->node, here->node);
-    EXPECT_FALSE(pick(there, grid, bricks, middle, middle + from, from));
-  }
-}
-
-TEST(Probe, WhatLiesBehindTheFirstHitIsNotReadForIt) {
-  const auto source = turned_ball();
-  Scene scene(source, {.threads = 2});
-  const NodeGrid& grid = scene.tree().grid();
-  const Vec3d middle = scene.origin();
-  Cut cut = RandomCut(grid, 1, 100).cut({0.0});
-  for (const CutNode& node : cut.nodes) ASSERT_EQ(node.key.level, 0);
-  scene.stream().set_cut(cut);
-  ASSERT_TRUE(scene.stream().wait_idle(60));
-  Drawable there = *scene.drawable();
-  for (DrawnNode& node : there.nodes) node.mesh = on_device(*node.mesh);
-  for_each_point({{0, 0, 0}, {4, 4, 1}}, [&](Int3 b) { source->damage(0, b); });
-  ResidentBricks bricks(source, 100 << 20);
-  const auto pick_from = [&](Vec3d from) {
-    return pick(there, grid, bricks, middle, middle + from, from * -1.0);
-  };
-  EXPECT_TRUE(pick_from({1, -2, 90}));
-  EXPECT_THROW(pick_from({1, -2, -90}), DamageError);
 }
 
 TEST(Probe, TellsTheFieldOfTheFinestLevelThatIsThere) {

@@ -6,17 +6,13 @@
 #include <thread>
 #include <vector>
 
+#include "tests/viewer/always.h"
 #include "tests/viewer/held_up.h"
 #include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {
 namespace {
-
-class Always final : public Wanted {
- public:
-  void check() const override {}
-};
 
 class PlanTest : public testing::Test {
  protected:

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "isobrick/viewer/resident_bricks.h"
+
+namespace isobrick::test {
+
+/// Work that is never abandoned.
+class Always final : public Wanted {
+ public:
+  void check() const override {}
+};
+
+}  // namespace isobrick::test
