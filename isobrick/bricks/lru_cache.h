@@ -41,6 +41,14 @@ class LruCache {
     return loaded.first;
   }
 
+  /// Drops what is there.
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    entries_.clear();
+    order_.clear();
+    weight_ = 0;
+  }
+
  private:
   struct Entry {
     std::uint64_t key, weight;

@@ -1,49 +1,37 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
-#include <unordered_map>
+#include <utility>
 
-#include "isobrick/viewer/node_grid.h"
+#include "isobrick/bricks/lru_cache.h"
+#include "isobrick/viewer/brick_source.h"
 
 namespace isobrick {
-
-class BrickSource;
-struct RangeTable;
 
 /// Ranges of 16³ blocks, read in the chunks in which they are stored; those that were asked for
 /// last stay. Thread-safe.
 class BlockRanges {
  public:
   /// `budget` in bytes; one chunk is kept in any case.
-  BlockRanges(std::shared_ptr<const BrickSource> source, std::uint64_t budget);
+  BlockRanges(std::shared_ptr<const BrickSource> source, std::uint64_t budget)
+      : source_(std::move(source)), chunks_(budget) {}
 
   /// The ranges of the chunk that holds a block of a stored level. Throws what reading throws.
   std::shared_ptr<const RangeTable> around(int level, Int3 block);
+  /// Drops what is there.
+  void clear() { chunks_.clear(); }
 
  private:
-  /// A chunk: its stored level and its place among the chunks.
-  using Key = NodeKey;
+  /// Read by whoever asks for it first, while others read other chunks.
   struct Chunk {
-    std::once_flag once;
-    std::shared_ptr<const RangeTable> table;
+    mutable std::once_flag once;
+    mutable std::shared_ptr<const RangeTable> table;
   };
-  struct Entry {
-    std::shared_ptr<Chunk> chunk;
-    std::list<Key>::iterator order;
-  };
-
-  std::shared_ptr<Chunk> find(const Key& key);
-  std::shared_ptr<const RangeTable> read(const Key& key) const;
 
   std::shared_ptr<const BrickSource> source_;
-  std::size_t most_;
-  std::mutex mutex_;
-  std::unordered_map<Key, Entry, NodeKeyHash> chunks_;
-  std::list<Key> order_;  ///< most recently used first
+  LruCache<Chunk> chunks_;
 };
 
 }  // namespace isobrick
