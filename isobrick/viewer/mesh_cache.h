@@ -37,6 +37,7 @@ class MeshCache {
   void shrink_device(std::uint64_t bytes);
 
   void set_device_budget(std::uint64_t bytes) { device_budget_ = bytes; }
+  std::uint64_t device_budget() const { return device_budget_; }
 
   std::uint64_t bytes() const { return bytes_; }
   std::uint64_t device_bytes() const { return device_bytes_; }

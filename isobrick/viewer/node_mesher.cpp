@@ -168,9 +168,20 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
   return impl_->read(key, isovalue, coarser, wanted);
 }
 
-NodeMesher::Needs NodeMesher::needs(const NodeKey& key) const {
+NodeMesher::Holders NodeMesher::holders(const NodeKey& key) const {
   return {impl_->grid.level(key.level).source,
           impl_->samples.bricks(key.level, impl_->points(key))};
+}
+
+void NodeMesher::will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
+  const Holders all = holders(key);
+  const std::optional<NeededSamples> needed = impl_->needed_of(key, isovalue, coarser);
+  const Lattice& lattice =
+      impl_->bricks.source().info().levels[static_cast<std::size_t>(all.stored)].lattice;
+  for_each_point(all.bricks, [&](Int3 b) {
+    if (needed && !needed->any(intersect(impl_->points(key), lattice.full_brick_box(b)))) return;
+    impl_->bricks.will_need(all.stored, b);
+  });
 }
 
 double NodeMesher::seconds() const { return std::chrono::duration<double>(impl_->busy).count(); }

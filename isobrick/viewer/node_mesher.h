@@ -32,12 +32,16 @@ class NodeMesher {
   /// The mesh of what grid() gave last. `mesh` says which it is.
   NodeMesh extract(const GridView& grid, NodeMesh mesh);
 
-  /// The bricks that hold a node's points, by stored level: what its mesh needs above all.
-  struct Needs {
+  /// The bricks that hold a node's points, of its stored level. Of the finest level its mesh may
+  /// need fewer of them.
+  struct Holders {
     int stored;
     Box3 bricks;
   };
-  Needs needs(const NodeKey& key) const;
+  Holders holders(const NodeKey& key) const;
+
+  /// Hints that those of them which the mesh needs are read soon. Throws what reading ranges does.
+  void will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
 
   /// Seconds that this thread spent on meshing so far, without waiting for bricks or a device.
   double seconds() const;

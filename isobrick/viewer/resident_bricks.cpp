@@ -191,6 +191,7 @@ bool ResidentBricks::resident(int level, Box3 box) const {
 }
 
 void ResidentBricks::close() {
+  ranges_.clear();
   const std::lock_guard lock(mutex_);
   budget_ = 0;
   make_room(0);
@@ -203,14 +204,12 @@ bool ResidentBricks::half_resident(int level, Box3 box) const {
   return 2 * found >= volume(box.extent());
 }
 
-void ResidentBricks::will_need(int level, Box3 box) const {
-  for_each_point(box, [&](Int3 b) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (entries_.contains({level, b})) return;
-    }
-    source_->will_need(level, b);
-  });
+void ResidentBricks::will_need(int level, Int3 brick) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (entries_.contains({level, brick})) return;
+  }
+  source_->will_need(level, brick);
 }
 
 ResidentBricks::Counters ResidentBricks::counters() const {

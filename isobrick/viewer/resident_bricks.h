@@ -71,16 +71,16 @@ class ResidentBricks {
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
   /// Whether all bricks of `box` (in bricks) are there.
   bool resident(int level, Box3 box) const;
-  /// Drops what is there; from now on nothing is kept.
-  void close();
-  /// Whether half of them are.
+  /// Whether at least half of them are.
   bool half_resident(int level, Box3 box) const;
+  /// Drops what is there, ranges as well; from now on no brick is kept.
+  void close();
   /// The ranges of blocks around this one, those of its node of 64³ cells among them.
   std::shared_ptr<const RangeTable> block_ranges(int level, Int3 block) {
     return ranges_.around(level, block);
   }
-  /// Hints that bricks of `box` are read soon.
-  void will_need(int level, Box3 box) const;
+  /// Hints that the brick is read soon, unless it is there.
+  void will_need(int level, Int3 brick) const;
 
   const BrickSource& source() const { return *source_; }
 

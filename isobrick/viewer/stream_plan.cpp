@@ -88,8 +88,8 @@ MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
   MeshPlan plan;
   Planner(tree, cut, meshes, plan).run(soon);
   for (MeshJob& job : plan.jobs) {
-    const NodeMesher::Needs needs = mesher.needs(job.key);
-    job.resident = bricks.half_resident(needs.stored, needs.bricks);
+    const NodeMesher::Holders holders = mesher.holders(job.key);
+    job.resident = bricks.half_resident(holders.stored, holders.bricks);
   }
   std::sort(plan.jobs.begin(), plan.jobs.end(), more_urgent);
   return plan;

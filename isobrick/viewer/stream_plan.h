@@ -23,7 +23,8 @@ struct MeshJob {
 
 /// The meshes that a cut lacks.
 struct MeshPlan {
-  /// Most urgent first: visible ones, of them those whose bricks are resident, of them coarse
+  /// Most urgent first: visible ones, of them those of whose bricks at least half are there (all
+  /// that hold its points: which of them are needed would take ranges to be read), of them coarse
   /// ones, then those with the longest cells on the picture, then near ones. Nodes without any
   /// mesh bring the ancestors along that will stand in for them, of levels that are stored.
   std::vector<MeshJob> jobs;

@@ -10,8 +10,8 @@ namespace {
 /// How much a job counts in the mean of those before.
 constexpr double kWeightOfJob = 1.0 / 32;
 
-/// Where a device has no room: the part of its memory that older meshes give back.
-constexpr std::uint64_t kPartForNew = 16;
+/// Where a device has no room: the part of its budget that older meshes give back.
+constexpr std::uint64_t kPartForNew = 8;
 
 NodeMesh empty_mesh(const MeshJob& job) {
   NodeMesh mesh;
@@ -97,10 +97,10 @@ void SceneStream::Shared::received(const std::shared_ptr<Running>& r, NodeMesh&&
 void SceneStream::Shared::take_over(const Running& done, NodeMesh&& mesh, const DeviceMesher& by) {
   ++counters.device_meshes_made;
   // What came here for want of room there has to be uploaded: older ones make room instead, once
-  // for all that came so.
-  const std::uint64_t there = by.bytes(), part = there / kPartForNew;
+  // for all that came so. The budget itself may never be reached, since places fall between.
+  const std::uint64_t budget = meshes.device_budget(), part = budget / kPartForNew;
   if (!mesh.device && !mesh.empty() && !by.shared_blocks().empty() &&
-      meshes.device_bytes() + part > there)
+      meshes.device_bytes() + part > budget)
     meshes.shrink_device(part);
   publish(done, std::move(mesh));
 }
@@ -155,10 +155,7 @@ void SceneStream::Shared::make_mesh(NodeMesher& mesher, const std::shared_ptr<Ru
   if (!jobs.empty()) next = jobs.back();
   lock.unlock();
   try {
-    if (next) {
-      const NodeMesher::Needs needs = mesher.needs(next->key);
-      bricks.will_need(needs.stored, needs.bricks);
-    }
+    if (next) mesher.will_need(next->key, next->isovalue, next->coarser);
   } catch (const Error&) {  // whoever reads it will say so
   }
   const double before = mesher.seconds();

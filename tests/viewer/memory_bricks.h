@@ -6,6 +6,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <set>
 #include <thread>
 #include <tuple>
@@ -80,6 +81,11 @@ class MemoryBricks final : public BrickSource {
     return !all_fill;
   }
 
+  void will_need(int level, Int3 b) const override {
+    const std::lock_guard lock(mutex_);
+    hinted_.insert({level, b.x, b.y, b.z});
+  }
+
   RangeTable brick_ranges(int level, Box3 box) const override {
     return ranges(level, box, lattice(level).brick);
   }
@@ -98,6 +104,12 @@ class MemoryBricks final : public BrickSource {
   void set_delay(std::chrono::milliseconds delay) { delay_ = delay; }
   void damage(int level, Int3 b) { damaged_.insert({level, b.x, b.y, b.z}); }
   std::uint64_t reads() const { return reads_; }
+  using BrickNumber = std::tuple<int, Index, Index, Index>;  ///< level, x, y, z
+  /// The bricks that somebody hinted at since the last call.
+  std::set<BrickNumber> take_hints() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(hinted_, {});
+  }
   std::uint64_t bytes() const {
     std::uint64_t bytes = 0;
     for (const auto& level : samples_) bytes += level.size();
@@ -128,7 +140,9 @@ class MemoryBricks final : public BrickSource {
 
   StoreInfo info_;
   std::vector<std::vector<std::byte>> samples_;
-  std::set<std::tuple<int, Index, Index, Index>> damaged_;
+  std::set<BrickNumber> damaged_;
+  mutable std::mutex mutex_;
+  mutable std::set<BrickNumber> hinted_;
   std::atomic<std::chrono::milliseconds> delay_{std::chrono::milliseconds{0}};
   mutable std::atomic<std::uint64_t> reads_ = 0;
 };

@@ -13,6 +13,7 @@
 #include "isobrick/viewer/scene.h"
 #include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/perspective.h"
+#include "tests/viewer/plain_device.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {
@@ -203,7 +204,7 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
 }
 
 /// Takes some grids and then says of all of them that it has failed.
-class FailingDevice final : public DeviceMesher {
+class FailingDevice final : public PlainDevice {
  public:
   ~FailingDevice() override {
     for (std::thread& thread : threads_) thread.join();
@@ -224,12 +225,6 @@ class FailingDevice final : public DeviceMesher {
     const std::lock_guard lock(mutex_);
     return failed_ ? "broken" : "";
   }
-  const std::string& name() const override { return name_; }
-  std::vector<DeviceBlock> shared_blocks() const override { return {}; }
-  void share_only(std::size_t) override {}
-  std::uint64_t bytes() const override { return 0; }
-  Turns& turns() override { return turns_; }
-  Times times() const override { return {}; }
 
   static constexpr std::size_t kTaken = 3;
   std::atomic<std::size_t> asked = 0;
@@ -239,8 +234,6 @@ class FailingDevice final : public DeviceMesher {
   bool failed_ = false;
   std::vector<std::pair<NodeMesh, Done>> taken_;
   std::vector<std::thread> threads_;
-  std::string name_ = "failing";
-  Turns turns_;
 };
 
 TEST(SceneStream, WhatADeviceFailsToMakeIsMadeWithoutIt) {

@@ -13,6 +13,7 @@
 #include "isobrick/viewer/scene_stream.h"
 #include "tests/viewer/held_up.h"
 #include "tests/viewer/memory_bricks.h"
+#include "tests/viewer/plain_device.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {
@@ -22,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 /// Makes empty meshes on a thread of its own, some time after they are asked for.
-class SlowDevice final : public DeviceMesher {
+class SlowDevice final : public PlainDevice {
  public:
   explicit SlowDevice(milliseconds time) : time_(time), thread_([this] { run(); }) {}
   ~SlowDevice() override {
@@ -37,21 +38,20 @@ class SlowDevice final : public DeviceMesher {
     {
       const std::lock_guard lock(mutex_);
       taken_.emplace_back(std::move(mesh), std::move(done));
+      ++asked_;
     }
     change_.notify_all();
     return true;
   }
-  std::string failure() const override { return {}; }
-  const std::string& name() const override { return name_; }
-  std::vector<DeviceBlock> shared_blocks() const override { return {}; }
-  void share_only(std::size_t) override {}
-  std::uint64_t bytes() const override { return 0; }
-  Turns& turns() override { return turns_; }
-  Times times() const override { return {}; }
 
   void wait_until_asked() {
     std::unique_lock lock(mutex_);
     change_.wait(lock, [&] { return !taken_.empty(); });
+  }
+  /// How many meshes it was asked for.
+  int asked() const {
+    const std::lock_guard lock(mutex_);
+    return asked_;
   }
   /// Meshes that somebody holds.
   int held() const { return *held_; }
@@ -86,12 +86,11 @@ class SlowDevice final : public DeviceMesher {
 
   milliseconds time_;
   std::shared_ptr<std::atomic<int>> held_ = std::make_shared<std::atomic<int>>(0);
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable change_;
   std::vector<std::pair<NodeMesh, Done>> taken_;
+  int asked_ = 0;
   bool end_ = false;
-  std::string name_ = "slow";
-  Turns turns_;
   std::thread thread_;
 };
 
@@ -106,6 +105,14 @@ class StreamEnd : public testing::Test {
     // Not all bricks fit: another isovalue has to read.
     stream_ = std::make_unique<SceneStream>(
         source_, tree_, StreamOptions{.threads = threads, .brick_bytes = 4 << 20});
+  }
+  /// With a device that is at a mesh.
+  void begin_with(const std::shared_ptr<SlowDevice>& device) {
+    begin();
+    stream_->set_device(device);
+    source_->open();
+    want(0);
+    device->wait_until_asked();
   }
   void want(double isovalue) { stream_->set_cut(RandomCut(tree_->grid(), 1, 100).cut({isovalue})); }
   /// Whether the stream's threads have ended: they hold the source.
@@ -165,19 +172,17 @@ TEST_F(StreamEnd, AThreadThatWasHeldUpMakesNothingAnyMore) {
     source_->wait_until_read();
     expect_quick_end();
     EXPECT_EQ(device.use_count(), 1);
+    const int asked = device->asked();
     source_->open();
     EXPECT_TRUE(threads_end());
+    EXPECT_EQ(device->asked(), asked);
     EXPECT_EQ(device->held(), 0);
   }
 }
 
 TEST_F(StreamEnd, WaitsForWhatADeviceMakes) {
-  const auto device = std::make_shared<SlowDevice>(milliseconds(20));
-  begin();
-  stream_->set_device(device);
-  source_->open();
-  want(0);
-  device->wait_until_asked();
+  const auto device = std::make_shared<SlowDevice>(milliseconds(5));
+  begin_with(device);
   expect_quick_end();
   EXPECT_EQ(device->held(), 0);
   EXPECT_EQ(device.use_count(), 1);
@@ -187,11 +192,7 @@ TEST_F(StreamEnd, WaitsForWhatADeviceMakes) {
 TEST_F(StreamEnd, WhatADeviceMakesTooLateIsDropped) {
   auto device = std::make_shared<SlowDevice>(milliseconds(300));
   const auto held = device->held_count();
-  begin();
-  stream_->set_device(device);
-  source_->open();
-  want(0);
-  device->wait_until_asked();
+  begin_with(device);
   expect_quick_end();
   EXPECT_GT(device.use_count(), 1) << "it makes what it was sent";
   for (int i = 0; i < 1000 && device.use_count() > 1; ++i)

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "isobrick/viewer/device_mesher.h"
+
+namespace isobrick::test {
+
+/// What devices of tests have in common: no memory that is shared, and no failure.
+class PlainDevice : public DeviceMesher {
+ public:
+  std::string failure() const override { return {}; }
+  const std::string& name() const override { return name_; }
+  std::vector<DeviceBlock> shared_blocks() const override { return {}; }
+  void share_only(std::size_t) override {}
+  std::uint64_t bytes() const override { return 0; }
+  Turns& turns() override { return turns_; }
+  Times times() const override { return {}; }
+
+ private:
+  std::string name_ = "of a test";
+  Turns turns_;
+};
+
+}  // namespace isobrick::test
