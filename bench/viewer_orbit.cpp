@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "bench/guarded_main.h"
 #include "bench/picture_times.h"
 #include "isobrick/core/stopwatch.h"
 #include "isobrick/render/gl_context.h"
@@ -152,10 +153,5 @@ int run(int argc, char** argv) {
 }  // namespace isobrick::bench
 
 int main(int argc, char** argv) {
-  try {
-    return isobrick::bench::run(argc, argv);
-  } catch (const std::exception& e) {
-    std::cerr << "bench_viewer_orbit: " << e.what() << '\n';
-    return 1;
-  }
+  return isobrick::bench::guarded_main("bench_viewer_orbit", isobrick::bench::run, argc, argv);
 }

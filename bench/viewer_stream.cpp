@@ -24,6 +24,7 @@
 #include <thread>
 #include <utility>
 
+#include "bench/guarded_main.h"
 #include "bench/picture_times.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/extract.h"
@@ -386,10 +387,5 @@ int run(int argc, char** argv) {
 }  // namespace isobrick::bench
 
 int main(int argc, char** argv) {
-  try {
-    return isobrick::bench::run(argc, argv);
-  } catch (const std::exception& e) {
-    std::cerr << "bench_viewer_stream: " << e.what() << '\n';
-    return 1;
-  }
+  return isobrick::bench::guarded_main("bench_viewer_stream", isobrick::bench::run, argc, argv);
 }
