@@ -121,7 +121,7 @@ class Session {
     glFinish();
     const double seconds = seconds_since(start);
     const PictureState& state = picture_->state();
-    if (picture_->times().draw > 0) {  // nothing is drawn that would look the same
+    if (picture_->drew()) {  // nothing is drawn that would look the same
       began_ = start;
       if (!moving && state.complete && !state.plain)
         at_rest.add(seconds);
