@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
@@ -37,7 +38,7 @@ struct ResidentExtractor::Impl {
   DeviceVolume::Impl& volume;
   SurfaceOptions options;
   LaunchShapes shapes;
-  std::uint32_t active = 0;  ///< tiles of the last extraction
+  std::uint32_t active = 0;  ///< tiles of the last launch
   double isovalue = 0;
   std::uint32_t epoch = 0;
   DeviceBuffer<std::uint16_t> case_entries;
@@ -50,7 +51,7 @@ struct ResidentExtractor::Impl {
   DeviceBuffer<Triangle> triangles;
   MappedHost<LaunchReport> report;
   std::uint32_t launches = 0;
-  SurfaceTotals made{};  ///< by the last extraction
+  DeviceCounts made;  ///< by the last extraction
   Event start, end;
   TileSearch search;
   std::optional<SpanIndices> index;  ///< of the tiles, where the search is through one
@@ -163,8 +164,10 @@ struct ResidentExtractor::Impl {
     p.end.zero = &counters()->search_ticket;
     p.end.zero_words = static_cast<std::uint32_t>(
         (words.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
-    launch_extraction(kernel_of(volume.lattice.type, options), p, case_entries.data(),
-                      shapes.of(active), volume.stream.get(), !searched_by_blocks());
+    LaunchShape shape = shapes.of(active);
+    shape.blocks = std::min(shape.blocks, static_cast<int>(volume.tile_count));
+    launch_extraction(kernel_of(volume.lattice.type, options), p, case_entries.data(), shape,
+                      volume.stream.get(), !searched_by_blocks());
   }
 
   /// Buffers for a mesh of that size. What they held is lost.
@@ -191,18 +194,25 @@ struct ResidentExtractor::Impl {
   }
 
   /// Waits for the last launch. Its report comes some microseconds before an event would.
-  LaunchReport wait_for_report() const {
-    LaunchReport& seen = *report;
-    const std::atomic_ref<std::uint32_t> launch(seen.launch);
-    for (std::uint32_t looks = 1; launch.load(std::memory_order_acquire) != launches; ++looks) {
+  DeviceCounts wait_for_report() const {
+    std::uint64_t seen[LaunchReport::kWords];
+    const auto is_there = [&] {
+      for (int i = 0; i < LaunchReport::kWords; ++i) {
+        seen[i] = std::atomic_ref((*report).words[i]).load(std::memory_order_relaxed);
+        if (!LaunchReport::is_about(seen[i], launches)) return false;
+      }
+      return true;
+    };
+    for (std::uint32_t looks = 1; !is_there(); ++looks) {
       if (looks % kLooks != 0) continue;
       const cudaError_t state = cudaStreamQuery(volume.stream.get());
       if (state == cudaErrorNotReady) continue;
       check(state);
-      if (launch.load(std::memory_order_acquire) != launches)
+      if (!is_there())
         throw Error("the device has ended an extraction without saying what it made");
     }
-    return seen;
+    return {LaunchReport::value_of(seen[0]), LaunchReport::value_of(seen[1]),
+            static_cast<std::uint32_t>(LaunchReport::value_of(seen[2]))};
   }
 
   DeviceCounts extract(double value) {
@@ -211,22 +221,21 @@ struct ResidentExtractor::Impl {
     // Tiles that have no room are not begun: the first launch tells how many there are.
     for (;;) {
       launch();
-      const LaunchReport seen = wait_for_report();
-      active = seen.found;
-      const bool begun = seen.found <= row_tables.size();
-      make_row_tables(seen.found);
-      if (!begun || (seen.found > 0 && positions.size() == 0)) {
-        make_room(kVerticesOfTile * seen.found, kTrianglesOfTile * seen.found);
+      const DeviceCounts seen = wait_for_report();
+      active = seen.active_tiles;
+      const bool begun = active <= row_tables.size();
+      make_row_tables(active);
+      if (!begun || (active > 0 && positions.size() == 0)) {
+        make_room(kVerticesOfTile * active, kTrianglesOfTile * active);
         continue;
       }
-      made = seen.made;
-      if (made.vertices > std::numeric_limits<std::uint32_t>::max())
+      if (seen.vertices > std::numeric_limits<std::uint32_t>::max())
         throw Error(
             "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "
             "number; extract it in parts with --roi");
-      if (made.vertices <= positions.size() && made.triangles <= triangles.size())
-        return {made.vertices, made.triangles, seen.found};
-      make_room(made.vertices, made.triangles);
+      if (seen.vertices <= positions.size() && seen.triangles <= triangles.size())
+        return made = seen;
+      make_room(seen.vertices, seen.triangles);
     }
   }
 
@@ -256,7 +265,7 @@ float ResidentExtractor::milliseconds() {
 }
 
 void ResidentExtractor::download(MeshBuffer& mesh) const {
-  const SurfaceTotals made = impl_->made;
+  const DeviceCounts made = impl_->made;
   impl_->volume.stream.wait();
   mesh.clear();
   mesh.positions.resize(made.vertices);

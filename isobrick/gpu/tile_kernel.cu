@@ -21,25 +21,43 @@ constexpr std::size_t kSharedBytes = sizeof(TileShared) +
 static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later device has");
 
-/// Counts a tile's crossing edges and active cells, and leaves their places.
+/// A tile without a vertex or a cell tells so and nothing else: whoever asks for its sums adds
+/// nothing, and whoever asks for its rows finds no vertex there.
+__device__ void pass_empty_tile(TileShared& s, const TileParams& p) {
+  if (threadIdx.x != 0) return;
+  publish_sum(p.order[s.item].vertices, s.item, 0);
+  publish_sum(p.order[s.item].triangles, s.item, 0);
+  s.number_base = 0;
+  release_rows(s, p);
+}
+
+/// Counts a tile's crossing edges and active cells, and leaves their places. False where there
+/// are none; the last tile, which tells what all have, goes on.
 template <int N, bool Nan>
-__device__ void count_tile(TileShared& s, const TileParams& p) {
+__device__ bool count_tile(TileShared& s, const TileParams& p) {
   count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
     if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
   });
   __syncthreads();
   if constexpr (Nan) clear_lists<N>(s);
   const PlaneBases bases = PlaneBases::of(s);
+  const std::uint32_t vertices =
+      bases.vertices + (s.plane_sums[32] & 0xffffu) + (s.last_row_sums[32] & 0xffffu);
+  if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
+    pass_empty_tile(s, p);
+    __syncthreads();
+    return false;
+  }
   if (threadIdx.x == 0) {
     s.next_cells = s.next_vertices = 0;
-    s.all_vertices =
-        bases.vertices + (s.plane_sums[32] & 0xffffu) + (s.last_row_sums[32] & 0xffffu);
+    s.all_vertices = vertices;
     s.all_cells = bases.cells;
     publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
   publish_rows<N>(s, bases, p.row_tables[s.tile.slot]);
   __syncthreads();
+  return true;
 }
 
 /// The triangles of a tile with more cells than are listed at a time. The last
@@ -60,11 +78,11 @@ __device__ std::uint32_t count_in_turns(TileShared& s) {
   return triangles;
 }
 
-/// Whether warps that have so many things to list wait for each other by named barriers. In
-/// tiles that take turns, the turns' barriers are between them anyway.
+/// Whether the warps of a tile wait for each other by named barriers. In those that take turns,
+/// the turns' barriers are between them anyway.
 template <int N, bool Nan>
-__device__ bool wait_by_name(std::uint32_t count) {
-  return !Nan && count <= ListsOf<N>::kListed;
+__device__ bool wait_by_name(const TileShared& s) {
+  return !Nan && ::max(s.all_cells, s.all_vertices) <= ListsOf<N>::kListed;
 }
 
 /// Finds the tile's cells and where its vertices and triangles go. Two warps ask what other
@@ -72,7 +90,7 @@ __device__ bool wait_by_name(std::uint32_t count) {
 template <int N, bool Nan>
 __device__ void find_places(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
-  const bool at_once = wait_by_name<N, Nan>(cells);
+  const bool at_once = wait_by_name<N, Nan>(s);
   if (warp_id() == Team<N>::kVertices) {
     find_vertex_base(s, p);
     if (at_once) arrive<N, TeamBarrier::vertex_base>();
@@ -109,7 +127,7 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
   }
   if (for_vertices) {
     ask_neighbours<N>(s, p, neighbour);
-    if (wait_by_name<N, Nan>(s.all_vertices)) arrive<N, TeamBarrier::neighbours>();
+    if (at_once) arrive<N, TeamBarrier::neighbours>();
   }
 }
 
@@ -146,6 +164,26 @@ __device__ void emit_all_triangles(TileShared& s, const TileParams& p) {
   }
 }
 
+/// Of a counted tile.
+template <int N, class T, bool Normals, bool Nan>
+__device__ void make_mesh_of_tile(TileShared& s, const TileParams& p) {
+  find_places<N, Nan>(s, p);
+  emit_all_vertices<N, T, Normals>(s, p);
+  // After the vertices, which read the tile's samples once more. Wider samples of the tiles
+  // in work fill the L2 cache alone, and would be driven out.
+  if constexpr (sizeof(T) == 1) prefetch_tile<N, T>(s, p, s.item + gridDim.x);
+  if (!wait_by_name<N, Nan>(s))
+    __syncthreads();
+  else if (warp_id() != Team<N>::kVertices)
+    wait<N, TeamBarrier::neighbours>();
+  number_at_0<N>(s);
+  __syncthreads();
+  borrow_rows<N>(s);
+  place_numbers<N>(s);
+  __syncthreads();
+  emit_all_triangles<N>(s, p);
+}
+
 /// The last block to come here tells the host and leaves everything as the next launch
 /// needs it.
 template <int N>
@@ -157,11 +195,15 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
   __syncthreads();
   if (s.done_before + 1 < gridDim.x) return;
   if (threadIdx.x == 0) {
-    LaunchReport& report = *end.report;
-    report.made = s.items > 0 ? *p.totals : SurfaceTotals{};
-    report.found = p.candidates.count > 0 ? s.items : *end.found;
-    cuda::atomic_ref<std::uint32_t, cuda::thread_scope_system>(report.launch)
-        .store(end.launch, cuda::memory_order_release);
+    const SurfaceTotals made = s.items > 0 ? *p.totals : SurfaceTotals{};
+    const std::uint32_t found = p.candidates.count > 0 ? s.items : *end.found;
+    const auto say = [&](int i, std::uint64_t value) {
+      cuda::atomic_ref<std::uint64_t, cuda::thread_scope_system>(end.report->words[i])
+          .store(LaunchReport::word(value, end.launch), cuda::memory_order_relaxed);
+    };
+    say(0, made.vertices);
+    say(1, made.triangles);
+    say(2, found);
   }
   for (std::uint32_t i = own_thread(); i < end.zero_words; i += N) end.zero[i] = 0;
   if (p.candidates.count == 0) return;
@@ -190,22 +232,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
       clear_lists<N>(s);
     classify<N>(s, p, classifier);
     __syncthreads();
-    count_tile<N, Nan>(s, p);
-    find_places<N, Nan>(s, p);
-    emit_all_vertices<N, T, Normals>(s, p);
-    // After the vertices, which read the tile's samples once more. Wider samples of the tiles
-    // in work fill the L2 cache alone, and would be driven out.
-    if constexpr (sizeof(T) == 1) prefetch_tile<N, T>(s, p, s.item + gridDim.x);
-    if (!wait_by_name<N, Nan>(s.all_vertices))
-      __syncthreads();
-    else if (warp_id() != Team<N>::kVertices)
-      wait<N, TeamBarrier::neighbours>();
-    number_at_0<N>(s);
-    __syncthreads();
-    borrow_rows<N>(s);
-    place_numbers<N>(s);
-    __syncthreads();
-    emit_all_triangles<N>(s, p);
+    if (count_tile<N, Nan>(s, p)) make_mesh_of_tile<N, T, Normals, Nan>(s, p);
     if (s.items <= gridDim.x) {  // each block has one at most
       __syncthreads();
       break;
@@ -250,15 +277,15 @@ struct Launcher {
     check(cudaFuncGetAttributes(&attributes, kKernel));
     return attributes.ptxVersion >= 90;
   }
-  static void launch(const TileParams& params, const std::uint16_t* case_entries, int blocks,
-                     cudaStream_t stream, bool start_early) {
+  static void launch(const TileParams& params, const std::uint16_t* case_entries,
+                     const LaunchShape& shape, cudaStream_t stream, bool start_early) {
     cudaLaunchAttribute early{};
     early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
     early.val.programmaticStreamSerializationAllowed = 1;
     cudaLaunchConfig_t config{};
-    config.gridDim = static_cast<unsigned>(blocks);
+    config.gridDim = static_cast<unsigned>(shape.blocks);
     config.blockDim = N;
-    config.dynamicSmemBytes = shared();
+    config.dynamicSmemBytes = shape.shared_bytes;
     config.stream = stream;
     config.attrs = &early;
     config.numAttrs = start_early ? 1 : 0;
@@ -329,7 +356,7 @@ LaunchShapes launch_shapes(const TileKernel& kernel, int threads) {
   for (int i = 0; i < 3; ++i) {
     const int team = threads > 0 ? threads : kernel.may_have_nan ? kNanTeam : kTeams[i];
     shapes.shapes[i] = visit_launcher(kernel, team, [&](auto l) {
-      return LaunchShape{l.blocks(), team, l.may_start_early()};
+      return LaunchShape{l.blocks(), team, l.shared(), l.may_start_early()};
     });
   }
   if (shapes.shapes[2].blocks == 0)
@@ -352,7 +379,7 @@ void launch_extraction(const TileKernel& kernel, const TileParams& params,
                        const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream,
                        bool after_search) {
   visit_launcher(kernel, shape.threads, [&](auto l) {
-    l.launch(params, case_entries, shape.blocks, stream, after_search && shape.may_start_early);
+    l.launch(params, case_entries, shape, stream, after_search && shape.may_start_early);
   });
 }
 

@@ -27,6 +27,7 @@ inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& options) {
 /// How many blocks, and how many threads each; no blocks where one does not fit.
 struct LaunchShape {
   int blocks = 0, threads = 0;
+  std::size_t shared_bytes = 0;  ///< of each
   bool may_start_early = false;  ///< the code that runs waits for the launch before it
 };
 

@@ -79,11 +79,22 @@ struct TileCandidates {
   std::uint32_t count;
 };
 
-/// What a launch tells the host, in the host's memory.
+/// What a launch tells the host, in the host's memory: vertices and triangles made, and active
+/// tiles. Each word says by itself which launch it is about, so that none has to be written
+/// after the others, for which the device would wait until those have crossed the bus.
 struct LaunchReport {
-  SurfaceTotals made;
-  std::uint32_t found;   ///< active tiles
-  std::uint32_t launch;  ///< written last: which launch this is about
+  static constexpr int kValueBits = 40, kWords = 3;
+  std::uint64_t words[kWords];
+
+  static constexpr std::uint64_t word(std::uint64_t value, std::uint32_t launch) {
+    return value | static_cast<std::uint64_t>(launch) << kValueBits;
+  }
+  static constexpr std::uint64_t value_of(std::uint64_t word) {
+    return word & ((std::uint64_t{1} << kValueBits) - 1);
+  }
+  static constexpr bool is_about(std::uint64_t word, std::uint32_t launch) {
+    return (word ^ LaunchReport::word(0, launch)) >> kValueBits == 0;
+  }
 };
 
 /// What the last block of a launch does when all others are done.
