@@ -63,7 +63,7 @@ struct ResidentExtractor::Impl {
         case_entries(kCaseEntries, volume.stream),
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
-        order(volume.tile_count, volume.stream),
+        order(volume.tile_count * slabs(), volume.stream),
         words(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
         search(tuning.search) {
     if (const auto kind = index_kind_of(search)) index.emplace(index_tiles(volume, *kind));
@@ -78,7 +78,7 @@ struct ResidentExtractor::Impl {
                           volume.stream.get()));
     check(cudaMemsetAsync(words.data(), 0, words.bytes(), volume.stream.get()));
     if (searched_by_blocks()) {
-      make_row_tables(volume.tile_count);
+      make_row_tables(volume.tile_count * slabs());
       check(cudaMemsetAsync(order.data(), 0, order.bytes(), volume.stream.get()));
     }
     volume.stream.wait();
@@ -86,6 +86,8 @@ struct ResidentExtractor::Impl {
 
   /// Few tiles need no launch of their own to find the active ones.
   bool searched_by_blocks() const { return volume.tile_count <= kMostSearchedByBlock; }
+  /// Parts of a tile that may have a block each.
+  std::uint32_t slabs() const { return volume.tile_count <= kMostInSlabs ? kSlabsOfTile : 1; }
   std::size_t search_blocks() const {
     return (volume.tile_count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
   }
@@ -164,8 +166,8 @@ struct ResidentExtractor::Impl {
     p.end.zero = &counters()->search_ticket;
     p.end.zero_words = static_cast<std::uint32_t>(
         (words.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
-    LaunchShape shape = shapes.of(active);
-    shape.blocks = std::min(shape.blocks, static_cast<int>(volume.tile_count));
+    LaunchShape shape = slabs() > 1 ? shapes.in_slabs(active) : shapes.of(active);
+    shape.blocks = std::min(shape.blocks, static_cast<int>(volume.tile_count) * shape.slabs);
     launch_extraction(kernel_of(volume.lattice.type, options), p, case_entries.data(), shape,
                       volume.stream.get(), !searched_by_blocks());
   }

@@ -132,7 +132,8 @@ struct SamplesOfRows {
 template <int N, class T>
 __device__ inline void classify_rows(TileShared& s, const TileParams& p,
                                      const Classifier<T>& classifier) {
-  for_each_piece<N>([&](auto rows) {
+  const SlabPlanes planes = planes_of<N>(s.item);
+  for_each_piece<N>(planes.first, planes.read_end, [&](auto rows) {
     const OwnRow at(rows);
     const RowBits bits = SamplesOfRows<T>::read(s, p, rows).bits(classifier);
     if (at.exists()) s.rows[at.row()] = bits;
@@ -146,7 +147,9 @@ __device__ inline void classify_planes(TileShared& s, const TileParams& p,
                                        const Classifier<T>& classifier) {
   const int lane = static_cast<int>(lane_id());
   const auto inside = [&](T v) { return __ballot_sync(kAll, v >= classifier.threshold); };
-  for (int z = static_cast<int>(warp_id()); z < 33; z += Team<N>::kWarps) {
+  const SlabPlanes planes = planes_of<N>(s.item);
+  for (int z = planes.first + static_cast<int>(warp_id()); z < planes.read_end;
+       z += Team<N>::kWarps) {
     const int page = page_of(0, 0, z), start = 1024 * z;
     const T* from = sample_at<T>(s, page, start + lane);
     std::uint32_t word = 0;

@@ -22,7 +22,7 @@ __device__ inline void find_candidates(TileShared& s, const TileParams& p) {
     const auto own = static_cast<std::uint32_t>(__popc(s.active[lane_id()]));
     const std::uint32_t sum = warp_inclusive_sum(own);
     s.active_before[lane_id()] = sum - own;
-    if (lane_id() == 31) s.items = sum;
+    if (lane_id() == 31) s.items = sum * Team<N>::kSlabs;
   }
   __syncthreads();
 }

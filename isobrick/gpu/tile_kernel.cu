@@ -40,9 +40,9 @@ __device__ bool count_tile(TileShared& s, const TileParams& p) {
   });
   __syncthreads();
   if constexpr (Nan) clear_lists<N>(s);
-  const PlaneBases bases = PlaneBases::of(s);
-  const std::uint32_t vertices =
-      bases.vertices + (s.plane_sums[32] & 0xffffu) + (s.last_row_sums[32] & 0xffffu);
+  const SlabPlanes planes = planes_of<N>(s.item);
+  const PlaneBases bases = PlaneBases::of(s, planes);
+  const std::uint32_t vertices = bases.made<N>(s, planes);
   if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
     pass_empty_tile(s, p);
     __syncthreads();
@@ -55,7 +55,7 @@ __device__ bool count_tile(TileShared& s, const TileParams& p) {
     publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
-  publish_rows<N>(s, bases, p.row_tables[s.tile.slot]);
+  publish_rows<N>(s, bases, planes, p.row_tables[s.tile.slot]);
   __syncthreads();
   return true;
 }
@@ -107,7 +107,7 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
   const bool for_vertices = warp_id() == Team<N>::kVertices,
              for_triangles = warp_id() == Team<N>::kTriangles;
   Neighbour neighbour{};
-  if (for_vertices) neighbour = Neighbour::of_lane(s, p);
+  if (for_vertices) neighbour = Neighbour::of_lane<N>(s, p);
   if (at_once) {
     // All wait for each other at this one, so nobody may do anything before it.
     if (!for_vertices && for_triangles) wait<N, TeamBarrier::vertex_base>();
@@ -171,7 +171,8 @@ __device__ void make_mesh_of_tile(TileShared& s, const TileParams& p) {
   emit_all_vertices<N, T, Normals>(s, p);
   // After the vertices, which read the tile's samples once more. Wider samples of the tiles
   // in work fill the L2 cache alone, and would be driven out.
-  if constexpr (sizeof(T) == 1) prefetch_tile<N, T>(s, p, s.item + gridDim.x);
+  if constexpr (sizeof(T) == 1 && Team<N>::kSlabs == 1)
+    prefetch_tile<N, T>(s, p, s.item + gridDim.x);
   if (!wait_by_name<N, Nan>(s))
     __syncthreads();
   else if (warp_id() != Team<N>::kVertices)
@@ -196,7 +197,7 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
   if (s.done_before + 1 < gridDim.x) return;
   if (threadIdx.x == 0) {
     const SurfaceTotals made = s.items > 0 ? *p.totals : SurfaceTotals{};
-    const std::uint32_t found = p.candidates.count > 0 ? s.items : *end.found;
+    const std::uint32_t found = p.candidates.count > 0 ? s.items / Team<N>::kSlabs : *end.found;
     const auto say = [&](int i, std::uint64_t value) {
       cuda::atomic_ref<std::uint64_t, cuda::thread_scope_system>(end.report->words[i])
           .store(LaunchReport::word(value, end.launch), cuda::memory_order_relaxed);
@@ -223,7 +224,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   wait_for_launch_before();
   if (p.candidates.count == 0 && threadIdx.x == 0) s.items = *p.item_count;
   __syncthreads();
-  take_tile<T>(s, p, first);
+  take_tile<N, T>(s, p, first);
   __syncthreads();
   while (s.item < s.items) {
     if constexpr (Nan)
@@ -238,7 +239,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
       break;
     }
     // No earlier than this: a tile that is taken but not begun holds all later ones up.
-    take_tile<T>(s, p, next_number(p));
+    take_tile<N, T>(s, p, next_number(p));
     __syncthreads();
   }
   end_launch<N>(s, p);
@@ -255,6 +256,7 @@ int device_attribute(cudaDeviceAttr attribute) {
 template <int N, class T, bool Normals, bool Nan = false>
 struct Launcher {
   static constexpr auto kKernel = extract_tiles<N, T, Normals, Nan>;
+  static constexpr int kSlabs = Team<N>::kSlabs;
   static std::size_t shared() {
     const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
     return before_ampere ? kSharedBytes<kListedBeforeAmpere, Nan>
@@ -321,6 +323,7 @@ auto visit_launcher(const TileKernel& kernel, int threads, F&& f) {
     case 128: return f(Launcher<128, Byte, false>());
     case 256: return f(Launcher<256, Byte, false>());
     case 512: return f(Launcher<512, Byte, false>());
+    case kSlabTeam: return visit_launcher_of<kSlabTeam>(type, normals, f);
     case 640: return visit_launcher_of<640>(type, normals, f);
     case 1024: return visit_launcher_of<1024>(type, normals, f);
     default: return visit_launcher_of<384>(type, normals, f);
@@ -352,13 +355,15 @@ void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]) {
 
 LaunchShapes launch_shapes(const TileKernel& kernel, int threads) {
   if (threads > 0) check_threads(kernel, threads);
-  LaunchShapes shapes;
-  for (int i = 0; i < 3; ++i) {
-    const int team = threads > 0 ? threads : kernel.may_have_nan ? kNanTeam : kTeams[i];
-    shapes.shapes[i] = visit_launcher(kernel, team, [&](auto l) {
-      return LaunchShape{l.blocks(), team, l.shared(), l.may_start_early()};
+  const auto shape_of = [&](int team) {
+    return visit_launcher(kernel, team, [&](auto l) {
+      return LaunchShape{l.blocks(), team, l.kSlabs, l.shared(), l.may_start_early()};
     });
-  }
+  };
+  LaunchShapes shapes;
+  for (int i = 0; i < 3; ++i)
+    shapes.shapes[i] = shape_of(threads > 0 ? threads : kernel.may_have_nan ? kNanTeam : kTeams[i]);
+  if (threads == 0 && !kernel.may_have_nan) shapes.slabs = shape_of(kSlabTeam);
   if (shapes.shapes[2].blocks == 0)
     throw Error("the device has too little shared memory for the extraction kernel");
   return shapes;
@@ -373,6 +378,11 @@ LaunchShape LaunchShapes::of(std::uint32_t tiles) const {
   for (const LaunchShape& shape : shapes)
     if (shape.blocks > 0 && tiles <= static_cast<std::uint32_t>(shape.blocks)) return shape;
   return *best;
+}
+
+LaunchShape LaunchShapes::in_slabs(std::uint32_t tiles) const {
+  const auto blocks = static_cast<std::uint32_t>(slabs.blocks);
+  return blocks > 0 && tiles * kSlabsOfTile <= blocks ? slabs : of(tiles);
 }
 
 void launch_extraction(const TileKernel& kernel, const TileParams& params,

@@ -26,7 +26,7 @@ inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& options) {
 
 /// How many blocks, and how many threads each; no blocks where one does not fit.
 struct LaunchShape {
-  int blocks = 0, threads = 0;
+  int blocks = 0, threads = 0, slabs = 1;
   std::size_t shared_bytes = 0;  ///< of each
   bool may_start_early = false;  ///< the code that runs waits for the launch before it
 };
@@ -35,9 +35,13 @@ struct LaunchShape {
 /// one.
 struct LaunchShapes {
   LaunchShape shapes[3];  ///< by falling number of threads
+  LaunchShape slabs;      ///< of several blocks a tile; no blocks where there is none
 
-  /// For so many tiles.
+  /// For so many tiles, a block each.
   LaunchShape of(std::uint32_t tiles) const;
+  /// The same where blocks search tiles themselves: with several to a tile if each can have
+  /// a slab for itself.
+  LaunchShape in_slabs(std::uint32_t tiles) const;
 };
 
 /// `threads` that share a tile: 0 chooses. Throws UsageError for numbers that have no

@@ -116,12 +116,16 @@ __device__ inline void find_triangle_base(TileShared& s, const TileParams& p,
   if (item + 1 == s.items) p.totals->triangles = base + triangles;
 }
 
-/// Where an active tile of a resident volume leaves its row table; kNone for others.
+/// Where an active tile of a resident volume, or that slab of it, leaves its row table; kNone
+/// for others.
+template <int N>
 __device__ inline std::uint32_t slot_of(const TileShared& s, const TileParams& p, int x, int y,
-                                        int z) {
+                                        int z, std::uint32_t slab) {
   const std::int64_t place = (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x;
-  return p.candidates.count > 0 ? number_of_candidate(s, p.candidates.order_of_tile[place])
-                                : p.slot_of_tile[place];
+  const std::uint32_t number = p.candidates.count > 0
+                                   ? number_of_candidate(s, p.candidates.order_of_tile[place])
+                                   : p.slot_of_tile[place];
+  return Team<N>::kSlabs == 1 || number == kNone ? number : number * Team<N>::kSlabs + slab;
 }
 
 /// Brings the row table of the tile before to shared memory, on the way while this
@@ -146,14 +150,19 @@ struct Neighbour {
   std::uint32_t slot;  ///< or kNone
   bool wait;           ///< the table may not be ready
 
+  template <int N>
   __device__ static Neighbour of_lane(const TileShared& s, const TileParams& p) {
+    constexpr std::uint32_t kSlabs = Team<N>::kSlabs;
     const TileItem& item = s.tile;
     const unsigned n = lane_id();
     const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
+    const std::uint32_t slab = s.item % kSlabs;
     const bool inside = n >= 1 && n <= 6 && !(dx && s.shape.first[0]) &&
-                        !(dy && s.shape.first[1]) && !(dz && s.shape.first[2]);
+                        !(dy && s.shape.first[1]) && !(dz && (s.shape.first[2] || slab > 0));
     if (!inside) return {kNone, false};
-    if (!p.links) return {slot_of(s, p, item.x - dx, item.y - dy, item.z - dz), true};
+    if (!p.links)
+      return {slot_of<N>(s, p, item.x - dx, item.y - dy, item.z - dz, dz ? kSlabs - 1 : slab),
+              true};
     const std::uint32_t slot = p.links[s.item].before[n - 1];
     if (slot == kNone) return {kNone, false};
     return {slot & ~TileLinks::kSameLaunch, (slot & TileLinks::kSameLaunch) && !p.tables_known};
@@ -217,7 +226,8 @@ __device__ inline void number_at_0(TileShared& s) {
   const RowTable* before = s.before;
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
-  for_each_piece<N>([&](auto rows) {
+  const SlabPlanes planes = planes_of<N>(s.item);
+  for_each_piece<N>(planes.first, planes.counted_end, [&](auto rows) {
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();
@@ -268,9 +278,10 @@ __device__ inline void borrow_rows(TileShared& s) {
     const std::uint32_t corner = s.lower.xz[y];
     s.at_0[0][row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
   };
+  const SlabPlanes planes = planes_of<N>(s.item);
   for (int t = static_cast<int>(own_thread()); t < 128; t += N) {
-    if (t < 33 && !fy) row_0_of(t);
-    if (t >= 64 && t < 97 && !fz) row_of_plane_0(t - 64);
+    if (t >= planes.first && t < planes.counted_end && !fy) row_0_of(t);
+    if (t >= 64 && t < 97 && !fz && planes.first == 0) row_of_plane_0(t - 64);
   }
 }
 

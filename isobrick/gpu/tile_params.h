@@ -13,6 +13,8 @@ namespace isobrick::gpu {
 inline constexpr std::uint32_t kPageSamples = 32 * 32 * 32;
 /// Samples of its first column, x = 0.
 inline constexpr std::uint32_t kColumnSamples = 32 * 32;
+/// Where tiles are few, so many blocks share one, each of so many threads.
+inline constexpr int kSlabsOfTile = 4, kSlabTeam = 352;
 /// Rows (y, z) of the 33³ samples that the cells of a tile touch.
 inline constexpr int kRowsOfTile = 33 * 33;
 
@@ -65,8 +67,9 @@ enum class TileTest : std::uint8_t {
   all             ///< takes them all
 };
 
-/// Tiles of volumes that are so small that every block searches them all by itself.
-inline constexpr std::uint32_t kMostSearchedByBlock = 1024;
+/// Tiles of volumes that are so small that every block searches them all by itself; of those
+/// whose tiles may be shared by several blocks.
+inline constexpr std::uint32_t kMostSearchedByBlock = 1024, kMostInSlabs = 128;
 
 /// All tiles of a volume in Morton order.
 struct TileCandidates {

@@ -11,6 +11,7 @@ namespace isobrick::gpu {
 /// The first 32 rows of a plane.
 struct PlaneRows {
   static constexpr bool kPlane = true;
+  static constexpr int end = 33;
   int plane;
 
   /// Of row `i` of the piece, which is that of lane i.
@@ -20,7 +21,7 @@ struct PlaneRows {
 /// The last rows of planes. There may be less than 32.
 struct LastRows {
   static constexpr bool kPlane = false;
-  int first;
+  int first, end;
 
   __device__ static constexpr int y(int) { return 32; }
   __device__ int z(int i) const { return first + i; }
@@ -28,23 +29,34 @@ struct LastRows {
 /// The row of the own lane.
 template <class Rows>
 struct OwnRow {
-  int y, z;
+  int y, z, end;
 
   __device__ explicit OwnRow(Rows rows)
-      : y(rows.y(static_cast<int>(lane_id()))), z(rows.z(static_cast<int>(lane_id()))) {}
-  __device__ bool exists() const { return Rows::kPlane || z < 33; }
+      : y(rows.y(static_cast<int>(lane_id()))),
+        z(rows.z(static_cast<int>(lane_id()))),
+        end(rows.end) {}
+  __device__ bool exists() const { return Rows::kPlane || z < end; }
   __device__ int row() const { return 33 * z + y; }
 };
 
-/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp. Loops, so that the code of
+/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp, which lie in planes `first`
+/// to `end`: of a whole tile, all. Loops, so that the code of
 /// each kind is there once: warps in different steps share the instruction cache.
 template <int N, class F>
-__device__ inline void for_each_piece(F&& f) {
+__device__ inline void for_each_piece(int first, int end, F&& f) {
   auto piece = static_cast<int>(uniform(warp_id()));
+  if constexpr (Team<N>::kSlabs > 1) {
+    static_assert(Team<N>::kWarps > 32 / Team<N>::kSlabs + 2, "a piece a warp");
+    if (first + piece < end)
+      f(PlaneRows{first + piece});
+    else if (first + piece == end)
+      f(LastRows{first, end});
+  } else {
 #pragma unroll 1
-  for (; piece < 33; piece += Team<N>::kWarps) f(PlaneRows{piece});
+    for (; piece < 33; piece += Team<N>::kWarps) f(PlaneRows{piece});
 #pragma unroll 1
-  for (; piece < kPieces; piece += Team<N>::kWarps) f(LastRows{32 * (piece - 33)});
+    for (; piece < kPieces; piece += Team<N>::kWarps) f(LastRows{32 * (piece - 33), 33});
+  }
 }
 
 }  // namespace isobrick::gpu

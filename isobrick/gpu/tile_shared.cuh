@@ -18,15 +18,17 @@ static_assert(kRowPitch % 32 == 11);
 /// Rows are dealt out to warps in pieces of up to 32 (tile_pieces.cuh).
 inline constexpr int kPieces = 33 + 2;
 
-/// How many threads share a tile, and how its rows are dealt out to them.
+/// How many threads share a tile, or a slab of it, and how its rows are dealt out to them.
 template <int N>
 struct Team {
   static constexpr int kWarps = N / 32;
+  /// Teams to a tile: each makes the mesh of some planes of cells.
+  static constexpr int kSlabs = N == kSlabTeam ? kSlabsOfTile : 1;
   /// The warps that ask other tiles: where vertices go and what numbers those of neighbours
   /// have, and where triangles go.
   static constexpr unsigned kVertices = 0, kTriangles = kWarps > 1 ? 1 : 0;
   /// How many teams a multiprocessor has room for.
-  static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
+  static constexpr int kTeams = kSlabs > 1 ? 2 : N <= 384 ? 3 : N <= 640 ? 2 : 1;
   /// Vertices or cells that are found at a time; tiles with more take several turns.
   /// A multiprocessor before Ampere has 64 KiB of shared memory.
   static constexpr std::uint32_t kMostListed = kTeams == 3 ? 2560 : 7168;
@@ -62,6 +64,22 @@ struct Shape {
   std::uint32_t at_0;                    ///< 1 where the tile owns edges at sample 0
   bool inner;                            ///< nothing is cut along y or z, and at_0 is 0
 };
+
+/// The planes of samples of a slab. A slab numbers the vertices of one plane more than it has,
+/// which its upper cells share with the next slab, and for that looks at yet another.
+struct SlabPlanes {
+  int first, end;  ///< it makes the vertices and cells that begin here
+  int counted_end, read_end;
+};
+/// Of the slab with that number among all; of a tile that one team makes, all planes.
+template <int N>
+__device__ inline SlabPlanes planes_of(std::uint32_t item) {
+  constexpr int kSlabs = Team<N>::kSlabs, kPlanes = 32 / kSlabs;
+  if constexpr (kSlabs == 1) return {0, 33, 33, 33};
+  const auto slab = static_cast<int>(item % kSlabs);
+  const int first = kPlanes * slab, end = slab + 1 == kSlabs ? 33 : first + kPlanes;
+  return {first, end, ::min(end + 1, 33), ::min(end + 2, 33)};
+}
 
 /// What a tile needs of the row tables of the tiles below; 0 where there is none.
 struct LowerRows {

@@ -45,9 +45,11 @@ __device__ inline void find_pages(TileShared& s, const TileParams& p, const Tile
     s.columns[column] = address(p.pages, start - before + 32);
 }
 
+template <int N>
 __device__ inline TileItem item_of(const TileShared& s, const TileParams& p, std::uint32_t number) {
-  if (p.candidates.count == 0) return p.items[number];
-  const std::int32_t* tile = p.candidates.tiles + 3 * candidate_of_number(s, number);
+  if (Team<N>::kSlabs == 1 && p.candidates.count == 0) return p.items[number];
+  const std::int32_t* tile =
+      p.candidates.tiles + 3 * candidate_of_number(s, number / Team<N>::kSlabs);
   return {tile[0], tile[1], tile[2], number};
 }
 
@@ -56,14 +58,14 @@ __device__ inline std::uint32_t next_number(const TileParams& p) {
   return threadIdx.x == 0 ? atomicAdd(p.ticket, 1u) : 0;
 }
 
-/// The first warp takes the tile with that number.
-template <class T>
+/// The first warp takes the tile, or slab, with that number.
+template <int N, class T>
 __device__ inline void take_tile(TileShared& s, const TileParams& p, std::uint32_t number) {
   if (warp_id() != 0) return;
   number = __shfl_sync(kAll, number, 0);
   if (lane_id() == 0) s.item = number;
   if (number >= s.items) return;
-  const TileItem tile = item_of(s, p, number);
+  const TileItem tile = item_of<N>(s, p, number);
   find_pages<T>(s, p, tile, number);
   if (lane_id() == 0) {
     s.tile = tile;
@@ -81,7 +83,7 @@ __device__ inline void prefetch_tile(const TileShared& s, const TileParams& p,
   if (p.links) {
     from += streamed_page(number, kOwnPage) * static_cast<std::int64_t>(sizeof(T));
   } else {
-    const TileItem item = item_of(s, p, number);
+    const TileItem item = item_of<N>(s, p, number);
     const std::int64_t place =
         (static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] + item.x;
     const std::uint32_t page = page_of_place(p, place);

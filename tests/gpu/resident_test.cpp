@@ -165,10 +165,10 @@ TYPED_TEST(GpuResident, AnyNumberOfThreadsMakesTheSameMesh) {
     usual.extract(this->lowest() + 100);
     MeshBuffer expected;
     usual.download(expected);
-    for (const int threads : {32, 64, 128, 256, 384, 512, 1024}) {
+    for (const int threads : {32, 64, 128, 256, 384, 512, 640, 1024}) {
       SCOPED_TRACE(std::to_string(threads) + " threads");
       const bool studied = std::is_same_v<TypeParam, std::uint8_t> && !normals;
-      if (threads != 384 && threads != 1024 && !studied) {
+      if (threads != 384 && threads != 640 && threads != 1024 && !studied) {
         EXPECT_THROW(gpu::ResidentExtractor(volume, options, {.threads = threads}), UsageError);
         continue;
       }
