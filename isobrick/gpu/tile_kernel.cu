@@ -218,12 +218,13 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   extern __shared__ __align__(256) unsigned char bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(bytes);
   const std::uint32_t first = next_number(p);
+  const CaseEntries<N> cases(case_entries);
   if (p.candidates.count > 0) find_candidates<N, T>(s, p);
-  fill_tables<N>(s, case_entries);
+  fill_tables<N>(s, cases);
   const Classifier<T> classifier(threshold);
   wait_for_launch_before();
   if (p.candidates.count == 0 && threadIdx.x == 0) s.items = *p.item_count;
-  __syncthreads();
+  __syncwarp();
   take_tile<N, T>(s, p, first);
   __syncthreads();
   while (s.item < s.items) {
