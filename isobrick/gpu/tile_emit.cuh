@@ -1,7 +1,7 @@
 #pragma once
 
 #include "isobrick/gpu/tile_classify.cuh"
-#include "isobrick/gpu/tile_count.cuh"
+#include "isobrick/gpu/tile_lists.cuh"
 
 // Last step: vertices and triangles, written where they belong.
 

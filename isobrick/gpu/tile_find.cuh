@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/gpu/tile_count.cuh"
+#include "isobrick/gpu/tile_lists.cuh"
 #include "isobrick/gpu/tile_test.cuh"
 
 // Small volumes need no launch of their own to find active tiles: every block looks at
