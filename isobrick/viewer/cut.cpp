@@ -154,36 +154,43 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
     }
   }
   cut.triangles = static_cast<std::uint64_t>(std::max(used, 0.0));
-  for_each_point(top_nodes, [&](Int3 p) { append({top, p}, 0, node_view, cut); });
+  for_each_point(top_nodes, [&](Int3 p) { append({top, p}, 0, node_view, active, cut); });
   return cut;
 }
 
-/// Which of a node and its neighbours are not refined and shown.
-std::uint32_t CutSelector::coarse_around(const NodeKey& n, const NodeView& view) {
+/// Which of a node and its neighbours are not refined, shown, and to be met by the node's children.
+/// Where a neighbour has nothing at all the faces that it shares with nodes of the finest level lie
+/// on one side of the isovalue, by its values and by theirs: nothing is to be met, and its samples
+/// need not be read. (Points of coarser levels are mixed of samples from beyond the face as well.)
+std::uint32_t CutSelector::coarse_around(const NodeKey& n, const NodeView& view,
+                                         const ActiveNodes& active) {
+  const auto may_meet = [&](const NodeKey& k) { return n.level > 1 || active.below(k); };
   std::uint32_t coarse = 0;
   std::uint32_t bit = 1;
   for_each_point({n.node - Int3{1, 1, 1}, n.node + Int3{2, 2, 2}}, [&](Int3 p) {
-    if (!refined_({n.level, p}) && !view.cuts_away({n.level, p})) coarse |= bit;
+    const NodeKey k{n.level, p};
+    if (!refined_(k) && !view.cuts_away(k) && may_meet(k)) coarse |= bit;
     bit <<= 1;
   });
   return coarse;
 }
 
-void CutSelector::append(const NodeKey& n, std::uint32_t coarser, const NodeView& view, Cut& cut) {
+void CutSelector::append(const NodeKey& n, std::uint32_t coarser, const NodeView& view,
+                         const ActiveNodes& active, Cut& cut) {
   if (n.level == 0 || !refined_(n)) {
     const NodeSight sight = view.see(n);
     cut.nodes.push_back({n, coarser, static_cast<float>(sight.pixels),
                          static_cast<float>(sight.distance), sight.visible, sight.cut_away});
     return;
   }
-  const std::uint32_t coarse = coarse_around(n, view);
+  const std::uint32_t coarse = coarse_around(n, view, active);
   const Int3 ratio = tree_.grid().ratio(n.level - 1), nodes = tree_.grid().level(n.level - 1).nodes;
   for_each_point(tree_.grid().children(n), [&](Int3 c) {
     std::uint32_t mask = 0;
     const auto& bits = kBits[place_of(c, ratio, nodes)];
     for (std::size_t i = 0; coarse != 0 && i < bits.size(); ++i)
       mask |= (coarse >> bits[i] & 1u) << i;
-    append({n.level - 1, c}, mask, view, cut);
+    append({n.level - 1, c}, mask, view, active, cut);
   });
 }
 

@@ -27,8 +27,8 @@ inline constexpr std::uint64_t kBytesPerTriangle = 24;
 /// A node of a cut.
 struct CutNode {
   NodeKey key;
-  /// Directions in which the neighbour lies one level above; but not where it is cut away, since
-  /// nobody sees whether it is met.
+  /// Directions in which a neighbour lies one level above that is to be met; not one that is cut
+  /// away, since nobody sees whether it is met, nor, of the finest level, one without any surface.
   std::uint32_t coarser = 0;
   float pixels = 0;    ///< a cell's length on the picture
   float distance = 0;  ///< from the eye, world length
@@ -64,8 +64,9 @@ class CutSelector {
   double added_triangles(std::span<const NodeKey> refined, const NodeView& view,
                          std::span<const double> isovalues, double per_block) const;
   void collect(const NodeKey& n, std::vector<NodeKey>& needed);
-  std::uint32_t coarse_around(const NodeKey& n, const NodeView& view);
-  void append(const NodeKey& n, std::uint32_t coarser, const NodeView& view, Cut& cut);
+  std::uint32_t coarse_around(const NodeKey& n, const NodeView& view, const ActiveNodes& active);
+  void append(const NodeKey& n, std::uint32_t coarser, const NodeView& view,
+              const ActiveNodes& active, Cut& cut);
 
   const NodeTree& tree_;
   // Nodes beside the volume count as refined: nothing is to be done there.

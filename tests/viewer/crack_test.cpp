@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "isobrick/viewer/node_mesher.h"
+#include "tests/viewer/active_of.h"
 #include "tests/viewer/always.h"
 #include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
@@ -31,7 +35,8 @@ class Cracks : public ::testing::TestWithParam<Shape> {
               return static_cast<float>(GetParam().field(p, kEdge));
             }),
             MemoryBricks::Options{.brick = 16, .levels = GetParam().levels})),
-        grid_(source_->info()),
+        tree_(*source_),
+        grid_(tree_.grid()),
         bricks_(source_, std::uint64_t{1} << 30),
         mesher_(grid_, bricks_, {}) {}
 
@@ -43,7 +48,8 @@ class Cracks : public ::testing::TestWithParam<Shape> {
   }
 
   std::shared_ptr<MemoryBricks> source_;
-  NodeGrid grid_;
+  NodeTree tree_;
+  const NodeGrid& grid_;
   ResidentBricks bricks_;
   NodeMesher mesher_;
 };
@@ -69,6 +75,43 @@ TEST_P(Cracks, AreNotBetweenLevels) {
   EXPECT_GT(covered, 500000u);
   EXPECT_GT(ribbons, 1000u) << "there are borders between levels";
   // A vertex on a chord is on it to within float's rounding.
+  EXPECT_LE(unbalanced, covered / 100000);
+  EXPECT_EQ(inside_seen, 0u);
+}
+
+/// What ends just before coarser nodes that have nothing.
+double beside_nothing(Int3 p, Index) {
+  const auto ball_at = [&](Vec3d centre, double radius) {
+    const Vec3d d =
+        Vec3d{static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)} -
+        centre;
+    return radius - std::sqrt(dot(d, d));
+  };
+  return std::max(
+      {ball_at({100, 60, 60}, 26.6), ball_at({60, 101, 30}, 26.9), ball_at({40, 40, 112}, 15.4)});
+}
+
+/// Nodes of the finest level that do not meet what has nothing end nowhere either.
+class Nothing : public Cracks {};
+
+TEST_P(Nothing, NeedsNotBeMet) {
+  const ActiveNodes active = active_of(tree_, std::vector<double>{0});
+  std::size_t covered = 0, unbalanced = 0, inside_seen = 0, unmet = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const RandomCut random(grid_, seed, 3 + static_cast<int>(seed));
+    const Cut all = random.cut({0}), cut = random.cut({0}, &active);
+    for (std::size_t i = 0; i < cut.nodes.size(); ++i)
+      unmet += tree_.active(cut.nodes[i].key, 0) && cut.nodes[i].coarser != all.nodes[i].coarser;
+    Rasteriser raster = picture(static_cast<int>(seed));
+    for (const NodeMesh& mesh : meshes_of(cut)) raster.draw(mesh);
+    for (const Rasteriser::Pixel& pixel : raster.pixels()) {
+      covered += pixel.front > 0;
+      unbalanced += pixel.front != pixel.back;
+      inside_seen += pixel.nearest_is_back;
+    }
+  }
+  EXPECT_GT(covered, 100000u);
+  EXPECT_GT(unmet, 10u);
   EXPECT_LE(unbalanced, covered / 100000);
   EXPECT_EQ(inside_seen, 0u);
 }
@@ -111,6 +154,11 @@ INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Cracks,
                                            Shape{"blobs", blobs},
                                            Shape{"ball_of_one_level", ball, 1},
                                            Shape{"blobs_of_one_level", blobs, 1}),
+                         [](const auto& shape) { return shape.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Nothing,
+                         ::testing::Values(Shape{"balls", beside_nothing},
+                                           Shape{"balls_of_one_level", beside_nothing, 1}),
                          [](const auto& shape) { return shape.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Holes,

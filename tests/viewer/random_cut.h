@@ -5,6 +5,7 @@
 #include <tuple>
 #include <vector>
 
+#include "isobrick/viewer/active_nodes.h"
 #include "isobrick/viewer/cut.h"
 
 namespace isobrick::test {
@@ -27,10 +28,12 @@ class RandomCut {
     }
   }
 
-  Cut cut(const std::vector<double>& isovalues) const {
+  /// With `active`, nodes of the finest level need not meet neighbours that have nothing.
+  Cut cut(const std::vector<double>& isovalues, const ActiveNodes* active = nullptr) const {
     Cut cut;
     cut.isovalues = isovalues;
-    for (const NodeKey& n : leaves()) cut.nodes.push_back({n, coarser(n), 1.0f, 1.0f, true});
+    for (const NodeKey& n : leaves())
+      cut.nodes.push_back({n, coarser(n, active), 1.0f, 1.0f, true});
     return cut;
   }
 
@@ -48,11 +51,14 @@ class RandomCut {
     }
     refined_.insert(id(n));
   }
-  std::uint32_t coarser(const NodeKey& n) const {
+  std::uint32_t coarser(const NodeKey& n, const ActiveNodes* active) const {
     std::uint32_t mask = 0;
     for (int i = 0; i < kDirections; ++i) {
       const NodeKey m{n.level, n.node + direction(i)};
-      if (has_node(grid_, m) && grid_.has_parent(m) && !refined(grid_.parent(m))) mask |= 1u << i;
+      if (!has_node(grid_, m) || !grid_.has_parent(m)) continue;
+      const NodeKey above = grid_.parent(m);
+      const bool nothing = active != nullptr && n.level == 0 && !active->below(above);
+      if (!refined(above) && !nothing) mask |= 1u << i;
     }
     return mask;
   }
