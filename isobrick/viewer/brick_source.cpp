@@ -17,7 +17,9 @@ class StoreBricks final : public BrickSource {
   bool read_brick(int level, Int3 brick, std::byte* out) const override {
     return store_->read_brick(level, brick, out);
   }
-  void will_need(int level, Int3 brick) const override { store_->will_need(level, brick); }
+  void will_need(int level, Int3 brick) const override {
+    if (!store_->brick_times().from_memory()) store_->will_need(level, brick);
+  }
   RangeTable brick_ranges(int level, Box3 box) const override {
     return store_->brick_ranges(level, box);
   }
