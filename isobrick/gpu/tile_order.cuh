@@ -3,6 +3,7 @@
 #include <cuda/atomic>
 
 #include "isobrick/gpu/tile_find.cuh"
+#include "isobrick/gpu/tile_pieces.cuh"
 
 // Third step: where the tile's output goes, and the numbers of vertices that
 // belong to tiles before it.
