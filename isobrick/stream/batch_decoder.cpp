@@ -54,7 +54,7 @@ BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& pl
     grow_if_short();
   }
   threads_.emplace_back([this] { plan(); });
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this, i] { run(i); });
+  for (int i = 0; i < threads; ++i) threads_.emplace_back([this, i] { work(i); });
 }
 
 BatchDecoder::~BatchDecoder() {
@@ -62,7 +62,7 @@ BatchDecoder::~BatchDecoder() {
     const std::lock_guard lock(mutex_);
     stop_ = true;
   }
-  work_.notify_all();
+  jobs_.stop();
   changed_.notify_all();
   for (std::thread& thread : threads_) thread.join();
   jobs_.clear();
@@ -84,9 +84,12 @@ std::shared_ptr<const DecodedBatch> BatchDecoder::next() {
   if (batches_.empty()) return nullptr;
   const Batch batch = std::move(batches_.front());
   batches_.pop_front();
+  const std::vector<Int3>& bricks = batch->batch_.bricks;
+  for (std::size_t i = bricks.size() - batch->loads_; i < bricks.size(); ++i)
+    if (slots_.find(bricks[i])) slots_.decoded(bricks[i], true);
   ahead_ -= batch->loads_;
-  batch->samples_ = FlatMap<const std::byte*>(batch->batch_.bricks.size());
-  for (const Int3 b : batch->batch_.bricks)
+  batch->samples_ = FlatMap<const std::byte*>(bricks.size());
+  for (const Int3 b : bricks)
     batch->samples_.insert(key_of(b, batch->grid_)).first = slots_.find(b);
   changed_.notify_all();
   return batch;
@@ -104,6 +107,7 @@ void BatchDecoder::plan() {
   } catch (...) {
     return fail(std::current_exception());
   }
+  jobs_.close();
   const std::lock_guard lock(mutex_);
   planned_ = true;
   changed_.notify_all();
@@ -138,24 +142,23 @@ void BatchDecoder::begin(const Batch& batch) {
     const Int3 brick = bricks[batch->held_];
     std::byte* slot = place(brick);
     if (!slot) {
-      load(batch, loads);  // nothing is to wait for this
+      load(batch, std::exchange(loads, {}));  // nothing is to wait for this
       wait(lock, [&] { return (slot = place(brick)) != nullptr; });
       if (!slot) return;
     }
     ++batch->held_;
     loads.push_back({brick, slot});
-    if (loads.size() == bricks_of_job_) load(batch, loads);
+    if (loads.size() == bricks_of_job_) load(batch, std::exchange(loads, {}));
   }
-  load(batch, loads);
+  load(batch, std::move(loads));
   batch->begun_ = true;
   changed_.notify_all();
 }
 
-void BatchDecoder::load(const Batch& batch, std::vector<Load>& loads) {
+void BatchDecoder::load(const Batch& batch, std::vector<Load> loads) {
   if (loads.empty()) return;
-  jobs_.push_back(
-      [this, batch, mine = std::exchange(loads, {})](int thread) { decode(thread, batch, mine); });
-  work_.notify_one();
+  jobs_.push(
+      [this, batch, loads = std::move(loads)](int thread) { decode(thread, *batch, loads); });
 }
 
 /// Null when there is no room now. A brick that is not needed for long goes rather than that
@@ -174,7 +177,6 @@ void BatchDecoder::hint(const TileBatch& batch) {
   jobs_.push_front([this, missing = std::move(missing)](int) {
     for (const Int3 b : missing) store_.will_need(level_, b);
   });
-  work_.notify_one();
 }
 
 /// Gets more memory beforehand, for that takes a while.
@@ -187,7 +189,6 @@ void BatchDecoder::grow_if_short() {
     slots_count_ += count;
     coming_ += count;
     jobs_.push_front([this, count](int) { grow(count); });
-    work_.notify_one();
   }
 }
 
@@ -201,35 +202,28 @@ void BatchDecoder::grow(std::size_t count) {
   changed_.notify_all();
 }
 
-void BatchDecoder::run(int thread) {
+void BatchDecoder::work(int thread) {
   try {
-    for (;;) {
-      Job job;
-      {
-        std::unique_lock lock(mutex_);
-        work_.wait(lock, [&] { return stop_ || !jobs_.empty(); });
-        if (stop_) return;
-        job = std::move(jobs_.front());
-        jobs_.pop_front();
-      }
-      job(thread);
-    }
+    jobs_.run(thread);
   } catch (...) {
     fail(std::current_exception());
   }
 }
 
-void BatchDecoder::decode(int thread, const Batch& batch, const std::vector<Load>& loads) {
-  std::vector<char> present;
+void BatchDecoder::decode(int thread, DecodedBatch& batch, const std::vector<Load>& loads) {
   for (const Load& load : loads) {
-    std::byte* to = memory_.begin(thread, load.samples);
-    present.push_back(store_.read_brick(level_, load.brick, to));
-    if (present.back()) memory_.end(thread, load.samples);
+    std::byte* const to = memory_.begin(thread, load.place);
+    if (store_.read_brick(level_, load.brick, to)) {
+      memory_.end(thread, load.place);
+    } else {
+      const std::lock_guard lock(mutex_);
+      slots_.decoded(load.brick, false);
+    }
   }
+  if (batch.missing_.fetch_sub(loads.size()) > loads.size()) return;
+  // Under the lock, or whoever has just looked would not be told.
   const std::lock_guard lock(mutex_);
-  for (std::size_t i = 0; i < loads.size(); ++i) slots_.decoded(loads[i].brick, present[i] != 0);
-  batch->missing_ -= loads.size();
-  if (batch->missing_ == 0) changed_.notify_all();
+  changed_.notify_all();
 }
 
 void BatchDecoder::release(const DecodedBatch& batch) {

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <exception>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -16,6 +16,7 @@
 #include "isobrick/core/flat_map.h"
 #include "isobrick/stream/brick_memory.h"
 #include "isobrick/stream/brick_slots.h"
+#include "isobrick/stream/job_queue.h"
 #include "isobrick/stream/tile_stream.h"
 
 namespace isobrick {
@@ -41,10 +42,10 @@ class DecodedBatch final : public BrickLookup {
   TileBatch batch_;
   Int3 grid_;
   FlatMap<const std::byte*> samples_;
-  std::size_t held_ = 0;     ///< of its bricks, the first so many
-  std::size_t missing_ = 0;  ///< bricks to decode for it, not done
-  std::size_t loads_ = 0;    ///< all bricks to decode for it
-  bool begun_ = false;       ///< all of its bricks are held
+  std::size_t held_ = 0;                  ///< of its bricks, the first so many
+  std::size_t loads_ = 0;                 ///< of its bricks, the last so many are decoded for it
+  std::atomic<std::size_t> missing_ = 0;  ///< of those, not done; not under the decoder's lock
+  bool begun_ = false;                    ///< all of its bricks are held
 };
 
 /// Decodes the bricks of batch after batch, some batches ahead of whoever takes them, so
@@ -78,20 +79,19 @@ class BatchDecoder {
   using Batch = std::shared_ptr<DecodedBatch>;
   struct Load {
     Int3 brick;
-    std::byte* samples;
+    std::byte* place;
   };
-  using Job = std::function<void(int thread)>;
 
   void plan();
   bool next_planned(TileBatch& batch);
   void begin(const Batch& batch);
-  void load(const Batch& batch, std::vector<Load>& loads);
+  void load(const Batch& batch, std::vector<Load> loads);
   std::byte* place(Int3 brick);
   void hint(const TileBatch& batch);
   void grow_if_short();
   void grow(std::size_t count);
-  void run(int thread);
-  void decode(int thread, const Batch& batch, const std::vector<Load>& loads);
+  void work(int thread);
+  void decode(int thread, DecodedBatch& batch, const std::vector<Load>& loads);
   void release(const DecodedBatch& batch);
   void fail(std::exception_ptr error);
   template <class Ready>
@@ -106,9 +106,11 @@ class BatchDecoder {
   const std::size_t bricks_of_job_;
   BrickMemory& memory_;
 
-  std::mutex mutex_;
-  std::condition_variable work_, changed_;
-  std::deque<Job> jobs_;
+  // Decoders take jobs and end them without the lock of the books, which planning and handing on
+  // hold for long.
+  JobQueue jobs_;
+  std::mutex mutex_;  ///< of all below
+  std::condition_variable changed_;
   BrickSlots slots_;
   std::deque<Batch> batches_;    ///< begun or about to be, not taken
   std::size_t ahead_ = 0;        ///< bricks decoded for those, or being so
