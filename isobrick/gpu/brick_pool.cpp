@@ -1,16 +1,17 @@
 #include "isobrick/gpu/brick_pool.h"
 
 #include <array>
-#include <atomic>
+#include <chrono>
 #include <exception>
 #include <mutex>
-#include <utility>
+#include <thread>
 #include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/device_arena.h"
 #include "isobrick/gpu/pinned_region.h"
+#include "isobrick/gpu/send_books.h"
 #include "isobrick/gpu/stream.h"
 
 namespace isobrick::gpu {
@@ -23,36 +24,21 @@ constexpr std::size_t kGoodRequest = std::size_t{4} << 20;
 constexpr std::uint64_t kTimedOf = 16;
 /// Requests that can be told apart; of older ones it is only known that they are over.
 constexpr std::size_t kEvents = 16;
+/// Looks whether a copy is over before whoever waits for it sleeps between them.
+constexpr int kQuickLooks = 64;
+constexpr std::chrono::microseconds kBetweenLooks{50};
 /// What bricks are before they are sent: noticed when it is taken for samples.
 constexpr int kPoison = 0xff;
 
-/// A brick's buffer.
-struct Buffer {
-  /// Its copy is asked for by no request yet, or it is by the one of this number, from 1.
-  static constexpr std::uint64_t kEnded = ~std::uint64_t{0};
-  std::uint64_t request = 0;
-};
-
-/// What a thread fills, in turn.
-struct Writer {
-  std::vector<Buffer> buffers;
-  std::size_t next = 0;
-};
-
-/// A brick that waits to be copied.
-struct Piece {
-  Buffer* buffer;
-  std::byte *from, *to;
-};
-
-/// Copies pieces of the same size.
-void copy_all(const std::vector<Piece>& pieces, std::size_t bytes, const Stream& stream) {
+/// Copies pieces of `bytes` out of buffers that lie one after the other.
+void copy_all(const std::vector<SendBooks::Piece>& pieces, const std::byte* buffers,
+              std::size_t bytes, const Stream& stream) {
 #if CUDART_VERSION >= 13000
   std::vector<void*> to;
   std::vector<const void*> from;
-  for (const Piece& piece : pieces) {
+  for (const SendBooks::Piece& piece : pieces) {
     to.push_back(piece.to);
-    from.push_back(piece.from);
+    from.push_back(buffers + piece.buffer * bytes);
   }
   const std::vector<std::size_t> sizes(pieces.size(), bytes);
   cudaMemcpyAttributes attributes{};
@@ -61,8 +47,9 @@ void copy_all(const std::vector<Piece>& pieces, std::size_t bytes, const Stream&
   check(cudaMemcpyBatchAsync(to.data(), from.data(), sizes.data(), sizes.size(), &attributes,
                              &of_all, 1, stream.get()));
 #else
-  for (const Piece& piece : pieces)
-    check(cudaMemcpyAsync(piece.to, piece.from, bytes, cudaMemcpyHostToDevice, stream.get()));
+  for (const SendBooks::Piece& piece : pieces)
+    check(cudaMemcpyAsync(piece.to, buffers + piece.buffer * bytes, bytes, cudaMemcpyHostToDevice,
+                          stream.get()));
 #endif
 }
 
@@ -75,19 +62,16 @@ struct BrickPool::Impl {
   DeviceArena memory;
   std::byte* bricks;
   Stream stream;
-  std::vector<Writer> writers;
   std::size_t good_request;  ///< bricks
+  SendBooks books;
 
-  std::mutex mutex;  ///< of `used`, the buffers' requests and what has ended
-  std::vector<Piece> ended;
-
-  std::mutex requesting;  ///< of all below
+  std::mutex taking;      ///< of `used`
+  std::mutex requesting;  ///< of all below, but for looking at `overs`
   std::uint64_t requests = 0, bricks_sent = 0;
   struct Over : Event {
-    Over() : Event(cudaEventBlockingSync | cudaEventDisableTiming) {}
+    Over() : Event(cudaEventDisableTiming) {}
   };
   std::array<Over, kEvents> overs;
-  std::atomic<std::uint64_t> known_over = 0;  ///< requests of which no buffer is waited for
   Event all_sent{cudaEventDisableTiming}, timed_begin, timed_end;
   std::uint64_t timing = 0;  ///< bricks of the request that is being timed
   double timed_seconds = 0;
@@ -99,43 +83,45 @@ struct BrickPool::Impl {
         brick_bytes(of_brick),
         size(count * of_brick),
         buffers(id, {static_cast<std::size_t>(pinned_bytes(of_brick, threads))}),
-        memory(size) {
+        memory(size),
+        books(threads, buffers_of_thread(of_brick)) {
     if (!memory) throw OutOfDeviceMemory("the GPU has no room for a pool of bricks");
     bricks = memory.take<std::byte>(size);
     check(cudaMemsetAsync(bricks, kPoison, size, stream.get()));
-    const std::size_t each = buffers_of_thread(of_brick);
-    for (int i = 0; i < threads; ++i) writers.push_back({std::vector<Buffer>(each)});
     good_request = std::clamp<std::size_t>(kGoodRequest / of_brick, 1,
-                                           std::max<std::size_t>(1, writers.size() * each / 2));
+                                           std::max<std::size_t>(1, books.buffers() / 2));
   }
   /// Copies end before their buffers.
   ~Impl() { (void)cudaStreamSynchronize(stream.get()); }
 
-  Writer& writer(int thread) { return writers[static_cast<std::size_t>(thread)]; }
-  std::size_t offset_of(int thread, std::size_t buffer) const {
-    return (static_cast<std::size_t>(thread) * writers.front().buffers.size() + buffer) *
-           brick_bytes;
-  }
-  const Event& over(std::uint64_t request) const { return overs[request % kEvents]; }
+  std::byte* at(std::size_t buffer) { return buffers.touched(0) + buffer * brick_bytes; }
 
-  std::uint64_t request_of(const Buffer& buffer) {
-    const std::lock_guard lock(mutex);
-    return buffer.request;
-  }
-
-  /// The buffer's brick has been copied.
-  void wait_for(const Buffer& buffer) {
-    if (request_of(buffer) == Buffer::kEnded) {
-      const std::lock_guard lock(requesting);
-      request();
+  /// The buffer's brick has been copied. Copies are over soon and mostly before anybody waits, so
+  /// the waiting looks again and again: an event that can be slept for costs the driver's thread
+  /// a core each time, whether anybody sleeps or not.
+  void wait_for(std::size_t buffer) {
+    for (int looks = 0;; ++looks) {
+      const SendBooks::State state = books.state_of(buffer);
+      if (state == SendBooks::State::free) return;
+      if (state == SendBooks::State::ended) {
+        const std::lock_guard lock(requesting);
+        request();
+      } else if (const std::uint64_t number = books.request_of(buffer); is_over(number)) {
+        books.over(number);
+      } else if (looks < kQuickLooks) {
+        std::this_thread::yield();
+      } else {
+        std::this_thread::sleep_for(kBetweenLooks);
+      }
     }
-    const std::uint64_t request = request_of(buffer);
-    if (request <= known_over) return;
+  }
+
+  /// Of a request that was made.
+  bool is_over(std::uint64_t request) {
     make_current(device);
-    over(request).wait();
-    std::uint64_t known = known_over;
-    while (known < request && !known_over.compare_exchange_weak(known, request)) {
-    }
+    const cudaError_t result = cudaEventQuery(overs[request % kEvents].get());
+    if (result != cudaErrorNotReady) check(result);
+    return result == cudaSuccess;
   }
 
   /// Asks for the copies of what has ended; `requesting` is held.
@@ -150,20 +136,16 @@ struct BrickPool::Impl {
   }
 
   void request_all() {
-    std::vector<Piece> pieces;
-    {
-      const std::lock_guard lock(mutex);
-      pieces.swap(ended);
-    }
+    const std::vector<SendBooks::Piece> pieces = books.take_ended();
     if (pieces.empty()) return;
     make_current(device);
-    (void)buffers.locked(0);
+    const std::byte* const from = buffers.locked(0);
     const bool timed = requests % kTimedOf == 0;
     if (timed) {
       end_timing();
       timed_begin.record(stream);
     }
-    copy_all(pieces, brick_bytes, stream);
+    copy_all(pieces, from, brick_bytes, stream);
     if (timed) {
       timed_end.record(stream);
       timing = pieces.size();
@@ -171,8 +153,7 @@ struct BrickPool::Impl {
     ++requests;
     overs[requests % kEvents].record(stream);
     bricks_sent += pieces.size();
-    const std::lock_guard lock(mutex);
-    for (const Piece& piece : pieces) piece.buffer->request = requests;
+    books.asked(pieces, requests);
   }
 
   void end_timing() {
@@ -190,7 +171,7 @@ BrickPool::BrickPool(int device, std::size_t brick_bytes, std::size_t bricks, in
 BrickPool::~BrickPool() = default;
 
 std::byte* BrickPool::take(std::size_t bytes) {
-  const std::lock_guard lock(impl_->mutex);
+  const std::lock_guard lock(impl_->taking);
   if (bytes > impl_->size - impl_->used) throw Error("the pool of bricks on the device is used up");
   std::byte* at = impl_->bricks + impl_->used;
   impl_->used += bytes;
@@ -198,22 +179,13 @@ std::byte* BrickPool::take(std::size_t bytes) {
 }
 
 std::byte* BrickPool::begin(int thread) {
-  Writer& writer = impl_->writer(thread);
-  impl_->wait_for(writer.buffers[writer.next]);
-  return impl_->buffers.touched(0) + impl_->offset_of(thread, writer.next);
+  const std::size_t buffer = impl_->books.buffer_of(thread);
+  impl_->wait_for(buffer);
+  return impl_->at(buffer);
 }
 
 void BrickPool::end(int thread, std::byte* place) {
-  Writer& writer = impl_->writer(thread);
-  Buffer& buffer = writer.buffers[writer.next];
-  std::byte* const from = impl_->buffers.touched(0) + impl_->offset_of(thread, writer.next);
-  writer.next = (writer.next + 1) % writer.buffers.size();
-  {
-    const std::lock_guard lock(impl_->mutex);
-    buffer.request = Buffer::kEnded;
-    impl_->ended.push_back({&buffer, from, place});
-    if (impl_->ended.size() < impl_->good_request) return;
-  }
+  if (impl_->books.end(thread, place) < impl_->good_request) return;
   // Whoever is asking the driver just now leaves it to the next one.
   const std::unique_lock lock(impl_->requesting, std::try_to_lock);
   if (lock) impl_->request();

@@ -25,10 +25,9 @@ struct Lane {
   Vec3f *positions = nullptr, *normals = nullptr;
   Triangle* triangles = nullptr;
   SurfaceTotals* totals = nullptr;  ///< page-locked
-  Event upload_begin{cudaEventBlockingSync}, uploaded{cudaEventBlockingSync},
-      unpack_begin{cudaEventBlockingSync}, unpacked{cudaEventBlockingSync},
-      extracted{cudaEventBlockingSync}, download_begin{cudaEventBlockingSync},
-      downloaded{cudaEventBlockingSync};
+  // Each that can be slept for wakes a thread of the driver's when it is over.
+  Event extracted{cudaEventBlockingSync}, downloaded{cudaEventBlockingSync};
+  Event upload_begin, uploaded, unpack_begin, unpacked, download_begin;
   std::uint32_t count = 0;                  ///< tiles
   std::vector<std::uint32_t> unused_slots;  ///< once this launch is not repeated any more
 

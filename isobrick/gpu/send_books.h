@@ -1,0 +1,55 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+namespace isobrick::gpu {
+
+/// Books of the buffers that threads fill with bricks, each its own ones in turn, and of the
+/// requests, numbered from 1, by which these are copied to their places. Thread-safe; knows nothing
+/// of a device.
+class SendBooks {
+ public:
+  /// A brick that waits to be copied.
+  struct Piece {
+    std::size_t buffer;  ///< counted over all threads
+    std::byte* to;
+  };
+  /// What becomes of a buffer: it may be filled, waits for a request, or is copied by one.
+  enum class State { free, ended, asked };
+
+  SendBooks(int threads, std::size_t buffers_of_thread);
+
+  std::size_t buffers() const { return requests_.size(); }
+  /// The buffer that `thread` fills, or is about to once it is free. By that thread.
+  std::size_t buffer_of(int thread) const;
+  /// What `thread` has filled belongs to `place`; its next buffer is the one to fill. How many
+  /// bricks wait for a request now. By that thread.
+  std::size_t end(int thread, std::byte* place);
+
+  State state_of(std::size_t buffer) const;
+  /// The request that copies a buffer that was asked for.
+  std::uint64_t request_of(std::size_t buffer) const { return requests_[buffer]; }
+
+  /// All bricks that wait, for a request.
+  std::vector<Piece> take_ended();
+  /// The request of this number copies these, once it has been made.
+  void asked(const std::vector<Piece>& pieces, std::uint64_t request);
+  /// That request and all before it are over: their buffers are free.
+  void over(std::uint64_t request);
+
+ private:
+  static constexpr std::uint64_t kEnded = ~std::uint64_t{0};
+
+  std::size_t buffers_of_thread_;
+  std::vector<std::size_t> next_;                     ///< of each thread, in its own ones
+  std::vector<std::atomic<std::uint64_t>> requests_;  ///< of each buffer; kEnded: none yet
+  std::atomic<std::uint64_t> known_over_ = 0;
+  std::mutex mutex_;
+  std::vector<Piece> ended_;
+};
+
+}  // namespace isobrick::gpu
