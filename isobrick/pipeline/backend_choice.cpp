@@ -41,18 +41,20 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
 
 ChosenBackend set_up_backend(const ExtractRequest& request, const ExtractOptions& options,
                              std::uint64_t active_bricks, std::uint64_t other_bytes, MeshSink& sink,
-                             const OpenGpu& open) {
+                             const OpenGpu& open, const BeginDecoding& begin) {
   ChosenBackend chosen;
   try {
     chosen.gpu = open();
     if (chosen.gpu) {
       chosen.plan = plan_gpu_memory(request, options, active_bricks, other_bytes, *chosen.gpu);
+      chosen.decoded = begin(chosen.plan, *chosen.gpu);
       chosen.surface = chosen.gpu->make_surface(request, sink);
       return chosen;
     }
   } catch (const Error& e) {
     if (options.backend == Backend::cuda) throw;
     chosen.gpu_refusal = e.what();
+    chosen.decoded.reset();
     chosen.gpu.reset();
   }
   chosen.plan = plan_memory(request, options.memory, active_bricks, other_bytes);

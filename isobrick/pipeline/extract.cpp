@@ -12,10 +12,9 @@
 #include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
+#include "isobrick/pipeline/extract_tiles.h"
 #include "isobrick/pipeline/workers.h"
-#include "isobrick/stream/batch_decoder.h"
 #include "isobrick/stream/brick_cache.h"
-#include "isobrick/stream/tile_stream.h"
 
 namespace isobrick {
 namespace {
@@ -60,7 +59,6 @@ struct Work {
   const ExtractOptions& options;
   const ExtractRequest& request;
   const ExtractPlan& plan;
-  BatchPlanner& batches;
   ExtractReport& report;
   Done done;
 };
@@ -74,8 +72,8 @@ struct CpuBatch {
 /// Hands the batches of an extraction out, and their bricks.
 class CpuBatches {
  public:
-  explicit CpuBatches(const Work& work)
-      : planner_(work.batches),
+  CpuBatches(const Work& work, BatchPlanner& planner)
+      : planner_(planner),
         cache_(work.store, work.options.level, sample_reach(work.request.surface),
                work.plan.cache_bricks) {
     planner_.next(planned_);
@@ -102,6 +100,13 @@ class CpuBatches {
   TileBatch planned_;
 };
 
+void report_search(const TileStream& tiles, ExtractReport& report) {
+  report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
+  // Once for the plan and once for the surface; the index has files of its own.
+  report.bytes_read = 2 * tiles.index_bytes();
+  report.search_seconds = tiles.seconds();
+}
+
 /// Threads' time of reading and decoding so far.
 double bricks_seconds(const StoreReader& store) {
   const BrickTimes times = store.brick_times();
@@ -111,11 +116,12 @@ double bricks_seconds(const StoreReader& store) {
 /// While the surface of one batch is made the bricks of the next are decoded, by the same
 /// threads: where the one has nothing to do for them just then, the other has.
 void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
+  PlannedTiles planned(work.store, work.options, work.request, work.plan);
   double decoded_beside = 0;  // of threads
   const bool room_for_two = work.plan.cache_bricks >= 2 * work.plan.batch_bricks;
   Workers workers(work.request.threads);
   workers.execute([&] {
-    CpuBatches batches(work);
+    CpuBatches batches(work, planned.batches);
     CpuBatch now = batches.next();
     batches.begin(now);
     while (now.bricks) {
@@ -143,14 +149,13 @@ void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
   surface.report(work.report);
   double& seconds = work.report.surface.seconds;
   seconds = std::max(0.0, seconds - decoded_beside / work.request.threads);
+  report_search(planned.tiles, work.report);
 }
 
 /// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.
-void extract_on_gpu(const Work& work, GpuSession& gpu, std::unique_ptr<SurfaceExtractor> made) {
-  BatchDecoder decoder(work.store, work.options.level, work.batches,
-                       sample_reach(work.request.surface), work.plan.cache_bricks,
-                       work.request.threads, gpu.bricks());
-  const auto surface = std::move(made);  // ends first: it holds batches
+void extract_on_gpu(const Work& work, ChosenBackend& backend) {
+  BatchDecoder& decoder = backend.decoded->decoder;
+  SurfaceExtractor* const surface = backend.surface.get();
   for (;;) {
     std::shared_ptr<const DecodedBatch> batch;
     {
@@ -166,9 +171,13 @@ void extract_on_gpu(const Work& work, GpuSession& gpu, std::unique_ptr<SurfaceEx
   }
   surface->finish();
   surface->report(work.report);
-  if (gpu.pool_bricks() == 0) work.report.pinned_bytes += decoder.memory_bytes();
+  if (backend.gpu->pool_bricks() == 0) work.report.pinned_bytes += decoder.memory_bytes();
   work.report.bricks_read = decoder.bricks_read();
   work.report.brick_reads = decoder.reads();
+  report_search(backend.decoded->planned.tiles, work.report);
+  // What they take is given back before the sink ends its file.
+  backend.surface.reset();
+  backend.decoded.reset();
 }
 
 /// Counts what is active and sets up who makes the surface. A device takes some tenths of a
@@ -181,11 +190,15 @@ ChosenBackend choose_backend(const ExtractRequest& request, const ExtractOptions
   active = count_active(store, options);
   const bool wanted = early.valid() || use_cuda(request, options, active.active_blocks);
   const std::uint64_t other = sink.memory() + decode_extra(store.info(), request.threads);
-  return set_up_backend(request, options, active.active_bricks, other, sink,
-                        [&]() -> std::unique_ptr<GpuSession> {
-                          if (early.valid()) return early.get();
-                          return wanted ? open_gpu(options.device) : nullptr;
-                        });
+  return set_up_backend(
+      request, options, active.active_bricks, other, sink,
+      [&]() -> std::unique_ptr<GpuSession> {
+        if (early.valid()) return early.get();
+        return wanted ? open_gpu(options.device) : nullptr;
+      },
+      [&](const ExtractPlan& plan, GpuSession& gpu) {
+        return std::make_unique<DecodedTiles>(store, options, request, plan, gpu.bricks());
+      });
 }
 
 }  // namespace
@@ -215,7 +228,6 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     Stopwatch whole(report.seconds);
     const ExtractRequest request = check_request(store, options, sink.indexing());
     const Lattice& lattice = request.level->lattice;
-    const Index reach = sample_reach(request.surface);
 
     ActiveParts active;
     ChosenBackend backend;
@@ -229,9 +241,6 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     report.gpu_refusal = backend.gpu_refusal;
 
     sink.begin(header_of(*request.level, request.surface));
-    TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
-    BatchPlanner batches(tiles, lattice, reach, request.surface.may_have_nan, plan.limits.tiles,
-                         plan.batch_bricks);
     progress.begin("extracting", active.active_bricks * lattice.brick_bytes());
     const double bytes_per_block = static_cast<double>(active.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /
@@ -242,18 +251,14 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
         blocks += static_cast<double>(std::popcount(tile.active_blocks));
       progress.advance(static_cast<std::uint64_t>(blocks * bytes_per_block));
     };
-    const Work work{store, options, request, plan, batches, report, done};
+    const Work work{store, options, request, plan, report, done};
     if (backend.gpu)
-      extract_on_gpu(work, *backend.gpu, std::move(backend.surface));
+      extract_on_gpu(work, backend);
     else
       extract_on_cpu(work, *backend.surface);
     sink.finish();
     progress.end();
     report.index = request.search.kind;
-    report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
-    // Once for the plan and once for the surface; the index has files of its own.
-    report.bytes_read = 2 * tiles.index_bytes();
-    report.search_seconds = tiles.seconds();
     const BrickTimes times = store.brick_times();
     report.read = {(times.read_seconds - times_before.read_seconds) / request.threads,
                    times.bytes_read - times_before.bytes_read};

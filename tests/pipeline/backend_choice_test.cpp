@@ -19,6 +19,12 @@ class NoSurface final : public SurfaceExtractor {
   void report(ExtractReport&) const override {}
 };
 
+class HeapMemory final : public BrickMemory {
+  std::shared_ptr<std::byte> room(std::size_t bytes) override {
+    return {new std::byte[bytes], std::default_delete<std::byte[]>()};
+  }
+};
+
 /// A GPU that is busy or small, or neither.
 class FakeGpu final : public GpuSession {
  public:
@@ -31,7 +37,7 @@ class FakeGpu final : public GpuSession {
   }
   std::size_t good_batch() const override { return 8; }
   std::size_t pool_bricks() const override { return 0; }
-  BrickMemory& bricks() override { throw Error("nobody asks for bricks"); }
+  BrickMemory& bricks() override { return bricks_; }
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, MeshSink&) override {
     if (full_) throw Error("no device memory is left");
     return std::make_unique<NoSurface>();
@@ -40,6 +46,7 @@ class FakeGpu final : public GpuSession {
  private:
   std::uint64_t pinned_;
   bool full_;
+  HeapMemory bricks_;
 };
 
 class BackendChoice : public ::testing::Test {
@@ -54,7 +61,10 @@ class BackendChoice : public ::testing::Test {
     const ExtractOptions options{
         .isovalue = 100, .memory = memory, .threads = 2, .backend = backend};
     const ExtractRequest request = check_request(*store_, options, Indexing::welded);
-    return set_up_backend(request, options, 64, 0, sink_, open);
+    return set_up_backend(
+        request, options, 64, 0, sink_, open, [&](const ExtractPlan& plan, GpuSession& gpu) {
+          return std::make_unique<DecodedTiles>(*store_, options, request, plan, gpu.bricks());
+        });
   }
 
   TemporaryFolder folder_;
