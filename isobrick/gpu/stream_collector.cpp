@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/prompt_thread.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -75,6 +76,7 @@ void StreamCollector::finish() {
 }
 
 void StreamCollector::run() {
+  const PromptThread prompt;
   try {
     check(cudaSetDevice(cuda_device_));
     follow();

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "isobrick/core/morton.h"
+#include "isobrick/core/prompt_thread.h"
 #include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
@@ -154,6 +155,7 @@ void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
 
 /// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.
 void extract_on_gpu(const Work& work, ChosenBackend& backend) {
+  const PromptThread prompt;
   BatchDecoder& decoder = backend.decoded->decoder;
   SurfaceExtractor* const surface = backend.surface.get();
   for (;;) {

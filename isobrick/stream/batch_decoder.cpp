@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "isobrick/core/morton.h"
+#include "isobrick/core/prompt_thread.h"
 
 namespace isobrick {
 namespace {
@@ -96,6 +97,7 @@ std::shared_ptr<const DecodedBatch> BatchDecoder::next() {
 }
 
 void BatchDecoder::plan() {
+  const PromptThread prompt;
   try {
     for (TileBatch batch; next_planned(batch);) {
       // The disk works on what comes next, while this waits for its turn.
