@@ -16,6 +16,7 @@
 #include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/volume_choice.h"
 #include "isobrick/core/error.h"
+#include "isobrick/core/pod_buffer.h"
 
 namespace isobrick {
 namespace {
@@ -312,9 +313,11 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   const std::size_t bytes = lattice.brick_bytes(), decoded = bytes * volumes.chunk_volumes;
   if (place->size > largest_encoded(decoded))
     impl_->damaged(level, b, *place, fmt::format("too long for {} bytes of samples", decoded));
-  thread_local std::vector<std::byte> buffer, several;
-  if (buffer.size() < place->size) buffer.resize(static_cast<std::size_t>(place->size));
-  const auto encoded = std::span(buffer).first(static_cast<std::size_t>(place->size));
+  thread_local PodBuffer<std::byte> buffer;
+  thread_local std::vector<std::byte> several;
+  buffer.clear();
+  buffer.resize(static_cast<std::size_t>(place->size));
+  const std::span encoded(buffer.data(), buffer.size());
   if (volumes.chunk_volumes > 1) several.resize(decoded);
   const std::span to = volumes.chunk_volumes > 1 ? std::span(several) : std::span(out, decoded);
   try {
