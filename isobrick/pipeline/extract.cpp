@@ -117,7 +117,7 @@ double bricks_seconds(const StoreReader& store) {
 /// While the surface of one batch is made the bricks of the next are decoded, by the same
 /// threads: where the one has nothing to do for them just then, the other has.
 void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
-  PlannedTiles planned(work.store, work.options, work.request, work.plan);
+  PlannedTiles planned(tiles_of(work.store, work.options, work.request), work.request, work.plan);
   double decoded_beside = 0;  // of threads
   const bool room_for_two = work.plan.cache_bricks >= 2 * work.plan.batch_bricks;
   Workers workers(work.request.threads);
@@ -183,12 +183,20 @@ void extract_on_gpu(const Work& work, ChosenBackend& backend) {
 }
 
 /// Counts what is active and sets up who makes the surface. A device takes some tenths of a
-/// second to open: when it is known that there will be one, that goes on meanwhile.
+/// second to open: when it is known that there will be one, that goes on meanwhile, and the first
+/// tiles are found.
 ChosenBackend choose_backend(const ExtractRequest& request, const ExtractOptions& options,
                              const StoreReader& store, MeshSink& sink, ActiveParts& active) {
   std::future<std::unique_ptr<GpuSession>> early;
-  if (options.backend == Backend::cuda && use_cuda(request, options, 0))
+  std::future<TileStream> first;
+  if (options.backend == Backend::cuda && use_cuda(request, options, 0)) {
     early = std::async(std::launch::async, open_gpu, options.device);
+    first = std::async(std::launch::async, [&] {
+      TileStream tiles = tiles_of(store, options, request);
+      Workers(request.threads).execute([&] { tiles.begin(); });
+      return tiles;
+    });
+  }
   active = count_active(store, options);
   const bool wanted = early.valid() || use_cuda(request, options, active.active_blocks);
   const std::uint64_t other = sink.memory() + decode_extra(store.info(), request.threads);
@@ -199,7 +207,9 @@ ChosenBackend choose_backend(const ExtractRequest& request, const ExtractOptions
         return wanted ? open_gpu(options.device) : nullptr;
       },
       [&](const ExtractPlan& plan, GpuSession& gpu) {
-        return std::make_unique<DecodedTiles>(store, options, request, plan, gpu.bricks());
+        return std::make_unique<DecodedTiles>(
+            store, options.level, first.valid() ? first.get() : tiles_of(store, options, request),
+            request, plan, gpu.bricks());
       });
 }
 

@@ -48,9 +48,14 @@ bool TileStream::load_next_chunk() {
   return true;
 }
 
+void TileStream::begin() {
+  while (next_tile_ == tiles_.size() && load_next_chunk()) {
+  }
+}
+
 std::optional<TileWork> TileStream::next() {
-  while (next_tile_ == tiles_.size())
-    if (!load_next_chunk()) return std::nullopt;
+  begin();
+  if (next_tile_ == tiles_.size()) return std::nullopt;
   return tiles_[next_tile_++];
 }
 

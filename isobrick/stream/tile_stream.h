@@ -18,6 +18,8 @@ class TileStream {
   /// they are found.
   TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by = {});
 
+  /// Finds the first tiles, so that next() need not.
+  void begin();
   /// The next tile, or nothing at the end.
   std::optional<TileWork> next();
 

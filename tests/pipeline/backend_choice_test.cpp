@@ -63,7 +63,8 @@ class BackendChoice : public ::testing::Test {
     const ExtractRequest request = check_request(*store_, options, Indexing::welded);
     return set_up_backend(
         request, options, 64, 0, sink_, open, [&](const ExtractPlan& plan, GpuSession& gpu) {
-          return std::make_unique<DecodedTiles>(*store_, options, request, plan, gpu.bricks());
+          return std::make_unique<DecodedTiles>(*store_, 0, tiles_of(*store_, options, request),
+                                                request, plan, gpu.bricks());
         });
   }
 
