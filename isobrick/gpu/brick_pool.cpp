@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isobrick/core/error.h"
+#include "isobrick/gpu/copy_kernel.h"
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/device_arena.h"
 #include "isobrick/gpu/pinned_region.h"
@@ -30,29 +31,6 @@ constexpr std::chrono::microseconds kBetweenLooks{50};
 /// What bricks are before they are sent: noticed when it is taken for samples.
 constexpr int kPoison = 0xff;
 
-/// Copies pieces of `bytes` out of buffers that lie one after the other.
-void copy_all(const std::vector<SendBooks::Piece>& pieces, const std::byte* buffers,
-              std::size_t bytes, const Stream& stream) {
-#if CUDART_VERSION >= 13000
-  std::vector<void*> to;
-  std::vector<const void*> from;
-  for (const SendBooks::Piece& piece : pieces) {
-    to.push_back(piece.to);
-    from.push_back(buffers + piece.buffer * bytes);
-  }
-  const std::vector<std::size_t> sizes(pieces.size(), bytes);
-  cudaMemcpyAttributes attributes{};
-  attributes.srcAccessOrder = cudaMemcpySrcAccessOrderStream;
-  std::size_t of_all = 0;
-  check(cudaMemcpyBatchAsync(to.data(), from.data(), sizes.data(), sizes.size(), &attributes,
-                             &of_all, 1, stream.get()));
-#else
-  for (const SendBooks::Piece& piece : pieces)
-    check(cudaMemcpyAsync(piece.to, buffers + piece.buffer * bytes, bytes, cudaMemcpyHostToDevice,
-                          stream.get()));
-#endif
-}
-
 }  // namespace
 
 struct BrickPool::Impl {
@@ -63,6 +41,7 @@ struct BrickPool::Impl {
   std::byte* bricks;
   Stream stream;
   std::size_t good_request;  ///< bricks
+  bool by_kernel;            ///< are bricks copied
   SendBooks books;
 
   std::mutex taking;      ///< of `used`
@@ -88,6 +67,7 @@ struct BrickPool::Impl {
     if (!memory) throw OutOfDeviceMemory("the GPU has no room for a pool of bricks");
     bricks = memory.take<std::byte>(size);
     check(cudaMemsetAsync(bricks, kPoison, size, stream.get()));
+    by_kernel = brick_bytes % CopyPieces::kAlign == 0 && reads_host_memory(device);
     good_request = std::clamp<std::size_t>(kGoodRequest / of_brick, 1,
                                            std::max<std::size_t>(1, books.buffers() / 2));
   }
@@ -96,17 +76,17 @@ struct BrickPool::Impl {
 
   std::byte* at(std::size_t buffer) { return buffers.touched(0) + buffer * brick_bytes; }
 
-  /// The buffer's brick has been copied. Copies are over soon and mostly before anybody waits, so
-  /// the waiting looks again and again: an event that can be slept for costs the driver's thread
-  /// a core each time, whether anybody sleeps or not.
-  void wait_for(std::size_t buffer) {
+  /// A buffer of the thread's whose brick has been copied. Copies are over soon and mostly before
+  /// anybody waits, so the waiting looks again and again: an event that can be slept for costs the
+  /// driver's thread a core each time, whether anybody sleeps or not.
+  std::size_t free_buffer(int thread) {
     for (int looks = 0;; ++looks) {
-      const SendBooks::State state = books.state_of(buffer);
-      if (state == SendBooks::State::free) return;
-      if (state == SendBooks::State::ended) {
+      if (const auto buffer = books.begin(thread)) return *buffer;
+      const std::size_t oldest = books.oldest(thread);
+      if (books.state_of(oldest) == SendBooks::State::ended) {
         const std::lock_guard lock(requesting);
         request();
-      } else if (const std::uint64_t number = books.request_of(buffer); is_over(number)) {
+      } else if (const std::uint64_t number = books.request_of(oldest); is_over(number)) {
         books.over(number);
       } else if (looks < kQuickLooks) {
         std::this_thread::yield();
@@ -120,8 +100,12 @@ struct BrickPool::Impl {
   bool is_over(std::uint64_t request) {
     make_current(device);
     const cudaError_t result = cudaEventQuery(overs[request % kEvents].get());
-    if (result != cudaErrorNotReady) check(result);
-    return result == cudaSuccess;
+    if (result == cudaErrorNotReady) {
+      (void)cudaGetLastError();  // or the next launch would report it
+      return false;
+    }
+    check(result);
+    return true;
   }
 
   /// Asks for the copies of what has ended; `requesting` is held.
@@ -145,7 +129,7 @@ struct BrickPool::Impl {
       end_timing();
       timed_begin.record(stream);
     }
-    copy_all(pieces, from, brick_bytes, stream);
+    copy_all(pieces, from);
     if (timed) {
       timed_end.record(stream);
       timing = pieces.size();
@@ -154,6 +138,23 @@ struct BrickPool::Impl {
     overs[requests % kEvents].record(stream);
     bricks_sent += pieces.size();
     books.asked(pieces, requests);
+  }
+
+  void copy_all(const std::vector<SendBooks::Piece>& pieces, const std::byte* from) {
+    CopyPieces some;
+    for (const SendBooks::Piece& piece : pieces) {
+      const std::byte* const buffer = from + piece.buffer * brick_bytes;
+      if (!by_kernel) {
+        check(cudaMemcpyAsync(piece.to, buffer, brick_bytes, cudaMemcpyHostToDevice, stream.get()));
+        continue;
+      }
+      some.from[some.count] = buffer;
+      some.to[some.count++] = piece.to;
+      if (some.count < CopyPieces::kMost) continue;
+      launch_copy(some, brick_bytes, stream.get());
+      some.count = 0;
+    }
+    launch_copy(some, brick_bytes, stream.get());
   }
 
   void end_timing() {
@@ -179,8 +180,7 @@ std::byte* BrickPool::take(std::size_t bytes) {
 }
 
 std::byte* BrickPool::begin(int thread) {
-  const std::size_t buffer = impl_->books.buffer_of(thread);
-  impl_->wait_for(buffer);
+  const std::size_t buffer = impl_->free_buffer(thread);
   return impl_->at(buffer);
 }
 

@@ -11,7 +11,7 @@ class Stream;
 
 /// Memory of the device for bricks, which some threads fill. Each decodes to page-locked
 /// buffers of its own, few enough to stay in its cache: one is copied while the next is filled.
-/// Whichever thread has ended enough of them asks the driver for the copies of all.
+/// Whichever thread has ended enough of them has the device copy all.
 class BrickPool {
  public:
   /// Throws OutOfDeviceMemory where the device has no room. The buffers are got meanwhile.
@@ -36,10 +36,10 @@ class BrickPool {
   double seconds();
   std::uint64_t bytes() const;
 
-  /// Buffers of a thread: what a core's cache holds beside the encoded brick, but at least one
-  /// to fill and one to copy.
+  /// Buffers of a thread: one to fill, one to copy, and as many again for when that takes longer,
+  /// as far as they stay in a core's cache.
   static constexpr std::size_t buffers_of_thread(std::size_t brick_bytes) {
-    return std::clamp<std::size_t>((std::size_t{3} << 19) / brick_bytes, 2, 8);
+    return std::clamp<std::size_t>((std::size_t{2} << 20) / brick_bytes, 2, 8);
   }
   /// Page-locked host memory that it takes.
   static constexpr std::uint64_t pinned_bytes(std::size_t brick_bytes, int threads) {

@@ -13,6 +13,12 @@ int device_count() noexcept {
   return cudaGetDeviceCount(&count) == cudaSuccess ? count : 0;
 }
 
+bool reads_host_memory(int device) {
+  int same = 0;
+  check(cudaDeviceGetAttribute(&same, cudaDevAttrCanUseHostPointerForRegisteredMem, device));
+  return same != 0;
+}
+
 std::array<std::uint8_t, 16> device_id(int device) {
   cudaDeviceProp properties{};
   check(cudaGetDeviceProperties(&properties, device));

@@ -1,23 +1,30 @@
 #include "isobrick/gpu/send_books.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace isobrick::gpu {
 
 SendBooks::SendBooks(int threads, std::size_t buffers_of_thread)
-    : buffers_of_thread_(buffers_of_thread),
-      next_(static_cast<std::size_t>(threads)),
-      requests_(next_.size() * buffers_of_thread) {}
+    : orders_(static_cast<std::size_t>(threads), Order(buffers_of_thread)),
+      requests_(orders_.size() * buffers_of_thread) {
+  std::size_t buffer = 0;
+  for (Order& order : orders_)
+    for (std::size_t& place : order) place = buffer++;
+}
 
-std::size_t SendBooks::buffer_of(int thread) const {
-  const auto t = static_cast<std::size_t>(thread);
-  return t * buffers_of_thread_ + next_[t];
+std::optional<std::size_t> SendBooks::begin(int thread) {
+  Order& order = order_of(thread);
+  const auto found = std::find_if(order.begin(), order.end(), [&](std::size_t buffer) {
+    return state_of(buffer) == State::free;
+  });
+  if (found == order.end()) return std::nullopt;
+  std::rotate(order.begin(), found, found + 1);
+  return order.front();
 }
 
 std::size_t SendBooks::end(int thread, std::byte* place) {
-  const std::size_t buffer = buffer_of(thread);
-  auto& next = next_[static_cast<std::size_t>(thread)];
-  next = (next + 1) % buffers_of_thread_;
+  const std::size_t buffer = order_of(thread).front();
   const std::lock_guard lock(mutex_);
   requests_[buffer] = kEnded;
   ended_.push_back({buffer, place});

@@ -4,13 +4,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 namespace isobrick::gpu {
 
-/// Books of the buffers that threads fill with bricks, each its own ones in turn, and of the
-/// requests, numbered from 1, by which these are copied to their places. Thread-safe; knows nothing
-/// of a device.
+/// Books of the buffers that threads fill with bricks, each its own ones, and of the requests,
+/// numbered from 1, by which these are copied to their places. Thread-safe; knows nothing of a
+/// device.
 class SendBooks {
  public:
   /// A brick that waits to be copied.
@@ -24,10 +25,13 @@ class SendBooks {
   SendBooks(int threads, std::size_t buffers_of_thread);
 
   std::size_t buffers() const { return requests_.size(); }
-  /// The buffer that `thread` fills, or is about to once it is free. By that thread.
-  std::size_t buffer_of(int thread) const;
-  /// What `thread` has filled belongs to `place`; its next buffer is the one to fill. How many
-  /// bricks wait for a request now. By that thread.
+  /// A free buffer for `thread` to fill: the one that it filled last, which its cache holds rather
+  /// than another. None while all of its buffers wait or are copied. By that thread.
+  std::optional<std::size_t> begin(int thread);
+  /// The buffer that `thread` filled longest ago: the first to be free. By that thread.
+  std::size_t oldest(int thread) const { return order_of(thread).back(); }
+  /// What `thread` has filled since begin() belongs to `place`. How many bricks wait for a request
+  /// now. By that thread.
   std::size_t end(int thread, std::byte* place);
 
   State state_of(std::size_t buffer) const;
@@ -44,8 +48,11 @@ class SendBooks {
  private:
   static constexpr std::uint64_t kEnded = ~std::uint64_t{0};
 
-  std::size_t buffers_of_thread_;
-  std::vector<std::size_t> next_;                     ///< of each thread, in its own ones
+  using Order = std::vector<std::size_t>;
+  const Order& order_of(int thread) const { return orders_[static_cast<std::size_t>(thread)]; }
+  Order& order_of(int thread) { return orders_[static_cast<std::size_t>(thread)]; }
+
+  std::vector<Order> orders_;  ///< buffers of each thread, the one that was begun last first
   std::vector<std::atomic<std::uint64_t>> requests_;  ///< of each buffer; kEnded: none yet
   std::atomic<std::uint64_t> known_over_ = 0;
   std::mutex mutex_;

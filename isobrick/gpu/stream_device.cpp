@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "isobrick/core/error.h"
+#include "isobrick/gpu/device.h"
 #include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/unpack_kernel.h"
 #include "isobrick/surface/cpu_extractor.h"
@@ -14,12 +15,12 @@ namespace isobrick::gpu {
 
 namespace {
 
-/// Kernels read bricks where they lie in host memory, under the address that the host knows.
+/// Kernels read bricks where they lie in host memory.
 void check_reads_host_memory() {
-  int device = 0, same = 0;
+  int device = 0;
   check(cudaGetDevice(&device));
-  check(cudaDeviceGetAttribute(&same, cudaDevAttrCanUseHostPointerForRegisteredMem, device));
-  if (!same) throw Error("the GPU cannot read the host's memory in place; use --backend cpu");
+  if (!reads_host_memory(device))
+    throw Error("the GPU cannot read the host's memory in place; use --backend cpu");
 }
 
 }  // namespace

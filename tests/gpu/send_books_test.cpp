@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -17,14 +18,15 @@ std::byte* place(std::size_t i) { return reinterpret_cast<std::byte*>(i); }
 TEST(SendBooks, ABufferIsFreeAgainOnceItsRequestIsOver) {
   SendBooks books(2, 2);
   EXPECT_EQ(books.buffers(), 4u);
-  EXPECT_EQ(books.buffer_of(1), 2u);
-  EXPECT_EQ(books.state_of(2), State::free);
+  EXPECT_EQ(books.begin(1), 2u);
+  EXPECT_EQ(books.begin(1), 2u) << "the same until it was filled";
   EXPECT_EQ(books.end(1, place(10)), 1u);
   EXPECT_EQ(books.state_of(2), State::ended);
-  EXPECT_EQ(books.buffer_of(1), 3u);
+  EXPECT_EQ(books.begin(1), 3u);
   EXPECT_EQ(books.end(1, place(11)), 2u);
-  EXPECT_EQ(books.buffer_of(1), 2u) << "in turn";
-  EXPECT_EQ(books.buffer_of(0), 0u) << "another thread's";
+  EXPECT_EQ(books.begin(1), std::nullopt);
+  EXPECT_EQ(books.oldest(1), 2u);
+  EXPECT_EQ(books.begin(0), 0u) << "another thread's";
 
   const std::vector<SendBooks::Piece> first = books.take_ended();
   ASSERT_EQ(first.size(), 2u);
@@ -37,12 +39,13 @@ TEST(SendBooks, ABufferIsFreeAgainOnceItsRequestIsOver) {
   books.asked(first, 1);
   EXPECT_EQ(books.state_of(2), State::asked);
   EXPECT_EQ(books.request_of(3), 1u);
+  EXPECT_EQ(books.begin(1), std::nullopt);
 
   EXPECT_EQ(books.end(0, place(12)), 1u);
   books.asked(books.take_ended(), 2);
   books.over(1);
-  EXPECT_EQ(books.state_of(2), State::free);
-  EXPECT_EQ(books.state_of(3), State::free);
+  EXPECT_EQ(books.begin(1), 3u) << "what was filled last";
+  EXPECT_EQ(books.oldest(1), 2u);
   EXPECT_EQ(books.state_of(0), State::asked);
   books.over(2);
   books.over(1);
@@ -61,10 +64,10 @@ TEST(SendBooks, NoBufferIsFilledBeforeItWasCopiedAndNothingIsLost) {
   for (int t = 0; t < kThreads; ++t)
     threads.emplace_back([&, t] {
       for (std::size_t i = 0; i < kEach; ++i) {
-        const std::size_t buffer = books.buffer_of(t);
-        while (books.state_of(buffer) != State::free) std::this_thread::yield();
+        std::optional<std::size_t> buffer;
+        while (!(buffer = books.begin(t))) std::this_thread::yield();
         const std::size_t number = 1 + static_cast<std::size_t>(t) * kEach + i;
-        buffers[buffer] = number;
+        buffers[*buffer] = number;
         books.end(t, reinterpret_cast<std::byte*>(&places[number]));
       }
       --filling;
