@@ -3,6 +3,8 @@
 #include <epoxy/gl.h>
 #include <fmt/format.h>
 
+#include <limits>
+
 #include <vector>
 
 #include "isobrick/core/error.h"
@@ -59,6 +61,18 @@ void delete_texture(unsigned name) { glDeleteTextures(1, &name); }
 void delete_framebuffer(unsigned name) { glDeleteFramebuffers(1, &name); }
 void delete_program(unsigned name) { glDeleteProgram(name); }
 }  // namespace gl
+
+GlFence GlFence::insert() {
+  GlFence fence(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0));
+  glFlush();
+  return fence;
+}
+
+GlFence::~GlFence() { glDeleteSync(static_cast<GLsync>(sync_)); }
+
+void GlFence::wait() const {
+  glClientWaitSync(static_cast<GLsync>(sync_), 0, std::numeric_limits<GLuint64>::max());
+}
 
 void check_gl(const char* what) {
   const unsigned error = glGetError();

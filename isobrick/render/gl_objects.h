@@ -66,6 +66,25 @@ GlFramebuffer make_framebuffer(std::span<const unsigned> colours, unsigned depth
 /// with the compiler's words.
 GlProgram make_program(const std::string& vertex, const std::string& fragment, const char* what);
 
+/// A place in what the current context has been told.
+class GlFence {
+ public:
+  static GlFence insert();
+  GlFence(GlFence&& other) noexcept : sync_(std::exchange(other.sync_, nullptr)) {}
+  GlFence& operator=(GlFence&& other) noexcept {
+    std::swap(sync_, other.sync_);
+    return *this;
+  }
+  ~GlFence();
+
+  /// Until everything before it is drawn.
+  void wait() const;
+
+ private:
+  explicit GlFence(void* sync) : sync_(sync) {}
+  void* sync_;
+};
+
 /// Throws Error "OpenGL: WHAT: …" if a call since the last check failed.
 void check_gl(const char* what);
 

@@ -175,7 +175,7 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
   std::vector<Command> commands;
   for (const MeshDraw& draw : meshes) {
     const MeshPlace& place = draw.mesh->place();
-    commands.push_back({3 * place.triangle_count, 1, 3 * place.first_triangle,
+    commands.push_back({3 * draw.triangles, 1, 3 * (place.first_triangle + draw.first_triangle),
                         static_cast<std::int32_t>(place.first_vertex),
                         static_cast<std::uint32_t>(looks.size())});
     looks.push_back(look_of(draw.style, draw.mesh->origin(), eye, draw.mesh->has_normals()));

@@ -6,16 +6,10 @@
 
 #include "isobrick/core/vec.h"
 #include "isobrick/render/gl_objects.h"
-#include "isobrick/render/mesh_pool.h"
+#include "isobrick/render/mesh_queue.h"
 #include "isobrick/render/renderer.h"
 
 namespace isobrick {
-
-/// A mesh and how it looks.
-struct MeshDraw {
-  const PooledMesh* mesh;
-  MeshStyle style;
-};
 
 /// Draws meshes into the framebuffer that is bound, opaque or weighted for blending.
 class MeshPass {

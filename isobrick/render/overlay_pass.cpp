@@ -221,14 +221,14 @@ void OverlayPass::add_scale_bar(const std::string& unit) {
            dark);
 }
 
-void OverlayPass::run(const PictureTargets& targets) {
+void OverlayPass::run(const PictureResult& result) {
   if (corners_.empty()) return;
   fill_buffer(buffer_, std::as_bytes(std::span(corners_)));
-  glBindFramebuffer(GL_FRAMEBUFFER, targets.picture_target.get());
+  glBindFramebuffer(GL_FRAMEBUFFER, result.picture_target.get());
   glUseProgram(program_.get());
   glBindVertexArray(vertices_.get());
   glBindTextureUnit(0, atlas_.get());
-  glBindTextureUnit(1, targets.near_depth.get());
+  glBindTextureUnit(1, result.near_depth.get());
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
   glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(corners_.size()));

@@ -32,7 +32,7 @@ class OverlayPass {
   /// A round length in the lower right corner.
   void add_scale_bar(const std::string& unit);
 
-  void run(const PictureTargets& targets);
+  void run(const PictureResult& result);
 
  private:
   /// A corner of a rectangle: on the screen, depth, and what its kind needs.

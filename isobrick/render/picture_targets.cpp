@@ -7,6 +7,23 @@
 
 namespace isobrick {
 
+PictureResult::PictureResult(int picture_width, int picture_height, bool with_ids)
+    : width(picture_width), height(picture_height), ids(with_ids) {
+  const auto texture = [&](unsigned format) {
+    return make_texture(format, width, height, 1, "memory for the picture");
+  };
+  near_depth = texture(GL_R32F);
+  near_normal = texture(GL_RG16F);
+  std::vector<unsigned> each{near_depth.get(), near_normal.get()};
+  if (ids) {
+    near_id = texture(GL_R32UI);
+    each.push_back(near_id.get());
+  }
+  nearest = make_framebuffer(each, 0, "the nearest samples");
+  picture = texture(GL_RGBA8);
+  picture_target = make_framebuffer(std::array{picture.get()}, 0, "the picture");
+}
+
 PictureTargets::PictureTargets(int picture_width, int picture_height, int sample_count,
                                bool with_ids)
     : width(picture_width), height(picture_height), samples(sample_count), ids(with_ids) {
@@ -16,25 +33,17 @@ PictureTargets::PictureTargets(int picture_width, int picture_height, int sample
   colour = texture(GL_RGBA16F, samples);
   normal = texture(GL_RG16F, samples);
   depth = texture(GL_DEPTH_COMPONENT32F, samples);
-  near_depth = texture(GL_R32F, 1);
-  near_normal = texture(GL_RG16F, 1);
-  std::vector<unsigned> each{colour.get(), normal.get()},
-      nearest_each{near_depth.get(), near_normal.get()};
+  std::vector<unsigned> each{colour.get(), normal.get()};
   if (ids) {
     id = texture(GL_R32UI, samples);
-    near_id = texture(GL_R32UI, 1);
     each.push_back(id.get());
-    nearest_each.push_back(near_id.get());
   }
   opaque = make_framebuffer(each, depth.get(), "the picture of opaque meshes");
-  nearest = make_framebuffer(nearest_each, 0, "the nearest samples");
 
   open = texture(GL_R8, 1);
   open_rows = texture(GL_R8, 1);
   open_target = make_framebuffer(std::array{open.get()}, 0, "the occlusion");
   open_rows_target = make_framebuffer(std::array{open_rows.get()}, 0, "the occlusion");
-  picture = texture(GL_RGBA8, 1);
-  picture_target = make_framebuffer(std::array{picture.get()}, 0, "the picture");
 }
 
 void PictureTargets::add_transparent() {

@@ -6,6 +6,24 @@
 
 namespace isobrick {
 
+/// A picture, and what is kept of it beside its colours: what picking and lines read.
+struct PictureResult {
+  PictureResult(int picture_width, int picture_height, bool with_ids);
+
+  bool fits(int other_width, int other_height, bool with_ids) const {
+    return width == other_width && height == other_height && ids == with_ids;
+  }
+
+  int width, height;
+  bool ids;
+
+  // Of each pixel: the nearest sample's depth (world length; 0: background), normal, mesh.
+  GlTexture near_depth, near_normal, near_id;
+  GlFramebuffer nearest;
+  GlTexture picture;
+  GlFramebuffer picture_target;
+};
+
 /// The textures that a picture goes through, and framebuffers of them.
 struct PictureTargets {
   PictureTargets(int picture_width, int picture_height, int sample_count, bool with_ids);
@@ -13,7 +31,7 @@ struct PictureTargets {
   /// Those of transparent meshes, made when the first one comes.
   void add_transparent();
 
-  /// Device memory in all.
+  /// Device memory in all, with that of one result.
   static std::uint64_t bytes(int width, int height, int samples, bool ids, bool transparent);
 
   int width, height, samples;
@@ -25,14 +43,9 @@ struct PictureTargets {
   // Of each sample: weighted sum, and what part of the background is still seen.
   GlTexture sum, seen;
   GlFramebuffer transparent;
-  // Of each pixel: the nearest sample's depth (world length; 0: background), normal, mesh.
-  GlTexture near_depth, near_normal, near_id;
-  GlFramebuffer nearest;
   // Of each pixel: how open it is, and that smoothed along rows.
   GlTexture open, open_rows;
   GlFramebuffer open_target, open_rows_target;
-  GlTexture picture;
-  GlFramebuffer picture_target;
 };
 
 }  // namespace isobrick

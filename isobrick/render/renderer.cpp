@@ -6,17 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <functional>
-#include <map>
+#include <limits>
+#include <utility>
 
 #include "isobrick/core/error.h"
 #include "isobrick/render/frame.h"
 #include "isobrick/render/gl_context.h"
-#include "isobrick/render/mesh_pass.h"
-#include "isobrick/render/overlay_pass.h"
 #include "isobrick/render/picture_targets.h"
-#include "isobrick/render/screen_pass.h"
-#include "isobrick/render/slice_pass.h"
+#include "isobrick/render/picture_work.h"
 #include "isobrick/render/vectors.h"
 
 namespace isobrick {
@@ -25,54 +22,6 @@ namespace {
 constexpr int kSamples = 4;
 
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
-
-/// What drawing needs of a context's switches; leaves OpenGL's defaults.
-class Switches {
- public:
-  explicit Switches(const FrameBlock& frame) {
-    glGetIntegerv(GL_VIEWPORT, viewport_.data());
-    glViewport(0, 0, static_cast<int>(frame.viewport.x), static_cast<int>(frame.viewport.y));
-    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    glDepthFunc(GL_GREATER);
-    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-    for (const GLenum off : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
-                             GL_FRAMEBUFFER_SRGB, GL_DEPTH_TEST})
-      glDisable(off);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  }
-  ~Switches() {
-    meshes(0, false, false);
-    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
-    glDepthFunc(GL_LESS);
-    glViewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    glUseProgram(0);
-    glBindVertexArray(0);
-  }
-  Switches(const Switches&) = delete;
-  Switches& operator=(const Switches&) = delete;
-
-  /// Depth test, clipping by the first `distances` planes, weighted blending.
-  void meshes(int distances, bool depth_test, bool blended) const {
-    const auto set = [](GLenum what, bool on) { on ? glEnable(what) : glDisable(what); };
-    set(GL_DEPTH_TEST, depth_test);
-    glDepthMask(!blended);
-    for (int i = 0; i < kClipDistances; ++i)
-      set(GL_CLIP_DISTANCE0 + static_cast<GLenum>(i), i < distances);
-    set(GL_BLEND, blended);
-    if (!blended) return;
-    glBlendFunci(0, GL_ONE, GL_ONE);
-    glBlendFunci(1, GL_ZERO, GL_ONE_MINUS_SRC_COLOR);
-  }
-
- private:
-  std::array<int, 4> viewport_{};
-};
-
-/// Meshes of the same block stand together.
-bool before(const MeshDraw& a, const MeshDraw& b) {
-  return a.mesh->place().positions < b.mesh->place().positions;
-}
 
 }  // namespace
 
@@ -88,27 +37,27 @@ struct Renderer::State {
   void clear_transparent();
   void bind_frame() { glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.get()); }
   /// Makes ready to draw meshes or slices.
-  void bind_target(const Switches& switches, bool blended);
-  void draw_blocks(const Switches& switches, std::vector<MeshDraw>& list, bool blended);
-  void draw_slices(const Switches& switches, bool blended);
-  void finish();
+  void bind_target(const DrawSwitches& switches, bool blended);
+  bool draw_surfaces(const DrawSwitches& switches, bool blended, std::uint64_t& work);
+  void choose_result(bool in_one_go);
+  bool go_on(std::uint64_t most);
 
   GlDevice device;
   int largest_edge = 0;
-  MeshPass meshes;
-  SlicePass slices;
-  OverlayPass overlays;
+  PicturePasses passes;
   // One for each way to sample: switching to and fro while something moves costs nothing.
   std::array<std::optional<ScreenPass>, 2> screens;
   std::array<std::optional<PictureTargets>, 2> kept_targets;
-  ScreenPass* screen = nullptr;       ///< of this picture
-  PictureTargets* targets = nullptr;  ///< likewise
+  ScreenPass* screen = nullptr;              ///< of this picture
+  PictureTargets* targets = nullptr;         ///< likewise
+  std::optional<PictureResult> shown, next;  ///< the finished picture; what the next one becomes
+  Camera shown_camera;
 
   Camera camera;
   PictureSettings settings;
   FrameBlock frame{};
   GlBuffer frame_buffer;
-  std::vector<MeshDraw> opaque, transparent;
+  PictureWork work;
   bool any_transparent = false;  ///< in this picture
 };
 
@@ -125,12 +74,11 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   camera = new_camera;
   settings = new_settings;
   frame = make_frame(camera, width, height, settings);
-  opaque.clear();
-  transparent.clear();
-  slices.clear();
-  overlays.start(camera, width, height);
+  passes.slices.clear();
+  passes.overlays.start(camera, width, height);
   any_transparent = false;
   choose_targets(width, height);
+  work.start(*targets, settings);
   fill_buffer(frame_buffer, std::as_bytes(std::span(&frame, 1)));
   clear();
 }
@@ -150,7 +98,7 @@ void Renderer::State::choose_targets(int width, int height) {
 }
 
 void Renderer::State::clear() {
-  const Switches switches(frame);
+  const DrawSwitches switches(frame);
   const std::array<float, 4> nothing{};
   const std::array<unsigned, 4> nobody{};
   const unsigned target = targets->opaque.get();
@@ -169,40 +117,46 @@ void Renderer::State::clear_transparent() {
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 1, all.data());
 }
 
-void Renderer::State::bind_target(const Switches& switches, bool blended) {
+void Renderer::State::bind_target(const DrawSwitches& switches, bool blended) {
   if (blended) clear_transparent();
   glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets->transparent.get() : targets->opaque.get());
   switches.meshes(frame.counts.x, true, blended);
 }
 
-void Renderer::State::draw_slices(const Switches& switches, bool blended) {
-  if (!slices.any(blended)) return;
+bool Renderer::State::draw_surfaces(const DrawSwitches& switches, bool blended,
+                                    std::uint64_t& most) {
+  if (!work.any_surfaces(passes, blended)) return true;
   bind_target(switches, blended);
-  slices.draw(camera.eye, blended);
+  return work.draw_surfaces(passes, camera.eye, blended, most);
 }
 
-void Renderer::State::draw_blocks(const Switches& switches, std::vector<MeshDraw>& list,
-                                  bool blended) {
-  if (list.empty()) return;
-  bind_target(switches, blended);
-  std::stable_sort(list.begin(), list.end(), before);
-  for (auto first = list.begin(); first != list.end();) {
-    const auto last = std::upper_bound(first, list.end(), *first, before);
-    meshes.draw(std::span(first, last), camera.eye, blended);
-    first = last;
+/// `in_one_go`: nobody sees the picture before until the next one is there, which may take its
+/// place.
+void Renderer::State::choose_result(bool in_one_go) {
+  const auto keep_fitting = [&](std::optional<PictureResult>& result) {
+    if (result && !result->fits(targets->width, targets->height, targets->ids)) result.reset();
+  };
+  keep_fitting(next);
+  if (in_one_go && !next) {
+    next = std::exchange(shown, std::nullopt);
+    keep_fitting(next);
   }
+  if (!next) next.emplace(targets->width, targets->height, targets->ids);
 }
 
-void Renderer::State::finish() {
-  const Switches switches(frame);
+/// Whether the picture is finished.
+bool Renderer::State::go_on(std::uint64_t most) {
+  const bool in_one_go = most >= work.left();
+  const DrawSwitches switches(frame);
   bind_frame();
-  draw_blocks(switches, opaque, false);
-  draw_slices(switches, false);
-  draw_blocks(switches, transparent, true);
-  draw_slices(switches, true);
+  if (!draw_surfaces(switches, false, most) || !draw_surfaces(switches, true, most)) return false;
   switches.meshes(0, false, false);
-  screen->run(*targets, settings, any_transparent);
-  overlays.run(*targets);
+  choose_result(in_one_go);
+  if (!work.run_steps(*screen, {*targets, *next, settings, any_transparent}, most)) return false;
+  passes.overlays.run(*next);
+  std::swap(shown, next);
+  shown_camera = camera;
+  return true;
 }
 
 Renderer::Renderer() : state_(std::make_unique<State>()) {}
@@ -219,24 +173,24 @@ void Renderer::begin(const Camera& camera, int width, int height, const PictureS
 
 void Renderer::draw(const PooledMesh& mesh, const MeshStyle& style) {
   if (mesh.empty() || style.opacity <= 0) return;
-  (style.opacity < 1 ? state_->transparent : state_->opaque).push_back({&mesh, style});
+  state_->work.meshes(style.opacity < 1).add(mesh, style);
 }
 
 void Renderer::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin) {
   if (style.opacity <= 0) return;
   const bool blended = style.opacity < 1;
-  const Switches switches(state_->frame);
+  const DrawSwitches switches(state_->frame);
   state_->bind_frame();
   state_->bind_target(switches, blended);
-  state_->meshes.draw(mesh, style, origin, state_->camera.eye, blended);
+  state_->passes.meshes.draw(mesh, style, origin, state_->camera.eye, blended);
 }
 
 void Renderer::draw(const SliceImage& slice) {
-  if (slice.opacity > 0) state_->slices.add(slice);
+  if (slice.opacity > 0) state_->passes.slices.add(slice);
 }
 
 void Renderer::draw_lines(std::span<const WorldLine> lines, Vec3f colour, float line_width) {
-  for (const WorldLine& line : lines) state_->overlays.add_line(line, colour, line_width);
+  for (const WorldLine& line : lines) state_->passes.overlays.add_line(line, colour, line_width);
 }
 
 void Renderer::draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float line_width) {
@@ -248,14 +202,24 @@ void Renderer::draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float line_width) {
       if (corner & 2) line.from[third] = hi[third];
       line.to = line.from;
       line.to[axis] = hi[axis];
-      state_->overlays.add_line(line, colour, line_width);
+      state_->passes.overlays.add_line(line, colour, line_width);
     }
 }
 
-void Renderer::draw_axes() { state_->overlays.add_axes(); }
-void Renderer::draw_scale_bar(const std::string& unit) { state_->overlays.add_scale_bar(unit); }
+void Renderer::draw_axes() { state_->passes.overlays.add_axes(); }
+void Renderer::draw_scale_bar(const std::string& unit) {
+  state_->passes.overlays.add_scale_bar(unit);
+}
 
-void Renderer::end() { state_->finish(); }
+void Renderer::end() { state_->go_on(std::numeric_limits<std::uint64_t>::max()); }
+bool Renderer::end_piece(std::uint64_t work) { return state_->go_on(work); }
+std::uint64_t Renderer::work_left() const { return state_->work.left(); }
+
+void Renderer::discard() {
+  state_->shown.reset();
+  state_->next.reset();
+}
+bool Renderer::has_picture() const { return state_->shown.has_value(); }
 
 void Renderer::prepare(const PictureSettings& settings) {
   constexpr int edge = 16;
@@ -271,12 +235,14 @@ void Renderer::prepare(const PictureSettings& settings) {
   draw_axes();
   draw_scale_bar("");
   end();
+  discard();
 }
 
-int Renderer::width() const { return state_->targets ? state_->targets->width : 0; }
-int Renderer::height() const { return state_->targets ? state_->targets->height : 0; }
+int Renderer::width() const { return state_->shown ? state_->shown->width : 0; }
+int Renderer::height() const { return state_->shown ? state_->shown->height : 0; }
 
 std::vector<std::uint8_t> Renderer::read_pixels() const {
+  if (!has_picture()) return {};
   const std::size_t row = 4 * static_cast<std::size_t>(width());
   const auto rows = static_cast<std::size_t>(height());
   std::vector<std::uint8_t> pixels(row * rows);
@@ -289,30 +255,31 @@ std::vector<std::uint8_t> Renderer::read_pixels() const {
   return pixels;
 }
 
-unsigned Renderer::texture() const { return state_->targets->picture.get(); }
+unsigned Renderer::texture() const { return state_->shown ? state_->shown->picture.get() : 0; }
 
 void Renderer::copy_to(unsigned framebuffer, int to_width, int to_height) const {
+  if (!has_picture()) return;
   const bool same = to_width == width() && to_height == height();
-  glBlitNamedFramebuffer(state_->targets->picture_target.get(), framebuffer, 0, 0, width(),
-                         height(), 0, 0, to_width, to_height, GL_COLOR_BUFFER_BIT,
+  glBlitNamedFramebuffer(state_->shown->picture_target.get(), framebuffer, 0, 0, width(), height(),
+                         0, 0, to_width, to_height, GL_COLOR_BUFFER_BIT,
                          same ? GL_NEAREST : GL_LINEAR);
   check_gl("showing the picture");
 }
 
 std::optional<Picked> Renderer::pick(int x, int y) const {
   if (x < 0 || y < 0 || x >= width() || y >= height()) return std::nullopt;
-  const PictureTargets& targets = *state_->targets;
+  const PictureResult& result = *state_->shown;
   const int from_bottom = height() - 1 - y;
   float depth = 0;
-  glGetTextureSubImage(targets.near_depth.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED, GL_FLOAT,
+  glGetTextureSubImage(result.near_depth.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED, GL_FLOAT,
                        sizeof(depth), &depth);
   Picked picked;
-  if (targets.ids)
-    glGetTextureSubImage(targets.near_id.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED_INTEGER,
+  if (result.ids)
+    glGetTextureSubImage(result.near_id.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED_INTEGER,
                          GL_UNSIGNED_INT, sizeof(picked.id), &picked.id);
   check_gl("reading a pixel");
   if (!(depth > 0)) return std::nullopt;
-  const Camera& camera = state_->camera;
+  const Camera& camera = state_->shown_camera;
   const WorldRay ray = camera.ray(x + 0.5, y + 0.5, width(), height());
   // The depth is along the line of sight, the ray may slant.
   picked.position = ray.origin + ray.direction * (depth / -dot(ray.direction, camera.back));

@@ -73,8 +73,9 @@ class Renderer {
   Renderer();
   ~Renderer();
 
-  /// Device memory of a picture of this size while it is made. With transparent meshes: more; and
-  /// where pictures of one size are made with and without multisampling, both are kept.
+  /// Device memory of a picture of this size while it is made. With transparent meshes: more;
+  /// where pictures of one size are made with and without multisampling, the samples of both are
+  /// kept; and where one is drawn in pieces, what the one before has become.
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
 
@@ -82,10 +83,11 @@ class Renderer {
   /// something is first drawn with them, and the next picture does not wait for that any more.
   void prepare(const PictureSettings& settings);
 
-  /// Starts a picture. Throws UsageError for a size that cannot be.
+  /// Starts a picture; one that is not finished is dropped. Throws UsageError for a size that
+  /// cannot be.
   void begin(const Camera& camera, int width, int height, const PictureSettings& settings);
 
-  /// Draws a mesh at end(); it must live until then.
+  /// Draws a mesh at end(); it must live until the picture is finished or the next one begins.
   void draw(const PooledMesh& mesh, const MeshStyle& style);
   /// Draws a mesh now, without keeping it; numbers count from its first vertex.
   /// Opaque ones before transparent ones.
@@ -106,10 +108,22 @@ class Renderer {
 
   /// Finishes the picture.
   void end();
+  /// Does about `work` more of what end() does. True once the picture is finished, which then is
+  /// the same bytes; until then the one before stays whole, for all functions below. Other
+  /// drawing in the context may come in between. Work is counted in triangles; a step over the
+  /// whole picture counts as many as take as long in software.
+  bool end_piece(std::uint64_t work);
+  /// What end() would have to do.
+  std::uint64_t work_left() const;
+
+  /// Forgets the finished picture.
+  void discard();
+  /// Whether one has been finished since. Without one the functions below give and do nothing.
+  bool has_picture() const;
 
   int width() const;
   int height() const;
-  /// The picture after end(): RGBA, 4 bytes a pixel, sRGB, rows from the top.
+  /// The picture: RGBA, 4 bytes a pixel, sRGB, rows from the top.
   std::vector<std::uint8_t> read_pixels() const;
   /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for ImGui::Image say.
   unsigned texture() const;

@@ -226,36 +226,59 @@ void ScreenPass::draw(const GlProgram& program, const GlFramebuffer& target) {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-void ScreenPass::run(const PictureTargets& targets, const PictureSettings& settings,
-                     bool transparent) {
-  bind(0, targets.normal);
-  bind(1, targets.depth);
-  if (targets.ids) bind(2, targets.id);
-  glProgramUniform1i(nearest_.get(), 0, targets.ids);
-  draw(nearest_, targets.nearest);
+std::vector<ScreenPass::Step> ScreenPass::steps(const PictureSettings& settings) {
+  if (!settings.occlusion) return {Step::nearest, Step::compose};
+  return {Step::nearest, Step::occlusion, Step::smooth_rows, Step::smooth_columns, Step::compose};
+}
 
-  if (settings.occlusion) {
-    bind(0, targets.near_depth);
-    bind(1, targets.near_normal);
-    draw(occlusion_, targets.open_target);
-    bind(1, targets.open);
-    glProgramUniform2i(smooth_.get(), 0, 1, 0);
-    draw(smooth_, targets.open_rows_target);
-    bind(1, targets.open_rows);
-    glProgramUniform2i(smooth_.get(), 0, 0, 1);
-    draw(smooth_, targets.open_target);
+/// What the last step reads.
+void ScreenPass::bind_samples(const ScreenPicture& picture) {
+  bind(0, picture.targets.colour);
+  bind(1, picture.targets.depth);
+  if (picture.transparent) {
+    bind(2, picture.targets.sum);
+    bind(3, picture.targets.seen);
   }
+  bind(4, picture.result.near_depth);
+  bind(5, picture.result.near_normal);
+  bind(6, picture.targets.open);
+}
 
-  bind(0, targets.colour);
-  bind(1, targets.depth);
-  if (transparent) {
-    bind(2, targets.sum);
-    bind(3, targets.seen);
+void ScreenPass::run(Step step, const ScreenPicture& picture, PictureRows rows) {
+  const PictureTargets& targets = picture.targets;
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(0, rows.first, targets.width, rows.count);
+  switch (step) {
+    case Step::nearest:
+      bind(0, targets.normal);
+      bind(1, targets.depth);
+      if (targets.ids) bind(2, targets.id);
+      glProgramUniform1i(nearest_.get(), 0, targets.ids);
+      draw(nearest_, picture.result.nearest);
+      break;
+    case Step::occlusion:
+      bind(0, picture.result.near_depth);
+      bind(1, picture.result.near_normal);
+      draw(occlusion_, targets.open_target);
+      break;
+    case Step::smooth_rows:
+      bind(0, picture.result.near_depth);
+      bind(1, targets.open);
+      glProgramUniform2i(smooth_.get(), 0, 1, 0);
+      draw(smooth_, targets.open_rows_target);
+      break;
+    case Step::smooth_columns:
+      bind(0, picture.result.near_depth);
+      bind(1, targets.open_rows);
+      glProgramUniform2i(smooth_.get(), 0, 0, 1);
+      draw(smooth_, targets.open_target);
+      break;
+    case Step::compose:
+      bind_samples(picture);
+      draw(compose(picture.settings, picture.transparent), picture.result.picture_target);
+      break;
   }
-  bind(4, targets.near_depth);
-  bind(5, targets.near_normal);
-  bind(6, targets.open);
-  draw(compose(settings, transparent), targets.picture_target);
+  glDisable(GL_SCISSOR_TEST);
   check_gl("making the picture");
 }
 

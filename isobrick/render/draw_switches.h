@@ -1,0 +1,54 @@
+#pragma once
+
+#include <epoxy/gl.h>
+
+#include <array>
+
+#include "isobrick/render/frame.h"
+
+namespace isobrick {
+
+/// What drawing needs of a context's switches; leaves OpenGL's defaults.
+class DrawSwitches {
+ public:
+  explicit DrawSwitches(const FrameBlock& frame) {
+    glGetIntegerv(GL_VIEWPORT, viewport_.data());
+    glViewport(0, 0, static_cast<int>(frame.viewport.x), static_cast<int>(frame.viewport.y));
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glDepthFunc(GL_GREATER);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    for (const GLenum off : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
+                             GL_FRAMEBUFFER_SRGB, GL_DEPTH_TEST})
+      glDisable(off);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  }
+  ~DrawSwitches() {
+    meshes(0, false, false);
+    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+    glDepthFunc(GL_LESS);
+    glViewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glUseProgram(0);
+    glBindVertexArray(0);
+  }
+  DrawSwitches(const DrawSwitches&) = delete;
+  DrawSwitches& operator=(const DrawSwitches&) = delete;
+
+  /// Depth test, clipping by the first `distances` planes, weighted blending.
+  void meshes(int distances, bool depth_test, bool blended) const {
+    const auto set = [](GLenum what, bool on) { on ? glEnable(what) : glDisable(what); };
+    set(GL_DEPTH_TEST, depth_test);
+    glDepthMask(!blended);
+    for (int i = 0; i < kClipDistances; ++i)
+      set(GL_CLIP_DISTANCE0 + static_cast<GLenum>(i), i < distances);
+    set(GL_BLEND, blended);
+    if (!blended) return;
+    glBlendFunci(0, GL_ONE, GL_ONE);
+    glBlendFunci(1, GL_ZERO, GL_ONE_MINUS_SRC_COLOR);
+  }
+
+ private:
+  std::array<int, 4> viewport_{};
+};
+
+}  // namespace isobrick

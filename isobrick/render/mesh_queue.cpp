@@ -1,0 +1,39 @@
+#include "isobrick/render/mesh_queue.h"
+
+#include <algorithm>
+
+namespace isobrick {
+namespace {
+
+unsigned block_of(const MeshDraw& draw) { return draw.mesh->place().positions; }
+
+}  // namespace
+
+void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
+  draws_.push_back({&mesh, style, 0, mesh.place().triangle_count});
+  left_ += mesh.place().triangle_count;
+}
+
+std::span<const MeshDraw> MeshQueue::take(std::uint64_t most) {
+  if (!sorted_)
+    std::stable_sort(draws_.begin(), draws_.end(), [](const MeshDraw& a, const MeshDraw& b) {
+      return block_of(a) < block_of(b);
+    });
+  sorted_ = true;
+  piece_.clear();
+  most = std::max<std::uint64_t>(most, 1);
+  const unsigned block = block_of(draws_[next_]);
+  while (most > 0 && next_ < draws_.size() && block_of(draws_[next_]) == block) {
+    MeshDraw& rest = draws_[next_];
+    MeshDraw& taken = piece_.emplace_back(rest);
+    taken.triangles = static_cast<std::uint32_t>(std::min<std::uint64_t>(rest.triangles, most));
+    rest.first_triangle += taken.triangles;
+    rest.triangles -= taken.triangles;
+    most -= taken.triangles;
+    left_ -= taken.triangles;
+    if (rest.triangles == 0) ++next_;
+  }
+  return piece_;
+}
+
+}  // namespace isobrick

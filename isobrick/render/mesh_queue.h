@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "isobrick/render/mesh_pool.h"
+#include "isobrick/render/renderer.h"
+
+namespace isobrick {
+
+/// Triangles of a mesh and how they look.
+struct MeshDraw {
+  const PooledMesh* mesh;
+  MeshStyle style;
+  std::uint32_t first_triangle, triangles;  ///< of the mesh's
+};
+
+/// Meshes that are to be drawn, in pieces of any size. However large the pieces are, the triangles
+/// have one order: meshes of one block of a pool stand together, or else as they were added.
+class MeshQueue {
+ public:
+  /// Before the first take(); `mesh` must live until the last one or clear().
+  void add(const PooledMesh& mesh, const MeshStyle& style);
+  void clear() { *this = {}; }
+
+  bool empty() const { return left_ == 0; }
+  /// That have not been taken.
+  std::uint64_t triangles() const { return left_; }
+
+  /// The next ones of one block, `most` triangles at most and one at least; valid until the next
+  /// call. The queue must not be empty.
+  std::span<const MeshDraw> take(std::uint64_t most);
+
+ private:
+  std::vector<MeshDraw> draws_, piece_;
+  std::size_t next_ = 0;
+  std::uint64_t left_ = 0;
+  bool sorted_ = false;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,159 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "tests/meshes/test_meshes.h"
+#include "tests/render/pictures.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kWidth = 230, kHeight = 170;
+
+/// A picture with something of everything: opaque and transparent meshes of several blocks, one
+/// with a block of its own, through each other; slices of both kinds; planes, edges, lines, text.
+class Pieces : public RenderTest {
+ protected:
+  void SetUp() override {
+    RenderTest::SetUp();
+    if (IsSkipped()) return;
+    pool_.emplace(3000);
+    for (int i = 0; i < 9; ++i) {
+      const float step = static_cast<float>(i), at = -0.8f + 0.2f * step;
+      const TestMesh ball = make_ball({at, 0.3f * std::sin(4 * step), -at}, 0.5f, i == 4 ? 60 : 24);
+      meshes_.push_back(pool_->add(ball.chunk()));
+    }
+    for (std::size_t i = 0; i < samples_.size(); ++i)
+      samples_[i] =
+          i % 7 == 3 ? std::numeric_limits<float>::quiet_NaN() : 0.01f * static_cast<float>(i % 90);
+  }
+  void TearDown() override {
+    meshes_.clear();
+    pool_.reset();
+    RenderTest::TearDown();
+  }
+
+  void begin(const PictureSettings& settings, double turn = 0) {
+    Camera camera({0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1});
+    camera.fit({-1, -1, -1}, {1, 1, 1}, double{kWidth} / kHeight);
+    camera.orbit(turn, 0, {0, 0, 1});
+    renderer().begin(camera, kWidth, kHeight, settings);
+    for (std::size_t i = 0; i < meshes_.size(); ++i) {
+      const float blue = 0.1f * static_cast<float>(i);
+      renderer().draw(meshes_[i], {.colour = {0.9f, 0.4f, blue},
+                                   .opacity = i % 3 == 1 ? 0.4f : 1.0f,
+                                   .id = static_cast<std::uint32_t>(i + 1)});
+    }
+    SliceImage slice{.corner = {-1, 0.2, -1},
+                     .along_x = {2, 0, 0},
+                     .along_y = {0, 0, 2},
+                     .width = 30,
+                     .height = 20,
+                     .samples = samples_};
+    renderer().draw(slice);
+    slice.corner.y = -0.5;
+    slice.opacity = 0.3f;
+    renderer().draw(slice);
+    renderer().draw_box({-1, -1, -1}, {1, 1, 1}, {0.2f, 0.2f, 0.2f});
+    renderer().draw_axes();
+    renderer().draw_scale_bar("mm");
+  }
+
+  /// How many pieces it took.
+  int draw_in_pieces(std::uint64_t work) {
+    int pieces = 1;
+    while (!renderer().end_piece(work)) ++pieces;
+    return pieces;
+  }
+
+  std::vector<std::uint32_t> ids() {
+    std::vector<std::uint32_t> all;
+    for (int y = 0; y < kHeight; y += 3)
+      for (int x = 0; x < kWidth; x += 3) {
+        const auto picked = renderer().pick(x, y);
+        all.push_back(picked ? picked->id : 99);
+      }
+    return all;
+  }
+
+  std::optional<MeshPool> pool_;
+  std::vector<PooledMesh> meshes_;
+  std::vector<float> samples_ = std::vector<float>(30 * 20);
+};
+
+PictureSettings with_everything(bool multisample) {
+  PictureSettings settings{.multisample = multisample, .edges = true, .picking = true};
+  settings.planes = {{{0.2, 1, 0.1}, -0.6}};
+  return settings;
+}
+
+TEST_F(Pieces, GiveTheSameBytesWhateverTheirSize) {
+  for (const bool multisample : {false, true}) {
+    begin(with_everything(multisample));
+    const std::uint64_t all = renderer().work_left();
+    renderer().end();
+    EXPECT_EQ(renderer().work_left(), 0u);
+    const auto expected = renderer().read_pixels();
+    const auto expected_ids = ids();
+    for (const std::uint64_t work :
+         {std::uint64_t{97}, std::uint64_t{2500}, all / 2, all / 10 * 9}) {
+      renderer().discard();
+      begin(with_everything(multisample));
+      EXPECT_EQ(renderer().work_left(), all);
+      EXPECT_GE(draw_in_pieces(work), work == 97 ? 100 : 2) << work;
+      EXPECT_EQ(renderer().work_left(), 0u);
+      EXPECT_EQ(renderer().read_pixels(), expected) << work << ' ' << multisample;
+      EXPECT_EQ(ids(), expected_ids) << work << ' ' << multisample;
+    }
+    begin(with_everything(multisample));
+    EXPECT_EQ(draw_in_pieces(all), 1);
+    EXPECT_EQ(renderer().read_pixels(), expected);
+  }
+}
+
+TEST_F(Pieces, ThePictureBeforeStaysUntilTheNextOneIsWhole) {
+  begin(with_everything(false));
+  EXPECT_FALSE(renderer().has_picture());
+  EXPECT_FALSE(renderer().pick(kWidth / 2, kHeight / 2));
+  renderer().end();
+  const auto first = renderer().read_pixels();
+  const auto first_ids = ids();
+  // One of another view, of other samples: dropped when it is nearly done; and finished.
+  for (const bool dropped : {true, false}) {
+    begin(with_everything(true), 1.5);
+    const std::uint64_t all = renderer().work_left();
+    while (!renderer().end_piece(1500)) {
+      ASSERT_EQ(renderer().read_pixels(), first);
+      if (dropped && renderer().work_left() < all / 5) break;
+    }
+    EXPECT_EQ(renderer().work_left() > 0, dropped);
+    if (!dropped) break;
+    EXPECT_EQ(ids(), first_ids);
+  }
+  EXPECT_NE(renderer().read_pixels(), first);
+  // What was dropped has left nothing behind.
+  begin(with_everything(false));
+  draw_in_pieces(4000);
+  EXPECT_EQ(renderer().read_pixels(), first);
+}
+
+TEST_F(Pieces, MayBeOfAnotherSizeThanThePictureBefore) {
+  begin(with_everything(false));
+  renderer().end();
+  const auto first = renderer().read_pixels();
+  renderer().begin(Camera({0, -3, 0}, {0, 0, 0}, {0, 0, 1}), 40, 30, {});
+  renderer().draw(meshes_[4], {});
+  ASSERT_FALSE(renderer().end_piece(1000));
+  EXPECT_EQ(renderer().width(), kWidth);
+  EXPECT_EQ(renderer().read_pixels(), first);
+  renderer().end();
+  EXPECT_EQ(renderer().width(), 40);
+  EXPECT_EQ(renderer().read_pixels().size(), 40u * 30 * 4);
+}
+
+}  // namespace
+}  // namespace isobrick
