@@ -200,7 +200,10 @@ void status_panel(const ViewerState& state) {
                    mebibytes(c.mesh_bytes), c.queue, c.without_bricks, c.working));
   if (p.limited_by_budget) text("as fine as the memory allows");
   if (c.damaged > 0) text(fmt::format("{} parts cannot be shown", c.damaged));
-  ImGui::TextDisabled(p.complete ? "complete" : "refining \u2026");
+  if (p.drawing)
+    ImGui::TextDisabled("drawing \u2026 %.0f %%", 100 * p.drawn_part);
+  else
+    ImGui::TextDisabled(p.complete ? "complete" : "refining \u2026");
 }
 
 void import_progress(ImportJob& import) {

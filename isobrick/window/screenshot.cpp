@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "isobrick/core/error.h"
 #include "isobrick/io/png_file.h"
 
 namespace isobrick {
@@ -18,6 +19,7 @@ std::vector<Shot> turntable(Camera camera, Vec3d vertical, int frames, const std
 }
 
 void write_picture(const Renderer& renderer, const std::string& file, bool force) {
+  if (!renderer.has_picture()) throw Error("there is no picture yet");
   const std::vector<std::uint8_t> rgb = without_alpha(renderer.read_pixels());
   write_png(file, renderer.width(), renderer.height(), rgb, force);
 }

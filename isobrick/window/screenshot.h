@@ -17,7 +17,8 @@ struct Shot {
 /// FOLDER/0000.png and so on.
 std::vector<Shot> turntable(Camera camera, Vec3d vertical, int frames, const std::string& folder);
 
-/// Writes the renderer's last picture as a PNG. See OutputFile for what it may throw.
+/// Writes the renderer's last finished picture as a PNG. Throws Error when there is none; see
+/// OutputFile for what else it may throw.
 void write_picture(const Renderer& renderer, const std::string& file, bool force);
 
 }  // namespace isobrick

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstring>
 #include <limits>
 
 #include <epoxy/gl.h>
@@ -27,55 +25,17 @@ constexpr double kRefiningSeconds = 0.04;
 constexpr double kRefiningPause = 2;
 constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
 constexpr double kMarginOfWait = 0.05;
-
-/// Of host memory: what slices take, with what the renderer is given of them.
-std::uint64_t slice_memory(const PictureBudgets& budgets) { return budgets.memory / 8; }
-
-/// Most that the samples of one slice may take: beside them are as many floats, and on the device.
-std::uint64_t slice_bytes(const PictureBudgets& budgets, ScalarType type) {
-  const std::uint64_t sample = std::min<std::uint64_t>(size_of(type), sizeof(float));
-  const std::uint64_t samples = std::min(slice_memory(budgets) / 3 / (sample + sizeof(float)),
-                                         budgets.device_memory / 8 / 3 / sizeof(float));
-  return std::min(SliceRequest{}.bytes, samples * sample);
-}
+/// Of a piece's time: for less another piece is not begun.
+constexpr double kLeastPart = 0.25;
 
 StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change) {
   StreamOptions options;
   options.threads = budgets.threads;
   options.mesh_bytes = budgets.memory / 2;
-  options.brick_bytes = budgets.memory - options.mesh_bytes - slice_memory(budgets);
+  options.brick_bytes = budgets.memory - options.mesh_bytes - ShownSlices::memory(budgets);
   options.device_bytes = DeviceMeshes::cache_bytes(budgets.device_mesh_memory());
   options.on_change = std::move(on_change);
   return options;
-}
-
-template <class T>
-void append_floats(const std::vector<std::byte>& pixels, std::vector<float>& samples) {
-  samples.resize(pixels.size() / sizeof(T));
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    T value;
-    std::memcpy(&value, pixels.data() + i * sizeof(T), sizeof(T));
-    samples[i] = static_cast<float>(value);
-  }
-}
-
-std::vector<float> floats_of(const SliceSamples& slice) {
-  std::vector<float> samples;
-  if (slice.type == ScalarType::u8)
-    append_floats<std::uint8_t>(slice.pixels, samples);
-  else if (slice.type == ScalarType::u16)
-    append_floats<std::uint16_t>(slice.pixels, samples);
-  else
-    append_floats<float>(slice.pixels, samples);
-  return samples;
-}
-
-/// Room of a block of what is uploaded: little of the budget, so that little of it is idle. Meshes
-/// that are larger have blocks of their own.
-std::uint32_t pool_vertices(const PictureBudgets& budgets) {
-  constexpr std::uint64_t vertex = 4 * sizeof(Vec3f);  // with a normal and two triangles
-  return static_cast<std::uint32_t>(
-      std::clamp<std::uint64_t>(budgets.device_memory / 128 / vertex, 1u << 12, 1u << 19));
 }
 
 /// Whether both show the same.
@@ -85,6 +45,12 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
                     [](const DrawnNode& p, const DrawnNode& q) {
                       return p.mesh == q.mesh && p.isovalue == q.isovalue;
                     });
+}
+
+std::uint64_t triangles_of(const Drawable& drawable) {
+  std::uint64_t sum = 0;
+  for (const DrawnNode& node : drawable.nodes) sum += node.mesh->triangles();
+  return sum;
 }
 
 /// What a picture depends on beside the meshes and slices that there are. An isovalue
@@ -107,10 +73,13 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
                                                            stream_options(budgets_, on_change));
                           })),
       setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)),
-      pool_(pool_vertices(budgets)) {
+      uploads_(budgets.device_memory),
+      slices_(budgets, last_sample(*store_), store_->info().type),
+      pieces_(setup_->software()) {
   scene_ = reading_.get();
   device_ = std::make_unique<DeviceMeshes>(scene_->stream(), setup_->device());
   device_->use(budgets.backend);
+  renderer().discard();  // that of another store
 }
 
 StorePicture::~StorePicture() = default;
@@ -151,12 +120,16 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
 }
 
 void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
-  UploadShare share;
+  MeshUploads::Share share;
+  // The first picture takes what it needs.
+  const auto add = [&](const Drawable& drawable) {
+    return uploads_.add(drawable, scene_->origin(), shown_ == nullptr ? nullptr : &share);
+  };
   // What was begun first, or nothing would be finished while there is always something newer.
-  if (next_ != nullptr && next_ != shown_ && !upload_all(*next_, share)) return;
+  if (next_ != nullptr && next_ != shown_ && !add(*next_)) return;
   if (next_ != nullptr) shown_ = next_;
   next_ = newest;
-  if (upload_all(*next_, share)) shown_ = next_;
+  if (add(*next_)) shown_ = next_;
 }
 
 /// Whether what is new can be shown a little later, since more is to come.
@@ -164,69 +137,29 @@ bool StorePicture::can_wait(const Drawable& newest) const {
   if (shown_ == nullptr || !shown_->covers || newest.complete ||
       shown_->isovalues != newest.isovalues)
     return false;
-  const double pause = kRefiningPause * draw_seconds_;
+  const double pause = kRefiningPause * picture_seconds_;
   return std::chrono::duration<double>(Clock::now() - drawn_).count() <
          (device_->turns() != nullptr ? std::max(pause, kRefiningSeconds) : pause);
 }
 
-/// `idle`: nothing finer than the newest is to come, though a full budget may leave it incomplete.
-bool StorePicture::may_be_plain(const PictureWay& way, const Drawable& newest, bool idle) const {
-  if (way.plain != PictureWay::Plain::until_complete) return way.plain == PictureWay::Plain::yes;
+bool StorePicture::may_be_plain(const Asked& asked) const {
+  if (asked.way.plain != PictureWay::Plain::until_complete)
+    return asked.way.plain == PictureWay::Plain::yes;
   if (setup_->software()) return !state_.complete;
-  return shown_.get() != &newest || !(newest.complete || idle);
-}
-
-bool StorePicture::upload_all(const Drawable& drawable, UploadShare& share) {
-  for (const DrawnNode& node : drawable.nodes) {
-    if (node.mesh->device) continue;
-    Upload& upload = uploads_[node.mesh->id()];
-    upload.used = frame_;
-    if (upload.there) continue;
-    if (shown_ != nullptr && share.spent()) return false;  // the rest with the next picture
-    upload.there = true;
-    if (node.mesh->empty()) continue;
-    upload.place = pool_.add(node.mesh->mesh.chunk(0), scene_->origin());
-    share.bytes += upload.place.bytes();
-  }
-  return true;
+  // A full budget may leave the newest incomplete.
+  return shown_ != asked.newest || !(asked.newest->complete || asked.idle);
 }
 
 void StorePicture::drop_unused() {
-  if (shown_ != nullptr)
-    for (const DrawnNode& node : shown_->nodes) {
-      if (node.mesh->device) continue;
-      if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
-        upload->second.used = frame_;
-    }
-  drop_uploads(upload_memory());
-  state_.device_bytes = pool_.capacity() + device_->held() + slice_bytes_there();
-}
-
-std::uint64_t StorePicture::slice_bytes_there() const {
-  std::uint64_t bytes = 0;
-  for (const ShownSlice& slice : slices_) bytes += slice.samples.size() * sizeof(float);
-  return bytes;
+  if (shown_ != nullptr) uploads_.keep(*shown_);
+  uploads_.drop(upload_memory());
+  state_.device_bytes = uploads_.bytes() + device_->held() + slices_.bytes();
 }
 
 /// What is uploaded, slices and the device's own meshes share its memory.
 std::uint64_t StorePicture::upload_memory() const {
-  const std::uint64_t others = device_->reserved() + slice_bytes_there();
+  const std::uint64_t others = device_->reserved() + slices_.bytes();
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
-}
-
-/// Drops what is not drawn, the oldest first, until no more than this is held for uploads.
-void StorePicture::drop_uploads(std::uint64_t most) {
-  if (pool_.capacity() <= most) return;
-  std::vector<std::pair<std::uint64_t, MeshId>> oldest;
-  for (const auto& [id, upload] : uploads_)
-    if (upload.used != frame_) oldest.emplace_back(upload.used, id);
-  std::sort(oldest.begin(), oldest.end(),
-            [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (const auto& [used, id] : oldest) {
-    uploads_.erase(id);
-    pool_.trim();
-    if (pool_.capacity() <= most) return;
-  }
 }
 
 PictureSettings StorePicture::picture_settings(const ViewSettings& settings) const {
@@ -255,77 +188,30 @@ PictureSettings StorePicture::picture_settings(const ViewSettings& settings) con
   return picture;
 }
 
-void StorePicture::draw_surfaces(const ViewSettings& settings) {
-  state_.triangles = state_.nodes = 0;
-  state_.damage.clear();
-  state_.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
+void StorePicture::draw_surfaces(const ViewSettings& settings, PictureState& state) {
+  state.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
   if (shown_ == nullptr) return;
   for (const DrawnNode& node : shown_->nodes) {
     if (!node.mesh->damage.empty()) {
-      state_.damage.push_back(node.mesh->damage);
+      state.damage.push_back(node.mesh->damage);
       continue;
     }
     const auto number = static_cast<std::size_t>(node.isovalue);
     const PooledMesh* mesh = nullptr;
     if (node.mesh->device)
       mesh = &device_->drawn(*node.mesh, scene_->origin());
-    else if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
-      mesh = &upload->second.place;
+    else
+      mesh = uploads_.find(*node.mesh);
     if (number >= shown_surfaces_.size() || mesh == nullptr || mesh->empty()) continue;
     const SurfaceSettings& surface = settings.surfaces[shown_surfaces_[number]];
-    state_.isovalues[shown_surfaces_[number]] = node.mesh->isovalue;
+    state.isovalues[shown_surfaces_[number]] = node.mesh->isovalue;
     MeshStyle style;
     style.colour = surface.colour;
     style.opacity = surface.opacity;
     style.id = static_cast<std::uint32_t>(shown_surfaces_[number] + 1);
     renderer().draw(*mesh, style);
-    state_.triangles += node.mesh->triangles();
-    ++state_.nodes;
-  }
-}
-
-bool StorePicture::update_slices(const ViewSettings& settings) {
-  const Vec3d last = last_sample(*store_);
-  bool changed = false;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto slot = static_cast<std::size_t>(axis);
-    ShownSlice& shown = slices_[slot];
-    if (!settings.slices[slot].shown) {
-      if (shown.asked) scene_->stream().set_slice(axis, std::nullopt);
-      changed |= shown.from != nullptr;
-      shown = {};
-      continue;
-    }
-    shown.asked = true;
-    SliceRequest request;
-    request.axis = axis;
-    request.bytes = slice_bytes(budgets_, store_->info().type);
-    request.position = settings.slices[slot].place * last[axis];
-    scene_->stream().set_slice(axis, request);
-    // Until it is there the last one stays.
-    const auto slice = scene_->stream().slice(axis);
-    if (slice == nullptr || slice == shown.from) continue;
-    shown = {slice, floats_of(*slice), true};
-    changed = true;
-  }
-  return changed;
-}
-
-void StorePicture::draw_slices(const ViewSettings& settings) {
-  for (const ShownSlice& shown : slices_) {
-    if (shown.from == nullptr) continue;
-    const SliceSamples& from = *shown.from;
-    if (!from.damage.empty()) state_.damage.push_back(from.damage);
-    SliceImage image;
-    image.corner = from.corner;
-    image.along_x = from.along_width;
-    image.along_y = from.along_height;
-    image.width = static_cast<int>(from.width);
-    image.height = static_cast<int>(from.height);
-    image.samples = shown.samples;
-    image.window_lo = settings.window_lo;
-    image.window_hi = settings.window_hi;
-    renderer().draw(image);
+    state.triangles += node.mesh->triangles();
+    ++state.nodes;
   }
 }
 
@@ -347,82 +233,196 @@ void StorePicture::draw_marks(const ViewSettings& settings) {
   if (settings.scale_bar) renderer().draw_scale_bar(unit_symbol(transform.unit));
 }
 
-void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& asked,
+/// Whether a picture that has been begun is still worth finishing.
+bool StorePicture::still_wanted(const Work& work, const Asked& asked) const {
+  const std::string& shows = work.becomes.shows;
+  // A picture in full serves as a plain one, and a plain one comes first.
+  const bool same_view = shows == asked.shows || shows == asked.shows_plain;
+  if (same_view && work.isovalues == scene_->cut().isovalues) return true;
+  return work.state.moving && asked.way.moving &&
+         triangles_of(*asked.newest) > work.state.triangles / 2;
+}
+
+/// Whether the next picture would show no more than the last one.
+bool StorePicture::shows_all_there_is(const Pictured& next, const Asked& asked) const {
+  if (pictured_.shows != next.shows && pictured_.shows != asked.shows) return false;
+  if (!pictured_.stale && pictured_.slices == next.slices &&
+      same_meshes(pictured_.meshes.get(), next.meshes.get()))
+    return true;
+  // Meshes of another isovalue are awaited; a picture of this one was dropped for that.
+  return !asked.idle && pictured_.stale && pictured_.slices == next.slices &&
+         pictured_.isovalues == next.isovalues && next.isovalues != scene_->cut().isovalues;
+}
+
+/// Unless it would show nothing new.
+void StorePicture::choose_picture(const Asked& asked) {
+  Stopwatch watch;
+  const bool plain_serves =
+      asked.way.plain != PictureWay::Plain::no && pictured_.shows == asked.shows_plain;
+  const bool other_view = pictured_.shows != asked.shows && !plain_serves;
+  if (other_view || asked.idle || !can_wait(*asked.newest)) upload(asked.newest);
+  times_.upload = watch.lap();
+  slices_.update(scene_->stream(), asked.settings);
+  times_.slices = watch.lap();
+  const bool plain = may_be_plain(asked);
+  Pictured next{.shows = plain ? asked.shows_plain : asked.shows,
+                .meshes = shown_,
+                .slices = slices_.samples(),
+                .isovalues = {}};
+  if (shown_ != nullptr) next.isovalues = shown_->isovalues;
+  // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
+  if (shows_all_there_is(next, asked)) return;
+  if (pictured_.slices != next.slices || !same_meshes(pictured_.meshes.get(), shown_.get())) {
+    pictured_.stale = true;
+    pictured_.meshes.reset();
+    pictured_.slices = next.slices;
+  }
+  work_.emplace(
+      Work{.becomes = std::move(next), .state = {}, .isovalues = scene_->cut().isovalues});
+  work_->state.moving = asked.way.moving;
+  work_->state.plain = plain;
+}
+
+void StorePicture::begin_picture(const Asked& asked) {
+  Stopwatch watch;
+  ViewSettings settings = asked.settings;
+  if (work_->state.plain) settings.occlusion = settings.multisample = false;
+  renderer().begin(asked.camera, asked.width, asked.height, picture_settings(settings));
+  draw_surfaces(settings, work_->state);
+  slices_.draw(renderer(), settings, work_->state.damage);
+  draw_marks(settings);
+  work_->all = renderer().work_left();
+  times_.draw = watch.lap();
+}
+
+/// Until a piece is drawn; in software, if it is not the last one: the piece before, because what
+/// is told is drawn in part by the thread that tells it, and the rest beside the next one.
+void StorePicture::wait_drawn(bool last) {
+  if (last || !setup_->software()) {
+    glFinish();  // see DeviceMeshes::drawn(); and drawing counts for the pause after it
+    return piece_fence_.reset();
+  }
+  GlFence fence = GlFence::insert();
+  if (piece_fence_) piece_fence_->wait();
+  piece_fence_ = std::move(fence);
+}
+
+/// As much as there is time for.
+void StorePicture::draw_piece(double most) {
+  double left = most;
+  for (;;) {
+    Stopwatch watch;
+    const std::uint64_t before = renderer().work_left();
+    const bool finished = renderer().end_piece(pieces_.work(left));
+    const double told = watch.lap();
+    wait_drawn(finished);
+    const double waited = watch.lap();
+    pieces_.drawn(before - renderer().work_left(), told + waited);
+    times_.draw += told;
+    times_.finish += waited;
+    left -= told + waited;
+    if (finished) return finish_picture();
+    if (left < kLeastPart * most) break;
+  }
+  ++counters_.pieces;
+  work_->seconds += times_.draw + times_.finish;
+}
+
+void StorePicture::finish_picture() {
+  picture_seconds_ = work_->seconds + times_.draw + times_.finish;
+  drawn_ = Clock::now();
+  drew_ = true;
+  ++counters_.finished;
+  pictured_ = std::move(work_->becomes);
+  state_.moving = work_->state.moving;
+  state_.triangles = work_->state.triangles;
+  state_.nodes = work_->state.nodes;
+  state_.isovalues = std::move(work_->state.isovalues);
+  state_.damage = std::move(work_->state.damage);
+  work_.reset();
+  device_->forget();
+}
+
+/// Its last piece has ended.
+void StorePicture::drop_picture() {
+  ++counters_.dropped;
+  work_.reset();
+  device_->forget();
+}
+
+void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
                         const PictureWay& way) {
-  ++frame_;
+  uploads_.begin_use();
+  drew_ = false;
   Stopwatch watch;
   state_.imports = device_->update();
   times_ = {.device = watch.lap()};
-  update_scene(camera, width, height, asked, way.coarser);
+  update_scene(camera, width, height, settings, way.coarser);
   times_.scene = scene_->times();
   watch.lap();
-  const auto before = shown_;
   const bool idle = scene_->stream().idle();  // first: then the newest has everything
-  const auto newest = scene_->drawable();
-  times_.drawable = watch.lap();
-  ViewSettings plain = asked;
+  ViewSettings plain = settings;
   plain.occlusion = plain.multisample = false;
-  const std::string shows_all = what_shows(camera, width, height, asked);
-  const std::string shows_plain = what_shows(camera, width, height, plain);
-  // A picture in full serves as a plain one.
-  const bool plain_serves = way.plain != PictureWay::Plain::no && shows_ == shows_plain;
-  const bool other_view = shows_ != shows_all && !plain_serves;
-  if (other_view || idle || !can_wait(*newest)) upload(newest);
-  const bool be_plain = may_be_plain(way, *newest, idle);
-  const ViewSettings& settings = be_plain ? plain : asked;
-  const std::string& shows = be_plain ? shows_plain : shows_all;
-  times_.upload = watch.lap();
-  const bool other_slices = update_slices(settings);
-  times_.slices = watch.lap();
-  // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
-  if (other_slices || !same_meshes(before.get(), shown_.get()) ||
-      (shows_ != shows && shows_ != shows_all)) {
-    // Two contexts of one device are changed slowly and to and fro: one after the other is sooner
-    // done, for both.
-    Turns* const turns = device_->turns();
-    const Turn turn(turns);
-    times_.turn = watch.lap();
-    try {
-      renderer().begin(camera, width, height, picture_settings(settings));
-      draw_surfaces(settings);
-      draw_slices(settings);
-      draw_marks(settings);
-      renderer().end();
-    } catch (...) {
-      shows_.clear();  // half a picture is none
-      glFinish();
-      device_->forget();
-      throw;
+  const Asked asked{.camera = camera,
+                    .width = width,
+                    .height = height,
+                    .settings = settings,
+                    .way = way,
+                    .shows = what_shows(camera, width, height, settings),
+                    .shows_plain = what_shows(camera, width, height, plain),
+                    .idle = idle,
+                    .newest = scene_->drawable()};
+  times_.drawable = watch.lap();
+  if (work_ && !still_wanted(*work_, asked)) drop_picture();
+  try {
+    const bool goes_on = work_.has_value();
+    if (!goes_on) choose_picture(asked);
+    if (work_) {
+      watch.lap();
+      // Two contexts of one device are changed slowly and to and fro: one after the other is
+      // sooner done, for both.
+      const Turn turn(device_->turns());
+      times_.turn = watch.lap();
+      if (!goes_on) begin_picture(asked);
+      draw_piece(asked.way.piece_seconds);
     }
-    times_.draw = watch.lap();
-    glFinish();  // see DeviceMeshes::drawn(); and drawing counts for the pause after it
-    times_.finish = watch.lap();
-    device_->forget();
-    shows_ = shows;
-    drawn_ = Clock::now();
-    draw_seconds_ = times_.draw + times_.finish;
+  } catch (...) {
+    glFinish();
+    if (work_) drop_picture();
+    pictured_ = {};  // half a picture is none
+    throw;
   }
+  watch.lap();
   drop_unused();
-  state_.plain = shows_ != shows_all;
+  update_state(asked);
+  times_.tidy = watch.lap();
+}
+
+void StorePicture::update_state(const Asked& asked) {
+  state_.drawing = work_.has_value();
+  state_.drawn_part = work_ && work_->all > 0 ? 1 - static_cast<double>(renderer().work_left()) /
+                                                        static_cast<double>(work_->all)
+                                              : 0;
+  state_.plain = pictured_.shows != asked.shows;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;
-  state_.complete = shown_ != nullptr && shown_ == scene_->drawable() &&
+  state_.complete = !work_ && shown_ != nullptr && shown_ == scene_->drawable() &&
                     (shown_->complete || scene_->stream().idle());
-  times_.tidy = watch.lap();
 }
 
 void StorePicture::draw_complete(const Camera& camera, int width, int height,
                                  const ViewSettings& settings, const std::function<void()>& wait) {
+  const PictureWay way{.piece_seconds = kPieceSeconds};
   for (;;) {
-    draw(camera, width, height, settings);
+    draw(camera, width, height, settings, way);
     // The cut depends on what meshes were like; once more, it may be another.
     if (state_.complete) {
-      draw(camera, width, height, settings);
+      draw(camera, width, height, settings, way);
       if (state_.complete) return;
     }
     wait();
-    scene_->stream().wait_idle(kMarginOfWait);
+    if (!state_.drawing) scene_->stream().wait_idle(kMarginOfWait);
   }
 }
 

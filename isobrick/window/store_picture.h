@@ -1,35 +1,43 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <future>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
-#include "isobrick/render/mesh_pool.h"
 #include "isobrick/render/renderer.h"
 #include "isobrick/viewer/scene.h"
 #include "isobrick/window/device_meshes.h"
+#include "isobrick/window/mesh_uploads.h"
 #include "isobrick/window/picture_setup.h"
+#include "isobrick/window/piece_pacer.h"
 #include "isobrick/window/shown_part.h"
+#include "isobrick/window/shown_slices.h"
 #include "isobrick/window/view_settings.h"
 
 namespace isobrick {
 
+/// So long a piece of a picture takes, about, that is drawn in pieces: input is answered in
+/// between.
+inline constexpr double kPieceSeconds = 0.06;
+
 /// What a picture shows and what it still lacks.
 struct PictureState {
   bool complete = false;  ///< nothing finer, nothing else is on its way
+  bool drawing = false;   ///< a picture has been begun, and the next draw() goes on with it
+  double drawn_part = 0;  ///< of that one, 0 … 1
   /// Of each surface that is drawn, by its number: at first, and while the one that was asked
   /// for does not cover the view, not the settings'. NaN: nothing of it is drawn.
   std::vector<double> isovalues;
   bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
   std::uint64_t triangles = 0, nodes = 0;
   bool plain = false;               ///< drawn without occlusion and multisampling to be quick
+  bool moving = false;              ///< drawn as PictureWay::moving
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
   bool imports = false;             ///< the next draw() takes more of a device's memory over
   bool limited_by_budget = false;   ///< with more memory it would be finer
@@ -42,9 +50,21 @@ struct PictureWay {
   /// Without occlusion and multisampling; `until_complete`: unless nothing finer is to come. In
   /// software, which draws slowly, that is one picture later: first a plain one of all.
   enum class Plain : std::uint8_t { no, until_complete, yes } plain = Plain::no;
+  /// A picture that would take longer is drawn in pieces of about so many seconds, one with each
+  /// draw(): the same picture, shown when it is whole, dropped when the view changes before.
+  double piece_seconds = std::numeric_limits<double>::infinity();
+  /// The view changes all the time: a picture that has been begun is finished all the same, unless
+  /// there are much fewer triangles to draw by now.
+  bool moving = false;
 };
 
-/// Seconds that the steps of a picture took this thread; where none was made, from `turn` to
+/// What has become of pictures so far.
+struct PictureCounters {
+  std::uint64_t finished = 0, dropped = 0;
+  std::uint64_t pieces = 0;  ///< after which a picture was not finished yet
+};
+
+/// Seconds that the steps of a draw() took this thread; where nothing was drawn, from `turn` to
 /// `finish` are 0.
 struct PictureTimes {
   double device = 0;    ///< taking over a device, or a part of its memory
@@ -78,81 +98,91 @@ class StorePicture {
   /// The box around the volume, axis by axis of world space.
   WorldBox bounds() const;
 
-  /// Makes the picture in the renderer, of what is there by now; leaves the one before where that
-  /// would show the same.
+  /// Makes the picture in the renderer, of what is there by now, or goes on with it; leaves the one
+  /// before until it is whole, and where it would show the same.
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
             const PictureWay& way = {});
   const PictureState& state() const { return state_; }
-  /// Whether the last draw() made a picture, rather than to leave the one before.
-  bool drew() const { return times_.draw > 0; }
+  /// Whether the last draw() finished a picture, rather than to leave the one before.
+  bool drew() const { return drew_; }
+  /// That the last finished picture took to be drawn, in all of its pieces.
+  double picture_seconds() const { return picture_seconds_; }
+  const PictureCounters& counters() const { return counters_; }
   /// Of the last draw().
   const PictureTimes& times() const { return times_; }
 
-  /// Draws again and again until the picture is complete. Calls `wait` between, at
-  /// least ten times a second, which may throw.
+  /// Draws again and again until the picture is complete. Calls `wait` between, which may throw,
+  /// some ten times a second.
   void draw_complete(const Camera& camera, int width, int height, const ViewSettings& settings,
                      const std::function<void()>& wait);
 
  private:
-  /// A mesh on the device. It may outlive the one in host memory, which made again
-  /// would be the same.
-  struct Upload {
-    bool there = false;
-    PooledMesh place;
-    std::uint64_t used = 0;
+  /// What somebody asks to see.
+  struct Asked {
+    const Camera& camera;
+    int width, height;
+    const ViewSettings& settings;
+    const PictureWay& way;
+    std::string shows, shows_plain;  ///< see what_shows()
+    bool idle;                       ///< nothing finer than `newest` is to come
+    std::shared_ptr<const Drawable> newest;
   };
-
-  /// What may be taken to the device in a picture while others wait: copies that a driver puts
-  /// off take their time later.
-  struct UploadShare {
-    std::uint64_t bytes = 0;
-    std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
-
-    bool spent() const {
-      return bytes > (16u << 20) || std::chrono::steady_clock::now() - begin > kMost;
-    }
-    static constexpr std::chrono::milliseconds kMost{6};
+  /// What a picture shows.
+  struct Pictured {
+    std::string shows;  ///< camera, size and settings
+    std::shared_ptr<const Drawable> meshes;
+    ShownSlices::Samples slices;
+    std::vector<double> isovalues;  ///< of the meshes
+    bool stale = false;  ///< meshes or slices are others by now; these are not kept for that
+  };
+  /// A picture that has been begun.
+  struct Work {
+    Pictured becomes;
+    PictureState state;             ///< what changes with the picture
+    std::vector<double> isovalues;  ///< that were asked for
+    std::uint64_t all = 0;          ///< what there was to draw
+    double seconds = 0;             ///< that it has taken so far
   };
 
   void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
                     double coarser);
   /// Takes meshes of the newest drawable to the device; shows it once all are there.
   void upload(const std::shared_ptr<const Drawable>& newest);
-  bool upload_all(const Drawable& drawable, UploadShare& share);
   bool can_wait(const Drawable& newest) const;
-  bool may_be_plain(const PictureWay& way, const Drawable& newest, bool idle) const;
-  std::uint64_t slice_bytes_there() const;
+  bool may_be_plain(const Asked& asked) const;
   std::uint64_t upload_memory() const;
   void drop_unused();
-  void drop_uploads(std::uint64_t most);
-  void draw_surfaces(const ViewSettings& settings);
-  /// Takes new samples of slices. Whether there are any.
-  bool update_slices(const ViewSettings& settings);
-  void draw_slices(const ViewSettings& settings);
+  bool still_wanted(const Work& work, const Asked& asked) const;
+  bool shows_all_there_is(const Pictured& next, const Asked& asked) const;
+  void choose_picture(const Asked& asked);
+  void begin_picture(const Asked& asked);
+  void draw_piece(double most_seconds);
+  void wait_drawn(bool last);
+  void finish_picture();
+  void drop_picture();
+  void draw_surfaces(const ViewSettings& settings, PictureState& state);
   void draw_marks(const ViewSettings& settings);
   PictureSettings picture_settings(const ViewSettings& settings) const;
+  void update_state(const Asked& asked);
 
   std::shared_ptr<const StoreReader> store_;
   PictureBudgets budgets_;
   std::future<std::unique_ptr<Scene>> reading_;  ///< beside the set-up
   std::shared_ptr<PictureSetup> setup_;
-  MeshPool pool_;
+  MeshUploads uploads_;
+  ShownSlices slices_;
   std::unique_ptr<Scene> scene_;
   std::unique_ptr<DeviceMeshes> device_;
   std::shared_ptr<const Drawable> shown_, next_;
   std::vector<std::size_t> shown_surfaces_;  ///< which surface each isovalue of the scene is
-  std::unordered_map<MeshId, Upload, MeshIdHash> uploads_;
-  /// What slices show, as the renderer takes it.
-  struct ShownSlice {
-    std::shared_ptr<const SliceSamples> from;
-    std::vector<float> samples;
-    bool asked = false;
-  };
-  std::array<ShownSlice, 3> slices_;
-  std::string shows_;  ///< camera, size and settings of the picture in the renderer
-  std::chrono::steady_clock::time_point drawn_;  ///< when that was
-  double draw_seconds_ = 0;                      ///< how long it took
-  std::uint64_t frame_ = 0;
+  Pictured pictured_;                        ///< the finished picture
+  std::optional<Work> work_;                 ///< `shown_` does not change while it is there
+  PiecePacer pieces_;
+  std::optional<GlFence> piece_fence_;  ///< behind the last piece, where nobody waited for it
+  std::chrono::steady_clock::time_point drawn_;  ///< when the last picture was finished
+  double picture_seconds_ = 0;
+  bool drew_ = false;
+  PictureCounters counters_;
   PictureState state_;
   PictureTimes times_;
 };

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -30,6 +31,9 @@ constexpr double kLongestStep = 0.1;
 /// While meshes come in and nothing moves, from a step that has drawn nothing new to the next one:
 /// the cores are for meshes.
 constexpr double kNothingNew = 0.008;
+/// While a picture is drawn in pieces and nothing else happens, from one frame to the next: frames
+/// would keep software from drawing.
+constexpr double kLongestUnseen = 0.25;
 /// Moving pictures may be coarser for so long after the last motion.
 constexpr double kSettleSeconds = 0.25;
 
@@ -218,40 +222,44 @@ bool ViewerWindow::moving() const {
          glfwGetTime() - std::max(events_->last_motion(), opened_) < kSettleSeconds;
 }
 
-void ViewerWindow::draw_frame() {
+/// Makes the picture, or goes on with it. Whether there may be anything new to be seen.
+bool ViewerWindow::draw_picture(int width, int height) {
+  StorePicture& picture = *state_.picture;
+  const double begin = glfwGetTime();
+  // The first picture of a surface should not wait for a good one.
+  const bool fluent = moving() || !picture.state().covers;
+  PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1,
+                 .piece_seconds = kPieceSeconds,
+                 .moving = fluent};
+  // Nor should those that follow while meshes come in.
+  if (state_.pacer.plain())
+    way.plain = fluent ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
+  const int smaller = fluent ? state_.pacer.smaller() : 1;
+  try {
+    picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
+                 std::max(height / smaller, 1), state_.settings, way);
+  } catch (const std::exception& e) {
+    if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
+    return true;
+  }
+  state_.draw_seconds = glfwGetTime() - begin;
+  pace();
+  return !picture.state().drawing;
+}
+
+void ViewerWindow::draw_frame(bool asked) {
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
   if (width == 0 || height == 0) return;  // minimised
+  const bool other = state_.picture == nullptr || draw_picture(width, height);
+  // While a picture is drawn in pieces nothing changes but what tells how much of it there is.
+  if (!other && !asked && glfwGetTime() - shown_ < kLongestUnseen) return;
+  shown_ = glfwGetTime();
   glClearColor(0.2f, 0.21f, 0.23f, 1);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glViewport(0, 0, width, height);
   glClear(GL_COLOR_BUFFER_BIT);
-  if (state_.picture != nullptr) {
-    const double begin = glfwGetTime();
-    // The first picture of a surface should not wait for a good one.
-    const bool fluent = moving() || !state_.picture->state().covers;
-    PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1};
-    // Nor should those that follow while meshes come in.
-    if (state_.pacer.plain())
-      way.plain = fluent ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
-    const int smaller = fluent ? state_.pacer.smaller() : 1;
-    try {
-      state_.picture->draw(state_.navigator.camera, std::max(width / smaller, 1),
-                           std::max(height / smaller, 1), state_.settings, way);
-      state_.picture->renderer().copy_to(0, width, height);
-    } catch (const std::exception& e) {
-      if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
-    }
-    glFinish();
-    state_.draw_seconds = glfwGetTime() - begin;
-    const bool plain = state_.picture->state().plain;
-    // There is a better one to come; or more of a device's memory to import.
-    changed_ |= plain || state_.picture->state().imports;
-    if (fluent)
-      state_.pacer.drawn(state_.draw_seconds);
-    else if (!plain)
-      state_.pacer.drawn_still(state_.draw_seconds);
-  }
+  if (state_.picture != nullptr) state_.picture->renderer().copy_to(0, width, height);
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
@@ -263,14 +271,33 @@ void ViewerWindow::draw_frame() {
   glfwSwapBuffers(window_);
 }
 
+/// What a picture says of the next one.
+void ViewerWindow::pace() {
+  const StorePicture& picture = *state_.picture;
+  // There is more to draw; or a better one to come; or more of a device's memory to import.
+  more_ = picture.state().drawing || picture.state().plain || picture.state().imports;
+  if (!picture.drew()) return;
+  const double seconds = std::max(state_.draw_seconds, picture.picture_seconds());
+  if (picture.state().moving)
+    state_.pacer.drawn(seconds);
+  else if (!picture.state().plain)
+    state_.pacer.drawn_still(seconds);
+}
+
 void ViewerWindow::wait(double most_seconds) {
   const bool there = state_.picture != nullptr;
   if (there && moving()) return glfwPollEvents();
-  if (!changed_ && (!there || state_.picture->state().complete))
+  if (!changed_ && !more_ && (!there || state_.picture->state().complete))
     return glfwWaitEventsTimeout(most_seconds);
-  changed_ = false;
+  const bool before = std::exchange(changed_, false);
   glfwPollEvents();
-  if (!there || state_.picture->drew()) return;
+  wait_for_meshes(most_seconds);
+  changed_ |= before;
+}
+
+void ViewerWindow::wait_for_meshes(double most_seconds) {
+  if (state_.picture == nullptr || state_.picture->drew() || state_.picture->state().drawing)
+    return;
   // Each mesh that comes in ends a wait, and is not worth a step; what a user does is.
   const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
   for (double now = glfwGetTime(); !changed_ && now < end; now = glfwGetTime())
@@ -280,7 +307,9 @@ void ViewerWindow::wait(double most_seconds) {
 bool ViewerWindow::step(double most_seconds) {
   wait(most_seconds);
   if (glfwWindowShouldClose(window_)) return false;
-  changed_ = false;
+  // What a panel is told by one event it may show with the second frame.
+  const bool told = std::exchange(changed_, false), asked = std::exchange(told_, told) || told;
+  more_ = false;
   const double now = glfwGetTime();
   state_.frame_seconds = now - last_time_;
   state_.frame_times[state_.frame_number++ % state_.frame_times.size()] =
@@ -289,7 +318,7 @@ bool ViewerWindow::step(double most_seconds) {
   state_.navigator.update(std::min(state_.frame_seconds, kLongestStep));
   handle_import();
   handle_requests();
-  draw_frame();
+  draw_frame(asked);
   return true;
 }
 

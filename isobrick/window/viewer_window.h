@@ -50,7 +50,10 @@ class ViewerWindow {
   class Events;
 
   void wait(double most_seconds);
-  void draw_frame();
+  void wait_for_meshes(double most_seconds);
+  bool draw_picture(int width, int height);
+  void draw_frame(bool asked);
+  void pace();
   void handle_requests();
   void handle_import();
   void look_along(Vec3d direction);
@@ -66,7 +69,10 @@ class ViewerWindow {
   ViewerState state_;
   double last_time_ = 0;
   double opened_ = 0;    ///< when the store was
-  bool changed_ = true;  ///< the next picture may differ from the last
+  double shown_ = 0;     ///< when the last frame was
+  bool changed_ = true;  ///< something has happened: the next frame may differ from the last
+  bool told_ = false;    ///< something had happened before the last step
+  bool more_ = false;    ///< the picture would go on by itself
 };
 
 }  // namespace isobrick

@@ -196,6 +196,59 @@ TEST_F(Window, ClosesAtOnceWhileItStreams) {
   EXPECT_LT(spent.count(), 0.5);  // of that at most 0.1 for the stream; Mesa takes its time, too
 }
 
+TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
+  const auto source = make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}});
+  NoProgress progress;
+  convert(*source, dir_ / "many.zarr", {}, progress);
+  ViewerWindow& window = open();
+  window.open(dir_ / "many.zarr");
+  window.state().settings.pixel_error = 0.2f;
+  const StorePicture& picture = *window.state().picture;
+  const auto rests = [&] { return picture.state().complete && !picture.state().plain; };
+  until(rests);
+  steps(15);  // nothing moves any more
+  until(rests);
+  // A picture at rest of the same view, with edges.
+  window.state().settings.edges = true;
+  glfwPostEmptyEvent();
+  until([&] { return picture.state().drawing; });
+  const PictureCounters before = picture.counters();
+  const Vec3d eye = window.state().navigator.camera.eye;
+  // A pointer that does nothing to the view leaves it.
+  display_->move_pointer(kWidth / 2 + 5, kHeight / 2);
+  steps(1);
+  EXPECT_EQ(picture.counters().dropped, before.dropped);
+  EXPECT_TRUE(picture.state().drawing) << "the test has too few triangles";
+  display_->button(1, true);
+  steps(1);
+  EXPECT_EQ(picture.counters().finished, before.finished) << "the test has too few triangles";
+  display_->move_pointer(kWidth / 2 + 80, kHeight / 2 + 20);
+  until([&] { return length(window.state().navigator.camera.eye - eye) > 1; });
+  EXPECT_EQ(picture.counters().dropped, before.dropped + 1);
+  display_->button(1, false);
+  until(rests);
+  EXPECT_GT(picture.counters().finished, before.finished);
+}
+
+TEST_F(Window, ClosesWithinAPieceOfAPicture) {
+  const auto source = make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}});
+  NoProgress progress;
+  convert(*source, dir_ / "many.zarr", {}, progress);
+  ViewerWindow& window = open();
+  window.open(dir_ / "many.zarr");
+  window.state().settings.pixel_error = 0.2f;
+  const StorePicture& picture = *window.state().picture;
+  until([&] { return picture.state().complete && !picture.state().plain; });
+  steps(15);
+  window.state().settings.edges = !window.state().settings.edges;
+  glfwPostEmptyEvent();
+  until([&] { return picture.state().drawing; });
+  const PictureCounters before = picture.counters();
+  glfwSetWindowShouldClose(window.handle(), GLFW_TRUE);
+  EXPECT_FALSE(window.step());
+  EXPECT_EQ(picture.counters().pieces, before.pieces) << "no further piece is drawn";
+}
+
 TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
   make_store("big.zarr", {320, 320, 320});
   WindowOptions options;
@@ -211,7 +264,7 @@ TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
     window.state().settings.surfaces[0].isovalue += 2;  // as nobody does who moves it
     steps(1);
     while (!picture.state().complete) {
-      const bool drew = picture.drew();
+      const bool drew = picture.drew() || picture.state().drawing;
       const auto start = std::chrono::steady_clock::now();
       steps(1);
       if (drew) continue;

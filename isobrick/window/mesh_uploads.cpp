@@ -1,0 +1,64 @@
+#include "isobrick/window/mesh_uploads.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+namespace isobrick {
+namespace {
+
+/// Room of a block of what is uploaded: little of the budget, so that little of it is idle. Meshes
+/// that are larger have blocks of their own.
+std::uint32_t pool_vertices(std::uint64_t device_memory) {
+  constexpr std::uint64_t vertex = 4 * sizeof(Vec3f);  // with a normal and two triangles
+  return static_cast<std::uint32_t>(
+      std::clamp<std::uint64_t>(device_memory / 128 / vertex, 1u << 12, 1u << 19));
+}
+
+}  // namespace
+
+MeshUploads::MeshUploads(std::uint64_t device_memory) : pool_(pool_vertices(device_memory)) {}
+
+bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
+  for (const DrawnNode& node : drawable.nodes) {
+    if (node.mesh->device) continue;
+    Upload& upload = uploads_[node.mesh->id()];
+    upload.used = now_;
+    if (upload.there) continue;
+    if (share != nullptr && share->spent()) return false;
+    upload.there = true;
+    if (node.mesh->empty()) continue;
+    upload.place = pool_.add(node.mesh->mesh.chunk(0), origin);
+    if (share != nullptr) share->bytes += upload.place.bytes();
+  }
+  return true;
+}
+
+void MeshUploads::keep(const Drawable& drawable) {
+  for (const DrawnNode& node : drawable.nodes) {
+    if (node.mesh->device) continue;
+    if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
+      upload->second.used = now_;
+  }
+}
+
+const PooledMesh* MeshUploads::find(const NodeMesh& mesh) const {
+  const auto upload = uploads_.find(mesh.id());
+  return upload == uploads_.end() ? nullptr : &upload->second.place;
+}
+
+void MeshUploads::drop(std::uint64_t most) {
+  if (pool_.capacity() <= most) return;
+  std::vector<std::pair<std::uint64_t, MeshId>> oldest;
+  for (const auto& [id, upload] : uploads_)
+    if (upload.used != now_) oldest.emplace_back(upload.used, id);
+  std::sort(oldest.begin(), oldest.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [used, id] : oldest) {
+    uploads_.erase(id);
+    pool_.trim();
+    if (pool_.capacity() <= most) return;
+  }
+}
+
+}  // namespace isobrick

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <unordered_map>
+
+#include "isobrick/render/mesh_pool.h"
+#include "isobrick/viewer/drawable.h"
+
+namespace isobrick {
+
+/// Meshes taken from host memory to the device. Those that are not drawn stay while there is room:
+/// they may outlive the ones in host memory, which made again would be the same. For the thread
+/// of the context.
+class MeshUploads {
+ public:
+  /// What may be taken to the device in a picture while others wait: copies that a driver puts
+  /// off take their time later.
+  struct Share {
+    std::uint64_t bytes = 0;
+    std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+
+    bool spent() const {
+      return bytes > (16u << 20) || std::chrono::steady_clock::now() - begin > kMost;
+    }
+    static constexpr std::chrono::milliseconds kMost{6};
+  };
+
+  /// `device_memory`: of all pictures, of which a block of meshes is a small part.
+  explicit MeshUploads(std::uint64_t device_memory);
+
+  /// From now on what was used before may go.
+  void begin_use() { ++now_; }
+  /// Uses a picture's meshes and takes those that are not there; false when `share` (null: without
+  /// a limit) was spent before all were. `origin`: world position of (0, 0, 0) in meshes'
+  /// coordinates. Throws what MeshPool::add does.
+  bool add(const Drawable& drawable, Vec3d origin, Share* share);
+  /// Uses a picture's meshes that are there.
+  void keep(const Drawable& drawable);
+  /// Null for what is not there.
+  const PooledMesh* find(const NodeMesh& mesh) const;
+
+  /// Drops what is not used, the oldest first, until no more than this is taken.
+  void drop(std::uint64_t most);
+  /// Device memory that is taken.
+  std::uint64_t bytes() const { return pool_.capacity(); }
+
+ private:
+  struct Upload {
+    bool there = false;
+    PooledMesh place;
+    std::uint64_t used = 0;
+  };
+
+  MeshPool pool_;
+  std::unordered_map<MeshId, Upload, MeshIdHash> uploads_;
+  std::uint64_t now_ = 0;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "isobrick/render/renderer.h"
+#include "isobrick/viewer/scene_stream.h"
+#include "isobrick/window/picture_setup.h"
+#include "isobrick/window/view_settings.h"
+
+namespace isobrick {
+
+/// Slices of a store, as a renderer takes them. Not thread-safe.
+class ShownSlices {
+ public:
+  using Samples = std::array<std::shared_ptr<const SliceSamples>, 3>;
+
+  /// `last`: the last sample of level 0; `type`: of the samples.
+  ShownSlices(const PictureBudgets& budgets, Vec3d last, ScalarType type);
+
+  /// Of host memory: what slices take, with what renderers are given of them.
+  static std::uint64_t memory(const PictureBudgets& budgets) { return budgets.memory / 8; }
+
+  /// Asks for the samples that settings want, and takes those that have come; until new ones are
+  /// there the last ones stay.
+  void update(SceneStream& stream, const ViewSettings& settings);
+  /// What is there, across x, y, z; null: nothing.
+  Samples samples() const;
+  /// Draws them; appends what is wrong with them to `damage`.
+  void draw(Renderer& renderer, const ViewSettings& settings,
+            std::vector<std::string>& damage) const;
+  /// Of device memory, while they are drawn.
+  std::uint64_t bytes() const;
+
+ private:
+  struct Slice {
+    std::shared_ptr<const SliceSamples> from;
+    std::vector<float> samples;
+    bool asked = false;
+  };
+
+  Vec3d last_;
+  std::uint64_t most_bytes_;  ///< of the samples of one
+  std::array<Slice, 3> slices_;
+};
+
+}  // namespace isobrick
