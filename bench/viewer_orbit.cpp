@@ -1,6 +1,7 @@
 // How many pictures a second a store gives while the camera flies around it, off-screen, as the
 // window draws them (simpler ones where full ones take too long): from opening on, when all of
-// it is there, and while the isovalue slides as well.
+// it is there, and while the isovalue slides as well. Then how long a picture at rest takes, and
+// how long input waits for a piece of it.
 //
 //   isobrick synth gyroid g.zarr --frequency 6 --dims 512,512,512 --type u8
 //   bench_viewer_orbit g.zarr --isovalue 127.5 --to 140
@@ -37,6 +38,7 @@ struct Arguments {
   int width = 1280, height = 800;
   double seconds = 8;  ///< of each phase, once around
   double memory_gib = 2;
+  double piece_seconds = kPieceSeconds;
   bool no_rest = false, pictures = false;
 };
 
@@ -89,17 +91,31 @@ class Flight {
     return result;
   }
 
-  /// As the window draws when nothing moves, until nothing is missing.
-  void rest() {
-    const auto draw_still = [&] {
+  /// As the window draws when nothing moves, until nothing is missing. Of the pictures that it
+  /// takes, all but the last are simpler ones or lack meshes.
+  Json rest() {
+    PicturesTimes steps;
+    const std::uint64_t before = picture_->counters().finished;
+    double all = 0, until_there = 0;
+    do {
       PictureWay way;
+      way.piece_seconds = arguments_.piece_seconds;
       if (pacer_.plain()) way.plain = PictureWay::Plain::until_complete;
       Stopwatch watch;
-      draw(way, 1);
-      if (!picture_->state().plain) pacer_.drawn_still(watch.lap());
-    };
-    do draw_still();
-    while (!picture_->state().complete || picture_->state().plain);
+      picture_->draw(camera_, arguments_.width, arguments_.height, settings_, way);
+      const double step = watch.lap();
+      if (picture_->drew() || picture_->state().drawing) steps.add(step, picture_->times(), 0);
+      all += step;
+      if (!picture_->scene().stream().idle()) until_there = all;
+      if (picture_->drew() && !picture_->state().plain)
+        pacer_.drawn_still(picture_->picture_seconds());
+    } while (!picture_->state().complete || picture_->state().plain);
+    return {{"seconds", all},
+            {"seconds_until_meshes_are_there", until_there},
+            {"pictures", picture_->counters().finished - before},
+            {"last_picture_seconds", picture_->picture_seconds()},
+            {"triangles", picture_->state().triangles},
+            {"steps", steps.summary()}};
   }
 
  private:
@@ -133,6 +149,7 @@ int run(int argc, char** argv) {
   app.add_option("--height", arguments.height);
   app.add_option("--memory", arguments.memory_gib, "GiB");
   app.add_flag("--no-rest", arguments.no_rest, "Do not wait until all is there");
+  app.add_option("--piece", arguments.piece_seconds, "Of pictures at rest, seconds");
   app.add_flag("--pictures", arguments.pictures, "Tell of every picture");
   CLI11_PARSE(app, argc, argv);
 
@@ -141,7 +158,7 @@ int run(int argc, char** argv) {
   Flight flight(arguments);
   result["from_opening_on"] = flight.around(false);
   if (!arguments.no_rest) {
-    flight.rest();
+    result["rest"] = flight.rest();
     result["all_there"] = flight.around(false);
   }
   result["sliding"] = flight.around(true);
