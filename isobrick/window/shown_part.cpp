@@ -85,6 +85,32 @@ std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings) {
   return kept;
 }
 
+PictureSettings picture_settings(const ViewSettings& settings, const Transform& transform,
+                                 Vec3d last) {
+  PictureSettings picture;
+  picture.background_top = settings.background_top;
+  picture.background_bottom = settings.background_bottom;
+  picture.occlusion = settings.occlusion;
+  picture.edges = settings.edges;
+  picture.multisample = settings.multisample;
+  picture.picking = true;
+  picture.planes = shown_half_spaces(settings);
+  const ShownBox box = shown_box(settings);
+  const Vec3d zero = transform.apply({0, 0, 0});
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3d step;
+    step[axis] = 1;
+    const Vec3d inward = unit(transform.apply(step) - zero, step);
+    Vec3d place;
+    place[axis] = box.lo[axis] * last[axis];
+    if (box.lo[axis] > 0) picture.planes.push_back(half_space_at(transform.apply(place), inward));
+    place[axis] = box.hi[axis] * last[axis];
+    if (box.hi[axis] < 1)
+      picture.planes.push_back(half_space_at(transform.apply(place), inward * -1.0));
+  }
+  return picture;
+}
+
 View view_of(const Camera& camera, int width, int height, double pixel_error) {
   View view;
   view.eye = camera.eye;

@@ -29,6 +29,10 @@ ShownBox shown_box(const ViewSettings& settings);
 /// What planes that are on leave.
 std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings);
 
+/// How a renderer draws what settings say, of a volume whose last sample is `last`.
+PictureSettings picture_settings(const ViewSettings& settings, const Transform& transform,
+                                 Vec3d last);
+
 /// The camera's view of nodes.
 View view_of(const Camera& camera, int width, int height, double pixel_error);
 

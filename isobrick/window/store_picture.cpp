@@ -8,9 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/length_unit.h"
 #include "isobrick/core/stopwatch.h"
-#include "isobrick/render/vectors.h"
+#include "isobrick/window/marks.h"
 
 namespace isobrick {
 namespace {
@@ -23,7 +22,6 @@ constexpr double kRefiningSeconds = 0.04;
 /// The same, in times of the last picture: pictures that are soon out of date, and may take
 /// seconds in software, take a third of the time at most.
 constexpr double kRefiningPause = 2;
-constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
 constexpr double kMarginOfWait = 0.05;
 /// Of a piece's time: for less another piece is not begun.
 constexpr double kLeastPart = 0.25;
@@ -162,32 +160,6 @@ std::uint64_t StorePicture::upload_memory() const {
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
 }
 
-PictureSettings StorePicture::picture_settings(const ViewSettings& settings) const {
-  PictureSettings picture;
-  picture.background_top = settings.background_top;
-  picture.background_bottom = settings.background_bottom;
-  picture.occlusion = settings.occlusion;
-  picture.edges = settings.edges;
-  picture.multisample = settings.multisample;
-  picture.picking = true;
-  picture.planes = shown_half_spaces(settings);
-  const ShownBox box = shown_box(settings);
-  const Transform& transform = scene_->tree().grid().transform();
-  const Vec3d last = last_sample(*store_), zero = transform.apply({0, 0, 0});
-  for (int axis = 0; axis < 3; ++axis) {
-    Vec3d step;
-    step[axis] = 1;
-    const Vec3d inward = unit(transform.apply(step) - zero, step);
-    Vec3d place;
-    place[axis] = box.lo[axis] * last[axis];
-    if (box.lo[axis] > 0) picture.planes.push_back(half_space_at(transform.apply(place), inward));
-    place[axis] = box.hi[axis] * last[axis];
-    if (box.hi[axis] < 1)
-      picture.planes.push_back(half_space_at(transform.apply(place), inward * -1.0));
-  }
-  return picture;
-}
-
 void StorePicture::draw_surfaces(const ViewSettings& settings, PictureState& state) {
   state.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
   if (shown_ == nullptr) return;
@@ -213,24 +185,6 @@ void StorePicture::draw_surfaces(const ViewSettings& settings, PictureState& sta
     state.triangles += node.mesh->triangles();
     ++state.nodes;
   }
-}
-
-void StorePicture::draw_marks(const ViewSettings& settings) {
-  const NodeGrid& grid = scene_->tree().grid();
-  const Transform& transform = grid.transform();
-  if (shown_ != nullptr)
-    for (const DrawnNode& node : shown_->nodes) {
-      if (node.mesh->damage.empty()) continue;
-      const IndexBox box = grid.box(node.mesh->key);
-      const auto c = corners(transform, box.lo, box.hi);
-      std::vector<WorldLine> lines = edges(c);
-      for (std::size_t i = 0; i < 4; ++i) lines.push_back({c[i], c[7 - i]});  // a cross inside
-      renderer().draw_lines(lines, kMarkColour, 2);
-    }
-  if (settings.box)
-    renderer().draw_lines(edges(corners(transform, {0, 0, 0}, last_sample(*store_))), kBoxColour);
-  if (settings.axes) renderer().draw_axes();
-  if (settings.scale_bar) renderer().draw_scale_bar(unit_symbol(transform.unit));
 }
 
 /// Whether a picture that has been begun is still worth finishing.
@@ -287,10 +241,12 @@ void StorePicture::begin_picture(const Asked& asked) {
   Stopwatch watch;
   ViewSettings settings = asked.settings;
   if (work_->state.plain) settings.occlusion = settings.multisample = false;
-  renderer().begin(asked.camera, asked.width, asked.height, picture_settings(settings));
+  renderer().begin(
+      asked.camera, asked.width, asked.height,
+      picture_settings(settings, scene_->tree().grid().transform(), last_sample(*store_)));
   draw_surfaces(settings, work_->state);
   slices_.draw(renderer(), settings, work_->state.damage);
-  draw_marks(settings);
+  draw_marks(renderer(), settings, scene_->tree().grid(), last_sample(*store_), shown_.get());
   work_->all = renderer().work_left();
   times_.draw = watch.lap();
 }

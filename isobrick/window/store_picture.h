@@ -161,8 +161,6 @@ class StorePicture {
   void finish_picture();
   void drop_picture();
   void draw_surfaces(const ViewSettings& settings, PictureState& state);
-  void draw_marks(const ViewSettings& settings);
-  PictureSettings picture_settings(const ViewSettings& settings) const;
   void update_state(const Asked& asked);
 
   std::shared_ptr<const StoreReader> store_;

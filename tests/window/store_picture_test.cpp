@@ -4,73 +4,17 @@
 
 #include <chrono>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <map>
 
 #include "isobrick/core/error.h"
-#include "isobrick/pipeline/convert.h"
 #include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/render/gl_context.h"
 #include "isobrick/render/vectors.h"
-#include "isobrick/volumes/synth_source.h"
 #include "isobrick/window/pick.h"
 #include "isobrick/window/screenshot.h"
-#include "tests/io/temp_dir.h"
+#include "tests/window/picture_test.h"
 
 namespace isobrick {
 namespace {
-
-constexpr int kWidth = 320, kHeight = 240;
-
-class Picture : public testing::Test {
- protected:
-  void SetUp() override {
-    if (!GlContext::available()) GTEST_SKIP() << "there is no OpenGL 4.5";
-    context_ = std::make_unique<GlContext>();
-  }
-
-  /// A picture of a synthetic volume, from the front.
-  void open(SynthKind kind, Int3 extent, PictureBudgets budgets = {}) {
-    const auto source = make_synth({.kind = kind, .extent = extent});
-    NoProgress progress;
-    convert(*source, dir_ / "store.zarr", {.brick = 32, .force = true}, progress);
-    show(budgets);
-    settings_.surfaces = {{default_isovalue(ScalarType::u8), surface_colour(0), 1, true}};
-    settings_.box = settings_.axes = settings_.scale_bar = false;
-  }
-  void show(PictureBudgets budgets = {}) {
-    picture_.reset();
-    picture_ = std::make_unique<StorePicture>(
-        std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {});
-    const WorldBox box = picture_->bounds();
-    camera_.fit(box.lo, box.hi, static_cast<double>(kWidth) / kHeight);
-  }
-  void draw() {
-    picture_->draw_complete(camera_, kWidth, kHeight, settings_, [] {});
-  }
-  /// Something in each of the larger files of level 0.
-  void damage_bricks() {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(dir_ / "store.zarr/0")) {
-      if (!entry.is_regular_file() || entry.path().extension() == ".json" ||
-          entry.file_size() < 4096)
-        continue;
-      std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
-      file.seekp(static_cast<std::streamoff>(entry.file_size() / 3));
-      file.write("damage", 6);
-    }
-  }
-  std::vector<std::uint8_t> pixels() {
-    draw();
-    return picture_->renderer().read_pixels();
-  }
-
-  TempDir dir_;
-  std::unique_ptr<GlContext> context_;
-  std::unique_ptr<StorePicture> picture_;
-  Camera camera_{{0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1}};
-  ViewSettings settings_;
-};
 
 TEST_F(Picture, ShowsTheSurfaceWhereItIs) {
   open(SynthKind::sphere, {96, 96, 96});
@@ -95,87 +39,6 @@ TEST_F(Picture, IsTheSameTwice) {
   const auto first = pixels();
   show();
   EXPECT_EQ(pixels(), first);
-}
-
-/// Pictures of `kShort` pieces: each has many, however quick the machine is.
-constexpr double kShort = 1e-4;
-
-TEST_F(Picture, IsTheSameInPieces) {
-  open(SynthKind::gyroid, {96, 96, 96});
-  damage_bricks();
-  show();
-  settings_.surfaces.push_back({100, surface_colour(1), 0.4f, true});
-  settings_.slices[1] = {true, 0.5f};
-  settings_.cuts[0] = {true, 0.8f, true};
-  settings_.planes = {{true, {{0.3, 1, 0.2}, 10}}};
-  settings_.edges = settings_.box = settings_.axes = settings_.scale_bar = true;
-  settings_.pixel_error = 3;
-  choose_values(settings_, picture_->scene().tree());
-  const PictureWay whole, pieces{.piece_seconds = kShort};
-  const auto pixels_of = [&](const PictureWay& way) {
-    picture_->renderer().discard();
-    for (int i = 0; i < 2 || !picture_->state().complete; ++i) {
-      picture_->draw(camera_, kWidth, kHeight, settings_, way);
-      if (!picture_->state().drawing) picture_->scene().stream().wait_idle(1);
-    }
-    EXPECT_FALSE(picture_->state().damage.empty());
-    return picture_->renderer().read_pixels();
-  };
-  for (const bool multisample : {false, true}) {
-    settings_.multisample = multisample;
-    const auto expected = pixels_of(whole);
-    const std::uint64_t before = picture_->counters().pieces;
-    settings_.occlusion = false;  // a picture in between
-    EXPECT_NE(pixels_of(pieces), expected);
-    settings_.occlusion = true;
-    EXPECT_EQ(pixels_of(pieces), expected) << multisample;
-    EXPECT_GE(picture_->counters().pieces, before + 10);
-  }
-  EXPECT_EQ(picture_->counters().dropped, 0u);
-}
-
-TEST_F(Picture, InPiecesIsDroppedWhenTheViewChangesUnlessItKeepsChanging) {
-  open(SynthKind::gyroid, {96, 96, 96});
-  const auto first = pixels();
-  PictureWay way{.piece_seconds = kShort};
-  const auto draw_one = [&](double turn) {
-    if (turn != 0) camera_.orbit(turn, 0, {0, 0, 1});
-    picture_->draw(camera_, kWidth, kHeight, settings_, way);
-  };
-  const PictureCounters& counters = picture_->counters();
-  const PictureCounters before = counters;
-  draw_one(0.3);
-  draw_one(0);
-  EXPECT_TRUE(picture_->state().drawing);
-  EXPECT_FALSE(picture_->state().complete);
-  EXPECT_EQ(counters.pieces, before.pieces + 2);
-  EXPECT_EQ(counters.dropped, 0u);
-  draw_one(0.3);
-  EXPECT_EQ(counters.dropped, 1u);
-  settings_.surfaces[0].isovalue += 7;  // as good as another view
-  draw_one(0);
-  EXPECT_EQ(counters.dropped, 2u);
-  EXPECT_EQ(counters.finished, before.finished);
-  EXPECT_EQ(picture_->renderer().read_pixels(), first) << "what is not whole is not shown";
-  // While something moves there would never be any picture.
-  way.moving = true;
-  draw_one(0.1);
-  EXPECT_EQ(counters.dropped, 3u);
-  for (int i = 0; counters.finished == before.finished; ++i) {
-    ASSERT_LT(i, 100000);
-    draw_one(1e-3);
-  }
-  EXPECT_TRUE(picture_->drew());
-  EXPECT_TRUE(picture_->state().moving);
-  // What moves no more is seen as it stands.
-  draw_one(0);
-  ASSERT_TRUE(picture_->state().drawing);
-  way.moving = false;
-  draw_one(1e-3);
-  const std::uint64_t dropped = counters.dropped;
-  EXPECT_GE(dropped, 4u);
-  while (!picture_->state().complete) draw_one(0);
-  EXPECT_EQ(counters.dropped, dropped);
 }
 
 TEST_F(Picture, CoarseOnesLookLikeFineOnes) {
