@@ -24,7 +24,7 @@ std::vector<T> values_at(std::string_view bytes, std::size_t offset, std::size_t
   if (offset > bytes.size() || count > (bytes.size() - offset) / sizeof(T))
     throw std::runtime_error("the file is too short");
   std::vector<T> values(count);
-  std::memcpy(values.data(), bytes.data() + offset, count * sizeof(T));
+  if (count > 0) std::memcpy(values.data(), bytes.data() + offset, count * sizeof(T));
   return values;
 }
 
