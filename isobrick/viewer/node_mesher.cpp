@@ -174,13 +174,14 @@ NodeMesher::Holders NodeMesher::holders(const NodeKey& key) const {
 }
 
 void NodeMesher::will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
-  const Holders all = holders(key);
+  const Box3 points = impl_->points_around(key);
+  const int stored = impl_->grid.level(key.level).source;
   const std::optional<NeededSamples> needed = impl_->needed_of(key, isovalue, coarser);
   const Lattice& lattice =
-      impl_->bricks.source().info().levels[static_cast<std::size_t>(all.stored)].lattice;
-  for_each_point(all.bricks, [&](Int3 b) {
-    if (needed && !needed->any(intersect(impl_->points(key), lattice.full_brick_box(b)))) return;
-    impl_->bricks.will_need(all.stored, b);
+      impl_->bricks.source().info().levels[static_cast<std::size_t>(stored)].lattice;
+  for_each_point(impl_->samples.bricks(key.level, points), [&](Int3 b) {
+    if (needed && !needed->any(intersect(points, lattice.full_brick_box(b)))) return;
+    impl_->bricks.will_need(stored, b);
   });
 }
 

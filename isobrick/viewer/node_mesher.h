@@ -40,7 +40,8 @@ class NodeMesher {
   };
   Holders holders(const NodeKey& key) const;
 
-  /// Hints that those of them which the mesh needs are read soon. Throws what reading ranges does.
+  /// Says which bricks the mesh needs soon, its neighbours' left out; see
+  /// ResidentBricks::will_need(). Throws what reading ranges does.
   void will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
 
   /// Seconds that this thread spent on meshing so far, without waiting for bricks or a device.

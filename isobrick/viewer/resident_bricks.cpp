@@ -14,6 +14,10 @@ using Clock = std::chrono::steady_clock;
 /// How often a thread that waits for another's brick asks whether it is still wanted.
 constexpr std::chrono::milliseconds kPatience{5};
 
+/// Of the budget: the part for bricks that are read together, and for those that are read before
+/// they are asked for. More of them would displace one another.
+constexpr std::uint64_t kPartTogether = 8;
+
 /// Of a budget: what ranges take.
 std::uint64_t range_bytes(std::uint64_t budget) {
   return std::min(budget / 16, std::uint64_t{32} << 20);
@@ -90,13 +94,24 @@ std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key, const Wa
   return std::move(made.samples);
 }
 
-/// The next brick of the oldest request that has one which nobody reads.
+std::uint64_t ResidentBricks::brick_bytes(int level) const {
+  return source_->info().levels[static_cast<std::size_t>(level)].lattice.brick_bytes();
+}
+
+/// The next brick of the oldest request that has one which nobody reads; else one that is wanted
+/// soon.
 std::optional<ResidentBricks::Key> ResidentBricks::next_wanted() {
   for (Request& request : requests_)
     while (request.next < request.bricks.size()) {
       const Key key{request.level, request.bricks[request.next++]};
       if (!entries_.contains(key)) return key;
     }
+  while (!soon_.empty()) {
+    const Key key = soon_.front();
+    soon_.pop_front();
+    soon_bytes_ -= brick_bytes(key.level);
+    if (!entries_.contains(key)) return key;
+  }
   return std::nullopt;
 }
 
@@ -109,14 +124,13 @@ bool ResidentBricks::over(const Request& request) const {
 }
 
 void ResidentBricks::read_together(int level, std::span<const Int3> bricks, const Wanted& wanted) {
-  const std::uint64_t bytes =
-      source_->info().levels[static_cast<std::size_t>(level)].lattice.brick_bytes();
+  const std::uint64_t bytes = brick_bytes(level);
   std::unique_lock lock(mutex_);
   const auto missing =
       static_cast<std::uint64_t>(std::count_if(bricks.begin(), bricks.end(), [&](Int3 b) {
         return !there({level, b});
       }));
-  if (missing < 2 || missing * bytes > budget_ / 8) return;
+  if (missing < 2 || missing * bytes > budget_ / kPartTogether) return;
   const auto own = requests_.insert(requests_.end(), {level, bricks});
   try {
     while (!over(*own)) {
@@ -136,8 +150,7 @@ void ResidentBricks::read_together(int level, std::span<const Int3> bricks, cons
 /// Reads what is not there, and nobody else reads; gives the lock up meanwhile.
 ResidentBricks::Read ResidentBricks::read(const Key& key, std::unique_lock<std::mutex>& lock) {
   entries_[key];
-  const std::uint64_t bytes =
-      source_->info().levels[static_cast<std::size_t>(key.level)].lattice.brick_bytes();
+  const std::uint64_t bytes = brick_bytes(key.level);
   make_room(bytes);
   // Counted before it is there: threads that load at once must not all find room.
   counters_.bytes += bytes;
@@ -192,6 +205,7 @@ bool ResidentBricks::resident(int level, Box3 box) const {
 
 void ResidentBricks::close() {
   ranges_.clear();
+  forget_needs();
   const std::lock_guard lock(mutex_);
   budget_ = 0;
   make_room(0);
@@ -204,12 +218,23 @@ bool ResidentBricks::half_resident(int level, Box3 box) const {
   return 2 * found >= volume(box.extent());
 }
 
-void ResidentBricks::will_need(int level, Int3 brick) const {
+void ResidentBricks::will_need(int level, Int3 brick) {
   {
     const std::lock_guard lock(mutex_);
     if (entries_.contains({level, brick})) return;
+    const std::uint64_t bytes = brick_bytes(level);
+    if (soon_bytes_ + bytes <= budget_ / kPartTogether) {
+      soon_.push_back({level, brick});
+      soon_bytes_ += bytes;
+    }
   }
   source_->will_need(level, brick);
+}
+
+void ResidentBricks::forget_needs() {
+  const std::lock_guard lock(mutex_);
+  soon_.clear();
+  soon_bytes_ = 0;
 }
 
 ResidentBricks::Counters ResidentBricks::counters() const {

@@ -31,6 +31,7 @@ int thread_count(int asked) {
 void SceneStream::Shared::plan(bool late) {
   meshes.begin_use();
   keep_shown();
+  bricks.forget_needs();
   const bool sliding = changed_twice && Clock::now() - *last_isovalue < kSliding;
   const double soon =
       late || sliding ? 0 : kSoon.count() / seconds_per_job * static_cast<double>(threads.size());

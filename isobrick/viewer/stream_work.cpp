@@ -151,8 +151,9 @@ std::optional<NodeMesh> SceneStream::Shared::mesh_of(NodeMesher& mesher,
 
 void SceneStream::Shared::make_mesh(NodeMesher& mesher, const std::shared_ptr<Running>& r,
                                     std::unique_lock<std::mutex>& lock) {
+  // Those before it are taken by other threads at the same time.
   std::optional<MeshJob> next;
-  if (!jobs.empty()) next = jobs.back();
+  if (jobs.size() >= threads.size()) next = jobs[jobs.size() - threads.size()];
   lock.unlock();
   try {
     if (next) mesher.will_need(next->key, next->isovalue, next->coarser);

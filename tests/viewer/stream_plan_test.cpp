@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -130,6 +133,58 @@ TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
   EXPECT_THROW(bricks.read_together(0, others, Never()), Abandoned);
   bricks.read_together(0, one, Always());
   EXPECT_EQ(bricks.find(0, others[0]), nullptr) << "nobody wants it any more";
+}
+
+/// A brick that comes only when another one has been read.
+class OneAfterAnother final : public BrickSource {
+ public:
+  OneAfterAnother(std::shared_ptr<const BrickSource> from, Int3 held, Int3 first)
+      : from_(std::move(from)), held_(held), first_(first) {}
+  const StoreInfo& info() const override { return from_->info(); }
+  RangeTable brick_ranges(int level, Box3 bricks) const override {
+    return from_->brick_ranges(level, bricks);
+  }
+  RangeTable block_ranges(int level, Box3 blocks) const override {
+    return from_->block_ranges(level, blocks);
+  }
+  bool read_brick(int level, Int3 brick, std::byte* samples) const override {
+    std::unique_lock lock(mutex_);
+    if (brick == first_) {
+      read_ = true;
+      change_.notify_all();
+    } else if (brick == held_) {
+      change_.wait_for(lock, std::chrono::seconds(10), [&] { return read_; });
+    }
+    return from_->read_brick(level, brick, samples);
+  }
+
+ private:
+  std::shared_ptr<const BrickSource> from_;
+  Int3 held_, first_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable change_;
+  mutable bool read_ = false;
+};
+
+TEST(ResidentBricks, WhoWouldWaitReadsWhatIsWantedSoon) {
+  const auto memory = std::make_shared<MemoryBricks>(
+      Int3{128, 128, 128},
+      std::function<float(Int3)>([](Int3 p) { return static_cast<float>(p.x); }),
+      MemoryBricks::Options{});
+  const Int3 held{1, 0, 0}, soon{3, 0, 0}, forgotten{3, 1, 0};
+  ResidentBricks bricks(std::make_shared<OneAfterAnother>(memory, held, soon), 100 << 20);
+  bricks.will_need(0, forgotten);
+  bricks.forget_needs();
+  bricks.will_need(0, soon);
+  const std::vector<Int3> now{{0, 0, 0}, held, {2, 0, 0}};
+  const auto start = std::chrono::steady_clock::now();
+  std::thread other([&] { bricks.read_together(0, now, Always()); });
+  bricks.read_together(0, now, Always());
+  other.join();
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+  EXPECT_NE(bricks.find(0, soon), nullptr);
+  EXPECT_EQ(bricks.find(0, forgotten), nullptr);
+  EXPECT_EQ(bricks.counters().reads, 4u);
 }
 
 }  // namespace
