@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/give_way.h"
 #include "isobrick/core/stopwatch.h"
 #include "isobrick/viewer/stream_state.h"
 
@@ -199,6 +200,7 @@ void SceneStream::Shared::make_slice(const std::shared_ptr<Running>& r,
 }
 
 void SceneStream::Shared::run() {
+  if (options.give_way) isobrick::give_way();
   NodeMesher mesher(tree->grid(), bricks, options.origin);
   std::unique_lock lock(mutex);
   while (const std::shared_ptr<Running> r = take(lock)) {

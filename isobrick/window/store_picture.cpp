@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isobrick/core/stopwatch.h"
+#include "isobrick/render/gl_context.h"
 #include "isobrick/window/marks.h"
 
 namespace isobrick {
@@ -26,13 +27,16 @@ constexpr double kMarginOfWait = 0.05;
 /// Of a piece's time: for less another piece is not begun.
 constexpr double kLeastPart = 0.25;
 
-StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change) {
+/// `software`: then others than this thread draw, and what they draw of is made beside them.
+StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change,
+                             bool software) {
   StreamOptions options;
   options.threads = budgets.threads;
   options.mesh_bytes = budgets.memory / 2;
   options.brick_bytes = budgets.memory - options.mesh_bytes - ShownSlices::memory(budgets);
   options.device_bytes = DeviceMeshes::cache_bytes(budgets.device_mesh_memory());
   options.on_change = std::move(on_change);
+  options.give_way = !software;
   return options;
 }
 
@@ -66,9 +70,10 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
     : store_(std::move(store)),
       budgets_(budgets),
       reading_(std::async(std::launch::async,
-                          [&] {
-                            return std::make_unique<Scene>(store_bricks(store_),
-                                                           stream_options(budgets_, on_change));
+                          [&, software = current_gl_device().software] {
+                            return std::make_unique<Scene>(
+                                store_bricks(store_),
+                                stream_options(budgets_, on_change, software));
                           })),
       setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)),
       uploads_(budgets.device_memory),
