@@ -8,7 +8,8 @@ namespace isobrick {
 /// Keeps pictures fluent while something moves by asking for simpler ones: first
 /// without occlusion and multisampling, then with cells up to four times as long, then
 /// smaller, which is what helps where OpenGL is software, at last with cells still
-/// longer. Not thread-safe.
+/// longer. Where a device draws, with much longer cells before smaller: it gets other memory for
+/// another size, which takes longer than a picture may. Not thread-safe.
 class FramePacer {
  public:
   /// `target`: how long a picture may take while something moves, seconds.
@@ -18,7 +19,10 @@ class FramePacer {
   /// simple ones; as many as displays show where a device draws.
   static FramePacer for_device(bool software) {
     FramePacer pacer(software ? 1.0 / 20 : 1.0 / 80);
-    if (!software) return pacer;
+    if (!software) {
+      pacer.first_coarser_ = kCoarsest;
+      return pacer;
+    }
     pacer.plain_ = true;
     pacer.coarser_ = kFirstInSoftware;
     return pacer;
@@ -62,13 +66,13 @@ class FramePacer {
   static constexpr int kSmallest = 4;
 
   void simplify(double ratio) {
-    if (coarser_ >= kFirstCoarser && smaller_ < kSmallest) {
+    if (coarser_ >= first_coarser_ && smaller_ < kSmallest) {
       smaller_ = std::min(static_cast<int>(std::ceil(smaller_ * std::sqrt(ratio))), kSmallest);
       return;
     }
     // Triangles, and so times, go with the inverse square of a cell's length: the root
     // of the ratio would do at once, but single pictures are off.
-    const double most = smaller_ < kSmallest ? kFirstCoarser : kCoarsest;
+    const double most = smaller_ < kSmallest ? first_coarser_ : kCoarsest;
     coarser_ = std::min(coarser_ * (1 + 0.5 * (ratio - 1)), most);
   }
 
@@ -86,6 +90,7 @@ class FramePacer {
   }
 
   double target_, coarser_ = 1, full_seconds_ = 0;
+  double first_coarser_ = kFirstCoarser;  ///< before pictures become smaller
   int smaller_ = 1;
   bool plain_ = false;
 };

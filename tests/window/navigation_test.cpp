@@ -153,6 +153,17 @@ TEST(FramePacer, MakesPicturesSmallerWhereTheirPixelsTakeTheTime) {
   EXPECT_EQ(pacer.smaller(), 1);
 }
 
+TEST(FramePacer, KeepsTheirSizeWhereADeviceIsSlow) {
+  FramePacer pacer = FramePacer::for_device(false);
+  for (int i = 0; i < 60; ++i) {
+    pacer.drawn(0.04 / std::pow(pacer.coarser() * pacer.smaller(), 2));
+    EXPECT_EQ(pacer.smaller(), 1);
+  }
+  EXPECT_GT(pacer.coarser(), 1.5);
+  for (int i = 0; i < 100; ++i) pacer.drawn(0.04);  // whatever the cells
+  EXPECT_GT(pacer.smaller(), 1);
+}
+
 TEST(FramePacer, LeavesOcclusionOutBeforeDetail) {
   FramePacer pacer(0.05);
   pacer.drawn(0.08);
