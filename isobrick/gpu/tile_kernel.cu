@@ -22,18 +22,28 @@ constexpr std::size_t kSharedBytes = sizeof(TileShared) +
 static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later device has");
 
-/// A tile without a vertex or a cell tells so and nothing else: whoever asks for its sums adds
-/// nothing, and whoever asks for its rows finds no vertex there.
+/// A tile without a vertex or a cell passes the sums before it on, and that is all: whoever asks
+/// for its rows finds no vertex there.
+template <int N>
 __device__ void pass_empty_tile(TileShared& s, const TileParams& p) {
-  if (threadIdx.x != 0) return;
-  publish_sum(p.order[s.item].vertices, s.item, 0);
-  publish_sum(p.order[s.item].triangles, s.item, 0);
-  s.number_base = 0;
-  release_rows(s, p);
+  if (warp_id() == Team<N>::kVertices) {
+    if (lane_id() == 0) {
+      s.all_vertices = 0;
+      publish_sum(p.order[s.item].vertices, s.item, 0);
+    }
+    __syncwarp();
+    find_vertex_base(s, p);
+    if (lane_id() == 0) release_rows(s, p);
+  }
+  if (warp_id() == Team<N>::kTriangles) {
+    if (lane_id() == 0) publish_sum(p.order[s.item].triangles, s.item, 0);
+    find_triangle_base(s, p, 0);
+  }
+  __syncthreads();
 }
 
 /// Counts a tile's crossing edges and active cells, and leaves their places. False where there
-/// are none; the last tile, which tells what all have, goes on.
+/// are none.
 template <int N, bool Nan>
 __device__ bool count_tile(TileShared& s, const TileParams& p) {
   count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
@@ -44,9 +54,8 @@ __device__ bool count_tile(TileShared& s, const TileParams& p) {
   const SlabPlanes planes = planes_of<N>(s.item);
   const PlaneBases bases = PlaneBases::of(s, planes);
   const std::uint32_t vertices = bases.made<N>(s, planes);
-  if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
-    pass_empty_tile(s, p);
-    __syncthreads();
+  if (!Nan && vertices + bases.cells == 0) {
+    pass_empty_tile<N>(s, p);
     return false;
   }
   if (threadIdx.x == 0) {
@@ -102,8 +111,8 @@ __device__ void find_places(TileShared& s, const TileParams& p) {
     find_cells<N>(s, cells);
   } else {
     triangles = count_in_turns<N>(s);
-    // A tile may have vertices of cells of others only.
-    if constexpr (Nan) __syncthreads();
+    // A tile with NaN, or a slab, may have vertices of cells of others only.
+    if constexpr (Nan || Team<N>::kSlabs > 1) __syncthreads();
   }
   const bool for_vertices = warp_id() == Team<N>::kVertices,
              for_triangles = warp_id() == Team<N>::kTriangles;

@@ -29,7 +29,8 @@ inline constexpr std::uint32_t kNone = 0xffffffffu;
 /// What later tiles ask of a tile: the number of the first own vertex of each
 /// row, counted from the tile's first vertex, and where in the row those on
 /// edges along y and along z begin: base | y << 17 | z << 23. One entry more
-/// ends the last row.
+/// ends the last row. That of a slab has its planes and the first of the next one; that of a
+/// tile, or slab, without vertices and cells has nothing that anyone asks for.
 struct alignas(16) RowTable {
   std::uint32_t rows[kRowsOfTile + 1];
   /// The mesh number of the tile's first vertex, and above it the epoch in which it was
@@ -99,6 +100,9 @@ struct LaunchReport {
     return (word ^ LaunchReport::word(0, launch)) >> kValueBits == 0;
   }
 };
+static_assert(LaunchReport::is_about(LaunchReport::word(5, (1u << 24) + 1), (1u << 24) + 1));
+static_assert(!LaunchReport::is_about(LaunchReport::word(5, 1u << 24), (1u << 24) - 1));
+static_assert(LaunchReport::value_of(LaunchReport::word((1ull << 40) - 1, 77)) == (1ull << 40) - 1);
 
 /// What the last block of a launch does when all others are done.
 struct LaunchEnd {

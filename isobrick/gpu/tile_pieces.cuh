@@ -39,9 +39,9 @@ struct OwnRow {
   __device__ int row() const { return 33 * z + y; }
 };
 
-/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp, which lie in planes `first`
-/// to `end`: of a whole tile, all. Loops, so that the code of
-/// each kind is there once: warps in different steps share the instruction cache.
+/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp: of a slab, those of its planes
+/// `first` to `end`; of a whole tile, all. Loops, so that the code of each kind is there once:
+/// warps in different steps share the instruction cache.
 template <int N, class F>
 __device__ inline void for_each_piece(int first, int end, F&& f) {
   auto piece = static_cast<int>(uniform(warp_id()));

@@ -120,7 +120,7 @@ struct alignas(256) TileShared {
   /// Crossing edges at sample 0 of the lower planes: along z at y = 0, along y at z = 0.
   std::uint8_t plane_at_0[2][33];
   const RowTable* before;  ///< of the tile one lower along x, or null
-  std::uint32_t item;      ///< the number of the tile that is worked on
+  std::uint32_t item;      ///< the number of the tile, or slab, that is worked on
   std::uint32_t items;     ///< how many there are
   std::uint32_t all_triangles;
   std::uint32_t next_cells, next_vertices;  ///< groups of 32 that a warp has taken

@@ -66,6 +66,44 @@ TYPED_TEST(GpuResident, ExtentsThatFillNoTile) {
     compare(this->noise(extent, 7), {this->lowest() + 100}, {});
 }
 
+/// A plane of edges where a slab begins, and no cell above it.
+TYPED_TEST(GpuResident, VolumesThatEndWhereASlabBegins) {
+  const double mid = this->lowest() + 100;
+  for (const Int3 extent : {Int3{33, 33, 9}, Int3{48, 49, 17}, Int3{40, 40, 57}})
+    compare(this->noise(extent, 11), {mid}, {});
+  SurfaceOptions options;
+  options.roi = {{3, 0, 40}, {60, 41, 57}};
+  compare(this->noise({67, 41, 75}, 3), {mid}, options);
+}
+
+/// Found by every block for itself, but too many to be shared by blocks.
+TYPED_TEST(GpuResident, MoreTilesThanHaveSlabs) {
+  const double mid = this->lowest() + 100;
+  compare(this->waves({3, 400, 390}), {mid + 70, mid, mid + 1e9}, {});  // 13 × 13 tiles
+}
+
+/// Most of them are empty when every tile is taken; the last one, too.
+TYPED_TEST(GpuResident, EmptyTilesPassOnWhatLiesBefore) {
+  const Field<TypeParam> dots({100, 97, 131}, [](Int3 p) {
+    return (p == Int3{40, 50, 33} || p == Int3{70, 3, 64} || p == Int3{2, 90, 100}) ? 100.0 : 0.0;
+  });
+  const Lattice lattice{dots.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, dots.samples.data());
+  SurfaceOptions options;
+  options.isovalue = 50;
+  options.roi = lattice.box();
+  gpu::DeviceVolume volume(lattice, bricks, 0);
+  for (const int threads : {0, 384, 1024}) {
+    gpu::ResidentExtractor extractor(volume, options,
+                                     {.search = gpu::TileSearch::none, .threads = threads});
+    EXPECT_EQ(extractor.extract(50).active_tiles, 4 * 4 * 5u);
+    MeshBuffer mesh;
+    extractor.download(mesh);
+    EXPECT_EQ(mesh.triangles.size(), 3 * 8u);
+    expect_same(on_cpu(dots, lattice, bricks, options), mesh);
+  }
+}
+
 TYPED_TEST(GpuResident, RegionsOfInterest) {
   const double mid = this->lowest() + 100;
   for (const Box3 roi : {Box3{{5, 3, 7}, {60, 40, 70}}, Box3{{33, 0, 31}, {66, 39, 75}},
