@@ -5,6 +5,7 @@
 #include "isobrick/core/error.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/no_sink.h"
+#include "tests/stream/heap_memory.h"
 
 namespace isobrick::test {
 namespace {
@@ -17,12 +18,6 @@ class NoSurface final : public SurfaceExtractor {
                const std::shared_ptr<const void>&) override {}
   void finish() override {}
   void report(ExtractReport&) const override {}
-};
-
-class HeapMemory final : public BrickMemory {
-  std::shared_ptr<std::byte> room(std::size_t bytes) override {
-    return {new std::byte[bytes], std::default_delete<std::byte[]>()};
-  }
 };
 
 /// A GPU that is busy or small, or neither.
@@ -39,7 +34,11 @@ class FakeGpu final : public GpuSession {
   std::size_t pool_bricks() const override { return 0; }
   BrickMemory& bricks() override { return bricks_; }
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, MeshSink&) override {
-    if (full_) throw Error("no device memory is left");
+    if (full_) {
+      // Decoding is to be stopped in the middle, not before it has begun.
+      bricks_.wait_for_demand();
+      throw Error("no device memory is left");
+    }
     return std::make_unique<NoSurface>();
   }
 
@@ -83,9 +82,14 @@ TEST_F(BackendChoice, AGpuThatWorksIsTaken) {
     EXPECT_TRUE(chosen.gpu);
     EXPECT_TRUE(chosen.surface);
     EXPECT_EQ(chosen.gpu_refusal, "");
+    ASSERT_TRUE(chosen.decoded);
+    const auto batch = chosen.decoded->decoder.next();
+    ASSERT_TRUE(batch);
+    EXPECT_FALSE(batch->tiles().empty());
   }
   const ChosenBackend cpu = choose(Backend::automatic, 400 * kMiB, [] { return nullptr; });
   EXPECT_FALSE(cpu.gpu);
+  EXPECT_FALSE(cpu.decoded);
   EXPECT_TRUE(cpu.surface);
   EXPECT_EQ(cpu.gpu_refusal, "");
 }
@@ -95,6 +99,7 @@ TEST_F(BackendChoice, TheCpuStepsInForAnAutomaticGpuAndSaysWhy) {
   const auto expect_cpu = [&](std::uint64_t memory, const OpenGpu& open, const std::string& why) {
     const ChosenBackend chosen = choose(Backend::automatic, memory, open);
     EXPECT_FALSE(chosen.gpu);
+    EXPECT_FALSE(chosen.decoded);
     EXPECT_TRUE(chosen.surface);
     EXPECT_LE(chosen.plan.bytes, memory);
     EXPECT_EQ(chosen.gpu_refusal, why);

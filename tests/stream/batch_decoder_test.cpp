@@ -2,24 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <deque>
 #include <fstream>
 
 #include "isobrick/core/error.h"
+#include "tests/stream/heap_memory.h"
 #include "tests/stream/stored_volume.h"
 
 namespace isobrick::test {
 namespace {
-
-class HeapMemory : public BrickMemory {
- public:
-  std::shared_ptr<std::byte> room(std::size_t size) override {
-    bytes += size;
-    return {new std::byte[size], std::default_delete<std::byte[]>()};
-  }
-  std::atomic<std::size_t> bytes = 0;
-};
 
 /// As a device has it: a thread decodes a brick to a buffer of its own, which is then sent.
 class ElsewhereMemory final : public HeapMemory {
