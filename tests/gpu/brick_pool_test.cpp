@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isobrick/core/error.h"
+#include "isobrick/gpu/copy_kernel.h"
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/stream.h"
 #include "isobrick/gpu/stream_sizes.h"
@@ -26,34 +27,51 @@ class GpuBrickPool : public ::testing::Test {
     return static_cast<std::byte>((brick * 131 + at * 7 + (at >> 8)) & 0xff);
   }
 
-  /// Fills a pool by some threads, in turn, and compares what a stream finds in it.
+  /// A pool of which all is taken.
+  struct Pool {
+    std::size_t brick_bytes, bricks;
+    int threads;
+    gpu::BrickPool pool{0, brick_bytes, bricks, threads};
+    std::byte* first = pool.take(brick_bytes * bricks);
+
+    /// The brick is sent by the thread whose turn it is.
+    void send(std::size_t brick) {
+      const auto thread = static_cast<int>(brick % static_cast<std::size_t>(threads));
+      std::byte* const to = pool.begin(thread);
+      for (std::size_t i = 0; i < brick_bytes; ++i) to[i] = sample(brick, i);
+      pool.end(thread, first + brick * brick_bytes);
+    }
+
+    /// Compares what a stream finds in it.
+    void expect_all() {
+      const gpu::Stream stream;
+      pool.wait_on(stream);
+      std::vector<std::byte> found(brick_bytes * bricks);
+      gpu::check(
+          cudaMemcpyAsync(found.data(), first, found.size(), cudaMemcpyDeviceToHost, stream.get()));
+      stream.wait();
+      for (std::size_t b = 0; b < bricks; ++b)
+        for (std::size_t i = 0; i < brick_bytes; ++i)
+          if (found[b * brick_bytes + i] != sample(b, i))
+            FAIL() << brick_bytes << " bytes, brick " << b << ", byte " << i;
+      EXPECT_EQ(pool.bytes(), found.size());
+      EXPECT_GT(pool.seconds(), 0);
+    }
+  };
+
+  /// Fills a pool by some threads at once.
   static void fill(std::size_t brick_bytes, std::size_t bricks, int threads) {
-    gpu::BrickPool pool(0, brick_bytes, bricks, threads);
-    std::byte* const first = pool.take(brick_bytes * bricks);
-    EXPECT_THROW(pool.take(1), Error);
+    Pool pool{brick_bytes, bricks, threads};
+    EXPECT_THROW(pool.pool.take(1), Error);
     std::vector<std::thread> fillers;
     for (int t = 0; t < threads; ++t)
       fillers.emplace_back([&, t] {
         for (std::size_t b = static_cast<std::size_t>(t); b < bricks;
-             b += static_cast<std::size_t>(threads)) {
-          std::byte* const to = pool.begin(t);
-          for (std::size_t i = 0; i < brick_bytes; ++i) to[i] = sample(b, i);
-          pool.end(t, first + b * brick_bytes);
-        }
+             b += static_cast<std::size_t>(threads))
+          pool.send(b);
       });
     for (std::thread& filler : fillers) filler.join();
-    const gpu::Stream stream;
-    pool.wait_on(stream);
-    std::vector<std::byte> found(brick_bytes * bricks);
-    gpu::check(
-        cudaMemcpyAsync(found.data(), first, found.size(), cudaMemcpyDeviceToHost, stream.get()));
-    stream.wait();
-    for (std::size_t b = 0; b < bricks; ++b)
-      for (std::size_t i = 0; i < brick_bytes; ++i)
-        if (found[b * brick_bytes + i] != sample(b, i))
-          FAIL() << brick_bytes << " bytes, brick " << b << ", byte " << i;
-    EXPECT_EQ(pool.bytes(), found.size());
-    EXPECT_GT(pool.seconds(), 0);
+    pool.expect_all();
   }
 };
 
@@ -61,8 +79,18 @@ TEST_F(GpuBrickPool, WhatSomeThreadsFillLiesInItsPlaces) {
   fill(std::size_t{128} << 10, 200, 4);
   fill(std::size_t{512} << 10, 70, 16);
   fill(16 * 1001, 300, 3);
-  // More than one launch of the kernel takes.
-  fill(4096, 1000, 12);
+}
+
+TEST_F(GpuBrickPool, ARequestMayBeMoreThanALaunchOfTheKernelTakes) {
+  constexpr std::size_t kBytes = 4096;
+  constexpr int kThreads = 24;
+  static_assert(kThreads * gpu::BrickPool::buffers_of_thread(kBytes) / 2 > gpu::CopyPieces::kMost,
+                "half of all buffers make a request");
+  Pool pool{kBytes, 1000, kThreads};
+  // By this thread for all of them: none runs out of buffers before, which would make a smaller
+  // request.
+  for (std::size_t b = 0; b < pool.bricks; ++b) pool.send(b);
+  pool.expect_all();
 }
 
 TEST_F(GpuBrickPool, BricksOfOddSizesAreCopiedToo) { fill(51 * 51 * 51, 90, 5); }
