@@ -49,12 +49,12 @@ bool TileStream::load_next_chunk() {
 }
 
 void TileStream::begin() {
-  while (next_tile_ == tiles_.size() && load_next_chunk()) {
-  }
+  if (next_tile_ == tiles_.size()) load_next_chunk();
 }
 
 std::optional<TileWork> TileStream::next() {
-  begin();
+  while (next_tile_ == tiles_.size() && load_next_chunk()) {
+  }
   if (next_tile_ == tiles_.size()) return std::nullopt;
   return tiles_[next_tile_++];
 }

@@ -18,7 +18,8 @@ class TileStream {
   /// they are found.
   TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by = {});
 
-  /// Finds the first tiles, so that next() need not.
+  /// Looks for the first tiles in one range chunk, so that next() need not; where it has none,
+  /// next() goes on.
   void begin();
   /// The next tile, or nothing at the end.
   std::optional<TileWork> next();
