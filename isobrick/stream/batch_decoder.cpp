@@ -86,14 +86,21 @@ std::shared_ptr<const DecodedBatch> BatchDecoder::next() {
   const Batch batch = std::move(batches_.front());
   batches_.pop_front();
   const std::vector<Int3>& bricks = batch->batch_.bricks;
-  for (std::size_t i = bricks.size() - batch->loads_; i < bricks.size(); ++i)
-    if (slots_.find(bricks[i])) slots_.decoded(bricks[i], true);
+  const std::size_t first_load = bricks.size() - batch->loads_;
   ahead_ -= batch->loads_;
   batch->samples_ = FlatMap<const std::byte*>(bricks.size());
-  for (const Int3 b : bricks)
-    batch->samples_.insert(key_of(b, batch->grid_)).first = slots_.find(b);
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    const std::byte* const samples = slots_.find(bricks[i]);
+    if (samples && i >= first_load) slots_.count_read(bricks[i]);
+    batch->samples_.insert(key_of(bricks[i], batch->grid_)).first = samples;
+  }
   changed_.notify_all();
   return batch;
+}
+
+std::uint64_t BatchDecoder::memory_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return memory_bytes_;
 }
 
 void BatchDecoder::plan() {
@@ -219,7 +226,7 @@ void BatchDecoder::decode(int thread, DecodedBatch& batch, const std::vector<Loa
       memory_.end(thread, load.place);
     } else {
       const std::lock_guard lock(mutex_);
-      slots_.decoded(load.brick, false);
+      slots_.set_absent(load.brick);
     }
   }
   if (batch.missing_.fetch_sub(loads.size()) > loads.size()) return;

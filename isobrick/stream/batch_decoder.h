@@ -64,8 +64,8 @@ class BatchDecoder {
   /// in reading, decoding or planning.
   std::shared_ptr<const DecodedBatch> next();
 
-  /// Memory for bricks that there is. After the end.
-  std::uint64_t memory_bytes() const { return memory_bytes_; }
+  /// Memory for bricks that there is by now; after the end a last piece may still be coming.
+  std::uint64_t memory_bytes() const;
   /// Bricks read and decoded, and how many different ones. After the end.
   std::uint64_t reads() const { return slots_.reads(); }
   std::uint64_t bricks_read() const { return slots_.bricks_read(); }
@@ -106,10 +106,10 @@ class BatchDecoder {
   const std::size_t bricks_of_job_;
   BrickMemory& memory_;
 
-  // Decoders take jobs and end them without the lock of the books, which planning and handing on
-  // hold for long.
+  // Decoders take jobs and mostly end them without the lock of the books, which planning and
+  // handing on hold for long.
   JobQueue jobs_;
-  std::mutex mutex_;  ///< of all below
+  mutable std::mutex mutex_;  ///< of all below
   std::condition_variable changed_;
   BrickSlots slots_;
   std::deque<Batch> batches_;    ///< begun or about to be, not taken

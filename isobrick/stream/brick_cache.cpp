@@ -24,7 +24,11 @@ CachedBricks::~CachedBricks() noexcept {
 
 void CachedBricks::wait() {
   tasks_.wait();
-  for (const Load& load : loads_) cache_.slots_.decoded(load.brick, load.present);
+  for (const Load& load : loads_)
+    if (load.present)
+      cache_.slots_.count_read(load.brick);
+    else
+      cache_.slots_.set_absent(load.brick);
   loads_.clear();
   for (const Int3 b : bricks_) samples_[cache_.key(b)] = cache_.slots_.find(b);
 }

@@ -76,13 +76,13 @@ std::byte* BrickSlots::place(Int3 brick) {
   return slot;
 }
 
-void BrickSlots::decoded(Int3 brick, bool present) {
-  if (!present) {
-    Entry& entry = entries_.at(key(brick));
-    free_.push_back(entry.slot);
-    entry.slot = nullptr;
-    return;
-  }
+void BrickSlots::set_absent(Int3 brick) {
+  Entry& entry = entries_.at(key(brick));
+  free_.push_back(entry.slot);
+  entry.slot = nullptr;
+}
+
+void BrickSlots::count_read(Int3 brick) {
   auto is_seen = seen_[static_cast<std::size_t>(key(brick))];
   ++reads_;
   bricks_read_ += !is_seen;

@@ -41,8 +41,10 @@ class BrickSlots {
   bool hold(Int3 brick);
   /// Puts a brick that is not here into a slot, and holds it. Null when all slots are held.
   std::byte* place(Int3 brick);
-  /// The brick, which is here, was decoded, or it is absent and its slot free again.
-  void decoded(Int3 brick, bool present);
+  /// The brick, which is here, turned out to be absent: its slot is free again.
+  void set_absent(Int3 brick);
+  /// The brick was read and decoded.
+  void count_read(Int3 brick);
   void release(Int3 brick);
 
   bool contains(Int3 brick) const { return entries_.count(key(brick)) > 0; }

@@ -60,7 +60,7 @@ TEST(BrickSlots, WhatNobodyNeedsAnyMoreIsFreed) {
   slots.add_slots(memory.data(), 2);
   slots.place({0, 0, 0});
   slots.place({1, 0, 0});
-  slots.decoded({1, 0, 0}, false);
+  slots.set_absent({1, 0, 0});
   EXPECT_EQ(slots.find({1, 0, 0}), nullptr);
   EXPECT_EQ(slots.free_slots(), 1u);
   slots.release({1, 0, 0});
@@ -82,7 +82,10 @@ TEST(BrickSlots, CountsWhatIsDecodedAgain) {
   slots.add_slots(memory.data(), 1);
   for (const Index x : {0, 1, 0, 2, 0}) {
     slots.place({x, 0, 0});
-    slots.decoded({x, 0, 0}, x != 2);
+    if (x == 2)
+      slots.set_absent({x, 0, 0});
+    else
+      slots.count_read({x, 0, 0});
     slots.release({x, 0, 0});
   }
   EXPECT_EQ(slots.reads(), 4u) << "absent bricks are none";
