@@ -5,7 +5,8 @@
 namespace isobrick {
 
 /// From now on the calling thread gives way, where cores are short, to those that have not called
-/// this: for threads that keep all cores at work beside one that draws. It cannot be taken back.
+/// this: for threads that keep all cores at work beside one that draws. Threads that it makes later
+/// inherit that. It cannot be taken back.
 /// On Linux; elsewhere, and where the system does not allow it, nothing happens.
 inline void give_way() noexcept {
 #ifdef __linux__
