@@ -17,8 +17,8 @@ struct CopyPieces {
   unsigned count = 0;
 };
 
-/// Copies them by a kernel, which costs the calling thread a tenth of what eight requests to the
-/// copy engine do.
+/// Copies them by a kernel, which costs the calling thread less than a request to the copy engine
+/// for each.
 void launch_copy(const CopyPieces& pieces, std::size_t bytes, cudaStream_t stream);
 
 }  // namespace isobrick::gpu
