@@ -95,14 +95,18 @@ float weight_at(float depth) {
 
 const char* const kCutVertexGlsl = R"(
 out vec3 from_eye;
+#if CUT
 out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[8]; };
+#endif
 
 // Sets where the vertex is.
 void place(vec3 position_from_eye) {
   from_eye = position_from_eye;
   gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
+#if CUT
   for (int i = 0; i < 8; ++i)
     gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
+#endif
 }
 )";
 
@@ -111,8 +115,10 @@ in vec3 from_eye;
 
 // Those that clip distances leave.
 void cut() {
+#if CUT
   for (int i = 8; i < counts.y; ++i)
     if (dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w < 0) discard;
+#endif
 }
 )";
 

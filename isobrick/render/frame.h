@@ -24,13 +24,17 @@ struct FrameBlock {
   glm::vec4 pixel;        ///< length of a pixel at depth 1 (or everywhere)
   glm::vec4 top, bottom;  ///< background, linear
   glm::ivec4 counts;      ///< clip distances, half spaces
+
+  bool cuts() const { return counts.y > 0; }
 };
 
 FrameBlock make_frame(const Camera& camera, int width, int height, const PictureSettings& settings);
 
 /// GLSL: the block Frame and functions of depth and camera space.
 extern const char* const kFrameGlsl;
-/// GLSL: cutting by the half spaces, in vertex and in fragment shaders; after kFrameGlsl.
+/// GLSL: cutting by the half spaces, in vertex and in fragment shaders; after kFrameGlsl and a
+/// definition of CUT. Where that is 0 nothing is cut: vertices are spared distances that nobody
+/// asks for, and fragments that never go can be hidden before they are shaded.
 extern const char* const kCutVertexGlsl;
 extern const char* const kCutFragmentGlsl;
 /// GLSL: light on a surface, after kFrameGlsl.

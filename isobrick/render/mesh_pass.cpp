@@ -1,6 +1,7 @@
 #include "isobrick/render/mesh_pass.h"
 
 #include <epoxy/gl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -77,7 +78,7 @@ Seen see() {
   if (dot(s.normal, facet) < 0) s.normal = -s.normal;
   float facing = dot(s.normal, s.eye);
   if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
-  bool opened = counts.y > 0 && !gl_FrontFacing;
+  bool opened = CUT != 0 && !gl_FrontFacing;
   s.light = lit(s.normal, s.eye, opened ? inner_colour.rgb : outer_colour.rgb);
   return s;
 }
@@ -127,6 +128,14 @@ Look look_of(const MeshStyle& style, Vec3d origin, Vec3d eye, bool normals) {
 
 }  // namespace
 
+MeshPass::Programs::Programs(bool cut) {
+  const std::string frame = fmt::format("#define CUT {}\n", cut ? 1 : 0) + kFrameGlsl;
+  const std::string vertex = frame + kCutVertexGlsl + kLooks + kVertex,
+                    fragment = frame + kCutFragmentGlsl + kLightGlsl + kFragment;
+  opaque = make_program(vertex, fragment + kOpaque, "meshes");
+  transparent = make_program(vertex, fragment + kTransparent, "transparent meshes");
+}
+
 MeshPass::MeshPass()
     : vertices_(make_vertex_array()),
       looks_(make_stream_buffer()),
@@ -135,11 +144,6 @@ MeshPass::MeshPass()
       positions_(make_stream_buffer()),
       normals_(make_stream_buffer()),
       triangles_(make_stream_buffer()) {
-  const std::string frame = kFrameGlsl;
-  const std::string vertex = frame + kCutVertexGlsl + kLooks + kVertex,
-                    fragment = frame + kCutFragmentGlsl + kLightGlsl + kFragment;
-  opaque_ = make_program(vertex, fragment + kOpaque, "meshes");
-  transparent_ = make_program(vertex, fragment + kTransparent, "transparent meshes");
   const unsigned array = vertices_.get();
   for (unsigned attribute : {0u, 1u}) {
     glEnableVertexArrayAttrib(array, attribute);
@@ -164,7 +168,8 @@ void MeshPass::need_numbers(std::size_t count) {
 }
 
 void MeshPass::bind(bool transparent) {
-  glUseProgram(transparent ? transparent_.get() : opaque_.get());
+  const Programs& programs = cut_ ? cut_programs_ : whole_programs_;
+  glUseProgram((transparent ? programs.transparent : programs.opaque).get());
   glBindVertexArray(vertices_.get());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, looks_.get());
 }

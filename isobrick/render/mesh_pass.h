@@ -16,6 +16,8 @@ class MeshPass {
  public:
   MeshPass();
 
+  /// Whether half spaces cut what is drawn from now on.
+  void start(bool cut) { cut_ = cut; }
   /// Those of one block of a pool with one call.
   void draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent);
   /// One that lies in memory.
@@ -23,11 +25,18 @@ class MeshPass {
             bool transparent);
 
  private:
+  /// One source in two forms.
+  struct Programs {
+    explicit Programs(bool cut);
+    GlProgram opaque, transparent;
+  };
+
   void bind(bool transparent);
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
   void need_numbers(std::size_t count);
 
-  GlProgram opaque_, transparent_;
+  Programs whole_programs_{false}, cut_programs_{true};
+  bool cut_ = false;
   GlVertexArray vertices_;
   GlBuffer looks_, numbers_, commands_;
   GlBuffer positions_, normals_, triangles_;  ///< of meshes that lie in memory

@@ -74,6 +74,7 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   camera = new_camera;
   settings = new_settings;
   frame = make_frame(camera, width, height, settings);
+  passes.meshes.start(frame.cuts());
   passes.slices.clear();
   passes.overlays.start(camera, width, height);
   any_transparent = false;
@@ -229,12 +230,18 @@ void Renderer::prepare(const PictureSettings& settings) {
   mesh.positions = corners;
   mesh.normals = corners;
   mesh.triangles = triangle;
-  begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), edge, edge, settings);
-  draw(mesh, {}, {});
-  draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
-  draw_axes();
-  draw_scale_bar("");
-  end();
+  PictureSettings whole = settings, cut = settings;
+  whole.planes.clear();
+  whole.region.reset();
+  cut.planes = {{{1, 0, 0}, 0}};
+  for (const PictureSettings& form : {whole, cut}) {
+    begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), edge, edge, form);
+    draw(mesh, {}, {});
+    draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
+    draw_axes();
+    draw_scale_bar("");
+    end();
+  }
   discard();
 }
 

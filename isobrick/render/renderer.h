@@ -79,8 +79,8 @@ class Renderer {
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
 
-  /// Draws a few pixels as pictures with these settings are drawn: drivers compile shaders when
-  /// something is first drawn with them, and the next picture does not wait for that any more.
+  /// Draws a few pixels as pictures with these settings are drawn, cut or not: drivers compile
+  /// shaders when something is first drawn with them, and no picture waits for that any more.
   void prepare(const PictureSettings& settings);
 
   /// Starts a picture; one that is not finished is dropped. Throws UsageError for a size that

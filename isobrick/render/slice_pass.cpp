@@ -78,7 +78,9 @@ void set(const GlProgram& program, int location, Vec3f v) {
 }  // namespace
 
 SlicePass::SlicePass() : nothing_(make_vertex_array()) {
-  const std::string frame = kFrameGlsl, vertex = frame + kCutVertexGlsl + kVertex,
+  // One form is enough: a slice has four corners.
+  const std::string frame = std::string("#define CUT 1\n") + kFrameGlsl,
+                    vertex = frame + kCutVertexGlsl + kVertex,
                     fragment = frame + kCutFragmentGlsl + kColour;
   opaque_ = make_program(vertex, fragment + kOpaque, "slices");
   transparent_ = make_program(vertex, fragment + kTransparent, "slices");

@@ -1,0 +1,144 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+#include <vector>
+
+#include "tests/meshes/test_meshes.h"
+#include "tests/render/pictures.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kWidth = 200, kHeight = 160;
+
+/// Meshes are drawn by one program where something cuts them and by another where nothing does.
+class Cut : public RenderTest {
+ protected:
+  void SetUp() override {
+    RenderTest::SetUp();
+    if (IsSkipped()) return;
+    pool_.emplace(20'000);
+    pooled_ = pool_->add(make_ball({0.3f, 0, 0.2f}, 0.6f, 40).chunk());
+  }
+  void TearDown() override {
+    pooled_ = {};
+    pool_.reset();
+    RenderTest::TearDown();
+  }
+
+  /// What can be cut: meshes in a pool and in memory, opaque and transparent ones, slices.
+  void draw_all(Renderer& renderer, const PictureSettings& settings) {
+    Camera camera({0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1});
+    camera.fit({-1, -1, -1}, {1, 1, 1}, double{kWidth} / kHeight);
+    renderer.begin(camera, kWidth, kHeight, settings);
+    renderer.draw(pooled_, style({0.8f, 0.8f, 0.6f}, 1, 1));
+    renderer.draw(pooled_, style({0.2f, 0.5f, 0.9f}, 0.3f, 2));
+    renderer.draw(ball_.chunk(), style({0.9f, 0.3f, 0.2f}, 1, 3));
+    renderer.draw(ball_.chunk(), style({0.4f, 0.9f, 0.2f}, 0.5f, 4), {0.2, -0.5, 0.3});
+    SliceImage slice{.corner = {-1, 0.1, -1},
+                     .along_x = {2, 0, 0},
+                     .along_y = {0, 0, 2},
+                     .width = 2,
+                     .height = 2,
+                     .samples = samples_};
+    renderer.draw(slice);
+    slice.corner.y = -0.4;
+    slice.opacity = 0.3f;
+    renderer.draw(slice);
+    renderer.end();
+  }
+
+  MeshStyle style(Vec3f colour, float opacity, std::uint32_t id) const {
+    MeshStyle style{.colour = colour, .opacity = opacity, .id = id};
+    if (one_tone_) style.inside = colour;
+    return style;
+  }
+
+  bool one_tone_ = false;  ///< backs are drawn as fronts
+  std::optional<MeshPool> pool_;
+  PooledMesh pooled_;
+  TestMesh ball_ = make_ball({-0.4f, 0.1f, -0.2f}, 0.5f, 30);
+  std::vector<float> samples_{0, 0.4f, 0.7f, 1};
+};
+
+/// Nothing cuts; a plane; a region; more than OpenGL clips by itself.
+std::vector<PictureSettings> ways_to_cut() {
+  PictureSettings whole{.picking = true}, plane = whole, region = whole, many = whole;
+  plane.planes = {{{0.3, 1, 0.1}, -0.2}};
+  region.region = WorldBox{{-0.6, -0.3, -0.7}, {0.5, 0.9, 0.4}};
+  many.region = region.region;
+  many.planes = {
+      {{0.3, 1, 0.1}, -0.2}, {{-1, 0, 0}, -0.4}, {{0, 0, 1}, -0.5}, {{0, -1, 0.2}, -0.8}};
+  return {whole, plane, region, many};
+}
+
+struct Picture {
+  std::vector<std::uint8_t> pixels;
+  std::vector<std::uint32_t> ids;  ///< 99: nothing
+  bool operator==(const Picture&) const = default;
+};
+
+Picture read(const Renderer& renderer) {
+  Picture picture{renderer.read_pixels(), {}};
+  for (int y = 0; y < kHeight; y += 4)
+    for (int x = 0; x < kWidth; x += 4) {
+      const std::optional<Picked> picked = renderer.pick(x, y);
+      picture.ids.push_back(picked ? picked->id : 99);
+    }
+  return picture;
+}
+
+TEST_F(Cut, WhatWasCutBeforeChangesNothing) {
+  const std::vector<PictureSettings> ways = ways_to_cut();
+  std::vector<Picture> expected;
+  for (const PictureSettings& way : ways) {
+    Renderer fresh;
+    draw_all(fresh, way);
+    expected.push_back(read(fresh));
+    for (std::size_t other = 0; other + 1 < expected.size(); ++other)
+      EXPECT_NE(expected.back().pixels, expected[other].pixels) << other;
+  }
+  for (std::size_t before = 0; before < ways.size(); ++before)
+    for (std::size_t after = 0; after < ways.size(); ++after) {
+      draw_all(renderer(), ways[before]);
+      draw_all(renderer(), ways[after]);
+      EXPECT_TRUE(read(renderer()) == expected[after]) << after << " after " << before;
+    }
+}
+
+TEST_F(Cut, PreparingChangesNothing) {
+  for (const PictureSettings& way : ways_to_cut()) {
+    Renderer fresh;
+    draw_all(fresh, way);
+    renderer().prepare(way);
+    EXPECT_FALSE(renderer().has_picture());
+    draw_all(renderer(), way);
+    EXPECT_TRUE(read(renderer()) == read(fresh));
+  }
+}
+
+TEST_F(Cut, PlanesThatLeaveAllChangeNothing) {
+  one_tone_ = true;
+  PictureSettings settings{.picking = true};
+  draw_all(renderer(), settings);
+  const Picture whole = read(renderer());
+  settings.planes = {{{0.3, 1, 0.1}, -9}, {{-1, 0, 0}, -9}};
+  settings.region = WorldBox{{-7, -7, -7}, {7, 7, 7}};
+  // Also with planes that each fragment is asked for.
+  for (const std::size_t planes : {1u, 3u}) {
+    settings.planes.resize(planes, {{0, 0, 1}, -9});
+    draw_all(renderer(), settings);
+    const Picture cut = read(renderer());
+    EXPECT_EQ(cut.ids, whole.ids);
+    // Another program may round otherwise.
+    int apart = 0;
+    for (std::size_t i = 0; i < cut.pixels.size(); ++i)
+      apart += std::abs(int{cut.pixels[i]} - int{whole.pixels[i]}) > 4;
+    EXPECT_LT(apart, 60) << planes;
+  }
+}
+
+}  // namespace
+}  // namespace isobrick
