@@ -197,7 +197,8 @@ TEST_F(Window, ClosesAtOnceWhileItStreams) {
 }
 
 TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
-  const auto source = make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}});
+  const auto source =
+      make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}, .frequency = 4});
   NoProgress progress;
   convert(*source, dir_ / "many.zarr", {}, progress);
   ViewerWindow& window = open();
@@ -224,7 +225,8 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
   EXPECT_EQ(picture.counters().finished, before.finished) << "the test has too few triangles";
   display_->move_pointer(kWidth / 2 + 80, kHeight / 2 + 20);
   until([&] { return length(window.state().navigator.camera.eye - eye) > 1; });
-  EXPECT_EQ(picture.counters().dropped, before.dropped + 1);
+  // Where the pointer's way comes in parts, the next picture is dropped as well.
+  EXPECT_GT(picture.counters().dropped, before.dropped);
   display_->button(1, false);
   until(rests);
   EXPECT_GT(picture.counters().finished, before.finished);
