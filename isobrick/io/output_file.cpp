@@ -37,15 +37,22 @@ Temporary create_beside(const std::string& path) {
 }  // namespace
 
 FileWriter::FileWriter(UniqueFd fd, std::string path, std::size_t memory)
-    : fd_(std::move(fd)), path_(std::move(path)), capacity_(std::max(memory, kBuffer)) {
+    : fd_(std::move(fd)), path_(std::move(path)) {
+  make_buffer(std::max(memory, kBuffer));
+}
+
+void FileWriter::make_buffer(std::size_t capacity) {
   // The first touch of a small page takes as long as to write it.
   constexpr std::size_t large_page = std::size_t{2} << 20;
-  const bool large = capacity_ >= large_page;
+  const bool large = capacity >= large_page;
   const std::size_t align = large ? large_page : 64;
-  const std::size_t bytes = (capacity_ + align - 1) / align * align;
-  buffer_.reset(static_cast<std::byte*>(std::aligned_alloc(align, bytes)));
-  if (!buffer_) throw std::bad_alloc();
-  if (large) (void)::madvise(buffer_.get(), bytes, MADV_HUGEPAGE);
+  const std::size_t bytes = (capacity + align - 1) / align * align;
+  std::unique_ptr<std::byte, Free> buffer(
+      static_cast<std::byte*>(std::aligned_alloc(align, bytes)));
+  if (!buffer) throw std::bad_alloc();
+  if (large) (void)::madvise(buffer.get(), bytes, MADV_HUGEPAGE);
+  buffer_ = std::move(buffer);
+  capacity_ = capacity;
 }
 
 std::byte* FileWriter::reserve(std::size_t size) {
@@ -66,7 +73,7 @@ void FileWriter::append(std::span<const std::byte> bytes) {
 void FileWriter::flush() {
   write_all(buffer_.get(), std::exchange(used_, 0));
   // What did not fit in memory goes into the file as it comes.
-  capacity_ = kBuffer;
+  if (capacity_ > kBuffer) make_buffer(kBuffer);
 }
 
 void FileWriter::write_all(const std::byte* bytes, std::size_t size) {

@@ -16,7 +16,7 @@ namespace isobrick {
 class FileWriter {
  public:
   /// `path` is for messages. The first `memory` bytes stay in memory, as long as there are no
-  /// more and nothing asks for them to be in the file; at least kBuffer.
+  /// more and nothing asks for them to be in the file; at least kBuffer, and no more afterwards.
   FileWriter(UniqueFd fd, std::string path, std::size_t memory = kBuffer);
 
   /// Room for `size` <= kBuffer bytes, to be filled in place and then committed.
@@ -48,6 +48,7 @@ class FileWriter {
   static constexpr std::size_t kBuffer = std::size_t{1} << 20;
 
  private:
+  void make_buffer(std::size_t capacity);
   void write_all(const std::byte* bytes, std::size_t size);
   [[noreturn]] void fail(int errno_value) const;
 
@@ -57,7 +58,7 @@ class FileWriter {
 
   UniqueFd fd_;
   std::string path_;
-  std::size_t capacity_;  ///< of the buffer; kBuffer when something has been written
+  std::size_t capacity_ = 0;  ///< of the buffer; kBuffer when something has been written
   std::unique_ptr<std::byte, Free> buffer_;
   std::size_t used_ = 0;
   std::uint64_t written_ = 0;

@@ -1,6 +1,7 @@
 #include "isobrick/io/output_file.h"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -125,6 +126,26 @@ TEST(OutputFile, AppendsWhatWaitsInMemoryOrInAFile) {
                                      bytes.substr(bytes.size() - 10))
         << memory;
   }
+}
+
+TEST(OutputFile, KeepsNoLargeBufferForWhatIsInTheFile) {
+  // What is allocated, in bytes; a sanitizer's allocator says 0 throughout.
+  const auto allocated = [] {
+    const struct mallinfo2 info = ::mallinfo2();
+    return info.uordblks + info.hblkhd;
+  };
+  const TempDir dir;
+  constexpr std::size_t memory = std::size_t{64} << 20;
+  const std::string piece(std::size_t{1} << 20, 'x');
+  const std::size_t before = allocated();
+  FileWriter scratch = open_scratch_beside(dir / "a", memory);
+  for (std::size_t bytes = 0; bytes < memory; bytes += piece.size()) scratch.append(piece);
+  EXPECT_TRUE(allocated() == before || allocated() >= before + memory);
+  scratch.append("y");
+  EXPECT_LT(allocated(), before + 2 * FileWriter::kBuffer);
+  std::string end(2, ' ');
+  scratch.read_back(memory - 1, std::as_writable_bytes(std::span(end)));
+  EXPECT_EQ(end, "xy");
 }
 
 TEST(OutputFile, AppendsAndPatches) {
