@@ -41,6 +41,13 @@ class LruCache {
     return loaded.first;
   }
 
+  /// The cached value or null; does not count as use.
+  std::shared_ptr<const Value> find(std::uint64_t key) {
+    const std::lock_guard lock(mutex_);
+    const auto found = entries_.find(key);
+    return found != entries_.end() ? found->second->value : nullptr;
+  }
+
   /// Drops what is there.
   void clear() {
     const std::lock_guard lock(mutex_);

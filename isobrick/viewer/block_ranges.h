@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -20,6 +21,8 @@ class BlockRanges {
 
   /// The ranges of the chunk that holds a block of a stored level. Throws what reading throws.
   std::shared_ptr<const RangeTable> around(int level, Int3 block);
+  /// The same if they are there, null otherwise: reads nothing and waits for nobody who reads.
+  std::shared_ptr<const RangeTable> find(int level, Int3 block);
   /// Drops what is there.
   void clear() { chunks_.clear(); }
 
@@ -28,7 +31,10 @@ class BlockRanges {
   struct Chunk {
     mutable std::once_flag once;
     mutable std::shared_ptr<const RangeTable> table;
+    mutable std::atomic<bool> read = false;  ///< for those who did not wait for `once`
   };
+
+  std::uint64_t number(int level, Int3 chunk) const;
 
   std::shared_ptr<const BrickSource> source_;
   LruCache<Chunk> chunks_;

@@ -107,15 +107,33 @@ struct NodeMesher::Impl {
     return v;
   }
 
-  /// Nothing: all samples are needed, or their bricks are there anyway. With NaN between them two
-  /// sides may lie beside each other without any surface.
-  std::optional<NeededSamples> needed_of(const NodeKey& key, double isovalue,
-                                         std::uint32_t coarser) const {
+  enum class Ranges { kRead, kKnown };
+
+  /// Nothing: all samples are needed, or their bricks are there anyway, or the ranges, if only
+  /// known ones are asked for, are not. With NaN between them two sides may lie beside each other
+  /// without any surface.
+  std::optional<NeededSamples> needed_of(const NodeKey& key, double isovalue, std::uint32_t coarser,
+                                         Ranges ranges = Ranges::kRead) const {
     if (key.level != 0 || view.may_have_nan) return std::nullopt;
     if (bricks.resident(0, samples.bricks(0, points_around(key)))) return std::nullopt;
     const Box3 own = points(key);
     const Int3 first = floor_div(own.lo, {kBlockEdge, kBlockEdge, kBlockEdge});
-    return NeededSamples(own, *bricks.block_ranges(0, first), isovalue, coarser);
+    const auto table = ranges == Ranges::kRead ? bricks.block_ranges(0, first)
+                                               : bricks.known_block_ranges(0, first);
+    if (!table) return std::nullopt;
+    return NeededSamples(own, *table, isovalue, coarser);
+  }
+
+  /// Those of the bricks around `box`, points of the node, that are needed.
+  std::vector<Int3> bricks_of(const NodeKey& key, Box3 box,
+                              const std::optional<NeededSamples>& needed) const {
+    const auto stored = static_cast<std::size_t>(grid.level(key.level).source);
+    const Lattice& lattice = bricks.source().info().levels[stored].lattice;
+    std::vector<Int3> found;
+    for_each_point(samples.bricks(key.level, box), [&](Int3 b) {
+      if (!needed || needed->any(intersect(box, lattice.full_brick_box(b)))) found.push_back(b);
+    });
+    return found;
   }
 
   GridView read(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted) {
@@ -168,21 +186,16 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
   return impl_->read(key, isovalue, coarser, wanted);
 }
 
-NodeMesher::Holders NodeMesher::holders(const NodeKey& key) const {
-  return {impl_->grid.level(key.level).source,
-          impl_->samples.bricks(key.level, impl_->points(key))};
+bool NodeMesher::half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
+  const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
+  return impl_->bricks.half_resident(impl_->grid.level(key.level).source,
+                                     impl_->bricks_of(key, impl_->points(key), needed));
 }
 
 void NodeMesher::will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
-  const Box3 points = impl_->points_around(key);
-  const int stored = impl_->grid.level(key.level).source;
   const std::optional<NeededSamples> needed = impl_->needed_of(key, isovalue, coarser);
-  const Lattice& lattice =
-      impl_->bricks.source().info().levels[static_cast<std::size_t>(stored)].lattice;
-  for_each_point(impl_->samples.bricks(key.level, points), [&](Int3 b) {
-    if (needed && !needed->any(intersect(points, lattice.full_brick_box(b)))) return;
-    impl_->bricks.will_need(stored, b);
-  });
+  for (const Int3 b : impl_->bricks_of(key, impl_->points_around(key), needed))
+    impl_->bricks.will_need(impl_->grid.level(key.level).source, b);
 }
 
 double NodeMesher::seconds() const { return std::chrono::duration<double>(impl_->busy).count(); }

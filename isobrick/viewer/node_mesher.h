@@ -32,13 +32,9 @@ class NodeMesher {
   /// The mesh of what grid() gave last. `mesh` says which it is.
   NodeMesh extract(const GridView& grid, NodeMesh mesh);
 
-  /// The bricks that hold a node's points, of its stored level. Of the finest level its mesh may
-  /// need fewer of them.
-  struct Holders {
-    int stored;
-    Box3 bricks;
-  };
-  Holders holders(const NodeKey& key) const;
+  /// Whether at least half of the bricks are there that hold a node's points and that the mesh
+  /// needs. Reads nothing: where ranges have not been read, it seems to need all of them.
+  bool half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
 
   /// Says which bricks the mesh needs soon, its neighbours' left out; see
   /// ResidentBricks::will_need(). Throws what reading ranges does.

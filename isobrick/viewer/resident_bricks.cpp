@@ -211,11 +211,11 @@ void ResidentBricks::close() {
   make_room(0);
 }
 
-bool ResidentBricks::half_resident(int level, Box3 box) const {
+bool ResidentBricks::half_resident(int level, std::span<const Int3> bricks) const {
   const std::lock_guard lock(mutex_);
-  Index found = 0;
-  for_each_point(box, [&](Int3 b) { found += there({level, b}); });
-  return 2 * found >= volume(box.extent());
+  std::size_t found = 0;
+  for (const Int3 b : bricks) found += there({level, b});
+  return 2 * found >= bricks.size();
 }
 
 void ResidentBricks::will_need(int level, Int3 brick) {

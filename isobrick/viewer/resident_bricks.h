@@ -73,13 +73,17 @@ class ResidentBricks {
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
   /// Whether all bricks of `box` (in bricks) are there.
   bool resident(int level, Box3 box) const;
-  /// Whether at least half of them are.
-  bool half_resident(int level, Box3 box) const;
+  /// Whether at least half of these are.
+  bool half_resident(int level, std::span<const Int3> bricks) const;
   /// Drops what is there, ranges as well; from now on no brick is kept.
   void close();
   /// The ranges of blocks around this one, those of its node of 64³ cells among them.
   std::shared_ptr<const RangeTable> block_ranges(int level, Int3 block) {
     return ranges_.around(level, block);
+  }
+  /// The same if they have been read, null otherwise.
+  std::shared_ptr<const RangeTable> known_block_ranges(int level, Int3 block) {
+    return ranges_.find(level, block);
   }
   /// Says that the brick is wanted soon, unless it is there: hints it to the disk, and threads that
   /// would wait in read_together() read it meanwhile, those first that were named first. What

@@ -35,7 +35,7 @@ void SceneStream::Shared::plan(bool late) {
   const bool sliding = changed_twice && Clock::now() - *last_isovalue < kSliding;
   const double soon =
       late || sliding ? 0 : kSoon.count() / seconds_per_job * static_cast<double>(threads.size());
-  MeshPlan next = plan_jobs(*tree, cut, meshes, bricks, planner, soon);
+  MeshPlan next = plan_jobs(*tree, cut, meshes, planner, soon);
   if (!next.straight || next.jobs.empty())
     straight_until.reset();
   else if (!straight_until)

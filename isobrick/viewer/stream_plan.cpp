@@ -84,13 +84,11 @@ class Planner {
 }  // namespace
 
 MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
-                   const ResidentBricks& bricks, const NodeMesher& mesher, double soon) {
+                   const NodeMesher& mesher, double soon) {
   MeshPlan plan;
   Planner(tree, cut, meshes, plan).run(soon);
-  for (MeshJob& job : plan.jobs) {
-    const NodeMesher::Holders holders = mesher.holders(job.key);
-    job.resident = bricks.half_resident(holders.stored, holders.bricks);
-  }
+  for (MeshJob& job : plan.jobs)
+    job.resident = mesher.half_there(job.key, job.isovalue, job.coarser);
   std::sort(plan.jobs.begin(), plan.jobs.end(), more_urgent);
   return plan;
 }

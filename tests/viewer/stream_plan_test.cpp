@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
+#include <cstdint>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -19,7 +21,7 @@ namespace {
 
 class PlanTest : public testing::Test {
  protected:
-  MeshPlan plan(double soon) { return plan_jobs(tree_, cut_, meshes_, bricks_, mesher_, soon); }
+  MeshPlan plan(double soon) { return plan_jobs(tree_, cut_, meshes_, mesher_, soon); }
   /// Jobs that are no nodes of the cut.
   std::size_t ancestors(const MeshPlan& plan, bool coarsest_only) const {
     std::size_t count = 0;
@@ -77,10 +79,42 @@ TEST_F(PlanTest, WhereMostIsThereAllLevelsStandIn) {
 
 TEST_F(PlanTest, LevelsThatAreNotStoredAreMadeWhereACutAsksForThem) {
   cut_ = RandomCut(tree_.grid(), 1, 0).cut({0.0});
-  const MeshPlan plan = plan_jobs(tree_, cut_, meshes_, bricks_, mesher_, 0);
+  const MeshPlan plan = plan_jobs(tree_, cut_, meshes_, mesher_, 0);
   ASSERT_EQ(plan.jobs.size(), 1u);
   EXPECT_FALSE(tree_.grid().has_parent(plan.jobs.front().key));
   EXPECT_GT(plan.jobs.front().key.level, tree_.grid().coarsest_stored());
+}
+
+TEST(Plan, ANodeIsThereWhenHalfOfWhatItsMeshNeedsIs) {
+  const auto source = std::make_shared<MemoryBricks>(
+      Int3{128, 128, 128}, std::function<std::int16_t(Int3)>([](Int3 p) {
+        const auto d = [](Index i) { return static_cast<double>(i) - 24; };
+        return static_cast<std::int16_t>(100 * (6 - std::hypot(d(p.x), d(p.y), d(p.z))));
+      }),
+      MemoryBricks::Options{.brick = 16});
+  const NodeTree tree(*source);
+  ResidentBricks bricks(source, 100 << 20);
+  NodeMesher mesher(tree.grid(), bricks, {0, 0, 0});
+  MeshCache meshes(100 << 20, 0);
+  Cut cut;
+  cut.isovalues = {0.0};
+  cut.nodes.push_back({.key = {0, {0, 0, 0}}});
+  const auto resident = [&] {
+    const MeshPlan plan = plan_jobs(tree, cut, meshes, mesher, 1e6);
+    const auto job = std::find_if(plan.jobs.begin(), plan.jobs.end(),
+                                  [&](const MeshJob& j) { return j.key == cut.nodes.front().key; });
+    return job != plan.jobs.end() && job->resident;
+  };
+  // Those around the ball, a small part of the 5³ of the node.
+  for_each_point({{0, 0, 0}, {3, 3, 3}}, [&](Int3 b) { (void)bricks.get(0, b, Always()); });
+  EXPECT_FALSE(resident()) << "no ranges have been read: all might be needed";
+  EXPECT_EQ(bricks.known_block_ranges(0, {0, 0, 0}), nullptr);
+  ASSERT_GT(mesher.mesh(cut.nodes.front().key, 0, 0, Always()).mesh.triangles.size(), 0u);
+  EXPECT_LE(bricks.counters().reads, 27u);
+  EXPECT_NE(bricks.known_block_ranges(0, {0, 0, 0}), nullptr);
+  EXPECT_TRUE(resident());
+  bricks.close();
+  EXPECT_FALSE(resident());
 }
 
 TEST(ResidentBricks, WhatAnotherThreadReadsIsBusy) {
