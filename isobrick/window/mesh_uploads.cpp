@@ -26,10 +26,11 @@ bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
     upload.used = now_;
     if (upload.there) continue;
     if (share != nullptr && share->spent()) return false;
+    if (!node.mesh->empty()) {
+      upload.place = pool_.add(node.mesh->mesh.chunk(0), origin);
+      if (share != nullptr) share->bytes += upload.place.bytes();
+    }
     upload.there = true;
-    if (node.mesh->empty()) continue;
-    upload.place = pool_.add(node.mesh->mesh.chunk(0), origin);
-    if (share != nullptr) share->bytes += upload.place.bytes();
   }
   return true;
 }
