@@ -109,10 +109,11 @@ double ViewerWindow::aspect() const {
 
 void ViewerWindow::open(const std::filesystem::path& path) {
   auto store = std::make_shared<const StoreReader>(path);
+  auto facts = std::make_unique<IsovalueFacts>(store);
+  // Last: once it is made, that of the store before has gone from the renderer.
   auto picture =
       std::make_unique<StorePicture>(store, options_.budgets, glfwPostEmptyEvent, setup_);
   picture->scene().search().use(state_.index);
-  auto facts = std::make_unique<IsovalueFacts>(store);
   state_.facts = std::move(facts);
   state_.picture = std::move(picture);
   state_.path = path;
