@@ -49,12 +49,6 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
                     });
 }
 
-std::uint64_t triangles_of(const Drawable& drawable) {
-  std::uint64_t sum = 0;
-  for (const DrawnNode& node : drawable.nodes) sum += node.mesh->triangles();
-  return sum;
-}
-
 /// What a picture depends on beside the meshes and slices that there are. An isovalue
 /// shows when meshes of it are there, and not before.
 std::string what_shows(const Camera& camera, int width, int height, ViewSettings settings) {
@@ -199,7 +193,7 @@ bool StorePicture::still_wanted(const Work& work, const Asked& asked) const {
   const bool same_view = shows == asked.shows || shows == asked.shows_plain;
   if (same_view && work.isovalues == scene_->cut().isovalues) return true;
   return work.state.moving && asked.way.moving &&
-         triangles_of(*asked.newest) > work.state.triangles / 2;
+         2 * asked.newest->triangles >= work.state.triangles;
 }
 
 /// Whether the next picture would show no more than the last one.
@@ -256,29 +250,34 @@ void StorePicture::begin_picture(const Asked& asked) {
   times_.draw = watch.lap();
 }
 
-/// Until a piece is drawn; in software, if it is not the last one: the piece before, because what
-/// is told is drawn in part by the thread that tells it, and the rest beside the next one.
-void StorePicture::wait_drawn(bool last) {
-  if (last || !setup_->software()) {
+/// Until the piece before is drawn, with a fence behind the one that has just been told; without
+/// one: until all is.
+void StorePicture::wait_drawn(std::optional<GlFence> fence) {
+  Stopwatch watch;
+  if (!fence) {
     glFinish();  // see DeviceMeshes::drawn(); and drawing counts for the pause after it
-    return piece_fence_.reset();
+    piece_fence_.reset();
+    return pieces_.drawn_all(watch.lap());
   }
-  GlFence fence = GlFence::insert();
   if (piece_fence_) piece_fence_->wait();
   piece_fence_ = std::move(fence);
+  pieces_.drawn_before_last(watch.lap());
 }
 
-/// As much as there is time for.
+/// As much as there is time for. In software the last piece alone is waited for at once: what is
+/// told is drawn in part by the thread that tells it, and the rest beside the next piece.
 void StorePicture::draw_piece(double most) {
   double left = most;
   for (;;) {
     Stopwatch watch;
     const std::uint64_t before = renderer().work_left();
     const bool finished = renderer().end_piece(pieces_.work(left));
+    std::optional<GlFence> fence;
+    if (!finished && setup_->software()) fence = GlFence::insert();
     const double told = watch.lap();
-    wait_drawn(finished);
+    pieces_.told(before - renderer().work_left(), told);
+    wait_drawn(std::move(fence));
     const double waited = watch.lap();
-    pieces_.drawn(before - renderer().work_left(), told + waited);
     times_.draw += told;
     times_.finish += waited;
     left -= told + waited;
@@ -304,15 +303,30 @@ void StorePicture::finish_picture() {
   device_->forget();
 }
 
-/// Its last piece has ended.
+/// Waits for the piece that is still being drawn, if any: then its meshes may go.
 void StorePicture::drop_picture() {
   ++counters_.dropped;
+  if (piece_fence_) wait_drawn({});
   work_.reset();
   device_->forget();
 }
 
 void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
                         const PictureWay& way) {
+  try {
+    draw_next(camera, width, height, settings, way);
+  } catch (...) {
+    glFinish();
+    if (work_) drop_picture();
+    pictured_ = {};  // half a picture is none
+    drew_ = state_.drawing = state_.complete = false;
+    state_.drawn_part = 0;
+    throw;
+  }
+}
+
+void StorePicture::draw_next(const Camera& camera, int width, int height,
+                             const ViewSettings& settings, const PictureWay& way) {
   uploads_.begin_use();
   drew_ = false;
   Stopwatch watch;
@@ -335,23 +349,16 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
                     .newest = scene_->drawable()};
   times_.drawable = watch.lap();
   if (work_ && !still_wanted(*work_, asked)) drop_picture();
-  try {
-    const bool goes_on = work_.has_value();
-    if (!goes_on) choose_picture(asked);
-    if (work_) {
-      watch.lap();
-      // Two contexts of one device are changed slowly and to and fro: one after the other is
-      // sooner done, for both.
-      const Turn turn(device_->turns());
-      times_.turn = watch.lap();
-      if (!goes_on) begin_picture(asked);
-      draw_piece(asked.way.piece_seconds);
-    }
-  } catch (...) {
-    glFinish();
-    if (work_) drop_picture();
-    pictured_ = {};  // half a picture is none
-    throw;
+  const bool goes_on = work_.has_value();
+  if (!goes_on) choose_picture(asked);
+  if (work_) {
+    watch.lap();
+    // Two contexts of one device are changed slowly and to and fro: one after the other is
+    // sooner done, for both.
+    const Turn turn(device_->turns());
+    times_.turn = watch.lap();
+    if (!goes_on) begin_picture(asked);
+    draw_piece(asked.way.piece_seconds);
   }
   watch.lap();
   drop_unused();

@@ -99,7 +99,8 @@ class StorePicture {
   WorldBox bounds() const;
 
   /// Makes the picture in the renderer, of what is there by now, or goes on with it; leaves the one
-  /// before until it is whole, and where it would show the same.
+  /// before until it is whole, and where it would show the same. Throws what Scene, Renderer and
+  /// DeviceMeshes do; what had been begun is dropped then.
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
             const PictureWay& way = {});
   const PictureState& state() const { return state_; }
@@ -144,6 +145,8 @@ class StorePicture {
     double seconds = 0;             ///< that it has taken so far
   };
 
+  void draw_next(const Camera& camera, int width, int height, const ViewSettings& settings,
+                 const PictureWay& way);
   void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
                     double coarser);
   /// Takes meshes of the newest drawable to the device; shows it once all are there.
@@ -157,7 +160,7 @@ class StorePicture {
   void choose_picture(const Asked& asked);
   void begin_picture(const Asked& asked);
   void draw_piece(double most_seconds);
-  void wait_drawn(bool last);
+  void wait_drawn(std::optional<GlFence> fence);
   void finish_picture();
   void drop_picture();
   void draw_surfaces(const ViewSettings& settings, PictureState& state);
@@ -176,7 +179,8 @@ class StorePicture {
   Pictured pictured_;                        ///< the finished picture
   std::optional<Work> work_;                 ///< `shown_` does not change while it is there
   PiecePacer pieces_;
-  std::optional<GlFence> piece_fence_;  ///< behind the last piece, where nobody waited for it
+  std::optional<GlFence>
+      piece_fence_;  ///< behind the last piece of `work_`, if it may not be drawn
   std::chrono::steady_clock::time_point drawn_;  ///< when the last picture was finished
   double picture_seconds_ = 0;
   bool drew_ = false;

@@ -3,12 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdint>
-#include <limits>
 
 #include "isobrick/render/vectors.h"
 #include "isobrick/window/frame_pacer.h"
-#include "isobrick/window/piece_pacer.h"
 
 namespace isobrick {
 namespace {
@@ -104,24 +101,6 @@ TEST(Navigator, TheWheelZooms) {
   EXPECT_LT(n.camera.distance(), distance * 0.75);
   n.wheel(-3);
   EXPECT_NEAR(n.camera.distance(), distance, 1e-9);
-}
-
-TEST(PiecePacer, FindsOutHowMuchIsDrawnInATime) {
-  PiecePacer pacer(true);
-  // 4 million triangles a second, and a millisecond for each piece.
-  const auto seconds_of = [](std::uint64_t work) { return 1e-3 + static_cast<double>(work) / 4e6; };
-  EXPECT_LT(seconds_of(pacer.work(0.06)), 0.06) << "the first piece is a small one";
-  for (int i = 0; i < 5; ++i) {
-    const std::uint64_t work = pacer.work(0.06);
-    pacer.drawn(work, seconds_of(work));
-  }
-  EXPECT_NEAR(seconds_of(pacer.work(0.06)), 0.06, 0.003);
-  pacer.drawn(100'000, 0.5);  // it has become slow at once
-  EXPECT_LE(pacer.work(0.06), 12'000u);
-  for (int i = 0; i < 100; ++i) pacer.drawn(pacer.work(1e-6), 1);
-  EXPECT_GE(pacer.work(1e-6), 1000u) << "what pieces cost must not make them smaller and smaller";
-  PiecePacer device(false);
-  EXPECT_EQ(device.work(0.06), std::numeric_limits<std::uint64_t>::max());
 }
 
 TEST(FramePacer, SettlesWherePicturesAreFastEnough) {

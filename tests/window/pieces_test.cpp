@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "isobrick/core/error.h"
 #include "tests/window/picture_test.h"
 
 namespace isobrick {
@@ -88,6 +89,51 @@ TEST_F(Pieces, AreDroppedWhenTheViewChangesUnlessItKeepsChanging) {
   EXPECT_GE(dropped, 4u);
   while (!picture_->state().complete) draw_one(0);
   EXPECT_EQ(counters.dropped, dropped);
+}
+
+TEST_F(Pieces, OfPicturesWithoutTrianglesAreFinishedWhileTheViewKeepsChanging) {
+  open(SynthKind::gyroid, {96, 96, 96});
+  settings_.surfaces[0].shown = false;
+  settings_.slices[1] = {true, 0.5f};
+  choose_values(settings_, picture_->scene().tree());
+  draw();
+  const PictureCounters before = picture_->counters();
+  const PictureWay way{.piece_seconds = kShort, .moving = true};
+  for (int i = 0; picture_->counters().finished < before.finished + 3; ++i) {
+    ASSERT_LT(i, 10000);
+    camera_.orbit(1e-3, 0, {0, 0, 1});
+    picture_->draw(camera_, kWidth, kHeight, settings_, way);
+  }
+  EXPECT_GT(picture_->counters().pieces, before.pieces) << "there is nothing to be finished";
+  EXPECT_EQ(picture_->counters().dropped, before.dropped);
+}
+
+TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
+  open(SynthKind::gyroid, {96, 96, 96});
+  const auto first = pixels();
+  const std::uint64_t finished = picture_->counters().finished;
+  ASSERT_TRUE(picture_->state().complete);
+  const auto fail = [&] {
+    EXPECT_THROW(picture_->draw(camera_, 1 << 24, kHeight, settings_), UsageError);
+    EXPECT_FALSE(picture_->drew());
+    EXPECT_FALSE(picture_->state().drawing);
+    EXPECT_FALSE(picture_->state().complete);
+    EXPECT_EQ(picture_->state().drawn_part, 0);
+  };
+  fail();
+  // One that has been begun goes with it.
+  const PictureWay way{.piece_seconds = kShort};
+  const Camera front = camera_;
+  camera_.orbit(0.3, 0, {0, 0, 1});
+  for (int i = 0; i < 3; ++i) picture_->draw(camera_, kWidth, kHeight, settings_, way);
+  ASSERT_TRUE(picture_->state().drawing);
+  ASSERT_GT(picture_->state().drawn_part, 0);
+  fail();
+  EXPECT_EQ(picture_->counters().finished, finished);
+  EXPECT_EQ(picture_->renderer().read_pixels(), first);
+  EXPECT_NE(pixels(), first);
+  camera_ = front;
+  EXPECT_EQ(pixels(), first);
 }
 
 }  // namespace
