@@ -106,13 +106,21 @@ std::optional<ResidentBricks::Key> ResidentBricks::next_wanted() {
       const Key key{request.level, request.bricks[request.next++]};
       if (!entries_.contains(key)) return key;
     }
-  while (!soon_.empty()) {
-    const Key key = soon_.front();
-    soon_.pop_front();
-    soon_bytes_ -= brick_bytes(key.level);
-    if (!entries_.contains(key)) return key;
-  }
-  return std::nullopt;
+  if (soon_.empty()) return std::nullopt;
+  // What is in use fills the budget at times: then it would be read to be dropped at once.
+  const std::uint64_t bytes = brick_bytes(soon_.front().level);
+  make_room(bytes);
+  if (counters_.bytes + bytes > budget_) return std::nullopt;
+  return soon_.front();
+}
+
+/// Takes a brick off those that are wanted soon.
+void ResidentBricks::forget_need(const Key& key) {
+  const auto found = soon_places_.find(key);
+  if (found == soon_places_.end()) return;
+  soon_.erase(found->second);
+  soon_places_.erase(found);
+  soon_bytes_ -= brick_bytes(key.level);
 }
 
 bool ResidentBricks::over(const Request& request) const {
@@ -150,6 +158,7 @@ void ResidentBricks::read_together(int level, std::span<const Int3> bricks, cons
 /// Reads what is not there, and nobody else reads; gives the lock up meanwhile.
 ResidentBricks::Read ResidentBricks::read(const Key& key, std::unique_lock<std::mutex>& lock) {
   entries_[key];
+  forget_need(key);
   const std::uint64_t bytes = brick_bytes(key.level);
   make_room(bytes);
   // Counted before it is there: threads that load at once must not all find room.
@@ -221,10 +230,12 @@ bool ResidentBricks::half_resident(int level, std::span<const Int3> bricks) cons
 void ResidentBricks::will_need(int level, Int3 brick) {
   {
     const std::lock_guard lock(mutex_);
-    if (entries_.contains({level, brick})) return;
-    const std::uint64_t bytes = brick_bytes(level);
-    if (soon_bytes_ + bytes <= budget_ / kPartTogether) {
-      soon_.push_back({level, brick});
+    const Key key{level, brick};
+    if (entries_.contains(key) || soon_places_.contains(key)) return;
+    const std::uint64_t bytes = brick_bytes(level), most = budget_ / kPartTogether;
+    if (bytes <= most) {
+      while (soon_bytes_ + bytes > most) forget_need(Key(soon_.front()));
+      soon_places_.emplace(key, soon_.insert(soon_.end(), key));
       soon_bytes_ += bytes;
     }
   }
@@ -234,6 +245,7 @@ void ResidentBricks::will_need(int level, Int3 brick) {
 void ResidentBricks::forget_needs() {
   const std::lock_guard lock(mutex_);
   soon_.clear();
+  soon_places_.clear();
   soon_bytes_ = 0;
 }
 

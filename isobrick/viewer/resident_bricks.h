@@ -3,7 +3,6 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <exception>
 #include <list>
 #include <memory>
@@ -64,10 +63,11 @@ class ResidentBricks {
   /// The same, but null at once where another thread is reading it.
   std::shared_ptr<const BrickSamples> get_unless_busy(int level, Int3 brick, const Wanted& wanted);
   /// Reads those of these bricks that are missing. Threads that are in here at the same time read
-  /// one another's, whoever came first first, then those that will_need() named, so that none of
-  /// them waits while there is something to read. Does nothing where the bricks would take much of
-  /// the budget: then they would displace one another. Throws Abandoned; what cannot be read says
-  /// so when it is got.
+  /// one another's, whoever came first first, then those that will_need() named while there is room
+  /// for them, rather than wait for what others are reading. Does nothing where fewer than two
+  /// bricks are missing, which get() reads or waits for, nor where they would take much of the
+  /// budget: then they would displace one another. Throws Abandoned; what cannot be read says so
+  /// when it is got.
   void read_together(int level, std::span<const Int3> bricks, const Wanted& wanted);
   /// The brick if it is there.
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
@@ -85,9 +85,10 @@ class ResidentBricks {
   std::shared_ptr<const RangeTable> known_block_ranges(int level, Int3 block) {
     return ranges_.find(level, block);
   }
-  /// Says that the brick is wanted soon, unless it is there: hints it to the disk, and threads that
-  /// would wait in read_together() read it meanwhile, those first that were named first. What
-  /// would take much of the budget is hinted only.
+  /// Says that the brick is wanted soon, unless it is there or somebody has said so: hints it to
+  /// the disk, and threads that would wait in read_together() read it meanwhile, those first that
+  /// were named first. Together they take an eighth of the budget at most; what was named first is
+  /// forgotten for what was named last. A brick that is larger is hinted only.
   void will_need(int level, Int3 brick);
   /// What will_need() named is not wanted any more.
   void forget_needs();
@@ -132,6 +133,7 @@ class ResidentBricks {
   std::shared_ptr<const BrickSamples> get(const Key& key, const Wanted& wanted, bool may_wait);
   Read read(const Key& key, std::unique_lock<std::mutex>& lock);
   std::optional<Key> next_wanted();
+  void forget_need(const Key& key);
   std::uint64_t brick_bytes(int level) const;
   bool over(const Request& request) const;
   std::shared_ptr<const BrickSamples> load(const Key& key);
@@ -146,8 +148,10 @@ class ResidentBricks {
   std::unordered_map<Key, Entry, KeyHash> entries_;
   std::list<Key> order_;  ///< most recently used first; only what is loaded
   std::list<Request> requests_;
-  std::deque<Key> soon_;          ///< that will_need() named
-  std::uint64_t soon_bytes_ = 0;  ///< of those
+  /// That will_need() named and nobody has begun to read, those first that were named first.
+  std::list<Key> soon_;
+  std::unordered_map<Key, std::list<Key>::iterator, KeyHash> soon_places_;  ///< in `soon_`
+  std::uint64_t soon_bytes_ = 0;                                            ///< of those
   Counters counters_;
 };
 
