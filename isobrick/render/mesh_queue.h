@@ -21,9 +21,8 @@ struct MeshDraw {
 /// have one order: meshes of one block of a pool stand together, or else as they were added.
 class MeshQueue {
  public:
-  /// Before the first take(); `mesh` must live until the last one or clear().
+  /// Before the first take(); `mesh` must live until the last of those.
   void add(const PooledMesh& mesh, const MeshStyle& style);
-  void clear() { *this = {}; }
 
   bool empty() const { return left_ == 0; }
   /// That have not been taken.

@@ -108,10 +108,10 @@ class Renderer {
 
   /// Finishes the picture.
   void end();
-  /// Does about `work` more of what end() does. True once the picture is finished, which then is
-  /// the same bytes; until then the one before stays whole, for all functions below. Other
-  /// drawing in the context may come in between. Work is counted in triangles; a step over the
-  /// whole picture counts as many as take as long in software.
+  /// Does about `work`, at least 1, more of what end() does. True once the picture is finished,
+  /// which then is the same bytes; until then the one before stays whole, for all functions below.
+  /// Other drawing in the context may come in between. Work is counted in triangles; a step over
+  /// the whole picture counts as many as take as long in software.
   bool end_piece(std::uint64_t work);
   /// What end() would have to do.
   std::uint64_t work_left() const;
