@@ -185,10 +185,11 @@ std::vector<OrderState> StreamDevice::totals_of_tiles(Lane& lane) {
                         totals.size() * sizeof(OrderState), cudaMemcpyDeviceToHost,
                         download_.get()));
   download_.wait();
-  for (OrderState& t : totals) {
-    t.vertices &= kOrderMask;
-    t.triangles &= kOrderMask;
-  }
+  // Tiles without a mesh have not asked for the sums before them.
+  OrderState before{0, 0};
+  for (OrderState& t : totals)
+    before = t = {std::max(before.vertices, t.vertices & kOrderMask),
+                  std::max(before.triangles, t.triangles & kOrderMask)};
   return totals;
 }
 

@@ -162,27 +162,11 @@ __device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::ui
 inline constexpr std::uint32_t kNumberOfWord =
     offsetof(TileShared, number) - offsetof(TileShared, crossing);
 
-/// A thread's part of the table of triangles, on its way while something else is done.
-template <int N>
-struct CaseEntries {
-  static constexpr int kEach = (256 * 5 + N - 1) / N;
-  std::uint16_t entries[kEach];
-
-  __device__ explicit CaseEntries(const std::uint16_t* all) {
-#pragma unroll
-    for (int i = 0; i < kEach; ++i)
-      entries[i] = __ldg(all + ::min(threadIdx.x + i * N, 256u * 5 - 1));
-  }
-};
-
 /// Fills the tables of places and triangles; once a block.
 template <int N>
-__device__ inline void fill_tables(TileShared& s, const CaseEntries<N>& triangles) {
-#pragma unroll
-  for (int k = 0; k < CaseEntries<N>::kEach; ++k) {
-    const unsigned i = threadIdx.x + k * N;
-    if (i >= 256 * 5) break;
-    const std::uint32_t entry = triangles.entries[k];
+__device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles) {
+  for (unsigned i = threadIdx.x; i < 256 * 5; i += N) {
+    const std::uint32_t entry = triangles[i];
     s.triangles[i] = static_cast<std::uint16_t>((entry & 0xfffu) << 3);
     if (i % 5 == 0) s.triangle_count[i / 5] = static_cast<std::uint8_t>(entry >> 12);
   }

@@ -8,8 +8,7 @@
 
 namespace isobrick::gpu {
 
-/// Finds the active ones among the candidates. All threads; known to the first warp then, to the
-/// others after the next barrier.
+/// Finds the active ones among the candidates. All threads; ends with a barrier.
 template <int N, class T>
 __device__ inline void find_candidates(TileShared& s, const TileParams& p) {
   for (std::uint32_t i = threadIdx.x; i < kMostSearchedByBlock; i += N) {
@@ -25,6 +24,7 @@ __device__ inline void find_candidates(TileShared& s, const TileParams& p) {
     s.active_before[lane_id()] = sum - own;
     if (lane_id() == 31) s.items = sum * Team<N>::kSlabs;
   }
+  __syncthreads();
 }
 
 /// The number of a candidate among the active ones, or kNone.

@@ -22,28 +22,18 @@ constexpr std::size_t kSharedBytes = sizeof(TileShared) +
 static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later device has");
 
-/// A tile without a vertex or a cell passes the sums before it on, and that is all: whoever asks
-/// for its rows finds no vertex there.
-template <int N>
+/// A tile without a vertex or a cell tells so and nothing else: whoever asks for its sums adds
+/// nothing, and whoever asks for its rows finds no vertex there.
 __device__ void pass_empty_tile(TileShared& s, const TileParams& p) {
-  if (warp_id() == Team<N>::kVertices) {
-    if (lane_id() == 0) {
-      s.all_vertices = 0;
-      publish_sum(p.order[s.item].vertices, s.item, 0);
-    }
-    __syncwarp();
-    find_vertex_base(s, p);
-    if (lane_id() == 0) release_rows(s, p);
-  }
-  if (warp_id() == Team<N>::kTriangles) {
-    if (lane_id() == 0) publish_sum(p.order[s.item].triangles, s.item, 0);
-    find_triangle_base(s, p, 0);
-  }
-  __syncthreads();
+  if (threadIdx.x != 0) return;
+  publish_sum(p.order[s.item].vertices, s.item, 0);
+  publish_sum(p.order[s.item].triangles, s.item, 0);
+  s.number_base = 0;
+  release_rows(s, p);
 }
 
 /// Counts a tile's crossing edges and active cells, and leaves their places. False where there
-/// are none.
+/// are none; the last tile, which tells what all have, goes on.
 template <int N, bool Nan>
 __device__ bool count_tile(TileShared& s, const TileParams& p) {
   count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
@@ -54,8 +44,9 @@ __device__ bool count_tile(TileShared& s, const TileParams& p) {
   const SlabPlanes planes = planes_of<N>(s.item);
   const PlaneBases bases = PlaneBases::of(s, planes);
   const std::uint32_t vertices = bases.made<N>(s, planes);
-  if (!Nan && vertices + bases.cells == 0) {
-    pass_empty_tile<N>(s, p);
+  if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
+    pass_empty_tile(s, p);
+    __syncthreads();
     return false;
   }
   if (threadIdx.x == 0) {
@@ -228,13 +219,12 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   extern __shared__ __align__(256) unsigned char bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(bytes);
   const std::uint32_t first = next_number(p);
-  const CaseEntries<N> cases(case_entries);
   if (p.candidates.count > 0) find_candidates<N, T>(s, p);
-  fill_tables<N>(s, cases);
+  fill_tables<N>(s, case_entries);
   const Classifier<T> classifier(threshold);
   wait_for_launch_before();
   if (p.candidates.count == 0 && threadIdx.x == 0) s.items = *p.item_count;
-  __syncwarp();
+  __syncthreads();
   take_tile<N, T>(s, p, first);
   __syncthreads();
   while (s.item < s.items) {
