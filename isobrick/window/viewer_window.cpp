@@ -230,7 +230,7 @@ bool ViewerWindow::draw_picture(int width, int height) {
   // The first picture of a surface should not wait for a good one.
   const bool fluent = moving() || !picture.state().covers;
   PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1,
-                 .piece_seconds = kPieceSeconds,
+                 .piece_seconds = options_.piece_seconds,
                  .moving = fluent};
   // Nor should those that follow while meshes come in.
   if (state_.pacer.plain())

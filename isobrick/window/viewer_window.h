@@ -19,6 +19,7 @@ struct WindowOptions {
   CameraRequest camera;                 ///< for the first store
   ViewSettings settings;                ///< for the first store
   std::filesystem::path bookmarks;      ///< file; empty: the user's own
+  double piece_seconds = kPieceSeconds;
 };
 
 /// A window that shows a store: mouse, keys, panels, files dropped on it. All functions

@@ -201,7 +201,7 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
       make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}, .frequency = 4});
   NoProgress progress;
   convert(*source, dir_ / "many.zarr", {}, progress);
-  ViewerWindow& window = open();
+  ViewerWindow& window = open({.piece_seconds = 0.01});
   window.open(dir_ / "many.zarr");
   window.state().settings.pixel_error = 0.2f;
   const StorePicture& picture = *window.state().picture;
@@ -236,7 +236,7 @@ TEST_F(Window, ClosesWithinAPieceOfAPicture) {
   const auto source = make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}});
   NoProgress progress;
   convert(*source, dir_ / "many.zarr", {}, progress);
-  ViewerWindow& window = open();
+  ViewerWindow& window = open({.piece_seconds = 0.01});
   window.open(dir_ / "many.zarr");
   window.state().settings.pixel_error = 0.2f;
   const StorePicture& picture = *window.state().picture;
