@@ -18,9 +18,15 @@ struct MeshDraw {
 };
 
 /// Meshes that are to be drawn, in pieces of any size. However large the pieces are, the triangles
-/// have one order: meshes of one block of a pool stand together, or else as they were added.
+/// have one order.
 class MeshQueue {
  public:
+  /// Meshes of one block of a pool together, which takes fewer calls, or all as they were added, so
+  /// that it does not show where in the pool they lie.
+  enum class Order : std::uint8_t { blocks, added };
+
+  explicit MeshQueue(Order order = Order::added) : sorted_(order == Order::added) {}
+
   /// Before the first take(); `mesh` must live until the last of those.
   void add(const PooledMesh& mesh, const MeshStyle& style);
 
@@ -36,7 +42,7 @@ class MeshQueue {
   std::vector<MeshDraw> draws_, piece_;
   std::size_t next_ = 0;
   std::uint64_t left_ = 0;
-  bool sorted_ = false;
+  bool sorted_;
 };
 
 }  // namespace isobrick

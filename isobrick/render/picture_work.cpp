@@ -28,6 +28,8 @@ void take(std::uint64_t& work, std::uint64_t done) { work -= std::min(work, done
 
 void PictureWork::start(const PictureTargets& targets, const PictureSettings& settings) {
   *this = {};
+  opaque_ = transparent_ =
+      MeshQueue(settings.in_order ? MeshQueue::Order::added : MeshQueue::Order::blocks);
   steps_ = ScreenPass::steps(settings);
   width_ = targets.width;
   height_ = targets.height;

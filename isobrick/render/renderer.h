@@ -22,10 +22,13 @@ struct WorldBox {
 /// How a picture is made. Colours are sRGB in [0, 1].
 struct PictureSettings {
   Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
-  bool multisample = true;         ///< four samples a pixel
-  bool occlusion = true;           ///< less light where the surroundings are near
-  bool edges = false;              ///< dark lines where depth or direction break off
-  bool picking = false;            ///< keep which mesh each pixel shows
+  bool multisample = true;  ///< four samples a pixel
+  bool occlusion = true;    ///< less light where the surroundings are near
+  bool edges = false;       ///< dark lines where depth or direction break off
+  bool picking = false;     ///< keep which mesh each pixel shows
+  /// Meshes are drawn as they come. It shows at pixels where two are equally far, and of
+  /// transparent ones in the last bits. Without, those that lie together in memory take one call.
+  bool in_order = true;
   std::vector<HalfSpace> planes;   ///< what lies within all of them is drawn
   std::optional<WorldBox> region;  ///< and within this box, which counts as 6 planes of at most 12
 };

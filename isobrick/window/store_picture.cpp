@@ -240,9 +240,10 @@ void StorePicture::begin_picture(const Asked& asked) {
   Stopwatch watch;
   ViewSettings settings = asked.settings;
   if (work_->state.plain) settings.occlusion = settings.multisample = false;
-  renderer().begin(
-      asked.camera, asked.width, asked.height,
-      picture_settings(settings, scene_->tree().grid().transform(), last_sample(*store_)));
+  PictureSettings picture =
+      picture_settings(settings, scene_->tree().grid().transform(), last_sample(*store_));
+  picture.in_order = asked.way.in_order || setup_->software();
+  renderer().begin(asked.camera, asked.width, asked.height, picture);
   draw_surfaces(settings, work_->state);
   slices_.draw(renderer(), settings, work_->state.damage);
   draw_marks(renderer(), settings, scene_->tree().grid(), last_sample(*store_), shown_.get());
@@ -381,7 +382,7 @@ void StorePicture::update_state(const Asked& asked) {
 
 void StorePicture::draw_complete(const Camera& camera, int width, int height,
                                  const ViewSettings& settings, const std::function<void()>& wait) {
-  const PictureWay way{.piece_seconds = kPieceSeconds};
+  const PictureWay way{.piece_seconds = kPieceSeconds, .in_order = true};
   for (;;) {
     draw(camera, width, height, settings, way);
     // The cut depends on what meshes were like; once more, it may be another.

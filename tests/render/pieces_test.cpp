@@ -91,6 +91,37 @@ PictureSettings with_everything(bool multisample) {
   return settings;
 }
 
+/// Balls around each other, the next one so much larger, added to a pool in the order of `order`.
+std::vector<PooledMesh> add_shells(MeshPool& pool, const std::vector<std::size_t>& order,
+                                   float larger) {
+  std::vector<PooledMesh> shells(order.size());
+  for (const std::size_t i : order)
+    shells[i] = pool.add(make_ball({0, 0, 0}, 0.3f + larger * static_cast<float>(i), 24).chunk());
+  return shells;
+}
+
+TEST_F(Pieces, WhereMeshesLieDoesNotShow) {
+  const auto picture = [&](bool opaque, const std::vector<std::size_t>& order) {
+    MeshPool pool(3000);
+    const std::vector<PooledMesh> shells = add_shells(pool, order, opaque ? 0 : 0.05f);
+    Camera camera({0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1});
+    camera.fit({-1, -1, -1}, {1, 1, 1}, double{kWidth} / kHeight);
+    renderer().begin(camera, kWidth, kHeight, {.multisample = false, .occlusion = false});
+    for (std::size_t i = 0; i < shells.size(); ++i)
+      renderer().draw(shells[i], {.colour = {0.9f, 0.4f, 0.1f * static_cast<float>(i)},
+                                  .opacity = opaque ? 1 : 0.3f + 0.05f * static_cast<float>(i)});
+    renderer().end();
+    auto pixels = renderer().read_pixels();
+    renderer().discard();
+    return pixels;
+  };
+  for (const bool opaque : {false, true}) {
+    const auto expected = picture(opaque, {0, 1, 2, 3, 4, 5, 6, 7});
+    EXPECT_EQ(picture(opaque, {7, 2, 5, 0, 3, 6, 1, 4}), expected) << opaque;
+    EXPECT_EQ(picture(opaque, {7, 6, 5, 4, 3, 2, 1, 0}), expected) << opaque;
+  }
+}
+
 TEST_F(Pieces, GiveTheSameBytesWhateverTheirSize) {
   for (const bool multisample : {false, true}) {
     begin(with_everything(multisample));
