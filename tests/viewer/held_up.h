@@ -1,25 +1,16 @@
 #pragma once
 
 #include <condition_variable>
-#include <memory>
 #include <mutex>
-#include <utility>
 
-#include "isobrick/viewer/brick_source.h"
+#include "tests/viewer/forwarding.h"
 
 namespace isobrick::test {
 
 /// A source whose bricks are read only when they may be.
-class HeldUp final : public BrickSource {
+class HeldUp final : public Forwarding {
  public:
-  explicit HeldUp(std::shared_ptr<const BrickSource> from) : from_(std::move(from)) {}
-  const StoreInfo& info() const override { return from_->info(); }
-  RangeTable brick_ranges(int level, Box3 bricks) const override {
-    return from_->brick_ranges(level, bricks);
-  }
-  RangeTable block_ranges(int level, Box3 blocks) const override {
-    return from_->block_ranges(level, blocks);
-  }
+  using Forwarding::Forwarding;
   bool read_brick(int level, Int3 brick, std::byte* samples) const override {
     std::unique_lock lock(mutex_);
     reading_ = true;
@@ -43,7 +34,6 @@ class HeldUp final : public BrickSource {
   }
 
  private:
-  std::shared_ptr<const BrickSource> from_;
   mutable std::mutex mutex_;
   mutable std::condition_variable change_;
   mutable bool reading_ = false;

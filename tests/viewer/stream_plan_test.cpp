@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/viewer/always.h"
+#include "tests/viewer/forwarding.h"
 #include "tests/viewer/held_up.h"
 #include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
@@ -170,17 +171,10 @@ TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
 }
 
 /// A brick that comes only when another one has been read.
-class OneAfterAnother final : public BrickSource {
+class OneAfterAnother final : public Forwarding {
  public:
   OneAfterAnother(std::shared_ptr<const BrickSource> from, Int3 held, Int3 first)
-      : from_(std::move(from)), held_(held), first_(first) {}
-  const StoreInfo& info() const override { return from_->info(); }
-  RangeTable brick_ranges(int level, Box3 bricks) const override {
-    return from_->brick_ranges(level, bricks);
-  }
-  RangeTable block_ranges(int level, Box3 blocks) const override {
-    return from_->block_ranges(level, blocks);
-  }
+      : Forwarding(std::move(from)), held_(held), first_(first) {}
   bool read_brick(int level, Int3 brick, std::byte* samples) const override {
     std::unique_lock lock(mutex_);
     if (brick == first_) {
@@ -193,7 +187,6 @@ class OneAfterAnother final : public BrickSource {
   }
 
  private:
-  std::shared_ptr<const BrickSource> from_;
   Int3 held_, first_;
   mutable std::mutex mutex_;
   mutable std::condition_variable change_;

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "isobrick/viewer/brick_source.h"
+
+namespace isobrick::test {
+
+/// A source that gives what another one gives, but for how bricks are read.
+class Forwarding : public BrickSource {
+ public:
+  explicit Forwarding(std::shared_ptr<const BrickSource> from) : from_(std::move(from)) {}
+  const StoreInfo& info() const override { return from_->info(); }
+  RangeTable brick_ranges(int level, Box3 bricks) const override {
+    return from_->brick_ranges(level, bricks);
+  }
+  RangeTable block_ranges(int level, Box3 blocks) const override {
+    return from_->block_ranges(level, blocks);
+  }
+
+ protected:
+  std::shared_ptr<const BrickSource> from_;
+};
+
+}  // namespace isobrick::test
