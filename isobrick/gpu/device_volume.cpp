@@ -88,6 +88,19 @@ void DeviceVolume::Impl::list_tiles() {
   ranges = DeviceBuffer<std::byte>(2 * lattice.sample_bytes() * tile_count, stream);
   launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(), stream.get());
   stream.wait();
+  if (tile_count <= kMostSearchedByBlock) keep_ranges_here();
+}
+
+void DeviceVolume::Impl::keep_ranges_here() {
+  for_each_morton(lattice.tiles(), [&](Int3 t) { tiles_here.push_back(t); });
+  visit_device_scalar(lattice.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    std::vector<T> values(2 * std::size_t{tile_count});
+    check(cudaMemcpy(values.data(), ranges.data(), ranges.bytes(), cudaMemcpyDeviceToHost));
+    for (std::size_t i = 0; i < tile_count; ++i)
+      ranges_here.push_back(
+          {static_cast<double>(values[2 * i]), static_cast<double>(values[2 * i + 1])});
+  });
 }
 
 TileParams DeviceVolume::Impl::params() const {

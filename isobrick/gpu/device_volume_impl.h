@@ -1,5 +1,8 @@
 #pragma once
 
+#include <vector>
+
+#include "isobrick/core/range.h"
 #include "isobrick/gpu/device_volume.h"
 #include "isobrick/gpu/stream.h"
 #include "isobrick/gpu/tile_params.h"
@@ -17,6 +20,10 @@ struct DeviceVolume::Impl {
   DeviceBuffer<std::uint32_t> order_of_tile;  ///< [z, y, x]: its place in that order
   DeviceBuffer<std::byte> ranges;             ///< of all in Morton order
 
+  /// Few tiles and their ranges are also kept here, for the host to search: in Morton order.
+  std::vector<Int3> tiles_here;
+  std::vector<ValueRange<double>> ranges_here;
+
   Impl(const Lattice& lattice, const BrickLookup& bricks, double fill_value);
 
   /// What the kernels need to find samples; page 0 is that of the fill value.
@@ -25,6 +32,7 @@ struct DeviceVolume::Impl {
  private:
   void upload_pages(const BrickLookup& bricks, double fill_value);
   void list_tiles();
+  void keep_ranges_here();
 };
 
 }  // namespace isobrick::gpu

@@ -8,6 +8,8 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume_impl.h"
+#include "isobrick/gpu/host_search.h"
+#include "isobrick/gpu/kernel_graph.h"
 #include "isobrick/gpu/search_kernel.h"
 #include "isobrick/gpu/supported.h"
 #include "isobrick/gpu/tile_index.h"
@@ -21,7 +23,6 @@ namespace {
 struct Counters {
   std::uint32_t item_count, found;
   unsigned long long number_start, number_end;
-  SurfaceTotals totals;
   // From here on, with the sums of the search behind it, zeroed by the end of each launch.
   alignas(8) std::uint32_t search_ticket, extract_ticket, done, unused;
 };
@@ -41,7 +42,7 @@ struct ResidentExtractor::Impl {
   std::uint32_t active = 0;  ///< tiles of the last launch
   double isovalue = 0;
   std::uint32_t epoch = 0;
-  DeviceBuffer<std::uint16_t> case_entries;
+  DeviceBuffer<CaseTable> cases;
   DeviceBuffer<TileItem> items;
   DeviceBuffer<std::uint32_t> slot_of_tile;
   DeviceBuffer<OrderState> order;
@@ -54,16 +55,18 @@ struct ResidentExtractor::Impl {
   DeviceCounts made;  ///< by the last extraction
   Event start, end;
   TileSearch search;
-  std::optional<SpanIndices> index;  ///< of the tiles, where the search is through one
+  std::optional<SpanIndices> index;       ///< of the tiles, where the search is through one
+  std::optional<HostSearch> host_search;  ///< where there is no index and tiles are few
+  KernelGraph graph;
 
   Impl(DeviceVolume& v, const SurfaceOptions& o, const ResidentTuning& tuning)
       : volume(v.impl()),
         options(o),
         shapes(launch_shapes(kernel_of(volume.lattice.type, o), tuning.threads)),
-        case_entries(kCaseEntries, volume.stream),
+        cases(1, volume.stream),
         items(volume.tile_count, volume.stream),
         slot_of_tile(volume.tile_count, volume.stream),
-        order(volume.tile_count * slabs(), volume.stream),
+        order(volume.tile_count * slabs() * (are_few() ? 2 : 1), volume.stream),
         words(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
         search(tuning.search) {
     if (const auto kind = index_kind_of(search)) index.emplace(index_tiles(volume, *kind));
@@ -72,20 +75,35 @@ struct ResidentExtractor::Impl {
       throw UsageError("a resident volume makes welded meshes only; use the CPU");
     options.roi = intersect(o.roi, volume.lattice.box());
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
-    std::uint16_t entries[kCaseEntries];
-    make_case_entries(world_map(options.transform).mirrored, entries);
-    check(cudaMemcpyAsync(case_entries.data(), entries, sizeof entries, cudaMemcpyHostToDevice,
+    const CaseTable table = make_case_table(world_map(options.transform).mirrored);
+    check(cudaMemcpyAsync(cases.data(), &table, sizeof table, cudaMemcpyHostToDevice,
                           volume.stream.get()));
     check(cudaMemsetAsync(words.data(), 0, words.bytes(), volume.stream.get()));
-    if (searched_by_blocks()) {
+    if (are_few()) {
       make_row_tables(volume.tile_count * slabs());
       check(cudaMemsetAsync(order.data(), 0, order.bytes(), volume.stream.get()));
+      if (!index) host_search.emplace(volume.tiles_here, ranges_to_search());
     }
     volume.stream.wait();
   }
 
-  /// Few tiles need no launch of their own to find the active ones.
-  bool searched_by_blocks() const { return volume.tile_count <= kMostSearchedByBlock; }
+  /// So few tiles need no launch of their own to find the active ones.
+  bool are_few() const { return volume.tile_count <= kMostSearchedByBlock; }
+  /// Of the tiles that have a cell in the region of interest; empty ones of others.
+  std::vector<ValueRange<double>> ranges_to_search() const {
+    std::vector<ValueRange<double>> ranges = volume.ranges_here;
+    const bool uncut = options.roi == volume.lattice.box();
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+      const Int3 origin = volume.tiles_here[i] * Index{32};
+      const Int3 lo = max(options.roi.lo, origin),
+                 last = min(options.roi.hi - Int3{1, 1, 1}, origin + Int3{32, 32, 32});
+      if (!uncut && (last.x <= lo.x || last.y <= lo.y || last.z <= lo.z))
+        ranges[i] = {};
+      else if (search == TileSearch::none)
+        ranges[i] = {-HUGE_VAL, HUGE_VAL};
+    }
+    return ranges;
+  }
   /// Parts of a tile that may have a block each.
   std::uint32_t slabs() const { return volume.tile_count <= kMostInSlabs ? kSlabsOfTile : 1; }
   std::size_t search_blocks() const {
@@ -130,10 +148,11 @@ struct ResidentExtractor::Impl {
     gpu::launch_search(volume.lattice.type, p, volume.stream.get());
   }
 
-  void launch_tiles() {
+  void launch_tiles(const FoundTiles& found) {
     TileParams p = volume.params();
-    if (searched_by_blocks()) {
+    if (are_few()) {
       p.candidates = candidates();
+      p.found = found;
     } else {
       p.items = items.data();
       p.item_count = &counters()->item_count;
@@ -148,7 +167,6 @@ struct ResidentExtractor::Impl {
     p.world = world_map(options.transform);
     p.diagonal = is_diagonal(p.world);
     p.row_tables = row_tables.data();
-    p.order = order.data();
     p.ticket = &counters()->extract_ticket;
     p.epoch = ++epoch;
     p.number_start = &counters()->number_start;
@@ -158,18 +176,34 @@ struct ResidentExtractor::Impl {
     p.triangles = triangles.data();
     p.vertex_capacity = positions.size();
     p.triangle_capacity = triangles.size();
-    p.totals = &counters()->totals;
     p.end.report = report.on_device();
     p.end.launch = ++launches;
+    p.order = order.data();
+    if (are_few()) {  // two that take turns
+      p.end.next_items = volume.tile_count * slabs();
+      p.end.next_order = order.data();
+      (launches % 2 ? p.order : p.end.next_order) += p.end.next_items;
+    }
     p.end.found = &counters()->found;
     p.end.done = &counters()->done;
     p.end.zero = &counters()->search_ticket;
     p.end.zero_words = static_cast<std::uint32_t>(
         (words.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
-    LaunchShape shape = slabs() > 1 ? shapes.in_slabs(active) : shapes.of(active);
-    shape.blocks = std::min(shape.blocks, static_cast<int>(volume.tile_count) * shape.slabs);
-    launch_extraction(kernel_of(volume.lattice.type, options), p, case_entries.data(), shape,
-                      volume.stream.get(), !searched_by_blocks());
+    const LaunchShape shape = shape_of(found);
+    // Blocks that are all at work at a time may wait for each other in any order.
+    if (shape.blocks == static_cast<int>(found.count) * shape.slabs) p.ticket = nullptr;
+    launch_extraction(kernel_of(volume.lattice.type, options), p, cases.data(), shape,
+                      volume.stream.get(), !are_few(), are_few() ? &graph : nullptr);
+  }
+
+  /// Of no more blocks than there are tiles, or slabs.
+  LaunchShape shape_of(const FoundTiles& found) const {
+    const bool known = found.count != FoundTiles::kNotSearched;
+    const std::uint32_t expected = known ? found.count : active;
+    LaunchShape shape = known && slabs() > 1 ? shapes.in_slabs(expected) : shapes.of(expected);
+    const std::uint32_t most = known ? found.count : volume.tile_count;
+    shape.blocks = std::min(shape.blocks, static_cast<int>(most) * shape.slabs);
+    return shape;
   }
 
   /// Buffers for a mesh of that size. What they held is lost.
@@ -213,8 +247,9 @@ struct ResidentExtractor::Impl {
       if (!is_there())
         throw Error("the device has ended an extraction without saying what it made");
     }
-    return {LaunchReport::value_of(seen[0]), LaunchReport::value_of(seen[1]),
-            static_cast<std::uint32_t>(LaunchReport::value_of(seen[2]))};
+    return {LaunchReport::value_of(seen[LaunchReport::kVertices]),
+            LaunchReport::value_of(seen[LaunchReport::kTriangles]),
+            static_cast<std::uint32_t>(LaunchReport::value_of(seen[LaunchReport::kActiveTiles]))};
   }
 
   DeviceCounts extract(double value) {
@@ -222,7 +257,7 @@ struct ResidentExtractor::Impl {
     isovalue = value;
     // Tiles that have no room are not begun: the first launch tells how many there are.
     for (;;) {
-      launch();
+      if (!launch()) return made = {};
       const DeviceCounts seen = wait_for_report();
       active = seen.active_tiles;
       const bool begun = active <= row_tables.size();
@@ -241,9 +276,14 @@ struct ResidentExtractor::Impl {
     }
   }
 
-  void launch() {
-    if (!searched_by_blocks()) launch_search();
-    launch_tiles();
+  /// False where it is known that there is nothing to make.
+  bool launch() {
+    FoundTiles found;
+    if (host_search) found = host_search->find(isovalue);
+    if (found.count == 0) return false;
+    if (!are_few()) launch_search();
+    launch_tiles(found);
+    return true;
   }
 
   void repeat() {
@@ -283,7 +323,7 @@ void ResidentExtractor::download(MeshBuffer& mesh) const {
 
 std::uint64_t ResidentExtractor::bytes() const {
   const Impl& i = *impl_;
-  return i.case_entries.bytes() + i.items.bytes() + i.slot_of_tile.bytes() + i.order.bytes() +
+  return i.cases.bytes() + i.items.bytes() + i.slot_of_tile.bytes() + i.order.bytes() +
          i.words.bytes() + i.row_tables.bytes() + i.positions.bytes() + i.normals.bytes() +
          i.triangles.bytes() + (i.index ? i.index->bytes() : 0);
 }

@@ -68,16 +68,14 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
     lanes_.push_back(std::move(lane));
   }
   pages_ = arena_->take<std::byte>(sizes.page_bytes);
-  case_entries_ = arena_->take<std::uint16_t>(kCaseEntries);
+  cases_ = arena_->take<CaseTable>(1);
   number_ends_ = arena_->take<unsigned long long>(kEnds + 1);
   params_.row_tables = arena_->take<RowTable>(sizes.slots);
   check(cudaMemsetAsync(number_ends_, 0, (kEnds + 1) * sizeof(unsigned long long), kernel_.get()));
   check(cudaMemsetAsync(params_.row_tables, 0, sizes.slots * sizeof(RowTable), kernel_.get()));
   const WorldMap world = world_map(options_.transform);
-  std::uint16_t entries[kCaseEntries];
-  make_case_entries(world.mirrored, entries);
-  check(cudaMemcpyAsync(case_entries_, entries, sizeof entries, cudaMemcpyHostToDevice,
-                        kernel_.get()));
+  const CaseTable cases = make_case_table(world.mirrored);
+  check(cudaMemcpyAsync(cases_, &cases, sizeof cases, cudaMemcpyHostToDevice, kernel_.get()));
   kernel_.wait();
   params_.pages = pages_;
   for (int axis = 0; axis < 3; ++axis) {
@@ -135,7 +133,7 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   lane.unpacked.record(kernel_);
   LaunchShape shape = shapes_.of(count);
   shape.blocks = std::min(shape.blocks, static_cast<int>(count));
-  launch_extraction(kernel_of(lattice_.type, options_), p, case_entries_, shape, kernel_.get());
+  launch_extraction(kernel_of(lattice_.type, options_), p, cases_, shape, kernel_.get());
   check(cudaMemcpyAsync(lane.totals, &header->totals, sizeof(SurfaceTotals), cudaMemcpyDeviceToHost,
                         kernel_.get()));
   lane.extracted.record(kernel_);

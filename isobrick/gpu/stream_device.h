@@ -92,7 +92,7 @@ class StreamDevice {
   std::mutex launching_;
   TileParams params_{};
   std::byte* pages_ = nullptr;
-  std::uint16_t* case_entries_ = nullptr;
+  CaseTable* cases_ = nullptr;
   static constexpr std::uint64_t kEnds = 4;
   unsigned long long* number_ends_ = nullptr;  ///< of the last launches, in turn; then a zero
   std::uint32_t epoch_ = 0;

@@ -148,8 +148,9 @@ __device__ inline void classify_planes(TileShared& s, const TileParams& p,
   const int lane = static_cast<int>(lane_id());
   const auto inside = [&](T v) { return __ballot_sync(kAll, v >= classifier.threshold); };
   const SlabPlanes planes = planes_of<N>(s.item);
-  for (int z = planes.first + static_cast<int>(warp_id()); z < planes.read_end;
-       z += Team<N>::kWarps) {
+  const int first = static_cast<int>(warp_id()) - Team<N>::kFirstWithRows;
+  if (first < 0) return;
+  for (int z = planes.first + first; z < planes.read_end; z += Team<N>::kWarps) {
     const int page = page_of(0, 0, z), start = 1024 * z;
     const T* from = sample_at<T>(s, page, start + lane);
     std::uint32_t word = 0;
@@ -181,9 +182,10 @@ template <int N>
 __device__ inline void clear_lists(TileShared& s) {
   const uint4 zero{0, 0, 0, 0};
   auto& lists = lists_of<N>(s);
-  for (unsigned i = own_thread(); i < lists.kListed / 4; i += N)
+  using Spare = SpareThreads<N>;
+  for (unsigned i = Spare::own(); i < lists.kListed / 4; i += Spare::kCount)
     reinterpret_cast<uint4*>(lists.cells)[i] = zero;
-  for (unsigned i = own_thread(); i < lists.kListed / 8; i += N)
+  for (unsigned i = Spare::own(); i < lists.kListed / 8; i += Spare::kCount)
     reinterpret_cast<uint4*>(lists.vertex_marks)[i] = zero;
 }
 

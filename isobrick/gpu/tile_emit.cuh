@@ -164,13 +164,11 @@ inline constexpr std::uint32_t kNumberOfWord =
 
 /// Fills the tables of places and triangles; once a block.
 template <int N>
-__device__ inline void fill_tables(TileShared& s, const std::uint16_t* triangles) {
-  for (unsigned i = threadIdx.x; i < 256 * 5; i += N) {
-    const std::uint32_t entry = triangles[i];
-    s.triangles[i] = static_cast<std::uint16_t>((entry & 0xfffu) << 3);
-    if (i % 5 == 0) s.triangle_count[i / 5] = static_cast<std::uint8_t>(entry >> 12);
-  }
-  for (unsigned t = threadIdx.x; t < 24; t += N) {
+__device__ inline void fill_tables(TileShared& s, const CaseTable* cases) {
+  using Spare = SpareThreads<N>;
+  for (unsigned i = Spare::own(); i < sizeof(CaseTable) / sizeof(uint4); i += Spare::kCount)
+    reinterpret_cast<uint4*>(&s.cases)[i] = __ldg(reinterpret_cast<const uint4*>(cases) + i);
+  for (unsigned t = Spare::own(); t < 24; t += Spare::kCount) {
     const unsigned e = t % 12, at_0 = t / 12;
     const unsigned axis = e / 4, first = e & 1u, second = e >> 1 & 1u;
     const unsigned row = axis == 0 ? first + 33 * second : axis == 1 ? 33 * second : second;
@@ -206,7 +204,7 @@ __device__ inline void emit_triangle(const TileShared& s, std::uint32_t places, 
     return *reinterpret_cast<const std::uint32_t*>(base + at);
   };
   const std::uint32_t x = cell & 31u, row = cell >> 3 & 0x1ffcu, mask = low_bits(x);
-  const std::uint32_t edges = s.triangles[5 * __byte_perm(cell, 0, 0x4442) + number];
+  const std::uint32_t edges = s.cases.triangles[5 * __byte_perm(cell, 0, 0x4442) + number];
   const std::uint32_t of_x =
       x == 0 ? places + static_cast<std::uint32_t>(sizeof s.places[0]) : places;
   std::uint32_t corners[3];

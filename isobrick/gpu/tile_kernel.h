@@ -3,16 +3,11 @@
 #include <cuda_runtime_api.h>
 
 #include "isobrick/core/scalar.h"
+#include "isobrick/gpu/kernel_graph.h"
 #include "isobrick/gpu/tile_params.h"
 #include "isobrick/surface/surface_options.h"
 
 namespace isobrick::gpu {
-
-/// Bytes of the table that the kernel reads its cases from, and their making:
-/// for each case five entries of three edges, 4 bits each; the upper 4 bits of
-/// the first entry are the number of triangles.
-inline constexpr std::size_t kCaseEntries = 256 * 5;
-void make_case_entries(bool mirrored, std::uint16_t (&entries)[kCaseEntries]);
 
 /// Which kernel makes a surface.
 struct TileKernel {
@@ -50,9 +45,9 @@ LaunchShapes launch_shapes(const TileKernel& kernel, int threads = 0);
 
 /// Launches the extraction of all items on `stream`: one block takes one tile
 /// after the other, in their order. After a search, which finds them, blocks start while it is
-/// at work.
-void launch_extraction(const TileKernel& kernel, const TileParams& params,
-                       const std::uint16_t* case_entries, LaunchShape shape, cudaStream_t stream,
-                       bool after_search = false);
+/// at work. With a graph it is launched through that.
+void launch_extraction(const TileKernel& kernel, const TileParams& params, const CaseTable* cases,
+                       LaunchShape shape, cudaStream_t stream, bool after_search = false,
+                       KernelGraph* graph = nullptr);
 
 }  // namespace isobrick::gpu

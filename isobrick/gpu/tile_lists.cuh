@@ -101,7 +101,7 @@ __device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
       return __funnelshift_r(bits.at, bits.last, x) & 3u;
     };
     const std::uint32_t index = pair(0) | pair(1) << 2 | pair(33) << 4 | pair(34) << 6;
-    std::uint32_t count = s.triangle_count[index];
+    std::uint32_t count = s.cases.triangle_count[index];
     if (i >= listed) count = 0;
     const std::uint32_t sum = warp_inclusive_sum(count);
     if (i < listed) lists.cells[i] = x | place.row << 5 | index << 16 | (sum - count) << 24;

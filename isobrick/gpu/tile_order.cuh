@@ -82,6 +82,12 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
   return sum;
 }
 
+/// One word of the launch's report. No order among them, so none waits for another.
+__device__ inline void say(const LaunchEnd& end, LaunchReport::Word word, std::uint64_t value) {
+  cuda::atomic_ref<std::uint64_t, cuda::thread_scope_system>(end.report->words[word])
+      .store(LaunchReport::word(value, end.launch), cuda::memory_order_relaxed);
+}
+
 /// Where the tile's vertices go. One warp.
 __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   const std::uint32_t item = s.item;
@@ -93,7 +99,10 @@ __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   s.vertex_base = base;
   s.number_base = static_cast<std::uint32_t>(start + base);
   if (item + 1 < s.items) return;
-  p.totals->vertices = base + s.all_vertices;
+  if (p.end.report)
+    say(p.end, LaunchReport::kVertices, base + s.all_vertices);
+  else
+    p.totals->vertices = base + s.all_vertices;
   *p.number_end = start + base + s.all_vertices;
 }
 
@@ -114,35 +123,48 @@ __device__ inline void find_triangle_base(TileShared& s, const TileParams& p,
                  triangles);
   if (lane_id() != 0) return;
   s.triangle_base = base;
-  if (item + 1 == s.items) p.totals->triangles = base + triangles;
+  if (item + 1 < s.items) return;
+  if (p.end.report)
+    say(p.end, LaunchReport::kTriangles, base + triangles);
+  else
+    p.totals->triangles = base + triangles;
 }
 
-/// Where an active tile of a resident volume, or that slab of it, leaves its row table; kNone
-/// for others.
-template <int N>
+/// Where an active tile of a resident volume leaves its row table; kNone for others.
 __device__ inline std::uint32_t slot_of(const TileShared& s, const TileParams& p, int x, int y,
-                                        int z, std::uint32_t slab) {
+                                        int z) {
   const std::int64_t place = (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x;
-  const std::uint32_t number = p.candidates.count > 0
-                                   ? number_of_candidate(s, p.candidates.order_of_tile[place])
-                                   : p.slot_of_tile[place];
-  return Team<N>::kSlabs == 1 || number == kNone ? number : number * Team<N>::kSlabs + slab;
+  return p.candidates.count > 0 ? number_of_candidate(s, p.candidates.order_of_tile[place])
+                                : p.slot_of_tile[place];
+}
+
+/// Where the row table of the tile before is copied to. In a slab others still look for cells
+/// while it comes.
+template <int N>
+__device__ inline RowTable& before_copy_of(TileShared& s) {
+  if constexpr (Team<N>::kSlabs == 1) return s.before_copy;
+  return *reinterpret_cast<RowTable*>(&lists_of<N>(s) + 1);
 }
 
 /// Brings the row table of the tile before to shared memory, on the way while this
 /// returns. One warp.
-__device__ inline void copy_before(TileShared& s, const RowTable& table) {
+__device__ inline void copy_table(RowTable& copy, const RowTable& table) {
 #if __CUDA_ARCH__ >= 800
   static_assert(sizeof(RowTable) % 16 == 0);
-  const auto to = static_cast<std::uint32_t>(__cvta_generic_to_shared(&s.before_copy));
+  const auto to = static_cast<std::uint32_t>(__cvta_generic_to_shared(&copy));
   const char* from = reinterpret_cast<const char*>(&table);
   for (unsigned at = 16 * lane_id(); at < sizeof(RowTable); at += 16 * 32)
     asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(to + at), "l"(from + at)
                  : "memory");
   asm volatile("cp.async.commit_group;" ::: "memory");
 #else
-  for (unsigned i = lane_id(); i <= kRowsOfTile; i += 32) s.before_copy.rows[i] = table.rows[i];
+  for (unsigned i = lane_id(); i <= kRowsOfTile; i += 32) copy.rows[i] = table.rows[i];
 #endif
+}
+
+__device__ inline std::uint32_t packed(const TileItem& tile) {
+  return FoundTiles::packed(static_cast<std::uint32_t>(tile.x), static_cast<std::uint32_t>(tile.y),
+                            static_cast<std::uint32_t>(tile.z));
 }
 
 /// The row table of the lower neighbour that lane 1 … 6 asks, where bits 0, 1, 2 of the lane
@@ -151,22 +173,58 @@ struct Neighbour {
   std::uint32_t slot;  ///< or kNone
   bool wait;           ///< the table may not be ready
 
-  template <int N>
   __device__ static Neighbour of_lane(const TileShared& s, const TileParams& p) {
-    constexpr std::uint32_t kSlabs = Team<N>::kSlabs;
     const TileItem& item = s.tile;
     const unsigned n = lane_id();
-    const int dx = n & 1, dy = n >> 1 & 1, dz = n >> 2;
-    const std::uint32_t slab = s.item % kSlabs;
-    const bool inside = n >= 1 && n <= 6 && !(dx && s.shape.first[0]) &&
-                        !(dy && s.shape.first[1]) && !(dz && (s.shape.first[2] || slab > 0));
-    if (!inside) return {kNone, false};
+    if (!has_lower(s, n)) return {kNone, false};
     if (!p.links)
-      return {slot_of<N>(s, p, item.x - dx, item.y - dy, item.z - dz, dz ? kSlabs - 1 : slab),
+      return {slot_of(s, p, item.x - static_cast<int>(n & 1), item.y - static_cast<int>(n >> 1 & 1),
+                      item.z - static_cast<int>(n >> 2)),
               true};
     const std::uint32_t slot = p.links[s.item].before[n - 1];
     if (slot == kNone) return {kNone, false};
     return {slot & ~TileLinks::kSameLaunch, (slot & TileLinks::kSameLaunch) && !p.tables_known};
+  }
+  /// The same of a slab, by the tiles that the host has found. All lanes.
+  template <int N>
+  __device__ static Neighbour of_slab(const TileShared& s, const TileParams& p) {
+    static_assert(kMostActiveInSlabs == 2 * 32);
+    constexpr std::uint32_t kSlabs = Team<N>::kSlabs;
+    const auto tile_at = [&](unsigned i) { return i < p.found.count ? p.found.tiles[i] : kNone; };
+    const std::uint32_t low = tile_at(lane_id()), high = tile_at(lane_id() + 32);
+    const auto number_of = [&](std::uint32_t tile) {
+      const auto in_low = static_cast<int>(__ballot_sync(kAll, low == tile)),
+                 in_high = static_cast<int>(__ballot_sync(kAll, high == tile));
+      if (in_low) return static_cast<std::uint32_t>(__ffs(in_low) - 1);
+      return in_high ? static_cast<std::uint32_t>(__ffs(in_high) + 31) : kNone;
+    };
+    const std::uint32_t own = packed(s.tile), slab = s.item % kSlabs;
+    Neighbour found{kNone, true};
+#pragma unroll
+    for (unsigned n = 1; n <= 6; ++n) {
+      // Only the first slab shares a plane with tiles below.
+      if (!has_lower(s, n) || (n >= 4 && slab > 0)) continue;
+      const std::uint32_t tile = own - FoundTiles::packed(n & 1, n >> 1 & 1, n >> 2);
+      const std::uint32_t number = number_of(tile);
+      if (lane_id() == n && number != kNone)
+        found.slot = number * kSlabs + (n >= 4 ? kSlabs - 1 : slab);
+    }
+    return found;
+  }
+
+  /// Kept in shared memory until it is asked.
+  __device__ void keep(TileShared& s) const {
+    if (lane_id() < 8) s.neighbour_base[lane_id()] = slot;
+  }
+  __device__ static Neighbour kept(const TileShared& s) {
+    return {lane_id() < 8 ? s.neighbour_base[lane_id()] : kNone, true};
+  }
+
+ private:
+  /// Whether the volume, or the region of interest, has a tile that is one lower like that.
+  __device__ static bool has_lower(const TileShared& s, unsigned n) {
+    return n >= 1 && n <= 6 && !((n & 1) && s.shape.first[0]) &&
+           !((n >> 1 & 1) && s.shape.first[1]) && !((n >> 2) && s.shape.first[2]);
   }
 };
 
@@ -182,7 +240,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
     DeviceWord word(p.row_tables[slot].base_and_epoch);
     unsigned long long seen = word.load(cuda::memory_order_acquire);
     while (neighbour.wait && seen >> 32 != p.epoch) {
-      __nanosleep(20);
+      if (Team<N>::kSlabs == 1) __nanosleep(20);  // slabs are all at work, and about as far
       seen = word.load(cuda::memory_order_acquire);
     }
     s.neighbour_base[n] = static_cast<std::uint32_t>(seen) - s.number_base;
@@ -194,9 +252,9 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
   const std::uint32_t before = slot_of_neighbour(1);
   // Where the cells' rows are needed again, the table is read where it is.
   const bool copied = before != kNone && s.all_cells <= ListsOf<N>::kListed;
-  if (copied) copy_before(s, p.row_tables[before]);
-  if (n == 0)
-    s.before = before == kNone ? nullptr : copied ? &s.before_copy : &p.row_tables[before];
+  RowTable& copy = before_copy_of<N>(s);
+  if (copied) copy_table(copy, p.row_tables[before]);
+  if (n == 0) s.before = before == kNone ? nullptr : copied ? &copy : &p.row_tables[before];
   // All on their way before the first is waited for.
   const auto fetch = [&](int neighbour, unsigned row) {
     const std::uint32_t from = slot_of_neighbour(neighbour);

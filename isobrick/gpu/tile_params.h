@@ -14,7 +14,7 @@ inline constexpr std::uint32_t kPageSamples = 32 * 32 * 32;
 /// Samples of its first column, x = 0.
 inline constexpr std::uint32_t kColumnSamples = 32 * 32;
 /// Where tiles are few, so many blocks share one, each of so many threads.
-inline constexpr int kSlabsOfTile = 4, kSlabTeam = 352;
+inline constexpr int kSlabsOfTile = 8, kSlabTeam = 352;
 /// Rows (y, z) of the 33³ samples that the cells of a tile touch.
 inline constexpr int kRowsOfTile = 33 * 33;
 
@@ -68,9 +68,24 @@ enum class TileTest : std::uint8_t {
   all             ///< takes them all
 };
 
-/// Tiles of volumes that are so small that every block searches them all by itself; of those
-/// whose tiles may be shared by several blocks.
+/// Tiles of volumes that are so small that no launch searches them; of those whose tiles may be
+/// shared by several blocks.
 inline constexpr std::uint32_t kMostSearchedByBlock = 1024, kMostInSlabs = 128;
+/// Active ones of the latter that are shared.
+inline constexpr std::uint32_t kMostActiveInSlabs = 64;
+
+/// Which of so few candidates are active, where the host has looked.
+struct FoundTiles {
+  static constexpr std::uint32_t kNotSearched = 0xffffffffu;
+  std::uint32_t count = kNotSearched;
+  std::uint32_t words[kMostSearchedByBlock / 32] = {};  ///< bit i: candidate i
+  std::uint32_t tiles[kMostActiveInSlabs] = {};         ///< the first active ones, packed
+
+  static constexpr std::uint32_t packed(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    static_assert(kMostSearchedByBlock <= 1u << 10);
+    return x | y << 10 | z << 20;
+  }
+};
 
 /// All tiles of a volume in Morton order.
 struct TileCandidates {
@@ -87,7 +102,8 @@ struct TileCandidates {
 /// tiles. Each word says by itself which launch it is about, so that none has to be written
 /// after the others, for which the device would wait until those have crossed the bus.
 struct LaunchReport {
-  static constexpr int kValueBits = 40, kWords = 3;
+  enum Word { kVertices, kTriangles, kActiveTiles, kWords };
+  static constexpr int kValueBits = 40;
   std::uint64_t words[kWords];
 
   static constexpr std::uint64_t word(std::uint64_t value, std::uint32_t launch) {
@@ -104,21 +120,33 @@ static_assert(LaunchReport::is_about(LaunchReport::word(5, (1u << 24) + 1), (1u 
 static_assert(!LaunchReport::is_about(LaunchReport::word(5, 1u << 24), (1u << 24) - 1));
 static_assert(LaunchReport::value_of(LaunchReport::word((1ull << 40) - 1, 77)) == (1ull << 40) - 1);
 
-/// What the last block of a launch does when all others are done.
+/// How a launch tells the host what it has made, and leaves everything as the next one needs it.
 struct LaunchEnd {
-  LaunchReport* report;        ///< or null: nothing
+  LaunchReport* report;        ///< or null: totals say it, and nothing is left to be done
   std::uint32_t launch;        ///< goes into the report
   const std::uint32_t* found;  ///< active tiles, where a search has counted them
   std::uint32_t* done;         ///< zeroed
   std::uint32_t* zero;         ///< words that the next launch needs zeroed, also `done`
   std::uint32_t zero_words;
+  OrderState* next_order;  ///< zeroed for the next launch, if not null
+  std::uint32_t next_items;
 };
+
+/// The cases as the kernel has them in shared memory: of each, its triangles, with three edges
+/// times 8, 4 bits apart, and how many there are.
+struct alignas(16) CaseTable {
+  std::uint16_t triangles[256 * 5];
+  std::uint8_t triangle_count[256];
+};
+/// For right-handed axes, or mirrored ones.
+CaseTable make_case_table(bool mirrored);
 
 struct TileParams {
   /// The tiles, where blocks do not search them themselves: then there are candidates.
   const TileItem* items;
   const std::uint32_t* item_count;
   TileCandidates candidates;
+  FoundTiles found;  ///< of the candidates
   const void* pages;
   /// [z, y, x] of `tiles`; kNone: all fill value. Null where page i + 1 is that of tile i.
   const std::uint32_t* page_of_tile;
@@ -138,7 +166,7 @@ struct TileParams {
   bool diagonal;  ///< the map has no term off the diagonal
   RowTable* row_tables;
   OrderState* order;                       ///< one an item, zeroed
-  std::uint32_t* ticket;                   ///< zeroed
+  std::uint32_t* ticket;                   ///< zeroed; null: block i takes item i
   std::uint32_t epoch;                     ///< never 0, new in each launch
   const unsigned long long* number_start;  ///< vertices of the launches before
   unsigned long long* number_end;          ///< and of this one, once it is over
@@ -146,7 +174,7 @@ struct TileParams {
   Vec3f* normals;
   Triangle* triangles;
   std::uint64_t vertex_capacity, triangle_capacity;
-  SurfaceTotals* totals;
+  SurfaceTotals* totals;  ///< where there is no report
   LaunchEnd end;
 };
 

@@ -39,6 +39,29 @@ struct OwnRow {
   __device__ int row() const { return 33 * z + y; }
 };
 
+/// The pieces of a slab: a plane each, of its own, one that it counts and one that it looks at,
+/// and the last rows of all. A warp has one at most.
+template <int N>
+inline constexpr int kPiecesOfSlab = 32 / Team<N>::kSlabs + 3;
+
+/// The threads that do what is to be done beside classifying: those of a slab that have no rows
+/// and do not look for neighbours, else all.
+template <int N>
+struct SpareThreads {
+  static constexpr int kAbove = Team<N>::kFirstWithRows + kPiecesOfSlab<N>;  ///< first warp
+  static_assert(Team<N>::kSlabs == 1 || Team<N>::kWarps > kAbove);
+  static constexpr unsigned kCount = Team<N>::kSlabs == 1 ? N : 32 * (1 + Team<N>::kWarps - kAbove);
+
+  /// The number of this one; beyond any number of things to do where it is none.
+  __device__ static unsigned own() {
+    if constexpr (Team<N>::kSlabs == 1) return own_thread();
+    const unsigned warp = warp_id();
+    return warp == Team<N>::kTriangles ? lane_id()
+           : warp >= kAbove            ? 32 * (1 + warp - kAbove) + lane_id()
+                                       : 1u << 30;
+  }
+};
+
 /// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp: of a slab, those of its planes
 /// `first` to `end`; of a whole tile, all. Loops, so that the code of each kind is there once:
 /// warps in different steps share the instruction cache.
@@ -46,7 +69,8 @@ template <int N, class F>
 __device__ inline void for_each_piece(int first, int end, F&& f) {
   auto piece = static_cast<int>(uniform(warp_id()));
   if constexpr (Team<N>::kSlabs > 1) {
-    static_assert(Team<N>::kWarps > 32 / Team<N>::kSlabs + 2, "a piece a warp");
+    piece -= Team<N>::kFirstWithRows;
+    if (piece < 0) return;
     if (first + piece < end)
       f(PlaneRows{first + piece});
     else if (first + piece == end)

@@ -28,10 +28,12 @@ struct Team {
   /// have, and where triangles go.
   static constexpr unsigned kVertices = 0, kTriangles = kWarps > 1 ? 1 : 0;
   /// How many teams a multiprocessor has room for.
-  static constexpr int kTeams = kSlabs > 1 ? 2 : N <= 384 ? 3 : N <= 640 ? 2 : 1;
+  static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
   /// Vertices or cells that are found at a time; tiles with more take several turns.
   /// A multiprocessor before Ampere has 64 KiB of shared memory.
-  static constexpr std::uint32_t kMostListed = kTeams == 3 ? 2560 : 7168;
+  static constexpr std::uint32_t kMostListed = kSlabs > 1 ? 2048 : kTeams == 3 ? 2560 : 7168;
+  /// The warps that have no rows: in a slab the two that ask, and those above.
+  static constexpr int kFirstWithRows = kSlabs > 1 ? 2 : 0;
 };
 inline constexpr std::uint32_t kListedBeforeAmpere = 512;
 template <int N>
@@ -100,9 +102,7 @@ struct alignas(256) TileShared {
   std::uint16_t cell_base[kRowsOfTile + 1];
   /// Numbers of the vertices at sample 0 on edges along y and along z.
   std::uint32_t at_0[2][kRowPitch];
-  /// Three edges times 8, 4 bits apart, a triangle: five a case.
-  std::uint16_t triangles[256 * 5];
-  std::uint8_t triangle_count[256];
+  CaseTable cases;
   alignas(256) EdgePlace places[2][16];  ///< of cells with x > 0, of those with x = 0
   /// Of the tiles around, x + 3·y + 9·z, where their sample (0, 0, 0) of this tile's
   /// coordinates would be.
@@ -127,8 +127,7 @@ struct alignas(256) TileShared {
   std::uint32_t done_before;                ///< blocks that were done before this one
   TileItem tile;
   Shape shape;
-  /// The active tiles as bits and how many come before each 32, where the block has
-  /// searched them.
+  /// The active tiles as bits and how many come before each 32, where there are candidates.
   std::uint32_t active[kMostSearchedByBlock / 32], active_before[kMostSearchedByBlock / 32];
 };
 

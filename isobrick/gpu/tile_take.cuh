@@ -47,15 +47,23 @@ __device__ inline void find_pages(TileShared& s, const TileParams& p, const Tile
 
 template <int N>
 __device__ inline TileItem item_of(const TileShared& s, const TileParams& p, std::uint32_t number) {
-  if (Team<N>::kSlabs == 1 && p.candidates.count == 0) return p.items[number];
-  const std::int32_t* tile =
-      p.candidates.tiles + 3 * candidate_of_number(s, number / Team<N>::kSlabs);
+  if constexpr (Team<N>::kSlabs > 1) {
+    const std::uint32_t tile = p.found.tiles[number / Team<N>::kSlabs];
+    return {static_cast<std::int32_t>(tile & 1023u), static_cast<std::int32_t>(tile >> 10 & 1023u),
+            static_cast<std::int32_t>(tile >> 20), number};
+  }
+  if (p.candidates.count == 0) return p.items[number];
+  const std::int32_t* tile = p.candidates.tiles + 3 * candidate_of_number(s, number);
   return {tile[0], tile[1], tile[2], number};
 }
 
 /// Which tile is the next. The first thread; others get anything.
 __device__ inline std::uint32_t next_number(const TileParams& p) {
   return threadIdx.x == 0 ? atomicAdd(p.ticket, 1u) : 0;
+}
+/// Which is a block's first.
+__device__ inline std::uint32_t first_number(const TileParams& p) {
+  return p.ticket ? next_number(p) : blockIdx.x;
 }
 
 /// The first warp takes the tile, or slab, with that number.

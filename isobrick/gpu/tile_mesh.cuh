@@ -1,0 +1,182 @@
+#pragma once
+
+#include "isobrick/gpu/tile_count.cuh"
+#include "isobrick/gpu/tile_emit.cuh"
+#include "isobrick/gpu/tile_nan.cuh"
+#include "isobrick/gpu/tile_order.cuh"
+#include "isobrick/gpu/tile_take.cuh"
+
+// From the inside bits of a tile to its mesh: the steps, and where its warps wait for each other.
+
+namespace isobrick::gpu {
+
+/// A tile without a vertex or a cell tells so and nothing else: whoever asks for its sums adds
+/// nothing, and whoever asks for its rows finds no vertex there.
+__device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
+  if (threadIdx.x != 0) return;
+  publish_sum(p.order[s.item].vertices, s.item, 0);
+  publish_sum(p.order[s.item].triangles, s.item, 0);
+  s.number_base = 0;
+  release_rows(s, p);
+}
+
+/// Counts a tile's crossing edges and active cells, and leaves their places. False where there
+/// are none; the last tile, which tells what all have, goes on.
+template <int N, bool Nan>
+__device__ inline bool count_tile(TileShared& s, const TileParams& p) {
+  count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
+    if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
+  });
+  __syncthreads();
+  if constexpr (Nan) clear_lists<N>(s);
+  const SlabPlanes planes = planes_of<N>(s.item);
+  const PlaneBases bases = PlaneBases::of(s, planes);
+  const std::uint32_t vertices = bases.made<N>(s, planes);
+  if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
+    pass_empty_tile(s, p);
+    __syncthreads();
+    return false;
+  }
+  if (threadIdx.x == 0) {
+    s.next_cells = s.next_vertices = 0;
+    s.all_vertices = vertices;
+    s.all_cells = bases.cells;
+    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
+  }
+  if constexpr (Nan) __syncthreads();  // the lists are empty
+  publish_rows<N>(s, bases, planes, p.row_tables[s.tile.slot]);
+  __syncthreads();
+  return true;
+}
+
+/// The triangles of a tile with more cells than are listed at a time. The last
+/// cells stay listed.
+template <int N>
+__device__ inline std::uint32_t count_in_turns(TileShared& s) {
+  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
+  const std::uint32_t cells = s.all_cells;
+  std::uint32_t triangles = 0;
+  for (std::uint32_t first = 0; first < cells; first += kListed) {
+    if (first > 0) mark_cells<N>(s, first);
+    const std::uint32_t listed = ::min(cells - first, kListed);
+    find_cells<N>(s, listed);
+    __syncthreads();
+    triangles += triangles_before<N>(s, (listed + 31) / 32);
+    __syncthreads();
+  }
+  return triangles;
+}
+
+/// Whether the warps of a tile wait for each other by named barriers. In those that take turns,
+/// the turns' barriers are between them anyway.
+template <int N, bool Nan>
+__device__ inline bool wait_by_name(const TileShared& s) {
+  return !Nan && ::max(s.all_cells, s.all_vertices) <= ListsOf<N>::kListed;
+}
+
+/// Finds the tile's cells and where its vertices and triangles go. Two warps ask what other
+/// tiles know; the others wait for no more than the place of the vertices.
+template <int N, bool Nan>
+__device__ inline void find_places(TileShared& s, const TileParams& p) {
+  const std::uint32_t cells = s.all_cells;
+  const bool at_once = wait_by_name<N, Nan>(s);
+  // A slab has few cells and vertices: the warp on which others wait leaves them to the others.
+  constexpr bool kSlab = Team<N>::kSlabs > 1;
+  if (warp_id() == Team<N>::kVertices) {
+    find_vertex_base(s, p);
+    if (at_once) arrive<N, TeamBarrier::vertex_base>();
+    if (lane_id() == 0) release_rows(s, p);
+  }
+  std::uint32_t triangles = 0;
+  if (at_once) {
+    if (!kSlab || warp_id() != Team<N>::kVertices) find_cells<N>(s, cells);
+  } else {
+    triangles = count_in_turns<N>(s);
+    // A tile with NaN, or a slab, may have vertices of cells of others only.
+    if constexpr (Nan || kSlab) __syncthreads();
+  }
+  const bool for_vertices = warp_id() == Team<N>::kVertices,
+             for_triangles = warp_id() == Team<N>::kTriangles;
+  Neighbour neighbour{};
+  if (for_vertices) neighbour = kSlab ? Neighbour::kept(s) : Neighbour::of_lane(s, p);
+  if (at_once) {
+    // All wait for each other at this one, so nobody may do anything before it.
+    if (!for_vertices && for_triangles) wait<N, TeamBarrier::vertex_base>();
+    if ((for_vertices && !kSlab) || for_triangles)
+      wait<N, TeamBarrier::cells>();
+    else
+      arrive<N, TeamBarrier::cells>();
+    if (!for_vertices && !for_triangles) wait<N, TeamBarrier::vertex_base>();
+  }
+  if (for_triangles) {
+    if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
+    if (lane_id() == 0) {
+      s.all_triangles = triangles;
+      publish_sum(p.order[s.item].triangles, s.item, triangles);
+    }
+    find_triangle_base(s, p, triangles);
+  }
+  if (for_vertices) {
+    ask_neighbours<N>(s, p, neighbour);
+    if (at_once && !kSlab) arrive<N, TeamBarrier::neighbours>();
+  }
+}
+
+template <int N, class T, bool Normals>
+__device__ inline void emit_all_vertices(TileShared& s, const TileParams& p) {
+  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
+  const std::uint32_t vertices = s.all_vertices;
+  if (s.vertex_base + vertices > p.vertex_capacity) return;
+  for (std::uint32_t first = 0; first < vertices; first += kListed) {
+    if (first > 0) mark_vertices<N>(s, first);
+    emit_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
+    if (vertices > kListed) __syncthreads();
+  }
+}
+
+template <int N>
+__device__ inline void emit_all_triangles(TileShared& s, const TileParams& p) {
+  constexpr std::uint32_t kListed = ListsOf<N>::kListed;
+  const std::uint32_t cells = s.all_cells;
+  std::uint64_t base = s.triangle_base;
+  if (base + s.all_triangles > p.triangle_capacity) return;
+  for (std::uint32_t first = 0; first < cells; first += kListed) {
+    const std::uint32_t listed = ::min(cells - first, kListed);
+    if (cells > kListed) {
+      mark_cells<N>(s, first);
+      find_cells<N>(s, listed);
+      __syncthreads();
+    }
+    emit_triangles<N>(s, p, listed, base);
+    if (cells > kListed) {
+      base += triangles_before<N>(s, (listed + 31) / 32);
+      __syncthreads();
+    }
+  }
+}
+
+/// Of a counted tile.
+template <int N, class T, bool Normals, bool Nan>
+__device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
+  constexpr bool kSlab = Team<N>::kSlabs > 1;
+  find_places<N, Nan>(s, p);
+  const bool at_once = wait_by_name<N, Nan>(s);
+  if (!kSlab || !at_once || warp_id() != Team<N>::kVertices) emit_all_vertices<N, T, Normals>(s, p);
+  // After the vertices, which read the tile's samples once more. Wider samples of the tiles
+  // in work fill the L2 cache alone, and would be driven out.
+  if constexpr (sizeof(T) == 1 && Team<N>::kSlabs == 1)
+    prefetch_tile<N, T>(s, p, s.item + gridDim.x);
+  if (!at_once || kSlab)
+    __syncthreads();
+  else if (warp_id() != Team<N>::kVertices)
+    wait<N, TeamBarrier::neighbours>();
+  number_at_0<N>(s);
+  // Elsewhere the first warp may still make vertices.
+  if constexpr (!kSlab) __syncthreads();
+  borrow_rows<N>(s);
+  place_numbers<N>(s);
+  __syncthreads();
+  emit_all_triangles<N>(s, p);
+}
+
+}  // namespace isobrick::gpu

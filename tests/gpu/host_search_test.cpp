@@ -1,0 +1,63 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "isobrick/gpu/host_search.h"
+
+namespace isobrick::gpu {
+namespace {
+
+using Range = HostSearch::Range;
+
+std::vector<Int3> tiles_in_a_row(std::size_t count) {
+  std::vector<Int3> tiles;
+  for (std::size_t i = 0; i < count; ++i) tiles.push_back({static_cast<Index>(i), 1, 2});
+  return tiles;
+}
+
+bool is_found(const FoundTiles& found, std::size_t tile) {
+  return found.words[tile / 32] >> (tile % 32) & 1u;
+}
+
+TEST(HostSearch, FindsWhatAnIsovalueStabs) {
+  for (const std::size_t count : {1u, 31u, 32u, 33u, 500u, kMostSearchedByBlock}) {
+    std::vector<Range> ranges;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto lo = static_cast<double>(i * 7 % 50);
+      ranges.push_back({lo, lo + static_cast<double>(i % 9)});
+    }
+    const HostSearch search(tiles_in_a_row(count), ranges);
+    for (const double isovalue : {-1.0, 0.0, 3.0, 24.5, 30.0, 57.0, 58.0, 1e9}) {
+      const FoundTiles found = search.find(isovalue);
+      std::uint32_t expected = 0;
+      for (std::size_t i = 0; i < kMostSearchedByBlock; ++i) {
+        const bool stabbed = i < count && ranges[i].stabbed_by(isovalue);
+        EXPECT_EQ(is_found(found, i), stabbed) << i << " of " << count << " at " << isovalue;
+        if (stabbed && expected < kMostActiveInSlabs) {
+          EXPECT_EQ(found.tiles[expected], FoundTiles::packed(static_cast<std::uint32_t>(i), 1, 2));
+        }
+        expected += stabbed;
+      }
+      EXPECT_EQ(found.count, expected);
+    }
+  }
+}
+
+TEST(HostSearch, EmptyRangesAndNoneAreNeverActive) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const HostSearch search(tiles_in_a_row(4),
+                          {Range{}, Range{1, 2}, Range{}, Range{-infinity, infinity}});
+  for (const double isovalue : {-1e300, 1.5, 1e300}) {
+    const FoundTiles found = search.find(isovalue);
+    EXPECT_FALSE(is_found(found, 0));
+    EXPECT_EQ(is_found(found, 1), isovalue == 1.5);
+    EXPECT_FALSE(is_found(found, 2));
+    EXPECT_TRUE(is_found(found, 3));
+  }
+  EXPECT_EQ(search.find(std::nan("")).count, 0u);
+  EXPECT_EQ(HostSearch().find(0).count, 0u);
+}
+
+}  // namespace
+}  // namespace isobrick::gpu
