@@ -5,7 +5,9 @@
 //
 // What the stages do alone is measured in the same run: reading the encoded bricks (from
 // the page cache, where they fit it), reading and decoding them on all cores, copies of
-// the same bytes up and down. --check compares the mesh with the CPU's by a hash. With --cold
+// the same bytes up and down. After an extraction that sets the device up, extractions take turns
+// with reading and decoding alone, so that what the machine does meanwhile meets both alike, and
+// medians are compared. --check compares the mesh with the CPU's by a hash. With --cold
 // the store is dropped from the page cache before each extraction, and before the reads alone.
 
 #include <fcntl.h>
@@ -18,7 +20,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -76,7 +77,7 @@ class HashSink final : public MeshSink {
 struct Arguments {
   std::string store;
   ExtractOptions options;
-  int runs = 3;
+  int turns = 3;
   bool check = false, cold = false, json = false;
 };
 
@@ -149,6 +150,49 @@ double decode_alone(const StoreReader& store, int level, const std::vector<Int3>
   return seconds_since(start);
 }
 
+/// The middle one, or the lower of two.
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Extractions and stages alone, in turns.
+struct Measured {
+  double first_seconds = 0;  ///< the device's setting up included
+  std::vector<ExtractReport> reports;
+  std::map<std::string, std::vector<double>> seconds;
+
+  /// The report of the extraction that took the median.
+  const ExtractReport& report() const {
+    const double middle = median(seconds.at("whole"));
+    return *std::find_if(reports.begin(), reports.end(),
+                         [&](const ExtractReport& r) { return r.seconds == middle; });
+  }
+};
+
+Measured measure(const StoreReader& store, const Arguments& a, const std::vector<Int3>& bricks) {
+  Measured measured;
+  Workers workers(a.options.threads);
+  const auto extract_once = [&] {
+    NoProgress silent;
+    HashSink sink(false);
+    if (a.cold) drop_from_cache(a.store);
+    return extract(store, a.options, sink, silent);
+  };
+  measured.first_seconds = extract_once().seconds;
+  for (int turn = 0; turn < a.turns; ++turn) {
+    measured.reports.push_back(extract_once());
+    measured.seconds["whole"].push_back(measured.reports.back().seconds);
+    if (a.cold) drop_from_cache(a.store);
+    workers.execute([&] {
+      measured.seconds["read"].push_back(read_alone(store, a.options.level, bricks));
+      measured.seconds["decode"].push_back(decode_alone(store, a.options.level, bricks));
+    });
+  }
+  return measured;
+}
+
 int run(Arguments a) {
   const StoreReader store(a.store);
   a.options.backend = Backend::cuda;
@@ -156,26 +200,10 @@ int run(Arguments a) {
   const std::vector<Int3> bricks = needed_bricks(store, a.options);
   nlohmann::ordered_json out{{"store", a.store}, {"bricks", bricks.size()}};
 
-  std::vector<ExtractReport> reports;
-  for (int i = 0; i < a.runs; ++i) {
-    HashSink sink(false);
-    if (a.cold) drop_from_cache(a.store);
-    reports.push_back(extract(store, a.options, sink, silent));
-  }
-  const auto best =
-      std::min_element(reports.begin(), reports.end(),
-                       [](const auto& l, const auto& r) { return l.seconds < r.seconds; });
-  const ExtractReport& r = *best;
-
-  // The best of as many, as of the whole; reads from disk once, for then it is all in memory.
-  std::map<std::string, double> alone{{"read", HUGE_VAL}, {"decode", HUGE_VAL}};
-  Workers workers(a.options.threads);
-  if (a.cold) drop_from_cache(a.store);
-  for (int i = 0; i < (a.cold ? 1 : a.runs); ++i)
-    workers.execute([&] {
-      alone["read"] = std::min(alone["read"], read_alone(store, a.options.level, bricks));
-      alone["decode"] = std::min(alone["decode"], decode_alone(store, a.options.level, bricks));
-    });
+  const Measured measured = measure(store, a, bricks);
+  const ExtractReport& r = measured.report();
+  std::map<std::string, double> alone{{"read", median(measured.seconds.at("read"))},
+                                      {"decode", median(measured.seconds.at("decode"))}};
   const std::uint64_t launches = std::max<std::uint64_t>(r.launches, 1);
   alone["upload"] = copy_seconds(r.upload.bytes, r.upload.bytes / launches, true);
   alone["download"] = copy_seconds(r.download.bytes, r.download.bytes / launches, false);
@@ -191,7 +219,8 @@ int run(Arguments a) {
   const double prediction = std::max(decode, slowest->second);
 
   out["seconds"] = r.seconds;
-  out["first_seconds"] = reports.front().seconds;
+  out["first_seconds"] = measured.first_seconds;
+  for (const auto& [name, seconds] : measured.seconds) out["turns"][name] = seconds;
   out["plan_seconds"] = r.plan_seconds;
   out["wait_seconds"] = {{"bricks", r.decode_seconds}, {"gpu", r.surface_seconds}};
   out["prediction"] = prediction;
@@ -223,8 +252,8 @@ int run(Arguments a) {
     fmt::print(
         "{} triangles in {:.3f} s (first {:.3f}), predicted {:.3f}; slowest alone: {} {:.3f}, "
         "ratio {:.2f}\n",
-        r.triangles, r.seconds, reports.front().seconds, prediction, slowest->first,
-        slowest->second, slowest->second / r.seconds);
+        r.triangles, r.seconds, measured.first_seconds, prediction, slowest->first, slowest->second,
+        slowest->second / r.seconds);
     fmt::print(
         "  of that {:.3f} s to plan, {:.3f} waiting for bricks, {:.3f} for the GPU to take them; "
         "{} bricks read {} times; {} launches; {:.1f} MiB of device "
@@ -255,7 +284,7 @@ int main(int argc, char** argv) {
   app.add_option("--gpu-memory", a.options.gpu_memory)->transform(CLI::AsSizeValue(false));
   app.add_option("--threads", a.options.threads);
   app.add_flag("--normals", a.options.normals);
-  app.add_option("--runs", a.runs);
+  app.add_option("--turns", a.turns, "extractions, besides the first")->check(CLI::PositiveNumber);
   app.add_flag("--check", a.check, "compare with the CPU's mesh");
   app.add_flag("--cold", a.cold, "drop the store from the page cache before each run");
   app.add_flag("--json", a.json);
