@@ -8,6 +8,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/brick_table.h"
 #include "isobrick/gpu/row_slots.h"
+#include "isobrick/gpu/spare_pages.h"
 #include "isobrick/gpu/stream_collector.h"
 #include "isobrick/gpu/stream_device.h"
 #include "isobrick/gpu/supported.h"
@@ -52,7 +53,10 @@ struct GpuExtractor::Impl {
         pool(std::move(brick_pool)),
         device(l, options, sizes, pool.get()),
         slots(device.sizes().slots, l.tiles()),
-        collector(id, device, welded(), options.normals, std::move(take)) {}
+        collector(id, device, welded(), options.normals, std::move(take)) {
+    // What an extraction takes it has now, and its budget does not count what others left.
+    spare_pages().drop();
+  }
 
   /// Where there may be NaN all of an active tile is looked at, because ranges leave NaN out.
   std::span<const TileWork> all_to_look_at(std::span<const TileWork> tiles) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "isobrick/gpu/cuda_check.h"
+#include "isobrick/gpu/spare_pages.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -20,12 +21,9 @@ void touch(tbb::task_arena& arena, std::byte* data, std::size_t bytes) {
   });
 }
 
-/// Where each piece begins, and the end.
-std::vector<std::size_t> offsets_of(const std::vector<std::size_t>& pieces) {
-  std::vector<std::size_t> offsets{0};
-  for (const std::size_t bytes : pieces)
-    offsets.push_back(offsets.back() + MappedPages::whole_pages(bytes));
-  return offsets;
+LockedPieces spare_or_new(int device, const std::vector<std::size_t>& pieces) {
+  if (auto spare = spare_pages().take(device, pieces)) return std::move(*spare);
+  return {device, pieces};
 }
 
 }  // namespace
@@ -33,17 +31,20 @@ std::vector<std::size_t> offsets_of(const std::vector<std::size_t>& pieces) {
 PinnedRegion::PinnedRegion(int device, const std::vector<std::size_t>& pieces)
     : device_(device),
       threads_(tbb::this_task_arena::max_concurrency()),
-      offsets_(offsets_of(pieces)),
-      pages_(offsets_.back()),
-      thread_([this] { run(); }) {}
+      pieces_(spare_or_new(device, pieces)) {
+  if (pieces_.all_locked())
+    touched_ = locked_ = pieces_.count();
+  else
+    thread_ = std::thread([this] { run(); });
+}
 
 PinnedRegion::~PinnedRegion() {
   {
     const std::lock_guard lock(mutex_);
     stop_ = true;
   }
-  thread_.join();
-  for (std::size_t piece = 0; piece < locked_; ++piece) (void)cudaHostUnregister(at(piece));
+  if (thread_.joinable()) thread_.join();
+  spare_pages().give(std::move(pieces_));
 }
 
 bool PinnedRegion::stopped() {
@@ -55,11 +56,11 @@ void PinnedRegion::run() {
   try {
     make_current(device_);
     tbb::task_arena arena(threads_);
-    for (std::size_t piece = 0; piece + 1 < offsets_.size() && !stopped(); ++piece) {
-      touch(arena, at(piece), bytes(piece));
+    for (std::size_t piece = 0; piece < pieces_.count() && !stopped(); ++piece) {
+      touch(arena, pieces_.at(piece), pieces_.bytes(piece));
       advance(touched_);
       if (stopped()) return;
-      check(cudaHostRegister(at(piece), bytes(piece), cudaHostRegisterMapped));
+      pieces_.lock_next();
       advance(locked_);
     }
   } catch (...) {
@@ -79,7 +80,7 @@ std::byte* PinnedRegion::wait_for(std::size_t piece, const std::size_t& count) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return error_ || piece < count; });
   if (piece >= count) std::rethrow_exception(error_);
-  return at(piece);
+  return pieces_.at(piece);
 }
 
 }  // namespace isobrick::gpu

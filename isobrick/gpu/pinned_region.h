@@ -7,13 +7,13 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/gpu/mapped_pages.h"
+#include "isobrick/gpu/locked_pieces.h"
 
 namespace isobrick::gpu {
 
 /// Page-locked host memory in pieces, which a thread of its own gets one after the other while
 /// others begin to work: as many cores as its maker has to itself touch a piece, then the driver
-/// locks it.
+/// locks it. Unless there are spare pages of these sizes.
 class PinnedRegion {
  public:
   /// Pieces of so many bytes, in the order in which they are needed. Throws Error where there
@@ -21,7 +21,7 @@ class PinnedRegion {
   PinnedRegion(int device, const std::vector<std::size_t>& pieces);
   PinnedRegion(const PinnedRegion&) = delete;
   PinnedRegion& operator=(const PinnedRegion&) = delete;
-  /// Nothing is copied from or to it any more.
+  /// Nothing is copied from or to it any more. The pages are spare now.
   ~PinnedRegion();
 
   /// A piece, for the processor; waits until it has been touched.
@@ -34,12 +34,9 @@ class PinnedRegion {
   bool stopped();
   void advance(std::size_t& count);
   std::byte* wait_for(std::size_t piece, const std::size_t& count);
-  std::byte* at(std::size_t piece) const { return pages_.data() + offsets_[piece]; }
-  std::size_t bytes(std::size_t piece) const { return offsets_[piece + 1] - offsets_[piece]; }
 
   int device_, threads_;
-  std::vector<std::size_t> offsets_;  ///< of the pieces, and the end
-  MappedPages pages_;
+  LockedPieces pieces_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
