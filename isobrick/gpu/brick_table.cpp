@@ -29,17 +29,18 @@ class Needs {
       : bricks_(bricks), grid_(grid), numbers_(tiles) {}
 
   /// The number of a brick, counted from 1; 0 when it is absent.
-  std::size_t add(Int3 b, std::uint64_t samples) {
+  std::size_t number_of(Int3 b) {
     const auto [number, added] =
         numbers_.insert(static_cast<std::uint64_t>(linear_index(b, grid_)));
-    if (added) {
-      if (const std::byte* brick = bricks_.find(b)) {
-        all_.push_back({brick, 0, reinterpret_cast<std::uint64_t>(brick)});
-        number = all_.size();
-      }
+    if (!added) return number;
+    if (const std::byte* brick = bricks_.find(b)) {
+      all_.push_back({brick, 0, reinterpret_cast<std::uint64_t>(brick)});
+      number = all_.size();
     }
-    if (number > 0) all_[number - 1].samples += samples;
     return number;
+  }
+  void add(std::size_t number, std::uint64_t samples) {
+    if (number > 0) all_[number - 1].samples += samples;
   }
   std::vector<Need>& all() { return all_; }
 
@@ -69,9 +70,11 @@ BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWor
     }
     for_each_needed_box(lattice, tiles[i], reach, [&](Box3 box) {
       for_each_point(lattice.bricks_of(box), [&](Int3 b) {
+        // Boxes of a tile mostly share their bricks.
+        std::uint64_t& number = addresses[linear_index(b - around.lo, grid)];
+        if (number == 0) number = needs.number_of(b);
         const Box3 part = intersect(box, lattice.full_brick_box(b));
-        addresses[linear_index(b - around.lo, grid)] =
-            needs.add(b, static_cast<std::uint64_t>(volume(part.extent())));
+        needs.add(number, static_cast<std::uint64_t>(volume(part.extent())));
       });
     });
   }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "isobrick/core/flat_map.h"
@@ -30,14 +32,23 @@ class RowSlots {
 
  private:
   struct Entry {
-    std::uint32_t slot, launch;
+    std::uint32_t slot = kNone, launch = 0;
+  };
+  /// Of tiles that lie together, for neighbours are looked up for every tile.
+  struct Cube {
+    std::array<Entry, 64> entries;
+    int used = 0;
   };
   struct Expiry {
-    std::uint64_t last_asker, key;
+    std::uint64_t last_asker;
+    Int3 tile;
   };
-  void drop(const Expiry& expiry, std::vector<std::uint32_t>& unused);
+  const Cube* cube_of(Int3 tile) const;
+  void drop(Int3 tile, std::vector<std::uint32_t>& unused);
 
-  FlatMap<Entry> map_;
+  FlatMap<std::unique_ptr<Cube>> cubes_;
+  std::uint64_t added_key_ = 0;
+  Cube* added_cube_ = nullptr;  ///< the one that was added to last, by that key
   /// By cubes of tiles that the last askers lie in: neighbours are added after one another.
   std::map<std::uint64_t, std::vector<Expiry>> expiries_;
   std::map<std::uint64_t, std::vector<Expiry>>::iterator added_last_ = expiries_.end();

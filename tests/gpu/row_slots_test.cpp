@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -54,6 +56,40 @@ TEST(RowSlots, ATileIsFoundUntilItsLastAskerIsDone) {
   slots.end_launch({1, 1, 1}, unused);
   EXPECT_EQ(unused, (std::vector{first, last}));
   EXPECT_EQ(slots.find({0, 0, 0}), gpu::kNone);
+}
+
+// Beside books of the simplest kind, over tiles here and there.
+TEST(RowSlots, EachNeighbourIsFoundWithItsSlot) {
+  const Int3 grid{13, 9, 10};
+  gpu::RowSlots slots(static_cast<std::uint32_t>(volume(grid)), grid);
+  std::map<std::uint64_t, std::pair<std::uint32_t, int>> known;  // by code: slot, launch
+  std::vector<std::uint32_t> unused;
+  std::mt19937 random(1);
+  int launch = 0, in_launch = 0;
+  for_each_morton(grid, [&](Int3 tile) {
+    if (random() % 3 == 0) return;
+    for (int n = 1; n <= 6; ++n) {
+      const Int3 neighbour = tile - Int3{n & 1, n >> 1 & 1, n >> 2};
+      if (neighbour.x < 0 || neighbour.y < 0 || neighbour.z < 0) continue;
+      const auto found = known.find(morton_encode(neighbour));
+      const std::uint32_t expected =
+          found == known.end()
+              ? gpu::kNone
+              : found->second.first |
+                    (found->second.second == launch ? gpu::TileLinks::kSameLaunch : 0);
+      EXPECT_EQ(slots.find(neighbour), expected);
+    }
+    known[morton_encode(tile)] = {slots.add(tile), launch};
+    if (++in_launch < 11) return;
+    slots.end_launch(tile, unused);
+    for (const std::uint32_t slot : unused)
+      EXPECT_EQ(std::erase_if(known, [&](const auto& entry) { return entry.second.first == slot; }),
+                1u);
+    slots.recycle(unused);
+    in_launch = 0;
+    ++launch;
+  });
+  EXPECT_GT(launch, 50);
 }
 
 }  // namespace
