@@ -45,7 +45,7 @@ std::uint32_t RowSlots::add(Int3 tile) {
   const std::uint64_t last_asker = morton_encode(min(tile + Int3{1, 1, 1}, last_tile_));
   if (added_last_ == expiries_.end() || added_last_->first != group_of(last_asker))
     added_last_ = expiries_.try_emplace(group_of(last_asker)).first;
-  added_last_->second.push_back({last_asker, tile});
+  added_last_->second.push_back({last_asker, morton_encode(tile)});
   return slot;
 }
 
@@ -69,13 +69,13 @@ void RowSlots::end_launch(Int3 last, std::vector<std::uint32_t>& unused) {
   const std::uint64_t now = morton_encode(last);
   added_last_ = expiries_.end();
   while (!expiries_.empty() && expiries_.begin()->first < group_of(now)) {
-    for (const Expiry& expiry : expiries_.begin()->second) drop(expiry.tile, unused);
+    for (const Expiry& expiry : expiries_.begin()->second) drop(morton_decode(expiry.tile), unused);
     expiries_.erase(expiries_.begin());
   }
   if (expiries_.empty() || expiries_.begin()->first != group_of(now)) return;
   std::erase_if(expiries_.begin()->second, [&](const Expiry& expiry) {
     const bool over = expiry.last_asker <= now;
-    if (over) drop(expiry.tile, unused);
+    if (over) drop(morton_decode(expiry.tile), unused);
     return over;
   });
 }

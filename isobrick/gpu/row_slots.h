@@ -34,14 +34,13 @@ class RowSlots {
   struct Entry {
     std::uint32_t slot = kNone, launch = 0;
   };
-  /// Of tiles that lie together, for neighbours are looked up for every tile.
+  /// Of 4×4×4 tiles: a tile's neighbours are looked up, and most lie in its own cube.
   struct Cube {
     std::array<Entry, 64> entries;
     int used = 0;
   };
   struct Expiry {
-    std::uint64_t last_asker;
-    Int3 tile;
+    std::uint64_t last_asker, tile;  ///< codes
   };
   const Cube* cube_of(Int3 tile) const;
   void drop(Int3 tile, std::vector<std::uint32_t>& unused);

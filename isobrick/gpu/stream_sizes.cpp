@@ -29,9 +29,9 @@ constexpr std::uint64_t kLeastTilesWithPool = 128;
 /// Bricks a thread that are decoded ahead into a pool, and that are being decoded or belong to
 /// launches.
 constexpr std::uint64_t kLeastAhead = 24, kMostAhead = 40, kUnderWay = 8;
-/// A row table in the host's books: its slot, its tile, its expiry. Maps are up to three
-/// quarters empty.
-constexpr std::uint64_t kBytesOfSlot = 192;
+/// A row table in the host's books: its slot, its tile, its expiry. Tables on the faces of what is
+/// finished fill a quarter of their cubes, those of a launch may be alone in theirs.
+constexpr std::uint64_t kBytesOfSlot = 128, kBytesOfCube = 640;
 
 /// Row tables that are needed at a time: as with the CPU's boundaries those on the upper
 /// faces of what is finished, and those of the launches under way.
@@ -88,7 +88,8 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
       of_lanes * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
   s.pinned_bytes = kSmallBuffers + of_lanes * s.staging_bytes + kOutputs * s.output_bytes +
                    BrickPool::pinned_bytes(lattice.brick_bytes(), pool.threads);
-  s.host_bytes = kBytesOfSlot * s.slots + of_lanes * tiles * sizeof(OrderState);
+  s.host_bytes = kBytesOfSlot * s.slots + (of_lanes + 1) * tiles * kBytesOfCube +
+                 of_lanes * tiles * sizeof(OrderState);
   return s;
 }
 
