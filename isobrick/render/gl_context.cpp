@@ -9,7 +9,6 @@
 #include <map>
 #include <mutex>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "isobrick/core/error.h"
@@ -48,14 +47,6 @@ class Display {
   Display& operator=(const Display&) = delete;
 
   EGLDisplay get() const { return display_; }
-
-  /// The current context's, if it is one of these: libEGL is loaded then.
-  static EGLDisplay current() {
-    const std::lock_guard lock(mutex());
-    if (users().empty()) return EGL_NO_DISPLAY;
-    const EGLDisplay display = eglGetCurrentDisplay();
-    return users().contains(display) ? display : EGL_NO_DISPLAY;
-  }
 
  private:
   static std::mutex& mutex() {
@@ -105,7 +96,7 @@ std::vector<Candidate> candidates() {
   return hardware;
 }
 
-EGLContext create_context(EGLDisplay display, EGLContext shared = EGL_NO_CONTEXT) {
+EGLContext create_context(EGLDisplay display) {
   if (!eglBindAPI(EGL_OPENGL_API)) throw Error("it has no OpenGL");
   const char* extensions = eglQueryString(display, EGL_EXTENSIONS);
   if (!has_word(extensions, "EGL_KHR_surfaceless_context") ||
@@ -119,7 +110,8 @@ EGLContext create_context(EGLDisplay display, EGLContext shared = EGL_NO_CONTEXT
                                EGL_CONTEXT_OPENGL_PROFILE_MASK,
                                EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
                                EGL_NONE};
-  const EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, shared, attributes);
+  const EGLContext context =
+      eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes);
   if (context == EGL_NO_CONTEXT) throw Error("it has no OpenGL 4.5");
   return context;
 }
@@ -130,8 +122,6 @@ struct GlContext::State {
   explicit State(const Candidate& candidate)
       : display(eglGetPlatformDisplayEXT(candidate.platform, candidate.device, nullptr)),
         context(create_context(display.get())) {}
-  State(EGLDisplay current, EGLContext shared)
-      : display(current), context(create_context(current, shared)) {}
   ~State() {
     if (eglGetCurrentContext() == context)
       eglMakeCurrent(display.get(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
@@ -169,16 +159,7 @@ GlContext::GlContext() {
                   tried.empty() ? "EGL knows no device" : tried));
 }
 
-GlContext::GlContext(std::unique_ptr<State> state) : state_(std::move(state)) {}
-
-std::optional<GlContext> GlContext::sharing_current() {
-  const EGLDisplay display = Display::current();
-  if (display == EGL_NO_DISPLAY) return std::nullopt;
-  return GlContext(std::make_unique<State>(display, eglGetCurrentContext()));
-}
-
 GlContext::~GlContext() = default;
-GlContext::GlContext(GlContext&&) noexcept = default;
 
 void GlContext::make_current() {
   eglBindAPI(EGL_OPENGL_API);  // each thread has its own

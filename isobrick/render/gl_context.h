@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 
 namespace isobrick {
@@ -16,22 +15,16 @@ class GlContext {
   /// Throws Error, with what was tried, when there is no OpenGL 4.5 here.
   GlContext();
   ~GlContext();
-  GlContext(GlContext&&) noexcept;
 
   void make_current();
   /// For a move to another thread, which then calls make_current.
   void release_current();
-
-  /// A context with the buffers and other objects of the one that is current here, for another
-  /// thread, which calls make_current. Nothing where the current one is no GlContext's.
-  static std::optional<GlContext> sharing_current();
 
   /// Whether GlContext() would succeed.
   static bool available();
 
  private:
   struct State;
-  explicit GlContext(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 

@@ -1,6 +1,5 @@
 #include "isobrick/window/device_meshes.h"
 
-#include <epoxy/gl.h>
 #include <fmt/format.h>
 
 #include <chrono>
@@ -9,59 +8,21 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/render/gl_context.h"
 
 namespace isobrick {
 
-namespace {
-
-/// Nothing where there can be none: pictures then import what they need.
-std::optional<GlContext> sharing_context() {
-  try {
-    return GlContext::sharing_current();
-  } catch (const Error&) {
-    return std::nullopt;
-  }
-}
-
-bool becomes_current(GlContext& context) {
-  try {
-    context.make_current();
-    return true;
-  } catch (const Error&) {
-    return false;
-  }
-}
-
-}  // namespace
-
 void DeviceOpening::begin() {
   if (begun()) return;
-  const auto id = current_gl_device_id();
-  auto sharing = id ? sharing_context() : std::nullopt;
   std::promise<std::shared_ptr<DeviceMesher>> opened;
   mesher_ = opened.get_future().share();
-  opener_ =
-      std::jthread([this, id, sharing = std::move(sharing), opened = std::move(opened)]() mutable {
-        try {
-          opened.set_value(open(id, std::exchange(sharing, std::nullopt)));
-        } catch (...) {
-          opened.set_exception(std::current_exception());
-        }
-        if (on_change_) on_change_();
-      });
-}
-
-/// In a thread of its own. `sharing` has ended when this returns.
-std::shared_ptr<DeviceMesher> DeviceOpening::open(std::optional<DeviceId> drawing,
-                                                  std::optional<GlContext> sharing) {
-  std::shared_ptr<DeviceMesher> mesher = open_device_mesher(drawing, budget_);
-  if (mesher && sharing && becomes_current(*sharing)) {
-    while (import_one(*mesher)) {
+  opener_ = std::jthread([this, id = current_gl_device_id(), opened = std::move(opened)]() mutable {
+    try {
+      opened.set_value(open_device_mesher(id, budget_));
+    } catch (...) {
+      opened.set_exception(std::current_exception());
     }
-    glFinish();
-  }
-  return mesher;
+    if (on_change_) on_change_();
+  });
 }
 
 /// Whether there was anything to import.

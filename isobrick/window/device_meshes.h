@@ -4,23 +4,20 @@
 #include <functional>
 #include <future>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 #include <unordered_map>
 #include <utility>
 
 #include "isobrick/pipeline/extract.h"
-#include "isobrick/render/gl_context.h"
 #include "isobrick/render/imported_buffers.h"
 #include "isobrick/viewer/scene_stream.h"
 
 namespace isobrick {
 
 /// The device that makes meshes, opened once and beside everything else, and its memory as OpenGL
-/// sees it. All of that memory is taken and imported before the device makes any mesh, in a thread
-/// with a context of its own, since an import may take longer than a picture. For the thread of
-/// the context.
+/// sees it. All of that memory is taken and imported before the device makes any mesh, a piece with
+/// each picture: an import takes as long as half a picture may. For the thread of the context.
 class DeviceOpening {
  public:
   /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
@@ -35,8 +32,7 @@ class DeviceOpening {
   bool over() const;
   /// Waits for that. Null where there is no device; throws Error when it cannot be opened.
   std::shared_ptr<DeviceMesher> get();
-  /// Where this context shares nothing with another thread's: imports one piece of the memory, so
-  /// that no picture waits for much of it. Whether there is another.
+  /// Imports one piece of the memory, once it is there. Whether there is another.
   bool import_next();
 
   /// Device memory for meshes: that is taken, and that may be taken.
@@ -53,15 +49,12 @@ class DeviceOpening {
     ImportedBuffers buffers;
   };
 
-  std::shared_ptr<DeviceMesher> open(std::optional<DeviceId> drawing,
-                                     std::optional<GlContext> sharing);
   bool opened() const;
   DeviceMesher* mesher() const;
   bool import_one(DeviceMesher& mesher);
 
   std::uint64_t budget_;
   std::function<void()> on_change_;
-  /// Of the opening thread until it is done.
   std::unordered_map<const void*, std::unique_ptr<Imported>> imported_;
   std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;
   std::jthread opener_;  ///< last: ends before the others

@@ -1,8 +1,6 @@
-#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <optional>
 #include <thread>
 
 #include "isobrick/core/error.h"
@@ -52,26 +50,6 @@ TEST_F(Context, MovesToAnotherThread) {
     EXPECT_FALSE(current_gl_device().version.empty());
     context.release_current();
   }).join();
-}
-
-TEST_F(Context, SharesItsBuffersWithAnotherThread) {
-  EXPECT_FALSE(GlContext::sharing_current()) << "there is none";
-  const GlContext context;
-  std::optional<GlContext> sharing = GlContext::sharing_current();
-  ASSERT_TRUE(sharing);
-  const int sent = 42;
-  unsigned buffer = 0;
-  std::thread([&] {
-    sharing->make_current();
-    glCreateBuffers(1, &buffer);
-    glNamedBufferStorage(buffer, sizeof sent, &sent, 0);
-    glFinish();
-    sharing.reset();
-  }).join();
-  int received = 0;
-  glGetNamedBufferSubData(buffer, 0, sizeof received, &received);
-  EXPECT_EQ(received, sent);
-  glDeleteBuffers(1, &buffer);
 }
 
 TEST_F(Context, SizesAndPlanesAreChecked) {
