@@ -48,7 +48,8 @@ class Flight {
     PictureBudgets budgets;
     budgets.memory = static_cast<std::uint64_t>(arguments.memory_gib * (1 << 30));
     budgets.device_memory = budgets.memory;
-    setup_ = std::make_shared<PictureSetup>(budgets, [] {});
+    setup_ = std::make_shared<PictureSetup>(
+        budgets, [] {}, PictureSize{arguments.width, arguments.height});
     picture_ = std::make_unique<StorePicture>(
         std::make_shared<const StoreReader>(arguments.store), budgets, [] {}, setup_);
     settings_.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};

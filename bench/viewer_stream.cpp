@@ -369,7 +369,8 @@ int run(int argc, char** argv) {
               {"size", fmt::format("{}x{}", arguments.width, arguments.height)}};
   // As a window does when it is made, before any store is opened.
   const auto start = Clock::now();
-  const auto setup = std::make_shared<PictureSetup>(budgets, [] {});
+  const auto setup = std::make_shared<PictureSetup>(
+      budgets, [] {}, PictureSize{arguments.width, arguments.height});
   result["set_up_ms"] = seconds_since(start) * 1e3;
   // First what is best measured in a process that has drawn nothing yet.
   result["first_opening"] = first_opening(arguments, budgets, setup);

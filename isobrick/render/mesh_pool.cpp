@@ -164,6 +164,8 @@ void MeshPool::trim() {
                 [](const std::shared_ptr<MeshBlock>& block) { return block->used == 0; });
 }
 
+void MeshPool::tidy() { state_->tidy(); }
+
 std::uint64_t MeshPool::bytes() const {
   std::uint64_t sum = 0;
   for (const std::shared_ptr<MeshBlock>& block : state_->blocks) sum += block->used;

@@ -66,6 +66,8 @@ class MeshPool {
 
   /// Gives blocks back that no mesh lies in.
   void trim();
+  /// All of these but one, for what comes next.
+  void tidy();
 
   /// Device memory in use by meshes, and taken for blocks.
   std::uint64_t bytes() const;

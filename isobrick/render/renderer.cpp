@@ -217,26 +217,19 @@ bool Renderer::end_piece(std::uint64_t work) { return state_->go_on(work); }
 std::uint64_t Renderer::work_left() const { return state_->work.left(); }
 
 void Renderer::discard() {
-  state_->shown.reset();
-  state_->next.reset();
+  if (state_->shown) state_->next = std::exchange(state_->shown, std::nullopt);
 }
 bool Renderer::has_picture() const { return state_->shown.has_value(); }
 
-void Renderer::prepare(const PictureSettings& settings) {
-  constexpr int edge = 16;
-  const std::array<Vec3f, 3> corners{Vec3f{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  const std::array<Triangle, 1> triangle{Triangle{0, 1, 2}};
-  MeshChunk mesh;
-  mesh.positions = corners;
-  mesh.normals = corners;
-  mesh.triangles = triangle;
+void Renderer::prepare(const PictureSettings& settings, int width, int height,
+                       const PooledMesh& mesh) {
   PictureSettings whole = settings, cut = settings;
   whole.planes.clear();
   whole.region.reset();
   cut.planes = {{{1, 0, 0}, 0}};
   for (const PictureSettings& form : {whole, cut}) {
-    begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), edge, edge, form);
-    draw(mesh, {}, {});
+    begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), width, height, form);
+    draw(mesh, {});
     draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
     draw_axes();
     draw_scale_bar("");

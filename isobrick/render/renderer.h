@@ -82,9 +82,10 @@ class Renderer {
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
 
-  /// Draws a few pixels as pictures with these settings are drawn, cut or not: drivers compile
-  /// shaders when something is first drawn with them, and no picture waits for that any more.
-  void prepare(const PictureSettings& settings);
+  /// Draws a mesh as pictures of this size and with these settings are drawn, cut or not: drivers
+  /// compile shaders, and get memory, when something is first drawn, and no picture waits for that
+  /// any more.
+  void prepare(const PictureSettings& settings, int width, int height, const PooledMesh& mesh);
 
   /// Starts a picture; one that is not finished is dropped. Throws UsageError for a size that
   /// cannot be.
@@ -119,7 +120,7 @@ class Renderer {
   /// What end() would have to do.
   std::uint64_t work_left() const;
 
-  /// Forgets the finished picture.
+  /// Forgets the finished picture; its memory is for the next one.
   void discard();
   /// Whether one has been finished since. Without one the functions below give and do nothing.
   bool has_picture() const;

@@ -5,19 +5,10 @@
 #include <vector>
 
 namespace isobrick {
-namespace {
-
-/// Room of a block of what is uploaded: little of the budget, so that little of it is idle. Meshes
-/// that are larger have blocks of their own.
-std::uint32_t pool_vertices(std::uint64_t device_memory) {
-  constexpr std::uint64_t vertex = 4 * sizeof(Vec3f);  // with a normal and two triangles
-  return static_cast<std::uint32_t>(
-      std::clamp<std::uint64_t>(device_memory / 128 / vertex, 1u << 12, 1u << 19));
+MeshUploads::~MeshUploads() {
+  uploads_.clear();
+  pool_.tidy();
 }
-
-}  // namespace
-
-MeshUploads::MeshUploads(std::uint64_t device_memory) : pool_(pool_vertices(device_memory)) {}
 
 bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
   for (const DrawnNode& node : drawable.nodes) {

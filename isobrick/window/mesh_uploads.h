@@ -9,9 +9,9 @@
 
 namespace isobrick {
 
-/// Meshes taken from host memory to the device. Those that are not drawn stay while there is room:
-/// they may outlive the ones in host memory, which made again would be the same. For the thread
-/// of the context.
+/// Meshes taken from host memory to the device, into a pool that outlives this. Those that are not
+/// drawn stay while there is room: they may outlive the ones in host memory, which made again would
+/// be the same. For the thread of the context.
 class MeshUploads {
  public:
   /// What may be taken to the device in a picture while others wait: copies that a driver puts
@@ -26,8 +26,10 @@ class MeshUploads {
     static constexpr std::chrono::milliseconds kMost{6};
   };
 
-  /// `device_memory`: of all pictures, of which a block of meshes is a small part.
-  explicit MeshUploads(std::uint64_t device_memory);
+  explicit MeshUploads(MeshPool& pool) : pool_(pool) {}
+  ~MeshUploads();
+  MeshUploads(const MeshUploads&) = delete;
+  MeshUploads& operator=(const MeshUploads&) = delete;
 
   /// From now on what was used before may go.
   void begin_use() { ++now_; }
@@ -52,7 +54,7 @@ class MeshUploads {
     std::uint64_t used = 0;
   };
 
-  MeshPool pool_;
+  MeshPool& pool_;
   std::unordered_map<MeshId, Upload, MeshIdHash> uploads_;
   std::uint64_t now_ = 0;
 };

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "isobrick/pipeline/extract.h"
+#include "isobrick/render/mesh_pool.h"
 #include "isobrick/render/renderer.h"
 #include "isobrick/window/device_meshes.h"
 
@@ -23,26 +24,36 @@ struct PictureBudgets {
   std::uint64_t device_mesh_memory() const { return device_memory / 4 * 3; }
 };
 
-/// What pictures of stores need of a context and what takes time to set up: compiled shaders, and
-/// a device that makes meshes. Made with the context, so that stores open quickly; one
+/// Pixels.
+struct PictureSize {
+  int width = 16, height = 16;
+};
+
+/// What pictures of stores need of a context and what takes time to set up: compiled shaders,
+/// memory, and a device that makes meshes. Made with the context, so that stores open quickly; one
 /// picture after the other uses it. For the thread of the context, which must outlive it.
 class PictureSetup {
  public:
   /// Begins to open the device that budgets.backend may use, and does not wait for it; see
-  /// DeviceOpening. `software`: whether to take OpenGL for software; nothing: what it is. Throws
-  /// what Renderer does.
+  /// DeviceOpening. `likely`: of the first pictures, whose memory is got here. `software`: whether
+  /// to take OpenGL for software; nothing: what it is. Throws what Renderer does.
   PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change,
-               std::optional<bool> software = std::nullopt);
+               PictureSize likely = {}, std::optional<bool> software = std::nullopt);
 
   Renderer& renderer() { return renderer_; }
+  /// For meshes that are uploaded.
+  MeshPool& pool() { return pool_; }
   const std::shared_ptr<DeviceOpening>& device() const { return device_; }
   /// Whether OpenGL is software.
   bool software() const { return software_; }
 
  private:
-  std::shared_ptr<DeviceOpening> device_;  ///< first: it opens beside the shaders' compilation
+  void prepare(PictureSize likely, std::uint32_t block_vertices);
+
   Renderer renderer_;
+  MeshPool pool_;
   bool software_;
+  std::shared_ptr<DeviceOpening> device_;
 };
 
 }  // namespace isobrick

@@ -70,7 +70,7 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
                                 stream_options(budgets_, on_change, software));
                           })),
       setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)),
-      uploads_(budgets.device_memory),
+      uploads_(setup_->pool()),
       slices_(budgets, last_sample(*store_), store_->info().type),
       pieces_(setup_->software()) {
   scene_ = reading_.get();

@@ -80,7 +80,10 @@ ViewerWindow::ViewerWindow(WindowOptions options)
     : options_(std::move(options)), window_(make_window(options_)) {
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
-  setup_ = std::make_shared<PictureSetup>(options_.budgets, glfwPostEmptyEvent);
+  PictureSize size;
+  glfwGetFramebufferSize(window_, &size.width, &size.height);
+  size = {std::max(size.width, 1), std::max(size.height, 1)};
+  setup_ = std::make_shared<PictureSetup>(options_.budgets, glfwPostEmptyEvent, size);
   // Before ImGui's, which calls those that it finds.
   events_ = std::make_unique<Events>(*this);
   set_up_imgui(window_);

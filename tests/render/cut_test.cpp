@@ -112,10 +112,12 @@ TEST_F(Cut, PreparingChangesNothing) {
   for (const PictureSettings& way : ways_to_cut()) {
     Renderer fresh;
     draw_all(fresh, way);
-    renderer().prepare(way);
-    EXPECT_FALSE(renderer().has_picture());
-    draw_all(renderer(), way);
-    EXPECT_TRUE(read(renderer()) == read(fresh));
+    for (const int width : {16, kWidth}) {
+      renderer().prepare(way, width, kHeight, pooled_);
+      EXPECT_FALSE(renderer().has_picture());
+      draw_all(renderer(), way);
+      EXPECT_TRUE(read(renderer()) == read(fresh));
+    }
   }
 }
 

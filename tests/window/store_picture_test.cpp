@@ -170,7 +170,7 @@ TEST_F(Picture, IsDrawnInFullWhenTheMeshBudgetIsFull) {
     picture_ = std::make_unique<StorePicture>(
         store, budgets, [] {},
         std::make_shared<PictureSetup>(
-            budgets, [] {}, software));
+            budgets, [] {}, PictureSize{}, software));
     const PictureWay way{.plain = PictureWay::Plain::until_complete};
     const auto draw = [&] {
       picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, way);
@@ -269,6 +269,28 @@ TEST_F(Picture, KeepsTheBudgetOfADeviceThatMakesMeshes) {
     draw();
     EXPECT_TRUE(picture_->state().covers);
     EXPECT_LE(picture_->state().device_bytes, budgets.device_memory);
+  }
+}
+
+TEST_F(Picture, WhatIsSetUpBeforeChangesNothingAndIsKept) {
+  const PictureBudgets budgets{.device_memory = 64u << 20};
+  open(SynthKind::gyroid, {96, 96, 96}, budgets);
+  const auto expected = pixels();
+  const auto store = std::make_shared<const StoreReader>(dir_ / "store.zarr");
+  const auto setup = std::make_shared<PictureSetup>(
+      budgets, [] {}, PictureSize{kWidth, kHeight}, false);
+  const std::uint64_t block = setup->pool().capacity();
+  EXPECT_GT(block, 0u);
+  EXPECT_EQ(setup->pool().bytes(), 0u);
+  for (int opened = 0; opened < 2; ++opened) {
+    picture_ = std::make_unique<StorePicture>(
+        store, budgets, [] {}, setup);
+    EXPECT_FALSE(picture_->renderer().has_picture());
+    EXPECT_EQ(pixels(), expected);
+    EXPECT_GT(setup->pool().bytes(), 0u);
+    picture_.reset();
+    EXPECT_EQ(setup->pool().bytes(), 0u);
+    EXPECT_EQ(setup->pool().capacity(), block);
   }
 }
 
