@@ -7,7 +7,8 @@
 //   bench_viewer_stream g.zarr --isovalue 127.5 --to 160.5 --json
 //
 // A picture's time ends with glFinish. Pictures are started at most 60 times a second, as a
-// display would.
+// display would. A frame is what input waits for: a whole picture while something moves, otherwise
+// a piece of one or what is done between two; those of less than a millisecond do not count.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -69,7 +70,7 @@ class Session {
         store_, budgets, [this] { changed_ = Clock::now(); }, setup);
     set_up_seconds = seconds_since(opened_);
     settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
-    settings.multisample = !current_gl_device().software;
+    settings.multisample = !software_;
     choose_values(settings, picture_->scene().tree());
     const WorldBox box = picture_->bounds();
     camera.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
@@ -82,8 +83,8 @@ class Session {
     return std::chrono::duration<double>(changed_.load() - start).count();
   }
 
-  /// One picture as the window makes it. `moving`: it may be a simpler one.
-  void draw(bool moving) { make_picture(moving); }
+  /// One frame as the window makes it. `moving`: its picture may be a simpler one.
+  void draw(bool moving) { make_frame(moving); }
   /// At most 60 times a second until `done`, and when all is there without waiting for the
   /// next turn of a display. Throws Error when that takes longer than two minutes.
   template <class F>
@@ -93,6 +94,7 @@ class Session {
       const auto next = Clock::now() + kPeriod;
       draw(moving);
       if (done()) return;
+      if (picture_->state().drawing) continue;
       const std::chrono::duration<double> left = next - Clock::now();
       const bool all_there = !moving && picture_->scene().stream().wait_idle(left.count());
       std::this_thread::sleep_until(all_there ? std::min(next, began_ + kPeriod) : next);
@@ -104,15 +106,24 @@ class Session {
   Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   double read_seconds = 0, set_up_seconds = 0;
   std::uint64_t device_peak = 0;
-  PicturesTimes pictures;  ///< since somebody took them; none at rest
-  Times at_rest;           ///< pictures in full when nothing moves and nothing is missing
+  Times at_rest;  ///< pictures in full when nothing moves and nothing is missing
+
+  /// Since it was last asked: frames, and whole pictures but for those at rest.
+  Json take_times() {
+    Json json = std::exchange(frames_, {}).summary();
+    json["whole_pictures"] = std::exchange(pictures_, {}).summary();
+    return json;
+  }
 
  private:
   static constexpr auto kPeriod = std::chrono::microseconds(16'667);
+  static constexpr double kLeast = 1e-3;  ///< seconds of a frame that counts
 
-  void make_picture(bool moving) {
+  void make_frame(bool moving) {
     const auto start = Clock::now();
-    PictureWay way{.coarser = moving ? pacer_.coarser() : 1};
+    PictureWay way{.coarser = moving ? pacer_.coarser() : 1,
+                   .piece_seconds = PictureWay::usual_piece(software_, moving),
+                   .moving = moving};
     if (pacer_.plain())
       way.plain = moving ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
     const int smaller = moving ? pacer_.smaller() : 1;
@@ -121,18 +132,16 @@ class Session {
     glFinish();
     const double seconds = seconds_since(start);
     const PictureState& state = picture_->state();
-    if (picture_->drew()) {  // nothing is drawn that would look the same
-      began_ = start;
-      if (!moving && state.complete && !state.plain)
-        at_rest.add(seconds);
-      else
-        pictures.add(seconds, picture_->times(), seconds - submitted);
-    }
-    if (moving)
-      pacer_.drawn(seconds);
-    else if (!state.plain)
-      pacer_.drawn_still(seconds);
+    if (seconds >= kLeast) frames_.add(seconds, picture_->times(), seconds - submitted);
     device_peak = std::max(device_peak, state.device_bytes);
+    if (!picture_->drew()) return;  // nothing is drawn that would look the same
+    began_ = start;
+    const double whole = std::max(seconds, picture_->picture_seconds());
+    (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
+    if (moving)
+      pacer_.drawn(whole);
+    else if (!state.plain)
+      pacer_.drawn_still(whole);
   }
 
   const Arguments& arguments_;
@@ -140,7 +149,10 @@ class Session {
   std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
   std::unique_ptr<StorePicture> picture_;
-  FramePacer pacer_ = FramePacer::for_device(current_gl_device().software);
+  PicturesTimes frames_;
+  Times pictures_;
+  const bool software_ = current_gl_device().software;
+  FramePacer pacer_ = FramePacer::for_device(software_);
 };
 
 /// Takes a mesh and keeps nothing.
@@ -182,7 +194,7 @@ Json slide(Session& session, const Arguments& arguments) {
     asked.emplace(isovalue, Clock::now());
     return turn >= 1;
   });
-  Json result = std::exchange(session.pictures, {}).summary();
+  Json result = session.take_times();
   // From asking for an isovalue to the end of a picture of its surface.
   result["surface_behind_slider"] = behind.summary();
   return result;
@@ -213,7 +225,7 @@ Json first_opening(const Arguments& arguments, const PictureBudgets& budgets,
     const auto& device = setup->device();
     return !device->begun() || device->over();
   });
-  result["pictures"] = session.pictures.summary();
+  result["frames"] = session.take_times();
   return result;
 }
 
@@ -250,7 +262,7 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
     jumps.push_back(jump);
   }
   result["jumps"] = jumps;
-  result["while_streaming"] = std::exchange(session.pictures, {}).summary();
+  result["while_streaming"] = session.take_times();
   result["at_rest"] = session.at_rest.summary();
 
   result["while_sliding"] = slide(session, arguments);
@@ -263,7 +275,7 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
     session.camera.orbit(turn * 2 * 3.14159265358979, 0, {0, 0, 1});
     return turn >= 1;
   });
-  result["while_turning"] = std::exchange(session.pictures, {}).summary();
+  result["while_turning"] = session.take_times();
   result["meshes_by"] = session.picture().device().describe();
   result["stream"] = stream_json(session.picture().scene().stream().counters());
   result["device"] = device_json(session.picture().device().times());
@@ -330,7 +342,7 @@ Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
                       {"limited_by_budget", session.picture().state().limited_by_budget},
                       {"picture_ends_ms_nodes_triangles", ends},
                       {"last_mesh_seconds", session.changed_after(start)},
-                      {"pictures", session.pictures.summary()},
+                      {"frames", session.take_times()},
                       {"at_rest", session.at_rest.summary()},
                       {"device", device_json(session.picture().device().times())},
                       {"stream", stream_json(session.picture().scene().stream().counters())}};

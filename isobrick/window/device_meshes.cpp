@@ -64,7 +64,7 @@ bool DeviceOpening::over() const {
 bool DeviceOpening::import_next() {
   if (!opened()) return false;
   DeviceMesher* const device = mesher();
-  return device != nullptr && import_one(*device) && !over();
+  return device != nullptr && import_one(*device);
 }
 
 std::shared_ptr<DeviceMesher> DeviceOpening::get() {
@@ -104,9 +104,9 @@ void DeviceMeshes::use(Backend backend) {
 
 bool DeviceMeshes::update() {
   if (opened_) return false;
-  if (!opening_->over() && opening_->import_next()) return true;
+  const bool imported = !opening_->over() && opening_->import_next();
   if (opening_->over()) take_over();
-  return false;
+  return imported;
 }
 
 void DeviceMeshes::take_over() {

@@ -32,7 +32,7 @@ class DeviceOpening {
   bool over() const;
   /// Waits for that. Null where there is no device; throws Error when it cannot be opened.
   std::shared_ptr<DeviceMesher> get();
-  /// Imports one piece of the memory, once it is there. Whether there is another.
+  /// Imports one piece of the memory, once it is there. Whether there was one.
   bool import_next();
 
   /// Device memory for meshes: that is taken, and that may be taken.
@@ -70,8 +70,8 @@ class DeviceMeshes {
   /// open, without waiting for it. Backend::cuda waits, and throws Error where there is none.
   void use(Backend backend);
   Backend backend() const { return backend_; }
-  /// Takes over a device that has been opened meanwhile, or imports a piece of its memory before.
-  /// Whether there is another piece.
+  /// Takes over a device that has been opened meanwhile; before, imports its memory, a piece with
+  /// each call. Whether it has imported one.
   bool update();
 
   /// Who makes meshes now, in a line: a device's name and how meshes get into pictures, or

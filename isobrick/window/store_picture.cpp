@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <utility>
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -24,7 +25,8 @@ constexpr double kRefiningSeconds = 0.04;
 /// seconds in software, take a third of the time at most.
 constexpr double kRefiningPause = 2;
 constexpr double kMarginOfWait = 0.05;
-/// Of a piece's time: for less another piece is not begun.
+/// Of a piece's time: for less another piece is not begun; after more of other work a picture
+/// waits.
 constexpr double kLeastPart = 0.25;
 
 /// `software`: then others than this thread draw, and what they draw of is made beside them.
@@ -207,13 +209,21 @@ bool StorePicture::shows_all_there_is(const Pictured& next, const Asked& asked) 
          pictured_.isovalues == next.isovalues && next.isovalues != scene_->cut().isovalues;
 }
 
+/// Whether taking things to the device has been enough for a frame: the next one can show them.
+bool StorePicture::can_be_put_off(const Pictured& next, const Asked& asked) const {
+  return times_.device + times_.upload > kLeastPart * asked.way.piece_seconds && state_.covers &&
+         next.isovalues == pictured_.isovalues &&
+         (pictured_.shows == asked.shows || pictured_.shows == asked.shows_plain);
+}
+
 /// Unless it would show nothing new.
 void StorePicture::choose_picture(const Asked& asked) {
   Stopwatch watch;
   const bool plain_serves =
       asked.way.plain != PictureWay::Plain::no && pictured_.shows == asked.shows_plain;
   const bool other_view = pictured_.shows != asked.shows && !plain_serves;
-  if (other_view || asked.idle || !can_wait(*asked.newest)) upload(asked.newest);
+  const bool enough = (std::exchange(put_off_, false) || imported_) && shown_ != nullptr;
+  if (!enough && (other_view || asked.idle || !can_wait(*asked.newest))) upload(asked.newest);
   times_.upload = watch.lap();
   slices_.update(scene_->stream(), asked.settings);
   times_.slices = watch.lap();
@@ -225,6 +235,8 @@ void StorePicture::choose_picture(const Asked& asked) {
   if (shown_ != nullptr) next.isovalues = shown_->isovalues;
   // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
   if (shows_all_there_is(next, asked)) return;
+  put_off_ = can_be_put_off(next, asked);
+  if (put_off_) return;
   if (pictured_.slices != next.slices || !same_meshes(pictured_.meshes.get(), shown_.get())) {
     pictured_.stale = true;
     pictured_.meshes.reset();
@@ -320,7 +332,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     glFinish();
     if (work_) drop_picture();
     pictured_ = {};  // half a picture is none
-    drew_ = state_.drawing = state_.complete = false;
+    drew_ = put_off_ = state_.drawing = state_.complete = false;
     state_.drawn_part = 0;
     throw;
   }
@@ -331,7 +343,7 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
   uploads_.begin_use();
   drew_ = false;
   Stopwatch watch;
-  state_.imports = device_->update();
+  imported_ = !work_ && !put_off_ && device_->update();
   times_ = {.device = watch.lap()};
   update_scene(camera, width, height, settings, way.coarser);
   times_.scene = scene_->times();
@@ -376,7 +388,8 @@ void StorePicture::update_state(const Asked& asked) {
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;
-  state_.complete = !work_ && shown_ != nullptr && shown_ == scene_->drawable() &&
+  state_.more = imported_ || put_off_;
+  state_.complete = !work_ && !put_off_ && shown_ != nullptr && shown_ == scene_->drawable() &&
                     (shown_->complete || scene_->stream().idle());
 }
 

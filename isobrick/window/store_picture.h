@@ -25,6 +25,8 @@ namespace isobrick {
 /// So long a piece of a picture takes, about, that is drawn in pieces: input is answered in
 /// between.
 inline constexpr double kPieceSeconds = 0.06;
+/// The same where a device draws and nothing moves: half a frame of a display.
+inline constexpr double kDevicePieceSeconds = 0.008;
 
 /// What a picture shows and what it still lacks.
 struct PictureState {
@@ -39,7 +41,7 @@ struct PictureState {
   bool plain = false;               ///< drawn without occlusion and multisampling to be quick
   bool moving = false;              ///< drawn as PictureWay::moving
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
-  bool imports = false;             ///< the next draw() takes more of a device's memory over
+  bool more = false;                ///< the next draw() has something to do, whatever comes
   bool limited_by_budget = false;   ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
 };
@@ -59,6 +61,11 @@ struct PictureWay {
   /// The same picture every time, whichever mesh came first. A device takes longer for it; in
   /// software it is always so.
   bool in_order = false;
+
+  /// What windows take for piece_seconds.
+  static double usual_piece(bool software, bool moving) {
+    return software || moving ? kPieceSeconds : kDevicePieceSeconds;
+  }
 };
 
 /// What has become of pictures so far.
@@ -102,8 +109,9 @@ class StorePicture {
   WorldBox bounds() const;
 
   /// Makes the picture in the renderer, of what is there by now, or goes on with it; leaves the one
-  /// before until it is whole, and where it would show the same. Throws what Scene, Renderer and
-  /// DeviceMeshes do; what had been begun is dropped then.
+  /// before until it is whole, and where it would show the same. A picture of the same view that
+  /// shows more is left to the next draw() when it took long to take that to the device. Throws
+  /// what Scene, Renderer and DeviceMeshes do; what had been begun is dropped then.
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
             const PictureWay& way = {});
   const PictureState& state() const { return state_; }
@@ -160,6 +168,7 @@ class StorePicture {
   void drop_unused();
   bool still_wanted(const Work& work, const Asked& asked) const;
   bool shows_all_there_is(const Pictured& next, const Asked& asked) const;
+  bool can_be_put_off(const Pictured& next, const Asked& asked) const;
   void choose_picture(const Asked& asked);
   void begin_picture(const Asked& asked);
   void draw_piece(double most_seconds);
@@ -187,6 +196,8 @@ class StorePicture {
   std::chrono::steady_clock::time_point drawn_;  ///< when the last picture was finished
   double picture_seconds_ = 0;
   bool drew_ = false;
+  bool imported_ = false;  ///< a piece of a device's memory, in the last draw()
+  bool put_off_ = false;   ///< a picture, to the next draw(), which takes nothing to the device
   PictureCounters counters_;
   PictureState state_;
   PictureTimes times_;

@@ -233,7 +233,8 @@ bool ViewerWindow::draw_picture(int width, int height) {
   // The first picture of a surface should not wait for a good one.
   const bool fluent = moving() || !picture.state().covers;
   PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1,
-                 .piece_seconds = options_.piece_seconds,
+                 .piece_seconds = options_.piece_seconds.value_or(
+                     PictureWay::usual_piece(setup_->software(), fluent)),
                  .moving = fluent};
   // Nor should those that follow while meshes come in.
   if (state_.pacer.plain())
@@ -278,8 +279,8 @@ void ViewerWindow::draw_frame(bool asked) {
 /// What a picture says of the next one.
 void ViewerWindow::pace() {
   const StorePicture& picture = *state_.picture;
-  // There is more to draw; or a better one to come; or more of a device's memory to import.
-  more_ = picture.state().drawing || picture.state().plain || picture.state().imports;
+  // There is more to draw; or a better one to come; or something else to do.
+  more_ = picture.state().drawing || picture.state().plain || picture.state().more;
   if (!picture.drew()) return;
   const double seconds = std::max(state_.draw_seconds, picture.picture_seconds());
   if (picture.state().moving)
@@ -300,8 +301,8 @@ void ViewerWindow::wait(double most_seconds) {
 }
 
 void ViewerWindow::wait_for_meshes(double most_seconds) {
-  if (state_.picture == nullptr || state_.picture->drew() || state_.picture->state().drawing)
-    return;
+  if (state_.picture == nullptr || state_.picture->drew()) return;
+  if (state_.picture->state().drawing || state_.picture->state().more) return;
   // Each mesh that comes in ends a wait, and is not worth a step; what a user does is.
   const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
   for (double now = glfwGetTime(); !changed_ && now < end; now = glfwGetTime())

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "isobrick/render/camera_request.h"
@@ -19,7 +20,7 @@ struct WindowOptions {
   CameraRequest camera;                 ///< for the first store
   ViewSettings settings;                ///< for the first store
   std::filesystem::path bookmarks;      ///< file; empty: the user's own
-  double piece_seconds = kPieceSeconds;
+  std::optional<double> piece_seconds;  ///< nothing: PictureWay::usual_piece()
 };
 
 /// A window that shows a store: mouse, keys, panels, files dropped on it. All functions

@@ -108,6 +108,36 @@ TEST_F(Pieces, OfPicturesWithoutTrianglesAreFinishedWhileTheViewKeepsChanging) {
   EXPECT_EQ(picture_->counters().dropped, before.dropped);
 }
 
+TEST_F(Pieces, WaitForTheNextFrameWhenThisOneHasTakenMeshesToTheDevice) {
+  open(SynthKind::gyroid, {96, 96, 96});
+  settings_.pixel_error = 0.5f;
+  const auto expected = pixels();
+  show();
+  PictureWay way{.coarser = 16, .piece_seconds = 1e-6};  // whatever is taken takes longer
+  const auto told = [&] { return picture_->counters().finished + picture_->counters().pieces; };
+  int put_off = 0;
+  const auto complete = [&] {
+    bool owed = false;
+    for (int i = 0; i == 0 || !picture_->state().complete; ++i) {
+      const std::uint64_t before = told();
+      picture_->draw(camera_, kWidth, kHeight, settings_, way);
+      EXPECT_TRUE(told() > before || !owed) << "once is enough";
+      owed = picture_->state().more;
+      if (!owed) continue;
+      ++put_off;
+      EXPECT_EQ(told(), before);
+      EXPECT_FALSE(picture_->state().complete);
+    }
+  };
+  complete();
+  EXPECT_NE(picture_->renderer().read_pixels(), expected);
+  put_off = 0;
+  way.coarser = 1;
+  complete();
+  EXPECT_GT(put_off, 0);
+  EXPECT_EQ(picture_->renderer().read_pixels(), expected);
+}
+
 TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
   open(SynthKind::gyroid, {96, 96, 96});
   const auto first = pixels();
