@@ -259,17 +259,20 @@ TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
   window.open(dir_ / "big.zarr");
   window.state().settings.pixel_error = 0.5f;
   const StorePicture& picture = *window.state().picture;
-  until([&] { return picture.state().complete && !picture.drew(); });
-  steps(15);  // nothing moves any more
+  const auto opened = std::chrono::steady_clock::now();
+  until([&] {
+    return picture.state().complete && !picture.drew() &&
+           std::chrono::steady_clock::now() - opened > std::chrono::milliseconds(400);
+  });  // nothing moves any more
   int pauses = 0;
   for (int round = 0; round < 20 && pauses < 3; ++round) {
     window.state().settings.surfaces[0].isovalue += 2;  // as nobody does who moves it
     steps(1);
     while (!picture.state().complete) {
-      const bool drew = picture.drew() || picture.state().drawing;
+      const bool busy = picture.drew() || picture.state().drawing || picture.state().more;
       const auto start = std::chrono::steady_clock::now();
       steps(1);
-      if (drew) continue;
+      if (busy) continue;
       ++pauses;
       EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(7));
     }
