@@ -221,15 +221,20 @@ void Renderer::discard() {
 }
 bool Renderer::has_picture() const { return state_->shown.has_value(); }
 
-void Renderer::prepare(const PictureSettings& settings, int width, int height,
-                       const PooledMesh& mesh) {
+void Renderer::prepare(const PictureSettings& settings, int width, int height) {
+  const std::array<Vec3f, 3> corners{Vec3f{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::array<Triangle, 1> triangle{Triangle{0, 1, 2}};
+  MeshChunk mesh;
+  mesh.positions = corners;
+  mesh.normals = corners;
+  mesh.triangles = triangle;
   PictureSettings whole = settings, cut = settings;
   whole.planes.clear();
   whole.region.reset();
   cut.planes = {{{1, 0, 0}, 0}};
   for (const PictureSettings& form : {whole, cut}) {
     begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), width, height, form);
-    draw(mesh, {});
+    draw(mesh, {}, {});
     draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
     draw_axes();
     draw_scale_bar("");

@@ -82,10 +82,10 @@ class Renderer {
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
 
-  /// Draws a mesh as pictures of this size and with these settings are drawn, cut or not: drivers
-  /// compile shaders, and get memory, when something is first drawn, and no picture waits for that
-  /// any more.
-  void prepare(const PictureSettings& settings, int width, int height, const PooledMesh& mesh);
+  /// Draws a triangle as pictures of this size and with these settings are drawn, cut or not:
+  /// drivers compile shaders, and get memory, when something is first drawn, and no picture waits
+  /// for that any more.
+  void prepare(const PictureSettings& settings, int width, int height);
 
   /// Starts a picture; one that is not finished is dropped. Throws UsageError for a size that
   /// cannot be.

@@ -19,14 +19,18 @@ std::uint32_t block_vertices(std::uint64_t device_memory) {
       std::clamp<std::uint64_t>(device_memory / 128 / vertex, 1u << 12, 1u << 19));
 }
 
-/// A triangle, and as many without extent as a block has room for.
-PooledMesh fill_block(MeshPool& pool, std::uint32_t vertices) {
-  std::vector<Vec3f> places(vertices);
-  places[1].x = places[2].y = 1;
-  std::vector<Triangle> triangles(std::size_t{2} * vertices);
-  triangles[0] = {0, 1, 2};
+/// A flat mesh of about as many triangles as vertices.
+PooledMesh add_sheet(MeshPool& pool, std::uint32_t vertices) {
+  const std::uint32_t row = vertices / 100;
+  std::vector<Vec3f> positions(vertices), normals(vertices, {0, 0, 1});
+  for (std::uint32_t i = 0; i < vertices; ++i)
+    positions[i] = {static_cast<float>(i % row) / static_cast<float>(row),
+                    static_cast<float>(i / row) / 100, 0};
+  std::vector<Triangle> triangles;
+  for (std::uint32_t i = 0; i + row < vertices; ++i) triangles.push_back({i, i + 1, i + row});
   MeshChunk mesh;
-  mesh.positions = mesh.normals = places;
+  mesh.positions = positions;
+  mesh.normals = normals;
   mesh.triangles = triangles;
   return pool.add(mesh);
 }
@@ -45,13 +49,23 @@ PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> 
   if (budgets.backend != Backend::cpu) device_->begin();
 }
 
+/// As a first store is drawn, some times over: that much it takes until a driver has all that it
+/// wants.
 void PictureSetup::prepare(PictureSize likely, std::uint32_t block_vertices) {
-  const PooledMesh mesh = fill_block(pool_, block_vertices);
-  PictureSettings settings;
-  settings.picking = true;  // as StorePicture's pictures
-  renderer_.prepare(settings, likely.width, likely.height, mesh);
-  settings.occlusion = settings.multisample = false;  // as while something moves
-  renderer_.prepare(settings, likely.width, likely.height, mesh);
+  PictureSettings full, plain;
+  full.picking = plain.picking = true;          // as StorePicture's pictures
+  plain.occlusion = plain.multisample = false;  // as while something moves
+  for (const PictureSize size : {PictureSize{}, likely})
+    for (const PictureSettings& settings : {full, plain})
+      renderer_.prepare(settings, size.width, size.height);
+  std::vector<PooledMesh> meshes(3);  // most of a block
+  for (PooledMesh& mesh : meshes) mesh = add_sheet(pool_, block_vertices / 7 * 2);
+  for (const PictureSettings& settings : {full, plain}) {
+    renderer_.begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), likely.width, likely.height, settings);
+    for (const PooledMesh& mesh : meshes) renderer_.draw(mesh, {});
+    renderer_.end();
+  }
+  renderer_.discard();
   glFinish();
 }
 

@@ -113,7 +113,7 @@ TEST_F(Cut, PreparingChangesNothing) {
     Renderer fresh;
     draw_all(fresh, way);
     for (const int width : {16, kWidth}) {
-      renderer().prepare(way, width, kHeight, pooled_);
+      renderer().prepare(way, width, kHeight);
       EXPECT_FALSE(renderer().has_picture());
       draw_all(renderer(), way);
       EXPECT_TRUE(read(renderer()) == read(fresh));
