@@ -149,7 +149,7 @@ int run(const Arguments& a) {
   const double written =
       12.0 * static_cast<double>(counts.vertices * (a.normals ? 2 : 1) + counts.triangles);
   const double floor = (read / bandwidth.read + written / bandwidth.write) * 1e3;
-  const float median = times[times.size() / 2];
+  const float middle = times[times.size() / 2];
   const std::uint64_t extra_bytes = extractor.bytes();
   const double wall = wall_milliseconds(extractor, options.isovalue, a.runs);
   out["extent"] = {v.extent.x, v.extent.y, v.extent.z};
@@ -161,12 +161,12 @@ int run(const Arguments& a) {
   out["triangles"] = counts.triangles;
   out["active_tiles"] = counts.active_tiles;
   out["tiles"] = volume(lattice.tiles());
-  out["ms_median"] = median;
+  out["ms_median"] = middle;
   out["ms_least"] = times.front();
   out["ms_most"] = times.back();
   out["wall_ms_median"] = wall;
   out["floor_ms"] = floor;
-  out["times_floor"] = median / floor;
+  out["times_floor"] = middle / floor;
   out["read_bytes_per_s"] = bandwidth.read;
   out["write_bytes_per_s"] = bandwidth.write;
   out["volume_device_bytes"] = resident.bytes();
@@ -178,7 +178,7 @@ int run(const Arguments& a) {
         "{}x{}x{} {} iso {}{}: {:.3f} ms (least {:.3f}), floor {:.3f}, x{:.2f}; {} triangles, "
         "{} of {} tiles{}{}\n",
         v.extent.x, v.extent.y, v.extent.z, short_name(v.type), options.isovalue,
-        a.normals ? " normals" : "", median, times.front(), floor, median / floor, counts.triangles,
+        a.normals ? " normals" : "", middle, times.front(), floor, middle / floor, counts.triangles,
         counts.active_tiles, volume(lattice.tiles()),
         out.contains("cpu_ms") ? fmt::format(", cpu {:.2f} ms", out["cpu_ms"].get<double>()) : "",
         out.contains("same_as_cpu") ? out["same_as_cpu"].get<bool>() ? ", same" : ", DIFFERS" : "");
@@ -200,7 +200,7 @@ int main(int argc, char** argv) {
   app.add_option("--isovalue", a.isovalue)->each([&](const std::string&) {
     a.has_isovalue = true;
   });
-  app.add_option("--runs", a.runs);
+  app.add_option("--runs", a.runs)->check(CLI::PositiveNumber);
   app.add_option("--write-raw", a.write_raw, "also writes the volume");
   app.add_flag("--normals", a.normals);
   app.add_flag("--brute-force", a.brute_force, "take every tile instead of searching");

@@ -88,7 +88,7 @@ void DeviceVolume::Impl::list_tiles() {
   ranges = DeviceBuffer<std::byte>(2 * lattice.sample_bytes() * tile_count, stream);
   launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(), stream.get());
   stream.wait();
-  if (tile_count <= kMostSearchedByBlock) keep_ranges_here();
+  if (tile_count <= kMostCandidates) keep_ranges_here();
 }
 
 void DeviceVolume::Impl::keep_ranges_here() {

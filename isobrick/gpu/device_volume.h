@@ -70,7 +70,8 @@ class ResidentExtractor {
   DeviceCounts extract(double isovalue);
   /// Makes the last mesh once more, without waiting; for measuring.
   void repeat();
-  /// Milliseconds on the device of the last repeat(), search included.
+  /// Milliseconds on the device of the last repeat(), with the searches that it makes: of some
+  /// 320³ samples and fewer the host compares the ranges.
   float milliseconds();
 
   /// Copies the last mesh to the host.

@@ -15,7 +15,7 @@ class HostSearch {
   using Range = ValueRange<double>;
 
   HostSearch() = default;
-  /// Of up to kMostSearchedByBlock tiles; those with an empty range are never active.
+  /// Of up to kMostCandidates tiles; those with an empty range are never active.
   HostSearch(const std::vector<Int3>& tiles, const std::vector<Range>& ranges);
 
   FoundTiles find(double isovalue) const;

@@ -10,10 +10,12 @@ KernelGraph::~KernelGraph() {
 }
 
 void KernelGraph::make(const cudaKernelNodeParams& kernel) {
-  if (!graph_) {
-    check(cudaGraphCreate(&graph_, 0));
+  // As far as it was made by one that failed.
+  if (!graph_) check(cudaGraphCreate(&graph_, 0));
+  if (node_)
+    check(cudaGraphKernelNodeSetParams(node_, &kernel));
+  else
     check(cudaGraphAddKernelNode(&node_, graph_, nullptr, 0, &kernel));
-  }
   check(cudaGraphInstantiate(&executable_, graph_, 0));
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/threshold.h"
 #include "isobrick/gpu/device_volume_impl.h"
 #include "isobrick/gpu/host_search.h"
 #include "isobrick/gpu/kernel_graph.h"
@@ -88,7 +89,7 @@ struct ResidentExtractor::Impl {
   }
 
   /// So few tiles need no launch of their own to find the active ones.
-  bool are_few() const { return volume.tile_count <= kMostSearchedByBlock; }
+  bool are_few() const { return volume.tile_count <= kMostCandidates; }
   /// Of the tiles that have a cell in the region of interest; empty ones of others.
   std::vector<ValueRange<double>> ranges_to_search() const {
     std::vector<ValueRange<double>> ranges = volume.ranges_here;
@@ -103,6 +104,12 @@ struct ResidentExtractor::Impl {
         ranges[i] = {-HUGE_VAL, HUGE_VAL};
     }
     return ranges;
+  }
+  /// Then no tile is stabbed, but by brute force all are taken.
+  bool is_above_all_samples() const {
+    return visit_device_scalar(volume.lattice.type, [&](auto tag) {
+      return Threshold<typename decltype(tag)::type>(isovalue).none;
+    });
   }
   /// Parts of a tile that may have a block each.
   std::uint32_t slabs() const { return volume.tile_count <= kMostInSlabs ? kSlabsOfTile : 1; }
@@ -177,12 +184,12 @@ struct ResidentExtractor::Impl {
     p.vertex_capacity = positions.size();
     p.triangle_capacity = triangles.size();
     p.end.report = report.on_device();
-    p.end.launch = ++launches;
+    p.end.launch = launches + 1;
     p.order = order.data();
-    if (are_few()) {  // two that take turns
+    if (are_few()) {  // two sets that take turns
       p.end.next_items = volume.tile_count * slabs();
       p.end.next_order = order.data();
-      (launches % 2 ? p.order : p.end.next_order) += p.end.next_items;
+      (launches % 2 == 0 ? p.order : p.end.next_order) += p.end.next_items;
     }
     p.end.found = &counters()->found;
     p.end.done = &counters()->done;
@@ -190,10 +197,12 @@ struct ResidentExtractor::Impl {
     p.end.zero_words = static_cast<std::uint32_t>(
         (words.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
     const LaunchShape shape = shape_of(found);
-    // Blocks that are all at work at a time may wait for each other in any order.
+    // All fit the device at a time, and it begins them in their order: none waits for one that
+    // cannot begin.
     if (shape.blocks == static_cast<int>(found.count) * shape.slabs) p.ticket = nullptr;
     launch_extraction(kernel_of(volume.lattice.type, options), p, cases.data(), shape,
                       volume.stream.get(), !are_few(), are_few() ? &graph : nullptr);
+    ++launches;  // only now: the sums of one that could not be launched are those of the next
   }
 
   /// Of no more blocks than there are tiles, or slabs.
@@ -278,6 +287,7 @@ struct ResidentExtractor::Impl {
 
   /// False where it is known that there is nothing to make.
   bool launch() {
+    if (is_above_all_samples()) return false;
     FoundTiles found;
     if (host_search) found = host_search->find(isovalue);
     if (found.count == 0) return false;

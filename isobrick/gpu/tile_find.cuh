@@ -12,10 +12,10 @@ namespace isobrick::gpu {
 /// afterwards.
 template <int N, class T>
 __device__ inline void find_candidates(TileShared& s, const TileParams& p) {
-  static_assert(kMostSearchedByBlock == 32 * 32);
+  static_assert(kMostCandidates == 32 * 32);
   const bool searched = p.found.count != FoundTiles::kNotSearched;
   if (!searched) {
-    for (std::uint32_t i = threadIdx.x; i < kMostSearchedByBlock; i += N) {
+    for (std::uint32_t i = threadIdx.x; i < kMostCandidates; i += N) {
       const unsigned word =
           __ballot_sync(kAll, i < p.candidates.count && is_active<T>(p, p.tiles, i));
       if (lane_id() == 0) s.active[i / 32] = word;

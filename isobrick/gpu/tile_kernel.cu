@@ -24,8 +24,8 @@ static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later
 
 /// The last block to come here tells the host and leaves the counters as the next launch needs
 /// them. Nobody reads what the others have written before the launch is over, and the sums they
-/// ask each other for are not zeroed by this launch but by the next but one: nothing has to be in
-/// order with the count.
+/// ask each other for are not zeroed by this launch but by the next, or by its search: nothing has
+/// to be in order with the count.
 template <int N>
 __device__ void end_launch(TileShared& s, const TileParams& p) {
   const LaunchEnd& end = p.end;
@@ -231,7 +231,7 @@ LaunchShape LaunchShapes::of(std::uint32_t tiles) const {
 
 LaunchShape LaunchShapes::in_slabs(std::uint32_t tiles) const {
   const auto blocks = static_cast<std::uint32_t>(slabs.blocks);
-  return blocks > 0 && tiles * kSlabsOfTile <= blocks ? slabs : of(tiles);
+  return tiles <= kMostActiveInSlabs && tiles * kSlabsOfTile <= blocks ? slabs : of(tiles);
 }
 
 void launch_extraction(const TileKernel& kernel, const TileParams& params, const CaseTable* cases,

@@ -34,8 +34,8 @@ struct LaunchShapes {
 
   /// For so many tiles, a block each.
   LaunchShape of(std::uint32_t tiles) const;
-  /// The same where blocks search tiles themselves: with several to a tile if each can have
-  /// a slab for itself.
+  /// The same where the host has found the tiles: with several to a tile if each can have a slab
+  /// for itself.
   LaunchShape in_slabs(std::uint32_t tiles) const;
 };
 

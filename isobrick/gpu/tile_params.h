@@ -70,7 +70,7 @@ enum class TileTest : std::uint8_t {
 
 /// Tiles of volumes that are so small that no launch searches them; of those whose tiles may be
 /// shared by several blocks.
-inline constexpr std::uint32_t kMostSearchedByBlock = 1024, kMostInSlabs = 128;
+inline constexpr std::uint32_t kMostCandidates = 1024, kMostInSlabs = 128;
 /// Active ones of the latter that are shared.
 inline constexpr std::uint32_t kMostActiveInSlabs = 64;
 
@@ -78,11 +78,11 @@ inline constexpr std::uint32_t kMostActiveInSlabs = 64;
 struct FoundTiles {
   static constexpr std::uint32_t kNotSearched = 0xffffffffu;
   std::uint32_t count = kNotSearched;
-  std::uint32_t words[kMostSearchedByBlock / 32] = {};  ///< bit i: candidate i
-  std::uint32_t tiles[kMostActiveInSlabs] = {};         ///< the first active ones, packed
+  std::uint32_t words[kMostCandidates / 32] = {};  ///< bit i: candidate i
+  std::uint32_t tiles[kMostActiveInSlabs] = {};    ///< the first active ones, packed
 
   static constexpr std::uint32_t packed(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    static_assert(kMostSearchedByBlock <= 1u << 10);
+    static_assert(kMostCandidates <= 1u << 10);
     return x | y << 10 | z << 20;
   }
 };
@@ -142,7 +142,7 @@ struct alignas(16) CaseTable {
 CaseTable make_case_table(bool mirrored);
 
 struct TileParams {
-  /// The tiles, where blocks do not search them themselves: then there are candidates.
+  /// The tiles, where a launch has found them; otherwise there are candidates.
   const TileItem* items;
   const std::uint32_t* item_count;
   TileCandidates candidates;

@@ -128,7 +128,7 @@ struct alignas(256) TileShared {
   TileItem tile;
   Shape shape;
   /// The active tiles as bits and how many come before each 32, where there are candidates.
-  std::uint32_t active[kMostSearchedByBlock / 32], active_before[kMostSearchedByBlock / 32];
+  std::uint32_t active[kMostCandidates / 32], active_before[kMostCandidates / 32];
 };
 
 /// The row that the first of 32 listed things lies in, and how many of the row

@@ -21,7 +21,7 @@ bool is_found(const FoundTiles& found, std::size_t tile) {
 }
 
 TEST(HostSearch, FindsWhatAnIsovalueStabs) {
-  for (const std::size_t count : {1u, 31u, 32u, 33u, 500u, kMostSearchedByBlock}) {
+  for (const std::size_t count : {1u, 31u, 32u, 33u, 500u, kMostCandidates}) {
     std::vector<Range> ranges;
     for (std::size_t i = 0; i < count; ++i) {
       const auto lo = static_cast<double>(i * 7 % 50);
@@ -31,7 +31,7 @@ TEST(HostSearch, FindsWhatAnIsovalueStabs) {
     for (const double isovalue : {-1.0, 0.0, 3.0, 24.5, 30.0, 57.0, 58.0, 1e9}) {
       const FoundTiles found = search.find(isovalue);
       std::uint32_t expected = 0;
-      for (std::size_t i = 0; i < kMostSearchedByBlock; ++i) {
+      for (std::size_t i = 0; i < kMostCandidates; ++i) {
         const bool stabbed = i < count && ranges[i].stabbed_by(isovalue);
         EXPECT_EQ(is_found(found, i), stabbed) << i << " of " << count << " at " << isovalue;
         if (stabbed && expected < kMostActiveInSlabs) {

@@ -2,6 +2,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume.h"
+#include "isobrick/gpu/tile_kernel.h"
 #include "tests/gpu/compare.h"
 
 // The mesh from the device is the CPU's, byte for byte.
@@ -11,14 +12,14 @@ namespace {
 
 template <class T>
 void compare(const Field<T>& field, std::vector<double> isovalues, SurfaceOptions options,
-             Index brick = 64) {
+             Index brick = 64, gpu::TileSearch search = gpu::TileSearch::ranges) {
   const Lattice lattice{field.extent, {brick, brick, brick}, scalar_type_of<T>};
   const DenseBricks bricks(lattice, field.samples.data());
   if (options.roi == Box3{}) options.roi = lattice.box();
   gpu::DeviceVolume volume(lattice, bricks, options.fill_value);
   for (const bool normals : {false, true}) {
     options.normals = normals;
-    gpu::ResidentExtractor extractor(volume, options);
+    gpu::ResidentExtractor extractor(volume, options, {.search = search});
     for (const double isovalue : isovalues) {
       options.isovalue = isovalue;
       const MeshBuffer expected = on_cpu(field, lattice, bricks, options);
@@ -76,10 +77,37 @@ TYPED_TEST(GpuResident, VolumesThatEndWhereASlabBegins) {
   compare(this->noise({67, 41, 75}, 3), {mid}, options);
 }
 
-/// Found by every block for itself, but too many to be shared by blocks.
+/// Found without a launch, but too many to be shared by blocks: 13 × 13.
 TYPED_TEST(GpuResident, MoreTilesThanHaveSlabs) {
   const double mid = this->lowest() + 100;
-  compare(this->waves({3, 400, 390}), {mid + 70, mid, mid + 1e9}, {});  // 13 × 13 tiles
+  const auto field = this->waves({3, 400, 390});
+  compare(field, {mid + 70, mid, mid + 1e9}, {});
+  compare(field, {mid}, {}, 64, gpu::TileSearch::interval);  // found by every block
+}
+
+/// A sample that equals the largest of its type is no reason to make anything above.
+TYPED_TEST(GpuResident, NoSampleReachesAnIsovalueAboveItsType) {
+  using Limits = std::numeric_limits<TypeParam>;
+  if constexpr (!Limits::is_integer) {
+    GTEST_SKIP() << "no largest value";
+  } else {
+    const Field<TypeParam> field({40, 33, 35},
+                                 [](Int3 p) { return p.x < 17 ? 0.0 : double{Limits::max()}; });
+    compare(field, {double{Limits::max()} + 1, 1e9}, {}, 64, gpu::TileSearch::none);
+  }
+}
+
+TEST(LaunchShapes, SlabsAreForAsManyTilesAsTheHostLists) {
+  gpu::LaunchShapes shapes;
+  for (gpu::LaunchShape& shape : shapes.shapes) shape = {.blocks = 1000, .threads = 384};
+  shapes.slabs = {.blocks = 1000, .threads = gpu::kSlabTeam, .slabs = gpu::kSlabsOfTile};
+  EXPECT_EQ(shapes.in_slabs(gpu::kMostActiveInSlabs).slabs, gpu::kSlabsOfTile);
+  EXPECT_EQ(shapes.in_slabs(gpu::kMostActiveInSlabs + 1).slabs, 1);
+  shapes.slabs.blocks = 15;
+  EXPECT_EQ(shapes.in_slabs(1).slabs, gpu::kSlabsOfTile);
+  EXPECT_EQ(shapes.in_slabs(2).slabs, 1);
+  shapes.slabs.blocks = 0;
+  EXPECT_EQ(shapes.in_slabs(1).slabs, 1);
 }
 
 /// Most of them are empty when every tile is taken; the last one, too.
