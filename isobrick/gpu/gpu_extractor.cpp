@@ -54,8 +54,8 @@ struct GpuExtractor::Impl {
         device(l, options, sizes, pool.get()),
         slots(device.sizes().slots, l.tiles()),
         collector(id, device, welded(), options.normals, std::move(take)) {
-    // What an extraction takes it has now, and its budget does not count what others left.
-    spare_pages().drop();
+    // Launches may have been halved, which leaves pages that they would have taken.
+    spare_pages().keep_only(id, pinned_regions(l, device.sizes()));
   }
 
   /// Where there may be NaN all of an active tile is looked at, because ranges leave NaN out.

@@ -19,16 +19,20 @@ LockedPieces::LockedPieces(int device, const std::vector<std::size_t>& pieces)
 
 LockedPieces::~LockedPieces() {
   if (locked_ == 0) return;
-  // Whoever gives memory back may work with another device.
+  // Whoever gives memory back may work with another device, and goes on to. A thread that has
+  // chosen none cannot be told from one that works with the first, which is set up for it then.
   int current = device_;
   (void)cudaGetDevice(&current);
-  (void)cudaSetDevice(device_);
+  if (current != device_) (void)cudaSetDevice(device_);
   for (std::size_t piece = 0; piece < locked_; ++piece) (void)cudaHostUnregister(at(piece));
-  (void)cudaSetDevice(current);
+  if (current != device_) (void)cudaSetDevice(current);
 }
 
 bool LockedPieces::are(int device, const std::vector<std::size_t>& pieces) const {
-  return device_ == device && offsets_ == offsets_of(pieces);
+  if (device_ != device || count() != pieces.size()) return false;
+  for (std::size_t piece = 0; piece < count(); ++piece)
+    if (bytes(piece) != MappedPages::whole_pages(pieces[piece])) return false;
+  return true;
 }
 
 void LockedPieces::lock_next() {

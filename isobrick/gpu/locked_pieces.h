@@ -25,7 +25,7 @@ class LockedPieces {
   /// Nothing is copied from or to it any more.
   ~LockedPieces();
 
-  std::size_t count() const { return offsets_.size() - 1; }
+  std::size_t count() const { return offsets_.empty() ? 0 : offsets_.size() - 1; }
   std::byte* at(std::size_t piece) const { return pages_.data() + offsets_[piece]; }
   std::size_t bytes(std::size_t piece) const { return offsets_[piece + 1] - offsets_[piece]; }
   std::size_t bytes() const { return pages_.bytes(); }
@@ -41,7 +41,7 @@ class LockedPieces {
 
  private:
   int device_ = 0;
-  std::vector<std::size_t> offsets_{0};  ///< where each piece begins, and the end
+  std::vector<std::size_t> offsets_;  ///< where each piece begins, and the end; not once moved
   MappedPages pages_;
   std::size_t locked_ = 0;  ///< the first so many pieces
 };

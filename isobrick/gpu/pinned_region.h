@@ -21,7 +21,7 @@ class PinnedRegion {
   PinnedRegion(int device, const std::vector<std::size_t>& pieces);
   PinnedRegion(const PinnedRegion&) = delete;
   PinnedRegion& operator=(const PinnedRegion&) = delete;
-  /// Nothing is copied from or to it any more. The pages are spare now.
+  /// Nothing is copied from or to it any more. The pages are spare now, or go.
   ~PinnedRegion();
 
   /// A piece, for the processor; waits until it has been touched.

@@ -10,26 +10,38 @@
 namespace isobrick::gpu {
 
 /// Page-locked memory that one extraction has given back, for the next one of the process: to
-/// touch, lock and unlock it takes a tenth of a short extraction. Thread-safe.
+/// touch, lock and unlock it takes a tenth of a short extraction. Of each of the sizes that the
+/// extraction that began last asks for there is one at most, so that its budget holds; where these
+/// are more than may be kept, there are none. Thread-safe.
 class SparePages {
  public:
-  /// More is not kept.
+  using Sizes = std::vector<std::size_t>;  ///< of pieces
+
   explicit SparePages(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// Pieces of such sizes, locked. Where there are none, what there is is of no use: it goes.
-  std::optional<LockedPieces> take(int device, const std::vector<std::size_t>& pieces);
-  /// Keeps them, unless there are such already or one of them is not locked.
+  /// An extraction begins that will ask for these: all else goes, and is not kept from now on.
+  void keep_only(int device, std::vector<Sizes> wanted);
+  /// Gives back what there is, for what begins asks for none.
+  void drop() { keep_only(0, {}); }
+  /// Pieces of such sizes, locked, where there are some.
+  std::optional<LockedPieces> take(int device, const Sizes& pieces);
+  /// Keeps them when they are wanted, all locked and not there already. Never throws.
   void give(LockedPieces pieces);
-  /// Gives back what there is.
-  void drop();
+  /// What is kept just now.
+  std::size_t bytes();
 
  private:
+  bool is_wanted(const LockedPieces& pieces) const;
+
   const std::size_t most_bytes_;
   std::mutex mutex_;
-  std::vector<LockedPieces> all_;
+  int device_ = 0;
+  std::vector<Sizes> wanted_;
+  std::vector<LockedPieces> all_;  ///< has room for what is wanted
 };
 
-/// Those of the process. What they hold when it ends goes with it.
+/// Those of the process. What they hold when it ends goes with it. A program that resets the device
+/// (cudaDeviceReset) drops them before, for they are not locked any more afterwards.
 SparePages& spare_pages();
 
 }  // namespace isobrick::gpu

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "isobrick/core/lattice.h"
 #include "isobrick/surface/surface_options.h"
@@ -42,6 +44,14 @@ inline constexpr std::uint32_t kMostTilesOfLaunch = 256;
 /// The sizes for launches of `tiles` tiles.
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
                          int lanes = kLeastLanes, PoolSizes pool = {});
+
+/// The pieces of the page-locked memory that meshes come to.
+std::vector<std::size_t> output_pieces(const StreamSizes& sizes);
+
+/// The pieces of each region of page-locked memory (pinned_region.h) that such an extraction takes:
+/// of its pool, where there is one, and its outputs.
+std::vector<std::vector<std::size_t>> pinned_regions(const Lattice& lattice,
+                                                     const StreamSizes& sizes);
 
 /// Bricks that a pool should have room for when so many threads decode for launches of a
 /// whole volume.

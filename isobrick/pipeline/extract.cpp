@@ -177,7 +177,7 @@ void extract_on_gpu(const Work& work, ChosenBackend& backend) {
   work.report.bricks_read = decoder.bricks_read();
   work.report.brick_reads = decoder.reads();
   report_search(backend.decoded->planned.tiles, work.report);
-  // What they take is given back before the sink ends its file.
+  // What they take goes, or is spare for the next extraction, before the sink ends its file.
   backend.surface.reset();
   backend.decoded.reset();
 }

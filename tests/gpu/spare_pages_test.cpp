@@ -9,7 +9,7 @@
 namespace isobrick::gpu {
 namespace {
 
-using Sizes = std::vector<std::size_t>;
+using Sizes = SparePages::Sizes;
 
 LockedPieces locked(const Sizes& sizes) {
   LockedPieces pieces(0, sizes);
@@ -36,6 +36,7 @@ TEST(LockedPieces, BeginAtPagesOneAfterTheOther) {
 
 TEST(SparePages, WhatIsNotLockedIsNotKept) {
   SparePages spare(1 << 20);
+  spare.keep_only(0, {{4096}});
   spare.give(LockedPieces(0, {4096}));
   EXPECT_FALSE(spare.take(0, {4096}));
 }
@@ -50,6 +51,7 @@ class SparePagesOnADevice : public ::testing::Test {
 
 TEST_F(SparePagesOnADevice, AreTakenOnceByWhoeverWantsTheirSizes) {
   SparePages spare(1 << 20);
+  spare.keep_only(0, {{4096}, {8192, 4096}});
   LockedPieces first = locked({4096}), second = locked({8192, 4096});
   const std::byte *const one = first.at(0), *const two = second.at(0);
   spare.give(std::move(first));
@@ -62,26 +64,51 @@ TEST_F(SparePagesOnADevice, AreTakenOnceByWhoeverWantsTheirSizes) {
   EXPECT_FALSE(spare.take(0, {4096}));
 }
 
-TEST_F(SparePagesOnADevice, GoWhenOthersAreWantedOrThereAreSuch) {
+TEST_F(SparePagesOnADevice, OnlyWhatIsWantedIsKeptAndThatOnce) {
   SparePages spare(1 << 20);
   spare.give(locked({4096}));
-  spare.give(locked({4096}));
-  EXPECT_TRUE(spare.take(0, {4096}));
-  EXPECT_FALSE(spare.take(0, {4096}));
-  spare.give(locked({4096}));
-  EXPECT_FALSE(spare.take(0, {8192}));
-  EXPECT_FALSE(spare.take(0, {4096}));
-  spare.give(locked({4096}));
-  spare.drop();
-  EXPECT_FALSE(spare.take(0, {4096}));
+  EXPECT_EQ(spare.bytes(), 0u);
+  spare.keep_only(0, {{4096}, {8192}});
+  for (const Sizes& sizes : {Sizes{4096}, Sizes{4096}, Sizes{8192}, Sizes{12288}})
+    spare.give(locked(sizes));
+  EXPECT_EQ(spare.bytes(), 12288u);
+  EXPECT_FALSE(spare.take(0, {12288}));
+  EXPECT_EQ(spare.bytes(), 12288u) << "others stay, of which they are taken next";
 }
 
-TEST_F(SparePagesOnADevice, AreNoMoreThanWasSaid) {
+TEST_F(SparePagesOnADevice, GoWhenWhatBeginsDoesNotAskForThem) {
+  SparePages spare(1 << 20);
+  const auto fill = [&] {
+    spare.keep_only(0, {{4096}, {8192}});
+    spare.give(locked({4096}));
+    spare.give(locked({8192}));
+    EXPECT_EQ(spare.bytes(), 12288u);
+  };
+  fill();
+  spare.keep_only(0, {{8192}, {12288}});
+  EXPECT_EQ(spare.bytes(), 8192u);
+  EXPECT_TRUE(spare.take(0, {8192}));
+  fill();
+  spare.keep_only(1, {{4096}, {8192}});
+  EXPECT_EQ(spare.bytes(), 0u) << "another device";
+  fill();
+  LockedPieces in_use = *spare.take(0, {4096});
+  spare.drop();
+  EXPECT_EQ(spare.bytes(), 0u);
+  spare.give(std::move(in_use));
+  EXPECT_EQ(spare.bytes(), 0u);
+}
+
+TEST_F(SparePagesOnADevice, AreNoneWhereAllThatIsWantedIsTooMuch) {
   SparePages spare(8192);
+  spare.keep_only(0, {{4096}, {8192}});
   spare.give(locked({4096}));
-  spare.give(locked({8192}));
-  EXPECT_TRUE(spare.take(0, {4096}));
-  EXPECT_FALSE(spare.take(0, {8192}));
+  EXPECT_EQ(spare.bytes(), 0u);
+  spare.keep_only(0, {{4096}, {4000}});
+  spare.give(locked({4096}));
+  EXPECT_EQ(spare.bytes(), 4096u);
+  spare.keep_only(0, {{4096}, {8192}});
+  EXPECT_EQ(spare.bytes(), 0u);
 }
 
 }  // namespace
