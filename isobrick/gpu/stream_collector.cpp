@@ -28,7 +28,7 @@ StreamCollector::StreamCollector(int cuda_device, StreamDevice& device, bool wel
       welded_(welded),
       normals_(normals),
       take_(std::move(take)),
-      outputs_(cuda_device, std::vector<std::size_t>(kOutputs, device.sizes().output_bytes)),
+      outputs_(cuda_device, output_pieces(device.sizes())),
       good_tiles_(device.sizes().tiles) {
   for (std::size_t i = 0; i < kOutputs; ++i) free_outputs_.push_back(kOutputs - 1 - i);
   thread_ = std::thread([this] { run(); });
@@ -41,6 +41,8 @@ StreamCollector::~StreamCollector() {
   }
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
+  // When something went wrong a mesh may still be on its way to an output.
+  device_.end_downloads();
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return taken_outputs_ == 0; });
 }

@@ -68,6 +68,8 @@ class StreamDevice {
   std::vector<OrderState> totals_of_tiles(Lane& lane);
   /// Copies a lane's mesh to the host; waits for nothing.
   void download(Lane& lane, const HostOutput& to, SurfaceTotals size);
+  /// Waits until nothing is copied to the host any more, whatever went wrong.
+  void end_downloads() noexcept { (void)cudaStreamSynchronize(download_.get()); }
 
  private:
   void launch(Lane& lane, std::uint32_t first, std::uint32_t count,
