@@ -4,6 +4,7 @@
 
 #include <map>
 #include <random>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -62,7 +63,12 @@ TEST(RowSlots, ATileIsFoundUntilItsLastAskerIsDone) {
 TEST(RowSlots, EachNeighbourIsFoundWithItsSlot) {
   const Int3 grid{13, 9, 10};
   gpu::RowSlots slots(static_cast<std::uint32_t>(volume(grid)), grid);
-  std::map<std::uint64_t, std::pair<std::uint32_t, int>> known;  // by code: slot, launch
+  struct Known {
+    std::uint32_t slot;
+    int launch;
+    std::uint64_t last_asker;
+  };
+  std::map<std::uint64_t, Known> known;  // by code
   std::vector<std::uint32_t> unused;
   std::mt19937 random(1);
   int launch = 0, in_launch = 0;
@@ -75,16 +81,22 @@ TEST(RowSlots, EachNeighbourIsFoundWithItsSlot) {
       const std::uint32_t expected =
           found == known.end()
               ? gpu::kNone
-              : found->second.first |
-                    (found->second.second == launch ? gpu::TileLinks::kSameLaunch : 0);
+              : found->second.slot |
+                    (found->second.launch == launch ? gpu::TileLinks::kSameLaunch : 0);
       EXPECT_EQ(slots.find(neighbour), expected);
     }
-    known[morton_encode(tile)] = {slots.add(tile), launch};
+    const Int3 one{1, 1, 1};
+    known[morton_encode(tile)] = {slots.add(tile), launch,
+                                  morton_encode(min(tile + one, grid - one))};
     if (++in_launch < 11) return;
     slots.end_launch(tile, unused);
-    for (const std::uint32_t slot : unused)
-      EXPECT_EQ(std::erase_if(known, [&](const auto& entry) { return entry.second.first == slot; }),
-                1u);
+    std::multiset<std::uint32_t> expected;
+    std::erase_if(known, [&](const auto& entry) {
+      const bool over = entry.second.last_asker <= morton_encode(tile);
+      if (over) expected.insert(entry.second.slot);
+      return over;
+    });
+    EXPECT_EQ(std::multiset(unused.begin(), unused.end()), expected);
     slots.recycle(unused);
     in_launch = 0;
     ++launch;
