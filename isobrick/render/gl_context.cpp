@@ -190,6 +190,7 @@ GlDevice current_gl_device() {
     throw Error(fmt::format("OpenGL 4.5 is needed; '{}' has {}", device.renderer, device.version));
   for (const char* word : {"llvmpipe", "softpipe", "swrast", "SwiftShader"})
     device.software |= device.renderer.find(word) != std::string::npos;
+  device.nvidia = text(GL_VENDOR) == "NVIDIA Corporation";
   return device;
 }
 

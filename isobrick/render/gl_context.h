@@ -33,6 +33,7 @@ struct GlDevice {
   std::string renderer;  ///< "llvmpipe (LLVM 15.0.6, 256 bits)"
   std::string version;   ///< "4.5 (Core Profile) Mesa 22.3.6"
   bool software = false;
+  bool nvidia = false;  ///< drawn by NVIDIA's driver, which is that of CUDA as well
 };
 
 /// Describes the current context. Throws Error if it is older than OpenGL 4.5.

@@ -3,13 +3,32 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 #include <vector>
 
+#include "isobrick/core/error.h"
+#include "isobrick/pipeline/gpu_backend.h"
 #include "isobrick/render/gl_context.h"
 
 namespace isobrick {
 namespace {
+
+/// Pixels enough to have everything compiled.
+constexpr PictureSize kFew{16, 16};
+
+/// While CUDA is set up, OpenGL by the same driver waits for it.
+bool cuda_may_hold_up(Backend backend) {
+  return backend != Backend::cpu && built_with_cuda() && current_gl_device().nvidia;
+}
+
+/// Full pictures, and those while something moves.
+std::array<PictureSettings, 2> usual_settings() {
+  PictureSettings full, plain;
+  full.picking = plain.picking = true;  // as StorePicture's pictures
+  plain.occlusion = plain.multisample = false;
+  return {full, plain};
+}
 
 /// Room of a block of what is uploaded: little of the budget, so that little of it is idle. Meshes
 /// that are larger have blocks of their own.
@@ -38,35 +57,42 @@ PooledMesh add_sheet(MeshPool& pool, std::uint32_t vertices) {
 }  // namespace
 
 PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change,
-                           PictureSize likely, std::optional<bool> software)
-    : pool_(block_vertices(budgets.device_memory)),
+                           std::optional<PictureSize> likely, std::optional<bool> software)
+    : block_vertices_(block_vertices(budgets.device_memory)),
+      pool_(block_vertices_),
       software_(software.value_or(current_gl_device().software)),
       device_(std::make_shared<DeviceOpening>(budgets.device_mesh_memory(), std::move(on_change))) {
   // Software compiles quickly and draws slowly.
-  if (!software_) prepare(likely, block_vertices(budgets.device_memory));
+  if (!software_)
+    for (const PictureSettings& settings : usual_settings())
+      renderer_.prepare(settings, kFew.width, kFew.height);
+  if (likely && !software_ && cuda_may_hold_up(budgets.backend)) warm_up(*likely);
   // Only now: while CUDA is set up, whoever makes OpenGL ask for memory waits for it, tens of
   // milliseconds at a time.
   if (budgets.backend != Backend::cpu) device_->begin();
 }
 
-/// As a first store is drawn, some times over: that much it takes until a driver has all that it
-/// wants.
-void PictureSetup::prepare(PictureSize likely, std::uint32_t block_vertices) {
-  PictureSettings full, plain;
-  full.picking = plain.picking = true;          // as StorePicture's pictures
-  plain.occlusion = plain.multisample = false;  // as while something moves
-  for (const PictureSize size : {PictureSize{}, likely})
-    for (const PictureSettings& settings : {full, plain})
-      renderer_.prepare(settings, size.width, size.height);
-  std::vector<PooledMesh> meshes(3);  // most of a block
-  for (PooledMesh& mesh : meshes) mesh = add_sheet(pool_, block_vertices / 7 * 2);
-  for (const PictureSettings& settings : {full, plain}) {
-    renderer_.begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), likely.width, likely.height, settings);
-    for (const PooledMesh& mesh : meshes) renderer_.draw(mesh, {});
-    renderer_.end();
+void PictureSetup::warm_up(PictureSize size) {
+  try {
+    draw_first(size);
+  } catch (const Error&) {  // pictures that are asked for say so where somebody reads it
   }
   renderer_.discard();
   glFinish();
+}
+
+/// As a first store is drawn, some times over: that much it takes until a driver has all that it
+/// wants.
+void PictureSetup::draw_first(PictureSize size) {
+  for (const PictureSettings& settings : usual_settings())
+    renderer_.prepare(settings, size.width, size.height);
+  std::vector<PooledMesh> meshes(3);  // most of a block
+  for (PooledMesh& mesh : meshes) mesh = add_sheet(pool_, block_vertices_ / 7 * 2);
+  for (const PictureSettings& settings : usual_settings()) {
+    renderer_.begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), size.width, size.height, settings);
+    for (const PooledMesh& mesh : meshes) renderer_.draw(mesh, {});
+    renderer_.end();
+  }
 }
 
 }  // namespace isobrick

@@ -26,7 +26,7 @@ struct PictureBudgets {
 
 /// Pixels.
 struct PictureSize {
-  int width = 16, height = 16;
+  int width = 1, height = 1;
 };
 
 /// What pictures of stores need of a context and what takes time to set up: compiled shaders,
@@ -35,10 +35,16 @@ struct PictureSize {
 class PictureSetup {
  public:
   /// Begins to open the device that budgets.backend may use, and does not wait for it; see
-  /// DeviceOpening. `likely`: of the first pictures, whose memory is got here. `software`: whether
-  /// to take OpenGL for software; nothing: what it is. Throws what Renderer does.
+  /// DeviceOpening. `likely`: of the first pictures, for warm_up() where they would wait for CUDA.
+  /// `software`: whether to take OpenGL for software; nothing: what it is. Throws what Renderer and
+  /// DeviceOpening::begin() do.
   PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change,
-               PictureSize likely = {}, std::optional<bool> software = std::nullopt);
+               std::optional<PictureSize> likely = std::nullopt,
+               std::optional<bool> software = std::nullopt);
+
+  /// Gets what a driver needs for pictures of this size and a first block of meshes, so that they
+  /// do not wait for that. Where memory is short it is left to them.
+  void warm_up(PictureSize size);
 
   Renderer& renderer() { return renderer_; }
   /// For meshes that are uploaded.
@@ -48,9 +54,10 @@ class PictureSetup {
   bool software() const { return software_; }
 
  private:
-  void prepare(PictureSize likely, std::uint32_t block_vertices);
+  void draw_first(PictureSize size);
 
   Renderer renderer_;
+  std::uint32_t block_vertices_;
   MeshPool pool_;
   bool software_;
   std::shared_ptr<DeviceOpening> device_;

@@ -170,7 +170,7 @@ TEST_F(Picture, IsDrawnInFullWhenTheMeshBudgetIsFull) {
     picture_ = std::make_unique<StorePicture>(
         store, budgets, [] {},
         std::make_shared<PictureSetup>(
-            budgets, [] {}, PictureSize{}, software));
+            budgets, [] {}, std::nullopt, software));
     const PictureWay way{.plain = PictureWay::Plain::until_complete};
     const auto draw = [&] {
       picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, way);
@@ -273,12 +273,13 @@ TEST_F(Picture, KeepsTheBudgetOfADeviceThatMakesMeshes) {
 }
 
 TEST_F(Picture, WhatIsSetUpBeforeChangesNothingAndIsKept) {
-  const PictureBudgets budgets{.device_memory = 64u << 20};
+  const PictureBudgets budgets{.device_memory = 64u << 20, .backend = Backend::cpu};
   open(SynthKind::gyroid, {96, 96, 96}, budgets);
   const auto expected = pixels();
   const auto store = std::make_shared<const StoreReader>(dir_ / "store.zarr");
   const auto setup = std::make_shared<PictureSetup>(
-      budgets, [] {}, PictureSize{kWidth, kHeight}, false);
+      budgets, [] {}, std::nullopt, false);
+  setup->warm_up({kWidth, kHeight});
   const std::uint64_t block = setup->pool().capacity();
   EXPECT_GT(block, 0u);
   EXPECT_EQ(setup->pool().bytes(), 0u);
@@ -292,6 +293,19 @@ TEST_F(Picture, WhatIsSetUpBeforeChangesNothingAndIsKept) {
     EXPECT_EQ(setup->pool().bytes(), 0u);
     EXPECT_EQ(setup->pool().capacity(), block);
   }
+}
+
+TEST_F(Picture, CanBeHadWhereItCannotBeSetUpBefore) {
+  const PictureBudgets budgets{.device_memory = 64u << 20, .backend = Backend::cpu};
+  open(SynthKind::gyroid, {48, 48, 48}, budgets);
+  const auto expected = pixels();
+  const auto setup = std::make_shared<PictureSetup>(budgets, [] {});
+  EXPECT_NO_THROW(setup->warm_up({1 << 24, kHeight}));
+  EXPECT_FALSE(setup->renderer().has_picture());
+  EXPECT_EQ(setup->pool().bytes(), 0u);
+  picture_ = std::make_unique<StorePicture>(
+      std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {}, setup);
+  EXPECT_EQ(pixels(), expected);
 }
 
 TEST_F(Picture, KeepsTheBudgetWhoeverMakesMeshesAndForEveryStore) {
