@@ -13,9 +13,10 @@ namespace isobrick {
 
 void DeviceOpening::begin() {
   if (begun()) return;
+  const auto id = current_gl_device_id();  // may throw
   std::promise<std::shared_ptr<DeviceMesher>> opened;
   mesher_ = opened.get_future().share();
-  opener_ = std::jthread([this, id = current_gl_device_id(), opened = std::move(opened)]() mutable {
+  opener_ = std::jthread([this, id, opened = std::move(opened)]() mutable {
     try {
       opened.set_value(open_device_mesher(id, budget_));
     } catch (...) {

@@ -16,8 +16,8 @@
 namespace isobrick {
 
 /// The device that makes meshes, opened once and beside everything else, and its memory as OpenGL
-/// sees it. All of that memory is taken and imported before the device makes any mesh, a piece with
-/// each picture: an import takes as long as half a picture may. For the thread of the context.
+/// sees it. All of that memory is taken and imported before the device makes any mesh, one piece at
+/// a time: an import takes as long as half a picture may. For the thread of the context.
 class DeviceOpening {
  public:
   /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
@@ -25,7 +25,8 @@ class DeviceOpening {
   DeviceOpening(std::uint64_t budget, std::function<void()> on_change)
       : budget_(budget), on_change_(std::move(on_change)) {}
 
-  /// Unless it has begun: that of the current OpenGL context, if possible.
+  /// Unless it has begun: that of the current OpenGL context, if possible. Throws Error, and has
+  /// not begun, when that context cannot say which it is.
   void begin();
   bool begun() const { return mesher_.valid(); }
   /// Whether the device is there with its memory, or is known not to come.

@@ -1,5 +1,6 @@
 #include "isobrick/window/store_picture.h"
 
+#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -306,6 +307,16 @@ TEST_F(Picture, CanBeHadWhereItCannotBeSetUpBefore) {
   picture_ = std::make_unique<StorePicture>(
       std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {}, setup);
   EXPECT_EQ(pixels(), expected);
+}
+
+TEST_F(Picture, ADeviceThatCouldNotBeAskedForHasNotBegunToOpen) {
+  if (!current_gl_device_id()) GTEST_SKIP() << "OpenGL imports no memory here";
+  DeviceOpening opening(1 << 20, [] {});
+  glEnable(GL_RGBA8);  // no switch: an error that somebody finds
+  EXPECT_THROW(opening.begin(), Error);
+  EXPECT_FALSE(opening.begun());
+  opening.begin();
+  EXPECT_NO_THROW(opening.get());
 }
 
 TEST_F(Picture, KeepsTheBudgetWhoeverMakesMeshesAndForEveryStore) {
