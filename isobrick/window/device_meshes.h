@@ -29,6 +29,8 @@ class DeviceOpening {
   /// not begun, when that context cannot say which it is.
   void begin();
   bool begun() const { return mesher_.valid(); }
+  /// Whether the device is there, perhaps without its memory, or is known not to come.
+  bool opened() const;
   /// Whether the device is there with its memory, or is known not to come.
   bool over() const;
   /// Waits for that. Null where there is no device; throws Error when it cannot be opened.
@@ -50,7 +52,6 @@ class DeviceOpening {
     ImportedBuffers buffers;
   };
 
-  bool opened() const;
   DeviceMesher* mesher() const;
   bool import_one(DeviceMesher& mesher);
 
@@ -74,6 +75,8 @@ class DeviceMeshes {
   /// Takes over a device that has been opened meanwhile; before, imports its memory, a piece with
   /// each call. Whether it has imported one.
   bool update();
+  /// Whether update() has something to do.
+  bool more() const { return !opened_ && opening_->opened(); }
 
   /// Who makes meshes now, in a line: a device's name and how meshes get into pictures, or
   /// "CPU" and why.

@@ -222,7 +222,8 @@ void StorePicture::choose_picture(const Asked& asked) {
   const bool plain_serves =
       asked.way.plain != PictureWay::Plain::no && pictured_.shows == asked.shows_plain;
   const bool other_view = pictured_.shows != asked.shows && !plain_serves;
-  const bool enough = (std::exchange(put_off_, false) || imported_) && shown_ != nullptr;
+  const bool owed = std::exchange(put_off_, false);
+  const bool enough = (owed || imported_) && shown_ != nullptr;
   if (!enough && (other_view || asked.idle || !can_wait(*asked.newest))) upload(asked.newest);
   times_.upload = watch.lap();
   slices_.update(scene_->stream(), asked.settings);
@@ -235,7 +236,7 @@ void StorePicture::choose_picture(const Asked& asked) {
   if (shown_ != nullptr) next.isovalues = shown_->isovalues;
   // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
   if (shows_all_there_is(next, asked)) return;
-  put_off_ = can_be_put_off(next, asked);
+  put_off_ = !owed && can_be_put_off(next, asked);
   if (put_off_) return;
   if (pictured_.slices != next.slices || !same_meshes(pictured_.meshes.get(), shown_.get())) {
     pictured_.stale = true;
@@ -332,7 +333,8 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     glFinish();
     if (work_) drop_picture();
     pictured_ = {};  // half a picture is none
-    drew_ = put_off_ = state_.drawing = state_.complete = false;
+    drew_ = imported_ = put_off_ = false;
+    state_.drawing = state_.more = state_.complete = false;
     state_.drawn_part = 0;
     throw;
   }
@@ -343,7 +345,8 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
   uploads_.begin_use();
   drew_ = false;
   Stopwatch watch;
-  imported_ = !work_ && !put_off_ && device_->update();
+  // Not twice in a row: in between, what has arrived is taken to the device.
+  imported_ = !work_ && !put_off_ && !imported_ && device_->update();
   times_ = {.device = watch.lap()};
   update_scene(camera, width, height, settings, way.coarser);
   times_.scene = scene_->times();
@@ -388,7 +391,7 @@ void StorePicture::update_state(const Asked& asked) {
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;
-  state_.more = imported_ || put_off_;
+  state_.more = imported_ || put_off_ || device_->more();
   state_.complete = !work_ && !put_off_ && shown_ != nullptr && shown_ == scene_->drawable() &&
                     (shown_->complete || scene_->stream().idle());
 }
@@ -404,7 +407,7 @@ void StorePicture::draw_complete(const Camera& camera, int width, int height,
       if (state_.complete) return;
     }
     wait();
-    if (!state_.drawing) scene_->stream().wait_idle(kMarginOfWait);
+    if (!state_.drawing && !state_.more) scene_->stream().wait_idle(kMarginOfWait);
   }
 }
 

@@ -109,11 +109,12 @@ TEST_F(Pieces, OfPicturesWithoutTrianglesAreFinishedWhileTheViewKeepsChanging) {
 }
 
 TEST_F(Pieces, WaitForTheNextFrameWhenThisOneHasTakenMeshesToTheDevice) {
-  open(SynthKind::gyroid, {96, 96, 96});
+  const PictureBudgets budgets{.backend = Backend::cpu};
+  open(SynthKind::gyroid, {96, 96, 96}, budgets);
   settings_.pixel_error = 0.5f;
   const auto expected = pixels();
-  show();
-  PictureWay way{.coarser = 16, .piece_seconds = 1e-6};  // whatever is taken takes longer
+  show(budgets);
+  PictureWay way{.coarser = 16, .piece_seconds = 1e-9};  // whatever is done takes longer
   const auto told = [&] { return picture_->counters().finished + picture_->counters().pieces; };
   int put_off = 0;
   const auto complete = [&] {
@@ -121,7 +122,7 @@ TEST_F(Pieces, WaitForTheNextFrameWhenThisOneHasTakenMeshesToTheDevice) {
     for (int i = 0; i == 0 || !picture_->state().complete; ++i) {
       const std::uint64_t before = told();
       picture_->draw(camera_, kWidth, kHeight, settings_, way);
-      EXPECT_TRUE(told() > before || !owed) << "once is enough";
+      ASSERT_TRUE(told() > before || !owed) << "once is enough";
       owed = picture_->state().more;
       if (!owed) continue;
       ++put_off;
@@ -139,7 +140,7 @@ TEST_F(Pieces, WaitForTheNextFrameWhenThisOneHasTakenMeshesToTheDevice) {
 }
 
 TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
-  open(SynthKind::gyroid, {96, 96, 96});
+  open(SynthKind::gyroid, {96, 96, 96}, {.backend = Backend::cpu});
   const auto first = pixels();
   const std::uint64_t finished = picture_->counters().finished;
   ASSERT_TRUE(picture_->state().complete);
@@ -147,6 +148,7 @@ TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
     EXPECT_THROW(picture_->draw(camera_, 1 << 24, kHeight, settings_), UsageError);
     EXPECT_FALSE(picture_->drew());
     EXPECT_FALSE(picture_->state().drawing);
+    EXPECT_FALSE(picture_->state().more);
     EXPECT_FALSE(picture_->state().complete);
     EXPECT_EQ(picture_->state().drawn_part, 0);
   };
@@ -163,6 +165,14 @@ TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
   EXPECT_EQ(picture_->renderer().read_pixels(), first);
   EXPECT_NE(pixels(), first);
   camera_ = front;
+  EXPECT_EQ(pixels(), first);
+  // One that has been put off as well.
+  const PictureWay hasty{.coarser = 16, .piece_seconds = 1e-6};
+  for (int i = 0; !picture_->state().more; ++i) {
+    ASSERT_LT(i, 100000);
+    picture_->draw(camera_, kWidth, kHeight, settings_, hasty);
+  }
+  fail();
   EXPECT_EQ(pixels(), first);
 }
 
