@@ -134,8 +134,8 @@ class Session {
     const PictureState& state = picture_->state();
     if (seconds >= kLeast) frames_.add(seconds, picture_->times(), seconds - submitted);
     device_peak = std::max(device_peak, state.device_bytes);
+    if (picture_->drew() || state.more) began_ = start;
     if (!picture_->drew()) return;  // nothing is drawn that would look the same
-    began_ = start;
     const double whole = std::max(seconds, picture_->picture_seconds());
     (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
     if (moving)
@@ -145,7 +145,7 @@ class Session {
   }
 
   const Arguments& arguments_;
-  Clock::time_point opened_, began_;  ///< the last picture that was really made
+  Clock::time_point opened_, began_;  ///< the last frame that a display has shown
   std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
   std::unique_ptr<StorePicture> picture_;
