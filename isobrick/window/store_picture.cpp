@@ -345,8 +345,8 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
   uploads_.begin_use();
   drew_ = false;
   Stopwatch watch;
-  // Not twice in a row: in between, what has arrived is taken to the device.
-  imported_ = !work_ && !put_off_ && !imported_ && device_->update();
+  // Until there is a picture of what is asked for, every other time is for what has arrived.
+  imported_ = !work_ && !put_off_ && (state_.covers || !imported_) && device_->update();
   times_ = {.device = watch.lap()};
   update_scene(camera, width, height, settings, way.coarser);
   times_.scene = scene_->times();
