@@ -43,22 +43,27 @@ class PicturesTimes {
   /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds.
   void add(double total, const PictureTimes& steps, double finish) {
     total_.add(total);
-    pictures_.push_back({total, steps, finish});
+    pictures_.push_back({pictures_.size(), total, steps, finish});
   }
 
-  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth.
+  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth, and
+  /// which ones these are, counted from 0.
   nlohmann::ordered_json summary() {
     auto json = total_.summary();
     if (pictures_.empty()) return json;
     std::sort(pictures_.begin(), pictures_.end(),
               [](const Picture& a, const Picture& b) { return a.total > b.total; });
     json["all"] = mean(pictures_.size());
-    json["slowest"] = mean((pictures_.size() + 99) / 100);
+    const std::size_t slowest = (pictures_.size() + 99) / 100;
+    json["slowest"] = mean(slowest);
+    for (std::size_t i = 0; i < slowest; ++i)
+      json["slowest"]["numbers"].push_back(pictures_[i].number);
     return json;
   }
 
  private:
   struct Picture {
+    std::size_t number;
     double total;
     PictureTimes steps;
     double finish;

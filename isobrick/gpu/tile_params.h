@@ -128,7 +128,7 @@ struct LaunchEnd {
   std::uint32_t* done;         ///< zeroed
   std::uint32_t* zero;         ///< words that the next launch needs zeroed, also `done`
   std::uint32_t zero_words;
-  OrderState* next_order;  ///< zeroed for the next launch, if not null
+  OrderState* next_order;  ///< the next launch's, zeroed by this one; of `next_items`
   std::uint32_t next_items;
 };
 

@@ -32,7 +32,7 @@ struct Team {
   /// Vertices or cells that are found at a time; tiles with more take several turns.
   /// A multiprocessor before Ampere has 64 KiB of shared memory.
   static constexpr std::uint32_t kMostListed = kSlabs > 1 ? 2048 : kTeams == 3 ? 2560 : 7168;
-  /// The warps that have no rows: in a slab the two that ask, and those above.
+  /// The first warp with rows: in a slab the two before ask the others.
   static constexpr int kFirstWithRows = kSlabs > 1 ? 2 : 0;
 };
 inline constexpr std::uint32_t kListedBeforeAmpere = 512;
