@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "bench/bandwidth.h"
+#include "bench/median.h"
 #include "bench/volume.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/error.h"
@@ -54,11 +55,6 @@ Volume read_volume(const Arguments& a) {
   if (a.frequency > 0) options.frequency = a.frequency;
   options.noise = a.noise;
   return read_all(*make_synth(options));
-}
-
-double median(std::vector<double> times) {
-  std::sort(times.begin(), times.end());
-  return times[times.size() / 2];
 }
 
 /// The CPU with all its cores: the median of its times, and its mesh.
@@ -149,7 +145,7 @@ int run(const Arguments& a) {
   const double written =
       12.0 * static_cast<double>(counts.vertices * (a.normals ? 2 : 1) + counts.triangles);
   const double floor = (read / bandwidth.read + written / bandwidth.write) * 1e3;
-  const float middle = times[times.size() / 2];
+  const float middle = median(times);
   const std::uint64_t extra_bytes = extractor.bytes();
   const double wall = wall_milliseconds(extractor, options.isovalue, a.runs);
   out["extent"] = {v.extent.x, v.extent.y, v.extent.z};

@@ -25,6 +25,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/copies.h"
+#include "bench/median.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/pipeline/extract_plan.h"
@@ -148,13 +149,6 @@ double decode_alone(const StoreReader& store, int level, const std::vector<Int3>
   tbb::parallel_for_each(bricks,
                          [&](Int3 b) { (void)store.read_brick(level, b, buffers.local().data()); });
   return seconds_since(start);
-}
-
-/// The middle one, or the lower of two.
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Extractions and stages alone, in turns.

@@ -11,6 +11,7 @@
 #include <functional>
 #include <mutex>
 
+#include "bench/median.h"
 #include "bench/paper/cell_by_cell.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/morton.h"
@@ -39,8 +40,7 @@ double median_of(int runs, const std::function<void()>& f) {
   f();
   std::vector<double> took;
   for (int i = 0; i < runs; ++i) took.push_back(seconds_of(f));
-  std::sort(took.begin(), took.end());
-  return took[took.size() / 2];
+  return median(took);
 }
 
 constexpr Index kBrick = 64;  ///< cells along the bricks of the structures over cells

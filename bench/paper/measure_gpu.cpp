@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 
+#include "bench/median.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/morton.h"
@@ -27,11 +28,6 @@ constexpr int kFrames = 101;
 constexpr Index kBrick = 64;  ///< cells along the bricks of the structures over cells
 /// Cells whose structures are built at a time.
 constexpr std::size_t kCellsAtOnce = std::size_t{1} << 26;
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 
 template <class V>
 bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {

@@ -14,7 +14,6 @@ class HostSearch {
  public:
   using Range = ValueRange<double>;
 
-  HostSearch() = default;
   /// Of up to kMostCandidates tiles; those with an empty range are never active.
   HostSearch(const std::vector<Int3>& tiles, const std::vector<Range>& ranges);
 

@@ -10,16 +10,15 @@
 namespace isobrick::gpu {
 namespace {
 
-template <std::uint32_t Listed, bool Nan = false>
+/// A slab has its own copy of a row table behind the lists.
+template <std::uint32_t Listed, bool Nan = false, bool Slab = false>
 constexpr std::size_t kSharedBytes = sizeof(TileShared) +
                                      (Nan ? std::max(sizeof(Lists<Listed>), sizeof(NanRows))
-                                          : sizeof(Lists<Listed>));
-/// Of a slab, which has its own copy of a row table behind the lists.
-template <std::uint32_t Listed>
-constexpr std::size_t kSharedBytesOfSlab = kSharedBytes<Listed> + sizeof(RowTable);
+                                          : sizeof(Lists<Listed>)) +
+                                     (Slab ? sizeof(RowTable) : 0);
 
 static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
-static_assert(kSharedBytesOfSlab<kListedBeforeAmpere> <= 64 << 10, "what Turing has");
+static_assert(kSharedBytes<kListedBeforeAmpere, false, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later device has");
 
 /// The last block to come here tells the host and leaves the counters as the next launch needs
@@ -107,9 +106,9 @@ struct Launcher {
   static constexpr int kSlabs = Team<N>::kSlabs;
   static std::size_t shared() {
     const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
-    const std::size_t bytes = before_ampere ? kSharedBytes<kListedBeforeAmpere, Nan>
-                                            : kSharedBytes<Team<N>::kMostListed, Nan>;
-    return kSlabs > 1 ? bytes + sizeof(RowTable) : bytes;
+    constexpr bool kSlab = kSlabs > 1;
+    return before_ampere ? kSharedBytes<kListedBeforeAmpere, Nan, kSlab>
+                         : kSharedBytes<Team<N>::kMostListed, Nan, kSlab>;
   }
   /// 0 where the device has too little shared memory for one.
   static int blocks() {

@@ -56,7 +56,7 @@ TEST(HostSearch, EmptyRangesAndNoneAreNeverActive) {
     EXPECT_TRUE(is_found(found, 3));
   }
   EXPECT_EQ(search.find(std::nan("")).count, 0u);
-  EXPECT_EQ(HostSearch().find(0).count, 0u);
+  EXPECT_EQ(HostSearch({}, {}).find(0).count, 0u);
 }
 
 }  // namespace
