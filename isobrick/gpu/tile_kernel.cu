@@ -61,6 +61,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   const Classifier<T> classifier(threshold);
   wait_for_launch_before();
   if (threadIdx.x == 0) {
+    init_barriers<N>(s.barriers);
     if (kSlab)
       s.items = p.found.count * Team<N>::kSlabs;
     else if (p.candidates.count == 0)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "isobrick/gpu/tile_barrier.cuh"
 #include "isobrick/gpu/tile_count.cuh"
 #include "isobrick/gpu/tile_emit.cuh"
 #include "isobrick/gpu/tile_nan.cuh"
@@ -18,6 +19,24 @@ __device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
   publish_sum(p.order[s.item].triangles, s.item, 0);
   s.number_base = 0;
   release_rows(s, p);
+}
+
+/// Whether all cells and vertices of a tile are listed at once. Then its warps wait for no more
+/// than they need (TeamBarriers); the turns of others have __syncthreads between them anyway.
+template <int N, bool Nan>
+__device__ inline bool listed_at_once(const TileShared& s) {
+  return kTeamBarriers && !Nan && ::max(s.all_cells, s.all_vertices) <= ListsOf<N>::kListed;
+}
+
+/// One thread, before a block's first tile.
+template <int N>
+__device__ inline void init_barriers(TeamBarriers& barriers) {
+  if constexpr (!kTeamBarriers) return;
+  // In a slab the first warp finds no cells.
+  init_barrier(barriers.cells, Team<N>::kWarps - (Team<N>::kSlabs > 1 ? 1 : 0));
+  init_barrier(barriers.vertex_base, 1);
+  init_barrier(barriers.neighbours, 1);
+  barriers.turn = 1;
 }
 
 /// Counts a tile's crossing edges and active cells, and leaves their places. False where there
@@ -41,6 +60,7 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     s.next_cells = s.next_vertices = 0;
     s.all_vertices = vertices;
     s.all_cells = bases.cells;
+    if (listed_at_once<N, Nan>(s)) s.barriers.turn ^= 1;
     publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
@@ -67,29 +87,26 @@ __device__ inline std::uint32_t count_in_turns(TileShared& s) {
   return triangles;
 }
 
-/// Whether the warps of a tile wait for each other by named barriers. In those that take turns,
-/// the turns' barriers are between them anyway.
-template <int N, bool Nan>
-__device__ inline bool wait_by_name(const TileShared& s) {
-  return !Nan && ::max(s.all_cells, s.all_vertices) <= ListsOf<N>::kListed;
-}
-
 /// Finds the tile's cells and where its vertices and triangles go. Two warps ask what other
 /// tiles know; the others wait for no more than the place of the vertices.
 template <int N, bool Nan>
 __device__ inline void find_places(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
-  const bool at_once = wait_by_name<N, Nan>(s);
+  const bool at_once = listed_at_once<N, Nan>(s);
+  const std::uint32_t turn = s.barriers.turn;
   // A slab has few cells and vertices: the warp on which others wait leaves them to the others.
   constexpr bool kSlab = Team<N>::kSlabs > 1;
   if (warp_id() == Team<N>::kVertices) {
     find_vertex_base(s, p);
-    if (at_once) arrive<N, TeamBarrier::vertex_base>();
+    if (at_once) arrive(s.barriers.vertex_base);
     if (lane_id() == 0) release_rows(s, p);
   }
   std::uint32_t triangles = 0;
   if (at_once) {
-    if (!kSlab || warp_id() != Team<N>::kVertices) find_cells<N>(s, cells);
+    if (!kSlab || warp_id() != Team<N>::kVertices) {
+      find_cells<N>(s, cells);
+      arrive(s.barriers.cells);
+    }
   } else {
     triangles = count_in_turns<N>(s);
     // A tile with NaN, or a slab, may have vertices of cells of others only.
@@ -99,15 +116,7 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
              for_triangles = warp_id() == Team<N>::kTriangles;
   Neighbour neighbour{};
   if (for_vertices) neighbour = kSlab ? Neighbour::kept(s) : Neighbour::of_lane(s, p);
-  if (at_once) {
-    // All wait for each other at this one, so nobody may do anything before it.
-    if (!for_vertices && for_triangles) wait<N, TeamBarrier::vertex_base>();
-    if ((for_vertices && !kSlab) || for_triangles)
-      wait<N, TeamBarrier::cells>();
-    else
-      arrive<N, TeamBarrier::cells>();
-    if (!for_vertices && !for_triangles) wait<N, TeamBarrier::vertex_base>();
-  }
+  if (at_once && ((for_vertices && !kSlab) || for_triangles)) wait(s.barriers.cells, turn);
   if (for_triangles) {
     if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
     if (lane_id() == 0) {
@@ -118,7 +127,9 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
   }
   if (for_vertices) {
     ask_neighbours<N>(s, p, neighbour);
-    if (at_once && !kSlab) arrive<N, TeamBarrier::neighbours>();
+    if (at_once && !kSlab) arrive(s.barriers.neighbours);
+  } else if (at_once) {
+    wait(s.barriers.vertex_base, turn);
   }
 }
 
@@ -160,7 +171,7 @@ template <int N, class T, bool Normals, bool Nan>
 __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
   constexpr bool kSlab = Team<N>::kSlabs > 1;
   find_places<N, Nan>(s, p);
-  const bool at_once = wait_by_name<N, Nan>(s);
+  const bool at_once = listed_at_once<N, Nan>(s);
   if (!kSlab || !at_once || warp_id() != Team<N>::kVertices) emit_all_vertices<N, T, Normals>(s, p);
   // After the vertices, which read the tile's samples once more. Wider samples of the tiles
   // in work fill the L2 cache alone, and would be driven out.
@@ -169,7 +180,7 @@ __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
   if (!at_once || kSlab)
     __syncthreads();
   else if (warp_id() != Team<N>::kVertices)
-    wait<N, TeamBarrier::neighbours>();
+    wait(s.barriers.neighbours, s.barriers.turn);
   number_at_0<N>(s);
   // Elsewhere the first warp may still make vertices.
   if constexpr (!kSlab) __syncthreads();

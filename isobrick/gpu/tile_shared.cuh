@@ -88,6 +88,12 @@ struct LowerRows {
   std::uint32_t y[33], xy[33], z[33], xz[33], yz;
 };
 
+/// Where warps wait for some of the others (tile_barrier.cuh).
+struct TeamBarriers {
+  unsigned long long vertex_base, cells, neighbours;
+  std::uint32_t turn;  ///< of the tile that is worked on, if it needs them
+};
+
 /// Numbers of vertices count from the tile's first one.
 struct alignas(256) TileShared {
   RowBits rows[kRowsOfTile];
@@ -124,6 +130,7 @@ struct alignas(256) TileShared {
   std::uint32_t items;     ///< how many there are
   std::uint32_t all_triangles;
   std::uint32_t next_cells, next_vertices;  ///< groups of 32 that a warp has taken
+  TeamBarriers barriers;
   std::uint32_t done_before;                ///< blocks that were done before this one
   TileItem tile;
   Shape shape;
@@ -165,17 +172,6 @@ __device__ inline unsigned own_thread() {
 }
 __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
 
-/// Barriers of a team beside that of __syncthreads: who only arrives goes on at once.
-enum class TeamBarrier : int { vertex_base = 1, cells = 2, neighbours = 3 };
-template <int N, TeamBarrier Barrier>
-__device__ inline void arrive() {
-  __syncwarp();
-  asm volatile("barrier.cta.arrive %0, %1;" ::"n"(static_cast<int>(Barrier)), "n"(N) : "memory");
-}
-template <int N, TeamBarrier Barrier>
-__device__ inline void wait() {
-  asm volatile("barrier.cta.sync %0, %1;" ::"n"(static_cast<int>(Barrier)), "n"(N) : "memory");
-}
 /// What all threads of a warp have alike, so that the compiler knows it too: loops
 /// and branches on it then need no care for threads that part.
 __device__ inline std::uint32_t uniform(std::uint32_t v) { return __shfl_sync(kAll, v, 0); }
