@@ -109,7 +109,7 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
     }
   } else {
     triangles = count_in_turns<N>(s);
-    // A tile with NaN, or a slab, may have vertices of cells of others only.
+    // A tile with NaN, or a slab, may have vertices of cells of others only: then there is no turn.
     if constexpr (Nan || kSlab) __syncthreads();
   }
   const bool for_vertices = warp_id() == Team<N>::kVertices,
