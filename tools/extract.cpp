@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isobrick/pipeline/estimate.h"
+#include "tools/extract_report.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/mesh_output.h"
@@ -40,13 +41,6 @@ struct Arguments {
   std::uint64_t gpu_memory = 0;
   int device = 0;
   bool estimate = false, force = false, no_space_check = false;
-};
-
-/// One isosurface to make and where it goes (empty: nowhere).
-struct Surface {
-  ExtractOptions options;
-  MeshForm form;
-  fs::path output, preview;
 };
 
 /// `path`, told apart by isovalue when there are several.
@@ -109,7 +103,7 @@ void check(const Arguments& arguments) {
   if (!arguments.estimate) check_picture(arguments);
 }
 
-std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) {
+std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader& store) {
   ExtractOptions options;
   options.level = arguments.level;
   options.roi = store_region(store, arguments.level, arguments.roi);
@@ -122,7 +116,7 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   options.gpu_memory = arguments.gpu_memory;
   options.device = arguments.device;
   const MeshForm form = form_of(arguments);
-  std::vector<Surface> surfaces;
+  std::vector<ExtractedSurface> surfaces;
   for (const double isovalue : arguments.isovalues) {
     options.isovalue = isovalue;
     surfaces.push_back({options, form, named(arguments.output, arguments, isovalue),
@@ -131,11 +125,12 @@ std::vector<Surface> plan(const Arguments& arguments, const StoreReader& store) 
   return surfaces;
 }
 
-/// The meshes to write, with size_of(Surface) as PlannedMesh has it.
+/// The meshes to write, with size_of(ExtractedSurface) as PlannedMesh has it.
 template <class F>
-std::vector<PlannedMesh> planned_meshes(const std::vector<Surface>& surfaces, const F& size_of) {
+std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& surfaces,
+                                        const F& size_of) {
   std::vector<PlannedMesh> meshes;
-  for (const Surface& surface : surfaces) {
+  for (const ExtractedSurface& surface : surfaces) {
     if (surface.output.empty()) continue;
     PlannedMesh mesh = size_of(surface);
     mesh.path = surface.output;
@@ -145,20 +140,20 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<Surface>& surfaces, co
   return meshes;
 }
 
-ExtractEstimate estimate_one(const Surface& surface, const StoreReader& store) {
+ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store) {
   return estimate(
       store, surface.options,
       mesh_memory(surface.form.format, surface.options.threads, surface.options.memory));
 }
 
 /// Refuses meshes that cannot fit their disk, before anything is written.
-void check_space(const std::vector<Surface>& surfaces, const StoreReader& store) {
+void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
   // Mostly all that the active cells could hold fits, which is known without a sample.
-  const auto largest = planned_meshes(surfaces, [&](const Surface& surface) {
+  const auto largest = planned_meshes(surfaces, [&](const ExtractedSurface& surface) {
     return PlannedMesh{.size = largest_mesh(count_active(store, surface.options))};
   });
   if (!find_shortage(largest, free_space)) return;
-  const auto likely = planned_meshes(surfaces, [&](const Surface& surface) {
+  const auto likely = planned_meshes(surfaces, [&](const ExtractedSurface& surface) {
     const ExtractEstimate guess = estimate_one(surface, store);
     return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
   });
@@ -171,90 +166,6 @@ void check_space(const std::vector<Surface>& surfaces, const StoreReader& store)
         human_bytes(shortage->needed), human_bytes(shortage->free)));
 }
 
-ordered_json estimate_json(const Surface& surface, const ExtractEstimate& e) {
-  return {{"isovalue", surface.options.isovalue},
-          {"bricks", {{"total", e.active.bricks}, {"active", e.active.active_bricks}}},
-          {"active_blocks", e.active.active_blocks},
-          {"triangles", e.mesh.triangles},
-          {"vertices", e.mesh.vertices},
-          {"uncertainty", e.uncertainty},
-          {"file_bytes", predict_bytes(surface.form, e.mesh).file},
-          {"memory_bytes", e.memory}};
-}
-
-std::string estimate_text(const Surface& surface, const ExtractEstimate& e) {
-  return fmt::format(
-      "isovalue {}: about {} triangles and {} vertices (± {:.0f} %), {} as {}; {} of {} bricks "
-      "active, {} of memory\n",
-      surface.options.isovalue, human_count(e.mesh.triangles), human_count(e.mesh.vertices),
-      100 * e.uncertainty, human_bytes(predict_bytes(surface.form, e.mesh).file),
-      name_of(surface.form.format), human_count(e.active.active_bricks),
-      human_count(e.active.bricks), human_bytes(e.memory));
-}
-
-/// Who made the surface, and how long its stages were busy.
-void add_backend(ordered_json& object, const ExtractReport& r) {
-  object["backend"] = r.backend;
-  object["device"] = r.device.empty() ? ordered_json() : ordered_json(r.device);
-  object["gpu_refusal"] = r.gpu_refusal.empty() ? ordered_json() : ordered_json(r.gpu_refusal);
-  for (const auto& [name, stage] : stages_of(r))
-    object["stages"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
-  object["bound"] = bound_of(r);
-  if (r.backend != "cuda") return;
-  object["launches"] = r.launches;
-  object["device_bytes"] = r.device_bytes;
-  object["device_bytes_in_use"] = r.device_bytes_in_use;
-  object["pinned_bytes"] = r.pinned_bytes;
-  object["pool_bricks"] = r.pool_bricks;
-}
-
-ordered_json report_json(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
-  ordered_json object{
-      {"isovalue", surface.options.isovalue},
-      {"output", nullptr},
-      {"preview", nullptr},
-      {"output_bytes", bytes},
-      {"triangles", r.triangles},
-      {"vertices", r.vertices},
-      {"bricks", {{"total", r.bricks}, {"active", r.active_bricks}, {"read", r.bricks_read}}},
-      {"brick_reads", r.brick_reads},
-      {"bytes_read", r.bytes_read},
-      {"seconds",
-       {{"total", r.seconds},
-        {"plan", r.plan_seconds},
-        {"decode", r.decode_seconds},
-        {"surface", r.surface_seconds},
-        {"sink", r.sink.seconds}}},
-      {"index",
-       {{"used", r.index ? name_of(*r.index) : "none"},
-        {"bytes_read", r.search_bytes},
-        {"seconds", r.search_seconds}}}};
-  add_backend(object, r);
-  if (surface.options.drop_degenerate) object["degenerate_triangles"] = r.degenerate_triangles;
-  if (!surface.output.empty()) object["output"] = surface.output.string();
-  if (!surface.preview.empty()) object["preview"] = surface.preview.string();
-  return object;
-}
-
-std::string report_text(const Surface& surface, const ExtractReport& r, std::uint64_t bytes) {
-  std::string text =
-      fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
-                  surface.options.isovalue, human_count(r.triangles), human_count(r.vertices),
-                  human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
-  if (!r.gpu_refusal.empty())
-    text += fmt::format("  on the CPU, for the GPU cannot: {}\n", r.gpu_refusal);
-  if (r.backend == "cuda")
-    text += fmt::format("  on {} with {} of its memory, bound by {}\n", r.device,
-                        human_bytes(r.device_bytes), bound_of(r));
-  if (surface.options.drop_degenerate)
-    text +=
-        fmt::format("  {} degenerate triangles left out\n", human_count(r.degenerate_triangles));
-  if (!surface.output.empty())
-    text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
-  if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());
-  return text;
-}
-
 /// The files of one surface; null where none was asked for.
 struct Sinks {
   std::unique_ptr<MeshSink> mesh, preview;
@@ -262,10 +173,11 @@ struct Sinks {
 
 /// Opens every output before the first extraction, so that one that exists or
 /// cannot be written stops the command at once.
-std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Arguments& arguments) {
+std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
+                              const Arguments& arguments) {
   const bool force = arguments.force;
   std::vector<Sinks> sinks;
-  for (const Surface& surface : surfaces) {
+  for (const ExtractedSurface& surface : surfaces) {
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty())
       of_surface.mesh =
@@ -276,7 +188,7 @@ std::vector<Sinks> open_sinks(const std::vector<Surface>& surfaces, const Argume
   return sinks;
 }
 
-ExtractReport make(const Surface& surface, const Sinks& sinks, const Arguments& arguments,
+ExtractReport make(const ExtractedSurface& surface, const Sinks& sinks, const Arguments& arguments,
                    const StoreReader& store, Console& console) {
   ExtractReport report;
   if (sinks.mesh) report = extract(store, surface.options, *sinks.mesh, console.progress());
@@ -300,9 +212,9 @@ struct Said {
   std::string text;
 };
 
-Said estimate_all(const std::vector<Surface>& surfaces, const StoreReader& store) {
+Said estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
   Said said;
-  for (const Surface& surface : surfaces) {
+  for (const ExtractedSurface& surface : surfaces) {
     const ExtractEstimate guess = estimate_one(surface, store);
     said.objects.push_back(estimate_json(surface, guess));
     said.text += estimate_text(surface, guess);
@@ -310,7 +222,7 @@ Said estimate_all(const std::vector<Surface>& surfaces, const StoreReader& store
   return said;
 }
 
-Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
+Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& surfaces,
               const StoreReader& store, Console& console) {
   if (!arguments.no_space_check) check_space(surfaces, store);
   std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
@@ -328,7 +240,7 @@ Said make_all(const Arguments& arguments, const std::vector<Surface>& surfaces,
 int run(const Arguments& arguments, Console& console) {
   check(arguments);
   const StoreReader store(arguments.store, arguments.selection);
-  const std::vector<Surface> surfaces = plan(arguments, store);
+  const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
   const Said said = arguments.estimate ? estimate_all(surfaces, store)
                                        : make_all(arguments, surfaces, store, console);
   console.result({{"command", "extract"},

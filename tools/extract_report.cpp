@@ -1,0 +1,101 @@
+#include "tools/extract_report.h"
+
+#include <fmt/format.h>
+
+#include "tools/format.h"
+#include "tools/mesh_space.h"
+
+namespace isobrick::tools {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// Who made the surface, and how long its stages were busy.
+void add_backend(ordered_json& object, const ExtractReport& r) {
+  object["backend"] = r.backend;
+  object["device"] = r.device.empty() ? ordered_json() : ordered_json(r.device);
+  object["gpu_refusal"] = r.gpu_refusal.empty() ? ordered_json() : ordered_json(r.gpu_refusal);
+  for (const auto& [name, stage] : stages_of(r))
+    object["stages"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
+  object["bound"] = bound_of(r);
+  if (r.backend != "cuda") return;
+  object["launches"] = r.launches;
+  object["device_bytes"] = r.device_bytes;
+  object["device_bytes_in_use"] = r.device_bytes_in_use;
+  object["pinned_bytes"] = r.pinned_bytes;
+  object["pool_bricks"] = r.pool_bricks;
+}
+
+}  // namespace
+
+ordered_json estimate_json(const ExtractedSurface& surface, const ExtractEstimate& e) {
+  return {{"isovalue", surface.options.isovalue},
+          {"bricks", {{"total", e.active.bricks}, {"active", e.active.active_bricks}}},
+          {"active_blocks", e.active.active_blocks},
+          {"triangles", e.mesh.triangles},
+          {"vertices", e.mesh.vertices},
+          {"uncertainty", e.uncertainty},
+          {"file_bytes", predict_bytes(surface.form, e.mesh).file},
+          {"memory_bytes", e.memory}};
+}
+
+std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate& e) {
+  return fmt::format(
+      "isovalue {}: about {} triangles and {} vertices (± {:.0f} %), {} as {}; {} of {} bricks "
+      "active, {} of memory\n",
+      surface.options.isovalue, human_count(e.mesh.triangles), human_count(e.mesh.vertices),
+      100 * e.uncertainty, human_bytes(predict_bytes(surface.form, e.mesh).file),
+      name_of(surface.form.format), human_count(e.active.active_bricks),
+      human_count(e.active.bricks), human_bytes(e.memory));
+}
+
+ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r,
+                         std::uint64_t bytes) {
+  ordered_json object{
+      {"isovalue", surface.options.isovalue},
+      {"output", nullptr},
+      {"preview", nullptr},
+      {"output_bytes", bytes},
+      {"triangles", r.triangles},
+      {"vertices", r.vertices},
+      {"bricks", {{"total", r.bricks}, {"active", r.active_bricks}, {"read", r.bricks_read}}},
+      {"brick_reads", r.brick_reads},
+      {"bytes_read", r.bytes_read},
+      {"seconds",
+       {{"total", r.seconds},
+        {"plan", r.plan_seconds},
+        {"decode", r.decode_seconds},
+        {"surface", r.surface_seconds},
+        {"sink", r.sink.seconds}}},
+      {"index",
+       {{"used", r.index ? name_of(*r.index) : "none"},
+        {"bytes_read", r.search_bytes},
+        {"seconds", r.search_seconds}}}};
+  add_backend(object, r);
+  if (surface.options.drop_degenerate) object["degenerate_triangles"] = r.degenerate_triangles;
+  if (!surface.output.empty()) object["output"] = surface.output.string();
+  if (!surface.preview.empty()) object["preview"] = surface.preview.string();
+  return object;
+}
+
+std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
+                        std::uint64_t bytes) {
+  std::string text =
+      fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
+                  surface.options.isovalue, human_count(r.triangles), human_count(r.vertices),
+                  human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
+  if (!r.gpu_refusal.empty())
+    text += fmt::format("  on the CPU, for the GPU cannot: {}\n", r.gpu_refusal);
+  if (r.backend == "cuda")
+    text += fmt::format("  on {} with {} of its memory, bound by {}\n", r.device,
+                        human_bytes(r.device_bytes), bound_of(r));
+  if (surface.options.drop_degenerate)
+    text +=
+        fmt::format("  {} degenerate triangles left out\n", human_count(r.degenerate_triangles));
+  if (!surface.output.empty())
+    text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
+  if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());
+  return text;
+}
+
+}  // namespace isobrick::tools
