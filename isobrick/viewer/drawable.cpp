@@ -1,5 +1,7 @@
 #include "isobrick/viewer/drawable.h"
 
+#include <bit>
+
 namespace isobrick {
 namespace {
 
@@ -12,6 +14,7 @@ class Cover {
         isovalue_(isovalue),
         number_(number),
         meshes_(meshes),
+        finest_(meshes.finest_level(isovalue)),
         nodes_(nodes),
         complete_(complete) {}
 
@@ -55,7 +58,7 @@ class Cover {
 
   /// By the node's finer nodes, if all that need it are there.
   bool cover_finer(const NodeKey& n) {
-    if (n.level == 0) return false;
+    if (n.level <= finest_) return false;
     const std::size_t mark = nodes_.size();
     bool all = true, any = false;
     for_each_child(n, [&](const NodeKey& child) {
@@ -85,20 +88,30 @@ class Cover {
   double isovalue_;
   int number_;
   MeshCache& meshes_;
+  int finest_;  ///< level with any mesh of the isovalue: nothing finer is looked for
   std::vector<DrawnNode>& nodes_;
   bool& complete_;
 };
 
 }  // namespace
 
-CutIndex::CutIndex(const Cut& cut) {
-  nodes_.reserve(cut.nodes.size());
-  for (const CutNode& node : cut.nodes) nodes_.emplace(node.key, node);
+CutIndex::CutIndex(const Cut& cut)
+    : nodes_(cut.nodes), places_(std::bit_ceil(2 * nodes_.size() + 1)) {
+  std::uint32_t number = 0;
+  for (const CutNode& node : nodes_) {
+    std::size_t at = NodeKeyHash()(node.key);
+    while (places_[at & (places_.size() - 1)] != 0) ++at;
+    places_[at & (places_.size() - 1)] = ++number;
+  }
 }
 
 const CutNode* CutIndex::find(const NodeKey& key) const {
-  const auto found = nodes_.find(key);
-  return found == nodes_.end() ? nullptr : &found->second;
+  for (std::size_t at = NodeKeyHash()(key);; ++at) {
+    const std::uint32_t number = places_[at & (places_.size() - 1)];
+    if (number == 0) return nullptr;
+    const CutNode& node = nodes_[number - 1];
+    if (node.key == key) return &node;
+  }
 }
 
 bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 #include "isobrick/viewer/cut.h"
@@ -31,11 +30,14 @@ struct Drawable {
 class CutIndex {
  public:
   explicit CutIndex(const Cut& cut);
-  /// The node's neighbours one level above, or null when it is not in the cut.
+  /// Null when it is not in the cut.
   const CutNode* find(const NodeKey& key) const;
 
  private:
-  std::unordered_map<NodeKey, CutNode, NodeKeyHash> nodes_;
+  std::vector<CutNode> nodes_;
+  /// Numbers of nodes + 1, 0 for none: each at its hash or the next place that is free. At least
+  /// every other one is.
+  std::vector<std::uint32_t> places_;
 };
 
 /// Appends the meshes that show one isovalue of a cut as far as they are there: a

@@ -1,15 +1,23 @@
 #include "isobrick/viewer/mesh_cache.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace isobrick {
 
+std::vector<MeshCache::Entry>* MeshCache::entries_of(const NodeKey& key, double isovalue) {
+  const auto surface = surfaces_.find(isovalue);
+  if (surface == surfaces_.end()) return nullptr;
+  const auto found = surface->second.nodes.find(key);
+  return found == surface->second.nodes.end() ? nullptr : &found->second;
+}
+
 MeshPtr MeshCache::find(const NodeKey& key, double isovalue, std::uint32_t coarser) {
-  const auto found = nodes_.find(key);
-  if (found == nodes_.end()) return nullptr;
-  for (Entry& entry : found->second)
-    if (entry.mesh->isovalue == isovalue && entry.mesh->coarser == coarser) {
+  std::vector<Entry>* const entries = entries_of(key, isovalue);
+  if (entries == nullptr) return nullptr;
+  for (Entry& entry : *entries)
+    if (entry.coarser == coarser) {
       entry.used = now_;
       return entry.mesh;
     }
@@ -17,23 +25,25 @@ MeshPtr MeshCache::find(const NodeKey& key, double isovalue, std::uint32_t coars
 }
 
 MeshPtr MeshCache::find_any(const NodeKey& key, double isovalue, std::uint32_t coarser) {
-  if (MeshPtr exact = find(key, isovalue, coarser)) return exact;
-  const auto found = nodes_.find(key);
-  if (found == nodes_.end()) return nullptr;
+  std::vector<Entry>* const entries = entries_of(key, isovalue);
+  if (entries == nullptr) return nullptr;
+  const auto exact = std::find_if(entries->begin(), entries->end(),
+                                  [&](const Entry& entry) { return entry.coarser == coarser; });
   // The one made last met neighbours that are most like those of now.
-  for (auto entry = found->second.rbegin(); entry != found->second.rend(); ++entry)
-    if (entry->mesh->isovalue == isovalue) {
-      entry->used = now_;
-      return entry->mesh;
-    }
-  return nullptr;
+  Entry& entry = exact != entries->end() ? *exact : entries->back();
+  entry.used = now_;
+  return entry.mesh;
 }
 
 bool MeshCache::has_any(const NodeKey& key, double isovalue) const {
-  const auto found = nodes_.find(key);
-  return found != nodes_.end() &&
-         std::any_of(found->second.begin(), found->second.end(),
-                     [&](const Entry& entry) { return entry.mesh->isovalue == isovalue; });
+  const auto surface = surfaces_.find(isovalue);
+  return surface != surfaces_.end() && surface->second.nodes.contains(key);
+}
+
+int MeshCache::finest_level(double isovalue) const {
+  const auto surface = surfaces_.find(isovalue);
+  return surface == surfaces_.end() ? std::numeric_limits<int>::max()
+                                    : surface->second.levels.begin()->first;
 }
 
 void MeshCache::put(MeshPtr mesh) {
@@ -41,11 +51,13 @@ void MeshCache::put(MeshPtr mesh) {
   bytes_ += mesh->bytes();
   device_bytes_ += mesh->device_bytes;
   ++meshes_;
-  nodes_[mesh->key].push_back({std::move(mesh), now_});
+  Surface& surface = surfaces_[mesh->isovalue];
+  std::vector<Entry>& entries = surface.nodes[mesh->key];
+  if (entries.empty()) ++surface.levels[mesh->key.level];
+  entries.push_back({mesh->coarser, now_, std::move(mesh)});
 }
 
 bool MeshCache::shrink() {
-  const auto keeps_budgets = [&] { return bytes_ <= budget_ && device_bytes_ <= device_budget_; };
   if (keeps_budgets()) return true;
   // Not for each mesh that is made anew.
   drop_until(budget_ - budget_ / 8, device_budget_ - device_budget_ / 8);
@@ -59,21 +71,31 @@ void MeshCache::shrink_device(std::uint64_t bytes) {
 /// Drops what was not used since begin_use(), the oldest first, down to this or as far as it goes.
 void MeshCache::drop_until(std::uint64_t bytes, std::uint64_t device_bytes) {
   std::vector<std::pair<std::uint64_t, const NodeMesh*>> old;
-  for (const auto& [key, entries] : nodes_)
-    for (const Entry& entry : entries)
-      if (entry.used < now_) old.emplace_back(entry.used, entry.mesh.get());
+  for (const auto& [isovalue, surface] : surfaces_)
+    for (const auto& [key, entries] : surface.nodes)
+      for (const Entry& entry : entries)
+        if (entry.used < now_) old.emplace_back(entry.used, entry.mesh.get());
   std::sort(old.begin(), old.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [used, mesh] : old) {
     const bool here_too_many = bytes_ > bytes, there_too_many = device_bytes_ > device_bytes;
     if (!here_too_many && !there_too_many) break;
-    if (!here_too_many && mesh->device_bytes == 0) continue;
-    const auto found = nodes_.find(mesh->key);
-    bytes_ -= mesh->bytes();
-    device_bytes_ -= mesh->device_bytes;
-    --meshes_;
-    std::erase_if(found->second, [&](const Entry& entry) { return entry.mesh.get() == mesh; });
-    if (found->second.empty()) nodes_.erase(found);
+    if (here_too_many || mesh->device_bytes > 0) drop(*mesh);
   }
+}
+
+void MeshCache::drop(const NodeMesh& mesh) {
+  const auto surface = surfaces_.find(mesh.isovalue);
+  auto& [nodes, levels] = surface->second;
+  const auto node = nodes.find(mesh.key);
+  const auto level = levels.find(mesh.key.level);
+  bytes_ -= mesh.bytes();
+  device_bytes_ -= mesh.device_bytes;
+  --meshes_;
+  std::erase_if(node->second, [&](const Entry& entry) { return entry.mesh.get() == &mesh; });
+  if (!node->second.empty()) return;
+  nodes.erase(node);
+  if (--level->second == 0) levels.erase(level);
+  if (nodes.empty()) surfaces_.erase(surface);
 }
 
 }  // namespace isobrick

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <unordered_map>
 #include <vector>
@@ -24,11 +26,14 @@ class MeshCache {
   /// The same, or else one with other neighbours.
   MeshPtr find_any(const NodeKey& key, double isovalue, std::uint32_t coarser);
   bool has_any(const NodeKey& key, double isovalue) const;
+  /// Of all meshes of an isovalue: the finest one's level; above all levels where there is none.
+  int finest_level(double isovalue) const;
 
   void put(MeshPtr mesh);
 
   /// What is found from now on is kept by the next shrink().
   void begin_use() { ++now_; }
+  bool keeps_budgets() const { return bytes_ <= budget_ && device_bytes_ <= device_budget_; }
   /// When a budget is exceeded, drops what was not used since begin_use() until there is
   /// some room again. False when the budgets are exceeded all the same.
   bool shrink();
@@ -44,15 +49,25 @@ class MeshCache {
   std::uint64_t meshes() const { return meshes_; }
 
  private:
+  /// What is compared lies here: a mesh is looked at only when it is the one.
   struct Entry {
+    std::uint32_t coarser;
+    std::uint64_t used;
     MeshPtr mesh;
-    std::uint64_t used = 0;
+  };
+  struct Surface {
+    /// Each node's in the order in which they were made.
+    std::unordered_map<NodeKey, std::vector<Entry>, NodeKeyHash> nodes;
+    std::map<int, std::size_t> levels;  ///< how many of its nodes lie in each
   };
 
+  std::vector<Entry>* entries_of(const NodeKey& key, double isovalue);
+  void drop(const NodeMesh& mesh);
   void drop_until(std::uint64_t bytes, std::uint64_t device_bytes);
 
   std::uint64_t budget_, device_budget_, bytes_ = 0, device_bytes_ = 0, meshes_ = 0, now_ = 1;
-  std::unordered_map<NodeKey, std::vector<Entry>, NodeKeyHash> nodes_;
+  /// By isovalue: nothing is looked for in many nodes where one is new.
+  std::map<double, Surface> surfaces_;
 };
 
 }  // namespace isobrick
