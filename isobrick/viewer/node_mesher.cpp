@@ -188,8 +188,10 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
 
 bool NodeMesher::half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
   const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
-  return impl_->bricks.half_resident(impl_->grid.level(key.level).source,
-                                     impl_->bricks_of(key, impl_->points(key), needed));
+  const int stored = impl_->grid.level(key.level).source;
+  const Box3 points = impl_->points(key);
+  if (!needed) return impl_->bricks.half_resident(stored, impl_->samples.bricks(key.level, points));
+  return impl_->bricks.half_resident(stored, impl_->bricks_of(key, points, needed));
 }
 
 void NodeMesher::will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const {

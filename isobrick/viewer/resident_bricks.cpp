@@ -37,7 +37,8 @@ std::size_t ResidentBricks::KeyHash::operator()(const Key& k) const {
 ResidentBricks::ResidentBricks(std::shared_ptr<const BrickSource> source, std::uint64_t budget)
     : source_(std::move(source)),
       ranges_(source_, range_bytes(budget)),
-      budget_(budget - range_bytes(budget)) {}
+      budget_(budget - range_bytes(budget)),
+      there_(source_->info()) {}
 
 /// Drops what nobody uses until so many bytes fit, as far as that goes.
 void ResidentBricks::make_room(std::uint64_t bytes) {
@@ -49,6 +50,7 @@ void ResidentBricks::make_room(std::uint64_t bytes) {
       counters_.bytes -= found->second.samples->size();
       --counters_.bricks;
     }
+    there_.erase(at->level, at->brick);
     entries_.erase(found);
     at = order_.erase(at);
   }
@@ -182,6 +184,7 @@ ResidentBricks::Read ResidentBricks::read(const Key& key, std::unique_lock<std::
   }
   Entry& entry = entries_[key];
   entry.loading = false;
+  there_.insert(key.level, key.brick);
   entry.samples = made.samples;
   entry.failure = made.failure;
   order_.push_front(key);
@@ -198,17 +201,24 @@ std::shared_ptr<const BrickSamples> ResidentBricks::find(int level, Int3 brick) 
   return found->second.samples;
 }
 
-bool ResidentBricks::there(const Key& key) const {
-  const auto found = entries_.find(key);
-  return found != entries_.end() && !found->second.loading;
-}
-
 bool ResidentBricks::resident(int level, Box3 box) const {
-  const std::lock_guard lock(mutex_);
   for (Index z = box.lo.z; z < box.hi.z; ++z)
     for (Index y = box.lo.y; y < box.hi.y; ++y)
       for (Index x = box.lo.x; x < box.hi.x; ++x)
         if (!there({level, {x, y, z}})) return false;
+  return true;
+}
+
+bool ResidentBricks::half_resident(int level, Box3 bricks) const {
+  const Index all = volume(bricks.extent());
+  Index found = 0, missing = 0;
+  for (Index z = bricks.lo.z; z < bricks.hi.z; ++z)
+    for (Index y = bricks.lo.y; y < bricks.hi.y; ++y)
+      for (Index x = bricks.lo.x; x < bricks.hi.x; ++x) {
+        ++(there({level, {x, y, z}}) ? found : missing);
+        if (2 * found >= all) return true;
+        if (2 * missing > all) return false;
+      }
   return true;
 }
 
@@ -221,7 +231,6 @@ void ResidentBricks::close() {
 }
 
 bool ResidentBricks::half_resident(int level, std::span<const Int3> bricks) const {
-  const std::lock_guard lock(mutex_);
   std::size_t found = 0;
   for (const Int3 b : bricks) found += there({level, b});
   return 2 * found >= bricks.size();

@@ -12,6 +12,7 @@
 #include <unordered_map>
 
 #include "isobrick/viewer/block_ranges.h"
+#include "isobrick/viewer/brick_set.h"
 #include "isobrick/viewer/brick_source.h"
 
 namespace isobrick {
@@ -71,10 +72,11 @@ class ResidentBricks {
   void read_together(int level, std::span<const Int3> bricks, const Wanted& wanted);
   /// The brick if it is there.
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
-  /// Whether all bricks of `box` (in bricks) are there.
+  /// Whether all bricks of `box` (in bricks) are there. Waits for nobody, like the next two.
   bool resident(int level, Box3 box) const;
   /// Whether at least half of these are.
   bool half_resident(int level, std::span<const Int3> bricks) const;
+  bool half_resident(int level, Box3 bricks) const;
   /// Drops what is there, ranges as well; from now on no brick is kept.
   void close();
   /// The ranges of blocks around this one, those of its node of 64³ cells among them.
@@ -138,7 +140,7 @@ class ResidentBricks {
   bool over(const Request& request) const;
   std::shared_ptr<const BrickSamples> load(const Key& key);
   void make_room(std::uint64_t bytes);
-  bool there(const Key& key) const;
+  bool there(const Key& key) const { return there_.has(key.level, key.brick); }
 
   std::shared_ptr<const BrickSource> source_;
   BlockRanges ranges_;
@@ -146,6 +148,7 @@ class ResidentBricks {
   mutable std::mutex mutex_;
   std::condition_variable loaded_;
   std::unordered_map<Key, Entry, KeyHash> entries_;
+  BrickSet there_;        ///< those of entries_ that are loaded; may be asked without the lock
   std::list<Key> order_;  ///< most recently used first; only what is loaded
   std::list<Request> requests_;
   /// That will_need() named and nobody has begun to read, those first that were named first.

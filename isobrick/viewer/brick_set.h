@@ -1,0 +1,56 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "isobrick/bricks/store_reader.h"
+
+namespace isobrick {
+
+/// Some of a store's bricks, a bit for each. One thread at a time changes it; others may ask
+/// meanwhile, without waiting.
+class BrickSet {
+ public:
+  explicit BrickSet(const StoreInfo& info) {
+    for (const auto& level : info.levels) {
+      const Int3 bricks = level.lattice.bricks();
+      levels_.emplace_back(bricks, static_cast<std::size_t>((volume(bricks) + 63) / 64));
+    }
+  }
+
+  bool has(int level, Int3 brick) const {
+    const Place place = place_of(level, brick);
+    return (place.word->load(std::memory_order_relaxed) & place.bit) != 0;
+  }
+  void insert(int level, Int3 brick) {
+    const Place place = place_of(level, brick);
+    place.word->fetch_or(place.bit, std::memory_order_relaxed);
+  }
+  void erase(int level, Int3 brick) {
+    const Place place = place_of(level, brick);
+    place.word->fetch_and(~place.bit, std::memory_order_relaxed);
+  }
+
+ private:
+  using Word = std::atomic<std::uint64_t>;
+  struct Level {
+    Level(Int3 b, std::size_t count) : bricks(b), words(count) {}
+    Int3 bricks;
+    mutable std::vector<Word> words;
+  };
+  struct Place {
+    Word* word;
+    std::uint64_t bit;
+  };
+
+  Place place_of(int level, Int3 brick) const {
+    const Level& l = levels_[static_cast<std::size_t>(level)];
+    const auto i = static_cast<std::uint64_t>(linear_index(brick, l.bricks));
+    return {&l.words[i / 64], std::uint64_t{1} << i % 64};
+  }
+
+  std::vector<Level> levels_;
+};
+
+}  // namespace isobrick
