@@ -52,24 +52,31 @@ class Planner {
     const int top = tree_.grid().coarsest_stored();
     for (NodeKey n = node.key; n.level < top;) {
       n = tree_.grid().parent(n);
-      const auto [place, added] = ancestors_.try_emplace(n, jobs.size());
+      const auto [place, added] = ancestors_.try_emplace(n);
+      Ancestor& ancestor = place->second;
       if (!added) {
-        if (place->second != kNoJob) jobs[place->second].visible |= node.visible;
+        if (ancestor.visible || !node.visible) return;  // and so are those above
+        ancestor.visible = true;
+        if (ancestor.job != kNoJob) jobs[ancestor.job].visible = true;
         continue;
       }
-      place->second = kNoJob;
+      ancestor.visible = node.visible;
       if (meshes_.has_any(n, isovalue)) {
         meshes_.find_any(n, isovalue, 0);  // is kept
         return;
       }
       if (plan_.straight && n.level < top) continue;
       if (!tree_.active(n, isovalue)) continue;
-      place->second = jobs.size();
+      ancestor.job = jobs.size();
       jobs.push_back({n, isovalue, 0, node.visible, false, node.pixels, node.distance});
     }
   }
 
   static constexpr std::size_t kNoJob = ~std::size_t{0};
+  struct Ancestor {
+    std::size_t job = kNoJob;  ///< its number
+    bool visible = false;      ///< some node below is
+  };
 
   const NodeTree& tree_;
   const Cut& cut_;
@@ -77,8 +84,8 @@ class Planner {
   MeshPlan& plan_;
   std::size_t held_ = 0;  ///< nodes of the cut with a surface, for each isovalue
   std::vector<Bare> bare_;
-  std::unordered_map<NodeKey, std::size_t, NodeKeyHash> ancestors_;  ///< numbers of their jobs
-  double ancestors_of_ = 0;                                          ///< isovalue
+  std::unordered_map<NodeKey, Ancestor, NodeKeyHash> ancestors_;
+  double ancestors_of_ = 0;  ///< isovalue
 };
 
 }  // namespace

@@ -78,6 +78,26 @@ TEST_F(PlanTest, WhereMostIsThereAllLevelsStandIn) {
   EXPECT_GT(ancestors(rest, false), ancestors(rest, true));
 }
 
+TEST_F(PlanTest, WhatStandsInForAnythingVisibleIsVisible) {
+  for (std::size_t i = 0; i < cut_.nodes.size(); ++i) cut_.nodes[i].visible = i % 7 == 5;
+  std::size_t hidden = 0, visible = 0;
+  for (const MeshJob& job : plan(0).jobs) {
+    bool any = false, in_cut = false;
+    for (const CutNode& node : cut_.nodes) {
+      in_cut |= node.key == job.key;
+      if (!node.visible || !tree_.may_hold_surface(node.key, 0, node.coarser)) continue;
+      NodeKey n = node.key;
+      while (n.level < job.key.level) n = tree_.grid().parent(n);
+      any |= n == job.key;
+    }
+    if (in_cut) continue;
+    EXPECT_EQ(job.visible, any);
+    ++(any ? visible : hidden);
+  }
+  EXPECT_GT(visible, 0u);
+  EXPECT_GT(hidden, 0u);
+}
+
 TEST_F(PlanTest, LevelsThatAreNotStoredAreMadeWhereACutAsksForThem) {
   cut_ = RandomCut(tree_.grid(), 1, 0).cut({0.0});
   const MeshPlan plan = plan_jobs(tree_, cut_, meshes_, mesher_, 0);
