@@ -12,6 +12,7 @@ namespace isobrick {
 struct WorldBall {
   Vec3d centre;
   double radius = 1;
+  friend bool operator==(const WorldBall&, const WorldBall&) = default;
 };
 
 /// The smallest ball around a box; of radius 1 if the box is a point or not finite.
@@ -75,6 +76,8 @@ class Camera {
   /// The picture's point of a world position; the third is its depth (in front of
   /// the eye: > 0), world units.
   Vec3d project(Vec3d world, int width, int height) const;
+
+  friend bool operator==(const Camera&, const Camera&) = default;
 };
 
 }  // namespace isobrick

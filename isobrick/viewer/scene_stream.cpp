@@ -30,7 +30,6 @@ int thread_count(int asked) {
 
 void SceneStream::Shared::plan(bool late) {
   meshes.begin_use();
-  keep_shown();
   bricks.forget_needs();
   const bool sliding = changed_twice && Clock::now() - *last_isovalue < kSliding;
   const double soon =
@@ -65,7 +64,11 @@ void SceneStream::Shared::keep_shown() {
 }
 
 void SceneStream::Shared::make_room() {
-  full = !meshes.shrink();
+  full = false;
+  if (!meshes.keeps_budgets()) {
+    keep_shown();
+    full = !meshes.shrink();
+  }
   counters.mesh_budget_full = full && !jobs.empty();
 }
 
@@ -100,10 +103,6 @@ void SceneStream::Shared::rebuild_drawable() {
     next->nodes.insert(next->nodes.end(), shown[i].begin(), shown[i].end());
   }
   for (const DrawnNode& node : next->nodes) next->triangles += node.mesh->triangles();
-  keep_shown();
-  // What the cut still waits for is kept as well.
-  for (const CutNode& node : cut.nodes)
-    for (const double isovalue : cut.isovalues) meshes.find(node.key, isovalue, node.coarser);
   drawn = std::move(next);
   drawn_version = version;
   const bool was_full = full;
@@ -207,6 +206,11 @@ std::shared_ptr<const SliceSamples> SceneStream::slice(int slot) const {
   const std::lock_guard lock(shared_->mutex);
   const auto found = shared_->slots.find(slot);
   return found == shared_->slots.end() ? nullptr : found->second.image;
+}
+
+bool SceneStream::is_newest(const Drawable& drawable) const {
+  const std::lock_guard lock(shared_->mutex);
+  return drawable.version == shared_->version;
 }
 
 bool SceneStream::idle() const {

@@ -68,6 +68,8 @@ class SceneStream {
   /// What to draw now. The same object until something changes. Until an isovalue covers the
   /// view, what the one in its place showed before is kept.
   std::shared_ptr<const Drawable> drawable();
+  /// Whether drawable() would give this one, without making another.
+  bool is_newest(const Drawable& drawable) const;
 
   /// From now on this device makes meshes of what the threads read; null: the threads do. What
   /// has been made stays. Where it fails the threads go on alone; see

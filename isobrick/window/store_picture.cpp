@@ -6,8 +6,6 @@
 #include <utility>
 
 #include <epoxy/gl.h>
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "isobrick/core/stopwatch.h"
 #include "isobrick/render/gl_context.h"
@@ -49,14 +47,6 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
                     [](const DrawnNode& p, const DrawnNode& q) {
                       return p.mesh == q.mesh && p.isovalue == q.isovalue;
                     });
-}
-
-/// What a picture depends on beside the meshes and slices that there are. An isovalue
-/// shows when meshes of it are there, and not before.
-std::string what_shows(const Camera& camera, int width, int height, ViewSettings settings) {
-  for (SurfaceSettings& surface : settings.surfaces) surface.isovalue = 0;
-  return fmt::format("{} {} {} {}", width, height, to_json(camera).dump(),
-                     to_json(settings).dump());
 }
 
 }  // namespace
@@ -190,7 +180,7 @@ void StorePicture::draw_surfaces(const ViewSettings& settings, PictureState& sta
 
 /// Whether a picture that has been begun is still worth finishing.
 bool StorePicture::still_wanted(const Work& work, const Asked& asked) const {
-  const std::string& shows = work.becomes.shows;
+  const Shows& shows = work.becomes.shows;
   // A picture in full serves as a plain one, and a plain one comes first.
   const bool same_view = shows == asked.shows || shows == asked.shows_plain;
   if (same_view && work.isovalues == scene_->cut().isovalues) return true;
@@ -352,15 +342,17 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
   times_.scene = scene_->times();
   watch.lap();
   const bool idle = scene_->stream().idle();  // first: then the newest has everything
-  ViewSettings plain = settings;
-  plain.occlusion = plain.multisample = false;
+  Shows shows{camera, width, height, settings};
+  for (SurfaceSettings& surface : shows.settings.surfaces) surface.isovalue = 0;
+  Shows plain = shows;
+  plain.settings.occlusion = plain.settings.multisample = false;
   const Asked asked{.camera = camera,
                     .width = width,
                     .height = height,
                     .settings = settings,
                     .way = way,
-                    .shows = what_shows(camera, width, height, settings),
-                    .shows_plain = what_shows(camera, width, height, plain),
+                    .shows = std::move(shows),
+                    .shows_plain = std::move(plain),
                     .idle = idle,
                     .newest = scene_->drawable()};
   times_.drawable = watch.lap();
@@ -392,7 +384,8 @@ void StorePicture::update_state(const Asked& asked) {
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;
   state_.more = imported_ || put_off_ || device_->more();
-  state_.complete = !work_ && !put_off_ && shown_ != nullptr && shown_ == scene_->drawable() &&
+  state_.complete = !work_ && !put_off_ && shown_ != nullptr &&
+                    scene_->stream().is_newest(*shown_) &&
                     (shown_->complete || scene_->stream().idle());
 }
 

@@ -129,19 +129,26 @@ class StorePicture {
                      const std::function<void()>& wait);
 
  private:
+  /// What a picture depends on beside the meshes and slices that there are.
+  struct Shows {
+    Camera camera;
+    int width = 0, height = 0;
+    ViewSettings settings;  ///< without isovalues: one shows when meshes of it are there
+    friend bool operator==(const Shows&, const Shows&) = default;
+  };
   /// What somebody asks to see.
   struct Asked {
     const Camera& camera;
     int width, height;
     const ViewSettings& settings;
     const PictureWay& way;
-    std::string shows, shows_plain;  ///< see what_shows()
-    bool idle;                       ///< nothing finer than `newest` is to come
+    Shows shows, shows_plain;
+    bool idle;  ///< nothing finer than `newest` is to come
     std::shared_ptr<const Drawable> newest;
   };
   /// What a picture shows.
   struct Pictured {
-    std::string shows;  ///< camera, size and settings
+    Shows shows;
     std::shared_ptr<const Drawable> meshes;
     ShownSlices::Samples slices;
     std::vector<double> isovalues;  ///< of the meshes

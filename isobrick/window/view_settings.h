@@ -19,6 +19,7 @@ struct SurfaceSettings {
   Vec3f colour{0.87f, 0.80f, 0.70f};                           ///< sRGB in [0, 1]
   float opacity = 1;
   bool shown = true;
+  friend bool operator==(const SurfaceSettings&, const SurfaceSettings&) = default;
 };
 
 /// A plane across an axis of the volume that cuts away what lies beyond it.
@@ -26,18 +27,21 @@ struct CutSettings {
   bool on = false;
   float place = 0.5f;  ///< between the volume's first sample (0) and its last (1)
   bool beyond = true;  ///< what lies at larger places goes; else at smaller ones
+  friend bool operator==(const CutSettings&, const CutSettings&) = default;
 };
 
 /// A plane at any angle that cuts away one side.
 struct PlaneSettings {
   bool on = true;
   HalfSpace kept;
+  friend bool operator==(const PlaneSettings&, const PlaneSettings&) = default;
 };
 
 /// A picture of the samples across an axis of the volume.
 struct SliceSettings {
   bool shown = false;
   float place = 0.5f;
+  friend bool operator==(const SliceSettings&, const SliceSettings&) = default;
 };
 
 /// Everything that a picture of a store depends on besides the camera, the store and
@@ -55,6 +59,7 @@ struct ViewSettings {
   bool box = true, axes = true, scale_bar = true;
   float pixel_error = 1.5f;  ///< how long a cell may be on the picture
   Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
+  friend bool operator==(const ViewSettings&, const ViewSettings&) = default;
 };
 
 inline constexpr std::size_t kMostSurfaces = 16;

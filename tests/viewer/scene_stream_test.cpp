@@ -80,6 +80,7 @@ TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {
     for (;;) {
       const bool idle = stream.idle();
       const auto drawable = stream.drawable();
+      EXPECT_TRUE(!idle || stream.is_newest(*drawable));
       expect_no_overlap(tree->grid(), *drawable);
       versions.insert(drawable->version);
       if (begun) {
