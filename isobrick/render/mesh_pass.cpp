@@ -116,11 +116,12 @@ glm::vec4 offset_of(Vec3d origin, Vec3d eye, bool normals) {
   return {from_eye.x, from_eye.y, from_eye.z, normals ? 1.0f : 0.0f};
 }
 
-Look look_of(const MeshStyle& style, Vec3d origin, Vec3d eye, bool normals) {
+/// But for its offset.
+Look look_of(const MeshStyle& style) {
   const Vec3f c = style.colour;
   const Vec3f darker{0.30f + 0.42f * c.x, 0.24f + 0.38f * c.y, 0.22f + 0.34f * c.z};
   const float opacity = std::clamp(style.opacity, 0.0f, 1.0f);
-  return {offset_of(origin, eye, normals),
+  return {{},
           to_linear(c, opacity),
           to_linear(style.inside.value_or(darker), opacity),
           {style.id, 0, 0, 0}};
@@ -174,28 +175,39 @@ void MeshPass::bind(bool transparent) {
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, looks_.get());
 }
 
+void MeshPass::bind_block(const MeshPlace& place) {
+  glVertexArrayVertexBuffer(vertices_.get(), 0, place.positions, 0, sizeof(Vec3f));
+  glVertexArrayVertexBuffer(vertices_.get(), 1, place.normals, 0, sizeof(Vec3f));
+  glVertexArrayElementBuffer(vertices_.get(), place.triangles);
+}
+
 void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent) {
   if (meshes.empty()) return;
   std::vector<Look> looks;
   std::vector<Command> commands;
+  looks.reserve(meshes.size());
+  commands.reserve(meshes.size());
   for (const MeshDraw& draw : meshes) {
     const MeshPlace& place = draw.mesh->place();
     commands.push_back({3 * draw.triangles, 1, 3 * (place.first_triangle + draw.first_triangle),
                         static_cast<std::int32_t>(place.first_vertex),
                         static_cast<std::uint32_t>(looks.size())});
-    looks.push_back(look_of(draw.style, draw.mesh->origin(), eye, draw.mesh->has_normals()));
+    const bool again = !looks.empty() && draw.style == (&draw - 1)->style;
+    looks.push_back(again ? looks.back() : look_of(draw.style));
+    looks.back().offset = offset_of(draw.mesh->origin(), eye, draw.mesh->has_normals());
   }
   fill_buffer(looks_, std::as_bytes(std::span(looks)));
   fill_buffer(commands_, std::as_bytes(std::span(commands)));
   need_numbers(looks.size());
-  const MeshPlace& place = meshes.front().mesh->place();
-  glVertexArrayVertexBuffer(vertices_.get(), 0, place.positions, 0, sizeof(Vec3f));
-  glVertexArrayVertexBuffer(vertices_.get(), 1, place.normals, 0, sizeof(Vec3f));
-  glVertexArrayElementBuffer(vertices_.get(), place.triangles);
   bind(transparent);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.get());
-  glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr,
-                              static_cast<GLsizei>(commands.size()), 0);
+  for (std::size_t first = 0, end = 0; first < meshes.size(); first = end) {
+    while (end < meshes.size() && meshes[end].block() == meshes[first].block()) ++end;
+    bind_block(meshes[first].mesh->place());
+    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
+                                reinterpret_cast<const void*>(first * sizeof(Command)),
+                                static_cast<GLsizei>(end - first), 0);
+  }
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
   check_gl("drawing meshes");
 }
@@ -205,16 +217,16 @@ void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin,
   kept_.clear();
   const std::span<const Triangle> triangles = drawable_triangles(mesh, kept_);
   if (triangles.empty()) return;
-  const Look look = look_of(style, origin, eye, !mesh.normals.empty());
+  Look look = look_of(style);
+  look.offset = offset_of(origin, eye, !mesh.normals.empty());
   fill_buffer(looks_, std::as_bytes(std::span(&look, 1)));
   fill_buffer(positions_, std::as_bytes(mesh.positions));
   if (!mesh.normals.empty()) fill_buffer(normals_, std::as_bytes(mesh.normals));
   fill_buffer(triangles_, std::as_bytes(triangles));
   need_numbers(1);
   const GlBuffer& normals = mesh.normals.empty() ? positions_ : normals_;
-  glVertexArrayVertexBuffer(vertices_.get(), 0, positions_.get(), 0, sizeof(Vec3f));
-  glVertexArrayVertexBuffer(vertices_.get(), 1, normals.get(), 0, sizeof(Vec3f));
-  glVertexArrayElementBuffer(vertices_.get(), triangles_.get());
+  bind_block(
+      {.positions = positions_.get(), .normals = normals.get(), .triangles = triangles_.get()});
   bind(transparent);
   glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * triangles.size()), GL_UNSIGNED_INT,
                  nullptr);

@@ -18,7 +18,7 @@ class MeshPass {
 
   /// Whether half spaces cut what is drawn from now on.
   void start(bool cut) { cut_ = cut; }
-  /// Those of one block of a pool with one call.
+  /// Those that follow each other in one block of a pool with one call.
   void draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent);
   /// One that lies in memory.
   void draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin, Vec3d eye,
@@ -32,6 +32,7 @@ class MeshPass {
   };
 
   void bind(bool transparent);
+  void bind_block(const MeshPlace& place);
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
   void need_numbers(std::size_t count);
 

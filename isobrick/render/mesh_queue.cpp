@@ -3,12 +3,6 @@
 #include <algorithm>
 
 namespace isobrick {
-namespace {
-
-unsigned block_of(const MeshDraw& draw) { return draw.mesh->place().positions; }
-
-}  // namespace
-
 void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
   draws_.push_back({&mesh, style, 0, mesh.place().triangle_count});
   left_ += mesh.place().triangle_count;
@@ -16,14 +10,12 @@ void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
 
 std::span<const MeshDraw> MeshQueue::take(std::uint64_t most) {
   if (!sorted_)
-    std::stable_sort(draws_.begin(), draws_.end(), [](const MeshDraw& a, const MeshDraw& b) {
-      return block_of(a) < block_of(b);
-    });
+    std::stable_sort(draws_.begin(), draws_.end(),
+                     [](const MeshDraw& a, const MeshDraw& b) { return a.block() < b.block(); });
   sorted_ = true;
   piece_.clear();
   most = std::max<std::uint64_t>(most, 1);
-  const unsigned block = block_of(draws_[next_]);
-  while (most > 0 && next_ < draws_.size() && block_of(draws_[next_]) == block) {
+  while (most > 0 && next_ < draws_.size()) {
     MeshDraw& rest = draws_[next_];
     MeshDraw& taken = piece_.emplace_back(rest);
     taken.triangles = static_cast<std::uint32_t>(std::min<std::uint64_t>(rest.triangles, most));

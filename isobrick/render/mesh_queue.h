@@ -15,6 +15,9 @@ struct MeshDraw {
   const PooledMesh* mesh;
   MeshStyle style;
   std::uint32_t first_triangle, triangles;  ///< of the mesh's
+
+  /// Tells the blocks of a pool apart.
+  unsigned block() const { return mesh->place().positions; }
 };
 
 /// Meshes that are to be drawn, in pieces of any size. However large the pieces are, the triangles
@@ -34,8 +37,8 @@ class MeshQueue {
   /// That have not been taken.
   std::uint64_t triangles() const { return left_; }
 
-  /// The next ones of one block, `most` triangles at most and one at least; valid until the next
-  /// call. The queue must not be empty.
+  /// The next ones, `most` triangles at most and one at least; valid until the next call. The queue
+  /// must not be empty.
   std::span<const MeshDraw> take(std::uint64_t most);
 
  private:

@@ -39,6 +39,7 @@ struct MeshStyle {
   float opacity = 1;                 ///< of a piece seen face to face; below 1: transparent
   std::optional<Vec3f> inside = {};  ///< of the back where something is cut off; else a darker tone
   std::uint32_t id = 0;              ///< what pick() tells; 0: nothing
+  friend bool operator==(const MeshStyle&, const MeshStyle&) = default;
 };
 
 /// A plane picture in space: samples from corner to corner.
