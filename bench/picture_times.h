@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
+#include "bench/machine_pace.h"
 #include "isobrick/window/store_picture.h"
 
 namespace isobrick::bench {
@@ -40,23 +42,39 @@ class Times {
 /// How long pictures take, and what the slowest of them consist of.
 class PicturesTimes {
  public:
-  /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds.
+  /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds. Now it ends.
   void add(double total, const PictureTimes& steps, double finish) {
     total_.add(total);
-    pictures_.push_back({pictures_.size(), total, steps, finish});
+    pictures_.push_back({pictures_.size(), total, steps, finish, MachinePace::Clock::now()});
   }
 
-  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth, and
-  /// which ones these are, counted from 0.
+  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth, which
+  /// ones these are, counted from 0, and how many times slower than usual the processor was then.
+  /// "at_pace": those during which it was at most `kOffPace` times slower.
+  nlohmann::ordered_json summary(const MachinePace& pace) {
+    auto json = summary();
+    if (pictures_.empty()) return json;
+    Times at_pace;
+    for (std::size_t i = 0; i < pictures_.size(); ++i) {
+      const Picture& p = pictures_[i];
+      const std::chrono::duration<double> total(p.total);
+      const double slower = pace.slower(
+          p.end - std::chrono::duration_cast<MachinePace::Clock::duration>(total), p.end);
+      if (slower <= kOffPace) at_pace.add(p.total);
+      if (i < slowest()) json["slowest"]["processor_slower"].push_back(slower);
+    }
+    json["at_pace"] = at_pace.summary();
+    return json;
+  }
+  /// Without what depends on the processor's pace.
   nlohmann::ordered_json summary() {
     auto json = total_.summary();
     if (pictures_.empty()) return json;
     std::sort(pictures_.begin(), pictures_.end(),
               [](const Picture& a, const Picture& b) { return a.total > b.total; });
     json["all"] = mean(pictures_.size());
-    const std::size_t slowest = (pictures_.size() + 99) / 100;
-    json["slowest"] = mean(slowest);
-    for (std::size_t i = 0; i < slowest; ++i)
+    json["slowest"] = mean(slowest());
+    for (std::size_t i = 0; i < slowest(); ++i)
       json["slowest"]["numbers"].push_back(pictures_[i].number);
     return json;
   }
@@ -67,7 +85,11 @@ class PicturesTimes {
     double total;
     PictureTimes steps;
     double finish;
+    MachinePace::Clock::time_point end;
   };
+  static constexpr double kOffPace = 2;
+
+  std::size_t slowest() const { return (pictures_.size() + 99) / 100; }
 
   nlohmann::ordered_json mean(std::size_t count) const {
     nlohmann::ordered_json json;

@@ -110,7 +110,7 @@ class Session {
 
   /// Since it was last asked: frames, and whole pictures but for those at rest.
   Json take_times() {
-    Json json = std::exchange(frames_, {}).summary();
+    Json json = std::exchange(frames_, {}).summary(pace_);
     json["whole_pictures"] = std::exchange(pictures_, {}).summary();
     return json;
   }
@@ -153,6 +153,7 @@ class Session {
   Times pictures_;
   const bool software_ = current_gl_device().software;
   FramePacer pacer_ = FramePacer::for_device(software_);
+  MachinePace pace_;
 };
 
 /// Takes a mesh and keeps nothing.
