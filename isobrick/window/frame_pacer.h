@@ -34,21 +34,23 @@ class FramePacer {
     if (seconds < kNothingDrawn) return;
     const double ratio = seconds / target_;
     // While something changes there is more to do than to draw.
-    plain_ = ratio > kLeisure;
-    if (plain_) full_seconds_ = seconds;
+    if (ratio > kLeisure)
+      leave_rest_out(seconds);
+    else
+      plain_ = false;
     coarser_ = std::clamp(kMargin * std::sqrt(ratio), 1.0, kCoarsest);
   }
 
   /// A picture that took `seconds` to draw as plain(), coarser() and smaller() say now.
   void drawn(double seconds) {
     const double ratio = seconds / target_;
+    if (plain_ && rest_seconds_ < 0) rest_seconds_ = std::max(full_seconds_ - seconds, 0.0);
     if (ratio > 1 && !plain_) {
-      plain_ = true;
-      full_seconds_ = seconds;
+      leave_rest_out(seconds);
     } else if (ratio > 1) {
       simplify(std::min(ratio, 4.0));
     } else if (ratio < kLeisure) {
-      refine(ratio);
+      refine(seconds);
     }
   }
 
@@ -76,20 +78,30 @@ class FramePacer {
     coarser_ = std::min(coarser_ * (1 + 0.5 * (ratio - 1)), most);
   }
 
-  void refine(double ratio) {
+  void leave_rest_out(double full_seconds) {
+    plain_ = true;
+    full_seconds_ = full_seconds;
+    rest_seconds_ = -1;
+  }
+
+  void refine(double seconds) {
+    const double ratio = seconds / target_;
     if (coarser_ > 1) {
       coarser_ = std::max(coarser_ * (0.7 + 0.5 * ratio), 1.0);
     } else if (smaller_ > 1) {
       const double larger = static_cast<double>(smaller_) / (smaller_ - 1);
       if (ratio * larger * larger < kLeisure) --smaller_;
     } else if (plain_) {
-      // What the rest costs is known from when it was left out.
-      full_seconds_ *= 0.98;
-      if (full_seconds_ < target_ * 0.8) plain_ = false;
+      // What the rest costs is known from when it was left out; it may cost less by now. To try
+      // that often would show, and each time be a picture that takes too long.
+      rest_seconds_ *= 0.99;
+      if (seconds + rest_seconds_ < target_ * 0.8) plain_ = false;
     }
   }
 
-  double target_, coarser_ = 1, full_seconds_ = 0;
+  double target_, coarser_ = 1;
+  double full_seconds_ = 0;   ///< of the last picture before what a plain one lacks was left out
+  double rest_seconds_ = -1;  ///< that this takes; below 0: not known before the first plain one
   double first_coarser_ = kFirstCoarser;  ///< before pictures become smaller
   int smaller_ = 1;
   bool plain_ = false;
