@@ -21,8 +21,10 @@ __device__ inline std::uint32_t address_of(const unsigned long long& barrier) {
 
 /// `warps` arrive each time. One thread, once a block.
 __device__ inline void init_barrier(unsigned long long& barrier, int warps) {
+#if __CUDA_ARCH__ >= 800
   asm volatile("mbarrier.init.shared.b64 [%0], %1;" ::"r"(address_of(barrier)), "r"(32 * warps)
                : "memory");
+#endif
 }
 
 /// Whole warps: what they have written before is seen by who waits, and by each other. Each thread
@@ -30,26 +32,39 @@ __device__ inline void init_barrier(unsigned long long& barrier, int warps) {
 /// writes only.
 __device__ inline void arrive(unsigned long long& barrier) {
   __syncwarp();
+#if __CUDA_ARCH__ >= 800
   asm volatile(
       "{.reg .b64 state; mbarrier.arrive.shared.b64 state, [%0];}" ::"r"(address_of(barrier))
       : "memory");
+#endif
 }
 
-/// Until all have arrived that often: `turn` is 0 for the first time, 1 for the second, 0 again.
-__device__ inline void wait(const unsigned long long& barrier, std::uint32_t turn) {
+/// Whether all have arrived that often: `turn` is 0 for the first time, 1 for the second, 0 again.
+/// From Hopper on a thread may sleep for a while before it is told that they have not.
+__device__ inline bool have_arrived(const unsigned long long& barrier, std::uint32_t turn) {
+  std::uint32_t over = 1;
 #if __CUDA_ARCH__ >= 900
 #define ISOBRICK_MBARRIER_WAIT "mbarrier.try_wait.parity"
 #else
 #define ISOBRICK_MBARRIER_WAIT "mbarrier.test_wait.parity"
 #endif
-  std::uint32_t over = 0;
-  while (!over)
-    asm volatile("{.reg .pred over; " ISOBRICK_MBARRIER_WAIT
-                 ".shared.b64 over, [%1], %2; selp.u32 %0, 1, 0, over;}"
-                 : "=r"(over)
-                 : "r"(address_of(barrier)), "r"(turn)
-                 : "memory");
+#if __CUDA_ARCH__ >= 800
+  asm volatile("{.reg .pred over; " ISOBRICK_MBARRIER_WAIT
+               ".shared.b64 over, [%1], %2; selp.u32 %0, 1, 0, over;}"
+               : "=r"(over)
+               : "r"(address_of(barrier)), "r"(turn)
+               : "memory");
+#endif
 #undef ISOBRICK_MBARRIER_WAIT
+  return over != 0;
+}
+
+__device__ inline void wait(const unsigned long long& barrier, std::uint32_t turn) {
+  while (!have_arrived(barrier, turn)) {
+#if __CUDA_ARCH__ < 900
+    __nanosleep(20);
+#endif
+  }
 }
 
 }  // namespace isobrick::gpu

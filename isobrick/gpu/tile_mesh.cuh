@@ -21,8 +21,8 @@ __device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
   release_rows(s, p);
 }
 
-/// Whether all cells and vertices of a tile are listed at once. Then its warps wait for no more
-/// than they need (TeamBarriers); the turns of others have __syncthreads between them anyway.
+/// Whether all cells and vertices of a tile are listed at once, and its warps wait for no more
+/// than they need (TeamBarriers). Others take turns, with __syncthreads between them.
 template <int N, bool Nan>
 __device__ inline bool listed_at_once(const TileShared& s) {
   return kTeamBarriers && !Nan && ::max(s.all_cells, s.all_vertices) <= ListsOf<N>::kListed;
@@ -109,8 +109,9 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
     }
   } else {
     triangles = count_in_turns<N>(s);
-    // A tile with NaN, or a slab, may have vertices of cells of others only: then there is no turn.
-    if constexpr (Nan || kSlab) __syncthreads();
+    // No turn has been between where there is no cell: with NaN, and in slabs, vertices may belong
+    // to cells of others only.
+    if constexpr (Nan || kSlab || !kTeamBarriers) __syncthreads();
   }
   const bool for_vertices = warp_id() == Team<N>::kVertices,
              for_triangles = warp_id() == Team<N>::kTriangles;
