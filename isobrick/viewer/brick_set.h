@@ -8,8 +8,8 @@
 
 namespace isobrick {
 
-/// Some of a store's bricks, a bit for each. One thread at a time changes it; others may ask
-/// meanwhile, without waiting.
+/// Some of a store's bricks, a bit for each; of levels that are stored, and bricks within their
+/// lattices. One thread at a time changes it; others may ask meanwhile, without waiting.
 class BrickSet {
  public:
   explicit BrickSet(const StoreInfo& info) {

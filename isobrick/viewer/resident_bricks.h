@@ -72,7 +72,8 @@ class ResidentBricks {
   void read_together(int level, std::span<const Int3> bricks, const Wanted& wanted);
   /// The brick if it is there.
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
-  /// Whether all bricks of `box` (in bricks) are there. Waits for nobody, like the next two.
+  /// Whether all bricks of `box` (in bricks, within the lattice) are there. Waits for nobody, like
+  /// the next two: bricks may come and go while it looks.
   bool resident(int level, Box3 box) const;
   /// Whether at least half of these are.
   bool half_resident(int level, std::span<const Int3> bricks) const;

@@ -58,11 +58,13 @@ class Planner {
         if (ancestor.visible || !node.visible) return;  // and so are those above
         ancestor.visible = true;
         if (ancestor.job != kNoJob) jobs[ancestor.job].visible = true;
+        if (ancestor.stands_in) return;
         continue;
       }
       ancestor.visible = node.visible;
       if (meshes_.has_any(n, isovalue)) {
         meshes_.find_any(n, isovalue, 0);  // is kept
+        ancestor.stands_in = true;
         return;
       }
       if (plan_.straight && n.level < top) continue;
@@ -76,6 +78,7 @@ class Planner {
   struct Ancestor {
     std::size_t job = kNoJob;  ///< its number
     bool visible = false;      ///< some node below is
+    bool stands_in = false;    ///< it has a mesh: none above it is needed
   };
 
   const NodeTree& tree_;

@@ -101,8 +101,10 @@ void SceneStream::Shared::take_over(const Running& done, NodeMesh&& mesh, const 
   // for all that came so. The budget itself may never be reached, since places fall between.
   const std::uint64_t budget = meshes.device_budget(), part = budget / kPartForNew;
   if (!mesh.device && !mesh.empty() && !by.shared_blocks().empty() &&
-      meshes.device_bytes() + part > budget)
+      meshes.device_bytes() + part > budget) {
+    keep_shown();
     meshes.shrink_device(part);
+  }
   publish(done, std::move(mesh));
 }
 

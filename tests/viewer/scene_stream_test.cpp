@@ -74,7 +74,9 @@ TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {
   SceneStream stream(source, tree, {.threads = 2});
   for (unsigned seed = 1; seed < 4; ++seed) {
     const Cut cut = RandomCut(tree->grid(), seed, 5).cut({0.0});
+    const auto before = stream.drawable();
     stream.set_cut(cut);
+    EXPECT_FALSE(stream.is_newest(*before));
     std::set<std::uint64_t> versions;
     bool begun = false;
     for (;;) {

@@ -20,7 +20,10 @@ constexpr std::uint64_t kMeshBytes = 1000;
 /// Has places for so many meshes; what comes beside them goes to host memory.
 class SmallDevice final : public PlainDevice {
  public:
-  explicit SmallDevice(int places) : free_(std::make_shared<std::atomic<int>>(places)) {}
+  explicit SmallDevice(int places)
+      : places_(places), free_(std::make_shared<std::atomic<int>>(places)) {}
+  /// Bytes of the meshes that somebody still has.
+  std::uint64_t held() const { return static_cast<std::uint64_t>(places_ - *free_) * kMeshBytes; }
   bool make(const GridView&, NodeMesh mesh, Done done) override {
     if (*free_ > 0) {
       mesh.device = std::make_shared<const Place>(free_);
@@ -40,6 +43,7 @@ class SmallDevice final : public PlainDevice {
     ~Place() override { ++*free; }
     std::shared_ptr<std::atomic<int>> free;
   };
+  int places_;
   std::shared_ptr<std::atomic<int>> free_;
 };
 
@@ -66,13 +70,20 @@ TEST(StreamDevice, OlderMeshesMakeRoomBeforeTheBudgetIsReached) {
   SceneStream stream(
       source, tree,
       {.threads = 1, .device_bytes = (static_cast<std::uint64_t>(places) + 1) * kMeshBytes});
-  stream.set_device(std::make_shared<SmallDevice>(places));
+  const auto device = std::make_shared<SmallDevice>(places);
+  stream.set_device(device);
   for (const double isovalue : {0.0, 0.1, 0.2, 0.3, 0.4}) {
     const auto drawn = show(stream, isovalue);
     const auto there = std::count_if(drawn->nodes.begin(), drawn->nodes.end(),
                                      [](const DrawnNode& node) { return node.mesh->device; });
     EXPECT_TRUE(drawn->complete);
     EXPECT_GT(static_cast<std::size_t>(there), drawn->nodes.size() / 3) << isovalue;
+  }
+  // Meshes that are shown have their places whatever comes, so they count.
+  for (const double isovalue : {0.5, 0.6, 0.7}) {
+    stream.set_cut(cut.cut({isovalue}));
+    EXPECT_TRUE(stream.wait_idle(60));
+    EXPECT_EQ(stream.counters().device_bytes, device->held()) << isovalue;
   }
 }
 

@@ -98,6 +98,24 @@ TEST_F(PlanTest, WhatStandsInForAnythingVisibleIsVisible) {
   EXPECT_GT(hidden, 0u);
 }
 
+TEST_F(PlanTest, NothingIsMadeAboveAMeshThatStandsIn) {
+  ASSERT_GT(tree_.grid().coarsest_stored(), 1);
+  std::erase_if(cut_.nodes, [](const CutNode& node) { return node.key.level > 0; });
+  std::vector<NodeKey> parents;
+  for (const CutNode& node : cut_.nodes) {
+    const NodeKey parent = tree_.grid().parent(node.key);
+    if (std::find(parents.begin(), parents.end(), parent) == parents.end())
+      parents.push_back(parent);
+  }
+  ASSERT_GT(ancestors(plan(0), false), 0u);
+  for (const NodeKey& parent : parents) make({.key = parent, .isovalue = 0.0});
+  for (const std::size_t each : {1, 2, 3}) {
+    for (std::size_t i = 0; i < cut_.nodes.size(); ++i)
+      cut_.nodes[i].visible = i % each == each - 1;
+    EXPECT_EQ(ancestors(plan(0), false), 0u) << each;
+  }
+}
+
 TEST_F(PlanTest, LevelsThatAreNotStoredAreMadeWhereACutAsksForThem) {
   cut_ = RandomCut(tree_.grid(), 1, 0).cut({0.0});
   const MeshPlan plan = plan_jobs(tree_, cut_, meshes_, mesher_, 0);
