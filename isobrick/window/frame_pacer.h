@@ -24,6 +24,7 @@ class FramePacer {
       return pacer;
     }
     pacer.plain_ = true;
+    pacer.until_try_ = kShortestPause;
     pacer.coarser_ = kFirstInSoftware;
     return pacer;
   }
@@ -34,24 +35,25 @@ class FramePacer {
     if (seconds < kNothingDrawn) return;
     const double ratio = seconds / target_;
     // While something changes there is more to do than to draw.
-    if (ratio > kLeisure)
-      leave_rest_out(seconds);
-    else
-      plain_ = false;
+    plain_ = ratio > kLeisure;
+    if (plain_) until_try_ = ratio > 1 ? pause_ : kShortestPause;
     coarser_ = std::clamp(kMargin * std::sqrt(ratio), 1.0, kCoarsest);
   }
 
   /// A picture that took `seconds` to draw as plain(), coarser() and smaller() say now.
   void drawn(double seconds) {
     const double ratio = seconds / target_;
-    if (plain_ && rest_seconds_ < 0) rest_seconds_ = std::max(full_seconds_ - seconds, 0.0);
-    if (ratio > 1 && !plain_) {
-      leave_rest_out(seconds);
-    } else if (ratio > 1) {
-      simplify(std::min(ratio, 4.0));
-    } else if (ratio < kLeisure) {
-      refine(seconds);
+    if (!plain_ && ratio > 1) {
+      leave_rest_out();
+      return;
     }
+    if (!plain_) pause_ = std::max(pause_ * kForgetting, kShortestPause);
+    if (ratio > 1)
+      simplify(std::min(ratio, 4.0));
+    else if ((coarser_ > 1 || smaller_ > 1) && ratio < kLeisure)
+      refine(ratio);
+    else if (plain_ && coarser_ <= kMargin && smaller_ == 1)
+      plain_ = --until_try_ > 0 || ratio > kRoomForRest;
   }
 
   /// Whether to leave occlusion and multisampling out while something moves.
@@ -65,6 +67,8 @@ class FramePacer {
   static constexpr double kFirstCoarser = 4, kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 16;
   static constexpr double kNothingDrawn = 1e-3;  ///< seconds: the picture was the one before
   static constexpr double kLeisure = 0.6;        ///< of the target: less is time for more
+  static constexpr double kRoomForRest = 0.9;    ///< of the target: less may be time for the rest
+  static constexpr double kShortestPause = 30, kLongestPause = 1000, kForgetting = 0.95;
   static constexpr int kSmallest = 4;
 
   void simplify(double ratio) {
@@ -78,30 +82,26 @@ class FramePacer {
     coarser_ = std::min(coarser_ * (1 + 0.5 * (ratio - 1)), most);
   }
 
-  void leave_rest_out(double full_seconds) {
+  /// The rest may have taken long for once, or may take less soon: it is tried again. Each time
+  /// that shows and may be a picture that takes too long, so it is tried less and less often.
+  void leave_rest_out() {
     plain_ = true;
-    full_seconds_ = full_seconds;
-    rest_seconds_ = -1;
+    until_try_ = pause_;
+    pause_ = std::min(2 * pause_, kLongestPause);
   }
 
-  void refine(double seconds) {
-    const double ratio = seconds / target_;
+  void refine(double ratio) {
     if (coarser_ > 1) {
       coarser_ = std::max(coarser_ * (0.7 + 0.5 * ratio), 1.0);
-    } else if (smaller_ > 1) {
+    } else {
       const double larger = static_cast<double>(smaller_) / (smaller_ - 1);
       if (ratio * larger * larger < kLeisure) --smaller_;
-    } else if (plain_) {
-      // What the rest costs is known from when it was left out; it may cost less by now. To try
-      // that often would show, and each time be a picture that takes too long.
-      rest_seconds_ *= 0.99;
-      if (seconds + rest_seconds_ < target_ * 0.8) plain_ = false;
     }
   }
 
   double target_, coarser_ = 1;
-  double full_seconds_ = 0;   ///< of the last picture before what a plain one lacks was left out
-  double rest_seconds_ = -1;  ///< that this takes; below 0: not known before the first plain one
+  double pause_ = kShortestPause;  ///< plain pictures before the rest is tried, the next time
+  double until_try_ = 0;           ///< the same, now
   double first_coarser_ = kFirstCoarser;  ///< before pictures become smaller
   int smaller_ = 1;
   bool plain_ = false;

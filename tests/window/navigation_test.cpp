@@ -153,19 +153,40 @@ TEST(FramePacer, LeavesOcclusionOutBeforeDetail) {
   EXPECT_EQ(pacer.coarser(), 1);
 }
 
-TEST(FramePacer, TriesOcclusionAgainRarelyWhereItTakesTooLong) {
-  FramePacer pacer = FramePacer::for_device(false);
-  int full = 0;
-  for (int i = 0; i < 240; ++i) {
-    full += !pacer.plain();
-    pacer.drawn(pacer.plain() ? 0.0065 : 0.0132);
-    EXPECT_EQ(pacer.coarser(), 1);
+/// How many of so many pictures are drawn in full.
+int full_ones(FramePacer& pacer, int pictures, double plain, double full) {
+  int count = 0;
+  for (int i = 0; i < pictures; ++i) {
+    count += !pacer.plain();
+    pacer.drawn(pacer.plain() ? plain : full);
+    EXPECT_LT(pacer.coarser(), 1.25);
   }
-  EXPECT_GT(full, 1) << "it may take less by now";
-  EXPECT_LT(full, 6);
-  // And so it does where the picture took long for another reason.
-  for (int i = 0; i < 30; ++i) pacer.drawn(0.002);
-  EXPECT_FALSE(pacer.plain());
+  return count;
+}
+
+TEST(FramePacer, TriesOcclusionAgainRarelyWhereItTakesTooLong) {
+  for (const double plain : {0.001, 0.002, 0.0065, 0.011}) {
+    FramePacer pacer = FramePacer::for_device(false);
+    const int soon = full_ones(pacer, 240, plain, 0.0132);
+    EXPECT_GT(soon, 1) << "it may take less by now";
+    EXPECT_LT(soon, 6) << plain;
+    EXPECT_LT(full_ones(pacer, 2400, plain, 0.0132), 6) << plain;
+    EXPECT_GT(full_ones(pacer, 2400, plain, 0.0120), 1000) << plain << ": it does";
+  }
+}
+
+TEST(FramePacer, TriesOcclusionSoonAgainWhereAPictureTookLongForOnce) {
+  // Also where there is no leisure, but room.
+  for (const double plain : {0.002, 0.0065, 0.0080, 0.0100}) {
+    FramePacer pacer = FramePacer::for_device(false);
+    pacer.drawn_still(plain + 0.0015);
+    EXPECT_GT(full_ones(pacer, 120, plain, plain + 0.0015), 80) << plain;
+    for (int hiccup = 0; hiccup < 5; ++hiccup) {
+      ASSERT_FALSE(pacer.plain());
+      pacer.drawn(0.025);
+      EXPECT_GT(full_ones(pacer, 200, plain, plain + 0.0015), 100) << plain;
+    }
+  }
 }
 
 TEST(FramePacer, LeavesFastPicturesAlone) {
