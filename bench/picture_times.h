@@ -87,7 +87,7 @@ class PicturesTimes {
     double finish;
     MachinePace::Clock::time_point end;
   };
-  static constexpr double kOffPace = 2;
+  static constexpr double kOffPace = 3;
 
   std::size_t slowest() const { return (pictures_.size() + 99) / 100; }
 
