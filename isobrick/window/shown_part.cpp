@@ -57,8 +57,9 @@ void choose_values(ViewSettings& settings, const NodeTree& tree) {
       surface.isovalue = own.empty() ? 0 : (static_cast<double>(own.lo) + own.hi) / 2;
   if (settings.window_lo < settings.window_hi) return;
   const auto all = range_of_all(tree, [&](const NodeKey& n) { return tree.range_below(n); });
-  settings.window_lo = all.empty() ? 0 : all.lo;
-  settings.window_hi = all.empty() ? 1 : all.hi;
+  const bool known = !all.empty() && std::isfinite(all.lo) && std::isfinite(all.hi);
+  settings.window_lo = known ? all.lo : 0;
+  settings.window_hi = known ? all.hi : 1;
 }
 
 ShownBox shown_box(const ViewSettings& settings) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "tests/meshes/test_meshes.h"
@@ -98,6 +99,43 @@ std::vector<PooledMesh> add_shells(MeshPool& pool, const std::vector<std::size_t
   for (const std::size_t i : order)
     shells[i] = pool.add(make_ball({0, 0, 0}, 0.3f + larger * static_cast<float>(i), 24).chunk());
   return shells;
+}
+
+TEST_F(Pieces, MeshesMayBeDrawnByTheBlocksThatTheyLieIn) {
+  const auto picture = [&](bool opaque, bool in_order, std::uint64_t work) {
+    MeshPool pool(1500);
+    std::vector<PooledMesh> balls;
+    std::set<unsigned> blocks;
+    for (int i = 0; i < 12; ++i) {  // apart, so that the order does not show
+      const float at = -0.8f + 0.14f * static_cast<float>(i);
+      balls.push_back(pool.add(make_ball({at, 0, -at}, 0.05f, 24).chunk(), {0, 0, 0.1 * (i % 3)}));
+      blocks.insert(balls.back().place().positions);
+    }
+    EXPECT_GT(blocks.size(), 2u);
+    Camera camera({0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1});
+    camera.fit({-1, -1, -1}, {1, 1, 1}, double{kWidth} / kHeight);
+    renderer().begin(camera, kWidth, kHeight,
+                     {.multisample = false, .occlusion = false, .in_order = in_order});
+    for (std::size_t i = 0; i < 12; ++i) {
+      const std::size_t ball = i * 5 % 12;  // four of each look, one after another in no block
+      const auto look = static_cast<std::uint32_t>(ball / 4);
+      renderer().draw(balls[ball], {.colour = {0.9f, 0.4f, 0.2f * static_cast<float>(look)},
+                                    .opacity = opaque ? 1.0f : 0.5f,
+                                    .id = look + 1});
+    }
+    while (!renderer().end_piece(work)) {
+    }
+    auto pixels = renderer().read_pixels();
+    for (const auto id : ids()) pixels.push_back(static_cast<std::uint8_t>(id));
+    renderer().discard();
+    return pixels;
+  };
+  for (const bool opaque : {true, false}) {
+    const auto expected = picture(opaque, true, std::uint64_t{1} << 40);
+    EXPECT_TRUE(picture(opaque, false, std::uint64_t{1} << 40) == expected) << opaque;
+    EXPECT_TRUE(picture(opaque, false, 500) == expected) << opaque;
+    EXPECT_TRUE(picture(opaque, true, 500) == expected) << opaque;
+  }
 }
 
 TEST_F(Pieces, WhereMeshesLieDoesNotShow) {
