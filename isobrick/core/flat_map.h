@@ -8,9 +8,19 @@
 
 namespace isobrick {
 
-/// A hash map from numbers to small values in one array, for books that are looked up for every
-/// tile. Any key but ~0. What it points to may move with the next insertion or erasure.
-template <class Value>
+/// What FlatMap needs of keys: one that is never used, and a number that tells most others apart.
+template <class Key>
+struct FlatKey;
+template <>
+struct FlatKey<std::uint64_t> {
+  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
+  static std::uint64_t number(std::uint64_t key) { return key; }
+};
+
+/// A hash map from numbers, or other small keys, to small values in one array, for books that are
+/// looked up for every tile. Any key but FlatKey<Key>::kFree. What it points to may move with the
+/// next insertion or erasure.
+template <class Value, class Key = std::uint64_t>
 class FlatMap {
  public:
   /// With room for so many before it grows.
@@ -18,15 +28,15 @@ class FlatMap {
       : entries_(std::bit_ceil(2 * expected + 2)), shift_(shift_for(entries_.size())) {}
 
   std::size_t size() const { return size_; }
-  bool contains(std::uint64_t key) const { return find(key) != nullptr; }
+  bool contains(const Key& key) const { return find(key) != nullptr; }
   /// Null when the key is not there.
-  const Value* find(std::uint64_t key) const {
+  const Value* find(const Key& key) const {
     const Entry& entry = entries_[place_of(key)];
     return entry.key == key ? &entry.value : nullptr;
   }
-  Value* find(std::uint64_t key) { return const_cast<Value*>(std::as_const(*this).find(key)); }
+  Value* find(const Key& key) { return const_cast<Value*>(std::as_const(*this).find(key)); }
   /// The key's value, a new one when there is none, and whether it is new.
-  std::pair<Value&, bool> insert(std::uint64_t key) {
+  std::pair<Value&, bool> insert(const Key& key) {
     std::size_t place = place_of(key);
     const bool added = entries_[place].key == kFree;
     if (added) {
@@ -40,7 +50,7 @@ class FlatMap {
     return {entries_[place].value, added};
   }
   /// The key is there.
-  void erase(std::uint64_t key) {
+  void erase(const Key& key) {
     std::size_t hole = place_of(key);
     const std::size_t mask = entries_.size() - 1;
     // What follows moves up unless that would be before its own place.
@@ -54,18 +64,18 @@ class FlatMap {
   }
 
  private:
-  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
+  static constexpr Key kFree = FlatKey<Key>::kFree;
   struct Entry {
-    std::uint64_t key = kFree;
+    Key key = kFree;
     Value value{};
   };
 
   static int shift_for(std::size_t size) { return 64 - std::countr_zero(size); }
-  std::size_t home_of(std::uint64_t key) const {
-    return static_cast<std::size_t>(key * 0x9e3779b97f4a7c15u >> shift_);
+  std::size_t home_of(const Key& key) const {
+    return static_cast<std::size_t>(FlatKey<Key>::number(key) * 0x9e3779b97f4a7c15u >> shift_);
   }
   /// Where the key is, or belongs.
-  std::size_t place_of(std::uint64_t key) const {
+  std::size_t place_of(const Key& key) const {
     const std::size_t mask = entries_.size() - 1;
     std::size_t i = home_of(key);
     while (entries_[i].key != key && entries_[i].key != kFree) i = (i + 1) & mask;

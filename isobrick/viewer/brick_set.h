@@ -20,34 +20,33 @@ class BrickSet {
   }
 
   bool has(int level, Int3 brick) const {
-    const Place place = place_of(level, brick);
-    return (place.word->load(std::memory_order_relaxed) & place.bit) != 0;
+    const Place p = place_of(level, brick);
+    return (levels_[p.level].words[p.word].load(std::memory_order_relaxed) & p.bit) != 0;
   }
   void insert(int level, Int3 brick) {
-    const Place place = place_of(level, brick);
-    place.word->fetch_or(place.bit, std::memory_order_relaxed);
+    const Place p = place_of(level, brick);
+    levels_[p.level].words[p.word].fetch_or(p.bit, std::memory_order_relaxed);
   }
   void erase(int level, Int3 brick) {
-    const Place place = place_of(level, brick);
-    place.word->fetch_and(~place.bit, std::memory_order_relaxed);
+    const Place p = place_of(level, brick);
+    levels_[p.level].words[p.word].fetch_and(~p.bit, std::memory_order_relaxed);
   }
 
  private:
-  using Word = std::atomic<std::uint64_t>;
   struct Level {
     Level(Int3 b, std::size_t count) : bricks(b), words(count) {}
     Int3 bricks;
-    mutable std::vector<Word> words;
+    std::vector<std::atomic<std::uint64_t>> words;
   };
   struct Place {
-    Word* word;
+    std::size_t level, word;
     std::uint64_t bit;
   };
 
   Place place_of(int level, Int3 brick) const {
-    const Level& l = levels_[static_cast<std::size_t>(level)];
-    const auto i = static_cast<std::uint64_t>(linear_index(brick, l.bricks));
-    return {&l.words[i / 64], std::uint64_t{1} << i % 64};
+    const auto l = static_cast<std::size_t>(level);
+    const auto i = static_cast<std::uint64_t>(linear_index(brick, levels_[l].bricks));
+    return {l, static_cast<std::size_t>(i / 64), std::uint64_t{1} << i % 64};
   }
 
   std::vector<Level> levels_;

@@ -1,7 +1,5 @@
 #include "isobrick/viewer/drawable.h"
 
-#include <bit>
-
 namespace isobrick {
 namespace {
 
@@ -95,23 +93,16 @@ class Cover {
 
 }  // namespace
 
-CutIndex::CutIndex(const Cut& cut)
-    : nodes_(cut.nodes), places_(std::bit_ceil(2 * nodes_.size() + 1)) {
-  std::uint32_t number = 0;
-  for (const CutNode& node : nodes_) {
-    std::size_t at = NodeKeyHash()(node.key);
-    while (places_[at & (places_.size() - 1)] != 0) ++at;
-    places_[at & (places_.size() - 1)] = ++number;
+CutIndex::CutIndex(const Cut& cut) : nodes_(cut.nodes), numbers_(nodes_.size()) {
+  for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+    const auto [number, added] = numbers_.insert(nodes_[i].key);
+    if (added) number = i;
   }
 }
 
 const CutNode* CutIndex::find(const NodeKey& key) const {
-  for (std::size_t at = NodeKeyHash()(key);; ++at) {
-    const std::uint32_t number = places_[at & (places_.size() - 1)];
-    if (number == 0) return nullptr;
-    const CutNode& node = nodes_[number - 1];
-    if (node.key == key) return &node;
-  }
+  const std::uint32_t* number = numbers_.find(key);
+  return number ? &nodes_[*number] : nullptr;
 }
 
 bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "isobrick/core/flat_map.h"
 #include "isobrick/viewer/cut.h"
 #include "isobrick/viewer/mesh_cache.h"
 
@@ -35,9 +36,7 @@ class CutIndex {
 
  private:
   std::vector<CutNode> nodes_;
-  /// Numbers of nodes + 1, 0 for none: each at its hash or the next place that is free. At least
-  /// every other one is.
-  std::vector<std::uint32_t> places_;
+  FlatMap<std::uint32_t, NodeKey> numbers_;
 };
 
 /// Appends the meshes that show one isovalue of a cut as far as they are there: a

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/flat_map.h"
 
 namespace isobrick {
 
@@ -28,6 +29,12 @@ struct NodeKeyHash {
       h = (h ^ static_cast<std::uint64_t>(k.node[axis])) * 0x9e3779b97f4a7c15ULL, h ^= h >> 29;
     return static_cast<std::size_t>(h);
   }
+};
+
+template <>
+struct FlatKey<NodeKey> {
+  static constexpr NodeKey kFree{-1, {}};
+  static std::uint64_t number(const NodeKey& key) { return NodeKeyHash()(key); }
 };
 
 /// The 26 directions in which a node has neighbours over faces, edges and
