@@ -131,7 +131,7 @@ struct alignas(256) TileShared {
   std::uint32_t all_triangles;
   std::uint32_t next_cells, next_vertices;  ///< groups of 32 that a warp has taken
   TeamBarriers barriers;
-  std::uint32_t done_before;                ///< blocks that were done before this one
+  std::uint32_t done_before;  ///< blocks that were done before this one
   TileItem tile;
   Shape shape;
   /// The active tiles as bits and how many come before each 32, where there are candidates.

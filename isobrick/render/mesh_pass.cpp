@@ -187,12 +187,14 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
   std::vector<Command> commands;
   looks.reserve(meshes.size());
   commands.reserve(meshes.size());
+  const MeshStyle* before = nullptr;
   for (const MeshDraw& draw : meshes) {
     const MeshPlace& place = draw.mesh->place();
     commands.push_back({3 * draw.triangles, 1, 3 * (place.first_triangle + draw.first_triangle),
                         static_cast<std::int32_t>(place.first_vertex),
                         static_cast<std::uint32_t>(looks.size())});
-    const bool again = !looks.empty() && draw.style == (&draw - 1)->style;
+    const bool again = before != nullptr && draw.style == *before;
+    before = &draw.style;
     looks.push_back(again ? looks.back() : look_of(draw.style));
     looks.back().offset = offset_of(draw.mesh->origin(), eye, draw.mesh->has_normals());
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 namespace isobrick {
+
 void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
   draws_.push_back({&mesh, style, 0, mesh.place().triangle_count});
   left_ += mesh.place().triangle_count;
