@@ -13,7 +13,8 @@ namespace isobrick::bench {
 
 /// Whether the machine keeps its pace: a thread does the same arithmetic over and over, in
 /// registers alone, and notes the processor time that it took. Where that is several times as long,
-/// the processor is slow: another thread on the same core takes a half of it at most.
+/// the processor is slow: another thread on the same core takes a half of it at most. It takes a
+/// twelfth of a core.
 class MachinePace {
  public:
   using Clock = std::chrono::steady_clock;
@@ -53,7 +54,7 @@ class MachinePace {
         if (x != 0) samples_.push_back({begin, Clock::now(), took});  // so that x is needed
         least_ = std::min(least_, took);
       }
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      std::this_thread::sleep_for(std::chrono::milliseconds(3));
     }
   }
 
