@@ -40,7 +40,7 @@ struct Arguments {
   bool has_isovalue = false, normals = false, brute_force = false, check = false, cpu = false,
        json = false;
   double frequency = 0, noise = 0;
-  int runs = 25;
+  int runs = 25, threads = 0;
 };
 
 Volume read_volume(const Arguments& a) {
@@ -117,6 +117,7 @@ int run(const Arguments& a) {
 
   gpu::DeviceVolume resident(lattice, bricks, 0);
   gpu::ResidentTuning tuning;
+  tuning.threads = a.threads;
   if (a.brute_force) tuning.search = gpu::TileSearch::none;
   gpu::ResidentExtractor extractor(resident, options, tuning);
   const gpu::DeviceCounts counts = extractor.extract(options.isovalue);
@@ -198,6 +199,7 @@ int main(int argc, char** argv) {
   });
   app.add_option("--runs", a.runs)->check(CLI::PositiveNumber);
   app.add_option("--write-raw", a.write_raw, "also writes the volume");
+  app.add_option("--threads", a.threads, "that share a tile; 0: as many as are best");
   app.add_flag("--normals", a.normals);
   app.add_flag("--brute-force", a.brute_force, "take every tile instead of searching");
   app.add_flag("--check", a.check, "compare with the CPU's mesh");

@@ -209,7 +209,10 @@ struct ResidentExtractor::Impl {
   LaunchShape shape_of(const FoundTiles& found) const {
     const bool known = found.count != FoundTiles::kNotSearched;
     const std::uint32_t expected = known ? found.count : active;
-    LaunchShape shape = known && slabs() > 1 ? shapes.in_slabs(expected) : shapes.of(expected);
+    // A cell has two triangles, give or take.
+    const std::uint64_t cells = made.triangles / 2 / std::max(made.active_tiles, 1u);
+    LaunchShape shape =
+        known && slabs() > 1 ? shapes.in_slabs(expected) : shapes.of(expected, cells);
     const std::uint32_t most = known ? found.count : volume.tile_count;
     shape.blocks = std::min(shape.blocks, static_cast<int>(most) * shape.slabs);
     return shape;

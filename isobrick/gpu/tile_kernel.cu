@@ -105,11 +105,14 @@ template <int N, class T, bool Normals, bool Nan = false>
 struct Launcher {
   static constexpr auto kKernel = extract_tiles<N, T, Normals, Nan>;
   static constexpr int kSlabs = Team<N>::kSlabs;
+  static bool before_ampere() { return device_attribute(cudaDevAttrComputeCapabilityMajor) < 8; }
+  static std::uint32_t listed() {
+    return before_ampere() ? kListedBeforeAmpere : Team<N>::kMostListed;
+  }
   static std::size_t shared() {
-    const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
     constexpr bool kSlab = kSlabs > 1;
-    return before_ampere ? kSharedBytes<kListedBeforeAmpere, Nan, kSlab>
-                         : kSharedBytes<Team<N>::kMostListed, Nan, kSlab>;
+    return before_ampere() ? kSharedBytes<kListedBeforeAmpere, Nan, kSlab>
+                           : kSharedBytes<Team<N>::kMostListed, Nan, kSlab>;
   }
   /// 0 where the device has too little shared memory for one.
   static int blocks() {
@@ -206,7 +209,7 @@ LaunchShapes launch_shapes(const TileKernel& kernel, int threads) {
   if (threads > 0) check_threads(kernel, threads);
   const auto shape_of = [&](int team) {
     return visit_launcher(kernel, team, [&](auto l) {
-      return LaunchShape{l.blocks(), team, l.kSlabs, l.shared(), l.may_start_early()};
+      return LaunchShape{l.blocks(), team, l.kSlabs, l.shared(), l.listed(), l.may_start_early()};
     });
   };
   LaunchShapes shapes;
@@ -218,9 +221,11 @@ LaunchShapes launch_shapes(const TileKernel& kernel, int threads) {
   return shapes;
 }
 
-LaunchShape LaunchShapes::of(std::uint32_t tiles) const {
+LaunchShape LaunchShapes::of(std::uint32_t tiles, std::uint64_t cells) const {
   const auto threads_at_work = [](const LaunchShape& s) { return s.blocks * s.threads; };
   const LaunchShape* best = &shapes[2];
+  if (cells > best->listed && shapes[1].blocks > 0 && shapes[1].listed > best->listed)
+    best = &shapes[1];
   // Where shared memory is scarce, a larger team keeps more threads at work.
   for (const LaunchShape& shape : shapes)
     if (threads_at_work(shape) > 2 * threads_at_work(*best)) best = &shape;

@@ -23,6 +23,7 @@ inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& options) {
 struct LaunchShape {
   int blocks = 0, threads = 0, slabs = 1;
   std::size_t shared_bytes = 0;  ///< of each
+  std::uint32_t listed = 0;      ///< cells of a tile; fuller tiles are listed in turns
   bool may_start_early = false;  ///< the code that runs waits for the launch before it
 };
 
@@ -32,8 +33,9 @@ struct LaunchShapes {
   LaunchShape shapes[3];  ///< by falling number of threads
   LaunchShape slabs;      ///< of several blocks a tile; no blocks where there is none
 
-  /// For so many tiles, a block each.
-  LaunchShape of(std::uint32_t tiles) const;
+  /// For so many tiles, a block each, in which so many active cells are expected. Where most
+  /// would be listed in turns, which takes a third longer, teams that list more are better.
+  LaunchShape of(std::uint32_t tiles, std::uint64_t cells = 0) const;
   /// The same where the host has found the tiles: with several to a tile if each can have a slab
   /// for itself.
   LaunchShape in_slabs(std::uint32_t tiles) const;

@@ -110,6 +110,23 @@ TEST(LaunchShapes, SlabsAreForAsManyTilesAsTheHostLists) {
   EXPECT_EQ(shapes.in_slabs(1).slabs, 1);
 }
 
+/// Teams of 640 list more cells at a time, which pays where most tiles have more than 384 list.
+TEST(LaunchShapes, TeamsThatListMoreAreForFullTiles) {
+  gpu::LaunchShapes shapes;
+  shapes.shapes[0] = {.blocks = 132, .threads = 1024, .listed = 7168};
+  shapes.shapes[1] = {.blocks = 264, .threads = 640, .listed = 7168};
+  shapes.shapes[2] = {.blocks = 396, .threads = 384, .listed = 2560};
+  EXPECT_EQ(shapes.of(4096).threads, 384);
+  EXPECT_EQ(shapes.of(4096, 2560).threads, 384);
+  EXPECT_EQ(shapes.of(4096, 2561).threads, 640);
+  EXPECT_EQ(shapes.of(100, 2561).threads, 1024) << "few tiles";
+  shapes.shapes[1].blocks = 0;
+  EXPECT_EQ(shapes.of(4096, 2561).threads, 384) << "none that fits the device";
+  for (gpu::LaunchShape& shape : shapes.shapes) shape.listed = 512;
+  shapes.shapes[1].blocks = 264;
+  EXPECT_EQ(shapes.of(4096, 2561).threads, 384) << "all list as many";
+}
+
 /// Most of them are empty when every tile is taken; the last one, too.
 TYPED_TEST(GpuResident, EmptyTilesPassOnWhatLiesBefore) {
   const Field<TypeParam> dots({100, 97, 131}, [](Int3 p) {
