@@ -194,6 +194,15 @@ bool NodeMesher::half_there(const NodeKey& key, double isovalue, std::uint32_t c
   return impl_->bricks.half_resident(stored, impl_->bricks_of(key, points, needed));
 }
 
+void NodeMesher::add_missing(const NodeKey& key, double isovalue, std::uint32_t coarser,
+                             std::vector<StoredBrick>& missing) const {
+  const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
+  const int stored = impl_->grid.level(key.level).source;
+  for (const Int3 b : impl_->bricks_of(key, impl_->points(key), needed))
+    if (!impl_->bricks.resident(stored, {b, b + Int3{1, 1, 1}}))
+      missing.push_back({stored, b.z, b.y, b.x});
+}
+
 void NodeMesher::will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
   const std::optional<NeededSamples> needed = impl_->needed_of(key, isovalue, coarser);
   for (const Int3 b : impl_->bricks_of(key, impl_->points_around(key), needed))

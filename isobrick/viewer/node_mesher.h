@@ -1,13 +1,22 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "isobrick/surface/grid_view.h"
 #include "isobrick/viewer/node_mesh.h"
 #include "isobrick/viewer/node_samples.h"
 
 namespace isobrick {
+
+/// A brick of a stored level.
+struct StoredBrick {
+  int level = 0;
+  Index z = 0, y = 0, x = 0;
+  friend auto operator<=>(const StoredBrick&, const StoredBrick&) = default;
+};
 
 /// Makes node meshes. One for each thread: keeps its work space.
 ///
@@ -35,6 +44,10 @@ class NodeMesher {
   /// Whether at least half of the bricks are there that hold a node's points and that the mesh
   /// needs. Reads nothing: where ranges have not been read, it seems to need all of them.
   bool half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
+
+  /// Adds those of these bricks that are not there.
+  void add_missing(const NodeKey& key, double isovalue, std::uint32_t coarser,
+                   std::vector<StoredBrick>& missing) const;
 
   /// Says which bricks the mesh needs soon, its neighbours' left out; see
   /// ResidentBricks::will_need(). Throws what reading ranges does.

@@ -241,13 +241,21 @@ StreamCounters SceneStream::counters() const {
   c.device_bytes = shared_->meshes.device_bytes();
   c.queue = shared_->jobs.size();
   c.working = shared_->running.size();
-  c.without_bricks =
-      static_cast<std::uint64_t>(std::count_if(shared_->jobs.begin(), shared_->jobs.end(),
-                                               [](const MeshJob& job) { return !job.resident; }));
   if (shared_->blocks_made >= kMeasuredBlocks)
     c.triangles_per_block =
         static_cast<double>(shared_->triangles_made) / static_cast<double>(shared_->blocks_made);
   return c;
+}
+
+std::uint64_t SceneStream::bricks_wanted() const {
+  std::vector<StoredBrick> missing;
+  {
+    const std::lock_guard lock(shared_->mutex);
+    for (const MeshJob& job : shared_->jobs)
+      shared_->planner.add_missing(job.key, job.isovalue, job.coarser, missing);
+  }
+  std::sort(missing.begin(), missing.end());
+  return static_cast<std::uint64_t>(std::unique(missing.begin(), missing.end()) - missing.begin());
 }
 
 ResidentBricks& SceneStream::bricks() const { return shared_->bricks; }

@@ -35,8 +35,6 @@ struct StreamCounters {
   std::uint64_t bricks_resident = 0, brick_bytes = 0, brick_bytes_peak = 0, bricks_read = 0;
   std::uint64_t meshes = 0, mesh_bytes = 0, meshes_made = 0;
   std::uint64_t queue = 0, working = 0;  ///< meshes that wait, that are being made
-  /// Of those that wait: less than half of the bricks around were there when they were planned.
-  std::uint64_t without_bricks = 0;
   std::uint64_t damaged = 0;             ///< of meshes_made, without triangles for that reason
   std::uint64_t device_meshes_made = 0;  ///< of meshes_made, by a device
   std::uint64_t device_bytes = 0;        ///< of meshes on a device
@@ -91,6 +89,9 @@ class SceneStream {
   bool wait_idle(double seconds) const;
 
   StreamCounters counters() const;
+  /// Bricks that meshes need which wait to be made, and that are not there. Takes about as long as
+  /// to plan them.
+  std::uint64_t bricks_wanted() const;
   /// The decoded bricks; thread-safe by itself.
   ResidentBricks& bricks() const;
 

@@ -1,7 +1,9 @@
 #include "isobrick/window/panels.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 #include <imgui.h>
@@ -23,6 +25,21 @@ std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
 
+/// What is typed counts once it is all there: after Enter, or when the field is left.
+void type_isovalue(ViewerState& state, std::size_t number) {
+  double& isovalue = state.settings.surfaces[number].isovalue;
+  const bool going_on = state.typed && state.typed->surface == number;
+  std::string text = going_on ? state.typed->text : fmt::format("{:.6g}", isovalue);
+  if (ImGui::InputText("##isovalue", &text, ImGuiInputTextFlags_CharsScientific))
+    state.typed = {number, text};
+  if (!ImGui::IsItemDeactivated() || !state.typed) return;
+  const std::string& typed = state.typed->text;
+  double value = 0;
+  const std::errc error = std::from_chars(typed.data(), typed.data() + typed.size(), value).ec;
+  if (error == std::errc() && std::isfinite(value)) isovalue = value;
+  state.typed.reset();
+}
+
 void surfaces_panel(ViewerState& state) {
   auto& surfaces = state.settings.surfaces;
   draw_isovalue_slider(state, ImGui::GetContentRegionAvail().x, 90);
@@ -37,9 +54,7 @@ void surfaces_panel(ViewerState& state) {
     ImGui::ColorEdit3("##colour", &s.colour.x, ImGuiColorEditFlags_NoInputs);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(90);
-    ImGui::InputDouble("##isovalue", &s.isovalue, 0, 0, "%.6g",
-                       ImGuiInputTextFlags_EnterReturnsTrue);
-    if (!std::isfinite(s.isovalue)) s.isovalue = 0;
+    type_isovalue(state, i);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(70);
     ImGui::SliderFloat("##opacity", &s.opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
@@ -179,7 +194,18 @@ void bookmarks_panel(ViewerState& state) {
     });
 }
 
-void status_panel(const ViewerState& state) {
+/// Counted some times a second: it takes as long as to plan.
+std::uint64_t bricks_wanted(ViewerState& state) {
+  constexpr double kSeconds = 0.25;
+  const double now = ImGui::GetTime();
+  if (!state.wanted_at || now - *state.wanted_at > kSeconds) {
+    state.bricks_wanted = state.picture->scene().stream().bricks_wanted();
+    state.wanted_at = now;
+  }
+  return state.bricks_wanted;
+}
+
+void status_panel(ViewerState& state) {
   const StreamCounters c = state.picture->scene().stream().counters();
   const PictureState& p = state.picture->state();
   ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
@@ -193,22 +219,23 @@ void status_panel(const ViewerState& state) {
                      state.pacer.coarser(), state.pacer.smaller()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
-  text(fmt::format("{} bricks ({})", c.bricks_resident, mebibytes(c.brick_bytes)));
+  text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
+                   mebibytes(c.brick_bytes), bricks_wanted(state)));
   text(fmt::format("read {} in {:.2f} s, decode {:.2f} s, mesh {:.2f} s", mebibytes(c.bytes_read),
                    c.read_seconds, c.decode_seconds, c.mesh_seconds));
-  text(fmt::format("{} meshes ({}), {} wait, {} of them for bricks, {} in work", c.meshes,
-                   mebibytes(c.mesh_bytes), c.queue, c.without_bricks, c.working));
+  text(fmt::format("{} meshes ({}), {} wait, {} in work", c.meshes, mebibytes(c.mesh_bytes),
+                   c.queue, c.working));
   if (p.limited_by_budget) text("as fine as the memory allows");
-  if (c.damaged > 0) text(fmt::format("{} parts cannot be shown", c.damaged));
+  if (!p.damage.empty()) text(fmt::format("{} parts cannot be shown", p.damage.size()));
   if (p.drawing)
-    ImGui::TextDisabled("drawing \u2026 %.0f %%", 100 * p.drawn_part);
+    ImGui::TextDisabled("drawing %.0f %%", 100 * p.drawn_part);
   else
-    ImGui::TextDisabled(p.complete ? "complete" : "refining \u2026");
+    ImGui::TextDisabled(p.complete ? "complete" : "refining");
 }
 
 void import_progress(ImportJob& import) {
   const ImportJob::State s = import.state();
-  text(fmt::format("{}\n\u2192 {}", import.input().string(), import.store().string()));
+  text(fmt::format("{}\nto {}", import.input().string(), import.store().string()));
   const float part = s.total > 0 ? static_cast<float>(s.done) / static_cast<float>(s.total) : 0;
   ImGui::ProgressBar(std::min(part, 1.f), {400, 0}, s.stage.c_str());
   if (ImGui::Button("Cancel")) import.cancel();
@@ -225,41 +252,67 @@ void import_panel(ViewerState& state) {
 }
 
 void messages_panel(ViewerState& state) {
-  if (state.messages.empty()) return;
-  const ImGuiViewport* viewport = ImGui::GetMainViewport();
-  ImGui::SetNextWindowPos({viewport->Size.x / 2, viewport->Size.y - 20}, ImGuiCond_Always,
-                          {0.5f, 1});
-  ImGui::SetNextWindowSizeConstraints({300, 0}, {viewport->Size.x * 0.8f, viewport->Size.y * 0.4f});
+  if (state.messages.empty()) {
+    state.messages_shown = 0;
+    return;
+  }
+  // Beside the panel where there is room, and always above it.
+  const ImVec2 all = ImGui::GetMainViewport()->Size;
+  const float taken = state.panels && all.x > 2 * kPanelWidth ? kPanelWidth + 10 : 0;
+  const float width = 0.9f * (all.x - taken);
+  ImGui::SetNextWindowPos({(all.x + taken) / 2, all.y - 20}, ImGuiCond_Always, {0.5f, 1});
+  ImGui::SetNextWindowSizeConstraints({std::min(300.f, width), 0}, {width, all.y * 0.4f});
+  if (std::exchange(state.messages_shown, state.messages.size()) < state.messages.size())
+    ImGui::SetNextWindowFocus();
   ImGui::Begin("Messages", nullptr,
                ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_AlwaysAutoResize |
                    ImGuiWindowFlags_NoSavedSettings);
-  ImGui::PushTextWrapPos(viewport->Size.x * 0.75f);
+  ImGui::PushTextWrapPos(width - 20);
   for (const std::string& message : state.messages) text(message);
   ImGui::PopTextWrapPos();
   if (ImGui::Button("Dismiss")) state.messages.clear();
   ImGui::End();
 }
 
+void streaming_panel(ViewerState& state) {
+  draw_search_panel(state);
+  draw_backend_panel(state);
+  status_panel(state);
+}
+
+/// Widgets of different sections may have the same names.
+template <class Body>
+void section(const char* name, bool open, Body&& body, ViewerState& state) {
+  if (!ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0)) return;
+  ImGui::PushID(name);
+  body(state);
+  ImGui::PopID();
+}
+
+/// A window that has become smaller leaves the panel's title within reach.
+void keep_in_view() {
+  const ImVec2 all = ImGui::GetMainViewport()->Size, at = ImGui::GetWindowPos();
+  const ImVec2 within(std::clamp(at.x, 60 - ImGui::GetWindowWidth(), std::max(all.x - 60, 0.f)),
+                      std::clamp(at.y, 0.f, std::max(all.y - 30, 0.f)));
+  if (within.x != at.x || within.y != at.y) ImGui::SetWindowPos(within);
+}
+
 void main_panel(ViewerState& state) {
   const ImGuiViewport* viewport = ImGui::GetMainViewport();
   ImGui::SetNextWindowPos({10, 10}, ImGuiCond_FirstUseEver);
-  ImGui::SetNextWindowSize({kPanelWidth, std::min(760.f, viewport->Size.y - 20)},
+  // The axes in the lower left corner are to be seen.
+  const float axes = viewport->Size.y / 5;
+  ImGui::SetNextWindowSize({kPanelWidth, std::max(viewport->Size.y - axes - 20, 200.f)},
                            ImGuiCond_FirstUseEver);
   ImGui::Begin(fmt::format("{}###panel", state.path.filename().string()).c_str());
-  const auto section = [](const char* name, bool open) {
-    return ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
-  };
-  if (section("Surfaces", true)) surfaces_panel(state);
-  if (section("Camera and look", false)) look_panel(state);
-  if (section("Cuts and region", false)) draw_cuts_panel(state);
-  if (section("Slices", false)) slices_panel(state);
-  if (section("Point and measure", false)) picking_panel(state);
-  if (section("Bookmarks", false)) bookmarks_panel(state);
-  if (section("Streaming", true)) {
-    draw_search_panel(state);
-    draw_backend_panel(state);
-    status_panel(state);
-  }
+  keep_in_view();
+  section("Surfaces", true, surfaces_panel, state);
+  section("Camera and look", false, look_panel, state);
+  section("Cuts and region", false, draw_cuts_panel, state);
+  section("Slices", false, slices_panel, state);
+  section("Point and measure", false, picking_panel, state);
+  section("Bookmarks", false, bookmarks_panel, state);
+  section("Streaming", true, streaming_panel, state);
   if (ImGui::SmallButton("Picture")) state.requests.screenshot = "isobrick.png";
   ImGui::End();
 }

@@ -28,11 +28,10 @@ void draw_search_panel(ViewerState& state) {
     state.index = kIndexKinds[chosen];
     search.use(state.index);
   }
-  const std::string line =
-      fmt::format("{} of {} nodes in {:.1f} \u00b5s, {}{}", now.active, now.nodes,
-                  now.search_seconds * 1e6, size_text(now.bytes),
-                  now.building ? ", building \u2026"
-                               : fmt::format(", built in {:.1f} ms", now.build_seconds * 1e3));
+  const std::string line = fmt::format(
+      "{} of {} nodes in {:.1f} \u00b5s, {}{}", now.active, now.nodes, now.search_seconds * 1e6,
+      size_text(now.bytes),
+      now.building ? ", building" : fmt::format(", built in {:.1f} ms", now.build_seconds * 1e3));
   ImGui::TextUnformatted(line.c_str());
   if (!now.refused.empty()) ImGui::TextWrapped("%s", now.refused.c_str());
 }

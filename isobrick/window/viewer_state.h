@@ -33,6 +33,12 @@ struct Requests {
   std::optional<std::filesystem::path> screenshot;
 };
 
+/// An isovalue that is being typed.
+struct TypedIsovalue {
+  std::size_t surface = 0;
+  std::string text;
+};
+
 /// What a window shows and how; panels change it. Not thread-safe.
 struct ViewerState {
   std::filesystem::path path;             ///< of the store; empty: none is open
@@ -47,6 +53,10 @@ struct ViewerState {
   std::string new_bookmark;  ///< the name that is being typed
   std::unique_ptr<ImportJob> import;
   std::vector<std::string> messages;  ///< what went wrong, the latest last
+  std::size_t messages_shown = 0;     ///< so many of them the panel has shown
+  std::optional<TypedIsovalue> typed;
+  std::uint64_t bricks_wanted = 0;  ///< as counted at
+  std::optional<double> wanted_at;  ///< this time of Dear ImGui
   std::optional<PickedPoint> picked;
   bool measuring = false;
   std::vector<Vec3d> measured;  ///< world positions, two at most

@@ -34,6 +34,8 @@ constexpr double kNothingNew = 0.008;
 /// While a picture is drawn in pieces and nothing else happens, from one frame to the next: frames
 /// would keep software from drawing.
 constexpr double kLongestUnseen = 0.25;
+/// Messages about damage that are shown one by one.
+constexpr std::size_t kMostTold = 3;
 /// Moving pictures may be coarser for so long after the last motion.
 constexpr double kSettleSeconds = 0.25;
 
@@ -130,6 +132,8 @@ void ViewerWindow::open(const std::filesystem::path& path) {
   choose_values(state_.settings, state_.picture->scene().tree());
   state_.picked.reset();
   state_.measured.clear();
+  click_.reset();
+  told_damage_.clear();
   const WorldBox box = state_.picture->bounds();
   state_.navigator.stop();
   state_.navigator.vertical = options_.camera.up;
@@ -207,17 +211,49 @@ void ViewerWindow::save_picture(const std::filesystem::path& file) {
   }
 }
 
-void ViewerWindow::click(double x, double y) {
-  if (state_.picture == nullptr) return;
-  int width = 1, height = 1;
-  glfwGetFramebufferSize(window_, &width, &height);
+std::optional<PickedPoint> ViewerWindow::pick(const Click& click) {
   // While something moves the picture may be smaller than the window.
   const Renderer& renderer = state_.picture->renderer();
-  state_.picked = pick_point(*state_.picture, static_cast<int>(x * renderer.width() / width),
-                             static_cast<int>(y * renderer.height() / height));
+  return pick_point(*state_.picture, static_cast<int>(click.x * renderer.width()),
+                    static_cast<int>(click.y * renderer.height()));
+}
+
+void ViewerWindow::click(double x, double y) {
+  if (state_.picture == nullptr) return;
+  const Click click{x, y, state_.navigator.camera};
+  state_.picked = pick(click);
+  click_.reset();
+  if (!rests()) click_ = click;
   if (!state_.measuring || !state_.picked) return;
   if (state_.measured.size() == 2) state_.measured.clear();
   state_.measured.push_back(state_.picked->world);
+}
+
+/// Whether the picture that is shown is the finest there will be.
+bool ViewerWindow::rests() const {
+  const PictureState& state = state_.picture->state();
+  return !moving() && state.complete && !state.moving;
+}
+
+void ViewerWindow::settle_click() {
+  if (!click_) return;
+  if (!(click_->camera == state_.navigator.camera)) return click_.reset();
+  if (!rests()) return;
+  const auto point = pick(*std::exchange(click_, std::nullopt));
+  if (!point) return;
+  state_.picked = point;
+  if (state_.measuring && !state_.measured.empty()) state_.measured.back() = point->world;
+}
+
+/// Says once what cannot be shown.
+void ViewerWindow::tell_damage() {
+  for (const std::string& message : state_.picture->state().damage) {
+    if (told_damage_.size() > kMostTold) return;
+    if (!told_damage_.insert(message).second) continue;
+    state_.say(told_damage_.size() <= kMostTold
+                   ? message
+                   : "more is damaged: 'isobrick verify' names all bricks that cannot be read");
+  }
 }
 
 bool ViewerWindow::moving() const {
@@ -247,8 +283,9 @@ bool ViewerWindow::draw_picture(int width, int height) {
     if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
     return true;
   }
-  state_.draw_seconds = glfwGetTime() - begin;
-  pace();
+  pace(glfwGetTime() - begin);
+  tell_damage();
+  settle_click();
   return !picture.state().drawing;
 }
 
@@ -267,26 +304,28 @@ void ViewerWindow::draw_frame(bool asked) {
   if (state_.picture != nullptr) state_.picture->renderer().copy_to(0, width, height);
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
+  events_->hold_tapped_keys();
   ImGui::NewFrame();
   draw_panels(state_);
   draw_measure(state_, width, height);
   ImGui::Render();
+  events_->release_tapped_keys();
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glfwSwapBuffers(window_);
 }
 
-/// What a picture says of the next one.
-void ViewerWindow::pace() {
+/// What a picture, or a piece of one, that took this thread so long says of the next one.
+void ViewerWindow::pace(double seconds) {
   const StorePicture& picture = *state_.picture;
   // There is more to draw; or a better one to come; or something else to do.
   more_ = picture.state().drawing || picture.state().plain || picture.state().more;
   if (!picture.drew()) return;
-  const double seconds = std::max(state_.draw_seconds, picture.picture_seconds());
+  state_.draw_seconds = std::max(seconds, picture.picture_seconds());
   if (picture.state().moving)
-    state_.pacer.drawn(seconds);
+    state_.pacer.drawn(state_.draw_seconds);
   else if (!picture.state().plain)
-    state_.pacer.drawn_still(seconds);
+    state_.pacer.drawn_still(state_.draw_seconds);
 }
 
 void ViewerWindow::wait(double most_seconds) {

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "isobrick/render/camera_request.h"
@@ -50,15 +52,24 @@ class ViewerWindow {
 
  private:
   class Events;
+  /// Parts of the window's width and height, and the camera then.
+  struct Click {
+    double x, y;
+    Camera camera;
+  };
 
   void wait(double most_seconds);
   void wait_for_meshes(double most_seconds);
   bool draw_picture(int width, int height);
   void draw_frame(bool asked);
-  void pace();
+  void pace(double seconds);
+  void tell_damage();
+  bool rests() const;
+  void settle_click();
   void handle_requests();
   void handle_import();
   void look_along(Vec3d direction);
+  std::optional<PickedPoint> pick(const Click& click);
   void click(double x, double y);
   void save_picture(const std::filesystem::path& file);
   bool moving() const;
@@ -75,6 +86,10 @@ class ViewerWindow {
   bool changed_ = true;  ///< something has happened: the next frame may differ from the last
   bool told_ = false;    ///< something had happened before the last step
   bool more_ = false;    ///< the picture would go on by itself
+  /// On a picture that was not at rest, whose surface may be a coarser one: it is looked at again
+  /// once the picture rests, if the camera is the same.
+  std::optional<Click> click_;
+  std::set<std::string> told_damage_;  ///< of this store
 };
 
 }  // namespace isobrick

@@ -56,25 +56,25 @@ void ViewerWindow::Events::on_button(int button, int action, int mods) {
     button_ = button;
     mods_ = mods;
     glfwGetCursorPos(owner_.window_, &x_, &y_);
-    pressed_x_ = x_;
-    pressed_y_ = y_;
+    dragged_ = false;
     time_ = glfwGetTime();
     owner_.state_.navigator.stop();
   } else if (button == button_) {
     button_ = -1;
     owner_.state_.navigator.release();
-    const bool still = std::hypot(x_ - pressed_x_, y_ - pressed_y_) < kClickPixels;
-    if (!still || button != GLFW_MOUSE_BUTTON_LEFT) return;
-    int width = 1, height = 1, pixels_x = 1, pixels_y = 1;
+    if (dragged_ || button != GLFW_MOUSE_BUTTON_LEFT) return;
+    int width = 1, height = 1;
     glfwGetWindowSize(owner_.window_, &width, &height);
-    glfwGetFramebufferSize(owner_.window_, &pixels_x, &pixels_y);
-    owner_.click(x_ * pixels_x / std::max(width, 1), y_ * pixels_y / std::max(height, 1));
+    owner_.click(x_ / std::max(width, 1), y_ / std::max(height, 1));
   }
 }
 
 void ViewerWindow::Events::on_pointer(double x, double y) {
   owner_.changed_ = true;
   if (button_ >= 0) {
+    // A click leaves the camera, and the picture at rest, as they are.
+    dragged_ |= std::hypot(x - x_, y - y_) >= kClickPixels;
+    if (!dragged_) return;
     int width = 1, height = 1;
     glfwGetWindowSize(owner_.window_, &width, &height);
     const double side = std::max(1, std::min(width, height));
@@ -108,8 +108,20 @@ FlyKeys ViewerWindow::Events::fly_keys() const {
           down(GLFW_KEY_W) - down(GLFW_KEY_S)};
 }
 
+void ViewerWindow::Events::hold_tapped_keys() {
+  for (const int key : tapped_) ImGui::GetIO().KeysDown[key] = true;
+}
+
+void ViewerWindow::Events::release_tapped_keys() {
+  for (const int key : tapped_)
+    ImGui::GetIO().KeysDown[key] = glfwGetKey(owner_.window_, key) == GLFW_PRESS;
+  tapped_.clear();
+}
+
 void ViewerWindow::Events::on_key(int key, int action, int mods) {
   owner_.changed_ = true;
+  if (action == GLFW_PRESS && key >= 0 && key < IM_ARRAYSIZE(ImGuiIO::KeysDown))
+    tapped_.push_back(key);
   const bool typing = ImGui::GetIO().WantTextInput;
   Navigator& navigator = owner_.state_.navigator;
   navigator.press(!typing && navigator.mode == NavigationMode::fly ? fly_keys() : FlyKeys{});

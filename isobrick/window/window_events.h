@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "isobrick/window/viewer_window.h"
 
 namespace isobrick {
@@ -10,8 +12,11 @@ class ViewerWindow::Events {
   /// Sets the window's callbacks, for its lifetime.
   explicit Events(ViewerWindow& owner);
 
-  /// A button is down that moves the camera.
-  bool dragging() const { return button_ >= 0; }
+  /// A button is down that moves the camera, and the pointer has moved since.
+  bool dragging() const { return button_ >= 0 && dragged_; }
+  /// Around a frame of Dear ImGui, which would not see a key that went down and up since the last.
+  void hold_tapped_keys();
+  void release_tapped_keys();
   /// When the camera or an isovalue moved last, GLFW's time.
   double last_motion() const { return last_motion_; }
 
@@ -27,8 +32,11 @@ class ViewerWindow::Events {
 
   ViewerWindow& owner_;
   int button_ = -1, mods_ = 0;  ///< of the drag; −1: none
-  double x_ = 0, y_ = 0, pressed_x_ = 0, pressed_y_ = 0, time_ = 0;
+  bool dragged_ = false;        ///< further than a click
+  double x_ = 0, y_ = 0;        ///< of the pointer; until it is dragged where it was pressed
+  double time_ = 0;
   double last_motion_ = -1e9;
+  std::vector<int> tapped_;  ///< keys that went down since the last frame
 };
 
 }  // namespace isobrick

@@ -350,6 +350,11 @@ TEST_F(Picture, ADamagedBrickIsMarkedAndTheRestIsShown) {
   draw();
   EXPECT_FALSE(picture_->state().damage.empty());
   EXPECT_GT(picture_->state().triangles, 100u);
+  const auto rgba = picture_->renderer().read_pixels();
+  int red = 0;  // as nothing else in this picture is
+  for (std::size_t i = 0; i < rgba.size(); i += 4)
+    red += rgba[i] > 150 && rgba[i + 1] < 90 && rgba[i + 2] < 90;
+  EXPECT_GT(red, 100) << "lines around what cannot be shown, and through it";
 }
 
 TEST_F(Picture, SlicesShowSamples) {

@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 
 #include "isobrick/core/error.h"
@@ -21,6 +22,7 @@ namespace isobrick {
 namespace {
 
 constexpr int kWidth = 640, kHeight = 480;
+constexpr int kFieldRow = 165;  ///< of the first isovalue, on the panel
 
 /// A window with a sphere, and hands.
 class Window : public testing::Test {
@@ -53,6 +55,11 @@ class Window : public testing::Test {
     return *window_;
   }
 
+  /// Whether the picture shows all there is, and not one that may be coarse.
+  bool rests() const {
+    const PictureState& state = window_->state().picture->state();
+    return state.complete && !state.moving;
+  }
   /// Steps until it holds. A test that waits for nothing fails.
   void until(const std::function<bool()>& holds) {
     const auto start = std::chrono::steady_clock::now();
@@ -168,6 +175,84 @@ TEST_F(Window, ClicksPickAndMeasure) {
   EXPECT_GT(length(window.state().measured[1] - window.state().measured[0]), 1);
   click(3, 3);  // the background is no point
   EXPECT_EQ(window.state().measured.size(), 2u);
+}
+
+/// A press does not make the picture a coarse one, whatever moving pictures are like.
+TEST_F(Window, ClicksPickFromThePictureAtRest) {
+  ViewerWindow& window = open();
+  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
+  ASSERT_GT(window.state().pacer.coarser(), 4);
+  until([&] { return rests(); });
+  const double isovalue = window.state().settings.surfaces[0].isovalue;
+  const Vec3d eye = window.state().navigator.camera.eye;
+  const auto triangles = window.state().picture->state().triangles;
+  display_->move_pointer(kWidth / 2 + 40, kHeight / 2 - 50);
+  steps(2);
+  display_->button(1, true);
+  steps(8);
+  EXPECT_EQ(window.state().picture->state().triangles, triangles);
+  display_->move_pointer(kWidth / 2 + 42, kHeight / 2 - 50);  // a hand that trembles
+  steps(2);
+  display_->button(1, false);
+  steps(3);
+  ASSERT_TRUE(window.state().picked && window.state().picked->value);
+  EXPECT_NEAR(*window.state().picked->value, isovalue, 0.5);
+  EXPECT_EQ(length(window.state().navigator.camera.eye - eye), 0);
+}
+
+/// What is picked while the picture is a coarse one is looked at again.
+TEST_F(Window, AClickBeforeThePictureRestsIsMadeGood) {
+  ViewerWindow& window = open();
+  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
+  drag(3, kWidth / 2, kHeight / 2, kWidth / 2, kHeight / 2 + 20);
+  window.state().measuring = true;
+  click(kWidth / 2 + 40, kHeight / 2 - 50);
+  ASSERT_TRUE(window.state().picked);
+  EXPECT_TRUE(window.state().picture->state().moving);
+  const double isovalue = window.state().settings.surfaces[0].isovalue;
+  until([&] { return rests(); });
+  steps(3);
+  ASSERT_TRUE(window.state().picked->value);
+  EXPECT_NEAR(*window.state().picked->value, isovalue, 0.5);
+  ASSERT_EQ(window.state().measured.size(), 1u);
+  EXPECT_EQ(length(window.state().measured[0] - window.state().picked->world), 0);
+}
+
+TEST_F(Window, KeysThatComeAtOnceAreTyped) {
+  ViewerWindow& window = open();
+  window.state().panels = true;
+  until([&] { return window.state().facts->histogram() != nullptr; });
+  steps(3);
+  display_->key(XK_Control_L, true);
+  click(140, kFieldRow);  // the field of the isovalue, all of it selected
+  display_->key(XK_Control_L, false);
+  steps(2);
+  for (const unsigned long key : {XK_1, XK_5, XK_0, XK_Return}) display_->tap(key);
+  steps(4);
+  EXPECT_EQ(window.state().settings.surfaces[0].isovalue, 150);
+}
+
+TEST_F(Window, SaysWhatIsDamaged) {
+  ViewerWindow& window = open();
+  make_store("damaged.zarr", {96, 96, 96});
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(dir_ / "damaged.zarr/0")) {
+    if (!entry.is_regular_file() || entry.path().extension() == ".json") continue;
+    std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(entry.file_size() / 3));
+    file.write("damage", 6);
+  }
+  window.open(dir_ / "damaged.zarr");
+  until([&] { return rests(); });
+  steps(3);
+  ASSERT_FALSE(window.state().picture->state().damage.empty());
+  ASSERT_FALSE(window.state().messages.empty());
+  EXPECT_EQ(window.state().messages[0], window.state().picture->state().damage[0]);
+  const std::size_t said = window.state().messages.size();
+  window.state().messages.clear();
+  window.state().settings.edges = true;
+  steps(5);
+  EXPECT_TRUE(window.state().messages.empty()) << "said once";
+  EXPECT_LE(said, 4u);
 }
 
 TEST_F(Window, SurvivesOtherSizesAndNone) {

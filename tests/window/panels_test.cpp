@@ -1,0 +1,219 @@
+#include "isobrick/window/panels.h"
+
+#include <imgui.h>
+#include <imgui_internal.h>
+
+#include <map>
+
+#include "tests/window/picture_test.h"
+
+namespace isobrick {
+namespace {
+
+/// Panels without a window: frames of Dear ImGui that nobody draws, a pointer and keys.
+class Panels : public Picture {
+ protected:
+  void SetUp() override {
+    Picture::SetUp();
+    if (IsSkipped()) return;
+    ImGui::CreateContext();
+    ImGuiIO& io = ImGui::GetIO();
+    io.IniFilename = nullptr;
+    io.DisplaySize = {700, 2400};
+    io.DeltaTime = 0.3f;  // a click is no double click
+    unsigned char* font = nullptr;
+    int width = 0, height = 0;
+    io.Fonts->GetTexDataAsRGBA32(&font, &width, &height);
+    open(SynthKind::sphere, {64, 64, 64});
+    state_.path = dir_ / "store.zarr";
+    state_.facts =
+        std::make_unique<IsovalueFacts>(std::make_shared<const StoreReader>(dir_ / "store.zarr"));
+    state_.settings = settings_;
+    state_.navigator.camera = camera_;
+    state_.bookmarks = std::make_unique<Bookmarks>(dir_ / "bookmarks.json", dir_ / "store.zarr");
+    draw();
+    state_.picture = std::move(picture_);
+    frame();
+    ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
+    ASSERT_NE(panel, nullptr);
+    ImGui::SetWindowSize(panel, {390, 2300});
+    for (const char* section :
+         {"Camera and look", "Cuts and region", "Slices", "Point and measure", "Bookmarks"})
+      panel->StateStorage.SetInt(panel->GetID(section), 1);
+    frame();
+  }
+  void TearDown() override {
+    state_.picture.reset();
+    if (ImGui::GetCurrentContext() != nullptr) ImGui::DestroyContext();
+    Picture::TearDown();
+  }
+
+  void frame() {
+    ImGui::NewFrame();
+    draw_panels(state_);
+    ImGui::Render();
+  }
+  void point(float x, float y) {
+    ImGui::GetIO().MousePos = {x, y};
+    frame();
+  }
+  void click(ImVec2 at) {
+    point(at.x, at.y);
+    ImGui::GetIO().MouseDown[0] = true;
+    frame();
+    ImGui::GetIO().MouseDown[0] = false;
+    frame();
+    frame();
+  }
+  void press(ImGuiKey key) {
+    ImGuiIO& io = ImGui::GetIO();
+    const int code = io.KeyMap[key] = 300 + key;
+    io.KeysDown[code] = true;
+    frame();
+    io.KeysDown[code] = false;
+    frame();
+  }
+
+  /// Where on the panel each widget is under the pointer.
+  std::map<ImGuiID, std::vector<ImVec2>> widgets() {
+    std::map<ImGuiID, std::vector<ImVec2>> places;
+    for (float y = 30; y < 2300; y += kStep)
+      for (float x = 16; x < 390; x += kAcross) {
+        point(x, y);
+        if (const ImGuiID id = GImGui->HoveredId) places[id].push_back({x, y});
+      }
+    return places;
+  }
+  /// The middle of the widget with this path of IDs.
+  ImVec2 place_of(std::initializer_list<const char*> path, std::optional<int> number = {}) {
+    ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
+    ImGuiID id = panel->ID;
+    const char* last = *(path.end() - 1);
+    for (const char* part : path) {
+      if (part == last && number) id = ImHashData(&*number, sizeof *number, id);
+      id = ImHashStr(part, 0, id);
+    }
+    const auto all = widgets();
+    const auto found = all.find(id);
+    if (found == all.end()) {
+      ADD_FAILURE() << "there is no " << last;
+      return {0, 0};
+    }
+    const ImVec2 a = found->second.front(), b = found->second.back();
+    return {(a.x + b.x) / 2, (a.y + b.y) / 2};
+  }
+
+  static constexpr float kStep = 5, kAcross = 8;
+  ViewerState state_;
+};
+
+/// Two that share an ID are one to Dear ImGui: the first takes the other's clicks.
+TEST_F(Panels, EveryWidgetIsInOnePlace) {
+  state_.settings.surfaces.push_back(state_.settings.surfaces[0]);
+  state_.settings.planes.push_back({true, {{0, 0, 1}, 10}});
+  state_.settings.region_on = true;
+  state_.bookmarks->add({"one", camera_, settings_});
+  frame();
+  const auto all = widgets();
+  EXPECT_GT(all.size(), 60u);
+  for (const auto& [id, places] : all) {
+    float lowest = places[0].y, highest = places[0].y;
+    for (const ImVec2& p : places) {
+      lowest = std::min(lowest, p.y);
+      highest = std::max(highest, p.y);
+    }
+    // All rows in between are its own.
+    std::map<float, int> rows;
+    for (const ImVec2& p : places) ++rows[p.y];
+    EXPECT_EQ(rows.size(), static_cast<std::size_t>((highest - lowest) / kStep + 1))
+        << "at " << places[0].x << ", " << lowest << " and down to " << highest;
+  }
+}
+
+TEST_F(Panels, PlanesBookmarksAndSurfacesAreRemovedOneByOne) {
+  state_.settings.surfaces.push_back(state_.settings.surfaces[0]);
+  state_.settings.planes.push_back({true, {{0, 0, 1}, 10}});
+  state_.bookmarks->add({"one", camera_, settings_});
+  frame();
+  click(place_of({"Cuts and region", "x"}, 0));
+  EXPECT_TRUE(state_.settings.planes.empty());
+  click(place_of({"Bookmarks", "x"}, 0));
+  EXPECT_TRUE(state_.bookmarks->list().empty());
+  EXPECT_EQ(state_.settings.surfaces.size(), 2u);
+  click(place_of({"Surfaces", "x"}, 0));
+  EXPECT_EQ(state_.settings.surfaces.size(), 1u);
+}
+
+TEST_F(Panels, SlicesAndCutsHaveTheirOwnBoxes) {
+  click(place_of({"Slices", "x", "x"}));
+  EXPECT_TRUE(state_.settings.slices[0].shown);
+  EXPECT_FALSE(state_.settings.cuts[0].on);
+  click(place_of({"Cuts and region", "y", "y"}));
+  EXPECT_TRUE(state_.settings.cuts[1].on);
+  EXPECT_FALSE(state_.settings.slices[1].shown);
+  click(place_of({"Cuts and region", "Region"}));
+  EXPECT_TRUE(state_.settings.region_on);
+}
+
+TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
+  ImGuiIO& io = ImGui::GetIO();
+  const auto type = [&](const char* text) {
+    io.KeyCtrl = true;
+    click(place_of({"Surfaces", "##isovalue"}, 0));  // selects all
+    io.KeyCtrl = false;
+    for (; *text != 0; ++text) {
+      io.AddInputCharacter(static_cast<unsigned>(*text));
+      frame();
+    }
+  };
+  const double before = state_.settings.surfaces[0].isovalue;
+  type("150.5");
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, before);
+  press(ImGuiKey_Enter);
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, 150.5);
+  type("99");
+  click({600, 2000});  // beside the panel
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
+  type("12");
+  press(ImGuiKey_Escape);
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
+  type("12");
+  for (int i = 0; i < 2; ++i) press(ImGuiKey_Backspace);
+  type("99");  // what it was
+  press(ImGuiKey_Enter);
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
+  type("nonsense");
+  press(ImGuiKey_Enter);
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
+}
+
+TEST_F(Panels, MessagesAreNotBehindThePanel) {
+  ImGui::GetIO().DisplaySize = {1000, 800};
+  state_.say("one two three four five six seven eight nine ten eleven twelve thirteen fourteen");
+  frame();
+  frame();
+  const ImGuiWindow* messages = ImGui::FindWindowByName("Messages");
+  const ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
+  ASSERT_NE(messages, nullptr);
+  EXPECT_GE(messages->Pos.x, panel->Pos.x + panel->Size.x);
+  EXPECT_LE(messages->Pos.x + messages->Size.x, 1000);
+  EXPECT_GT(messages->FocusOrder, panel->FocusOrder);
+}
+
+TEST_F(Panels, ThePanelStaysWithinReach) {
+  ImGui::SetWindowPos("###panel", {500, 1200});
+  frame();
+  ImGui::GetIO().DisplaySize = {300, 200};
+  frame();
+  frame();
+  const ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
+  EXPECT_LT(panel->Pos.x, 300);
+  EXPECT_LT(panel->Pos.y, 200);
+}
+
+TEST_F(Panels, TheStatusNamesBricks) {
+  EXPECT_EQ(state_.picture->scene().stream().bricks_wanted(), 0u) << "all are there";
+}
+
+}  // namespace
+}  // namespace isobrick
