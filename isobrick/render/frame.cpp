@@ -45,7 +45,7 @@ FrameBlock make_frame(const Camera& camera, int width, int height,
     add(half_space_at(settings.region->lo, inward));
     add(half_space_at(settings.region->hi, inward * -1.0));
   }
-  frame.counts = {std::min(count, kClipDistances), count, 0, 0};
+  frame.counts = {std::min(count, kClipDistances), count, settings.picking ? 1 : 0, 0};
 
   const double near = camera.near_depth(), far = camera.far_depth();
   const double tangent = std::tan(glm::radians(camera.field_of_view) / 2);

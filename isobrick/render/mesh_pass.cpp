@@ -98,11 +98,18 @@ void main() {
 )";
 
 const char* const kTransparent = R"(
+// What is hidden by opaque meshes is not in front, either.
+layout(early_fragment_tests) in;
+layout(binding = 0, r32ui) uniform uimage2D front;
 layout(location = 0) out vec4 sum;
 layout(location = 1) out float hidden;
 
 void main() {
   Seen s = see();
+  // Near is large; of the depth what leaves room for a number.
+  if (counts.z != 0)
+    imageAtomicMax(front, ivec2(gl_FragCoord.xy),
+                   floatBitsToUint(gl_FragCoord.z) & 0xffffff00u | mesh.x & 0xffu);
   // Slanting rays have a longer way through it.
   float facing = max(dot(s.normal, s.eye), 0.12);
   float alpha = 1 - pow(1 - outer_colour.a, 1 / facing);

@@ -50,13 +50,22 @@ void PictureTargets::add_transparent() {
   if (transparent) return;
   sum = make_texture(GL_RGBA16F, width, height, samples, "memory for transparency");
   seen = make_texture(GL_R16F, width, height, samples, "memory for transparency");
+  if (ids) front = make_texture(GL_R32UI, width, height, 1, "memory for transparency");
   transparent = make_framebuffer(std::array{sum.get(), seen.get()}, depth.get(), "transparency");
+}
+
+void PictureResult::take_front(const GlTexture& drawn) {
+  if (!front) front = make_texture(GL_R32UI, width, height, 1, "memory for transparency");
+  glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);
+  glCopyImageSubData(drawn.get(), GL_TEXTURE_2D, 0, 0, 0, 0, front.get(), GL_TEXTURE_2D, 0, 0, 0, 0,
+                     width, height, 1);
+  has_front = true;
 }
 
 std::uint64_t PictureTargets::bytes(int width, int height, int samples, bool ids,
                                     bool transparent) {
   const std::uint64_t sample = 8 + 4 + 4 + (ids ? 4 : 0) + (transparent ? 8 + 2 : 0);
-  const std::uint64_t pixel = 4 + 4 + (ids ? 4 : 0) + 1 + 1 + 4;
+  const std::uint64_t pixel = 4 + 4 + (ids ? 4 : 0) + (ids && transparent ? 8 : 0) + 1 + 1 + 4;
   return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
          (sample * static_cast<std::uint64_t>(samples) + pixel);
 }

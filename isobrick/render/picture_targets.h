@@ -17,9 +17,16 @@ struct PictureResult {
   int width, height;
   bool ids;
 
-  // Of each pixel: the nearest sample's depth (world length; 0: background), normal, mesh.
+  /// Takes what is known of transparent meshes over from where it was drawn.
+  void take_front(const GlTexture& drawn);
+
+  // Of each pixel: the nearest opaque sample's depth (world length; 0: background), normal, mesh.
   GlTexture near_depth, near_normal, near_id;
   GlFramebuffer nearest;
+  // Of each pixel: the nearest transparent mesh's depth, as it is stored and but for its last 8
+  // bits, which are those of its number; 0: none.
+  GlTexture front;
+  bool has_front = false;
   GlTexture picture;
   GlFramebuffer picture_target;
 };
@@ -42,6 +49,7 @@ struct PictureTargets {
   GlFramebuffer opaque;
   // Of each sample: weighted sum, and what part of the background is still seen.
   GlTexture sum, seen;
+  GlTexture front;  ///< with ids: see PictureResult
   GlFramebuffer transparent;
   // Of each pixel: how open it is, and that smoothed along rows.
   GlTexture open, open_rows;

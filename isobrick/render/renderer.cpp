@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -20,6 +21,14 @@ namespace isobrick {
 namespace {
 
 constexpr int kSamples = 4;
+
+/// World length in front of the eye, of a word of PictureResult::front.
+float depth_of_front(const Camera& camera, std::uint32_t word) {
+  const auto stored =
+      std::bit_cast<float>((word & ~0xffu) | 0x80u);  // the middle of what it may be
+  const double near = camera.near_depth(), far = camera.far_depth();
+  return static_cast<float>(camera.orthographic ? far - stored * (far - near) : near / stored);
+}
 
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
 
@@ -116,11 +125,15 @@ void Renderer::State::clear_transparent() {
   const std::array<float, 4> nothing{}, all{1, 1, 1, 1};
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 0, nothing.data());
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 1, all.data());
+  if (targets->ids)
+    glClearTexImage(targets->front.get(), 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
 
 void Renderer::State::bind_target(const DrawSwitches& switches, bool blended) {
   if (blended) clear_transparent();
   glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets->transparent.get() : targets->opaque.get());
+  if (blended && targets->ids)
+    glBindImageTexture(0, targets->front.get(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_R32UI);
   switches.meshes(frame.counts.x, true, blended);
 }
 
@@ -154,6 +167,8 @@ bool Renderer::State::go_on(std::uint64_t most) {
   switches.meshes(0, false, false);
   choose_result(in_one_go);
   if (!work.run_steps(*screen, {*targets, *next, settings, any_transparent}, most)) return false;
+  next->has_front = false;
+  if (any_transparent && targets->ids) next->take_front(targets->front);
   passes.overlays.run(*next);
   std::swap(shown, next);
   shown_camera = camera;
@@ -282,9 +297,19 @@ std::optional<Picked> Renderer::pick(int x, int y) const {
   if (result.ids)
     glGetTextureSubImage(result.near_id.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED_INTEGER,
                          GL_UNSIGNED_INT, sizeof(picked.id), &picked.id);
+  const Camera& camera = state_->shown_camera;
+  if (result.has_front) {
+    std::uint32_t front = 0;
+    glGetTextureSubImage(result.front.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED_INTEGER,
+                         GL_UNSIGNED_INT, sizeof(front), &front);
+    const float nearer = front != 0 ? depth_of_front(camera, front) : 0;
+    if (nearer > 0 && !(depth > 0 && depth <= nearer)) {
+      depth = nearer;
+      picked.id = front & 0xff;
+    }
+  }
   check_gl("reading a pixel");
   if (!(depth > 0)) return std::nullopt;
-  const Camera& camera = state_->shown_camera;
   const WorldRay ray = camera.ray(x + 0.5, y + 0.5, width(), height());
   // The depth is along the line of sight, the ray may slant.
   picked.position = ray.origin + ray.direction * (depth / -dot(ray.direction, camera.back));

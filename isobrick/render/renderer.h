@@ -38,7 +38,8 @@ struct MeshStyle {
   Vec3f colour{0.87f, 0.80f, 0.70f};
   float opacity = 1;                 ///< of a piece seen face to face; below 1: transparent
   std::optional<Vec3f> inside = {};  ///< of the back where something is cut off; else a darker tone
-  std::uint32_t id = 0;              ///< what pick() tells; 0: nothing
+  /// What pick() tells; 0: nothing. Of transparent ones the lowest 8 bits.
+  std::uint32_t id = 0;
   friend bool operator==(const MeshStyle&, const MeshStyle&) = default;
 };
 
@@ -59,7 +60,7 @@ struct WorldLine {
 
 /// What is under a pixel.
 struct Picked {
-  Vec3d position;        ///< world space, of the nearest opaque surface
+  Vec3d position;        ///< world space, of the nearest surface, transparent meshes among them
   std::uint32_t id = 0;  ///< of its MeshStyle; 0 for others, and without PictureSettings::picking
 };
 

@@ -49,5 +49,56 @@ TEST_F(RenderTest, PickingTellsPlaceAndMesh) {
   EXPECT_FALSE(renderer().pick(-1, 80));
 }
 
+double distance_from_middle(const Picked& picked) {
+  const Vec3d p = picked.position;
+  return std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
+}
+
+/// A small opaque ball in a transparent one in a larger, and beside them nothing.
+TEST_F(RenderTest, TransparentMeshesCanBePicked) {
+  const TestMesh small = make_ball({0, 0, 0}, 0.3f, 100), middle = make_ball({0, 0, 0}, 0.6f, 100),
+                 large = make_ball({0, 0, 0}, 1, 200);
+  for (const bool orthographic : {false, true})
+    for (const bool multisample : {false, true})
+      for (const bool cut : {false, true}) {
+        SCOPED_TRACE(testing::Message() << orthographic << multisample << cut);
+        Camera camera = front_camera(1.25);
+        camera.orthographic = orthographic;
+        PictureSettings settings{.multisample = multisample, .picking = true};
+        // Away with the near half of the large ones.
+        if (cut) settings.planes = {{{0, 1, 0}, -0.31}};
+        renderer().begin(camera, 200, 160, settings);
+        renderer().draw(small.chunk(), {.id = 3});
+        renderer().draw(large.chunk(), {.opacity = 0.2f, .id = 5});
+        renderer().draw(middle.chunk(), {.opacity = 0.2f, .id = 4});
+        renderer().end();
+        const std::optional<Picked> picked = renderer().pick(100, 80);
+        ASSERT_TRUE(picked);
+        EXPECT_EQ(picked->id, cut ? 3u : 5u);
+        EXPECT_NEAR(distance_from_middle(*picked), cut ? 0.3 : 1, 2e-3);
+        EXPECT_FALSE(renderer().pick(3, 3));
+        // The next picture has none.
+        renderer().begin(camera, 200, 160, settings);
+        renderer().draw(small.chunk(), {.id = 3});
+        renderer().end();
+        ASSERT_TRUE(renderer().pick(100, 80));
+        EXPECT_EQ(renderer().pick(100, 80)->id, 3u);
+      }
+}
+
+/// What an opaque mesh hides is not picked through it.
+TEST_F(RenderTest, TransparentMeshesBehindOpaqueOnesAreNotPicked) {
+  const TestMesh near = make_ball({0, -0.5f, 0}, 0.15f, 100),
+                 far = make_ball({0, 0.5f, 0}, 0.5f, 100);
+  renderer().begin(front_camera(1.25), 200, 160, {.picking = true});
+  renderer().draw(near.chunk(), {.id = 1});
+  renderer().draw(far.chunk(), {.opacity = 0.5f, .id = 2});
+  renderer().end();
+  ASSERT_TRUE(renderer().pick(100, 80));
+  EXPECT_EQ(renderer().pick(100, 80)->id, 1u);
+  ASSERT_TRUE(renderer().pick(100, 62));
+  EXPECT_EQ(renderer().pick(100, 62)->id, 2u);
+}
+
 }  // namespace
 }  // namespace isobrick

@@ -200,6 +200,18 @@ TEST_F(Window, ClicksPickFromThePictureAtRest) {
   EXPECT_EQ(length(window.state().navigator.camera.eye - eye), 0);
 }
 
+TEST_F(Window, ATransparentSurfaceIsPickedAsWell) {
+  ViewerWindow& window = open();
+  window.state().settings.surfaces[0].opacity = 0.4f;
+  until([&] { return rests(); });
+  steps(3);
+  until([&] { return rests(); });
+  click(kWidth / 2 + 40, kHeight / 2 - 50);
+  ASSERT_TRUE(window.state().picked && window.state().picked->value);
+  EXPECT_EQ(window.state().picked->surface, 1u);
+  EXPECT_NEAR(*window.state().picked->value, window.state().settings.surfaces[0].isovalue, 0.5);
+}
+
 /// What is picked while the picture is a coarse one is looked at again.
 TEST_F(Window, AClickBeforeThePictureRestsIsMadeGood) {
   ViewerWindow& window = open();
@@ -209,10 +221,12 @@ TEST_F(Window, AClickBeforeThePictureRestsIsMadeGood) {
   click(kWidth / 2 + 40, kHeight / 2 - 50);
   ASSERT_TRUE(window.state().picked);
   EXPECT_TRUE(window.state().picture->state().moving);
+  const double before = window.state().picked->value.value();
   const double isovalue = window.state().settings.surfaces[0].isovalue;
   until([&] { return rests(); });
   steps(3);
   ASSERT_TRUE(window.state().picked->value);
+  EXPECT_NE(*window.state().picked->value, before);
   EXPECT_NEAR(*window.state().picked->value, isovalue, 0.5);
   ASSERT_EQ(window.state().measured.size(), 1u);
   EXPECT_EQ(length(window.state().measured[0] - window.state().picked->world), 0);
