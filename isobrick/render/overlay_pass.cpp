@@ -54,7 +54,8 @@ void main() {
   float alpha = clamp(line_size.x + 0.5 - length(off), 0.0, 1.0);
   if (depth > 0) {
     float far = depth_range.z > 0.5 ? depth : 1 / depth;
-    float seen = texelFetch(near_depths, ivec2(gl_FragCoord.xy), 0).r;
+    vec2 place = gl_FragCoord.xy * vec2(textureSize(near_depths, 0)) / viewport.xy;
+    float seen = texelFetch(near_depths, ivec2(place), 0).r;
     if (seen > 0 && seen < far - 2 * pixel_length(far)) alpha *= 0.14;
   }
   picture = vec4(tint, alpha);
@@ -98,13 +99,6 @@ OverlayPass::OverlayPass()
   attribute(2, 2, offsetof(Corner, half_width));
   attribute(3, 3, offsetof(Corner, red));
   check_gl("lines and text");
-}
-
-void OverlayPass::start(const Camera& camera, int width, int height) {
-  camera_ = camera;
-  width_ = width;
-  height_ = height;
-  corners_.clear();
 }
 
 void OverlayPass::add_rectangle(const std::array<Corner, 4>& c) {
@@ -221,14 +215,22 @@ void OverlayPass::add_scale_bar(const std::string& unit) {
            dark);
 }
 
-void OverlayPass::run(const PictureResult& result) {
+void OverlayPass::run(const Overlays& overlays, const Camera& camera, unsigned framebuffer,
+                      int width, int height, const GlTexture& near_depth) {
+  camera_ = camera;
+  width_ = width;
+  height_ = height;
+  corners_.clear();
+  for (const Overlays::Line& l : overlays.lines) add_line(l.line, l.colour, l.width);
+  if (overlays.axes) add_axes();
+  if (overlays.scale_bar) add_scale_bar(*overlays.scale_bar);
   if (corners_.empty()) return;
   fill_buffer(buffer_, std::as_bytes(std::span(corners_)));
-  glBindFramebuffer(GL_FRAMEBUFFER, result.picture_target.get());
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
   glUseProgram(program_.get());
   glBindVertexArray(vertices_.get());
   glBindTextureUnit(0, atlas_.get());
-  glBindTextureUnit(1, result.near_depth.get());
+  glBindTextureUnit(1, near_depth.get());
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
   glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(corners_.size()));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,28 +14,39 @@
 
 namespace isobrick {
 
+/// What lies on top of a picture.
+struct Overlays {
+  struct Line {
+    WorldLine line;
+    Vec3f colour;
+    float width;  ///< pixels
+  };
+  std::vector<Line> lines;
+  bool axes = false;                     ///< of the world, in the lower left corner
+  std::optional<std::string> scale_bar;  ///< a round length in the lower right corner: its unit
+
+  bool empty() const { return lines.empty() && !axes && !scale_bar; }
+};
+
 /// Lines and text on top of a finished picture.
 class OverlayPass {
  public:
   OverlayPass();
 
-  /// Forgets what was added; the next picture has this camera and size.
-  void start(const Camera& camera, int width, int height);
+  /// Draws them into a framebuffer of that size, which shows what `camera` sees; faint behind
+  /// what `near_depth` has, of a picture of any size. Its frame is bound.
+  void run(const Overlays& overlays, const Camera& camera, unsigned framebuffer, int width,
+           int height, const GlTexture& near_depth);
 
+ private:
   void add_line(const WorldLine& line, Vec3f colour, float width);
   /// From pixel to pixel, always seen.
   void add_flat_line(Vec3d from, Vec3d to, Vec3f colour, float width);
   void add_text(const std::string& text, double x, double y, double line_height, Vec3f colour);
   double text_width(const std::string& text, double line_height) const;
-
-  /// Axes of the world in the lower left corner.
   void add_axes();
-  /// A round length in the lower right corner.
   void add_scale_bar(const std::string& unit);
 
-  void run(const PictureResult& result);
-
- private:
   /// A corner of a rectangle: on the screen, depth, and what its kind needs.
   struct Corner {
     float x, y;        ///< pixels, rows from the top

@@ -35,7 +35,10 @@ int samples_of(const PictureSettings& settings) { return settings.multisample ? 
 }  // namespace
 
 struct Renderer::State {
-  State() : device(current_gl_device()), frame_buffer(make_stream_buffer()) {
+  State()
+      : device(current_gl_device()),
+        frame_buffer(make_stream_buffer()),
+        later_buffer(make_stream_buffer()) {
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest_edge);
     check_gl("the limits of the device");
   }
@@ -50,6 +53,7 @@ struct Renderer::State {
   bool draw_surfaces(const DrawSwitches& switches, bool blended, std::uint64_t& work);
   void choose_result(bool in_one_go);
   bool go_on(std::uint64_t most);
+  void draw_overlays_later(unsigned framebuffer, int width, int height);
 
   GlDevice device;
   int largest_edge = 0;
@@ -61,11 +65,14 @@ struct Renderer::State {
   PictureTargets* targets = nullptr;         ///< likewise
   std::optional<PictureResult> shown, next;  ///< the finished picture; what the next one becomes
   Camera shown_camera;
+  PictureSettings shown_settings;
+  Overlays shown_later;  ///< overlays that the finished picture does not have
 
   Camera camera;
   PictureSettings settings;
   FrameBlock frame{};
-  GlBuffer frame_buffer;
+  Overlays overlays;
+  GlBuffer frame_buffer, later_buffer;
   PictureWork work;
   bool any_transparent = false;  ///< in this picture
 };
@@ -85,7 +92,7 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   frame = make_frame(camera, width, height, settings);
   passes.meshes.start(frame.cuts());
   passes.slices.clear();
-  passes.overlays.start(camera, width, height);
+  overlays = {};
   any_transparent = false;
   choose_targets(width, height);
   work.start(*targets, settings);
@@ -169,10 +176,25 @@ bool Renderer::State::go_on(std::uint64_t most) {
   if (!work.run_steps(*screen, {*targets, *next, settings, any_transparent}, most)) return false;
   next->has_front = false;
   if (any_transparent && targets->ids) next->take_front(targets->front);
-  passes.overlays.run(*next);
+  shown_later = {};
+  if (settings.overlays_later)
+    shown_later = std::move(overlays);
+  else
+    passes.overlays.run(overlays, camera, next->picture_target.get(), next->width, next->height,
+                        next->near_depth);
   std::swap(shown, next);
   shown_camera = camera;
+  shown_settings = settings;
   return true;
+}
+
+void Renderer::State::draw_overlays_later(unsigned framebuffer, int width, int height) {
+  if (shown_later.empty() || width < 1 || height < 1) return;
+  const FrameBlock block = make_frame(shown_camera, width, height, shown_settings);
+  const DrawSwitches switches(block);
+  fill_buffer(later_buffer, std::as_bytes(std::span(&block, 1)));
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, later_buffer.get());
+  passes.overlays.run(shown_later, shown_camera, framebuffer, width, height, shown->near_depth);
 }
 
 Renderer::Renderer() : state_(std::make_unique<State>()) {}
@@ -206,7 +228,7 @@ void Renderer::draw(const SliceImage& slice) {
 }
 
 void Renderer::draw_lines(std::span<const WorldLine> lines, Vec3f colour, float line_width) {
-  for (const WorldLine& line : lines) state_->passes.overlays.add_line(line, colour, line_width);
+  for (const WorldLine& line : lines) state_->overlays.lines.push_back({line, colour, line_width});
 }
 
 void Renderer::draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float line_width) {
@@ -218,14 +240,12 @@ void Renderer::draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float line_width) {
       if (corner & 2) line.from[third] = hi[third];
       line.to = line.from;
       line.to[axis] = hi[axis];
-      state_->passes.overlays.add_line(line, colour, line_width);
+      state_->overlays.lines.push_back({line, colour, line_width});
     }
 }
 
-void Renderer::draw_axes() { state_->passes.overlays.add_axes(); }
-void Renderer::draw_scale_bar(const std::string& unit) {
-  state_->passes.overlays.add_scale_bar(unit);
-}
+void Renderer::draw_axes() { state_->overlays.axes = true; }
+void Renderer::draw_scale_bar(const std::string& unit) { state_->overlays.scale_bar = unit; }
 
 void Renderer::end() { state_->go_on(std::numeric_limits<std::uint64_t>::max()); }
 bool Renderer::end_piece(std::uint64_t work) { return state_->go_on(work); }
@@ -283,6 +303,7 @@ void Renderer::copy_to(unsigned framebuffer, int to_width, int to_height) const 
   glBlitNamedFramebuffer(state_->shown->picture_target.get(), framebuffer, 0, 0, width(), height(),
                          0, 0, to_width, to_height, GL_COLOR_BUFFER_BIT,
                          same ? GL_NEAREST : GL_LINEAR);
+  state_->draw_overlays_later(framebuffer, to_width, to_height);
   check_gl("showing the picture");
 }
 

@@ -26,6 +26,9 @@ struct PictureSettings {
   bool occlusion = true;    ///< less light where the surroundings are near
   bool edges = false;       ///< dark lines where depth or direction break off
   bool picking = false;     ///< keep which mesh each pixel shows
+  /// Lines, axes and the scale bar are drawn where the picture is copied to, and at that size: it
+  /// is smaller than what it is shown in. The picture itself has none then.
+  bool overlays_later = false;
   /// Meshes are drawn as they come. It shows at pixels where two are equally far, and of
   /// transparent ones in the last bits. Without, those that lie together in memory take one call.
   bool in_order = true;
@@ -134,7 +137,7 @@ class Renderer {
   /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for ImGui::Image say.
   unsigned texture() const;
   /// Copies it into a framebuffer (0: the window's), lower left corner at (0, 0), enlarged or
-  /// reduced to this size.
+  /// reduced to this size; see PictureSettings::overlays_later.
   void copy_to(unsigned framebuffer, int to_width, int to_height) const;
 
   /// What the picture shows at pixel (x, y), rows from the top; nothing on the background.

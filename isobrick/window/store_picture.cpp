@@ -246,6 +246,7 @@ void StorePicture::begin_picture(const Asked& asked) {
   PictureSettings picture =
       picture_settings(settings, scene_->tree().grid().transform(), last_sample(*store_));
   picture.in_order = asked.way.in_order || setup_->software();
+  picture.overlays_later = asked.way.smaller;
   renderer().begin(asked.camera, asked.width, asked.height, picture);
   draw_surfaces(settings, work_->state);
   slices_.draw(renderer(), settings, work_->state.damage);

@@ -58,6 +58,9 @@ struct PictureWay {
   /// The view changes all the time: a picture that has been begun is finished all the same, unless
   /// there are much fewer triangles to draw by now.
   bool moving = false;
+  /// It is shown in something larger: box, axes and scale bar are drawn there, and as large as
+  /// always.
+  bool smaller = false;
   /// The same picture every time, whichever mesh came first. A device takes longer for it; in
   /// software it is always so.
   bool in_order = false;

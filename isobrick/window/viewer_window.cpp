@@ -276,6 +276,7 @@ bool ViewerWindow::draw_picture(int width, int height) {
   if (state_.pacer.plain())
     way.plain = fluent ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
   const int smaller = fluent ? state_.pacer.smaller() : 1;
+  way.smaller = smaller > 1;
   try {
     picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
                  std::max(height / smaller, 1), state_.settings, way);

@@ -1,9 +1,13 @@
 #include "isobrick/render/renderer.h"
 
+#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <vector>
 
+#include "isobrick/render/gl_objects.h"
 #include "tests/meshes/test_meshes.h"
 #include "tests/render/pictures.h"
 
@@ -84,6 +88,45 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
         ASSERT_TRUE(renderer().pick(100, 80));
         EXPECT_EQ(renderer().pick(100, 80)->id, 3u);
       }
+}
+
+/// Pixels that are as blue as the z axis.
+template <class Rgba>
+int count_blue(const Rgba& rgba) {
+  int blue = 0;
+  for (std::size_t i = 0; i + 3 < rgba.size(); i += 4)
+    blue += rgba[i + 2] > 150 && rgba[i] < 90 && rgba[i + 1] < 120;
+  return blue;
+}
+
+TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
+  constexpr int kWidth = 400, kHeight = 320;
+  const auto draw = [&](int smaller, const PictureSettings& settings) {
+    renderer().begin(front_camera(1.25), kWidth / smaller, kHeight / smaller, settings);
+    renderer().draw(make_ball({0, 0, 0}, 0.5f, 60).chunk(), {});
+    renderer().draw_box({-1, -1, -1}, {1, 1, 1}, {0.1f, 0.1f, 0.9f}, 3);
+    renderer().draw_axes();
+    renderer().draw_scale_bar("mm");
+    renderer().end();
+  };
+  draw(1, {});
+  const int wanted = count_blue(renderer().read_pixels());
+  EXPECT_GT(wanted, 500);
+  draw(4, {.overlays_later = true});
+  EXPECT_EQ(count_blue(renderer().read_pixels()), 0);
+  const GlTexture shown = make_texture(GL_RGBA8, kWidth, kHeight, 1, "a window");
+  const GlFramebuffer window = make_framebuffer(std::array{shown.get()}, 0, "a window");
+  renderer().copy_to(window.get(), kWidth, kHeight);
+  std::vector<std::uint8_t> rgba(std::size_t{4} * kWidth * kHeight);
+  glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
+                    rgba.data());
+  EXPECT_NEAR(count_blue(rgba), wanted, 0.03 * wanted);
+  // What hides them hides them, too, where the picture has fewer pixels.
+  draw(1, {.overlays_later = true});
+  renderer().copy_to(window.get(), kWidth, kHeight);
+  glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
+                    rgba.data());
+  EXPECT_EQ(count_blue(rgba), wanted);
 }
 
 /// What an opaque mesh hides is not picked through it.
