@@ -6,6 +6,7 @@
 #include <GLFW/glfw3.h>
 #include <X11/keysym.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -284,15 +285,19 @@ TEST_F(Window, SurvivesOtherSizesAndNone) {
 
 TEST_F(Window, ClosesAtOnceWhileItStreams) {
   make_store("big.zarr", {320, 320, 320});
-  ViewerWindow& window = open();
-  window.open(dir_ / "big.zarr");
-  window.state().settings.pixel_error = 0.1f;  // much to do, also for pictures that may be coarse
-  steps(2);
-  EXPECT_FALSE(window.state().picture->state().complete);
-  const auto start = std::chrono::steady_clock::now();
-  window_.reset();
-  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-  EXPECT_LT(spent.count(), 0.5);  // of that at most 0.1 for the stream; Mesa takes its time, too
+  double least = 1;
+  for (int i = 0; i < 4 && least > 0.1; ++i) {  // others may keep the cores busy
+    ViewerWindow& window = open();
+    window.open(dir_ / "big.zarr");
+    window.state().settings.pixel_error = 0.1f;  // much to do, also for pictures that may be coarse
+    steps(2);
+    EXPECT_FALSE(window.state().picture->state().complete);
+    const auto start = std::chrono::steady_clock::now();
+    window_.reset();
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    least = std::min(least, spent.count());
+  }
+  EXPECT_LT(least, 0.1);
 }
 
 TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
