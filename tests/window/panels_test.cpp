@@ -1,8 +1,11 @@
 #include "isobrick/window/panels.h"
 
 #include <imgui.h>
+// ImVec2 can be added up there.
+#define IMGUI_DEFINE_MATH_OPERATORS
 #include <imgui_internal.h>
 
+#include <filesystem>
 #include <map>
 
 #include "tests/window/picture_test.h"
@@ -19,7 +22,7 @@ class Panels : public Picture {
     ImGui::CreateContext();
     ImGuiIO& io = ImGui::GetIO();
     io.IniFilename = nullptr;
-    io.DisplaySize = {700, 2400};
+    io.DisplaySize = {700, 1400};
     io.DeltaTime = 0.3f;  // a click is no double click
     unsigned char* font = nullptr;
     int width = 0, height = 0;
@@ -36,7 +39,7 @@ class Panels : public Picture {
     frame();
     ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
     ASSERT_NE(panel, nullptr);
-    ImGui::SetWindowSize(panel, {390, 2300});
+    ImGui::SetWindowSize(panel, {390, 1300});
     for (const char* section :
          {"Camera and look", "Cuts and region", "Slices", "Point and measure", "Bookmarks"})
       panel->StateStorage.SetInt(panel->GetID(section), 1);
@@ -74,26 +77,28 @@ class Panels : public Picture {
     frame();
   }
 
-  /// Where on the panel each widget is under the pointer.
-  std::map<ImGuiID, std::vector<ImVec2>> widgets() {
+  /// Where in a window each widget is under the pointer.
+  std::map<ImGuiID, std::vector<ImVec2>> widgets(const char* window = "###panel") {
     std::map<ImGuiID, std::vector<ImVec2>> places;
-    for (float y = 30; y < 2300; y += kStep)
-      for (float x = 16; x < 390; x += kAcross) {
+    const ImGuiWindow* w = ImGui::FindWindowByName(window);
+    const ImVec2 from = w->Pos, to = from + w->Size;
+    for (float y = from.y + 20; y < to.y; y += kStep)
+      for (float x = from.x + 6; x < to.x - 6; x += kAcross) {
         point(x, y);
         if (const ImGuiID id = GImGui->HoveredId) places[id].push_back({x, y});
       }
     return places;
   }
   /// The middle of the widget with this path of IDs.
-  ImVec2 place_of(std::initializer_list<const char*> path, std::optional<int> number = {}) {
-    ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
-    ImGuiID id = panel->ID;
+  ImVec2 place_of(std::initializer_list<const char*> path, std::optional<int> number = {},
+                  const char* window = "###panel") {
+    ImGuiID id = ImGui::FindWindowByName(window)->ID;
     const char* last = *(path.end() - 1);
     for (const char* part : path) {
       if (part == last && number) id = ImHashData(&*number, sizeof *number, id);
       id = ImHashStr(part, 0, id);
     }
-    const auto all = widgets();
+    const auto all = widgets(window);
     const auto found = all.find(id);
     if (found == all.end()) {
       ADD_FAILURE() << "there is no " << last;
@@ -157,9 +162,10 @@ TEST_F(Panels, SlicesAndCutsHaveTheirOwnBoxes) {
 
 TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
   ImGuiIO& io = ImGui::GetIO();
+  const ImVec2 field = place_of({"Surfaces", "##isovalue"}, 0);
   const auto type = [&](const char* text) {
     io.KeyCtrl = true;
-    click(place_of({"Surfaces", "##isovalue"}, 0));  // selects all
+    click(field);  // selects all
     io.KeyCtrl = false;
     for (; *text != 0; ++text) {
       io.AddInputCharacter(static_cast<unsigned>(*text));
@@ -172,7 +178,7 @@ TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
   press(ImGuiKey_Enter);
   EXPECT_EQ(state_.settings.surfaces[0].isovalue, 150.5);
   type("99");
-  click({600, 2000});  // beside the panel
+  click({600, 1350});  // beside the panel
   EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
   type("12");
   press(ImGuiKey_Escape);
@@ -200,8 +206,25 @@ TEST_F(Panels, MessagesAreNotBehindThePanel) {
   EXPECT_GT(messages->FocusOrder, panel->FocusOrder);
 }
 
+TEST_F(Panels, AConversionCanBeCancelled) {
+  const auto file = dir_ / "a_2048x2048x2048_uint8.raw";
+  dir_.write("a_2048x2048x2048_uint8.raw", "");
+  std::filesystem::resize_file(file, std::uintmax_t{1} << 33);
+  state_.import = std::make_unique<ImportJob>(file, dir_ / "a.zarr", ConvertOptions{});
+  for (int i = 0; i < 3; ++i) frame();
+  const ImGuiWindow* popup =
+      GImGui->OpenPopupStack.empty() ? nullptr : GImGui->OpenPopupStack[0].Window;
+  ASSERT_NE(popup, nullptr);
+  click(place_of({"Cancel"}, {}, popup->Name));
+  while (!state_.import->state().finished) frame();
+  EXPECT_TRUE(state_.import->state().cancelled);
+  state_.import.reset();
+  frame();
+  EXPECT_FALSE(std::filesystem::exists(dir_ / "a.zarr"));
+}
+
 TEST_F(Panels, ThePanelStaysWithinReach) {
-  ImGui::SetWindowPos("###panel", {500, 1200});
+  ImGui::SetWindowPos("###panel", {500, 1100});
   frame();
   ImGui::GetIO().DisplaySize = {300, 200};
   frame();
