@@ -13,6 +13,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// Enough for the headers of two indices and what their arrays are rounded up by.
+constexpr std::uint64_t kHeaders = 1 << 12;
+
+std::string size_text(std::uint64_t bytes) {
+  const double kib = static_cast<double>(bytes) / 1024;
+  return kib < 1024 ? fmt::format("{:.1f} KiB", kib) : fmt::format("{:.0f} MiB", kib / 1024);
+}
+
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -72,7 +80,7 @@ std::uint64_t NodeSearch::building_bytes(std::uint64_t nodes) {
   std::uint64_t most = 0;
   for (const IndexKind kind : kIndexKinds) most = std::max(most, building_bytes(kind, nodes));
   // The one before answers until then, and has given back what it was built with.
-  return most + nodes * 25;
+  return most + nodes * 25 + kHeaders;
 }
 
 std::vector<std::byte> NodeSearch::build(IndexKind kind) const {
@@ -118,10 +126,8 @@ void NodeSearch::build_what_is_wanted() {
     const std::uint64_t need = building_bytes(kind, state_.nodes) + state_.bytes;
     std::string refused;
     if (need > most_bytes_) {
-      constexpr double mib = 1 << 20;
-      refused = fmt::format("the {} index of {} nodes takes {:.0f} MiB to build, of {:.0f}",
-                            name_of(kind), state_.nodes, static_cast<double>(need) / mib,
-                            static_cast<double>(most_bytes_) / mib);
+      refused = fmt::format("the {} index of {} nodes takes {} to build, of {}", name_of(kind),
+                            state_.nodes, size_text(need), size_text(most_bytes_));
     } else {
       lock.unlock();
       const auto start = Clock::now();

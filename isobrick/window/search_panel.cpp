@@ -22,7 +22,8 @@ std::string size_text(std::uint64_t bytes) {
 void draw_search_panel(ViewerState& state) {
   NodeSearch& search = state.picture->scene().search();
   const NodeSearch::State now = search.state();
-  int chosen = static_cast<int>(state.index);
+  // What was refused is not what answers; the next store may have room for it.
+  int chosen = static_cast<int>(now.refused.empty() ? state.index : now.kind);
   ImGui::SetNextItemWidth(130);
   if (ImGui::Combo("finds active nodes", &chosen, kNames.data(), static_cast<int>(kNames.size()))) {
     state.index = kIndexKinds[chosen];

@@ -158,21 +158,23 @@ TEST(NodeSearch, RefusesWhatDoesNotFit) {
   search.wait();
   EXPECT_EQ(search.state().kind, IndexKind::linear);
   EXPECT_NE(search.state().refused.find("kdtree"), std::string::npos);
+  EXPECT_NE(search.state().refused.find("of 2.0 KiB"), std::string::npos) << search.state().refused;
   search.use(IndexKind::linear);
   search.wait();
   EXPECT_EQ(search.state().refused, "");
 }
 
 TEST(NodeSearch, ItsMemoryIsTakenFromThatOfBricks) {
-  EXPECT_EQ(NodeSearch::building_bytes(0), 0u);
-  const auto source = waves<float>({330, 150, 200}, 0.37, 0.001);
-  const auto tree = std::make_shared<const NodeTree>(*source);
-  const auto nodes = static_cast<std::uint64_t>(volume(tree->grid().level(0).nodes));
-  NodeSearch search(tree, ScalarType::f32, NodeSearch::building_bytes(nodes), {});
-  for (const IndexKind kind : {IndexKind::quadtree, IndexKind::interval, IndexKind::kdtree}) {
-    search.use(kind);
-    search.wait();
-    EXPECT_EQ(search.state().kind, kind) << search.state().refused;
+  for (const Int3 extent : {Int3{330, 150, 200}, Int3{40, 40, 40}}) {
+    const auto source = waves<float>(extent, 0.37, 0.001);
+    const auto tree = std::make_shared<const NodeTree>(*source);
+    const auto nodes = static_cast<std::uint64_t>(volume(tree->grid().level(0).nodes));
+    NodeSearch search(tree, ScalarType::f32, NodeSearch::building_bytes(nodes), {});
+    for (const IndexKind kind : kIndexKinds) {
+      search.use(kind);
+      search.wait();
+      EXPECT_EQ(search.state().kind, kind) << search.state().refused;
+    }
   }
 }
 
