@@ -43,10 +43,24 @@ Vec3d triple(std::string_view part, std::string_view text) {
           number(part, text.substr(second + 1))};
 }
 
+bool has_direction(Vec3d v) {
+  const double size = length(v);
+  return size > 0 && std::isfinite(size);
+}
+
 Vec3d direction(std::string_view part, std::string_view text) {
   const Vec3d v = triple(part, text);
-  if (v == Vec3d{}) throw UsageError(fmt::format("'{}' in a camera is no direction", part));
+  if (!has_direction(v)) throw UsageError(fmt::format("'{}' in a camera is no direction", part));
   return v;
+}
+
+/// `back`: from the target towards the eye. Up as it is when nobody says so gives way.
+void check_view(const CameraRequest& request, Vec3d back) {
+  if (!has_direction(back))
+    throw UsageError("a camera's eye is where its target is; one of them has to be elsewhere");
+  if (request.up != CameraRequest().up &&
+      length(cross(unit(request.up, {}), unit(back, {}))) < 1e-6)
+    throw UsageError("a camera cannot look along its up; give another or leave it out");
 }
 
 void take(CameraRequest& request, std::string_view part) {
@@ -103,12 +117,15 @@ CameraRequest parse_camera(std::string_view text) {
   }
   if (request.eye && request.from)
     throw UsageError("a camera has an eye or a direction that it looks from, not both");
+  if (request.from) check_view(request, *request.from);
+  if (request.eye && request.target) check_view(request, *request.eye - *request.target);
   return request;
 }
 
 Camera make_camera(const CameraRequest& request, Vec3d lo, Vec3d hi, double aspect) {
   const WorldBall ball = ball_around(lo, hi);
   const Vec3d target = request.target.value_or(ball.centre);
+  if (request.eye) check_view(request, *request.eye - target);
   const Vec3d from = unit(request.from.value_or(direction_of(request)), {0, -1, 0});
   Camera camera(request.eye.value_or(target + from * ball.radius), target, request.up);
   camera.field_of_view = request.field_of_view;

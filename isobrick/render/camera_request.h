@@ -26,7 +26,7 @@ struct CameraRequest {
 CameraRequest parse_camera(std::string_view text);
 
 /// The camera for a scene and a picture of width / height `aspect`. With an eye the
-/// zoom narrows the field of view.
+/// zoom narrows the field of view. Throws UsageError for an eye at the target.
 Camera make_camera(const CameraRequest& request, Vec3d lo, Vec3d hi, double aspect);
 
 }  // namespace isobrick

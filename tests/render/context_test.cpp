@@ -99,8 +99,16 @@ TEST(CameraText, Parts) {
 TEST(CameraText, NonsenseIsRefused) {
   for (const char* text :
        {"", "azimut=3", "azimuth", "azimuth=x", "zoom=0", "zoom=-1", "fov=180", "up=0:0:0",
-        "up=1:2", "eye=1:2:3,from=1:0:0", "elevation=91", "azimuth=30,", "azimuth=nan"})
-    message_of([&] { parse_camera(text); });
+        "up=1:2", "eye=1:2:3,from=1:0:0", "elevation=91", "azimuth=30,", "azimuth=nan",
+        "eye=1:2:3,target=1:2:3", "up=0:1:0,eye=1:2:3,target=1:9:3", "from=1:1:0,up=-2:-2:0",
+        "from=1e-200:0:0"})
+    message_of<UsageError>([&] { parse_camera(text); });
+  // Where the scene's centre is the target.
+  const CameraRequest centre = parse_camera("eye=0:0:0");
+  message_of<UsageError>([&] { make_camera(centre, {-1, -1, -1}, {1, 1, 1}, 1); });
+  // From above something else is up.
+  const Camera above = make_camera(parse_camera("from=0:0:1"), {-1, -1, -1}, {1, 1, 1}, 1);
+  EXPECT_NEAR(above.back.z, 1, 1e-12);
 }
 
 TEST(CameraMoves, OrbitKeepsDistanceAndAxes) {
