@@ -23,6 +23,9 @@ std::unique_ptr<MeshFile> open_mesh_file(const std::string& path) {
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   if (extension == ".stl") return read_stl(path, file);
   if (extension == ".obj") return read_obj(path, file);
+  if (extension == ".ply" || extension == ".glb")
+    throw Error(fmt::format("'{}' is damaged: its {} bytes do not begin as those of {} files do",
+                            path, bytes.size(), extension));
   throw UsageError(
       fmt::format("'{}' is no mesh that can be drawn: neither PLY nor GLB, and not named .stl or "
                   ".obj",

@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "isobrick/core/error.h"
 #include "isobrick/render/gl_context.h"
 
 namespace isobrick {
 namespace {
 
 struct Opened {
+  std::string path;
   std::unique_ptr<MeshFile> file;
   MeshStyle style;
 };
@@ -38,7 +42,7 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
   std::vector<Opened> meshes;
   std::uint64_t faces = 0;
   for (const PicturedMesh& mesh : request.meshes) {
-    meshes.push_back({open_mesh_file(mesh.path), mesh.style});
+    meshes.push_back({mesh.path, open_mesh_file(mesh.path), mesh.style});
     const MeshFileInfo info = meshes.back().file->info();
     picture.vertices += info.vertices;
     faces += info.faces;
@@ -57,12 +61,16 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
                  request.height, request.settings);
   const Vec3d origin = (picture.lo + picture.hi) * 0.5;
   progress.begin("draw", faces * sizeof(Triangle));
-  for (const Opened& mesh : meshes)
+  for (const Opened& mesh : meshes) {
+    const std::uint64_t before = picture.triangles;
     mesh.file->read(origin, [&](const MeshChunk& chunk, Vec3d from) {
       renderer.draw(chunk, mesh.style, from);
       picture.triangles += chunk.triangles.size();
       progress.advance(chunk.triangles.size_bytes());
     });
+    if (picture.triangles == before)
+      throw Error(fmt::format("'{}' has no triangles to draw; is it whole?", mesh.path));
+  }
   progress.end();
   if (request.box) renderer.draw_box(picture.lo, picture.hi, {0.36f, 0.40f, 0.46f});
   if (request.axes) renderer.draw_axes();

@@ -34,7 +34,7 @@ struct MeshPicture {
 };
 
 /// Draws mesh files off-screen; memory is that of the picture and of a batch of triangles.
-/// Throws as open_mesh_file, GlContext and Renderer do.
+/// Throws Error for a file without triangles, and as open_mesh_file, GlContext and Renderer do.
 MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progress);
 
 }  // namespace isobrick

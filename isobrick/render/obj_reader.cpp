@@ -98,6 +98,8 @@ class ObjTriangles final : public TriangleReader {
       corners_.push_back(vertex > 0 ? static_cast<std::uint64_t>(vertex) - 1
                                     : vertices_ + static_cast<std::uint64_t>(vertex));
     }
+    if (corners_.size() < 3)
+      text_.fail(fmt::format("a face of {} corners is none", corners_.size()));
   }
 
   std::string path_;

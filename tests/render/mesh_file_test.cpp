@@ -4,12 +4,15 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 
 #include "isobrick/meshes/glb_sink.h"
 #include "isobrick/meshes/obj_sink.h"
 #include "isobrick/meshes/ply_sink.h"
 #include "isobrick/meshes/stl_sink.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/render/mesh_picture.h"
 #include "tests/io/temp_dir.h"
 #include "tests/meshes/test_meshes.h"
 
@@ -152,7 +155,11 @@ TEST(MeshFile, DamageIsSaid) {
       {"index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"},
       {"back.obj", "v 0 0 0\nf -1 -2 -3\n"},
       {"zero.obj", "v 0 0 0\nf 0 1 1\n"},
+      {"corners.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2"},
       {"short.glb", "glTF"},
+      {"empty.ply", ""},
+      {"empty.glb", ""},
+      {"empty.stl", ""},
   };
   for (const auto& [name, bytes] : files) {
     const std::string path = dir.write(name, bytes);
@@ -160,6 +167,47 @@ TEST(MeshFile, DamageIsSaid) {
     EXPECT_TRUE(contains(message, name)) << message;
   }
   message_of([&] { open_mesh_file(dir.write("a.txt", "hello")); });
+}
+
+TEST(MeshFile, HalfOfOneIsSaid) {
+  const TempDir dir;
+  PlySink ply(dir / "a.ply", false);
+  write(ply);
+  GlbSink glb(dir / "a.glb", false);
+  write(glb);
+  StlSink stl(dir / "a.stl", false);
+  write(stl);
+  for (const char* name : {"a.ply", "a.glb", "a.stl"}) {
+    const auto size = std::filesystem::file_size(dir / name);
+    for (const std::uintmax_t left : {size - 1, size - 40, size / 2, size / 9, size / 90}) {
+      std::filesystem::resize_file(dir / name, left);
+      SCOPED_TRACE(left);
+      EXPECT_TRUE(contains(message_of<Error>([&] { read_all(dir / name); }), name));
+    }
+  }
+}
+
+TEST(MeshFile, WithoutTrianglesIsNoPicture) {
+  if (!GlContext::available()) GTEST_SKIP() << "no OpenGL 4.5 without a window here";
+  const TempDir dir;
+  dir.write("empty.obj", "");
+  dir.write("vertices.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  dir.write("whole.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const TestMesh none;
+  const auto write_none = [&](MeshSink&& sink) {
+    sink.begin({false, {0, 0, 0}, {0, 0, 0}});
+    sink.write(none.chunk());
+    sink.finish();
+  };
+  write_none(PlySink(dir / "none.ply", false));
+  write_none(StlSink(dir / "none.stl", false));
+  write_none(GlbSink(dir / "none.glb", false));
+  for (const char* name : {"empty.obj", "vertices.obj", "none.ply", "none.stl", "none.glb"}) {
+    MeshPictureRequest request{.width = 32, .height = 32};
+    for (const char* mesh : {"whole.obj", name}) request.meshes.push_back({dir / mesh, {}});
+    NoProgress progress;
+    EXPECT_TRUE(contains(message_of<Error>([&] { draw_mesh_files(request, progress); }), name));
+  }
 }
 
 std::string glb(const std::string& json, std::string binary) {
