@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/file_error.h"
 #include "tools/console.h"
 #include "tools/options.h"
 
@@ -93,7 +94,7 @@ int run(Program& program, int argc, char** argv) {
     print_error(name_of(parsed(program)), "out of memory; a smaller --memory may help");
     return 1;
   } catch (const std::exception& error) {
-    print_error(name_of(parsed(program)), error.what());
+    print_error(name_of(parsed(program)), what_of(error));
     return 1;
   }
 }

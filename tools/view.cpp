@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/core/error.h"
 #include "isobrick/io/output_file.h"
 #include "isobrick/render/camera_request.h"
 #include "isobrick/render/gl_context.h"
@@ -50,11 +51,17 @@ nlohmann::ordered_json to_json(const NodeSearch::State& search) {
           {"active_nodes", search.active},         {"nodes", search.nodes}};
 }
 
+void make_folder(const std::string& folder) {
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure) throw system_error("create the folder", folder, failure.value());
+}
+
 /// The pictures that are asked for, of which none may be there already.
 std::vector<Shot> shots_of(const Arguments& arguments, const Camera& camera) {
   std::vector<Shot> shots;
   if (!arguments.turntable.empty()) {
-    std::filesystem::create_directories(arguments.turntable);
+    make_folder(arguments.turntable);
     shots = turntable(camera, arguments.picture.camera.up, arguments.frames, arguments.turntable);
   }
   if (!arguments.screenshot.empty()) shots.insert(shots.begin(), {arguments.screenshot, camera});
@@ -108,6 +115,10 @@ int draw(const Arguments& arguments, Console& console) {
   const Drawn drawn = draw_shots(picture, shots, arguments.picture.size, settings, arguments.force,
                                  console.progress());
   for (const std::string& message : drawn.damage) console.note(message);
+  if (drawn.limited_by_budget)
+    console.note(
+        "coarser than --pixel-error asks for: there is no room for more triangles; a larger "
+        "--memory or --gpu-memory makes it finer");
   nlohmann::ordered_json isovalues = nlohmann::ordered_json::array();
   for (const SurfaceSettings& surface : settings.surfaces) isovalues.push_back(surface.isovalue);
   const std::string text =
@@ -139,6 +150,8 @@ int draw(const Arguments& arguments, Console& console) {
 int run(const Arguments& arguments, Console& console) {
   if (!arguments.screenshot.empty() || !arguments.turntable.empty())
     return draw(arguments, console);
+  // One that cannot be opened is said before anything is about windows.
+  static_cast<void>(StoreReader(arguments.store));
   WindowOptions options;
   options.width = arguments.picture.size.width;
   options.height = arguments.picture.size.height;

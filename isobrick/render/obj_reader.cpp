@@ -109,11 +109,18 @@ class ObjTriangles final : public TriangleReader {
   std::size_t corner_ = 1;
 };
 
+std::filesystem::path temporary_folder() {
+  std::error_code failure;
+  std::filesystem::path folder = std::filesystem::temp_directory_path(failure);
+  if (failure)
+    throw Error("there is no folder for temporary files; set TMPDIR to one: " + failure.message());
+  return folder;
+}
+
 /// Vectors in a nameless file.
 class VectorFile {
  public:
-  VectorFile()
-      : out_(open_scratch_beside((std::filesystem::temp_directory_path() / "isobrick").string())) {}
+  VectorFile() : out_(open_scratch_beside((temporary_folder() / "isobrick").string())) {}
   void add(Vec3f v) {
     out_.append(std::as_bytes(std::span(&v, 1)));
     ++count_;

@@ -8,6 +8,7 @@
 
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
+#include "isobrick/core/file_error.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
 
@@ -71,7 +72,7 @@ void ImportJob::run() {
   } catch (const Cancelled&) {
     cancelled = true;
   } catch (const std::exception& e) {
-    failure = e.what();
+    failure = what_of(e);
   }
   // A conversion keeps what it has so that it can be resumed; a cancelled drop is not.
   std::error_code ignored;

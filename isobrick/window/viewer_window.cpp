@@ -16,6 +16,7 @@
 
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
+#include "isobrick/core/file_error.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/render/vectors.h"
 #include "isobrick/window/panels.h"
@@ -143,7 +144,7 @@ void ViewerWindow::open(const std::filesystem::path& path) {
     state_.bookmarks = std::make_unique<Bookmarks>(
         options_.bookmarks.empty() ? Bookmarks::default_file() : options_.bookmarks, path);
   } catch (const std::exception& e) {
-    state_.say(e.what());
+    state_.say(what_of(e));
   }
   glfwSetWindowTitle(window_, fmt::format("{} - Isobrick", path.filename().string()).c_str());
   // The next store is seen whole and with its own isovalue.
@@ -161,7 +162,7 @@ void ViewerWindow::drop(const std::filesystem::path& path) {
     options.threads = options_.budgets.threads;
     state_.import = std::make_unique<ImportJob>(path, store_for(path), options);
   } catch (const std::exception& e) {
-    state_.say(e.what());
+    state_.say(what_of(e));
   }
 }
 

@@ -194,6 +194,22 @@ TEST_F(BadInput, AFolderThatIsNotThereIsNamed) {
                  {"cannot create", "no/such"});
 }
 
+// The standard library's own words for it are none of ours.
+TEST_F(BadInput, APathThatCannotBeOneIsNamed) {
+  const std::string store = make_store("a"), name = path(std::string(300, 'n'));
+  for (const Arguments& arguments :
+       {Arguments{"info", name}, Arguments{"verify", name}, Arguments{"export", name, path("b")},
+        Arguments{"extract", name, "--isovalue", "1", "-o", path("b.ply")},
+        Arguments{"extract", store, "--isovalue", "127.5", "-o", name + ".pvtp"},
+        Arguments{"convert", name, path("b.zarr")},
+        Arguments{"synth", "sphere", name + ".zarr", "--dims", "9,9,9", "--type", "u8"}}) {
+    const Outcome outcome = run(arguments);
+    expect_refused(outcome, 1, {"cannot ", "nnn", "File name too long"});
+    EXPECT_EQ(outcome.err.find("filesystem"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(files(), Arguments{"a.zarr"});
+}
+
 TEST_F(BadInput, FormatsOfMeshes) {
   const std::string store = make_store("a");
   const std::vector<std::string> names = files();
