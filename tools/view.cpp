@@ -159,9 +159,12 @@ int run(const Arguments& arguments, Console& console) {
   options.index = arguments.index;
   options.camera = arguments.picture.camera;
   options.settings = settings_of(arguments);
-  ViewerWindow window(options);
-  window.open(arguments.store);
-  window.run();
+  {
+    ViewerWindow window(options);
+    window.open(arguments.store);
+    window.run();
+  }  // a conversion that still ran has left nothing
+  if (const int signal = interrupting_signal(); signal != 0) throw Interrupted(signal);
   console.result({{"command", "view"}, {"store", arguments.store}}, "");
   return 0;
 }

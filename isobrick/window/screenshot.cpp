@@ -18,6 +18,14 @@ std::vector<Shot> turntable(Camera camera, Vec3d vertical, int frames, const std
   return shots;
 }
 
+std::filesystem::path free_name(const std::filesystem::path& file) {
+  std::filesystem::path free = file;
+  for (int number = 2; std::filesystem::exists(std::filesystem::symlink_status(free)); ++number)
+    free = file.parent_path() /
+           fmt::format("{}-{}{}", file.stem().string(), number, file.extension().string());
+  return free;
+}
+
 void write_picture(const Renderer& renderer, const std::string& file, bool force) {
   if (!renderer.has_picture()) throw Error("there is no picture yet");
   const std::vector<std::uint8_t> rgb = without_alpha(renderer.read_pixels());

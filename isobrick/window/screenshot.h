@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,9 @@ struct Shot {
 /// A full turn of the camera in equal steps about a vertical through its target, as
 /// FOLDER/0000.png and so on.
 std::vector<Shot> turntable(Camera camera, Vec3d vertical, int frames, const std::string& folder);
+
+/// `file`, or where it is taken its name with -2, -3 and so on behind.
+std::filesystem::path free_name(const std::filesystem::path& file);
 
 /// Writes the renderer's last finished picture as a PNG. Throws Error when there is none; see
 /// OutputFile for what else it may throw.

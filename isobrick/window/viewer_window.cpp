@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "isobrick/bricks/metadata_files.h"
+#include "isobrick/core/cancel.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"
 #include "isobrick/render/gl_context.h"
@@ -205,8 +206,9 @@ void ViewerWindow::handle_requests() {
 
 void ViewerWindow::save_picture(const std::filesystem::path& file) {
   try {
-    write_picture(state_.picture->renderer(), file.string(), true);
-    state_.say(fmt::format("wrote '{}'", std::filesystem::absolute(file).string()));
+    const std::filesystem::path free = free_name(file);
+    write_picture(state_.picture->renderer(), free.string(), false);
+    state_.say(fmt::format("wrote '{}'", std::filesystem::absolute(free).string()));
   } catch (const std::exception& e) {
     state_.say(e.what());
   }
@@ -369,7 +371,7 @@ bool ViewerWindow::step(double most_seconds) {
 }
 
 void ViewerWindow::run() {
-  while (step()) {
+  while (!cancel_requested() && step()) {
   }
 }
 

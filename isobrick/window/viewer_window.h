@@ -44,7 +44,7 @@ class ViewerWindow {
   /// milliseconds while meshes come in), and shows the next picture. False once the window is
   /// closed.
   bool step(double most_seconds = 0.1);
-  /// Until the window is closed.
+  /// Until the window is closed, or an end is asked for (core/cancel.h).
   void run();
 
   ViewerState& state() { return state_; }

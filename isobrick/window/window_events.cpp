@@ -158,7 +158,12 @@ void ViewerWindow::Events::on_press(int key, int mods) {
       if (!state.settings.surfaces.empty())
         state.selected = (state.selected + 1) % state.settings.surfaces.size();
       return;
-    case GLFW_KEY_ESCAPE: state.requests.close = true; return;
+    case GLFW_KEY_ESCAPE:
+      if (state.import != nullptr)
+        state.import->cancel();
+      else
+        state.requests.close = true;
+      return;
     case GLFW_KEY_H: state.panels = !state.panels; return;
     case GLFW_KEY_R: state.requests.fit = true; return;
     case GLFW_KEY_F: next_mode(); return;

@@ -1,0 +1,21 @@
+#include "isobrick/window/screenshot.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/io/temp_dir.h"
+
+namespace isobrick {
+namespace {
+
+TEST(FreeName, IsThatOfNoFile) {
+  const TempDir dir;
+  EXPECT_EQ(free_name(dir / "a.png"), dir / "a.png");
+  dir.write("a.png", "");
+  EXPECT_EQ(free_name(dir / "a.png"), dir / "a-2.png");
+  std::filesystem::create_symlink("nowhere", dir / "a-2.png");
+  EXPECT_EQ(free_name(dir / "a.png"), dir / "a-3.png");
+  EXPECT_EQ(free_name("no such file.png"), "no such file.png");
+}
+
+}  // namespace
+}  // namespace isobrick
