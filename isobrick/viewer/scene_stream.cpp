@@ -241,6 +241,8 @@ StreamCounters SceneStream::counters() const {
   c.device_bytes = shared_->meshes.device_bytes();
   c.queue = shared_->jobs.size();
   c.working = shared_->running.size();
+  c.triangles_made = shared_->triangles_made;
+  c.blocks_made = shared_->blocks_made;
   if (shared_->blocks_made >= kMeasuredBlocks)
     c.triangles_per_block =
         static_cast<double>(shared_->triangles_made) / static_cast<double>(shared_->blocks_made);

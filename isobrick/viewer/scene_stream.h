@@ -39,8 +39,9 @@ struct StreamCounters {
   std::uint64_t device_meshes_made = 0;  ///< of meshes_made, by a device
   std::uint64_t device_bytes = 0;        ///< of meshes on a device
   std::string device_failure;            ///< why the device makes no more meshes; or empty
-  double triangles_per_block = 0;        ///< of the meshes made; 0: too few yet
-  bool mesh_budget_full = false;         ///< meshes are not made for lack of room
+  std::uint64_t triangles_made = 0, blocks_made = 0;  ///< by all meshes, and in such blocks
+  double triangles_per_block = 0;                     ///< of the meshes made; 0: too few yet
+  bool mesh_budget_full = false;                      ///< meshes are not made for lack of room
 };
 
 /// Makes the meshes of cuts on threads of its own, the most urgent first, and says

@@ -1,6 +1,9 @@
 #include "isobrick/window/isovalue_facts.h"
 
+#include <utility>
+
 #include "isobrick/core/error.h"
+#include "isobrick/core/file_error.h"
 #include "isobrick/core/progress.h"
 
 namespace isobrick {
@@ -34,8 +37,11 @@ IsovalueFacts::IsovalueFacts(std::shared_ptr<const StoreReader> store)
           std::make_shared<const Histogram>(isobrick::histogram(*store, progress, kBins));
       const std::scoped_lock lock(mutex_);
       histogram_ = std::move(counted);
-    } catch (const std::exception&) {
-      // Stopped, or a damaged brick: the picture says so where it is seen.
+    } catch (const Cancelled&) {
+      // Nobody waits for it any more.
+    } catch (const std::exception& error) {
+      const std::scoped_lock lock(mutex_);
+      failure_ = what_of(error);
     }
   });
 }
@@ -48,6 +54,21 @@ IsovalueFacts::~IsovalueFacts() {
 std::shared_ptr<const Histogram> IsovalueFacts::histogram() const {
   const std::scoped_lock lock(mutex_);
   return histogram_;
+}
+
+std::string IsovalueFacts::take_failure() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(failure_, {});
+}
+
+double IsovalueFacts::triangles(double isovalue, const StreamCounters& made) const {
+  const std::uint64_t blocks = counts_.active_blocks(isovalue);
+  double each = made.triangles_per_block;
+  // A small surface is measured once as much as all of it was made; until then as cuts guess.
+  if (each == 0 && made.blocks_made > 0 && made.blocks_made >= blocks)
+    each = static_cast<double>(made.triangles_made) / static_cast<double>(made.blocks_made);
+  if (each == 0) each = CutBudget().triangles_per_block;
+  return each * static_cast<double>(blocks);
 }
 
 }  // namespace isobrick

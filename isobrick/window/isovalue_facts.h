@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "isobrick/pipeline/histogram.h"
 #include "isobrick/viewer/isovalue_counts.h"
+#include "isobrick/viewer/scene_stream.h"
 
 namespace isobrick {
 
@@ -21,15 +23,20 @@ class IsovalueFacts {
 
   /// The histogram, once it is counted. Null before and when it failed.
   std::shared_ptr<const Histogram> histogram() const;
+  /// Why it failed, once; empty when it has not, or that was taken before.
+  std::string take_failure();
 
   /// Of level 0.
   const IsovalueCounts& counts() const { return counts_; }
+  /// About how many triangles level 0 has, as many a block as the meshes made so far.
+  double triangles(double isovalue, const StreamCounters& made) const;
 
  private:
   IsovalueCounts counts_;
   std::atomic<bool> stop_ = false;
   mutable std::mutex mutex_;
   std::shared_ptr<const Histogram> histogram_;
+  std::string failure_;
   std::thread thread_;
 };
 

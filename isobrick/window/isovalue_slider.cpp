@@ -52,14 +52,10 @@ std::string human_count(double n) {
 
 void tell(const ViewerState& state, double isovalue) {
   const IsovalueCounts& counts = state.facts->counts();
-  const double each = state.picture->scene().stream().counters().triangles_per_block;
-  const std::string triangles =
-      each > 0
-          ? fmt::format("about {} triangles\n",
-                        human_count(each * static_cast<double>(counts.active_blocks(isovalue))))
-          : "";
-  ImGui::SetTooltip("%s", fmt::format("{:.6g}\n{}in {} of {} bricks of level 0", isovalue,
-                                      triangles, counts.active_bricks(isovalue), counts.bricks())
+  const StreamCounters made = state.picture->scene().stream().counters();
+  ImGui::SetTooltip("%s", fmt::format("{:.6g}\nabout {} triangles\nin {} of {} bricks of level 0",
+                                      isovalue, human_count(state.facts->triangles(isovalue, made)),
+                                      counts.active_bricks(isovalue), counts.bricks())
                               .c_str());
 }
 

@@ -250,6 +250,8 @@ void ViewerWindow::settle_click() {
 
 /// Says once what cannot be shown.
 void ViewerWindow::tell_damage() {
+  if (const std::string why = state_.facts->take_failure(); !why.empty())
+    state_.say("the histogram cannot be counted: " + why);
   for (const std::string& message : state_.picture->state().damage) {
     if (told_damage_.size() > kMostTold) return;
     if (!told_damage_.insert(message).second) continue;

@@ -260,14 +260,18 @@ TEST_F(Window, SaysWhatIsDamaged) {
   until([&] { return rests(); });
   steps(3);
   ASSERT_FALSE(window.state().picture->state().damage.empty());
-  ASSERT_FALSE(window.state().messages.empty());
-  EXPECT_EQ(window.state().messages[0], window.state().picture->state().damage[0]);
+  const auto is_said = [&](const std::string& text) {
+    return std::any_of(window.state().messages.begin(), window.state().messages.end(),
+                       [&](const std::string& message) { return message.find(text) == 0; });
+  };
+  EXPECT_TRUE(is_said(window.state().picture->state().damage[0]));
+  until([&] { return is_said("the histogram cannot be counted: "); });
   const std::size_t said = window.state().messages.size();
   window.state().messages.clear();
   window.state().settings.edges = true;
   steps(5);
   EXPECT_TRUE(window.state().messages.empty()) << "said once";
-  EXPECT_LE(said, 4u);
+  EXPECT_LE(said, 5u);
 }
 
 TEST_F(Window, SurvivesOtherSizesAndNone) {

@@ -1,0 +1,79 @@
+#include "isobrick/window/isovalue_facts.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "tests/window/picture_test.h"
+
+namespace isobrick {
+namespace {
+
+bool comes(const std::function<bool()>& holds) {
+  for (int i = 0; i < 3000; ++i) {
+    if (holds()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+class Facts : public Picture {
+ protected:
+  void make_store(Int3 extent) {
+    NoProgress progress;
+    convert(*make_synth({.kind = SynthKind::sphere, .extent = extent}), dir_ / "store.zarr",
+            {.brick = 32}, progress);
+  }
+  std::shared_ptr<const StoreReader> store() {
+    return std::make_shared<const StoreReader>(dir_ / "store.zarr");
+  }
+};
+
+TEST_F(Facts, TellWhyThereIsNoHistogram) {
+  make_store({96, 96, 96});
+  IsovalueFacts whole(store());
+  EXPECT_TRUE(comes([&] { return whole.histogram() != nullptr; }));
+  EXPECT_EQ(whole.take_failure(), "");
+  damage_bricks();
+  IsovalueFacts damaged(store());
+  std::string why;
+  EXPECT_TRUE(comes([&] { return !(why = damaged.take_failure()).empty(); }));
+  EXPECT_TRUE(contains(why, "store.zarr")) << why;
+  EXPECT_EQ(damaged.histogram(), nullptr);
+  EXPECT_EQ(damaged.take_failure(), "") << "once";
+}
+
+TEST_F(Facts, ThereIsAlwaysAnEstimateOfTriangles) {
+  make_store({48, 48, 48});  // of 27 blocks
+  const IsovalueFacts facts(store());
+  const double iso = default_isovalue(ScalarType::u8);
+  const auto blocks = static_cast<double>(facts.counts().active_blocks(iso));
+  ASSERT_GT(blocks, 0);
+  StreamCounters made;
+  EXPECT_EQ(facts.triangles(iso, made), blocks * CutBudget().triangles_per_block);
+  made.blocks_made = 1;  // less than there are
+  made.triangles_made = 7;
+  EXPECT_EQ(facts.triangles(iso, made), blocks * CutBudget().triangles_per_block);
+  made.blocks_made = 100;
+  made.triangles_made = 20'000;
+  EXPECT_EQ(facts.triangles(iso, made), blocks * 200);
+  made.triangles_per_block = 300;
+  EXPECT_EQ(facts.triangles(iso, made), blocks * 300);
+  EXPECT_EQ(facts.triangles(1e9, made), 0);
+}
+
+TEST_F(Facts, AFewBlocksAreMeasured) {
+  open(SynthKind::sphere, {48, 48, 48});
+  settings_.pixel_error = 0.5f;  // the finest level
+  draw();
+  const IsovalueFacts facts(store());
+  const double iso = settings_.surfaces[0].isovalue;
+  const double told = facts.triangles(iso, picture_->scene().stream().counters());
+  const auto there = static_cast<double>(picture_->state().triangles);
+  EXPECT_NEAR(told, there, 0.3 * there);
+}
+
+}  // namespace
+}  // namespace isobrick
