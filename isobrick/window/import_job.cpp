@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,20 +12,11 @@
 #include "isobrick/core/file_error.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
+#include "isobrick/volumes/volume_format.h"
 
 namespace isobrick {
-namespace {
 
 namespace fs = std::filesystem;
-
-std::unique_ptr<VolumeSource> open_any(const fs::path& input, const ConvertOptions& options) {
-  VolumeRequest request;
-  if (is_zarr(input.string())) return open_store_source(input.string(), request, options.threads);
-  request.memory = options.memory;
-  return open_source(input.string(), request);
-}
-
-}  // namespace
 
 /// Tells the window how far it is, and throws where the window does not want it any more.
 class ImportJob::Reporter final : public Progress {
@@ -62,12 +54,28 @@ ImportJob::~ImportJob() {
   thread_.join();
 }
 
+std::unique_ptr<VolumeSource> ImportJob::open() {
+  VolumeRequest request;
+  const std::string input = input_.string();
+  if (is_zarr(input)) return open_store_source(input, request, options_.threads);
+  request.memory = options_.memory;
+  if (format_of_extension(input) == VolumeFormat::vdb)
+    request.grid = grid_to_show(read_vdb_header(input));
+  if (request.grid) {
+    const std::scoped_lock lock(mutex_);
+    state_.note =
+        fmt::format("'{}' has several grids; this is '{}' (others: isobrick convert --grid)",
+                    input_.filename().string(), *request.grid);
+  }
+  return open_source(input, request);
+}
+
 void ImportJob::run() {
   std::string failure;
   bool cancelled = false;
   try {
     Reporter reporter(*this);
-    const auto source = open_any(input_, options_);
+    const auto source = open();
     convert(*source, store_, options_, reporter);
   } catch (const Cancelled&) {
     cancelled = true;
@@ -86,6 +94,13 @@ void ImportJob::run() {
 ImportJob::State ImportJob::state() const {
   const std::scoped_lock lock(mutex_);
   return state_;
+}
+
+std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids) {
+  const auto found = std::find_if(grids.begin(), grids.end(),
+                                  [](const VdbGrid& grid) { return grid.value_type() == "float"; });
+  if (grids.size() < 2 || found == grids.end()) return std::nullopt;
+  return found->name;
 }
 
 fs::path store_for(const fs::path& input) {

@@ -4,11 +4,15 @@
 #include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "isobrick/pipeline/convert.h"
+#include "isobrick/volumes/vdb_header.h"
 
 namespace isobrick {
 
@@ -26,6 +30,7 @@ class ImportJob {
     bool finished = false;              ///< well, cancelled or not
     std::string failure;                ///< empty when all went well or was cancelled
     bool cancelled = false;
+    std::string note;  ///< beside what is converted
   };
   State state() const;
   void cancel() { cancel_ = true; }
@@ -36,6 +41,7 @@ class ImportJob {
  private:
   class Reporter;
   void run();
+  std::unique_ptr<VolumeSource> open();
 
   std::filesystem::path input_, store_;
   ConvertOptions options_;
@@ -44,6 +50,9 @@ class ImportJob {
   std::atomic<bool> cancel_ = false;
   std::thread thread_;  ///< last: it uses the others
 };
+
+/// The grid of a dropped OpenVDB file, where somebody would have to choose: the first of floats.
+std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids);
 
 /// Where a dropped file's store goes: beside it if its folder can be written to, else
 /// among temporary files; a name that is not taken.

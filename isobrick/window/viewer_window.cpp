@@ -176,6 +176,7 @@ void ViewerWindow::handle_import() {
   if (now.cancelled) return;
   if (!now.failure.empty()) return state_.say(now.failure);
   drop(store);
+  if (!now.note.empty()) state_.say(now.note);
 }
 
 void ViewerWindow::look_along(Vec3d direction) {

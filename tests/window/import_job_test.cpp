@@ -52,6 +52,22 @@ TEST(ImportJob, LeavesNothingWhenItIsCancelled) {
   EXPECT_EQ(dir.list().size(), 1u);
 }
 
+TEST(ImportJob, SaysHowRawFilesAreNamed) {
+  const TempDir dir;
+  dir.write("ramp.raw", ramp(1000));
+  const ImportJob job(dir / "ramp.raw", dir / "ramp.zarr", {});
+  EXPECT_TRUE(contains(finished(job).failure, "256x256x128_uint8.raw"));
+}
+
+TEST(ImportJob, TakesTheFirstGridOfFloats) {
+  const VdbGrid colour{.name = "colour", .type = "Tree_vec3s_5_4_3"},
+      density{.name = "density[0]", .type = "Tree_float_5_4_3"},
+      other{.name = "density[1]", .type = "Tree_float_5_4_3"};
+  EXPECT_EQ(grid_to_show({colour, density, other}), "density[0]");
+  EXPECT_EQ(grid_to_show({colour, colour}), std::nullopt);
+  EXPECT_EQ(grid_to_show({density}), std::nullopt) << "nobody has to choose";
+}
+
 TEST(StoreFor, TakesANameThatIsFree) {
   const TempDir dir;
   EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a.zarr");
