@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstring>
 #include <vector>
 
@@ -12,11 +13,16 @@
 namespace isobrick::gpu {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
+/// Meshes of all slots take half of that.
+constexpr std::chrono::milliseconds kAwake{1};
+
 /// With a layer of points on every side.
 constexpr std::size_t kAround = kGridPoints + 2,
                       kVertices = 3 * kGridRows * std::size_t{kGridPoints};
 /// Of a grid that is sent: both kinds of values, faces, places of all kinds, and what
-/// aligning takes.
+/// aligning takes. Stored samples and the values that are made of them take less.
 constexpr std::size_t kSent = 4 * (kAround * kAround * kAround + kGridRows * kGridPoints) +
                               4 * 6 * kGridRows + 3 * 20 * kAround + 32 * 64;
 
@@ -37,6 +43,11 @@ class Cutter {
   std::byte* data_;
   std::size_t used_ = 0;
 };
+
+/// The largest stored samples.
+constexpr std::size_t kLargestStored = 2;
+static_assert((4 + kLargestStored) * kAround * kAround * kAround + 3 * 12 * kAround + 32 * 64 <=
+              kSent);
 
 /// What the work on one grid takes on the device.
 constexpr std::size_t kSlotBytes =
@@ -119,8 +130,15 @@ struct GridBatch::Impl {
 
   Slot& at(int slot) { return slots[static_cast<std::size_t>(slot)]; }
 
+  /// Awake at first: where all cores are at work a thread that sleeps is woken late, when another
+  /// one's share of time is over, which takes milliseconds.
   void wait() {
     done.record(stream);
+    const auto end = Clock::now() + kAwake;
+    cudaError_t state = cudaErrorNotReady;
+    while (state == cudaErrorNotReady && Clock::now() < end) state = cudaEventQuery(done.get());
+    if (state != cudaErrorNotReady) return check(state);
+    (void)cudaGetLastError();  // that it was not ready is none
     done.wait();
   }
 
@@ -144,10 +162,15 @@ struct GridBatch::Impl {
              static_cast<std::size_t>(n[2]);
     };
     const std::size_t around = points(g.around_n);
-    there.around = stage(slot, g.around, around);
-    const bool within = g.values >= g.around && g.values < g.around + around;
-    there.values =
-        within ? there.around + (g.values - g.around) : stage(slot, g.values, points(g.n));
+    if (g.stored.samples != nullptr) {
+      const auto* samples = static_cast<const std::byte*>(g.stored.samples);
+      there.stored.samples = stage(slot, samples, around * size_of(g.stored.type));
+    } else {
+      there.around = stage(slot, g.around, around);
+      const bool within = g.values >= g.around && g.values < g.around + around;
+      there.values =
+          within ? there.around + (g.values - g.around) : stage(slot, g.values, points(g.n));
+    }
     for (int axis = 0; axis < 3; ++axis) {
       const auto n = static_cast<std::size_t>(g.around_n[axis]);
       there.place[axis] = stage(slot, g.place[axis], n);
@@ -159,6 +182,10 @@ struct GridBatch::Impl {
     for (CoarseFace& face : there.faces)
       if (face.values)
         face.values = stage(slot, face.values, static_cast<std::size_t>(face.n[0] * face.n[1]));
+    if (g.stored.samples == nullptr) return;
+    // Behind what is sent.
+    there.around = reinterpret_cast<const float*>(slot.sent + slot.used);
+    there.values = there.around + (g.shift[2] * g.plane + g.shift[1] * g.row + g.shift[0]);
   }
 
   GridBatchWork send_works(std::span<const GridMeshJob> jobs) {
@@ -172,6 +199,7 @@ struct GridBatch::Impl {
       work.triangle_room = job.place.triangle_count;
       batch.most_rows = std::max(batch.most_rows, work.grid.n[1] * work.grid.n[2]);
       batch.any_meets_coarser |= work.meets_coarser;
+      batch.any_stored |= work.grid.stored.samples != nullptr;
       sent_works[static_cast<std::size_t>(batch.count++)] = work;
     }
     check(cudaMemcpyAsync(works.data(), sent_works.data(), jobs.size() * sizeof(GridWork),
@@ -202,6 +230,7 @@ void GridBatch::make(std::span<const GridMeshJob> jobs) {
                           i.stream.get()));
   }
   const GridBatchWork batch = i.send_works(jobs);
+  launch_grid_values(batch, i.stream.get());
   launch_grid_count(batch, i.stream.get());
   launch_grid_mesh(batch, i.stream.get());
   i.wait();

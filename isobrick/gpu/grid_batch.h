@@ -46,7 +46,7 @@ class GridBatch {
   void stage(int slot, const GridView& grid);
 
   /// Finds the sizes of the meshes of staged grids and writes those that their places hold;
-  /// waits once, asleep.
+  /// waits once, awake for a millisecond and then asleep.
   void make(std::span<const GridMeshJob> jobs);
   /// Of a grid made last; valid until the slot is staged again.
   GridMeshSize size(int slot) const;

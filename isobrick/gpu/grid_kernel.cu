@@ -9,6 +9,8 @@
 namespace isobrick::gpu {
 namespace {
 
+/// That make the values of a grid.
+constexpr unsigned kBlocksOfValues = 32;
 constexpr int kThreads = 256, kWarps = kThreads / 32, kScanThreads = 1024;
 constexpr unsigned kAll = 0xffffffffu;
 
@@ -30,6 +32,30 @@ __device__ const GridWork& load_work(const GridWork* works, WorkStorage& storage
 
 __device__ std::uint64_t below(int count) {
   return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
+}
+
+template <class T>
+__device__ void make_values(const GridView& g) {
+  const int count = g.around_n[0] * g.around_n[1] * g.around_n[2];
+  const T* from = static_cast<const T*>(g.stored.samples);
+  // Of this grid alone: nothing else reads or writes there meanwhile.
+  auto* to = const_cast<float*>(g.around);
+  for (int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x); i < count;
+       i += static_cast<int>(gridDim.x * blockDim.x))
+    to[i] = point_value(from[i], g.stored.isovalue);
+}
+
+__global__ void __launch_bounds__(kThreads) make_values(const GridWork* works) {
+  __shared__ WorkStorage storage;
+  const GridView& g = load_work(works, storage).grid;
+  if (g.stored.samples == nullptr) return;
+  switch (g.stored.type) {
+    case ScalarType::u8: return make_values<std::uint8_t>(g);
+    case ScalarType::i8: return make_values<std::int8_t>(g);
+    case ScalarType::u16: return make_values<std::uint16_t>(g);
+    case ScalarType::i16: return make_values<std::int16_t>(g);
+    default: return;  // larger ones are not stored
+  }
 }
 
 /// The row that a warp is for, and its lane.
@@ -363,6 +389,13 @@ __global__ void __launch_bounds__(kThreads) emit_triangles(const GridWork* works
 }
 
 }  // namespace
+
+void launch_grid_values(const GridBatchWork& batch, cudaStream_t stream) {
+  if (!batch.any_stored) return;
+  make_values<<<dim3(kBlocksOfValues, static_cast<unsigned>(batch.count)), kThreads, 0, stream>>>(
+      batch.works);
+  check_launch("the values of grids");
+}
 
 void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream) {
   const auto grids = static_cast<unsigned>(batch.count);

@@ -52,8 +52,11 @@ struct GridBatchWork {
   int count = 0;
   int most_rows = 0;               ///< rows of points in the largest of them
   bool any_meets_coarser = false;  ///< whether any of them does
+  bool any_stored = false;         ///< whether any of them is of stored samples
 };
 
+/// Makes the values of grids that are of stored samples, first of all.
+void launch_grid_values(const GridBatchWork& batch, cudaStream_t stream);
 /// Finds the sizes of the meshes, into their `totals`.
 void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream);
 /// Writes the meshes that were counted, where there is room for them.

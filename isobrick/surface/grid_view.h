@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "isobrick/core/scalar.h"
 #include "isobrick/surface/cell_math.h"
 
 namespace isobrick {
@@ -16,6 +17,20 @@ struct CoarseFace {
   int n[2] = {0, 0};              ///< points along the face's two axes
 };
 
+/// What stands at a grid point: 0 is the surface. Exact enough in double that no sample changes
+/// sides.
+template <class T>
+ISOBRICK_HD inline float point_value(T sample, double isovalue) {
+  return static_cast<float>(static_cast<double>(sample) - isovalue);
+}
+
+/// The samples that a grid's values are made of, as a store has them.
+struct StoredPoints {
+  const void* samples = nullptr;  ///< in the order of GridView::around
+  ScalarType type = ScalarType::u8;
+  double isovalue = 0;
+};
+
 /// The points of a grid in a box of at most kGridPoints a side, whose surface at 0 is looked
 /// for: what both backends make a mesh of. A view; the arrays lie with who reads it. Point
 /// (x, y, z) stands at values[z · plane + y · row + x].
@@ -27,6 +42,9 @@ struct GridView {
   /// the volume has one; gradients are made of these. Point p is p + shift here, without gaps
   /// between rows.
   const float* around = nullptr;
+  /// Or, where no value on the border is replaced, what both are made of: then they are null, and
+  /// gpu::GridBatch makes them on the device.
+  StoredPoints stored;
   int around_n[3] = {0, 0, 0}, shift[3] = {0, 0, 0};
   /// Of each point of `around` along an axis: its place, and 1 / the distance between the
   /// points before and after it (itself at the ends).

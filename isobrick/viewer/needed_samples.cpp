@@ -1,7 +1,5 @@
 #include "isobrick/viewer/needed_samples.h"
 
-#include <algorithm>
-
 #include "isobrick/viewer/node_grid.h"
 
 namespace isobrick {
@@ -32,7 +30,7 @@ NeededSamples::NeededSamples(Box3 samples, const RangeTable& table, double isova
   for_each_point(blocks_, [&](Int3 b) {
     const ValueRange<double>& range = table.at(b);
     const bool needed = range.empty() || range.stabbed_by(isovalue) || beside(b, blocks_, coarser);
-    sides_.push_back(needed ? 0.0f : range.lo < isovalue ? -1.0f : 1.0f);
+    sides_.push_back(needed ? Side::needed : range.lo < isovalue ? Side::below : Side::above);
   });
 }
 
@@ -43,24 +41,9 @@ bool NeededSamples::any(Box3 part) const {
     const Int3 first = b * kBlockEdge;
     const Box3 around{first - Int3{kBefore, kBefore, kBefore},
                       first + Int3{kBehind, kBehind, kBehind}};
-    found |= sides_[i++] == 0 && !intersect(around, part).empty();
+    found |= sides_[i++] == Side::needed && !intersect(around, part).empty();
   });
   return found;
-}
-
-/// Those of the border take the side of the node's own block beside them.
-void NeededSamples::fill(Box3 part, float* to, Int3 to_extent) const {
-  const auto block = [&](int axis, Index p) {
-    return std::clamp(p / kBlockEdge, blocks_.lo[axis], blocks_.hi[axis] - 1);
-  };
-  const Int3 n = blocks_.extent();
-  for (Index z = part.lo.z; z < part.hi.z; ++z)
-    for (Index y = part.lo.y; y < part.hi.y; ++y) {
-      const Int3 row{blocks_.lo.x, block(1, y), block(2, z)};
-      const float* sides = &sides_[static_cast<std::size_t>(linear_index(row - blocks_.lo, n))];
-      float* out = to + ((z - part.lo.z) * to_extent.y + (y - part.lo.y)) * to_extent.x;
-      for (Index x = part.lo.x; x < part.hi.x; ++x) *out++ = sides[block(0, x) - blocks_.lo.x];
-    }
 }
 
 }  // namespace isobrick

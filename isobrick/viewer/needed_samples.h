@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -18,13 +19,32 @@ class NeededSamples {
 
   /// Whether any of `part` is needed, as the corner of a cell with a surface or for its gradient.
   bool any(Box3 part) const;
-  /// Writes values on the right side of 0 for samples of `part` that are not needed, to rows of
-  /// an array of that extent.
-  void fill(Box3 part, float* to, Int3 to_extent) const;
+  /// Writes `below` or `above`, whichever side they are on, for samples of `part` that are not
+  /// needed, to rows of an array of that extent.
+  template <class T>
+  void fill(Box3 part, T below, T above, T* to, Int3 to_extent) const;
 
  private:
   Box3 blocks_;
-  std::vector<float> sides_;  ///< of blocks: a value of its side; 0: needed
+  enum class Side : std::uint8_t { needed, below, above };
+  std::vector<Side> sides_;  ///< of blocks
 };
+
+/// Those of the border take the side of the node's own block beside them.
+template <class T>
+void NeededSamples::fill(Box3 part, T below, T above, T* to, Int3 to_extent) const {
+  const auto block = [&](int axis, Index p) {
+    return std::clamp(p / kBlockEdge, blocks_.lo[axis], blocks_.hi[axis] - 1);
+  };
+  const Int3 n = blocks_.extent();
+  for (Index z = part.lo.z; z < part.hi.z; ++z)
+    for (Index y = part.lo.y; y < part.hi.y; ++y) {
+      const Int3 row{blocks_.lo.x, block(1, y), block(2, z)};
+      const Side* sides = &sides_[static_cast<std::size_t>(linear_index(row - blocks_.lo, n))];
+      T* out = to + linear_index({0, y - part.lo.y, z - part.lo.z}, to_extent);
+      for (Index x = part.lo.x; x < part.hi.x; ++x)
+        *out++ = sides[block(0, x) - blocks_.lo.x] == Side::below ? below : above;
+    }
+}
 
 }  // namespace isobrick

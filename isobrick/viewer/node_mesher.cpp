@@ -26,9 +26,10 @@ struct NodeMesher::Impl {
   ResidentBricks& bricks;
   NodeSamples samples;
   NodeBorder border;
-  GridView view;                  ///< what is the same for all nodes
-  GridValues around, field;       ///< with a layer around for gradients; with neighbours' values
-  std::vector<double> places[3];  ///< of the points of `around`, level-0 index space
+  GridView view;             ///< what is the same for all nodes
+  GridValues around, field;  ///< with a layer around for gradients; with neighbours' values
+  std::vector<std::byte> stored_samples;  ///< instead of the values of `around`
+  std::vector<double> places[3];          ///< of the points of `around`, level-0 index space
   std::vector<float> inverse[3];
   GridExtractor extractor;
   MeshBuffer work;
@@ -84,17 +85,19 @@ struct NodeMesher::Impl {
     }
   }
 
-  /// The node as a grid, with `field` where neighbours are coarser.
-  GridView view_of(const NodeKey& key, bool coarser) {
+  /// The node as a grid, with `field` where neighbours are coarser. Of values, or of nothing yet.
+  GridView view_of(const NodeKey& key, bool coarser, bool values_too = true) {
     find_places(key.level);
     GridView v = view;
     const Box3 own = points(key);
     const GridValues& values = coarser ? field : around;
     const Int3 n = values.points.extent();
-    v.values = &values.at(own.lo);
+    if (values_too) {
+      v.values = &values.at(own.lo);
+      v.around = around.values.data();
+    }
     v.row = static_cast<int>(n.x);
     v.plane = static_cast<int>(n.x * n.y);
-    v.around = around.values.data();
     for (int axis = 0; axis < 3; ++axis) {
       v.n[axis] = static_cast<int>(own.extent()[axis]);
       v.around_n[axis] = static_cast<int>(around.points.extent()[axis]);
@@ -134,6 +137,22 @@ struct NodeMesher::Impl {
       if (!needed || needed->any(intersect(box, lattice.full_brick_box(b)))) found.push_back(b);
     });
     return found;
+  }
+
+  /// Whether a node's grid can be of stored samples: its points are samples, all its own, of types
+  /// that take less than values.
+  bool may_be_stored(const NodeKey& key, std::uint32_t coarser) const {
+    const ScalarType type = bricks.source().info().type;
+    return key.level == 0 && coarser == 0 && size_of(type) < sizeof(float);
+  }
+
+  GridView read_stored(const NodeKey& key, double isovalue, const Wanted& wanted) {
+    const std::optional<NeededSamples> needed = needed_of(key, isovalue, 0);
+    around.points = points_around(key);
+    samples.read_stored(around.points, wanted, stored_samples, needed ? &*needed : nullptr);
+    GridView v = view_of(key, false, false);
+    v.stored = {stored_samples.data(), bricks.source().info().type, isovalue};
+    return v;
   }
 
   GridView read(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted) {
@@ -182,7 +201,9 @@ NodeMesh NodeMesher::extract(const GridView& grid, NodeMesh mesh) {
 }
 
 GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coarser,
-                          const Wanted& wanted) {
+                          const Wanted& wanted, Form form) {
+  if (form == Form::stored_if_possible && impl_->may_be_stored(key, coarser))
+    return impl_->read_stored(key, isovalue, wanted);
   return impl_->read(key, isovalue, coarser, wanted);
 }
 

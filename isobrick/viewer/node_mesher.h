@@ -35,10 +35,14 @@ class NodeMesher {
   /// above. Throws Abandoned, DamageError and what else reading bricks throws.
   NodeMesh mesh(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
 
-  /// What that mesh is made of, for a device. Valid until the next call; throws the same.
-  GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
+  /// Whether a grid may hold samples as they are stored instead of values, which takes less time
+  /// and memory: for a device.
+  enum class Form : std::uint8_t { values, stored_if_possible };
+  /// What that mesh is made of. Valid until the next call; throws the same.
+  GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted,
+                Form form = Form::values);
 
-  /// The mesh of what grid() gave last. `mesh` says which it is.
+  /// The mesh of the values that grid() gave last. `mesh` says which it is.
   NodeMesh extract(const GridView& grid, NodeMesh mesh);
 
   /// Whether at least half of the bricks are there that hold a node's points and that the mesh

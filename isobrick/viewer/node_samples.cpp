@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <span>
+
+#include "isobrick/core/copy_box.h"
+#include "isobrick/surface/grid_view.h"
 
 namespace isobrick {
 namespace {
@@ -67,17 +71,14 @@ void NodeSamples::for_each_row(Int3 corner, Int3 edge, F&& f) {
 
 template <class T>
 void NodeSamples::copy_part(const std::byte* brick, Int3 corner, Int3 edge, double isovalue) {
-  const auto value = [&](T sample) {
-    return static_cast<float>(static_cast<double>(sample) - isovalue);
-  };
   for_each_row(corner, edge, [&](Index row, float* to, std::span<const Index> places) {
     const T* from = reinterpret_cast<const T*>(brick) + row - corner.x;
     const std::size_t n = places.size();
     if (places.back() - places.front() + 1 == static_cast<Index>(n)) {
       from += places.front();
-      for (std::size_t x = 0; x < n; ++x) to[x] = value(from[x]);
+      for (std::size_t x = 0; x < n; ++x) to[x] = point_value(from[x], isovalue);
     } else {
-      for (std::size_t x = 0; x < n; ++x) to[x] = value(from[places[x]]);
+      for (std::size_t x = 0; x < n; ++x) to[x] = point_value(from[places[x]], isovalue);
     }
   });
 }
@@ -93,6 +94,32 @@ Box3 NodeSamples::box() const {
   return box;
 }
 
+/// Of the bricks that lie in `box`: calls take(brick, samples) for those that are needed, skip(part
+/// of the box) for the others.
+template <class Take, class Skip>
+void NodeSamples::for_each_brick(int stored, Box3 box, const Wanted& wanted,
+                                 const NeededSamples* needed, Take&& take, Skip&& skip) {
+  const Lattice& lattice = bricks_.source().info().levels[static_cast<std::size_t>(stored)].lattice;
+  wanted_.clear();
+  for_each_point(lattice.bricks_of(box), [&](Int3 b) {
+    const Box3 part = intersect(box, lattice.full_brick_box(b));
+    if (needed == nullptr || needed->any(part))
+      wanted_.push_back(b);
+    else
+      skip(part);
+  });
+  bricks_.read_together(stored, wanted_, wanted);
+  // Threads at nodes beside each other want the same bricks: were each to wait for what another
+  // one is reading, all would read one brick after the other.
+  std::vector<Int3> busy;
+  for (const Int3 b : wanted_)
+    if (const auto brick = bricks_.get_unless_busy(stored, b, wanted))
+      take(b, *brick);
+    else
+      busy.push_back(b);
+  for (const Int3 b : busy) take(b, *bricks_.get(stored, b, wanted));
+}
+
 void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted,
                          const NeededSamples* needed) {
   const StoreInfo& info = bricks_.source().info();
@@ -105,33 +132,45 @@ void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted,
     const Int3 corner = b * edge;
     if (brick.empty())
       for_each_row(corner, edge, [&](Index, float* to, std::span<const Index> places) {
-        std::fill_n(to, places.size(), static_cast<float>(info.fill_value - isovalue));
+        std::fill_n(to, places.size(), point_value(info.fill_value, isovalue));
       });
     else
       visit_scalar(lattice.type, [&](auto tag) {
         copy_part<typename decltype(tag)::type>(brick.data(), corner, edge, isovalue);
       });
   };
-  wanted_.clear();
-  for_each_point(lattice.bricks_of(box), [&](Int3 b) {
-    const Box3 part = intersect(box, lattice.full_brick_box(b));
-    if (needed == nullptr || needed->any(part))
-      wanted_.push_back(b);
-    else
-      needed->fill(
-          part, &gathered_[static_cast<std::size_t>(linear_index(part.lo - box.lo, box.extent()))],
-          box.extent());
+  const auto skip = [&](Box3 part) {
+    const Index first = linear_index(part.lo - box.lo, box.extent());
+    needed->fill(part, -1.0f, 1.0f, gathered_.data() + first, box.extent());
+  };
+  for_each_brick(stored, box, wanted, needed, take, skip);
+}
+
+void NodeSamples::read_stored(Box3 points, const Wanted& wanted, std::vector<std::byte>& out,
+                              const NeededSamples* needed) {
+  const int stored = grid_.level(0).source;
+  const StoreInfo& info = bricks_.source().info();
+  const Lattice& lattice = info.levels[static_cast<std::size_t>(stored)].lattice;
+  visit_scalar(lattice.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    out.resize(static_cast<std::size_t>(volume(points.extent())) * sizeof(T));
+    const auto row_at = [&](Int3 p) {
+      return reinterpret_cast<T*>(out.data()) + linear_index(p - points.lo, points.extent());
+    };
+    const auto take = [&](Int3 b, const BrickSamples& brick) {
+      const Box3 all = lattice.full_brick_box(b), part = intersect(points, all);
+      if (!brick.empty())
+        return copy_box({brick.data(), all}, {out.data(), points}, part, sizeof(T));
+      for (Index z = part.lo.z; z < part.hi.z; ++z)
+        for (Index y = part.lo.y; y < part.hi.y; ++y)
+          std::fill_n(row_at({part.lo.x, y, z}), part.extent().x, static_cast<T>(info.fill_value));
+    };
+    const auto skip = [&](Box3 part) {
+      using Limits = std::numeric_limits<T>;
+      needed->fill(part, Limits::lowest(), Limits::max(), row_at(part.lo), points.extent());
+    };
+    for_each_brick(stored, points, wanted, needed, take, skip);
   });
-  bricks_.read_together(stored, wanted_, wanted);
-  // Threads at nodes beside each other want the same bricks: were each to wait for what another
-  // one is reading, all would read one brick after the other.
-  std::vector<Int3> busy;
-  for (const Int3 b : wanted_)
-    if (const auto brick = bricks_.get_unless_busy(stored, b, wanted))
-      take(b, *brick);
-    else
-      busy.push_back(b);
-  for (const Int3 b : busy) take(b, *bricks_.get(stored, b, wanted));
 }
 
 void NodeSamples::read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out,

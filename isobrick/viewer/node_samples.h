@@ -37,6 +37,11 @@ class NodeSamples {
   void read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out,
             const NeededSamples* needed = nullptr);
 
+  /// The samples themselves at the points `points` of level 0, in the store's type; those that
+  /// `needed` has no need of are the least or the largest there is, unless it is null.
+  void read_stored(Box3 points, const Wanted& wanted, std::vector<std::byte>& out,
+                   const NeededSamples* needed);
+
   /// Bricks of the stored level that read() looks at.
   Box3 bricks(int v, Box3 points) const;
 
@@ -58,6 +63,9 @@ class NodeSamples {
   void find_axis(int v, int axis, Index lo, Index hi);
   Box3 box() const;
   void gather(int stored, double isovalue, const Wanted& wanted, const NeededSamples* needed);
+  template <class Take, class Skip>
+  void for_each_brick(int stored, Box3 box, const Wanted& wanted, const NeededSamples* needed,
+                      Take&& take, Skip&& skip);
   template <class T>
   void copy_part(const std::byte* brick, Int3 corner, Int3 edge, double isovalue);
   template <class F>

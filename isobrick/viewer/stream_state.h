@@ -87,8 +87,8 @@ struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
         planner(tree->grid(), bricks, options.origin),
         meshes(options.mesh_bytes, options.device_bytes) {}
 
-  // All but run(), send(), mesh_of() and received() need the lock; those that are given one give
-  // it up meanwhile.
+  // All but run(), has_device(), send(), mesh_of() and received() need the lock; those that are
+  // given one give it up meanwhile.
 
   // scene_stream.cpp
   /// Abandons what is not wanted any more. `late`: finer meshes have not come soon enough.
@@ -108,6 +108,7 @@ struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
                  std::unique_lock<std::mutex>& lock);
   void make_slice(const std::shared_ptr<Running>& r, std::unique_lock<std::mutex>& lock);
   std::optional<NodeMesh> mesh_of(NodeMesher& mesher, const std::shared_ptr<Running>& r);
+  bool has_device() const;
   bool send(const GridView& grid, const std::shared_ptr<Running>& r);
   void received(const std::shared_ptr<Running>& r, NodeMesh&& mesh, const std::string& failure,
                 std::shared_ptr<DeviceMesher> by);

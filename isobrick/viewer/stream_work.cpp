@@ -115,6 +115,11 @@ void SceneStream::Shared::give_up(const std::shared_ptr<DeviceMesher>& failed,
   counters.device_failure = failure;
 }
 
+bool SceneStream::Shared::has_device() const {
+  const std::lock_guard lock(mutex);
+  return device != nullptr;
+}
+
 /// Without the lock. False where there is no device, or it has failed.
 bool SceneStream::Shared::send(const GridView& grid, const std::shared_ptr<Running>& r) {
   std::unique_lock lock(mutex);
@@ -138,10 +143,15 @@ bool SceneStream::Shared::send(const GridView& grid, const std::shared_ptr<Runni
 std::optional<NodeMesh> SceneStream::Shared::mesh_of(NodeMesher& mesher,
                                                      const std::shared_ptr<Running>& r) {
   try {
-    // The device is asked for only now: a read that is held up keeps none.
-    const GridView grid = mesher.grid(r->job.key, r->job.isovalue, r->job.coarser, *r);
+    const auto read = [&](NodeMesher::Form form) {
+      return mesher.grid(r->job.key, r->job.isovalue, r->job.coarser, *r, form);
+    };
+    GridView grid =
+        read(has_device() ? NodeMesher::Form::stored_if_possible : NodeMesher::Form::values);
     r->check();
+    // The device is asked for only now: a read that is held up keeps none.
     if (send(grid, r)) return std::nullopt;
+    if (grid.stored.samples != nullptr) grid = read(NodeMesher::Form::values);
     return mesher.extract(grid, empty_mesh(r->job));
   } catch (const Abandoned&) {
     return std::nullopt;

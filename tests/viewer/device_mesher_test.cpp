@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <future>
 #include <limits>
@@ -37,7 +38,9 @@ class Device : public testing::Test {
     std::vector<std::promise<NodeMesh>> made(cut.nodes.size());
     for (std::size_t i = 0; i < made.size(); ++i) {
       const CutNode& node = cut.nodes[i];
-      const GridView view = mesher.grid(node.key, isovalue, node.coarser, Always());
+      const GridView view = mesher.grid(node.key, isovalue, node.coarser, Always(),
+                                        NodeMesher::Form::stored_if_possible);
+      stored_ += view.stored.samples != nullptr;
       ASSERT_TRUE(device_->make(view, {}, [&, i](NodeMesh&& mesh, const std::string& failure) {
         EXPECT_EQ(failure, "");
         made[i].set_value(std::move(mesh));
@@ -61,6 +64,7 @@ class Device : public testing::Test {
 
   std::shared_ptr<DeviceMesher> device_;
   std::uint64_t triangles_ = 0, ribbons_ = 0;
+  int stored_ = 0;  ///< grids of stored samples
 };
 
 template <class T>
@@ -98,6 +102,33 @@ TEST_F(Device, MakesTheSameMeshesWhereTheVolumeEndsAndAxesDiffer) {
     expect_same(source, RandomCut(grid, seed, 3).cut({100.25}));
   }
   EXPECT_GT(triangles_, 100'000u);
+}
+
+/// Every type that grids hold as it is stored, with blocks that are not needed and bricks that are
+/// absent.
+template <class T>
+class DeviceOfType : public Device {};
+using StoredTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t>;
+TYPED_TEST_SUITE(DeviceOfType, StoredTypes);
+
+TYPED_TEST(DeviceOfType, MakesTheSameMeshesOfStoredSamples) {
+  const Index n = 150;
+  MemoryBricks::Options options;
+  options.fill_value = 30;
+  const auto source = volume_of<TypeParam>(
+      {n, n, n}, [&](Int3 p) { return static_cast<TypeParam>(30 + std::max(0.0, ball(p, n))); },
+      options);
+  const NodeGrid grid(source->info());
+  Cut cut;
+  for_each_point({{0, 0, 0}, grid.level(0).nodes}, [&](Int3 p) {
+    cut.nodes.push_back({.key = {0, p}});
+  });
+  for (const double isovalue : {45.5, 40.0}) {
+    cut.isovalues = {isovalue};
+    this->expect_same(source, cut);
+  }
+  EXPECT_GT(this->triangles_, 10'000u);
+  EXPECT_EQ(this->stored_, 2 * 27);
 }
 
 TEST_F(Device, MakesTheSameMeshesAroundWhatIsNoNumber) {

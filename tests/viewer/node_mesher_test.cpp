@@ -175,6 +175,68 @@ TEST(NodeMesher, HolesOfNaNAndAbsentBricksDoNotDisturbIt) {
   }
 }
 
+/// What a device makes of stored samples, made here.
+template <class T>
+void expect_the_mesh_of_stored_samples() {
+  const Index n = 150;
+  MemoryBricks::Options options;
+  options.fill_value = 30;
+  const auto source = std::make_shared<MemoryBricks>(
+      Int3{n, n, n},
+      std::function<T(Int3)>([](Int3 p) { return static_cast<T>(30 + std::max(0.0, ball(p, n))); }),
+      options);
+  const NodeGrid grid(source->info());
+  ResidentBricks bricks(source, std::uint64_t{1} << 30);
+  NodeMesher mesher(grid, bricks, {1, 2, 3});
+  std::uint64_t triangles = 0;
+  for (const CutNode& node : uniform_cut(grid, 0, 0).nodes) {
+    GridView view = mesher.grid(node.key, 40, 0, Always(), NodeMesher::Form::stored_if_possible);
+    ASSERT_EQ(view.stored.type, scalar_type_of<T>);
+    std::vector<float> values;
+    const T* samples = static_cast<const T*>(view.stored.samples);
+    for (int i = 0; i < view.around_n[0] * view.around_n[1] * view.around_n[2]; ++i)
+      values.push_back(point_value(samples[i], view.stored.isovalue));
+    view.around = values.data();
+    view.values =
+        view.around + view.shift[2] * view.plane + view.shift[1] * view.row + view.shift[0];
+    const NodeMesh a = mesher.extract(view, {}), b = mesher.mesh(node.key, 40, 0, Always());
+    EXPECT_TRUE(std::ranges::equal(a.mesh.positions, b.mesh.positions));
+    EXPECT_TRUE(std::ranges::equal(a.mesh.normals, b.mesh.normals));
+    EXPECT_TRUE(std::ranges::equal(a.mesh.triangles, b.mesh.triangles));
+    triangles += a.triangles();
+  }
+  EXPECT_GT(triangles, 10'000u);
+  EXPECT_LT(bricks.counters().reads, 125u) << "some are not needed";
+}
+
+TEST(NodeMesher, StoredSamplesAreThoseOfTheMesh) {
+  expect_the_mesh_of_stored_samples<std::uint8_t>();
+  expect_the_mesh_of_stored_samples<std::int8_t>();
+  expect_the_mesh_of_stored_samples<std::uint16_t>();
+  expect_the_mesh_of_stored_samples<std::int16_t>();
+}
+
+TEST(NodeMesher, ValuesAreGivenWhereStoredSamplesWouldNotDo) {
+  const auto source = cube_of(ball, 150);
+  const NodeGrid grid(source->info());
+  ResidentBricks bricks(source, std::uint64_t{1} << 30);
+  NodeMesher mesher(grid, bricks, {});
+  const auto form = NodeMesher::Form::stored_if_possible;
+  EXPECT_EQ(mesher.grid({0, {0, 0, 0}}, 0, 0, Always(), form).stored.samples, nullptr) << "floats";
+  const auto bytes = std::make_shared<MemoryBricks>(
+      Int3{150, 150, 150},
+      std::function<std::uint8_t(Int3)>([](Int3 p) { return static_cast<std::uint8_t>(p.x); }),
+      MemoryBricks::Options{});
+  ResidentBricks others(bytes, std::uint64_t{1} << 30);
+  NodeMesher other(grid, others, {});
+  const auto stored = [&](NodeKey key, std::uint32_t coarser) {
+    return other.grid(key, 40.5, coarser, Always(), form).stored.samples != nullptr;
+  };
+  EXPECT_TRUE(stored({0, {0, 0, 0}}, 0));
+  EXPECT_FALSE(stored({1, {0, 0, 0}}, 0)) << "points between samples";
+  EXPECT_FALSE(stored({0, {1, 0, 0}}, 1u << 26 >> 1)) << "a neighbour's values";
+}
+
 TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
   class Never final : public Wanted {
    public:
