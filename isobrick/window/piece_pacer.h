@@ -14,11 +14,12 @@ class PiecePacer {
   explicit PiecePacer(bool software)
       : rate_(software ? kFirstRate : std::numeric_limits<double>::infinity()) {}
 
-  /// Of the next piece, to take so long.
-  std::uint64_t work(double seconds) const {
+  /// Of the next piece, to take so long. Of `left` no rest is left that would take a quarter of
+  /// that.
+  std::uint64_t work(double seconds, std::uint64_t left = kMost) const {
     const double most = rate_ * seconds;
-    return most < kAll ? static_cast<std::uint64_t>(std::max(most, kLeast))
-                       : std::numeric_limits<std::uint64_t>::max();
+    if (static_cast<double>(left) <= (1 + kLeastPart) * most) return left;
+    return most < kAll ? static_cast<std::uint64_t>(std::max(most, kLeast)) : kMost;
   }
 
   /// OpenGL was told within `seconds` to draw a piece, which goes on until one of the functions
@@ -39,6 +40,8 @@ class PiecePacer {
   }
 
  private:
+  static constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+
   struct Piece {
     std::uint64_t work = 0;
     double seconds = 0;
@@ -55,6 +58,7 @@ class PiecePacer {
   /// Less takes no shorter, since each piece has a price of its own.
   static constexpr double kLeast = 5000;
   static constexpr double kAll = 1e18;
+  static constexpr double kLeastPart = 0.25;
 
   double rate_;
   Piece before_, last_;  ///< that may not be drawn; no work: there is none

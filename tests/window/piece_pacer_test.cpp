@@ -31,6 +31,19 @@ TEST(PiecePacer, FindsOutHowMuchIsDrawnInATime) {
   EXPECT_EQ(device.work(0.06), std::numeric_limits<std::uint64_t>::max());
 }
 
+TEST(PiecePacer, NoSmallRestIsLeft) {
+  PiecePacer pacer(true);
+  for (int i = 0; i < 20; ++i) {
+    pacer.told(1'000'000, 1);
+    pacer.drawn_all(0);
+  }
+  EXPECT_EQ(pacer.work(1), 1'000'000u);
+  EXPECT_EQ(pacer.work(1, 1'250'000), 1'250'000u);
+  EXPECT_EQ(pacer.work(1, 1'300'000), 1'000'000u);
+  EXPECT_EQ(pacer.work(1, 10), 10u);
+  EXPECT_EQ(PiecePacer(false).work(1, 10), 10u);
+}
+
 TEST(PiecePacer, SecondsCountForThePieceThatTookThem) {
   PiecePacer pacer(true);
   const std::uint64_t first = pacer.work(1);
