@@ -34,13 +34,17 @@ class DrawSwitches {
   DrawSwitches(const DrawSwitches&) = delete;
   DrawSwitches& operator=(const DrawSwitches&) = delete;
 
-  /// Depth test, clipping by the first `distances` planes, weighted blending.
-  void meshes(int distances, bool depth_test, bool blended) const {
-    const auto set = [](GLenum what, bool on) { on ? glEnable(what) : glDisable(what); };
-    set(GL_DEPTH_TEST, depth_test);
-    glDepthMask(!blended);
+  /// Clipping by the first `distances` planes.
+  static void clip(int distances) {
     for (int i = 0; i < kClipDistances; ++i)
       set(GL_CLIP_DISTANCE0 + static_cast<GLenum>(i), i < distances);
+  }
+
+  /// Depth test, clipping as above, weighted blending.
+  void meshes(int distances, bool depth_test, bool blended) const {
+    set(GL_DEPTH_TEST, depth_test);
+    glDepthMask(!blended);
+    clip(distances);
     set(GL_BLEND, blended);
     if (!blended) return;
     glBlendFunci(0, GL_ONE, GL_ONE);
@@ -48,6 +52,8 @@ class DrawSwitches {
   }
 
  private:
+  static void set(GLenum what, bool on) { on ? glEnable(what) : glDisable(what); }
+
   std::array<int, 4> viewport_{};
 };
 

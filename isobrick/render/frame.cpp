@@ -1,5 +1,7 @@
 #include "isobrick/render/frame.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/trigonometric.hpp>
@@ -27,6 +29,17 @@ glm::vec4 to_linear(Vec3f colour, float alpha) {
   return {to_linear(colour.x), to_linear(colour.y), to_linear(colour.z), alpha};
 }
 
+std::vector<HalfSpace> PictureSettings::half_spaces() const {
+  std::vector<HalfSpace> all = planes;
+  for (int axis = 0; region && axis < 3; ++axis) {
+    Vec3d inward;
+    inward[axis] = 1;
+    all.push_back(half_space_at(region->lo, inward));
+    all.push_back(half_space_at(region->hi, inward * -1.0));
+  }
+  return all;
+}
+
 FrameBlock make_frame(const Camera& camera, int width, int height,
                       const PictureSettings& settings) {
   FrameBlock frame{};
@@ -35,16 +48,8 @@ FrameBlock make_frame(const Camera& camera, int width, int height,
   frame.rotation = glm::mat4(glm::mat3(camera.rotation()));
 
   int count = 0;
-  const auto add = [&](const HalfSpace& half) {
+  for (const HalfSpace& half : settings.half_spaces())
     frame.half_spaces[static_cast<std::size_t>(count++)] = from_eye(half, camera.eye);
-  };
-  for (const HalfSpace& half : settings.planes) add(half);
-  for (int axis = 0; settings.region && axis < 3; ++axis) {
-    Vec3d inward;
-    inward[axis] = 1;
-    add(half_space_at(settings.region->lo, inward));
-    add(half_space_at(settings.region->hi, inward * -1.0));
-  }
   frame.counts = {std::min(count, kClipDistances), count, settings.picking ? 1 : 0, 0};
 
   const double near = camera.near_depth(), far = camera.far_depth();
@@ -93,19 +98,35 @@ float weight_at(float depth) {
 }
 )";
 
+std::string cut_glsl(CutBy cut) {
+  return fmt::format("#define CUT_BY_FEW {}\n#define CUT_BY_ALL {}\n#define CUT {}\n",
+                     static_cast<int>(CutBy::few), static_cast<int>(CutBy::all),
+                     static_cast<int>(cut));
+}
+
 const char* const kCutVertexGlsl = R"(
 out vec3 from_eye;
-#if CUT
-out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[8]; };
+// The same in all forms, or meshes drawn by different ones would not meet.
+invariant gl_Position;
+#if CUT == CUT_BY_ALL
+out float gl_ClipDistance[8];
+#elif CUT == CUT_BY_FEW
+out float gl_ClipDistance[4];
 #endif
 
-// Sets where the vertex is.
-void place(vec3 position_from_eye) {
+// Sets where the vertex is. `few`: which half spaces cut it, a byte each; 255: none.
+void place(vec3 position_from_eye, uint few) {
   from_eye = position_from_eye;
   gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
-#if CUT
+#if CUT == CUT_BY_ALL
   for (int i = 0; i < 8; ++i)
     gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
+#elif CUT == CUT_BY_FEW
+  for (int i = 0; i < 4; ++i) {
+    uint number = few >> (8 * i) & 255u;
+    vec4 by = number < 12u ? half_spaces[number] : vec4(0, 0, 0, 1);
+    gl_ClipDistance[i] = dot(by.xyz, from_eye) + by.w;
+  }
 #endif
 }
 )";
@@ -115,7 +136,7 @@ in vec3 from_eye;
 
 // Those that clip distances leave.
 void cut() {
-#if CUT
+#if CUT == CUT_BY_ALL
   for (int i = 8; i < counts.y; ++i)
     if (dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w < 0) discard;
 #endif

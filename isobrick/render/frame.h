@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
+#include <string>
 
 #include "isobrick/render/camera.h"
 #include "isobrick/render/gl_objects.h"
@@ -24,17 +25,22 @@ struct FrameBlock {
   glm::vec4 pixel;        ///< length of a pixel at depth 1 (or everywhere)
   glm::vec4 top, bottom;  ///< background, linear
   glm::ivec4 counts;      ///< clip distances, half spaces
-
-  bool cuts() const { return counts.y > 0; }
 };
 
 FrameBlock make_frame(const Camera& camera, int width, int height, const PictureSettings& settings);
 
 /// GLSL: the block Frame and functions of depth and camera space.
 extern const char* const kFrameGlsl;
-/// GLSL: cutting by the half spaces, in vertex and in fragment shaders; after kFrameGlsl and a
-/// definition of CUT. Where that is 0 nothing is cut: vertices are spared distances that nobody
-/// asks for, and fragments that never go can be hidden before they are shaded.
+/// By how many half spaces something may be cut. The fewer distances vertices have to them the
+/// sooner small triangles are drawn, and fragments that never go can be hidden before they are
+/// shaded.
+enum class CutBy : std::uint8_t { none, few, all };
+/// Clip distances of what is cut by few.
+inline constexpr int kFew = 4;
+/// GLSL: which of them a shader is for.
+std::string cut_glsl(CutBy cut);
+/// GLSL: cutting by the half spaces, in vertex and in fragment shaders; after kFrameGlsl and
+/// cut_glsl().
 extern const char* const kCutVertexGlsl;
 extern const char* const kCutFragmentGlsl;
 /// GLSL: light on a surface, after kFrameGlsl.

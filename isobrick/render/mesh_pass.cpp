@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <glm/vec4.hpp>
 #include <numeric>
 
+#include "isobrick/render/draw_switches.h"
 #include "isobrick/render/frame.h"
+#include "isobrick/render/gl_context.h"
 #include "isobrick/render/vectors.h"
 
 namespace isobrick {
@@ -19,7 +22,7 @@ struct Look {
   glm::vec4 offset;  ///< from the eye; w: has normals
   glm::vec4 colour;  ///< linear; alpha: opacity
   glm::vec4 inside;
-  glm::uvec4 id;
+  glm::uvec4 id;  ///< y: where few half spaces cut it, their numbers, a byte each
 };
 
 /// What glMultiDrawElementsIndirect reads.
@@ -39,24 +42,40 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in uint number;
 centroid out vec3 world_normal;
+#if SOFTWARE
 // Fragments get the look from here and not from the buffer: Mesa's llvmpipe draws them
 // when the buffer may hold the next mesh's already.
 flat out vec4 outer_colour, inner_colour;
 flat out uvec2 mesh;  // id, has normals
+#else
+// What small triangles take goes with what their corners hand on.
+flat out uint look;
+#endif
 
 void main() {
-  place(position + looks[number].offset.xyz);
+  place(position + looks[number].offset.xyz, looks[number].id.y);
   world_normal = normal;
+#if SOFTWARE
   outer_colour = looks[number].colour;
   inner_colour = looks[number].inside;
   mesh = uvec2(looks[number].id.x, looks[number].offset.w > 0.5 ? 1 : 0);
+#else
+  look = number;
+#endif
 }
 )";
 
 const char* const kFragment = R"(
 centroid in vec3 world_normal;
+#if SOFTWARE
 flat in vec4 outer_colour, inner_colour;
 flat in uvec2 mesh;
+#else
+flat in uint look;
+#define outer_colour looks[look].colour
+#define inner_colour looks[look].inside
+#define mesh uvec2(looks[look].id.x, looks[look].offset.w > 0.5 ? 1 : 0)
+#endif
 
 struct Seen { vec3 position, normal, eye, light; };
 
@@ -78,7 +97,7 @@ Seen see() {
   if (dot(s.normal, facet) < 0) s.normal = -s.normal;
   float facing = dot(s.normal, s.eye);
   if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
-  bool opened = CUT != 0 && !gl_FrontFacing;
+  bool opened = OPEN != 0 && !gl_FrontFacing;
   s.light = lit(s.normal, s.eye, opened ? inner_colour.rgb : outer_colour.rgb);
   return s;
 }
@@ -123,6 +142,14 @@ glm::vec4 offset_of(Vec3d origin, Vec3d eye, bool normals) {
   return {from_eye.x, from_eye.y, from_eye.z, normals ? 1.0f : 0.0f};
 }
 
+/// The numbers of the first few bits that are set, a byte each; 255: none.
+std::uint32_t numbers_of_few(std::uint16_t bits) {
+  std::uint32_t numbers = 0;
+  for (int i = 0; i < kFew; ++i, bits &= static_cast<std::uint16_t>(bits - 1))
+    numbers |= (bits == 0 ? 255u : static_cast<unsigned>(std::countr_zero(bits))) << (8 * i);
+  return numbers;
+}
+
 /// But for its offset.
 Look look_of(const MeshStyle& style) {
   const Vec3f c = style.colour;
@@ -131,21 +158,25 @@ Look look_of(const MeshStyle& style) {
   return {{},
           to_linear(c, opacity),
           to_linear(style.inside.value_or(darker), opacity),
-          {style.id, 0, 0, 0}};
+          {style.id, numbers_of_few(style.cut_by), 0, 0}};
 }
 
 }  // namespace
 
-MeshPass::Programs::Programs(bool cut) {
-  const std::string frame = fmt::format("#define CUT {}\n", cut ? 1 : 0) + kFrameGlsl;
+MeshPass::Programs::Programs(CutBy cut, bool picture_is_cut, bool software) {
+  const std::string frame = fmt::format("#define OPEN {}\n#define SOFTWARE {}\n",
+                                        picture_is_cut ? 1 : 0, software ? 1 : 0) +
+                            cut_glsl(cut) + kFrameGlsl;
   const std::string vertex = frame + kCutVertexGlsl + kLooks + kVertex,
-                    fragment = frame + kCutFragmentGlsl + kLightGlsl + kFragment;
+                    fragment = frame + (software ? "" : kLooks) + kCutFragmentGlsl + kLightGlsl +
+                               kFragment;
   opaque = make_program(vertex, fragment + kOpaque, "meshes");
   transparent = make_program(vertex, fragment + kTransparent, "transparent meshes");
 }
 
 MeshPass::MeshPass()
-    : vertices_(make_vertex_array()),
+    : software_(current_gl_device().software),
+      vertices_(make_vertex_array()),
       looks_(make_stream_buffer()),
       numbers_(make_stream_buffer()),
       commands_(make_stream_buffer()),
@@ -175,9 +206,13 @@ void MeshPass::need_numbers(std::size_t count) {
   glVertexArrayVertexBuffer(vertices_.get(), 2, numbers_.get(), 0, sizeof(std::uint32_t));
 }
 
-void MeshPass::bind(bool transparent) {
-  const Programs& programs = cut_ ? cut_programs_ : whole_programs_;
-  glUseProgram((transparent ? programs.transparent : programs.opaque).get());
+void MeshPass::bind(CutBy cut, bool transparent) {
+  if (!cuts_) cut = CutBy::none;
+  std::optional<Programs>& programs =
+      cuts_ ? programs_[static_cast<std::size_t>(cut)] : whole_programs_;
+  if (!programs) programs.emplace(cut, cuts_, software_);
+  DrawSwitches::clip(cut == CutBy::none ? 0 : cut == CutBy::few ? kFew : clip_distances_);
+  glUseProgram((transparent ? programs->transparent : programs->opaque).get());
   glBindVertexArray(vertices_.get());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, looks_.get());
 }
@@ -208,16 +243,20 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
   fill_buffer(looks_, std::as_bytes(std::span(looks)));
   fill_buffer(commands_, std::as_bytes(std::span(commands)));
   need_numbers(looks.size());
-  bind(transparent);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.get());
   for (std::size_t first = 0, end = 0; first < meshes.size(); first = end) {
-    while (end < meshes.size() && meshes[end].block() == meshes[first].block()) ++end;
+    const CutBy cut = cut_of(meshes[first].style);
+    while (end < meshes.size() && meshes[end].block() == meshes[first].block() &&
+           cut_of(meshes[end].style) == cut)
+      ++end;
+    bind(cut, transparent);
     bind_block(meshes[first].mesh->place());
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
                                 reinterpret_cast<const void*>(first * sizeof(Command)),
                                 static_cast<GLsizei>(end - first), 0);
   }
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
+  DrawSwitches::clip(clip_distances_);  // as slices want it
   check_gl("drawing meshes");
 }
 
@@ -236,9 +275,10 @@ void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin,
   const GlBuffer& normals = mesh.normals.empty() ? positions_ : normals_;
   bind_block(
       {.positions = positions_.get(), .normals = normals.get(), .triangles = triangles_.get()});
-  bind(transparent);
+  bind(cut_of(style), transparent);
   glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * triangles.size()), GL_UNSIGNED_INT,
                  nullptr);
+  DrawSwitches::clip(clip_distances_);
   check_gl("drawing a mesh");
 }
 

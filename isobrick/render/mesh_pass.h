@@ -1,10 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "isobrick/core/vec.h"
+#include "isobrick/render/frame.h"
 #include "isobrick/render/gl_objects.h"
 #include "isobrick/render/mesh_queue.h"
 #include "isobrick/render/renderer.h"
@@ -16,8 +19,11 @@ class MeshPass {
  public:
   MeshPass();
 
-  /// Whether half spaces cut what is drawn from now on.
-  void start(bool cut) { cut_ = cut; }
+  /// By how many half spaces what is drawn from now on is cut, as FrameBlock::counts has them.
+  void start(int clip_distances, int half_spaces) {
+    clip_distances_ = clip_distances;
+    cuts_ = half_spaces > 0;
+  }
   /// Those that follow each other in one block of a pool with one call.
   void draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent);
   /// One that lies in memory.
@@ -25,19 +31,22 @@ class MeshPass {
             bool transparent);
 
  private:
-  /// One source in two forms.
+  /// One source in several forms.
   struct Programs {
-    explicit Programs(bool cut);
+    Programs(CutBy cut, bool picture_is_cut, bool software);
     GlProgram opaque, transparent;
   };
 
-  void bind(bool transparent);
+  void bind(CutBy cut, bool transparent);
   void bind_block(const MeshPlace& place);
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
   void need_numbers(std::size_t count);
 
-  Programs whole_programs_{false}, cut_programs_{true};
-  bool cut_ = false;
+  bool software_;
+  std::optional<Programs> whole_programs_;           ///< where nothing is cut
+  std::array<std::optional<Programs>, 3> programs_;  ///< elsewhere, by CutBy
+  int clip_distances_ = 0;
+  bool cuts_ = false;
   GlVertexArray vertices_;
   GlBuffer looks_, numbers_, commands_;
   GlBuffer positions_, normals_, triangles_;  ///< of meshes that lie in memory

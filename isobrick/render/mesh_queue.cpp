@@ -1,8 +1,17 @@
 #include "isobrick/render/mesh_queue.h"
 
 #include <algorithm>
+#include <bit>
+#include <utility>
 
 namespace isobrick {
+
+CutBy cut_of(const MeshStyle& style) {
+  if (style.cut_by == 0) return CutBy::none;
+  // What is cut pixel by pixel stays so.
+  const bool exactly = style.cut_by < 1 << kClipDistances;
+  return exactly && std::popcount(style.cut_by) <= kFew ? CutBy::few : CutBy::all;
+}
 
 void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
   draws_.push_back({&mesh, style, 0, mesh.place().triangle_count});
@@ -11,8 +20,9 @@ void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
 
 std::span<const MeshDraw> MeshQueue::take(std::uint64_t most) {
   if (!sorted_)
-    std::stable_sort(draws_.begin(), draws_.end(),
-                     [](const MeshDraw& a, const MeshDraw& b) { return a.block() < b.block(); });
+    std::stable_sort(draws_.begin(), draws_.end(), [](const MeshDraw& a, const MeshDraw& b) {
+      return std::pair(cut_of(a.style), a.block()) < std::pair(cut_of(b.style), b.block());
+    });
   sorted_ = true;
   piece_.clear();
   most = std::max<std::uint64_t>(most, 1);

@@ -90,7 +90,7 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   camera = new_camera;
   settings = new_settings;
   frame = make_frame(camera, width, height, settings);
-  passes.meshes.start(frame.cuts());
+  passes.meshes.start(frame.counts.x, frame.counts.y);
   passes.slices.clear();
   overlays = {};
   any_transparent = false;
@@ -114,15 +114,15 @@ void Renderer::State::choose_targets(int width, int height) {
   targets = &*kept_targets[way];
 }
 
+/// The depth alone: where nothing is drawn nobody looks at the rest.
 void Renderer::State::clear() {
   const DrawSwitches switches(frame);
-  const std::array<float, 4> nothing{};
-  const std::array<unsigned, 4> nobody{};
   const unsigned target = targets->opaque.get();
-  glClearNamedFramebufferfv(target, GL_COLOR, 0, nothing.data());
-  glClearNamedFramebufferfv(target, GL_COLOR, 1, nothing.data());
-  if (targets->ids) glClearNamedFramebufferuiv(target, GL_COLOR, 2, nobody.data());
-  glClearNamedFramebufferfv(target, GL_DEPTH, 0, nothing.data());  // 0 is far
+  const std::array<GLenum, 3> rest{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
+                                   GL_COLOR_ATTACHMENT2};
+  glInvalidateNamedFramebufferData(target, targets->ids ? 3 : 2, rest.data());
+  const float far = 0;
+  glClearNamedFramebufferfv(target, GL_DEPTH, 0, &far);
   check_gl("clearing the picture");
 }
 
@@ -267,9 +267,14 @@ void Renderer::prepare(const PictureSettings& settings, int width, int height) {
   whole.planes.clear();
   whole.region.reset();
   cut.planes = {{{1, 0, 0}, 0}};
+  // By all, by few, by none of its half spaces.
+  const std::array<std::uint16_t, 3> cut_by{MeshStyle{}.cut_by, 1, 0};
   for (const PictureSettings& form : {whole, cut}) {
     begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), width, height, form);
-    draw(mesh, {}, {});
+    for (const std::uint16_t by : cut_by)
+      // Software draws in order, and so in one form.
+      if (by == cut_by[0] || (!form.planes.empty() && !state_->device.software))
+        draw(mesh, {.cut_by = by}, {});
     draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
     draw_axes();
     draw_scale_bar("");

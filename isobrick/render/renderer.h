@@ -34,6 +34,9 @@ struct PictureSettings {
   bool in_order = true;
   std::vector<HalfSpace> planes;   ///< what lies within all of them is drawn
   std::optional<WorldBox> region;  ///< and within this box, which counts as 6 planes of at most 12
+
+  /// Those of the planes, then those of the region.
+  std::vector<HalfSpace> half_spaces() const;
 };
 
 /// How a mesh is drawn.
@@ -43,6 +46,8 @@ struct MeshStyle {
   std::optional<Vec3f> inside = {};  ///< of the back where something is cut off; else a darker tone
   /// What pick() tells; 0: nothing. Of transparent ones the lowest 8 bits.
   std::uint32_t id = 0;
+  /// Of the picture's half spaces those that may cut it, a bit each: with few it is drawn sooner.
+  std::uint16_t cut_by = 0xffff;
   friend bool operator==(const MeshStyle&, const MeshStyle&) = default;
 };
 

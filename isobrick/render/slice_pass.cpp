@@ -21,7 +21,7 @@ out vec2 uv;
 
 void main() {
   uv = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-  place(corner + along_x * uv.x + along_y * uv.y);
+  place(corner + along_x * uv.x + along_y * uv.y, 0u);
 }
 )";
 
@@ -79,7 +79,7 @@ void set(const GlProgram& program, int location, Vec3f v) {
 
 SlicePass::SlicePass() : nothing_(make_vertex_array()) {
   // One form is enough: a slice has four corners.
-  const std::string frame = std::string("#define CUT 1\n") + kFrameGlsl,
+  const std::string frame = cut_glsl(CutBy::all) + kFrameGlsl,
                     vertex = frame + kCutVertexGlsl + kVertex,
                     fragment = frame + kCutFragmentGlsl + kColour;
   opaque_ = make_program(vertex, fragment + kOpaque, "slices");

@@ -112,6 +112,28 @@ PictureSettings picture_settings(const ViewSettings& settings, const Transform& 
   return picture;
 }
 
+Cuts::Cuts(const PictureSettings& picture) : half_spaces_(picture.half_spaces()) {
+  for (HalfSpace& half : half_spaces_) {
+    const double scale = 1 / length(half.normal);
+    half = {half.normal * scale, half.least * scale};
+  }
+}
+
+std::uint16_t Cuts::of(Vec3d middle, double radius) const {
+  unsigned bits = 0;
+  for (std::size_t i = 0; i < half_spaces_.size(); ++i)
+    if (dot(half_spaces_[i].normal, middle) - radius < half_spaces_[i].least) bits |= 1u << i;
+  return static_cast<std::uint16_t>(bits);
+}
+
+/// Ribbons go a little beyond the node, less than a cell.
+std::uint16_t Cuts::of(const NodeGrid& grid, const NodeKey& node) const {
+  const IndexBox box = grid.box(node);
+  const Transform& t = grid.transform();
+  const Vec3d middle = t.apply((box.lo + box.hi) * 0.5);
+  return of(middle, length(t.apply(box.hi) - middle) + grid.level(node.level).spacing);
+}
+
 View view_of(const Camera& camera, int width, int height, double pixel_error) {
   View view;
   view.eye = camera.eye;

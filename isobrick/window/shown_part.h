@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
@@ -32,6 +33,19 @@ std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings);
 /// How a renderer draws what settings say, of a volume whose last sample is `last`.
 PictureSettings picture_settings(const ViewSettings& settings, const Transform& transform,
                                  Vec3d last);
+
+/// What cuts a picture.
+class Cuts {
+ public:
+  explicit Cuts(const PictureSettings& picture);
+  /// MeshStyle::cut_by of what lies around `middle`.
+  std::uint16_t of(Vec3d middle, double radius) const;
+  /// Of a node's mesh.
+  std::uint16_t of(const NodeGrid& grid, const NodeKey& node) const;
+
+ private:
+  std::vector<HalfSpace> half_spaces_;  ///< with normals of length 1
+};
 
 /// The camera's view of nodes.
 View view_of(const Camera& camera, int width, int height, double pixel_error);

@@ -151,9 +151,11 @@ std::uint64_t StorePicture::upload_memory() const {
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
 }
 
-void StorePicture::draw_surfaces(const ViewSettings& settings, PictureState& state) {
+void StorePicture::draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
+                                 PictureState& state) {
   state.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
   if (shown_ == nullptr) return;
+  const Cuts cuts(picture);
   for (const DrawnNode& node : shown_->nodes) {
     if (!node.mesh->damage.empty()) {
       state.damage.push_back(node.mesh->damage);
@@ -172,6 +174,8 @@ void StorePicture::draw_surfaces(const ViewSettings& settings, PictureState& sta
     style.colour = surface.colour;
     style.opacity = surface.opacity;
     style.id = static_cast<std::uint32_t>(shown_surfaces_[number] + 1);
+    // What is cut alike is drawn together, so the order must be free.
+    if (!picture.in_order) style.cut_by = cuts.of(scene_->tree().grid(), node.mesh->key);
     renderer().draw(*mesh, style);
     state.triangles += node.mesh->triangles();
     ++state.nodes;
@@ -248,7 +252,7 @@ void StorePicture::begin_picture(const Asked& asked) {
   picture.in_order = asked.way.in_order || setup_->software();
   picture.overlays_later = asked.way.smaller;
   renderer().begin(asked.camera, asked.width, asked.height, picture);
-  draw_surfaces(settings, work_->state);
+  draw_surfaces(settings, picture, work_->state);
   slices_.draw(renderer(), settings, work_->state.damage);
   draw_marks(renderer(), settings, scene_->tree().grid(), last_sample(*store_), shown_.get());
   work_->all = renderer().work_left();
@@ -276,7 +280,7 @@ void StorePicture::draw_piece(double most) {
   for (;;) {
     Stopwatch watch;
     const std::uint64_t before = renderer().work_left();
-    const bool finished = renderer().end_piece(pieces_.work(left));
+    const bool finished = renderer().end_piece(pieces_.work(left, before));
     std::optional<GlFence> fence;
     if (!finished && setup_->software()) fence = GlFence::insert();
     const double told = watch.lap();

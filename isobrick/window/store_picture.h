@@ -185,7 +185,8 @@ class StorePicture {
   void wait_drawn(std::optional<GlFence> fence);
   void finish_picture();
   void drop_picture();
-  void draw_surfaces(const ViewSettings& settings, PictureState& state);
+  void draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
+                     PictureState& state);
   void update_state(const Asked& asked);
 
   std::shared_ptr<const StoreReader> store_;

@@ -51,12 +51,13 @@ class Cut : public RenderTest {
   }
 
   MeshStyle style(Vec3f colour, float opacity, std::uint32_t id) const {
-    MeshStyle style{.colour = colour, .opacity = opacity, .id = id};
+    MeshStyle style{.colour = colour, .opacity = opacity, .id = id, .cut_by = cut_by_};
     if (one_tone_) style.inside = colour;
     return style;
   }
 
   bool one_tone_ = false;  ///< backs are drawn as fronts
+  std::uint16_t cut_by_ = MeshStyle{}.cut_by;
   std::optional<MeshPool> pool_;
   PooledMesh pooled_;
   TestMesh ball_ = make_ball({-0.4f, 0.1f, -0.2f}, 0.5f, 30);
@@ -121,6 +122,41 @@ TEST_F(Cut, PreparingChangesNothing) {
   }
 }
 
+/// Pixels that differ by more than what another program may round otherwise.
+int pixels_apart(const Picture& a, const Picture& b) {
+  int apart = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    apart += std::abs(int{a.pixels[i]} - int{b.pixels[i]}) > 4;
+  return apart;
+}
+
+/// Slices, which come last, are cut all the same.
+TEST_F(Cut, HalfSpacesThatAreSaidToCutNothingAreNotLookedAt) {
+  PictureSettings settings{.picking = true, .in_order = false};
+  // The first one cuts everything, the others nothing that is drawn.
+  settings.planes = {{{0.3, 1, 0.1}, -0.2}, {{-1, 0, 0}, -9}};
+  settings.region = WorldBox{{-7, -7, -7}, {7, 7, 7}};
+  for (const std::size_t planes : {2u, 3u}) {
+    settings.planes.resize(planes, {{0, 0, 1}, -9});
+    draw_all(renderer(), settings);
+    const Picture expected = read(renderer());
+    for (const int by : {0b1, 0b1001, 0b1111, 0b11111, 0b101010101}) {
+      cut_by_ = static_cast<std::uint16_t>(by);
+      draw_all(renderer(), settings);
+      const Picture few = read(renderer());
+      EXPECT_EQ(few.ids, expected.ids) << by;
+      EXPECT_LT(pixels_apart(few, expected), 60) << by;
+    }
+    cut_by_ = 0;
+    draw_all(renderer(), settings);
+    EXPECT_NE(read(renderer()).ids, expected.ids);
+    cut_by_ = 0b10;
+    draw_all(renderer(), settings);
+    EXPECT_NE(read(renderer()).ids, expected.ids);
+    cut_by_ = MeshStyle{}.cut_by;
+  }
+}
+
 TEST_F(Cut, PlanesThatLeaveAllChangeNothing) {
   one_tone_ = true;
   PictureSettings settings{.picking = true};
@@ -134,11 +170,7 @@ TEST_F(Cut, PlanesThatLeaveAllChangeNothing) {
     draw_all(renderer(), settings);
     const Picture cut = read(renderer());
     EXPECT_EQ(cut.ids, whole.ids);
-    // Another program may round otherwise.
-    int apart = 0;
-    for (std::size_t i = 0; i < cut.pixels.size(); ++i)
-      apart += std::abs(int{cut.pixels[i]} - int{whole.pixels[i]}) > 4;
-    EXPECT_LT(apart, 60) << planes;
+    EXPECT_LT(pixels_apart(cut, whole), 60) << planes;
   }
 }
 

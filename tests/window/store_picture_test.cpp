@@ -12,6 +12,7 @@
 #include "isobrick/render/vectors.h"
 #include "isobrick/window/pick.h"
 #include "isobrick/window/screenshot.h"
+#include "isobrick/window/shown_part.h"
 #include "tests/window/picture_test.h"
 
 namespace isobrick {
@@ -134,6 +135,19 @@ TEST_F(Picture, PlanesCutAtAnyAngleAndHideWhatIsBehindThem) {
   settings_ = {.surfaces = settings_.surfaces, .planes = {{false, kept}}};
   draw();
   EXPECT_EQ(picture_->state().triangles, triangles);
+}
+
+TEST(Cuts, AreThoseThatComeNearEnough) {
+  PictureSettings settings;
+  settings.planes = {{{0, 0, 10}, 50}};  // z >= 5
+  settings.region = WorldBox{{0, -100, -100}, {20, 100, 100}};
+  const Cuts cuts(settings);
+  EXPECT_EQ(cuts.of({10, 0, 20}, 9), 0u);
+  EXPECT_EQ(cuts.of({10, 0, 10}, 5.1), 0b1u);
+  EXPECT_EQ(cuts.of({4, 0, 20}, 5), 0b10u);
+  EXPECT_EQ(cuts.of({16, 0, 8}, 5), 0b101u);
+  EXPECT_EQ(cuts.of({10, 0, 20}, 1000), 0b1111111u);
+  EXPECT_EQ(Cuts(PictureSettings{}).of({0, 0, 0}, 1e9), 0u);
 }
 
 TEST_F(Picture, SeveralSurfacesAreToldApart) {
