@@ -7,8 +7,10 @@
 //   bench_viewer_stream g.zarr --isovalue 127.5 --to 160.5 --json
 //
 // A picture's time ends with glFinish. Pictures are started at most 60 times a second, as a
-// display would. A frame is what input waits for: a whole picture while something moves, otherwise
-// a piece of one or what is done between two; those of less than a millisecond do not count.
+// display would have them; the one that shows everything when all is there, since a display has
+// room for one more that waits for its turn. A frame is what input waits for: a whole picture while
+// something moves, otherwise a piece of one or what is done between two; those of less than a
+// millisecond do not count.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -86,7 +88,8 @@ class Session {
   /// One frame as the window makes it. `moving`: its picture may be a simpler one.
   void draw(bool moving) { make_frame(moving); }
   /// At most 60 times a second until `done`, and when all is there without waiting for the
-  /// next turn of a display. Throws Error when that takes longer than two minutes.
+  /// next turn of a display, unless the picture before the last is waiting for it. Throws Error
+  /// when that takes longer than two minutes.
   template <class F>
   void draw_until(bool moving, F&& done) {
     const auto start = Clock::now();
@@ -97,7 +100,7 @@ class Session {
       if (picture_->state().drawing) continue;
       const std::chrono::duration<double> left = next - Clock::now();
       const bool all_there = !moving && picture_->scene().stream().wait_idle(left.count());
-      std::this_thread::sleep_until(all_there ? std::min(next, began_ + kPeriod) : next);
+      std::this_thread::sleep_until(all_there ? std::min(next, began_before_ + kPeriod) : next);
     }
     throw Error("what is waited for is not there after 120 s");
   }
@@ -134,7 +137,7 @@ class Session {
     const PictureState& state = picture_->state();
     if (seconds >= kLeast) frames_.add(seconds, picture_->times(), seconds - submitted);
     device_peak = std::max(device_peak, state.device_bytes);
-    if (picture_->drew() || state.more) began_ = start;
+    if (picture_->drew() || state.more) began_before_ = std::exchange(began_, start);
     if (!picture_->drew()) return;  // nothing is drawn that would look the same
     const double whole = std::max(seconds, picture_->picture_seconds());
     (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
@@ -145,7 +148,8 @@ class Session {
   }
 
   const Arguments& arguments_;
-  Clock::time_point opened_, began_;  ///< the last frame that a display has shown
+  Clock::time_point opened_;
+  Clock::time_point began_, began_before_;  ///< the last frames that a display has shown
   std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
   std::unique_ptr<StorePicture> picture_;

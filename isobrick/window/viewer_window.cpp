@@ -33,8 +33,9 @@ constexpr double kLongestStep = 0.1;
 /// While meshes come in and nothing moves, from a step that has drawn nothing new to the next one:
 /// the cores are for meshes.
 constexpr double kNothingNew = 0.008;
-/// While a picture is drawn in pieces and nothing else happens, from one frame to the next: frames
-/// would keep software from drawing.
+/// While a picture is drawn in pieces or meshes come in, and nothing else happens, from one frame
+/// to the next: frames would keep software from drawing, and where a display sets the pace a
+/// picture of what has come would wait for its turn, after that of a frame that showed nothing new.
 constexpr double kLongestUnseen = 0.25;
 /// Messages about damage that are shown one by one.
 constexpr std::size_t kMostTold = 3;
@@ -293,7 +294,8 @@ bool ViewerWindow::draw_picture(int width, int height) {
   pace(glfwGetTime() - begin);
   tell_damage();
   settle_click();
-  return !picture.state().drawing;
+  const PictureState& state = picture.state();
+  return !state.drawing && (picture.drew() || state.complete || fluent);
 }
 
 void ViewerWindow::draw_frame(bool asked) {
@@ -301,7 +303,7 @@ void ViewerWindow::draw_frame(bool asked) {
   glfwGetFramebufferSize(window_, &width, &height);
   if (width == 0 || height == 0) return;  // minimised
   const bool other = state_.picture == nullptr || draw_picture(width, height);
-  // While a picture is drawn in pieces nothing changes but what tells how much of it there is.
+  // Until then nothing changes but what tells how much there is.
   if (!other && !asked && glfwGetTime() - shown_ < kLongestUnseen) return;
   shown_ = glfwGetTime();
   glClearColor(0.2f, 0.21f, 0.23f, 1);
@@ -349,9 +351,11 @@ void ViewerWindow::wait(double most_seconds) {
 void ViewerWindow::wait_for_meshes(double most_seconds) {
   if (state_.picture == nullptr || state_.picture->drew()) return;
   if (state_.picture->state().drawing || state_.picture->state().more) return;
-  // Each mesh that comes in ends a wait, and is not worth a step; what a user does is.
+  // Each mesh that comes in ends a wait, and is not worth a step; the last one is, and what a user
+  // does.
+  const SceneStream& stream = state_.picture->scene().stream();
   const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
-  for (double now = glfwGetTime(); !changed_ && now < end; now = glfwGetTime())
+  for (double now = glfwGetTime(); !changed_ && now < end && !stream.idle(); now = glfwGetTime())
     glfwWaitEventsTimeout(end - now);
 }
 
