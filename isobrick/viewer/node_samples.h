@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "isobrick/stream/resident_bricks.h"
 #include "isobrick/viewer/needed_samples.h"
 #include "isobrick/viewer/node_grid.h"
-#include "isobrick/viewer/resident_bricks.h"
 
 namespace isobrick {
 

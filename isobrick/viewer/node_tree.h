@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "isobrick/core/range.h"
-#include "isobrick/viewer/brick_source.h"
+#include "isobrick/stream/brick_source.h"
 #include "isobrick/viewer/node_grid.h"
 
 namespace isobrick {

@@ -2,8 +2,8 @@
 
 #include <optional>
 
+#include "isobrick/stream/resident_bricks.h"
 #include "isobrick/viewer/node_grid.h"
-#include "isobrick/viewer/resident_bricks.h"
 
 namespace isobrick {
 

@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 
+#include "isobrick/stream/resident_bricks.h"
 #include "isobrick/viewer/cut.h"
 #include "isobrick/viewer/device_mesher.h"
 #include "isobrick/viewer/drawable.h"
-#include "isobrick/viewer/resident_bricks.h"
 #include "isobrick/viewer/slice_image.h"
 
 namespace isobrick {

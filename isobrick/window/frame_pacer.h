@@ -43,7 +43,7 @@ class FramePacer {
   /// A picture that took `seconds` to draw as plain(), coarser() and smaller() say now.
   void drawn(double seconds) {
     const double ratio = seconds / target_;
-    if (!plain_ && ratio > 1) {
+    if (!plain_ && ratio > kMostWithRest) {
       leave_rest_out();
       return;
     }
@@ -67,7 +67,9 @@ class FramePacer {
   static constexpr double kFirstCoarser = 4, kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 16;
   static constexpr double kNothingDrawn = 1e-3;  ///< seconds: the picture was the one before
   static constexpr double kLeisure = 0.6;        ///< of the target: less is time for more
-  static constexpr double kRoomForRest = 0.9;    ///< of the target: less may be time for the rest
+  /// Of the target: less may be time for the rest; with the rest, more is too much: a processor
+  /// that is slower for a moment needs what is left.
+  static constexpr double kRoomForRest = 0.6, kMostWithRest = 0.75;
   static constexpr double kShortestPause = 30, kLongestPause = 1000, kForgetting = 0.95;
   static constexpr int kSmallest = 4;
 

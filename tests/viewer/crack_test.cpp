@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "isobrick/viewer/node_mesher.h"
+#include "tests/stream/always.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/viewer/active_of.h"
-#include "tests/viewer/always.h"
-#include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 #include "tests/viewer/rasteriser.h"
 

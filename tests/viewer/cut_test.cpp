@@ -9,8 +9,8 @@
 #include <tuple>
 
 #include "isobrick/pipeline/downsample.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/viewer/active_of.h"
-#include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/perspective.h"
 #include "tests/viewer/random_cut.h"
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "isobrick/viewer/node_mesher.h"
-#include "tests/viewer/always.h"
-#include "tests/viewer/memory_bricks.h"
+#include "tests/stream/always.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {

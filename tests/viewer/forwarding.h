@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include "isobrick/viewer/brick_source.h"
+#include "isobrick/stream/brick_source.h"
 
 namespace isobrick::test {
 

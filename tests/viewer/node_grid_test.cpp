@@ -5,8 +5,8 @@
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/viewer/node_samples.h"
 #include "isobrick/viewer/node_tree.h"
-#include "tests/viewer/always.h"
-#include "tests/viewer/memory_bricks.h"
+#include "tests/stream/always.h"
+#include "tests/stream/memory_bricks.h"
 
 namespace isobrick::test {
 namespace {

@@ -9,9 +9,9 @@
 #include <limits>
 #include <map>
 
+#include "tests/stream/always.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/surface/field.h"
-#include "tests/viewer/always.h"
-#include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {

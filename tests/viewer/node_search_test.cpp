@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "isobrick/viewer/scene.h"
-#include "tests/viewer/memory_bricks.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/viewer/perspective.h"
 
 namespace isobrick::test {

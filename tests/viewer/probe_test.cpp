@@ -7,8 +7,8 @@
 #include "isobrick/viewer/device_mesher.h"
 #include "isobrick/viewer/isovalue_counts.h"
 #include "isobrick/viewer/scene.h"
-#include "tests/viewer/always.h"
-#include "tests/viewer/memory_bricks.h"
+#include "tests/stream/always.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "isobrick/viewer/scene_stream.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/viewer/held_up.h"
-#include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/plain_device.h"
 #include "tests/viewer/random_cut.h"
 

@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
-#include "tests/viewer/always.h"
+#include "tests/stream/always.h"
+#include "tests/stream/memory_bricks.h"
 #include "tests/viewer/forwarding.h"
 #include "tests/viewer/held_up.h"
-#include "tests/viewer/memory_bricks.h"
 #include "tests/viewer/random_cut.h"
 
 namespace isobrick::test {

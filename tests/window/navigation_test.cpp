@@ -165,19 +165,19 @@ int full_ones(FramePacer& pacer, int pictures, double plain, double full) {
 }
 
 TEST(FramePacer, TriesOcclusionAgainRarelyWhereItTakesTooLong) {
-  for (const double plain : {0.001, 0.002, 0.0065, 0.011}) {
+  for (const double plain : {0.001, 0.002, 0.0065, 0.0074}) {
     FramePacer pacer = FramePacer::for_device(false);
     const int soon = full_ones(pacer, 240, plain, 0.0132);
     EXPECT_GT(soon, 1) << "it may take less by now";
     EXPECT_LT(soon, 6) << plain;
     EXPECT_LT(full_ones(pacer, 2400, plain, 0.0132), 6) << plain;
-    EXPECT_GT(full_ones(pacer, 2400, plain, 0.0120), 1000) << plain << ": it does";
+    EXPECT_GT(full_ones(pacer, 2400, plain, 0.0090), 1000) << plain << ": it does";
   }
 }
 
 TEST(FramePacer, TriesOcclusionSoonAgainWhereAPictureTookLongForOnce) {
   // Also where there is no leisure, but room.
-  for (const double plain : {0.002, 0.0065, 0.0080, 0.0100}) {
+  for (const double plain : {0.002, 0.0065, 0.0072}) {
     FramePacer pacer = FramePacer::for_device(false);
     pacer.drawn_still(plain + 0.0015);
     EXPECT_GT(full_ones(pacer, 120, plain, plain + 0.0015), 80) << plain;
@@ -187,6 +187,13 @@ TEST(FramePacer, TriesOcclusionSoonAgainWhereAPictureTookLongForOnce) {
       EXPECT_GT(full_ones(pacer, 200, plain, plain + 0.0015), 100) << plain;
     }
   }
+}
+
+/// What takes nearly as long as there is time for takes too long where the processor slows down.
+TEST(FramePacer, LeavesAMarginWithOcclusion) {
+  FramePacer pacer = FramePacer::for_device(false);
+  EXPECT_LT(full_ones(pacer, 2400, 0.007, 0.0105), 10);
+  EXPECT_EQ(full_ones(pacer, 2400, 0.008, 0.0085), 0) << "and is not tried";
 }
 
 TEST(FramePacer, LeavesFastPicturesAlone) {

@@ -15,7 +15,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/downsample.h"
-#include "isobrick/viewer/brick_source.h"
+#include "isobrick/stream/brick_source.h"
 
 namespace isobrick::test {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/viewer/resident_bricks.h"
+#include "isobrick/stream/resident_bricks.h"
 
 namespace isobrick::test {
 

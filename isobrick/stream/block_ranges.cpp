@@ -1,4 +1,4 @@
-#include "isobrick/viewer/block_ranges.h"
+#include "isobrick/stream/block_ranges.h"
 
 #include <utility>
 

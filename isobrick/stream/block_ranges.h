@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "isobrick/bricks/lru_cache.h"
-#include "isobrick/viewer/brick_source.h"
+#include "isobrick/stream/brick_source.h"
 
 namespace isobrick {
 

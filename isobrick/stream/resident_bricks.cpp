@@ -1,4 +1,4 @@
-#include "isobrick/viewer/resident_bricks.h"
+#include "isobrick/stream/resident_bricks.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/resident_bricks.h"
+#include "isobrick/stream/resident_bricks.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "isobrick/core/error.h"
-#include "tests/viewer/always.h"
-#include "tests/viewer/memory_bricks.h"
+#include "tests/stream/always.h"
+#include "tests/stream/memory_bricks.h"
 
 namespace isobrick::test {
 namespace {

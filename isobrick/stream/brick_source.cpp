@@ -1,4 +1,4 @@
-#include "isobrick/viewer/brick_source.h"
+#include "isobrick/stream/brick_source.h"
 
 #include <fmt/format.h>
 
