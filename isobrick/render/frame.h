@@ -14,6 +14,8 @@ namespace isobrick {
 
 /// Planes and box faces that cut; what OpenGL must offer clips exactly, the rest by pixel.
 inline constexpr int kMostHalfSpaces = 12, kClipDistances = 8;
+/// Of a pixel, with multisampling.
+inline constexpr int kSamples = 4;
 
 /// What every shader knows of the picture: the uniform block Frame of frame_glsl.
 struct FrameBlock {
@@ -24,7 +26,8 @@ struct FrameBlock {
   glm::vec4 viewport;     ///< width, height, half width and half height at depth 1 (or everywhere)
   glm::vec4 pixel;        ///< length of a pixel at depth 1 (or everywhere)
   glm::vec4 top, bottom;  ///< background, linear
-  glm::ivec4 counts;      ///< clip distances, half spaces
+  /// Clip distances, half spaces, whether picking, all samples of a pixel as bits.
+  glm::ivec4 counts;
 };
 
 FrameBlock make_frame(const Camera& camera, int width, int height, const PictureSettings& settings);

@@ -42,6 +42,10 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in uint number;
 centroid out vec3 world_normal;
+#if FRONT
+// Within the triangle, also where a pixel's centre is beside it.
+noperspective centroid out float stored_depth;
+#endif
 #if SOFTWARE
 // Fragments get the look from here and not from the buffer: Mesa's llvmpipe draws them
 // when the buffer may hold the next mesh's already.
@@ -55,6 +59,9 @@ flat out uint look;
 void main() {
   place(position + looks[number].offset.xyz, looks[number].id.y);
   world_normal = normal;
+#if FRONT
+  stored_depth = gl_Position.z / gl_Position.w;
+#endif
 #if SOFTWARE
   outer_colour = looks[number].colour;
   inner_colour = looks[number].inside;
@@ -120,15 +127,20 @@ const char* const kTransparent = R"(
 // What is hidden by opaque meshes is not in front, either.
 layout(early_fragment_tests) in;
 layout(binding = 0, r32ui) uniform uimage2D front;
+noperspective centroid in float stored_depth;
 layout(location = 0) out vec4 sum;
 layout(location = 1) out float hidden;
 
 void main() {
   Seen s = see();
-  // Near is large; of the depth what leaves room for a number.
-  if (counts.z != 0)
+  if (counts.z != 0) {
+    // A triangle that goes past the eye has no depth in between, but it covers whole pixels.
+    bool whole = gl_SampleMaskIn[0] == counts.w;
+    float depth = whole ? gl_FragCoord.z : clamp(stored_depth, 0.0, 1.0);
+    // Near is large; of the depth what leaves room for a number.
     imageAtomicMax(front, ivec2(gl_FragCoord.xy),
-                   floatBitsToUint(gl_FragCoord.z) & 0xffffff00u | mesh.x & 0xffu);
+                   floatBitsToUint(depth) & 0xffffff00u | mesh.x & 0xffu);
+  }
   // Slanting rays have a longer way through it.
   float facing = max(dot(s.normal, s.eye), 0.12);
   float alpha = 1 - pow(1 - outer_colour.a, 1 / facing);
@@ -167,11 +179,12 @@ MeshPass::Programs::Programs(CutBy cut, bool picture_is_cut, bool software) {
   const std::string frame = fmt::format("#define OPEN {}\n#define SOFTWARE {}\n",
                                         picture_is_cut ? 1 : 0, software ? 1 : 0) +
                             cut_glsl(cut) + kFrameGlsl;
-  const std::string vertex = frame + kCutVertexGlsl + kLooks + kVertex,
+  const std::string vertex = kCutVertexGlsl + std::string(kLooks) + kVertex,
                     fragment = frame + (software ? "" : kLooks) + kCutFragmentGlsl + kLightGlsl +
                                kFragment;
-  opaque = make_program(vertex, fragment + kOpaque, "meshes");
-  transparent = make_program(vertex, fragment + kTransparent, "transparent meshes");
+  opaque = make_program("#define FRONT 0\n" + frame + vertex, fragment + kOpaque, "meshes");
+  transparent = make_program("#define FRONT 1\n" + frame + vertex, fragment + kTransparent,
+                             "transparent meshes");
 }
 
 MeshPass::MeshPass()

@@ -20,8 +20,6 @@
 namespace isobrick {
 namespace {
 
-constexpr int kSamples = 4;
-
 /// World length in front of the eye, of a word of PictureResult::front.
 float depth_of_front(const Camera& camera, std::uint32_t word) {
   const auto stored =
@@ -132,8 +130,9 @@ void Renderer::State::clear_transparent() {
   const std::array<float, 4> nothing{}, all{1, 1, 1, 1};
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 0, nothing.data());
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 1, all.data());
-  if (targets->ids)
-    glClearTexImage(targets->front.get(), 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+  if (!targets->ids) return;
+  glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);  // after a picture that was dropped
+  glClearTexImage(targets->front.get(), 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
 
 void Renderer::State::bind_target(const DrawSwitches& switches, bool blended) {

@@ -250,12 +250,15 @@ StreamCounters SceneStream::counters() const {
 }
 
 std::uint64_t SceneStream::bricks_wanted() const {
-  std::vector<StoredBrick> missing;
+  std::vector<MeshJob> jobs;
   {
     const std::lock_guard lock(shared_->mutex);
-    for (const MeshJob& job : shared_->jobs)
-      shared_->planner.add_missing(job.key, job.isovalue, job.coarser, missing);
+    jobs = shared_->jobs;
   }
+  // Workers take jobs meanwhile: nothing that they change is asked.
+  std::vector<StoredBrick> missing;
+  for (const MeshJob& job : jobs)
+    shared_->planner.add_missing(job.key, job.isovalue, job.coarser, missing);
   std::sort(missing.begin(), missing.end());
   return static_cast<std::uint64_t>(std::unique(missing.begin(), missing.end()) - missing.begin());
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <utility>
@@ -183,14 +184,17 @@ std::vector<VdbGrid> read_vdb_header(const std::string& path) {
   return grids;
 }
 
+bool is_readable(const VdbGrid& grid) {
+  static constexpr std::array<std::string_view, 6> kTypes{"Tree_float_5_4_3", "Tree_double_5_4_3",
+                                                          "Tree_int32_5_4_3", "Tree_int64_5_4_3",
+                                                          "Tree_bool_5_4_3",  "Tree_mask_5_4_3"};
+  return std::find(kTypes.begin(), kTypes.end(), grid.type) != kTypes.end();
+}
+
 const VdbGrid& choose_vdb_grid(const std::string& path, const std::vector<VdbGrid>& grids,
-                               const std::optional<std::string>& name,
-                               const std::vector<std::string_view>& types) {
-  const auto readable = [&](const VdbGrid& grid) {
-    return std::find(types.begin(), types.end(), grid.type) != types.end();
-  };
+                               const std::optional<std::string>& name) {
   const auto fits = [&](const VdbGrid& grid) {
-    return name ? grid.name == shown(*name) : readable(grid);
+    return name ? grid.name == shown(*name) : is_readable(grid);
   };
   if (grids.empty()) throw UsageError(fmt::format("'{}' holds no grids", path));
   const auto chosen = std::find_if(grids.begin(), grids.end(), fits);
@@ -198,7 +202,7 @@ const VdbGrid& choose_vdb_grid(const std::string& path, const std::vector<VdbGri
   if (count == 0 && name)
     throw UsageError(
         fmt::format("'{}' has no grid '{}'; it has {}", path, shown(*name), list(grids)));
-  if (count == 0 || !readable(*chosen))
+  if (count == 0 || !is_readable(*chosen))
     throw UsageError(
         fmt::format("'{}': only grids of float, double, int32, int64, bool and mask can be read, "
                     "not {}",

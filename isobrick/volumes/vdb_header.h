@@ -31,10 +31,12 @@ struct VdbGrid {
 /// older than OpenVDB 1.0, and for streams, which do not say where grids are.
 std::vector<VdbGrid> read_vdb_header(const std::string& path);
 
-/// The grid that is meant: by name, or the only one of a type in `types`. Throws
+/// Whether it is of a type and a shape that volumes are made of.
+bool is_readable(const VdbGrid& grid);
+
+/// The grid that is meant: by name, or the only one that is readable. Throws
 /// UsageError that lists the grids otherwise.
 const VdbGrid& choose_vdb_grid(const std::string& path, const std::vector<VdbGrid>& grids,
-                               const std::optional<std::string>& name,
-                               const std::vector<std::string_view>& types);
+                               const std::optional<std::string>& name);
 
 }  // namespace isobrick

@@ -226,10 +226,7 @@ std::unique_ptr<VolumeSource> open_vdb(const std::string& file, const VolumeRequ
   refuse_raw_description(file, "an OpenVDB file", said);
   refuse_selection(file, said);
   const std::vector<VdbGrid> grids = read_vdb_header(file);
-  const VdbGrid& grid =
-      choose_vdb_grid(file, grids, said.grid,
-                      {"Tree_float_5_4_3", "Tree_double_5_4_3", "Tree_int32_5_4_3",
-                       "Tree_int64_5_4_3", "Tree_bool_5_4_3", "Tree_mask_5_4_3"});
+  const VdbGrid& grid = choose_vdb_grid(file, grids, said.grid);
   check_transform(file, grid);
   return with_vdb_errors(file, grid.name, [&] {
     VdbArchive archive(file);

@@ -59,7 +59,7 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
   const std::string input = input_.string();
   if (is_zarr(input)) return open_store_source(input, request, options_.threads);
   request.memory = options_.memory;
-  if (format_of_extension(input) == VolumeFormat::vdb)
+  if (recognise_format(input) == VolumeFormat::vdb)
     request.grid = grid_to_show(read_vdb_header(input));
   if (request.grid) {
     const std::scoped_lock lock(mutex_);
@@ -97,10 +97,15 @@ ImportJob::State ImportJob::state() const {
 }
 
 std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids) {
-  const auto found = std::find_if(grids.begin(), grids.end(),
-                                  [](const VdbGrid& grid) { return grid.value_type() == "float"; });
-  if (grids.size() < 2 || found == grids.end()) return std::nullopt;
-  return found->name;
+  const VdbGrid* first = nullptr;
+  int readable = 0;
+  for (const VdbGrid& grid : grids) {
+    if (!is_readable(grid)) continue;
+    ++readable;
+    if (first == nullptr || (grid.value_type() == "float" && first->value_type() != "float"))
+      first = &grid;
+  }
+  return readable > 1 ? std::optional(first->name) : std::nullopt;
 }
 
 fs::path store_for(const fs::path& input) {

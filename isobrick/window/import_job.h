@@ -51,7 +51,8 @@ class ImportJob {
   std::thread thread_;  ///< last: it uses the others
 };
 
-/// The grid of a dropped OpenVDB file, where somebody would have to choose: the first of floats.
+/// The grid of a dropped OpenVDB file, where somebody would have to choose: the first of
+/// floats, else the first that can be read.
 std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids);
 
 /// Where a dropped file's store goes: beside it if its folder can be written to, else

@@ -10,7 +10,9 @@
 #include <imgui_stdlib.h>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/file_error.h"
 #include "isobrick/core/length_unit.h"
+#include "isobrick/core/stopwatch.h"
 #include "isobrick/render/vectors.h"
 
 namespace isobrick {
@@ -25,18 +27,28 @@ std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
 
+/// The whole text as a number.
+std::optional<double> number_of(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value;
+}
+
 /// What is typed counts once it is all there: after Enter, or when the field is left.
 void type_isovalue(ViewerState& state, std::size_t number) {
   double& isovalue = state.settings.surfaces[number].isovalue;
   const bool going_on = state.typed && state.typed->surface == number;
-  std::string text = going_on ? state.typed->text : fmt::format("{:.6g}", isovalue);
+  const std::string shown = fmt::format("{:.6g}", isovalue);
+  std::string text = going_on ? state.typed->text : shown;
   if (ImGui::InputText("##isovalue", &text, ImGuiInputTextFlags_CharsScientific))
     state.typed = {number, text};
-  if (!ImGui::IsItemDeactivated() || !state.typed) return;
-  const std::string& typed = state.typed->text;
-  double value = 0;
-  const std::errc error = std::from_chars(typed.data(), typed.data() + typed.size(), value).ec;
-  if (error == std::errc() && std::isfinite(value)) isovalue = value;
+  if (!state.typed || state.typed->surface != number || ImGui::IsItemActive()) return;
+  const std::optional<double> value = number_of(state.typed->text);
+  // What is shown is rounded, and so no other value.
+  if (ImGui::IsItemDeactivated() && value && state.typed->text != shown) isovalue = *value;
   state.typed.reset();
 }
 
@@ -160,7 +172,7 @@ void attempt(ViewerState& state, F&& f) {
   try {
     f();
   } catch (const std::exception& e) {
-    state.say(e.what());
+    state.say(what_of(e));
   }
 }
 
@@ -197,10 +209,13 @@ void bookmarks_panel(ViewerState& state) {
 /// Counted some times a second: it takes as long as to plan.
 std::uint64_t bricks_wanted(ViewerState& state) {
   constexpr double kSeconds = 0.25;
+  // Of many a fiftieth of the time at most.
+  constexpr double kPart = 50;
   const double now = ImGui::GetTime();
-  if (!state.wanted_at || now - *state.wanted_at > kSeconds) {
+  if (now >= state.count_wanted_at) {
+    Stopwatch watch;
     state.bricks_wanted = state.picture->scene().stream().bricks_wanted();
-    state.wanted_at = now;
+    state.count_wanted_at = now + std::max(kSeconds, kPart * watch.lap());
   }
   return state.bricks_wanted;
 }
@@ -262,11 +277,13 @@ void messages_panel(ViewerState& state) {
   const float width = 0.9f * (all.x - taken);
   ImGui::SetNextWindowPos({(all.x + taken) / 2, all.y - 20}, ImGuiCond_Always, {0.5f, 1});
   ImGui::SetNextWindowSizeConstraints({std::min(300.f, width), 0}, {width, all.y * 0.4f});
-  if (std::exchange(state.messages_shown, state.messages.size()) < state.messages.size())
+  // A new one comes to the front, but takes nobody's field or slider away.
+  const bool busy = ImGui::IsAnyItemActive() || ImGui::GetIO().WantTextInput;
+  if (!busy && std::exchange(state.messages_shown, state.messages.size()) != state.messages.size())
     ImGui::SetNextWindowFocus();
   ImGui::Begin("Messages", nullptr,
                ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_AlwaysAutoResize |
-                   ImGuiWindowFlags_NoSavedSettings);
+                   ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing);
   ImGui::PushTextWrapPos(width - 20);
   for (const std::string& message : state.messages) text(message);
   ImGui::PopTextWrapPos();
@@ -292,8 +309,9 @@ void section(const char* name, bool open, Body&& body, ViewerState& state) {
 /// A window that has become smaller leaves the panel's title within reach.
 void keep_in_view() {
   const ImVec2 all = ImGui::GetMainViewport()->Size, at = ImGui::GetWindowPos();
-  const ImVec2 within(std::clamp(at.x, 60 - ImGui::GetWindowWidth(), std::max(all.x - 60, 0.f)),
-                      std::clamp(at.y, 0.f, std::max(all.y - 30, 0.f)));
+  const ImVec2 within(
+      std::clamp(at.x, std::min(60 - ImGui::GetWindowWidth(), 0.f), std::max(all.x - 60, 0.f)),
+      std::clamp(at.y, 0.f, std::max(all.y - 30, 0.f)));
   if (within.x != at.x || within.y != at.y) ImGui::SetWindowPos(within);
 }
 

@@ -385,6 +385,8 @@ void StorePicture::update_state(const Asked& asked) {
                                                         static_cast<double>(work_->all)
                                               : 0;
   state_.plain = pictured_.shows != asked.shows;
+  // One that is no simpler than those at rest is not drawn again.
+  if (!work_ && !asked.way.moving && !state_.plain) state_.moving = false;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
       shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;

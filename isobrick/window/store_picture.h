@@ -39,7 +39,7 @@ struct PictureState {
   bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
   std::uint64_t triangles = 0, nodes = 0;
   bool plain = false;               ///< drawn without occlusion and multisampling to be quick
-  bool moving = false;              ///< drawn as PictureWay::moving
+  bool moving = false;              ///< drawn as PictureWay::moving, and may be coarser for that
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
   bool more = false;                ///< the next draw() has something to do, whatever comes
   bool limited_by_budget = false;   ///< with more memory it would be finer

@@ -55,8 +55,8 @@ struct ViewerState {
   std::vector<std::string> messages;  ///< what went wrong, the latest last
   std::size_t messages_shown = 0;     ///< so many of them the panel has shown
   std::optional<TypedIsovalue> typed;
-  std::uint64_t bricks_wanted = 0;  ///< as counted at
-  std::optional<double> wanted_at;  ///< this time of Dear ImGui
+  std::uint64_t bricks_wanted = 0;  ///< as counted last
+  double count_wanted_at = 0;       ///< when next: time of Dear ImGui
   std::optional<PickedPoint> picked;
   bool measuring = false;
   std::vector<Vec3d> measured;  ///< world positions, two at most

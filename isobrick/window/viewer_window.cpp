@@ -135,7 +135,8 @@ void ViewerWindow::open(const std::filesystem::path& path) {
   choose_values(state_.settings, state_.picture->scene().tree());
   state_.picked.reset();
   state_.measured.clear();
-  click_.reset();
+  clicks_.clear();
+  state_.typed.reset();
   told_damage_.clear();
   const WorldBox box = state_.picture->bounds();
   state_.navigator.stop();
@@ -203,7 +204,12 @@ void ViewerWindow::handle_requests() {
     state_.navigator.camera.fit(box.lo, box.hi, aspect());
     state_.navigator.stop();
   }
-  if (asked.screenshot) save_picture(*asked.screenshot);
+  if (!asked.screenshot) return;
+  // One that moves may be smaller, and without box and axes: that at rest is worth keeping.
+  if (rests())
+    save_picture(*asked.screenshot);
+  else
+    state_.requests.screenshot = asked.screenshot;
 }
 
 void ViewerWindow::save_picture(const std::filesystem::path& file) {
@@ -212,7 +218,7 @@ void ViewerWindow::save_picture(const std::filesystem::path& file) {
     write_picture(state_.picture->renderer(), free.string(), false);
     state_.say(fmt::format("wrote '{}'", std::filesystem::absolute(free).string()));
   } catch (const std::exception& e) {
-    state_.say(e.what());
+    state_.say(what_of(e));
   }
 }
 
@@ -223,15 +229,34 @@ std::optional<PickedPoint> ViewerWindow::pick(const Click& click) {
                     static_cast<int>(click.y * renderer.height()));
 }
 
+ViewerWindow::Click ViewerWindow::click_at(double x, double y) const {
+  Click click{.x = x,
+              .y = y,
+              .width = 0,
+              .height = 0,
+              .camera = state_.navigator.camera,
+              .settings = state_.settings,
+              .measuring = state_.measuring,
+              .point = {}};
+  glfwGetFramebufferSize(window_, &click.width, &click.height);
+  return click;
+}
+
+/// Which point of the measurement it becomes.
+std::size_t ViewerWindow::measure(Vec3d world) {
+  if (state_.measured.size() == 2) state_.measured.clear();
+  state_.measured.push_back(world);
+  return state_.measured.size() - 1;
+}
+
 void ViewerWindow::click(double x, double y) {
   if (state_.picture == nullptr) return;
-  const Click click{x, y, state_.navigator.camera};
+  Click click = click_at(x, y);
   state_.picked = pick(click);
-  click_.reset();
-  if (!rests()) click_ = click;
-  if (!state_.measuring || !state_.picked) return;
-  if (state_.measured.size() == 2) state_.measured.clear();
-  state_.measured.push_back(state_.picked->world);
+  if (state_.measuring && state_.picked) click.point = measure(state_.picked->world);
+  // Those before were of a measurement that is over, or of none.
+  if (!click.measuring || click.point == 0u) clicks_.clear();
+  if (!rests()) clicks_.push_back(std::move(click));
 }
 
 /// Whether the picture that is shown is the finest there will be.
@@ -240,14 +265,25 @@ bool ViewerWindow::rests() const {
   return !moving() && state.complete && !state.moving;
 }
 
-void ViewerWindow::settle_click() {
-  if (!click_) return;
-  if (!(click_->camera == state_.navigator.camera)) return click_.reset();
-  if (!rests()) return;
-  const auto point = pick(*std::exchange(click_, std::nullopt));
-  if (!point) return;
-  state_.picked = point;
-  if (state_.measuring && !state_.measured.empty()) state_.measured.back() = point->world;
+void ViewerWindow::settle_clicks() {
+  if (clicks_.empty()) return;
+  const Click now = click_at(0, 0);
+  const auto is_over = [&](const Click& c) {
+    return !(c.camera == now.camera) || !(c.settings == now.settings) || c.width != now.width ||
+           c.height != now.height || c.measuring != now.measuring ||
+           (c.point && *c.point >= state_.measured.size());
+  };
+  std::erase_if(clicks_, is_over);
+  if (clicks_.empty() || !rests()) return;
+  for (const Click& click : std::exchange(clicks_, {})) {
+    const auto point = pick(click);
+    if (!point) continue;
+    state_.picked = point;
+    if (click.point)
+      state_.measured[*click.point] = point->world;
+    else if (click.measuring)
+      measure(point->world);
+  }
 }
 
 /// Says once what cannot be shown.
@@ -293,7 +329,7 @@ bool ViewerWindow::draw_picture(int width, int height) {
   }
   pace(glfwGetTime() - begin);
   tell_damage();
-  settle_click();
+  settle_clicks();
   const PictureState& state = picture.state();
   return !state.drawing && (picture.drew() || state.complete || fluent);
 }

@@ -52,10 +52,14 @@ class ViewerWindow {
 
  private:
   class Events;
-  /// Parts of the window's width and height, and the camera then.
+  /// Parts of the window's width and height, and what was seen then.
   struct Click {
     double x, y;
+    int width, height;
     Camera camera;
+    ViewSettings settings;
+    bool measuring;
+    std::optional<std::size_t> point;  ///< of the measurement, that it made
   };
 
   void wait(double most_seconds);
@@ -65,11 +69,13 @@ class ViewerWindow {
   void pace(double seconds);
   void tell_damage();
   bool rests() const;
-  void settle_click();
+  void settle_clicks();
   void handle_requests();
   void handle_import();
   void look_along(Vec3d direction);
+  Click click_at(double x, double y) const;
   std::optional<PickedPoint> pick(const Click& click);
+  std::size_t measure(Vec3d world);
   void click(double x, double y);
   void save_picture(const std::filesystem::path& file);
   bool moving() const;
@@ -86,9 +92,9 @@ class ViewerWindow {
   bool changed_ = true;  ///< something has happened: the next frame may differ from the last
   bool told_ = false;    ///< something had happened before the last step
   bool more_ = false;    ///< the picture would go on by itself
-  /// On a picture that was not at rest, whose surface may be a coarser one: it is looked at again
-  /// once the picture rests, if the camera is the same.
-  std::optional<Click> click_;
+  /// On a picture that was not at rest, whose surface may be a coarser one: they are looked at
+  /// again once the picture rests, if it is still of the same.
+  std::vector<Click> clicks_;
   std::set<std::string> told_damage_;  ///< of this store
 };
 

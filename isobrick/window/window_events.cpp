@@ -125,7 +125,7 @@ void ViewerWindow::Events::on_key(int key, int action, int mods) {
   const bool typing = ImGui::GetIO().WantTextInput;
   Navigator& navigator = owner_.state_.navigator;
   navigator.press(!typing && navigator.mode == NavigationMode::fly ? fly_keys() : FlyKeys{});
-  if (!typing && action != GLFW_RELEASE) on_press(key, mods);
+  if (!typing && action != GLFW_RELEASE) on_press(key, mods, action == GLFW_REPEAT);
 }
 
 void ViewerWindow::Events::move_isovalue(double steps) {
@@ -144,7 +144,7 @@ void ViewerWindow::Events::next_mode() {
   mode = static_cast<NavigationMode>((static_cast<int>(mode) + 1) % 3);
 }
 
-void ViewerWindow::Events::on_press(int key, int mods) {
+void ViewerWindow::Events::on_press(int key, int mods, bool again) {
   ViewerState& state = owner_.state_;
   const bool fine = (mods & GLFW_MOD_SHIFT) != 0;
   const bool flying = state.navigator.mode == NavigationMode::fly;
@@ -154,6 +154,10 @@ void ViewerWindow::Events::on_press(int key, int mods) {
     case GLFW_KEY_UP: return move_isovalue(fine ? 0.1 : 1);
     case GLFW_KEY_LEFT_BRACKET:
     case GLFW_KEY_DOWN: return move_isovalue(fine ? -0.1 : -1);
+    default: break;
+  }
+  if (again) return;  // one that is held does not do the rest over and over
+  switch (key) {
     case GLFW_KEY_TAB:
       if (!state.settings.surfaces.empty())
         state.selected = (state.selected + 1) % state.settings.surfaces.size();

@@ -90,6 +90,27 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
       }
 }
 
+/// Triangles that cover a part of a pixel are picked where they are, not where their plane is.
+TEST_F(RenderTest, TransparentEdgesArePickedOnTheSurface) {
+  for (const bool orthographic : {false, true})
+    for (const int segments : {30, 100}) {
+      const TestMesh ball = make_ball({0, 0, 0}, 1, segments);
+      Camera camera = front_camera(1.25);
+      camera.orthographic = orthographic;
+      renderer().begin(camera, 200, 160, {.picking = true});
+      renderer().draw(ball.chunk(), {.opacity = 0.5f, .id = 5});
+      renderer().end();
+      int hits = 0;
+      for (int y = 0; y < 160; ++y)
+        for (int x = 0; x < 200; ++x)
+          if (const auto picked = renderer().pick(x, y)) {
+            ++hits;
+            EXPECT_NEAR(distance_from_middle(*picked), 1, 0.03) << x << ' ' << y;
+          }
+      EXPECT_GT(hits, 3000);
+    }
+}
+
 /// Pixels that are as blue as the z axis.
 template <class Rgba>
 int count_blue(const Rgba& rgba) {

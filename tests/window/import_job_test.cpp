@@ -66,6 +66,12 @@ TEST(ImportJob, TakesTheFirstGridOfFloats) {
   EXPECT_EQ(grid_to_show({colour, density, other}), "density[0]");
   EXPECT_EQ(grid_to_show({colour, colour}), std::nullopt);
   EXPECT_EQ(grid_to_show({density}), std::nullopt) << "nobody has to choose";
+  EXPECT_EQ(grid_to_show({colour, density}), std::nullopt) << "nobody can";
+  const VdbGrid labels{.name = "labels", .type = "Tree_int32_5_4_3"},
+      others{.name = "others", .type = "Tree_int64_5_4_3"},
+      shallow{.name = "shallow", .type = "Tree_float_4_3"};
+  EXPECT_EQ(grid_to_show({shallow, labels, density}), "density[0]");
+  EXPECT_EQ(grid_to_show({labels, others}), "labels");
 }
 
 TEST(StoreFor, TakesANameThatIsFree) {

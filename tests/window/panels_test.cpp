@@ -193,6 +193,50 @@ TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
   EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
 }
 
+TEST_F(Panels, WhatIsTypedGoesToItsOwnFieldOrNone) {
+  state_.settings.surfaces.push_back(state_.settings.surfaces[0]);
+  state_.settings.surfaces[0].isovalue = 123.456789123;
+  state_.settings.surfaces[1].isovalue = 50;
+  frame();
+  const ImVec2 first = place_of({"Surfaces", "##isovalue"}, 0),
+               second = place_of({"Surfaces", "##isovalue"}, 1), header = place_of({"Surfaces"});
+  const auto type = [&](const char* text) {
+    for (; *text != 0; ++text) {
+      ImGui::GetIO().AddInputCharacter(static_cast<unsigned>(*text));
+      frame();
+    }
+  };
+  click(first);
+  type("9");
+  press(ImGuiKey_Escape);
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, 123.456789123) << "not as it is shown";
+  click(first);
+  type("7");
+  ImGui::GetIO().MousePos = header;  // closes the section without another frame of the field
+  click(header);
+  click(header);
+  const double kept = state_.settings.surfaces[0].isovalue;
+  click(second);
+  click({600, 1350});
+  EXPECT_EQ(state_.settings.surfaces[1].isovalue, 50);
+  EXPECT_EQ(state_.settings.surfaces[0].isovalue, kept);
+  click(second);
+  type("*2");
+  press(ImGuiKey_Enter);
+  EXPECT_EQ(state_.settings.surfaces[1].isovalue, 50) << "no number";
+}
+
+TEST_F(Panels, AMessageTakesNobodysFieldAway) {
+  click(place_of({"Surfaces", "##isovalue"}, 0));
+  ASSERT_TRUE(ImGui::GetIO().WantTextInput);
+  state_.say("something");
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_TRUE(ImGui::GetIO().WantTextInput);
+  press(ImGuiKey_Enter);
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_FALSE(ImGui::GetIO().WantTextInput);
+}
+
 TEST_F(Panels, MessagesAreNotBehindThePanel) {
   ImGui::GetIO().DisplaySize = {1000, 800};
   state_.say("one two three four five six seven eight nine ten eleven twelve thirteen fourteen");
@@ -236,6 +280,18 @@ TEST_F(Panels, ThePanelStaysWithinReach) {
 
 TEST_F(Panels, TheStatusNamesBricks) {
   EXPECT_EQ(state_.picture->scene().stream().bricks_wanted(), 0u) << "all are there";
+  // One thread, and a cut of many bricks.
+  open(SynthKind::gyroid, {200, 200, 200}, {.threads = 1});
+  const SceneStream& stream = picture_->scene().stream();
+  const auto all = static_cast<std::uint64_t>(7 * 7 * 7);
+  std::uint64_t most = 0;
+  do {
+    picture_->draw(camera_, kWidth, kHeight, settings_);
+    most = std::max(most, stream.bricks_wanted());
+  } while (!picture_->state().complete);
+  EXPECT_GT(most, all / 2);
+  EXPECT_LE(most, 2 * all) << "each counts once";
+  EXPECT_EQ(stream.bricks_wanted(), 0u);
 }
 
 }  // namespace

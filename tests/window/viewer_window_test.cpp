@@ -233,6 +233,53 @@ TEST_F(Window, AClickBeforeThePictureRestsIsMadeGood) {
   EXPECT_EQ(length(window.state().measured[0] - window.state().picked->world), 0);
 }
 
+/// A click that meets nothing makes no point, also once the picture rests.
+TEST_F(Window, AClickBesideTheSurfaceLeavesWhatWasMeasured) {
+  ViewerWindow& window = open();
+  until([&] { return rests(); });
+  window.state().measuring = true;
+  click(kWidth / 2 + 40, kHeight / 2 - 50);
+  ASSERT_EQ(window.state().measured.size(), 1u);
+  const Vec3d point = window.state().measured[0];
+  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
+  display_->button(4, true);  // nearer
+  display_->button(4, false);
+  steps(1);
+  click(3, 3);
+  until([&] { return rests(); });
+  steps(3);
+  ASSERT_EQ(window.state().measured.size(), 1u);
+  EXPECT_EQ(length(window.state().measured[0] - point), 0);
+}
+
+/// Where pictures in motion are as good as those at rest, none is drawn again.
+TEST_F(Window, RestsAfterMotionThatLeftNothingOut) {
+  ViewerWindow& window = open();
+  until([&] { return rests(); });
+  window.state().pacer = FramePacer(10);
+  drag(1, kWidth / 2, kHeight / 2, kWidth / 2 + 60, kHeight / 2);
+  until([&] { return !window.state().navigator.moving(); });
+  until([&] { return rests(); });
+}
+
+TEST_F(Window, KeysThatAreHeldDoMostThingsOnce) {
+  ViewerWindow& window = open();
+  const bool box = window.state().settings.box;
+  const double isovalue = window.state().settings.surfaces[0].isovalue;
+  const auto hold = [&](unsigned long key) {
+    display_->key(key, true);
+    const auto start = std::chrono::steady_clock::now();
+    while (std::chrono::steady_clock::now() - start < std::chrono::milliseconds(1200)) steps(1);
+    display_->key(key, false);
+    steps(2);
+  };
+  hold(XK_b);
+  EXPECT_NE(window.state().settings.box, box);
+  hold(XK_bracketright);
+  const double step = window.state().facts->counts().range().hi / 200;
+  EXPECT_GT(window.state().settings.surfaces[0].isovalue, isovalue + 2.5 * step);
+}
+
 TEST_F(Window, KeysThatComeAtOnceAreTyped) {
   ViewerWindow& window = open();
   window.state().panels = true;
