@@ -325,8 +325,10 @@ bool ViewerWindow::draw_picture(int width, int height) {
                  std::max(height / smaller, 1), state_.settings, way);
   } catch (const std::exception& e) {
     if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
+    failed_ = true;
     return true;
   }
+  failed_ = false;
   pace(glfwGetTime() - begin);
   tell_damage();
   settle_clicks();
@@ -391,7 +393,8 @@ void ViewerWindow::wait_for_meshes(double most_seconds) {
   // does.
   const SceneStream& stream = state_.picture->scene().stream();
   const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
-  for (double now = glfwGetTime(); !changed_ && now < end && !stream.idle(); now = glfwGetTime())
+  for (double now = glfwGetTime(); !changed_ && now < end && (failed_ || !stream.idle());
+       now = glfwGetTime())
     glfwWaitEventsTimeout(end - now);
 }
 

@@ -92,6 +92,7 @@ class ViewerWindow {
   bool changed_ = true;  ///< something has happened: the next frame may differ from the last
   bool told_ = false;    ///< something had happened before the last step
   bool more_ = false;    ///< the picture would go on by itself
+  bool failed_ = false;  ///< the last picture has thrown: it is tried again, but not at once
   /// On a picture that was not at rest, whose surface may be a coarser one: they are looked at
   /// again once the picture rests, if it is still of the same.
   std::vector<Click> clicks_;
