@@ -149,7 +149,7 @@ class Session {
 
   const Arguments& arguments_;
   Clock::time_point opened_;
-  Clock::time_point began_, began_before_;  ///< the last frames that a display has shown
+  Clock::time_point began_, began_before_;  ///< the last frames that may have been shown
   std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
   std::unique_ptr<StorePicture> picture_;

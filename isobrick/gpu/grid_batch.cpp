@@ -6,6 +6,7 @@
 #include <cstring>
 #include <vector>
 
+#include "isobrick/core/error.h"
 #include "isobrick/gpu/grid_kernel.h"
 #include "isobrick/gpu/stream.h"
 #include "isobrick/surface/case_tables.h"
@@ -59,16 +60,16 @@ GridMeshSize size_of(const GridTotals& t) {
   return {t.vertices + 2 * t.border_vertices, t.triangles + 2 * t.ribbon_sides, 2 * t.ribbon_sides};
 }
 
-/// A cell with a triangle that meets a coarser grid, on all kinds of arrays.
+/// A cell with a triangle that meets a coarser grid, of stored samples: all kernels have work.
 struct SmallGrid {
-  std::array<float, 8> values{-1, 1, 1, 1, 1, 1, 1, 1};
+  std::array<std::uint8_t, 8> samples{0, 1, 1, 1, 1, 1, 1, 1};
   std::array<double, 2> places{0, 1};
   std::array<float, 2> inverse{1, 1};
   std::array<float, 4> face{-1, 1, 1, 1};
   GridView view;
 
   SmallGrid() {
-    view.values = view.around = values.data();
+    view.stored = {samples.data(), ScalarType::u8, 0.5};
     view.row = 2;
     view.plane = 4;
     for (int axis = 0; axis < 3; ++axis) {
@@ -163,6 +164,8 @@ struct GridBatch::Impl {
     };
     const std::size_t around = points(g.around_n);
     if (g.stored.samples != nullptr) {
+      if (size_of(g.stored.type) > kLargestStored)
+        throw Error("a device's grids are made of stored samples of one or two bytes");
       const auto* samples = static_cast<const std::byte*>(g.stored.samples);
       there.stored.samples = stage(slot, samples, around * size_of(g.stored.type));
     } else {

@@ -133,10 +133,13 @@ layout(location = 1) out float hidden;
 
 void main() {
   Seen s = see();
+  // What it is where the pixel's centre is beside the triangle; not farther off than that is, for
+  // one that goes past the eye has none in between.
+  float slope = fwidth(gl_FragCoord.z);
+  float within = clamp(stored_depth, gl_FragCoord.z - slope, gl_FragCoord.z + slope);
   if (counts.z != 0) {
-    // A triangle that goes past the eye has no depth in between, but it covers whole pixels.
     bool whole = gl_SampleMaskIn[0] == counts.w;
-    float depth = whole ? gl_FragCoord.z : clamp(stored_depth, 0.0, 1.0);
+    float depth = whole ? gl_FragCoord.z : clamp(within, 0.0, 1.0);
     // Near is large; of the depth what leaves room for a number.
     imageAtomicMax(front, ivec2(gl_FragCoord.xy),
                    floatBitsToUint(depth) & 0xffffff00u | mesh.x & 0xffu);

@@ -36,7 +36,7 @@ class FramePacer {
     const double ratio = seconds / target_;
     // While something changes there is more to do than to draw.
     plain_ = ratio > kLeisure;
-    if (plain_) until_try_ = ratio > 1 ? pause_ : kShortestPause;
+    if (plain_) until_try_ = ratio > kMostWithRest ? pause_ : kShortestPause;
     coarser_ = std::clamp(kMargin * std::sqrt(ratio), 1.0, kCoarsest);
   }
 
@@ -52,8 +52,8 @@ class FramePacer {
       simplify(std::min(ratio, 4.0));
     else if ((coarser_ > 1 || smaller_ > 1) && ratio < kLeisure)
       refine(ratio);
-    else if (plain_ && coarser_ <= kMargin && smaller_ == 1)
-      plain_ = --until_try_ > 0 || ratio > kRoomForRest;
+    else if (plain_ && coarser_ == 1 && smaller_ == 1)
+      plain_ = --until_try_ > 0 || ratio > kLeisure;
   }
 
   /// Whether to leave occlusion and multisampling out while something moves.
@@ -67,9 +67,9 @@ class FramePacer {
   static constexpr double kFirstCoarser = 4, kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 16;
   static constexpr double kNothingDrawn = 1e-3;  ///< seconds: the picture was the one before
   static constexpr double kLeisure = 0.6;        ///< of the target: less is time for more
-  /// Of the target: less may be time for the rest; with the rest, more is too much: a processor
-  /// that is slower for a moment needs what is left.
-  static constexpr double kRoomForRest = 0.6, kMostWithRest = 0.75;
+  /// Of the target, with the rest: more is too much, as a processor that is slower for a moment
+  /// needs what is left.
+  static constexpr double kMostWithRest = 0.75;
   static constexpr double kShortestPause = 30, kLongestPause = 1000, kForgetting = 0.95;
   static constexpr int kSmallest = 4;
 

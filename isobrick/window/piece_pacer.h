@@ -17,9 +17,9 @@ class PiecePacer {
   /// Of the next piece, to take so long. Of `left` no rest is left that would take a quarter of
   /// that.
   std::uint64_t work(double seconds, std::uint64_t left = kMost) const {
-    const double most = rate_ * seconds;
+    const double most = std::max(rate_ * seconds, kLeast);
     if (static_cast<double>(left) <= (1 + kLeastPart) * most) return left;
-    return most < kAll ? static_cast<std::uint64_t>(std::max(most, kLeast)) : kMost;
+    return most < kAll ? static_cast<std::uint64_t>(most) : kMost;
   }
 
   /// OpenGL was told within `seconds` to draw a piece, which goes on until one of the functions

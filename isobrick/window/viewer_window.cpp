@@ -333,7 +333,7 @@ bool ViewerWindow::draw_picture(int width, int height) {
   tell_damage();
   settle_clicks();
   const PictureState& state = picture.state();
-  return !state.drawing && (picture.drew() || state.complete || fluent);
+  return !state.drawing && (picture.drew() || state.complete || moving());
 }
 
 void ViewerWindow::draw_frame(bool asked) {

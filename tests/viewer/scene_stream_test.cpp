@@ -209,15 +209,17 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
 /// Takes some grids and then says of all of them that it has failed.
 class FailingDevice final : public PlainDevice {
  public:
+  explicit FailingDevice(std::size_t taken = kTaken) : most_(taken) {}
   ~FailingDevice() override {
     for (std::thread& thread : threads_) thread.join();
   }
-  bool make(const GridView&, NodeMesh mesh, Done done) override {
+  bool make(const GridView& grid, NodeMesh mesh, Done done) override {
     const std::lock_guard lock(mutex_);
     ++asked;
+    stored += grid.stored.samples != nullptr;
     if (failed_) return false;
     taken_.emplace_back(std::move(mesh), std::move(done));
-    if (taken_.size() < kTaken) return true;
+    if (taken_.size() < most_) return true;
     failed_ = true;
     threads_.emplace_back([taken = std::exchange(taken_, {})]() mutable {
       for (auto& [of, tell] : taken) tell(std::move(of), "broken");
@@ -230,9 +232,10 @@ class FailingDevice final : public PlainDevice {
   }
 
   static constexpr std::size_t kTaken = 3;
-  std::atomic<std::size_t> asked = 0;
+  std::atomic<std::size_t> asked = 0, stored = 0;
 
  private:
+  std::size_t most_;
   mutable std::mutex mutex_;
   bool failed_ = false;
   std::vector<std::pair<NodeMesh, Done>> taken_;
@@ -262,6 +265,32 @@ TEST(SceneStream, WhatADeviceFailsToMakeIsMadeWithoutIt) {
     }
   }
   EXPECT_EQ(device.asked, 0u) << "nobody asks it in vain";
+}
+
+/// A device is sent samples as they are stored, of which nobody else makes meshes.
+TEST(SceneStream, WhatADeviceFailsToMakeOfStoredSamplesIsMadeWithoutIt) {
+  constexpr Index n = 200;
+  const auto source = std::make_shared<MemoryBricks>(
+      Int3{n, n, n}, std::function<std::uint8_t(Int3)>([](Int3 p) {
+        return static_cast<std::uint8_t>(std::clamp(128 + 60 * gyroid_ball(p, n), 0.0, 255.0));
+      }),
+      MemoryBricks::Options{.brick = 32});
+  const auto tree = std::make_shared<const NodeTree>(*source);
+  const Cut cut = RandomCut(tree->grid(), 1, 100).cut({127.5});
+  FailingDevice device(12);  // among them some of the finest level
+  SceneStream stream(source, tree, {.threads = 4}), without(source, tree, {.threads = 4});
+  stream.set_device(std::shared_ptr<DeviceMesher>(&device, [](DeviceMesher*) {}));
+  for (SceneStream* s : {&stream, &without}) {
+    s->set_cut(cut);
+    ASSERT_TRUE(s->wait_idle(60));
+  }
+  EXPECT_EQ(stream.counters().device_failure, "broken");
+  EXPECT_GT(device.stored, 0u);
+  const auto drawable = stream.drawable(), expected = without.drawable();
+  EXPECT_TRUE(drawable->complete);
+  ASSERT_EQ(drawable->nodes.size(), expected->nodes.size());
+  EXPECT_EQ(drawable->triangles, expected->triangles);
+  EXPECT_GT(drawable->triangles, 1000u);
 }
 
 TEST(SceneStream, WhatAStraightPlanIsLateWithBringsTheLevelsBetween) {
