@@ -275,14 +275,15 @@ void ViewerWindow::settle_clicks() {
   };
   std::erase_if(clicks_, is_over);
   if (clicks_.empty() || !rests()) return;
-  for (const Click& click : std::exchange(clicks_, {})) {
+  const std::vector<Click> clicks = std::exchange(clicks_, {});
+  for (const Click& click : clicks) {
     const auto point = pick(click);
     if (!point) continue;
     state_.picked = point;
     if (click.point)
       state_.measured[*click.point] = point->world;
-    else if (click.measuring)
-      measure(point->world);
+    else if (click.measuring && (state_.measured.size() < 2 || clicks.size() == 1))
+      measure(point->world);  // and so ends no measurement that clicks after it have made
   }
 }
 
