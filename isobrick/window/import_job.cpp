@@ -59,7 +59,8 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
   const std::string input = input_.string();
   if (is_zarr(input)) return open_store_source(input, request, options_.threads);
   request.memory = options_.memory;
-  if (recognise_format(input) == VolumeFormat::vdb)
+  // A folder of slices has no format of its own.
+  if (fs::is_regular_file(input_) && recognise_format(input) == VolumeFormat::vdb)
     request.grid = grid_to_show(read_vdb_header(input));
   if (request.grid) {
     const std::scoped_lock lock(mutex_);

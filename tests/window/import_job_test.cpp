@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/volumes/open_source.h"
 #include "tests/io/temp_dir.h"
 
 namespace isobrick {
@@ -57,6 +58,15 @@ TEST(ImportJob, SaysHowRawFilesAreNamed) {
   dir.write("ramp.raw", ramp(1000));
   const ImportJob job(dir / "ramp.raw", dir / "ramp.zarr", {});
   EXPECT_TRUE(contains(finished(job).failure, "256x256x128_uint8.raw"));
+}
+
+/// A folder of slices is opened as one, whatever it holds.
+TEST(ImportJob, TakesFolders) {
+  const TempDir dir;
+  std::filesystem::create_directory(dir / "slices");
+  const ImportJob job(dir / "slices", dir / "slices.zarr", {});
+  EXPECT_EQ(finished(job).failure,
+            message_of<Error>([&] { open_source(dir / "slices", VolumeRequest{}); }));
 }
 
 TEST(ImportJob, TakesTheFirstGridOfFloats) {
