@@ -16,11 +16,6 @@ using Clock = std::chrono::steady_clock;
 /// Enough for the headers of two indices and what their arrays are rounded up by.
 constexpr std::uint64_t kHeaders = 1 << 12;
 
-std::string size_text(std::uint64_t bytes) {
-  const double kib = static_cast<double>(bytes) / 1024;
-  return kib < 1024 ? fmt::format("{:.1f} KiB", kib) : fmt::format("{:.0f} MiB", kib / 1024);
-}
-
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -40,6 +35,11 @@ std::vector<std::byte> build_as(IndexKind kind, const NodeTree& tree) {
 }
 
 }  // namespace
+
+std::string size_text(std::uint64_t bytes) {
+  const auto kib = static_cast<double>(bytes) / 1024;
+  return kib < 1024 ? fmt::format("{:.1f} KiB", kib) : fmt::format("{:.1f} MiB", kib / 1024);
+}
 
 NodeSearch::NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type,
                        std::uint64_t most_bytes, std::function<void()> on_change)

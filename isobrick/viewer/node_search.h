@@ -18,6 +18,9 @@
 
 namespace isobrick {
 
+/// Bytes as somebody reads them: "1.5 KiB", "3.0 MiB".
+std::string size_text(std::uint64_t bytes);
+
 /// Finds the active nodes of isovalues through an index of the finest nodes' ranges, of
 /// any kind; all kinds find the same. Another kind is built by a thread of its own while
 /// the one before goes on answering. find() is for one thread, the rest is thread-safe.

@@ -12,11 +12,6 @@ namespace {
 constexpr std::array<const char*, std::size(kIndexKinds)> kNames{"linear scan", "interval tree",
                                                                  "k-d tree", "quadtree", "octree"};
 
-std::string size_text(std::uint64_t bytes) {
-  const auto kib = static_cast<double>(bytes) / 1024;
-  return kib < 1024 ? fmt::format("{:.1f} KiB", kib) : fmt::format("{:.1f} MiB", kib / 1024);
-}
-
 }  // namespace
 
 void draw_search_panel(ViewerState& state) {
