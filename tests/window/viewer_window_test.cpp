@@ -2,10 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#define GLFW_INCLUDE_NONE
-#include <GLFW/glfw3.h>
-#include <X11/keysym.h>
-
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
@@ -16,88 +12,14 @@
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/render/vectors.h"
 #include "isobrick/volumes/synth_source.h"
-#include "tests/io/temp_dir.h"
-#include "tests/window/virtual_display.h"
+#include "tests/window/window_test.h"
 
 namespace isobrick {
 namespace {
 
-constexpr int kWidth = 640, kHeight = 480;
+constexpr int kWidth = test::kWindowWidth, kHeight = test::kWindowHeight;
+using Window = test::WindowTest;
 constexpr int kFieldRow = 165;  ///< of the first isovalue, on the panel
-
-/// A window with a sphere, and hands.
-class Window : public testing::Test {
- protected:
-  void SetUp() override {
-    if (!VirtualDisplay::available()) GTEST_SKIP() << "there is no Xvfb";
-    display_ = std::make_unique<VirtualDisplay>(kWidth, kHeight);
-    make_store("sphere.zarr", {96, 96, 96});
-  }
-
-  void make_store(const std::string& name, Int3 extent) {
-    const auto source = make_synth({.kind = SynthKind::sphere, .extent = extent});
-    NoProgress progress;
-    convert(*source, dir_ / name, {.brick = 32}, progress);
-  }
-
-  ViewerWindow& open(WindowOptions options = {}) {
-    options.width = kWidth;
-    options.height = kHeight;
-    options.bookmarks = dir_ / "bookmarks.json";
-    options.settings.occlusion = options.settings.multisample = false;  // slow in software
-    window_ = std::make_unique<ViewerWindow>(options);
-    window_->open(dir_ / "sphere.zarr");
-    window_->state().panels = false;
-    until([&] { return window_->state().picture->state().complete; });
-    glfwSetWindowPos(window_->handle(), 0, 0);
-    display_->move_pointer(kWidth / 2, kHeight / 2);
-    display_->focus_under_pointer();
-    steps(3);
-    return *window_;
-  }
-
-  /// Whether the picture shows all there is, and not one that may be coarse.
-  bool rests() const {
-    const PictureState& state = window_->state().picture->state();
-    return state.complete && !state.moving;
-  }
-  /// Steps until it holds. A test that waits for nothing fails.
-  void until(const std::function<bool()>& holds) {
-    const auto start = std::chrono::steady_clock::now();
-    while (!holds()) {
-      ASSERT_TRUE(window_->step(0.02));
-      ASSERT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
-    }
-  }
-  void steps(int n) {
-    for (int i = 0; i < n; ++i) ASSERT_TRUE(window_->step(0.02));
-  }
-
-  void drag(int button, int from_x, int from_y, int to_x, int to_y) {
-    display_->move_pointer(from_x, from_y);
-    steps(2);
-    display_->button(button, true);
-    steps(2);
-    for (int i = 1; i <= 5; ++i) {
-      display_->move_pointer(from_x + (to_x - from_x) * i / 5, from_y + (to_y - from_y) * i / 5);
-      steps(2);
-    }
-    display_->button(button, false);
-    steps(2);
-  }
-  void click(int x, int y) {
-    display_->move_pointer(x, y);
-    steps(2);
-    display_->button(1, true);
-    steps(2);
-    display_->button(1, false);
-    steps(3);
-  }
-
-  TempDir dir_;
-  std::unique_ptr<VirtualDisplay> display_;
-  std::unique_ptr<ViewerWindow> window_;
-};
 
 TEST_F(Window, ShowsAStore) {
   ViewerWindow& window = open();
@@ -160,96 +82,6 @@ TEST_F(Window, KeysCutTheVolume) {
   until([&] { return window.state().picture->state().complete; });
   steps(2);
   EXPECT_NE(renderer.read_pixels(), whole);
-}
-
-TEST_F(Window, ClicksPickAndMeasure) {
-  ViewerWindow& window = open();
-  click(kWidth / 2, kHeight / 2);
-  ASSERT_TRUE(window.state().picked);
-  // On the sphere around the middle of the volume.
-  EXPECT_EQ(window.state().picked->surface, 1u);
-  display_->tap(XK_m);
-  until([&] { return window.state().measuring; });
-  click(kWidth / 2 - 30, kHeight / 2);
-  click(kWidth / 2 + 30, kHeight / 2);
-  ASSERT_EQ(window.state().measured.size(), 2u);
-  EXPECT_GT(length(window.state().measured[1] - window.state().measured[0]), 1);
-  click(3, 3);  // the background is no point
-  EXPECT_EQ(window.state().measured.size(), 2u);
-}
-
-/// A press does not make the picture a coarse one, whatever moving pictures are like.
-TEST_F(Window, ClicksPickFromThePictureAtRest) {
-  ViewerWindow& window = open();
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
-  ASSERT_GT(window.state().pacer.coarser(), 4);
-  until([&] { return rests(); });
-  const double isovalue = window.state().settings.surfaces[0].isovalue;
-  const Vec3d eye = window.state().navigator.camera.eye;
-  const auto triangles = window.state().picture->state().triangles;
-  display_->move_pointer(kWidth / 2 + 40, kHeight / 2 - 50);
-  steps(2);
-  display_->button(1, true);
-  steps(8);
-  EXPECT_EQ(window.state().picture->state().triangles, triangles);
-  display_->move_pointer(kWidth / 2 + 42, kHeight / 2 - 50);  // a hand that trembles
-  steps(2);
-  display_->button(1, false);
-  steps(3);
-  ASSERT_TRUE(window.state().picked && window.state().picked->value);
-  EXPECT_NEAR(*window.state().picked->value, isovalue, 0.5);
-  EXPECT_EQ(length(window.state().navigator.camera.eye - eye), 0);
-}
-
-TEST_F(Window, ATransparentSurfaceIsPickedAsWell) {
-  ViewerWindow& window = open();
-  window.state().settings.surfaces[0].opacity = 0.4f;
-  until([&] { return rests(); });
-  steps(3);
-  until([&] { return rests(); });
-  click(kWidth / 2 + 40, kHeight / 2 - 50);
-  ASSERT_TRUE(window.state().picked && window.state().picked->value);
-  EXPECT_EQ(window.state().picked->surface, 1u);
-  EXPECT_NEAR(*window.state().picked->value, window.state().settings.surfaces[0].isovalue, 0.5);
-}
-
-/// What is picked while the picture is a coarse one is looked at again.
-TEST_F(Window, AClickBeforeThePictureRestsIsMadeGood) {
-  ViewerWindow& window = open();
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
-  drag(3, kWidth / 2, kHeight / 2, kWidth / 2, kHeight / 2 + 20);
-  window.state().measuring = true;
-  click(kWidth / 2 + 40, kHeight / 2 - 50);
-  ASSERT_TRUE(window.state().picked);
-  EXPECT_TRUE(window.state().picture->state().moving);
-  const double before = window.state().picked->value.value();
-  const double isovalue = window.state().settings.surfaces[0].isovalue;
-  until([&] { return rests(); });
-  steps(3);
-  ASSERT_TRUE(window.state().picked->value);
-  EXPECT_NE(*window.state().picked->value, before);
-  EXPECT_NEAR(*window.state().picked->value, isovalue, 0.5);
-  ASSERT_EQ(window.state().measured.size(), 1u);
-  EXPECT_EQ(length(window.state().measured[0] - window.state().picked->world), 0);
-}
-
-/// A click that meets nothing makes no point, also once the picture rests.
-TEST_F(Window, AClickBesideTheSurfaceLeavesWhatWasMeasured) {
-  ViewerWindow& window = open();
-  until([&] { return rests(); });
-  window.state().measuring = true;
-  click(kWidth / 2 + 40, kHeight / 2 - 50);
-  ASSERT_EQ(window.state().measured.size(), 1u);
-  const Vec3d point = window.state().measured[0];
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
-  display_->button(4, true);  // nearer
-  display_->button(4, false);
-  steps(1);
-  click(3, 3);
-  until([&] { return rests(); });
-  steps(3);
-  ASSERT_EQ(window.state().measured.size(), 1u);
-  EXPECT_EQ(length(window.state().measured[0] - point), 0);
 }
 
 /// Where pictures in motion are as good as those at rest, none is drawn again.

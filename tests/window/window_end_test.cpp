@@ -1,50 +1,20 @@
-#include <gtest/gtest.h>
-
-#define GLFW_INCLUDE_NONE
-#include <GLFW/glfw3.h>
-#include <X11/keysym.h>
 #include <signal.h>
 
 #include <chrono>
 #include <filesystem>
 
 #include "isobrick/core/cancel.h"
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/volumes/synth_source.h"
-#include "isobrick/window/viewer_window.h"
-#include "tests/io/temp_dir.h"
 #include "tests/tools/program.h"
-#include "tests/window/virtual_display.h"
+#include "tests/window/window_test.h"
 
 namespace isobrick {
 namespace {
 
 /// Ways in which a window ends, or does not.
-class WindowEnd : public testing::Test {
+class WindowEnd : public test::WindowTest {
  protected:
-  void SetUp() override {
-    if (!VirtualDisplay::available()) GTEST_SKIP() << "there is no Xvfb";
-    display_ = std::make_unique<VirtualDisplay>(320, 240);
-    NoProgress progress;
-    convert(*make_synth({.kind = SynthKind::sphere, .extent = {40, 40, 40}}), dir_ / "a.zarr", {},
-            progress);
-  }
   void TearDown() override { detail::cancel_requested = false; }
 
-  ViewerWindow& open() {
-    WindowOptions options;
-    options.width = 320;
-    options.height = 240;
-    options.bookmarks = dir_ / "bookmarks.json";
-    options.settings.occlusion = options.settings.multisample = false;
-    window_ = std::make_unique<ViewerWindow>(options);
-    window_->open(dir_ / "a.zarr");
-    glfwSetWindowPos(window_->handle(), 0, 0);
-    display_->move_pointer(160, 120);
-    display_->focus_under_pointer();
-    for (int i = 0; i < 3; ++i) EXPECT_TRUE(window_->step(0.02));
-    return *window_;
-  }
   /// Something that takes a while to convert.
   void drop_much() {
     const std::string file = dir_.write("b_1024x1024x1024_uint8.raw", "");
@@ -52,10 +22,6 @@ class WindowEnd : public testing::Test {
     window_->drop(file);
     ASSERT_NE(window_->state().import, nullptr);
   }
-
-  TempDir dir_;
-  std::unique_ptr<VirtualDisplay> display_;
-  std::unique_ptr<ViewerWindow> window_;
 };
 
 TEST_F(WindowEnd, ComesWhenOneIsAskedForAndLeavesNothingUnfinished) {
@@ -65,7 +31,7 @@ TEST_F(WindowEnd, ComesWhenOneIsAskedForAndLeavesNothingUnfinished) {
   request_cancel();
   window_->run();
   window_.reset();
-  EXPECT_EQ(dir_.list(), (std::vector<std::string>{"a.zarr", "b_1024x1024x1024_uint8.raw"}));
+  EXPECT_EQ(dir_.list(), (std::vector<std::string>{"b_1024x1024x1024_uint8.raw", "sphere.zarr"}));
 }
 
 TEST_F(WindowEnd, EscapeCancelsAConversionFirst) {
@@ -107,7 +73,7 @@ TEST_F(WindowEnd, PicturesReplaceNoOther) {
 #ifdef ISOBRICK_PROGRAM
 TEST_F(WindowEnd, TheProgramEndsOfASignal) {
   const test::Arguments words{
-      "timeout", "-s",      "KILL",          "30", ISOBRICK_PROGRAM, "view", dir_ / "a.zarr",
+      "timeout", "-s",      "KILL",          "30", ISOBRICK_PROGRAM, "view", dir_ / "sphere.zarr",
       "--size",  "320x240", "--no-occlusion"};
   EXPECT_EQ(test::run_process(words, {.interrupt_after = 2}).signal, SIGINT);
 }
