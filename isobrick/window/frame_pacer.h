@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace isobrick {
 
@@ -25,6 +26,7 @@ class FramePacer {
     }
     pacer.plain_ = true;
     pacer.until_try_ = kShortestPause;
+    pacer.rest_ = pacer.rest_before_ = pacer.target_;  // a pixel takes long there
     pacer.coarser_ = kFirstInSoftware;
     return pacer;
   }
@@ -43,6 +45,10 @@ class FramePacer {
   /// A picture that took `seconds` to draw as plain(), coarser() and smaller() say now.
   void drawn(double seconds) {
     const double ratio = seconds / target_;
+    if (plain_)
+      last_plain_ = seconds;
+    else
+      learn_rest(seconds);
     if (!plain_ && ratio > kMostWithRest) {
       leave_rest_out();
       return;
@@ -53,7 +59,7 @@ class FramePacer {
     else if ((coarser_ > 1 || smaller_ > 1) && ratio < kLeisure)
       refine(ratio);
     else if (plain_ && coarser_ == 1 && smaller_ == 1)
-      plain_ = --until_try_ > 0 || ratio > kLeisure;
+      plain_ = --until_try_ > 0 || ratio > kLeisure || !has_room_for_rest(seconds);
   }
 
   /// Whether to leave occlusion and multisampling out while something moves.
@@ -71,6 +77,7 @@ class FramePacer {
   /// needs what is left.
   static constexpr double kMostWithRest = 0.75;
   static constexpr double kShortestPause = 30, kLongestPause = 1000, kForgetting = 0.95;
+  static constexpr double kFading = 0.998;
   static constexpr int kSmallest = 4;
 
   void simplify(double ratio) {
@@ -82,6 +89,20 @@ class FramePacer {
     // of the ratio would do at once, but single pictures are off.
     const double most = smaller_ < kSmallest ? first_coarser_ : kCoarsest;
     coarser_ = std::min(coarser_ * (1 + 0.5 * (ratio - 1)), most);
+  }
+
+  /// What a picture with occlusion and multisampling takes beside the same one without.
+  void learn_rest(double seconds) {
+    if (last_plain_ == 0) return;
+    rest_before_ = std::exchange(rest_, std::max(seconds - last_plain_, 0.0));
+  }
+
+  /// Of the last two times the quicker one counts, as a single one may have been slow for another
+  /// reason; in the course of some hundred pictures both are forgotten, as it may take less by now.
+  bool has_room_for_rest(double plain_seconds) {
+    rest_ *= kFading;
+    rest_before_ *= kFading;
+    return plain_seconds + std::min(rest_, rest_before_) <= kMostWithRest * target_;
   }
 
   /// The rest may have taken long for once, or may take less soon: it is tried again. Each time
@@ -104,6 +125,8 @@ class FramePacer {
   double target_, coarser_ = 1;
   double pause_ = kShortestPause;  ///< plain pictures before the rest is tried, the next time
   double until_try_ = 0;           ///< the same, now
+  double rest_ = 0, rest_before_ = 0;     ///< seconds that it took; see learn_rest()
+  double last_plain_ = 0;                 ///< seconds; 0: none yet
   double first_coarser_ = kFirstCoarser;  ///< before pictures become smaller
   int smaller_ = 1;
   bool plain_ = false;

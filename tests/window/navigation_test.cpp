@@ -203,6 +203,16 @@ TEST(FramePacer, LeavesAMarginWithOcclusion) {
   EXPECT_LT(seen, 8);
 }
 
+/// Where a picture with occlusion is a tenth of a second, each try is one that somebody waits for.
+TEST(FramePacer, DoesNotTryInSoftwareWhatTakesTooLong) {
+  FramePacer pacer = FramePacer::for_device(true);
+  for (int i = 0; i < 100; ++i) pacer.drawn(0.02);
+  EXPECT_EQ(pacer.coarser(), 1);
+  EXPECT_EQ(full_ones(pacer, 300, 0.028, 0.1), 0);
+  EXPECT_LT(full_ones(pacer, 3000, 0.028, 0.1), 10);
+  EXPECT_GT(full_ones(pacer, 3000, 0.004, 0.012), 1500) << "in a small window";
+}
+
 TEST(FramePacer, LeavesFastPicturesAlone) {
   FramePacer pacer(0.05);
   pacer.drawn(0.01);
