@@ -23,7 +23,7 @@ class DrawSwitches {
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   }
   ~DrawSwitches() {
-    meshes(0, false, false);
+    meshes(false, false);
     glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
     glDepthFunc(GL_LESS);
     glViewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
@@ -34,17 +34,10 @@ class DrawSwitches {
   DrawSwitches(const DrawSwitches&) = delete;
   DrawSwitches& operator=(const DrawSwitches&) = delete;
 
-  /// Clipping by the first `distances` planes.
-  static void clip(int distances) {
-    for (int i = 0; i < kClipDistances; ++i)
-      set(GL_CLIP_DISTANCE0 + static_cast<GLenum>(i), i < distances);
-  }
-
-  /// Depth test, clipping as above, weighted blending.
-  void meshes(int distances, bool depth_test, bool blended) const {
+  /// Depth test, weighted blending.
+  void meshes(bool depth_test, bool blended) const {
     set(GL_DEPTH_TEST, depth_test);
     glDepthMask(!blended);
-    clip(distances);
     set(GL_BLEND, blended);
     if (!blended) return;
     glBlendFunci(0, GL_ONE, GL_ONE);

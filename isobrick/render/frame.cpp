@@ -50,8 +50,8 @@ FrameBlock make_frame(const Camera& camera, int width, int height,
   int count = 0;
   for (const HalfSpace& half : settings.half_spaces())
     frame.half_spaces[static_cast<std::size_t>(count++)] = from_eye(half, camera.eye);
-  frame.counts = {std::min(count, kClipDistances), count, settings.picking ? 1 : 0,
-                  settings.multisample ? (1 << kSamples) - 1 : 1};
+  frame.counts = {count, settings.picking ? 1 : 0,
+                  settings.multisample ? (1 << kSamples) - 1 : 1, 0};
 
   const double near = camera.near_depth(), far = camera.far_depth();
   const double tangent = std::tan(glm::radians(camera.field_of_view) / 2);
@@ -76,6 +76,7 @@ layout(std140, binding = 0) uniform Frame {
   vec4 pixel;
   vec4 background_top, background_bottom;
   ivec4 counts;
+  vec4 samples_x, samples_y;
 };
 
 // World length in front of the eye, from what the depth buffer holds.
@@ -99,50 +100,52 @@ float weight_at(float depth) {
 }
 )";
 
-std::string cut_glsl(CutBy cut) {
-  return fmt::format("#define CUT_BY_FEW {}\n#define CUT_BY_ALL {}\n#define CUT {}\n",
-                     static_cast<int>(CutBy::few), static_cast<int>(CutBy::all),
-                     static_cast<int>(cut));
-}
-
-const char* const kCutVertexGlsl = R"(
-out vec3 from_eye;
+const char* const kPlaceGlsl = R"(
 // The same in all forms, or meshes drawn by different ones would not meet.
 invariant gl_Position;
-#if CUT == CUT_BY_ALL
-out float gl_ClipDistance[8];
-#elif CUT == CUT_BY_FEW
-out float gl_ClipDistance[4];
-#endif
 
-// Sets where the vertex is. `few`: which half spaces cut it, a byte each; 255: none.
-void place(vec3 position_from_eye, uint few) {
-  from_eye = position_from_eye;
-  gl_Position = projection * vec4(mat3(rotation) * from_eye, 1);
-#if CUT == CUT_BY_ALL
-  for (int i = 0; i < 8; ++i)
-    gl_ClipDistance[i] = dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w;
-#elif CUT == CUT_BY_FEW
-  for (int i = 0; i < 4; ++i) {
-    uint number = few >> (8 * i) & 255u;
-    vec4 by = number < 12u ? half_spaces[number] : vec4(0, 0, 0, 1);
-    gl_ClipDistance[i] = dot(by.xyz, from_eye) + by.w;
+void place(vec3 from_eye) { gl_Position = projection * vec4(mat3(rotation) * from_eye, 1); }
+)";
+
+namespace {
+
+// What small triangles take goes with what their corners hand on, and clip distances make them go
+// another way still: so corners hand on neither where they are nor how far from planes.
+const char* const kHereGlsl = R"(
+// Camera space. The middle of the pixel, which may be beside the triangle: on its plane then, but
+// for triangles that are seen from their edge not behind everything.
+vec3 here() {
+  float farthest = depth_range.z > 0.5 ? 0.0 : 0.5 * depth_range.x / depth_range.y;
+  return view_position(gl_FragCoord.xy, depth_of(max(gl_FragCoord.z, farthest)));
+}
+)";
+
+const char* const kCutGlsl = R"(
+// A sample lies where a half space ends by what is linear on the picture: its distance, times the
+// stored depth with perspective, and never divided by that.
+void cut(uint bits) {
+  vec2 across = (gl_FragCoord.xy / viewport.xy * 2 - 1) * viewport.zw;
+  bool parallel = depth_range.z > 0.5;
+  vec3 at = parallel ? vec3(across, -depth_of(gl_FragCoord.z)) : vec3(across, -1) * depth_range.x;
+  float scale = parallel ? 1.0 : gl_FragCoord.z;
+  ivec4 kept = ivec4(1, 2, 4, 8);
+  for (int i = 0; i < counts.x; ++i) {
+    if ((bits >> i & 1u) == 0u) continue;
+    float middle = dot(mat3(rotation) * half_spaces[i].xyz, at) + half_spaces[i].w * scale;
+    vec4 there = middle + samples_x * dFdx(middle) + samples_y * dFdy(middle);
+    kept *= ivec4(greaterThanEqual(there, vec4(0)));
   }
-#endif
+  int mask = (kept.x | kept.y | kept.z | kept.w) & counts.z;
+  if (mask == 0) discard;
+  gl_SampleMask[0] = mask;
 }
 )";
 
-const char* const kCutFragmentGlsl = R"(
-in vec3 from_eye;
+}  // namespace
 
-// Those that clip distances leave.
-void cut() {
-#if CUT == CUT_BY_ALL
-  for (int i = 8; i < counts.y; ++i)
-    if (dot(half_spaces[i].xyz, from_eye) + half_spaces[i].w < 0) discard;
-#endif
+std::string fragment_glsl(bool cut) {
+  return kHereGlsl + std::string(cut ? kCutGlsl : "void cut(uint bits) {}\n");
 }
-)";
 
 const char* const kLightGlsl = R"(
 // Linear light that a surface sends to the eye; all in camera space. A key light from

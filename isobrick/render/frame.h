@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
 #include <string>
@@ -12,8 +11,8 @@
 
 namespace isobrick {
 
-/// Planes and box faces that cut; what OpenGL must offer clips exactly, the rest by pixel.
-inline constexpr int kMostHalfSpaces = 12, kClipDistances = 8;
+/// Planes and box faces that cut.
+inline constexpr int kMostHalfSpaces = 12;
 /// Of a pixel, with multisampling.
 inline constexpr int kSamples = 4;
 
@@ -26,26 +25,21 @@ struct FrameBlock {
   glm::vec4 viewport;     ///< width, height, half width and half height at depth 1 (or everywhere)
   glm::vec4 pixel;        ///< length of a pixel at depth 1 (or everywhere)
   glm::vec4 top, bottom;  ///< background, linear
-  /// Clip distances, half spaces, whether picking, all samples of a pixel as bits.
+  /// Half spaces, whether picking, all samples of a pixel as bits.
   glm::ivec4 counts;
+  glm::vec4 samples_x, samples_y;  ///< where a pixel's samples lie, pixels from its middle
 };
 
 FrameBlock make_frame(const Camera& camera, int width, int height, const PictureSettings& settings);
 
 /// GLSL: the block Frame and functions of depth and camera space.
 extern const char* const kFrameGlsl;
-/// By how many half spaces something may be cut. The fewer distances vertices have to them the
-/// sooner small triangles are drawn, and fragments that never go can be hidden before they are
-/// shaded.
-enum class CutBy : std::uint8_t { none, few, all };
-/// Clip distances of what is cut by few.
-inline constexpr int kFew = 4;
-/// GLSL: which of them a shader is for.
-std::string cut_glsl(CutBy cut);
-/// GLSL: cutting by the half spaces, in vertex and in fragment shaders; after kFrameGlsl and
-/// cut_glsl().
-extern const char* const kCutVertexGlsl;
-extern const char* const kCutFragmentGlsl;
+/// GLSL for vertex shaders, after kFrameGlsl: place(position from the eye).
+extern const char* const kPlaceGlsl;
+/// GLSL for fragment shaders, after kFrameGlsl: here(), where the fragment is; and if `cut`
+/// cut(bits), which drops the samples that lie outside of any of these half spaces. What has nothing
+/// to drop can be hidden before it is shaded.
+std::string fragment_glsl(bool cut);
 /// GLSL: light on a surface, after kFrameGlsl.
 extern const char* const kLightGlsl;
 

@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <glm/vec4.hpp>
 #include <numeric>
 
-#include "isobrick/render/draw_switches.h"
 #include "isobrick/render/frame.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/render/vectors.h"
@@ -22,7 +20,7 @@ struct Look {
   glm::vec4 offset;  ///< from the eye; w: has normals
   glm::vec4 colour;  ///< linear; alpha: opacity
   glm::vec4 inside;
-  glm::uvec4 id;  ///< y: where few half spaces cut it, their numbers, a byte each
+  glm::uvec4 id;  ///< y: the half spaces that may cut it, as bits
 };
 
 /// What glMultiDrawElementsIndirect reads.
@@ -50,14 +48,13 @@ noperspective centroid out float stored_depth;
 // Fragments get the look from here and not from the buffer: Mesa's llvmpipe draws them
 // when the buffer may hold the next mesh's already.
 flat out vec4 outer_colour, inner_colour;
-flat out uvec2 mesh;  // id, has normals
+flat out uvec3 mesh;  // id, cut by, has normals
 #else
-// What small triangles take goes with what their corners hand on.
 flat out uint look;
 #endif
 
 void main() {
-  place(position + looks[number].offset.xyz, looks[number].id.y);
+  place(position + looks[number].offset.xyz);
   world_normal = normal;
 #if FRONT
   stored_depth = gl_Position.z / gl_Position.w;
@@ -65,7 +62,7 @@ void main() {
 #if SOFTWARE
   outer_colour = looks[number].colour;
   inner_colour = looks[number].inside;
-  mesh = uvec2(looks[number].id.x, looks[number].offset.w > 0.5 ? 1 : 0);
+  mesh = uvec3(looks[number].id.xy, looks[number].offset.w > 0.5 ? 1 : 0);
 #else
   look = number;
 #endif
@@ -76,27 +73,27 @@ const char* const kFragment = R"(
 centroid in vec3 world_normal;
 #if SOFTWARE
 flat in vec4 outer_colour, inner_colour;
-flat in uvec2 mesh;
+flat in uvec3 mesh;
 #else
 flat in uint look;
 #define outer_colour looks[look].colour
 #define inner_colour looks[look].inside
-#define mesh uvec2(looks[look].id.x, looks[look].offset.w > 0.5 ? 1 : 0)
+#define mesh uvec3(looks[look].id.xy, looks[look].offset.w > 0.5 ? 1 : 0)
 #endif
 
 struct Seen { vec3 position, normal, eye, light; };
 
 Seen see() {
-  cut();
   Seen s;
-  s.position = mat3(rotation) * from_eye;
-  s.eye = towards_eye(s.position);
+  s.position = here();
   vec3 facet = cross(dFdx(s.position), dFdy(s.position));
+  cut(mesh.y);  // after what is looked at across pixels
+  s.eye = towards_eye(s.position);
   facet = dot(facet, facet) > 0 ? normalize(facet) : s.eye;
   if (dot(facet, s.eye) < 0) facet = -facet;
   s.normal = mat3(rotation) * world_normal;
   float size = dot(s.normal, s.normal);
-  if (mesh.y == 0u || !(size > 1e-12) || isinf(size))
+  if (mesh.z == 0u || !(size > 1e-12) || isinf(size))
     s.normal = facet;
   else
     s.normal *= inversesqrt(size);
@@ -137,8 +134,8 @@ void main() {
   // one that goes past the eye has none in between.
   float slope = fwidth(gl_FragCoord.z);
   float within = clamp(stored_depth, gl_FragCoord.z - slope, gl_FragCoord.z + slope);
-  if (counts.z != 0) {
-    bool whole = gl_SampleMaskIn[0] == counts.w;
+  if (counts.y != 0) {
+    bool whole = gl_SampleMaskIn[0] == counts.z;
     float depth = whole ? gl_FragCoord.z : clamp(within, 0.0, 1.0);
     // Near is large; of the depth what leaves room for a number.
     imageAtomicMax(front, ivec2(gl_FragCoord.xy),
@@ -157,14 +154,6 @@ glm::vec4 offset_of(Vec3d origin, Vec3d eye, bool normals) {
   return {from_eye.x, from_eye.y, from_eye.z, normals ? 1.0f : 0.0f};
 }
 
-/// The numbers of the first few bits that are set, a byte each; 255: none.
-std::uint32_t numbers_of_few(std::uint16_t bits) {
-  std::uint32_t numbers = 0;
-  for (int i = 0; i < kFew; ++i, bits &= static_cast<std::uint16_t>(bits - 1))
-    numbers |= (bits == 0 ? 255u : static_cast<unsigned>(std::countr_zero(bits))) << (8 * i);
-  return numbers;
-}
-
 /// But for its offset.
 Look look_of(const MeshStyle& style) {
   const Vec3f c = style.colour;
@@ -173,17 +162,17 @@ Look look_of(const MeshStyle& style) {
   return {{},
           to_linear(c, opacity),
           to_linear(style.inside.value_or(darker), opacity),
-          {style.id, numbers_of_few(style.cut_by), 0, 0}};
+          {style.id, style.cut_by, 0, 0}};
 }
 
 }  // namespace
 
-MeshPass::Programs::Programs(CutBy cut, bool picture_is_cut, bool software) {
+MeshPass::Programs::Programs(bool cut, bool picture_is_cut, bool software) {
   const std::string frame = fmt::format("#define OPEN {}\n#define SOFTWARE {}\n",
                                         picture_is_cut ? 1 : 0, software ? 1 : 0) +
-                            cut_glsl(cut) + kFrameGlsl;
-  const std::string vertex = kCutVertexGlsl + std::string(kLooks) + kVertex,
-                    fragment = frame + (software ? "" : kLooks) + kCutFragmentGlsl + kLightGlsl +
+                            kFrameGlsl;
+  const std::string vertex = kPlaceGlsl + std::string(kLooks) + kVertex,
+                    fragment = frame + (software ? "" : kLooks) + fragment_glsl(cut) + kLightGlsl +
                                kFragment;
   opaque = make_program("#define FRONT 0\n" + frame + vertex, fragment + kOpaque, "meshes");
   transparent = make_program("#define FRONT 1\n" + frame + vertex, fragment + kTransparent,
@@ -222,12 +211,10 @@ void MeshPass::need_numbers(std::size_t count) {
   glVertexArrayVertexBuffer(vertices_.get(), 2, numbers_.get(), 0, sizeof(std::uint32_t));
 }
 
-void MeshPass::bind(CutBy cut, bool transparent) {
-  if (!cuts_) cut = CutBy::none;
-  std::optional<Programs>& programs =
-      cuts_ ? programs_[static_cast<std::size_t>(cut)] : whole_programs_;
+void MeshPass::bind(bool cut, bool transparent) {
+  cut &= cuts_;
+  std::optional<Programs>& programs = cuts_ ? programs_[cut ? 1 : 0] : whole_programs_;
   if (!programs) programs.emplace(cut, cuts_, software_);
-  DrawSwitches::clip(cut == CutBy::none ? 0 : cut == CutBy::few ? kFew : clip_distances_);
   glUseProgram((transparent ? programs->transparent : programs->opaque).get());
   glBindVertexArray(vertices_.get());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, looks_.get());
@@ -261,9 +248,9 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
   need_numbers(looks.size());
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.get());
   for (std::size_t first = 0, end = 0; first < meshes.size(); first = end) {
-    const CutBy cut = cut_of(meshes[first].style);
+    const bool cut = may_be_cut(meshes[first].style);
     while (end < meshes.size() && meshes[end].block() == meshes[first].block() &&
-           cut_of(meshes[end].style) == cut)
+           may_be_cut(meshes[end].style) == cut)
       ++end;
     bind(cut, transparent);
     bind_block(meshes[first].mesh->place());
@@ -272,7 +259,6 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
                                 static_cast<GLsizei>(end - first), 0);
   }
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
-  DrawSwitches::clip(clip_distances_);  // as slices want it
   check_gl("drawing meshes");
 }
 
@@ -291,10 +277,9 @@ void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin,
   const GlBuffer& normals = mesh.normals.empty() ? positions_ : normals_;
   bind_block(
       {.positions = positions_.get(), .normals = normals.get(), .triangles = triangles_.get()});
-  bind(cut_of(style), transparent);
+  bind(may_be_cut(style), transparent);
   glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * triangles.size()), GL_UNSIGNED_INT,
                  nullptr);
-  DrawSwitches::clip(clip_distances_);
   check_gl("drawing a mesh");
 }
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "isobrick/core/vec.h"
-#include "isobrick/render/frame.h"
 #include "isobrick/render/gl_objects.h"
 #include "isobrick/render/mesh_queue.h"
 #include "isobrick/render/renderer.h"
@@ -19,11 +18,8 @@ class MeshPass {
  public:
   MeshPass();
 
-  /// By how many half spaces what is drawn from now on is cut, as FrameBlock::counts has them.
-  void start(int clip_distances, int half_spaces) {
-    clip_distances_ = clip_distances;
-    cuts_ = half_spaces > 0;
-  }
+  /// From now on half spaces cut what is drawn, or none does.
+  void start(bool cuts) { cuts_ = cuts; }
   /// Those that follow each other in one block of a pool with one call.
   void draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent);
   /// One that lies in memory.
@@ -33,19 +29,18 @@ class MeshPass {
  private:
   /// One source in several forms.
   struct Programs {
-    Programs(CutBy cut, bool picture_is_cut, bool software);
+    Programs(bool cut, bool picture_is_cut, bool software);
     GlProgram opaque, transparent;
   };
 
-  void bind(CutBy cut, bool transparent);
+  void bind(bool cut, bool transparent);
   void bind_block(const MeshPlace& place);
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
   void need_numbers(std::size_t count);
 
   bool software_;
   std::optional<Programs> whole_programs_;           ///< where nothing is cut
-  std::array<std::optional<Programs>, 3> programs_;  ///< elsewhere, by CutBy
-  int clip_distances_ = 0;
+  std::array<std::optional<Programs>, 2> programs_;  ///< elsewhere: for meshes that are not, and are
   bool cuts_ = false;
   GlVertexArray vertices_;
   GlBuffer looks_, numbers_, commands_;

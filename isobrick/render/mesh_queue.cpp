@@ -1,17 +1,9 @@
 #include "isobrick/render/mesh_queue.h"
 
 #include <algorithm>
-#include <bit>
 #include <utility>
 
 namespace isobrick {
-
-CutBy cut_of(const MeshStyle& style) {
-  if (style.cut_by == 0) return CutBy::none;
-  // What is cut pixel by pixel stays so.
-  const bool exactly = style.cut_by < 1 << kClipDistances;
-  return exactly && std::popcount(style.cut_by) <= kFew ? CutBy::few : CutBy::all;
-}
 
 void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
   draws_.push_back({&mesh, style, 0, mesh.place().triangle_count});
@@ -21,7 +13,7 @@ void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
 std::span<const MeshDraw> MeshQueue::take(std::uint64_t most) {
   if (!sorted_)
     std::stable_sort(draws_.begin(), draws_.end(), [](const MeshDraw& a, const MeshDraw& b) {
-      return std::pair(cut_of(a.style), a.block()) < std::pair(cut_of(b.style), b.block());
+      return std::pair(may_be_cut(a.style), a.block()) < std::pair(may_be_cut(b.style), b.block());
     });
   sorted_ = true;
   piece_.clear();

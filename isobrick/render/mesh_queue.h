@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/render/frame.h"
 #include "isobrick/render/mesh_pool.h"
 #include "isobrick/render/renderer.h"
 
@@ -21,14 +20,14 @@ struct MeshDraw {
   unsigned block() const { return mesh->place().positions; }
 };
 
-/// How a mesh of this style is cut, in a picture that is.
-CutBy cut_of(const MeshStyle& style);
+/// Whether any half space of the picture may cut a mesh of this style.
+inline bool may_be_cut(const MeshStyle& style) { return style.cut_by != 0; }
 
 /// Meshes that are to be drawn, in pieces of any size. However large the pieces are, the triangles
 /// have one order.
 class MeshQueue {
  public:
-  /// Meshes of one block of a pool that are cut alike together, which takes fewer calls, or all as
+  /// Meshes of one block of a pool that are cut, or not, together, which takes fewer calls, or all as
   /// they were added, so that it does not show where in the pool they lie.
   enum class Order : std::uint8_t { blocks, added };
 

@@ -39,11 +39,24 @@ PictureTargets::PictureTargets(int picture_width, int picture_height, int sample
     each.push_back(id.get());
   }
   opaque = make_framebuffer(each, depth.get(), "the picture of opaque meshes");
+  if (samples > 1) find_samples();
 
   open = texture(GL_R8, 1);
   open_rows = texture(GL_R8, 1);
   open_target = make_framebuffer(std::array{open.get()}, 0, "the occlusion");
   open_rows_target = make_framebuffer(std::array{open_rows.get()}, 0, "the occlusion");
+}
+
+void PictureTargets::find_samples() {
+  glBindFramebuffer(GL_FRAMEBUFFER, opaque.get());
+  for (int i = 0; i < samples; ++i) {
+    std::array<float, 2> place{};
+    glGetMultisamplefv(GL_SAMPLE_POSITION, static_cast<GLuint>(i), place.data());
+    samples_x[i] = place[0] - 0.5f;
+    samples_y[i] = place[1] - 0.5f;
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  check_gl("where samples lie");
 }
 
 void PictureTargets::add_transparent() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec4.hpp>
 
 #include "isobrick/render/gl_objects.h"
 
@@ -44,6 +45,9 @@ struct PictureTargets {
   int width, height, samples;
   bool ids;
 
+  /// Where a pixel's samples lie, pixels from its middle; 0 beyond `samples`.
+  glm::vec4 samples_x{0}, samples_y{0};
+
   // Of each sample: lit colour (alpha 0: no light is taken away later), normal, mesh, depth.
   GlTexture colour, normal, id, depth;
   GlFramebuffer opaque;
@@ -54,6 +58,9 @@ struct PictureTargets {
   // Of each pixel: how open it is, and that smoothed along rows.
   GlTexture open, open_rows;
   GlFramebuffer open_target, open_rows_target;
+
+ private:
+  void find_samples();
 };
 
 }  // namespace isobrick

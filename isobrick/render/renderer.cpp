@@ -88,11 +88,13 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
   camera = new_camera;
   settings = new_settings;
   frame = make_frame(camera, width, height, settings);
-  passes.meshes.start(frame.counts.x, frame.counts.y);
+  passes.meshes.start(frame.counts.x > 0);
   passes.slices.clear();
   overlays = {};
   any_transparent = false;
   choose_targets(width, height);
+  frame.samples_x = targets->samples_x;
+  frame.samples_y = targets->samples_y;
   work.start(*targets, settings);
   fill_buffer(frame_buffer, std::as_bytes(std::span(&frame, 1)));
   clear();
@@ -140,7 +142,7 @@ void Renderer::State::bind_target(const DrawSwitches& switches, bool blended) {
   glBindFramebuffer(GL_FRAMEBUFFER, blended ? targets->transparent.get() : targets->opaque.get());
   if (blended && targets->ids)
     glBindImageTexture(0, targets->front.get(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_R32UI);
-  switches.meshes(frame.counts.x, true, blended);
+  switches.meshes(true, blended);
 }
 
 bool Renderer::State::draw_surfaces(const DrawSwitches& switches, bool blended,
@@ -170,7 +172,7 @@ bool Renderer::State::go_on(std::uint64_t most) {
   const DrawSwitches switches(frame);
   bind_frame();
   if (!draw_surfaces(switches, false, most) || !draw_surfaces(switches, true, most)) return false;
-  switches.meshes(0, false, false);
+  switches.meshes(false, false);
   choose_result(in_one_go);
   if (!work.run_steps(*screen, {*targets, *next, settings, any_transparent}, most)) return false;
   next->has_front = false;
@@ -266,14 +268,10 @@ void Renderer::prepare(const PictureSettings& settings, int width, int height) {
   whole.planes.clear();
   whole.region.reset();
   cut.planes = {{{1, 0, 0}, 0}};
-  // By all, by few, by none of its half spaces.
-  const std::array<std::uint16_t, 3> cut_by{MeshStyle{}.cut_by, 1, 0};
   for (const PictureSettings& form : {whole, cut}) {
     begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), width, height, form);
-    for (const std::uint16_t by : cut_by)
-      // Software draws in order, and so in one form.
-      if (by == cut_by[0] || (!form.planes.empty() && !state_->device.software))
-        draw(mesh, {.cut_by = by}, {});
+    for (const std::uint16_t by : {MeshStyle{}.cut_by, std::uint16_t{0}})
+      draw(mesh, {.cut_by = by}, {});
     draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
     draw_axes();
     draw_scale_bar("");

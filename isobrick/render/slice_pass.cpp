@@ -21,7 +21,7 @@ out vec2 uv;
 
 void main() {
   uv = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-  place(corner + along_x * uv.x + along_y * uv.y, 0u);
+  place(corner + along_x * uv.x + along_y * uv.y);
 }
 )";
 
@@ -32,7 +32,7 @@ layout(location = 3) uniform vec3 window_opacity;  // first value, 1 / width, op
 in vec2 uv;
 
 vec3 shown() {
-  cut();
+  cut(~0u);
   float value = texture(samples, uv).r;
   if (isnan(value)) discard;
   float part = clamp((value - window_opacity.x) * window_opacity.y, 0.0, 1.0);
@@ -51,7 +51,7 @@ layout(location = 1) out vec2 normal;
 layout(location = 2) out uint id;
 void main() {
   colour = vec4(shown(), 0);
-  vec3 position = mat3(rotation) * from_eye;
+  vec3 position = here();
   vec3 facet = normalize(cross(dFdx(position), dFdy(position)));
   normal = facet.z < 0 ? -facet.xy : facet.xy;
   id = 0u;
@@ -63,7 +63,7 @@ layout(location = 0) out vec4 sum;
 layout(location = 1) out float hidden;
 void main() {
   vec3 colour = shown();
-  float depth = -(mat3(rotation) * from_eye).z;
+  float depth = -here().z;
   sum = vec4(colour, 1) * window_opacity.z * weight_at(depth);
   hidden = window_opacity.z;
 }
@@ -78,10 +78,8 @@ void set(const GlProgram& program, int location, Vec3f v) {
 }  // namespace
 
 SlicePass::SlicePass() : nothing_(make_vertex_array()) {
-  // One form is enough: a slice has four corners.
-  const std::string frame = cut_glsl(CutBy::all) + kFrameGlsl,
-                    vertex = frame + kCutVertexGlsl + kVertex,
-                    fragment = frame + kCutFragmentGlsl + kColour;
+  const std::string frame = kFrameGlsl, vertex = frame + kPlaceGlsl + kVertex,
+                    fragment = frame + fragment_glsl(true) + kColour;
   opaque_ = make_program(vertex, fragment + kOpaque, "slices");
   transparent_ = make_program(vertex, fragment + kTransparent, "slices");
 }

@@ -64,7 +64,7 @@ class Cut : public RenderTest {
   std::vector<float> samples_{0, 0.4f, 0.7f, 1};
 };
 
-/// Nothing cuts; a plane; a region; more than OpenGL clips by itself.
+/// Nothing cuts; a plane; a region; many.
 std::vector<PictureSettings> ways_to_cut() {
   PictureSettings whole{.picking = true}, plane = whole, region = whole, many = whole;
   plane.planes = {{{0.3, 1, 0.1}, -0.2}};
@@ -128,6 +128,52 @@ int pixels_apart(const Picture& a, const Picture& b) {
   for (std::size_t i = 0; i < a.pixels.size(); ++i)
     apart += std::abs(int{a.pixels[i]} - int{b.pixels[i]}) > 4;
   return apart;
+}
+
+/// A square that is seen at an angle, but for what lies beyond `right` and `top` of it.
+TestMesh leaning_square(float right, float top) {
+  TestMesh mesh;
+  const Vec3f corner{-0.8f, -0.6f, -0.7f}, along_x{1.5f, 1.1f, 0.1f}, along_y{0.2f, 0.4f, 1.4f};
+  const auto at = [&](float x, float y) { return corner + along_x * x + along_y * y; };
+  mesh.positions = {at(0, 0), at(right, 0), at(0, top), at(right, top)};
+  mesh.normals.assign(4, Vec3f{0.6f, -0.8f, 0});
+  mesh.triangles = {{0, 1, 2}, {1, 3, 2}};
+  return mesh;
+}
+
+/// Where a half space ends it is as smooth as where a triangle does, and lies where it should to a
+/// fraction of a pixel.
+TEST_F(Cut, CutEdgesAreThoseOfAMeshThatEndsThere) {
+  const TestMesh all = leaning_square(1, 1), part = leaning_square(0.55f, 0.35f);
+  // Planes through the edges of `part`, along the normal of the square.
+  const auto vec = [](Vec3f v) { return Vec3d{v.x, v.y, v.z}; };
+  const Vec3d p = vec(part.positions[3]), across = vec(part.positions[2]) - p,
+              down = vec(part.positions[1]) - p, normal = cross(across, down);
+  const auto inward = [&](Vec3d edge, Vec3d to) {
+    const Vec3d n = cross(edge, normal);
+    return half_space_at(p, dot(n, to) > 0 ? n : n * -1.0);
+  };
+  for (const bool orthographic : {false, true})
+    for (const bool multisample : {false, true}) {
+      PictureSettings settings{
+          .multisample = multisample, .occlusion = false, .picking = true};
+      Camera camera({0.9, -1, 0.4}, {0, 0, 0}, {0, 0, 1});
+      camera.fit({-1, -1, -1}, {1, 1, 1}, double{kWidth} / kHeight);
+      camera.orthographic = orthographic;
+      const auto picture = [&](const TestMesh& mesh) {
+        renderer().begin(camera, kWidth, kHeight, settings);
+        renderer().draw(mesh.chunk(), {.id = 5}, {});
+        renderer().end();
+        return read(renderer());
+      };
+      const Picture expected = picture(part), whole = picture(all);
+      settings.planes = {inward(down, across), inward(across, down)};
+      const Picture cut = picture(all);
+      EXPECT_GT(pixels_apart(whole, expected), 1000);
+      // A sample may lie on the edge itself.
+      EXPECT_LT(pixels_apart(cut, expected), 8) << orthographic << multisample;
+      EXPECT_EQ(cut.ids, expected.ids);
+    }
 }
 
 /// Slices, which come last, are cut all the same.
