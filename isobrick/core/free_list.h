@@ -12,6 +12,12 @@ class FreeList {
  public:
   explicit FreeList(std::uint32_t size) { free_.push_back({0, size}); }
 
+  /// Whether take() would give something.
+  bool has(std::uint32_t size) const {
+    return std::any_of(free_.begin(), free_.end(),
+                       [&](const Range& range) { return range.size >= size; });
+  }
+
   std::optional<std::uint32_t> take(std::uint32_t size) {
     for (std::size_t i = 0; i < free_.size(); ++i) {
       if (free_[i].size < size) continue;

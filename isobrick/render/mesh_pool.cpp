@@ -49,6 +49,10 @@ struct MeshBlock {
     return std::nullopt;
   }
 
+  bool has_room(std::uint32_t vertex_count, std::uint32_t triangle_count) const {
+    return free_vertices.has(vertex_count) && free_triangles.has(triangle_count);
+  }
+
   void give_back(const MeshPlace& place) {
     free_vertices.give_back(place.first_vertex, place.vertices);
     free_triangles.give_back(place.first_triangle, place.triangle_count);
@@ -149,6 +153,14 @@ PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
   upload(place.triangles, place.first_triangle, triangles);
   check_gl("a mesh");
   return mesh;
+}
+
+bool MeshPool::has_room(const MeshChunk& mesh) const {
+  return std::any_of(state_->blocks.begin(), state_->blocks.end(),
+                     [&](const std::shared_ptr<MeshBlock>& block) {
+                       return block->has_room(static_cast<std::uint32_t>(mesh.positions.size()),
+                                              static_cast<std::uint32_t>(mesh.triangles.size()));
+                     });
 }
 
 PooledMesh MeshPool::borrow(const MeshPlace& place, Vec3d origin) {

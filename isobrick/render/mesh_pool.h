@@ -61,6 +61,9 @@ class MeshPool {
   /// that name other vertices, and when device memory is short.
   PooledMesh add(const MeshChunk& mesh, Vec3d origin = {});
 
+  /// Whether add() finds room for it in a block that there is.
+  bool has_room(const MeshChunk& mesh) const;
+
   /// A mesh with normals in buffers that somebody else owns, and keeps while it is drawn.
   static PooledMesh borrow(const MeshPlace& place, Vec3d origin = {});
 

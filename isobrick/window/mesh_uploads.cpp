@@ -5,6 +5,7 @@
 #include <vector>
 
 namespace isobrick {
+
 MeshUploads::~MeshUploads() {
   uploads_.clear();
   pool_.tidy();
@@ -18,6 +19,7 @@ bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
     if (upload.there) continue;
     if (share != nullptr && share->spent()) return false;
     if (!node.mesh->empty()) {
+      make_room(node.mesh->mesh.chunk(0));
       upload.place = pool_.add(node.mesh->mesh.chunk(0), origin);
       if (share != nullptr) share->bytes += upload.place.bytes();
     }
@@ -39,8 +41,9 @@ const PooledMesh* MeshUploads::find(const NodeMesh& mesh) const {
   return upload == uploads_.end() ? nullptr : &upload->second.place;
 }
 
-void MeshUploads::drop(std::uint64_t most) {
-  if (pool_.capacity() <= most) return;
+template <class F>
+void MeshUploads::drop_until(F&& enough) {
+  if (enough()) return;
   std::vector<std::pair<std::uint64_t, MeshId>> oldest;
   for (const auto& [id, upload] : uploads_)
     if (upload.used != now_) oldest.emplace_back(upload.used, id);
@@ -48,9 +51,19 @@ void MeshUploads::drop(std::uint64_t most) {
             [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [used, id] : oldest) {
     uploads_.erase(id);
-    pool_.trim();
-    if (pool_.capacity() <= most) return;
+    if (enough()) return;
   }
+}
+
+void MeshUploads::drop(std::uint64_t most) {
+  drop_until([&] {
+    if (pool_.capacity() > most) pool_.trim();
+    return pool_.capacity() <= most;
+  });
+}
+
+void MeshUploads::make_room(const MeshChunk& mesh) {
+  if (unused_ == Unused::go) drop_until([&] { return pool_.has_room(mesh); });
 }
 
 }  // namespace isobrick

@@ -26,7 +26,11 @@ class MeshUploads {
     static constexpr std::chrono::milliseconds kMost{6};
   };
 
-  explicit MeshUploads(MeshPool& pool) : pool_(pool) {}
+  /// Before the pool grows: meshes that are not used may go, or stay. Where OpenGL is software they
+  /// are soon copied again, while new memory is cleared, tens of milliseconds a block.
+  enum class Unused : std::uint8_t { stay, go };
+
+  MeshUploads(MeshPool& pool, Unused unused) : pool_(pool), unused_(unused) {}
   ~MeshUploads();
   MeshUploads(const MeshUploads&) = delete;
   MeshUploads& operator=(const MeshUploads&) = delete;
@@ -54,7 +58,13 @@ class MeshUploads {
     std::uint64_t used = 0;
   };
 
+  void make_room(const MeshChunk& mesh);
+  /// Meshes that are not used, the oldest first, until `enough()`.
+  template <class F>
+  void drop_until(F&& enough);
+
   MeshPool& pool_;
+  Unused unused_;
   std::unordered_map<MeshId, Upload, MeshIdHash> uploads_;
   std::uint64_t now_ = 0;
 };

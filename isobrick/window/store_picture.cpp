@@ -62,7 +62,8 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
                                 stream_options(budgets_, on_change, software));
                           })),
       setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)),
-      uploads_(setup_->pool()),
+      uploads_(setup_->pool(),
+               setup_->software() ? MeshUploads::Unused::go : MeshUploads::Unused::stay),
       slices_(budgets, last_sample(*store_), store_->info().type),
       pieces_(setup_->software()) {
   scene_ = reading_.get();
@@ -114,6 +115,7 @@ void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
   const auto add = [&](const Drawable& drawable) {
     return uploads_.add(drawable, scene_->origin(), shown_ == nullptr ? nullptr : &share);
   };
+  if (shown_ != nullptr) uploads_.keep(*shown_);
   // What was begun first, or nothing would be finished while there is always something newer.
   if (next_ != nullptr && next_ != shown_ && !add(*next_)) return;
   if (next_ != nullptr) shown_ = next_;

@@ -1,0 +1,102 @@
+#include "isobrick/window/mesh_uploads.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "isobrick/render/gl_context.h"
+#include "tests/meshes/test_meshes.h"
+
+namespace isobrick {
+namespace {
+
+template <class T>
+void fill(PodBuffer<T>& buffer, const std::vector<T>& values) {
+  buffer.resize(values.size());
+  std::copy(values.begin(), values.end(), buffer.data());
+}
+
+class Uploads : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!GlContext::available()) GTEST_SKIP() << "there is no OpenGL 4.5";
+    context_.emplace();
+    pool_.emplace(kVertices);
+  }
+  void TearDown() override {
+    uploads_.reset();
+    pool_.reset();
+  }
+
+  /// Balls of 435 vertices each, from this number on.
+  static Drawable balls(int first, int count) {
+    Drawable drawable;
+    for (int i = first; i < first + count; ++i) {
+      const TestMesh ball = make_ball({0, 0, 0}, 1, 14);
+      NodeMesh mesh;
+      mesh.isovalue = i;
+      fill(mesh.mesh.positions, ball.positions);
+      fill(mesh.mesh.normals, ball.normals);
+      fill(mesh.mesh.triangles, ball.triangles);
+      drawable.nodes.push_back({std::make_shared<const NodeMesh>(std::move(mesh)), 0});
+    }
+    return drawable;
+  }
+  /// As a picture of `drawable` does while `shown` is on the screen.
+  void take(const Drawable& drawable, const Drawable& shown) {
+    uploads_->begin_use();
+    uploads_->keep(shown);
+    EXPECT_TRUE(uploads_->add(drawable, {}, nullptr));
+  }
+  void expect_there(const Drawable& drawable) const {
+    for (const DrawnNode& node : drawable.nodes) EXPECT_NE(uploads_->find(*node.mesh), nullptr);
+  }
+
+  static constexpr std::uint32_t kVertices = 5000;  ///< room for eleven balls
+  std::optional<GlContext> context_;
+  std::optional<MeshPool> pool_;
+  std::optional<MeshUploads> uploads_;
+};
+
+TEST_F(Uploads, WhatIsNotDrawnGoesBeforeThePoolGrows) {
+  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  Drawable shown = balls(0, 4);
+  take(shown, {});
+  const std::uint64_t one = uploads_->bytes();
+  for (int first = 4; first < 80; first += 4) {
+    const Drawable next = balls(first, 4);
+    take(next, shown);
+    expect_there(shown);
+    expect_there(next);
+    EXPECT_EQ(uploads_->bytes(), one);
+    shown = next;
+  }
+  // What is drawn needs more.
+  const Drawable many = balls(100, 12);
+  take(many, shown);
+  expect_there(shown);
+  expect_there(many);
+  EXPECT_EQ(uploads_->bytes(), 2 * one);
+}
+
+TEST_F(Uploads, WhatIsNotDrawnMayStay) {
+  uploads_.emplace(*pool_, MeshUploads::Unused::stay);
+  const Drawable first = balls(0, 11), second = balls(11, 11);
+  take(first, {});
+  const std::uint64_t one = uploads_->bytes();
+  take(second, {});
+  expect_there(first);
+  EXPECT_EQ(uploads_->bytes(), 2 * one);
+  uploads_->begin_use();
+  uploads_->keep(second);
+  uploads_->drop(one);
+  expect_there(second);
+  EXPECT_EQ(uploads_->find(*first.nodes[0].mesh), nullptr);
+  EXPECT_EQ(uploads_->bytes(), one);
+}
+
+}  // namespace
+}  // namespace isobrick
