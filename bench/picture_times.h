@@ -101,9 +101,7 @@ class PicturesTimes {
     json["pictures"] = count;
     put("total_ms", [](const Picture& p) { return p.total; });
     put("device_ms", [](const Picture& p) { return p.steps.device; });
-    put("search_ms", [](const Picture& p) { return p.steps.scene.search; });
-    put("cut_ms", [](const Picture& p) { return p.steps.scene.cut; });
-    put("plan_ms", [](const Picture& p) { return p.steps.scene.plan; });
+    put("scene_ms", [](const Picture& p) { return p.steps.scene; });
     put("drawable_ms", [](const Picture& p) { return p.steps.drawable; });
     put("upload_ms", [](const Picture& p) { return p.steps.upload; });
     put("slices_ms", [](const Picture& p) { return p.steps.slices; });

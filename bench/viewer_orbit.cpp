@@ -76,7 +76,8 @@ class Flight {
       Stopwatch watch;
       const double submitted =
           draw({.coarser = pacer_.coarser(),
-                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no},
+                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no,
+                .patience_seconds = kPatienceSeconds},
                pacer_.smaller());
       const double seconds = watch.lap();
       const PictureState& state = picture_->state();
@@ -101,6 +102,7 @@ class Flight {
     do {
       PictureWay way;
       way.piece_seconds = arguments_.piece_seconds;
+      way.patience_seconds = kPatienceSeconds;
       if (pacer_.plain()) way.plain = PictureWay::Plain::until_complete;
       Stopwatch watch;
       picture_->draw(camera_, arguments_.width, arguments_.height, settings_, way);

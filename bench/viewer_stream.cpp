@@ -126,6 +126,7 @@ class Session {
     const auto start = Clock::now();
     PictureWay way{.coarser = moving ? pacer_.coarser() : 1,
                    .piece_seconds = PictureWay::usual_piece(software_, moving),
+                   .patience_seconds = kPatienceSeconds,
                    .moving = moving};
     if (pacer_.plain())
       way.plain = moving ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
@@ -281,6 +282,9 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
     return turn >= 1;
   });
   result["while_turning"] = session.take_times();
+  const CutTimes cut = session.picture().scene().times();
+  result["last_cut"] = {
+      {"search_ms", cut.search * 1e3}, {"cut_ms", cut.cut * 1e3}, {"plan_ms", cut.plan * 1e3}};
   result["meshes_by"] = session.picture().device().describe();
   result["stream"] = stream_json(session.picture().scene().stream().counters());
   result["device"] = device_json(session.picture().device().times());

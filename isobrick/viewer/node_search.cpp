@@ -147,15 +147,19 @@ void NodeSearch::build_what_is_wanted() {
   }
 }
 
+std::shared_ptr<const NodeSearch::Bytes> NodeSearch::index() const {
+  const std::lock_guard lock(mutex_);
+  return index_;
+}
+
+bool NodeSearch::found(std::span<const double> isovalues) const {
+  return index() == searched_ && std::equal(isovalues.begin(), isovalues.end(),
+                                            active_.isovalues().begin(), active_.isovalues().end());
+}
+
 const ActiveNodes& NodeSearch::find(std::span<const double> isovalues) {
-  std::shared_ptr<const Bytes> index;
-  {
-    const std::lock_guard lock(mutex_);
-    index = index_;
-  }
-  if (index == searched_ && std::equal(isovalues.begin(), isovalues.end(),
-                                       active_.isovalues().begin(), active_.isovalues().end()))
-    return active_;
+  if (found(isovalues)) return active_;
+  std::shared_ptr<const Bytes> index = this->index();
   const IndexView view = view_index(*index);
   std::vector<std::uint64_t> finest(mask_words(view.items()));
   const auto start = Clock::now();

@@ -23,7 +23,7 @@ std::string size_text(std::uint64_t bytes);
 
 /// Finds the active nodes of isovalues through an index of the finest nodes' ranges, of
 /// any kind; all kinds find the same. Another kind is built by a thread of its own while
-/// the one before goes on answering. find() is for one thread, the rest is thread-safe.
+/// the one before goes on answering. find() is for one thread at a time, the rest is thread-safe.
 class NodeSearch {
  public:
   /// Begins with a linear scan. `type` is that of the samples. Indices that need more
@@ -44,6 +44,8 @@ class NodeSearch {
 
   /// The nodes that any of the isovalues crosses. Until the next call.
   const ActiveNodes& find(std::span<const double> isovalues);
+  /// Whether that is what the call before gave, by the same index. Not beside a call of find().
+  bool found(std::span<const double> isovalues) const;
 
   struct State {
     IndexKind kind = IndexKind::linear;  ///< what answers now
@@ -60,6 +62,7 @@ class NodeSearch {
   using Bytes = std::vector<std::byte>;
 
   static std::uint64_t building_bytes(IndexKind kind, std::uint64_t nodes);
+  std::shared_ptr<const Bytes> index() const;
   Bytes build(IndexKind kind) const;
   void set_index(IndexKind kind, Bytes bytes, double seconds);
   void build_what_is_wanted();

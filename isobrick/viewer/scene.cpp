@@ -4,21 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "isobrick/core/stopwatch.h"
-
 namespace isobrick {
-namespace {
-
-bool same_cut(const Cut& a, const Cut& b) {
-  return a.isovalues == b.isovalues &&
-         std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
-                    [](const CutNode& p, const CutNode& q) {
-                      return p.key == q.key && p.coarser == q.coarser && p.visible == q.visible &&
-                             p.cut_away == q.cut_away;
-                    });
-}
-
-}  // namespace
 
 Vec3d middle_of(const NodeGrid& grid) {
   const Int3 cells = grid.cells();
@@ -28,35 +14,52 @@ Vec3d middle_of(const NodeGrid& grid) {
 
 Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
     : tree_(std::make_shared<const NodeTree>(*source)),
-      origin_(middle_of(tree_->grid())),
-      selector_(*tree_) {
+      origin_(middle_of(tree_->grid())) {
   options.origin = origin_;
   const auto nodes = static_cast<std::uint64_t>(volume(tree_->grid().level(0).nodes));
   const std::uint64_t index = std::min(NodeSearch::building_bytes(nodes), options.brick_bytes / 4);
   options.brick_bytes -= index;
   search_ = std::make_unique<NodeSearch>(tree_, source->info().type, index, options.on_change);
   stream_ = std::make_unique<SceneStream>(std::move(source), tree_, std::move(options));
+  worker_ = std::make_unique<CutWorker>(*tree_, *search_, *stream_);
 }
 
-void Scene::update(const std::vector<double>& isovalues, const View& view, CutBudget budget) {
-  // A cut at the limit of its budget must not follow every mesh that is made.
-  const double measured = stream_->counters().triangles_per_block;
-  if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
-  if (per_block_ > 0) budget.triangles_per_block = per_block_;
-  times_ = {};
-  Stopwatch watch;
-  const ActiveNodes& active = search_->find(isovalues);
-  times_.search = watch.lap();
-  if (view_ == view && budget_ == budget && cut_.isovalues == isovalues) return;
-  view_ = view;
-  budget_ = budget;
-  Cut cut = selector_.select(active, view, budget);
-  const bool same = same_cut(cut, cut_);
-  times_.cut = watch.lap();
-  if (same) return;
-  cut_ = std::move(cut);
-  stream_->set_cut(cut_);
-  times_.plan = watch.lap();
+bool Scene::update(const std::vector<double>& isovalues, const View& view, const CutBudget& budget,
+                   double patience) {
+  const bool first = drawn_ == nullptr, busy = worker_->busy();
+  CutRequest request{isovalues, view, budget};
+  if (!busy) {
+    // A cut at the limit of its budget must not follow every mesh that is made.
+    up_to_date_ = true;
+    const double measured = counters().triangles_per_block;
+    if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
+  }
+  if (per_block_ > 0) request.budget.triangles_per_block = per_block_;
+  if (first || request != asked_ || (!busy && !search_->found(isovalues))) {
+    if (!busy) drawn_ = stream_->drawable();
+    asked_ = request;
+    worker_->ask(std::move(request));
+  }
+  up_to_date_ = false;
+  up_to_date_ = worker_->wait(first ? std::numeric_limits<double>::infinity() : patience);
+  cut_ = worker_->cut();
+  return up_to_date_;
+}
+
+std::shared_ptr<const Drawable> Scene::drawable() {
+  auto now = up_to_date_ ? stream_->drawable() : worker_->before();
+  if (now != nullptr && (drawn_ == nullptr || now->version >= drawn_->version))
+    drawn_ = std::move(now);
+  return drawn_;
+}
+
+bool Scene::is_newest(const Drawable& drawable) const {
+  return up_to_date_ && stream_->is_newest(drawable);
+}
+
+const StreamCounters& Scene::counters() {
+  if (up_to_date_) counters_ = stream_->counters();
+  return counters_;
 }
 
 }  // namespace isobrick

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <limits>
 #include <memory>
-#include <optional>
 #include <vector>
 
-#include "isobrick/viewer/node_search.h"
-#include "isobrick/viewer/scene_stream.h"
+#include "isobrick/viewer/cut_worker.h"
 
 namespace isobrick {
 
@@ -25,23 +24,31 @@ class Scene {
   /// Chooses the cut for a view and starts on it. `budget.triangles_per_block` is
   /// replaced by what has been measured, as far as that has moved by a fifth. Cheap enough for
   /// every frame; nothing happens when view, isovalues and budget are those of before, and the
-  /// stream goes on where the cut is the same.
-  void update(const std::vector<double>& isovalues, const View& view, CutBudget budget);
+  /// stream goes on where the cut is the same. The choice takes half a millisecond, but where the
+  /// processor slows down many times that: after `patience` seconds it goes on by itself, but for
+  /// the first one, and false is returned; what is below is then that of the cut before.
+  bool update(const std::vector<double>& isovalues, const View& view, const CutBudget& budget,
+              double patience = std::numeric_limits<double>::infinity());
+  /// What the last update() returned.
+  bool up_to_date() const { return up_to_date_; }
+  /// Of the last update().
+  const std::vector<double>& isovalues() const { return asked_.isovalues; }
 
-  /// What finds the nodes that isovalues cross.
+  /// What finds the nodes that isovalues cross. To be asked by update() alone.
   NodeSearch& search() { return *search_; }
   const NodeSearch& search() const { return *search_; }
 
-  /// Seconds that the steps of the last update() took.
-  struct Times {
-    double search = 0;  ///< finding the nodes that isovalues cross
-    double cut = 0;     ///< choosing nodes
-    double plan = 0;    ///< handing them to the stream
-  };
-  const Times& times() const { return times_; }
+  /// Of the cut that was chosen last.
+  CutTimes times() const { return worker_->times(); }
+  const Cut& cut() const { return *cut_; }
 
-  const Cut& cut() const { return cut_; }
-  std::shared_ptr<const Drawable> drawable() { return stream_->drawable(); }
+  /// See SceneStream.
+  std::shared_ptr<const Drawable> drawable();
+  bool is_newest(const Drawable& drawable) const;
+  bool idle() const { return up_to_date_ && stream_->idle(); }
+  /// Those of before while a cut is being chosen.
+  const StreamCounters& counters();
+
   SceneStream& stream() { return *stream_; }
   const SceneStream& stream() const { return *stream_; }
 
@@ -49,13 +56,14 @@ class Scene {
   std::shared_ptr<const NodeTree> tree_;
   Vec3d origin_;
   std::unique_ptr<NodeSearch> search_;
-  CutSelector selector_;
-  Cut cut_;
-  std::optional<View> view_;  ///< of the last cut
-  CutBudget budget_;
   std::unique_ptr<SceneStream> stream_;
+  std::unique_ptr<CutWorker> worker_;
+  CutRequest asked_;
+  bool up_to_date_ = false;
+  std::shared_ptr<const Cut> cut_ = std::make_shared<const Cut>();
+  std::shared_ptr<const Drawable> drawn_;
+  StreamCounters counters_;
   double per_block_ = 0;  ///< triangles, as cuts are estimated with
-  Times times_;
 };
 
 /// World space of a volume's middle.

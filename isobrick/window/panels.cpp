@@ -221,7 +221,7 @@ std::uint64_t bricks_wanted(ViewerState& state) {
 }
 
 void status_panel(ViewerState& state) {
-  const StreamCounters c = state.picture->scene().stream().counters();
+  const StreamCounters& c = state.picture->scene().counters();
   const PictureState& p = state.picture->state();
   ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
                    static_cast<int>(state.frame_number % state.frame_times.size()), nullptr, 0, 50,

@@ -86,7 +86,7 @@ WorldBox StorePicture::bounds() const {
 }
 
 void StorePicture::update_scene(const Camera& camera, int width, int height,
-                                const ViewSettings& settings, double coarser) {
+                                const ViewSettings& settings, const PictureWay& way) {
   std::vector<double> isovalues;
   shown_surfaces_.clear();
   for (std::size_t i = 0; i < settings.surfaces.size(); ++i)
@@ -94,7 +94,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
       isovalues.push_back(settings.surfaces[i].isovalue);
       shown_surfaces_.push_back(i);
     }
-  View view = view_of(camera, width, height, settings.pixel_error * coarser);
+  View view = view_of(camera, width, height, settings.pixel_error * way.coarser);
   const ShownBox box = shown_box(settings);
   if (!box.whole()) {
     const Vec3d last = last_sample(*store_);
@@ -106,7 +106,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
   const std::uint64_t there =
       device_->turns() != nullptr ? DeviceMeshes::cache_bytes(device_->held()) : upload_memory();
   budget.mesh_bytes = std::min(there, budgets_.memory / 2) / 2;
-  scene_->update(isovalues, view, budget);
+  scene_->update(isovalues, view, budget, way.patience_seconds);
 }
 
 void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
@@ -153,6 +153,17 @@ std::uint64_t StorePicture::upload_memory() const {
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
 }
 
+/// Which of the settings' surfaces a mesh of `shown_` belongs to. That may have been made when others
+/// were asked for: where there were as many, one has another isovalue by now.
+std::optional<std::size_t> StorePicture::surface_of(const DrawnNode& node,
+                                                    const ViewSettings& settings) const {
+  const auto number = static_cast<std::size_t>(node.isovalue);
+  if (shown_->isovalues.size() == shown_surfaces_.size()) return shown_surfaces_[number];
+  for (const std::size_t i : shown_surfaces_)
+    if (settings.surfaces[i].isovalue == node.mesh->isovalue) return i;
+  return std::nullopt;
+}
+
 void StorePicture::draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
                                  PictureState& state) {
   state.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
@@ -163,21 +174,20 @@ void StorePicture::draw_surfaces(const ViewSettings& settings, const PictureSett
       state.damage.push_back(node.mesh->damage);
       continue;
     }
-    const auto number = static_cast<std::size_t>(node.isovalue);
+    const std::optional<std::size_t> number = surface_of(node, settings);
     const PooledMesh* mesh = nullptr;
     if (node.mesh->device)
       mesh = &device_->drawn(*node.mesh, scene_->origin());
     else
       mesh = uploads_.find(*node.mesh);
-    if (number >= shown_surfaces_.size() || mesh == nullptr || mesh->empty()) continue;
-    const SurfaceSettings& surface = settings.surfaces[shown_surfaces_[number]];
-    state.isovalues[shown_surfaces_[number]] = node.mesh->isovalue;
+    if (!number || mesh == nullptr || mesh->empty()) continue;
+    const SurfaceSettings& surface = settings.surfaces[*number];
+    state.isovalues[*number] = node.mesh->isovalue;
     MeshStyle style;
     style.colour = surface.colour;
     style.opacity = surface.opacity;
-    style.id = static_cast<std::uint32_t>(shown_surfaces_[number] + 1);
-    // What is cut alike is drawn together, so the order must be free.
-    if (!picture.in_order) style.cut_by = cuts.of(scene_->tree().grid(), node.mesh->key);
+    style.id = static_cast<std::uint32_t>(*number + 1);
+    style.cut_by = cuts.of(scene_->tree().grid(), node.mesh->key);
     renderer().draw(*mesh, style);
     state.triangles += node.mesh->triangles();
     ++state.nodes;
@@ -189,7 +199,7 @@ bool StorePicture::still_wanted(const Work& work, const Asked& asked) const {
   const Shows& shows = work.becomes.shows;
   // A picture in full serves as a plain one, and a plain one comes first.
   const bool same_view = shows == asked.shows || shows == asked.shows_plain;
-  if (same_view && work.isovalues == scene_->cut().isovalues) return true;
+  if (same_view && work.isovalues == scene_->isovalues()) return true;
   return work.state.moving && asked.way.moving &&
          2 * asked.newest->triangles >= work.state.triangles;
 }
@@ -202,7 +212,7 @@ bool StorePicture::shows_all_there_is(const Pictured& next, const Asked& asked) 
     return true;
   // Meshes of another isovalue are awaited; a picture of this one was dropped for that.
   return !asked.idle && pictured_.stale && pictured_.slices == next.slices &&
-         pictured_.isovalues == next.isovalues && next.isovalues != scene_->cut().isovalues;
+         pictured_.isovalues == next.isovalues && next.isovalues != scene_->isovalues();
 }
 
 /// Whether taking things to the device has been enough for a frame: the next one can show them.
@@ -240,7 +250,7 @@ void StorePicture::choose_picture(const Asked& asked) {
     pictured_.slices = next.slices;
   }
   work_.emplace(
-      Work{.becomes = std::move(next), .state = {}, .isovalues = scene_->cut().isovalues});
+      Work{.becomes = std::move(next), .state = {}, .isovalues = scene_->isovalues()});
   work_->state.moving = asked.way.moving;
   work_->state.plain = plain;
 }
@@ -345,10 +355,9 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
   // Until there is a picture of what is asked for, every other time is for what has arrived.
   imported_ = !work_ && !put_off_ && (state_.covers || !imported_) && device_->update();
   times_ = {.device = watch.lap()};
-  update_scene(camera, width, height, settings, way.coarser);
-  times_.scene = scene_->times();
-  watch.lap();
-  const bool idle = scene_->stream().idle();  // first: then the newest has everything
+  update_scene(camera, width, height, settings, way);
+  times_.scene = watch.lap();
+  const bool idle = scene_->idle();  // first: then the newest has everything
   Shows shows{camera, width, height, settings};
   for (SurfaceSettings& surface : shows.settings.surfaces) surface.isovalue = 0;
   Shows plain = shows;
@@ -391,11 +400,10 @@ void StorePicture::update_state(const Asked& asked) {
   if (!work_ && !asked.way.moving && !state_.plain) state_.moving = false;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
   state_.covers =
-      shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->cut().isovalues;
+      shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
   state_.more = imported_ || put_off_ || device_->more();
   state_.complete = !work_ && !put_off_ && shown_ != nullptr &&
-                    scene_->stream().is_newest(*shown_) &&
-                    (shown_->complete || scene_->stream().idle());
+                    scene_->is_newest(*shown_) && (shown_->complete || scene_->idle());
 }
 
 void StorePicture::draw_complete(const Camera& camera, int width, int height,

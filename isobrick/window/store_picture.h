@@ -24,9 +24,11 @@ namespace isobrick {
 
 /// So long a piece of a picture takes, about, that is drawn in pieces: input is answered in
 /// between.
-inline constexpr double kPieceSeconds = 0.06;
+inline constexpr double kPieceSeconds = 0.045;
 /// The same where a device draws and nothing moves: half a frame of a display.
 inline constexpr double kDevicePieceSeconds = 0.008;
+/// What windows take for PictureWay::patience_seconds: some times what it takes.
+inline constexpr double kPatienceSeconds = 0.002;
 
 /// What a picture shows and what it still lacks.
 struct PictureState {
@@ -55,6 +57,9 @@ struct PictureWay {
   /// A picture that would take longer is drawn in pieces of about so many seconds, one with each
   /// draw(): the same picture, shown when it is whole, dropped when the view changes before.
   double piece_seconds = std::numeric_limits<double>::infinity();
+  /// What is to be shown is chosen beside the thread that draws; after so long the picture goes on
+  /// with what was chosen before. See Scene::update().
+  double patience_seconds = std::numeric_limits<double>::infinity();
   /// The view changes all the time: a picture that has been begun is finished all the same, unless
   /// there are much fewer triangles to draw by now.
   bool moving = false;
@@ -81,7 +86,7 @@ struct PictureCounters {
 /// `finish` are 0.
 struct PictureTimes {
   double device = 0;    ///< taking over a device, or a part of its memory
-  Scene::Times scene;   ///< choosing nodes
+  double scene = 0;     ///< waiting until nodes are chosen
   double drawable = 0;  ///< asking what can be drawn
   double upload = 0;    ///< taking meshes to the device
   double slices = 0;
@@ -169,7 +174,7 @@ class StorePicture {
   void draw_next(const Camera& camera, int width, int height, const ViewSettings& settings,
                  const PictureWay& way);
   void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
-                    double coarser);
+                    const PictureWay& way);
   /// Takes meshes of the newest drawable to the device; shows it once all are there.
   void upload(const std::shared_ptr<const Drawable>& newest);
   bool can_wait(const Drawable& newest) const;
@@ -185,6 +190,7 @@ class StorePicture {
   void wait_drawn(std::optional<GlFence> fence);
   void finish_picture();
   void drop_picture();
+  std::optional<std::size_t> surface_of(const DrawnNode& node, const ViewSettings& settings) const;
   void draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
                      PictureState& state);
   void update_state(const Asked& asked);

@@ -315,6 +315,7 @@ bool ViewerWindow::draw_picture(int width, int height) {
   PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1,
                  .piece_seconds = options_.piece_seconds.value_or(
                      PictureWay::usual_piece(setup_->software(), fluent)),
+                 .patience_seconds = kPatienceSeconds,
                  .moving = fluent};
   // Nor should those that follow while meshes come in.
   if (state_.pacer.plain())

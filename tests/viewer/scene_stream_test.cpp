@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/viewer/scene.h"
 #include "tests/stream/memory_bricks.h"
 #include "tests/viewer/perspective.h"
 #include "tests/viewer/plain_device.h"
@@ -357,28 +356,6 @@ TEST(SceneStream, KeepsBricksAndMeshesWithinTheirBudgets) {
   EXPECT_GT(stream.counters().brick_bytes_peak, options.brick_bytes / 2);
   // One mesh of each thread may come on top.
   EXPECT_LE(most_meshes, options.mesh_bytes + 2 * (2 << 20));
-}
-
-TEST(Scene, AWindowsLoopEndsWithTheWholeCut) {
-  const auto source = make_source(200);
-  Scene scene(source, {.threads = 2});
-  View view;
-  view.eye = {99.5, 99.5, 500};
-  view.width = view.height = 500;
-  view.pixel_error = 2;
-  view.view_projection = perspective_view(view.eye, {99.5, 99.5, 99.5}, {0, 1, 0}, 0.8, 1, 1, 2000);
-  for (const auto start = Clock::now(); seconds_since(start) < 60;) {
-    scene.update({0.0}, view, {});
-    if (scene.drawable()->complete && scene.stream().idle()) break;
-    std::this_thread::sleep_for(milliseconds(2));
-  }
-  const auto drawable = scene.drawable();
-  EXPECT_TRUE(drawable->complete);
-  EXPECT_GT(drawable->triangles, 10000u);
-  EXPECT_TRUE(covers(scene.tree(), *drawable, 0));
-  for (const DrawnNode& node : drawable->nodes)
-    for (const Vec3f p : node.mesh->mesh.positions)
-      EXPECT_LT(std::abs(p.x) + std::abs(p.y) + std::abs(p.z), 200.0f) << "around the origin";
 }
 
 }  // namespace

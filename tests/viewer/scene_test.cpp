@@ -1,0 +1,117 @@
+#include "isobrick/viewer/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "tests/stream/memory_bricks.h"
+#include "tests/viewer/perspective.h"
+
+namespace isobrick::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::shared_ptr<MemoryBricks> gyroid() {
+  constexpr Index n = 200;
+  return std::make_shared<MemoryBricks>(Int3{n, n, n}, std::function<float(Int3)>([](Int3 p) {
+                                          return static_cast<float>(gyroid_ball(p, n));
+                                        }),
+                                        MemoryBricks::Options{.brick = 32});
+}
+
+View view_from(Vec3d eye) {
+  View view;
+  view.eye = eye;
+  view.width = view.height = 500;
+  view.pixel_error = 2;
+  view.view_projection = perspective_view(view.eye, {99.5, 99.5, 99.5}, {0, 1, 0}, 0.8, 1, 1, 2000);
+  return view;
+}
+
+template <class F>
+testing::AssertionResult comes_true(F&& what) {
+  for (const auto start = Clock::now(); Clock::now() - start < std::chrono::seconds(60);) {
+    if (what()) return testing::AssertionSuccess();
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return testing::AssertionFailure() << "not within a minute";
+}
+
+TEST(Scene, AWindowsLoopEndsWithTheWholeCut) {
+  for (const double patience : {0.0, 1.0}) {
+    Scene scene(gyroid(), {.threads = 2});
+    EXPECT_TRUE(scene.update({0.0}, view_from({99.5, 99.5, 500}), {}, patience))
+        << "the first one is waited for";
+    EXPECT_TRUE(comes_true([&] {
+      const bool chosen = scene.update({0.0}, view_from({99.5, 99.5, 500}), {}, patience);
+      EXPECT_TRUE(chosen || patience == 0);
+      return scene.drawable()->complete && scene.idle();
+    }));
+    const auto drawable = scene.drawable();
+    EXPECT_TRUE(drawable->complete && drawable->covers);
+    EXPECT_TRUE(scene.is_newest(*drawable));
+    EXPECT_GT(drawable->triangles, 10000u);
+    for (const DrawnNode& node : drawable->nodes)
+      for (const Vec3f p : node.mesh->mesh.positions)
+        EXPECT_LT(std::abs(p.x) + std::abs(p.y) + std::abs(p.z), 200.0f) << "around the origin";
+  }
+}
+
+/// With every frame another isovalue and another view, none of which is waited for.
+TEST(Scene, WhileACutIsChosenTheOneBeforeIsShown) {
+  Scene scene(gyroid(), {.threads = 2});
+  const View from = view_from({99.5, 99.5, 500});
+  scene.update({0.0}, from, {});
+  ASSERT_TRUE(comes_true([&] { return scene.drawable()->complete && scene.idle(); }));
+  int not_chosen = 0;
+  std::uint64_t version = 0;
+  for (int i = 1; i <= 200; ++i) {
+    const std::vector<double> isovalues{0.001 * i};
+    const bool chosen =
+        scene.update(isovalues, view_from({99.5 + i, 99.5, 500}), {}, i % 2 == 0 ? 0 : 1e-4);
+    EXPECT_EQ(scene.up_to_date(), chosen);
+    EXPECT_EQ(scene.isovalues(), isovalues);
+    const auto drawable = scene.drawable();
+    ASSERT_NE(drawable, nullptr);
+    EXPECT_FALSE(drawable->nodes.empty());
+    EXPECT_GE(drawable->version, version) << "nothing older comes back";
+    version = drawable->version;
+    if (chosen) {
+      EXPECT_EQ(scene.cut().isovalues, isovalues);
+      EXPECT_EQ(drawable->isovalues, isovalues);
+    } else {
+      ++not_chosen;
+      EXPECT_FALSE(scene.idle());
+      EXPECT_FALSE(scene.is_newest(*drawable));
+    }
+  }
+  EXPECT_GT(not_chosen, 20);
+  EXPECT_TRUE(comes_true([&] {
+    scene.update({0.2}, view_from({99.5 + 200, 99.5, 500}), {}, 0);
+    return scene.drawable()->complete && scene.idle();
+  }));
+  EXPECT_EQ(scene.drawable()->isovalues, std::vector<double>{0.2});
+  EXPECT_TRUE(scene.drawable()->covers);
+}
+
+TEST(Scene, ASwitchOfTheIndexIsSearchedAtOnce) {
+  Scene scene(gyroid(), {.threads = 2});
+  const View from = view_from({99.5, 99.5, 500});
+  scene.update({0.0}, from, {});
+  const auto active = scene.search().state().active;
+  EXPECT_GT(active, 0u);
+  scene.search().use(IndexKind::octree);
+  scene.search().wait();
+  const Cut* const cut = &scene.cut();
+  EXPECT_FALSE(scene.search().found(std::vector<double>{0.0}));
+  scene.update({0.0}, from, {});
+  EXPECT_TRUE(scene.search().found(std::vector<double>{0.0}));
+  EXPECT_EQ(scene.search().state().active, active);
+  EXPECT_EQ(&scene.cut(), cut) << "the same nodes";
+}
+
+}  // namespace
+}  // namespace isobrick::test
