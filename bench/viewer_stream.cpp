@@ -18,148 +18,28 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <thread>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "bench/guarded_main.h"
-#include "bench/picture_times.h"
-#include "isobrick/core/error.h"
+#include "bench/median.h"
+#include "bench/viewer_session.h"
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/pipeline/gpu_backend.h"
 #include "isobrick/render/gl_context.h"
-#include "isobrick/window/frame_pacer.h"
-#include "isobrick/window/store_picture.h"
 
 namespace isobrick::bench {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
-  std::string store;
-  double isovalue = 127.5, to = 160.5;
-  int width = 1280, height = 800, jumps = 4, region = 256;
-  double seconds = 4;  ///< of sliding, of turning
-  double memory_gib = 2, gpu_memory_gib = 2;
-  int threads = 0;
-  std::string backend = "auto";
-  bool json = false;
-};
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 std::uint64_t bytes_of(double gib) { return static_cast<std::uint64_t>(gib * (1 << 30)); }
-
-/// A store on a screen of no window.
-class Session {
- public:
-  Session(const Arguments& arguments, const PictureBudgets& budgets,
-          const std::shared_ptr<PictureSetup>& setup)
-      : arguments_(arguments),
-        opened_(Clock::now()),
-        store_(std::make_shared<const StoreReader>(arguments.store)) {
-    read_seconds = seconds_since(opened_);
-    picture_ = std::make_unique<StorePicture>(
-        store_, budgets, [this] { changed_ = Clock::now(); }, setup);
-    set_up_seconds = seconds_since(opened_);
-    settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
-    settings.multisample = !software_;
-    choose_values(settings, picture_->scene().tree());
-    const WorldBox box = picture_->bounds();
-    camera.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
-  }
-
-  StorePicture& picture() { return *picture_; }
-  double since_opened() const { return seconds_since(opened_); }
-  /// Seconds from `start` until the last mesh came.
-  double changed_after(Clock::time_point start) const {
-    return std::chrono::duration<double>(changed_.load() - start).count();
-  }
-
-  /// One frame as the window makes it. `moving`: its picture may be a simpler one.
-  void draw(bool moving) { make_frame(moving); }
-  /// At most 60 times a second until `done`, and when all is there without waiting for the
-  /// next turn of a display, unless the picture before the last is waiting for it. Throws Error
-  /// when that takes longer than two minutes.
-  template <class F>
-  void draw_until(bool moving, F&& done) {
-    const auto start = Clock::now();
-    while (seconds_since(start) < 120) {
-      const auto next = Clock::now() + kPeriod;
-      draw(moving);
-      if (done()) return;
-      if (picture_->state().drawing) continue;
-      const std::chrono::duration<double> left = next - Clock::now();
-      const bool all_there = !moving && picture_->scene().stream().wait_idle(left.count());
-      std::this_thread::sleep_until(all_there ? std::min(next, began_before_ + kPeriod) : next);
-    }
-    throw Error("what is waited for is not there after 120 s");
-  }
-
-  ViewSettings settings;
-  Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
-  double read_seconds = 0, set_up_seconds = 0;
-  std::uint64_t device_peak = 0;
-  Times at_rest;  ///< pictures in full when nothing moves and nothing is missing
-
-  /// Since it was last asked: frames, and whole pictures but for those at rest.
-  Json take_times() {
-    Json json = std::exchange(frames_, {}).summary(pace_);
-    json["whole_pictures"] = std::exchange(pictures_, {}).summary();
-    return json;
-  }
-
- private:
-  static constexpr auto kPeriod = std::chrono::microseconds(16'667);
-  static constexpr double kLeast = 1e-3;  ///< seconds of a frame that counts
-
-  void make_frame(bool moving) {
-    const auto start = Clock::now();
-    PictureWay way{.coarser = moving ? pacer_.coarser() : 1,
-                   .piece_seconds = PictureWay::usual_piece(software_, moving),
-                   .patience_seconds = kPatienceSeconds,
-                   .moving = moving};
-    if (pacer_.plain())
-      way.plain = moving ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
-    const int smaller = moving ? pacer_.smaller() : 1;
-    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, settings, way);
-    const double submitted = seconds_since(start);
-    glFinish();
-    const double seconds = seconds_since(start);
-    const PictureState& state = picture_->state();
-    if (seconds >= kLeast) frames_.add(seconds, picture_->times(), seconds - submitted);
-    device_peak = std::max(device_peak, state.device_bytes);
-    if (picture_->drew() || state.more) began_before_ = std::exchange(began_, start);
-    if (!picture_->drew()) return;  // nothing is drawn that would look the same
-    const double whole = std::max(seconds, picture_->picture_seconds());
-    (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
-    if (moving)
-      pacer_.drawn(whole);
-    else if (!state.plain)
-      pacer_.drawn_still(whole);
-  }
-
-  const Arguments& arguments_;
-  Clock::time_point opened_;
-  Clock::time_point began_, began_before_;  ///< the last frames that may have been shown
-  std::atomic<Clock::time_point> changed_{Clock::time_point()};
-  std::shared_ptr<const StoreReader> store_;
-  std::unique_ptr<StorePicture> picture_;
-  PicturesTimes frames_;
-  Times pictures_;
-  const bool software_ = current_gl_device().software;
-  FramePacer pacer_ = FramePacer::for_device(software_);
-  MachinePace pace_;
-};
 
 /// Takes a mesh and keeps nothing.
 class NoSink final : public MeshSink {
@@ -292,43 +172,43 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
   return result;
 }
 
-/// A region in the middle, all of level 0, from nothing to complete, beside the extraction of
-/// the same samples.
-Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
-                const std::shared_ptr<PictureSetup>& setup) {
-  Json result;
-  const StoreReader store(arguments.store);
+/// A region in the middle, all of level 0.
+Box3 region_of(const StoreReader& store, int edge_cells) {
   const Int3 extent = store.info().levels.front().lattice.extent;
   Box3 roi;
   for (int axis = 0; axis < 3; ++axis) {
-    const Index edge = std::min<Index>(arguments.region, extent[axis] - 1);
+    const Index edge = std::min<Index>(edge_cells, extent[axis] - 1);
     roi.lo[axis] = (extent[axis] - 1 - edge) / 2 / 64 * 64;
     roi.hi[axis] = roi.lo[axis] + edge + 1;
   }
-  const auto extract_with = [&](Backend backend, const char* name) {
-    ExtractOptions options;
-    options.isovalue = arguments.isovalue;
-    options.roi = roi;
-    options.normals = true;
-    options.memory = budgets.memory;
-    options.threads = budgets.threads;
-    options.backend = backend;
-    NoSink sink;
-    NoProgress progress;
-    const auto start = Clock::now();
-    const ExtractReport report = extract(store, options, sink, progress);
-    result[name] = {{"seconds", seconds_since(start)}, {"triangles", report.triangles}};
-  };
-  extract_with(Backend::cpu, "first_extract_cpu");  // reads the store into the page cache
-  extract_with(Backend::cpu, "extract_cpu");
-  if (budgets.backend != Backend::cpu && cuda_device_count() > 0) {
-    extract_with(Backend::cuda, "first_extract_cuda");  // sets the device up
-    extract_with(Backend::cuda, "extract_cuda");
-  }
+  return roi;
+}
 
+/// The batch extraction of its samples; seconds and triangles.
+std::pair<double, std::uint64_t> extract_region(const StoreReader& store, Box3 roi,
+                                                const Arguments& arguments,
+                                                const PictureBudgets& budgets, Backend backend) {
+  ExtractOptions options;
+  options.isovalue = arguments.isovalue;
+  options.roi = roi;
+  options.normals = true;
+  options.memory = budgets.memory;
+  options.threads = budgets.threads;
+  options.backend = backend;
+  NoSink sink;
+  NoProgress progress;
+  const auto start = Clock::now();
+  const ExtractReport report = extract(store, options, sink, progress);
+  return {seconds_since(start), report.triangles};
+}
+
+/// From nothing to complete.
+Json refine_region(const StoreReader& store, Box3 roi, const Arguments& arguments,
+                   const PictureBudgets& budgets, const std::shared_ptr<PictureSetup>& setup) {
   glFinish();  // the session before may still be giving memory back
   Session session(arguments, budgets, setup);
   session.settings.region_on = true;
+  const Int3 extent = store.info().levels.front().lattice.extent;
   for (int axis = 0; axis < 3; ++axis) {
     const auto last = static_cast<double>(extent[axis] - 1);
     // Neighbours that only touch it stay out.
@@ -345,16 +225,44 @@ Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
     ends.push_back({seconds_since(start) * 1e3, state.nodes, state.triangles});
     return complete_in_full(session);
   });
-  result["refine"] = {{"seconds", seconds_since(start)},
-                      {"triangles", session.picture().state().triangles},
-                      {"nodes", session.picture().state().nodes},
-                      {"limited_by_budget", session.picture().state().limited_by_budget},
-                      {"picture_ends_ms_nodes_triangles", ends},
-                      {"last_mesh_seconds", session.changed_after(start)},
-                      {"frames", session.take_times()},
-                      {"at_rest", session.at_rest.summary()},
-                      {"device", device_json(session.picture().device().times())},
-                      {"stream", stream_json(session.picture().scene().stream().counters())}};
+  return {{"seconds", seconds_since(start)},
+          {"triangles", session.picture().state().triangles},
+          {"nodes", session.picture().state().nodes},
+          {"limited_by_budget", session.picture().state().limited_by_budget},
+          {"picture_ends_ms_nodes_triangles", ends},
+          {"last_mesh_seconds", session.changed_after(start)},
+          {"frames", session.take_times()},
+          {"at_rest", session.at_rest.summary()},
+          {"device", device_json(session.picture().device().times())},
+          {"stream", stream_json(session.picture().scene().stream().counters())}};
+}
+
+/// A region's refinement beside its extraction, by turns. The medians, and all.
+Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
+                const std::shared_ptr<PictureSetup>& setup) {
+  const StoreReader store(arguments.store);
+  const Box3 roi = region_of(store, arguments.region);
+  const bool cuda = budgets.backend != Backend::cpu && cuda_device_count() > 0;
+  std::map<std::string, std::vector<double>> seconds;
+  std::uint64_t triangles = 0;
+  const auto extract_with = [&](Backend backend, const char* name) {
+    const auto [took, made] = extract_region(store, roi, arguments, budgets, backend);
+    seconds[name].push_back(took);
+    triangles = made;
+  };
+  extract_with(Backend::cpu, "first_extract_cpu");  // reads the store into the page cache
+  if (cuda) extract_with(Backend::cuda, "first_extract_cuda");  // sets the device up
+  Json result;
+  for (int turn = 0; turn < arguments.turns; ++turn) {
+    extract_with(Backend::cpu, "extract_cpu");
+    if (cuda) extract_with(Backend::cuda, "extract_cuda");
+    Json refined = refine_region(store, roi, arguments, budgets, setup);
+    seconds["refine"].push_back(refined["seconds"].get<double>());
+    if (turn == 0) result["first_refine"] = std::move(refined);
+  }
+  for (const auto& [name, all] : seconds)
+    result[name] = {{"seconds", median(all)}, {"all_seconds", all}};
+  result["extracted_triangles"] = triangles;
   return result;
 }
 
@@ -367,6 +275,8 @@ int run(int argc, char** argv) {
   app.add_option("--jumps", arguments.jumps);
   app.add_option("--seconds", arguments.seconds, "Of sliding, of turning");
   app.add_option("--region", arguments.region, "Edge, in cells, of what is refined fully");
+  app.add_option("--turns", arguments.turns, "Refinements and extractions of that")
+      ->check(CLI::PositiveNumber);
   app.add_option("--width", arguments.width);
   app.add_option("--height", arguments.height);
   app.add_option("--memory", arguments.memory_gib, "GiB of host memory");

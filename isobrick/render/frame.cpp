@@ -50,8 +50,8 @@ FrameBlock make_frame(const Camera& camera, int width, int height,
   int count = 0;
   for (const HalfSpace& half : settings.half_spaces())
     frame.half_spaces[static_cast<std::size_t>(count++)] = from_eye(half, camera.eye);
-  frame.counts = {count, settings.picking ? 1 : 0,
-                  settings.multisample ? (1 << kSamples) - 1 : 1, 0};
+  frame.counts = {count, settings.picking ? 1 : 0, settings.multisample ? (1 << kSamples) - 1 : 1,
+                  0};
 
   const double near = camera.near_depth(), far = camera.far_depth();
   const double tangent = std::tan(glm::radians(camera.field_of_view) / 2);

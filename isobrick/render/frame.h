@@ -37,8 +37,8 @@ extern const char* const kFrameGlsl;
 /// GLSL for vertex shaders, after kFrameGlsl: place(position from the eye).
 extern const char* const kPlaceGlsl;
 /// GLSL for fragment shaders, after kFrameGlsl: here(), where the fragment is; and if `cut`
-/// cut(bits), which drops the samples that lie outside of any of these half spaces. What has nothing
-/// to drop can be hidden before it is shaded.
+/// cut(bits), which drops the samples that lie outside of any of these half spaces. What has
+/// nothing to drop can be hidden before it is shaded.
 std::string fragment_glsl(bool cut);
 /// GLSL: light on a surface, after kFrameGlsl.
 extern const char* const kLightGlsl;

@@ -27,8 +27,8 @@ inline bool may_be_cut(const MeshStyle& style) { return style.cut_by != 0; }
 /// have one order.
 class MeshQueue {
  public:
-  /// Meshes of one block of a pool that are cut, or not, together, which takes fewer calls, or all as
-  /// they were added, so that it does not show where in the pool they lie.
+  /// Meshes of one block of a pool that are cut, or not, together, which takes fewer calls, or all
+  /// as they were added, so that it does not show where in the pool they lie.
   enum class Order : std::uint8_t { blocks, added };
 
   explicit MeshQueue(Order order = Order::added) : sorted_(order == Order::added) {}

@@ -47,8 +47,8 @@ class CutWorker {
 
   /// The cut that was handed over last; never null.
   std::shared_ptr<const Cut> cut() const;
-  /// What could be drawn of the cut before, just before the next one is handed over; null before the
-  /// second. While busy() the stream itself may take its time to say.
+  /// What could be drawn of the cut before, just before the next one is handed over; null before
+  /// the second. While busy() the stream itself may take its time to say.
   std::shared_ptr<const Drawable> before() const;
   CutTimes times() const;
 

@@ -13,8 +13,7 @@ Vec3d middle_of(const NodeGrid& grid) {
 }
 
 Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
-    : tree_(std::make_shared<const NodeTree>(*source)),
-      origin_(middle_of(tree_->grid())) {
+    : tree_(std::make_shared<const NodeTree>(*source)), origin_(middle_of(tree_->grid())) {
   options.origin = origin_;
   const auto nodes = static_cast<std::uint64_t>(volume(tree_->grid().level(0).nodes));
   const std::uint64_t index = std::min(NodeSearch::building_bytes(nodes), options.brick_bytes / 4);

@@ -123,10 +123,10 @@ class FramePacer {
   }
 
   double target_, coarser_ = 1;
-  double pause_ = kShortestPause;  ///< plain pictures before the rest is tried, the next time
-  double until_try_ = 0;           ///< the same, now
-  double rest_ = 0, rest_before_ = 0;     ///< seconds that it took; see learn_rest()
-  double last_plain_ = 0;                 ///< seconds; 0: none yet
+  double pause_ = kShortestPause;      ///< plain pictures before the rest is tried, the next time
+  double until_try_ = 0;               ///< the same, now
+  double rest_ = 0, rest_before_ = 0;  ///< seconds that it took; see learn_rest()
+  double last_plain_ = 0;              ///< seconds; 0: none yet
   double first_coarser_ = kFirstCoarser;  ///< before pictures become smaller
   int smaller_ = 1;
   bool plain_ = false;

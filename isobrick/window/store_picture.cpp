@@ -153,8 +153,8 @@ std::uint64_t StorePicture::upload_memory() const {
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
 }
 
-/// Which of the settings' surfaces a mesh of `shown_` belongs to. That may have been made when others
-/// were asked for: where there were as many, one has another isovalue by now.
+/// Which of the settings' surfaces a mesh of `shown_` belongs to. That may have been made when
+/// others were asked for: where there were as many, one has another isovalue by now.
 std::optional<std::size_t> StorePicture::surface_of(const DrawnNode& node,
                                                     const ViewSettings& settings) const {
   const auto number = static_cast<std::size_t>(node.isovalue);
@@ -249,8 +249,7 @@ void StorePicture::choose_picture(const Asked& asked) {
     pictured_.meshes.reset();
     pictured_.slices = next.slices;
   }
-  work_.emplace(
-      Work{.becomes = std::move(next), .state = {}, .isovalues = scene_->isovalues()});
+  work_.emplace(Work{.becomes = std::move(next), .state = {}, .isovalues = scene_->isovalues()});
   work_->state.moving = asked.way.moving;
   work_->state.plain = plain;
 }
@@ -399,11 +398,10 @@ void StorePicture::update_state(const Asked& asked) {
   // One that is no simpler than those at rest is not drawn again.
   if (!work_ && !asked.way.moving && !state_.plain) state_.moving = false;
   state_.limited_by_budget = scene_->cut().limited_by_budget;
-  state_.covers =
-      shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
+  state_.covers = shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
   state_.more = imported_ || put_off_ || device_->more();
-  state_.complete = !work_ && !put_off_ && shown_ != nullptr &&
-                    scene_->is_newest(*shown_) && (shown_->complete || scene_->idle());
+  state_.complete = !work_ && !put_off_ && shown_ != nullptr && scene_->is_newest(*shown_) &&
+                    (shown_->complete || scene_->idle());
 }
 
 void StorePicture::draw_complete(const Camera& camera, int width, int height,

@@ -155,8 +155,7 @@ TEST_F(Cut, CutEdgesAreThoseOfAMeshThatEndsThere) {
   };
   for (const bool orthographic : {false, true})
     for (const bool multisample : {false, true}) {
-      PictureSettings settings{
-          .multisample = multisample, .occlusion = false, .picking = true};
+      PictureSettings settings{.multisample = multisample, .occlusion = false, .picking = true};
       Camera camera({0.9, -1, 0.4}, {0, 0, 0}, {0, 0, 1});
       camera.fit({-1, -1, -1}, {1, 1, 1}, double{kWidth} / kHeight);
       camera.orthographic = orthographic;

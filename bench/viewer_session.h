@@ -1,0 +1,142 @@
+#pragma once
+
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "bench/picture_times.h"
+#include "isobrick/core/error.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/window/frame_pacer.h"
+#include "isobrick/window/store_picture.h"
+
+namespace isobrick::bench {
+
+using Clock = std::chrono::steady_clock;
+
+/// Of bench_viewer_stream.
+struct Arguments {
+  std::string store;
+  double isovalue = 127.5, to = 160.5;
+  int width = 1280, height = 800, jumps = 4, region = 256, turns = 5;
+  double seconds = 4;  ///< of sliding, of turning
+  double memory_gib = 2, gpu_memory_gib = 2;
+  int threads = 0;
+  std::string backend = "auto";
+  bool json = false;
+};
+
+inline double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// A store on a screen of no window.
+class Session {
+ public:
+  Session(const Arguments& arguments, const PictureBudgets& budgets,
+          const std::shared_ptr<PictureSetup>& setup)
+      : arguments_(arguments),
+        opened_(Clock::now()),
+        store_(std::make_shared<const StoreReader>(arguments.store)) {
+    read_seconds = seconds_since(opened_);
+    picture_ = std::make_unique<StorePicture>(
+        store_, budgets, [this] { changed_ = Clock::now(); }, setup);
+    set_up_seconds = seconds_since(opened_);
+    settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
+    settings.multisample = !software_;
+    choose_values(settings, picture_->scene().tree());
+    const WorldBox box = picture_->bounds();
+    camera.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
+  }
+
+  StorePicture& picture() { return *picture_; }
+  double since_opened() const { return seconds_since(opened_); }
+  /// Seconds from `start` until the last mesh came.
+  double changed_after(Clock::time_point start) const {
+    return std::chrono::duration<double>(changed_.load() - start).count();
+  }
+
+  /// One frame as the window makes it. `moving`: its picture may be a simpler one.
+  void draw(bool moving) { make_frame(moving); }
+  /// At most 60 times a second until `done`, and when all is there without waiting for the
+  /// next turn of a display, unless the picture before the last is waiting for it. Throws Error
+  /// when that takes longer than two minutes.
+  template <class F>
+  void draw_until(bool moving, F&& done) {
+    const auto start = Clock::now();
+    while (seconds_since(start) < 120) {
+      const auto next = Clock::now() + kPeriod;
+      draw(moving);
+      if (done()) return;
+      if (picture_->state().drawing) continue;
+      const std::chrono::duration<double> left = next - Clock::now();
+      const bool all_there = !moving && picture_->scene().stream().wait_idle(left.count());
+      std::this_thread::sleep_until(all_there ? std::min(next, began_before_ + kPeriod) : next);
+    }
+    throw Error("what is waited for is not there after 120 s");
+  }
+
+  ViewSettings settings;
+  Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
+  double read_seconds = 0, set_up_seconds = 0;
+  std::uint64_t device_peak = 0;
+  Times at_rest;  ///< pictures in full when nothing moves and nothing is missing
+
+  /// Since it was last asked: frames, and whole pictures but for those at rest.
+  nlohmann::ordered_json take_times() {
+    nlohmann::ordered_json json = std::exchange(frames_, {}).summary(pace_);
+    json["whole_pictures"] = std::exchange(pictures_, {}).summary();
+    return json;
+  }
+
+ private:
+  static constexpr auto kPeriod = std::chrono::microseconds(16'667);
+  static constexpr double kLeast = 1e-3;  ///< seconds of a frame that counts
+
+  void make_frame(bool moving) {
+    const auto start = Clock::now();
+    PictureWay way{.coarser = moving ? pacer_.coarser() : 1,
+                   .piece_seconds = PictureWay::usual_piece(software_, moving),
+                   .patience_seconds = kPatienceSeconds,
+                   .moving = moving};
+    if (pacer_.plain())
+      way.plain = moving ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
+    const int smaller = moving ? pacer_.smaller() : 1;
+    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, settings, way);
+    const double submitted = seconds_since(start);
+    glFinish();
+    const double seconds = seconds_since(start);
+    const PictureState& state = picture_->state();
+    if (seconds >= kLeast) frames_.add(seconds, picture_->times(), seconds - submitted);
+    device_peak = std::max(device_peak, state.device_bytes);
+    if (picture_->drew() || state.more) began_before_ = std::exchange(began_, start);
+    if (!picture_->drew()) return;  // nothing is drawn that would look the same
+    const double whole = std::max(seconds, picture_->picture_seconds());
+    (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
+    if (moving)
+      pacer_.drawn(whole);
+    else if (!state.plain)
+      pacer_.drawn_still(whole);
+  }
+
+  const Arguments& arguments_;
+  Clock::time_point opened_;
+  Clock::time_point began_, began_before_;  ///< the last frames that may have been shown
+  std::atomic<Clock::time_point> changed_{Clock::time_point()};
+  std::shared_ptr<const StoreReader> store_;
+  std::unique_ptr<StorePicture> picture_;
+  PicturesTimes frames_;
+  Times pictures_;
+  const bool software_ = current_gl_device().software;
+  FramePacer pacer_ = FramePacer::for_device(software_);
+  MachinePace pace_;
+};
+
+}  // namespace isobrick::bench
