@@ -79,6 +79,7 @@ class ViewerWindow {
   void click(double x, double y);
   void save_picture(const std::filesystem::path& file);
   bool moving() const;
+  bool minimised() const;
   double aspect() const;
 
   WindowOptions options_;

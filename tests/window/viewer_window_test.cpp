@@ -166,6 +166,24 @@ TEST_F(Window, SurvivesOtherSizesAndNone) {
   until([&] { return window.state().picture->state().complete; });
 }
 
+TEST_F(Window, DrawsNothingWhileItIsMinimised) {
+  ViewerWindow& window = open();
+  until([&] { return rests(); });
+  display_->minimise(window.handle());
+  until([&] { return glfwGetWindowAttrib(window.handle(), GLFW_ICONIFIED) == GLFW_TRUE; });
+  const std::uint64_t before = window.state().picture->counters().finished;
+  window.state().settings.surfaces[0].isovalue -= 20;
+  const auto start = std::chrono::steady_clock::now();
+  steps(5);
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+  EXPECT_EQ(window.state().picture->counters().finished, before);
+  EXPECT_GT(spent.count(), 0.04) << "nor does it spin";
+  display_->restore(window.handle());
+  until([&] { return rests() && window.state().picture->counters().finished > before; });
+  EXPECT_EQ(window.state().picture->state().isovalues[0],
+            window.state().settings.surfaces[0].isovalue);
+}
+
 TEST_F(Window, ClosesAtOnceWhileItStreams) {
   make_store("big.zarr", {320, 320, 320});
   double least = 1;

@@ -1,6 +1,7 @@
 #include "tests/window/virtual_display.h"
 
 #include <X11/Xlib.h>
+#include <X11/Xutil.h>
 #include <X11/extensions/XTest.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -10,12 +11,24 @@
 #include <cstdlib>
 #include <stdexcept>
 
+// glfw3native.h wants headers of XRandR for it.
+extern "C" Window glfwGetX11Window(GLFWwindow* window);
+
 namespace isobrick {
 
 struct VirtualDisplay::State {
   pid_t server = -1;
   Display* display = nullptr;
   std::string before;
+
+  /// ICCCM 4.1.3.1: how a window learns that it is minimised.
+  void set_state(Window window, long value) const {
+    const Atom name = XInternAtom(display, "WM_STATE", False);
+    const long state[] = {value, None};
+    XChangeProperty(display, window, name, name, 32, PropModeReplace,
+                    reinterpret_cast<const unsigned char*>(state), 2);
+    XSync(display, False);
+  }
 
   ~State() {
     if (display != nullptr) XCloseDisplay(display);
@@ -54,6 +67,18 @@ VirtualDisplay::VirtualDisplay(int width, int height) : state_(std::make_unique<
 }
 
 VirtualDisplay::~VirtualDisplay() = default;
+
+void VirtualDisplay::minimise(GLFWwindow* window) {
+  const Window name = glfwGetX11Window(window);
+  XUnmapWindow(state_->display, name);
+  state_->set_state(name, IconicState);
+}
+
+void VirtualDisplay::restore(GLFWwindow* window) {
+  const Window name = glfwGetX11Window(window);
+  XMapWindow(state_->display, name);
+  state_->set_state(name, NormalState);
+}
 
 void VirtualDisplay::focus_under_pointer() {
   XSetInputFocus(state_->display, PointerRoot, RevertToPointerRoot, CurrentTime);

@@ -3,6 +3,8 @@
 #include <memory>
 #include <string>
 
+struct GLFWwindow;
+
 namespace isobrick {
 
 /// A display without a screen (Xvfb) and hands for it (the XTEST extension). DISPLAY names it
@@ -17,6 +19,10 @@ class VirtualDisplay {
 
   /// Whether there is an Xvfb program.
   static bool available();
+
+  /// What a window manager does to minimise a window, and to bring it back.
+  void minimise(GLFWwindow* window);
+  void restore(GLFWwindow* window);
 
   /// Keys go to the window under the pointer from now on, as there is no window manager.
   void focus_under_pointer();

@@ -1,0 +1,183 @@
+#include "isobrick/window/viewer_window.h"
+
+#include <epoxy/gl.h>
+// After OpenGL's.
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "isobrick/core/cancel.h"
+#include "isobrick/window/panels.h"
+#include "isobrick/window/pick.h"
+#include "isobrick/window/window_events.h"
+
+// What a window does again and again: wait for input, draw, show.
+
+namespace isobrick {
+namespace {
+
+/// Above it a frame is no frame but a pause.
+constexpr double kLongestStep = 0.1;
+/// While meshes come in and nothing moves, from a step that has drawn nothing new to the next one:
+/// the cores are for meshes.
+constexpr double kNothingNew = 0.008;
+/// While a picture is drawn in pieces or meshes come in, and nothing else happens, from one frame
+/// to the next: frames would keep software from drawing, and where a display sets the pace a
+/// picture of what has come would wait for its turn, after that of a frame that showed nothing new.
+constexpr double kLongestUnseen = 0.25;
+/// Messages about damage that are shown one by one.
+constexpr std::size_t kMostTold = 3;
+/// Moving pictures may be coarser for so long after the last motion.
+constexpr double kSettleSeconds = 0.25;
+
+}  // namespace
+
+/// Says once what cannot be shown.
+void ViewerWindow::tell_damage() {
+  if (const std::string why = state_.facts->take_failure(); !why.empty())
+    state_.say("the histogram cannot be counted: " + why);
+  for (const std::string& message : state_.picture->state().damage) {
+    if (told_damage_.size() > kMostTold) return;
+    if (!told_damage_.insert(message).second) continue;
+    state_.say(told_damage_.size() <= kMostTold
+                   ? message
+                   : "more is damaged: 'isobrick verify' names all bricks that cannot be read");
+  }
+}
+
+bool ViewerWindow::moving() const {
+  const bool sliding = ImGui::IsAnyItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+  return state_.navigator.moving() || events_->dragging() || sliding ||
+         glfwGetTime() - std::max(events_->last_motion(), opened_) < kSettleSeconds;
+}
+
+/// Makes the picture, or goes on with it. Whether there may be anything new to be seen.
+bool ViewerWindow::draw_picture(int width, int height) {
+  StorePicture& picture = *state_.picture;
+  const double begin = glfwGetTime();
+  // The first picture of a surface should not wait for a good one.
+  const bool fluent = moving() || !picture.state().covers;
+  PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1,
+                 .piece_seconds = options_.piece_seconds.value_or(
+                     PictureWay::usual_piece(setup_->software(), fluent)),
+                 .patience_seconds = kPatienceSeconds,
+                 .moving = fluent};
+  // Nor should those that follow while meshes come in.
+  if (state_.pacer.plain())
+    way.plain = fluent ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
+  const int smaller = fluent ? state_.pacer.smaller() : 1;
+  way.smaller = smaller > 1;
+  try {
+    picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
+                 std::max(height / smaller, 1), state_.settings, way);
+  } catch (const std::exception& e) {
+    if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
+    failed_ = true;
+    return true;
+  }
+  failed_ = false;
+  pace(glfwGetTime() - begin);
+  tell_damage();
+  settle_clicks();
+  const PictureState& state = picture.state();
+  return !state.drawing && (picture.drew() || state.complete || moving());
+}
+
+bool ViewerWindow::minimised() const {
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window_, &width, &height);
+  return width == 0 || height == 0 || glfwGetWindowAttrib(window_, GLFW_ICONIFIED) == GLFW_TRUE;
+}
+
+void ViewerWindow::draw_frame(bool asked) {
+  if (minimised()) return;
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window_, &width, &height);
+  const bool other = state_.picture == nullptr || draw_picture(width, height);
+  // Until then nothing changes but what tells how much there is.
+  if (!other && !asked && glfwGetTime() - shown_ < kLongestUnseen) return;
+  shown_ = glfwGetTime();
+  glClearColor(0.2f, 0.21f, 0.23f, 1);
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, width, height);
+  glClear(GL_COLOR_BUFFER_BIT);
+  if (state_.picture != nullptr) state_.picture->renderer().copy_to(0, width, height);
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  events_->hold_tapped_keys();
+  ImGui::NewFrame();
+  draw_panels(state_);
+  draw_measure(state_, width, height);
+  ImGui::Render();
+  events_->release_tapped_keys();
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  glfwSwapBuffers(window_);
+}
+
+/// What a picture, or a piece of one, that took this thread so long says of the next one.
+void ViewerWindow::pace(double seconds) {
+  const StorePicture& picture = *state_.picture;
+  // There is more to draw; or a better one to come; or something else to do.
+  more_ = picture.state().drawing || picture.state().plain || picture.state().more;
+  if (!picture.drew()) return;
+  state_.draw_seconds = std::max(seconds, picture.picture_seconds());
+  if (picture.state().moving)
+    state_.pacer.drawn(state_.draw_seconds);
+  else if (!picture.state().plain)
+    state_.pacer.drawn_still(state_.draw_seconds);
+}
+
+void ViewerWindow::wait(double most_seconds) {
+  if (minimised()) return glfwWaitEventsTimeout(most_seconds);
+  const bool there = state_.picture != nullptr;
+  if (there && moving()) return glfwPollEvents();
+  if (!changed_ && !more_ && (!there || state_.picture->state().complete))
+    return glfwWaitEventsTimeout(most_seconds);
+  const bool before = std::exchange(changed_, false);
+  glfwPollEvents();
+  wait_for_meshes(most_seconds);
+  changed_ |= before;
+}
+
+void ViewerWindow::wait_for_meshes(double most_seconds) {
+  if (state_.picture == nullptr || state_.picture->drew()) return;
+  if (state_.picture->state().drawing || state_.picture->state().more) return;
+  // Each mesh that comes in ends a wait, and is not worth a step; the last one is, and what a user
+  // does.
+  const SceneStream& stream = state_.picture->scene().stream();
+  const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
+  for (double now = glfwGetTime(); !changed_ && now < end && (failed_ || !stream.idle());
+       now = glfwGetTime())
+    glfwWaitEventsTimeout(end - now);
+}
+
+bool ViewerWindow::step(double most_seconds) {
+  wait(most_seconds);
+  if (glfwWindowShouldClose(window_)) return false;
+  // What a panel is told by one event it may show with the second frame.
+  const bool told = std::exchange(changed_, false), asked = std::exchange(told_, told) || told;
+  more_ = false;
+  const double now = glfwGetTime();
+  state_.frame_seconds = now - last_time_;
+  state_.frame_times[state_.frame_number++ % state_.frame_times.size()] =
+      static_cast<float>(state_.frame_seconds * 1e3);
+  last_time_ = now;
+  state_.navigator.update(std::min(state_.frame_seconds, kLongestStep));
+  handle_import();
+  handle_requests();
+  draw_frame(asked);
+  return true;
+}
+
+void ViewerWindow::run() {
+  while (!cancel_requested() && step()) {
+  }
+}
+
+}  // namespace isobrick
