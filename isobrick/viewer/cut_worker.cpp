@@ -22,7 +22,7 @@ bool same_cut(const Cut& a, const Cut& b) {
 }  // namespace
 
 CutWorker::CutWorker(const NodeTree& tree, NodeSearch& search, SceneStream& stream)
-    : search_(search), stream_(stream), selector_(tree), thread_([this] { run(); }) {}
+    : search_(search), stream_(stream), tree_(tree), thread_([this] { run(); }) {}
 
 CutWorker::~CutWorker() {
   {
@@ -50,12 +50,9 @@ bool CutWorker::wait(double seconds) {
     change_.wait_for(lock, std::chrono::duration<double>(seconds), done);
   if (!done()) return false;
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  const auto dropped = std::exchange(before_, nullptr);  // its meshes are in nobody's budget
+  lock.unlock();
   return true;
-}
-
-bool CutWorker::busy() const {
-  const std::lock_guard lock(mutex_);
-  return asked_ || choosing_;
 }
 
 std::shared_ptr<const Cut> CutWorker::cut() const {
@@ -87,6 +84,7 @@ void CutWorker::run() {
       choose(request);
     } catch (...) {
       failure = std::current_exception();
+      selector_.reset();  // it may have stopped half way
     }
     lock.lock();
     choosing_ = false;
@@ -102,8 +100,9 @@ void CutWorker::choose(const CutRequest& request) {
   times.search = watch.lap();
   std::shared_ptr<const Cut> next;
   if (chosen_ != request) {
-    next = std::make_shared<const Cut>(selector_.select(active, request.view, request.budget));
-    chosen_ = request;
+    chosen_.reset();
+    if (!selector_) selector_.emplace(tree_);
+    next = std::make_shared<const Cut>(selector_->select(active, request.view, request.budget));
     if (same_cut(*next, *cut_)) next.reset();
     times.cut = watch.lap();
   }
@@ -113,6 +112,7 @@ void CutWorker::choose(const CutRequest& request) {
     stream_.set_cut(*next);
     times.plan = watch.lap();
   }
+  chosen_ = request;
   const std::lock_guard lock(mutex_);
   times_ = times;
   if (next) cut_ = std::move(next);
@@ -121,7 +121,7 @@ void CutWorker::choose(const CutRequest& request) {
 void CutWorker::look_before() {
   auto drawable = stream_.drawable();
   const std::lock_guard lock(mutex_);
-  before_ = std::move(drawable);
+  std::swap(before_, drawable);  // the older one goes without the lock
 }
 
 }  // namespace isobrick

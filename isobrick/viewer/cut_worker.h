@@ -43,12 +43,11 @@ class CutWorker {
   /// Waits at most so many seconds until what was asked for last is handed over; whether it is.
   /// Throws what went wrong with it.
   bool wait(double seconds);
-  bool busy() const;
 
   /// The cut that was handed over last; never null.
   std::shared_ptr<const Cut> cut() const;
-  /// What could be drawn of the cut before, just before the next one is handed over; null before
-  /// the second. While busy() the stream itself may take its time to say.
+  /// What could be drawn of the cut before, just before the next one is handed over; null
+  /// since wait() was true. Until then the stream itself may take its time to say.
   std::shared_ptr<const Drawable> before() const;
   CutTimes times() const;
 
@@ -70,7 +69,8 @@ class CutWorker {
   std::exception_ptr failure_;
 
   // Of the thread alone.
-  CutSelector selector_;
+  const NodeTree& tree_;
+  std::optional<CutSelector> selector_;
   std::optional<CutRequest> chosen_;
 
   std::thread thread_;

@@ -23,7 +23,8 @@ std::string size_text(std::uint64_t bytes);
 
 /// Finds the active nodes of isovalues through an index of the finest nodes' ranges, of
 /// any kind; all kinds find the same. Another kind is built by a thread of its own while
-/// the one before goes on answering. find() is for one thread at a time, the rest is thread-safe.
+/// the one before goes on answering. find() and found() are for one thread at a time, the rest is
+/// thread-safe.
 class NodeSearch {
  public:
   /// Begins with a linear scan. `type` is that of the samples. Indices that need more
@@ -44,7 +45,7 @@ class NodeSearch {
 
   /// The nodes that any of the isovalues crosses. Until the next call.
   const ActiveNodes& find(std::span<const double> isovalues);
-  /// Whether that is what the call before gave, by the same index. Not beside a call of find().
+  /// Whether that is what the call before gave, by the same index.
   bool found(std::span<const double> isovalues) const;
 
   struct State {

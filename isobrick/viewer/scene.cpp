@@ -25,22 +25,23 @@ Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
 
 bool Scene::update(const std::vector<double>& isovalues, const View& view, const CutBudget& budget,
                    double patience) {
-  const bool first = drawn_ == nullptr, busy = worker_->busy();
+  const bool first = drawn_ == nullptr, again = std::exchange(again_, true);
+  up_to_date_ = worker_->wait(0);
   CutRequest request{isovalues, view, budget};
-  if (!busy) {
+  if (up_to_date_) {
     // A cut at the limit of its budget must not follow every mesh that is made.
-    up_to_date_ = true;
     const double measured = counters().triangles_per_block;
     if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
   }
   if (per_block_ > 0) request.budget.triangles_per_block = per_block_;
-  if (first || request != asked_ || (!busy && !search_->found(isovalues))) {
-    if (!busy) drawn_ = stream_->drawable();
+  if (again || request != asked_ || (up_to_date_ && !search_->found(isovalues))) {
+    if (first) drawn_ = stream_->drawable();
     asked_ = request;
     worker_->ask(std::move(request));
   }
   up_to_date_ = false;
   up_to_date_ = worker_->wait(first ? std::numeric_limits<double>::infinity() : patience);
+  again_ = false;
   cut_ = worker_->cut();
   return up_to_date_;
 }

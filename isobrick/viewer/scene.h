@@ -26,7 +26,8 @@ class Scene {
   /// every frame; nothing happens when view, isovalues and budget are those of before, and the
   /// stream goes on where the cut is the same. The choice takes half a millisecond, but where the
   /// processor slows down many times that: after `patience` seconds it goes on by itself, but for
-  /// the first one, and false is returned; what is below is then that of the cut before.
+  /// the first one, and false is returned; what is below is then that of the cut before. Throws
+  /// what went wrong, also with the choice of an earlier call; the next one tries again.
   bool update(const std::vector<double>& isovalues, const View& view, const CutBudget& budget,
               double patience = std::numeric_limits<double>::infinity());
   /// What the last update() returned.
@@ -60,6 +61,7 @@ class Scene {
   std::unique_ptr<CutWorker> worker_;
   CutRequest asked_;
   bool up_to_date_ = false;
+  bool again_ = true;  ///< what was asked for last has failed
   std::shared_ptr<const Cut> cut_ = std::make_shared<const Cut>();
   std::shared_ptr<const Drawable> drawn_;
   StreamCounters counters_;

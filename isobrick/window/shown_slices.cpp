@@ -42,6 +42,19 @@ std::vector<float> floats_of(const SliceSamples& slice) {
 ShownSlices::ShownSlices(const PictureBudgets& budgets, Vec3d last, ScalarType type)
     : last_(last), most_bytes_(slice_bytes(budgets, type)) {}
 
+/// Nothing: it is not shown.
+std::optional<double> ShownSlices::position(const ViewSettings& settings, int axis) const {
+  const SliceSettings& slice = settings.slices[static_cast<std::size_t>(axis)];
+  if (!slice.shown) return std::nullopt;
+  return slice.place * last_[axis];
+}
+
+bool ShownSlices::others_wanted(const ViewSettings& settings) const {
+  for (int axis = 0; axis < 3; ++axis)
+    if (slices_[static_cast<std::size_t>(axis)].asked != position(settings, axis)) return true;
+  return false;
+}
+
 void ShownSlices::update(SceneStream& stream, const ViewSettings& settings) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto slot = static_cast<std::size_t>(axis);
@@ -51,11 +64,11 @@ void ShownSlices::update(SceneStream& stream, const ViewSettings& settings) {
       shown = {};
       continue;
     }
-    shown.asked = true;
     SliceRequest request;
     request.axis = axis;
     request.bytes = most_bytes_;
-    request.position = settings.slices[slot].place * last_[axis];
+    request.position = *position(settings, axis);
+    shown.asked = request.position;
     stream.set_slice(axis, request);
     const auto slice = stream.slice(axis);
     if (slice != nullptr && slice != shown.from) shown = {slice, floats_of(*slice), true};

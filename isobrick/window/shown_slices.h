@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,8 @@ class ShownSlices {
   /// Asks for the samples that settings want, and takes those that have come; until new ones are
   /// there the last ones stay.
   void update(SceneStream& stream, const ViewSettings& settings);
+  /// Whether settings want other ones than the last update() asked for.
+  bool others_wanted(const ViewSettings& settings) const;
   /// What is there, across x, y, z; null: nothing.
   Samples samples() const;
   /// Draws them; appends what is wrong with them to `damage`.
@@ -39,8 +42,10 @@ class ShownSlices {
   struct Slice {
     std::shared_ptr<const SliceSamples> from;
     std::vector<float> samples;
-    bool asked = false;
+    std::optional<double> asked;  ///< position
   };
+
+  std::optional<double> position(const ViewSettings& settings, int axis) const;
 
   Vec3d last_;
   std::uint64_t most_bytes_;  ///< of the samples of one

@@ -138,7 +138,8 @@ bool StorePicture::may_be_plain(const Asked& asked) const {
     return asked.way.plain == PictureWay::Plain::yes;
   if (setup_->software()) return !state_.complete;
   // A full budget may leave the newest incomplete.
-  return shown_ != asked.newest || !(asked.newest->complete || asked.idle);
+  return shown_ != asked.newest ||
+         !(asked.idle || (scene_->up_to_date() && asked.newest->complete));
 }
 
 void StorePicture::drop_unused() {
@@ -232,7 +233,9 @@ void StorePicture::choose_picture(const Asked& asked) {
   const bool enough = (owed || imported_) && shown_ != nullptr;
   if (!enough && (other_view || asked.idle || !can_wait(*asked.newest))) upload(asked.newest);
   times_.upload = watch.lap();
-  slices_.update(scene_->stream(), asked.settings);
+  // The stream answers late while it is given a cut.
+  if (scene_->up_to_date() || slices_.others_wanted(asked.settings))
+    slices_.update(scene_->stream(), asked.settings);
   times_.slices = watch.lap();
   const bool plain = may_be_plain(asked);
   Pictured next{.shows = plain ? asked.shows_plain : asked.shows,

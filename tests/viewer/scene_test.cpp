@@ -4,7 +4,9 @@
 
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <thread>
+#include <vector>
 
 #include "tests/stream/memory_bricks.h"
 #include "tests/viewer/perspective.h"
@@ -95,6 +97,25 @@ TEST(Scene, WhileACutIsChosenTheOneBeforeIsShown) {
   }));
   EXPECT_EQ(scene.drawable()->isovalues, std::vector<double>{0.2});
   EXPECT_TRUE(scene.drawable()->covers);
+}
+
+/// What is dropped for a budget is gone.
+TEST(Scene, KeepsNoMeshesOfCutsBefore) {
+  Scene scene(gyroid(), {.threads = 2, .mesh_bytes = 12 << 20});
+  const View from = view_from({99.5, 99.5, 500});
+  std::vector<std::weak_ptr<const NodeMesh>> shown;
+  for (const double isovalue : {0.0, 0.05, 0.1, 0.15}) {
+    ASSERT_TRUE(comes_true([&] {
+      scene.update({isovalue}, from, {}, 0);
+      const auto drawable = scene.drawable();
+      return drawable->complete && scene.idle() && drawable->isovalues[0] == isovalue;
+    }));
+    for (const DrawnNode& node : scene.drawable()->nodes) shown.push_back(node.mesh);
+  }
+  std::uint64_t bytes = 0;
+  for (const auto& mesh : shown)
+    if (const auto there = mesh.lock()) bytes += there->bytes();
+  EXPECT_LE(bytes, scene.stream().counters().mesh_bytes);
 }
 
 TEST(Scene, ASwitchOfTheIndexIsSearchedAtOnce) {

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
+#include <optional>
 
 #include "tests/window/picture_test.h"
 
@@ -37,6 +39,32 @@ TEST_F(Patience, IsNotNeededForTheSamePictureInTheEnd) {
   }
   EXPECT_TRUE(picture_->state().complete);
   EXPECT_EQ(picture_->renderer().read_pixels(), expected);
+}
+
+/// A device draws a picture in full once nothing finer is to come, and not while that is being
+/// chosen.
+TEST_F(Patience, WhatWasCompleteBeforeIsNot) {
+  open(SynthKind::gyroid, {64, 64, 64});
+  const PictureBudgets budgets;
+  picture_ = std::make_unique<StorePicture>(
+      std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {},
+      std::make_shared<PictureSetup>(
+          budgets, [] {}, std::nullopt, false));
+  settings_.pixel_error = 0.5f;
+  int pending = 0;
+  for (int turn = 0; turn < 10; ++turn) {
+    do {
+      picture_->draw(camera_, kWidth, kHeight, settings_,
+                     {.coarser = 16, .plain = PictureWay::Plain::yes, .moving = true});
+    } while (!picture_->state().complete);
+    picture_->draw(camera_, kWidth, kHeight, settings_,
+                   {.plain = PictureWay::Plain::until_complete, .patience_seconds = 0});
+    if (picture_->scene().up_to_date()) continue;
+    ++pending;
+    EXPECT_TRUE(!picture_->drew() || picture_->state().plain);
+    EXPECT_FALSE(picture_->state().complete);
+  }
+  EXPECT_GT(pending, 0);
 }
 
 TEST_F(Patience, SurfacesThatAreHiddenAreNotTakenForOthers) {
