@@ -155,6 +155,11 @@ PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
   return mesh;
 }
 
+bool MeshPool::shares_block(const MeshChunk& mesh) const {
+  const std::uint64_t room = state_->block_vertices;
+  return mesh.positions.size() <= room && mesh.triangles.size() <= 2 * room;
+}
+
 bool MeshPool::has_room(const MeshChunk& mesh) const {
   return std::any_of(state_->blocks.begin(), state_->blocks.end(),
                      [&](const std::shared_ptr<MeshBlock>& block) {

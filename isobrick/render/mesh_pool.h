@@ -61,6 +61,8 @@ class MeshPool {
   /// that name other vertices, and when device memory is short.
   PooledMesh add(const MeshChunk& mesh, Vec3d origin = {});
 
+  /// Whether it may lie in a block with others, and not in one of its own.
+  bool shares_block(const MeshChunk& mesh) const;
   /// Whether add() finds room for it in a block that there is.
   bool has_room(const MeshChunk& mesh) const;
 

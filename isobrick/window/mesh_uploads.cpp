@@ -12,6 +12,8 @@ MeshUploads::~MeshUploads() {
 }
 
 bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
+  keep(drawable);  // what comes further on is used, too
+  std::optional<std::vector<MeshId>> left;
   for (const DrawnNode& node : drawable.nodes) {
     if (node.mesh->device) continue;
     Upload& upload = uploads_[node.mesh->id()];
@@ -19,7 +21,7 @@ bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
     if (upload.there) continue;
     if (share != nullptr && share->spent()) return false;
     if (!node.mesh->empty()) {
-      make_room(node.mesh->mesh.chunk(0));
+      make_room(node.mesh->mesh.chunk(0), left);
       upload.place = pool_.add(node.mesh->mesh.chunk(0), origin);
       if (share != nullptr) share->bytes += upload.place.bytes();
     }
@@ -41,29 +43,34 @@ const PooledMesh* MeshUploads::find(const NodeMesh& mesh) const {
   return upload == uploads_.end() ? nullptr : &upload->second.place;
 }
 
-template <class F>
-void MeshUploads::drop_until(F&& enough) {
-  if (enough()) return;
-  std::vector<std::pair<std::uint64_t, MeshId>> oldest;
+std::vector<MeshId> MeshUploads::unused() const {
+  std::vector<std::pair<std::uint64_t, MeshId>> found;
   for (const auto& [id, upload] : uploads_)
-    if (upload.used != now_) oldest.emplace_back(upload.used, id);
-  std::sort(oldest.begin(), oldest.end(),
-            [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (const auto& [used, id] : oldest) {
-    uploads_.erase(id);
-    if (enough()) return;
-  }
+    if (upload.used != now_) found.emplace_back(upload.used, id);
+  std::sort(found.begin(), found.end(),
+            [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<MeshId> ids;
+  for (const auto& [used, id] : found) ids.push_back(id);
+  return ids;
 }
 
 void MeshUploads::drop(std::uint64_t most) {
-  drop_until([&] {
-    if (pool_.capacity() > most) pool_.trim();
-    return pool_.capacity() <= most;
-  });
+  if (pool_.capacity() <= most) return;
+  pool_.trim();
+  for (std::vector<MeshId> left = unused(); pool_.capacity() > most && !left.empty();
+       left.pop_back(), pool_.trim())
+    uploads_.erase(left.back());
 }
 
-void MeshUploads::make_room(const MeshChunk& mesh) {
-  if (unused_ == Unused::go) drop_until([&] { return pool_.has_room(mesh); });
+/// `left`: what is not used, once that has been asked for.
+void MeshUploads::make_room(const MeshChunk& mesh, std::optional<std::vector<MeshId>>& left) {
+  if (unused_ == Unused::stay || !pool_.shares_block(mesh)) return;
+  while (!pool_.has_room(mesh)) {
+    if (!left) left = unused();
+    if (left->empty()) return;
+    uploads_.erase(left->back());
+    left->pop_back();
+  }
 }
 
 }  // namespace isobrick

@@ -2,7 +2,9 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <unordered_map>
+#include <vector>
 
 #include "isobrick/render/mesh_pool.h"
 #include "isobrick/viewer/drawable.h"
@@ -58,10 +60,9 @@ class MeshUploads {
     std::uint64_t used = 0;
   };
 
-  void make_room(const MeshChunk& mesh);
-  /// Meshes that are not used, the oldest first, until `enough()`.
-  template <class F>
-  void drop_until(F&& enough);
+  /// Those that are not used, the oldest last.
+  std::vector<MeshId> unused() const;
+  void make_room(const MeshChunk& mesh, std::optional<std::vector<MeshId>>& left);
 
   MeshPool& pool_;
   Unused unused_;

@@ -82,6 +82,38 @@ TEST_F(Uploads, WhatIsNotDrawnGoesBeforeThePoolGrows) {
   EXPECT_EQ(uploads_->bytes(), 2 * one);
 }
 
+TEST_F(Uploads, WhatIsNeededFurtherOnStays) {
+  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  const Drawable first = balls(0, 6), second = balls(6, 5);
+  take(first, {});
+  take(second, {});              // the pool's block is full
+  Drawable next = balls(20, 1);  // and then those that were used least recently
+  next.nodes.insert(next.nodes.end(), first.nodes.begin(), first.nodes.end());
+  MeshUploads::Share share;
+  uploads_->begin_use();
+  EXPECT_TRUE(uploads_->add(next, {}, &share));
+  EXPECT_EQ(share.bytes, pool_->bytes() / 11) << "one is copied";
+  expect_there(next);
+}
+
+TEST_F(Uploads, NothingGoesForAMeshWithABlockOfItsOwn) {
+  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  const Drawable small = balls(0, 8);
+  take(small, {});
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 60);
+  ASSERT_GT(ball.positions.size(), kVertices);
+  NodeMesh mesh;
+  mesh.isovalue = 100;
+  fill(mesh.mesh.positions, ball.positions);
+  fill(mesh.mesh.normals, ball.normals);
+  fill(mesh.mesh.triangles, ball.triangles);
+  Drawable large;
+  large.nodes.push_back({std::make_shared<const NodeMesh>(std::move(mesh)), 0});
+  take(large, {});
+  expect_there(large);
+  expect_there(small);
+}
+
 TEST_F(Uploads, WhatIsNotDrawnMayStay) {
   uploads_.emplace(*pool_, MeshUploads::Unused::stay);
   const Drawable first = balls(0, 11), second = balls(11, 11);
