@@ -81,12 +81,13 @@ flat in uint look;
 #define mesh uvec3(looks[look].id.xy, looks[look].offset.w > 0.5 ? 1 : 0)
 #endif
 
-struct Seen { vec3 position, normal, eye, light; };
+struct Seen { vec3 position, normal, eye, light; float slope; };
 
 Seen see() {
   Seen s;
   s.position = here();
   vec3 facet = cross(dFdx(s.position), dFdy(s.position));
+  s.slope = fwidth(gl_FragCoord.z);
   cut(mesh.y);  // after what is looked at across pixels
   s.eye = towards_eye(s.position);
   facet = dot(facet, facet) > 0 ? normalize(facet) : s.eye;
@@ -132,8 +133,7 @@ void main() {
   Seen s = see();
   // What it is where the pixel's centre is beside the triangle; not farther off than that is, for
   // one that goes past the eye has none in between.
-  float slope = fwidth(gl_FragCoord.z);
-  float within = clamp(stored_depth, gl_FragCoord.z - slope, gl_FragCoord.z + slope);
+  float within = clamp(stored_depth, gl_FragCoord.z - s.slope, gl_FragCoord.z + s.slope);
   if (counts.y != 0) {
     bool whole = gl_SampleMaskIn[0] == counts.z;
     float depth = whole ? gl_FragCoord.z : clamp(within, 0.0, 1.0);

@@ -46,7 +46,7 @@ struct MeshStyle {
   std::optional<Vec3f> inside = {};  ///< of the back where something is cut off; else a darker tone
   /// What pick() tells; 0: nothing. Of transparent ones the lowest 8 bits.
   std::uint32_t id = 0;
-  /// Of the picture's half spaces those that may cut it, a bit each: with few it is drawn sooner.
+  /// Of the picture's half spaces those that may cut it, a bit each: with none it is drawn sooner.
   std::uint16_t cut_by = 0xffff;
   friend bool operator==(const MeshStyle&, const MeshStyle&) = default;
 };

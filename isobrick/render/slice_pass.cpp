@@ -31,9 +31,10 @@ layout(binding = 1) uniform sampler2D colours;
 layout(location = 3) uniform vec3 window_opacity;  // first value, 1 / width, opacity
 in vec2 uv;
 
+// After all that is looked at across pixels.
 vec3 shown() {
-  cut(~0u);
   float value = texture(samples, uv).r;
+  cut(~0u);
   if (isnan(value)) discard;
   float part = clamp((value - window_opacity.x) * window_opacity.y, 0.0, 1.0);
   int last = textureSize(colours, 0).x - 1;
@@ -50,9 +51,9 @@ layout(location = 0) out vec4 colour;
 layout(location = 1) out vec2 normal;
 layout(location = 2) out uint id;
 void main() {
-  colour = vec4(shown(), 0);
   vec3 position = here();
   vec3 facet = normalize(cross(dFdx(position), dFdy(position)));
+  colour = vec4(shown(), 0);
   normal = facet.z < 0 ? -facet.xy : facet.xy;
   id = 0u;
 }

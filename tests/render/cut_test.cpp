@@ -209,7 +209,7 @@ TEST_F(Cut, PlanesThatLeaveAllChangeNothing) {
   const Picture whole = read(renderer());
   settings.planes = {{{0.3, 1, 0.1}, -9}, {{-1, 0, 0}, -9}};
   settings.region = WorldBox{{-7, -7, -7}, {7, 7, 7}};
-  // Also with planes that each fragment is asked for.
+  // Also with many.
   for (const std::size_t planes : {1u, 3u}) {
     settings.planes.resize(planes, {{0, 0, 1}, -9});
     draw_all(renderer(), settings);
