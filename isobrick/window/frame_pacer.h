@@ -36,6 +36,7 @@ class FramePacer {
   void drawn_still(double seconds) {
     if (seconds < kNothingDrawn) return;
     const double ratio = seconds / target_;
+    last_plain_ = 0;
     // While something changes there is more to do than to draw.
     plain_ = ratio > kLeisure;
     if (plain_) until_try_ = ratio > kMostWithRest ? pause_ : kShortestPause;
@@ -45,10 +46,10 @@ class FramePacer {
   /// A picture that took `seconds` to draw as plain(), coarser() and smaller() say now.
   void drawn(double seconds) {
     const double ratio = seconds / target_;
-    if (plain_)
-      last_plain_ = seconds;
-    else
+    if (!plain_)
       learn_rest(seconds);
+    else if (coarser_ == 1 && smaller_ == 1)
+      last_plain_ = seconds;
     if (!plain_ && ratio > kMostWithRest) {
       leave_rest_out();
       return;
@@ -126,7 +127,7 @@ class FramePacer {
   double pause_ = kShortestPause;      ///< plain pictures before the rest is tried, the next time
   double until_try_ = 0;               ///< the same, now
   double rest_ = 0, rest_before_ = 0;  ///< seconds that it took; see learn_rest()
-  double last_plain_ = 0;              ///< seconds; 0: none yet
+  double last_plain_ = 0;  ///< seconds, of one with all detail; 0: none since the last stop
   double first_coarser_ = kFirstCoarser;  ///< before pictures become smaller
   int smaller_ = 1;
   bool plain_ = false;
