@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace isobrick {
 namespace {
@@ -43,22 +44,19 @@ Box3 blocks_of(Box3 samples, Int3 all) {
 }  // namespace
 
 NodeTree::NodeTree(const BrickSource& source) : grid_(source.info()) {
-  nodes_.resize(static_cast<std::size_t>(grid_.levels()));
+  // Of all levels at once: the next one may be a single group.
+  std::vector<std::pair<int, Box3>> groups;
   for (int v = 0; v < grid_.levels(); ++v) {
-    read_level(source, v);
-    merge_below(v);
+    const Int3 all = grid_.level(v).nodes;
+    nodes_.emplace_back(static_cast<std::size_t>(volume(all)));
+    for_each_point({{0, 0, 0}, ceil_div(all, {kGroup, kGroup, kGroup})}, [&](Int3 g) {
+      groups.emplace_back(v,
+                          intersect({g * kGroup, (g + Int3{1, 1, 1}) * kGroup}, {{0, 0, 0}, all}));
+    });
   }
-}
-
-void NodeTree::read_level(const BrickSource& source, int v) {
-  const Int3 all = grid_.level(v).nodes;
-  nodes_[static_cast<std::size_t>(v)].resize(static_cast<std::size_t>(volume(all)));
-  if (volume(all) == 0) return;
-  const Int3 groups = ceil_div(all, {kGroup, kGroup, kGroup});
-  tbb::parallel_for(Index{0}, volume(groups), [&](Index i) {
-    const Int3 g{i % groups.x, i / groups.x % groups.y, i / groups.x / groups.y};
-    read_nodes(source, v, intersect({g * kGroup, (g + Int3{1, 1, 1}) * kGroup}, {{0, 0, 0}, all}));
-  });
+  tbb::parallel_for(std::size_t{0}, groups.size(),
+                    [&](std::size_t i) { read_nodes(source, groups[i].first, groups[i].second); });
+  for (int v = 1; v < grid_.levels(); ++v) merge_below(v);
 }
 
 void NodeTree::read_nodes(const BrickSource& source, int v, Box3 nodes) {
@@ -67,10 +65,12 @@ void NodeTree::read_nodes(const BrickSource& source, int v, Box3 nodes) {
   const Box3 samples{grid_.samples({v, nodes.lo}).lo,
                      grid_.samples({v, nodes.hi - Int3{1, 1, 1}}).hi};
   const RangeTable table = source.block_ranges(stored, blocks_of(samples, blocks));
-  for_each_point(nodes, [&](Int3 p) {
-    const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(v).nodes));
-    nodes_[static_cast<std::size_t>(v)][i] =
-        summary(table, blocks_of(grid_.samples({v, p}), blocks), blocks_in({v, p}));
+  tbb::parallel_for(nodes.lo.z, nodes.hi.z, [&](Index z) {
+    for_each_point({{nodes.lo.x, nodes.lo.y, z}, {nodes.hi.x, nodes.hi.y, z + 1}}, [&](Int3 p) {
+      const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(v).nodes));
+      nodes_[static_cast<std::size_t>(v)][i] =
+          summary(table, blocks_of(grid_.samples({v, p}), blocks), blocks_in({v, p}));
+    });
   });
 }
 
@@ -104,7 +104,6 @@ NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks, std::uint
 }
 
 void NodeTree::merge_below(int v) {
-  if (v == 0) return;
   const Int3 all = grid_.level(v).nodes;
   std::size_t i = 0;
   for_each_point({{0, 0, 0}, all}, [&](Int3 p) {

@@ -52,7 +52,6 @@ class NodeTree {
     return nodes_[static_cast<std::size_t>(n.level)]
                  [static_cast<std::size_t>(linear_index(n.node, grid_.level(n.level).nodes))];
   }
-  void read_level(const BrickSource& source, int v);
   void read_nodes(const BrickSource& source, int v, Box3 nodes);
   std::uint8_t blocks_in(const NodeKey& n) const;
   Node summary(const RangeTable& table, Box3 blocks, std::uint8_t most) const;
