@@ -131,28 +131,51 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
   return mesh;
 }
 
-PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
-  std::vector<Triangle> kept;
-  const std::span<const Triangle> triangles = drawable_triangles(chunk, kept);
+MeshCopy MeshPool::begin(const MeshChunk& chunk, Vec3d origin) {
+  MeshCopy copy;
+  const std::span<const Triangle> triangles = drawable_triangles(chunk, copy.kept_);
   constexpr std::size_t most = std::numeric_limits<std::int32_t>::max() / 3;
   if (chunk.positions.size() > most || triangles.size() > most)
     throw Error(
         fmt::format("a mesh of {} vertices and {} triangles is too large to be drawn as one",
                     chunk.positions.size(), triangles.size()));
-  PooledMesh mesh =
+  copy.mesh_ =
       reserve(static_cast<std::uint32_t>(chunk.positions.size()),
               static_cast<std::uint32_t>(triangles.size()), !chunk.normals.empty(), origin);
-  if (mesh.empty()) return mesh;
-  const auto upload = [](unsigned buffer, std::uint64_t first, auto span) {
-    glNamedBufferSubData(buffer, static_cast<GLintptr>(first * sizeof(span[0])),
-                         static_cast<GLsizeiptr>(span.size_bytes()), span.data());
-  };
-  const MeshPlace& place = mesh.place();
-  upload(place.positions, place.first_vertex, chunk.positions);
-  if (mesh.has_normals()) upload(place.normals, place.first_vertex, chunk.normals);
-  upload(place.triangles, place.first_triangle, triangles);
+  if (copy.mesh_.empty()) return copy;
+  const MeshPlace& place = copy.mesh_.place();
+  const std::uint64_t vertex = std::uint64_t{place.first_vertex} * sizeof(Vec3f),
+                      triangle = std::uint64_t{place.first_triangle} * sizeof(Triangle);
+  copy.parts_.push_back({place.triangles, triangle, std::as_bytes(triangles)});
+  if (copy.mesh_.has_normals())
+    copy.parts_.push_back({place.normals, vertex, std::as_bytes(chunk.normals)});
+  copy.parts_.push_back({place.positions, vertex, std::as_bytes(chunk.positions)});
+  return copy;
+}
+
+std::uint64_t MeshCopy::bytes_left() const {
+  std::uint64_t sum = 0;
+  for (const Part& part : parts_) sum += part.from.size();
+  return sum;
+}
+
+void MeshCopy::go_on(std::uint64_t bytes) {
+  if (done()) return;
+  Part& part = parts_.back();
+  const std::size_t now = static_cast<std::size_t>(
+      std::min<std::uint64_t>(part.from.size(), std::max<std::uint64_t>(bytes, 1)));
+  glNamedBufferSubData(part.buffer, static_cast<GLintptr>(part.offset),
+                       static_cast<GLsizeiptr>(now), part.from.data());
+  part.offset += now;
+  part.from = part.from.subspan(now);
+  if (part.from.empty()) parts_.pop_back();
   check_gl("a mesh");
-  return mesh;
+}
+
+PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
+  MeshCopy copy = begin(chunk, origin);
+  while (!copy.done()) copy.go_on(std::numeric_limits<std::uint64_t>::max());
+  return copy.take();
 }
 
 bool MeshPool::shares_block(const MeshChunk& mesh) const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "isobrick/core/vec.h"
@@ -47,6 +48,30 @@ class PooledMesh {
   bool has_normals_ = false;
 };
 
+/// A mesh on its way into a pool. What it is copied from must live until it is done.
+class MeshCopy {
+ public:
+  bool done() const { return parts_.empty(); }
+  /// Of what is copied.
+  std::uint64_t bytes_left() const;
+  /// Copies about so many bytes more, at least one.
+  void go_on(std::uint64_t bytes);
+  /// Once it is done.
+  PooledMesh take() { return std::move(mesh_); }
+
+ private:
+  friend class MeshPool;
+  struct Part {
+    unsigned buffer;
+    std::uint64_t offset;
+    std::span<const std::byte> from;
+  };
+
+  PooledMesh mesh_;
+  std::vector<Triangle> kept_;  ///< triangles, where not all are
+  std::vector<Part> parts_;     ///< the next one last
+};
+
 /// Meshes of any size in a few large buffers, so that thousands are drawn with one
 /// call. One thread at a time, with a context current.
 class MeshPool {
@@ -60,6 +85,8 @@ class MeshPool {
   /// coordinate that is not finite are left out. Throws Error for triangles
   /// that name other vertices, and when device memory is short.
   PooledMesh add(const MeshChunk& mesh, Vec3d origin = {});
+  /// The same, with nothing copied yet.
+  MeshCopy begin(const MeshChunk& mesh, Vec3d origin = {});
 
   /// Whether it may lie in a block with others, and not in one of its own.
   bool shares_block(const MeshChunk& mesh) const;

@@ -5,6 +5,13 @@
 #include <vector>
 
 namespace isobrick {
+namespace {
+
+/// Bytes that are copied at a time: where a driver gets memory for copies while something else
+/// holds it up, a megabyte takes it some milliseconds.
+constexpr std::uint64_t kPiece = 256 << 10;
+
+}  // namespace
 
 MeshUploads::~MeshUploads() {
   uploads_.clear();
@@ -20,13 +27,28 @@ bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
     upload.used = now_;
     if (upload.there) continue;
     if (share != nullptr && share->spent()) return false;
-    if (!node.mesh->empty()) {
+    if (!node.mesh->empty() && !upload.copy) {
       make_room(node.mesh->mesh.chunk(0), left);
-      upload.place = pool_.add(node.mesh->mesh.chunk(0), origin);
-      if (share != nullptr) share->bytes += upload.place.bytes();
+      upload.copy = pool_.begin(node.mesh->mesh.chunk(0), origin);
+      upload.from = node.mesh;
     }
-    upload.there = true;
+    if (!go_on(upload, share)) return false;
   }
+  return true;
+}
+
+/// False when `share` was spent before it was there.
+bool MeshUploads::go_on(Upload& upload, Share* share) {
+  while (upload.copy && !upload.copy->done()) {
+    if (share != nullptr && share->spent()) return false;
+    const std::uint64_t before = upload.copy->bytes_left();
+    upload.copy->go_on(kPiece);
+    if (share != nullptr) share->bytes += before - upload.copy->bytes_left();
+  }
+  if (upload.copy) upload.place = upload.copy->take();
+  upload.copy.reset();
+  upload.from.reset();
+  upload.there = true;
   return true;
 }
 

@@ -23,8 +23,9 @@ class MeshUploads {
     std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
 
     bool spent() const {
-      return bytes > (16u << 20) || std::chrono::steady_clock::now() - begin > kMost;
+      return bytes > kMostBytes || std::chrono::steady_clock::now() - begin > kMost;
     }
+    static constexpr std::uint64_t kMostBytes = 16u << 20;
     static constexpr std::chrono::milliseconds kMost{6};
   };
 
@@ -58,7 +59,11 @@ class MeshUploads {
     bool there = false;
     PooledMesh place;
     std::uint64_t used = 0;
+    std::optional<MeshCopy> copy;  ///< that has been begun, of `from`
+    MeshPtr from;
   };
+
+  bool go_on(Upload& upload, Share* share);
 
   /// Those that are not used, the oldest last.
   std::vector<MeshId> unused() const;

@@ -1,5 +1,6 @@
 #include "isobrick/window/mesh_uploads.h"
 
+#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,10 +33,10 @@ class Uploads : public testing::Test {
   }
 
   /// Balls of 435 vertices each, from this number on.
-  static Drawable balls(int first, int count) {
+  static Drawable balls(int first, int count, std::uint32_t rings = 14) {
     Drawable drawable;
     for (int i = first; i < first + count; ++i) {
-      const TestMesh ball = make_ball({0, 0, 0}, 1, 14);
+      const TestMesh ball = make_ball({0, 0, 0}, 1, rings);
       NodeMesh mesh;
       mesh.isovalue = i;
       fill(mesh.mesh.positions, ball.positions);
@@ -98,20 +99,39 @@ TEST_F(Uploads, WhatIsNeededFurtherOnStays) {
 
 TEST_F(Uploads, NothingGoesForAMeshWithABlockOfItsOwn) {
   uploads_.emplace(*pool_, MeshUploads::Unused::go);
-  const Drawable small = balls(0, 8);
+  const Drawable small = balls(0, 8), large = balls(100, 1, 60);
+  ASSERT_GT(large.nodes[0].mesh->mesh.positions.size(), kVertices);
   take(small, {});
-  const TestMesh ball = make_ball({0, 0, 0}, 1, 60);
-  ASSERT_GT(ball.positions.size(), kVertices);
-  NodeMesh mesh;
-  mesh.isovalue = 100;
-  fill(mesh.mesh.positions, ball.positions);
-  fill(mesh.mesh.normals, ball.normals);
-  fill(mesh.mesh.triangles, ball.triangles);
-  Drawable large;
-  large.nodes.push_back({std::make_shared<const NodeMesh>(std::move(mesh)), 0});
   take(large, {});
   expect_there(large);
   expect_there(small);
+}
+
+TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
+  uploads_.emplace(*pool_, MeshUploads::Unused::stay);
+  const Drawable large = balls(0, 1, 60), other = balls(1, 2);
+  const MeshBuffer& mesh = large.nodes[0].mesh->mesh;
+  const std::uint64_t all =
+      2 * mesh.positions.span().size_bytes() + mesh.triangles.span().size_bytes();
+  std::uint64_t copied = 0;
+  int pictures = 0;
+  for (bool there = false; !there; ++pictures) {
+    ASSERT_LT(pictures, 10);
+    MeshUploads::Share share;
+    share.bytes = MeshUploads::Share::kMostBytes;  // little is left
+    const std::uint64_t before = share.bytes;
+    uploads_->begin_use();
+    there = uploads_->add(large, {}, &share);
+    copied += share.bytes - before;
+    if (!there) take(other, {});  // others come and go meanwhile
+  }
+  EXPECT_GT(pictures, 2);
+  EXPECT_EQ(copied, all);
+  const MeshPlace& place = uploads_->find(*large.nodes[0].mesh)->place();
+  std::vector<Triangle> found(mesh.triangles.size());
+  glGetNamedBufferSubData(place.triangles, place.first_triangle * sizeof(Triangle),
+                          static_cast<GLsizeiptr>(found.size() * sizeof(Triangle)), found.data());
+  EXPECT_TRUE(std::equal(found.begin(), found.end(), mesh.triangles.begin()));
 }
 
 TEST_F(Uploads, WhatIsNotDrawnMayStay) {
