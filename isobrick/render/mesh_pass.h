@@ -39,9 +39,8 @@ class MeshPass {
   void need_numbers(std::size_t count);
 
   bool software_;
-  std::optional<Programs> whole_programs_;  ///< where nothing is cut
-  std::array<std::optional<Programs>, 2>
-      programs_;  ///< elsewhere: for meshes that are not, and are
+  std::optional<Programs> whole_programs_;           ///< where nothing is cut
+  std::array<std::optional<Programs>, 2> programs_;  ///< elsewhere, for what is not cut, and is
   bool cuts_ = false;
   GlVertexArray vertices_;
   GlBuffer looks_, numbers_, commands_;

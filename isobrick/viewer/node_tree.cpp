@@ -65,12 +65,10 @@ void NodeTree::read_nodes(const BrickSource& source, int v, Box3 nodes) {
   const Box3 samples{grid_.samples({v, nodes.lo}).lo,
                      grid_.samples({v, nodes.hi - Int3{1, 1, 1}}).hi};
   const RangeTable table = source.block_ranges(stored, blocks_of(samples, blocks));
-  tbb::parallel_for(nodes.lo.z, nodes.hi.z, [&](Index z) {
-    for_each_point({{nodes.lo.x, nodes.lo.y, z}, {nodes.hi.x, nodes.hi.y, z + 1}}, [&](Int3 p) {
-      const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(v).nodes));
-      nodes_[static_cast<std::size_t>(v)][i] =
-          summary(table, blocks_of(grid_.samples({v, p}), blocks), blocks_in({v, p}));
-    });
+  for_each_point(nodes, [&](Int3 p) {
+    const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(v).nodes));
+    nodes_[static_cast<std::size_t>(v)][i] =
+        summary(table, blocks_of(grid_.samples({v, p}), blocks), blocks_in({v, p}));
   });
 }
 

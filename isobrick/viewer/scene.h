@@ -61,7 +61,7 @@ class Scene {
   std::unique_ptr<CutWorker> worker_;
   CutRequest asked_;
   bool up_to_date_ = false;
-  bool again_ = true;  ///< what was asked for last has failed
+  bool again_ = true;  ///< what was asked for last has failed, or nothing was
   std::shared_ptr<const Cut> cut_ = std::make_shared<const Cut>();
   std::shared_ptr<const Drawable> drawn_;
   StreamCounters counters_;
