@@ -27,6 +27,9 @@ namespace isobrick {
 inline constexpr double kPieceSeconds = 0.045;
 /// The same where a device draws and nothing moves: half a frame of a display.
 inline constexpr double kDevicePieceSeconds = 0.008;
+/// Of a piece's time: for less another piece is not begun; after more of other work a picture
+/// waits.
+inline constexpr double kLeastPart = 0.25;
 /// What windows take for PictureWay::patience_seconds: some times what it takes.
 inline constexpr double kPatienceSeconds = 0.002;
 
