@@ -111,9 +111,13 @@ void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
     return uploads_.add(drawable, scene_->origin(), shown_ == nullptr ? nullptr : &share);
   };
   if (shown_ != nullptr) uploads_.keep(*shown_);
-  // What was begun first, or nothing would be finished while there is always something newer.
-  if (next_ != nullptr && next_ != shown_ && !add(*next_)) return;
-  if (next_ != nullptr) shown_ = next_;
+  // What was begun first, or nothing would be finished while there is always something newer; but
+  // nothing newer than all of a surface will come.
+  const bool last = next_ != nullptr && newest->complete && next_->isovalues == newest->isovalues;
+  if (next_ != nullptr && next_ != shown_ && !last) {
+    if (!add(*next_)) return;
+    shown_ = next_;
+  }
   next_ = newest;
   if (add(*next_)) shown_ = next_;
 }

@@ -274,7 +274,8 @@ TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
     window.state().settings.surfaces[0].isovalue += 2;  // as nobody does who moves it
     steps(1);
     while (!picture.state().complete) {
-      const bool busy = picture.drew() || picture.state().drawing || picture.state().more;
+      const bool busy = picture.drew() || picture.state().drawing || picture.state().more ||
+                        !window.state().picture->scene().up_to_date();
       const auto start = std::chrono::steady_clock::now();
       steps(1);
       if (busy) continue;
