@@ -24,9 +24,9 @@ class Scene {
   /// Chooses the cut for a view and starts on it. `budget.triangles_per_block` is
   /// replaced by what has been measured, as far as that has moved by a fifth. Cheap enough for
   /// every frame; nothing happens when view, isovalues and budget are those of before, and the
-  /// stream goes on where the cut is the same. The choice takes half a millisecond, but where the
-  /// processor slows down many times that: after `patience` seconds it goes on by itself, but for
-  /// the first one, and false is returned; what is below is then that of the cut before. Throws
+  /// stream goes on where the cut is the same. The choice takes some half a millisecond, but where
+  /// the processor slows down many times that: after `patience` seconds it goes on by itself, but
+  /// for the first one, and false is returned; what is below is then that of the cut before. Throws
   /// what went wrong, also with the choice of an earlier call; the next one tries again.
   bool update(const std::vector<double>& isovalues, const View& view, const CutBudget& budget,
               double patience = std::numeric_limits<double>::infinity());
@@ -35,7 +35,7 @@ class Scene {
   /// Of the last update().
   const std::vector<double>& isovalues() const { return asked_.isovalues; }
 
-  /// What finds the nodes that isovalues cross. To be asked by update() alone.
+  /// What finds the nodes that isovalues cross; find() is for update() alone.
   NodeSearch& search() { return *search_; }
   const NodeSearch& search() const { return *search_; }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
+#include "tests/viewer/drawn_nodes.h"
 #include "tests/viewer/perspective.h"
 #include "tests/viewer/plain_device.h"
 #include "tests/viewer/random_cut.h"
@@ -30,40 +31,6 @@ std::shared_ptr<MemoryBricks> make_source(Index n, Index brick = 32) {
                                           return static_cast<float>(gyroid_ball(p, n));
                                         }),
                                         MemoryBricks::Options{.brick = brick});
-}
-
-/// Whether the nodes' boxes overlap.
-bool overlap(const NodeGrid& grid, const NodeKey& a, const NodeKey& b) {
-  const IndexBox p = grid.box(a), q = grid.box(b);
-  for (int axis = 0; axis < 3; ++axis)
-    if (p.hi[axis] <= q.lo[axis] || q.hi[axis] <= p.lo[axis]) return false;
-  return true;
-}
-
-void expect_no_overlap(const NodeGrid& grid, const Drawable& drawable) {
-  for (std::size_t i = 0; i < drawable.nodes.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      if (drawable.nodes[i].isovalue == drawable.nodes[j].isovalue) {
-        EXPECT_FALSE(overlap(grid, drawable.nodes[i].mesh->key, drawable.nodes[j].mesh->key));
-      }
-}
-
-/// Whether every finest node with a surface lies in some node that is drawn, or in
-/// one whose own level has none.
-bool covers(const NodeTree& tree, const Drawable& drawable, double isovalue) {
-  bool all = true;
-  for_each_point({{0, 0, 0}, tree.grid().level(0).nodes}, [&](Int3 p) {
-    bool found = false, shown = true;
-    for (const DrawnNode& node : drawable.nodes)
-      found |= overlap(tree.grid(), node.mesh->key, {0, p});
-    for (NodeKey n{0, p};;) {
-      shown &= tree.active(n, isovalue);
-      if (!tree.grid().has_parent(n)) break;
-      n = tree.grid().parent(n);
-    }
-    all &= found || !shown;
-  });
-  return all;
 }
 
 TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
+#include "tests/viewer/drawn_nodes.h"
 #include "tests/viewer/perspective.h"
 
 namespace isobrick::test {
@@ -54,6 +55,8 @@ TEST(Scene, AWindowsLoopEndsWithTheWholeCut) {
     }));
     const auto drawable = scene.drawable();
     EXPECT_TRUE(drawable->complete && drawable->covers);
+    EXPECT_TRUE(covers(scene.tree(), *drawable, 0));
+    expect_no_overlap(scene.tree().grid(), *drawable);
     EXPECT_TRUE(scene.is_newest(*drawable));
     EXPECT_GT(drawable->triangles, 10000u);
     for (const DrawnNode& node : drawable->nodes)
@@ -97,6 +100,7 @@ TEST(Scene, WhileACutIsChosenTheOneBeforeIsShown) {
   }));
   EXPECT_EQ(scene.drawable()->isovalues, std::vector<double>{0.2});
   EXPECT_TRUE(scene.drawable()->covers);
+  EXPECT_TRUE(covers(scene.tree(), *scene.drawable(), 0.2));
 }
 
 /// What is dropped for a budget is gone.
