@@ -102,12 +102,7 @@ class Session {
 
   void make_frame(bool moving) {
     const auto start = Clock::now();
-    PictureWay way{.coarser = moving ? pacer_.coarser() : 1,
-                   .piece_seconds = PictureWay::usual_piece(software_, moving),
-                   .patience_seconds = kPatienceSeconds,
-                   .moving = moving};
-    if (pacer_.plain())
-      way.plain = moving ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
+    const PictureWay way = PictureWay::in_window(pacer_, software_, moving);
     const int smaller = moving ? pacer_.smaller() : 1;
     picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, settings, way);
     const double submitted = seconds_since(start);

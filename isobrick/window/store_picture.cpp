@@ -46,6 +46,17 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
 
 }  // namespace
 
+PictureWay PictureWay::in_window(const FramePacer& pacer, bool software, bool moving) {
+  PictureWay way{.coarser = moving ? pacer.coarser() : 1,
+                 .piece_seconds = software || moving ? kPieceSeconds : kDevicePieceSeconds,
+                 .patience_seconds = kPatienceSeconds,
+                 .moving = moving,
+                 .smaller = moving && pacer.smaller() > 1};
+  // Nor should pictures that follow while meshes come in wait for a good one.
+  if (pacer.plain()) way.plain = moving ? Plain::yes : Plain::until_complete;
+  return way;
+}
+
 StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
                            std::function<void()> on_change, std::shared_ptr<PictureSetup> setup)
     : store_(std::move(store)),

@@ -13,6 +13,7 @@
 #include "isobrick/render/renderer.h"
 #include "isobrick/viewer/scene.h"
 #include "isobrick/window/device_meshes.h"
+#include "isobrick/window/frame_pacer.h"
 #include "isobrick/window/mesh_uploads.h"
 #include "isobrick/window/picture_setup.h"
 #include "isobrick/window/piece_pacer.h"
@@ -73,10 +74,9 @@ struct PictureWay {
   /// software it is always so.
   bool in_order = false;
 
-  /// What windows take for piece_seconds.
-  static double usual_piece(bool software, bool moving) {
-    return software || moving ? kPieceSeconds : kDevicePieceSeconds;
-  }
+  /// As windows draw, whose pictures become simpler as `pacer` says while something moves.
+  /// `software`: whether OpenGL is.
+  static PictureWay in_window(const FramePacer& pacer, bool software, bool moving);
 };
 
 /// What has become of pictures so far.

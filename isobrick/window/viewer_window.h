@@ -22,7 +22,7 @@ struct WindowOptions {
   CameraRequest camera;                 ///< for the first store
   ViewSettings settings;                ///< for the first store
   std::filesystem::path bookmarks;      ///< file; empty: the user's own
-  std::optional<double> piece_seconds;  ///< nothing: PictureWay::usual_piece()
+  std::optional<double> piece_seconds;  ///< nothing: PictureWay::in_window()
 };
 
 /// A window that shows a store: mouse, keys, panels, files dropped on it. All functions

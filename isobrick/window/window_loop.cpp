@@ -62,16 +62,9 @@ bool ViewerWindow::draw_picture(int width, int height) {
   const double begin = glfwGetTime();
   // The first picture of a surface should not wait for a good one.
   const bool fluent = moving() || !picture.state().covers;
-  PictureWay way{.coarser = fluent ? state_.pacer.coarser() : 1,
-                 .piece_seconds = options_.piece_seconds.value_or(
-                     PictureWay::usual_piece(setup_->software(), fluent)),
-                 .patience_seconds = kPatienceSeconds,
-                 .moving = fluent};
-  // Nor should those that follow while meshes come in.
-  if (state_.pacer.plain())
-    way.plain = fluent ? PictureWay::Plain::yes : PictureWay::Plain::until_complete;
+  PictureWay way = PictureWay::in_window(state_.pacer, setup_->software(), fluent);
+  way.piece_seconds = options_.piece_seconds.value_or(way.piece_seconds);
   const int smaller = fluent ? state_.pacer.smaller() : 1;
-  way.smaller = smaller > 1;
   try {
     picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
                  std::max(height / smaller, 1), state_.settings, way);
