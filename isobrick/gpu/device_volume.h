@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 
@@ -36,7 +37,8 @@ enum class TileSearch : std::uint8_t {
   interval,
   kdtree,
   quadtree,
-  octree,  ///< through that structure over the tiles, built on the device
+  octree,  ///< through that structure over the tiles, on the device; of some 320³ samples and
+           ///< fewer the host has it
   none     ///< takes every tile: brute force
 };
 
@@ -46,6 +48,9 @@ struct ResidentTuning {
   /// Threads that share a tile: 0 chooses, 384, 640 and 1024 always work, 32, 64,
   /// 128, 256 and 512 for u8 without normals.
   int threads = 0;
+  /// Of small volumes (up to 128 tiles of 32³) an extraction stays on the device for so long, for
+  /// the next isovalue, where the last ones came sooner than that after each other; 0: it does not.
+  std::chrono::nanoseconds patience = std::chrono::microseconds(50);
 };
 
 /// What an extraction on the device made.
@@ -76,6 +81,8 @@ class ResidentExtractor {
 
   /// Copies the last mesh to the host.
   void download(MeshBuffer& mesh) const;
+  /// How many isovalues have been asked of an extraction that had stayed, which spares a launch.
+  std::uint64_t asked() const;
   /// Bytes of device memory besides the volume's.
   std::uint64_t bytes() const;
 

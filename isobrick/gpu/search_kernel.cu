@@ -4,7 +4,7 @@
 #include "isobrick/gpu/cuda_check.h"
 #include "isobrick/gpu/device_scalar.h"
 #include "isobrick/gpu/tile_order.cuh"
-#include "isobrick/gpu/tile_test.cuh"
+#include "isobrick/gpu/tile_page.cuh"
 
 namespace isobrick::gpu {
 namespace {
@@ -25,6 +25,38 @@ __device__ SumOfWarps sum_of_warps(const std::uint32_t* values) {
   return sum;
 }
 
+/// Where tile (t[0], t[1], t[2]) lies in C order [z, y, x].
+__device__ std::size_t place_of(const std::int32_t* t, const std::int32_t (&grid)[3]) {
+  return (static_cast<std::size_t>(t[2]) * grid[1] + t[1]) * grid[0] + t[0];
+}
+
+template <class T>
+__device__ bool is_stabbed(const SearchParams& p, std::uint32_t i) {
+  if (p.test == TileTest::all) return true;
+  if (p.test == TileTest::ranges) {
+    const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
+    return static_cast<double>(range[0]) < p.isovalue &&
+           p.isovalue <= static_cast<double>(range[1]);
+  }
+  const std::size_t bit = p.test == TileTest::mask_by_order
+                              ? i
+                              : place_of(p.tiles + 3 * static_cast<std::size_t>(i), p.grid);
+  return p.mask[bit >> 5] >> (bit & 31) & 1u;
+}
+
+/// Whether the isovalue stabs the tile's range and the region of interest leaves it a cell.
+template <class T>
+__device__ bool is_active(const SearchParams& p, std::uint32_t i) {
+  if (!is_stabbed<T>(p, i)) return false;
+  if (p.uncut) return true;
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+    const int origin = p.tiles[3 * static_cast<std::size_t>(i) + axis] * 32;
+    if (::min(p.roi_hi[axis] - 1, origin + 32) <= ::max(p.roi_lo[axis], origin)) return false;
+  }
+  return true;
+}
+
 template <class T>
 __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__ SearchParams p) {
   __shared__ std::uint32_t warp_sums[kWarps];
@@ -38,7 +70,7 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   std::uint32_t own = 0;
 #pragma unroll
   for (int i = 0; i < kTilesOfThread; ++i) {
-    active[i] = first + i < p.candidates.count && is_active<T>(p, p.grid, first + i);
+    active[i] = first + i < p.count && is_active<T>(p, first + i);
     own += active[i];
   }
   const std::uint32_t sum = warp_inclusive_sum(own);
@@ -51,7 +83,7 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
         [&](std::uint32_t i) -> unsigned long long& { return p.sums[i]; }, block, warps.all);
     if (lane_id() == 0) {
       base = before;
-      if ((block + 1) * kTilesOfSearchBlock >= p.candidates.count) {
+      if ((block + 1) * kTilesOfSearchBlock >= p.count) {
         const auto found = static_cast<std::uint32_t>(before + warps.all);
         *p.found = found;
         *p.item_count = found <= p.item_room ? found : 0;
@@ -62,8 +94,8 @@ __global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__
   auto place = static_cast<std::uint32_t>(base) + warps.before + sum - own;
 #pragma unroll
   for (int i = 0; i < kTilesOfThread; ++i) {
-    if (first + i >= p.candidates.count) return;
-    const std::int32_t* t = p.candidates.tiles + 3 * static_cast<std::size_t>(first + i);
+    if (first + i >= p.count) return;
+    const std::int32_t* t = p.tiles + 3 * static_cast<std::size_t>(first + i);
     const std::size_t at = place_of(t, p.grid);
     p.slot_of_tile[at] = active[i] ? place : kNone;
     if (!active[i]) continue;
@@ -129,7 +161,7 @@ __global__ void __launch_bounds__(kThreads) copy_first_columns(const T* pages, T
 }  // namespace
 
 void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream) {
-  const auto blocks = (params.candidates.count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
+  const auto blocks = (params.count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
   visit_device_scalar(type, [&](auto tag) {
     search_tiles<typename decltype(tag)::type><<<blocks, kThreads, 0, stream>>>(params);
   });

@@ -30,6 +30,12 @@ class Stream {
   cudaStream_t get() const { return stream_; }
   /// Blocks until all work of the stream is done; throws what went wrong in it.
   void wait() const { check(cudaStreamSynchronize(stream_)); }
+  /// Whether all work of the stream is done; throws what went wrong in it.
+  bool is_over() const {
+    const cudaError_t state = cudaStreamQuery(stream_);
+    if (state != cudaErrorNotReady) check(state);
+    return state == cudaSuccess;
+  }
 
  private:
   cudaStream_t stream_ = nullptr;

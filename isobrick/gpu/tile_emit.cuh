@@ -127,7 +127,7 @@ template <int N, class T, bool Normals, class At0>
 __device__ inline void emit_vertices_of(TileShared& s, const TileParams& p, std::uint32_t first,
                                         std::uint32_t listed, At0 at_0) {
   using Maker = VertexMaker<T>;
-  const Maker maker{s, p, p.crossing};
+  const Maker maker{s, p, Team<N>::kSlabs > 1 ? s.now.crossing : p.crossing};
   const auto& lists = lists_of<N>(s);
   Vec3f* const positions = kept(p.positions + s.vertex_base + first);
   Vec3f* const normals = Normals ? kept(p.normals + s.vertex_base + first) : nullptr;

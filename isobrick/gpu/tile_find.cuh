@@ -1,33 +1,19 @@
 #pragma once
 
 #include "isobrick/gpu/tile_lists.cuh"
-#include "isobrick/gpu/tile_test.cuh"
+#include "isobrick/gpu/tile_page.cuh"
 
-// Small volumes need no launch of their own to find active tiles: the host has found them, or
-// every block looks at all of them in the mask that a search through an index has left.
+// Small volumes need no launch of their own to find active tiles: the host has found them.
 
 namespace isobrick::gpu {
 
-/// Finds the active ones among the candidates. All threads; the first warp knows them
-/// afterwards.
-template <int N, class T>
-__device__ inline void find_candidates(TileShared& s, const TileParams& p) {
+/// Keeps which candidates are active. The first warp.
+__device__ inline void take_found(TileShared& s, const TileParams& p) {
   static_assert(kMostCandidates == 32 * 32);
-  const bool searched = p.found.count != FoundTiles::kNotSearched;
-  if (!searched) {
-    for (std::uint32_t i = threadIdx.x; i < kMostCandidates; i += N) {
-      const unsigned word =
-          __ballot_sync(kAll, i < p.candidates.count && is_active<T>(p, p.tiles, i));
-      if (lane_id() == 0) s.active[i / 32] = word;
-    }
-    __syncthreads();
-  }
   if (warp_id() != 0) return;
   // Lanes beyond the candidates ask for no word: each has to be fetched by itself.
   const bool has_word = 32 * lane_id() < p.candidates.count;
-  const std::uint32_t word = !searched  ? s.active[lane_id()]
-                             : has_word ? p.found.words[lane_id()]
-                                        : 0;
+  const std::uint32_t word = has_word ? p.found.words[lane_id()] : 0;
   const auto own = static_cast<std::uint32_t>(__popc(word));
   const std::uint32_t sum = warp_inclusive_sum(own);
   s.active[lane_id()] = word;

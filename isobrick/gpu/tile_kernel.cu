@@ -4,18 +4,18 @@
 #include "isobrick/core/threshold.h"
 #include "isobrick/gpu/cuda_check.h"
 #include "isobrick/gpu/device_scalar.h"
+#include "isobrick/gpu/stand_by.cuh"
 #include "isobrick/gpu/tile_mesh.cuh"
 #include "isobrick/gpu/tile_take.cuh"
 
 namespace isobrick::gpu {
 namespace {
 
-/// A slab has its own copy of a row table behind the lists.
 template <std::uint32_t Listed, bool Nan = false, bool Slab = false>
 constexpr std::size_t kSharedBytes = sizeof(TileShared) +
                                      (Nan ? std::max(sizeof(Lists<Listed>), sizeof(NanRows))
                                           : sizeof(Lists<Listed>)) +
-                                     (Slab ? sizeof(RowTable) : 0);
+                                     (Slab ? sizeof(RowTable) + sizeof(SlabTiles) : 0);
 
 static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<kListedBeforeAmpere, false, true> <= 64 << 10, "what Turing has");
@@ -30,17 +30,17 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
   const LaunchEnd& end = p.end;
   if (!end.report) return;
   for (std::uint32_t i = blockIdx.x * N + own_thread(); i < end.next_items; i += gridDim.x * N)
-    end.next_order[i] = {0, 0};
+    (Team<N>::kSlabs > 1 ? s.now.next_order : end.next_order)[i] = {0, 0};
   if (threadIdx.x == 0)
     s.done_before = DeviceFlag(*end.done).fetch_add(1, cuda::memory_order_relaxed);
   __syncthreads();
   if (s.done_before + 1 < gridDim.x) return;
   if (threadIdx.x == 0) {
-    say(end, LaunchReport::kActiveTiles,
-        p.candidates.count > 0 ? s.items / Team<N>::kSlabs : *end.found);
+    say<N>(s, p, LaunchReport::kActiveTiles,
+           p.candidates.count > 0 ? s.items / Team<N>::kSlabs : *end.found);
     if (s.items == 0) {
-      say(end, LaunchReport::kVertices, 0);
-      say(end, LaunchReport::kTriangles, 0);
+      say<N>(s, p, LaunchReport::kVertices, 0);
+      say<N>(s, p, LaunchReport::kTriangles, 0);
     }
   }
   for (std::uint32_t i = own_thread(); i < end.zero_words; i += N) end.zero[i] = 0;
@@ -55,12 +55,14 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   constexpr bool kSlab = Team<N>::kSlabs > 1;
   const std::uint32_t first = first_number(p);
   if constexpr (!kSlab) {
-    if (p.candidates.count > 0) find_candidates<N, T>(s, p);
+    if (p.candidates.count > 0) take_found(s, p);
     fill_tables<N>(s, cases);
   }
-  const Classifier<T> classifier(threshold);
+  Classifier<T> classifier(threshold);
+  bool has_tables = !kSlab;
   wait_for_launch_before();
   if (threadIdx.x == 0) {
+    if (kSlab) begin_launch(s.now, p);
     init_barriers<N>(s.barriers);
     if (kSlab)
       s.items = p.found.count * Team<N>::kSlabs;
@@ -70,27 +72,33 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   __syncwarp();
   take_tile<N, T>(s, p, first);
   __syncthreads();
-  while (s.item < s.items) {
-    if constexpr (kSlab) {
-      fill_tables<N>(s, cases);
-      if (warp_id() == Team<N>::kVertices) Neighbour::of_slab<N>(s, p).keep(s);
-    }
-    if constexpr (Nan)
-      find_nan<N, T>(s, p);
-    else
-      clear_lists<N>(s);
-    classify<N>(s, p, classifier);
-    __syncthreads();
-    if (count_tile<N, Nan>(s, p)) make_mesh_of_tile<N, T, Normals, Nan>(s, p);
-    if (s.items <= gridDim.x) {  // each block has one at most
+  for (;;) {
+    while (s.item < s.items) {
+      if constexpr (kSlab) {
+        if (!has_tables) fill_tables<N>(s, cases);
+        has_tables = true;
+        if (warp_id() == Team<N>::kVertices) Neighbour::of_slab<N>(s, p).keep(s);
+      }
+      if constexpr (Nan)
+        find_nan<N, T>(s, p);
+      else
+        clear_lists<N>(s);
+      classify<N>(s, p, classifier);
       __syncthreads();
-      break;
+      if (count_tile<N, Nan>(s, p)) make_mesh_of_tile<N, T, Normals, Nan>(s, p);
+      if (s.items <= gridDim.x) {  // each block has one at most
+        __syncthreads();
+        break;
+      }
+      // No earlier than this: a tile that is taken but not begun holds all later ones up.
+      take_tile<N, T>(s, p, next_number(p));
+      __syncthreads();
     }
-    // No earlier than this: a tile that is taken but not begun holds all later ones up.
-    take_tile<N, T>(s, p, next_number(p));
-    __syncthreads();
+    end_launch<N>(s, p);
+    if constexpr (!kSlab) return;
+    if (!stand_by<N, T>(s, p)) return;
+    classifier = Classifier<T>(threshold_of<T>(s.now));
   }
-  end_launch<N>(s, p);
 }
 
 int device_attribute(cudaDeviceAttr attribute) {

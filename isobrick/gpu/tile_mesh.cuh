@@ -13,12 +13,13 @@ namespace isobrick::gpu {
 
 /// A tile without a vertex or a cell tells so and nothing else: whoever asks for its sums adds
 /// nothing, and whoever asks for its rows finds no vertex there.
+template <int N>
 __device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
   if (threadIdx.x != 0) return;
-  publish_sum(p.order[s.item].vertices, s.item, 0);
-  publish_sum(p.order[s.item].triangles, s.item, 0);
+  publish_sum(order_of<N>(s, p)[s.item].vertices, s.item, 0);
+  publish_sum(order_of<N>(s, p)[s.item].triangles, s.item, 0);
   s.number_base = 0;
-  release_rows(s, p);
+  release_rows<N>(s, p);
 }
 
 /// Whether all cells and vertices of a tile are listed at once, and its warps wait for no more
@@ -52,7 +53,7 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
   const PlaneBases bases = PlaneBases::of(s, planes);
   const std::uint32_t vertices = bases.made<N>(s, planes);
   if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
-    pass_empty_tile(s, p);
+    pass_empty_tile<N>(s, p);
     __syncthreads();
     return false;
   }
@@ -61,7 +62,7 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     s.all_vertices = vertices;
     s.all_cells = bases.cells;
     if (listed_at_once<N, Nan>(s)) s.barriers.turn ^= 1;
-    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
+    publish_sum(order_of<N>(s, p)[s.item].vertices, s.item, s.all_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
   publish_rows<N>(s, bases, planes, p.row_tables[s.tile.slot]);
@@ -97,9 +98,9 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
   // A slab has few cells and vertices: the warp on which others wait leaves them to the others.
   constexpr bool kSlab = Team<N>::kSlabs > 1;
   if (warp_id() == Team<N>::kVertices) {
-    find_vertex_base(s, p);
+    find_vertex_base<N>(s, p);
     if (at_once) arrive(s.barriers.vertex_base);
-    if (lane_id() == 0) release_rows(s, p);
+    if (lane_id() == 0) release_rows<N>(s, p);
   }
   std::uint32_t triangles = 0;
   if (at_once) {
@@ -122,9 +123,9 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
     if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
     if (lane_id() == 0) {
       s.all_triangles = triangles;
-      publish_sum(p.order[s.item].triangles, s.item, triangles);
+      publish_sum(order_of<N>(s, p)[s.item].triangles, s.item, triangles);
     }
-    find_triangle_base(s, p, triangles);
+    find_triangle_base<N>(s, p, triangles);
   }
   if (for_vertices) {
     ask_neighbours<N>(s, p, neighbour);

@@ -14,6 +14,7 @@ inline constexpr unsigned long long kOwnSum = 1ull << 62, kFullSum = 2ull << 62,
                                     kSumMask = kOrderMask;
 
 using DeviceWord = cuda::atomic_ref<unsigned long long, cuda::thread_scope_device>;
+using HostWord = cuda::atomic_ref<std::uint64_t, cuda::thread_scope_system>;
 using DeviceFlag = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>;
 
 /// Where a launch may start before the one before it on the stream has ended: the latter says
@@ -82,25 +83,39 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
   return sum;
 }
 
+/// What changes from isovalue to isovalue: of slabs, whose launch may stay, as it is now.
+template <int N>
+__device__ inline OrderState* order_of(const TileShared& s, const TileParams& p) {
+  return Team<N>::kSlabs > 1 ? s.now.order : p.order;
+}
+template <int N>
+__device__ inline std::uint32_t epoch_of(const TileShared& s, const TileParams& p) {
+  return Team<N>::kSlabs > 1 ? s.now.epoch : p.epoch;
+}
+
 /// One word of the launch's report. No order among them, so none waits for another.
-__device__ inline void say(const LaunchEnd& end, LaunchReport::Word word, std::uint64_t value) {
-  cuda::atomic_ref<std::uint64_t, cuda::thread_scope_system>(end.report->words[word])
-      .store(LaunchReport::word(value, end.launch), cuda::memory_order_relaxed);
+template <int N>
+__device__ inline void say(const TileShared& s, const TileParams& p, LaunchReport::Word word,
+                           std::uint64_t value) {
+  HostWord(p.end.report->words[word])
+      .store(LaunchWord::of(value, Team<N>::kSlabs > 1 ? s.now.launch : p.end.launch),
+             cuda::memory_order_relaxed);
 }
 
 /// Where the tile's vertices go. One warp.
+template <int N>
 __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   const std::uint32_t item = s.item;
   const unsigned long long start = *p.number_start;
-  const auto base =
-      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
-                 s.all_vertices);
+  const auto base = sum_before(
+      [&](std::uint32_t i) -> unsigned long long& { return order_of<N>(s, p)[i].vertices; }, item,
+      s.all_vertices);
   if (lane_id() != 0) return;
   s.vertex_base = base;
   s.number_base = static_cast<std::uint32_t>(start + base);
   if (item + 1 < s.items) return;
   if (p.end.report)
-    say(p.end, LaunchReport::kVertices, base + s.all_vertices);
+    say<N>(s, p, LaunchReport::kVertices, base + s.all_vertices);
   else
     p.totals->vertices = base + s.all_vertices;
   *p.number_end = start + base + s.all_vertices;
@@ -108,24 +123,26 @@ __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
 
 /// Gives the tile's row table to later tiles, once it is known where its vertices go. One
 /// thread.
+template <int N>
 __device__ inline void release_rows(const TileShared& s, const TileParams& p) {
   DeviceWord(p.row_tables[s.tile.slot].base_and_epoch)
-      .store(s.number_base | static_cast<unsigned long long>(p.epoch) << 32,
+      .store(s.number_base | static_cast<unsigned long long>(epoch_of<N>(s, p)) << 32,
              cuda::memory_order_release);
 }
 
 /// Where the tile's triangles go. One warp.
+template <int N>
 __device__ inline void find_triangle_base(TileShared& s, const TileParams& p,
                                           std::uint64_t triangles) {
   const std::uint32_t item = s.item;
-  const auto base =
-      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; }, item,
-                 triangles);
+  const auto base = sum_before(
+      [&](std::uint32_t i) -> unsigned long long& { return order_of<N>(s, p)[i].triangles; }, item,
+      triangles);
   if (lane_id() != 0) return;
   s.triangle_base = base;
   if (item + 1 < s.items) return;
   if (p.end.report)
-    say(p.end, LaunchReport::kTriangles, base + triangles);
+    say<N>(s, p, LaunchReport::kTriangles, base + triangles);
   else
     p.totals->triangles = base + triangles;
 }
@@ -143,7 +160,7 @@ __device__ inline std::uint32_t slot_of(const TileShared& s, const TileParams& p
 template <int N>
 __device__ inline RowTable& before_copy_of(TileShared& s) {
   if constexpr (Team<N>::kSlabs == 1) return s.before_copy;
-  return *reinterpret_cast<RowTable*>(&lists_of<N>(s) + 1);
+  return slab_rows_of<N>(s);
 }
 
 /// Brings the row table of the tile before to shared memory, on the way while this
@@ -167,6 +184,12 @@ __device__ inline std::uint32_t packed(const TileItem& tile) {
                             static_cast<std::uint32_t>(tile.z));
 }
 
+/// An active tile of those in slabs, packed.
+template <int N>
+__device__ inline std::uint32_t found_tile(TileShared& s, const TileParams& p, std::uint32_t i) {
+  return s.now.asked ? slab_tiles_of<N>(s).found[i] : p.found.tiles[i];
+}
+
 /// The row table of the lower neighbour that lane 1 … 6 asks, where bits 0, 1, 2 of the lane
 /// say along which axes it is one lower.
 struct Neighbour {
@@ -187,10 +210,11 @@ struct Neighbour {
   }
   /// The same of a slab, by the tiles that the host has found. All lanes.
   template <int N>
-  __device__ static Neighbour of_slab(const TileShared& s, const TileParams& p) {
+  __device__ static Neighbour of_slab(TileShared& s, const TileParams& p) {
     static_assert(kMostActiveInSlabs == 2 * 32);
     constexpr std::uint32_t kSlabs = Team<N>::kSlabs;
-    const auto tile_at = [&](unsigned i) { return i < p.found.count ? p.found.tiles[i] : kNone; };
+    const std::uint32_t count = s.items / kSlabs;
+    const auto tile_at = [&](unsigned i) { return i < count ? found_tile<N>(s, p, i) : kNone; };
     const std::uint32_t low = tile_at(lane_id()), high = tile_at(lane_id() + 32);
     const auto number_of = [&](std::uint32_t tile) {
       const auto in_low = static_cast<int>(__ballot_sync(kAll, low == tile)),
@@ -239,7 +263,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
   if (slot != kNone) {
     DeviceWord word(p.row_tables[slot].base_and_epoch);
     unsigned long long seen = word.load(cuda::memory_order_acquire);
-    while (neighbour.wait && seen >> 32 != p.epoch) {
+    while (neighbour.wait && seen >> 32 != epoch_of<N>(s, p)) {
       if (Team<N>::kSlabs == 1) __nanosleep(20);  // slabs are all at work, and about as far
       seen = word.load(cuda::memory_order_acquire);
     }

@@ -60,24 +60,15 @@ struct SurfaceTotals {
   unsigned long long vertices, triangles;
 };
 
-/// How a search knows which tiles an isovalue stabs.
-enum class TileTest : std::uint8_t {
-  ranges,         ///< compares the range of each
-  mask_by_order,  ///< bit i of the mask: tile i in Morton order
-  mask_by_place,  ///< bit i of the mask: tile i in C order [z, y, x]
-  all             ///< takes them all
-};
-
 /// Tiles of volumes that are so small that no launch searches them; of those whose tiles may be
 /// shared by several blocks.
 inline constexpr std::uint32_t kMostCandidates = 1024, kMostInSlabs = 128;
 /// Active ones of the latter that are shared.
 inline constexpr std::uint32_t kMostActiveInSlabs = 64;
 
-/// Which of so few candidates are active, where the host has looked.
+/// Which of so few candidates are active: the host has looked.
 struct FoundTiles {
-  static constexpr std::uint32_t kNotSearched = 0xffffffffu;
-  std::uint32_t count = kNotSearched;
+  std::uint32_t count = 0;
   std::uint32_t words[kMostCandidates / 32] = {};  ///< bit i: candidate i
   std::uint32_t tiles[kMostActiveInSlabs] = {};    ///< the first active ones, packed
 
@@ -87,38 +78,55 @@ struct FoundTiles {
   }
 };
 
-/// All tiles of a volume in Morton order.
+/// All tiles of a volume of so few, in Morton order.
 struct TileCandidates {
-  TileTest test;
-  bool uncut;  ///< the region of interest is the whole volume
-  const std::uint32_t* mask;
   const std::int32_t* tiles;           ///< x, y, z of each
   const std::uint32_t* order_of_tile;  ///< [z, y, x] of the volume: its place in that order
-  const void* ranges;                  ///< min and max of each, of the sample type
   std::uint32_t count;
 };
 
-/// What a launch tells the host, in the host's memory: vertices and triangles made, and active
-/// tiles. Each word says by itself which launch it is about, so that none has to be written
-/// after the others, for which the device would wait until those have crossed the bus.
-struct LaunchReport {
-  enum Word { kVertices, kTriangles, kActiveTiles, kWords };
+/// What the device and the host tell each other, in the host's memory. Each word says by itself
+/// which launch it is about, so that none has to be written after the others, for which the
+/// device would wait until those have crossed the bus.
+struct LaunchWord {
   static constexpr int kValueBits = 40;
-  std::uint64_t words[kWords];
 
-  static constexpr std::uint64_t word(std::uint64_t value, std::uint32_t launch) {
+  static constexpr std::uint64_t of(std::uint64_t value, std::uint32_t launch) {
     return value | static_cast<std::uint64_t>(launch) << kValueBits;
   }
   static constexpr std::uint64_t value_of(std::uint64_t word) {
     return word & ((std::uint64_t{1} << kValueBits) - 1);
   }
   static constexpr bool is_about(std::uint64_t word, std::uint32_t launch) {
-    return (word ^ LaunchReport::word(0, launch)) >> kValueBits == 0;
+    return (word ^ of(0, launch)) >> kValueBits == 0;
   }
 };
-static_assert(LaunchReport::is_about(LaunchReport::word(5, (1u << 24) + 1), (1u << 24) + 1));
-static_assert(!LaunchReport::is_about(LaunchReport::word(5, 1u << 24), (1u << 24) - 1));
-static_assert(LaunchReport::value_of(LaunchReport::word((1ull << 40) - 1, 77)) == (1ull << 40) - 1);
+static_assert(LaunchWord::is_about(LaunchWord::of(5, (1u << 24) + 1), (1u << 24) + 1));
+static_assert(!LaunchWord::is_about(LaunchWord::of(5, 1u << 24), (1u << 24) - 1));
+static_assert(LaunchWord::value_of(LaunchWord::of((1ull << 40) - 1, 77)) == (1ull << 40) - 1);
+
+/// What a launch tells: vertices and triangles made, and active tiles. One that has stood by
+/// says when it leaves without being asked, with the number of the last launch as the value.
+struct LaunchReport {
+  enum Word { kVertices, kTriangles, kActiveTiles, kWords, kLeft = kWords };
+  std::uint64_t words[kWords + 1];
+};
+
+/// What is asked of a launch that stands by, which is then the next one: the samples' threshold
+/// and the isovalue as vertices are interpolated, bit by bit, and which candidates are active;
+/// or that it leaves.
+struct alignas(64) LaunchRequest {
+  enum Word { kThreshold, kCrossing, kTiles, kLeave = kTiles + kMostInSlabs / 32, kWords };
+  std::uint64_t words[kWords];
+};
+
+/// How a launch of slabs stays for the next isovalue (stand_by.cuh).
+struct StandBy {
+  const LaunchRequest* request;  ///< in the host's memory; null: it does not stay
+  LaunchRequest* passed_on;      ///< in the device's
+  std::uint32_t* ended;          ///< zeroed
+  std::uint64_t nanoseconds;     ///< it stays at most
+};
 
 /// How a launch tells the host what it has made, and leaves everything as the next one needs it.
 struct LaunchEnd {
@@ -176,6 +184,7 @@ struct TileParams {
   std::uint64_t vertex_capacity, triangle_capacity;
   SurfaceTotals* totals;  ///< where there is no report
   LaunchEnd end;
+  StandBy stand_by;
 };
 
 }  // namespace isobrick::gpu

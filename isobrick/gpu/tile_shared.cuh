@@ -94,6 +94,21 @@ struct TeamBarriers {
   std::uint32_t turn;  ///< of the tile that is worked on, if it needs them
 };
 
+/// What changes while a launch stays for further isovalues (stand_by.cuh); TileParams has what the
+/// first one is.
+struct LaunchNow {
+  OrderState *order, *next_order;
+  std::uint32_t launch, epoch;
+  std::uint32_t threshold;  ///< its bits
+  float crossing;
+  bool asked, leaves;
+};
+/// The tiles of a volume in slabs, packed: those that are active, once that has been asked for,
+/// and all.
+struct SlabTiles {
+  std::uint32_t found[kMostActiveInSlabs], all[kMostInSlabs];
+};
+
 /// Numbers of vertices count from the tile's first one.
 struct alignas(256) TileShared {
   RowBits rows[kRowsOfTile];
@@ -132,6 +147,7 @@ struct alignas(256) TileShared {
   std::uint32_t next_cells, next_vertices;  ///< groups of 32 that a warp has taken
   TeamBarriers barriers;
   std::uint32_t done_before;  ///< blocks that were done before this one
+  LaunchNow now;
   TileItem tile;
   Shape shape;
   /// The active tiles as bits and how many come before each 32, where there are candidates.
@@ -160,6 +176,16 @@ using ListsOf = Lists<listed_at_a_time<N>()>;
 template <int N>
 __device__ inline ListsOf<N>& lists_of(TileShared& s) {
   return *reinterpret_cast<ListsOf<N>*>(&s + 1);
+}
+
+/// What a slab has behind the lists: a copy of a row table, and tiles.
+template <int N>
+__device__ inline RowTable& slab_rows_of(TileShared& s) {
+  return *reinterpret_cast<RowTable*>(&lists_of<N>(s) + 1);
+}
+template <int N>
+__device__ inline SlabTiles& slab_tiles_of(TileShared& s) {
+  return *reinterpret_cast<SlabTiles*>(&slab_rows_of<N>(s) + 1);
 }
 
 __device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }

@@ -3,6 +3,7 @@
 #include "isobrick/gpu/streamed_pages.cuh"
 #include "isobrick/gpu/tile_classify.cuh"
 #include "isobrick/gpu/tile_find.cuh"
+#include "isobrick/gpu/tile_order.cuh"
 
 // Before the first step: which tile is the next, and where its samples lie.
 
@@ -46,9 +47,9 @@ __device__ inline void find_pages(TileShared& s, const TileParams& p, const Tile
 }
 
 template <int N>
-__device__ inline TileItem item_of(const TileShared& s, const TileParams& p, std::uint32_t number) {
+__device__ inline TileItem item_of(TileShared& s, const TileParams& p, std::uint32_t number) {
   if constexpr (Team<N>::kSlabs > 1) {
-    const std::uint32_t tile = p.found.tiles[number / Team<N>::kSlabs];
+    const std::uint32_t tile = found_tile<N>(s, p, number / Team<N>::kSlabs);
     return {static_cast<std::int32_t>(tile & 1023u), static_cast<std::int32_t>(tile >> 10 & 1023u),
             static_cast<std::int32_t>(tile >> 20), number};
   }
@@ -83,8 +84,7 @@ __device__ inline void take_tile(TileShared& s, const TileParams& p, std::uint32
 
 /// Brings the samples of a tile that is about to be taken into the L2 cache.
 template <int N, class T>
-__device__ inline void prefetch_tile(const TileShared& s, const TileParams& p,
-                                     std::uint32_t number) {
+__device__ inline void prefetch_tile(TileShared& s, const TileParams& p, std::uint32_t number) {
   if (number >= s.items) return;
   constexpr std::size_t bytes = kPageSamples * sizeof(T);
   const char* from = static_cast<const char*>(p.pages);

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "isobrick/core/morton.h"
 #include "isobrick/gpu/host_search.h"
 
 namespace isobrick::gpu {
@@ -40,6 +42,32 @@ TEST(HostSearch, FindsWhatAnIsovalueStabs) {
         expected += stabbed;
       }
       EXPECT_EQ(found.count, expected);
+    }
+  }
+}
+
+/// Tiles of a grid in Morton order, some with an empty range.
+TEST(HostSearch, FindsTheSameThroughAnIndex) {
+  for (const Int3 grid : {Int3{1, 1, 1}, Int3{5, 3, 2}, Int3{7, 9, 11}, Int3{16, 8, 8}}) {
+    std::vector<Int3> tiles;
+    std::vector<Range> ranges;
+    for_each_morton(grid, [&](Int3 t) {
+      tiles.push_back(t);
+      const auto lo = static_cast<double>((t.x * 7 + t.y * 13 + t.z * 5) % 50);
+      ranges.push_back(tiles.size() % 7 == 3
+                           ? Range{}
+                           : Range{lo, lo + static_cast<double>((t.x + t.y * t.z) % 9)});
+    });
+    const HostSearch by_ranges(tiles, ranges);
+    for (const IndexKind kind : kIndexKinds) {
+      const HostSearch search(tiles, ranges, kind, grid);
+      for (const double isovalue : {-1.0, 0.0, 3.0, 24.5, 30.0, 57.0, 58.0, 1e9}) {
+        SCOPED_TRACE(std::string(name_of(kind)) + " at " + std::to_string(isovalue));
+        const FoundTiles expected = by_ranges.find(isovalue), found = search.find(isovalue);
+        EXPECT_EQ(found.count, expected.count);
+        EXPECT_TRUE(std::ranges::equal(found.words, expected.words));
+        EXPECT_TRUE(std::ranges::equal(found.tiles, expected.tiles));
+      }
     }
   }
 }
