@@ -177,15 +177,17 @@ __device__ inline void classify(TileShared& s, const TileParams& p,
     classify_planes<N>(s, p, classifier);
 }
 
-/// Empties the lists of the tile before.
+/// Empties the lists, which held so many cells and vertices, or more than they have room for.
 template <int N>
-__device__ inline void clear_lists(TileShared& s) {
+__device__ inline void clear_lists(TileShared& s, std::uint32_t cells, std::uint32_t vertices) {
   const uint4 zero{0, 0, 0, 0};
   auto& lists = lists_of<N>(s);
   using Spare = SpareThreads<N>;
-  for (unsigned i = Spare::own(); i < lists.kListed / 4; i += Spare::kCount)
+  cells = (::min(cells, lists.kListed) + 3) / 4;
+  vertices = (::min(vertices, lists.kListed) + 7) / 8;
+  for (unsigned i = Spare::own(); i < cells; i += Spare::kCount)
     reinterpret_cast<uint4*>(lists.cells)[i] = zero;
-  for (unsigned i = Spare::own(); i < lists.kListed / 8; i += Spare::kCount)
+  for (unsigned i = Spare::own(); i < vertices; i += Spare::kCount)
     reinterpret_cast<uint4*>(lists.vertex_marks)[i] = zero;
 }
 

@@ -63,6 +63,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   wait_for_launch_before();
   if (threadIdx.x == 0) {
     if (kSlab) begin_launch(s.now, p);
+    s.all_cells = s.all_vertices = ListsOf<N>::kListed;
     init_barriers<N>(s.barriers);
     if (kSlab)
       s.items = p.found.count * Team<N>::kSlabs;
@@ -82,7 +83,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
       if constexpr (Nan)
         find_nan<N, T>(s, p);
       else
-        clear_lists<N>(s);
+        clear_lists<N>(s, s.all_cells, s.all_vertices);
       classify<N>(s, p, classifier);
       __syncthreads();
       if (count_tile<N, Nan>(s, p)) make_mesh_of_tile<N, T, Normals, Nan>(s, p);

@@ -48,7 +48,7 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
   });
   __syncthreads();
-  if constexpr (Nan) clear_lists<N>(s);
+  if constexpr (Nan) clear_lists<N>(s, ListsOf<N>::kListed, ListsOf<N>::kListed);
   const SlabPlanes planes = planes_of<N>(s.item);
   const PlaneBases bases = PlaneBases::of(s, planes);
   const std::uint32_t vertices = bases.made<N>(s, planes);

@@ -31,7 +31,7 @@ struct Team {
   static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
   /// Vertices or cells that are found at a time; tiles with more take several turns.
   /// A multiprocessor before Ampere has 64 KiB of shared memory.
-  static constexpr std::uint32_t kMostListed = kSlabs > 1 ? 2048 : kTeams == 3 ? 2560 : 7168;
+  static constexpr std::uint32_t kMostListed = kSlabs > 1 ? 2048 : kTeams == 3 ? 3392 : 7168;
   /// The first warp with rows: in a slab the two before ask the others.
   static constexpr int kFirstWithRows = kSlabs > 1 ? 2 : 0;
 };
