@@ -37,8 +37,7 @@ enum class TileSearch : std::uint8_t {
   interval,
   kdtree,
   quadtree,
-  octree,  ///< through that structure over the tiles, on the device; of some 320³ samples and
-           ///< fewer the host has it
+  octree,  ///< through that structure over the tiles; up to 1,024 of them the host searches it
   none     ///< takes every tile: brute force
 };
 
@@ -48,9 +47,10 @@ struct ResidentTuning {
   /// Threads that share a tile: 0 chooses, 384, 640 and 1024 always work, 32, 64,
   /// 128, 256 and 512 for u8 without normals.
   int threads = 0;
-  /// Of small volumes (up to 128 tiles of 32³) an extraction stays on the device for so long, for
-  /// the next isovalue, where the last ones came sooner than that after each other; 0: it does not.
-  std::chrono::nanoseconds patience = std::chrono::microseconds(50);
+  /// Of small volumes (up to 128 tiles of 32³, without NaN) an extraction stays on the device for so
+  /// long, for the next isovalue, where the last ones came sooner than that after each other, and
+  /// `threads` is 0. Other work may wait for it so long. 0: it does not stay.
+  std::chrono::nanoseconds patience = std::chrono::microseconds(20);
 };
 
 /// What an extraction on the device made.
@@ -75,8 +75,8 @@ class ResidentExtractor {
   DeviceCounts extract(double isovalue);
   /// Makes the last mesh once more, without waiting; for measuring.
   void repeat();
-  /// Milliseconds on the device of the last repeat(), with the searches that it makes: of some
-  /// 320³ samples and fewer the host compares the ranges.
+  /// Milliseconds on the device of the last repeat(), with the searches that it makes: the host
+  /// searches up to 4,096 tiles by their ranges, 1,024 through an index.
   float milliseconds();
 
   /// Copies the last mesh to the host.

@@ -9,6 +9,8 @@
 
 namespace isobrick::gpu {
 
+class ResidentLauncher;
+
 struct DeviceVolume::Impl {
   Lattice lattice;
   Stream stream;
@@ -23,6 +25,9 @@ struct DeviceVolume::Impl {
   /// Few tiles and their ranges are also kept here, for the host to search: in Morton order.
   std::vector<Int3> tiles_here;
   std::vector<ValueRange<double>> ranges_here;
+
+  /// Whose launch may stand by on the stream: others let it go before they use the stream.
+  ResidentLauncher* standing = nullptr;
 
   Impl(const Lattice& lattice, const BrickLookup& bricks, double fill_value);
 

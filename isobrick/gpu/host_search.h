@@ -17,9 +17,11 @@ class HostSearch {
  public:
   using Range = ValueRange<double>;
 
-  /// Of up to kMostCandidates tiles in Morton order; those with an empty range are never active.
+  /// Of up to kMostCandidates tiles in Morton order, the ends of whose ranges are floats; those
+  /// with an empty range are never active.
   HostSearch(const std::vector<Int3>& tiles, const std::vector<Range>& ranges);
-  /// The same through an index, `grid` being how many tiles there are along each axis.
+  /// The same through an index, of up to kMostThroughIndex; `grid` is how many tiles there are
+  /// along each axis.
   HostSearch(const std::vector<Int3>& tiles, const std::vector<Range>& ranges, IndexKind kind,
              Int3 grid);
 
@@ -29,8 +31,9 @@ class HostSearch {
   void compare_ranges(double isovalue, FoundTiles& found) const;
   void ask_index(double isovalue, FoundTiles& found) const;
 
-  std::vector<double> lo_, hi_;        ///< of the ranges
-  std::vector<std::uint32_t> tiles_;   ///< packed
+  std::size_t count_;
+  std::vector<float> lo_, hi_;         ///< of the ranges
+  std::vector<std::uint32_t> packed_;  ///< the tiles, where there are so few that slabs share them
   std::vector<std::byte> index_;       ///< or empty
   std::vector<std::uint32_t> places_;  ///< of the index's ids in Morton order; empty: the same
 };

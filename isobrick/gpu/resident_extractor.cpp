@@ -30,9 +30,9 @@ struct ResidentExtractor::Impl {
     launcher.dismiss();
     if (vertices > room.positions.size()) {
       room.positions = {};
-      room.positions = DeviceBuffer<Vec3f>(vertices, stream);
       room.normals = {};
       if (launcher.options().normals) room.normals = DeviceBuffer<Vec3f>(vertices, stream);
+      room.positions = DeviceBuffer<Vec3f>(vertices, stream);  // the last: it says how much fits
     }
     if (triangles > room.triangles.size()) {
       room.triangles = {};

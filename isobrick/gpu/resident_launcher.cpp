@@ -19,6 +19,9 @@ namespace {
 /// How often the host looks at a report before it asks the driver whether all is well.
 constexpr std::uint32_t kLooks = 4096;
 
+/// Row tables that few tiles have from the beginning, 4.4 MiB.
+constexpr std::uint32_t kTablesAtFirst = 1024;
+
 SurfaceOptions checked(SurfaceOptions options, const Lattice& lattice) {
   check_supported(lattice.type, options);
   if (options.indexing != Indexing::welded)
@@ -50,12 +53,13 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
       order_(volume.tile_count * slabs() * (are_few() ? 2 : 1), volume.stream),
       words_(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
       standing_(tuning.patience, volume.stream) {
+  dismiss_other();
   const cudaStream_t stream = volume.stream.get();
   const CaseTable table = make_case_table(world_map(options_.transform).mirrored);
   check(cudaMemcpyAsync(cases_.data(), &table, sizeof table, cudaMemcpyHostToDevice, stream));
   check(cudaMemsetAsync(words_.data(), 0, words_.bytes(), stream));
   if (are_few()) {
-    make_row_tables(volume.tile_count * slabs());
+    make_row_tables(std::min(volume.tile_count, kTablesAtFirst) * slabs());
     check(cudaMemsetAsync(order_.data(), 0, order_.bytes(), stream));
     make_host_search();
   } else if (const auto kind = index_kind_of(search_)) {
@@ -65,9 +69,22 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
 }
 
 ResidentLauncher::~ResidentLauncher() {
+  if (volume_.standing == this) volume_.standing = nullptr;
+  // What goes now is read and written by launches, if there is a driver still.
+  const cudaStream_t stream = volume_.stream.get();
+  if (cudaStreamQuery(stream) != cudaErrorNotReady) return;
   dismiss();
-  // What goes now is read and written by launches.
-  (void)cudaStreamSynchronize(volume_.stream.get());
+  (void)cudaStreamSynchronize(stream);
+}
+
+/// Of another extractor of the volume.
+void ResidentLauncher::dismiss_other() const {
+  if (volume_.standing && volume_.standing != this) volume_.standing->dismiss();
+}
+
+/// So few tiles need no launch of their own to find the active ones.
+bool ResidentLauncher::are_few() const {
+  return volume_.tile_count <= (index_kind_of(search_) ? kMostThroughIndex : kMostCandidates);
 }
 
 /// Parts of a tile that may have a block each.
@@ -95,7 +112,6 @@ std::vector<ValueRange<double>> ResidentLauncher::ranges_to_search() const {
   return ranges;
 }
 
-/// So few tiles need no launch of their own to find the active ones.
 void ResidentLauncher::make_host_search() {
   const std::vector<Int3>& tiles = volume_.tiles_here;
   if (const auto kind = index_kind_of(search_))
@@ -191,7 +207,11 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room, const
   TileParams p = volume_.params();
   if (are_few()) {
     p.candidates = {volume_.tiles.data(), volume_.order_of_tile.data(), volume_.tile_count};
-    p.found = found;
+    p.found = found.count;
+    if (shape.slabs > 1)
+      std::ranges::copy(found.tiles, p.found_tiles);
+    else
+      std::ranges::copy(found.words, p.found_words);
   } else {
     p.items = items_.data();
     p.item_count = &counters()->item_count;
@@ -219,12 +239,14 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room, const
   const bool stays = stay && shape.slabs > 1;
   if (stays) {
     shape.blocks = std::min(shapes_.slabs.blocks, static_cast<int>(volume_.tile_count * slabs()));
-    p.stand_by = standing_.prepare(launches_ + 1);
+    p.stand_by = standing_.prepare(launches_ + 1, volume_.stream);
   }
   launch_extraction(kernel_of(volume_.lattice.type, options_), p, cases_.data(), shape,
                     volume_.stream.get(), !are_few(), are_few() ? &graph_ : nullptr);
   ++launches_;  // only now: the sums of one that could not be launched are those of the next
-  if (stays) standing_.note_launch(static_cast<std::uint32_t>(shape.blocks));
+  if (!stays) return;
+  standing_.note_launch(static_cast<std::uint32_t>(shape.blocks));
+  volume_.standing = this;
 }
 
 /// Of no more blocks than there are tiles, or slabs.
@@ -241,11 +263,13 @@ LaunchShape ResidentLauncher::shape_of(const FoundTiles& found, const DeviceCoun
 bool ResidentLauncher::launch(double isovalue, const MeshRoom& room, const DeviceCounts& last,
                               bool stay) {
   if (is_above_all_samples(isovalue)) return false;
+  dismiss_other();
   FoundTiles found;
   if (host_search_) {
     found = host_search_->find(isovalue);
     if (found.count == 0) return false;
     if (stay && ask_standing(isovalue, found)) return true;
+    make_row_tables(found.count * slabs());
   } else {
     launch_search(isovalue);
   }

@@ -50,12 +50,13 @@ class ResidentLauncher {
  private:
   struct Counters;
 
-  bool are_few() const { return volume_.tile_count <= kMostCandidates; }
+  bool are_few() const;
   std::uint32_t slabs() const;
   std::size_t search_blocks() const;
   Counters* counters() const { return reinterpret_cast<Counters*>(words_.data()); }
   std::vector<ValueRange<double>> ranges_to_search() const;
   void make_host_search();
+  void dismiss_other() const;
   bool is_above_all_samples(double isovalue) const;
   template <class Params>
   void set_region(Params& p) const;

@@ -44,24 +44,28 @@ __device__ inline bool is_next(const LaunchNow& now, std::uint64_t word) {
       kAll, lane_id() >= LaunchRequest::kWords || LaunchWord::is_about(word, now.launch + 1));
 }
 
-/// The first block's first warp: waits until all blocks have ended, and then for the host, but not
-/// for longer than it may. Passes it on to the other blocks. A word a lane.
+/// How often a block must have ended an isovalue when all have ended this one.
+__device__ inline std::uint32_t all_ended(const LaunchNow& now, const TileParams& p) {
+  return p.stand_by.ended_before + gridDim.x * (now.launch - p.end.launch + 1);
+}
+
+/// The first block's first warp: waits until all blocks have ended and the host has asked, but not
+/// for longer than it may: others may wait for what this launch holds of the device, and its own
+/// last blocks for others to go. Passes on what it has seen. A word a lane.
 template <int N>
 __device__ inline std::uint64_t ask_host(TileShared& s, const TileParams& p) {
   const StandBy& by = p.stand_by;
-  if (lane_id() == 0) {
-    DeviceFlag ended(*by.ended);
-    while (ended.load(cuda::memory_order_acquire) < gridDim.x) {
-    }
-    ended.store(0, cuda::memory_order_relaxed);
-  }
-  __syncwarp();
-  __threadfence();  // for what the blocks have written, which is so passed on as well
   const bool has_word = lane_id() < LaunchRequest::kWords;
   const std::uint64_t start = global_nanoseconds();
   std::uint64_t word = 0;
-  bool asked = false;
+  bool ended = false, asked = false;
   do {
+    if (!ended) {
+      const std::uint32_t seen = DeviceFlag(*by.ended).load(cuda::memory_order_relaxed);
+      ended = __all_sync(kAll, seen == all_ended(s.now, p));
+      if (ended) __threadfence();  // what the blocks have written is passed on as well
+      continue;
+    }
     if (has_word)
       word = HostWord(const_cast<std::uint64_t&>(by.request->words[lane_id()]))
                  .load(cuda::memory_order_relaxed);
@@ -75,7 +79,9 @@ __device__ inline std::uint64_t ask_host(TileShared& s, const TileParams& p) {
   return word;
 }
 
-/// The same for the first warps of other blocks.
+/// The same for the first warps of other blocks. Each look empties the multiprocessor's first
+/// cache, in which another block may have samples; looks that do not, and a fence at the end, take
+/// longer.
 __device__ inline std::uint64_t ask_first_block(TileShared& s, const TileParams& p) {
   std::uint64_t word = 0;
   do {

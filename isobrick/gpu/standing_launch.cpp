@@ -1,5 +1,6 @@
 #include "isobrick/gpu/standing_launch.h"
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 
@@ -8,6 +9,9 @@ namespace {
 
 /// One isovalue that comes soon does not show yet that others will.
 constexpr int kSoonInARow = 2;
+
+/// After so many launches words on the device might be about one whose number comes round.
+constexpr std::uint32_t kLaunchesToForget = 1u << 23;
 
 }  // namespace
 
@@ -21,6 +25,7 @@ bool StandingLaunch::should_stay(Clock::time_point now) const {
 }
 
 void StandingLaunch::note_left() {
+  ended_ -= blocks_;
   blocks_ = 0;
   --asked_;
   waits_ = false;
@@ -32,19 +37,31 @@ void StandingLaunch::note_end(Clock::time_point asked, Clock::time_point now) {
   last_end_ = now;
 }
 
-StandBy StandingLaunch::prepare(std::uint32_t launch) {
+StandBy StandingLaunch::prepare(std::uint32_t launch, const Stream& stream) {
   // Not what was asked of another one long ago, whose number may come round. One that still stands
   // by takes it as it is meant.
   write_leave(launch);
   OnDevice* const device = device_.data();
-  return {request_.on_device(), &device->passed_on, &device->ended,
+  if (launch - passed_ > kLaunchesToForget) {
+    const int other = (launch + 1) % 256 == 0 ? 0xff : 0;  // no byte of the next launch's number
+    check(cudaMemsetAsync(&device->passed_on, other, sizeof device->passed_on, stream.get()));
+  }
+  passed_ = launch + 1;
+  return {request_.on_device(), &device->passed_on, &device->ended, ended_,
           static_cast<std::uint64_t>(patience_.count())};
+}
+
+void StandingLaunch::note_launch(std::uint32_t blocks) {
+  blocks_ = blocks;
+  ended_ += blocks;
 }
 
 void StandingLaunch::ask(std::uint32_t launch, std::uint32_t threshold, float crossing,
                          const FoundTiles& found) {
   ++asked_;
   waits_ = true;
+  ended_ += blocks_;
+  passed_ = launch + 1;
   write(LaunchRequest::kThreshold, threshold, launch);
   write(LaunchRequest::kCrossing, std::bit_cast<std::uint32_t>(crossing), launch);
   for (int i = 0; i < LaunchRequest::kLeave - LaunchRequest::kTiles; ++i)

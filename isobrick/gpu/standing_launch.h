@@ -24,10 +24,10 @@ class StandingLaunch {
   /// What it made is known.
   void note_end(Clock::time_point asked, Clock::time_point now);
 
-  /// What the kernel of launch `launch` is to know, before it is launched.
-  StandBy prepare(std::uint32_t launch);
+  /// What the kernel of launch `launch` is to know, before it is launched on `stream`.
+  StandBy prepare(std::uint32_t launch, const Stream& stream);
   /// So many blocks of it have been launched, and will stand by.
-  void note_launch(std::uint32_t blocks) { blocks_ = blocks; }
+  void note_launch(std::uint32_t blocks);
   /// Blocks of the one that stands by, or did when last heard of; 0: none does.
   std::uint32_t blocks() const { return blocks_; }
   /// Asks it to be launch `launch`, the one after its last. It may have left, and then says so.
@@ -54,7 +54,9 @@ class StandingLaunch {
   MappedHost<LaunchRequest> request_;
   DeviceBuffer<OnDevice> device_;
   std::uint32_t blocks_ = 0;
-  bool waits_ = false;  ///< for what has been asked
+  std::uint32_t ended_ = 0;   ///< OnDevice::ended after what has been launched and asked
+  std::uint32_t passed_ = 0;  ///< the latest launch that OnDevice::passed_on may be about
+  bool waits_ = false;        ///< for what has been asked
   Clock::time_point last_end_{};
   std::uint64_t asked_ = 0;
   int soon_ = 0;  ///< isovalues in a row that came soon

@@ -19,12 +19,17 @@ constexpr std::size_t kSharedBytes = sizeof(TileShared) +
 
 static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<kListedBeforeAmpere, false, true> <= 64 << 10, "what Turing has");
+// Of each block a multiprocessor takes 1 KiB for itself.
+static_assert(3 * (kSharedBytes<Team<384>::kMostListed, true> + 1024) <= 228 << 10, "three teams");
+static_assert(3 * (kSharedBytes<Team<kSlabTeam>::kMostListed, false, true> + 1024) <= 228 << 10);
+static_assert(2 * (kSharedBytes<Team<640>::kMostListed> + 1024) <= 228 << 10, "two teams");
 static_assert(kSharedBytes<Team<1024>::kMostListed> <= 99 << 10, "what any later device has");
 
 /// The last block to come here tells the host and leaves the counters as the next launch needs
-/// them. Nobody reads what the others have written before the launch is over, and the sums they
-/// ask each other for are not zeroed by this launch but by the next, or by its search: nothing has
-/// to be in order with the count.
+/// them. Nobody reads what the others have written before the launch is over, or before all blocks
+/// of one that stays have said so once more (stand_by.cuh), and the sums they ask each other for
+/// are not zeroed by this launch but by the next, or by its search: nothing has to be in order with
+/// the count.
 template <int N>
 __device__ void end_launch(TileShared& s, const TileParams& p) {
   const LaunchEnd& end = p.end;
@@ -66,7 +71,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
     s.all_cells = s.all_vertices = ListsOf<N>::kListed;
     init_barriers<N>(s.barriers);
     if (kSlab)
-      s.items = p.found.count * Team<N>::kSlabs;
+      s.items = p.found * Team<N>::kSlabs;
     else if (p.candidates.count == 0)
       s.items = *p.item_count;
   }

@@ -187,7 +187,7 @@ __device__ inline std::uint32_t packed(const TileItem& tile) {
 /// An active tile of those in slabs, packed.
 template <int N>
 __device__ inline std::uint32_t found_tile(TileShared& s, const TileParams& p, std::uint32_t i) {
-  return s.now.asked ? slab_tiles_of<N>(s).found[i] : p.found.tiles[i];
+  return s.now.asked ? slab_tiles_of<N>(s).found[i] : p.found_tiles[i];
 }
 
 /// The row table of the lower neighbour that lane 1 … 6 asks, where bits 0, 1, 2 of the lane

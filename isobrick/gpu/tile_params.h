@@ -60,9 +60,9 @@ struct SurfaceTotals {
   unsigned long long vertices, triangles;
 };
 
-/// Tiles of volumes that are so small that no launch searches them; of those whose tiles may be
-/// shared by several blocks.
-inline constexpr std::uint32_t kMostCandidates = 1024, kMostInSlabs = 128;
+/// Tiles of volumes that are so small that the host searches them, by ranges or through an index;
+/// of those whose tiles may be shared by several blocks.
+inline constexpr std::uint32_t kMostCandidates = 4096, kMostThroughIndex = 1024, kMostInSlabs = 128;
 /// Active ones of the latter that are shared.
 inline constexpr std::uint32_t kMostActiveInSlabs = 64;
 
@@ -70,10 +70,10 @@ inline constexpr std::uint32_t kMostActiveInSlabs = 64;
 struct FoundTiles {
   std::uint32_t count = 0;
   std::uint32_t words[kMostCandidates / 32] = {};  ///< bit i: candidate i
-  std::uint32_t tiles[kMostActiveInSlabs] = {};    ///< the first active ones, packed
+  std::uint32_t tiles[kMostActiveInSlabs] = {};    ///< of up to kMostInSlabs the first, packed
 
   static constexpr std::uint32_t packed(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    static_assert(kMostCandidates <= 1u << 10);
+    static_assert(kMostInSlabs <= 1u << 10);
     return x | y << 10 | z << 20;
   }
 };
@@ -124,8 +124,9 @@ struct alignas(64) LaunchRequest {
 struct StandBy {
   const LaunchRequest* request;  ///< in the host's memory; null: it does not stay
   LaunchRequest* passed_on;      ///< in the device's
-  std::uint32_t* ended;          ///< zeroed
-  std::uint64_t nanoseconds;     ///< it stays at most
+  std::uint32_t* ended;          ///< counts how often a block has ended an isovalue
+  std::uint32_t ended_before;    ///< of the launches before
+  std::uint64_t nanoseconds;     ///< that it waits after each isovalue
 };
 
 /// How a launch tells the host what it has made, and leaves everything as the next one needs it.
@@ -154,7 +155,11 @@ struct TileParams {
   const TileItem* items;
   const std::uint32_t* item_count;
   TileCandidates candidates;
-  FoundTiles found;  ///< of the candidates
+  std::uint32_t found;  ///< active candidates
+  union {
+    alignas(16) std::uint32_t found_words[kMostCandidates / 32];  ///< bit i: candidate i is one
+    std::uint32_t found_tiles[kMostActiveInSlabs];                ///< of slabs: packed
+  };
   const void* pages;
   /// [z, y, x] of `tiles`; kNone: all fill value. Null where page i + 1 is that of tile i.
   const std::uint32_t* page_of_tile;
@@ -175,7 +180,7 @@ struct TileParams {
   RowTable* row_tables;
   OrderState* order;                       ///< one an item, zeroed
   std::uint32_t* ticket;                   ///< zeroed; null: block i takes item i
-  std::uint32_t epoch;                     ///< never 0, new in each launch
+  std::uint32_t epoch;                     ///< never 0, new for each isovalue
   const unsigned long long* number_start;  ///< vertices of the launches before
   unsigned long long* number_end;          ///< and of this one, once it is over
   Vec3f* positions;

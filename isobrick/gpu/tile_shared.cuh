@@ -31,7 +31,7 @@ struct Team {
   static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
   /// Vertices or cells that are found at a time; tiles with more take several turns.
   /// A multiprocessor before Ampere has 64 KiB of shared memory.
-  static constexpr std::uint32_t kMostListed = kSlabs > 1 ? 2048 : kTeams == 3 ? 3392 : 7168;
+  static constexpr std::uint32_t kMostListed = kSlabs > 1 ? 2048 : kTeams == 3 ? 3360 : 7168;
   /// The first warp with rows: in a slab the two before ask the others.
   static constexpr int kFirstWithRows = kSlabs > 1 ? 2 : 0;
 };
@@ -150,8 +150,9 @@ struct alignas(256) TileShared {
   LaunchNow now;
   TileItem tile;
   Shape shape;
-  /// The active tiles as bits and how many come before each 32, where there are candidates.
-  std::uint32_t active[kMostCandidates / 32], active_before[kMostCandidates / 32];
+  /// The active tiles as bits and how many come before each 64, where there are candidates.
+  std::uint32_t active[kMostCandidates / 32];
+  std::uint16_t active_before[kMostCandidates / 64];
 };
 
 /// The row that the first of 32 listed things lies in, and how many of the row

@@ -49,8 +49,22 @@ TYPED_TEST(GpuResident, SmoothFieldOfOddExtents) {
 
 TYPED_TEST(GpuResident, ManyTilesAreFoundByALaunchOfTheirOwn) {
   const double mid = this->lowest() + 100;
-  const auto field = this->waves({3, 1030, 1060});  // 33 × 34 tiles
-  compare(field, {mid + 70, mid, this->lowest(), mid - 40}, {});
+  const Field<TypeParam> field({2, 2080, 2070}, [&](Int3 p) {  // 65 × 65 tiles
+    return mid + static_cast<double>((p.x * 31 + p.y / 7 * 13 + p.z * p.z / 50) % 150 - 75);
+  });
+  compare(field, {mid + 74, mid, this->lowest(), mid - 40}, {});
+  SurfaceOptions options;
+  options.roi = {{0, 31, 100}, {2, 500, 1060}};
+  compare(field, {mid}, options);
+}
+
+/// 33 × 34, which is too many to be found through an index without a launch.
+TYPED_TEST(GpuResident, ManyTilesAreFoundByTheHost) {
+  const double mid = this->lowest() + 100;
+  const auto field = this->waves({3, 1030, 1060});
+  for (const auto search :
+       {gpu::TileSearch::ranges, gpu::TileSearch::kdtree, gpu::TileSearch::octree})
+    compare(field, {mid + 70, mid, this->lowest(), mid - 40}, {}, 64, search);
   SurfaceOptions options;
   options.roi = {{0, 31, 100}, {2, 500, 1060}};
   compare(field, {mid}, options);
@@ -82,7 +96,7 @@ TYPED_TEST(GpuResident, MoreTilesThanHaveSlabs) {
   const double mid = this->lowest() + 100;
   const auto field = this->waves({3, 400, 390});
   compare(field, {mid + 70, mid, mid + 1e9}, {});
-  compare(field, {mid}, {}, 64, gpu::TileSearch::interval);  // found by every block
+  compare(field, {mid}, {}, 64, gpu::TileSearch::interval);
 }
 
 /// A sample that equals the largest of its type is no reason to make anything above.
