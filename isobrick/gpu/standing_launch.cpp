@@ -11,7 +11,7 @@ namespace {
 constexpr int kSoonInARow = 2;
 
 /// After so many launches words on the device might be about one whose number comes round.
-constexpr std::uint32_t kLaunchesToForget = 1u << 23;
+constexpr std::int32_t kLaunchesToForget = 1 << 23;
 
 }  // namespace
 
@@ -42,7 +42,7 @@ StandBy StandingLaunch::prepare(std::uint32_t launch, const Stream& stream) {
   // by takes it as it is meant.
   write_leave(launch);
   OnDevice* const device = device_.data();
-  if (launch - passed_ > kLaunchesToForget) {
+  if (static_cast<std::int32_t>(launch - passed_) > kLaunchesToForget) {
     const int other = (launch + 1) % 256 == 0 ? 0xff : 0;  // no byte of the next launch's number
     check(cudaMemsetAsync(&device->passed_on, other, sizeof device->passed_on, stream.get()));
   }
