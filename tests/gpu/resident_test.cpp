@@ -1,9 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "isobrick/core/error.h"
-#include "isobrick/gpu/device_volume.h"
 #include "isobrick/gpu/tile_kernel.h"
-#include "tests/gpu/compare.h"
+#include "tests/gpu/resident.h"
 
 // The mesh from the device is the CPU's, byte for byte.
 
@@ -13,23 +12,12 @@ namespace {
 template <class T>
 void compare(const Field<T>& field, std::vector<double> isovalues, SurfaceOptions options,
              Index brick = 64, gpu::TileSearch search = gpu::TileSearch::ranges) {
-  const Lattice lattice{field.extent, {brick, brick, brick}, scalar_type_of<T>};
-  const DenseBricks bricks(lattice, field.samples.data());
-  if (options.roi == Box3{}) options.roi = lattice.box();
-  gpu::DeviceVolume volume(lattice, bricks, options.fill_value);
+  Resident<T> r(field, options, brick);
   for (const bool normals : {false, true}) {
-    options.normals = normals;
-    gpu::ResidentExtractor extractor(volume, options, {.search = search});
+    r.options.normals = normals;
+    gpu::ResidentExtractor extractor(r.volume, r.options, {.search = search});
     for (const double isovalue : isovalues) {
-      options.isovalue = isovalue;
-      const MeshBuffer expected = on_cpu(field, lattice, bricks, options);
-      const gpu::DeviceCounts counts = extractor.extract(isovalue);
-      EXPECT_EQ(counts.vertices, expected.positions.size());
-      EXPECT_EQ(counts.triangles, expected.triangles.size());
-      MeshBuffer mesh;
-      extractor.download(mesh);
-      SCOPED_TRACE("isovalue " + std::to_string(isovalue) + (normals ? ", normals" : ""));
-      expect_same(expected, mesh);
+      r.expect_mesh(extractor, isovalue);
       if (::testing::Test::HasFailure()) return;
     }
   }

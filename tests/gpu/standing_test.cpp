@@ -5,9 +5,8 @@
 #include <chrono>
 #include <random>
 
-#include "isobrick/gpu/device_volume.h"
 #include "tests/gpu/busy_device.h"
-#include "tests/gpu/compare.h"
+#include "tests/gpu/resident.h"
 
 // Extractions that stay on the device for the next isovalue make what others make.
 
@@ -26,36 +25,6 @@ bool has_many_blocks() {
   return cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, 0) == cudaSuccess &&
          processors >= 132;
 }
-
-/// A volume on the device, and what an extractor of it should make.
-template <class T>
-struct Resident {
-  Field<T> field;
-  Lattice lattice;
-  DenseBricks bricks;
-  gpu::DeviceVolume volume;
-  SurfaceOptions options;
-
-  explicit Resident(Field<T> f)
-      : field(std::move(f)),
-        lattice{field.extent, {64, 64, 64}, scalar_type_of<T>},
-        bricks(lattice, field.samples.data()),
-        volume(lattice, bricks, 0) {
-    options.roi = lattice.box();
-  }
-
-  void expect_mesh(gpu::ResidentExtractor& extractor, double isovalue) {
-    SCOPED_TRACE("isovalue " + std::to_string(isovalue));
-    options.isovalue = isovalue;
-    const MeshBuffer expected = on_cpu(field, lattice, bricks, options);
-    const gpu::DeviceCounts counts = extractor.extract(isovalue);
-    EXPECT_EQ(counts.vertices, expected.positions.size());
-    EXPECT_EQ(counts.triangles, expected.triangles.size());
-    MeshBuffer mesh;
-    extractor.download(mesh);
-    expect_same(expected, mesh);
-  }
-};
 
 template <class T>
 class GpuStanding : public DeviceTest<T> {};
