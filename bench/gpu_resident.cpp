@@ -149,7 +149,7 @@ int run(const Arguments& a) {
   const float middle = median(times);
   const std::uint64_t extra_bytes = extractor.bytes();
   const double wall = wall_milliseconds(extractor, options.isovalue, a.runs);
-  tuning.patience = {};  // as an isovalue that comes alone
+  tuning.patience = {};  // each launched by itself
   gpu::ResidentExtractor impatient(resident, options, tuning);
   const double wall_alone = wall_milliseconds(impatient, options.isovalue, a.runs);
   out["extent"] = {v.extent.x, v.extent.y, v.extent.z};

@@ -49,7 +49,7 @@ struct ResidentTuning {
   int threads = 0;
   /// Of small volumes (up to 128 tiles of 32³, without NaN) an extraction stays on the device for so
   /// long, for the next isovalue, where the last ones came sooner than that after each other, and
-  /// `threads` is 0. Other work may wait for it so long. 0: it does not stay.
+  /// `threads` is 0. Other work may have to wait until no more come. 0: it does not stay.
   std::chrono::nanoseconds patience = std::chrono::microseconds(20);
 };
 
