@@ -64,7 +64,7 @@ void HostSearch::compare_ranges(double isovalue, FoundTiles& found) const {
 }
 
 void HostSearch::ask_index(double isovalue, FoundTiles& found) const {
-  std::array<std::uint64_t, mask_words(kMostCandidates)> mask{};
+  std::array<std::uint64_t, mask_words(kMostThroughIndex)> mask{};
   mark(view_index(index_), isovalue, std::span(mask).first(mask_words(count_)));
   for (std::size_t i = 0; i < mask.size(); ++i) {
     if (places_.empty()) {

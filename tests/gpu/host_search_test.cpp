@@ -46,6 +46,25 @@ TEST(HostSearch, FindsWhatAnIsovalueStabs) {
   }
 }
 
+/// Neighbours in double of ends that are floats.
+TEST(HostSearch, FloatsStandForAnyIsovalue) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::vector<double> ends{-infinity, -3.4e38f, -1,  -0.1f, 0,       1e-45f,
+                           0.1f,      1,        255, 65535, 3.4e38f, infinity};
+  std::vector<Range> ranges;
+  for (const double lo : ends)
+    for (const double hi : ends)
+      if (lo <= hi) ranges.push_back({lo, hi});
+  const HostSearch search(tiles_in_a_row(ranges.size()), ranges);
+  for (const double end : ends)
+    for (const double isovalue :
+         {end, std::nextafter(end, infinity), std::nextafter(end, -infinity)}) {
+      const FoundTiles found = search.find(isovalue);
+      for (std::size_t i = 0; i < ranges.size(); ++i)
+        EXPECT_EQ(is_found(found, i), ranges[i].stabbed_by(isovalue)) << i << " at " << isovalue;
+    }
+}
+
 /// Tiles of a grid in Morton order, some with an empty range.
 TEST(HostSearch, FindsTheSameThroughAnIndex) {
   for (const Int3 grid : {Int3{1, 1, 1}, Int3{5, 3, 2}, Int3{7, 9, 11}, Int3{16, 8, 8}}) {
