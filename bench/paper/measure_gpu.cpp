@@ -78,8 +78,7 @@ class GpuMeasurement {
   }
 
  private:
-  /// Seconds from an isovalue that was another one before to the mesh in device
-  /// memory, its size known to the caller; and those on the device alone.
+  /// One isovalue upon the other, and launched each by itself; and those on the device alone.
   nlohmann::json frames(gpu::ResidentTuning tuning) {
     gpu::ResidentExtractor extractor(resident_, surface_, tuning);
     extractor.extract(volume_.isovalue + 1);
@@ -102,6 +101,8 @@ class GpuMeasurement {
             {"extra_bytes", extractor.bytes()}};
   }
 
+  /// Seconds from an isovalue that was another one before to the mesh in device
+  /// memory, its size known to the caller.
   double contour_seconds(gpu::ResidentExtractor& extractor) const {
     std::vector<double> seconds;
     for (int i = 0; i < kFrames; ++i) {

@@ -26,7 +26,7 @@ struct DeviceVolume::Impl {
   std::vector<Int3> tiles_here;
   std::vector<ValueRange<double>> ranges_here;
 
-  /// Whose launch may stand by on the stream: others let it go before they use the stream.
+  /// Whose launch may stand by on the stream: others let it go before they launch.
   ResidentLauncher* standing = nullptr;
 
   Impl(const Lattice& lattice, const BrickLookup& bricks, double fill_value);

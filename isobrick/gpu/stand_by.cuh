@@ -66,9 +66,7 @@ __device__ inline std::uint64_t ask_host(TileShared& s, const TileParams& p) {
       if (ended) __threadfence();  // what the blocks have written is passed on as well
       continue;
     }
-    if (has_word)
-      word = HostWord(const_cast<std::uint64_t&>(by.request->words[lane_id()]))
-                 .load(cuda::memory_order_relaxed);
+    if (has_word) word = HostWord(by.request->words[lane_id()]).load(cuda::memory_order_relaxed);
     asked = is_next(s.now, word);
   } while (!asked && !__any_sync(kAll, global_nanoseconds() - start > by.nanoseconds));
   if (!asked) {

@@ -69,11 +69,10 @@ void StandingLaunch::ask(std::uint32_t launch, std::uint32_t threshold, float cr
   write(LaunchRequest::kLeave, 0, launch);
 }
 
-bool StandingLaunch::has_left(const LaunchReport& report, std::uint32_t launch) const {
+bool StandingLaunch::has_left(LaunchReport& report, std::uint32_t launch) const {
   if (!waits_) return false;
   const std::uint64_t word =
-      std::atomic_ref(const_cast<std::uint64_t&>(report.words[LaunchReport::kLeft]))
-          .load(std::memory_order_relaxed);
+      std::atomic_ref(report.words[LaunchReport::kLeft]).load(std::memory_order_relaxed);
   return word == LaunchWord::of(launch - 1, launch - 1);
 }
 

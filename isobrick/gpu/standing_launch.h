@@ -33,7 +33,7 @@ class StandingLaunch {
   /// Asks it to be launch `launch`, the one after its last. It may have left, and then says so.
   void ask(std::uint32_t launch, std::uint32_t threshold, float crossing, const FoundTiles& found);
   /// Whether it has left without seeing that it should be launch `launch`.
-  bool has_left(const LaunchReport& report, std::uint32_t launch) const;
+  bool has_left(LaunchReport& report, std::uint32_t launch) const;
   void note_left();
   /// Lets it go. What is launched next is launch `launch`.
   void dismiss(std::uint32_t launch);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include "isobrick/gpu/tile_lists.cuh"
-#include "isobrick/gpu/tile_page.cuh"
 
 // Small volumes need no launch of their own to find active tiles: the host has found them.
 

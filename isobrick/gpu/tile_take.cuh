@@ -4,6 +4,7 @@
 #include "isobrick/gpu/tile_classify.cuh"
 #include "isobrick/gpu/tile_find.cuh"
 #include "isobrick/gpu/tile_order.cuh"
+#include "isobrick/gpu/tile_page.cuh"
 
 // Before the first step: which tile is the next, and where its samples lie.
 
