@@ -60,7 +60,8 @@ struct DeviceCounts {
 };
 
 /// Isosurfaces of a resident volume: search and extraction without leaving the
-/// device. Keeps its buffers from isovalue to isovalue. Not thread-safe.
+/// device. Keeps its buffers from isovalue to isovalue. Those of one volume are for one thread at a
+/// time.
 class ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Throws UsageError for what the

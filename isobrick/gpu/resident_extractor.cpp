@@ -28,6 +28,7 @@ struct ResidentExtractor::Impl {
   void make_room(std::uint64_t vertices, std::uint64_t triangles) {
     const Stream& stream = launcher.stream();
     launcher.dismiss();
+    made = {};
     if (vertices > room.positions.size()) {
       room.positions = {};
       room.normals = {};

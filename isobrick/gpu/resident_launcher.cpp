@@ -53,7 +53,6 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
       order_(volume.tile_count * slabs() * (are_few() ? 2 : 1), volume.stream),
       words_(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
       standing_(tuning.patience, volume.stream) {
-  dismiss_other();
   const cudaStream_t stream = volume.stream.get();
   const CaseTable table = make_case_table(world_map(options_.transform).mirrored);
   check(cudaMemcpyAsync(cases_.data(), &table, sizeof table, cudaMemcpyHostToDevice, stream));
@@ -77,9 +76,10 @@ ResidentLauncher::~ResidentLauncher() {
   (void)cudaStreamSynchronize(stream);
 }
 
-/// Of another extractor of the volume.
-void ResidentLauncher::dismiss_other() const {
-  if (volume_.standing && volume_.standing != this) volume_.standing->dismiss();
+void ResidentLauncher::dismiss() {
+  if (volume_.standing && volume_.standing != this)
+    volume_.standing->standing_.dismiss(volume_.standing->launches_ + 1);
+  standing_.dismiss(launches_ + 1);
 }
 
 /// So few tiles need no launch of their own to find the active ones.
@@ -131,6 +131,7 @@ void ResidentLauncher::make_row_tables(std::uint32_t count) {
   if (count <= row_tables_.size()) return;
   dismiss();
   row_tables_ = {};
+  if (are_few()) count = volume_.tile_count * slabs();  // it comes among launches
   row_tables_ = DeviceBuffer<RowTable>(count, volume_.stream);
   check(cudaMemsetAsync(row_tables_.data(), 0, row_tables_.bytes(), volume_.stream.get()));
   epoch_ = 0;
@@ -203,7 +204,6 @@ void ResidentLauncher::say_end(TileParams& p) const {
 
 void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room, const FoundTiles& found,
                                     LaunchShape shape, bool stay) {
-  dismiss();
   TileParams p = volume_.params();
   if (are_few()) {
     p.candidates = {volume_.tiles.data(), volume_.order_of_tile.data(), volume_.tile_count};
@@ -263,14 +263,15 @@ LaunchShape ResidentLauncher::shape_of(const FoundTiles& found, const DeviceCoun
 bool ResidentLauncher::launch(double isovalue, const MeshRoom& room, const DeviceCounts& last,
                               bool stay) {
   if (is_above_all_samples(isovalue)) return false;
-  dismiss_other();
   FoundTiles found;
   if (host_search_) {
     found = host_search_->find(isovalue);
     if (found.count == 0) return false;
     if (stay && ask_standing(isovalue, found)) return true;
+    dismiss();
     make_row_tables(found.count * slabs());
   } else {
+    dismiss();
     launch_search(isovalue);
   }
   launch_tiles(isovalue, room, found, shape_of(found, last), stay);

@@ -35,8 +35,9 @@ class ResidentLauncher {
   /// Waits for the last launch. None where the one that should have been it was gone when it was
   /// asked; it is to be launched again.
   std::optional<DeviceCounts> wait();
-  /// Lets a launch that stands by go, which uses the room that it was given.
-  void dismiss() { standing_.dismiss(launches_ + 1); }
+  /// Lets a launch that stands by go, which uses the room that it was given; also of another
+  /// extractor of the volume.
+  void dismiss();
 
   /// Active tiles beyond this number are not begun.
   std::size_t tiles_with_room() const { return row_tables_.size(); }
@@ -56,7 +57,6 @@ class ResidentLauncher {
   Counters* counters() const { return reinterpret_cast<Counters*>(words_.data()); }
   std::vector<ValueRange<double>> ranges_to_search() const;
   void make_host_search();
-  void dismiss_other() const;
   bool is_above_all_samples(double isovalue) const;
   template <class Params>
   void set_region(Params& p) const;

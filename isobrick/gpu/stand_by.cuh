@@ -23,6 +23,7 @@ __device__ inline void begin_launch(LaunchNow& now, const TileParams& p) {
   now.next_order = p.end.next_order;
   now.launch = p.end.launch;
   now.epoch = p.epoch;
+  now.began = p.stand_by.request ? global_nanoseconds() : 0;
   now.crossing = p.crossing;
   now.asked = now.leaves = false;
 }
@@ -49,21 +50,25 @@ __device__ inline std::uint32_t all_ended(const LaunchNow& now, const TileParams
   return p.stand_by.ended_before + gridDim.x * (now.launch - p.end.launch + 1);
 }
 
-/// The first block's first warp: waits until all blocks have ended and the host has asked, but not
-/// for longer than it may: others may wait for what this launch holds of the device, and its own
-/// last blocks for others to go. Passes on what it has seen. A word a lane.
+/// The first block's first warp: waits until all blocks have ended and then until the host has
+/// asked, but for neither longer than it may: others may wait for what this launch holds of the
+/// device, and its own last blocks for others to go. Passes on what it has seen. A word a lane.
 template <int N>
 __device__ inline std::uint64_t ask_host(TileShared& s, const TileParams& p) {
   const StandBy& by = p.stand_by;
   const bool has_word = lane_id() < LaunchRequest::kWords;
-  const std::uint64_t start = global_nanoseconds();
+  std::uint64_t start = global_nanoseconds();
+  const bool long_enough = start - s.now.began > by.most_nanoseconds;
   std::uint64_t word = 0;
   bool ended = false, asked = false;
   do {
     if (!ended) {
       const std::uint32_t seen = DeviceFlag(*by.ended).load(cuda::memory_order_relaxed);
       ended = __all_sync(kAll, seen == all_ended(s.now, p));
-      if (ended) __threadfence();  // what the blocks have written is passed on as well
+      if (!ended) continue;
+      __threadfence();  // what the blocks have written is passed on as well
+      start = global_nanoseconds();
+      if (long_enough) break;
       continue;
     }
     if (has_word) word = HostWord(by.request->words[lane_id()]).load(cuda::memory_order_relaxed);

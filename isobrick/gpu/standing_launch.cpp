@@ -11,7 +11,10 @@ namespace {
 constexpr int kSoonInARow = 2;
 
 /// After so many launches words on the device might be about one whose number comes round.
-constexpr std::int32_t kLaunchesToForget = 1 << 23;
+constexpr std::uint32_t kLaunchesToForget = 1u << 23;
+
+/// Others that wait for the device have their turn.
+constexpr std::uint64_t kMostNanoseconds = 1'000'000;
 
 }  // namespace
 
@@ -42,13 +45,17 @@ StandBy StandingLaunch::prepare(std::uint32_t launch, const Stream& stream) {
   // by takes it as it is meant.
   write_leave(launch);
   OnDevice* const device = device_.data();
-  if (static_cast<std::int32_t>(launch - passed_) > kLaunchesToForget) {
+  if (launch + 1 - passed_ > kLaunchesToForget) {
     const int other = (launch + 1) % 256 == 0 ? 0xff : 0;  // no byte of the next launch's number
     check(cudaMemsetAsync(&device->passed_on, other, sizeof device->passed_on, stream.get()));
   }
   passed_ = launch + 1;
-  return {request_.on_device(), &device->passed_on, &device->ended, ended_,
-          static_cast<std::uint64_t>(patience_.count())};
+  return {request_.on_device(),
+          &device->passed_on,
+          &device->ended,
+          ended_,
+          static_cast<std::uint64_t>(patience_.count()),
+          std::max(kMostNanoseconds, static_cast<std::uint64_t>(patience_.count()))};
 }
 
 void StandingLaunch::note_launch(std::uint32_t blocks) {

@@ -19,7 +19,7 @@ constexpr std::size_t kSharedBytes = sizeof(TileShared) +
 
 static_assert(kSharedBytes<kListedBeforeAmpere, true> <= 64 << 10, "what Turing has");
 static_assert(kSharedBytes<kListedBeforeAmpere, false, true> <= 64 << 10, "what Turing has");
-// Of each block a multiprocessor takes 1 KiB for itself.
+// What Hopper's multiprocessors have; of each block they take 1 KiB for themselves.
 static_assert(3 * (kSharedBytes<Team<384>::kMostListed, true> + 1024) <= 228 << 10, "three teams");
 static_assert(3 * (kSharedBytes<Team<kSlabTeam>::kMostListed, false, true> + 1024) <= 228 << 10);
 static_assert(2 * (kSharedBytes<Team<640>::kMostListed> + 1024) <= 228 << 10, "two teams");

@@ -122,11 +122,12 @@ struct alignas(64) LaunchRequest {
 
 /// How a launch of slabs stays for the next isovalue (stand_by.cuh).
 struct StandBy {
-  LaunchRequest* request;      ///< in the host's memory; null: it does not stay
-  LaunchRequest* passed_on;    ///< in the device's
-  std::uint32_t* ended;        ///< counts how often a block has ended an isovalue
-  std::uint32_t ended_before;  ///< of the launches before
-  std::uint64_t nanoseconds;   ///< that it waits after each isovalue
+  LaunchRequest* request;          ///< in the host's memory; null: it does not stay
+  LaunchRequest* passed_on;        ///< in the device's
+  std::uint32_t* ended;            ///< counts how often a block has ended an isovalue
+  std::uint32_t ended_before;      ///< of the launches before
+  std::uint64_t nanoseconds;       ///< that it waits after each isovalue
+  std::uint64_t most_nanoseconds;  ///< after which it asks for no further one
 };
 
 /// How a launch tells the host what it has made, and leaves everything as the next one needs it.

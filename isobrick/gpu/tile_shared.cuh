@@ -99,6 +99,7 @@ struct TeamBarriers {
 struct LaunchNow {
   OrderState *order, *next_order;
   std::uint32_t launch, epoch;
+  std::uint64_t began;      ///< on the device's clock
   std::uint32_t threshold;  ///< its bits
   float crossing;
   bool asked, leaves;

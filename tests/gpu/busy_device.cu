@@ -18,12 +18,13 @@ __device__ unsigned long long now() {
   return time;
 }
 
+/// `words`: to end, has ended, and for each block whether it has begun.
 __global__ void stay_until_told(unsigned* words) {
-  HostWord(words[0]).fetch_add(1);
+  HostWord(words[2 + blockIdx.x]).store(1);
   const unsigned long long start = now();
-  while (HostWord(words[1]).load() == 0 && now() - start < kMostNanoseconds) {
+  while (HostWord(words[0]).load() == 0 && now() - start < kMostNanoseconds) {
   }
-  HostWord(words[2]).store(1);
+  HostWord(words[1]).store(1);
 }
 
 }  // namespace
@@ -32,23 +33,27 @@ BusyDevice::BusyDevice(int left) {
   int processors = 0, shared = 0;
   gpu::check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, 0));
   gpu::check(cudaDeviceGetAttribute(&shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0));
+  const auto blocks = static_cast<unsigned>(std::max(processors - left, 1));
+  const std::size_t bytes = (2 + blocks) * sizeof *words_;
   gpu::check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
-  gpu::check(
-      cudaHostAlloc(reinterpret_cast<void**>(&words_), 3 * sizeof *words_, cudaHostAllocMapped));
-  words_[0] = words_[1] = words_[2] = 0;
+  gpu::check(cudaHostAlloc(reinterpret_cast<void**>(&words_), bytes, cudaHostAllocMapped));
+  std::fill_n(words_, 2 + blocks, 0u);
   // Each takes the shared memory of one.
   gpu::check(
       cudaFuncSetAttribute(stay_until_told, cudaFuncAttributeMaxDynamicSharedMemorySize, shared));
-  const auto blocks = static_cast<unsigned>(std::max(processors - left, 1));
   stay_until_told<<<blocks, 1, static_cast<std::size_t>(shared), stream_>>>(words_);
   gpu::check_launch("stay_until_told");
-  while (std::atomic_ref(words_[0]).load() < blocks) gpu::check(cudaPeekAtLastError());
+  const auto all_begun = [&] {
+    return std::all_of(words_ + 2, words_ + 2 + blocks,
+                       [](unsigned& word) { return std::atomic_ref(word).load() != 0; });
+  };
+  while (!all_begun() && !has_ended()) gpu::check(cudaPeekAtLastError());
 }
 
-bool BusyDevice::has_ended() const { return std::atomic_ref(words_[2]).load() != 0; }
+bool BusyDevice::has_ended() const { return std::atomic_ref(words_[1]).load() != 0; }
 
 BusyDevice::~BusyDevice() {
-  std::atomic_ref(words_[1]).store(1);
+  std::atomic_ref(words_[0]).store(1);
   (void)cudaStreamSynchronize(stream_);
   (void)cudaStreamDestroy(stream_);
   (void)cudaFreeHost(words_);

@@ -16,7 +16,7 @@ class BusyDevice {
 
  private:
   cudaStream_t stream_ = nullptr;
-  unsigned* words_ = nullptr;  ///< page-locked: multiprocessors taken, to end, has ended
+  unsigned* words_ = nullptr;  ///< page-locked
 };
 
 }  // namespace isobrick::testing

@@ -46,6 +46,15 @@ TYPED_TEST(GpuResident, ManyTilesAreFoundByALaunchOfTheirOwn) {
   compare(field, {mid}, options);
 }
 
+/// 64 × 64, as many as the host searches.
+TYPED_TEST(GpuResident, AsManyTilesAsTheHostSearches) {
+  const double mid = this->lowest() + 100;
+  const Field<TypeParam> field({2, 2041, 2040}, [&](Int3 p) {
+    return mid + static_cast<double>((p.x * 31 + p.y / 9 * 13 + p.z * p.z / 40) % 150 - 75);
+  });
+  compare(field, {mid, mid + 74, mid - 40}, {});
+}
+
 /// 33 × 34, which is too many to be found through an index without a launch.
 TYPED_TEST(GpuResident, ManyTilesAreFoundByTheHost) {
   const double mid = this->lowest() + 100;
