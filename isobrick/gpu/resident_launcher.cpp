@@ -202,8 +202,15 @@ void ResidentLauncher::say_end(TileParams& p) const {
       (words_.bytes() - offsetof(Counters, search_ticket)) / sizeof(std::uint32_t));
 }
 
+/// Active tiles: the host has found them, or there will be about as many as last time.
+std::uint32_t ResidentLauncher::expected_tiles(const FoundTiles& found,
+                                               const DeviceCounts& last) const {
+  return are_few() ? found.count : last.active_tiles;
+}
+
 void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room, const FoundTiles& found,
-                                    LaunchShape shape, bool stay) {
+                                    const DeviceCounts& last, bool stay) {
+  LaunchShape shape = shape_of(found, last);
   TileParams p = volume_.params();
   if (are_few()) {
     p.candidates = {volume_.tiles.data(), volume_.order_of_tile.data(), volume_.tile_count};
@@ -236,6 +243,9 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room, const
   // cannot begin.
   const bool one_each = shape.blocks == static_cast<int>(found.count) * shape.slabs;
   p.ticket = one_each ? nullptr : &counters()->extract_ticket;
+  // Where they take several tiles each; before, time would be lost.
+  if (expected_tiles(found, last) > 2u * static_cast<std::uint32_t>(shape.blocks))
+    p.begin_at_once = static_cast<std::uint32_t>(shape.processors);
   const bool stays = stay && shape.slabs > 1;
   if (stays) {
     shape.blocks = std::min(shapes_.slabs.blocks, static_cast<int>(volume_.tile_count * slabs()));
@@ -251,7 +261,7 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room, const
 
 /// Of no more blocks than there are tiles, or slabs.
 LaunchShape ResidentLauncher::shape_of(const FoundTiles& found, const DeviceCounts& last) const {
-  const std::uint32_t expected = are_few() ? found.count : last.active_tiles;
+  const std::uint32_t expected = expected_tiles(found, last);
   // A cell has two triangles, give or take.
   const std::uint64_t cells = last.triangles / 2 / std::max(last.active_tiles, 1u);
   LaunchShape shape = slabs() > 1 ? shapes_.in_slabs(expected) : shapes_.of(expected, cells);
@@ -274,7 +284,7 @@ bool ResidentLauncher::launch(double isovalue, const MeshRoom& room, const Devic
     dismiss();
     launch_search(isovalue);
   }
-  launch_tiles(isovalue, room, found, shape_of(found, last), stay);
+  launch_tiles(isovalue, room, found, last, stay);
   return true;
 }
 

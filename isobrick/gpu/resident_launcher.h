@@ -64,7 +64,8 @@ class ResidentLauncher {
   void launch_search(double isovalue);
   bool ask_standing(double isovalue, const FoundTiles& found);
   void launch_tiles(double isovalue, const MeshRoom& room, const FoundTiles& found,
-                    LaunchShape shape, bool stay);
+                    const DeviceCounts& last, bool stay);
+  std::uint32_t expected_tiles(const FoundTiles& found, const DeviceCounts& last) const;
   void say_end(TileParams& p) const;
   LaunchShape shape_of(const FoundTiles& found, const DeviceCounts& last) const;
   std::optional<DeviceCounts> read_report() const;

@@ -11,12 +11,6 @@ namespace isobrick::gpu {
 
 using PassedWord = cuda::atomic_ref<std::uint64_t, cuda::thread_scope_device>;
 
-__device__ inline std::uint64_t global_nanoseconds() {
-  std::uint64_t now;
-  asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(now));
-  return now;
-}
-
 /// What a launch is first asked for. One thread.
 __device__ inline void begin_launch(LaunchNow& now, const TileParams& p) {
   now.order = p.order;

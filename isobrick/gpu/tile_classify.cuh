@@ -185,8 +185,10 @@ __device__ inline void clear_lists(TileShared& s, std::uint32_t cells, std::uint
   using Spare = SpareThreads<N>;
   cells = (::min(cells, lists.kListed) + 3) / 4;
   vertices = (::min(vertices, lists.kListed) + 7) / 8;
+#pragma unroll 1
   for (unsigned i = Spare::own(); i < cells; i += Spare::kCount)
     reinterpret_cast<uint4*>(lists.cells)[i] = zero;
+#pragma unroll 1
   for (unsigned i = Spare::own(); i < vertices; i += Spare::kCount)
     reinterpret_cast<uint4*>(lists.vertex_marks)[i] = zero;
 }

@@ -58,6 +58,7 @@ __global__ void __launch_bounds__(N, Team<N>::kTeams)
   extern __shared__ __align__(256) unsigned char bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(bytes);
   constexpr bool kSlab = Team<N>::kSlabs > 1;
+  if constexpr (!kSlab) begin_in_turns(p);
   const std::uint32_t first = first_number(p);
   if constexpr (!kSlab) {
     if (p.candidates.count > 0) take_found(s, p);
@@ -223,7 +224,9 @@ LaunchShapes launch_shapes(const TileKernel& kernel, int threads) {
   if (threads > 0) check_threads(kernel, threads);
   const auto shape_of = [&](int team) {
     return visit_launcher(kernel, team, [&](auto l) {
-      return LaunchShape{l.blocks(), team, l.kSlabs, l.shared(), l.listed(), l.may_start_early()};
+      const int processors = device_attribute(cudaDevAttrMultiProcessorCount);
+      return LaunchShape{l.blocks(), team,       l.kSlabs,           l.shared(),
+                         l.listed(), processors, l.may_start_early()};
     });
   };
   LaunchShapes shapes;

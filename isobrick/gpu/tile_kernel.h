@@ -24,6 +24,7 @@ struct LaunchShape {
   int blocks = 0, threads = 0, slabs = 1;
   std::size_t shared_bytes = 0;  ///< of each
   std::uint32_t listed = 0;      ///< cells of a tile; fuller tiles are listed in turns
+  int processors = 0;            ///< that the blocks are dealt out to
   bool may_start_early = false;  ///< the code that runs waits for the launch before it
 };
 

@@ -114,6 +114,7 @@ template <int N>
 __device__ inline std::uint32_t triangles_before(TileShared& s, std::uint32_t groups) {
   const auto& lists = lists_of<N>(s);
   std::uint32_t sum = 0;
+#pragma unroll 1
   for (std::uint32_t i = lane_id(); i < groups; i += 32) sum += lists.group_triangles[i];
   return warp_sum(sum);
 }

@@ -168,22 +168,33 @@ __device__ inline void emit_all_triangles(TileShared& s, const TileParams& p) {
   }
 }
 
+/// Whether so many vertices are left that a warp which comes late may take some as well: others
+/// would wait for it.
+template <int N>
+__device__ inline bool can_help(TileShared& s) {
+  const std::uint32_t taken = BlockWord(s.next_vertices).load(cuda::memory_order_relaxed);
+  return Team<N>::kWarps == 1 || uniform(taken) + Team<N>::kWarps <= (s.all_vertices + 31) / 32;
+}
+
 /// Of a counted tile.
 template <int N, class T, bool Normals, bool Nan>
 __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
   constexpr bool kSlab = Team<N>::kSlabs > 1;
   find_places<N, Nan>(s, p);
   const bool at_once = listed_at_once<N, Nan>(s);
-  if (!kSlab || !at_once || warp_id() != Team<N>::kVertices) emit_all_vertices<N, T, Normals>(s, p);
+  const bool has_asked = at_once && warp_id() == Team<N>::kVertices;
+  if (!has_asked || (!kSlab && can_help<N>(s))) emit_all_vertices<N, T, Normals>(s, p);
   // After the vertices, which read the tile's samples once more. Wider samples of the tiles
   // in work fill the L2 cache alone, and would be driven out.
   if constexpr (sizeof(T) == 1 && Team<N>::kSlabs == 1)
-    prefetch_tile<N, T>(s, p, s.item + gridDim.x);
-  if (!at_once || kSlab)
+    if (warp_id() == Team<N>::kWarps - 1) prefetch_tile<N, T>(s, p, s.item + gridDim.x);
+  if (!at_once || kSlab) {
     __syncthreads();
-  else if (warp_id() != Team<N>::kVertices)
-    wait(s.barriers.neighbours, s.barriers.turn);
-  number_at_0<N>(s);
+    number_at_0<N>(s);
+  } else {
+    if (!has_asked) wait(s.barriers.neighbours, s.barriers.turn);
+    number_at_0<N, true>(s);
+  }
   // Elsewhere the first warp may still make vertices.
   if constexpr (!kSlab) __syncthreads();
   borrow_rows<N>(s);

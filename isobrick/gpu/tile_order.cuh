@@ -16,6 +16,7 @@ inline constexpr unsigned long long kOwnSum = 1ull << 62, kFullSum = 2ull << 62,
 using DeviceWord = cuda::atomic_ref<unsigned long long, cuda::thread_scope_device>;
 using HostWord = cuda::atomic_ref<std::uint64_t, cuda::thread_scope_system>;
 using DeviceFlag = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>;
+using BlockWord = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_block>;
 
 /// Where a launch may start before the one before it on the stream has ended: the latter says
 /// so, and the former waits for what it writes. Before Hopper launches do not overlap.
@@ -303,14 +304,14 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
 
 /// The numbers of vertices that cells at x = 0 have at sample 0: an edge there is
 /// the one before the row's others, or the last of its kind in the row of the
-/// tile before.
-template <int N>
+/// tile before. `BesideFirst` as for pieces.
+template <int N, bool BesideFirst = false>
 __device__ inline void number_at_0(TileShared& s) {
   const RowTable* before = s.before;
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
   const SlabPlanes planes = planes_of<N>(s.item);
-  for_each_piece<N>(planes.first, planes.counted_end, [&](auto rows) {
+  for_each_piece<N, BesideFirst>(planes.first, planes.counted_end, [&](auto rows) {
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();
@@ -369,14 +370,15 @@ __device__ inline void borrow_rows(TileShared& s) {
 }
 
 /// The numbers in the mesh from those in the tile. The lower of a cell's edges along
-/// y and z are counted by the mask of its upper ones, so one too many.
+/// y and z are counted by the mask of its upper ones, so one too many. The last warp: the first
+/// ones have other rows to see to.
 template <int N>
 __device__ inline void place_numbers(TileShared& s) {
-  for (unsigned t = own_thread(); t < 24; t += N) {
-    const unsigned e = t % 12, at_0 = t / 12;
-    const bool lower = e >= 4 && (e & 1u) == 0;
-    s.places[at_0][e].addend = s.number_base - (lower && !at_0 ? 1u : 0u);
-  }
+  const unsigned t = own_thread() - (N - 32);
+  if (t >= 24) return;
+  const unsigned e = t % 12, at_0 = t / 12;
+  const bool lower = e >= 4 && (e & 1u) == 0;
+  s.places[at_0][e].addend = s.number_base - (lower && !at_0 ? 1u : 0u);
 }
 
 }  // namespace isobrick::gpu

@@ -181,6 +181,7 @@ struct TileParams {
   RowTable* row_tables;
   OrderState* order;                       ///< one an item, zeroed
   std::uint32_t* ticket;                   ///< zeroed; null: block i takes item i
+  std::uint32_t begin_at_once;             ///< blocks; others begin later (begin_in_turns); 0: all
   std::uint32_t epoch;                     ///< never 0, new for each isovalue
   const unsigned long long* number_start;  ///< vertices of the launches before
   unsigned long long* number_end;          ///< and of this one, once it is over

@@ -64,8 +64,9 @@ struct SpareThreads {
 
 /// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp: of a slab, those of its planes
 /// `first` to `end`; of a whole tile, all. Loops, so that the code of each kind is there once:
-/// warps in different steps share the instruction cache.
-template <int N, class F>
+/// warps in different steps share the instruction cache. `BesideFirst`: the first warp of several
+/// has something else to do and gets no planes, but the last rows.
+template <int N, bool BesideFirst = false, class F>
 __device__ inline void for_each_piece(int first, int end, F&& f) {
   auto piece = static_cast<int>(uniform(warp_id()));
   if constexpr (Team<N>::kSlabs > 1) {
@@ -76,10 +77,14 @@ __device__ inline void for_each_piece(int first, int end, F&& f) {
     else if (first + piece == end)
       f(LastRows{first, end});
   } else {
+    constexpr bool kBeside = BesideFirst && Team<N>::kWarps > 1;
+    constexpr int kStep = Team<N>::kWarps - (kBeside ? 1 : 0);
+    if (kBeside) piece = piece == 0 ? 33 : piece - 1;
 #pragma unroll 1
-    for (; piece < 33; piece += Team<N>::kWarps) f(PlaneRows{piece});
+    for (; piece < 33; piece += kStep) f(PlaneRows{piece});
+    if (kBeside && uniform(warp_id()) != 0) return;
 #pragma unroll 1
-    for (; piece < kPieces; piece += Team<N>::kWarps) f(LastRows{32 * (piece - 33), 33});
+    for (; piece < kPieces; piece += kBeside ? 1 : kStep) f(LastRows{32 * (piece - 33), 33});
   }
 }
 

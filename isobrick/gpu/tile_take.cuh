@@ -59,6 +59,17 @@ __device__ inline TileItem item_of(TileShared& s, const TileParams& p, std::uint
   return {tile[0], tile[1], tile[2], number};
 }
 
+/// Waits for as long as this block is to begin after the first ones. Where a launch fills the
+/// device, the blocks of a multiprocessor would all be in the same step for several tiles, wait
+/// for memory and then for instructions. Before a block takes a tile, so that nobody waits for it.
+__device__ inline void begin_in_turns(const TileParams& p) {
+  if (p.begin_at_once == 0) return;
+  constexpr std::uint64_t kNanosecondsApart = 2500;  // of some 17,000 that a tile takes
+  const std::uint64_t later = kNanosecondsApart * (blockIdx.x / p.begin_at_once);
+  const std::uint64_t start = global_nanoseconds();
+  while (global_nanoseconds() - start < later) __nanosleep(200);
+}
+
 /// Which tile is the next. The first thread; others get anything.
 __device__ inline std::uint32_t next_number(const TileParams& p) {
   return threadIdx.x == 0 ? atomicAdd(p.ticket, 1u) : 0;
@@ -83,11 +94,11 @@ __device__ inline void take_tile(TileShared& s, const TileParams& p, std::uint32
   }
 }
 
-/// Brings the samples of a tile that is about to be taken into the L2 cache.
+/// Brings the samples of a tile that is about to be taken into the L2 cache. One warp.
 template <int N, class T>
 __device__ inline void prefetch_tile(TileShared& s, const TileParams& p, std::uint32_t number) {
   if (number >= s.items) return;
-  constexpr std::size_t bytes = kPageSamples * sizeof(T);
+  constexpr std::uint32_t kLine = 128, kBytes = kPageSamples * sizeof(T);
   const char* from = static_cast<const char*>(p.pages);
   if (p.links) {
     from += streamed_page(number, kOwnPage) * static_cast<std::int64_t>(sizeof(T));
@@ -97,9 +108,11 @@ __device__ inline void prefetch_tile(TileShared& s, const TileParams& p, std::ui
         (static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] + item.x;
     const std::uint32_t page = page_of_place(p, place);
     if (page == p.fill_page) return;
-    from += page * bytes;
+    from += static_cast<std::size_t>(page) * kBytes;
   }
-  for (std::size_t at = own_thread() * 128; at < bytes; at += N * 128)
+  from += kLine * lane_id();
+#pragma unroll
+  for (std::uint32_t at = 0; at < kBytes; at += 32 * kLine)
     asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
 }
 
