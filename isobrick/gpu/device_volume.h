@@ -47,9 +47,10 @@ struct ResidentTuning {
   /// Threads that share a tile: 0 chooses, 384, 640 and 1024 always work, 32, 64,
   /// 128, 256 and 512 for u8 without normals.
   int threads = 0;
-  /// Of small volumes (up to 128 tiles of 32³, without NaN) an extraction stays on the device for so
-  /// long, for the next isovalue, where the last ones came sooner than that after each other, and
-  /// `threads` is 0. Other work may have to wait until no more come. 0: it does not stay.
+  /// Of small volumes (up to 128 tiles of 32³, without NaN) an extraction stays on the device for
+  /// so long, for the next isovalue, where the last ones came sooner than that after each other,
+  /// and `threads` is 0. Other work may have to wait for a millisecond, or that long. 0: it does
+  /// not stay.
   std::chrono::nanoseconds patience = std::chrono::microseconds(20);
 };
 
@@ -74,10 +75,12 @@ class ResidentExtractor {
   /// The mesh of `isovalue`, in device memory until the next call. Grows the
   /// buffers and repeats when it does not fit them.
   DeviceCounts extract(double isovalue);
-  /// Makes the last mesh once more, without waiting; for measuring.
-  void repeat();
-  /// Milliseconds on the device of the last repeat(), with the searches that it makes: the host
-  /// searches up to 4,096 tiles by their ranges, 1,024 through an index.
+  /// Makes the last mesh once more, without waiting; for measuring. `queued`: the stream begins
+  /// only once all of it is there, as where launches follow one another.
+  void repeat(bool queued = false);
+  /// Milliseconds of the last repeat() on the stream, with the searches that it makes: the host
+  /// searches up to 4,096 tiles by their ranges, 1,024 through an index. What the host does before
+  /// it has launched is part of it, but not of one that was queued.
   float milliseconds();
 
   /// Copies the last mesh to the host.

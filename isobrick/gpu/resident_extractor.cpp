@@ -1,3 +1,4 @@
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -11,6 +12,22 @@ namespace {
 /// Mesh to expect of a tile before anything is known: a sheet across it, twice.
 constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
 
+/// Whether what is on the stream waits for more.
+using Gate = std::atomic<bool>;
+class Closed {
+ public:
+  Closed(Gate& gate, bool closed) : gate_(gate) { gate_ = closed; }
+  Closed(const Closed&) = delete;
+  Closed& operator=(const Closed&) = delete;
+  ~Closed() {
+    gate_ = false;
+    gate_.notify_all();
+  }
+
+ private:
+  Gate& gate_;
+};
+
 }  // namespace
 
 struct ResidentExtractor::Impl {
@@ -20,6 +37,7 @@ struct ResidentExtractor::Impl {
   DeviceCounts made;  ///< by the last extraction
   DeviceCounts last;  ///< what the last launch would have made
   Event start, end;
+  Gate gate = false;
 
   Impl(DeviceVolume& volume, const SurfaceOptions& options, const ResidentTuning& tuning)
       : launcher(volume.impl(), options, tuning) {}
@@ -74,11 +92,17 @@ struct ResidentExtractor::Impl {
     }
   }
 
-  void repeat() {
+  void repeat(bool queued) {
+    const Stream& stream = launcher.stream();
     launcher.dismiss();
-    start.record(launcher.stream());
+    const Closed closed(gate, queued);
+    if (queued)
+      check(cudaLaunchHostFunc(
+          stream.get(), [](void* waited_for) { static_cast<Gate*>(waited_for)->wait(true); },
+          &gate));
+    start.record(stream);
     launcher.launch(isovalue, room, last, false);
-    end.record(launcher.stream());
+    end.record(stream);
   }
 
   void download(MeshBuffer& mesh) {
@@ -105,7 +129,7 @@ ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions&
 ResidentExtractor::~ResidentExtractor() = default;
 
 DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
-void ResidentExtractor::repeat() { impl_->repeat(); }
+void ResidentExtractor::repeat(bool queued) { impl_->repeat(queued); }
 
 float ResidentExtractor::milliseconds() {
   impl_->end.wait();
