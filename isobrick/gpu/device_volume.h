@@ -49,8 +49,8 @@ struct ResidentTuning {
   int threads = 0;
   /// Of small volumes (up to 128 tiles of 32³, without NaN) an extraction stays on the device for
   /// so long, for the next isovalue, where the last ones came sooner than that after each other,
-  /// and `threads` is 0. Other work may have to wait for a millisecond, or that long. 0: it does
-  /// not stay.
+  /// and `threads` is 0. Other work may have to wait for a millisecond or three times as long as
+  /// this. 0: it does not stay.
   std::chrono::nanoseconds patience = std::chrono::microseconds(20);
 };
 
@@ -75,8 +75,9 @@ class ResidentExtractor {
   /// The mesh of `isovalue`, in device memory until the next call. Grows the
   /// buffers and repeats when it does not fit them.
   DeviceCounts extract(double isovalue);
-  /// Makes the last mesh once more, without waiting; for measuring. `queued`: the stream begins
-  /// only once all of it is there, as where launches follow one another.
+  /// Makes the last mesh once more, without waiting for it; for measuring, after an extract().
+  /// `queued`: once the stream has nothing to do, and it begins only when all of it is there, as
+  /// where launches follow one another.
   void repeat(bool queued = false);
   /// Milliseconds of the last repeat() on the stream, with the searches that it makes: the host
   /// searches up to 4,096 tiles by their ranges, 1,024 through an index. What the host does before

@@ -95,6 +95,7 @@ struct ResidentExtractor::Impl {
   void repeat(bool queued) {
     const Stream& stream = launcher.stream();
     launcher.dismiss();
+    if (queued) stream.wait();  // nobody sleeps at a gate that is open for a moment only
     const Closed closed(gate, queued);
     if (queued)
       check(cudaLaunchHostFunc(

@@ -52,7 +52,7 @@ __device__ inline std::uint64_t ask_host(TileShared& s, const TileParams& p) {
   const StandBy& by = p.stand_by;
   const bool has_word = lane_id() < LaunchRequest::kWords;
   std::uint64_t start = global_nanoseconds();
-  const bool long_enough = start - s.now.began > by.most_nanoseconds;
+  const bool long_enough = __any_sync(kAll, start - s.now.began > by.most_nanoseconds);
   std::uint64_t word = 0;
   bool ended = false, asked = false;
   do {
