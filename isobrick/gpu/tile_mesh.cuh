@@ -183,9 +183,8 @@ __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
   find_places<N, Nan>(s, p);
   const bool at_once = listed_at_once<N, Nan>(s);
   const bool has_asked = at_once && warp_id() == Team<N>::kVertices;
-  // With normals vertices are most of the work, and all warps make them (docs/gpu.md).
-  constexpr bool kAlike = Normals && !kSlab;
-  if (kAlike || !has_asked || (!kSlab && can_help<N>(s))) emit_all_vertices<N, T, Normals>(s, p);
+  // With normals vertices are most of the work, and all warps make them.
+  if (!has_asked || (!kSlab && (Normals || can_help<N>(s)))) emit_all_vertices<N, T, Normals>(s, p);
   // After the vertices, which read the tile's samples once more. Wider samples of the tiles
   // in work fill the L2 cache alone, and would be driven out.
   if constexpr (sizeof(T) == 1 && Team<N>::kSlabs == 1)
@@ -195,7 +194,7 @@ __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
     number_at_0<N>(s);
   } else {
     if (!has_asked) wait(s.barriers.neighbours, s.barriers.turn);
-    number_at_0<N, !kAlike>(s);
+    number_at_0<N, !Normals>(s);
   }
   // Elsewhere the first warp may still make vertices.
   if constexpr (!kSlab) __syncthreads();

@@ -198,12 +198,6 @@ __device__ inline unsigned own_thread() {
   asm volatile("mov.u32 %0, %%tid.x;" : "=r"(thread));
   return thread;
 }
-/// Of the device's clock.
-__device__ inline std::uint64_t global_nanoseconds() {
-  std::uint64_t now;
-  asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(now));
-  return now;
-}
 __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
 
 /// What all threads of a warp have alike, so that the compiler knows it too: loops

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "isobrick/gpu/device_clock.cuh"
 #include "isobrick/gpu/streamed_pages.cuh"
 #include "isobrick/gpu/tile_classify.cuh"
 #include "isobrick/gpu/tile_find.cuh"

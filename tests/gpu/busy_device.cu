@@ -3,6 +3,7 @@
 #include <cuda/atomic>
 
 #include "isobrick/gpu/cuda_check.h"
+#include "isobrick/gpu/device_clock.cuh"
 #include "tests/gpu/busy_device.h"
 
 namespace isobrick::testing {
@@ -10,19 +11,13 @@ namespace {
 
 using HostWord = cuda::atomic_ref<unsigned, cuda::thread_scope_system>;
 
-constexpr unsigned long long kMostNanoseconds = 3'000'000'000;
-
-__device__ unsigned long long now() {
-  unsigned long long time;
-  asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(time));
-  return time;
-}
+constexpr std::uint64_t kMostNanoseconds = 3'000'000'000;
 
 /// `words`: to end, has ended, and for each block whether it has begun.
 __global__ void stay_until_told(unsigned* words) {
   HostWord(words[2 + blockIdx.x]).store(1);
-  const unsigned long long start = now();
-  while (HostWord(words[0]).load() == 0 && now() - start < kMostNanoseconds) {
+  const std::uint64_t start = gpu::global_nanoseconds();
+  while (HostWord(words[0]).load() == 0 && gpu::global_nanoseconds() - start < kMostNanoseconds) {
   }
   HostWord(words[1]).store(1);
 }
