@@ -10,7 +10,6 @@
 #include <tbb/task_arena.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -20,6 +19,7 @@
 
 #include "bench/bandwidth.h"
 #include "bench/median.h"
+#include "bench/resident_times.h"
 #include "bench/volume.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/error.h"
@@ -87,31 +87,6 @@ bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(V)) == 0;
 }
 
-/// Milliseconds from an isovalue that was another one before to the mesh in device memory, its
-/// size known to the caller.
-double wall_milliseconds(gpu::ResidentExtractor& extractor, double isovalue, int runs) {
-  std::vector<double> times;
-  for (int i = 0; i < runs; ++i) {
-    extractor.extract(std::nextafter(isovalue, HUGE_VAL));
-    const auto start = Clock::now();
-    extractor.extract(isovalue);
-    times.push_back(std::chrono::duration<double>(Clock::now() - start).count() * 1e3);
-  }
-  return median(times);
-}
-
-/// Sorted, by events.
-std::vector<float> repeat_milliseconds(gpu::ResidentExtractor& extractor, int runs, bool queued) {
-  std::vector<float> times;
-  for (int i = -3; i < runs; ++i) {
-    extractor.repeat(queued);
-    const float ms = extractor.milliseconds();
-    if (i >= 0) times.push_back(ms);
-  }
-  std::sort(times.begin(), times.end());
-  return times;
-}
-
 int run(const Arguments& a) {
   const Volume v = read_volume(a);
   if (!a.write_raw.empty()) {
@@ -155,10 +130,12 @@ int run(const Arguments& a) {
   const double floor = (read / bandwidth.read + written / bandwidth.write) * 1e3;
   const float middle = median(times);
   const std::uint64_t extra_bytes = extractor.bytes();
-  const double wall = wall_milliseconds(extractor, options.isovalue, a.runs);
+  const double other = std::nextafter(options.isovalue, HUGE_VAL);
+  const double wall = changed_isovalue_seconds(extractor, options.isovalue, other, a.runs) * 1e3;
   tuning.patience = {};  // each launched by itself
   gpu::ResidentExtractor impatient(resident, options, tuning);
-  const double wall_alone = wall_milliseconds(impatient, options.isovalue, a.runs);
+  const double wall_alone =
+      changed_isovalue_seconds(impatient, options.isovalue, other, a.runs) * 1e3;
   out["extent"] = {v.extent.x, v.extent.y, v.extent.z};
   out["type"] = short_name(v.type);
   out["isovalue"] = options.isovalue;

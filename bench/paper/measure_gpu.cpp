@@ -4,11 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 #include <functional>
 
 #include "bench/median.h"
+#include "bench/resident_times.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/morton.h"
@@ -21,7 +21,6 @@
 namespace isobrick::bench {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using gpu::TileSearch;
 
 constexpr int kFrames = 101;
@@ -90,28 +89,15 @@ class GpuMeasurement {
            volume_, "the mesh");
     tuning.patience = {};
     gpu::ResidentExtractor impatient(resident_, surface_, tuning);
-    std::vector<double> device;
-    for (int i = 0; i < kFrames; ++i) {
-      extractor.repeat();
-      device.push_back(extractor.milliseconds() * 1e-3);
-    }
+    const double device = median(repeat_milliseconds(extractor, kFrames, false)) * 1e-3;
     return {{"contour_s", contour_seconds(extractor)},
             {"alone_s", contour_seconds(impatient)},
-            {"device_s", median(device)},
+            {"device_s", device},
             {"extra_bytes", extractor.bytes()}};
   }
 
-  /// Seconds from an isovalue that was another one before to the mesh in device
-  /// memory, its size known to the caller.
   double contour_seconds(gpu::ResidentExtractor& extractor) const {
-    std::vector<double> seconds;
-    for (int i = 0; i < kFrames; ++i) {
-      extractor.extract(volume_.isovalue + 1);
-      const auto start = Clock::now();
-      extractor.extract(volume_.isovalue);
-      seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
-    }
-    return median(seconds);
+    return changed_isovalue_seconds(extractor, volume_.isovalue, volume_.isovalue + 1, kFrames);
   }
 
   /// Seconds on the device of a search, from the isovalue to the ids.
