@@ -1,169 +1,15 @@
 #include "isobrick/gpu/search_kernel.h"
 
-#include "isobrick/core/range.h"
 #include "isobrick/gpu/cuda_check.h"
 #include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/tile_order.cuh"
-#include "isobrick/gpu/tile_page.cuh"
+#include "isobrick/gpu/search_tiles.cuh"
 
 namespace isobrick::gpu {
-namespace {
-
-constexpr int kThreads = 256, kWarps = kThreads / 32;
-constexpr int kTilesOfThread = static_cast<int>(kTilesOfSearchBlock) / kThreads;
-
-/// Of one value a warp: the sum before this warp and of all.
-struct SumOfWarps {
-  std::uint32_t before, all;
-};
-
-__device__ SumOfWarps sum_of_warps(const std::uint32_t* values) {
-  SumOfWarps sum;
-  const std::uint32_t v = lane_id() < kWarps ? values[lane_id()] : 0;
-  sum.all = warp_sum(v);
-  sum.before = warp_sum(lane_id() < warp_id() ? v : 0u);
-  return sum;
-}
-
-/// Where tile (t[0], t[1], t[2]) lies in C order [z, y, x].
-__device__ std::size_t place_of(const std::int32_t* t, const std::int32_t (&grid)[3]) {
-  return (static_cast<std::size_t>(t[2]) * grid[1] + t[1]) * grid[0] + t[0];
-}
-
-template <class T>
-__device__ bool is_stabbed(const SearchParams& p, std::uint32_t i) {
-  if (p.test == TileTest::all) return true;
-  if (p.test == TileTest::ranges) {
-    const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
-    return static_cast<double>(range[0]) < p.isovalue &&
-           p.isovalue <= static_cast<double>(range[1]);
-  }
-  const std::size_t bit = p.test == TileTest::mask_by_order
-                              ? i
-                              : place_of(p.tiles + 3 * static_cast<std::size_t>(i), p.grid);
-  return p.mask[bit >> 5] >> (bit & 31) & 1u;
-}
-
-/// Whether the isovalue stabs the tile's range and the region of interest leaves it a cell.
-template <class T>
-__device__ bool is_active(const SearchParams& p, std::uint32_t i) {
-  if (!is_stabbed<T>(p, i)) return false;
-  if (p.uncut) return true;
-#pragma unroll
-  for (int axis = 0; axis < 3; ++axis) {
-    const int origin = p.tiles[3 * static_cast<std::size_t>(i) + axis] * 32;
-    if (::min(p.roi_hi[axis] - 1, origin + 32) <= ::max(p.roi_lo[axis], origin)) return false;
-  }
-  return true;
-}
-
-template <class T>
-__global__ void __launch_bounds__(kThreads) search_tiles(const __grid_constant__ SearchParams p) {
-  __shared__ std::uint32_t warp_sums[kWarps];
-  __shared__ std::uint32_t block;
-  __shared__ unsigned long long base;
-  let_next_launch_start();
-  if (threadIdx.x == 0) block = atomicAdd(p.ticket, 1u);
-  __syncthreads();
-  const std::uint32_t first = block * kTilesOfSearchBlock + threadIdx.x * kTilesOfThread;
-  bool active[kTilesOfThread];
-  std::uint32_t own = 0;
-#pragma unroll
-  for (int i = 0; i < kTilesOfThread; ++i) {
-    active[i] = first + i < p.count && is_active<T>(p, first + i);
-    own += active[i];
-  }
-  const std::uint32_t sum = warp_inclusive_sum(own);
-  if (lane_id() == 31) warp_sums[threadIdx.x >> 5] = sum;
-  __syncthreads();
-  const SumOfWarps warps = sum_of_warps(warp_sums);
-  if (threadIdx.x < 32) {
-    if (lane_id() == 0) publish_sum(p.sums[block], block, warps.all);
-    const unsigned long long before = sum_before(
-        [&](std::uint32_t i) -> unsigned long long& { return p.sums[i]; }, block, warps.all);
-    if (lane_id() == 0) {
-      base = before;
-      if ((block + 1) * kTilesOfSearchBlock >= p.count) {
-        const auto found = static_cast<std::uint32_t>(before + warps.all);
-        *p.found = found;
-        *p.item_count = found <= p.item_room ? found : 0;
-      }
-    }
-  }
-  __syncthreads();
-  auto place = static_cast<std::uint32_t>(base) + warps.before + sum - own;
-#pragma unroll
-  for (int i = 0; i < kTilesOfThread; ++i) {
-    if (first + i >= p.count) return;
-    const std::int32_t* t = p.tiles + 3 * static_cast<std::size_t>(first + i);
-    const std::size_t at = place_of(t, p.grid);
-    p.slot_of_tile[at] = active[i] ? place : kNone;
-    if (!active[i]) continue;
-    p.items[place] = {t[0], t[1], t[2], place};
-    p.order[place] = {0, 0};
-    ++place;
-  }
-}
-
-struct Grid {
-  std::int32_t extent[3];
-};
-
-template <class T>
-__global__ void __launch_bounds__(kThreads)
-    place_ranges(const std::int32_t* tiles, std::uint32_t count, const Grid grid,
-                 const ValueRange<T>* ranges, ValueRange<T>* placed) {
-  const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
-  if (i < count) placed[place_of(tiles + 3 * static_cast<std::size_t>(i), grid.extent)] = ranges[i];
-}
-
-template <class T>
-__global__ void __launch_bounds__(kThreads)
-    find_tile_ranges(const __grid_constant__ TileParams p, const std::int32_t* tiles, T* ranges) {
-  __shared__ T least[kWarps], most[kWarps];
-  const std::int32_t* t = tiles + 3 * static_cast<std::size_t>(blockIdx.x);
-  ValueRange<T> range;
-  for (int i = static_cast<int>(threadIdx.x); i < 33 * 33 * 33; i += kThreads) {
-    const int x = i % 33, y = i / 33 % 33, z = i / (33 * 33);
-    if (t[0] * 32 + x >= p.extent[0] || t[1] * 32 + y >= p.extent[1] ||
-        t[2] * 32 + z >= p.extent[2])
-      continue;
-    const std::int64_t place =
-        (static_cast<std::int64_t>(t[2] + (z >> 5)) * p.tiles[1] + t[1] + (y >> 5)) * p.tiles[0] +
-        t[0] + (x >> 5);
-    const std::size_t page = page_of_place(p, place);
-    range.include(static_cast<const T*>(
-        p.pages)[page * kPageSamples + ((z & 31) << 10 | (y & 31) << 5 | (x & 31))]);
-  }
-  const auto merge = [&](T lo, T hi) { range.include(ValueRange<T>{lo, hi}); };
-#pragma unroll
-  for (int d = 16; d; d /= 2)
-    merge(static_cast<T>(__shfl_xor_sync(kAll, range.lo, d)),
-          static_cast<T>(__shfl_xor_sync(kAll, range.hi, d)));
-  if (lane_id() == 0) {
-    least[threadIdx.x >> 5] = range.lo;
-    most[threadIdx.x >> 5] = range.hi;
-  }
-  __syncthreads();
-  if (threadIdx.x != 0) return;
-  for (int w = 1; w < kWarps; ++w) merge(least[w], most[w]);
-  ranges[2 * static_cast<std::size_t>(blockIdx.x)] = range.lo;
-  ranges[2 * static_cast<std::size_t>(blockIdx.x) + 1] = range.hi;
-}
-
-template <class T>
-__global__ void __launch_bounds__(kThreads) copy_first_columns(const T* pages, T* columns) {
-  const std::size_t page = blockIdx.x;
-  for (unsigned i = threadIdx.x; i < kColumnSamples; i += kThreads)
-    columns[page * kColumnSamples + i] = pages[page * kPageSamples + 32 * i];
-}
-
-}  // namespace
 
 void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream) {
   const auto blocks = (params.count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
   visit_device_scalar(type, [&](auto tag) {
-    search_tiles<typename decltype(tag)::type><<<blocks, kThreads, 0, stream>>>(params);
+    search_tiles<typename decltype(tag)::type><<<blocks, kSearchThreads, 0, stream>>>(params);
   });
   check_launch("search_tiles");
 }
@@ -173,8 +19,8 @@ void launch_place_ranges(ScalarType type, const std::int32_t* tiles, std::uint32
                          cudaStream_t stream) {
   visit_device_scalar(type, [&](auto tag) {
     using Range = ValueRange<typename decltype(tag)::type>;
-    place_ranges<<<(count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(
-        tiles, count, Grid{{grid[0], grid[1], grid[2]}}, static_cast<const Range*>(ranges),
+    place_ranges<<<(count + kSearchThreads - 1) / kSearchThreads, kSearchThreads, 0, stream>>>(
+        tiles, count, TileGrid{{grid[0], grid[1], grid[2]}}, static_cast<const Range*>(ranges),
         static_cast<Range*>(placed));
   });
   check_launch("place_ranges");
@@ -184,7 +30,8 @@ void launch_tile_ranges(ScalarType type, const TileParams& params, const std::in
                         std::uint32_t count, void* ranges, cudaStream_t stream) {
   visit_device_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    find_tile_ranges<T><<<count, kThreads, 0, stream>>>(params, tiles, static_cast<T*>(ranges));
+    find_tile_ranges<T>
+        <<<count, kSearchThreads, 0, stream>>>(params, tiles, static_cast<T*>(ranges));
   });
   check_launch("find_tile_ranges");
 }
@@ -193,8 +40,8 @@ void launch_first_columns(ScalarType type, const void* pages, std::uint32_t coun
                           cudaStream_t stream) {
   visit_device_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    copy_first_columns<<<count, kThreads, 0, stream>>>(static_cast<const T*>(pages),
-                                                       static_cast<T*>(columns));
+    copy_first_columns<<<count, kSearchThreads, 0, stream>>>(static_cast<const T*>(pages),
+                                                             static_cast<T*>(columns));
   });
   check_launch("copy_first_columns");
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include "isobrick/gpu/device_clock.cuh"
 #include "isobrick/gpu/tile_take.cuh"
 
 // A launch of slabs that stays for the next isovalue. It costs a launch and its report 7 µs to

@@ -22,8 +22,7 @@ __device__ inline std::uint32_t address_of(const unsigned long long& barrier) {
 /// `warps` arrive each time. One thread, once a block.
 __device__ inline void init_barrier(unsigned long long& barrier, int warps) {
 #if __CUDA_ARCH__ >= 800
-  asm volatile("mbarrier.init.shared.b64 [%0], %1;" ::"r"(address_of(barrier)), "r"(32 * warps)
-               : "memory");
+  init_barrier_at(address_of(barrier), 32 * warps);
 #endif
 }
 
@@ -33,30 +32,17 @@ __device__ inline void init_barrier(unsigned long long& barrier, int warps) {
 __device__ inline void arrive(unsigned long long& barrier) {
   __syncwarp();
 #if __CUDA_ARCH__ >= 800
-  asm volatile(
-      "{.reg .b64 state; mbarrier.arrive.shared.b64 state, [%0];}" ::"r"(address_of(barrier))
-      : "memory");
+  arrive_at(address_of(barrier));
 #endif
 }
 
 /// Whether all have arrived that often: `turn` is 0 for the first time, 1 for the second, 0 again.
-/// From Hopper on a thread may sleep for a while before it is told that they have not.
 __device__ inline bool have_arrived(const unsigned long long& barrier, std::uint32_t turn) {
-  std::uint32_t over = 1;
-#if __CUDA_ARCH__ >= 900
-#define ISOBRICK_MBARRIER_WAIT "mbarrier.try_wait.parity"
-#else
-#define ISOBRICK_MBARRIER_WAIT "mbarrier.test_wait.parity"
-#endif
 #if __CUDA_ARCH__ >= 800
-  asm volatile("{.reg .pred over; " ISOBRICK_MBARRIER_WAIT
-               ".shared.b64 over, [%1], %2; selp.u32 %0, 1, 0, over;}"
-               : "=r"(over)
-               : "r"(address_of(barrier)), "r"(turn)
-               : "memory");
+  return is_phase_over(address_of(barrier), turn);
+#else
+  return true;
 #endif
-#undef ISOBRICK_MBARRIER_WAIT
-  return over != 0;
 }
 
 __device__ inline void wait(const unsigned long long& barrier, std::uint32_t turn) {

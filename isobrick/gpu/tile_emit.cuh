@@ -181,18 +181,11 @@ __device__ inline void fill_tables(TileShared& s, const CaseTable* cases) {
   }
 }
 
-/// The lowest `x` bits.
-__device__ inline std::uint32_t low_bits(std::uint32_t x) {
-  std::uint32_t mask;
-  asm("bmsk.clamp.b32 %0, 0, %1;" : "=r"(mask) : "r"(x));
-  return mask;
-}
-
 /// The place with that address in shared memory. Addresses in TileShared::places are put
 /// together by or, which the compiler would not do.
 __device__ inline EdgePlace place_at(std::uint32_t address) {
   EdgePlace place;
-  asm("ld.shared.v2.u32 {%0, %1}, [%2];" : "=r"(place.offset), "=r"(place.addend) : "r"(address));
+  load_shared(address, place.offset, place.addend);
   return place;
 }
 
@@ -216,13 +209,6 @@ __device__ inline void emit_triangle(const TileShared& s, std::uint32_t places, 
   }
 #pragma unroll
   for (int c = 0; c < 3; ++c) __stcs(&to[static_cast<std::size_t>(c)], corners[c]);
-}
-
-/// 1 at that place; 0 where it is none of 0 … 31.
-__device__ inline std::uint32_t bit_at(std::uint32_t place) {
-  std::uint32_t bit;
-  asm("shl.b32 %0, 1, %1;" : "=r"(bit) : "r"(place));
-  return bit;
 }
 
 __device__ inline std::uint32_t warp_or(std::uint32_t v) {

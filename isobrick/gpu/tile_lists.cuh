@@ -66,16 +66,8 @@ __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
 /// `next` is 0 before the first.
 template <class F>
 __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed, F&& f) {
-  // As an addition that never comes round: the compiler would add up for any number of threads
-  // what one of them adds.
   const auto take = [address = static_cast<std::uint32_t>(__cvta_generic_to_shared(&next))] {
-    std::uint32_t before = 0;
-    if (lane_id() == 0)
-      asm volatile("atom.shared.inc.u32 %0, [%1], 0x7fffffff;"
-                   : "=r"(before)
-                   : "r"(address)
-                   : "memory");
-    return before;
+    return lane_id() == 0 ? increment_shared(address) : 0;
   };
   const std::uint32_t groups = uniform((listed + 31) / 32);
   std::uint32_t taken = take();

@@ -18,19 +18,6 @@ using HostWord = cuda::atomic_ref<std::uint64_t, cuda::thread_scope_system>;
 using DeviceFlag = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_device>;
 using BlockWord = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_block>;
 
-/// Where a launch may start before the one before it on the stream has ended: the latter says
-/// so, and the former waits for what it writes. Before Hopper launches do not overlap.
-__device__ inline void let_next_launch_start() {
-#if __CUDA_ARCH__ >= 900
-  asm volatile("griddepcontrol.launch_dependents;");
-#endif
-}
-__device__ inline void wait_for_launch_before() {
-#if __CUDA_ARCH__ >= 900
-  asm volatile("griddepcontrol.wait;" ::: "memory");
-#endif
-}
-
 __device__ inline unsigned long long warp_sum_64(unsigned long long v) {
 #pragma unroll
   for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kAll, v, d);
@@ -172,9 +159,8 @@ __device__ inline void copy_table(RowTable& copy, const RowTable& table) {
   const auto to = static_cast<std::uint32_t>(__cvta_generic_to_shared(&copy));
   const char* from = reinterpret_cast<const char*>(&table);
   for (unsigned at = 16 * lane_id(); at < sizeof(RowTable); at += 16 * 32)
-    asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(to + at), "l"(from + at)
-                 : "memory");
-  asm volatile("cp.async.commit_group;" ::: "memory");
+    begin_copy(to + at, from + at);
+  end_copies();
 #else
   for (unsigned i = lane_id(); i <= kRowsOfTile; i += 32) copy.rows[i] = table.rows[i];
 #endif
@@ -298,7 +284,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
   if (n < 4) (&s.lower.y[32])[33 * n] = last;
   if (n == 4) s.lower.yz = last;
 #if __CUDA_ARCH__ >= 800
-  asm volatile("cp.async.wait_all;" ::: "memory");
+  wait_for_copies();
 #endif
 }
 

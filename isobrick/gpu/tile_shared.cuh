@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "isobrick/gpu/ptx.cuh"
 #include "isobrick/gpu/tile_params.h"
 
 // How a block of threads works on one tile; docs/gpu.md has the whole picture.
@@ -191,13 +192,6 @@ __device__ inline SlabTiles& slab_tiles_of(TileShared& s) {
 }
 
 __device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }
-/// The thread's number, read again wherever it is asked for: what follows from it is not
-/// kept in registers throughout a tile.
-__device__ inline unsigned own_thread() {
-  unsigned thread;
-  asm volatile("mov.u32 %0, %%tid.x;" : "=r"(thread));
-  return thread;
-}
 __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
 
 /// What all threads of a warp have alike, so that the compiler knows it too: loops
@@ -225,15 +219,8 @@ __device__ inline std::uint32_t warp_sum(std::uint32_t v) {
 }
 
 __device__ inline std::uint32_t warp_inclusive_sum(std::uint32_t v) {
-  // The shuffle itself says whether there is a lane below.
 #pragma unroll
-  for (int d = 1; d < 32; d *= 2)
-    asm volatile(
-        "{.reg .pred there; .reg .u32 below;\n"
-        "shfl.sync.up.b32 below|there, %0, %1, 0, 0xffffffff;\n"
-        "@there add.u32 %0, %0, below;}"
-        : "+r"(v)
-        : "r"(d));
+  for (int d = 1; d < 32; d *= 2) add_from_below(v, d);
   return v;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include "isobrick/gpu/device_clock.cuh"
 #include "isobrick/gpu/streamed_pages.cuh"
 #include "isobrick/gpu/tile_classify.cuh"
 #include "isobrick/gpu/tile_find.cuh"
@@ -113,8 +112,7 @@ __device__ inline void prefetch_tile(TileShared& s, const TileParams& p, std::ui
   }
   from += kLine * lane_id();
 #pragma unroll
-  for (std::uint32_t at = 0; at < kBytes; at += 32 * kLine)
-    asm volatile("prefetch.global.L2 [%0];" ::"l"(from + at));
+  for (std::uint32_t at = 0; at < kBytes; at += 32 * kLine) prefetch_l2(from + at);
 }
 
 }  // namespace isobrick::gpu

@@ -3,25 +3,9 @@
 #include <cuda_runtime_api.h>
 
 #include "isobrick/core/scalar.h"
-#include "isobrick/gpu/stream_layout.h"
+#include "isobrick/gpu/unpack_params.h"
 
 namespace isobrick::gpu {
-
-/// The tiles of a launch, where their bricks lie, and where the extraction wants the samples.
-struct UnpackParams {
-  const TileItem* items;
-  const TileLinks* links;
-  std::uint32_t count;
-  const BrickBox* boxes;
-  const std::uint64_t* bricks;  ///< `tile_bricks` addresses a tile, on the device or in host memory
-  std::uint32_t tile_bricks;
-  int reach;               ///< layers of samples around a tile's 33³: 0 or 1
-  bool corners;            ///< where those of two axes meet, too
-  std::int32_t brick[3];   ///< samples of a brick
-  std::int32_t extent[3];  ///< samples of the volume
-  double fill_value;       ///< of bricks without an address
-  void* pages;
-};
 
 /// Lays the samples of streamed tiles out as pages. Those that no active block
 /// needs become what they are as good as: the sample that all blocks of a tile share.

@@ -3,7 +3,7 @@
 #include <cuda/atomic>
 
 #include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/device_clock.cuh"
+#include "isobrick/gpu/ptx.cuh"
 #include "tests/gpu/busy_device.h"
 
 namespace isobrick::testing {
