@@ -47,7 +47,8 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
       say<N>(s, p, LaunchReport::kTriangles, 0);
     }
   }
-  for (std::uint32_t i = own_thread(); i < end.zero_words; i += N) end.zero[i] = 0;
+  for (std::uint32_t i = own_thread(); i < end.zero_words; i += N)
+    DeviceFlag(end.zero[i]).store(0, cuda::memory_order_relaxed);  // others have added to them
 }
 
 template <int N, class T, bool Normals, bool Nan>

@@ -44,9 +44,7 @@ __device__ inline EdgeOfVertex find_edge(const TileShared& s, At0 at_0, std::uin
     if (number + 1 == y_first && number == s.number[0][row] + xs) return {0, 1};
   }
   const std::uint32_t axis = std::uint32_t{number >= y_first} + (number >= z_first);
-  const std::uint32_t place = row + axis * kRowPitch;
-  const std::uint32_t rank = number - s.number[0][place];
-  return {nth_bit(s.crossing[0][place], rank) + (axis > 0), axis};
+  return {nth_bit(s.crossing[axis][row], number - s.number[axis][row]) + (axis > 0), axis};
 }
 
 template <class T>
