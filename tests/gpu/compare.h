@@ -23,7 +23,7 @@ std::vector<TileWork> active_tiles(const Field<T>& field, double isovalue) {
 
 /// The mesh that those from a device are compared with.
 template <class T>
-MeshBuffer on_cpu(const Field<T>& field, const Lattice& lattice, const DenseBricks& bricks,
+MeshBuffer on_cpu(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
                   const SurfaceOptions& options) {
   const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
   CpuExtractor extractor(lattice, options, {});
@@ -90,13 +90,9 @@ struct HoledField final : BrickLookup {
   }
 };
 
-/// Fields in the range of every type that has kernels; skipped where there is no device.
+/// Fields in the range of every type that has kernels.
 template <class T>
-class DeviceTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
-  }
+struct TestFields {
   static constexpr double lowest() { return std::is_signed_v<T> ? -100.0 : 0.0; }
   static Field<T> noise(Int3 extent, unsigned seed) {
     return padded_noise<T>(extent, lowest(), lowest() + 200, static_cast<T>(lowest()), seed);
@@ -106,6 +102,15 @@ class DeviceTest : public ::testing::Test {
       const auto f = [](Index v, double k) { return std::sin(static_cast<double>(v) * k); };
       return lowest() + 100 + 30 * (f(p.x, 0.11) + f(p.y, 0.13) + f(p.z, 0.07));
     });
+  }
+};
+
+/// Skipped where there is no device.
+template <class T>
+class DeviceTest : public ::testing::Test, public TestFields<T> {
+ protected:
+  void SetUp() override {
+    if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
   }
 };
 

@@ -1,0 +1,250 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <vector>
+
+#include "isobrick/core/morton.h"
+#include "isobrick/gpu/host_search.h"
+#include "isobrick/gpu/page_gather.h"
+#include "isobrick/surface/world_map.h"
+#include "tests/gpu/compare.h"
+#include "tests/gpu/kernels/tile_runner.h"
+
+namespace isobrick::testing {
+
+/// The CPU's mesh, with one thread: ThreadSanitizer does not know what TBB does.
+template <class T>
+MeshBuffer expected_mesh(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
+                         SurfaceOptions options, double isovalue) {
+  options.isovalue = isovalue;
+  return tbb::task_arena(1).execute([&] { return on_cpu(field, lattice, bricks, options); });
+}
+
+/// Where a kernel leaves a mesh, and some room behind it that stays as it is.
+struct MeshRoom {
+  static constexpr std::size_t kBehind = 64;
+  static constexpr float kUntouched = -12345.0f;
+  std::vector<Vec3f> positions, normals;
+  std::vector<Triangle> triangles;
+
+  MeshRoom(std::size_t vertices, std::size_t all_triangles)
+      : positions(vertices + kBehind, {kUntouched, kUntouched, kUntouched}),
+        normals(positions),
+        triangles(all_triangles + kBehind, {gpu::kNone, gpu::kNone, gpu::kNone}) {}
+
+  void give(gpu::TileParams& p) {
+    p.positions = positions.data();
+    p.normals = normals.data();
+    p.triangles = triangles.data();
+    p.vertex_capacity = positions.size() - kBehind;
+    p.triangle_capacity = triangles.size() - kBehind;
+  }
+  /// The first of what is there.
+  void expect(const MeshBuffer& mesh) const {
+    expect_first("positions", mesh.positions, positions);
+    expect_first("normals", mesh.normals, normals);
+    expect_first("triangles", mesh.triangles, triangles);
+    expect_untouched(mesh.positions.size(), mesh.triangles.size());
+  }
+  /// From there on.
+  void expect_untouched(std::size_t vertex, std::size_t triangle) const {
+    for (std::size_t i = vertex; i < positions.size(); ++i) {
+      ASSERT_EQ(positions[i].x, kUntouched) << i << " of " << vertex;
+      ASSERT_EQ(normals[i].x, kUntouched) << i << " of " << vertex;
+    }
+    for (std::size_t i = triangle; i < triangles.size(); ++i)
+      ASSERT_EQ(triangles[i][0], gpu::kNone) << i << " of " << triangle;
+  }
+
+ private:
+  template <class V>
+  static void expect_first(const char* what, const PodBuffer<V>& mesh, const std::vector<V>& room) {
+    ASSERT_LE(mesh.size(), room.size()) << what;
+    for (std::size_t i = 0; i < mesh.size(); ++i)
+      ASSERT_EQ(std::memcmp(&mesh[i], &room[i], sizeof(V)), 0)
+          << what << ": first difference at " << i << " of " << mesh.size();
+  }
+};
+
+/// A small volume as kernels find it on a device; DeviceVolume does the same there.
+template <class T>
+class KernelVolume {
+ public:
+  Lattice lattice;
+  SurfaceOptions options;
+
+  /// Keeps `field` and `bricks`. The region of interest is all where `o` leaves it empty.
+  KernelVolume(const Field<T>& field, const BrickLookup& bricks, const Lattice& l,
+               const SurfaceOptions& o)
+      : lattice(l), options(o), field_(field), bricks_(bricks) {
+    if (options.roi == Box3{}) options.roi = lattice.box();
+    for_each_morton(lattice.tiles(), [&](Int3 t) { tiles_.push_back(t); });
+    make_pages();
+    list_tiles();
+    cases_ = gpu::make_case_table(world_map(options.transform).mirrored);
+  }
+
+  std::uint32_t tiles() const { return static_cast<std::uint32_t>(tiles_.size()); }
+  const gpu::CaseTable& cases() const { return cases_; }
+  MeshBuffer mesh(double isovalue) const {
+    return expected_mesh(field_, lattice, bricks_, options, isovalue);
+  }
+
+  /// Which of the candidates are active.
+  gpu::FoundTiles find(double isovalue) const {
+    std::vector<ValueRange<double>> ranges;
+    for (std::size_t i = 0; i < tiles(); ++i) {
+      const Box3 cells = intersect(samples_of(tiles_[i]), options.roi);
+      const Int3 size = cells.hi - cells.lo;
+      ranges.push_back(size.x > 1 && size.y > 1 && size.z > 1
+                           ? ValueRange<double>{static_cast<double>(ranges_[2 * i]),
+                                                static_cast<double>(ranges_[2 * i + 1])}
+                           : ValueRange<double>{});
+    }
+    return gpu::HostSearch(tiles_, ranges).find(isovalue);
+  }
+  /// What the search for them is told on the device.
+  gpu::SearchParams search_params(double isovalue) const {
+    gpu::SearchParams p{};
+    p.test = gpu::TileTest::ranges;
+    p.uncut = options.roi == lattice.box();
+    p.tiles = coordinates_.data();
+    p.ranges = ranges_.data();
+    p.count = tiles();
+    const gpu::TileParams t = params(isovalue);
+    std::ranges::copy(t.tiles, p.grid);
+    std::ranges::copy(t.roi_lo, p.roi_lo);
+    std::ranges::copy(t.roi_hi, p.roi_hi);
+    p.isovalue = isovalue;
+    return p;
+  }
+
+  /// What an extraction is told of the volume, with all tiles for candidates.
+  gpu::TileParams params(double isovalue) const {
+    gpu::TileParams p{};
+    p.pages = pages_.data();
+    p.columns = columns_.data();
+    p.page_of_tile = page_of_tile_.data();
+    for (int axis = 0; axis < 3; ++axis) {
+      p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
+      p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);
+      p.roi_lo[axis] = static_cast<std::int32_t>(options.roi.lo[axis]);
+      p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
+    }
+    p.isovalue = isovalue;
+    p.crossing = static_cast<float>(isovalue);
+    p.world = world_map(options.transform);
+    p.diagonal = is_diagonal(p.world);
+    p.candidates = {coordinates_.data(), order_of_tile_.data(), tiles()};
+    return p;
+  }
+
+  /// What kernels have found, by definition.
+  void expect_ranges_and_columns() const {
+    for (std::size_t i = 0; i < tiles(); ++i) {
+      ValueRange<T> range;
+      for_each_point(samples_of(tiles_[i]), [&](Int3 p) { range.include(field_.at(p)); });
+      EXPECT_EQ(range.lo, ranges_[2 * i]) << "tile " << i;
+      EXPECT_EQ(range.hi, ranges_[2 * i + 1]) << "tile " << i;
+    }
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      ASSERT_EQ(std::memcmp(&columns_[i], &pages_[32 * i], sizeof(T)), 0) << "row " << i;
+  }
+
+ private:
+  Box3 samples_of(Int3 tile) const {
+    const Int3 lo = tile * Index{32};
+    return intersect({lo, lo + Int3{33, 33, 33}}, lattice.box());
+  }
+  void make_pages() {
+    const Int3 grid = lattice.tiles();
+    pages_.resize((tiles_.size() + 1) * gpu::kPageSamples);
+    gpu::fill_page(lattice.type, options.fill_value, page(0));
+    for_each_point({{0, 0, 0}, grid}, [&](Int3 tile) {
+      const auto place = static_cast<std::uint32_t>(linear_index(tile, grid)) + 1;
+      const bool any = gpu::gather_page(lattice, bricks_, options.fill_value, tile, page(place));
+      page_of_tile_.push_back(any ? place : gpu::kNone);
+    });
+    columns_.resize((tiles_.size() + 1) * gpu::kColumnSamples);
+    on_cpu::run_first_columns(lattice.type, pages_.data(), tiles() + 1, columns_.data());
+  }
+  std::byte* page(std::size_t i) {
+    return reinterpret_cast<std::byte*>(pages_.data() + i * gpu::kPageSamples);
+  }
+  void list_tiles() {
+    order_of_tile_.resize(tiles());
+    for (std::uint32_t i = 0; i < tiles(); ++i) {
+      order_of_tile_[static_cast<std::size_t>(linear_index(tiles_[i], lattice.tiles()))] = i;
+      for (int axis = 0; axis < 3; ++axis)
+        coordinates_.push_back(static_cast<std::int32_t>(tiles_[i][axis]));
+    }
+    ranges_.resize(2 * std::size_t{tiles()});
+    on_cpu::run_tile_ranges(lattice.type, params(0), coordinates_.data(), tiles(), ranges_.data());
+  }
+
+  const Field<T>& field_;
+  const BrickLookup& bricks_;
+  std::vector<Int3> tiles_;  ///< in Morton order
+  std::vector<T> pages_, columns_, ranges_;
+  std::vector<std::uint32_t> page_of_tile_, order_of_tile_;
+  std::vector<std::int32_t> coordinates_;
+  gpu::CaseTable cases_;
+};
+
+/// What extractions of a volume count and tell with; ResidentLauncher keeps the same.
+struct KernelState {
+  explicit KernelState(std::uint32_t most_items)
+      : most(most_items), order(2 * std::size_t{most_items}), row_tables(most_items) {}
+
+  std::uint32_t most;
+  std::vector<gpu::OrderState> order;  ///< two sets that take turns
+  std::vector<gpu::RowTable> row_tables;
+  std::uint32_t launches = 0, epoch = 0;
+  unsigned long long number_start = 0, number_end = 0;
+  std::uint32_t found = 0;
+  struct {
+    std::uint32_t ticket = 0, done = 0;
+  } zeroed;
+  gpu::LaunchReport report{};
+
+  /// For the next launch.
+  void give(gpu::TileParams& p, bool block_each) {
+    ++launches;
+    p.epoch = ++epoch;
+    p.row_tables = row_tables.data();
+    p.order = order.data() + (launches % 2 == 0 ? most : 0);
+    p.number_start = &number_start;
+    p.number_end = &number_end;
+    p.ticket = block_each ? nullptr : &zeroed.ticket;
+    p.end = {&report, launches, &found, &zeroed.done, &zeroed.ticket, 2, order.data(), most};
+    if (launches % 2 == 1) p.end.next_order += most;
+  }
+
+  std::uint64_t word(int i) {
+    return std::atomic_ref(report.words[i]).load(std::memory_order_relaxed);
+  }
+  /// What the last one has told.
+  void expect_told(const MeshBuffer& mesh, std::uint32_t active) {
+    using gpu::LaunchReport, gpu::LaunchWord;
+    const std::uint64_t vertices = mesh.positions.size(), triangles = mesh.triangles.size();
+    EXPECT_EQ(word(LaunchReport::kVertices), LaunchWord::of(vertices, launches));
+    EXPECT_EQ(word(LaunchReport::kTriangles), LaunchWord::of(triangles, launches));
+    EXPECT_EQ(word(LaunchReport::kActiveTiles), LaunchWord::of(active, launches));
+  }
+  /// As the next one needs it, once the last is over.
+  void expect_zeroed() const {
+    const auto next = launches % 2 == 0 ? order.begin() : order.begin() + most;
+    EXPECT_TRUE(std::all_of(next, next + most, [](const gpu::OrderState& sums) {
+      return sums.vertices == 0 && sums.triangles == 0;
+    }));
+    EXPECT_EQ(zeroed.ticket, 0u);
+    EXPECT_EQ(zeroed.done, 0u);
+  }
+};
+
+}  // namespace isobrick::testing

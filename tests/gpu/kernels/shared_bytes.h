@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/asan_interface.h>
+#endif
+
+namespace isobrick::gpu {
+
+/// What kernels declare as `extern __shared__`: of each thread of the CPU, so of each block.
+extern thread_local unsigned char shared_bytes[] __attribute__((aligned(256)));
+
+}  // namespace isobrick::gpu
+
+namespace isobrick::on_cpu {
+
+inline constexpr std::size_t kMostSharedBytes = std::size_t{227} << 10;  ///< Hopper's
+
+/// So many bytes of it are a block's; they hold anything at first. AddressSanitizer tells where
+/// others are touched.
+class SharedBytes {
+ public:
+  explicit SharedBytes(std::size_t count) : count_(count) {
+    std::memset(gpu::shared_bytes, 0xa5, count);
+#if defined(__SANITIZE_ADDRESS__)
+    __asan_poison_memory_region(gpu::shared_bytes + count_, kMostSharedBytes - count_);
+#endif
+  }
+  ~SharedBytes() {
+#if defined(__SANITIZE_ADDRESS__)
+    __asan_unpoison_memory_region(gpu::shared_bytes + count_, kMostSharedBytes - count_);
+#endif
+  }
+  SharedBytes(const SharedBytes&) = delete;
+  SharedBytes& operator=(const SharedBytes&) = delete;
+
+ private:
+  std::size_t count_;
+};
+
+}  // namespace isobrick::on_cpu

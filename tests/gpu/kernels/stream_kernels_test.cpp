@@ -1,0 +1,234 @@
+#include <gtest/gtest.h>
+
+#include "isobrick/gpu/brick_table.h"
+#include "isobrick/gpu/page_groups.h"
+#include "isobrick/gpu/row_slots.h"
+#include "tests/gpu/kernels/kernel_volume.h"
+
+// Tiles that stream through a device, launch after launch: unpacked from their bricks, extracted,
+// and linked to those of launches before. The host's side is GpuExtractor's.
+
+namespace isobrick::testing {
+namespace {
+
+template <class T>
+class Streamed {
+ public:
+  Streamed(const Lattice& lattice, const BrickLookup& bricks, const SurfaceOptions& options)
+      : lattice_(lattice),
+        bricks_(bricks),
+        options_(options),
+        slots_(kSlots, lattice.tiles()),
+        row_tables_(kSlots),
+        cases_(gpu::make_case_table(world_map(options.transform).mirrored)),
+        tile_bricks_(static_cast<std::uint32_t>(max_bricks_of_tile(lattice, reach()))) {}
+
+  /// Appends the mesh of some tiles, which come after all before.
+  void extract(std::span<const TileWork> tiles, MeshRoom& room) {
+    count_ = static_cast<std::uint32_t>(tiles.size());
+    find_bricks(tiles);
+    link_all(tiles);
+    unpack();
+    gpu::TileParams p = params();
+    room.give(p);
+    p.positions += vertices_;
+    p.normals += vertices_;
+    p.triangles += triangles_;
+    p.vertex_capacity -= vertices_;
+    p.triangle_capacity -= triangles_;
+    std::uint32_t ticket = 0;
+    gpu::SurfaceTotals totals{};
+    std::vector<gpu::OrderState> order(tiles.size());
+    const unsigned long long start = vertices_;
+    unsigned long long end = 0;
+    p.ticket = &ticket;
+    p.totals = &totals;
+    p.order = order.data();
+    p.number_start = &start;
+    p.number_end = &end;
+    on_cpu::run_tiles({.type = lattice_.type,
+                       .normals = options_.normals,
+                       .may_have_nan = options_.may_have_nan,
+                       .blocks = std::min(3u, count_),
+                       .seed = ++epoch_},
+                      p, cases_);
+    slots_.recycle(unused_);
+    vertices_ += totals.vertices;
+    triangles_ += totals.triangles;
+    EXPECT_EQ(end, vertices_);
+  }
+
+  std::uint64_t vertices() const { return vertices_; }
+  std::uint64_t triangles() const { return triangles_; }
+
+ private:
+  static constexpr std::uint32_t kSlots = 200;
+
+  Index reach() const { return sample_reach(options_); }
+
+  void find_bricks(std::span<const TileWork> tiles) {
+    constexpr std::size_t kPlaces = 3;  // others are read where they lie
+    boxes_.assign(count_, {});
+    addresses_.assign(std::size_t{count_} * tile_bricks_, 0);
+    sent_.resize(kPlaces * lattice_.brick_bytes());
+    const gpu::BrickUse use = gpu::use_bricks(lattice_, reach(), tiles, bricks_, kPlaces,
+                                              sent_.data(), {boxes_, addresses_});
+    for (std::size_t i = 0; i < use.sent.size(); ++i)
+      std::memcpy(sent_.data() + i * lattice_.brick_bytes(), use.sent[i].from,
+                  lattice_.brick_bytes());
+  }
+
+  void link_all(std::span<const TileWork> tiles) {
+    items_.resize(count_);
+    links_.resize(count_);
+    const Int3 lo = options_.roi.lo, first{lo.x / 32, lo.y / 32, lo.z / 32};
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      const Int3 t = tiles[i].tile;
+      links_[i].active_blocks = tiles[i].active_blocks;
+      for (int n = 1; n <= 6; ++n) {
+        const Int3 step{n & 1, n >> 1 & 1, n >> 2};
+        const bool exists = (step.x == 0 || t.x > first.x) && (step.y == 0 || t.y > first.y) &&
+                            (step.z == 0 || t.z > first.z);
+        links_[i].before[n - 1] = exists ? slots_.find(t - step) : gpu::kNone;
+      }
+      items_[i] = {static_cast<std::int32_t>(t.x), static_cast<std::int32_t>(t.y),
+                   static_cast<std::int32_t>(t.z), slots_.add(t)};
+    }
+    slots_.end_launch(tiles.back().tile, unused_);
+  }
+
+  void unpack() {
+    const std::size_t groups = (count_ + gpu::kTilesOfPageGroup - 1) / gpu::kTilesOfPageGroup;
+    pages_.assign(groups * gpu::kPageGroupSamples, T{93});  // of launches before
+    gpu::UnpackParams u{};
+    u.items = items_.data();
+    u.links = links_.data();
+    u.count = count_;
+    u.boxes = boxes_.data();
+    u.bricks = addresses_.data();
+    u.tile_bricks = tile_bricks_;
+    u.reach = static_cast<int>(reach());
+    u.corners = options_.may_have_nan;
+    for (int axis = 0; axis < 3; ++axis) {
+      u.brick[axis] = static_cast<std::int32_t>(lattice_.brick[axis]);
+      u.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
+    }
+    u.fill_value = options_.fill_value;
+    u.pages = pages_.data();
+    on_cpu::run_unpack(lattice_.type, u, epoch_);
+  }
+
+  gpu::TileParams params() const {
+    gpu::TileParams p{};
+    p.items = items_.data();
+    p.item_count = &count_;
+    p.links = links_.data();
+    p.pages = pages_.data();
+    p.epoch = epoch_ + 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      p.tiles[axis] = static_cast<std::int32_t>(lattice_.tiles()[axis]);
+      p.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
+      p.roi_lo[axis] = static_cast<std::int32_t>(options_.roi.lo[axis]);
+      p.roi_hi[axis] = static_cast<std::int32_t>(options_.roi.hi[axis]);
+    }
+    p.isovalue = options_.isovalue;
+    p.crossing = static_cast<float>(options_.isovalue);
+    p.world = world_map(options_.transform);
+    p.diagonal = is_diagonal(p.world);
+    p.row_tables = const_cast<gpu::RowTable*>(row_tables_.data());
+    return p;
+  }
+
+  Lattice lattice_;
+  const BrickLookup& bricks_;
+  SurfaceOptions options_;
+  gpu::RowSlots slots_;
+  std::vector<gpu::RowTable> row_tables_;
+  gpu::CaseTable cases_;
+  std::uint32_t tile_bricks_, count_ = 0, epoch_ = 0;
+  std::uint64_t vertices_ = 0, triangles_ = 0;
+  std::vector<gpu::BrickBox> boxes_;
+  std::vector<std::uint64_t> addresses_;
+  std::vector<std::byte> sent_;
+  std::vector<gpu::TileItem> items_;
+  std::vector<gpu::TileLinks> links_;
+  std::vector<std::uint32_t> unused_;
+  std::vector<T> pages_;
+};
+
+/// In launches of so many tiles.
+template <class T>
+void compare(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
+             SurfaceOptions options, std::size_t tiles_of_launch) {
+  if (options.roi == Box3{}) options.roi = lattice.box();
+  for (const bool normals : {false, true}) {
+    SCOPED_TRACE(std::to_string(tiles_of_launch) + " tiles a launch" +
+                 (normals ? ", normals" : ""));
+    options.normals = normals;
+    const MeshBuffer expected = expected_mesh(field, lattice, bricks, options, options.isovalue);
+    ASSERT_GT(expected.triangles.size(), 0u);
+    std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+    if (options.may_have_nan)
+      for (TileWork& tile : tiles) tile.active_blocks = 0xff;
+    MeshRoom room(expected.positions.size(), expected.triangles.size());
+    Streamed<T> streamed(lattice, bricks, options);
+    for (std::size_t i = 0; i < tiles.size(); i += tiles_of_launch)
+      streamed.extract(std::span(tiles).subspan(i, std::min(tiles_of_launch, tiles.size() - i)),
+                       room);
+    room.expect(expected);
+    EXPECT_EQ(streamed.vertices(), expected.positions.size());
+    EXPECT_EQ(streamed.triangles(), expected.triangles.size());
+  }
+}
+
+template <class T>
+class StreamKernels : public ::testing::Test {
+ protected:
+  static constexpr double kMid = TestFields<T>::lowest() + 100;
+
+  static void compare_waves(Int3 brick, std::size_t tiles_of_launch) {
+    const auto field = TestFields<T>::waves({67, 41, 70});
+    const Lattice lattice{field.extent, brick, scalar_type_of<T>};
+    const DenseBricks bricks(lattice, field.samples.data());
+    SurfaceOptions options;
+    options.isovalue = kMid;
+    compare(field, lattice, bricks, options, tiles_of_launch);
+  }
+};
+
+TYPED_TEST_SUITE(StreamKernels, DeviceTypes);
+
+TYPED_TEST(StreamKernels, LaunchesOfAnyNumberOfTiles) {
+  this->compare_waves({64, 64, 64}, 1);
+  this->compare_waves({16, 40, 23}, 5);
+  this->compare_waves({32, 32, 32}, 100);
+}
+
+TYPED_TEST(StreamKernels, RegionOfInterest) {
+  const auto field = TestFields<TypeParam>::noise({70, 40, 45}, 5);
+  const Lattice lattice{field.extent, {32, 32, 32}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  SurfaceOptions options;
+  options.isovalue = TestFixture::kMid;
+  options.roi = {{20, 3, 31}, {69, 36, 40}};
+  compare(field, lattice, bricks, options, 3);
+}
+
+TYPED_TEST(StreamKernels, BricksThatAreAbsent) {
+  const HoledField<TypeParam> holed(TestFields<TypeParam>::noise({80, 34, 40}, 9),
+                                    static_cast<TypeParam>(TestFixture::kMid + 50));
+  compare(holed.field, holed.lattice, holed, holed.options(TestFixture::kMid), 4);
+}
+
+TEST(StreamKernelsOf, NotANumber) {
+  const auto field = with_nan(TestFields<float>::waves({67, 41, 40}), 1, 300);
+  const Lattice lattice{field.extent, {32, 32, 32}, ScalarType::f32};
+  const DenseBricks bricks(lattice, field.samples.data());
+  SurfaceOptions options;
+  options.isovalue = 0;
+  options.may_have_nan = true;
+  compare(field, lattice, bricks, options, 3);
+}
+
+}  // namespace
+}  // namespace isobrick::testing

@@ -1,0 +1,92 @@
+#include "tests/gpu/kernels/tile_runner.h"
+
+#include "tests/gpu/kernels/cuda_language.h"  // before what is written in it
+
+#include <stdexcept>
+
+#include "isobrick/core/threshold.h"
+#include "isobrick/gpu/device_scalar.h"
+#include "isobrick/gpu/extract_tiles.cuh"
+#include "isobrick/gpu/search_tiles.cuh"
+#include "isobrick/gpu/unpack_tiles.cuh"
+
+namespace isobrick::on_cpu {
+namespace {
+
+template <int N, class T, bool Normals, bool Nan>
+struct Kernel {
+  static constexpr std::uint32_t kListed = gpu::ListsOf<N>::kListed;
+
+  static void run(const TileRun& r, const gpu::TileParams& params, const gpu::CaseTable& cases) {
+    const T threshold = Threshold<T>(params.isovalue).value;
+    launch(r.blocks, N, gpu::kSharedBytes<kListed, Nan, (gpu::Team<N>::kSlabs > 1)>, r.seed,
+           [&] { gpu::extract_tiles<N, T, Normals, Nan>(params, threshold, &cases); });
+  }
+};
+
+template <int N, class F>
+auto with_team(const TileRun& r, F&& f) {
+  return gpu::visit_device_scalar(r.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    return r.normals ? f(Kernel<N, T, true, false>()) : f(Kernel<N, T, false, false>());
+  });
+}
+
+template <class F>
+auto with_kernel(const TileRun& r, F&& f) {
+  if (r.may_have_nan)
+    return r.normals ? f(Kernel<384, float, true, true>()) : f(Kernel<384, float, false, true>());
+  switch (r.threads) {
+    case 32: return f(Kernel<32, std::uint8_t, false, false>());
+    case 640: return f(Kernel<640, std::uint8_t, false, false>());
+    case 1024: return f(Kernel<1024, std::uint8_t, false, false>());
+    case gpu::kSlabTeam: return with_team<gpu::kSlabTeam>(r, f);
+    case 384: return with_team<384>(r, f);
+    default: throw std::invalid_argument("no such team");
+  }
+}
+
+}  // namespace
+
+std::uint32_t listed_at_a_time(const TileRun& run) {
+  return with_kernel(run, [](auto kernel) { return decltype(kernel)::kListed; });
+}
+
+void run_tiles(const TileRun& run, const gpu::TileParams& params, const gpu::CaseTable& cases) {
+  with_kernel(run, [&](auto kernel) { kernel.run(run, params, cases); });
+}
+
+void run_search(ScalarType type, const gpu::SearchParams& params, unsigned seed) {
+  const unsigned blocks = (params.count + gpu::kTilesOfSearchBlock - 1) / gpu::kTilesOfSearchBlock;
+  gpu::visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    launch(blocks, gpu::kSearchThreads, 0, seed, [&] { gpu::search_tiles<T>(params); });
+  });
+}
+
+void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::int32_t* tiles,
+                     std::uint32_t count, void* ranges) {
+  gpu::visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    launch(count, gpu::kSearchThreads, 0, 1,
+           [&] { gpu::find_tile_ranges<T>(params, tiles, static_cast<T*>(ranges)); });
+  });
+}
+
+void run_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns) {
+  gpu::visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    launch(count, gpu::kSearchThreads, 0, 1, [&] {
+      gpu::copy_first_columns<T>(static_cast<const T*>(pages), static_cast<T*>(columns));
+    });
+  });
+}
+
+void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed) {
+  gpu::visit_device_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    launch(params.count, gpu::kUnpackThreads, 0, seed, [&] { gpu::unpack_tiles<T>(params); });
+  });
+}
+
+}  // namespace isobrick::on_cpu

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "isobrick/core/scalar.h"
+#include "isobrick/gpu/search_params.h"
+#include "isobrick/gpu/tile_params.h"
+#include "isobrick/gpu/unpack_params.h"
+
+namespace isobrick::on_cpu {
+
+// Runs kernels on the CPU, until all blocks have ended.
+
+/// A kernel that extracts tiles, and how it is run.
+struct TileRun {
+  ScalarType type;
+  bool normals = false, may_have_nan = false;
+  unsigned threads = 384;  ///< 352: slabs
+  unsigned blocks = 2;
+  unsigned seed = 1;
+};
+
+/// Cells or vertices that such a kernel lists at a time.
+std::uint32_t listed_at_a_time(const TileRun& run);
+
+void run_tiles(const TileRun& run, const gpu::TileParams& params, const gpu::CaseTable& cases);
+
+void run_search(ScalarType type, const gpu::SearchParams& params, unsigned seed);
+void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::int32_t* tiles,
+                     std::uint32_t count, void* ranges);
+void run_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns);
+void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed);
+
+}  // namespace isobrick::on_cpu
