@@ -20,11 +20,11 @@
 #define __launch_bounds__(...)
 #define __align__(bytes) __attribute__((aligned(bytes)))
 
-#define threadIdx (isobrick::on_cpu::thread_place())
-#define blockIdx (isobrick::on_cpu::block_place())
-#define gridDim (isobrick::on_cpu::grid_size())
+#define threadIdx (isobrick::emulated::thread_place())
+#define blockIdx (isobrick::emulated::block_place())
+#define gridDim (isobrick::emulated::grid_size())
 
-namespace isobrick::on_cpu {
+namespace isobrick::emulated {
 
 using Together = ThreadBlock::Together;
 
@@ -40,7 +40,7 @@ std::array<T, 32> exchange(Together what, T value) {
   return ThreadBlock::current().exchange(what, value);
 }
 
-}  // namespace isobrick::on_cpu
+}  // namespace isobrick::emulated
 
 struct alignas(16) uint4 {
   unsigned x, y, z, w;
@@ -48,24 +48,24 @@ struct alignas(16) uint4 {
 
 // Threads of a warp do together what they do; none asks for a part of them.
 
-inline void __syncthreads() { isobrick::on_cpu::ThreadBlock::current().wait_for_block(); }
+inline void __syncthreads() { isobrick::emulated::ThreadBlock::current().wait_for_block(); }
 inline void __syncwarp() {
-  isobrick::on_cpu::exchange(isobrick::on_cpu::Together::warp, std::uint32_t{0});
+  isobrick::emulated::exchange(isobrick::emulated::Together::warp, std::uint32_t{0});
 }
-inline void __threadfence() { isobrick::on_cpu::ThreadBlock::current().fence(); }
-inline void __nanosleep(unsigned) { isobrick::on_cpu::ThreadBlock::current().pause(); }
+inline void __threadfence() { isobrick::emulated::ThreadBlock::current().fence(); }
+inline void __nanosleep(unsigned) { isobrick::emulated::ThreadBlock::current().pause(); }
 
 template <class T>
 T __shfl_sync(unsigned, T value, std::uint32_t from) {
-  return isobrick::on_cpu::exchange(isobrick::on_cpu::Together::shuffle, value)[from % 32];
+  return isobrick::emulated::exchange(isobrick::emulated::Together::shuffle, value)[from % 32];
 }
 template <class T>
 T __shfl_xor_sync(unsigned, T value, int other) {
   const unsigned from = threadIdx.x ^ static_cast<unsigned>(other);
-  return isobrick::on_cpu::exchange(isobrick::on_cpu::Together::shuffle, value)[from % 32];
+  return isobrick::emulated::exchange(isobrick::emulated::Together::shuffle, value)[from % 32];
 }
 inline unsigned __ballot_sync(unsigned, bool value) {
-  const auto all = isobrick::on_cpu::exchange(isobrick::on_cpu::Together::vote, value);
+  const auto all = isobrick::emulated::exchange(isobrick::emulated::Together::vote, value);
   unsigned bits = 0;
   for (std::size_t i = 0; i < 32; ++i) bits |= (all[i] ? 1u : 0u) << i;
   return bits;
@@ -75,14 +75,14 @@ inline bool __all_sync(unsigned mask, bool value) { return __ballot_sync(mask, v
 inline std::uint32_t __reduce_add_sync(unsigned, std::uint32_t value) {
   std::uint32_t sum = 0;
   for (const std::uint32_t v :
-       isobrick::on_cpu::exchange(isobrick::on_cpu::Together::reduce, value))
+       isobrick::emulated::exchange(isobrick::emulated::Together::reduce, value))
     sum += v;
   return sum;
 }
 inline std::uint32_t __reduce_or_sync(unsigned, std::uint32_t value) {
   std::uint32_t any = 0;
   for (const std::uint32_t v :
-       isobrick::on_cpu::exchange(isobrick::on_cpu::Together::reduce, value))
+       isobrick::emulated::exchange(isobrick::emulated::Together::reduce, value))
     any |= v;
   return any;
 }

@@ -4,19 +4,20 @@
 #include <ucontext.h>
 
 #include <cstddef>
+#include <cstdlib>
 #include <memory>
 #include <utility>
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(ISOBRICK_ASAN)
 #include <sanitizer/common_interface_defs.h>
 #elif defined(ISOBRICK_TSAN)
 #include <sanitizer/tsan_interface.h>
 #endif
 
-namespace isobrick::on_cpu {
+namespace isobrick::emulated {
 
-/// A thread of a kernel: a stack and where on it it goes on. Sanitizers are told of the switch;
-/// to ThreadSanitizer it is none after which one sees what the other has written.
+/// A thread of a kernel: a stack and where on it it goes on. Sanitizers are told of the switch; for
+/// ThreadSanitizer it orders nothing.
 class Fiber {
  public:
   /// The one that runs already.
@@ -34,6 +35,7 @@ class Fiber {
     bottom_ = stack_.get();
     size_ = kStack;
     makecontext(&context_, entry, 0);
+    context_.uc_stack = {};  // AddressSanitizer would forget all about it at each switch
     begun_ = false;
 #if defined(ISOBRICK_TSAN)
     tsan_ = __tsan_create_fiber(0);
@@ -49,32 +51,45 @@ class Fiber {
 
   /// From the running one.
   void switch_to(Fiber& other) {
-#if defined(__SANITIZE_ADDRESS__)
-    left = this;
-    __sanitizer_start_switch_fiber(&fake_stack_, other.bottom_, other.size_);
-#elif defined(ISOBRICK_TSAN)
-    __tsan_switch_to_fiber(other.tsan_, __tsan_switch_to_fiber_no_sync);
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(ISOBRICK_TSAN)
+    tell_of(other, &fake_stack_);
+#if defined(ISOBRICK_ASAN) || defined(ISOBRICK_TSAN)
     swapcontext(&context_, &other.context_);
 #else
     // swapcontext asks the system twice for the mask of signals, which is the same for all.
-    if (_setjmp(place_) == 0) {
-      if (std::exchange(other.begun_, true)) _longjmp(other.place_, 1);
-      setcontext(&other.context_);
-    }
+    if (_setjmp(place_) == 0) other.go_on();
 #endif
     arrive();
   }
+  /// From the running one, which does not go on.
+  [[noreturn]] void end_in(Fiber& other) {
+    tell_of(other, nullptr);
+    other.go_on();
+  }
   /// The first that a new one does.
   void arrive() {
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(ISOBRICK_ASAN)
     __sanitizer_finish_switch_fiber(fake_stack_, &left->bottom_, &left->size_);
 #endif
   }
 
  private:
-#if defined(__SANITIZE_ADDRESS__)
+  void tell_of([[maybe_unused]] Fiber& other, [[maybe_unused]] void** fake_stack) {
+#if defined(ISOBRICK_ASAN)
+    left = this;
+    __sanitizer_start_switch_fiber(fake_stack, other.bottom_, other.size_);
+#elif defined(ISOBRICK_TSAN)
+    __tsan_switch_to_fiber(other.tsan_, __tsan_switch_to_fiber_no_sync);
+#endif
+  }
+  [[noreturn]] void go_on() {
+#if !defined(ISOBRICK_ASAN) && !defined(ISOBRICK_TSAN)
+    if (std::exchange(begun_, true)) _longjmp(place_, 1);
+#endif
+    setcontext(&context_);
+    std::abort();
+  }
+
+#if defined(ISOBRICK_ASAN)
   static constexpr std::size_t kStack = std::size_t{256} << 10;
 #else
   static constexpr std::size_t kStack = std::size_t{64} << 10;
@@ -84,11 +99,11 @@ class Fiber {
   jmp_buf place_;
   bool begun_ = true;
   // For the sanitizers.
-  const void* bottom_ = nullptr;
-  std::size_t size_ = 0;
-  void* fake_stack_ = nullptr;
-  void* tsan_ = nullptr;
+  [[maybe_unused]] const void* bottom_ = nullptr;
+  [[maybe_unused]] std::size_t size_ = 0;
+  [[maybe_unused]] void* fake_stack_ = nullptr;
+  [[maybe_unused]] void* tsan_ = nullptr;
   inline static thread_local Fiber* left = nullptr;
 };
 
-}  // namespace isobrick::on_cpu
+}  // namespace isobrick::emulated

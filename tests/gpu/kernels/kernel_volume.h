@@ -46,10 +46,15 @@ struct MeshRoom {
   }
   /// The first of what is there.
   void expect(const MeshBuffer& mesh) const {
+    expect_begins_with(mesh);
+    expect_untouched(mesh.positions.size(), mesh.triangles.size());
+  }
+  /// The same where there may be larger ones of before behind it.
+  void expect_begins_with(const MeshBuffer& mesh) const {
     expect_first("positions", mesh.positions, positions);
     expect_first("normals", mesh.normals, normals);
     expect_first("triangles", mesh.triangles, triangles);
-    expect_untouched(mesh.positions.size(), mesh.triangles.size());
+    expect_untouched(positions.size() - kBehind, triangles.size() - kBehind);
   }
   /// From there on.
   void expect_untouched(std::size_t vertex, std::size_t triangle) const {
@@ -171,7 +176,7 @@ class KernelVolume {
       page_of_tile_.push_back(any ? place : gpu::kNone);
     });
     columns_.resize((tiles_.size() + 1) * gpu::kColumnSamples);
-    on_cpu::run_first_columns(lattice.type, pages_.data(), tiles() + 1, columns_.data());
+    emulated::run_first_columns(lattice.type, pages_.data(), tiles() + 1, columns_.data());
   }
   std::byte* page(std::size_t i) {
     return reinterpret_cast<std::byte*>(pages_.data() + i * gpu::kPageSamples);
@@ -184,7 +189,8 @@ class KernelVolume {
         coordinates_.push_back(static_cast<std::int32_t>(tiles_[i][axis]));
     }
     ranges_.resize(2 * std::size_t{tiles()});
-    on_cpu::run_tile_ranges(lattice.type, params(0), coordinates_.data(), tiles(), ranges_.data());
+    emulated::run_tile_ranges(lattice.type, params(0), coordinates_.data(), tiles(),
+                              ranges_.data());
   }
 
   const Field<T>& field_;

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstring>
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(ISOBRICK_ASAN)
 #include <sanitizer/asan_interface.h>
 #endif
 
@@ -14,7 +14,7 @@ extern thread_local unsigned char shared_bytes[] __attribute__((aligned(256)));
 
 }  // namespace isobrick::gpu
 
-namespace isobrick::on_cpu {
+namespace isobrick::emulated {
 
 inline constexpr std::size_t kMostSharedBytes = std::size_t{227} << 10;  ///< Hopper's
 
@@ -24,12 +24,12 @@ class SharedBytes {
  public:
   explicit SharedBytes(std::size_t count) : count_(count) {
     std::memset(gpu::shared_bytes, 0xa5, count);
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(ISOBRICK_ASAN)
     __asan_poison_memory_region(gpu::shared_bytes + count_, kMostSharedBytes - count_);
 #endif
   }
   ~SharedBytes() {
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(ISOBRICK_ASAN)
     __asan_unpoison_memory_region(gpu::shared_bytes + count_, kMostSharedBytes - count_);
 #endif
   }
@@ -37,7 +37,7 @@ class SharedBytes {
   SharedBytes& operator=(const SharedBytes&) = delete;
 
  private:
-  std::size_t count_;
+  [[maybe_unused]] std::size_t count_;
 };
 
-}  // namespace isobrick::on_cpu
+}  // namespace isobrick::emulated

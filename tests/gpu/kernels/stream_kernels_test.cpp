@@ -46,12 +46,12 @@ class Streamed {
     p.order = order.data();
     p.number_start = &start;
     p.number_end = &end;
-    on_cpu::run_tiles({.type = lattice_.type,
-                       .normals = options_.normals,
-                       .may_have_nan = options_.may_have_nan,
-                       .blocks = std::min(3u, count_),
-                       .seed = ++epoch_},
-                      p, cases_);
+    emulated::run_tiles({.type = lattice_.type,
+                         .normals = options_.normals,
+                         .may_have_nan = options_.may_have_nan,
+                         .blocks = std::min(3u, count_),
+                         .seed = ++epoch_},
+                        p, cases_);
     slots_.recycle(unused_);
     vertices_ += totals.vertices;
     triangles_ += totals.triangles;
@@ -115,7 +115,7 @@ class Streamed {
     }
     u.fill_value = options_.fill_value;
     u.pages = pages_.data();
-    on_cpu::run_unpack(lattice_.type, u, epoch_);
+    emulated::run_unpack(lattice_.type, u, epoch_);
   }
 
   gpu::TileParams params() const {

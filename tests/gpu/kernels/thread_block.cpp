@@ -12,11 +12,11 @@
 
 namespace isobrick::gpu {
 
-thread_local unsigned char shared_bytes[on_cpu::kMostSharedBytes] __attribute__((aligned(256)));
+thread_local unsigned char shared_bytes[emulated::kMostSharedBytes] __attribute__((aligned(256)));
 
 }  // namespace isobrick::gpu
 
-namespace isobrick::on_cpu {
+namespace isobrick::emulated {
 namespace {
 
 /// As many as ThreadSanitizer can tell apart.
@@ -39,6 +39,7 @@ ThreadBlock::ThreadBlock(unsigned index, unsigned blocks, unsigned threads, unsi
       caller_(std::make_unique<Fiber>()),
       warps_((threads + 31) / 32),
       round_of_(threads),
+      copies_(threads),
       last_load_(threads),
       has_fence_(threads) {}
 
@@ -47,6 +48,7 @@ ThreadBlock::~ThreadBlock() = default;
 ThreadBlock& ThreadBlock::current() { return *current_block; }
 
 void ThreadBlock::run(const std::function<void()>& kernel) {
+  // Nothing grows later, which ThreadSanitizer would see.
   paused_.reserve(fibers_.size());
   favoured_.resize(warps_.size());
   std::iota(favoured_.begin(), favoured_.end(), 0u);
@@ -61,7 +63,7 @@ void ThreadBlock::run(const std::function<void()>& kernel) {
   running_ = choose_next();
   release(this);
   caller_->switch_to(*fibers_[running_]);
-  acquire(this);
+  acquire(&ended_);
   current_block = nullptr;
 }
 
@@ -69,12 +71,9 @@ void ThreadBlock::begin_thread() {
   fibers_[running_]->arrive();
   acquire(this);
   (*kernel_)();
-  release(this);
-  if (++ended_ < fibers_.size())
-    go_on_elsewhere();
-  else
-    fibers_[running_]->switch_to(*caller_);
-  std::abort();  // nobody goes on here
+  release(&ended_);
+  Fiber& own = *fibers_[running_];
+  own.end_in(++ended_ < fibers_.size() ? *fibers_[running_ = choose_next()] : *caller_);
 }
 
 void ThreadBlock::go_on_elsewhere() {
@@ -101,7 +100,7 @@ unsigned ThreadBlock::choose_next() {
   // What paused threads look at is seldom there yet.
   if (!paused_.empty() && random_() % 16 == 0) return take(paused_);
   const unsigned warp = *first;
-  if (random_() % 256 == 0) std::rotate(first, first + 1, favoured_.end());
+  if (random_() % 256 == 0) std::iter_swap(first, favoured_.end() - 1);
   return take(warps_[warp].ready);
 }
 
@@ -116,13 +115,16 @@ void ThreadBlock::pause() {
 }
 
 void ThreadBlock::wait_for_block() {
-  release(&in_barrier_);
+  // Of two that take turns: who is late sees nothing of what comes after the next barrier.
+  const void* const barrier = &barriers_[barrier_];
+  release(barrier);
   if (++in_barrier_ == fibers_.size()) {
     in_barrier_ = 0;
+    barrier_ ^= 1;
     for (unsigned i = 0; i < fibers_.size(); ++i) make_ready(i);
   }
   go_on_elsewhere();
-  acquire(&in_barrier_);
+  acquire(barrier);
 }
 
 const std::uint64_t* ThreadBlock::exchange_words(Together what, std::uint64_t own) {
@@ -186,4 +188,4 @@ void launch(unsigned blocks, unsigned threads, std::size_t shared_bytes, unsigne
     });
 }
 
-}  // namespace isobrick::on_cpu
+}  // namespace isobrick::emulated

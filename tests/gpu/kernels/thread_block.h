@@ -7,9 +7,10 @@
 #include <functional>
 #include <memory>
 #include <random>
+#include <utility>
 #include <vector>
 
-namespace isobrick::on_cpu {
+namespace isobrick::emulated {
 
 class Fiber;
 
@@ -39,10 +40,12 @@ class ThreadBlock {
   unsigned blocks() const { return blocks_; }
   unsigned thread() const { return running_; }
 
+  /// Where to and from: what the thread has begun to copy, 16 bytes each.
+  std::vector<std::pair<void*, const void*>>& copies() { return copies_[running_]; }
+
   /// Others go on first.
   void pause();
-  /// What is relaxed of a thread's atomics: its last load before a fence acquires, and its stores
-  /// after one release.
+  /// Fences: a thread's last load before one acquires, its stores after one release.
   void note_load(const void* word);
   void note_store(const void* word);
   void fence();
@@ -77,7 +80,9 @@ class ThreadBlock {
   void make_ready(unsigned thread);
   [[noreturn]] void fail(const char* what) const;
 
-  unsigned index_, blocks_, running_ = 0, ended_ = 0, in_barrier_ = 0;
+  unsigned index_, blocks_, running_ = 0, ended_ = 0;
+  unsigned in_barrier_ = 0, barrier_ = 0;  ///< threads that have arrived; at which of two
+  char barriers_[2] = {};
   std::minstd_rand random_;
   const std::function<void()>* kernel_ = nullptr;
   std::vector<std::unique_ptr<Fiber>> fibers_;
@@ -86,6 +91,7 @@ class ThreadBlock {
   std::vector<std::uint8_t> round_of_;  ///< of each thread
   std::vector<unsigned> paused_;        ///< threads that look at something again and again
   std::vector<unsigned> favoured_;      ///< warps; the first goes on whenever it can
+  std::vector<std::vector<std::pair<void*, const void*>>> copies_;
   std::vector<const void*> last_load_;
   std::vector<std::uint8_t> has_fence_;
 };
@@ -98,4 +104,4 @@ void acquire(const void* what);
 void launch(unsigned blocks, unsigned threads, std::size_t shared_bytes, unsigned seed,
             const std::function<void()>& kernel);
 
-}  // namespace isobrick::on_cpu
+}  // namespace isobrick::emulated

@@ -7,7 +7,7 @@
 namespace isobrick::testing {
 namespace {
 
-using on_cpu::TileRun;
+using emulated::TileRun;
 
 /// Extracts tiles that the host has found.
 template <class T>
@@ -40,7 +40,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
     state.give(p, run.blocks == found.count * slabs);
     MeshRoom room(expected.positions.size(), expected.triangles.size());
     room.give(p);
-    on_cpu::run_tiles(run, p, volume.cases());
+    emulated::run_tiles(run, p, volume.cases());
     room.expect(expected);
     state.expect_told(expected, found.count);
     state.expect_zeroed();
@@ -146,7 +146,7 @@ TYPED_TEST(TileKernel, TooLittleRoom) {
     state.give(p, false);
     MeshRoom room(vertices, triangles);
     room.give(p);
-    on_cpu::run_tiles({.type = scalar_type_of<TypeParam>}, p, volume.cases());
+    emulated::run_tiles({.type = scalar_type_of<TypeParam>}, p, volume.cases());
     room.expect_untouched(vertices, triangles);
     state.expect_told(expected, found.count);
     state.expect_zeroed();
@@ -185,7 +185,7 @@ void compare_searched(const Field<T>& field, SurfaceOptions options, double isov
   search.order = p.order;
   search.sums = sums.data();
   search.ticket = &ticket;
-  on_cpu::run_search(scalar_type_of<T>, search, 1);
+  emulated::run_search(scalar_type_of<T>, search, 1);
   EXPECT_EQ(count, volume.find(isovalue).count);
   p.items = items.data();
   p.item_count = &count;
@@ -193,7 +193,7 @@ void compare_searched(const Field<T>& field, SurfaceOptions options, double isov
   p.begin_at_once = 1;
   MeshRoom room(expected.positions.size(), expected.triangles.size());
   room.give(p);
-  on_cpu::run_tiles({.type = scalar_type_of<T>, .blocks = 3}, p, volume.cases());
+  emulated::run_tiles({.type = scalar_type_of<T>, .blocks = 3}, p, volume.cases());
   room.expect(expected);
   state.expect_told(expected, count);
   state.expect_zeroed();

@@ -10,7 +10,7 @@
 #include "isobrick/gpu/search_tiles.cuh"
 #include "isobrick/gpu/unpack_tiles.cuh"
 
-namespace isobrick::on_cpu {
+namespace isobrick::emulated {
 namespace {
 
 template <int N, class T, bool Normals, bool Nan>
@@ -47,10 +47,6 @@ auto with_kernel(const TileRun& r, F&& f) {
 }
 
 }  // namespace
-
-std::uint32_t listed_at_a_time(const TileRun& run) {
-  return with_kernel(run, [](auto kernel) { return decltype(kernel)::kListed; });
-}
 
 void run_tiles(const TileRun& run, const gpu::TileParams& params, const gpu::CaseTable& cases) {
   with_kernel(run, [&](auto kernel) { kernel.run(run, params, cases); });
@@ -89,4 +85,4 @@ void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed)
   });
 }
 
-}  // namespace isobrick::on_cpu
+}  // namespace isobrick::emulated

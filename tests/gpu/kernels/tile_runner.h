@@ -5,7 +5,7 @@
 #include "isobrick/gpu/tile_params.h"
 #include "isobrick/gpu/unpack_params.h"
 
-namespace isobrick::on_cpu {
+namespace isobrick::emulated {
 
 // Runs kernels on the CPU, until all blocks have ended.
 
@@ -18,9 +18,6 @@ struct TileRun {
   unsigned seed = 1;
 };
 
-/// Cells or vertices that such a kernel lists at a time.
-std::uint32_t listed_at_a_time(const TileRun& run);
-
 void run_tiles(const TileRun& run, const gpu::TileParams& params, const gpu::CaseTable& cases);
 
 void run_search(ScalarType type, const gpu::SearchParams& params, unsigned seed);
@@ -29,4 +26,4 @@ void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::
 void run_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns);
 void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed);
 
-}  // namespace isobrick::on_cpu
+}  // namespace isobrick::emulated

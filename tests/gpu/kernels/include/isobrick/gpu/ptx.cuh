@@ -11,14 +11,14 @@ namespace isobrick::gpu {
 /// A clock that goes on by being looked at: no two threads see the same time, and none has to wait.
 inline std::uint64_t global_nanoseconds() {
   static std::atomic<std::uint64_t> now{1};
-  on_cpu::ThreadBlock::current().pause();
-  return now.fetch_add(50);
+  emulated::ThreadBlock::current().pause();
+  return now.fetch_add(50, std::memory_order_relaxed);
 }
 
 inline unsigned own_thread() { return threadIdx.x; }
 
 inline void add_from_below(std::uint32_t& v, int distance) {
-  const auto all = on_cpu::exchange(on_cpu::Together::shuffle, v);
+  const auto all = emulated::exchange(emulated::Together::shuffle, v);
   const int lane = static_cast<int>(threadIdx.x % 32);
   if (lane >= distance) v += all[static_cast<std::size_t>(lane - distance)];
 }
@@ -40,11 +40,15 @@ inline void prefetch_l2(const void*) {}
 inline void let_next_launch_start() {}
 inline void wait_for_launch_before() {}
 
+/// As late as may be.
 inline void begin_copy(std::uint32_t to, const void* from) {
-  std::memcpy(shared_bytes + to, from, 16);
+  emulated::ThreadBlock::current().copies().push_back({shared_bytes + to, from});
 }
 inline void end_copies() {}
-inline void wait_for_copies() {}
+inline void wait_for_copies() {
+  for (const auto& [to, from] : emulated::ThreadBlock::current().copies()) std::memcpy(to, from, 16);
+  emulated::ThreadBlock::current().copies().clear();
+}
 
 /// Eight bytes of shared memory as a barrier: how many have yet to arrive, of how many, and the
 /// parity of the phase that is on.
@@ -64,12 +68,13 @@ inline void init_barrier_at(std::uint32_t address, int count) {
 }
 inline void arrive_at(std::uint32_t address) {
   SharedBarrier& barrier = SharedBarrier::at(address);
-  if (barrier.left.fetch_sub(1) > 1) return;
+  if (barrier.left.fetch_sub(1, std::memory_order_release) > 1) return;
+  barrier.left.load(std::memory_order_acquire);
   barrier.left.store(barrier.count);
   barrier.parity.fetch_xor(1);
 }
 inline bool is_phase_over(std::uint32_t address, std::uint32_t parity) {
-  on_cpu::ThreadBlock::current().pause();
+  emulated::ThreadBlock::current().pause();
   return SharedBarrier::at(address).parity.load() != parity;
 }
 
