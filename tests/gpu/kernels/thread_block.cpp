@@ -117,6 +117,7 @@ void ThreadBlock::pause() {
 void ThreadBlock::wait_for_block() {
   // Of two that take turns: who is late sees nothing of what comes after the next barrier.
   const void* const barrier = &barriers_[barrier_];
+  has_fence_[running_] = false;
   release(barrier);
   if (++in_barrier_ == fibers_.size()) {
     in_barrier_ = 0;

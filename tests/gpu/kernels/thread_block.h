@@ -45,7 +45,8 @@ class ThreadBlock {
 
   /// Others go on first.
   void pause();
-  /// Fences: a thread's last load before one acquires, its stores after one release.
+  /// Fences: a thread's last load before one acquires, its stores between one and the block's next
+  /// barrier release.
   void note_load(const void* word);
   void note_store(const void* word);
   void fence();
@@ -82,7 +83,7 @@ class ThreadBlock {
 
   unsigned index_, blocks_, running_ = 0, ended_ = 0;
   unsigned in_barrier_ = 0, barrier_ = 0;  ///< threads that have arrived; at which of two
-  char barriers_[2] = {};
+  std::uint64_t barriers_[2] = {};         ///< for ThreadSanitizer
   std::minstd_rand random_;
   const std::function<void()>* kernel_ = nullptr;
   std::vector<std::unique_ptr<Fiber>> fibers_;
