@@ -76,6 +76,22 @@ struct MeshRoom {
   }
 };
 
+/// What an extraction is told of the lattice and the surface, wherever the samples lie.
+inline gpu::TileParams params_of(const Lattice& lattice, const SurfaceOptions& options) {
+  gpu::TileParams p{};
+  for (int axis = 0; axis < 3; ++axis) {
+    p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
+    p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);
+    p.roi_lo[axis] = static_cast<std::int32_t>(options.roi.lo[axis]);
+    p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
+  }
+  p.isovalue = options.isovalue;
+  p.crossing = static_cast<float>(options.isovalue);
+  p.world = world_map(options.transform);
+  p.diagonal = is_diagonal(p.world);
+  return p;
+}
+
 /// A small volume as kernels find it on a device; DeviceVolume does the same there.
 template <class T>
 class KernelVolume {
@@ -131,20 +147,12 @@ class KernelVolume {
 
   /// What an extraction is told of the volume, with all tiles for candidates.
   gpu::TileParams params(double isovalue) const {
-    gpu::TileParams p{};
+    SurfaceOptions o = options;
+    o.isovalue = isovalue;
+    gpu::TileParams p = params_of(lattice, o);
     p.pages = pages_.data();
     p.columns = columns_.data();
     p.page_of_tile = page_of_tile_.data();
-    for (int axis = 0; axis < 3; ++axis) {
-      p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
-      p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);
-      p.roi_lo[axis] = static_cast<std::int32_t>(options.roi.lo[axis]);
-      p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
-    }
-    p.isovalue = isovalue;
-    p.crossing = static_cast<float>(isovalue);
-    p.world = world_map(options.transform);
-    p.diagonal = is_diagonal(p.world);
     p.candidates = {coordinates_.data(), order_of_tile_.data(), tiles()};
     return p;
   }

@@ -118,24 +118,14 @@ class Streamed {
     emulated::run_unpack(lattice_.type, u, epoch_);
   }
 
-  gpu::TileParams params() const {
-    gpu::TileParams p{};
+  gpu::TileParams params() {
+    gpu::TileParams p = params_of(lattice_, options_);
     p.items = items_.data();
     p.item_count = &count_;
     p.links = links_.data();
     p.pages = pages_.data();
     p.epoch = epoch_ + 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      p.tiles[axis] = static_cast<std::int32_t>(lattice_.tiles()[axis]);
-      p.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
-      p.roi_lo[axis] = static_cast<std::int32_t>(options_.roi.lo[axis]);
-      p.roi_hi[axis] = static_cast<std::int32_t>(options_.roi.hi[axis]);
-    }
-    p.isovalue = options_.isovalue;
-    p.crossing = static_cast<float>(options_.isovalue);
-    p.world = world_map(options_.transform);
-    p.diagonal = is_diagonal(p.world);
-    p.row_tables = const_cast<gpu::RowTable*>(row_tables_.data());
+    p.row_tables = row_tables_.data();
     return p;
   }
 
