@@ -28,7 +28,7 @@ void add_volume_options(CLI::App* app, VolumeRequest& volume) {
   add_parsed(app, volume.origin, parse_vector,
              {"--origin", "X,Y,Z", "World position of the first sample", "the file's, or 0,0,0"});
   add_parsed(app, volume.unit, [](const std::string& text) { return text; },
-             {"--unit", "NAME", "Unit of world space, such as micrometer"});
+             {"--unit", "NAME", "Unit of world space, such as mm or micrometer"});
   add_selection(app, volume.selection);
   add_parsed(app, volume.grid, [](const std::string& text) { return text; },
              {"--grid", "NAME", "Which grid of an OpenVDB file that has several"});

@@ -6,21 +6,42 @@
 namespace isobrick {
 namespace {
 
-/// A unit of length; picometers make the factors between them exact.
+/// A unit of length; picometers make the factors between the usual ones exact.
 struct LengthUnit {
   std::string_view symbol, name;
   double picometers;
 };
 
-/// The first symbol of a name is the one that is shown. Where none is in ASCII, files
-/// have the name.
+/// The units that OME-Zarr names, which are UDUNITS-2's. The first symbol of a name is the one
+/// that is shown. Where none is in ASCII, files have the name.
 constexpr LengthUnit kUnits[] = {
-    {"m", "meter", 1e12},      {"dm", "decimeter", 1e11}, {"cm", "centimeter", 1e10},
-    {"mm", "millimeter", 1e9}, {"µm", "micrometer", 1e6}, {"μm", "micrometer", 1e6},
-    {"um", "micrometer", 1e6}, {"nm", "nanometer", 1e3},  {"pm", "picometer", 1},
-    {"km", "kilometer", 1e15}, {"in", "inch", 2.54e10},   {"ft", "foot", 3.048e11},
-    {"Å", "angstrom", 100},    {"å", "angstrom", 100},    {"mi", "mile", 1.609344e15},
+    {"m", "meter", 1e12},         {"dm", "decimeter", 1e11},
+    {"cm", "centimeter", 1e10},   {"mm", "millimeter", 1e9},
+    {"µm", "micrometer", 1e6},    {"μm", "micrometer", 1e6},
+    {"um", "micrometer", 1e6},    {"nm", "nanometer", 1e3},
+    {"pm", "picometer", 1},       {"km", "kilometer", 1e15},
+    {"in", "inch", 2.54e10},      {"ft", "foot", 3.048e11},
+    {"Å", "angstrom", 100},       {"å", "angstrom", 100},
+    {"mi", "mile", 1.609344e15},  {"yd", "yard", 9.144e11},
+    {"fm", "femtometer", 1e-3},   {"am", "attometer", 1e-6},
+    {"zm", "zeptometer", 1e-9},   {"ym", "yoctometer", 1e-12},
+    {"hm", "hectometer", 1e14},   {"Mm", "megameter", 1e18},
+    {"Gm", "gigameter", 1e21},    {"Tm", "terameter", 1e24},
+    {"Pm", "petameter", 1e27},    {"Em", "exameter", 1e30},
+    {"Zm", "zettameter", 1e33},   {"Ym", "yottameter", 1e36},
+    {"pc", "parsec", 3.0856775814913673e28},
 };
+
+/// Other spellings of the same: plurals, British ones, and "micron".
+std::string singular(std::string_view unit) {
+  if (unit == "micron" || unit == "microns") return "micrometer";
+  if (unit == "feet") return "foot";
+  if (unit == "inches") return "inch";
+  std::string name(unit);
+  if (name.ends_with("s") && name.size() > 3) name.pop_back();
+  if (name.ends_with("metre")) name.replace(name.size() - 2, 2, "er");
+  return name;
+}
 
 template <class Condition>
 const LengthUnit* find(Condition condition) {
@@ -36,13 +57,22 @@ bool is_ascii(std::string_view text) {
 }  // namespace
 
 std::string unit_name(std::string_view unit) {
+  const std::string other = singular(unit);
   const auto* const known =
-      find([&](const LengthUnit& u) { return unit == u.symbol || unit == u.name; });
-  if (known != nullptr) return std::string(known->name);
-  if (unit == "micron" || unit == "microns") return "micrometer";
-  // Lengths that OME-Zarr names and hardly anybody uses.
-  const bool length = unit.ends_with("meter") || unit == "yard" || unit == "parsec";
-  return length ? std::string(unit) : std::string();
+      find([&](const LengthUnit& u) { return unit == u.symbol || other == u.name; });
+  return known == nullptr ? std::string() : std::string(known->name);
+}
+
+std::string unit_names() {
+  std::string names;
+  std::string_view last;
+  for (const LengthUnit& unit : kUnits) {
+    if (unit.name == last) continue;
+    names += names.empty() ? "" : ", ";
+    names += unit.name;
+    last = unit.name;
+  }
+  return names;
 }
 
 std::optional<double> unit_ratio(std::string_view unit, std::string_view other) {

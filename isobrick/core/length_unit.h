@@ -12,6 +12,9 @@ namespace isobrick {
 /// "mm" → "millimeter" and so on; what is no unit of length becomes empty.
 std::string unit_name(std::string_view unit);
 
+/// All names, for messages: "meter, decimeter, …".
+std::string unit_names();
+
 /// How many of `other` are one of `unit`, both as unit_name() has them; nothing
 /// where that is not known.
 std::optional<double> unit_ratio(std::string_view unit, std::string_view other);

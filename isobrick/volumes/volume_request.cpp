@@ -7,6 +7,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/lattice.h"
+#include "isobrick/core/length_unit.h"
 
 namespace isobrick {
 namespace {
@@ -26,6 +27,14 @@ void check_geometry(const VolumeInfo& info) {
           fmt::format("'{}': spacing must be positive and finite, the origin finite", info.name));
 }
 
+std::string checked_unit(const std::string& unit) {
+  std::string name = unit_name(unit);
+  if (name.empty())
+    throw UsageError(
+        fmt::format("--unit: '{}' is no unit of length; it is one of {}", unit, unit_names()));
+  return name;
+}
+
 }  // namespace
 
 VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
@@ -37,7 +46,8 @@ VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type
   info.name = path;
   if (said.spacing) info.transform.spacing = *said.spacing;
   if (said.origin) info.transform.origin = *said.origin;
-  if (said.unit) info.transform.unit = *said.unit;
+  // What is no length ("pixel") is left out: viewers refuse a store with it.
+  info.transform.unit = said.unit ? checked_unit(*said.unit) : unit_name(info.transform.unit);
   check_geometry(info);
   return info;
 }

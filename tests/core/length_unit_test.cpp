@@ -6,7 +6,9 @@ namespace isobrick {
 namespace {
 
 TEST(LengthUnit, SymbolsBecomeNamesAndBack) {
-  for (const char* symbol : {"m", "dm", "cm", "mm", "nm", "pm", "km", "in", "ft", "mi"}) {
+  for (const char* symbol : {"m", "dm", "cm", "mm", "nm", "pm", "km", "in", "ft", "mi", "yd",
+                             "fm", "am", "zm", "ym", "hm", "Mm", "Gm", "Tm", "Pm", "Em", "Zm", "Ym",
+                             "pc"}) {
     const std::string name = unit_name(symbol);
     EXPECT_GT(name.size(), 3u) << symbol;
     EXPECT_EQ(unit_name(name), name);
@@ -24,9 +26,18 @@ TEST(LengthUnit, PeopleReadGreekAndFilesAscii) {
   EXPECT_EQ(ascii_unit_symbol("angstrom"), "angstrom");
 }
 
-TEST(LengthUnit, WhatIsUnknownKeepsItsNameOrIsNone) {
-  EXPECT_EQ(unit_name("gigameter"), "gigameter");
-  EXPECT_EQ(unit_symbol("gigameter"), "gigameter");
+TEST(LengthUnit, OtherSpellings) {
+  EXPECT_EQ(unit_name("microns"), "micrometer");
+  EXPECT_EQ(unit_name("millimetres"), "millimeter");
+  EXPECT_EQ(unit_name("inches"), "inch");
+  EXPECT_EQ(unit_name("feet"), "foot");
+}
+
+TEST(LengthUnit, WhatIsUnknownIsNone) {
+  for (const char* text : {"pixel", "kilogrammeter", "MM", "mms", "s", ""})
+    EXPECT_EQ(unit_name(text), "") << text;
+  EXPECT_EQ(unit_symbol("pixel"), "pixel");
+  EXPECT_NE(unit_names().find("angstrom, mile"), std::string::npos);
   EXPECT_EQ(unit_name("second"), "");
   EXPECT_EQ(unit_symbol(""), "");
 }
@@ -35,7 +46,7 @@ TEST(LengthUnit, RatiosAreExact) {
   EXPECT_EQ(unit_ratio("inch", "millimeter"), 25.4);
   EXPECT_EQ(unit_ratio("meter", "micrometer"), 1e6);
   EXPECT_EQ(unit_ratio("parsec", "parsec"), 1);
-  EXPECT_FALSE(unit_ratio("parsec", "meter"));
+  EXPECT_FALSE(unit_ratio("pixel", "meter"));
 }
 
 }  // namespace

@@ -169,7 +169,7 @@ TEST(OpenSource, SaidBeforeHeaderBeforeName) {
   said.type = ScalarType::i16;
   said.spacing = Vec3d{4, 4, 4};
   said.origin = Vec3d{1, 0, 0};
-  said.unit = "micrometer";
+  said.unit = "um";
   said.order = ByteOrder::big;
   source = open_source(path, said);
   EXPECT_EQ(source->info().type, ScalarType::i16);
@@ -178,6 +178,10 @@ TEST(OpenSource, SaidBeforeHeaderBeforeName) {
   EXPECT_EQ(source->info().transform.origin, (Vec3d{1, 0, 0}));
   EXPECT_EQ(source->info().transform.unit, "micrometer");
   EXPECT_NE(read_box(*source, {{0, 0, 0}, kExtent}), whole(ScalarType::u16));
+
+  said.unit = "furlong";
+  const auto message = message_of<UsageError>([&] { open_source(path, said); });
+  EXPECT_TRUE(contains(message, "furlong") && contains(message, "millimeter")) << message;
 }
 
 TEST(OpenSource, AHeaderBesideThatMeansAnotherFileIsNotUsed) {
