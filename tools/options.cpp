@@ -142,6 +142,15 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_parsed(app, options.levels, parse_levels,
              {"--levels", "auto|N", "Levels of the pyramid; auto: until one brick holds the last",
               "auto"});
+  add_repeated(app,
+               {"--factors", "FX,FY,FZ",
+                "Samples along x, y and z, 1 or 2, that become one of the next level; given several "
+                "times, of one step each, the last for all further ones",
+                "by spacing, towards cubes"},
+               [&options](const std::string& text) { options.factors.push_back(parse_dims(text)); });
+  add_parsed(app, options.downsampling, parse_downsampling_name,
+             {"--downsample", "mean|max|min|mode|stride",
+              "What such samples become; mode suits labels", "mean"});
   add_parsed(app, options.index,
              [](const std::string& text) {
                return text == "none" ? std::nullopt : std::optional(parse_stored_kind(text));

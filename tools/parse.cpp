@@ -170,6 +170,12 @@ std::optional<int> parse_levels(std::string_view text) {
   return parse_int(text, 1, 64);
 }
 
+Downsampling parse_downsampling_name(std::string_view text) {
+  if (const auto method = parse_downsampling(text)) return *method;
+  throw UsageError(
+      fmt::format("unknown method '{}'; it is mean, max, min, mode or stride", text));
+}
+
 RoiText parse_roi(std::string_view text) {
   const auto parts = split_box(text);
   constexpr Index most = Index{1} << 32;

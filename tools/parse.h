@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "isobrick/core/downsampling.h"
 #include "isobrick/core/half_space.h"
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/vec.h"
@@ -72,6 +73,9 @@ std::optional<int> parse_codec(std::string_view text);
 
 /// "auto" (nothing) or a number of levels.
 std::optional<int> parse_levels(std::string_view text);
+
+/// "mean", "max", "min", "mode" or "stride".
+Downsampling parse_downsampling_name(std::string_view text);
 
 /// A region as it was typed: what is left out reaches to the border.
 using RoiText = RegionRequest;

@@ -101,6 +101,8 @@ void parse_multiscales(const CheckedJson& multiscales, ImageMetadata& image) {
   if (multiscales.array_size() == 0) multiscales.damaged("is empty");
   const CheckedJson first = multiscales.at(std::size_t{0});
   if (first.has("name") && first.raw()["name"].is_string()) image.name = first.string_at("name");
+  if (first.has("type") && first.raw()["type"].is_string())
+    image.downsampling = first.string_at("type");
   const std::string unit = parse_axes(first.at("axes"), image);
   const std::size_t axes = image.leading.size() + 3;
   ScaleAndTranslation common;
@@ -181,6 +183,7 @@ std::string to_json(const ImageMetadata& image) {
   }
   Json multiscale;
   multiscale["name"] = image.name;
+  if (!image.downsampling.empty()) multiscale["type"] = image.downsampling;
   multiscale["axes"] = std::move(axes);
   multiscale["datasets"] = std::move(datasets);
 

@@ -35,6 +35,7 @@ struct ImageMetadata {
   std::optional<bool> may_have_nan;
   std::string grid_class;  ///< as OpenVDB calls it ("level set"), or empty
   std::string grid_name;   ///< of the OpenVDB grid, or empty
+  std::string downsampling;  ///< how coarser levels were made ("mean"): `type`; or empty
   /// What the root says that metadata_checksum() must be.
   std::optional<std::uint32_t> checksum;
 

@@ -11,12 +11,15 @@
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/downsampling.h"
 
 namespace isobrick {
 
 /// Everything that the metadata of a store will say. All levels share type and codec.
 struct StoreLayout {
   std::vector<LevelInfo> levels;
+  std::vector<Int3> factors;  ///< of each level but the last: 1 or 2 an axis, to the next one
+  Downsampling downsampling = Downsampling::mean;  ///< what makes the coarser levels
   std::optional<int> zstd_level = 3;
   double fill_value = 0;
   bool may_have_nan = false;

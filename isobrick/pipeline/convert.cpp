@@ -146,17 +146,19 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
   const Lattice& lattice = layout_.levels[static_cast<std::size_t>(level)].lattice;
   LevelWriter& writer = *writers_[static_cast<std::size_t>(level)];
   std::unique_ptr<SpooledVolume> next;
+  Int3 factors{1, 1, 1};
   if (level + 1 < level_count()) {
+    factors = layout_.factors[static_cast<std::size_t>(level)];
     VolumeInfo info = source.info();
-    info.extent = half_extent(lattice.extent);
+    info.extent = coarser_extent(lattice.extent, factors);
     next = std::make_unique<SpooledVolume>(staging_.path(), info);
   }
   const Int3 piece = plan_->piece(level);
   const Int3 pieces = ceil_div(lattice.extent, piece);
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
       bytes_of(min(piece, lattice.extent), lattice.type));
-  const auto half = std::make_unique_for_overwrite<std::byte[]>(
-      bytes_of(half_extent(min(piece, lattice.extent)), lattice.type));
+  const auto coarser = std::make_unique_for_overwrite<std::byte[]>(
+      next ? bytes_of(coarser_extent(min(piece, lattice.extent), factors), lattice.type) : 0);
   const auto box_of = [&](Int3 p) {
     return intersect({p * piece, (p + Int3{1, 1, 1}) * piece}, lattice.box());
   };
@@ -165,8 +167,10 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
     read_box(source, box, buffer.get());
     writer.write(box, buffer.get(), [&] {
       if (!next) return;
-      downsample(lattice.type, box.extent(), buffer.get(), half.get());
-      next->write({half_extent(box.lo), half_extent(box.hi)}, half.get());
+      downsample(layout_.downsampling, lattice.type, box.extent(), factors, buffer.get(),
+                 coarser.get());
+      next->write({coarser_extent(box.lo, factors), coarser_extent(box.hi, factors)},
+                  coarser.get());
     });
     if (p.x + 1 < pieces.x || p.y + 1 < pieces.y) return;
     writer.record(box.hi.z);

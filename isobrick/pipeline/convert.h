@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
+#include "isobrick/core/downsampling.h"
 #include "isobrick/core/progress.h"
 #include "isobrick/pipeline/index_build.h"
 #include "isobrick/volumes/volume_source.h"
@@ -16,6 +18,10 @@ struct ConvertOptions {
   Index shard = 512;                  ///< samples along each edge of a shard, a multiple of `brick`
   std::optional<int> zstd_level = 3;  ///< nothing: bricks are stored as they are
   std::optional<int> levels;          ///< nothing: until one brick holds the coarsest
+  /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
+  /// steps. Nothing: factors_by_spacing().
+  std::vector<Int3> factors;
+  Downsampling downsampling = Downsampling::mean;
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
   bool resume = false;             ///< go on with an interrupted conversion of the same input

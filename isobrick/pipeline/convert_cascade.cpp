@@ -27,11 +27,14 @@ void read_box(VolumeSource& source, Box3 box, std::byte* out) {
 
 Cascade::Cascade(const ConvertPlan& plan, const StoreLayout& layout, int first_level,
                  std::vector<LevelWriter*> levels)
-    : second_slab_(first_level == 0 && plan.second_slab_fits()) {
+    : method_(layout.downsampling),
+      second_slab_(first_level == 0 && plan.second_slab_fits()) {
   for (std::size_t i = 0; i < levels.size(); ++i) {
     Stage stage;
     stage.lattice = layout.levels[static_cast<std::size_t>(first_level) + i].lattice;
     stage.writer = levels[i];
+    if (i + 1 < levels.size())
+      stage.factors = layout.factors[static_cast<std::size_t>(first_level) + i];
     stage.capacity = std::min(plan.slab_planes(), stage.lattice.extent.z);
     stage.slab = std::make_unique_for_overwrite<std::byte[]>(stage.slab_bytes());
     stages_.push_back(std::move(stage));
@@ -77,12 +80,13 @@ void Cascade::flush(std::size_t i) {
   Stage* coarser = i + 1 < stages_.size() ? &stages_[i + 1] : nullptr;
   stage.writer->write(box, stage.slab.get(), [&] {
     if (coarser != nullptr)
-      downsample(stage.lattice.type, box.extent(), stage.slab.get(), coarser->free_planes());
+      downsample(method_, stage.lattice.type, box.extent(), stage.factors, stage.slab.get(),
+                 coarser->free_planes());
   });
   stage.writer->record(box.hi.z);
   bool coarser_is_full = false;
   if (coarser != nullptr) {
-    coarser->planes += half_extent(box.extent()).z;
+    coarser->planes += coarser_extent(box.extent(), stage.factors).z;
     const bool last = box.hi.z == stage.lattice.extent.z;
     coarser_is_full = last || coarser->planes == coarser->capacity;
   }

@@ -14,7 +14,7 @@ namespace isobrick {
 void read_box(VolumeSource& source, Box3 box, std::byte* out);
 
 /// Takes a level and all coarser ones through memory together: a full slab is
-/// written and averaged into the slab of the next level, which when it is full
+/// written and downsampled into the slab of the next level, which when it is full
 /// goes the same way. Each sample is read once and every level written at once.
 class Cascade {
  public:
@@ -28,6 +28,7 @@ class Cascade {
   struct Stage {
     Lattice lattice;
     LevelWriter* writer;
+    Int3 factors;  ///< to the next stage, if there is one
     std::unique_ptr<std::byte[]> slab;
     Index z0 = 0, planes = 0, capacity;  ///< the slab holds planes [z0, z0 + planes)
 
@@ -43,6 +44,7 @@ class Cascade {
 
   void flush(std::size_t stage);
 
+  Downsampling method_;
   std::vector<Stage> stages_;
   bool second_slab_;
 };

@@ -17,6 +17,8 @@ namespace {
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 /// Program, libraries and stacks.
 constexpr std::size_t kProgramBytes = 24 * kMiB;
+/// What a reader takes.
+constexpr int kMaxLevels = 64;
 
 Index longest(Int3 e) { return std::max({e.x, e.y, e.z}); }
 
@@ -26,17 +28,33 @@ Int3 shard_extent(const Lattice& lattice, Index shard) {
   return min({shard, shard, shard}, whole);
 }
 
-int level_count(Int3 extent, Index brick, std::optional<int> asked) {
-  int until_brick = 1, until_one = 1;
-  for (Int3 e = extent; longest(e) > 1; e = half_extent(e)) {
-    ++until_one;
-    if (longest(e) > brick) ++until_brick;
+/// From `level`, which is number `step` of the pyramid, to the next one.
+Int3 factors_of(const ConvertOptions& options, const LevelInfo& level, std::size_t step) {
+  if (options.factors.empty()) return factors_by_spacing(level.transform, level.lattice.extent);
+  return options.factors[std::min(step, options.factors.size() - 1)];
+}
+
+/// Adds coarser levels to the finest one, as many as are asked for or until one brick holds the
+/// last. Where the factors leave an axis as it is, they may end before.
+void add_levels(StoreLayout& layout, const ConvertOptions& options, Index shard) {
+  const auto wanted = static_cast<std::size_t>(options.levels.value_or(kMaxLevels));
+  while (layout.levels.size() < wanted) {
+    LevelInfo level = layout.levels.back();
+    const Int3 extent = level.lattice.extent;
+    if (!options.levels && longest(extent) <= options.brick) return;
+    const Int3 factors = factors_of(options, level, layout.factors.size());
+    level.lattice.extent = coarser_extent(extent, factors);
+    if (level.lattice.extent == extent) break;
+    level.transform = coarser_transform(level.transform, extent, factors, options.downsampling);
+    level.shard = shard_extent(level.lattice, shard);
+    layout.levels.push_back(level);
+    layout.factors.push_back(factors);
   }
-  if (!asked) return until_brick;
-  if (*asked < 1 || *asked > until_one)
+  const Int3 finest = layout.levels.front().lattice.extent;
+  if (options.levels && layout.levels.size() < wanted)
     throw UsageError(fmt::format("{} levels: a volume of {} × {} × {} samples can have 1 to {}",
-                                 *asked, extent.x, extent.y, extent.z, until_one));
-  return *asked;
+                                 *options.levels, finest.x, finest.y, finest.z,
+                                 layout.levels.size()));
 }
 
 void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
@@ -51,6 +69,13 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
   if (options.zstd_level && (*options.zstd_level < 1 || *options.zstd_level > 22))
     throw UsageError(fmt::format("zstd level {}: 1 to 22 are possible", *options.zstd_level));
   if (options.threads < 0) throw UsageError(fmt::format("{} threads", options.threads));
+  if (options.levels && (*options.levels < 1 || *options.levels > kMaxLevels))
+    throw UsageError(fmt::format("{} levels: 1 to {} are possible", *options.levels, kMaxLevels));
+  for (const Int3& f : options.factors)
+    if (min(f, {1, 1, 1}) != Int3{1, 1, 1} || max(f, {2, 2, 2}) != Int3{2, 2, 2} ||
+        f == Int3{1, 1, 1})
+      throw UsageError(fmt::format(
+          "factors {},{},{}: each is 1 or 2, and at least one of them 2", f.x, f.y, f.z));
 }
 
 }  // namespace
@@ -64,15 +89,13 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
   layout.grid_name = volume.grid_name;
   layout.name = std::filesystem::path(volume.name).filename().string();
   const Index shard = options.shard / options.brick * options.brick;
-  LevelInfo level;
-  level.lattice = {volume.extent, {options.brick, options.brick, options.brick}, volume.type};
-  level.transform = volume.transform;
-  for (int left = level_count(volume.extent, options.brick, options.levels); left > 0; --left) {
-    level.shard = shard_extent(level.lattice, shard);
-    layout.levels.push_back(level);
-    level.transform = half_transform(level.transform, level.lattice.extent);
-    level.lattice.extent = half_extent(level.lattice.extent);
-  }
+  LevelInfo finest;
+  finest.lattice = {volume.extent, {options.brick, options.brick, options.brick}, volume.type};
+  finest.transform = volume.transform;
+  finest.shard = shard_extent(finest.lattice, shard);
+  layout.levels.push_back(finest);
+  layout.downsampling = options.downsampling;
+  add_levels(layout, options, shard);
   return layout;
 }
 
@@ -132,9 +155,16 @@ bool ConvertPlan::second_slab_fits() const { return cascade_bytes(0) + slab_byte
 Int3 ConvertPlan::piece(int level) const {
   const Lattice& lattice = layout_.levels[static_cast<std::size_t>(level)].lattice;
   const Index s = slab_planes_;
-  // Beside a piece lies the eighth of it that goes to the next level.
-  const std::size_t room = (room_ - ranges_bytes(level)) / 9 * 8;
+  // Beside a piece lies the part of it that goes to the next level.
+  const std::size_t parts = coarser_part();
+  const std::size_t room = (room_ - ranges_bytes(level)) / (parts + 1) * parts;
   return largest_piece(lattice.extent, {s, s, s}, room / lattice.sample_bytes());
+}
+
+std::size_t ConvertPlan::coarser_part() const {
+  Index part = volume(kHalveAll);
+  for (const Int3& factors : layout_.factors) part = std::min(part, volume(factors));
+  return static_cast<std::size_t>(part);
 }
 
 Index ConvertPlan::spool_planes() const {
@@ -149,7 +179,8 @@ std::size_t ConvertPlan::least_room(bool random_access) const {
   const Lattice& lattice = layout_.levels.front().lattice;
   const std::size_t cube =
       static_cast<std::size_t>(slab_planes_ * slab_planes_ * slab_planes_) * lattice.sample_bytes();
-  const std::size_t pieces = ranges_bytes(0) + cube / 8 * 9 + 9;
+  const std::size_t parts = coarser_part();
+  const std::size_t pieces = ranges_bytes(0) + cube / parts * (parts + 1) + parts + 1;
   const std::size_t plane =
       static_cast<std::size_t>(lattice.extent.x * lattice.extent.y) * lattice.sample_bytes();
   return std::min(cascade_bytes(0), random_access ? pieces : std::max(pieces, plane));

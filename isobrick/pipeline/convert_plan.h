@@ -48,6 +48,8 @@ class ConvertPlan {
   std::size_t cascade_bytes(int level) const;
   std::size_t ranges_bytes(int level) const;
   std::size_t least_room(bool random_access) const;
+  /// The least samples of any level that become one of the next.
+  std::size_t coarser_part() const;
 
   const StoreLayout& layout_;
   std::size_t source_bytes_;

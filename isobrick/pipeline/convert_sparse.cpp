@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 /// Program, libraries and stacks.
 constexpr std::size_t kProgramBytes = 24 * kMiB;
-/// Bricks that one brick of the next level is averaged from.
+/// Bricks that one brick of the next level is made of, at most.
 constexpr std::size_t kChildren = 8;
 /// What is kept of each brick while it waits: its place, its parent's, and its shard's.
 constexpr std::size_t kBytesPerBrick = 3 * sizeof(SparseBrick);
@@ -50,8 +50,8 @@ class BrickSpool {
   void read(std::size_t place, std::byte* out) const {
     read_at(fd_.get(), path_, place * brick_bytes_, out, brick_bytes_);
   }
-  /// Leaves none.
-  SparseBricks take_bricks() { return SparseBricks(std::move(bricks_)); }
+  /// Leaves none. `factors`: from their level to the next one.
+  SparseBricks take_bricks(Int3 factors) { return {std::move(bricks_), factors}; }
 
  private:
   std::string path_;
@@ -70,8 +70,13 @@ struct Parcel {
   std::span<const SparseBrick> family;
   Int3 parent;
   std::vector<Brick> bricks;
-  PodBuffer<std::byte> average;  ///< the parent's samples, a full brick; empty in the last level
+  PodBuffer<std::byte> coarser;  ///< the parent's samples, a full brick; empty in the last level
 };
+
+/// From a level to the next; of the last one, which has none, any do.
+Int3 factors_of(const StoreLayout& layout, std::size_t level) {
+  return level < layout.factors.size() ? layout.factors[level] : kHalveAll;
+}
 
 std::size_t working_bytes(const StoreLayout& layout, std::size_t in_flight, int threads) {
   const std::size_t brick = layout.levels.front().lattice.brick_bytes();
@@ -85,9 +90,9 @@ std::size_t ranges_bytes(const StoreLayout& layout, const SparseBricks& finest, 
   bricks.reserve(finest.all().size());
   for (const SparseBrick& b : finest.all()) bricks.push_back(b.brick);
   std::size_t most = 0;
-  for (const LevelInfo& level : layout.levels) {
-    most = std::max(most, sparse_ranges_bytes(level.lattice, bricks, threads));
-    for (Int3& b : bricks) b = parent_of(b);
+  for (std::size_t i = 0; i < layout.levels.size(); ++i) {
+    most = std::max(most, sparse_ranges_bytes(layout.levels[i].lattice, bricks, threads));
+    for (Int3& b : bricks) b = floor_div(b, factors_of(layout, i));
     bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
   }
   return most;
@@ -106,6 +111,7 @@ class SparsePyramid::Level {
         store_(store),
         journal_(journal),
         bricks_per_shard_(ceil_div(info_.shard, info_.lattice.brick)),
+        factors_(factors_of(layout, static_cast<std::size_t>(level))),
         bricks_(std::move(bricks)),
         output_(store, layout, level, journal, progress) {
     find_shards();
@@ -131,11 +137,11 @@ class SparsePyramid::Level {
     };
     Index layer = 0;
     const auto deliver = [&](const Parcel& parcel) {
-      for (; layer < parcel.parent.z; ++layer) close(2 * (layer + 1) * info_.lattice.brick.z);
+      for (; layer < parcel.parent.z; ++layer) close((layer + 1) * factors_.z * info_.lattice.brick.z);
       put(parcel);
       if (next != nullptr &&
-          !all_fill(info_.lattice.type, parcel.average.span(), layout_.fill_value))
-        next->append(parcel.parent, parcel.average.span());
+          !all_fill(info_.lattice.type, parcel.coarser.span(), layout_.fill_value))
+        next->append(parcel.parent, parcel.coarser.span());
     };
     run_in_order<Parcel>(
         in_flight, take, [&](Parcel& parcel) { pack(parcel, source, spool, next); }, deliver);
@@ -189,11 +195,11 @@ class SparsePyramid::Level {
 
   void pack(Parcel& parcel, VolumeSource& source, const BrickSpool* spool, const BrickSpool* next) {
     const Lattice& lattice = info_.lattice;
-    parcel.parent = parent_of(parcel.family.front().brick);
+    parcel.parent = bricks_.parent_of(parcel.family.front().brick);
     if (next != nullptr) {
-      parcel.average.resize(lattice.brick_bytes());
+      parcel.coarser.resize(lattice.brick_bytes());
       const Box3 whole = lattice.full_brick_box(parcel.parent);
-      fill_box(lattice.type, layout_.fill_value, {parcel.average.data(), whole}, whole);
+      fill_box(lattice.type, layout_.fill_value, {parcel.coarser.data(), whole}, whole);
     }
     // A thread that waits for a part of one family must not begin another one:
     // they would share its buffers.
@@ -213,7 +219,7 @@ class SparsePyramid::Level {
       if (const auto bits = source.constant(box))
         return pack_constant(item.brick, *bits, kept, parcel);
     const std::size_t sample = lattice.sample_bytes();
-    thread_local PodBuffer<std::byte> samples, half;
+    thread_local PodBuffer<std::byte> samples, coarser;
     samples.resize(lattice.brick_bytes());
     if (spool != nullptr) {
       spool->read(item.place, samples.data());
@@ -225,23 +231,28 @@ class SparsePyramid::Level {
     Parcel::Brick brick;
     brick.ranges = scan_brick(lattice, box, samples.data());
     if (parcel != nullptr) {
-      half.resize(lattice.brick_bytes());
-      downsample(lattice.type, box.extent(), samples.data(), half.data());
-      const Box3 halves{half_extent(box.lo), half_extent(box.hi)};
-      copy_box({half.data(), halves},
-               {parcel->average.data(), lattice.full_brick_box(parcel->parent)}, halves, sample);
+      coarser.resize(lattice.brick_bytes());
+      downsample(layout_.downsampling, lattice.type, box.extent(), factors_, samples.data(),
+                 coarser.data());
+      const Box3 part = coarser_box(box);
+      copy_box({coarser.data(), part},
+               {parcel->coarser.data(), lattice.full_brick_box(parcel->parent)}, part, sample);
     }
     brick.packed = output_.pack(item.brick, box, samples.data(), kept);
     return brick;
   }
 
-  /// A full brick of one value, which is its average, too.
+  Box3 coarser_box(Box3 box) const {
+    return {coarser_extent(box.lo, factors_), coarser_extent(box.hi, factors_)};
+  }
+
+  /// A full brick of one value, which is that of the coarser level, too.
   Parcel::Brick pack_constant(Int3 place, std::uint64_t bits, bool kept, Parcel* parcel) {
     const Lattice& lattice = info_.lattice;
     const Box3 box = lattice.brick_box(place);
     if (parcel != nullptr)
-      set_box(lattice.type, bits, {parcel->average.data(), lattice.full_brick_box(parcel->parent)},
-              {half_extent(box.lo), half_extent(box.hi)});
+      set_box(lattice.type, bits, {parcel->coarser.data(), lattice.full_brick_box(parcel->parent)},
+              coarser_box(box));
     return {output_.pack_constant(place, bits, kept), constant_brick(lattice, box, bits)};
   }
 
@@ -272,6 +283,7 @@ class SparsePyramid::Level {
   StoreWriter& store_;
   ConvertJournal* journal_;
   Int3 bricks_per_shard_;
+  Int3 factors_;
   SparseBricks bricks_;
   BrickOutput output_;
   std::vector<Shard> shards_;  ///< in the order z, y, x
@@ -295,7 +307,7 @@ SparsePyramid::SparsePyramid(VolumeSource& source, const StoreLayout& layout,
   const std::size_t count = count_sparse_bricks(source, finest);
   const std::size_t fixed = kProgramBytes + source.memory() + count * kBytesPerBrick;
   fit(fixed, options.memory);
-  bricks_ = SparseBricks(find_sparse_bricks(source, finest, count));
+  bricks_ = SparseBricks(find_sparse_bricks(source, finest, count), factors_of(layout, 0));
   fit(fixed + ranges_bytes(layout, bricks_, threads_), options.memory);
 }
 
@@ -325,7 +337,8 @@ SparsePyramid::Counts SparsePyramid::write(StoreWriter& store, ConvertJournal& j
   progress.begin("convert", bytes);
   std::unique_ptr<BrickSpool> spool, next;
   for (int i = 0; i < levels; ++i) {
-    Level level(layout_, i, spool ? spool->take_bricks() : std::move(bricks_), store,
+    const Int3 factors = factors_of(layout_, static_cast<std::size_t>(i));
+    Level level(layout_, i, spool ? spool->take_bricks(factors) : std::move(bricks_), store,
                 i == 0 ? &journal : nullptr, resumed, progress);
     if (i + 1 < levels)
       next = std::make_unique<BrickSpool>(folder, finest.brick_bytes(), level.families());

@@ -15,12 +15,12 @@
 namespace isobrick {
 
 /// Converts a source that knows where it is the fill value: only the bricks that
-/// may be something else are read, encoded and averaged, so that time and memory
+/// may be something else are read, encoded and downsampled, so that time and memory
 /// follow what is there and not the extent. The store is the one that a Cascade
 /// writes, but for the order of bricks within a shard.
 ///
 /// A level is worked through by the bricks of the next one: the up to eight
-/// bricks that are averaged into one go through memory together, and the next
+/// bricks that become one go through memory together, and the next
 /// level's bricks wait in a temporary file.
 class SparsePyramid {
  public:

@@ -3,15 +3,17 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 namespace isobrick {
 namespace {
 
-/// The four rows that are averaged. At an odd end a row comes twice: counting
-/// every sample twice leaves the mean, and its rounding, as it is.
+/// The four rows that become one. At an odd end, and along an axis that stays, a row comes twice:
+/// counting every sample twice leaves the mean, its rounding and the mode as they are.
 template <class T>
 struct Rows {
   const T *a, *b, *c, *d;
@@ -87,6 +89,19 @@ bool average_pairs_fast(const Rows<T>& r, Index pairs, T* out) {
   return average_pairs(r, pairs, out);
 }
 
+/// Averages the columns of `width` samples, each by itself.
+template <class T>
+void average_columns(const Rows<T>& r, Index width, T* __restrict out) {
+  for (Index x = 0; x < width; ++x) {
+    if constexpr (std::is_floating_point_v<T>) {
+      const double mean = plain_sum(r.a[x], r.b[x], r.c[x], r.d[x]) * 0.25;
+      out[x] = std::isfinite(mean) ? static_cast<T>(mean) : mean_of_unusual(r, x, x);
+    } else {
+      out[x] = mean_of_integers(r, x, x);
+    }
+  }
+}
+
 /// Averages the pairs of a row of `width` samples.
 template <class T>
 void average_row(const Rows<T>& r, Index width, T* __restrict out) {
@@ -104,37 +119,104 @@ void average_row(const Rows<T>& r, Index width, T* __restrict out) {
   }
 }
 
+/// The most frequent of eight values, of equally frequent ones the smallest. A NaN, which equals
+/// nothing, counts as none.
 template <class T>
-void downsample_typed(Int3 extent, const T* in, T* out) {
-  const Int3 half = half_extent(extent);
+T mode_of(const std::array<T, 8>& values) {
+  T mode = values.front();
+  int most = 0;
+  for (const T v : values) {
+    int count = 0;
+    for (const T other : values) count += other == v;
+    if (count > most || (count == most && v < mode)) {
+      most = count;
+      mode = v;
+    }
+  }
+  return mode;
+}
+
+/// `is_better(a, b)` is false for a NaN in either place.
+template <class T, class Better>
+T best_of(const std::array<T, 8>& values, Better is_better) {
+  T best = values.front();
+  for (const T v : values)
+    if (is_better(v, best) || best != best) best = v;
+  return best;
+}
+
+template <class T, class Reduce>
+void reduce_row(const Rows<T>& r, Index width, Index factor, T* out, Reduce reduce) {
+  for (Index x = 0; x < width; x += factor) {
+    const Index next = std::min(x + factor - 1, width - 1);
+    *out++ = reduce(std::array<T, 8>{r.a[x], r.a[next], r.b[x], r.b[next], r.c[x], r.c[next],
+                                     r.d[x], r.d[next]});
+  }
+}
+
+template <class T>
+void reduce_row(Downsampling method, const Rows<T>& r, Index width, Index factor, T* out) {
+  using Values = std::array<T, 8>;
+  const auto with = [&](auto reduce) { reduce_row(r, width, factor, out, reduce); };
+  switch (method) {
+    case Downsampling::mean:
+      if (factor == 1) return average_columns(r, width, out);
+      return average_row(r, width, out);
+    case Downsampling::max:
+      return with([](const Values& v) { return best_of(v, [](T a, T b) { return a > b; }); });
+    case Downsampling::min:
+      return with([](const Values& v) { return best_of(v, [](T a, T b) { return a < b; }); });
+    case Downsampling::mode: return with([](const Values& v) { return mode_of(v); });
+    case Downsampling::stride: return with([](const Values& v) { return v.front(); });
+  }
+}
+
+template <class T>
+void downsample_typed(Downsampling method, Int3 extent, Int3 factors, const T* in, T* out) {
+  const Int3 coarser = coarser_extent(extent, factors);
   const auto row = [&](Index y, Index z) {
     return in + linear_index({0, std::min(y, extent.y - 1), std::min(z, extent.z - 1)}, extent);
   };
-  tbb::parallel_for(Index{0}, half.y * half.z, [&](Index i) {
-    const Index y = 2 * (i % half.y), z = 2 * (i / half.y);
-    const Rows<T> rows{row(y, z), row(y + 1, z), row(y, z + 1), row(y + 1, z + 1)};
-    average_row(rows, extent.x, out + i * half.x);
+  tbb::parallel_for(Index{0}, coarser.y * coarser.z, [&](Index i) {
+    const Index y = factors.y * (i % coarser.y), z = factors.z * (i / coarser.y);
+    const Index y1 = y + factors.y - 1, z1 = z + factors.z - 1;
+    const Rows<T> rows{row(y, z), row(y1, z), row(y, z1), row(y1, z1)};
+    reduce_row(method, rows, extent.x, factors.x, out + i * coarser.x);
   });
 }
 
 }  // namespace
 
-Transform half_transform(const Transform& transform, Int3 extent) {
+Transform coarser_transform(const Transform& transform, Int3 extent, Int3 factors,
+                            Downsampling method) {
   Vec3d middle;
-  Transform half = transform;
+  Transform coarser = transform;
   for (int axis = 0; axis < 3; ++axis)
     if (extent[axis] > 1) {
-      middle[axis] = 0.5;
-      half.spacing[axis] *= 2;
+      const auto factor = static_cast<double>(factors[axis]);
+      if (method != Downsampling::stride) middle[axis] = (factor - 1) / 2;
+      coarser.spacing[axis] *= factor;
     }
-  half.origin = transform.apply(middle);
-  return half;
+  coarser.origin = transform.apply(middle);
+  return coarser;
 }
 
-void downsample(ScalarType type, Int3 extent, const std::byte* in, std::byte* out) {
+Int3 factors_by_spacing(const Transform& transform, Int3 extent) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis)
+    if (extent[axis] > 1) least = std::min(least, transform.spacing[axis]);
+  Int3 factors;
+  for (int axis = 0; axis < 3; ++axis)
+    factors[axis] = transform.spacing[axis] < std::numbers::sqrt2 * least ? 2 : 1;
+  return factors;
+}
+
+void downsample(Downsampling method, ScalarType type, Int3 extent, Int3 factors,
+                const std::byte* in, std::byte* out) {
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    downsample_typed(extent, reinterpret_cast<const T*>(in), reinterpret_cast<T*>(out));
+    downsample_typed(method, extent, factors, reinterpret_cast<const T*>(in),
+                     reinterpret_cast<T*>(out));
   });
 }
 

@@ -1,17 +1,10 @@
 #include "isobrick/pipeline/sparse_bricks.h"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 namespace isobrick {
 namespace {
-
-/// What bricks are sorted by.
-auto order_of(Int3 brick) {
-  const Int3 p = parent_of(brick);
-  return std::tuple(p.z, p.y, p.x, brick.z, brick.y, brick.x);
-}
 
 /// Calls f(brick) for those that are not known to be the fill value, found by halving a box
 /// of bricks again and again.
@@ -39,8 +32,9 @@ void visit_all(const VolumeSource& source, const Lattice& lattice, const F& f) {
 
 }  // namespace
 
-SparseBricks::SparseBricks(std::vector<SparseBrick> bricks) : bricks_(std::move(bricks)) {
-  std::sort(bricks_.begin(), bricks_.end(), [](const SparseBrick& a, const SparseBrick& b) {
+SparseBricks::SparseBricks(std::vector<SparseBrick> bricks, Int3 factors)
+    : bricks_(std::move(bricks)), factors_(factors) {
+  std::sort(bricks_.begin(), bricks_.end(), [this](const SparseBrick& a, const SparseBrick& b) {
     return order_of(a.brick) < order_of(b.brick);
   });
 }
@@ -61,7 +55,7 @@ std::size_t SparseBricks::families() const {
 bool SparseBricks::contains(Int3 brick) const {
   const auto at = std::lower_bound(
       bricks_.begin(), bricks_.end(), brick,
-      [](const SparseBrick& a, Int3 b) { return order_of(a.brick) < order_of(b); });
+      [this](const SparseBrick& a, Int3 b) { return order_of(a.brick) < order_of(b); });
   return at != bricks_.end() && at->brick == brick;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "isobrick/core/lattice.h"
@@ -15,15 +16,16 @@ struct SparseBrick {
   std::size_t place = 0;  ///< of its samples in a spool
 };
 
-/// The brick of the next level that a brick is averaged into.
-constexpr Int3 parent_of(Int3 brick) { return floor_div(brick, {2, 2, 2}); }
-
-/// Such bricks of one level, in families: those that are averaged into one brick of the next
+/// Such bricks of one level, in families: those that are downsampled into one brick of the next
 /// level stand together. Families are in the order z, y, x of their parents.
 class SparseBricks {
  public:
   SparseBricks() = default;
-  explicit SparseBricks(std::vector<SparseBrick> bricks);
+  /// `factors`: from this level to the next one.
+  SparseBricks(std::vector<SparseBrick> bricks, Int3 factors);
+
+  /// The brick of the next level that a brick is downsampled into.
+  Int3 parent_of(Int3 brick) const { return floor_div(brick, factors_); }
 
   std::span<const SparseBrick> all() const { return bricks_; }
   std::size_t families() const;
@@ -32,7 +34,13 @@ class SparseBricks {
   bool contains(Int3 brick) const;
 
  private:
+  auto order_of(Int3 brick) const {
+    const Int3 p = parent_of(brick);
+    return std::tuple(p.z, p.y, p.x, brick.z, brick.y, brick.x);
+  }
+
   std::vector<SparseBrick> bricks_;
+  Int3 factors_{2, 2, 2};
 };
 
 /// How many bricks of `source` are not known to be the fill value.

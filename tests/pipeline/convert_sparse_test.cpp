@@ -93,6 +93,16 @@ TEST(ConvertSparse, TheStoreIsThatOfTheDenseVolume) {
   }
 }
 
+TEST(ConvertSparse, LevelsThatHalveSomeAxes) {
+  const Int3 extent{131, 90, 150};
+  ConvertOptions options{.brick = 16, .shard = 64, .memory = 200 * kMiB, .threads = 3};
+  options.factors = {{2, 2, 1}, {1, 2, 1}, {2, 2, 2}};
+  for (const Downsampling method : kDownsamplings) {
+    options.downsampling = method;
+    expect_dense_store<float>(extent, {{60, 17, 64}, {120, 70, 129}}, 7, options);
+  }
+}
+
 /// Bricks of one value that is not the fill value are neither read nor encoded one by one.
 template <class T>
 void expect_solid_bricks(T value, Box3 solid, bool full) {
@@ -240,19 +250,20 @@ TEST(ConvertSparse, WhatIsRememberedOfEachBrickIsPartOfTheBudget) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.partial"));
 }
 
-TEST(SparseBricks, FamiliesStandTogetherInTheOrderOfTheirParents) {
+/// Families of levels that are `factors` apart.
+void expect_families(Int3 factors) {
   std::vector<SparseBrick> bricks;
   for_each_point({{0, 0, 0}, {5, 3, 4}}, [&](Int3 p) {
     if ((p.x + p.y + p.z) % 3 != 0) bricks.push_back({p, bricks.size()});
   });
-  const SparseBricks sorted(bricks);
+  const SparseBricks sorted(bricks, factors);
   std::size_t families = 0, at = 0;
   Int3 last{-1, -1, -1};
   while (at < sorted.all().size()) {
     const auto family = sorted.family_at(at);
-    const Int3 parent = parent_of(family.front().brick);
+    const Int3 parent = sorted.parent_of(family.front().brick);
     EXPECT_LT(std::tuple(last.z, last.y, last.x), std::tuple(parent.z, parent.y, parent.x));
-    for (const SparseBrick& b : family) EXPECT_EQ(parent_of(b.brick), parent);
+    for (const SparseBrick& b : family) EXPECT_EQ(sorted.parent_of(b.brick), parent);
     last = parent;
     at += family.size();
     ++families;
@@ -262,6 +273,10 @@ TEST(SparseBricks, FamiliesStandTogetherInTheOrderOfTheirParents) {
   EXPECT_TRUE(sorted.family_at(at).empty());
   for_each_point({{0, 0, 0}, {5, 3, 4}},
                  [&](Int3 p) { EXPECT_EQ(sorted.contains(p), (p.x + p.y + p.z) % 3 != 0); });
+}
+
+TEST(SparseBricks, FamiliesStandTogetherInTheOrderOfTheirParents) {
+  for (const Int3 factors : {Int3{2, 2, 2}, Int3{2, 2, 1}, Int3{1, 1, 2}}) expect_families(factors);
 }
 
 }  // namespace

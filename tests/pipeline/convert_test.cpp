@@ -55,10 +55,10 @@ TYPED_TEST(Convert, KeepsEverySampleAndItsRanges) {
         EXPECT_EQ(blocks.at(p).lo, static_cast<double>(range.lo));
         EXPECT_EQ(blocks.at(p).hi, static_cast<double>(range.hi));
       });
-      std::vector<std::byte> half(bytes_of(half_extent(e), scalar_type_of<T>));
-      downsample(scalar_type_of<T>, e, expected.data(), half.data());
+      std::vector<std::byte> half(bytes_of(coarser_extent(e, kHalveAll), scalar_type_of<T>));
+      downsample(Downsampling::mean, scalar_type_of<T>, e, kHalveAll, expected.data(), half.data());
       expected = half;
-      e = half_extent(e);
+      e = coarser_extent(e, kHalveAll);
     }
     NoProgress progress;
     const VerifyReport check = verify(folder / "a.zarr", 2, progress);
@@ -309,7 +309,9 @@ TEST(ConvertLayout, LevelsLieInTheWorldWhereTheirSamplesAre) {
   MemorySource source = make_source<std::uint8_t>({64, 40, 1}, 1);
   source.mutable_info().transform.spacing = {0.5, 1, 3};
   source.mutable_info().transform.origin = {10, 20, 30};
-  convert_quietly(source, folder / "a", small_bricks());
+  ConvertOptions options = small_bricks();
+  options.factors = {kHalveAll};
+  convert_quietly(source, folder / "a", options);
   const StoreReader store(folder / "a");
   ASSERT_EQ(store.info().levels.size(), 3u);
   EXPECT_EQ(store.info().levels[2].lattice.extent, (Int3{16, 10, 1}));

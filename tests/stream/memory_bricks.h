@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -25,6 +26,8 @@ class MemoryBricks final : public BrickSource {
   struct Options {
     Index brick = 32;
     int levels = 0;  ///< 0: until one brick holds the coarsest
+    /// Of each step in turn, the last one of all further steps; none: all axes are halved.
+    std::vector<Int3> factors;
     Transform transform;
     double fill_value = 0;  ///< bricks of it are absent
   };
@@ -51,11 +54,16 @@ class MemoryBricks final : public BrickSource {
       const Int3 e = level.lattice.extent, bricks = level.lattice.bricks();
       const auto count = static_cast<int>(info_.levels.size());
       if (options.levels ? count == options.levels : volume(bricks) == 1) break;
-      std::vector<std::byte> half(static_cast<std::size_t>(volume(half_extent(e))) * sizeof(T));
-      downsample(info_.type, e, samples.data(), half.data());
-      samples = std::move(half);
-      level.transform = half_transform(level.transform, e);
-      level.lattice.extent = half_extent(e);
+      const auto step = static_cast<std::size_t>(count) - 1;
+      const Int3 factors = options.factors.empty()
+                               ? kHalveAll
+                               : options.factors[std::min(step, options.factors.size() - 1)];
+      const Int3 coarser = coarser_extent(e, factors);
+      std::vector<std::byte> next(static_cast<std::size_t>(volume(coarser)) * sizeof(T));
+      downsample(Downsampling::mean, info_.type, e, factors, samples.data(), next.data());
+      samples = std::move(next);
+      level.transform = coarser_transform(level.transform, e, factors);
+      level.lattice.extent = coarser;
     }
   }
 

@@ -17,7 +17,12 @@ struct Shape {
   const char* name;
   std::function<double(Int3, Index)> field;
   int levels = 0;  ///< that are stored; 0: until one brick holds the coarsest
+  std::vector<Int3> factors = {};  ///< of the pyramid; none: all axes are halved
 };
+
+/// Of a volume whose planes lie far apart, and of one whose axes take turns.
+const std::vector<Int3> kFlat{{2, 2, 1}, {2, 2, 1}, {2, 2, 2}};
+const std::vector<Int3> kTurns{{1, 2, 1}, {2, 1, 1}, {1, 1, 2}, {2, 2, 2}};
 
 constexpr Index kEdge = 150;
 constexpr int kPicture = 500;
@@ -34,7 +39,8 @@ class Cracks : public ::testing::TestWithParam<Shape> {
             Int3{kEdge, kEdge, kEdge}, std::function<float(Int3)>([](Int3 p) {
               return static_cast<float>(GetParam().field(p, kEdge));
             }),
-            MemoryBricks::Options{.brick = 16, .levels = GetParam().levels})),
+            MemoryBricks::Options{
+                .brick = 16, .levels = GetParam().levels, .factors = GetParam().factors})),
         tree_(*source_),
         grid_(tree_.grid()),
         bricks_(source_, std::uint64_t{1} << 30),
@@ -152,12 +158,16 @@ TEST_P(Holes, AreNotInsideTheSilhouette) {
 INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Cracks,
                          ::testing::Values(Shape{"ball", ball}, Shape{"gyroid", gyroid_ball},
                                            Shape{"blobs", blobs},
+                                           Shape{"gyroid_flat", gyroid_ball, 0, kFlat},
+                                           Shape{"blobs_flat", blobs, 0, kFlat},
+                                           Shape{"gyroid_turns", gyroid_ball, 0, kTurns},
                                            Shape{"ball_of_one_level", ball, 1},
                                            Shape{"blobs_of_one_level", blobs, 1}),
                          [](const auto& shape) { return shape.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Nothing,
                          ::testing::Values(Shape{"balls", beside_nothing},
+                                           Shape{"balls_flat", beside_nothing, 0, kFlat},
                                            Shape{"balls_of_one_level", beside_nothing, 1}),
                          [](const auto& shape) { return shape.param.name; });
 

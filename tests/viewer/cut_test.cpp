@@ -203,8 +203,8 @@ class LargeBall final : public BrickSource {
     level.lattice = {{2048, 2048, 2048}, {64, 64, 64}, ScalarType::f32};
     for (int i = 0; i < 6; ++i) {
       info_.levels.push_back(level);
-      level.transform = half_transform(level.transform, level.lattice.extent);
-      level.lattice.extent = half_extent(level.lattice.extent);
+      level.transform = coarser_transform(level.transform, level.lattice.extent, kHalveAll);
+      level.lattice.extent = coarser_extent(level.lattice.extent, kHalveAll);
     }
   }
   const StoreInfo& info() const override { return info_; }

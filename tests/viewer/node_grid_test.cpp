@@ -19,8 +19,8 @@ StoreInfo halved(Int3 extent, int levels) {
   level.transform.origin = {10, -4, 7};
   for (int i = 0; i < levels; ++i) {
     info.levels.push_back(level);
-    level.transform = half_transform(level.transform, level.lattice.extent);
-    level.lattice.extent = half_extent(level.lattice.extent);
+    level.transform = coarser_transform(level.transform, level.lattice.extent, kHalveAll);
+    level.lattice.extent = coarser_extent(level.lattice.extent, kHalveAll);
   }
   return info;
 }
