@@ -48,6 +48,7 @@ double bits_to_double(const CheckedJson& json, ScalarType type, const std::strin
     json.damaged(fmt::format("'{}' is no {}", text, zarr_name(type)));
   const std::uint64_t bits = std::strtoull(text.c_str() + 2, nullptr, 16);
   if (type == ScalarType::f64) return std::bit_cast<double>(bits);
+  if (!is_floating(type)) return static_cast<double>(bits);
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
 }
 
@@ -78,6 +79,52 @@ double parse_fill_value(const CheckedJson& json, ScalarType type) {
       json.damaged(fmt::format("{} is no {}", value, zarr_name(type)));
     return value;
   });
+}
+
+// Integers that no double is are refused, as samples are.
+double parse_integer(const CheckedJson& json) {
+  const nlohmann::json& raw = json.raw();
+  std::uint64_t bits = 0;
+  double value = 0;
+  try {
+    if (raw.is_number_unsigned()) {
+      bits = raw.get<std::uint64_t>();
+      widen(WideType::u64, reinterpret_cast<const std::byte*>(&bits),
+            reinterpret_cast<std::byte*>(&value), 1);
+    } else if (raw.is_number_integer()) {
+      bits = static_cast<std::uint64_t>(raw.get<std::int64_t>());
+      widen(WideType::i64, reinterpret_cast<const std::byte*>(&bits),
+            reinterpret_cast<std::byte*>(&value), 1);
+    } else {
+      value = json.number();
+      if (std::trunc(value) != value) json.damaged(fmt::format("{} is no integer", value));
+    }
+  } catch (const DamageError&) {
+    throw;
+  } catch (const Error& e) {
+    json.unsupported(e.what());
+  }
+  return value;
+}
+
+double parse_wide_fill_value(const CheckedJson& json, WideType type) {
+  if (type == WideType::boolean)
+    return (json.raw().is_boolean() ? json.boolean() : parse_integer(json) != 0) ? 1 : 0;
+  if (type != WideType::f16) {
+    const double value = parse_integer(json);
+    if (type == WideType::u64 && value < 0) json.damaged(fmt::format("{} is no uint64", value));
+    return value;
+  }
+  if (json.raw().is_string() && json.string().starts_with("0x") && json.string().size() == 6)
+    return static_cast<double>(half_to_float(
+        static_cast<std::uint16_t>(bits_to_double(json, ScalarType::u16, json.string()))));
+  return parse_fill_value(json, ScalarType::f32);
+}
+
+std::optional<ScalarType> parse_own_type(std::string_view name) {
+  for (const ScalarType type : kScalarTypes)
+    if (name == zarr_name(type)) return type;
+  return std::nullopt;
 }
 
 std::vector<Index> parse_extents(const CheckedJson& json, std::size_t dimensions) {
@@ -232,7 +279,7 @@ std::string to_json(const ArrayMetadata& array) {
   json["zarr_format"] = 3;
   json["node_type"] = "array";
   json["shape"] = array.shape;
-  json["data_type"] = zarr_name(array.type);
+  json["data_type"] = array.wide ? zarr_name(*array.wide) : zarr_name(array.type);
   json["chunk_grid"] = named("regular", {{"chunk_shape", array.chunk}});
   json["chunk_key_encoding"] =
       named(array.key_prefix ? "default" : "v2", {{"separator", std::string(1, array.separator)}});
@@ -259,20 +306,18 @@ ArrayMetadata parse_array_metadata(std::string_view text, const std::string& whe
 
   const CheckedJson type = json.at("data_type");
   const std::string type_name = type.raw().is_string() ? type.string() : type.string_at("name");
-  bool known = false;
-  for (const ScalarType candidate : kScalarTypes)
-    if (type_name == zarr_name(candidate)) {
-      array.type = candidate;
-      known = true;
-    }
-  if (!known) type.unsupported(fmt::format("data type '{}' is not supported", type_name));
+  array.wide = parse_wide_type(type_name);
+  const auto own = array.wide ? widened(*array.wide) : parse_own_type(type_name);
+  if (!own) type.unsupported(fmt::format("data type '{}' is not supported", type_name));
+  array.type = *own;
 
   const CheckedJson grid = json.at("chunk_grid");
   if (const std::string name = grid.string_at("name"); name != "regular")
     grid.unsupported(fmt::format("chunk grid '{}' is not supported", name));
   array.chunk = parse_extents(grid.at("configuration").at("chunk_shape"), dimensions);
   parse_key_encoding(json.at("chunk_key_encoding"), array);
-  array.fill_value = parse_fill_value(json.at("fill_value"), array.type);
+  array.fill_value = array.wide ? parse_wide_fill_value(json.at("fill_value"), *array.wide)
+                                : parse_fill_value(json.at("fill_value"), array.type);
 
   const CheckedJson codecs = json.at("codecs");
   if (codecs.array_size() == 1 && codec_name(codecs.at(std::size_t{0})) == "sharding_indexed") {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "isobrick/bricks/codec.h"
+#include "isobrick/bricks/stored_type.h"
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/vec.h"
 
@@ -26,6 +27,7 @@ struct ArrayMetadata {
   std::vector<Index> shape;
   std::vector<Index> chunk;  ///< of the regular grid: a shard, if there are shards
   ScalarType type = ScalarType::u8;
+  std::optional<WideType> wide;  ///< what is stored, where that is none of our types
   double fill_value = 0;
   CodecChain codecs;  ///< of a chunk, or of a brick if there are shards
   std::optional<Sharding> sharding;
@@ -37,6 +39,8 @@ struct ArrayMetadata {
 
   /// What is encoded by itself: the inner chunk of a shard, or a chunk.
   const std::vector<Index>& brick() const { return sharding ? sharding->brick : chunk; }
+  /// Of a sample as it is stored.
+  std::size_t stored_bytes() const { return wide ? size_of(*wide) : size_of(type); }
   /// File of a chunk relative to the array's folder: "c/z/y/x".
   std::string chunk_key(std::span<const Index> chunk_coordinates) const;
 };

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
-#include <cmath>
+#include <set>
 
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/codec.h"
+#include "isobrick/bricks/ome_transformations.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -18,37 +20,6 @@ constexpr std::size_t kMaxLevels = 64, kMaxAxes = 5;
 constexpr const char* kChecksumKey = "metadata_crc32c";
 
 Json zyx(Vec3d v) { return {v.z, v.y, v.x}; }
-
-// The last three of as many numbers as there are axes.
-Vec3d parse_zyx(const CheckedJson& json, std::size_t axes) {
-  if (json.array_size() != axes) json.damaged(fmt::format("must have {} numbers", axes));
-  return {json.at(axes - 1).number(), json.at(axes - 2).number(), json.at(axes - 3).number()};
-}
-
-// world = translation + scale ∘ index, from a list of OME-Zarr's transformations.
-struct ScaleAndTranslation {
-  Vec3d scale{1, 1, 1}, translation{0, 0, 0};
-};
-
-ScaleAndTranslation parse_transformations(const CheckedJson& list, std::size_t axes) {
-  ScaleAndTranslation result;
-  for (std::size_t i = 0; i < list.array_size(); ++i) {
-    const CheckedJson item = list.at(i);
-    const std::string type = item.string_at("type");
-    if (type == "scale") {
-      const Vec3d scale = parse_zyx(item.at("scale"), axes);
-      for (int axis = 0; axis < 3; ++axis)
-        if (!(scale[axis] > 0)) item.damaged("scale must be positive");
-      result.scale = result.scale * scale;
-      result.translation = result.translation * scale;
-    } else if (type == "translation") {
-      result.translation = result.translation + parse_zyx(item.at("translation"), axes);
-    } else if (type != "identity") {
-      item.unsupported(fmt::format("transformation '{}' is not supported", type));
-    }
-  }
-  return result;
-}
 
 ImageMetadata::Axis parse_leading_axis(const CheckedJson& axis) {
   using enum ImageMetadata::Axis::Role;
@@ -97,34 +68,115 @@ void check_path(const CheckedJson& json, const std::string& path) {
   if (bad) json.damaged(fmt::format("'{}' is no path inside the store", path));
 }
 
-void parse_multiscales(const CheckedJson& multiscales, ImageMetadata& image) {
+void add_level(const CheckedJson& dataset, const AffineMap& map, const std::string& unit,
+               ImageMetadata& image) {
+  ImageMetadata::Level level;
+  level.path = dataset.string_at("path");
+  check_path(dataset, level.path);
+  level.transform = to_transform(dataset, map);
+  level.transform.unit = unit;
+  image.levels.push_back(std::move(level));
+}
+
+CheckedJson datasets_of(const CheckedJson& multiscale) {
+  const CheckedJson datasets = multiscale.at("datasets");
+  const std::size_t count = datasets.array_size();
+  if (count == 0 || count > kMaxLevels) datasets.damaged(fmt::format("{} levels", count));
+  return datasets;
+}
+
+// OME-Zarr 0.4 and 0.5: one coordinate system, transformations in lists.
+void parse_levels(const CheckedJson& multiscale, ImageMetadata& image) {
+  const std::string unit = parse_axes(multiscale.at("axes"), image);
+  const std::size_t axes = image.leading.size() + 3;
+  AffineMap common;
+  if (multiscale.has("coordinateTransformations"))
+    common = parse_scale_and_translation(multiscale.at("coordinateTransformations"), axes);
+  const CheckedJson datasets = datasets_of(multiscale);
+  for (std::size_t i = 0; i < datasets.array_size(); ++i) {
+    const CheckedJson dataset = datasets.at(i);
+    const AffineMap own =
+        parse_scale_and_translation(dataset.at("coordinateTransformations"), axes);
+    add_level(dataset, then(own, common), unit, image);
+  }
+}
+
+// The axes of the coordinate system of this name.
+CheckedJson axes_of(const CheckedJson& multiscale, const std::string& name) {
+  const CheckedJson systems = multiscale.at("coordinateSystems");
+  for (std::size_t i = 0; i < systems.array_size(); ++i)
+    if (systems.at(i).string_at("name") == name) return systems.at(i).at("axes");
+  systems.damaged(fmt::format("has no '{}'", name));
+}
+
+// The only transformation of a whole image that begins at the system; several leave open which.
+std::optional<CheckedJson> only_one_from(const CheckedJson& multiscale, const std::string& system) {
+  std::optional<CheckedJson> found;
+  if (!multiscale.has("coordinateTransformations")) return found;
+  const CheckedJson list = multiscale.at("coordinateTransformations");
+  for (std::size_t i = 0; i < list.array_size(); ++i) {
+    if (coordinate_system(list.at(i).at("input")) != system) continue;
+    if (found) return std::nullopt;
+    found.emplace(list.at(i));
+  }
+  return found;
+}
+
+// OME-Zarr 0.6: levels are placed in the intrinsic system; what leads on from there to one
+// other system is followed.
+void parse_levels_06(const CheckedJson& multiscale, ImageMetadata& image) {
+  const CheckedJson datasets = datasets_of(multiscale);
+  const auto own_of = [&](std::size_t i) {
+    const CheckedJson list = datasets.at(i).at("coordinateTransformations");
+    if (list.array_size() != 1)
+      list.damaged(fmt::format("must have one transformation, has {}", list.array_size()));
+    return list.at(std::size_t{0});
+  };
+  const std::string intrinsic = coordinate_system(own_of(0).at("output"));
+  std::string unit = parse_axes(axes_of(multiscale, intrinsic), image);
+  const std::size_t axes = image.leading.size() + 3;
+  AffineMap common;
+  std::set<std::string> visited;
+  for (std::string system = intrinsic; visited.insert(system).second;) {
+    const auto next = only_one_from(multiscale, system);
+    if (!next) break;
+    common = then(common, parse_transformation(*next, axes));
+    system = coordinate_system(next->at("output"));
+    ImageMetadata reached;
+    unit = parse_axes(axes_of(multiscale, system), reached);
+    if (reached.leading != image.leading)
+      next->unsupported("a transformation to other axes is not supported");
+  }
+  for (std::size_t i = 0; i < datasets.array_size(); ++i) {
+    const CheckedJson own = own_of(i);
+    if (coordinate_system(own.at("output")) != intrinsic)
+      own.damaged(fmt::format("must lead to '{}', as that of the first level", intrinsic));
+    add_level(datasets.at(i), then(parse_transformation(own, axes), common), unit, image);
+  }
+}
+
+// Its drafts and release candidates had names such as "0.6.dev4" and "0.6rc1".
+bool is_06(std::string_view version) {
+  return version.starts_with("0.6") && (version.size() == 3 || version[3] < '0' || version[3] > '9');
+}
+
+void parse_multiscales(const CheckedJson& multiscales, bool version_06, ImageMetadata& image) {
   if (multiscales.array_size() == 0) multiscales.damaged("is empty");
   const CheckedJson first = multiscales.at(std::size_t{0});
   if (first.has("name") && first.raw()["name"].is_string()) image.name = first.string_at("name");
   if (first.has("type") && first.raw()["type"].is_string())
     image.downsampling = first.string_at("type");
-  const std::string unit = parse_axes(first.at("axes"), image);
-  const std::size_t axes = image.leading.size() + 3;
-  ScaleAndTranslation common;
-  if (first.has("coordinateTransformations"))
-    common = parse_transformations(first.at("coordinateTransformations"), axes);
-  const CheckedJson datasets = first.at("datasets");
-  const std::size_t count = datasets.array_size();
-  if (count == 0 || count > kMaxLevels) datasets.damaged(fmt::format("{} levels", count));
-  for (std::size_t i = 0; i < count; ++i) {
-    const CheckedJson dataset = datasets.at(i);
-    ImageMetadata::Level level;
-    level.path = dataset.string_at("path");
-    check_path(dataset, level.path);
-    const auto own = parse_transformations(dataset.at("coordinateTransformations"), axes);
-    level.transform.spacing = common.scale * own.scale;
-    level.transform.origin = common.scale * own.translation + common.translation;
-    level.transform.unit = unit;
-    for (int axis = 0; axis < 3; ++axis)
-      if (!(level.transform.spacing[axis] > 0) || !std::isfinite(level.transform.spacing[axis]) ||
-          !std::isfinite(level.transform.origin[axis]))
-        dataset.damaged("scale must be finite and positive, translation finite");
-    image.levels.push_back(std::move(level));
+  version_06 ? parse_levels_06(first, image) : parse_levels(first, image);
+}
+
+// How an image is shown is no part of the specification proper: what is not there is left out.
+void parse_channel_names(const nlohmann::json& ome, ImageMetadata& image) {
+  const nlohmann::json omero = ome.value("omero", nlohmann::json::object());
+  if (!omero.is_object() || !omero.contains("channels") || !omero["channels"].is_array()) return;
+  for (const nlohmann::json& channel : omero["channels"]) {
+    const bool has_label =
+        channel.is_object() && channel.contains("label") && channel["label"].is_string();
+    image.channel_names.push_back(has_label ? channel["label"].get<std::string>() : "");
   }
 }
 
@@ -215,15 +267,17 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
   const CheckedJson attributes = json.at("attributes");
   if (!attributes.has("ome"))
     json.unsupported(
-        "is no OME-Zarr 0.5 image: attributes.ome is missing; an image or an array in it can be "
+        "is no OME-Zarr image: attributes.ome is missing; an image or an array in it can be "
         "named");
   const CheckedJson ome = attributes.at("ome");
-  if (const std::string version = ome.string_at("version"); version != "0.5")
-    ome.unsupported(fmt::format("OME-Zarr {} is not supported, only 0.5", version));
+  const std::string version = ome.string_at("version");
+  if (version != "0.5" && !is_06(version))
+    ome.unsupported(fmt::format("OME-Zarr {} is not supported, only 0.4 to 0.6", version));
   if (!ome.has("multiscales")) ome.unsupported("is no multiscale image");
 
   ImageMetadata image;
-  parse_multiscales(ome.at("multiscales"), image);
+  parse_multiscales(ome.at("multiscales"), is_06(version), image);
+  if (!image.leading.empty()) parse_channel_names(ome.raw(), image);
   image.ours = attributes.has("isobrick");
   if (image.ours) parse_ours(attributes.at("isobrick"), image);
   return image;
@@ -248,18 +302,6 @@ std::uint32_t metadata_checksum(std::string_view root, std::span<const std::stri
   replace_numbers(covered);
   const std::string text = covered.dump();  // sorted by key, without blanks
   return crc32c(std::as_bytes(std::span(text)));
-}
-
-bool is_orthonormal(const std::array<double, 9>& direction) {
-  constexpr double tolerance = 1e-4;
-  for (std::size_t a = 0; a < 3; ++a)
-    for (std::size_t b = a; b < 3; ++b) {
-      double product = 0;
-      for (std::size_t row = 0; row < 3; ++row)
-        product += direction[3 * row + a] * direction[3 * row + b];
-      if (!(std::abs(product - (a == b ? 1 : 0)) <= tolerance)) return false;
-    }
-  return true;
 }
 
 }  // namespace isobrick

@@ -12,7 +12,7 @@
 
 namespace isobrick {
 
-/// The zarr.json of a store's root group: OME-Zarr 0.5's multiscales and what
+/// The zarr.json of a root group: OME-Zarr's multiscales, of 0.5 in ours, and what
 /// is ours under `attributes.isobrick`.
 struct ImageMetadata {
   struct Level {
@@ -29,6 +29,7 @@ struct ImageMetadata {
   };
   std::string name;
   std::vector<Axis> leading;  ///< none in ours
+  std::vector<std::string> channel_names;  ///< as `omero` calls them; empty where it does not
   std::vector<Level> levels;
   bool ours = true;  ///< has `attributes.isobrick`
   /// Nothing when the store doesn't say.
@@ -58,9 +59,5 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
 /// `where` names the root's file.
 std::uint32_t metadata_checksum(std::string_view root, std::span<const std::string> levels,
                                 const std::string& where);
-
-/// Whether the columns have length 1 and are at right angles, within 1e-4.
-/// Mirrored ones are as good.
-bool is_orthonormal(const std::array<double, 9>& direction);
 
 }  // namespace isobrick

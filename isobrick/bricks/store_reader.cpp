@@ -74,6 +74,8 @@ struct StoreReader::Impl {
   void open_ranges(int level);
   void check_brick(int level, Int3 b) const;
   [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
+  void widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
+                   std::byte* out) const;
   std::filesystem::path shard_path(int level, Int3 s) const;
   std::shared_ptr<const StoreFile> shard_file(int level, Int3 s);
   std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
@@ -199,6 +201,17 @@ void StoreReader::Impl::damaged(int level, Int3 b, const Place& place,
                                 what));
 }
 
+void StoreReader::Impl::widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
+                                    std::byte* out) const {
+  try {
+    widen(*at(level).metadata.wide, stored, out,
+          static_cast<std::size_t>(volume(lattice(level).brick)));
+  } catch (const Error& e) {
+    throw Error(fmt::format("level {}, brick ({}, {}, {}): '{}': {}", level, b.x, b.y, b.z,
+                            place.file->path().string(), e.what()));
+  }
+}
+
 std::filesystem::path StoreReader::Impl::shard_path(int level, Int3 s) const {
   std::vector<Index> coordinates = at(level).place.chunk;
   coordinates.insert(coordinates.end(), {s.z, s.y, s.x});
@@ -310,7 +323,10 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   if (!place) return false;
   const Lattice& lattice = impl_->lattice(level);
   const VolumePlace& volumes = impl_->at(level).place;
-  const std::size_t bytes = lattice.brick_bytes(), decoded = bytes * volumes.chunk_volumes;
+  const ArrayMetadata& array = impl_->at(level).metadata;
+  const auto samples = static_cast<std::size_t>(volume(lattice.brick));
+  const std::size_t stored = samples * array.stored_bytes(),
+                    decoded = stored * volumes.chunk_volumes;
   if (place->size > largest_encoded(decoded))
     impl_->damaged(level, b, *place, fmt::format("too long for {} bytes of samples", decoded));
   thread_local PodBuffer<std::byte> buffer;
@@ -319,7 +335,9 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   buffer.resize(static_cast<std::size_t>(place->size));
   const std::span encoded(buffer.data(), buffer.size());
   if (volumes.chunk_volumes > 1) several.resize(decoded);
-  const std::span to = volumes.chunk_volumes > 1 ? std::span(several) : std::span(out, decoded);
+  // What is widened afterwards goes to the end of where its samples will be.
+  std::byte* const at_end = out + (lattice.brick_bytes() - stored);
+  const std::span to = volumes.chunk_volumes > 1 ? std::span(several) : std::span(at_end, stored);
   try {
     const auto start = Clock::now();
     place->file->read_at(place->offset, encoded);
@@ -327,13 +345,18 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
     impl_->bytes_read += place->size;
     impl_->brick_bytes_read += place->size;
     impl_->read_ticks += (read - start).count();
-    decode_bytes(impl_->at(level).metadata.codecs, lattice.sample_bytes(), encoded, to);
+    decode_bytes(array.codecs, array.stored_bytes(), encoded, to);
     impl_->brick_bytes_decoded += decoded;
     impl_->decode_ticks += (Clock::now() - read).count();
   } catch (const DamageError& e) {
     impl_->damaged(level, b, *place, e.what());
   }
-  if (volumes.chunk_volumes > 1) std::copy_n(several.data() + volumes.in_chunk * bytes, bytes, out);
+  const std::byte* from =
+      volumes.chunk_volumes > 1 ? several.data() + volumes.in_chunk * stored : at_end;
+  if (array.wide)
+    impl_->widen_brick(level, b, *place, from, out);
+  else if (from != out)
+    std::copy_n(from, stored, out);
   return true;
 }
 

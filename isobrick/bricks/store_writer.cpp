@@ -11,6 +11,7 @@
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/image_metadata.h"
+#include "isobrick/bricks/ome_transformations.h"
 #include "isobrick/bricks/publisher.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/shard_index.h"

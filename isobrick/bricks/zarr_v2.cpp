@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/stored_type.h"
 #include "isobrick/core/scalar.h"
 
 namespace isobrick {
@@ -24,6 +25,9 @@ NumpyType parse_dtype(const CheckedJson& json) {
   };
   if (text.size() != 3 || std::string_view("<>|").find(text[0]) == std::string_view::npos) refuse();
   const int bytes = text[2] - '0';
+  for (const auto& [kind, type] : {std::pair("u8", WideType::u64), {"i8", WideType::i64},
+                                   {"f2", WideType::f16}, {"b1", WideType::boolean}})
+    if (text.substr(1) == kind) return {std::string(zarr_name(type)), text[0] == '>'};
   for (const ScalarType type : kScalarTypes) {
     const char kind = short_name(type)[0];
     if (kind == text[1] && static_cast<int>(size_of(type)) == bytes)
@@ -85,11 +89,12 @@ std::string v3_from_zattrs(std::string_view text, const std::string& where) {
   const CheckedJson first = multiscales.at(std::size_t{0});
   const std::string version = first.has("version") ? first.string_at("version") : "unknown";
   if (version != "0.4")
-    first.unsupported(fmt::format("OME-NGFF {} is not supported, only 0.4 and 0.5", version));
+    first.unsupported(fmt::format("OME-NGFF {} is not supported, only 0.4 to 0.6", version));
   Json group;
   group["zarr_format"] = 3;
   group["node_type"] = "group";
   group["attributes"]["ome"] = {{"version", "0.5"}, {"multiscales", multiscales.raw()}};
+  if (json.has("omero")) group["attributes"]["ome"]["omero"] = json.at("omero").raw();
   return group.dump();
 }
 

@@ -200,7 +200,7 @@ TEST_F(ZarrV2, WhatIsBrokenIsNamed) {
   expect("zarr_format", "zarr_format", 3, true);
   expect("order 'F'", "order", "F", false);
   expect("'|O'", "dtype", "|O", false);
-  expect("'<i8'", "dtype", "<i8", false);
+  expect("'<c8'", "dtype", "<c8", false);
   expect("structured", "dtype", json::array(), false);
   expect("filter 'x'", "filters", json::array({{{"id", "x"}}}), false);
   expect("'lzma'", "compressor", {{"id", "lzma"}}, false);
