@@ -10,6 +10,7 @@
 #include "isobrick/bricks/stored_index.h"
 #include "tools/format.h"
 #include "tools/histogram.h"
+#include "tools/info_volumes.h"
 #include "tools/options.h"
 
 namespace isobrick::tools {
@@ -229,11 +230,13 @@ void add_info(Program& program) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(program, "info",
-                                 "Show what a store holds: extents, levels, bricks, histogram.",
+                                 "Show what a store holds: extents, levels, bricks, histogram; or which channels and times.",
                                  "isobrick info head.zarr");
   add_path(app, "STORE", arguments->path, "Store to look at, or another program's Zarr");
   add_selection(app, arguments->selection);
   program.commands.push_back({app, [arguments](Console& console) {
+                                if (list_volumes(arguments->path, arguments->selection, console))
+                                  return 0;
                                 const StoreReader store(arguments->path, arguments->selection);
                                 const Facts facts = gather(store, console.progress());
                                 console.result(json_of(store.info(), facts),

@@ -45,6 +45,22 @@ Index choose_on_axis(const std::string& path, Index count, Role role, const Sele
 
 }  // namespace
 
+std::vector<VolumeAxis> open_axes(const ImageMetadata& image, const ArrayMetadata& array,
+                                  const Selection& selection) {
+  std::vector<VolumeAxis> axes;
+  const FreeRoles free(image);
+  for (std::size_t i = 0; i < image.leading.size() && i < array.shape.size(); ++i) {
+    const ImageMetadata::Axis& axis = image.leading[i];
+    const bool unknown = axis.role == Role::unknown;
+    if (array.shape[i] > 1)
+      axes.push_back({axis.name, array.shape[i],
+                      axis.role == Role::channel || (unknown && free.channel),
+                      axis.role == Role::time || (unknown && free.time)});
+  }
+  const std::size_t chosen = (selection.channel ? 1U : 0U) + (selection.time ? 1U : 0U);
+  return chosen < axes.size() ? axes : std::vector<VolumeAxis>();
+}
+
 VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadata& image,
                            const ArrayMetadata& array, const Selection& selection) {
   if (array.shape.size() != image.leading.size() + 3)

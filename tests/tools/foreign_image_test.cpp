@@ -1,0 +1,95 @@
+#include "tests/tools/program.h"
+
+// OME-Zarr of other programs, as users of the program meet it.
+namespace isobrick::test {
+namespace {
+
+using nlohmann::json;
+
+class ForeignImage : public ProgramTest {
+ protected:
+  /// OME-Zarr 0.6: two channels of 12³ samples of i64, a ball each, turned about z.
+  std::string write_image() const {
+    const std::string image = path("image.zarr");
+    for (const char* chunk : {"0", "1"})
+      std::filesystem::create_directories(image + "/0/c/" + chunk + "/0/0");
+    json axes = json::array({{{"name", "c"}, {"type", "channel"}}});
+    for (const char* name : {"z", "y", "x"})
+      axes.push_back({{"name", name}, {"type", "space"}, {"unit", "micrometer"}});
+    const json own{{"type", "sequence"},
+                   {"input", {{"path", "0"}}},
+                   {"output", {{"name", "intrinsic"}}},
+                   {"transformations",
+                    {{{"type", "scale"}, {"scale", {1, 3, 2, 1}}},
+                     {{"type", "translation"}, {"translation", {0, 30, 20, 10}}}}}};
+    const json turn{{"type", "rotation"},
+                    {"input", {{"name", "intrinsic"}}},
+                    {"output", {{"name", "world"}}},
+                    {"rotation", {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}, {0, 0, -1, 0}}}};
+    const json scale{
+        {"coordinateSystems",
+         {{{"name", "world"}, {"axes", axes}}, {{"name", "intrinsic"}, {"axes", axes}}}},
+        {"coordinateTransformations", {turn}},
+        {"datasets", {{{"path", "0"}, {"coordinateTransformations", {own}}}}}};
+    json group{{"zarr_format", 3}, {"node_type", "group"}};
+    group["attributes"]["ome"] = {
+        {"version", "0.6"},
+        {"multiscales", {scale}},
+        {"omero", {{"channels", {{{"label", "nuclei"}}, {{"label", "walls"}}}}}}};
+    write_file(image + "/zarr.json", group.dump());
+    json array{{"zarr_format", 3}, {"node_type", "array"},  {"shape", {2, 12, 12, 12}},
+               {"fill_value", 0},  {"data_type", "int64"}};
+    array["chunk_grid"] = {{"name", "regular"}, {"configuration", {{"chunk_shape", {1, 12, 12, 12}}}}};
+    array["chunk_key_encoding"] = {{"name", "default"}};
+    array["codecs"] = {{{"name", "bytes"}, {"configuration", {{"endian", "little"}}}}};
+    write_file(image + "/0/zarr.json", array.dump());
+    for (int c = 0; c < 2; ++c) write_file(image + "/0/c/" + std::to_string(c) + "/0/0/0", ball(c));
+    return image;
+  }
+
+  static std::string ball(int channel) {
+    std::string samples;
+    for (int i = 0; i < 12 * 12 * 12; ++i) {
+      const int x = i % 12 - 6, y = i / 12 % 12 - 6, z = i / 144 - 6;
+      const std::int64_t value = 20 + 5 * channel - (x * x + y * y + z * z);
+      samples.append(reinterpret_cast<const char*>(&value), sizeof value);
+    }
+    return samples;
+  }
+};
+
+TEST_F(ForeignImage, InfoListsChannelsInsteadOfRefusing) {
+  const std::string image = write_image();
+  const Outcome outcome = run({"info", image});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* part : {"2, each 12 x 12 x 12", "--channel 0 … 1", "nuclei", "walls"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " in " << outcome.out;
+  const json listed = run_json({"info", image});
+  ASSERT_EQ(listed["axes"].size(), 1u);
+  EXPECT_EQ(listed["axes"][0]["count"], 2);
+  EXPECT_EQ(listed["axes"][0]["names"], json({"nuclei", "walls"}));
+  EXPECT_EQ(listed["spacing"], json({1.0, 2.0, 3.0}));
+  EXPECT_EQ(run_json({"info", image, "--channel", "1"})["type"], "float64");
+  expect_refused(run({"info", image, "--channel", "2"}), 2, {"--channel 2 is not there"});
+  expect_refused(run({"export", image, path("x.raw")}), 2, {"--channel 0 … 1"});
+}
+
+TEST_F(ForeignImage, ATurnedImageBecomesAMeshThatIsTurned) {
+  const std::string image = write_image();
+  ASSERT_EQ(run({"index", image, "--kind", "octree", "--channel", "1"}).exit_code, 0);
+  const json mesh = run_json({"extract", image, "--channel", "1", "--isovalue", "0.5", "-o",
+                              path("a.ply")})["surfaces"][0];
+  EXPECT_GT(mesh["triangles"].get<int>(), 100);
+  ASSERT_EQ(run({"verify", image, "--channel", "1"}).exit_code, 0);
+  // The same after a conversion, which says the direction in its own words.
+  const Outcome converted = run({"convert", image, path("b.zarr"), "--channel", "1"});
+  ASSERT_EQ(converted.exit_code, 0) << converted.err;
+  const json info = run_json({"info", path("b.zarr")});
+  EXPECT_EQ(info["direction"], json({0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0}));
+  EXPECT_EQ(info["origin"], json({-20.0, 10.0, 30.0}));
+  run_json({"extract", path("b.zarr"), "--isovalue", "0.5", "-o", path("b.ply")});
+  EXPECT_TRUE(read_file(path("a.ply")) == read_file(path("b.ply")));
+}
+
+}  // namespace
+}  // namespace isobrick::test
