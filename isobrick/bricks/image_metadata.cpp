@@ -212,6 +212,17 @@ void replace_numbers(nlohmann::json& json) {
     for (nlohmann::json& element : json) replace_numbers(element);
 }
 
+// How viewers show the image at first: white, within the window.
+Json omero(const ImageMetadata& image) {
+  const DisplayWindow& w = *image.window;
+  const Json channel{
+      {"label", image.name},
+      {"active", true},
+      {"color", "FFFFFF"},
+      {"window", {{"min", w.min}, {"max", w.max}, {"start", w.start}, {"end", w.end}}}};
+  return {{"channels", Json::array({channel})}, {"rdefs", {{"model", "greyscale"}}}};
+}
+
 }  // namespace
 
 std::string to_json(const ImageMetadata& image) {
@@ -250,6 +261,7 @@ std::string to_json(const ImageMetadata& image) {
   Json attributes;
   attributes["ome"]["version"] = "0.5";
   attributes["ome"]["multiscales"] = Json::array({std::move(multiscale)});
+  if (image.window) attributes["ome"]["omero"] = omero(image);
   if (image.ours) attributes["isobrick"] = std::move(ours);
   Json json;
   json["zarr_format"] = 3;

@@ -12,6 +12,12 @@
 
 namespace isobrick {
 
+/// The range of the samples, and which part of it viewers show at first.
+struct DisplayWindow {
+  double min = 0, max = 0, start = 0, end = 0;
+  friend bool operator==(const DisplayWindow&, const DisplayWindow&) = default;
+};
+
 /// The zarr.json of a root group: OME-Zarr's multiscales, of 0.5 in ours, and what
 /// is ours under `attributes.isobrick`.
 struct ImageMetadata {
@@ -37,6 +43,7 @@ struct ImageMetadata {
   std::string grid_class;  ///< as OpenVDB calls it ("level set"), or empty
   std::string grid_name;   ///< of the OpenVDB grid, or empty
   std::string downsampling;  ///< how coarser levels were made ("mean"): `type`; or empty
+  std::optional<DisplayWindow> window;  ///< `omero`, which is written and never read
   /// What the root says that metadata_checksum() must be.
   std::optional<std::uint32_t> checksum;
 

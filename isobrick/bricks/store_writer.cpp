@@ -131,6 +131,7 @@ struct StoreWriter::Impl {
   }
   std::shared_ptr<OpenShard> open_shard(int i, Int3 s);
   void write(OpenShard& shard, std::span<const std::byte> bytes);
+  void publish_root(const ImageMetadata& image);
 
   std::filesystem::path dir;
   StoreLayout layout;
@@ -312,7 +313,17 @@ void StoreWriter::put_block_ranges(int level, Box3 box, std::span<const std::byt
   impl_->level(level).block_ranges->put(box, pairs);
 }
 
-void StoreWriter::finish(bool may_have_nan, const std::function<void()>& more) {
+void StoreWriter::Impl::publish_root(const ImageMetadata& image) {
+  const std::filesystem::path root = dir / "zarr.json";
+  const std::string text = to_json(image);
+  publisher->sync(publisher->write_temporary(root, std::as_bytes(std::span(text))));
+  publisher->wait();
+  rename_file(temporary_name(root), root);
+}
+
+void StoreWriter::finish(bool may_have_nan,
+                         const std::function<std::optional<DisplayWindow>()>& window,
+                         const std::function<void()>& more) {
   Publisher& publisher = *impl_->publisher;
   {
     const std::lock_guard lock(impl_->mutex);
@@ -333,12 +344,12 @@ void StoreWriter::finish(bool may_have_nan, const std::function<void()>& more) {
   std::vector<std::string> levels;
   for (const Impl::Level& l : impl_->levels) levels.push_back(to_json(l.metadata));
   image.checksum = metadata_checksum(to_json(image), levels, quoted(impl_->dir / "zarr.json"));
-  const std::filesystem::path root = impl_->dir / "zarr.json";
-  const std::string text = to_json(image);
-  publisher.sync(publisher.write_temporary(root, std::as_bytes(std::span(text))));
-  publisher.wait();
   // Only now, with everything on disk, does the directory become a store.
-  rename_file(temporary_name(root), root);
+  impl_->publish_root(image);
+  if (window) {
+    image.window = window();
+    impl_->publish_root(image);
+  }
   if (more) more();
   std::error_code failure;
   std::filesystem::remove(impl_->dir / kLayoutMarker, failure);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "isobrick/bricks/image_metadata.h"
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/downsampling.h"
 
@@ -62,10 +63,11 @@ class StoreWriter {
 
   /// Metadata, the group's last of all; then everything in `dir` is on disk (its
   /// own name is the caller's to sync).
-  /// `may_have_nan` replaces the layout's, known only now. `more`, if there is
-  /// one, adds to the store, which can be read by then; should it fail, a resume
-  /// goes on.
-  void finish(bool may_have_nan, const std::function<void()>& more = nullptr);
+  /// `may_have_nan` replaces the layout's, known only now. `window`, if there is one, reads the
+  /// store and says how it is shown at first. `more`, if there is one, adds to the store; should
+  /// either fail, a resume goes on.
+  void finish(bool may_have_nan, const std::function<std::optional<DisplayWindow>()>& window = nullptr,
+              const std::function<void()>& more = nullptr);
 
   /// Bytes written so far, all files.
   std::uint64_t bytes() const;

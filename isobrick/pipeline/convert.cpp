@@ -13,6 +13,7 @@
 #include "isobrick/pipeline/convert_plan.h"
 #include "isobrick/pipeline/convert_sparse.h"
 #include "isobrick/pipeline/convert_staging.h"
+#include "isobrick/pipeline/display_window.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/workers.h"
@@ -100,10 +101,12 @@ ConvertReport Conversion::run() {
     has_nan |= writer->has_nan();
   }
   // The journal goes last: until then a resume compares the input with it.
-  store_.finish(has_nan, [&] {
-    add_chosen_index(report);
-    journal_.remove();
-  });
+  store_.finish(
+      has_nan, [&] { return display_window(StoreReader(staging_.path())); },
+      [&] {
+        add_chosen_index(report);
+        journal_.remove();
+      });
   report.bytes_in = bytes_of(source_.info().extent, source_.info().type);
   report.bytes_out = store_.bytes() + report.index_bytes;
   report.levels = level_count();
