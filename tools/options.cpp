@@ -151,6 +151,15 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_parsed(app, options.downsampling, parse_downsampling_name,
              {"--downsample", "mean|max|min|mode|stride",
               "What such samples become; mode suits labels", "mean"});
+  add_parsed(app, options.ome,
+             [](const std::string& text) {
+               if (text != "0.4" && text != "0.5")
+                 throw UsageError(fmt::format("unknown version '{}'; it is 0.4 or 0.5", text));
+               return text == "0.4" ? OmeVersion::v04 : OmeVersion::v05;
+             },
+             {"--ome", "0.4|0.5",
+              "Version of OME-Zarr; 0.4, with a file for each brick, for readers without Zarr 3",
+              "0.5"});
   add_parsed(app, options.index,
              [](const std::string& text) {
                return text == "none" ? std::nullopt : std::optional(parse_stored_kind(text));

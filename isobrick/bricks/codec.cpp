@@ -44,11 +44,15 @@ void append_crc(std::vector<std::byte>& bytes) {
 
 // Compresses into a buffer of the thread first: what is handed out is then
 // exactly as large as what it holds, and the bound is not allocated each time.
-std::vector<std::byte> compress(std::span<const std::byte> bytes, int level, std::size_t reserve) {
+std::vector<std::byte> compress(std::span<const std::byte> bytes, const CodecChain& chain,
+                                std::size_t reserve) {
   thread_local PodBuffer<std::byte> buffer;
   buffer.resize(ZSTD_compressBound(bytes.size()));
-  const std::size_t size = ZSTD_compressCCtx(compression_context(), buffer.data(), buffer.size(),
-                                             bytes.data(), bytes.size(), level);
+  ZSTD_CCtx* const context = compression_context();
+  ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, chain.zstd_level);
+  ZSTD_CCtx_setParameter(context, ZSTD_c_checksumFlag, chain.zstd_checksum ? 1 : 0);
+  const std::size_t size =
+      ZSTD_compress2(context, buffer.data(), buffer.size(), bytes.data(), bytes.size());
   if (ZSTD_isError(size))
     throw Error(fmt::format("zstd cannot compress: {}", ZSTD_getErrorName(size)));
   std::vector<std::byte> result;
@@ -82,6 +86,15 @@ CodecChain CodecChain::ours(std::optional<int> zstd_level) {
     chain.zstd_level = *zstd_level;
   }
   chain.steps.push_back(ByteCodec::crc32c);
+  return chain;
+}
+
+CodecChain CodecChain::ours_v2(std::optional<int> zstd_level) {
+  CodecChain chain;
+  if (!zstd_level) return chain;
+  chain.steps.push_back(ByteCodec::zstd);
+  chain.zstd_level = *zstd_level;
+  chain.zstd_checksum = true;
   return chain;
 }
 
@@ -173,7 +186,7 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
   for (const ByteCodec step : chain.steps) {
     if (step == ByteCodec::zstd)
       result =
-          compress(first ? bytes : std::span<const std::byte>(result), chain.zstd_level, kCrcBytes);
+          compress(first ? bytes : std::span<const std::byte>(result), chain, kCrcBytes);
     else if (step != ByteCodec::crc32c) {
       throw Error(fmt::format("{} is only read, not written", name_of(step)));
     } else {
@@ -191,10 +204,9 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
 
 std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
                                                    std::span<const std::byte> samples,
-                                                   double fill_value,
-                                                   std::optional<int> zstd_level) {
+                                                   double fill_value, const CodecChain& chain) {
   if (all_fill(type, samples, fill_value)) return std::nullopt;
-  return encode_bytes(CodecChain::ours(zstd_level), samples);
+  return encode_bytes(chain, samples);
 }
 
 std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> encoded) {

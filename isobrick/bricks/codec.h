@@ -19,11 +19,15 @@ struct CodecChain {
   bool big_endian = false;
   std::vector<ByteCodec> steps;
   int zstd_level = 0;  ///< of the zstd step, if there is one
+  /// Whether what we write has a checksum within the zstd frame; what is read has it or not.
+  bool zstd_checksum = false;
 
   friend bool operator==(const CodecChain&, const CodecChain&) = default;
 
   /// What we write: bytes → zstd → crc32c, or bytes → crc32c.
   static CodecChain ours(std::optional<int> zstd_level);
+  /// The same for Zarr version 2, which has no crc32c: zstd with its own checksum, or nothing.
+  static CodecChain ours_v2(std::optional<int> zstd_level);
   /// "zstd:3", "blosc" or "none": how StoreInfo names a chain.
   std::string name() const;
 };
@@ -56,8 +60,7 @@ void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* bri
 /// it; nothing when all samples equal the fill value. Thread-safe.
 std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
                                                    std::span<const std::byte> samples,
-                                                   double fill_value,
-                                                   std::optional<int> zstd_level);
+                                                   double fill_value, const CodecChain& chain);
 
 /// Bytes that zstd keeps for one thread to encode bricks of so many bytes.
 std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_bytes);

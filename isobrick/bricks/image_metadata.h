@@ -12,6 +12,10 @@
 
 namespace isobrick {
 
+/// What a store is written as: OME-Zarr 0.5 is Zarr version 3, 0.4 is version 2 and has no
+/// shards, so that each brick is a file.
+enum class OmeVersion : std::uint8_t { v04, v05 };
+
 /// The range of the samples, and which part of it viewers show at first.
 struct DisplayWindow {
   double min = 0, max = 0, start = 0, end = 0;

@@ -71,14 +71,14 @@ Text read_root(const fs::path& path) {
   if (v3) {
     const nlohmann::json parsed = parse_json(*v3, quoted(path / "zarr.json"));
     if (parsed.value("node_type", nlohmann::json()) != "array") return {path / "zarr.json", *v3};
-  } else if (fs::exists(path / kLayoutMarker)) {
-    throw Error(fmt::format("'{}' is unfinished: its conversion was interrupted; resume it",
-                            path.string()));
   } else if (const auto attributes = read_text(path / ".zattrs")) {
     const fs::path file = path / ".zattrs";
     if (std::string group = v3_from_zattrs(*attributes, quoted(file)); !group.empty())
       return {file, std::move(group)};
   }
+  if (!v3 && fs::exists(path / kLayoutMarker))
+    throw Error(fmt::format("'{}' is unfinished: its conversion was interrupted; resume it",
+                            path.string()));
   if (const auto array = read_array(path))
     return {array->file,
             group_of(parse_array_metadata(array->json, quoted(array->file)), quoted(array->file))};

@@ -280,8 +280,9 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 
   check_brick(level, b);
   if (!at(level).metadata.sharding) {
     const auto file = shard_file(level, b);
-    if (!*file) return std::nullopt;
-    return Place{file, 0, file->size()};
+    if (*file) return Place{file, 0, file->size()};
+    check_missing_shard(level, b);
+    return std::nullopt;
   }
   const Int3 n = at(level).bricks_per_shard;
   const Int3 s{b.x / n.x, b.y / n.y, b.z / n.z};

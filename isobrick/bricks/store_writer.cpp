@@ -17,6 +17,7 @@
 #include "isobrick/bricks/shard_index.h"
 #include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
+#include "isobrick/bricks/zarr_v2.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -36,7 +37,11 @@ ArrayMetadata array_metadata(const LevelInfo& level, const StoreLayout& layout) 
   array.chunk = {s.z, s.y, s.x};
   array.type = level.lattice.type;
   array.fill_value = layout.fill_value;
-  array.codecs = CodecChain::ours(layout.zstd_level);
+  array.codecs = layout.codecs();
+  if (layout.ome == OmeVersion::v04) {
+    array.key_prefix = false;
+    return array;
+  }
   array.sharding.emplace().brick = {b.z, b.y, b.x};
   array.dimension_names = {"z", "y", "x"};
   return array;
@@ -53,6 +58,17 @@ ImageMetadata image_metadata(const StoreLayout& layout) {
   return image;
 }
 
+// The file whose name makes a folder a store.
+struct RootFile {
+  const char* name;
+  std::string json;
+};
+
+RootFile root_file(const ImageMetadata& image, OmeVersion ome) {
+  if (ome == OmeVersion::v04) return {".zattrs", to_zattrs(image)};
+  return {"zarr.json", to_json(image)};
+}
+
 // The metadata must survive its own parser: that is the one place where limits
 // on extents, bricks and shards are checked.
 void check_layout(const StoreLayout& layout) {
@@ -62,6 +78,8 @@ void check_layout(const StoreLayout& layout) {
     if (level.lattice.type != layout.levels[0].lattice.type)
       throw UsageError("all levels of a store have the same type");
     if (!checked_volume(level.lattice.extent)) throw UsageError("extents are out of bounds");
+    if (layout.ome == OmeVersion::v04 && level.shard != level.lattice.brick)
+      throw UsageError("Zarr version 2 has no shards");
     const Transform& transform = level.transform;
     for (int axis = 0; axis < 3; ++axis) {
       if (level.lattice.extent[axis] > kMaxAxisSamples)
@@ -131,6 +149,7 @@ struct StoreWriter::Impl {
   }
   std::shared_ptr<OpenShard> open_shard(int i, Int3 s);
   void write(OpenShard& shard, std::span<const std::byte> bytes);
+  std::uint32_t checksum_of(const ImageMetadata& image) const;
   void publish_root(const ImageMetadata& image);
 
   std::filesystem::path dir;
@@ -246,6 +265,7 @@ bool StoreWriter::shard_is_whole(int level, Int3 s) const {
   if (!impl_->resume) return false;
   const StoreFile file = StoreFile::open_if_exists(impl_->shard_path(l, s));
   if (!file) return false;
+  if (!l.metadata.sharding) return true;  // it has its name only when it is whole
   const std::uint64_t size = file.size();
   const auto bricks = static_cast<std::uint64_t>(volume(l.bricks_per_shard));
   const std::uint64_t index_size = ShardIndex::encoded_size(bricks, true);
@@ -297,7 +317,7 @@ void StoreWriter::finish_shard(int level, Int3 s) {
     return;
   }
   const std::lock_guard lock(shard->mutex);
-  impl_->write(*shard, shard->index.encode());
+  if (l.metadata.sharding) impl_->write(*shard, shard->index.encode());
   if (!shard->file) shard->file = StoreFile::open_for_writing(temporary_name(shard->path));
   if (shard->counted) --impl_->open_files;
   impl_->publisher->publish(std::move(shard->file), shard->path);
@@ -313,10 +333,22 @@ void StoreWriter::put_block_ranges(int level, Box3 box, std::span<const std::byt
   impl_->level(level).block_ranges->put(box, pairs);
 }
 
+// Over what a reader will find, which Zarr version 2 says in other words.
+std::uint32_t StoreWriter::Impl::checksum_of(const ImageMetadata& image) const {
+  const RootFile root = root_file(image, layout.ome);
+  const std::string where = quoted(dir / root.name);
+  std::vector<std::string> texts;
+  for (const Level& l : levels)
+    texts.push_back(layout.ome == OmeVersion::v04 ? v3_from_zarray(to_zarray(l.metadata), where)
+                                                  : to_json(l.metadata));
+  return metadata_checksum(
+      layout.ome == OmeVersion::v04 ? v3_from_zattrs(root.json, where) : root.json, texts, where);
+}
+
 void StoreWriter::Impl::publish_root(const ImageMetadata& image) {
-  const std::filesystem::path root = dir / "zarr.json";
-  const std::string text = to_json(image);
-  publisher->sync(publisher->write_temporary(root, std::as_bytes(std::span(text))));
+  const RootFile file = root_file(image, layout.ome);
+  const std::filesystem::path root = dir / file.name;
+  publisher->sync(publisher->write_temporary(root, std::as_bytes(std::span(file.json))));
   publisher->wait();
   rename_file(temporary_name(root), root);
 }
@@ -325,6 +357,7 @@ void StoreWriter::finish(bool may_have_nan,
                          const std::function<std::optional<DisplayWindow>()>& window,
                          const std::function<void()>& more) {
   Publisher& publisher = *impl_->publisher;
+  const StoreLayout& layout = impl_->layout;
   {
     const std::lock_guard lock(impl_->mutex);
     if (!impl_->open_shards.empty())
@@ -337,13 +370,15 @@ void StoreWriter::finish(bool may_have_nan,
     l.brick_ranges->finish();
     l.block_ranges->finish();
     publisher.write(impl_->dir / "isobrick" / std::to_string(i) / "zarr.json", group_json());
-    publisher.write(l.folder / "zarr.json", to_json(l.metadata));
+    if (layout.ome == OmeVersion::v04)
+      publisher.write(l.folder / ".zarray", to_zarray(l.metadata));
+    else
+      publisher.write(l.folder / "zarr.json", to_json(l.metadata));
   }
   ImageMetadata image = image_metadata(impl_->layout);
   image.may_have_nan = may_have_nan;
-  std::vector<std::string> levels;
-  for (const Impl::Level& l : impl_->levels) levels.push_back(to_json(l.metadata));
-  image.checksum = metadata_checksum(to_json(image), levels, quoted(impl_->dir / "zarr.json"));
+  if (layout.ome == OmeVersion::v04) publisher.write(impl_->dir / ".zgroup", zgroup_json());
+  image.checksum = impl_->checksum_of(image);
   // Only now, with everything on disk, does the directory become a store.
   impl_->publish_root(image);
   if (window) {

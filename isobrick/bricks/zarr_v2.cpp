@@ -94,8 +94,46 @@ std::string v3_from_zattrs(std::string_view text, const std::string& where) {
   group["zarr_format"] = 3;
   group["node_type"] = "group";
   group["attributes"]["ome"] = {{"version", "0.5"}, {"multiscales", multiscales.raw()}};
+  if (json.has("isobrick")) group["attributes"]["isobrick"] = json.at("isobrick").raw();
   if (json.has("omero")) group["attributes"]["ome"]["omero"] = json.at("omero").raw();
   return group.dump();
 }
+
+std::string to_zarray(const ArrayMetadata& array) {
+  // The fill value and the names of codecs are those of version 3.
+  const Json v3 = Json::parse(to_json(array));
+  Json json;
+  json["zarr_format"] = 2;
+  json["shape"] = v3["shape"];
+  json["chunks"] = v3["chunk_grid"]["configuration"]["chunk_shape"];
+  json["dtype"] = fmt::format("{}{}{}", size_of(array.type) == 1 ? '|' : '<',
+                              short_name(array.type)[0], size_of(array.type));
+  json["compressor"] = nullptr;
+  for (const ByteCodec step : array.codecs.steps)
+    json["compressor"] = {{"id", name_of(step)}, {"level", array.codecs.zstd_level}};
+  json["fill_value"] = v3["fill_value"];
+  json["order"] = "C";
+  json["filters"] = nullptr;
+  json["dimension_separator"] = std::string(1, array.separator);
+  return json.dump(2) + "\n";
+}
+
+std::string to_zattrs(const ImageMetadata& image) {
+  Json attributes = Json::parse(to_json(image))["attributes"];
+  Json json;
+  for (const Json& multiscale : attributes["ome"]["multiscales"]) {
+    Json item{{"version", "0.4"}};
+    item.update(multiscale);
+    json["multiscales"].push_back(std::move(item));
+  }
+  if (attributes["ome"].contains("omero")) {
+    json["omero"] = attributes["ome"]["omero"];
+    json["omero"]["version"] = "0.4";
+  }
+  if (attributes.contains("isobrick")) json["isobrick"] = attributes["isobrick"];
+  return json.dump(2) + "\n";
+}
+
+std::string zgroup_json() { return Json{{"zarr_format", 2}}.dump(2) + "\n"; }
 
 }  // namespace isobrick

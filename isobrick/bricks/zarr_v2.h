@@ -3,6 +3,9 @@
 #include <string>
 #include <string_view>
 
+#include "isobrick/bricks/array_metadata.h"
+#include "isobrick/bricks/image_metadata.h"
+
 namespace isobrick {
 
 // Zarr version 2, said in the words of version 3, so that one parser reads
@@ -15,5 +18,16 @@ std::string v3_from_zarray(std::string_view text, const std::string& where);
 /// The zarr.json that means what the .zattrs of an OME-NGFF 0.4 image means;
 /// empty when it is no image.
 std::string v3_from_zattrs(std::string_view text, const std::string& where);
+
+// And ours, said in the words of version 2.
+
+/// The .zarray of an array without shards whose samples are one of our types.
+std::string to_zarray(const ArrayMetadata& array);
+
+/// The .zattrs of an OME-NGFF 0.4 image; what is ours stands under `isobrick`.
+std::string to_zattrs(const ImageMetadata& image);
+
+/// The .zgroup of any group.
+std::string zgroup_json();
 
 }  // namespace isobrick

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "isobrick/bricks/image_metadata.h"
 #include "isobrick/core/downsampling.h"
 #include "isobrick/core/progress.h"
 #include "isobrick/pipeline/index_build.h"
@@ -21,6 +22,7 @@ struct ConvertOptions {
   /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
   /// steps. Nothing: factors_by_spacing().
   std::vector<Int3> factors;
+  OmeVersion ome = OmeVersion::v05;  ///< 0.4 has no shards: `shard` does not matter
   Downsampling downsampling = Downsampling::mean;
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores

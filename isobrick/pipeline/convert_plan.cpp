@@ -88,7 +88,10 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
   layout.grid_class = volume.grid_class;
   layout.grid_name = volume.grid_name;
   layout.name = std::filesystem::path(volume.name).filename().string();
-  const Index shard = options.shard / options.brick * options.brick;
+  layout.ome = options.ome;
+  const Index bricks_per_shard =
+      options.ome == OmeVersion::v04 ? 1 : options.shard / options.brick;
+  const Index shard = bricks_per_shard * options.brick;
   LevelInfo finest;
   finest.lattice = {volume.extent, {options.brick, options.brick, options.brick}, volume.type};
   finest.transform = volume.transform;

@@ -23,7 +23,8 @@ bool is_there(const fs::path& path) {
 
 /// A Zarr group (or an empty folder): something that is ours to replace.
 bool is_store(const fs::path& path) {
-  return fs::is_directory(path) && (fs::is_empty(path) || fs::exists(path / "zarr.json"));
+  return fs::is_directory(path) && (fs::is_empty(path) || fs::exists(path / "zarr.json") ||
+                                    (fs::exists(path / ".zgroup") && fs::exists(path / ".zattrs")));
 }
 
 /// Whether a conversion stopped before its first file, the marker, was whole.

@@ -152,7 +152,7 @@ inline void write_shard(StoreWriter& writer, const std::vector<Level>& levels, i
   for_each_point(intersect({s * n, (s + Int3{1, 1, 1}) * n}, {{0, 0, 0}, level.lattice.bricks()}),
                  [&](Int3 b) {
                    const auto encoded = encode_brick(level.lattice.type, cut_brick(level, b, fill),
-                                                     fill, zstd_level);
+                                                     fill, CodecChain::ours(zstd_level));
                    writer.put(number, b, encoded ? *encoded : std::vector<std::byte>());
                  });
   writer.finish_shard(number, s);

@@ -209,6 +209,48 @@ def check_in_place(folder, path, expected, *selection):
           f"{path.name}: {info['spacing']} {info['unit']}")
 
 
+def check_written(folder):
+    """What we write as OME-Zarr 0.4 is what Zarr-Python reads, and the same store to us."""
+    for code, name in (("|u1", "u8"), ("<i2", "i16"), ("<u4", "u32"), ("<f4", "f32"), ("<f8", "f64")):
+        data = samples((37, 70, 91), code)
+        data[:16, :16, :16] = 0
+        raw = folder / f"{name}.raw"
+        raw.write_bytes(data.tobytes())
+        for codec in ("zstd:3", "none"):
+            stores = []
+            for version in ("0.4", "0.5"):
+                stores.append(folder / f"{name}_{codec[:4]}_{version}.zarr")
+                run("convert", raw, stores[-1], "--dims", "91,70,37", "--type", name, "--brick", 16,
+                    "--spacing", "0.5,0.5,2", "--unit", "um", "--codec", codec, "--ome", version,
+                    "--index", "octree")
+            check_as_zarr_2(stores[0], data)
+            run("verify", stores[0])
+            meshes = []
+            for store in stores:
+                meshes.append(folder / "mesh.ply")
+                run("extract", store, "--isovalue", 30.5, "-o", meshes[-1], "--force")
+                meshes[-1] = meshes[-1].read_bytes()
+            check(meshes[0] == meshes[1] and len(meshes[0]) > 100_000, f"{name}: mesh")
+            expect_samples(folder, stores[0], data)
+
+
+def check_as_zarr_2(store, data):
+    group = zarr.open_group(str(store), mode="r")
+    image = group.attrs["multiscales"][0]
+    check(image["version"] == "0.4" and [a["unit"] for a in image["axes"]] == ["micrometer"] * 3,
+          f"{store.name}: {image}")
+    check(numpy.array_equal(group["0"][...], data), f"{store.name}: level 0")
+    check(group["0"].nchunks_initialized < group["0"].nchunks, f"{store.name}: an absent chunk")
+    window = group.attrs["omero"]["channels"][0]["window"]
+    check((window["min"], window["max"]) == (data.min(), data.max()), f"{store.name}: {window}")
+    shape = data.shape
+    for dataset in image["datasets"][1:]:
+        factors = [-(-a // b) for a, b in zip(shape, group[dataset["path"]].shape)]
+        check(set(factors) <= {1, 2} and factors != [1, 1, 1], f"{store.name}: {factors}")
+        shape = group[dataset["path"]].shape
+        check(group[dataset["path"]][...].any(), f"{store.name}: {dataset['path']}")
+
+
 def check_refusals(folder):
     path = folder / "a.zarr"
     data = samples((5, 6, 7), "<u2")
@@ -273,7 +315,7 @@ def check_damage(folder):
 def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         for part in (check_types, check_wide_types, check_compressors, check_fill_values,
-                     check_channels_and_times, check_refusals, check_damage):
+                     check_channels_and_times, check_written, check_refusals, check_damage):
             folder = pathlib.Path(name) / part.__name__
             folder.mkdir()
             part(folder)
