@@ -79,13 +79,53 @@ ISOBRICK_HD inline bool between(const GridView& g, int axis, int below, float pa
   return g.place[axis][below + g.shift[axis]] < coarse[1];
 }
 
+/// Which of two contours in an ambiguous cell crosses the fine edge from point `below` on: the
+/// one that ends on the cell's edge `near`. −1: either may be.
+ISOBRICK_HD inline int near_edge(const GridView& g, int u, int v, const int (&below)[3],
+                                 const float (&part)[3]) {
+  if (g.ratio[u] == 2 && g.ratio[v] == 2) {
+    // The fine edge goes from the cell's middle, which is inside, to that of an edge.
+    if (part[v] > 0) return below[v] % 2 ? 2 : 0;
+    return part[u] > 0 ? (below[u] % 2 ? 1 : 3) : -1;
+  }
+  // It goes between the middles of opposite edges: around the outside corner of the one whose
+  // middle is outside.
+  const bool inside = *g.at(below[0], below[1], below[2]) >= 0;
+  if (part[v] > 0 && g.ratio[v] == 1) return inside ? 2 : 0;
+  return part[u] > 0 && g.ratio[u] == 1 ? (inside ? 1 : 3) : -1;
+}
+
+/// A vertex on an edge of the coarser grid along `u`, in two halves of which the finer grid has
+/// it: where the coarser side has it.
+ISOBRICK_HD inline void move_on_edge(const GridView& g, int face, int u, int v,
+                                     const int (&below)[3], double (&place)[3]) {
+  const CoarseFace& coarse = g.faces[face];
+  const bool first = (face / 2 == 0 ? 1 : 0) == u;  // whether u is the face's first axis
+  const int i = below[u] / g.ratio[u];
+  const int j = (below[v] + g.ratio[v] - 1) / g.ratio[v];  // the last row may be cut short
+  const float* at = coarse.values + (first ? j * coarse.n[0] + i : i * coarse.n[0] + j);
+  const float a = at[0], b = at[first ? 1 : coarse.n[0]];
+  if ((a >= 0) == (b >= 0)) return;
+  const float t = crossing(a, b, 0.0f);
+  const float part =
+      static_cast<float>(static_cast<int>(t * 1048576.0f + 0.5f)) * (1.0f / 1048576.0f);
+  const double* ends = g.coarse_place[u] + i;
+  place[u] = ends[0] + static_cast<double>(part) * (ends[1] - ends[0]);
+}
+
 /// A vertex on face `face` (2 · axis + side), `part` of the way from point `below` on, at
-/// `place`: `place` is moved onto the contour of the coarser side, if it is not on an edge
-/// of the coarser grid anyway.
+/// `place`: `place` is moved onto the contour of the coarser side, or to where that crosses the
+/// edge of the coarser grid that the vertex is on.
 ISOBRICK_HD inline void move_to_contour(const GridView& g, int face, const int (&below)[3],
                                         const float (&part)[3], double (&place)[3]) {
   const int normal = face / 2, u = normal == 0 ? 1 : 0, v = normal == 2 ? 1 : 2;
-  if (!between(g, u, below[u], part[u]) || !between(g, v, below[v], part[v])) return;
+  const bool between_u = between(g, u, below[u], part[u]);
+  const bool between_v = between(g, v, below[v], part[v]);
+  if (between_u && !between_v && g.ratio[u] == 2)
+    return move_on_edge(g, face, u, v, below, place);
+  if (between_v && !between_u && g.ratio[v] == 2)
+    return move_on_edge(g, face, v, u, below, place);
+  if (!between_u || !between_v) return;
   const CoarseFace& coarse = g.faces[face];
   const int i = below[u] / g.ratio[u], j = below[v] / g.ratio[v];
   const double from_u = g.coarse_place[u][i], from_v = g.coarse_place[v][j];
@@ -94,15 +134,7 @@ ISOBRICK_HD inline void move_to_contour(const GridView& g, int face, const int (
   const Point at{(place[u] - from_u) / length_u, (place[v] - from_v) / length_v};
   const float* row = coarse.values + (j * coarse.n[0] + i);
   const Cell cell{{row[0], row[1], row[coarse.n[0]], row[coarse.n[0] + 1]}};
-  // The vertex's edge goes from the cell's middle to that of one of its edges; the
-  // contour that crosses it ends on that edge where there is a choice.
-  int near = -1;
-  if (cell.ambiguous()) {
-    if (part[v] > 0 && g.ratio[v] == 2)
-      near = below[v] % 2 ? 2 : 0;
-    else if (part[u] > 0 && g.ratio[u] == 2)
-      near = below[u] % 2 ? 1 : 3;
-  }
+  const int near = cell.ambiguous() ? near_edge(g, u, v, below, part) : -1;
   Nearest best{at, std::numeric_limits<double>::infinity()};
   for (int edge = 0; edge < 4; ++edge) {
     if (!cell.crosses(edge) || (near >= 0 && edge != near)) continue;

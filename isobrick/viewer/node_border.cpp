@@ -93,7 +93,7 @@ void NodeBorder::take_values(int i, double isovalue, const Wanted& wanted, GridV
 /// itself the vertices around the middle would be in one place.
 void NodeBorder::connect_inside(int face, GridValues& field) const {
   const int normal = face / 2, u = first_axis(normal), v = second_axis(normal);
-  if (ratio_[u] != 2 || ratio_[v] != 2) return;
+  if (ratio_[u] != 2 && ratio_[v] != 2) return;
   const GridValues& coarse = *faces_[static_cast<std::size_t>(face)];
   for (Index j = coarse.points.lo[v]; j + 1 < coarse.points.hi[v]; ++j)
     for (Index i = coarse.points.lo[u]; i + 1 < coarse.points.hi[u]; ++i) {
@@ -105,15 +105,36 @@ void NodeBorder::connect_inside(int face, GridValues& field) const {
         cell.v[c] = coarse.at(p);
       }
       if (!cell.ambiguous()) continue;
+      const float inside =
+          std::min(std::max(cell.v[0], cell.v[1]), std::max(cell.v[2], cell.v[3])) / 2;
       Int3 middle = face % 2 ? hi_ : lo_;
-      middle[u] = 2 * i + 1;
-      middle[v] = 2 * j + 1;
-      // A cell that is cut short by the volume's border may have no middle.
-      if (middle[u] >= hi_[u] || middle[v] >= hi_[v]) continue;
-      if (field.at(middle) < 0)
-        field.at(middle) =
-            std::min(std::max(cell.v[0], cell.v[1]), std::max(cell.v[2], cell.v[3])) / 2;
+      middle[u] = ratio_[u] * i + ratio_[u] / 2;
+      middle[v] = ratio_[v] * j + ratio_[v] / 2;
+      connect_through(middle, u, v, inside, field);
     }
+}
+
+/// Connects the corners of an ambiguous cell of the coarser side that are inside, through its
+/// middle or, where it is halved along one axis only, through the middle of one of two opposite
+/// edges.
+void NodeBorder::connect_through(Int3 middle, int u, int v, float inside,
+                                 GridValues& field) const {
+  // A cell that is cut short by the volume's border may have no middle.
+  const auto exists = [&](int axis) { return ratio_[axis] == 1 || middle[axis] < hi_[axis]; };
+  if (!exists(u) || !exists(v)) return;
+  if (ratio_[u] == 2 && ratio_[v] == 2) {
+    if (field.at(middle) < 0) field.at(middle) = inside;
+    return;
+  }
+  const int whole = ratio_[u] == 2 ? v : u;  // the axis along which the cell is not halved
+  Int3 other = middle;
+  ++other[whole];
+  if (field.at(middle) >= 0 || field.at(other) >= 0) return;
+  // Points on the node's own edges are other nodes', too.
+  if (other[whole] < hi_[whole])
+    field.at(other) = inside;
+  else if (middle[whole] > lo_[whole])
+    field.at(middle) = inside;
 }
 
 void NodeBorder::describe(GridView& view) {

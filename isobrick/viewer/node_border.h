@@ -27,6 +27,7 @@ class NodeBorder {
  private:
   void take_values(int i, double isovalue, const Wanted& wanted, GridValues& field);
   void connect_inside(int face, GridValues& field) const;
+  void connect_through(Int3 middle, int u, int v, float inside, GridValues& field) const;
   float interpolated(const GridValues& coarse, Int3 point) const;
   /// The two coarse grid points around a grid point, and how far it is from the first.
   struct Between {
