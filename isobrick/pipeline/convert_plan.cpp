@@ -28,10 +28,33 @@ Int3 shard_extent(const Lattice& lattice, Index shard) {
   return min({shard, shard, shard}, whole);
 }
 
+/// Whether an axis is halved that does not fit into a brick.
+bool halves_long_axis(Int3 factors, Int3 extent, Index brick) {
+  bool any = false;
+  for (int axis = 0; axis < 3; ++axis) any |= factors[axis] == 2 && extent[axis] > brick;
+  return any;
+}
+
+/// By spacing, but for volumes that have become thin: of these only the long axes are halved.
+Int3 own_factors(const LevelInfo& level, Index brick) {
+  const Int3 extent = level.lattice.extent;
+  const Int3 factors = factors_by_spacing(level.transform, extent);
+  if (longest(extent) <= brick || halves_long_axis(factors, extent, brick)) return factors;
+  return {extent.x > brick ? 2 : 1, extent.y > brick ? 2 : 1, extent.z > brick ? 2 : 1};
+}
+
 /// From `level`, which is number `step` of the pyramid, to the next one.
 Int3 factors_of(const ConvertOptions& options, const LevelInfo& level, std::size_t step) {
-  if (options.factors.empty()) return factors_by_spacing(level.transform, level.lattice.extent);
+  if (options.factors.empty()) return own_factors(level, options.brick);
   return options.factors[std::min(step, options.factors.size() - 1)];
+}
+
+/// Whether no further level gets nearer to one that a brick holds.
+bool is_coarsest(const ConvertOptions& options, const LevelInfo& level, std::size_t step) {
+  const Int3 extent = level.lattice.extent;
+  if (longest(extent) <= options.brick) return true;
+  return step + 1 >= options.factors.size() && !options.factors.empty() &&
+         !halves_long_axis(options.factors.back(), extent, options.brick);
 }
 
 /// Adds coarser levels to the finest one, as many as are asked for or until one brick holds the
@@ -41,7 +64,7 @@ void add_levels(StoreLayout& layout, const ConvertOptions& options, Index shard)
   while (layout.levels.size() < wanted) {
     LevelInfo level = layout.levels.back();
     const Int3 extent = level.lattice.extent;
-    if (!options.levels && longest(extent) <= options.brick) return;
+    if (!options.levels && is_coarsest(options, level, layout.factors.size())) return;
     const Int3 factors = factors_of(options, level, layout.factors.size());
     level.lattice.extent = coarser_extent(extent, factors);
     if (level.lattice.extent == extent) break;

@@ -68,10 +68,22 @@ TEST(ConvertPyramid, TheLastFactorsHoldForAllFurtherSteps) {
   ConvertOptions options{.brick = 16};
   options.factors = {kFlat};
   convert_quietly(source, folder / "a", options);
-  // Until nothing is left to halve: z is never in one brick.
-  expect_pyramid(folder / "a", std::vector<Int3>(7, kFlat), Downsampling::mean);
+  // Until x and y are in one brick, which z never is.
+  expect_pyramid(folder / "a", std::vector<Int3>(3, kFlat), Downsampling::mean);
+  options.levels = 8;
+  convert_quietly(source, folder / "b", options);
+  expect_pyramid(folder / "b", std::vector<Int3>(7, kFlat), Downsampling::mean);
   options.levels = 9;
-  EXPECT_THROW(convert_quietly(source, folder / "b", options), UsageError);
+  EXPECT_THROW(convert_quietly(source, folder / "c", options), UsageError);
+}
+
+TEST(ConvertPyramid, PlanesThatAreFarApartEndInOneBrickToo) {
+  TemporaryFolder folder;
+  MemorySource source = make_source<std::uint8_t>({60, 30, 70}, 4);
+  source.mutable_info().transform.spacing = {0.1, 0.1, 100};
+  convert_quietly(source, folder / "a", {.brick = 16});
+  const Int3 deep{1, 1, 2};
+  expect_pyramid(folder / "a", {kFlat, kFlat, deep, deep, deep}, Downsampling::mean);
 }
 
 TEST(ConvertPyramid, AResumeRefusesAnotherMethodOrOtherFactors) {
