@@ -229,9 +229,10 @@ void add_info(Program& program) {
     Selection selection;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* app = add_subcommand(program, "info",
-                                 "Show what a store holds: extents, levels, bricks, histogram; or which channels and times.",
-                                 "isobrick info head.zarr");
+  CLI::App* app = add_subcommand(
+      program, "info",
+      "Show what a store holds: extents, levels, bricks, histogram; or which channels and times.",
+      "isobrick info head.zarr");
   add_path(app, "STORE", arguments->path, "Store to look at, or another program's Zarr");
   add_selection(app, arguments->selection);
   program.commands.push_back({app, [arguments](Console& console) {

@@ -78,15 +78,13 @@ std::string text_of(const std::filesystem::path& path, const MetadataFiles& file
       text += fmt::format("  {:<10} {}\n", i, printable(files.image.channel_names[i], 80));
   }
   for (std::size_t i = 0; i < files.levels.size(); ++i)
-    text +=
-        fmt::format("level {:<6} {}\n", i, human_extent(extent_of(files.levels[i].array)));
+    text += fmt::format("level {:<6} {}\n", i, human_extent(extent_of(files.levels[i].array)));
   return text;
 }
 
 }  // namespace
 
-bool list_volumes(const std::filesystem::path& path, const Selection& selection,
-                  Console& console) {
+bool list_volumes(const std::filesystem::path& path, const Selection& selection, Console& console) {
   const MetadataFiles files = read_metadata_files(path);
   const std::vector<VolumeAxis> axes =
       open_axes(files.image, files.levels.front().array, selection);

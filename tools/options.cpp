@@ -142,24 +142,25 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_parsed(app, options.levels, parse_levels,
              {"--levels", "auto|N", "Levels of the pyramid; auto: until one brick holds the last",
               "auto"});
-  add_repeated(app,
-               {"--factors", "FX,FY,FZ",
-                "Samples along x, y and z, 1 or 2, that become one of the next level; given several "
-                "times, of one step each, the last for all further ones",
-                "by spacing, towards cubes"},
-               [&options](const std::string& text) { options.factors.push_back(parse_dims(text)); });
+  add_repeated(
+      app,
+      {"--factors", "FX,FY,FZ",
+       "Samples along x, y and z, 1 or 2, that become one of the next level; given several "
+       "times, of one step each, the last for all further ones",
+       "by spacing, towards cubes"},
+      [&options](const std::string& text) { options.factors.push_back(parse_dims(text)); });
   add_parsed(app, options.downsampling, parse_downsampling_name,
              {"--downsample", "mean|max|min|mode|stride",
               "What such samples become; mode suits labels", "mean"});
-  add_parsed(app, options.ome,
-             [](const std::string& text) {
-               if (text != "0.4" && text != "0.5")
-                 throw UsageError(fmt::format("unknown version '{}'; it is 0.4 or 0.5", text));
-               return text == "0.4" ? OmeVersion::v04 : OmeVersion::v05;
-             },
-             {"--ome", "0.4|0.5",
-              "Version of OME-Zarr; 0.4, with a file for each brick, for readers without Zarr 3",
-              "0.5"});
+  add_parsed(
+      app, options.ome,
+      [](const std::string& text) {
+        if (text != "0.4" && text != "0.5")
+          throw UsageError(fmt::format("unknown version '{}'; it is 0.4 or 0.5", text));
+        return text == "0.4" ? OmeVersion::v04 : OmeVersion::v05;
+      },
+      {"--ome", "0.4|0.5",
+       "Version of OME-Zarr; 0.4, with a file for each brick, for readers without Zarr 3", "0.5"});
   add_parsed(app, options.index,
              [](const std::string& text) {
                return text == "none" ? std::nullopt : std::optional(parse_stored_kind(text));

@@ -172,8 +172,7 @@ std::optional<int> parse_levels(std::string_view text) {
 
 Downsampling parse_downsampling_name(std::string_view text) {
   if (const auto method = parse_downsampling(text)) return *method;
-  throw UsageError(
-      fmt::format("unknown method '{}'; it is mean, max, min, mode or stride", text));
+  throw UsageError(fmt::format("unknown method '{}'; it is mean, max, min, mode or stride", text));
 }
 
 RoiText parse_roi(std::string_view text) {

@@ -185,8 +185,7 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
   bool first = true;
   for (const ByteCodec step : chain.steps) {
     if (step == ByteCodec::zstd)
-      result =
-          compress(first ? bytes : std::span<const std::byte>(result), chain, kCrcBytes);
+      result = compress(first ? bytes : std::span<const std::byte>(result), chain, kCrcBytes);
     else if (step != ByteCodec::crc32c) {
       throw Error(fmt::format("{} is only read, not written", name_of(step)));
     } else {

@@ -157,7 +157,8 @@ void parse_levels_06(const CheckedJson& multiscale, ImageMetadata& image) {
 
 // Its drafts and release candidates had names such as "0.6.dev4" and "0.6rc1".
 bool is_06(std::string_view version) {
-  return version.starts_with("0.6") && (version.size() == 3 || version[3] < '0' || version[3] > '9');
+  return version.starts_with("0.6") &&
+         (version.size() == 3 || version[3] < '0' || version[3] > '9');
 }
 
 void parse_multiscales(const CheckedJson& multiscales, bool version_06, ImageMetadata& image) {

@@ -38,15 +38,15 @@ struct ImageMetadata {
     friend bool operator==(const Axis&, const Axis&) = default;
   };
   std::string name;
-  std::vector<Axis> leading;  ///< none in ours
+  std::vector<Axis> leading;               ///< none in ours
   std::vector<std::string> channel_names;  ///< as `omero` calls them; empty where it does not
   std::vector<Level> levels;
   bool ours = true;  ///< has `attributes.isobrick`
   /// Nothing when the store doesn't say.
   std::optional<bool> may_have_nan;
-  std::string grid_class;  ///< as OpenVDB calls it ("level set"), or empty
-  std::string grid_name;   ///< of the OpenVDB grid, or empty
-  std::string downsampling;  ///< how coarser levels were made ("mean"): `type`; or empty
+  std::string grid_class;               ///< as OpenVDB calls it ("level set"), or empty
+  std::string grid_name;                ///< of the OpenVDB grid, or empty
+  std::string downsampling;             ///< how coarser levels were made ("mean"): `type`; or empty
   std::optional<DisplayWindow> window;  ///< `omero`, which is written and never read
   /// What the root says that metadata_checksum() must be.
   std::optional<std::uint32_t> checksum;

@@ -111,8 +111,8 @@ AffineMap parse_scale_and_translation(const CheckedJson& list, std::size_t axes)
       translated = true;
       map = then(map, parse_translation(item, axes));
     } else if (type != "identity") {
-      item.unsupported(fmt::format("transformation '{}' is not supported before OME-Zarr 0.6",
-                                   type));
+      item.unsupported(
+          fmt::format("transformation '{}' is not supported before OME-Zarr 0.6", type));
     }
   }
   return map;

@@ -22,7 +22,7 @@ struct StoreLayout {
   std::vector<LevelInfo> levels;
   std::vector<Int3> factors;  ///< of each level but the last: 1 or 2 an axis, to the next one
   Downsampling downsampling = Downsampling::mean;  ///< what makes the coarser levels
-  OmeVersion ome = OmeVersion::v05;  ///< in 0.4 every shard is one brick
+  OmeVersion ome = OmeVersion::v05;                ///< in 0.4 every shard is one brick
   std::optional<int> zstd_level = 3;
   double fill_value = 0;
   bool may_have_nan = false;
@@ -72,7 +72,8 @@ class StoreWriter {
   /// `may_have_nan` replaces the layout's, known only now. `window`, if there is one, reads the
   /// store and says how it is shown at first. `more`, if there is one, adds to the store; should
   /// either fail, a resume goes on.
-  void finish(bool may_have_nan, const std::function<std::optional<DisplayWindow>()>& window = nullptr,
+  void finish(bool may_have_nan,
+              const std::function<std::optional<DisplayWindow>()>& window = nullptr,
               const std::function<void()>& more = nullptr);
 
   /// Bytes written so far, all files.

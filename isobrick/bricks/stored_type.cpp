@@ -48,8 +48,7 @@ float half_to_float(std::uint16_t bits) {
 void widen(WideType type, const std::byte* stored, std::byte* samples, std::size_t count) {
   switch (type) {
     case WideType::u64:
-      return widen_each<std::uint64_t, double>(stored, samples, count,
-                                               exact_double<std::uint64_t>);
+      return widen_each<std::uint64_t, double>(stored, samples, count, exact_double<std::uint64_t>);
     case WideType::i64:
       return widen_each<std::int64_t, double>(stored, samples, count, exact_double<std::int64_t>);
     case WideType::f16:

@@ -27,8 +27,7 @@ void read_box(VolumeSource& source, Box3 box, std::byte* out) {
 
 Cascade::Cascade(const ConvertPlan& plan, const StoreLayout& layout, int first_level,
                  std::vector<LevelWriter*> levels)
-    : method_(layout.downsampling),
-      second_slab_(first_level == 0 && plan.second_slab_fits()) {
+    : method_(layout.downsampling), second_slab_(first_level == 0 && plan.second_slab_fits()) {
   for (std::size_t i = 0; i < levels.size(); ++i) {
     Stage stage;
     stage.lattice = layout.levels[static_cast<std::size_t>(first_level) + i].lattice;

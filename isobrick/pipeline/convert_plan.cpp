@@ -97,8 +97,8 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
   for (const Int3& f : options.factors)
     if (min(f, {1, 1, 1}) != Int3{1, 1, 1} || max(f, {2, 2, 2}) != Int3{2, 2, 2} ||
         f == Int3{1, 1, 1})
-      throw UsageError(fmt::format(
-          "factors {},{},{}: each is 1 or 2, and at least one of them 2", f.x, f.y, f.z));
+      throw UsageError(fmt::format("factors {},{},{}: each is 1 or 2, and at least one of them 2",
+                                   f.x, f.y, f.z));
 }
 
 }  // namespace
@@ -112,8 +112,7 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
   layout.grid_name = volume.grid_name;
   layout.name = std::filesystem::path(volume.name).filename().string();
   layout.ome = options.ome;
-  const Index bricks_per_shard =
-      options.ome == OmeVersion::v04 ? 1 : options.shard / options.brick;
+  const Index bricks_per_shard = options.ome == OmeVersion::v04 ? 1 : options.shard / options.brick;
   const Index shard = bricks_per_shard * options.brick;
   LevelInfo finest;
   finest.lattice = {volume.extent, {options.brick, options.brick, options.brick}, volume.type};

@@ -137,7 +137,8 @@ class SparsePyramid::Level {
     };
     Index layer = 0;
     const auto deliver = [&](const Parcel& parcel) {
-      for (; layer < parcel.parent.z; ++layer) close((layer + 1) * factors_.z * info_.lattice.brick.z);
+      for (; layer < parcel.parent.z; ++layer)
+        close((layer + 1) * factors_.z * info_.lattice.brick.z);
       put(parcel);
       if (next != nullptr &&
           !all_fill(info_.lattice.type, parcel.coarser.span(), layout_.fill_value))

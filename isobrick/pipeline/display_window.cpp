@@ -30,10 +30,10 @@ void add_samples(const Lattice& lattice, Int3 b, const std::byte* brick, Index s
   for_each_point(lattice.brick_box(b), [&](Int3 p) {
     if (count++ % step != 0) return;
     T sample;
-    std::memcpy(&sample,
-                brick + sizeof(T) * static_cast<std::size_t>(
-                                        linear_index(p - full.lo, lattice.brick)),
-                sizeof sample);
+    std::memcpy(
+        &sample,
+        brick + sizeof(T) * static_cast<std::size_t>(linear_index(p - full.lo, lattice.brick)),
+        sizeof sample);
     if (std::isfinite(static_cast<double>(sample))) values.push_back(static_cast<double>(sample));
   });
 }
@@ -52,8 +52,8 @@ std::vector<double> some_samples(const StoreReader& store) {
   for (Index i = nth_brick / 2; i < volume(bricks); i += nth_brick) {
     const Int3 b{i % bricks.x, i / bricks.x % bricks.y, i / (bricks.x * bricks.y)};
     if (!store.read_brick(level, b, brick.data()))
-      fill_box(lattice.type, store.info().fill_value,
-               {brick.data(), lattice.full_brick_box(b)}, lattice.full_brick_box(b));
+      fill_box(lattice.type, store.info().fill_value, {brick.data(), lattice.full_brick_box(b)},
+               lattice.full_brick_box(b));
     visit_scalar(lattice.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
       add_samples<T>(lattice, b, brick.data(), std::max<Index>(step, 1), count, values);

@@ -121,10 +121,8 @@ ISOBRICK_HD inline void move_to_contour(const GridView& g, int face, const int (
   const int normal = face / 2, u = normal == 0 ? 1 : 0, v = normal == 2 ? 1 : 2;
   const bool between_u = between(g, u, below[u], part[u]);
   const bool between_v = between(g, v, below[v], part[v]);
-  if (between_u && !between_v && g.ratio[u] == 2)
-    return move_on_edge(g, face, u, v, below, place);
-  if (between_v && !between_u && g.ratio[v] == 2)
-    return move_on_edge(g, face, v, u, below, place);
+  if (between_u && !between_v && g.ratio[u] == 2) return move_on_edge(g, face, u, v, below, place);
+  if (between_v && !between_u && g.ratio[v] == 2) return move_on_edge(g, face, v, u, below, place);
   if (!between_u || !between_v) return;
   const CoarseFace& coarse = g.faces[face];
   const int i = below[u] / g.ratio[u], j = below[v] / g.ratio[v];

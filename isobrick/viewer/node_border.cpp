@@ -117,8 +117,7 @@ void NodeBorder::connect_inside(int face, GridValues& field) const {
 /// Connects the corners of an ambiguous cell of the coarser side that are inside, through its
 /// middle or, where it is halved along one axis only, through the middle of one of two opposite
 /// edges.
-void NodeBorder::connect_through(Int3 middle, int u, int v, float inside,
-                                 GridValues& field) const {
+void NodeBorder::connect_through(Int3 middle, int u, int v, float inside, GridValues& field) const {
   // A cell that is cut short by the volume's border may have no middle.
   const auto exists = [&](int axis) { return ratio_[axis] == 1 || middle[axis] < hi_[axis]; };
   if (!exists(u) || !exists(v)) return;

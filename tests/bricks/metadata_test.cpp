@@ -203,8 +203,8 @@ TEST(ImageMetadata, HostileValues) {
   expect(true, "JSON", "\"scale\":[3.0,2.0,1.0]", "\"scale\":[1e999,1,1]");
   expect(false, "'affine'", "\"type\":\"scale\"", "\"type\":\"affine\"");
   const auto with_common = [&](const std::string& common) {
-    expect(true, "finite", "\"datasets\":", "\"coordinateTransformations\":[" + common +
-                                                "],\"datasets\":");
+    expect(true, "finite",
+           "\"datasets\":", "\"coordinateTransformations\":[" + common + "],\"datasets\":");
   };
   with_common("{\"type\":\"scale\",\"scale\":[1e308,1,1]}");
   expect(true, "number", "\"translation\":[6.0,5.0,4.0]", "\"translation\":[\"NaN\",1,1]");

@@ -40,10 +40,9 @@ class Ome06 : public testing::Test {
   }
 
   void set_own(const json& transformation) {
-    scale["datasets"] = {
-        {{"path", "s0"},
-         {"coordinateTransformations",
-          {leading(transformation, {{"path", "s0"}}, {{"name", "intrinsic"}})}}}};
+    scale["datasets"] = {{{"path", "s0"},
+                          {"coordinateTransformations",
+                           {leading(transformation, {{"path", "s0"}}, {{"name", "intrinsic"}})}}}};
   }
   void set_common(const json& transformation) {
     scale["coordinateTransformations"] = {
@@ -160,8 +159,7 @@ TEST(Ome05, ListsAreAScaleAndATranslationAfterIt) {
     json group{{"zarr_format", 3}, {"node_type", "group"}};
     const json datasets{{{"path", "0"}, {"coordinateTransformations", list}}};
     group["attributes"]["ome"] = {
-        {"version", "0.5"},
-        {"multiscales", {{{"axes", axes("meter")}, {"datasets", datasets}}}}};
+        {"version", "0.5"}, {"multiscales", {{{"axes", axes("meter")}, {"datasets", datasets}}}}};
     return parse_image_metadata(group.dump(), "file").levels.at(0).transform;
   };
   EXPECT_EQ(read({kScale, kTranslation}).origin, (Vec3d{10, 20, 30}));

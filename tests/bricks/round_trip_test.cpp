@@ -92,8 +92,8 @@ TEST(RoundTrip, MoreOpenShardsThanDescriptorsKept) {
   StoreWriter writer(folder / "a.zarr", make_layout(levels, 1, 0), false);
   const Int3 bricks = levels[0].lattice.bricks();
   for_each_point({{0, 0, 0}, bricks}, [&](Int3 b) {
-    writer.put(0, b, *encode_brick(ScalarType::u8, cut_brick(levels[0], b, 0), 0,
-                                    CodecChain::ours(1)));
+    writer.put(0, b,
+               *encode_brick(ScalarType::u8, cut_brick(levels[0], b, 0), 0, CodecChain::ours(1)));
   });
   for_each_point({{0, 0, 0}, bricks}, [&](Int3 s) { writer.finish_shard(0, s); });
   writer.finish(false);

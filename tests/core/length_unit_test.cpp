@@ -6,9 +6,9 @@ namespace isobrick {
 namespace {
 
 TEST(LengthUnit, SymbolsBecomeNamesAndBack) {
-  for (const char* symbol : {"m", "dm", "cm", "mm", "nm", "pm", "km", "in", "ft", "mi", "yd",
-                             "fm", "am", "zm", "ym", "hm", "Mm", "Gm", "Tm", "Pm", "Em", "Zm", "Ym",
-                             "pc"}) {
+  for (const char* symbol :
+       {"m",  "dm", "cm", "mm", "nm", "pm", "km", "in", "ft", "mi", "yd", "fm",
+        "am", "zm", "ym", "hm", "Mm", "Gm", "Tm", "Pm", "Em", "Zm", "Ym", "pc"}) {
     const std::string name = unit_name(symbol);
     EXPECT_GT(name.size(), 3u) << symbol;
     EXPECT_EQ(unit_name(name), name);

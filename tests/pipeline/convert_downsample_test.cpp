@@ -76,9 +76,7 @@ TYPED_TEST(Downsample, OtherMethodsTakeOneOfTheSamples) {
         EXPECT_EQ(max[i], values.back());
         EXPECT_EQ(min[i], values.front());
         EXPECT_EQ(stride[i], first);
-        const auto count = [&](TypeParam v) {
-          return std::count(values.begin(), values.end(), v);
-        };
+        const auto count = [&](TypeParam v) { return std::count(values.begin(), values.end(), v); };
         for (const TypeParam v : values)
           EXPECT_TRUE(count(v) < count(mode[i]) || (count(v) == count(mode[i]) && v >= mode[i]));
         ++i;

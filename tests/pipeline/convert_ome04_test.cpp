@@ -96,10 +96,12 @@ TEST(ConvertOme04, DamageIsFound) {
     const auto flip = [](std::string& bytes) { bytes[bytes.size() / 2] ^= 64; };
     // Plain samples have no checksum: only what leaves a range is noticed.
     EXPECT_TRUE(!codec || changed("0/0/0/0", flip) > 0);
-    EXPECT_GT(changed(".zattrs", [](std::string& text) { text.replace(text.find("1.0"), 3, "1.5"); }),
-              0u);
-    EXPECT_GT(changed("0/.zarray", [](std::string& text) { text.replace(text.find("40"), 2, "39"); }),
-              0u);
+    EXPECT_GT(
+        changed(".zattrs", [](std::string& text) { text.replace(text.find("1.0"), 3, "1.5"); }),
+        0u);
+    EXPECT_GT(
+        changed("0/.zarray", [](std::string& text) { text.replace(text.find("40"), 2, "39"); }),
+        0u);
     EXPECT_EQ(damages(folder / "a"), 0u);
     // A lost file is not empty space where ranges know better.
     fs::remove(folder / "a/0/0/0/0");

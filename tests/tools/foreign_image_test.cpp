@@ -37,9 +37,13 @@ class ForeignImage : public ProgramTest {
         {"multiscales", {scale}},
         {"omero", {{"channels", {{{"label", "nuclei"}}, {{"label", "walls"}}}}}}};
     write_file(image + "/zarr.json", group.dump());
-    json array{{"zarr_format", 3}, {"node_type", "array"},  {"shape", {2, 12, 12, 12}},
-               {"fill_value", 0},  {"data_type", "int64"}};
-    array["chunk_grid"] = {{"name", "regular"}, {"configuration", {{"chunk_shape", {1, 12, 12, 12}}}}};
+    json array{{"zarr_format", 3},
+               {"node_type", "array"},
+               {"shape", {2, 12, 12, 12}},
+               {"fill_value", 0},
+               {"data_type", "int64"}};
+    array["chunk_grid"] = {{"name", "regular"},
+                           {"configuration", {{"chunk_shape", {1, 12, 12, 12}}}}};
     array["chunk_key_encoding"] = {{"name", "default"}};
     array["codecs"] = {{{"name", "bytes"}, {"configuration", {{"endian", "little"}}}}};
     write_file(image + "/0/zarr.json", array.dump());

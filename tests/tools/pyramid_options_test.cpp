@@ -11,8 +11,8 @@ class PyramidOptions : public ProgramTest {
   PyramidOptions() { write_file(path("v.raw"), noise(std::size_t{64} * 48 * 40)); }
 
   Outcome convert(const Arguments& more) {
-    Arguments arguments{"convert", path("v.raw"), path("v.zarr"), "--force", "--dims",
-                        "64,48,40", "--type",     "u8",           "--brick", "16"};
+    Arguments arguments{"convert",  path("v.raw"), path("v.zarr"), "--force", "--dims",
+                        "64,48,40", "--type",      "u8",           "--brick", "16"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
@@ -31,10 +31,10 @@ TEST_F(PyramidOptions, FactorsAreBySpacingOrAsSaid) {
   EXPECT_NE(read_file(path("v.zarr/zarr.json")).find("\"millimeter\""), std::string::npos);
   ASSERT_EQ(convert({"--factors", "1,2,2", "--factors", "2,1,1", "--levels", "4"}).exit_code, 0);
   EXPECT_EQ(extents(), json({{64, 48, 40}, {64, 24, 20}, {32, 24, 20}, {16, 24, 20}}));
-  EXPECT_EQ(run({"extract", path("v.zarr"), "--isovalue", "100", "--level", "3", "-o",
-                 path("m.ply")})
-                .exit_code,
-            0);
+  EXPECT_EQ(
+      run({"extract", path("v.zarr"), "--isovalue", "100", "--level", "3", "-o", path("m.ply")})
+          .exit_code,
+      0);
   EXPECT_EQ(run({"verify", path("v.zarr")}).exit_code, 0);
   expect_refused(convert({"--factors", "4,1,1"}), 2, {"4,1,1", "1 or 2"});
   expect_refused(convert({"--unit", "furlong"}), 2, {"furlong", "micrometer", "parsec"});

@@ -16,7 +16,7 @@ namespace {
 struct Shape {
   const char* name;
   std::function<double(Int3, Index)> field;
-  int levels = 0;  ///< that are stored; 0: until one brick holds the coarsest
+  int levels = 0;                  ///< that are stored; 0: until one brick holds the coarsest
   std::vector<Int3> factors = {};  ///< of the pyramid; none: all axes are halved
 };
 
@@ -155,16 +155,14 @@ TEST_P(Holes, AreNotInsideTheSilhouette) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Cracks,
-                         ::testing::Values(Shape{"ball", ball}, Shape{"gyroid", gyroid_ball},
-                                           Shape{"blobs", blobs},
-                                           Shape{"gyroid_flat", gyroid_ball, 0, kFlat},
-                                           Shape{"blobs_flat", blobs, 0, kFlat},
-                                           Shape{"blobs_turns", blobs, 0, kTurns},
-                                           Shape{"gyroid_turns", gyroid_ball, 0, kTurns},
-                                           Shape{"ball_of_one_level", ball, 1},
-                                           Shape{"blobs_of_one_level", blobs, 1}),
-                         [](const auto& shape) { return shape.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    ClosedSurfaces, Cracks,
+    ::testing::Values(Shape{"ball", ball}, Shape{"gyroid", gyroid_ball}, Shape{"blobs", blobs},
+                      Shape{"gyroid_flat", gyroid_ball, 0, kFlat},
+                      Shape{"blobs_flat", blobs, 0, kFlat}, Shape{"blobs_turns", blobs, 0, kTurns},
+                      Shape{"gyroid_turns", gyroid_ball, 0, kTurns},
+                      Shape{"ball_of_one_level", ball, 1}, Shape{"blobs_of_one_level", blobs, 1}),
+    [](const auto& shape) { return shape.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Nothing,
                          ::testing::Values(Shape{"balls", beside_nothing},

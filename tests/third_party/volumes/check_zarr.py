@@ -105,7 +105,8 @@ def check_types(folder):
 
 def check_wide_types(folder):
     """Types that ours are not, as what they become."""
-    for code, becomes in (("<u8", "f8"), (">i8", "f8"), ("<f2", "f4"), (">f2", "f4"), ("|b1", "u1")):
+    for code, becomes in (("<u8", "f8"), (">i8", "f8"), ("<f2", "f4"), (">f2", "f4"),
+                          ("|b1", "u1")):
         data = samples((19, 33, 41), "<u2" if code == "<u8" else "<i2")
         data = data > 60 if code == "|b1" else data.astype(code)
         path = folder / f"type_{code[1:]}_{'big' if code[0] == '>' else 'little'}.zarr"
