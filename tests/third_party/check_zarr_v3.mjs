@@ -131,7 +131,9 @@ async function checkImage() {
     for (const c of [0, 1, 2])
       expectSamples(path, bytesOf(data).subarray((3 * t + c) * size, (3 * t + c + 1) * size),
                     "--time", `${t}`, "--channel", `${c}`);
-  check(run(2, "info", path).includes("choose one with --time"), "ambiguous");
+  check(run(2, "export", path, join(folder, "no.raw")).includes("choose one with --time"),
+        "ambiguous");
+  check(run(0, "info", path).includes("3 volumes: --channel 0 … 2"), "listed");
   check(run(2, "info", path, "--time", "2", "--channel", "0").includes("--time 2 is not there"),
         "not there");
   run(0, "index", path, "--kind", "octree", "--time", "1", "--channel", "2");
