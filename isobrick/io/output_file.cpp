@@ -76,6 +76,13 @@ void FileWriter::flush() {
   if (capacity_ > kBuffer) make_buffer(kBuffer);
 }
 
+void FileWriter::finish() {
+  flush();
+  // A network's file system may store only now, and say only to who closes that it could not.
+  const int copy = ::fcntl(fd_.get(), F_DUPFD_CLOEXEC, 0);
+  if (copy < 0 || ::close(copy) != 0) fail(errno);
+}
+
 void FileWriter::write_all(const std::byte* bytes, std::size_t size) {
   while (size > 0) {
     const ssize_t put = ::write(fd_.get(), bytes, std::min(size, std::size_t{1} << 30));
@@ -171,7 +178,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::publish() {
-  writer_.flush();
+  writer_.finish();
   int result = ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(),
                            force_ ? 0 : RENAME_NOREPLACE);
   if (result != 0 && !force_ && (errno == EINVAL || errno == ENOSYS)) {

@@ -37,6 +37,8 @@ class FileWriter {
   /// Forgets everything: the next byte is the first.
   void restart();
   void flush();
+  /// Flushes, and throws what file systems report only when a file is closed. Nothing follows.
+  void finish();
 
   /// Another descriptor of the same file, for who writes at places instead of
   /// appending; the two ways do not mix.
@@ -85,8 +87,7 @@ class OutputFile {
   FileWriter& writer() { return writer_; }
   const FileWriter& writer() const { return writer_; }
   const std::string& path() const { return path_; }
-  /// Where it is until it is published, for a library that opens files itself;
-  /// the writer is not used then.
+  /// Where it is until it is published, for a reader that checks it.
   const std::string& temporary_path() const { return temporary_; }
 
   /// Flushes and renames. Replaces a file that appeared in the meantime only with `force`.

@@ -60,7 +60,7 @@ void GlbSink::finish_parts() {
     FileWriter out = out_.create_part(kPartExtension);
     primitives.push_back(append_part(out, part));
     primitives.back().uri = percent_encoded(out_.reference(out_.parts() - 1, kPartExtension));
-    out.flush();
+    out.finish();
     part_bytes_ += out.size();
   });
   out_.index().writer().append(glb_start(glb_json(vertices_, primitives), 0));

@@ -51,7 +51,7 @@ void write_part(FileWriter& out, const VertexRows& rows, FileWriter& triangles,
     append_connectivity(out, layout, run);
   });
   append_vtp_end(out, layout);
-  out.flush();
+  out.finish();
 }
 
 }  // namespace

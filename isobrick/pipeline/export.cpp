@@ -113,7 +113,7 @@ void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, W
     grid->put({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
   });
   progress.end();
-  grid->write(output.temporary_path());
+  grid->write(output);
 }
 
 }  // namespace
@@ -128,7 +128,7 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   OutputFile output(out.string(), options.force);
   if (options.isovalue) {
     export_level_set(store, box, describe(level, box, out.string()), options,
-                     output.temporary_path(), progress);
+                     output, progress);
     output.publish();
     return;
   }

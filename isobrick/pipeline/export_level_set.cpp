@@ -89,7 +89,7 @@ class Signs {
 }  // namespace
 
 void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info,
-                      const ExportOptions& options, const std::string& path, Progress& progress) {
+                      const ExportOptions& options, OutputFile& file, Progress& progress) {
   if (options.half_band < 1 || options.half_band > kWidestHalfBand)
     throw UsageError(fmt::format("a band of {} samples on either side: 1 to {} are possible",
                                  options.half_band, kWidestHalfBand));
@@ -119,7 +119,7 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
     progress.advance(bytes(part));
   });
   progress.end();
-  set->write(path);
+  set->write(file);
 }
 
 }  // namespace isobrick

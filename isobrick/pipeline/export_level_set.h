@@ -1,18 +1,17 @@
 #pragma once
 
-#include <string>
-
 #include "isobrick/core/progress.h"
+#include "isobrick/io/output_file.h"
 #include "isobrick/pipeline/export.h"
 #include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
 
-/// Writes the isosurface of `box` (samples of a level) to `path` as a level set: distances
+/// Writes the isosurface of `box` (samples of a level) to `file` as a level set: distances
 /// from the triangles that extract() makes, negative where samples are at least the isovalue.
 /// `info` describes the box as a volume. Throws UsageError where the grid exceeds the
 /// budget, of which half at most goes to the extraction; Error where the store has no ranges.
 void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info,
-                      const ExportOptions& options, const std::string& path, Progress& progress);
+                      const ExportOptions& options, OutputFile& file, Progress& progress);
 
 }  // namespace isobrick

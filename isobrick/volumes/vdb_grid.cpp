@@ -2,7 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <openvdb/io/Archive.h>
+
+#include <ostream>
+#include <vector>
+
 #include "isobrick/core/error.h"
+#include "isobrick/io/writer_stream.h"
+#include "isobrick/volumes/vdb_header.h"
 
 namespace isobrick {
 namespace {
@@ -15,6 +22,15 @@ openvdb::math::Transform::Ptr grid_transform(const Transform& t) {
   for (int row = 0; row < 3; ++row) m(3, row) = t.origin[row];
   return openvdb::math::Transform::createLinearTransform(m);
 }
+
+/// OpenVDB's own File has a stream of its own, whose failures it does not look at: a full disk
+/// leaves a truncated file and no error.
+class GridArchive final : private openvdb::io::Archive {
+ public:
+  void write(std::ostream& out, const openvdb::GridBase::Ptr& grid) const {
+    Archive::write(out, openvdb::GridCPtrVec{grid}, /*seekable=*/true);
+  }
+};
 
 }  // namespace
 
@@ -32,12 +48,19 @@ void throw_vdb_budget(std::uint64_t budget) {
                   budget >> 20));
 }
 
-void write_vdb_grid(const std::string& path, const openvdb::GridBase::Ptr& grid) {
+void write_vdb_grid(OutputFile& file, const openvdb::GridBase::Ptr& grid) {
   try {
-    openvdb::io::File file(path);
-    file.write({grid});
+    WriterStream stream(file.writer());
+    GridArchive().write(stream, grid);
+    file.writer().flush();
+    const std::vector<VdbGrid> written = read_vdb_header(file.temporary_path());
+    if (written.size() != 1 || written[0].end != file.writer().size())
+      throw Error(fmt::format("cannot write '{}': OpenVDB left an unfinished file of {} bytes",
+                              file.path(), file.writer().size()));
+  } catch (const Error&) {
+    throw;
   } catch (const std::exception& error) {
-    throw Error(fmt::format("cannot write '{}': {}", path, error.what()));
+    throw Error(fmt::format("cannot write '{}': {}", file.path(), error.what()));
   }
 }
 

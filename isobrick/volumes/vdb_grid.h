@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 
+#include "isobrick/io/output_file.h"
 #include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
@@ -17,8 +18,8 @@ inline constexpr const char* kVdbUnit = "unit";
 /// Gives a grid the volume's place, unit and name.
 void describe_vdb_grid(openvdb::GridBase& grid, const VolumeInfo& info, const std::string& name);
 
-/// Throws Error when that fails.
-void write_vdb_grid(const std::string& path, const openvdb::GridBase::Ptr& grid);
+/// Writes the grid as all of `file`, and reads back where it ends. Throws Error when that fails.
+void write_vdb_grid(OutputFile& file, const openvdb::GridBase::Ptr& grid);
 
 inline openvdb::Coord vdb_coordinate(Int3 p) {
   return {static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z)};

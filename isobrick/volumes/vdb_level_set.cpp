@@ -83,9 +83,9 @@ class LevelSet final : public VdbLevelSet {
     for_each_vdb_leaf(box, [&](Int3 corner) { put_leaf(box, corner, [](Int3) { return true; }); });
   }
 
-  void write(const std::string& path) override {
+  void write(OutputFile& file) override {
     openvdb::tools::pruneLevelSet(grid_->tree());
-    write_vdb_grid(path, grid_);
+    write_vdb_grid(file, grid_);
   }
 
  private:

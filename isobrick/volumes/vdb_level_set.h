@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "isobrick/io/output_file.h"
 #include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
@@ -28,8 +29,8 @@ class VdbLevelSet {
   virtual void put_inside(Box3 box, const std::uint8_t* inside) = 0;
   virtual void put_all_inside(Box3 box) = 0;
 
-  /// Writes the grid as `path`. Throws Error when that fails.
-  virtual void write(const std::string& path) = 0;
+  /// Writes the grid as all of `file`, to be published. Throws Error when that fails.
+  virtual void write(OutputFile& file) = 0;
 };
 
 /// A float grid named `name` of the class "level set" over the volume. Its band is

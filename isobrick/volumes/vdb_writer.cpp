@@ -29,7 +29,7 @@ class TypedVdbWriter final : public VdbWriter {
         box, [&](Int3 leaf) { put_leaf(leaf, box, reinterpret_cast<const Sample*>(samples)); });
   }
 
-  void write(const std::string& path) override { write_vdb_grid(path, grid_); }
+  void write(OutputFile& file) override { write_vdb_grid(file, grid_); }
 
  private:
   using Value = typename Grid::ValueType;

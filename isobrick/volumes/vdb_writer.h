@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "isobrick/io/output_file.h"
 #include "isobrick/volumes/volume_source.h"
 
 namespace isobrick {
@@ -19,8 +20,8 @@ class VdbWriter {
   /// put is the fill value. Throws UsageError when the grid outgrows its budget.
   virtual void put(Box3 box, const std::byte* samples) = 0;
 
-  /// Writes the grid as `path`. Throws Error when that fails.
-  virtual void write(const std::string& path) = 0;
+  /// Writes the grid as all of `file`, to be published. Throws Error when that fails.
+  virtual void write(OutputFile& file) = 0;
 };
 
 /// A grid named `name` of the volume's type (integers of less than 32 bits become

@@ -263,7 +263,9 @@ TEST_F(Vdb, WritesWhatItReads) {
       for_each_point(box, [&](Int3 p) { samples.push_back(value(p)); });
       writer->put(box, reinterpret_cast<const std::byte*>(samples.data()));
     }
-    writer->write(dir / "out.vdb");
+    OutputFile file(dir / "out.vdb", true);
+    writer->write(file);
+    file.publish();
     const auto source = open_source(dir / "out.vdb", {});
     EXPECT_EQ(source->info().extent, info.extent);
     EXPECT_EQ(source->info().grid_class, "unknown");
