@@ -125,8 +125,17 @@ void TerminalProgress::erase() {
 Console::Console(Speech speech)
     : speech_(speech), progress_(!speech.quiet && isatty(STDERR_FILENO) == 1) {}
 
+void Console::reserve_output() {
+  if (speech_.json)
+    throw UsageError("--json and the output '-' would both be on standard output; name a file");
+  if (isatty(STDOUT_FILENO) == 1)
+    throw UsageError("standard output is a terminal; redirect it, or name a file");
+  reserved_ = true;
+}
+
 void Console::result(const nlohmann::ordered_json& object, std::string_view text) const {
   using nlohmann::ordered_json;
+  if (reserved_) return note(text);
   if (speech_.json)
     put(stdout, object.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + '\n');
   else if (!speech_.quiet)
@@ -138,7 +147,7 @@ void Console::result_text(std::string_view command, std::string_view text) const
 }
 
 void Console::note(std::string_view text) const {
-  if (!speech_.quiet) say(fmt::format("{}\n", text));
+  if (!speech_.quiet) say(fmt::format("{}{}", text, text.ends_with('\n') ? "" : "\n"));
 }
 
 void print_error(std::string_view command, std::string_view what) {

@@ -73,6 +73,9 @@ class Console {
  public:
   explicit Console(Speech speech);
 
+  /// From now on standard output carries the command's output, and results go to standard error.
+  /// Throws UsageError with --json, and where standard output is a terminal.
+  void reserve_output();
   /// The command's result, once. Throws Error when it cannot be written.
   void result(const nlohmann::ordered_json& object, std::string_view text) const;
   /// A result that is a text: {"command": …, "text": …}.
@@ -83,6 +86,7 @@ class Console {
 
  private:
   Speech speech_;
+  bool reserved_ = false;  ///< standard output is the command's output
   TerminalProgress progress_;
 };
 

@@ -6,6 +6,7 @@
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
 #include "tools/options.h"
+#include "tools/output_name.h"
 
 namespace isobrick::tools {
 namespace {
@@ -51,6 +52,7 @@ std::unique_ptr<VolumeSource> open_input(const Arguments& arguments) {
 }
 
 int run(const Arguments& arguments, Console& console) {
+  check_store_name(arguments.out);
   const auto source = open_input(arguments);
   const ConvertReport report = convert(*source, arguments.out, arguments.store, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);

@@ -2,12 +2,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "tools/format.h"
 #include "tools/options.h"
+#include "tools/output_name.h"
 #include "tools/parse.h"
 #include "tools/store_region.h"
 
@@ -23,31 +25,56 @@ struct Arguments {
   ExportOptions options;
 };
 
-constexpr std::pair<std::string_view, ExportFormat> kFormats[] = {
-    {"raw", ExportFormat::raw}, {"nrrd", ExportFormat::nrrd}, {"vdb", ExportFormat::vdb}};
+struct NamedFormat {
+  std::string_view word;
+  ExportFormat format;
+  std::vector<std::string_view> extensions;
+};
 
-ExportFormat format_by_name(const std::string& path) {
-  for (const auto& [name, format] : kFormats)
-    if (extension_of(path) == fmt::format(".{}", name)) return format;
-  return ExportFormat::raw;
+const std::vector<NamedFormat>& formats() {
+  static const std::vector<NamedFormat> all{{"raw", ExportFormat::raw, {".raw", ".bin", ""}},
+                                            {"nrrd", ExportFormat::nrrd, {".nrrd"}},
+                                            {"vdb", ExportFormat::vdb, {".vdb"}}};
+  return all;
 }
 
 std::string_view name_of(ExportFormat format) {
-  return kFormats[static_cast<std::size_t>(format)].first;
+  return formats()[static_cast<std::size_t>(format)].word;
+}
+
+/// By the name, which must say no other format than the one that is asked for.
+ExportFormat format_of(const std::string& path, std::optional<ExportFormat> asked) {
+  if (asked) {
+    const NamedFormat& format = formats()[static_cast<std::size_t>(*asked)];
+    refuse_misleading_name(path, format.extensions,
+                           fmt::format("--format {} writes another format", format.word));
+    return *asked;
+  }
+  const std::string extension = extension_of(path);
+  for (const NamedFormat& format : formats())
+    for (const std::string_view known : format.extensions)
+      if (extension == known) return format.format;
+  throw UsageError(
+      fmt::format("'{}' is no volume that can be written; name it .nrrd, .vdb, .raw or .bin (raw "
+                  "samples with a .nhdr beside them), or say --format",
+                  path));
 }
 
 int run(const Arguments& arguments, Console& console) {
-  const StoreReader store(arguments.store, arguments.selection);
   ExportOptions options = arguments.options;
+  options.format = format_of(arguments.out, arguments.format);
+  if (is_standard_output(arguments.out)) console.reserve_output();
+  const StoreReader store(arguments.store, arguments.selection);
   const Box3 box = store_region(store, options.level, arguments.roi);
   options.roi = box;
-  options.format = arguments.format.value_or(format_by_name(arguments.out));
   if (arguments.half_band && !options.isovalue)
     throw UsageError("--half-band is the width of a level set: say its --isovalue, too");
   options.half_band = arguments.half_band.value_or(options.half_band);
   export_volume(store, arguments.out, options, console.progress());
-  const std::uint64_t bytes = std::filesystem::file_size(arguments.out);
   const ScalarType type = store.info().type;
+  const std::uint64_t bytes = is_standard_output(arguments.out)
+                                  ? static_cast<std::uint64_t>(volume(box.extent())) * size_of(type)
+                                  : std::filesystem::file_size(arguments.out);
   nlohmann::ordered_json object{{"command", "export"},
                                 {"store", arguments.store},
                                 {"output", arguments.out},
@@ -72,8 +99,8 @@ int run(const Arguments& arguments, Console& console) {
 }
 
 ExportFormat parse_format(const std::string& text) {
-  for (const auto& [name, format] : kFormats)
-    if (text == name) return format;
+  for (const NamedFormat& format : formats())
+    if (text == format.word) return format.format;
   throw UsageError(fmt::format("'{}' is no format of a volume; it is raw, nrrd or vdb", text));
 }
 
@@ -88,9 +115,9 @@ void add_export(Program& program) {
       "  isobrick export head.zarr skull.vdb --isovalue 700");
   add_path(app, "STORE", arguments->store, "Store to read");
   add_path(app, "OUT", arguments->out,
-           "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb, raw otherwise (C order "
-           "[z, y, x], "
-           "little endian)");
+           "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb; raw if in .raw, .bin or "
+           "nothing (C order [z, y, x], little endian), with a header .nhdr beside it; - for raw "
+           "samples, or NRRD, on standard output");
   add_parsed(app, arguments->format, parse_format,
              {"--format", "raw|nrrd|vdb",
               "Format of the file; NRRD and OpenVDB keep spacing, origin and direction",

@@ -14,6 +14,7 @@
 #include "tools/mesh_output.h"
 #include "tools/mesh_space.h"
 #include "tools/options.h"
+#include "tools/output_name.h"
 #include "tools/pictures.h"
 #include "tools/store_region.h"
 
@@ -56,6 +57,7 @@ MeshForm form_of(const Arguments& arguments) {
     form.format = *arguments.format;
   else if (!arguments.output.empty())
     form.format = mesh_format(arguments.output);
+  if (!arguments.output.empty()) check_mesh_name(arguments.output, form.format);
   if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
@@ -100,6 +102,9 @@ void check(const Arguments& arguments) {
   const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
   if (twice != sorted.end()) throw UsageError(fmt::format("isovalue {} is given twice", *twice));
   check_names(arguments);
+  if (!arguments.preview.empty()) check_picture_name(arguments.preview);
+  if (is_standard_output(arguments.output) && arguments.isovalues.size() > 1)
+    throw UsageError("standard output takes one mesh; give one --isovalue, or name a file");
   if (!arguments.estimate) check_picture(arguments);
 }
 
@@ -131,7 +136,7 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& sur
                                         const F& size_of) {
   std::vector<PlannedMesh> meshes;
   for (const ExtractedSurface& surface : surfaces) {
-    if (surface.output.empty()) continue;
+    if (surface.output.empty() || is_standard_output(surface.output.native())) continue;
     PlannedMesh mesh = size_of(surface);
     mesh.path = surface.output;
     mesh.form = surface.form;
@@ -229,7 +234,10 @@ Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& s
   Said said;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ExtractReport report = make(surfaces[i], sinks[i], arguments, store, console);
-    const std::uint64_t bytes = sinks[i].mesh ? mesh_bytes(surfaces[i].output) : 0;
+    const std::uint64_t bytes = !sinks[i].mesh ? 0
+                                : is_standard_output(arguments.output)
+                                    ? sinks[i].mesh->bytes()
+                                    : mesh_bytes(surfaces[i].output);
     said.objects.push_back(report_json(surfaces[i], report, bytes));
     said.text += report_text(surfaces[i], report, bytes);
     sinks[i] = {};
@@ -239,6 +247,7 @@ Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& s
 
 int run(const Arguments& arguments, Console& console) {
   check(arguments);
+  if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
   const StoreReader store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
   const Said said = arguments.estimate ? estimate_all(surfaces, store)
@@ -303,7 +312,7 @@ void add_extract(Program& program) {
   add_text(app,
            {"-o,--output", "MESH",
             "Mesh to write, .ply, .stl, .obj, .glb, .vtp or .pvtp; several isovalues make "
-            "head_500.ply and so on"},
+            "head_500.ply and so on; - with --format obj for standard output"},
            [&output = arguments->output](const std::string& text) { output = text; });
   add_parsed(app, arguments->format, parse_mesh_format,
              {"--format", "ply|stl|obj|glb|vtp|pvtp", "Format of the mesh", "by its extension"});

@@ -13,6 +13,7 @@
 #include "isobrick/meshes/stl_sink.h"
 #include "isobrick/meshes/vtp_sink.h"
 #include "tools/format.h"
+#include "tools/output_name.h"
 
 namespace isobrick::tools {
 namespace {
@@ -45,6 +46,8 @@ std::string_view name_of(MeshFormat format) {
 }
 
 MeshFormat mesh_format(const fs::path& path) {
+  if (is_standard_output(path.native()))
+    throw UsageError("standard output has no name that says a format: say --format obj");
   const std::string extension = extension_of(path);
   for (const NamedFormat& known : kFormats)
     if (extension == fmt::format(".{}", known.word)) return known.format;
@@ -52,6 +55,21 @@ MeshFormat mesh_format(const fs::path& path) {
       fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp or "
                   ".pvtp, or say --format",
                   path.string()));
+}
+
+void check_mesh_name(const fs::path& path, MeshFormat format) {
+  const std::string_view word = kFormats[static_cast<std::size_t>(format)].word;
+  if (is_standard_output(path.native())) {
+    if (format == MeshFormat::obj) return;
+    throw UsageError(
+        fmt::format("{} cannot go to standard output, because its beginning is written last: "
+                    "name a file, or say --format obj",
+                    name_of(format)));
+  }
+  const std::string own = fmt::format(".{}", word);
+  const std::string_view extensions[] = {own};
+  refuse_misleading_name(path.string(), extensions,
+                         fmt::format("--format {} writes another format", word));
 }
 
 MeshFormat parse_mesh_format(const std::string& text) {

@@ -25,6 +25,9 @@ std::string_view name_of(MeshFormat format);
 
 /// By the name's extension. Throws UsageError for any other.
 MeshFormat mesh_format(const std::filesystem::path& path);
+/// Throws UsageError where the name says another format than `format`, or standard output where
+/// that cannot be streamed.
+void check_mesh_name(const std::filesystem::path& path, MeshFormat format);
 /// By its name in lower case.
 MeshFormat parse_mesh_format(const std::string& text);
 

@@ -7,6 +7,7 @@
 #include "isobrick/io/png_file.h"
 #include "isobrick/render/mesh_picture.h"
 #include "tools/format.h"
+#include "tools/output_name.h"
 #include "tools/picture_options.h"
 
 namespace isobrick::tools {
@@ -36,6 +37,10 @@ MeshPictureRequest request_of(const Arguments& arguments) {
 }
 
 int run(const Arguments& arguments, Console& console) {
+  if (is_standard_output(arguments.output))
+    console.reserve_output();
+  else
+    check_picture_name(arguments.output);
   const MeshPictureRequest request = request_of(arguments);
   OutputFile out(arguments.output, arguments.force);
   MeshPicture picture = draw_mesh_files(request, console.progress());
@@ -82,7 +87,7 @@ void add_render(Program& program) {
                                  "isobrick render skin.ply bone.ply --opacity 0.3 --camera "
                                  "azimuth=40,elevation=15 -o head.png");
   add_paths(app, "MESH", arguments->meshes, "Meshes to draw: PLY, STL, GLB or OBJ");
-  add_text(app, {"-o,--output", "PNG", "Picture to write", "", true},
+  add_text(app, {"-o,--output", "PNG", "Picture to write, - for standard output", "", true},
            [&output = arguments->output](const std::string& text) { output = text; });
   add_picture_options(app, arguments->picture, "mesh");
   add_text(

@@ -13,6 +13,7 @@
 #include "isobrick/window/screenshot.h"
 #include "isobrick/window/viewer_window.h"
 #include "tools/format.h"
+#include "tools/output_name.h"
 #include "tools/picture_options.h"
 
 namespace isobrick::tools {
@@ -59,6 +60,7 @@ void make_folder(const std::string& folder) {
 
 /// The pictures that are asked for, of which none may be there already.
 std::vector<Shot> shots_of(const Arguments& arguments, const Camera& camera) {
+  if (!arguments.screenshot.empty()) check_picture_name(arguments.screenshot);
   std::vector<Shot> shots;
   if (!arguments.turntable.empty()) {
     make_folder(arguments.turntable);

@@ -11,6 +11,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <new>
 
 #include "isobrick/core/error.h"
@@ -32,6 +33,12 @@ Temporary create_beside(const std::string& path) {
     if (fd >= 0) return {UniqueFd(fd), std::move(name)};
     if (errno != EEXIST || attempt == 100) throw system_error("create", path, errno);
   }
+}
+
+FileWriter open_standard_output() {
+  UniqueFd fd(::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0));
+  if (fd.get() < 0) throw system_error("write to", "standard output", errno);
+  return FileWriter(std::move(fd), "standard output");
 }
 
 }  // namespace
@@ -156,6 +163,7 @@ UniqueFd FileWriter::share() const {
 
 void check_output(const std::string& path, bool force) {
   if (path.empty()) throw UsageError("the output has no name");
+  if (path == kStandardOutput) return;
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) return;  // whatever is wrong shows when it is created
   if (S_ISDIR(status.st_mode)) throw UsageError(fmt::format("'{}' is a directory", path));
@@ -168,6 +176,7 @@ void check_output(const std::string& path, bool force) {
 OutputFile::OutputFile(std::string path, bool force)
     : path_(std::move(path)), force_(force), writer_([this] {
         check_output(path_, force_);
+        if (path_ == kStandardOutput) return open_standard_output();
         Temporary temporary = create_beside(path_);
         temporary_ = std::move(temporary.path);
         return FileWriter(std::move(temporary.fd), path_);
@@ -179,6 +188,7 @@ OutputFile::~OutputFile() {
 
 void OutputFile::publish() {
   writer_.finish();
+  if (path_ == kStandardOutput) return;
   int result = ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(),
                            force_ ? 0 : RENAME_NOREPLACE);
   if (result != 0 && !force_ && (errno == EINVAL || errno == ENOSYS)) {
@@ -192,7 +202,9 @@ void OutputFile::publish() {
 }
 
 FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {
-  Temporary temporary = create_beside(path);
+  Temporary temporary = create_beside(
+      path == kStandardOutput ? (std::filesystem::temp_directory_path() / "isobrick").string()
+                              : path);
   ::unlink(temporary.path.c_str());
   return FileWriter(std::move(temporary.fd), path, memory);
 }

@@ -66,6 +66,10 @@ class FileWriter {
   std::uint64_t written_ = 0;
 };
 
+/// The name of an output that goes to standard output as it is written. There is nothing to
+/// replace then, and nothing that was written can be read back or patched.
+inline constexpr std::string_view kStandardOutput = "-";
+
 /// Throws UsageError when `path` exists and `force` is not set, and when it is not a regular
 /// file.
 void check_output(const std::string& path, bool force);
@@ -100,8 +104,8 @@ class OutputFile {
   FileWriter writer_;
 };
 
-/// A nameless file in the folder of `path`: gone when it is closed, whatever happens. `memory`
-/// as FileWriter.
+/// A nameless file in the folder of `path`, for standard output in that of temporary files: gone
+/// when it is closed, whatever happens. `memory` as FileWriter.
 FileWriter open_scratch_beside(const std::string& path, std::size_t memory = FileWriter::kBuffer);
 
 }  // namespace isobrick

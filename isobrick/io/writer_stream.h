@@ -23,7 +23,8 @@ class WriterStream final : public std::ostream {
    private:
     int_type overflow(int_type c) override;
     std::streamsize xsputn(const char* bytes, std::streamsize size) override;
-    pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override;
+    pos_type seekoff(off_type offset, std::ios_base::seekdir from,
+                     std::ios_base::openmode) override;
     pos_type seekpos(pos_type place, std::ios_base::openmode) override;
 
     FileWriter& file_;

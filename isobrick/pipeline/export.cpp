@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <bit>
 #include <memory>
+#include <optional>
+#include <span>
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_file.h"
@@ -116,47 +118,125 @@ void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, W
   grid->write(output);
 }
 
+/// The header beside the samples of a raw file.
+class DetachedHeader {
+ public:
+  DetachedHeader(const std::filesystem::path& raw, const VolumeInfo& info, bool force)
+      : file_(name_of(raw), force), replaces_(force) {
+    file_.writer().append(nrrd_header_text(info, raw.filename().string()));
+  }
+
+  /// Removes what is there already, since it describes another file than the one that comes next.
+  /// What may fail comes before.
+  void remove_old() {
+    file_.writer().finish();
+    std::error_code none;
+    if (replaces_) std::filesystem::remove(file_.path(), none);
+  }
+  void publish() { file_.publish(); }
+
+ private:
+  static std::string name_of(std::filesystem::path raw) {
+    return raw.replace_extension(".nhdr").string();
+  }
+
+  OutputFile file_;
+  bool replaces_;
+};
+
+/// Where dense samples go: pieces of any box into a file, or one after the other into a stream.
+class DenseOutput {
+ public:
+  DenseOutput(OutputFile& output, Int3 extent, std::size_t sample_bytes)
+      : output_(output), sample_bytes_(sample_bytes) {
+    if (output.path() == kStandardOutput) return;
+    output.writer().flush();
+    file_.emplace(output.writer().share(), output.path(), extent, sample_bytes,
+                  output.writer().size());
+    file_->reserve();
+  }
+
+  /// Pieces of a stream follow each other in the order of its samples.
+  bool is_stream() const { return !file_; }
+
+  void write(Box3 box, const std::byte* samples) {
+    if (file_) return file_->write(box, samples);
+    const auto bytes = static_cast<std::size_t>(volume(box.extent())) * sample_bytes_;
+    output_.writer().append(std::span(samples, bytes));
+  }
+
+ private:
+  OutputFile& output_;
+  std::size_t sample_bytes_;
+  std::optional<SlabFile> file_;
+};
+
+/// The largest piece of whole rows, or of whole planes, that has no more samples than `piece`.
+/// Bricks may be read more than once then; at worst a piece is a part of a row.
+Int3 piece_in_order(Int3 extent, Int3 brick, Int3 piece) {
+  const Index samples = volume(piece);
+  if (const Index planes = samples / (extent.x * extent.y); planes > 0)
+    return {extent.x, extent.y, planes >= brick.z ? planes / brick.z * brick.z : planes};
+  if (const Index rows = samples / extent.x; rows > 0) return {extent.x, rows, 1};
+  return {samples, 1, 1};
+}
+
+void export_dense(const Piece& in, Int3 piece, Workers& workers, OutputFile& output,
+                  Progress& progress) {
+  const Lattice& lattice = in.lattice();
+  const Int3 extent = in.box.extent();
+  DenseOutput out(output, extent, lattice.sample_bytes());
+  // Planes of a stream begin where the box does; bricks are met where they are.
+  const Int3 grid = out.is_stream() ? Int3{1, 1, 1} : lattice.brick;
+  if (out.is_stream()) piece = piece_in_order(extent, lattice.brick, min(piece, extent));
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
+      static_cast<std::size_t>(volume(min(piece, extent))) * lattice.sample_bytes());
+  progress.begin("export", static_cast<std::uint64_t>(volume(extent)) * lattice.sample_bytes());
+  for_each_piece(in.box, grid, piece, [&](Box3 part) {
+    workers.execute([&] { read_slab(in.store, in.level, part, buffer.get()); });
+    out.write({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
+    progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
+  });
+  progress.end();
+}
+
 }  // namespace
 
 void export_volume(const StoreReader& store, const std::filesystem::path& out,
                    const ExportOptions& options, Progress& progress) {
   if (options.isovalue && options.format != ExportFormat::vdb)
     throw UsageError("a level set can only be written as an OpenVDB file");
+  const bool streamed = out == kStandardOutput;
+  if (streamed && options.format == ExportFormat::vdb)
+    throw UsageError(
+        "an OpenVDB file cannot go to standard output, because its beginning is written last: "
+        "name a file, or say --format nrrd");
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
-  const Lattice& lattice = level.lattice;
+  const VolumeInfo info = describe(level, box, out.string());
   OutputFile output(out.string(), options.force);
   if (options.isovalue) {
-    export_level_set(store, box, describe(level, box, out.string()), options,
-                     output, progress);
-    output.publish();
-    return;
+    export_level_set(store, box, info, options, output, progress);
+    return output.publish();
   }
   Workers workers(options.threads);
-  const Int3 piece = piece_within(lattice, box.extent(), options.memory,
+  const Piece samples{store, options.level, box};
+  const Int3 piece = piece_within(level.lattice, box.extent(), options.memory,
                                   fixed_bytes(store.info(), options.level, workers.threads()));
   if (options.format == ExportFormat::vdb) {
-    export_vdb({store, options.level, box}, describe(level, box, out.string()), options.memory,
-               workers, output, progress);
-    output.publish();
-    return;
+    export_vdb(samples, info, options.memory, workers, output, progress);
+    return output.publish();
   }
+  std::optional<DetachedHeader> header;
   if (options.format == ExportFormat::nrrd)
-    output.writer().append(nrrd_header_text(describe(level, box, out.string())));
-  output.writer().flush();
-  const SlabFile file(output.writer().share(), out.string(), box.extent(), lattice.sample_bytes(),
-                      output.writer().size());
-  file.reserve();
-  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
-      static_cast<std::size_t>(volume(min(piece, box.extent()))) * lattice.sample_bytes());
-  progress.begin("export", file.bytes());
-  for_each_piece(box, lattice.brick, piece, [&](Box3 part) {
-    workers.execute([&] { read_slab(store, options.level, part, buffer.get()); });
-    file.write({part.lo - box.lo, part.hi - box.lo}, buffer.get());
-    progress.advance(static_cast<std::uint64_t>(volume(part.extent())) * lattice.sample_bytes());
-  });
-  progress.end();
+    output.writer().append(nrrd_header_text(info));
+  else if (!streamed)
+    header.emplace(out, info, options.force);
+  export_dense(samples, piece, workers, output, progress);
+  output.writer().finish();
+  if (header) header->remove_old();
   output.publish();
+  if (header) header->publish();
 }
 
 }  // namespace isobrick

@@ -9,7 +9,7 @@
 
 namespace isobrick {
 
-/// The files that samples can become.
+/// The files that samples can become. A raw file has a NRRD header beside it, OUT.nhdr.
 enum class ExportFormat : std::uint8_t { raw, nrrd, vdb };
 
 /// Wider bands of a level set are of no use.
@@ -28,7 +28,8 @@ struct ExportOptions {
 };
 
 /// Writes the samples of one level (or of a region) bit for bit, C order [z, y, x],
-/// little endian; as NRRD behind a header that keeps their place in world space.
+/// little endian; as NRRD behind a header that keeps their place in world space, as raw with such
+/// a header beside it. `-` is standard output, for raw (without a header then) and NRRD.
 /// As OpenVDB: a sparse grid with the same samples and place; smaller integers
 /// become int32, u32 becomes int64. With an isovalue a level set (export_level_set.h).
 /// Memory: one row of bricks at a time, within the budget; for OpenVDB also the

@@ -11,7 +11,7 @@ std::string vector_text(Vec3d v) { return fmt::format("({},{},{})", v.x, v.y, v.
 
 }  // namespace
 
-std::string nrrd_header_text(const VolumeInfo& info) {
+std::string nrrd_header_text(const VolumeInfo& info, const std::string& data_file) {
   const Transform& t = info.transform;
   std::string text = fmt::format(
       "NRRD0004\n# Isobrick\ntype: {}\ndimension: 3\nsizes: {} {} {}\nspace dimension: 3\n"
@@ -23,7 +23,8 @@ std::string nrrd_header_text(const VolumeInfo& info) {
       vector_text(t.step(2)), vector_text(t.origin));
   if (!t.unit.empty())
     text += fmt::format("space units: \"{0}\" \"{0}\" \"{0}\"\n", ascii_unit_symbol(t.unit));
-  return text + "endian: little\nencoding: raw\n\n";
+  text += "endian: little\nencoding: raw\n";
+  return text + (data_file.empty() ? "\n" : fmt::format("data file: {}\n", data_file));
 }
 
 }  // namespace isobrick

@@ -59,7 +59,7 @@ TEST_F(Export, GivesBackTheInputBitForBit) {
   EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(source_.samples()));
   write(1, std::nullopt, true);
   EXPECT_EQ(content_of(folder_ / "x.raw"), text_of(samples_of(*store_, 1)));
-  EXPECT_EQ(files(), (std::vector<std::string>{"a", "x.raw"}));
+  EXPECT_EQ(files(), (std::vector<std::string>{"a", "x.nhdr", "x.raw"}));
 }
 
 TEST_F(Export, CutsRegionsWhateverTheBudget) {

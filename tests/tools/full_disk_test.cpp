@@ -115,9 +115,9 @@ TEST_F(FullDisk, OfASmallFileSystem) {
   const std::string disk = path("disk");
   std::filesystem::create_directory(disk);
   const auto on_small_disk = [&](const std::string& command) {
-    return run_process({"unshare", "-r", "-m", "sh", "-c",
-                        fmt::format("mount -t tmpfs -o size=16k none '{}' || exit 77\n{}", disk,
-                                    command)});
+    return run_process(
+        {"unshare", "-r", "-m", "sh", "-c",
+         fmt::format("mount -t tmpfs -o size=16k none '{}' || exit 77\n{}", disk, command)});
   };
   const int made = on_small_disk("exit 0").exit_code;
   if (made != 0) GTEST_SKIP() << "file systems cannot be mounted here";
@@ -128,9 +128,9 @@ TEST_F(FullDisk, OfASmallFileSystem) {
     std::string command = ISOBRICK_PROGRAM;
     for (const std::string& word : with_output(writer, disk + '/' + writer.output))
       command += " '" + word + '\'';
-    const Outcome outcome = on_small_disk(fmt::format(
-        "echo good > '{0}/{1}'; {2}; echo $? `cat '{0}/{1}'` `ls '{0}' | wc -l`", disk,
-        writer.output, command));
+    const Outcome outcome = on_small_disk(
+        fmt::format("echo good > '{0}/{1}'; {2}; echo $? `cat '{0}/{1}'` `ls '{0}' | wc -l`", disk,
+                    writer.output, command));
     EXPECT_EQ(outcome.out, "1 good 1\n") << outcome.err;
     EXPECT_NE(outcome.err.find("No space left"), std::string::npos) << outcome.err;
   }

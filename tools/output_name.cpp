@@ -1,0 +1,58 @@
+#include "tools/output_name.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "isobrick/core/error.h"
+#include "tools/format.h"
+
+namespace isobrick::tools {
+namespace {
+
+/// Extensions by which people and programs know a format of volumes, meshes or pictures.
+constexpr std::string_view kKnown[] = {
+    ".raw",  ".bin", ".nrrd", ".nhdr", ".vdb", ".mha",  ".mhd",  ".nii",  ".gz",  ".img", ".hdr",
+    ".h5",   ".hdf", ".hdf5", ".nc",   ".tif", ".tiff", ".dcm",  ".vti",  ".vtk", ".npy", ".npz",
+    ".zarr", ".n5",  ".ply",  ".stl",  ".obj", ".glb",  ".gltf", ".vtp",  ".vtu", ".off", ".pvtp",
+    ".png",  ".jpg", ".jpeg", ".bmp",  ".gif", ".webp", ".exr",  ".json", ".txt", ".csv", ".zip"};
+
+bool is_among(std::string_view extension, std::span<const std::string_view> extensions) {
+  return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
+}
+
+/// Of a folder's name, which may end in slashes.
+std::string extension_of_folder(std::string_view path) {
+  while (path.size() > 1 && path.back() == '/') path.remove_suffix(1);
+  return extension_of(path);
+}
+
+}  // namespace
+
+void refuse_misleading_name(const std::string& path, std::span<const std::string_view> own,
+                            std::string_view instead) {
+  const std::string extension = extension_of_folder(path);
+  if (is_among(extension, kKnown) && !is_among(extension, own))
+    throw UsageError(fmt::format("'{}' would not be what its name says; {}", path, instead));
+}
+
+void check_picture_name(const std::string& path) {
+  if (is_standard_output(path))
+    throw UsageError("this picture cannot go to standard output; name it .png");
+  const std::string extension = extension_of(path);
+  if (!extension.empty() && extension != ".png")
+    throw UsageError(
+        fmt::format("'{}' is no picture that can be written; PNG is: name it .png", path));
+}
+
+void check_store_name(const std::string& path) {
+  if (is_standard_output(path))
+    throw UsageError(
+        "a store is a folder and cannot go to standard output; name it, such as OUT.zarr");
+  constexpr std::string_view own[] = {".zarr"};
+  refuse_misleading_name(path, own,
+                         "a store is a folder of OME-Zarr: name it .zarr ('isobrick export' "
+                         "writes .nrrd, .vdb and .raw)");
+}
+
+}  // namespace isobrick::tools

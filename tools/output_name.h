@@ -1,0 +1,24 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+// Names of outputs: none may say another format than what is written.
+namespace isobrick::tools {
+
+/// Whether an output goes to standard output instead of a file.
+inline bool is_standard_output(std::string_view path) { return path == "-"; }
+
+/// Throws UsageError where the extension of `path` belongs to a format that is known and not among
+/// `own` (".ply"); `instead` ends the message.
+void refuse_misleading_name(const std::string& path, std::span<const std::string_view> own,
+                            std::string_view instead);
+
+/// Throws UsageError for a picture that is not named .png, nor without extension.
+void check_picture_name(const std::string& path);
+
+/// Throws UsageError for a store that is named as a file of a known format, or `-`.
+void check_store_name(const std::string& path);
+
+}  // namespace isobrick::tools
