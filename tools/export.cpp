@@ -69,6 +69,8 @@ int run(const Arguments& arguments, Console& console) {
   options.roi = box;
   if (arguments.half_band && !options.isovalue)
     throw UsageError("--half-band is the width of a level set: say its --isovalue, too");
+  if (options.inside && !options.isovalue)
+    throw UsageError("--inside is a side of an isosurface: say its --isovalue, too");
   options.half_band = arguments.half_band.value_or(options.half_band);
   export_volume(store, arguments.out, options, console.progress());
   const ScalarType type = store.info().type;
@@ -122,13 +124,15 @@ void add_export(Program& program) {
              {"--format", "raw|nrrd|vdb",
               "Format of the file; NRRD and OpenVDB keep spacing, origin and direction",
               "by its extension"});
-  add_parsed(app, arguments->options.isovalue, parse_number,
-             {"--isovalue", "V",
-              "OpenVDB only: write a level set of this isosurface, negative where samples are at "
-              "least V, in place of the samples"});
+  add_parsed(
+      app, arguments->options.isovalue, parse_number,
+      {"--isovalue", "V",
+       "OpenVDB only: write a level set of this isosurface, negative inside, in place of the "
+       "samples"});
   add_parsed(app, arguments->half_band,
              [](const std::string& text) { return parse_int(text, 1, kWidestHalfBand); },
              {"--half-band", "N", "Voxels with distances on either side of a level set", "3"});
+  add_inside(app, arguments->options.inside);
   add_level(app, arguments->options.level);
   add_roi(app, arguments->roi);
   add_selection(app, arguments->selection);

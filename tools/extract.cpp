@@ -1,12 +1,14 @@
 #include "isobrick/pipeline/extract.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/bricks/level_set.h"
 #include "isobrick/pipeline/estimate.h"
 #include "tools/extract_report.h"
 #include "tools/format.h"
@@ -34,6 +36,7 @@ struct Arguments {
   int level = 0;
   std::optional<RoiText> roi;
   Selection selection;
+  std::optional<Inside> inside;
   bool normals = false, drop_degenerate = false;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
@@ -112,6 +115,7 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
   ExtractOptions options;
   options.level = arguments.level;
   options.roi = store_region(store, arguments.level, arguments.roi);
+  options.inside = arguments.inside;
   options.normals = arguments.normals;
   options.drop_degenerate = arguments.drop_degenerate;
   options.memory = arguments.memory;
@@ -245,11 +249,22 @@ Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& s
   return said;
 }
 
+/// Beyond its narrow band a level set does not change: what there is of a surface is no contour.
+void note_band(double isovalue, const StoreInfo& info, Console& console) {
+  const std::optional<double> band = narrow_band(info);
+  if (!band || std::abs(isovalue) < *band) return;
+  console.note(fmt::format(
+      "isovalue {} lies outside of the narrow band of this level set, which has distances between "
+      "{} and {}: choose one within",
+      isovalue, -*band, *band));
+}
+
 int run(const Arguments& arguments, Console& console) {
   check(arguments);
   if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
   const StoreReader store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
+  for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
   const Said said = arguments.estimate ? estimate_all(surfaces, store)
                                        : make_all(arguments, surfaces, store, console);
   console.result({{"command", "extract"},
@@ -324,6 +339,7 @@ void add_extract(Program& program) {
   add_level(app, arguments->level);
   add_roi(app, arguments->roi);
   add_selection(app, arguments->selection);
+  add_inside(app, arguments->inside);
   add_parsed(app, arguments->normals, parse_normals,
              {"--normals", "gradient|none", "Normals at the vertices", "none"});
   add_flag(app, "--drop-degenerate", arguments->drop_degenerate,

@@ -120,6 +120,14 @@ void add_clip(CLI::App* app, std::vector<HalfSpace>& planes) {
                });
 }
 
+void add_inside(CLI::App* app, std::optional<Inside>& inside) {
+  add_parsed(app, inside, [](const std::string& text) { return std::optional(parse_inside(text)); },
+             {"--inside", "above|below",
+              "Which samples the surface encloses: those of at least the isovalue, or those less "
+              "than it",
+              "below in a level set, else above"});
+}
+
 void add_selection(CLI::App* app, Selection& selection) {
   const auto place = [](const std::string& text) {
     return std::optional(parse_whole(text, 0, std::numeric_limits<Index>::max()));

@@ -95,6 +95,8 @@ void add_threads(CLI::App* app, int& threads);
 void add_force(CLI::App* app, bool& force);
 /// --clip, up to kMostClipPlanes times.
 void add_clip(CLI::App* app, std::vector<HalfSpace>& planes);
+/// --inside.
+void add_inside(CLI::App* app, std::optional<Inside>& inside);
 /// --channel and --time.
 void add_selection(CLI::App* app, Selection& selection);
 

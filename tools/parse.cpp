@@ -113,6 +113,12 @@ HalfSpace parse_half_space(std::string_view text) {
   return half;
 }
 
+Inside parse_inside(std::string_view text) {
+  if (text == "above") return Inside::above;
+  if (text == "below") return Inside::below;
+  throw UsageError(fmt::format("'{}' is no side of a surface; it is above or below", text));
+}
+
 Backend parse_backend(std::string_view text) {
   if (text == "auto") return Backend::automatic;
   if (text == "cpu") return Backend::cpu;

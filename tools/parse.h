@@ -56,6 +56,9 @@ PictureSize parse_picture_size(std::string_view text);
 /// "auto", "cpu" or "cuda".
 Backend parse_backend(std::string_view text);
 
+/// "above" or "below".
+Inside parse_inside(std::string_view text);
+
 /// "#RRGGBB", "white" or "black": sRGB in [0, 1].
 Vec3f parse_colour(std::string_view text);
 

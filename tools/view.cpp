@@ -221,6 +221,7 @@ void add_view(Program& program) {
                  values.push_back(parse_number(text));
                });
   add_picture_options(app, arguments->picture, "surface");
+  add_inside(app, arguments->budgets.inside);
   add_what_to_draw(app, *arguments);
   add_parsed(app, arguments->settings.pixel_error, parse_pixel_error,
              {"--pixel-error", "PIXELS", "How long a cell may be on the picture", "1.5"});

@@ -54,7 +54,7 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
       words_(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
       standing_(tuning.patience, volume.stream) {
   const cudaStream_t stream = volume.stream.get();
-  const CaseTable table = make_case_table(world_map(options_.transform).mirrored);
+  const CaseTable table = make_case_table(world_map(options_.transform, options_.inside).mirrored);
   check(cudaMemcpyAsync(cases_.data(), &table, sizeof table, cudaMemcpyHostToDevice, stream));
   check(cudaMemsetAsync(words_.data(), 0, words_.bytes(), stream));
   if (are_few()) {
@@ -227,7 +227,7 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room, const
   set_region(p);
   p.isovalue = isovalue;
   p.crossing = static_cast<float>(isovalue);
-  p.world = world_map(options_.transform);
+  p.world = world_map(options_.transform, options_.inside);
   p.diagonal = is_diagonal(p.world);
   p.row_tables = row_tables_.data();
   p.epoch = ++epoch_;

@@ -73,7 +73,7 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   params_.row_tables = arena_->take<RowTable>(sizes.slots);
   check(cudaMemsetAsync(number_ends_, 0, (kEnds + 1) * sizeof(unsigned long long), kernel_.get()));
   check(cudaMemsetAsync(params_.row_tables, 0, sizes.slots * sizeof(RowTable), kernel_.get()));
-  const WorldMap world = world_map(options_.transform);
+  const WorldMap world = world_map(options_.transform, options_.inside);
   const CaseTable cases = make_case_table(world.mirrored);
   check(cudaMemcpyAsync(cases_, &cases, sizeof cases, cudaMemcpyHostToDevice, kernel_.get()));
   kernel_.wait();

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/inside.h"
 #include "isobrick/core/progress.h"
 
 namespace isobrick {
@@ -19,6 +20,7 @@ struct ExportOptions {
   ExportFormat format = ExportFormat::raw;
   /// Of OpenVDB: a level set of this isosurface in place of the samples.
   std::optional<double> isovalue;
+  std::optional<Inside> inside;  ///< of that; as ExtractOptions::inside
   int half_band = 3;  ///< voxels with distances on either side of that, 1 … kWidestHalfBand
   int level = 0;
   std::optional<Box3> roi;  ///< samples of that level; nothing: all

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "isobrick/bricks/level_set.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/threshold.h"
 #include "isobrick/pipeline/extract.h"
@@ -45,6 +46,7 @@ class Signs {
         lattice_(store.info().levels[static_cast<std::size_t>(options.level)].lattice),
         box_(box),
         isovalue_(*options.isovalue),
+        below_(options.inside.value_or(inside_of(store.info())) == Inside::below),
         set_(set),
         samples_(lattice_.brick_bytes()),
         inside_(static_cast<std::size_t>(volume(lattice_.brick))) {}
@@ -54,11 +56,14 @@ class Signs {
     const RangeTable ranges = store_.brick_ranges(level_, bricks);
     for_each_point(bricks, [&](Int3 b) {
       const ValueRange<double>& range = ranges.at(b);
-      if (range.empty() || range.hi < isovalue_) return;
+      const bool none_above = range.empty() || range.hi < isovalue_;
+      const bool none_below = range.empty() || range.lo >= isovalue_;
+      if (below_ ? none_below : none_above) return;
       const Box3 part = intersect(lattice_.brick_box(b), box_);
       const Box3 out{part.lo - box_.lo, part.hi - box_.lo};
       // Ranges say nothing of samples that are no numbers; those are outside.
-      if (range.lo >= isovalue_ && !store_.info().may_have_nan) return set_.put_all_inside(out);
+      if ((below_ ? none_above : none_below) && !store_.info().may_have_nan)
+        return set_.put_all_inside(out);
       workers.execute([&] { read_slab(store_, level_, part, samples_.data()); });
       compare(static_cast<std::size_t>(volume(part.extent())));
       set_.put_inside(out, inside_.data());
@@ -71,8 +76,11 @@ class Signs {
       using T = typename decltype(tag)::type;
       const Threshold<T> least(isovalue_);
       const T* samples = reinterpret_cast<const T*>(samples_.data());
-      for (std::size_t i = 0; i < count; ++i)
-        inside_[i] = !least.none && samples[i] >= least.value ? 1 : 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        const bool above = !least.none && samples[i] >= least.value;
+        const bool is_number = samples[i] == samples[i];
+        inside_[i] = below_ ? !above && is_number : above;
+      }
     });
   }
 
@@ -81,6 +89,7 @@ class Signs {
   Lattice lattice_;
   Box3 box_;
   double isovalue_;
+  bool below_;  ///< samples less than the isovalue are inside
   VdbLevelSet& set_;
   std::vector<std::byte> samples_;
   std::vector<std::uint8_t> inside_;
@@ -100,6 +109,7 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
   ExtractOptions extraction;
   extraction.isovalue = *options.isovalue;
   extraction.level = options.level;
+  extraction.inside = options.inside;
   extraction.roi = box;
   extraction.memory = for_extraction;
   extraction.threads = options.threads;

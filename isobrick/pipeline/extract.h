@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/inside.h"
 #include "isobrick/core/progress.h"
 #include "isobrick/pipeline/index_choice.h"
 #include "isobrick/surface/mesh.h"
@@ -26,6 +27,7 @@ struct ExtractOptions {
   double isovalue = 0;
   int level = 0;
   std::optional<Box3> roi;       ///< samples of that level; nothing: the whole volume
+  std::optional<Inside> inside;  ///< nothing: below the isovalue in a level set, else above
   bool normals = false;          ///< gradient normals
   bool drop_degenerate = false;  ///< see SurfaceOptions
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "isobrick/bricks/level_set.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/gpu_backend.h"
 #include "isobrick/stream/brick_slots.h"
@@ -88,6 +89,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
         "the region {}:{},{}:{},{}:{} is empty or leaves the level's {}×{}×{} samples", roi.lo.x,
         roi.hi.x, roi.lo.y, roi.hi.y, roi.lo.z, roi.hi.z, box.hi.x, box.hi.y, box.hi.z));
   request.surface = {.isovalue = options.isovalue,
+                     .inside = options.inside.value_or(inside_of(info)),
                      .normals = options.normals,
                      .indexing = indexing,
                      .drop_degenerate = options.drop_degenerate,

@@ -37,8 +37,10 @@ ISOBRICK_HD inline R crossing(R a, R b, R iso) {
 struct WorldMap {
   float m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   float origin[3] = {0, 0, 0};
-  float normal[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< gradients: direction · spacing⁻¹
-  bool mirrored = false;  ///< the axes are left-handed: triangles turn round
+  /// Of gradients: direction · spacing⁻¹, negated where smaller samples are inside.
+  float normal[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  /// Triangles turn round: either the axes are left-handed or smaller samples are inside.
+  bool mirrored = false;
 
   ISOBRICK_HD Vec3f position(Vec3f p) const {
     return {origin[0] + (m[0] * p.x + (m[1] * p.y + m[2] * p.z)),
@@ -46,7 +48,7 @@ struct WorldMap {
             origin[2] + (m[6] * p.x + (m[7] * p.y + m[8] * p.z))};
   }
 
-  /// Unit normal towards smaller samples from an index-space gradient; where
+  /// Unit normal towards the outside from an index-space gradient; where
   /// the gradient vanishes or is no number, from `fallback` instead.
   ISOBRICK_HD Vec3f unit_normal(Vec3f gradient, Vec3f fallback) const {
     Vec3f n = turn(gradient);

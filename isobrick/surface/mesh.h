@@ -8,8 +8,7 @@
 
 namespace isobrick {
 
-/// Three vertex numbers, counter-clockwise seen from the side of the smaller
-/// samples (outside).
+/// Three vertex numbers, counter-clockwise seen from outside (see Inside).
 using Triangle = std::array<std::uint32_t, 3>;
 
 /// How triangles name their vertices.

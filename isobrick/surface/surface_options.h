@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "isobrick/core/inside.h"
 #include "isobrick/core/lattice.h"
 #include "isobrick/core/pod_buffer.h"
 #include "isobrick/core/transform.h"
@@ -12,6 +13,7 @@ namespace isobrick {
 /// Which surface of a lattice to extract, and what of it.
 struct SurfaceOptions {
   double isovalue = 0;
+  Inside inside = Inside::above;
   bool normals = false;
   Indexing indexing = Indexing::welded;
   /// Leaves triangles without area out where samples equal the isovalue: the

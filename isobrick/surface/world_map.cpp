@@ -4,7 +4,7 @@
 
 namespace isobrick {
 
-WorldMap world_map(const Transform& t) {
+WorldMap world_map(const Transform& t, Inside inside) {
   WorldMap map;
   for (int row = 0; row < 3; ++row) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -18,6 +18,10 @@ WorldMap world_map(const Transform& t) {
   const double handed = d[0] * (d[4] * d[8] - d[5] * d[7]) - d[1] * (d[3] * d[8] - d[5] * d[6]) +
                         d[2] * (d[3] * d[7] - d[4] * d[6]);
   map.mirrored = handed * t.spacing.x * t.spacing.y * t.spacing.z < 0;
+  if (inside == Inside::below) {
+    map.mirrored = !map.mirrored;
+    for (float& factor : map.normal) factor = -factor;
+  }
   return map;
 }
 

@@ -1,12 +1,13 @@
 #pragma once
 
+#include "isobrick/core/inside.h"
 #include "isobrick/core/transform.h"
 #include "isobrick/surface/cell_math.h"
 
 namespace isobrick {
 
-/// The transform as both backends apply it, in float.
-WorldMap world_map(const Transform& transform);
+/// The transform as both backends apply it, in float. `inside` turns triangles and normals round.
+WorldMap world_map(const Transform& transform, Inside inside = Inside::above);
 
 /// Whether nothing lies off the diagonal of `map.m`, so that leaving those terms
 /// out changes no bit of a position.

@@ -32,9 +32,8 @@ struct NodeMesh {
   NodeKey key;
   double isovalue = 0;
   std::uint32_t coarser = 0;  ///< directions of the neighbours one level above that it meets
-  /// Positions in world space minus the scene's origin; unit normals towards
-  /// smaller samples; triangles number the mesh's own vertices, counter-clockwise
-  /// from that side.
+  /// Positions in world space minus the scene's origin; unit normals towards the
+  /// outside; triangles number the mesh's own vertices, counter-clockwise from there.
   MeshBuffer mesh;
   /// The same on a device, instead; see device_mesher.h.
   std::shared_ptr<const DeviceMesh> device;

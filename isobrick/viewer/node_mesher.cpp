@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "isobrick/bricks/level_set.h"
 #include "isobrick/surface/grid_extractor.h"
 #include "isobrick/surface/world_map.h"
 #include "isobrick/viewer/node_border.h"
@@ -35,11 +36,11 @@ struct NodeMesher::Impl {
   MeshBuffer work;
   Clock::duration busy{};
 
-  Impl(const NodeGrid& g, ResidentBricks& b, Vec3d origin)
+  Impl(const NodeGrid& g, ResidentBricks& b, Vec3d origin, std::optional<Inside> inside)
       : grid(g), bricks(b), samples(g, b), border(g, samples) {
     const Transform& t = g.transform();
     view.may_have_nan = b.source().info().may_have_nan;
-    view.map = world_map(t);
+    view.map = world_map(t, inside.value_or(inside_of(b.source().info())));
     for (int i = 0; i < 9; ++i)
       view.to_world[i] = t.direction[static_cast<std::size_t>(i)] * t.spacing[i % 3];
     for (int i = 0; i < 3; ++i) view.offset[i] = t.origin[i] - origin[i];
@@ -179,8 +180,9 @@ struct NodeMesher::Impl {
   }
 };
 
-NodeMesher::NodeMesher(const NodeGrid& grid, ResidentBricks& bricks, Vec3d origin)
-    : impl_(std::make_unique<Impl>(grid, bricks, origin)) {}
+NodeMesher::NodeMesher(const NodeGrid& grid, ResidentBricks& bricks, Vec3d origin,
+                       std::optional<Inside> inside)
+    : impl_(std::make_unique<Impl>(grid, bricks, origin, inside)) {}
 NodeMesher::~NodeMesher() = default;
 
 NodeMesh NodeMesher::mesh(const NodeKey& key, double isovalue, std::uint32_t coarser,

@@ -27,8 +27,10 @@ struct StoredBrick {
 /// the same samples on the face between them and so the same vertices, bit by bit.
 class NodeMesher {
  public:
-  /// `origin`, in world space, is subtracted from all positions.
-  NodeMesher(const NodeGrid& grid, ResidentBricks& bricks, Vec3d origin);
+  /// `origin`, in world space, is subtracted from all positions. `inside`: nothing is what
+  /// inside_of() says.
+  NodeMesher(const NodeGrid& grid, ResidentBricks& bricks, Vec3d origin,
+             std::optional<Inside> inside = std::nullopt);
   ~NodeMesher();
 
   /// The mesh of a node whose neighbours in `coarser` (directions) lie one level

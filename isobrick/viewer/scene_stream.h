@@ -19,7 +19,8 @@ struct StreamOptions {
   std::uint64_t brick_bytes = std::uint64_t{1} << 30;   ///< budget of decoded bricks
   std::uint64_t mesh_bytes = std::uint64_t{1} << 30;    ///< budget of node meshes
   std::uint64_t device_bytes = std::uint64_t{1} << 30;  ///< budget of those on a device
-  Vec3d origin;  ///< world space; subtracted from all positions
+  Vec3d origin;                  ///< world space; subtracted from all positions
+  std::optional<Inside> inside;  ///< nothing: as inside_of() the store
   /// Whether the threads give way to others of the process where cores are short.
   bool give_way = false;
   /// Called from a worker's thread whenever drawable() may give something new. Must

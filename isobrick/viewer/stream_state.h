@@ -84,7 +84,7 @@ struct SceneStream::Shared : std::enable_shared_from_this<SceneStream::Shared> {
         tree(std::move(t)),
         options(std::move(o)),
         bricks(source, options.brick_bytes),
-        planner(tree->grid(), bricks, options.origin),
+        planner(tree->grid(), bricks, options.origin, options.inside),
         meshes(options.mesh_bytes, options.device_bytes) {}
 
   // All but run(), has_device(), send(), mesh_of() and received() need the lock; those that are

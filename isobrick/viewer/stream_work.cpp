@@ -213,7 +213,7 @@ void SceneStream::Shared::make_slice(const std::shared_ptr<Running>& r,
 
 void SceneStream::Shared::run() {
   if (options.give_way) isobrick::give_way();
-  NodeMesher mesher(tree->grid(), bricks, options.origin);
+  NodeMesher mesher(tree->grid(), bricks, options.origin, options.inside);
   std::unique_lock lock(mutex);
   while (const std::shared_ptr<Running> r = take(lock)) {
     if (r->slot)

@@ -12,12 +12,13 @@
 
 namespace isobrick {
 
-/// What a picture of a store may use.
+/// What a picture of a store may use, and how its surfaces are made.
 struct PictureBudgets {
   std::uint64_t memory = std::uint64_t{2} << 30;         ///< host: decoded bricks and meshes
   std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes and slices on the device
   int threads = 0;                                       ///< 0: all cores but one
   Backend backend = Backend::automatic;                  ///< what makes meshes; see DeviceMeshes
+  std::optional<Inside> inside;                          ///< see StreamOptions
 
   /// Of device_memory: the part for meshes that the device makes itself. Slices and what is
   /// uploaded have the rest, and all where no device shares its memory.

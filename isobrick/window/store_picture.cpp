@@ -26,6 +26,7 @@ constexpr double kMarginOfWait = 0.05;
 StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change,
                              bool software) {
   StreamOptions options;
+  options.inside = budgets.inside;
   options.threads = budgets.threads;
   options.mesh_bytes = budgets.memory / 2;
   options.brick_bytes = budgets.memory - options.mesh_bytes - ShownSlices::memory(budgets);

@@ -4,10 +4,12 @@
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/export.h"
 #include "isobrick/pipeline/extract.h"
+#include "isobrick/volumes/open_source.h"
 #include "isobrick/volumes/vdb_level_set.h"
 #include "tests/pipeline/convert_store.h"
 
@@ -122,6 +124,75 @@ TEST_F(ExportVdb, DistancesFromASphere) {
   const Vec3d c = source.info().transform.apply(kCentre);
   for (const openvdb::Vec3s& p : points)
     ASSERT_NEAR((openvdb::Vec3d(p) - openvdb::Vec3d(c.x, c.y, c.z)).length(), 0.5 * kRadius, 0.25);
+}
+
+/// What a mesh encloses: positive where triangles are counter-clockwise seen from outside.
+double enclosed(const StoreReader& store, double isovalue, std::optional<Inside> inside = {}) {
+  TriangleList mesh;
+  NoProgress none;
+  extract(store, {.isovalue = isovalue, .inside = inside, .backend = Backend::cpu}, mesh, none);
+  double six = 0;
+  for (std::size_t i = 0; i + 2 < mesh.corners.size(); i += 3) {
+    const openvdb::Vec3d &a = mesh.corners[i], &b = mesh.corners[i + 1], &c = mesh.corners[i + 2];
+    const openvdb::Vec3d o = mesh.corners[0];
+    six += (a - o).dot((b - o).cross(c - o));
+  }
+  return six / 6;
+}
+
+TEST_F(ExportVdb, ASpheresLevelSetEnclosesItsVolumeWhateverWayItGoes) {
+  MemorySource source = sphere();
+  convert_to(source, "a", 16);  // larger inside
+  const double volume = 4.0 / 3 * std::acos(-1.0) * std::pow(0.5 * kRadius, 3);
+  const auto expect_volume = [&](const char* store) {
+    EXPECT_NEAR(enclosed(StoreReader(folder_ / store), 0), volume, 0.01 * volume) << store;
+  };
+  const auto convert_file = [&](const char* file, const char* store) {
+    const auto made = open_source(folder_ / file, {});
+    ConvertOptions options;
+    options.brick = 16;
+    convert_quietly(*made, folder_ / store, options);
+  };
+  expect_volume("a");
+  level_set("a", 0);
+  convert_file("x.vdb", "b");  // a level set: smaller inside
+  EXPECT_EQ(StoreReader(folder_ / "b").info().grid_class, "level set");
+  expect_volume("b");
+  EXPECT_NEAR(enclosed(StoreReader(folder_ / "b"), 0, Inside::above), -volume, 0.01 * volume);
+  EXPECT_NEAR(enclosed(StoreReader(folder_ / "a"), 0, Inside::below), -volume, 0.01 * volume);
+  // Its samples, and its own surface once more.
+  NoProgress none;
+  export_volume(StoreReader(folder_ / "b"), folder_ / "y.vdb", {.format = ExportFormat::vdb}, none);
+  convert_file("y.vdb", "c");
+  expect_volume("c");
+  const auto grid = level_set("b", 0);
+  EXPECT_LT(grid->getConstAccessor().getValue({24, 23, 22}), 0);
+  EXPECT_GT(grid->getConstAccessor().getValue({1, 1, 1}), 0);
+  convert_file("x.vdb", "d");
+  expect_volume("d");
+}
+
+TEST_F(ExportVdb, InsideBelowIsWhatIsNotInsideAboveButNaN) {
+  MemorySource source = make_source<float>({20, 18, 17}, 1, true);
+  convert_to(source, "a", 16);
+  const auto written = [&](Inside inside) {
+    NoProgress none;
+    export_volume(StoreReader(folder_ / "a"), folder_ / "x.vdb",
+                  {.format = ExportFormat::vdb, .isovalue = 0.5, .inside = inside, .force = true},
+                  none);
+    openvdb::io::File file((folder_ / "x.vdb").string());
+    file.open();
+    return openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("surface"));
+  };
+  const auto above = written(Inside::above), below = written(Inside::below);
+  std::vector<float> samples(source.samples().size() / sizeof(float));
+  std::memcpy(samples.data(), source.samples().data(), source.samples().size());
+  for_each_point({{0, 0, 0}, {20, 18, 17}}, [&](Int3 p) {
+    const openvdb::Coord at(static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z));
+    const float sample = samples[static_cast<std::size_t>(linear_index(p, {20, 18, 17}))];
+    ASSERT_EQ(above->getConstAccessor().getValue(at) < 0, sample >= 0.5F) << sample;
+    ASSERT_EQ(below->getConstAccessor().getValue(at) < 0, sample < 0.5F) << sample;
+  });
 }
 
 TEST_F(ExportVdb, DistancesAreThoseFromTheMesh) {

@@ -300,6 +300,28 @@ TEST(Extractor, MirroredAxesKeepTheOutsideOutside) {
   }
 }
 
+TEST(Extractor, ALevelSetsInsideIsBelow) {
+  const Field<float> field({40, 40, 40}, [](Int3 p) {
+    return std::hypot(static_cast<double>(p.x) - 19.3, static_cast<double>(p.y) - 20.1,
+                      static_cast<double>(p.z) - 19.8) -
+           12;
+  });
+  Request request{.isovalue = 0, .inside = Inside::below, .normals = true};
+  const Mesh mesh = extract(field, request);
+  const Measures m = measure(mesh, {19.3, 20.1, 19.8}, 12);
+  EXPECT_NEAR(m.volume / (4.0 / 3 * std::numbers::pi * 12 * 12 * 12), 1, 0.02);
+  EXPECT_LT(m.worst_normal, 0.01);
+  EXPECT_EQ(m.euler, 2);
+  // The same vertices, and normals exactly the other way.
+  request.inside = Inside::above;
+  const Mesh other = extract(field, request);
+  EXPECT_EQ(other.positions, mesh.positions);
+  ASSERT_EQ(other.normals.size(), mesh.normals.size());
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      ASSERT_EQ(other.normals[i][axis], -mesh.normals[i][axis]) << i;
+}
+
 TEST(Extractor, NormalsByDefinitionEverywhere) {
   const auto field = padded_noise<float>({66, 35, 34}, -1, 1, -1.0f, 8);
   const Mesh mesh = extract(field, {.isovalue = 0.1, .brick = {32, 32, 32}, .normals = true});

@@ -68,6 +68,7 @@ struct Mesh {
 
 struct Request {
   double isovalue = 0;
+  Inside inside = Inside::above;
   Int3 brick{64, 64, 64};
   bool normals = false;
   Indexing indexing = Indexing::welded;
@@ -89,6 +90,7 @@ Mesh extract(const Field<T>& field, const Request& request) {
   options.indexing = request.indexing;
   options.roi = request.roi.value_or(lattice.box());
   options.transform = request.transform;
+  options.inside = request.inside;
   options.drop_degenerate = request.drop_degenerate;
   if constexpr (std::is_floating_point_v<T>)
     for (const T v : field.samples) options.may_have_nan |= std::isnan(v);

@@ -323,5 +323,22 @@ TEST(NodeMesher, BesideWhatIsNoNumberTwoSidesMeetWithoutASurface) {
   }
 }
 
+TEST(NodeMesher, TurnsSurfacesRoundWhereSmallerSamplesAreInside) {
+  constexpr Index n = 40;
+  const auto source = cube_of(ball, n);
+  const NodeGrid grid(source->info());
+  ResidentBricks bricks(source, std::uint64_t{1} << 30);
+  NodeMesher above(grid, bricks, {}), below(grid, bricks, {}, Inside::below);
+  const NodeMesh a = above.mesh({0, {0, 0, 0}}, 5, 0, Always()),
+                 b = below.mesh({0, {0, 0, 0}}, 5, 0, Always());
+  ASSERT_GT(a.mesh.triangles.size(), 100u);
+  ASSERT_EQ(a.mesh.triangles.size(), b.mesh.triangles.size());
+  for (std::size_t i = 0; i < a.mesh.normals.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      ASSERT_EQ(a.mesh.normals[i][axis], -b.mesh.normals[i][axis]);
+  for (std::size_t i = 0; i < a.mesh.triangles.size(); ++i)
+    ASSERT_NE(a.mesh.triangles[i], b.mesh.triangles[i]);
+}
+
 }  // namespace
 }  // namespace isobrick::test

@@ -87,7 +87,7 @@ inline gpu::TileParams params_of(const Lattice& lattice, const SurfaceOptions& o
   }
   p.isovalue = options.isovalue;
   p.crossing = static_cast<float>(options.isovalue);
-  p.world = world_map(options.transform);
+  p.world = world_map(options.transform, options.inside);
   p.diagonal = is_diagonal(p.world);
   return p;
 }
@@ -107,7 +107,7 @@ class KernelVolume {
     for_each_morton(lattice.tiles(), [&](Int3 t) { tiles_.push_back(t); });
     make_pages();
     list_tiles();
-    cases_ = gpu::make_case_table(world_map(options.transform).mirrored);
+    cases_ = gpu::make_case_table(world_map(options.transform, options.inside).mirrored);
   }
 
   std::uint32_t tiles() const { return static_cast<std::uint32_t>(tiles_.size()); }

@@ -20,7 +20,7 @@ class Streamed {
         options_(options),
         slots_(kSlots, lattice.tiles()),
         row_tables_(kSlots),
-        cases_(gpu::make_case_table(world_map(options.transform).mirrored)),
+        cases_(gpu::make_case_table(world_map(options.transform, options.inside).mirrored)),
         tile_bricks_(static_cast<std::uint32_t>(max_bricks_of_tile(lattice, reach()))) {}
 
   /// Appends the mesh of some tiles, which come after all before.
@@ -201,7 +201,10 @@ TYPED_TEST(StreamKernels, RegionOfInterest) {
   SurfaceOptions options;
   options.isovalue = TestFixture::kMid;
   options.roi = {{20, 3, 31}, {69, 36, 40}};
-  compare(field, lattice, bricks, options, 3);
+  for (const Inside inside : {Inside::above, Inside::below}) {
+    options.inside = inside;
+    compare(field, lattice, bricks, options, 3);
+  }
 }
 
 TYPED_TEST(StreamKernels, BricksThatAreAbsent) {

@@ -124,8 +124,11 @@ TYPED_TEST(TileKernel, RegionOfInterestAndTransform) {
   options.transform.origin = {-5, 11, 0.25};
   options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
   for (const unsigned threads : {384u, unsigned{gpu::kSlabTeam}})
-    compare(TestFixture::Fields::noise({55, 35, 44}, 5), {.threads = threads}, {TestFixture::kMid},
-            options);
+    for (const Inside inside : {Inside::above, Inside::below}) {
+      options.inside = inside;
+      compare(TestFixture::Fields::noise({55, 35, 44}, 5), {.threads = threads},
+              {TestFixture::kMid}, options);
+    }
 }
 
 /// What has no room is not written, and what there would be is told.

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cmath>
+#include <optional>
+
+#include "isobrick/bricks/store_reader.h"
+#include "isobrick/core/inside.h"
+
+namespace isobrick {
+
+/// Whether the samples are signed distances, negative inside.
+inline bool is_level_set(const StoreInfo& info) { return info.grid_class == "level set"; }
+
+/// What is inside unless users say it.
+inline Inside inside_of(const StoreInfo& info) {
+  return is_level_set(info) ? Inside::below : Inside::above;
+}
+
+/// The distance from the surface up to which a level set has samples of its own; nothing for other
+/// volumes.
+inline std::optional<double> narrow_band(const StoreInfo& info) {
+  if (!is_level_set(info) || !(std::abs(info.fill_value) > 0)) return std::nullopt;
+  return std::abs(info.fill_value);
+}
+
+}  // namespace isobrick
