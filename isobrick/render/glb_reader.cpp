@@ -138,14 +138,26 @@ class GlbReader {
       if (at == start) {
         if (kind != kJsonChunk) fail("it does not begin with a scene");
         if (size > kMostJson) fail(fmt::format("its scene takes {} bytes", size));
-        const auto* text = reinterpret_cast<const char*>(chunk.data());
-        root_ = json::parse(text, text + chunk.size());
+        read_scene(chunk);
       } else if (kind == kBinaryChunk && binary_.empty()) {
         binary_ = chunk;
       }
       at += head + (size + 3) / 4 * 4;
     }
     if (!root_.is_object()) fail("its scene is no object");
+  }
+
+  /// Parses the scene. A level of nesting takes some 70 times the memory of its
+  /// byte of text, so the parser stops where the levels become too many.
+  void read_scene(std::span<const std::byte> chunk) {
+    const auto* text = reinterpret_cast<const char*>(chunk.data());
+    using Event = json::parse_event_t;
+    root_ = json::parse(text, text + chunk.size(), [this](int depth, Event event, json&) {
+      const bool opens = event == Event::object_start || event == Event::array_start;
+      if (opens && depth >= kMostDepth)
+        fail(fmt::format("its scene is nested more than {} levels deep", kMostDepth));
+      return true;
+    });
   }
 
   /// A whole number that counts or numbers something.

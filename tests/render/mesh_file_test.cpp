@@ -287,5 +287,20 @@ TEST(MeshFile, DamagedScenesAreSaid) {
   message_of<Error>([&] { read_all(dir.write("far.glb", glb(good, far))); });
 }
 
+TEST(MeshFile, ScenesNestedTooDeeplyAreRefused) {
+  const TempDir dir;
+  const auto nested = [&](std::size_t arrays) {
+    const std::string json =
+        R"({"extras":)" + std::string(arrays, '[') + std::string(arrays, ']') + "}";
+    return dir.write("nested.glb", glb(json, ""));
+  };
+  EXPECT_EQ(open_mesh_file(nested(63))->info().faces, 0U);
+  for (const std::size_t arrays : {64U, 1U << 20}) {
+    const std::string message = message_of<Error>([&] { open_mesh_file(nested(arrays)); });
+    EXPECT_TRUE(contains(message, "nested more than 64 levels deep")) << message;
+    EXPECT_TRUE(contains(message, "nested.glb")) << message;
+  }
+}
+
 }  // namespace
 }  // namespace isobrick
