@@ -44,8 +44,8 @@ class ObjText {
     return found;
   }
 
-  Vec3f vector() {
-    Vec3f v;
+  Vec3d vector() {
+    Vec3d v;
     for (int axis = 0; axis < 3; ++axis) {
       const std::string_view text = word();
       const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v[axis]);
@@ -117,11 +117,12 @@ std::filesystem::path temporary_folder() {
   return folder;
 }
 
-/// Vectors in a nameless file.
+/// Vectors in a nameless file. They are doubles: a float would round the coordinates of a map
+/// before the picture's origin is subtracted.
 class VectorFile {
  public:
   VectorFile() : out_(open_scratch_beside((temporary_folder() / "isobrick").string())) {}
-  void add(Vec3f v) {
+  void add(Vec3d v) {
     out_.append(std::as_bytes(std::span(&v, 1)));
     ++count_;
   }
@@ -158,8 +159,11 @@ std::unique_ptr<MeshFile> read_obj(const std::string& path, std::shared_ptr<Mapp
   const auto field = [&keep](VectorFile& vectors) {
     const std::shared_ptr<MappedFile> mapped = vectors.map();
     keep.push_back(mapped);
-    return VertexField{
-        .first = mapped->bytes().data(), .stride = sizeof(Vec3f), .offsets = {0, 4, 8}};
+    constexpr NumberKind kind = NumberKind::f64;
+    return VertexField{.first = mapped->bytes().data(),
+                       .stride = sizeof(Vec3d),
+                       .offsets = {0, 8, 16},
+                       .kinds = {kind, kind, kind}};
   };
   part.positions = field(positions);
   // A normal a vertex, as isosurfaces have it; others are lit by facet.

@@ -287,6 +287,31 @@ TEST(MeshFile, DamagedScenesAreSaid) {
   message_of<Error>([&] { read_all(dir.write("far.glb", glb(good, far))); });
 }
 
+TEST(MeshFile, CoordinatesFarFromZeroKeepTheirDecimals) {
+  const TempDir dir;
+  const std::string obj =
+      "v 5000000.123456 -5000000.5 0.25\nv 5000000.223456 -5000000.5 0.25\n"
+      "v 5000000.123456 -5000000.375 0.25\nf 1 2 3\n";
+  const std::string ply =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\n"
+      "property double y\nproperty double z\nelement face 1\n"
+      "property list uchar uint vertex_indices\nend_header\n";
+  const std::vector<Vec3d> expected{{5000000.123456, -5000000.5, 0.25},
+                                    {5000000.223456, -5000000.5, 0.25},
+                                    {5000000.123456, -5000000.375, 0.25}};
+  std::string body(reinterpret_cast<const char*>(expected.data()), 3 * sizeof(Vec3d));
+  const std::array<std::uint32_t, 3> face{0, 1, 2};
+  body += '\3';
+  body.append(reinterpret_cast<const char*>(face.data()), sizeof(face));
+  for (const std::string& path : {dir.write("far.obj", obj), dir.write("far.ply", ply + body)}) {
+    const std::vector<Vec3d> corners = corners_of(path, {5e6, -5e6, 0});
+    ASSERT_EQ(corners.size(), expected.size()) << path;
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      for (const int axis : {0, 1, 2})
+        EXPECT_NEAR(corners[i][axis], expected[i][axis], 1e-7) << path;
+  }
+}
+
 TEST(MeshFile, ScenesNestedTooDeeplyAreRefused) {
   const TempDir dir;
   const auto nested = [&](std::size_t arrays) {
