@@ -5,15 +5,22 @@
 namespace isobrick::tools {
 namespace {
 
-/// "a|b|c" → {"a", "b", "c"}; words in capitals stand for something to fill in
-/// and are no choices.
+constexpr const char* kCapitals = "ABCDEFGHIJKLMNOPQRSTUVWXYZ";
+
+/// "a|b:LEVEL|N" → {"a", "b"}: words in capitals stand for something to fill in and are no choices.
 std::vector<std::string> choices_in(const std::string& type) {
   std::vector<std::string> choices;
   if (type.find('|') == std::string::npos) return choices;
-  for (const std::string& word : CLI::detail::split(type, '|'))
-    if (word.find_first_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == std::string::npos)
-      choices.push_back(word);
+  for (const std::string& part : CLI::detail::split(type, '|')) {
+    const std::string word = part.substr(0, part.find(':'));
+    if (word.find_first_of(kCapitals) == std::string::npos) choices.push_back(word);
+  }
   return choices;
+}
+
+/// Whether a value of this name is a file or a folder.
+bool is_path(const std::string& value) {
+  return value == "MESH" || value == "PNG" || value == "DIR";
 }
 
 OptionView view_of(const CLI::Option& option) {
@@ -26,6 +33,10 @@ OptionView view_of(const CLI::Option& option) {
   view.help = option.get_description();
   view.fallback = option.get_default_str();
   view.required = option.get_required();
+  const bool positional = option.get_positional();
+  view.may_be_bare = !positional && view.choices.size() > 1 && option.get_expected_min() == 0;
+  view.repeated = option.get_items_expected_max() > 1;
+  view.path = positional ? view.choices.empty() : is_path(view.value);
   return view;
 }
 
@@ -44,6 +55,13 @@ CommandView view_of(const CLI::App& app) {
           CLI::detail::trim_copy(
               CLI::detail::find_and_replace(footer.substr(footer.find('\n') + 1), "\n  ", "\n")),
           views_of(app, false), views_of(app, true)};
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  return names;
 }
 
 std::vector<CommandView> subcommands_of(const CLI::App& app) {

@@ -16,6 +16,9 @@ struct OptionView {
   std::string help;
   std::string fallback;  ///< what holds when it is left out
   bool required = false;
+  bool may_be_bare = false;  ///< without a value it means the first of its choices
+  bool repeated = false;     ///< it may be given several times
+  bool path = false;         ///< its value is a file or a folder
 };
 
 /// The program or one of its subcommands.
@@ -25,6 +28,9 @@ struct CommandView {
 };
 
 CommandView view_of(const CLI::App& app);
+
+/// Names of the subcommands in the order of their definition.
+std::vector<std::string> command_names(const CLI::App& app);
 
 /// The subcommands in the order of their definition.
 std::vector<CommandView> subcommands_of(const CLI::App& app);

@@ -1,42 +1,25 @@
 #include <csignal>
 #include <cstdio>
-#include <memory>
 #include <new>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"
+#include "tools/command_line.h"
 #include "tools/console.h"
+#include "tools/help.h"
 #include "tools/options.h"
 
 namespace isobrick::tools {
 namespace {
 
-/// Help with defaults in brackets behind the description.
-class HelpFormatter final : public CLI::Formatter {
- public:
-  HelpFormatter() { column_width(30); }
-
-  std::string make_option_opts(const CLI::Option* option) const override {
-    if (option->get_type_size() == 0 || option->get_type_name().empty()) return "";
-    return " " + option->get_type_name();
-  }
-  std::string make_option_desc(const CLI::Option* option) const override {
-    std::string text = option->get_description();
-    if (!option->get_default_str().empty()) text += " [" + option->get_default_str() + "]";
-    if (option->get_required() && option->nonpositional()) text += " (required)";
-    return text;
-  }
-};
-
 void define(Program& program) {
-  program.app.formatter(std::make_shared<HelpFormatter>());
+  program.app.formatter(help_formatter());
   program.app.require_subcommand(1);
   program.app.set_version_flag("--version", "isobrick " ISOBRICK_VERSION,
                                "Print the version and exit");
-  program.app.footer("Help on a subcommand: isobrick convert --help");
+  program.app.footer("Help on a subcommand: isobrick help convert");
   add_convert(program);
   add_info(program);
   add_index(program);
@@ -48,6 +31,7 @@ void define(Program& program) {
   add_synth(program);
   add_completion(program);
   add_man(program);
+  add_help(program);
 }
 
 const Command* parsed(const Program& program) {
@@ -58,13 +42,6 @@ const Command* parsed(const Program& program) {
 
 std::string name_of(const Command* command) { return command ? command->app->get_name() : ""; }
 
-/// What is wrong with a command line. A word that nobody knows comes first:
-/// CLI11 would rather complain about what is missing.
-std::string complaint(const Program& program, const CLI::ParseError& error) {
-  const std::vector<std::string> unknown = program.app.remaining(true);
-  return unknown.empty() ? error.what() : fmt::format("unknown argument '{}'", unknown.front());
-}
-
 /// Ends as the signal would have ended the process, so that shells see it.
 int die_of(int signal) {
   std::signal(signal, SIG_DFL);
@@ -74,7 +51,7 @@ int die_of(int signal) {
 
 int run(Program& program, int argc, char** argv) {
   try {
-    program.app.parse(argc, argv);
+    program.app.parse(words_to_parse(program.app, argc, argv));
     set_up_signals();
     Console console(program.speech);
     return parsed(program)->run(console);

@@ -24,8 +24,13 @@ std::string roff(const std::string& text) {
 std::string bold(const std::string& text) { return fmt::format("\\fB{}\\fR", roff(text)); }
 std::string italic(const std::string& text) { return fmt::format("\\fI{}\\fR", roff(text)); }
 
+std::string in_brackets_if(bool optional, const std::string& text) {
+  return optional ? fmt::format("[{}]", text) : text;
+}
+
 std::string entry(const std::string& head, const OptionView& option) {
   std::string text = ".TP\n" + head + "\n" + roff(option.help) + ".";
+  if (option.required && option.names[0].starts_with('-')) text += " Required.";
   if (!option.fallback.empty()) text += " Default: " + roff(option.fallback) + ".";
   return text + "\n";
 }
@@ -34,14 +39,15 @@ std::string option_entry(const OptionView& option) {
   std::vector<std::string> names;
   for (const std::string& name : option.names) names.push_back(bold(name));
   std::string head = fmt::format("{}", fmt::join(names, ", "));
-  if (!option.value.empty()) head += fmt::format(" {}", italic(option.value));
+  if (!option.value.empty()) head += ' ' + in_brackets_if(option.may_be_bare, italic(option.value));
   return entry(head, option);
 }
 
 std::string synopsis(const CommandView& command) {
   std::string line = bold("isobrick " + command.name);
   for (const OptionView& positional : command.positionals)
-    line += fmt::format(" {}", italic(positional.names[0]));
+    line += ' ' + in_brackets_if(!positional.required, italic(positional.names[0])) +
+            (positional.repeated ? " ..." : "");
   for (const OptionView& option : command.options)
     if (option.required)
       line += fmt::format(" {} {}", bold(option.names.back()), italic(option.value));
@@ -59,18 +65,18 @@ std::string command_section(const CommandView& command) {
 }
 
 std::string man_page(const CLI::App& program) {
-  std::string text =
-      fmt::format(".TH ISOBRICK 1 \"\" \"isobrick {}\" \"User Commands\"\n", ISOBRICK_VERSION);
+  std::string text = fmt::format(".TH ISOBRICK 1 \"\" \"isobrick {}\" \"User Commands\"\n.ad l\n",
+                                 ISOBRICK_VERSION);
   text += ".SH NAME\nisobrick \\- isosurfaces of volumes larger than memory\n.SH SYNOPSIS\n";
   for (const CommandView& command : subcommands_of(program)) text += synopsis(command) + "\n.br\n";
   text +=
       ".SH DESCRIPTION\n" +
       roff(
-          "isobrick cuts a volume into bricks, keeps them in a store (an OME-Zarr 0.5 image) with "
+          "isobrick cuts a volume into bricks, keeps them in a store (an OME-Zarr image) with the "
+          "range of every brick, and extracts isosurfaces as triangle meshes while reading only "
           "the "
-          "range of every brick, and extracts isosurfaces as watertight triangle meshes while "
-          "reading "
-          "only the bricks that the surface touches. Memory stays within a budget, whatever the "
+          "bricks that the surface touches. A mesh has no cracks between bricks; it is open where "
+          "the surface leaves the volume or the region. Memory stays within a budget, whatever the "
           "volume's size.") +
       "\n";
   text += ".SH OPTIONS\n";

@@ -14,9 +14,12 @@ namespace isobrick::tools {
 
 namespace {
 
-/// Complaints about a value begin with the option's name.
-void take_named(const std::string& name, const std::function<void(const std::string&)>& take,
-                const std::string& text) {
+/// Complaints about a value begin with the option's name. CLI11 takes the next word for a value
+/// even where that is an option.
+void take_named(const CLI::App* app, const std::string& name,
+                const std::function<void(const std::string&)>& take, const std::string& text) {
+  if (text.starts_with('-') && app->get_option_no_throw(text) != nullptr)
+    throw UsageError(fmt::format("{}: a value is missing before '{}'", name, text));
   try {
     take(text);
   } catch (const UsageError& error) {
@@ -27,6 +30,7 @@ void take_named(const std::string& name, const std::function<void(const std::str
 void describe(CLI::Option* option, const OptionText& text) {
   option->type_name(text.value)->required(text.required);
   if (!text.fallback.empty()) option->default_str(text.fallback);
+  if (text.may_be_bare) option->expected(0, 1);
 }
 
 }  // namespace
@@ -43,17 +47,18 @@ CLI::App* add_subcommand(Program& program, const std::string& name, const std::s
 void add_text(CLI::App* app, const OptionText& option,
               std::function<void(const std::string&)> take) {
   const std::string name = option.name;
-  describe(app->add_option_function<std::string>(
-               name, [name, take](const std::string& text) { take_named(name, take, text); },
-               option.help),
-           option);
+  describe(
+      app->add_option_function<std::string>(
+          name, [app, name, take](const std::string& text) { take_named(app, name, take, text); },
+          option.help),
+      option);
 }
 
 void add_repeated(CLI::App* app, const OptionText& option,
                   std::function<void(const std::string&)> take) {
   const std::string name = option.name;
-  const auto take_all = [name, take](const std::vector<std::string>& texts) {
-    for (const std::string& text : texts) take_named(name, take, text);
+  const auto take_all = [app, name, take](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) take_named(app, name, take, text);
   };
   CLI::Option* added =
       app->add_option_function<std::vector<std::string>>(name, take_all, option.help);
@@ -71,16 +76,17 @@ void add_path(CLI::App* app, const std::string& name, std::string& target,
 
 void add_paths(CLI::App* app, const std::string& name, std::vector<std::string>& targets,
                const std::string& help) {
-  describe(app->add_option(name, targets, help)->expected(1, 1 << 20), {name, "", help, "", true});
+  describe(app->add_option(name, targets, help)->expected(1, CLI::detail::expected_max_vector_size),
+           {name, "", help, "", true});
 }
 
-void add_dims(CLI::App* app, std::optional<Int3>& dims) {
-  add_parsed(app, dims, parse_dims, {"--dims", "X,Y,Z", "Samples along x, y and z"});
+void add_dims(CLI::App* app, std::optional<Int3>& dims, bool required) {
+  add_parsed(app, dims, parse_dims, {"--dims", "X,Y,Z", "Samples along x, y and z", "", required});
 }
 
-void add_type(CLI::App* app, std::optional<ScalarType>& type) {
+void add_type(CLI::App* app, std::optional<ScalarType>& type, bool required) {
   add_parsed(app, type, parse_type,
-             {"--type", "u8|i8|u16|i16|u32|i32|f32|f64", "Type of a sample"});
+             {"--type", "u8|i8|u16|i16|u32|i32|f32|f64", "Type of a sample", "", required});
 }
 
 void add_level(CLI::App* app, int& level) {
@@ -111,7 +117,7 @@ void add_force(CLI::App* app, bool& force) {
 void add_clip(CLI::App* app, std::vector<HalfSpace>& planes) {
   add_repeated(app,
                {"--clip", "NX,NY,NZ,D",
-                fmt::format("Show only where NX·x + NY·y + NZ·z >= D, world units; up to {} times",
+                fmt::format("Show only where NX*x + NY*y + NZ*z >= D, world units; up to {} times",
                             kMostClipPlanes)},
                [&planes](const std::string& text) {
                  planes.push_back(parse_half_space(text));

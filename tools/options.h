@@ -43,6 +43,7 @@ void add_render(Program& program);
 void add_view(Program& program);
 void add_completion(Program& program);
 void add_man(Program& program);
+void add_help(Program& program);
 
 /// A new subcommand with what all of them have: --json, --quiet, an example.
 CLI::App* add_subcommand(Program& program, const std::string& name, const std::string& description,
@@ -59,10 +60,11 @@ void add_run(Program& program, CLI::App* app, std::shared_ptr<Arguments> argumen
 /// How an option is called and explained.
 struct OptionText {
   std::string name;   ///< "--dims", "-o,--output", or "OUT" for a positional
-  std::string value;  ///< what its value is called; "a|b|c" lists the choices
+  std::string value;  ///< what its value is called; "a|b|c" lists the choices, PNG is a file
   std::string help;
   std::string fallback = {};  ///< what holds when it is left out
   bool required = false;
+  bool may_be_bare = false;  ///< without a value it means the first of its choices
 };
 
 /// An option that hands the text of its value to `take`.
@@ -86,8 +88,8 @@ void add_path(CLI::App* app, const std::string& name, std::string& target, const
 void add_paths(CLI::App* app, const std::string& name, std::vector<std::string>& targets,
                const std::string& help);
 
-void add_dims(CLI::App* app, std::optional<Int3>& dims);
-void add_type(CLI::App* app, std::optional<ScalarType>& type);
+void add_dims(CLI::App* app, std::optional<Int3>& dims, bool required = false);
+void add_type(CLI::App* app, std::optional<ScalarType>& type, bool required = false);
 void add_level(CLI::App* app, int& level);
 void add_roi(CLI::App* app, std::optional<RoiText>& roi);
 void add_memory(CLI::App* app, std::uint64_t& memory);

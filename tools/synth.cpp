@@ -85,7 +85,6 @@ ConvertReport write_raw(VolumeSource& source, const std::string& path,
 }
 
 int run(const Arguments& arguments, Console& console) {
-  if (!arguments.dims || !arguments.type) throw UsageError("--dims and --type are needed");
   SynthOptions synth = arguments.synth;
   synth.extent = *arguments.dims;
   synth.type = *arguments.type;
@@ -110,8 +109,8 @@ void add_synth(Program& program) {
   add_text(app, {"KIND", "sphere|gyroid|marschner-lobb|mixing", "Which field", "", true},
            [&kind = arguments->synth.kind](const std::string& text) { kind = parse_kind(text); });
   add_path(app, "OUT", arguments->out, "Store to write, or a raw file if it ends in .raw");
-  add_dims(app, arguments->dims);
-  add_type(app, arguments->type);
+  add_dims(app, arguments->dims, true);
+  add_type(app, arguments->type, true);
   add_parsed(app, arguments->synth.seed, parse_offset,
              {"--seed", "N", "Of the random numbers", "1"});
   add_parsed(app, arguments->synth.frequency, parse_number,

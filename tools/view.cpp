@@ -198,7 +198,8 @@ void parse_slice(const std::string& text, ViewSettings& settings) {
 void add_what_to_draw(CLI::App* app, Arguments& arguments) {
   add_text(app, {"--screenshot", "PNG", "Draw into this file, without a window or a display"},
            [&](const std::string& text) { arguments.screenshot = text; });
-  add_text(app, {"--turntable", "DIR", "Draw a full turn into DIR/0000.png …, without a window"},
+  add_text(app,
+           {"--turntable", "DIR", "Draw a full turn into DIR/0000.png and so on, without a window"},
            [&](const std::string& text) { arguments.turntable = text; });
   add_parsed(app, arguments.frames,
              [](const std::string& text) { return parse_int(text, 1, 100'000); },

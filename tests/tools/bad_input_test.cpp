@@ -15,8 +15,7 @@ Arguments operator+(Arguments left, const Arguments& right) {
 TEST_F(BadInput, CommandLinesThatMakeNoSense) {
   const Arguments convert{"convert", path("in.raw"), path("out.zarr")};
   const std::vector<std::pair<Arguments, std::string>> lines{
-      {{}, "subcommand"},
-      {{"paint"}, "paint"},
+      {{"paint"}, "unknown subcommand 'paint'"},
       {{"convert"}, "IN"},
       {{"info"}, "STORE"},
       {{"extract", path("a.zarr"), "-o", path("a.ply")}, "--isovalue"},

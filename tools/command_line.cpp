@@ -1,0 +1,82 @@
+#include "tools/command_line.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "tools/definitions.h"
+#include "tools/spelling.h"
+
+namespace isobrick::tools {
+namespace {
+
+const OptionView* find_option(const CommandView& command, const std::string& name) {
+  for (const OptionView& option : command.options)
+    if (std::find(option.names.begin(), option.names.end(), name) != option.names.end())
+      return &option;
+  return nullptr;
+}
+
+/// Puts the values of options that may be bare behind "=".
+std::vector<std::string> with_values(const CommandView& command,
+                                     const std::vector<std::string>& words) {
+  std::vector<std::string> all;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    all.push_back(words[i]);
+    const OptionView* option = find_option(command, words[i]);
+    if (option == nullptr || !option->may_be_bare) continue;
+    const auto& choices = option->choices;
+    const bool has_value = i + 1 < words.size() &&
+                           std::find(choices.begin(), choices.end(), words[i + 1]) != choices.end();
+    all.back() += '=' + (has_value ? words[++i] : choices.front());
+  }
+  return all;
+}
+
+/// The subcommand of a command line, or the program.
+const CLI::App& parsed_app(const CLI::App& program) {
+  const auto parsed = program.get_subcommands();
+  return parsed.empty() ? program : *parsed.front();
+}
+
+/// Where to read on.
+std::string help_hint(const CLI::App& program, const CLI::App& app) {
+  return fmt::format("see 'isobrick {}'", &app == &program ? "--help" : app.get_name() + " --help");
+}
+
+std::string unknown_word(const CLI::App& program, const std::string& word) {
+  const CLI::App& app = parsed_app(program);
+  const bool option = word.starts_with('-');
+  std::vector<std::string> known;
+  if (option)
+    for (const OptionView& view : view_of(app).options)
+      known.insert(known.end(), view.names.begin(), view.names.end());
+  else if (&app == &program)
+    known = command_names(program);
+  const std::string nearest = nearest_word(word.substr(0, word.find('=')), known);
+  const char* what = !option && &app == &program ? "subcommand" : "argument";
+  return fmt::format(
+      "unknown {} '{}'; {}", what, word,
+      nearest.empty() ? help_hint(program, app) : fmt::format("did you mean '{}'?", nearest));
+}
+
+}  // namespace
+
+std::vector<std::string> words_to_parse(const CLI::App& program, int argc, char** argv) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (words.empty()) words.emplace_back("help");
+  for (const CommandView& command : subcommands_of(program))
+    if (command.name == words.front()) words = with_values(command, words);
+  std::reverse(words.begin(), words.end());
+  return words;
+}
+
+// A word that nobody knows comes first: CLI11 would rather complain about what is missing.
+std::string complaint(const Program& program, const CLI::ParseError& error) {
+  const std::vector<std::string> unknown = program.app.remaining(true);
+  if (!unknown.empty()) return unknown_word(program.app, unknown.front());
+  return fmt::format("{}; {}", error.what(), help_hint(program.app, parsed_app(program.app)));
+}
+
+}  // namespace isobrick::tools
