@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/format.h"
+#include "tools/open_store.h"
 #include "tools/options.h"
 #include "tools/output_name.h"
 #include "tools/parse.h"
@@ -64,7 +65,7 @@ int run(const Arguments& arguments, Console& console) {
   ExportOptions options = arguments.options;
   options.format = format_of(arguments.out, arguments.format);
   if (is_standard_output(arguments.out)) console.reserve_output();
-  const StoreReader store(arguments.store, arguments.selection);
+  const StoreReader store = open_store(arguments.store, arguments.selection);
   const Box3 box = store_region(store, options.level, arguments.roi);
   options.roi = box;
   if (arguments.half_band && !options.isovalue)

@@ -1,10 +1,10 @@
 #include "tools/histogram.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "tools/value_range.h"
 
 namespace isobrick::tools {
 namespace {
@@ -18,7 +18,7 @@ int height_of(std::uint64_t count, std::uint64_t most, int rows) {
 
 }  // namespace
 
-std::string draw(const Histogram& h, int rows) {
+std::string draw(const Histogram& h, int rows, ScalarType type) {
   if (h.counts.empty()) return "no finite sample\n";
   constexpr std::array<const char*, 9> blocks{" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
   const std::uint64_t most = *std::max_element(h.counts.begin(), h.counts.end());
@@ -30,7 +30,7 @@ std::string draw(const Histogram& h, int rows) {
           std::clamp(height_of(count, most, rows) - 8 * row, 0, 8))];
     text += '\n';
   }
-  const std::string lo = fmt::format("{:g}", h.lo), hi = fmt::format("{:g}", h.hi);
+  const std::string lo = sample_text(h.lo, type), hi = sample_text(h.hi, type);
   const std::size_t gap =
       h.counts.size() > lo.size() + hi.size() ? h.counts.size() - lo.size() - hi.size() : 1;
   return text + "  " + lo + std::string(gap, ' ') + hi + '\n';

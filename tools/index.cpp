@@ -6,6 +6,7 @@
 #include "isobrick/pipeline/index_build.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
+#include "tools/open_store.h"
 
 namespace isobrick::tools {
 namespace {
@@ -36,6 +37,7 @@ std::string text_of(const Arguments& arguments, const IndexReport& report) {
 }
 
 int run(const Arguments& arguments, Console& console) {
+  check_store(arguments.store);
   const IndexReport report = add_index(arguments.store, arguments.index, console.progress());
   const nlohmann::ordered_json object{
       {"command", "index"},
@@ -64,7 +66,7 @@ void add_index(Program& program) {
   add_path(app, "STORE", arguments->store,
            "Store to add to, or another program's Zarr image or array");
   add_parsed(app, arguments->index.kind, parse_stored_kind,
-             {"--kind", "interval|kdtree|quadtree|octree", "Which structure", "", true});
+             {"--kind", "interval|kdtree|quadtree|octree", "Which structure", "octree"});
   add_selection(app, arguments->index.selection);
   add_leaf(app, arguments->index.leaf);
   add_memory(app, arguments->index.memory);

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -11,7 +10,9 @@
 #include "tools/format.h"
 #include "tools/histogram.h"
 #include "tools/info_volumes.h"
+#include "tools/open_store.h"
 #include "tools/options.h"
+#include "tools/value_range.h"
 
 namespace isobrick::tools {
 namespace {
@@ -37,18 +38,6 @@ std::uint64_t stored_bricks(const StoreReader& store, int level) {
                    [&](Int3 b) { stored += store.locate(level, b).has_value() ? 1 : 0; });
   });
   return stored;
-}
-
-/// Range of level 0 from the bricks' ranges, one layer of them at a time.
-ValueRange<double> value_range(const StoreReader& store) {
-  const Int3 bricks = store.info().levels.front().lattice.bricks();
-  ValueRange<double> range;
-  for (Index z = 0; z < bricks.z; z += StoreReader::kRangeChunk) {
-    const Box3 layer{{0, 0, z},
-                     {bricks.x, bricks.y, std::min(bricks.z, z + StoreReader::kRangeChunk)}};
-    for (const auto& of_brick : store.brick_ranges(0, layer).ranges) range.include(of_brick);
-  }
-  return range;
 }
 
 /// A kind of index, and what it takes in each level that has it.
@@ -100,7 +89,7 @@ Facts gather(const StoreReader& store, Progress& progress) {
   for (int level = 0; level < static_cast<int>(info.levels.size()); ++level)
     facts.stored.push_back(stored_bricks(store, level));
   facts.has_ranges = store.has_ranges(0);
-  if (facts.has_ranges) facts.range = value_range(store);
+  if (facts.has_ranges) facts.range = value_range(store, 0);
   facts.histogram = histogram(store, progress);
   facts.indexes = indexes_of(store);
   return facts;
@@ -200,21 +189,26 @@ std::string text_of(const StoreInfo& info, const Facts& facts) {
   std::string text = fmt::format("store        {}\n", info.path.string());
   text += fmt::format("extent       {} samples of {}\n",
                       human_extent(info.levels.front().lattice.extent), zarr_name(info.type));
-  text += fmt::format("spacing      {:g} x {:g} x {:g} {}\n", spacing.x, spacing.y, spacing.z,
+  text += fmt::format("spacing      {} x {} x {} {}\n", spacing.x, spacing.y, spacing.z,
                       transform.unit.empty() ? "(no unit)" : transform.unit);
-  text += fmt::format("origin       {:g}, {:g}, {:g}\n", origin.x, origin.y, origin.z);
+  text += fmt::format("origin       {}, {}, {}\n", origin.x, origin.y, origin.z);
+  const auto& d = transform.direction;  // the columns are where x, y and z point
+  text += fmt::format("direction    x ({}, {}, {}), y ({}, {}, {}), z ({}, {}, {})\n", d[0], d[3],
+                      d[6], d[1], d[4], d[7], d[2], d[5], d[8]);
   if (!info.grid_name.empty()) text += fmt::format("grid         {}\n", info.grid_name);
   if (!info.grid_class.empty()) text += fmt::format("grid class   {}\n", info.grid_class);
   text += levels_text(info, facts);
   text += fmt::format("codec        {}\n", info.codec);
   text += fmt::format("bytes        {} for {} of samples ({:.2f} to 1)\n", human_bytes(facts.bytes),
                       human_bytes(facts.raw_bytes), facts.ratio());
-  text += !facts.has_ranges ? "value range  unknown: 'isobrick index' computes the ranges\n"
+  text += !facts.has_ranges ? fmt::format("value range  unknown; run: {}\n", index_command(info))
           : facts.range.empty()
-              ? "value range  none\n"
-              : fmt::format("value range  {:g} to {:g}\n", facts.range.lo, facts.range.hi);
+              ? std::string("value range  none\n")
+              : fmt::format("value range  {} to {}\n", sample_text(facts.range.lo, info.type),
+                            sample_text(facts.range.hi, info.type));
   text += indexes_text(facts);
-  text += fmt::format("histogram    of level {}, square-root scale\n{}", h.level, draw(h, 6));
+  text += fmt::format("histogram    of level {}, square-root scale\n{}", h.level,
+                      draw(h, 6, info.type));
   if (h.not_a_number + h.infinite > 0)
     text += fmt::format("  left out: {} NaN, {} infinite\n", human_count(h.not_a_number),
                         human_count(h.infinite));
@@ -235,15 +229,13 @@ void add_info(Program& program) {
       "isobrick info head.zarr");
   add_path(app, "STORE", arguments->path, "Store to look at, or another program's Zarr");
   add_selection(app, arguments->selection);
-  program.commands.push_back({app, [arguments](Console& console) {
-                                if (list_volumes(arguments->path, arguments->selection, console))
-                                  return 0;
-                                const StoreReader store(arguments->path, arguments->selection);
-                                const Facts facts = gather(store, console.progress());
-                                console.result(json_of(store.info(), facts),
-                                               text_of(store.info(), facts));
-                                return 0;
-                              }});
+  program.commands.push_back(
+      {app, [arguments](Console& console) {
+         const StoreReader store = open_store(arguments->path, arguments->selection);
+         const Facts facts = gather(store, console.progress());
+         console.result(json_of(store.info(), facts), text_of(store.info(), facts));
+         return 0;
+       }});
 }
 
 }  // namespace isobrick::tools

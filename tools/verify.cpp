@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/format.h"
+#include "tools/open_store.h"
 #include "tools/options.h"
 
 namespace isobrick::tools {
@@ -32,7 +33,7 @@ std::string text_of(const std::string& store, const VerifyReport& report) {
   for (const std::string& damage : report.damages) text += damage + '\n';
   if (report.damage_count > report.damages.size())
     text +=
-        fmt::format("… and {} more\n", human_count(report.damage_count - report.damages.size()));
+        fmt::format("... and {} more\n", human_count(report.damage_count - report.damages.size()));
   if (report.damage_count == 0)
     text += fmt::format("{} is whole: {} bricks{}, {} read\n", store, human_count(report.bricks),
                         indexes_text(report), human_bytes(report.bytes));
@@ -47,6 +48,7 @@ nlohmann::ordered_json indexes_json(const VerifyReport& report) {
 }
 
 int run(const Arguments& arguments, Console& console) {
+  check_store(arguments.store);
   const VerifyReport report =
       verify(arguments.store, arguments.threads, console.progress(), arguments.selection);
   const nlohmann::ordered_json object{{"command", "verify"},

@@ -17,6 +17,7 @@
 #include "isobrick/bricks/volume_choice.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/pod_buffer.h"
+#include "isobrick/core/shell_word.h"
 
 namespace isobrick {
 namespace {
@@ -298,10 +299,16 @@ RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
   check_brick(level, {0, 0, 0});
   const auto& reader = blocks ? at(level).block_ranges : at(level).brick_ranges;
   if (!reader)
-    throw Error(
-        fmt::format("level {} of '{}' has no ranges; 'isobrick index' with --kind computes them",
-                    level, info.path.string()));
+    throw Error(fmt::format("level {} of '{}' has no ranges yet; run: {}", level,
+                            info.path.string(), index_command(info)));
   return reader->read(box, bytes_read);
+}
+
+std::string index_command(const StoreInfo& info) {
+  std::string command = "isobrick index " + shell_word(info.path.string());
+  if (info.selection.channel) command += fmt::format(" --channel {}", *info.selection.channel);
+  if (info.selection.time) command += fmt::format(" --time {}", *info.selection.time);
+  return command;
 }
 
 StoreReader::StoreReader(const std::filesystem::path& path, const Selection& selection)

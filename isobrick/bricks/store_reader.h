@@ -51,6 +51,9 @@ struct StoreInfo {
   std::uint32_t metadata_crc32c = 0;  ///< metadata_checksum() of what was read
 };
 
+/// What a user types to have the ranges of such a store computed.
+std::string index_command(const StoreInfo& info);
+
 /// The most that any level's decode_extra takes for so many threads.
 std::uint64_t decode_extra(const StoreInfo& info, int threads);
 

@@ -30,10 +30,9 @@ SearchBy resolve_index(const StoreReader& store, int level, const IndexChoice& c
   if (!choice.kind) return {};
   const std::string kind(name_of(*choice.kind));
   if (!has_index(store.info().additions, level, kind))
-    throw UsageError(
-        fmt::format("level {} of '{}' has no {} index; 'isobrick index {} --kind {}' "
-                    "adds it",
-                    level, store.info().path.string(), kind, store.info().path.string(), kind));
+    throw UsageError(fmt::format("level {} of '{}' has no {} index; run: {} --kind {}", level,
+                                 store.info().path.string(), kind, index_command(store.info()),
+                                 kind));
   return {.kind = choice.kind, .only_if_few = false};
 }
 

@@ -38,9 +38,9 @@ std::shared_ptr<const BrickSource> store_bricks(std::shared_ptr<const StoreReade
   for (std::size_t level = 0; level < store->info().levels.size(); ++level)
     if (!store->has_ranges(static_cast<int>(level)))
       throw Error(
-          fmt::format("level {} of '{}' has no ranges, without which nothing can be shown; "
-                      "'isobrick index' with --kind computes them",
-                      level, store->info().path.string()));
+          fmt::format("level {} of '{}' has no ranges yet, without which nothing can be shown; "
+                      "run: {}",
+                      level, store->info().path.string(), index_command(store->info())));
   return std::make_shared<StoreBricks>(std::move(store));
 }
 

@@ -64,6 +64,23 @@ TEST_F(Speech, InfoOfOddVolumes) {
   EXPECT_EQ(run_json({"info", path("b.zarr")})["histogram"]["counts"], nlohmann::json({3}));
 }
 
+// Rounded to six digits the largest sample would be 0.1, which no sample reaches.
+TEST_F(Speech, InfoPrintsValuesThatReadBackExactly) {
+  const float samples[] = {-1.00000012f, 0.100000001f, 0.0999999866f, 16777215.0f};
+  write_file(path("a_4x1x1_float32.raw"),
+             std::string(reinterpret_cast<const char*>(samples), sizeof samples));
+  ASSERT_EQ(run({"convert", path("a_4x1x1_float32.raw"), path("a.zarr"), "--spacing",
+                 "0.123456789,1,2", "--origin", "1234567.25,0,0"})
+                .exit_code,
+            0);
+  const std::string info = run({"info", path("a.zarr")}).out;
+  for (const char* line :
+       {"value range  -1.0000001 to 16777215\n", "spacing      0.123456789 x 1 x 2 ",
+        "origin       1234567.25, 0, 0\n", "direction    x (1, 0, 0), y (0, 1, 0), z (0, 0, 1)\n",
+        "\n  -1.0000001"})
+    EXPECT_NE(info.find(line), std::string::npos) << line << "is not in\n" << info;
+}
+
 TEST_F(Speech, JsonOfConversions) {
   write_file(path("in_20x20x20_uint8.raw"), noise(8000));
   for (const Arguments& arguments :

@@ -1,0 +1,92 @@
+#include "tools/open_store.h"
+
+#include <array>
+#include <filesystem>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/metadata_files.h"
+#include "isobrick/core/error.h"
+#include "isobrick/core/shell_word.h"
+#include "isobrick/volumes/raw_name.h"
+#include "isobrick/volumes/volume_format.h"
+#include "tools/format.h"
+#include "tools/mesh_output.h"
+
+namespace isobrick::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kFormatNames{"a raw file",      "a NRRD file",    "a MetaImage",
+                                  "a NIfTI file",    "a VTK XML file", "a legacy VTK file",
+                                  "a TIFF file",     "an HDF5 file",   "a DICOM file",
+                                  "an OpenVDB file", "a NanoVDB file"};
+
+[[noreturn]] void refuse(const std::string& path, const std::string& what,
+                         const std::string& command) {
+  throw Error(fmt::format("'{}' is no store: {}; {}", path, what, command));
+}
+
+/// The command that makes a store of a volume.
+std::string convert_command(const fs::path& volume, const std::string& options = "") {
+  fs::path store = volume;
+  return fmt::format("run: isobrick convert {} {}{}", shell_word(volume.string()),
+                     shell_word(store.replace_extension(".zarr").string()), options);
+}
+
+[[noreturn]] void refuse_missing(const std::string& path) {
+  if (fs::exists(path + ".partial"))
+    refuse(path, fmt::format("its conversion was interrupted ('{}.partial')", path),
+           fmt::format("run: isobrick convert VOLUME {} --resume", shell_word(path)));
+  refuse(path, "nothing has that name",
+         fmt::format("make one: isobrick convert VOLUME {}", shell_word(path)));
+}
+
+/// A name that says nothing about its samples needs options.
+std::string raw_options(const fs::path& path) {
+  const RawName name = parse_raw_name(path.stem().string());
+  return name.extent && name.type ? "" : " --dims X,Y,Z --type TYPE";
+}
+
+[[noreturn]] void refuse_file(const fs::path& path) {
+  const std::string name = path.string();
+  for (const char* extension : {".ply", ".stl", ".obj", ".glb", ".vtp", ".pvtp"})
+    if (extension_of(path) == extension) {
+      fs::path picture = path;
+      refuse(name, "it is a mesh",
+             fmt::format("run: isobrick render {} -o {}", shell_word(name),
+                         shell_word(picture.replace_extension(".png").string())));
+    }
+  const VolumeFormat format = recognise_format(name);
+  refuse(name, fmt::format("it is {}", kFormatNames[static_cast<std::size_t>(format)]),
+         convert_command(path, format == VolumeFormat::raw ? raw_options(path) : ""));
+}
+
+[[noreturn]] void refuse_folder(const fs::path& path) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path, ignored))
+    if (entry.is_directory(ignored) && is_zarr(entry.path()))
+      refuse(path.string(), "it is a folder that holds Zarr",
+             fmt::format("name that, such as {}", shell_word(entry.path().string())));
+  refuse(path.string(), "it is a folder without Zarr's metadata",
+         "if it holds the slices of a volume, " + convert_command(path));
+}
+
+}  // namespace
+
+void check_store(const std::string& path) {
+  std::error_code ignored;
+  const fs::file_status status = fs::status(path, ignored);
+  if (!fs::exists(status)) refuse_missing(path);
+  if (fs::is_regular_file(status)) refuse_file(path);
+  if (fs::is_directory(status) && !is_zarr(path)) refuse_folder(path);
+}
+
+StoreReader open_store(const std::string& path, const Selection& selection) {
+  check_store(path);
+  return StoreReader(path, selection);
+}
+
+}  // namespace isobrick::tools

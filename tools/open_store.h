@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "isobrick/bricks/store_reader.h"
+
+namespace isobrick::tools {
+
+/// Throws Error where `path` is neither a store nor Zarr of another program. It says what is there
+/// and ends in the command to type next.
+void check_store(const std::string& path);
+
+/// Opens a store to read, after check_store().
+StoreReader open_store(const std::string& path, const Selection& selection = {});
+
+}  // namespace isobrick::tools
