@@ -15,10 +15,12 @@
 #include "tools/index_options.h"
 #include "tools/mesh_output.h"
 #include "tools/mesh_space.h"
+#include "tools/open_store.h"
 #include "tools/options.h"
 #include "tools/output_name.h"
 #include "tools/pictures.h"
 #include "tools/store_region.h"
+#include "tools/value_range.h"
 
 namespace isobrick::tools {
 namespace {
@@ -37,7 +39,8 @@ struct Arguments {
   std::optional<RoiText> roi;
   Selection selection;
   std::optional<Inside> inside;
-  bool normals = false, drop_degenerate = false;
+  std::optional<bool> normals;  ///< nothing: where the format holds them
+  bool drop_degenerate = false;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
   IndexChoice index;
@@ -55,12 +58,13 @@ fs::path named(const std::string& path, const Arguments& arguments, double isova
 
 /// How the mesh is written, or would be if it had a name.
 MeshForm form_of(const Arguments& arguments) {
-  MeshForm form{.normals = arguments.normals, .quantize = arguments.quantize};
+  MeshForm form{.quantize = arguments.quantize};
   if (arguments.format)
     form.format = *arguments.format;
   else if (!arguments.output.empty())
     form.format = mesh_format(arguments.output);
   if (!arguments.output.empty()) check_mesh_name(arguments.output, form.format);
+  form.normals = arguments.normals.value_or(has_normals(form.format));
   if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
@@ -116,7 +120,6 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
   options.level = arguments.level;
   options.roi = store_region(store, arguments.level, arguments.roi);
   options.inside = arguments.inside;
-  options.normals = arguments.normals;
   options.drop_degenerate = arguments.drop_degenerate;
   options.memory = arguments.memory;
   options.threads = arguments.threads;
@@ -125,6 +128,7 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
   options.gpu_memory = arguments.gpu_memory;
   options.device = arguments.device;
   const MeshForm form = form_of(arguments);
+  options.normals = form.normals;
   std::vector<ExtractedSurface> surfaces;
   for (const double isovalue : arguments.isovalues) {
     options.isovalue = isovalue;
@@ -197,6 +201,18 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
   return sinks;
 }
 
+/// Why a surface has no triangle.
+std::string why_empty(const ExtractOptions& options, const ExtractReport& report,
+                      const StoreReader& store) {
+  const std::string empty = fmt::format("isovalue {}: the surface is empty", options.isovalue);
+  if (report.degenerate_triangles > 0) return empty + ", all triangles are degenerate";
+  const ValueRange<double> range = value_range(store, options.level);
+  if (range.empty()) return empty + ", no sample is a number";
+  const ScalarType type = store.info().type;
+  return fmt::format("{}; the samples of level {} lie within {} and {}", empty, options.level,
+                     sample_text(range.lo, type), sample_text(range.hi, type));
+}
+
 ExtractReport make(const ExtractedSurface& surface, const Sinks& sinks, const Arguments& arguments,
                    const StoreReader& store, Console& console) {
   ExtractReport report;
@@ -208,10 +224,7 @@ ExtractReport make(const ExtractedSurface& surface, const Sinks& sinks, const Ar
     const ExtractReport drawn = extract(store, shaded, *sinks.preview, console.progress());
     if (!sinks.mesh) report = drawn;
   }
-  if (report.triangles == 0)
-    console.note(fmt::format(
-        "isovalue {}: {}, the surface is empty", surface.options.isovalue,
-        report.degenerate_triangles > 0 ? "all triangles are degenerate" : "no cell is active"));
+  if (report.triangles == 0) console.note(why_empty(surface.options, report, store));
   return report;
 }
 
@@ -262,7 +275,7 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
 int run(const Arguments& arguments, Console& console) {
   check(arguments);
   if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
-  const StoreReader store(arguments.store, arguments.selection);
+  const StoreReader store = open_store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
   for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
   const Said said = arguments.estimate ? estimate_all(surfaces, store)
@@ -327,7 +340,8 @@ void add_extract(Program& program) {
   add_text(app,
            {"-o,--output", "MESH",
             "Mesh to write, .ply, .stl, .obj, .glb, .vtp or .pvtp; several isovalues make "
-            "head_500.ply and so on; - with --format obj for standard output"},
+             "head_500.ply and so on; - with --format obj for standard output (this, --preview "
+             "or --estimate is needed)"},
            [&output = arguments->output](const std::string& text) { output = text; });
   add_parsed(app, arguments->format, parse_mesh_format,
              {"--format", "ply|stl|obj|glb|vtp|pvtp", "Format of the mesh", "by its extension"});
@@ -341,7 +355,11 @@ void add_extract(Program& program) {
   add_selection(app, arguments->selection);
   add_inside(app, arguments->inside);
   add_parsed(app, arguments->normals, parse_normals,
-             {"--normals", "gradient|none", "Normals at the vertices", "none"});
+             {.name = "--normals",
+              .value = "gradient|none",
+              .help = "Normals at the vertices",
+              .fallback = "gradient where the format holds them",
+              .may_be_bare = true});
   add_flag(app, "--drop-degenerate", arguments->drop_degenerate,
            "Leave out triangles without area where samples equal the isovalue");
   add_parsed(app, arguments->index, parse_index_choice,

@@ -10,6 +10,16 @@ namespace {
 
 using nlohmann::ordered_json;
 
+/// Whether the mesh that was written shares vertices. Those of an STL or of a picture are of no
+/// file: how many there are depends on the tiles.
+bool is_welded(const ExtractedSurface& surface) {
+  return !surface.output.empty() && has_vertices(surface.form.format);
+}
+
+ordered_json number_if(bool known, std::uint64_t number) {
+  return known ? ordered_json(number) : ordered_json();
+}
+
 /// Who made the surface, and how long its stages were busy.
 void add_backend(ordered_json& object, const ExtractReport& r) {
   object["backend"] = r.backend;
@@ -33,7 +43,7 @@ ordered_json estimate_json(const ExtractedSurface& surface, const ExtractEstimat
           {"bricks", {{"total", e.active.bricks}, {"active", e.active.active_bricks}}},
           {"active_blocks", e.active.active_blocks},
           {"triangles", e.mesh.triangles},
-          {"vertices", e.mesh.vertices},
+          {"vertices", number_if(has_vertices(surface.form.format), e.mesh.vertices)},
           {"uncertainty", e.uncertainty},
           {"file_bytes", predict_bytes(surface.form, e.mesh).file},
           {"memory_bytes", e.memory}};
@@ -41,9 +51,12 @@ ordered_json estimate_json(const ExtractedSurface& surface, const ExtractEstimat
 
 std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate& e) {
   return fmt::format(
-      "isovalue {}: about {} triangles and {} vertices (± {:.0f} %), {} as {}; {} of {} bricks "
+      "isovalue {}: about {} triangles{} (± {:.0f} %), {} as {}; {} of {} bricks "
       "active, {} of memory\n",
-      surface.options.isovalue, human_count(e.mesh.triangles), human_count(e.mesh.vertices),
+      surface.options.isovalue, human_count(e.mesh.triangles),
+      has_vertices(surface.form.format)
+          ? fmt::format(" and {} vertices", human_count(e.mesh.vertices))
+          : "",
       100 * e.uncertainty, human_bytes(predict_bytes(surface.form, e.mesh).file),
       name_of(surface.form.format), human_count(e.active.active_bricks),
       human_count(e.active.bricks), human_bytes(e.memory));
@@ -57,7 +70,7 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
       {"preview", nullptr},
       {"output_bytes", bytes},
       {"triangles", r.triangles},
-      {"vertices", r.vertices},
+      {"vertices", number_if(is_welded(surface), r.vertices)},
       {"bricks", {{"total", r.bricks}, {"active", r.active_bricks}, {"read", r.bricks_read}}},
       {"brick_reads", r.brick_reads},
       {"bytes_read", r.bytes_read},
@@ -81,8 +94,9 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
 std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
                         std::uint64_t bytes) {
   std::string text =
-      fmt::format("isovalue {}: {} triangles, {} vertices from {} of {} bricks in {}\n",
-                  surface.options.isovalue, human_count(r.triangles), human_count(r.vertices),
+      fmt::format("isovalue {}: {} triangles{} from {} of {} bricks in {}\n",
+                  surface.options.isovalue, human_count(r.triangles),
+                  is_welded(surface) ? fmt::format(", {} vertices", human_count(r.vertices)) : "",
                   human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
   if (!r.gpu_refusal.empty())
     text += fmt::format("  on the CPU, for the GPU cannot: {}\n", r.gpu_refusal);

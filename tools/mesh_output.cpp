@@ -45,6 +45,10 @@ std::string_view name_of(MeshFormat format) {
   return kFormats[static_cast<std::size_t>(format)].name;
 }
 
+bool has_normals(MeshFormat format) { return format != MeshFormat::stl; }
+
+bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
+
 MeshFormat mesh_format(const fs::path& path) {
   if (is_standard_output(path.native()))
     throw UsageError("standard output has no name that says a format: say --format obj");

@@ -23,6 +23,11 @@ struct MeshForm {
 /// "PLY".
 std::string_view name_of(MeshFormat format);
 
+/// Whether a mesh of this format has normals at its vertices. An STL has them at facets only.
+bool has_normals(MeshFormat format);
+/// Whether its triangles share vertices, so that it has a number of them.
+bool has_vertices(MeshFormat format);
+
 /// By the name's extension. Throws UsageError for any other.
 MeshFormat mesh_format(const std::filesystem::path& path);
 /// Throws UsageError where the name says another format than `format`, or standard output where

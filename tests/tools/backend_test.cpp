@@ -71,9 +71,9 @@ TEST_F(Backend, TheCpuReportsItsStages) {
             surface["bytes_read"].get<std::uint64_t>());
   EXPECT_EQ(stages["decode"]["bytes"].get<std::uint64_t>(),
             surface["brick_reads"].get<std::uint64_t>() * 16 * 16 * 16);
-  EXPECT_EQ(
-      stages["sink"]["bytes"].get<std::uint64_t>(),
-      12 * (surface["vertices"].get<std::uint64_t>() + surface["triangles"].get<std::uint64_t>()));
+  EXPECT_EQ(stages["sink"]["bytes"].get<std::uint64_t>(),
+            24 * surface["vertices"].get<std::uint64_t>() +
+                12 * surface["triangles"].get<std::uint64_t>());
   EXPECT_EQ(surface["bound"], longest(stages));
 }
 

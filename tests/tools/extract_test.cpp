@@ -59,7 +59,7 @@ TEST_F(Extract, WritesEveryFormatOfTheSameMesh) {
             read_file(path("a.PVTP")).size() + read_file(path("a.PVTP.parts/part_0.vtp")).size());
   const std::string obj = read_file(path("a.obj"));
   EXPECT_EQ(std::count(obj.begin(), obj.end(), '\n') - 1,
-            ply["vertices"].get<int>() + ply["triangles"].get<int>());
+            2 * ply["vertices"].get<int>() + ply["triangles"].get<int>());
   // The name need not say the format.
   extract("mesh", {"--format", "vtp"});
   EXPECT_TRUE(read_file(path("mesh")) == read_file(path("a.vtp")));
@@ -82,6 +82,64 @@ TEST_F(Extract, EveryFormatIsAsLongAsPredicted) {
                   0.25 * bytes)
           << format << ' ' << normals;
     }
+}
+
+TEST_F(Extract, NormalsAreTheDefaultWhereTheFormatHoldsThem) {
+  const std::string store = make_store("a");
+  const auto mesh = [&](const std::string& name, const Arguments& more) {
+    Arguments arguments{"extract", store, "--isovalue", "127.5"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    arguments.insert(arguments.end(), {"-o", path(name), "--force"});
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return read_file(path(name));
+  };
+  for (const std::string name : {"a.ply", "a.obj", "a.glb", "a.vtp"}) {
+    const std::string plain = mesh(name, {}), gradient = mesh(name, {"--normals", "gradient"});
+    EXPECT_TRUE(plain == gradient) << name;
+    EXPECT_TRUE(mesh(name, {"--normals"}) == gradient) << name;
+    EXPECT_LT(mesh(name, {"--normals", "none"}).size(), gradient.size()) << name;
+    EXPECT_EQ(mesh(name, {"--normals=none"}), mesh(name, {"--normals", "none"})) << name;
+  }
+  EXPECT_TRUE(mesh("a.stl", {}) == mesh("a.stl", {"--normals", "none"}));
+  // Bare, it may stand anywhere.
+  EXPECT_EQ(
+      run({"extract", "--normals", store, "--isovalue", "127.5", "-o", path("b.ply")}).exit_code,
+      0);
+  expect_refused(
+      run({"extract", store, "--isovalue", "127.5", "--normals=flat", "-o", path("c.ply")}), 2,
+      {"--normals", "'flat'", "gradient or none"});
+}
+
+// The triangles of an STL or a picture share no vertices, so that no file has a number of them.
+TEST_F(Extract, VerticesAreCountedWhereTheFileHasThem) {
+  const std::string store = make_store("a");
+  const auto surface = [&](const Arguments& more) {
+    Arguments arguments{"extract", store, "--isovalue", "127.5", "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(run(arguments).out.find("vertices") != std::string::npos,
+              !run_json(arguments)["surfaces"][0]["vertices"].is_null());
+    return run_json(arguments)["surfaces"][0];
+  };
+  const nlohmann::json ply = surface({"-o", path("a.ply")}), stl = surface({"-o", path("a.stl")});
+  EXPECT_TRUE(ply["vertices"].is_number());
+  EXPECT_TRUE(stl["vertices"].is_null());
+  EXPECT_TRUE(surface({"-o", path("a.stl"), "--estimate"})["vertices"].is_null());
+  EXPECT_TRUE(surface({"-o", path("a.ply"), "--estimate"})["vertices"].is_number());
+  EXPECT_EQ(stl["triangles"], ply["triangles"]);
+}
+
+TEST_F(Extract, APreviewCountsAsTheMeshDoes) {
+  const std::string store = make_store("a");
+  const Arguments preview{"extract",   store,         "--isovalue", "127.5",
+                          "--preview", path("a.png"), "--force"};
+  Arguments both = preview;
+  both.insert(both.end(), {"-o", path("a.ply")});
+  const nlohmann::json picture = run_json(preview)["surfaces"][0],
+                       mesh = run_json(both)["surfaces"][0];
+  EXPECT_EQ(picture["triangles"], mesh["triangles"]);
+  EXPECT_EQ(picture["bricks"], mesh["bricks"]);
+  EXPECT_TRUE(picture["vertices"].is_null());
 }
 
 TEST_F(Extract, NormalsEnlargeTheVertices) {

@@ -1,0 +1,87 @@
+#include <fmt/format.h>
+
+#include "tests/tools/program.h"
+
+// Errors end in what to type next.
+namespace isobrick::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Advice = ProgramTest;
+
+TEST_F(Advice, OfAStoreThatIsNotThere) {
+  const std::string store = path("no.zarr");
+  for (const Arguments& arguments :
+       {Arguments{"info", store}, Arguments{"verify", store}, Arguments{"index", store},
+        Arguments{"export", store, path("a.raw")},
+        Arguments{"extract", store, "--isovalue", "1", "-o", path("a.ply")}})
+    expect_refused(run(arguments), 1,
+                   {"'" + store + "' is no store: nothing has that name",
+                    "isobrick convert VOLUME " + store + "\n"});
+  fs::create_directory(store + ".partial");
+  expect_refused(run({"info", store}), 1,
+                 {"was interrupted", "isobrick convert VOLUME " + store + " --resume\n"});
+  EXPECT_EQ(files(), Arguments{"no.zarr.partial"});
+}
+
+TEST_F(Advice, SaysWhatTheFileIs) {
+  const auto refused = [&](const std::string& name, std::initializer_list<std::string> parts) {
+    expect_refused(run({"info", path(name)}), 1, parts);
+  };
+  write_file(path("a.raw"), "abc");
+  refused("a.raw",
+          {"it is a raw file", fmt::format("isobrick convert {} {} --dims X,Y,Z --type TYPE\n",
+                                           path("a.raw"), path("a.zarr"))});
+  write_file(path("a_1x1x3_uint8.raw"), "abc");
+  refused("a_1x1x3_uint8.raw", {fmt::format(" {}\n", path("a_1x1x3_uint8.zarr"))});
+  write_file(path("my scan.nrrd"), "NRRD0004\n");
+  refused("my scan.nrrd",
+          {"it is a NRRD file", fmt::format("isobrick convert '{}' '{}'\n", path("my scan.nrrd"),
+                                            path("my scan.zarr"))});
+  write_file(path("a.h5"), "\x89HDF\r\n\x1a\n");
+  refused("a.h5", {"it is an HDF5 file"});
+  write_file(path("a.ply"), "ply\n");
+  refused("a.ply", {"it is a mesh",
+                    fmt::format("isobrick render {} -o {}\n", path("a.ply"), path("a.png"))});
+  fs::create_directory(path("slices"));
+  refused("slices", {"a folder without Zarr's metadata",
+                     fmt::format("isobrick convert {} {}\n", path("slices"), path("slices.zarr"))});
+  const std::string store = make_store("slices/a");
+  refused("slices", {"a folder that holds Zarr", "name that, such as " + store});
+}
+
+TEST_F(Advice, OfRangesThatAreMissing) {
+  const std::string store = make_store("a");
+  // Without its attributes it is an image of another program.
+  nlohmann::json group = nlohmann::json::parse(read_file(store + "/zarr.json"));
+  group["attributes"].erase("isobrick");
+  write_file(store + "/zarr.json", group.dump());
+  fs::remove_all(store + "/isobrick");
+  const Arguments extract{"extract", store, "--isovalue", "127.5", "-o", path("a.ply")};
+  expect_refused(run(extract), 1, {"has no ranges yet", "run: isobrick index " + store + "\n"});
+  EXPECT_NE(run({"info", store}).out.find("run: isobrick index " + store + "\n"),
+            std::string::npos);
+  Arguments by_index = extract;
+  by_index.insert(by_index.end(), {"--index", "kdtree"});
+  expect_refused(run(by_index), 2, {"run: isobrick index " + store + " --kind kdtree\n"});
+  // The line does what it promises; octree is the default.
+  EXPECT_EQ(run_json({"index", store})["kind"], "octree");
+  EXPECT_EQ(run(extract).exit_code, 0);
+}
+
+TEST_F(Advice, OfAnIsovalueThatNoSampleReaches) {
+  write_file(path("a_2x2x2_int16.raw"), noise(16));
+  const std::string store = path("a.zarr");
+  ASSERT_EQ(run({"convert", path("a_2x2x2_int16.raw"), store}).exit_code, 0);
+  const nlohmann::json range = run_json({"info", store})["value_range"];
+  const Outcome outcome = run({"extract", store, "--isovalue", "40000", "-o", path("a.ply")});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err,
+            "isovalue 40000: the surface is empty; the samples of level 0 lie within " +
+                std::to_string(range[0].get<int>()) + " and " +
+                std::to_string(range[1].get<int>()) + "\n");
+}
+
+}  // namespace
+}  // namespace isobrick::test
