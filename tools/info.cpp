@@ -231,6 +231,8 @@ void add_info(Program& program) {
   add_selection(app, arguments->selection);
   program.commands.push_back(
       {app, [arguments](Console& console) {
+         check_store(arguments->path);
+         if (list_volumes(arguments->path, arguments->selection, console)) return 0;
          const StoreReader store = open_store(arguments->path, arguments->selection);
          const Facts facts = gather(store, console.progress());
          console.result(json_of(store.info(), facts), text_of(store.info(), facts));
