@@ -22,8 +22,16 @@ install(DIRECTORY isobrick/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/isobrick
   FILES_MATCHING PATTERN "*.h")
 install(EXPORT isobrick_targets NAMESPACE isobrick:: DESTINATION ${isobrick_package_dir})
 
+# The CUDA runtime that the libraries were built with, so that programs of others need no toolkit.
+if(ISOBRICK_CUDA)
+  get_target_property(cudart CUDA::cudart_static IMPORTED_LOCATION)
+  install(FILES ${cudart} DESTINATION ${CMAKE_INSTALL_LIBDIR}/isobrick)
+endif()
+string(REPLACE "isobrick_" "" isobrick_components "${libraries}")
+
 configure_package_config_file(cmake/isobrick-config.cmake.in
-  ${PROJECT_BINARY_DIR}/isobrick-config.cmake INSTALL_DESTINATION ${isobrick_package_dir})
+  ${PROJECT_BINARY_DIR}/isobrick-config.cmake INSTALL_DESTINATION ${isobrick_package_dir}
+  PATH_VARS CMAKE_INSTALL_LIBDIR)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/isobrick-config-version.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/isobrick-config.cmake

@@ -1,6 +1,7 @@
-# cmake -D BUILD=… -D PROJECT=… -D WORK=… -D COMPILER=… -D FLAGS=… -D GENERATOR=… -P check_install.cmake
-# Installs the build tree into a fresh prefix, then configures, builds and runs
-# the consumer against it.
+# cmake -D BUILD=… -D PROJECT=… -D WORK=… -D COMPILER=… -D FLAGS=… -D MODULES=… -D GENERATOR=…
+#       -P check_install.cmake
+# Installs the build tree into a fresh prefix, then configures, builds and runs the consumer
+# against it, where no library of windows, OpenGL or CUDA is found.
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT result EQUAL 0)
@@ -9,10 +10,31 @@ function(run)
   endif()
 endfunction()
 
+cmake_minimum_required(VERSION 3.25)
+separate_arguments(MODULES)
 file(REMOVE_RECURSE ${WORK})
-run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
+set(prefix ${WORK}/prefix)
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
 run(${CMAKE_COMMAND} -S ${PROJECT} -B ${WORK}/build -G ${GENERATOR}
-  -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_FLAGS=${FLAGS} -DCMAKE_PREFIX_PATH=${WORK}/prefix)
+  -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_FLAGS=${FLAGS} -DCMAKE_PREFIX_PATH=${prefix}
+  -DCMAKE_DISABLE_FIND_PACKAGE_glm=ON -DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON
+  -DCMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=ON)
 run(${CMAKE_COMMAND} --build ${WORK}/build)
-run(${WORK}/build/consumer ${WORK})
+run(${WORK}/build/consumer ${WORK} ${MODULES})
+
+# The program goes with its modules, wherever they are moved.
+file(RENAME ${prefix} ${WORK}/moved)
+run(${WORK}/moved/bin/isobrick synth sphere ${WORK}/a.zarr --dims 20,20,20 --type u8)
+if("openvdb" IN_LIST MODULES)
+  run(${WORK}/moved/bin/isobrick export ${WORK}/a.zarr ${WORK}/a.vdb)
+endif()
+
+# Modules of the build tree are not taken in place of those that have gone.
+if(MODULES)
+  execute_process(COMMAND ${WORK}/build/consumer ${WORK} ${MODULES} RESULT_VARIABLE result
+    ERROR_VARIABLE output OUTPUT_QUIET)
+  if(result EQUAL 0 OR NOT output MATCHES "install isobrick as a whole")
+    message(FATAL_ERROR "a module that is not installed was loaded: ${result} ${output}")
+  endif()
+endif()
 file(REMOVE_RECURSE ${WORK})
