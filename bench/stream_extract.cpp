@@ -9,6 +9,7 @@
 // with reading and decoding alone, so that what the machine does meanwhile meets both alike, and
 // medians are compared. --check compares the mesh with the CPU's by a hash. With --cold
 // the store is dropped from the page cache before each extraction, and before the reads alone.
+// Built as bench/README.md says.
 
 #include <fcntl.h>
 #include <fmt/format.h>

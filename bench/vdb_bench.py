@@ -79,7 +79,7 @@ vdb.write({str(path)!r}, [grid])"""], check=True)
             peer.append(measure([PYTHON, "-c", PEER_DENSE, path]))
         for _ in range(count):
             (folder / "m.ply").unlink(missing_ok=True)
-            meshes.append(measure([program, "extract", store, "--isovalue", 0, "-o", folder / "m.ply"]))
+            meshes.append(measure([program, "extract", store, "--isovalue", 0, "-o", folder / "m.ply", "--normals", "none"]))
             whole = measure([PYTHON, "-c", PEER_MESH, path])
             inside = [float(word) for word in whole[3].split()]
             peer_meshes.append((inside[0], inside[1], whole[2], inside[3]))

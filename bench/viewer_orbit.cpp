@@ -7,6 +7,7 @@
 //   bench_viewer_orbit g.zarr --isovalue 127.5 --to 140
 //
 // Pictures follow each other at once; a picture's time ends with glFinish.
+// Built as bench/README.md says.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>

@@ -11,6 +11,7 @@
 // room for one more that waits for its turn. A frame is what input waits for: a whole picture while
 // something moves, otherwise a piece of one or what is done between two; those of less than a
 // millisecond do not count.
+// Built as bench/README.md says.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>

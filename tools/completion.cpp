@@ -255,8 +255,10 @@ void add_completion(Program& program) {
   CLI::App* app = add_subcommand(
       program, "completion", "Print the completion script of a shell.",
       "source <(isobrick completion bash)   # in ~/.bashrc\n"
-      "  isobrick completion zsh > ~/.zfunc/_isobrick   # with fpath+=(~/.zfunc) before compinit\n"
-      "  isobrick completion fish > ~/.config/fish/completions/isobrick.fish");
+      "  mkdir -p ~/.zfunc && isobrick completion zsh > ~/.zfunc/_isobrick   # zsh: with "
+      "fpath+=(~/.zfunc) before compinit\n"
+      "  mkdir -p ~/.config/fish/completions && isobrick completion fish > "
+      "~/.config/fish/completions/isobrick.fish");
   add_text(app, {"SHELL", "bash|zsh|fish", "Which shell", "", true},
            [shell](const std::string& text) { *shell = text; });
   program.commands.push_back({app, [shell, &program](Console& console) {

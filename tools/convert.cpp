@@ -66,7 +66,7 @@ void add_convert(Program& program) {
   CLI::App* app = add_subcommand(
       program, "convert", "Turn a volume into a store, within a memory budget.",
       "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
-      "  isobrick convert engine_256x256x128_uint8.raw engine.zarr   # the name says it all");
+      "  isobrick convert head_64x64x93_int16.raw ct.zarr   # the name says it all");
   add_path(app, "IN", arguments->in,
            "Volume of a known format, FILE:/NAME for an array in it, folder of slices, Zarr, raw "
            "file, or - for raw samples on standard input");

@@ -115,7 +115,7 @@ void add_export(Program& program) {
       program, "export",
       "Write the samples of a store as a file, or its isosurface as an OpenVDB level set.",
       "isobrick export head.zarr jaw.nrrd --roi :,:,0:40\n"
-      "  isobrick export head.zarr skull.vdb --isovalue 700");
+      "  isobrick export head.zarr skull.vdb --isovalue 1150");
   add_path(app, "STORE", arguments->store, "Store to read");
   add_path(app, "OUT", arguments->out,
            "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb; raw if in .raw, .bin or "

@@ -34,11 +34,11 @@ std::unique_ptr<MeshSink> open_preview(const std::string&, bool, const PreviewOp
 std::uint64_t preview_memory(const PreviewOptions&) { refuse("--preview"); }
 
 void add_render(Program& program) {
-  add_refused(program, "render", "Draw mesh files", "isobrick render bone.ply -o bone.png");
+  add_refused(program, "render", "Draw mesh files", "isobrick render head_500.ply -o head.png");
 }
 
 void add_view(Program& program) {
-  add_refused(program, "view", "Look at a store", "isobrick view engine.zarr");
+  add_refused(program, "view", "Look at a store", "isobrick view head.zarr");
 }
 
 }  // namespace isobrick::tools

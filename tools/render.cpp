@@ -83,9 +83,10 @@ void add_overlay_options(CLI::App* app, MeshPictureRequest& request) {
 void add_render(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   MeshPictureRequest& request = arguments->request;
-  CLI::App* app = add_subcommand(program, "render", "Draw mesh files of any size into a picture.",
-                                 "isobrick render skin.ply bone.ply --opacity 0.3 --camera "
-                                 "azimuth=40,elevation=15 -o head.png");
+  CLI::App* app =
+      add_subcommand(program, "render", "Draw mesh files of any size into a picture.",
+                     "isobrick render head_500.ply head_1150.ply --opacity 0.3 --camera "
+                     "azimuth=40,elevation=15 -o head.png");
   add_paths(app, "MESH", arguments->meshes, "Meshes to draw: PLY, STL, GLB or OBJ");
   add_text(app, {"-o,--output", "PNG", "Picture to write, - for standard output", "", true},
            [&output = arguments->output](const std::string& text) { output = text; });

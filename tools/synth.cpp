@@ -105,7 +105,7 @@ void add_synth(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(program, "synth",
                                  "Make a procedural volume of any size, the same on every machine.",
-                                 "isobrick synth gyroid gyroid.zarr --dims 512,512,512 --type u8");
+                                 "isobrick synth gyroid gyroid.zarr --dims 256,256,256 --type u8");
   add_text(app, {"KIND", "sphere|gyroid|marschner-lobb|mixing", "Which field", "", true},
            [&kind = arguments->synth.kind](const std::string& text) { kind = parse_kind(text); });
   add_path(app, "OUT", arguments->out, "Store to write, or a raw file if it ends in .raw");

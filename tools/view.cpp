@@ -215,7 +215,7 @@ void add_view(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
       program, "view", "Look at a store: move the isovalue, fly through it, take pictures.",
-      "isobrick view engine.zarr --isovalue 90");
+      "isobrick view head.zarr --isovalue 500");
   add_path(app, "STORE", arguments->store, "Store to look at");
   add_repeated(app, {"--isovalue", "V", "Surface to begin with; may be repeated", "in the middle"},
                [&values = arguments->isovalues](const std::string& text) {

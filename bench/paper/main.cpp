@@ -7,6 +7,7 @@
 //
 //   bench_paper --data FOLDER > paper.jsonl
 //   bench_paper --gyroid 512 --frequency 1        # one volume, 1 % of its cells active
+// Built as bench/README.md says.
 
 #include <fmt/format.h>
 

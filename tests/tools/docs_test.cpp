@@ -1,0 +1,166 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+
+#include "tests/tools/program.h"
+
+// Every command line of README, of --help and of the quickstart runs from top to bottom in one
+// folder, with relative names, on the volume that comes with the sources.
+namespace isobrick::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+bool calls_isobrick(const std::string& line) {
+  return line.starts_with("isobrick ") || line.find("| isobrick ") != std::string::npos ||
+         line.find("<(isobrick ") != std::string::npos ||
+         line.find("&& isobrick ") != std::string::npos;
+}
+
+/// The spans between backquotes in a line of Markdown.
+std::vector<std::string> spans_of(const std::string& line) {
+  std::vector<std::string> spans;
+  for (auto begin = line.find('`'); begin != std::string::npos;) {
+    const auto end = line.find('`', begin + 1);
+    if (end == std::string::npos) break;
+    std::string span = line.substr(begin + 1, end - begin - 1);
+    if (const auto bar = span.find("\\|"); bar != std::string::npos) span.erase(bar, 1);
+    spans.push_back(span);
+    begin = line.find('`', end + 1);
+  }
+  return spans;
+}
+
+/// Command lines of a Markdown file in their order: whole lines of its blocks, spans elsewhere.
+std::vector<std::string> commands_of_markdown(const std::string& text) {
+  std::vector<std::string> commands;
+  bool in_block = false;
+  for (const std::string& line : lines_of(text)) {
+    if (line.starts_with("```")) {
+      in_block = !in_block;
+    } else if (in_block) {
+      if (calls_isobrick(line) || line.starts_with("zstd ")) commands.push_back(line);
+    } else {
+      for (const std::string& span : spans_of(line))
+        if (calls_isobrick(span) && span != "isobrick completion --help") commands.push_back(span);
+    }
+  }
+  return commands;
+}
+
+class Docs : public ProgramTest {
+ protected:
+  void SetUp() override {
+    if (!available("zstd")) GTEST_SKIP() << "no zstd";
+    fs::create_directory(path("data"));
+    fs::copy(fs::path(ISOBRICK_SOURCE) / "data", path("data"));
+    has_pictures_ = run({"help", "view"}).out.find("not in this program") == std::string::npos;
+  }
+
+  /// Runs a line as a user's shell does, in the scratch folder.
+  void expect_runs(std::string line) const {
+    SCOPED_TRACE(line);
+    line = line.substr(0, line.find(" #"));
+    const bool draws = line.find("isobrick render") != std::string::npos ||
+                       line.find("isobrick view") != std::string::npos ||
+                       line.find("--preview") != std::string::npos;
+    if (draws && !has_pictures_) return;
+    if (line.find("man -l") != std::string::npos && !available("man")) return;
+    // There is no display here.
+    if (line.starts_with("isobrick view") && line.find(" --screenshot") == std::string::npos)
+      line.insert(line.find(" --isovalue"), " --screenshot view.png");
+    const std::string folder = path("");
+    const Outcome outcome =
+        run_process({"env", fmt::format("HOME={}", folder), "bash", "-o", "pipefail", "-c",
+                     fmt::format("cd '{}'; PATH='{}':$PATH; {}", folder,
+                                 fs::path(ISOBRICK_PROGRAM).parent_path().string(), line)});
+    if (outcome.err.find("built without") != std::string::npos) return;
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+
+  void unpack(const std::string& name) const {
+    expect_runs("zstd -dq data/headsq_quarter_64x64x93_int16.raw.zst -o " + name);
+  }
+
+ private:
+  bool has_pictures_ = true;
+};
+
+TEST_F(Docs, LinesOfTheReadmeRun) {
+  const auto commands = commands_of_markdown(read_file(fs::path(ISOBRICK_SOURCE) / "README.md"));
+  ASSERT_GT(commands.size(), 20u);
+  std::set<std::string> subcommands;
+  for (const std::string& command : commands) {
+    expect_runs(command);
+    const std::string rest = command.substr(command.find("isobrick ") + 9);
+    subcommands.insert(rest.substr(0, rest.find(' ')));
+  }
+  for (const char* name : {"convert", "info", "extract", "render", "view", "index", "export",
+                           "verify", "synth", "man", "completion"})
+    EXPECT_TRUE(subcommands.contains(name)) << name;
+  EXPECT_TRUE(fs::exists(path("skull.pvtp")));
+}
+
+TEST_F(Docs, ExamplesOfHelpRun) {
+  unpack("head.raw");
+  unpack("head_64x64x93_int16.raw");
+  for (const char* command : {"convert", "info", "index", "verify", "extract", "export", "render",
+                              "view", "synth", "completion", "man", "help"}) {
+    const std::string help = run({"help", command}).out;
+    int examples = 0;
+    const auto begin = help.find("Example:\n");
+    ASSERT_NE(begin, std::string::npos) << command;
+    for (std::string line : lines_of(help.substr(begin))) {
+      line.erase(0, line.find_first_not_of(' '));
+      if (!calls_isobrick(line)) continue;
+      expect_runs(line);
+      ++examples;
+    }
+    EXPECT_GT(examples, 0) << command;
+  }
+}
+
+// What scripts/quickstart says after it has made its store.
+TEST_F(Docs, NextLinesOfTheQuickstartRun) {
+  unpack("head_64x64x93_int16.raw");
+  expect_runs("mkdir -p out && isobrick convert head_64x64x93_int16.raw out/head.zarr");
+  int commands = 0;
+  for (std::string line : lines_of(read_file(fs::path(ISOBRICK_SOURCE) / "scripts/quickstart"))) {
+    if (!line.starts_with("  $isobrick ")) continue;
+    line.replace(0, 11, "isobrick");
+    for (auto at = line.find("$out"); at != std::string::npos; at = line.find("$out"))
+      line.replace(at, 4, "out");
+    expect_runs(line);
+    ++commands;
+  }
+  EXPECT_GE(commands, 3);
+}
+
+TEST_F(Docs, BenchesSayHowTheyAreBuilt) {
+  int benches = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(ISOBRICK_SOURCE) / "bench")) {
+    if (entry.path().extension() != ".cpp") continue;
+    const std::string text = read_file(entry.path());
+    if (text.find("int main(") == std::string::npos &&
+        text.find("guarded_main(") == std::string::npos)
+      continue;
+    EXPECT_NE(text.find("bench/README.md"), std::string::npos) << entry.path();
+    ++benches;
+  }
+  EXPECT_GE(benches, 8);
+  EXPECT_NE(
+      read_file(fs::path(ISOBRICK_SOURCE) / "bench/README.md").find("-DISOBRICK_BUILD_BENCH=ON"),
+      std::string::npos);
+}
+
+}  // namespace
+}  // namespace isobrick::test
