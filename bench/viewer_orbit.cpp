@@ -76,21 +76,21 @@ class Flight {
             (0.5 - 0.5 * std::cos(part * kTurn)) * (arguments_.to - arguments_.isovalue);
       Stopwatch watch;
       const double submitted =
-          draw({.coarser = pacer_.coarser(),
+          draw({.max_triangles = pacer_.max_triangles(),
                 .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no,
                 .patience_seconds = kPatienceSeconds},
                pacer_.smaller());
       const double seconds = watch.lap();
       const PictureState& state = picture_->state();
-      pictures.push_back({seconds * 1e3, pacer_.coarser(), pacer_.smaller(), pacer_.plain(),
+      pictures.push_back({seconds * 1e3, pacer_.max_triangles(), pacer_.smaller(), pacer_.plain(),
                           state.nodes, state.triangles, state.covers});
-      pacer_.drawn(seconds);
+      pacer_.drawn(seconds, state.triangles, state.limited);
       times.add(seconds, picture_->times(), seconds - submitted);
       spent += seconds;
     }
     Json result = times.summary();
     if (arguments_.pictures)
-      result["pictures_ms_coarser_smaller_plain_nodes_triangles_covers"] = pictures;
+      result["pictures_ms_max_smaller_plain_nodes_triangles_covers"] = pictures;
     return result;
   }
 
@@ -112,7 +112,7 @@ class Flight {
       all += step;
       if (!picture_->scene().stream().idle()) until_there = all;
       if (picture_->drew() && !picture_->state().plain)
-        pacer_.drawn_still(picture_->picture_seconds());
+        pacer_.drawn_still(picture_->picture_seconds(), picture_->state().triangles);
     } while (!picture_->state().complete || picture_->state().plain);
     return {{"seconds", all},
             {"seconds_until_meshes_are_there", until_there},

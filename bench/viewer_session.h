@@ -116,9 +116,9 @@ class Session {
     const double whole = std::max(seconds, picture_->picture_seconds());
     (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
     if (moving)
-      pacer_.drawn(whole);
+      pacer_.drawn(whole, state.triangles, state.limited);
     else if (!state.plain)
-      pacer_.drawn_still(whole);
+      pacer_.drawn_still(whole, state.triangles);
   }
 
   const Arguments& arguments_;

@@ -10,6 +10,10 @@ namespace {
 
 /// By how much cells count as longer in nodes that were refined before.
 constexpr double kHysteresis = 1.3;
+/// The part of a budget that nodes which lose thin structure get before all others.
+constexpr double kThinPart = 0.5;
+/// Refinements that did not fit into the budget, after which no smaller one is looked for.
+constexpr int kMaxMisfits = 64;
 
 /// A node that may be refined. The greatest is the next.
 struct Candidate {
@@ -22,6 +26,25 @@ struct Candidate {
     };
     return order(a) < order(b);
   }
+};
+
+/// Candidates, those that lose thin structure apart.
+class Candidates {
+ public:
+  void push(const Candidate& candidate, bool loses) { (loses ? losing_ : others_).push(candidate); }
+  bool empty() const { return losing_.empty() && others_.empty(); }
+  /// `thin_first`: one that loses thin structure, if there is any.
+  NodeKey pop(bool thin_first) {
+    const bool thin = !losing_.empty() &&
+                      (thin_first || others_.empty() || others_.top() < losing_.top());
+    auto& queue = thin ? losing_ : others_;
+    const NodeKey key = queue.top().key;
+    queue.pop();
+    return key;
+  }
+
+ private:
+  std::priority_queue<Candidate> losing_, others_;
 };
 
 constexpr int kAround = 27;  ///< a node and its neighbours; bit (z + 1) · 9 + (y + 1) · 3 + x + 1
@@ -66,6 +89,12 @@ double CutSelector::urgency(const NodeKey& n, const NodeSight& sight, const Acti
   const bool before = before_(n) != 0;
   if (!(before ? sight.nearly_visible : sight.visible) || !active.below(n)) return 0;
   return sight.pixels * (before ? kHysteresis : 1);
+}
+
+bool CutSelector::loses(const NodeKey& n, const ActiveNodes& active) const {
+  const std::vector<double>& isovalues = active.isovalues();
+  return std::any_of(isovalues.begin(), isovalues.end(),
+                     [&](double iso) { return tree_.loses(n, iso); });
 }
 
 double CutSelector::triangles(const NodeKey& n, const NodeView& view,
@@ -116,14 +145,14 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   const NodeView node_view(view, grid);
   std::swap(refined_, before_);
   refined_.clear();
-  std::priority_queue<Candidate> queue;
+  Candidates queue;
   const double most =
       static_cast<double>(std::min(budget.triangles, budget.mesh_bytes / kBytesPerTriangle));
   double used = 0;
   const auto enter = [&](const NodeKey& n) {
-    if (n.level == 0) return;
+    if (n.level <= view.finest_level) return;
     const double pixels = urgency(n, node_view.see(n), active);
-    if (pixels > view.pixel_error) queue.push({pixels, n});
+    if (pixels > view.pixel_error) queue.push({pixels, n}, loses(n, active));
   };
   const int top = grid.levels() - 1;
   const Box3 top_nodes{{0, 0, 0}, grid.level(top).nodes};
@@ -135,9 +164,8 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   Cut cut;
   cut.isovalues = isovalues;
   std::vector<NodeKey> needed;
-  while (!queue.empty()) {
-    const NodeKey n = queue.top().key;
-    queue.pop();
+  for (int misfits = 0; misfits < kMaxMisfits && !queue.empty();) {
+    const NodeKey n = queue.pop(used < kThinPart * most);
     if (refined_(n)) continue;
     needed.clear();
     collect(n, needed);
@@ -145,7 +173,8 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
     const double more = added_triangles(needed, node_view, isovalues, budget.triangles_per_block);
     if (used + more > most) {
       cut.limited_by_budget = true;
-      break;
+      ++misfits;
+      continue;
     }
     used += more;
     for (const NodeKey& r : needed) {

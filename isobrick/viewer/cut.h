@@ -53,11 +53,13 @@ class CutSelector {
 
   /// The cut for a view: nodes are refined, the longest cells on the picture first,
   /// while these are longer than the view's pixel error, visible, and not without
-  /// any surface (of active.isovalues()) below, and while the budget lasts. A function
-  /// of its arguments and of the cut before.
+  /// any surface (of active.isovalues()) below, and while the budget lasts. Up to half of the
+  /// budget goes first to nodes that lose thin structure (NodeTree::loses). A function of its
+  /// arguments and of the cut before.
   Cut select(const ActiveNodes& active, const View& view, const CutBudget& budget);
 
  private:
+  bool loses(const NodeKey& n, const ActiveNodes& active) const;
   double urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active);
   double triangles(const NodeKey& n, const NodeView& view, std::span<const double> isovalues,
                    double per_block) const;

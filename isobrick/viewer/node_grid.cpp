@@ -145,4 +145,18 @@ Box3 NodeGrid::samples(const NodeKey& n) const {
   return box;
 }
 
+Box3 NodeGrid::samples_within(const NodeKey& n, int v) const {
+  Box3 box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index step = level(v).step[axis], first = n.node[axis] * kNodeEdge;
+    const Index begin = position(n.level, axis, first);
+    const Index end = position(n.level, axis, first + kNodeEdge);
+    const Between lo = between(v, axis, begin / step);
+    const Between hi = between(v, axis, (end + step - 1) / step);
+    box.lo[axis] = lo.first + (lo.weight > 0 ? 1 : 0);
+    box.hi[axis] = std::max(hi.first, box.lo[axis]) + 1;
+  }
+  return box;
+}
+
 }  // namespace isobrick

@@ -109,6 +109,8 @@ class NodeGrid {
 
   /// Samples of the stored level that the node's values come from.
   Box3 samples(const NodeKey& n) const;
+  /// Samples of level v's stored level that lie within a node of another one.
+  Box3 samples_within(const NodeKey& n, int v) const;
 
   /// Between which stored samples the value at a grid point lies: `first` and
   /// the next one, the part `weight` of the way. weight is 0 where it is a sample.

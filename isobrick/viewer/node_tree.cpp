@@ -49,6 +49,8 @@ NodeTree::NodeTree(const BrickSource& source) : grid_(source.info()) {
   for (int v = 0; v < grid_.levels(); ++v) {
     const Int3 all = grid_.level(v).nodes;
     nodes_.emplace_back(static_cast<std::size_t>(volume(all)));
+    parts_.emplace_back(
+        v > 0 ? static_cast<std::size_t>(volume(grid_.level(parts_level(v)).nodes)) : 0);
     for_each_point({{0, 0, 0}, ceil_div(all, {kGroup, kGroup, kGroup})}, [&](Int3 g) {
       groups.emplace_back(v,
                           intersect({g * kGroup, (g + Int3{1, 1, 1}) * kGroup}, {{0, 0, 0}, all}));
@@ -69,6 +71,7 @@ void NodeTree::read_nodes(const BrickSource& source, int v, Box3 nodes) {
     const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(v).nodes));
     nodes_[static_cast<std::size_t>(v)][i] =
         summary(table, blocks_of(grid_.samples({v, p}), blocks), blocks_in({v, p}));
+    if (v > 0) read_parts(table, {v, p}, blocks);
   });
 }
 
@@ -101,6 +104,26 @@ NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks, std::uint
   return node;
 }
 
+/// Positions of the nodes of parts_level() within a node.
+Box3 NodeTree::parts_of(const NodeKey& n) const {
+  Box3 parts = grid_.children(n);
+  if (n.level < 2) return parts;
+  const Int3 ratio = grid_.ratio(n.level - 2);
+  return intersect({parts.lo * ratio, parts.hi * ratio},
+                   {{0, 0, 0}, grid_.level(n.level - 2).nodes});
+}
+
+void NodeTree::read_parts(const RangeTable& table, const NodeKey& n, Int3 all_blocks) {
+  const int level = parts_level(n.level);
+  for_each_point(parts_of(n), [&](Int3 p) {
+    ValueRange<double> range;
+    for_each_point(blocks_of(grid_.samples_within({level, p}, n.level), all_blocks),
+                   [&](Int3 b) { range.include(table.at(b)); });
+    parts_[static_cast<std::size_t>(n.level)]
+          [static_cast<std::size_t>(linear_index(p, grid_.level(level).nodes))] = outwards(range);
+  });
+}
+
 void NodeTree::merge_below(int v) {
   const Int3 all = grid_.level(v).nodes;
   std::size_t i = 0;
@@ -120,6 +143,18 @@ bool NodeTree::active_below(const NodeKey& n, double isovalue) const {
   return at(n).below.stabbed_by(isovalue);
 }
 
+bool NodeTree::loses(const NodeKey& n, double isovalue) const {
+  if (n.level == 0 || !active_below(n, isovalue)) return false;
+  const int level = parts_level(n.level);
+  const auto& parts = parts_[static_cast<std::size_t>(n.level)];
+  bool lost = false;
+  for_each_point(parts_of(n), [&](Int3 p) {
+    const auto i = static_cast<std::size_t>(linear_index(p, grid_.level(level).nodes));
+    lost |= !parts[i].stabbed_by(isovalue) && active_below({level, p}, isovalue);
+  });
+  return lost;
+}
+
 bool NodeTree::may_hold_surface(const NodeKey& n, double isovalue, std::uint32_t coarser) const {
   if (active(n, isovalue)) return true;
   for (int i = 0; i < kDirections; ++i)
@@ -137,6 +172,7 @@ int NodeTree::active_blocks(const NodeKey& n, double isovalue) const {
 std::uint64_t NodeTree::bytes() const {
   std::uint64_t bytes = 0;
   for (const auto& level : nodes_) bytes += level.capacity() * sizeof(Node);
+  for (const auto& level : parts_) bytes += level.capacity() * sizeof(ValueRange<float>);
   return bytes;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -12,7 +13,7 @@
 
 namespace isobrick {
 
-/// The nodes of all levels with their ranges: some 32 bytes for each 64³ cells.
+/// The nodes of all levels with their ranges: some 56 bytes for each 64³ cells.
 /// Immutable and so thread-safe once it is made.
 class NodeTree {
  public:
@@ -29,6 +30,10 @@ class NodeTree {
   /// Whether its surface may hold anything when the neighbours in `coarser`
   /// (directions) lie one level above: a face takes their values.
   bool may_hold_surface(const NodeKey& n, double isovalue, std::uint32_t coarser) const;
+
+  /// Whether a finer level crosses the isovalue within a part of the node, a 64th (of level 1: an
+  /// eighth), where the node's own field does not: thin structure that averaging has removed.
+  bool loses(const NodeKey& n, double isovalue) const;
 
   /// About how many of the node's blocks of 16³ cells are active (never fewer
   /// than there are).
@@ -59,7 +64,14 @@ class NodeTree {
   static double part(const Node& node, double value);
 
   NodeGrid grid_;
+  /// The level of the nodes within which a level's own field is known beside its own nodes.
+  static int parts_level(int v) { return std::max(v - 2, 0); }
+  Box3 parts_of(const NodeKey& n) const;
+  void read_parts(const RangeTable& table, const NodeKey& n, Int3 all_blocks);
+
   std::vector<std::vector<Node>> nodes_;  ///< by level, x fastest
+  /// By level, from 1 on: the range of its field within each node of parts_level().
+  std::vector<std::vector<ValueRange<float>>> parts_;
 };
 
 }  // namespace isobrick

@@ -2,17 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <utility>
 
 namespace isobrick {
 
-/// Keeps pictures fluent while something moves by asking for simpler ones: first
-/// without occlusion and multisampling, then with cells up to four times as long, then
-/// smaller, which is what helps where OpenGL is software, at last with cells still
-/// longer. Where a device draws, with much longer cells before smaller: it gets other memory for
-/// another size, which takes longer than a picture may. Not thread-safe.
+/// Keeps pictures fluent while something moves by asking for previews: first without occlusion and
+/// multisampling, then with as many triangles as there is time for, then smaller, which is what
+/// helps where OpenGL is software, at last with still fewer triangles. Where a device draws, all
+/// that comes before smaller ones: it gets other memory for another size, which takes longer than
+/// a picture may. Not thread-safe.
 class FramePacer {
  public:
+  static constexpr std::uint64_t kAllTriangles = std::numeric_limits<std::uint64_t>::max();
+
   /// `target`: how long a picture may take while something moves, seconds.
   explicit FramePacer(double target = 1.0 / 20) : target_(target) {}
 
@@ -21,34 +25,36 @@ class FramePacer {
   static FramePacer for_device(bool software) {
     FramePacer pacer(software ? 1.0 / 20 : 1.0 / 80);
     if (!software) {
-      pacer.first_coarser_ = kCoarsest;
+      pacer.few_ = kFewest;
       return pacer;
     }
     pacer.plain_ = true;
     pacer.until_try_ = kShortestPause;
     pacer.rest_ = pacer.rest_before_ = pacer.target_;  // a pixel takes long there
-    pacer.coarser_ = kFirstInSoftware;
+    pacer.triangles_ = kFirstInSoftware;
     return pacer;
   }
 
-  /// A picture in full that took `seconds`, while nothing moved: the first one that
-  /// moves is then fluent as well.
-  void drawn_still(double seconds) {
+  /// A picture of all triangles, in full, that took `seconds` while nothing moved: the first
+  /// preview is then fluent as well.
+  void drawn_still(double seconds, std::uint64_t triangles) {
     if (seconds < kNothingDrawn) return;
     const double ratio = seconds / target_;
     last_plain_ = 0;
     // While something changes there is more to do than to draw.
     plain_ = ratio > kLeisure;
     if (plain_) until_try_ = ratio > kMostWithRest ? pause_ : kShortestPause;
-    coarser_ = std::clamp(kMargin * std::sqrt(ratio), 1.0, kCoarsest);
+    triangles_ = std::numeric_limits<double>::infinity();
+    if (ratio > kAim) triangles_ = std::max(static_cast<double>(triangles) * kAim / ratio, kFewest);
   }
 
-  /// A picture that took `seconds` to draw as plain(), coarser() and smaller() say now.
-  void drawn(double seconds) {
+  /// A preview that took `seconds` to draw as plain(), max_triangles() and smaller() say now.
+  /// `limited`: with more of them it would be finer.
+  void drawn(double seconds, std::uint64_t triangles, bool limited) {
     const double ratio = seconds / target_;
     if (!plain_)
       learn_rest(seconds);
-    else if (coarser_ == 1 && smaller_ == 1)
+    else if (!limited && smaller_ == 1)
       last_plain_ = seconds;
     if (!plain_ && ratio > kMostWithRest) {
       leave_rest_out();
@@ -56,24 +62,34 @@ class FramePacer {
     }
     if (!plain_) pause_ = std::max(pause_ * kForgetting, kShortestPause);
     if (ratio > 1)
-      simplify(std::min(ratio, 4.0));
-    else if ((coarser_ > 1 || smaller_ > 1) && ratio < kLeisure)
+      simplify(std::min(ratio, 4.0), static_cast<double>(triangles));
+    else if ((limited || smaller_ > 1) && ratio < kFull)
       refine(ratio);
-    else if (plain_ && coarser_ == 1 && smaller_ == 1)
+    else if (plain_ && !limited && smaller_ == 1)
       plain_ = --until_try_ > 0 || ratio > kLeisure || !has_room_for_rest(seconds);
   }
 
   /// Whether to leave occlusion and multisampling out while something moves.
   bool plain() const { return plain_; }
-  /// Factor on the error in pixels while something moves. At rest: 1.
-  double coarser() const { return coarser_; }
+  /// Of a preview.
+  std::uint64_t max_triangles() const {
+    return triangles_ < kUnlimited ? static_cast<std::uint64_t>(triangles_) : kAllTriangles;
+  }
   /// Divisor of the picture's width and height while something moves. At rest: 1.
   int smaller() const { return smaller_; }
 
  private:
-  static constexpr double kFirstCoarser = 4, kCoarsest = 32, kMargin = 1.25, kFirstInSoftware = 16;
+  static constexpr double kUnlimited = 1e12;
+  static constexpr double kFirstInSoftware = 60'000;
+  /// Before previews become smaller: in software, and at the very least.
+  static constexpr double kFew = 40'000, kFewest = 2'000;
   static constexpr double kNothingDrawn = 1e-3;  ///< seconds: the picture was the one before
-  static constexpr double kLeisure = 0.6;        ///< of the target: less is time for more
+  /// Of the target: a preview takes so long, and one that takes between kFull and 1 is left as it
+  /// is; less than kLeisure is time for occlusion.
+  static constexpr double kAim = 0.9, kFull = 0.8, kLeisure = 0.6;
+  static constexpr double kLargestStep = 1.5;  ///< single pictures are off
+  /// Of the target: less is no reason for another size.
+  static constexpr double kALittle = 1.25;
   /// Of the target, with the rest: more is too much, as a processor that is slower for a moment
   /// needs what is left.
   static constexpr double kMostWithRest = 0.75;
@@ -81,15 +97,13 @@ class FramePacer {
   static constexpr double kFading = 0.998;
   static constexpr int kSmallest = 4;
 
-  void simplify(double ratio) {
-    if (coarser_ >= first_coarser_ && smaller_ < kSmallest) {
+  void simplify(double ratio, double drawn) {
+    const double triangles = std::min(triangles_, drawn);
+    const bool a_little = ratio < kALittle || smaller_ == kSmallest;
+    if (triangles <= few_ && !a_little)
       smaller_ = std::min(static_cast<int>(std::ceil(smaller_ * std::sqrt(ratio))), kSmallest);
-      return;
-    }
-    // Triangles, and so times, go with the inverse square of a cell's length: the root
-    // of the ratio would do at once, but single pictures are off.
-    const double most = smaller_ < kSmallest ? first_coarser_ : kCoarsest;
-    coarser_ = std::min(coarser_ * (1 + 0.5 * (ratio - 1)), most);
+    else
+      triangles_ = std::max(triangles * kAim / ratio, a_little ? kFewest : few_);
   }
 
   /// What a picture with occlusion and multisampling takes beside the same one without.
@@ -115,20 +129,21 @@ class FramePacer {
   }
 
   void refine(double ratio) {
-    if (coarser_ > 1) {
-      coarser_ = std::max(coarser_ * (0.7 + 0.5 * ratio), 1.0);
+    const double larger = static_cast<double>(smaller_) / std::max(smaller_ - 1, 1);
+    if (smaller_ > 1 && triangles_ >= few_ / 2) {
+      if (ratio * larger * larger < kFull) --smaller_;
     } else {
-      const double larger = static_cast<double>(smaller_) / (smaller_ - 1);
-      if (ratio * larger * larger < kLeisure) --smaller_;
+      triangles_ *= std::min(kAim / ratio, kLargestStep);
     }
   }
 
-  double target_, coarser_ = 1;
+  double target_;
   double pause_ = kShortestPause;      ///< plain pictures before the rest is tried, the next time
   double until_try_ = 0;               ///< the same, now
   double rest_ = 0, rest_before_ = 0;  ///< seconds that it took; see learn_rest()
   double last_plain_ = 0;  ///< seconds, of one with all detail; 0: none since the last stop
-  double first_coarser_ = kFirstCoarser;  ///< before pictures become smaller
+  double triangles_ = std::numeric_limits<double>::infinity();
+  double few_ = kFew;  ///< before previews become smaller
   int smaller_ = 1;
   bool plain_ = false;
 };

@@ -220,6 +220,12 @@ std::uint64_t bricks_wanted(ViewerState& state) {
   return state.bricks_wanted;
 }
 
+/// What a picture is, or becomes.
+const char* stage_of(const PictureState& p) {
+  if (p.moving) return "preview";
+  return p.complete && !p.plain ? "complete" : "refining";
+}
+
 void status_panel(ViewerState& state) {
   const StreamCounters& c = state.picture->scene().counters();
   const PictureState& p = state.picture->state();
@@ -229,9 +235,9 @@ void status_panel(ViewerState& state) {
   text(fmt::format("{:.0f} frames/s, drawn in {:.1f} ms",
                    state.frame_seconds > 0 ? 1 / state.frame_seconds : 0,
                    state.draw_seconds * 1e3));
-  if (state.pacer.coarser() > 1 || state.pacer.smaller() > 1)
-    text(fmt::format("while moving: cells {:.1f} x as long, 1/{} of the size",
-                     state.pacer.coarser(), state.pacer.smaller()));
+  if (p.moving && p.limited)
+    text(fmt::format("preview: {} triangles at most, 1/{} of the size",
+                     state.pacer.max_triangles(), state.pacer.smaller()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
   text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
@@ -245,7 +251,7 @@ void status_panel(ViewerState& state) {
   if (p.drawing)
     ImGui::TextDisabled("drawing %.0f %%", 100 * p.drawn_part);
   else
-    ImGui::TextDisabled(p.complete ? "complete" : "refining");
+    ImGui::TextDisabled("%s", stage_of(p));
 }
 
 void import_progress(ImportJob& import) {

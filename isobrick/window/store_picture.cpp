@@ -48,7 +48,7 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
 }  // namespace
 
 PictureWay PictureWay::in_window(const FramePacer& pacer, bool software, bool moving) {
-  PictureWay way{.coarser = moving ? pacer.coarser() : 1,
+  PictureWay way{.max_triangles = moving ? pacer.max_triangles() : FramePacer::kAllTriangles,
                  .piece_seconds = software || moving ? kPieceSeconds : kDevicePieceSeconds,
                  .patience_seconds = kPatienceSeconds,
                  .moving = moving,
@@ -101,7 +101,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
       isovalues.push_back(settings.surfaces[i].isovalue);
       shown_surfaces_.push_back(i);
     }
-  View view = view_of(camera, width, height, settings.pixel_error * way.coarser);
+  View view = view_of(camera, width, height, settings.pixel_error);
   const ShownBox box = shown_box(settings);
   if (!box.whole()) {
     const Vec3d last = last_sample(*store_);
@@ -109,6 +109,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
   }
   view.planes = shown_half_spaces(settings);
   CutBudget budget;
+  budget.triangles = std::min(budget.triangles, way.max_triangles);
   // What stands in until the cut is there takes room beside it.
   const std::uint64_t there =
       device_->turns() != nullptr ? DeviceMeshes::cache_bytes(device_->held()) : upload_memory();
@@ -293,10 +294,11 @@ void StorePicture::update_state(const Asked& asked) {
   state_.plain = pictured_.shows != asked.shows;
   // One that is no simpler than those at rest is not drawn again.
   if (!work_ && !asked.way.moving && !state_.plain) state_.moving = false;
-  state_.limited_by_budget = scene_->cut().limited_by_budget;
+  state_.limited = scene_->cut().limited_by_budget;
+  state_.limited_by_budget = state_.limited && asked.way.max_triangles == FramePacer::kAllTriangles;
   state_.covers = shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
   state_.more = imported_ || put_off_ || device_->more();
-  state_.complete = !work_ && !put_off_ && shown_ != nullptr && scene_->is_newest(*shown_) &&
+  state_.complete = !asked.way.moving && !work_ && !put_off_ && shown_ != nullptr && scene_->is_newest(*shown_) &&
                     (shown_->complete || scene_->idle());
 }
 

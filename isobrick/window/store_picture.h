@@ -36,7 +36,8 @@ inline constexpr double kPatienceSeconds = 0.002;
 
 /// What a picture shows and what it still lacks.
 struct PictureState {
-  bool complete = false;  ///< nothing finer, nothing else is on its way
+  /// Nothing finer, nothing else is on its way, and it is no preview.
+  bool complete = false;
   bool drawing = false;   ///< a picture has been begun, and the next draw() goes on with it
   double drawn_part = 0;  ///< of that one, 0 … 1
   /// Of each surface that is drawn, by its number: at first, and while the one that was asked
@@ -45,16 +46,17 @@ struct PictureState {
   bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
   std::uint64_t triangles = 0, nodes = 0;
   bool plain = false;               ///< drawn without occlusion and multisampling to be quick
-  bool moving = false;              ///< drawn as PictureWay::moving, and may be coarser for that
+  bool moving = false;              ///< a preview: drawn as PictureWay::moving
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
   bool more = false;                ///< the next draw() has something to do, whatever comes
-  bool limited_by_budget = false;   ///< with more memory it would be finer
+  bool limited = false;            ///< by PictureWay::max_triangles, or by memory
+  bool limited_by_budget = false;  ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
 };
 
 /// How a picture may be simpler than its settings say.
 struct PictureWay {
-  double coarser = 1;  ///< factor on settings.pixel_error
+  std::uint64_t max_triangles = FramePacer::kAllTriangles;
   /// Without occlusion and multisampling; `until_complete`: unless nothing finer is to come. In
   /// software, which draws slowly, that is one picture later: first a plain one of all.
   enum class Plain : std::uint8_t { no, until_complete, yes } plain = Plain::no;

@@ -116,6 +116,7 @@ void ViewerWindow::open(const std::filesystem::path& path) {
   if (software) state_.settings.multisample = false;
   state_.pacer = FramePacer::for_device(software);
   opened_ = glfwGetTime();
+  covered_ = false;
   choose_values(state_.settings, state_.picture->scene().tree());
   state_.picked.reset();
   state_.measured.clear();

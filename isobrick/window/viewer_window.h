@@ -79,6 +79,7 @@ class ViewerWindow {
   void click(double x, double y);
   void save_picture(const std::filesystem::path& file);
   bool moving() const;
+  double settled_at() const;
   bool minimised() const;
   double aspect() const;
 
@@ -89,7 +90,8 @@ class ViewerWindow {
   ViewerState state_;
   double last_time_ = 0;
   double opened_ = 0;    ///< when the store was
-  double shown_ = 0;     ///< when the last frame was
+  bool covered_ = false;  ///< the store's surface has been shown
+  double shown_ = 0;      ///< when the last frame was
   bool changed_ = true;  ///< something has happened: the next frame may differ from the last
   bool told_ = false;    ///< something had happened before the last step
   bool more_ = false;    ///< the picture would go on by itself

@@ -102,6 +102,8 @@ void ViewerWindow::Events::on_wheel(double steps) {
   last_motion_ = glfwGetTime();
 }
 
+void ViewerWindow::Events::moved() { last_motion_ = glfwGetTime(); }
+
 FlyKeys ViewerWindow::Events::fly_keys() const {
   const auto down = [&](int key) { return glfwGetKey(owner_.window_, key) == GLFW_PRESS ? 1 : 0; };
   return {down(GLFW_KEY_D) - down(GLFW_KEY_A), down(GLFW_KEY_E) - down(GLFW_KEY_Q),

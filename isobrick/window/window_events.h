@@ -12,13 +12,13 @@ class ViewerWindow::Events {
   /// Sets the window's callbacks, for its lifetime.
   explicit Events(ViewerWindow& owner);
 
-  /// A button is down that moves the camera, and the pointer has moved since.
-  bool dragging() const { return button_ >= 0 && dragged_; }
   /// Around a frame of Dear ImGui, which would not see a key that went down and up since the last.
   void hold_tapped_keys();
   void release_tapped_keys();
-  /// When the camera or an isovalue moved last, GLFW's time.
+  /// When the camera or a slider's value moved last, GLFW's time.
   double last_motion() const { return last_motion_; }
+  /// One of them has just moved.
+  void moved();
 
  private:
   void on_button(int button, int action, int mods);

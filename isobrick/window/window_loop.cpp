@@ -50,18 +50,21 @@ void ViewerWindow::tell_damage() {
   }
 }
 
+double ViewerWindow::settled_at() const {
+  return std::max(events_->last_motion(), opened_) + kSettleSeconds;
+}
+
 bool ViewerWindow::moving() const {
-  const bool sliding = ImGui::IsAnyItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left);
-  return state_.navigator.moving() || events_->dragging() || sliding ||
-         glfwGetTime() - std::max(events_->last_motion(), opened_) < kSettleSeconds;
+  return state_.navigator.moving() || glfwGetTime() < settled_at();
 }
 
 /// Makes the picture, or goes on with it. Whether there may be anything new to be seen.
 bool ViewerWindow::draw_picture(int width, int height) {
   StorePicture& picture = *state_.picture;
   const double begin = glfwGetTime();
-  // The first picture of a surface should not wait for a good one.
-  const bool fluent = moving() || !picture.state().covers;
+  // The first picture of a store should not wait for a good one.
+  covered_ |= picture.state().covers;
+  const bool fluent = moving() || !covered_;
   PictureWay way = PictureWay::in_window(state_.pacer, setup_->software(), fluent);
   way.piece_seconds = options_.piece_seconds.value_or(way.piece_seconds);
   const int smaller = fluent ? state_.pacer.smaller() : 1;
@@ -104,7 +107,13 @@ void ViewerWindow::draw_frame(bool asked) {
   ImGui_ImplGlfw_NewFrame();
   events_->hold_tapped_keys();
   ImGui::NewFrame();
+  const ViewSettings settings = state_.settings;
+  const Camera camera = state_.navigator.camera;
   draw_panels(state_);
+  // A slider that is dragged, and no click on a widget, is a motion.
+  if (ImGui::IsMouseDown(ImGuiMouseButton_Left) && ImGui::IsAnyItemActive() &&
+      (settings != state_.settings || camera != state_.navigator.camera))
+    events_->moved();
   draw_measure(state_, width, height);
   ImGui::Render();
   events_->release_tapped_keys();
@@ -121,15 +130,21 @@ void ViewerWindow::pace(double seconds) {
   if (!picture.drew()) return;
   state_.draw_seconds = std::max(seconds, picture.picture_seconds());
   if (picture.state().moving)
-    state_.pacer.drawn(state_.draw_seconds);
+    state_.pacer.drawn(state_.draw_seconds, picture.state().triangles, picture.state().limited);
   else if (!picture.state().plain)
-    state_.pacer.drawn_still(state_.draw_seconds);
+    state_.pacer.drawn_still(state_.draw_seconds, picture.state().triangles);
 }
 
 void ViewerWindow::wait(double most_seconds) {
   if (minimised()) return glfwWaitEventsTimeout(most_seconds);
   const bool there = state_.picture != nullptr;
-  if (there && moving()) return glfwPollEvents();
+  if (there && moving()) {
+    // Until the hand moves on, or holds still for good.
+    if (!changed_ && !more_ && !state_.navigator.moving() && !state_.picture->drew())
+      return glfwWaitEventsTimeout(
+          std::clamp(settled_at() - glfwGetTime(), kNothingNew, std::max(most_seconds, kNothingNew)));
+    return glfwPollEvents();
+  }
   if (!changed_ && !more_ && (!there || state_.picture->state().complete))
     return glfwWaitEventsTimeout(most_seconds);
   const bool before = std::exchange(changed_, false);

@@ -195,6 +195,68 @@ TEST_F(CutTest, WhatPlanesCutAwayIsNotWanted) {
   EXPECT_NEAR(static_cast<double>(cut.triangles), triangles, 1);
 }
 
+/// A ball, and beside it a plate that averaging removes at level 1 already.
+std::uint8_t ball_and_plate(Int3 p) {
+  if (p.x == 230 && p.y < 240 && p.z > 20) return 200;
+  return p.x < 180 ? static_cast<std::uint8_t>(128 + ball(p, 180) / 3) : 0;
+}
+
+TEST(ThinStructure, ComesBeforeLongerCells) {
+  const MemoryBricks source({256, 256, 256}, std::function<std::uint8_t(Int3)>(ball_and_plate), {});
+  const NodeTree tree(source);
+  const double isovalue = 128;
+  const ActiveNodes active = active_of(tree, std::vector<double>{isovalue});
+  const View view = look({-300, 128, 400}, {128, 128, 128}, 0.5);
+  const Cut all = CutSelector(tree).select(active, view, {});
+  const Cut preview = CutSelector(tree).select(active, view, {.triangles = all.triangles / 3});
+  EXPECT_TRUE(preview.limited_by_budget);
+  expect_sound(tree.grid(), preview, active);
+  int lost_at_first = 0;
+  for_each_point({{0, 0, 0}, tree.grid().level(1).nodes},
+                 [&](Int3 p) { lost_at_first += tree.loses({1, p}, isovalue); });
+  ASSERT_GT(lost_at_first, 1);
+  int coarse = 0;
+  for (const CutNode& node : preview.nodes) {
+    EXPECT_FALSE(node.visible && tree.loses(node.key, isovalue)) << "level " << node.key.level;
+    coarse += node.key.level > 0 && active.below(node.key);
+  }
+  EXPECT_GT(coarse, 0) << "all of it fits";
+}
+
+/// A coarse level of noise has nothing of it: that may not take what the rest needs.
+TEST(ThinStructure, TakesNoMoreThanHalfOfABudget) {
+  const auto noise = [](Int3 p) {
+    const auto hash = static_cast<std::uint64_t>(p.x * 73856093 ^ p.y * 19349663 ^ p.z * 83492791);
+    const bool speck = p.z >= 128 && hash * 0x9e3779b97f4a7c15ULL >> 56 == 0;
+    return static_cast<std::uint8_t>(p.z < 40 ? 200 : speck ? 255 : 20);
+  };
+  const MemoryBricks source({256, 256, 256}, std::function<std::uint8_t(Int3)>(noise), {});
+  const NodeTree tree(source);
+  const ActiveNodes active = active_of(tree, std::vector<double>{128});
+  const View view = look({400, 400, 500}, {128, 128, 128}, 0.5);
+  const Cut all = CutSelector(tree).select(active, view, {});
+  const Cut preview = CutSelector(tree).select(active, view, {.triangles = all.triangles / 2});
+  EXPECT_TRUE(preview.limited_by_budget);
+  int finest_of_plane = 0;
+  for (const CutNode& node : preview.nodes)
+    finest_of_plane += node.key.level == 0 && node.key.node.z == 0;
+  EXPECT_GT(finest_of_plane, 0);
+}
+
+TEST_F(CutTest, RefinesNoFurtherThanTheFinestLevelAskedFor) {
+  const ActiveNodes active = active_of(tree(), std::vector<double>{128});
+  View view = look({150, 150, 320}, {150, 150, 150}, 0.1);
+  view.finest_level = 1;
+  const Cut cut = CutSelector(tree()).select(active, view, {});
+  bool any = false;
+  for (const CutNode& node : cut.nodes) {
+    EXPECT_GE(node.key.level, 1);
+    any |= node.key.level == 1;
+  }
+  EXPECT_TRUE(any);
+  EXPECT_FALSE(cut.limited_by_budget);
+}
+
 /// Ranges of a field that is known without samples: a store of 2048³ in no memory.
 class LargeBall final : public BrickSource {
  public:

@@ -26,8 +26,8 @@ TEST_F(Click, ClicksPickAndMeasure) {
 /// A press does not make the picture a coarse one, whatever moving pictures are like.
 TEST_F(Click, ClicksPickFromThePictureAtRest) {
   ViewerWindow& window = open();
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
-  ASSERT_GT(window.state().pacer.coarser(), 4);
+  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
+  ASSERT_LT(window.state().pacer.max_triangles(), 4000u);
   until([&] { return rests(); });
   const double isovalue = window.state().settings.surfaces[0].isovalue;
   const Vec3d eye = window.state().navigator.camera.eye;
@@ -61,7 +61,7 @@ TEST_F(Click, ATransparentSurfaceIsPickedAsWell) {
 /// What is picked while the picture is a coarse one is looked at again.
 TEST_F(Click, AClickBeforeThePictureRestsIsMadeGood) {
   ViewerWindow& window = open();
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
+  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
   drag(3, kWidth / 2, kHeight / 2, kWidth / 2, kHeight / 2 + 20);
   window.state().measuring = true;
   click(kWidth / 2 + 40, kHeight / 2 - 50);
@@ -86,7 +86,7 @@ TEST_F(Click, AClickBesideTheSurfaceLeavesWhatWasMeasured) {
   click(kWidth / 2 + 40, kHeight / 2 - 50);
   ASSERT_EQ(window.state().measured.size(), 1u);
   const Vec3d point = window.state().measured[0];
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2);
+  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
   display_->button(4, true);  // nearer
   display_->button(4, false);
   steps(1);

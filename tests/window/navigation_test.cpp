@@ -103,54 +103,78 @@ TEST(Navigator, TheWheelZooms) {
   EXPECT_NEAR(n.camera.distance(), distance, 1e-9);
 }
 
-TEST(FramePacer, SettlesWherePicturesAreFastEnough) {
-  // A picture takes 400 ms at full quality, and goes with the square of coarseness.
-  FramePacer pacer(0.05);
-  double seconds = 0;
-  for (int i = 0; i < 40; ++i) {
-    seconds = 0.4 / std::pow(pacer.coarser() * pacer.smaller(), 2);
-    pacer.drawn(seconds);
+/// Previews of a surface: `full` triangles, of which a million take `seconds_per_million`.
+struct Previews {
+  FramePacer& pacer;
+  double full, pixels, seconds_per_million, occlusion = 0;
+  double seconds = 0, triangles = 0;
+
+  void draw() {
+    const double s = pacer.smaller();
+    triangles = std::min(full, static_cast<double>(pacer.max_triangles()));
+    seconds = pixels / (s * s) + triangles / 1e6 * seconds_per_million +
+              (pacer.plain() ? 0 : occlusion);
+    pacer.drawn(seconds, static_cast<std::uint64_t>(triangles), triangles < full);
   }
-  EXPECT_LT(seconds, 0.055);
-  EXPECT_GT(seconds, 0.02);
+};
+
+TEST(FramePacer, PreviewsUseTheWholeTime) {
+  for (const double full : {6e5, 6e6})
+    for (const double pixels : {0.0, 0.01}) {
+      FramePacer pacer(0.05);
+      pacer.drawn_still(pixels + full / 1e6 + 0.3, static_cast<std::uint64_t>(full));
+      Previews previews{pacer, full, pixels, 1};
+      for (int i = 0; i < 15; ++i) previews.draw();
+      EXPECT_LT(previews.seconds, 0.05) << full;
+      EXPECT_GT(previews.seconds, 0.038) << full;
+      EXPECT_EQ(pacer.smaller(), 1);
+    }
+}
+
+TEST(FramePacer, PicturesThatAreQuickEnoughLoseNothing) {
+  FramePacer pacer = FramePacer::for_device(true);
+  pacer.drawn_still(0.02, 600'000);
+  EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
+  EXPECT_EQ(pacer.smaller(), 1);
+  EXPECT_FALSE(pacer.plain());
 }
 
 TEST(FramePacer, MakesPicturesSmallerWhereTheirPixelsTakeTheTime) {
   // As llvmpipe: 70 ms for the pixels of a plain picture, 60 ms more for its triangles.
   FramePacer pacer(0.05);
-  double seconds = 0, longest_after = 0;
+  Previews previews{pacer, 60'000, 0.07, 1, 0.2};
+  double longest_after = 0;
   for (int i = 0; i < 60; ++i) {
-    const double s = pacer.smaller();
-    seconds = 0.07 / (s * s) + 0.06 / std::pow(s * pacer.coarser(), 2) + (pacer.plain() ? 0 : 0.2);
-    if (i > 10) longest_after = std::max(longest_after, seconds);
-    pacer.drawn(seconds);
+    previews.draw();
+    if (i > 10) longest_after = std::max(longest_after, previews.seconds);
   }
   EXPECT_LT(longest_after, 0.1);
   EXPECT_LE(pacer.smaller(), 2);
-  EXPECT_LT(pacer.coarser(), 4) << "there is time for longer cells";
-  for (int i = 0; i < 300; ++i) pacer.drawn(0.002);
+  EXPECT_GT(previews.triangles, 20'000) << "there is time for them";
+  for (int i = 0; i < 300; ++i) pacer.drawn(0.002, 60'000, previews.triangles < 60'000);
   EXPECT_EQ(pacer.smaller(), 1);
 }
 
 TEST(FramePacer, KeepsTheirSizeWhereADeviceIsSlow) {
   FramePacer pacer = FramePacer::for_device(false);
+  Previews previews{pacer, 1e7, 0, 4e-3};
   for (int i = 0; i < 60; ++i) {
-    pacer.drawn(0.04 / std::pow(pacer.coarser() * pacer.smaller(), 2));
+    previews.draw();
     EXPECT_EQ(pacer.smaller(), 1);
   }
-  EXPECT_GT(pacer.coarser(), 1.5);
-  for (int i = 0; i < 100; ++i) pacer.drawn(0.04);  // whatever the cells
+  EXPECT_LT(previews.triangles, 4e6);
+  for (int i = 0; i < 100; ++i) pacer.drawn(0.04, 1e6, true);  // whatever is drawn
   EXPECT_GT(pacer.smaller(), 1);
 }
 
 TEST(FramePacer, LeavesOcclusionOutBeforeDetail) {
   FramePacer pacer(0.05);
-  pacer.drawn(0.08);
+  pacer.drawn(0.08, 100'000, false);
   EXPECT_TRUE(pacer.plain());
-  EXPECT_EQ(pacer.coarser(), 1);
-  for (int i = 0; i < 5; ++i) pacer.drawn(0.03);
+  EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
+  for (int i = 0; i < 5; ++i) pacer.drawn(0.03, 100'000, false);
   EXPECT_TRUE(pacer.plain());
-  EXPECT_EQ(pacer.coarser(), 1);
+  EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
 }
 
 /// How many of so many pictures are drawn in full.
@@ -158,8 +182,8 @@ int full_ones(FramePacer& pacer, int pictures, double plain, double full) {
   int count = 0;
   for (int i = 0; i < pictures; ++i) {
     count += !pacer.plain();
-    pacer.drawn(pacer.plain() ? plain : full);
-    EXPECT_LT(pacer.coarser(), 1.25);
+    pacer.drawn(pacer.plain() ? plain : full, 100'000, false);
+    EXPECT_GE(pacer.max_triangles(), 100'000u);
   }
   return count;
 }
@@ -179,11 +203,11 @@ TEST(FramePacer, TriesOcclusionSoonAgainWhereAPictureTookLongForOnce) {
   // Also where there is no leisure, but room.
   for (const double plain : {0.002, 0.0065, 0.0072}) {
     FramePacer pacer = FramePacer::for_device(false);
-    pacer.drawn_still(plain + 0.0015);
+    pacer.drawn_still(plain + 0.0015, 100'000);
     EXPECT_GT(full_ones(pacer, 120, plain, plain + 0.0015), 80) << plain;
     for (int hiccup = 0; hiccup < 5; ++hiccup) {
       ASSERT_FALSE(pacer.plain());
-      pacer.drawn(0.025);
+      pacer.drawn(0.025, 100'000, false);
       EXPECT_GT(full_ones(pacer, 200, plain, plain + 0.0015), 100) << plain;
     }
   }
@@ -197,7 +221,7 @@ TEST(FramePacer, LeavesAMarginWithOcclusion) {
   // Whoever stops and goes on does not see it every time.
   int seen = 0;
   for (int stop = 0; stop < 40; ++stop) {
-    pacer.drawn_still(0.0105);
+    pacer.drawn_still(0.0105, 100'000);
     seen += full_ones(pacer, 60, 0.005, 0.0105);
   }
   EXPECT_LT(seen, 8);
@@ -206,22 +230,25 @@ TEST(FramePacer, LeavesAMarginWithOcclusion) {
 /// Where a picture with occlusion is a tenth of a second, each try is one that somebody waits for.
 TEST(FramePacer, DoesNotTryInSoftwareWhatTakesTooLong) {
   FramePacer pacer = FramePacer::for_device(true);
-  for (int i = 0; i < 100; ++i) pacer.drawn(0.02);
-  EXPECT_EQ(pacer.coarser(), 1);
+  for (int i = 0; i < 100; ++i) pacer.drawn(0.02, 100'000, pacer.max_triangles() < 100'000);
+  EXPECT_GE(pacer.max_triangles(), 100'000u);
   EXPECT_EQ(full_ones(pacer, 300, 0.028, 0.1), 0);
   EXPECT_LT(full_ones(pacer, 3000, 0.028, 0.1), 10);
   EXPECT_GT(full_ones(pacer, 3000, 0.004, 0.012), 1500) << "in a small window";
 }
 
-TEST(FramePacer, LeavesFastPicturesAlone) {
+TEST(FramePacer, RefinesAgainWhereThereIsTime) {
   FramePacer pacer(0.05);
-  pacer.drawn(0.01);
+  pacer.drawn(0.01, 100'000, false);
   EXPECT_FALSE(pacer.plain());
-  for (int i = 0; i < 10; ++i) pacer.drawn(0.2);
-  EXPECT_GT(pacer.coarser(), 1);
+  Previews slow{pacer, 1e5, 0.2, 1};
+  for (int i = 0; i < 10; ++i) slow.draw();
+  EXPECT_LT(pacer.max_triangles(), 50'000u);
   EXPECT_GT(pacer.smaller(), 1);
-  for (int i = 0; i < 200; ++i) pacer.drawn(0.004);
-  EXPECT_EQ(pacer.coarser(), 1);
+  Previews quick{pacer, 1e5, 0, 0.04};
+  for (int i = 0; i < 200; ++i) quick.draw();
+  EXPECT_EQ(quick.triangles, 1e5);
+  EXPECT_EQ(pacer.smaller(), 1);
   EXPECT_FALSE(pacer.plain());
 }
 

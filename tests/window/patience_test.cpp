@@ -56,8 +56,9 @@ TEST_F(Patience, WhatWasCompleteBeforeIsNot) {
   for (int turn = 0; turn < 300 && pending < 5; ++turn) {
     do {
       picture_->draw(camera_, kWidth, kHeight, settings_,
-                     {.coarser = 16, .plain = PictureWay::Plain::yes, .moving = true});
-    } while (!picture_->state().complete);
+                     {.max_triangles = 2000, .plain = PictureWay::Plain::yes, .moving = true});
+      EXPECT_FALSE(picture_->state().complete) << "a preview";
+    } while (!picture_->scene().idle() || picture_->drew());
     picture_->draw(camera_, kWidth, kHeight, settings_,
                    {.plain = PictureWay::Plain::until_complete, .patience_seconds = 0});
     if (picture_->scene().up_to_date()) continue;

@@ -114,7 +114,7 @@ TEST_F(Pieces, WaitForTheNextFrameWhenThisOneHasTakenMeshesToTheDevice) {
   settings_.pixel_error = 0.5f;
   const auto expected = pixels();
   show(budgets);
-  PictureWay way{.coarser = 16, .piece_seconds = 1e-9};  // whatever is done takes longer
+  PictureWay way{.max_triangles = 2000, .piece_seconds = 1e-9};  // whatever is done takes longer
   const auto told = [&] { return picture_->counters().finished + picture_->counters().pieces; };
   int put_off = 0;
   const auto complete = [&] {
@@ -133,7 +133,7 @@ TEST_F(Pieces, WaitForTheNextFrameWhenThisOneHasTakenMeshesToTheDevice) {
   complete();
   EXPECT_NE(picture_->renderer().read_pixels(), expected);
   put_off = 0;
-  way.coarser = 1;
+  way.max_triangles = FramePacer::kAllTriangles;
   complete();
   EXPECT_GT(put_off, 0);
   EXPECT_EQ(picture_->renderer().read_pixels(), expected);
@@ -167,7 +167,7 @@ TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
   camera_ = front;
   EXPECT_EQ(pixels(), first);
   // One that has been put off as well.
-  const PictureWay hasty{.coarser = 16, .piece_seconds = 1e-6};
+  const PictureWay hasty{.max_triangles = 2000, .piece_seconds = 1e-6};
   for (int i = 0; !picture_->state().more; ++i) {
     ASSERT_LT(i, 100000);
     picture_->draw(camera_, kWidth, kHeight, settings_, hasty);
