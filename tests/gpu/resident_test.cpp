@@ -185,6 +185,15 @@ TYPED_TEST(GpuResident, TransformsTurnAndMirror) {
   compare(this->waves({67, 41, 75}), {this->lowest() + 100}, options);
 }
 
+TYPED_TEST(GpuResident, SmallerSamplesInsideTurnTheMeshRound) {
+  SurfaceOptions options;
+  options.inside = Inside::below;
+  for (const bool normals : {false, true}) {
+    options.normals = normals;
+    compare(this->waves({67, 41, 75}), {this->lowest() + 100}, options);
+  }
+}
+
 TYPED_TEST(GpuResident, AbsentBricksAreTheFillValue) {
   using T = TypeParam;
   const HoledField<T> holed(this->waves({131, 70, 97}), static_cast<T>(this->lowest() + 30));

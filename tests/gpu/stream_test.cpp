@@ -268,6 +268,15 @@ TYPED_TEST(GpuStream, TransformsTurnAndMirror) {
   compare(this->waves({67, 41, 75}), this->lowest() + 100, options, {{512}, {4}});
 }
 
+TYPED_TEST(GpuStream, SmallerSamplesInsideTurnTheMeshRound) {
+  SurfaceOptions options;
+  options.inside = Inside::below;
+  for (const bool normals : {false, true}) {
+    options.normals = normals;
+    compare(this->waves({67, 41, 75}), this->lowest() + 100, options, {{512}, {4}});
+  }
+}
+
 TYPED_TEST(GpuStream, AbsentBricksAreTheFillValue) {
   using T = TypeParam;
   const HoledField<T> holed(this->waves(kOdd), static_cast<T>(this->lowest() + 30));
