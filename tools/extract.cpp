@@ -1,6 +1,7 @@
 #include "isobrick/pipeline/extract.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isobrick/bricks/level_set.h"
+#include "isobrick/io/output_guard.h"
 #include "isobrick/pipeline/estimate.h"
 #include "tools/extract_report.h"
 #include "tools/format.h"
@@ -189,8 +191,11 @@ struct Sinks {
 std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
                               const Arguments& arguments) {
   const bool force = arguments.force;
+  const std::array<fs::path, 1> inputs{arguments.store};
   std::vector<Sinks> sinks;
   for (const ExtractedSurface& surface : surfaces) {
+    check_replaces_no_input(surface.output, inputs);
+    check_replaces_no_input(surface.preview, inputs);
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty())
       of_surface.mesh =

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/parted_output.h"
 #include "isobrick/meshes/glb_sink.h"
 #include "isobrick/meshes/mesh_parts.h"
 #include "isobrick/meshes/obj_sink.h"
@@ -110,9 +111,9 @@ std::uint64_t mesh_memory(MeshFormat format, int threads, std::uint64_t memory) 
 
 std::uint64_t mesh_bytes(const fs::path& path) {
   std::uint64_t bytes = fs::file_size(path);
-  std::error_code none;
-  for (const fs::directory_entry& part : fs::directory_iterator(path.string() + ".parts", none))
-    bytes += part.file_size();
+  for (const fs::path& folder : part_folders(path))
+    for (const fs::directory_entry& part : fs::directory_iterator(folder))
+      bytes += part.file_size();
   return bytes;
 }
 

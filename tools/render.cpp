@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/io/output_guard.h"
+#include "isobrick/io/parted_output.h"
 #include "isobrick/io/png_file.h"
 #include "isobrick/render/mesh_picture.h"
 #include "tools/format.h"
@@ -36,12 +39,21 @@ MeshPictureRequest request_of(const Arguments& arguments) {
   return request;
 }
 
+/// The meshes with the folders of their parts.
+std::vector<std::filesystem::path> input_paths(const std::vector<std::string>& meshes) {
+  std::vector<std::filesystem::path> paths(meshes.begin(), meshes.end());
+  for (const std::string& mesh : meshes)
+    for (std::filesystem::path& folder : part_folders(mesh)) paths.push_back(std::move(folder));
+  return paths;
+}
+
 int run(const Arguments& arguments, Console& console) {
   if (is_standard_output(arguments.output))
     console.reserve_output();
   else
     check_picture_name(arguments.output);
   const MeshPictureRequest request = request_of(arguments);
+  check_replaces_no_input(arguments.output, input_paths(arguments.meshes));
   OutputFile out(arguments.output, arguments.force);
   MeshPicture picture = draw_mesh_files(request, console.progress());
   write_png(out, request.width, request.height, without_alpha(std::move(picture.rgba)));

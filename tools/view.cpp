@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <set>
@@ -8,6 +9,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_file.h"
+#include "isobrick/io/output_guard.h"
 #include "isobrick/render/camera_request.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/window/screenshot.h"
@@ -67,7 +69,11 @@ std::vector<Shot> shots_of(const Arguments& arguments, const Camera& camera) {
     shots = turntable(camera, arguments.picture.camera.up, arguments.frames, arguments.turntable);
   }
   if (!arguments.screenshot.empty()) shots.insert(shots.begin(), {arguments.screenshot, camera});
-  for (const Shot& shot : shots) check_output(shot.file, arguments.force);
+  const std::array<std::filesystem::path, 1> inputs{arguments.store};
+  for (const Shot& shot : shots) {
+    check_replaces_no_input(shot.file, inputs);
+    check_output(shot.file, arguments.force);
+  }
   // Also shows that there is such a folder, and that it can be written to.
   for (const Shot* shot : {&shots.front(), &shots.back()}) OutputFile(shot->file, arguments.force);
   return shots;

@@ -8,32 +8,16 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <new>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/leftovers.h"
 
 namespace isobrick {
 namespace {
-
-struct Temporary {
-  UniqueFd fd;
-  std::string path;
-};
-
-Temporary create_beside(const std::string& path) {
-  static std::atomic<unsigned> counter{0};
-  for (int attempt = 0;; ++attempt) {
-    std::string name = fmt::format("{}.partial-{}-{}", path, ::getpid(), counter++);
-    // O_EXCL: never through a link that somebody else put there.
-    const int fd = ::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd >= 0) return {UniqueFd(fd), std::move(name)};
-    if (errno != EEXIST || attempt == 100) throw system_error("create", path, errno);
-  }
-}
 
 FileWriter open_standard_output() {
   UniqueFd fd(::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0));
@@ -166,10 +150,16 @@ void check_output(const std::string& path, bool force) {
   if (path == kStandardOutput) return;
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) return;  // whatever is wrong shows when it is created
-  if (S_ISDIR(status.st_mode)) throw UsageError(fmt::format("'{}' is a directory", path));
-  // Renaming over a device or a pipe would replace it by a file.
-  if (!S_ISREG(status.st_mode) && !S_ISLNK(status.st_mode))
-    throw UsageError(fmt::format("'{}' is not a regular file", path));
+  const bool is_link = S_ISLNK(status.st_mode);
+  if (is_link && ::stat(path.c_str(), &status) != 0)
+    throw UsageError(fmt::format("'{}' is a symbolic link to nothing; remove it", path));
+  const char* link = is_link ? " a symbolic link to" : "";
+  if (S_ISDIR(status.st_mode))
+    throw UsageError(fmt::format("'{}' is{} a directory", path, link));
+  // Renaming over a device or a pipe, or over a link to one, would replace it by a file.
+  if (!S_ISREG(status.st_mode))
+    throw UsageError(fmt::format("'{}' is{} {} regular file", path, link,
+                                 is_link ? "something that is no" : "not a"));
   if (!force) throw UsageError(fmt::format("'{}' exists already; say --force to replace it", path));
 }
 
@@ -177,7 +167,8 @@ OutputFile::OutputFile(std::string path, bool force)
     : path_(std::move(path)), force_(force), writer_([this] {
         check_output(path_, force_);
         if (path_ == kStandardOutput) return open_standard_output();
-        Temporary temporary = create_beside(path_);
+        remove_leftovers(path_);
+        Temporary temporary = create_temporary_file(path_);
         temporary_ = std::move(temporary.path);
         return FileWriter(std::move(temporary.fd), path_);
       }()) {}
@@ -189,6 +180,7 @@ OutputFile::~OutputFile() {
 void OutputFile::publish() {
   writer_.finish();
   if (path_ == kStandardOutput) return;
+  if (force_) check_output(path_, true);  // something else may have appeared
   int result = ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(),
                            force_ ? 0 : RENAME_NOREPLACE);
   if (result != 0 && !force_ && (errno == EINVAL || errno == ENOSYS)) {
@@ -202,7 +194,7 @@ void OutputFile::publish() {
 }
 
 FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {
-  Temporary temporary = create_beside(
+  Temporary temporary = create_temporary_file(
       path == kStandardOutput ? (std::filesystem::temp_directory_path() / "isobrick").string()
                               : path);
   ::unlink(temporary.path.c_str());

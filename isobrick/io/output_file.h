@@ -70,13 +70,13 @@ class FileWriter {
 /// replace then, and nothing that was written can be read back or patched.
 inline constexpr std::string_view kStandardOutput = "-";
 
-/// Throws UsageError when `path` exists and `force` is not set, and when it is not a regular
-/// file.
+/// Throws UsageError when `path` exists and `force` is not set, and when it is neither a regular
+/// file nor a link to one.
 void check_output(const std::string& path, bool force);
 
 /// A file that appears under its name only when it is whole: it is written
 /// beside it under a temporary name, which the destructor removes unless
-/// `publish` was called.
+/// `publish` was called; what a killed process left of the same output is removed first.
 ///
 /// Nothing is synced: a mesh or a picture lost in a power cut is made again,
 /// and a sync would cost more than the writing.

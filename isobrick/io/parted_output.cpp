@@ -5,53 +5,57 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <atomic>
 #include <cerrno>
 
 #include "isobrick/core/error.h"
-#include "isobrick/io/exchange.h"
+#include "isobrick/io/output_guard.h"
 
 namespace isobrick {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool is_part_name(std::string_view name) {
-  constexpr std::string_view prefix = "part_";
-  if (!name.starts_with(prefix)) return false;
-  const std::size_t dot = name.find('.');
-  const std::string_view number = name.substr(prefix.size(), dot - prefix.size());
-  return dot != std::string_view::npos && !number.empty() &&
-         std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
+/// path.parts, path.parts-2, path.parts-3 and so on.
+fs::path part_folder(const fs::path& path, int number) {
+  return path.string() + ".parts" + (number == 1 ? "" : fmt::format("-{}", number));
 }
 
-/// Whether something is at the folder's place; throws when it must stay there.
-bool check_folder(const fs::path& folder, bool force) {
-  const fs::file_status status = fs::symlink_status(folder);
-  if (status.type() == fs::file_type::not_found) return false;
-  if (!force)
+bool is_there(const fs::path& path) {
+  return fs::symlink_status(path).type() != fs::file_type::not_found;
+}
+
+/// Throws when the folder must stay.
+void check_folder(const fs::path& folder, bool replace) {
+  if (!replace)
     throw UsageError(
         fmt::format("'{}' exists already; say --force to replace it", folder.string()));
-  if (status.type() != fs::file_type::directory)
+  if (fs::symlink_status(folder).type() != fs::file_type::directory)
     throw UsageError(fmt::format("'{}' is no folder of parts", folder.string()));
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
     if (entry.symlink_status().type() != fs::file_type::regular ||
         !is_part_name(entry.path().filename().native()))
       throw UsageError(fmt::format("'{}' holds '{}', which is no part of a mesh; move it away",
                                    folder.string(), entry.path().filename().string()));
-  return true;
+  check_replaces_no_input(folder, {});
 }
 
-fs::path create_folder_beside(const fs::path& folder) {
-  static std::atomic<unsigned> counter{0};
-  for (int attempt = 0;; ++attempt) {
-    const fs::path name = fmt::format("{}.partial-{}-{}", folder.string(), ::getpid(), counter++);
-    std::error_code failure;
-    if (fs::create_directory(name, failure)) return name;
-    if (failure) throw system_error("create", name.string(), failure.value());
-    if (attempt == 100) throw system_error("create", name.string(), EEXIST);
-  }
+/// The folders that will be removed when the output is whole; throws when one must stay.
+std::vector<fs::path> earlier_folders(const std::string& path, bool force) {
+  const bool killed = remove_leftovers(path);
+  remove_leftovers(part_folder(path, 1).string());
+  std::vector<fs::path> folders = part_folders(path);
+  // A process that was killed between its two moves leaves a folder and no file.
+  const bool left = killed && !is_there(path);
+  for (const fs::path& folder : folders) check_folder(folder, force || left);
+  if (!left) return folders;
+  for (const fs::path& folder : folders) fs::remove_all(folder);
+  return {};
+}
+
+fs::path free_folder(const fs::path& path) {
+  int number = 1;
+  while (is_there(part_folder(path, number))) ++number;
+  return part_folder(path, number);
 }
 
 /// Moves `from` to `to`, where nothing may be.
@@ -63,26 +67,22 @@ void move_to_free_place(const fs::path& from, const fs::path& to) {
   throw system_error("rename the finished folder to", to.string(), errno);
 }
 
-/// Moves `from` to `to`; when that exists the two change places.
-void move_folder(const fs::path& from, const fs::path& to, bool exists) {
-  exists ? exchange(from, to) : move_to_free_place(from, to);
-}
-
 }  // namespace
 
 PartedOutput::PartedOutput(std::string path, bool force)
-    : folder_(path + ".parts"),
-      replaces_(check_folder(folder_, force)),
+    : earlier_(earlier_folders(path, force)),
+      folder_(free_folder(path)),
       index_(std::move(path), force) {}
 
 PartedOutput::~PartedOutput() {
   std::error_code ignored;
-  if (!temporary_.empty()) fs::remove_all(temporary_, ignored);
+  if (!temporary_.path.empty()) fs::remove_all(temporary_.path, ignored);
 }
 
 FileWriter PartedOutput::create_part(std::string_view extension) {
-  if (temporary_.empty()) temporary_ = create_folder_beside(folder_);
-  const fs::path path = temporary_ / fmt::format("part_{}{}", parts_, extension);
+  if (temporary_.path.empty())
+    temporary_ = create_temporary_folder(part_folder(index_.path(), 1).string());
+  const fs::path path = fs::path(temporary_.path) / fmt::format("part_{}{}", parts_, extension);
   UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (fd.get() < 0) throw system_error("create", path.string(), errno);
   ++parts_;
@@ -94,19 +94,22 @@ std::string PartedOutput::reference(std::size_t part, std::string_view extension
 }
 
 void PartedOutput::publish() {
-  if (parts_ == 0) {
-    index_.publish();
-    if (replaces_) fs::remove_all(folder_);
-    return;
+  if (parts_ > 0) {
+    move_to_free_place(temporary_.path, folder_);
+    temporary_.path = folder_;  // goes with the file if that cannot be published
   }
-  move_folder(temporary_, folder_, replaces_);
-  try {
-    index_.publish();
-  } catch (...) {
-    move_folder(replaces_ ? temporary_ : folder_, replaces_ ? folder_ : temporary_, replaces_);
-    throw;
-  }
-  if (!replaces_) temporary_.clear();  // else the one that was replaced; the destructor removes it
+  index_.publish();
+  temporary_.path.clear();
+  std::error_code ignored;  // the output is whole; the next one of its name tries again
+  for (const fs::path& folder : earlier_) fs::remove_all(folder, ignored);
+}
+
+std::vector<fs::path> part_folders(const fs::path& path) {
+  std::vector<fs::path> folders;
+  for (int number = 1; number < 10; ++number)
+    if (fs::path folder = part_folder(path, number); is_there(folder))
+      folders.push_back(std::move(folder));
+  return folders;
 }
 
 }  // namespace isobrick

@@ -1,24 +1,27 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "isobrick/io/leftovers.h"
 #include "isobrick/io/output_file.h"
 
 namespace isobrick {
 
-/// A file and, where it needs them, parts in a folder beside it, `path`.parts:
-/// written under temporary names and moved to their places together.
+/// A file and, where it needs them, parts in a folder beside it, `path`.parts: written under
+/// temporary names and moved to their places together.
 ///
-/// Each of the two moves is one step; between them lies an instant in which
-/// the folder is new and the file is not.
+/// The file names the folder of its parts, so the rename of the file alone makes the output
+/// another one. New parts never take the folder of old ones, but `path`.parts-2 and so on; the
+/// old ones go when nothing names them any more.
 class PartedOutput {
  public:
-  /// As OutputFile. The folder is replaced only with `force`, and only when
-  /// everything in it has the name of a part: otherwise UsageError.
+  /// As OutputFile. Folders of parts are replaced only with `force`, or when a killed process left
+  /// them without their file, and only when everything in them has the name of a part: otherwise
+  /// UsageError.
   PartedOutput(std::string path, bool force);
   ~PartedOutput();
   PartedOutput(const PartedOutput&) = delete;
@@ -34,16 +37,19 @@ class PartedOutput {
   /// How the file names a part, relative to its own folder: head.pvtp.parts/part_0.vtp.
   std::string reference(std::size_t part, std::string_view extension) const;
 
-  /// Moves the folder and then the file to their places. Removes the folder of
+  /// Moves the folder and then the file to their places. Removes the folders of
   /// an earlier output even if this one has no parts.
   void publish();
 
  private:
-  std::filesystem::path folder_;
-  bool replaces_;  ///< there is a folder at its place
+  std::vector<std::filesystem::path> earlier_;  ///< folders of parts that are there
+  std::filesystem::path folder_;                ///< where the parts will be
   OutputFile index_;
-  std::filesystem::path temporary_;  ///< the folder while it is written, or the one replaced
+  Temporary temporary_;  ///< the folder while it is written; without a path when there is none
   std::size_t parts_ = 0;
 };
+
+/// The folders of parts that are beside `path`.
+std::vector<std::filesystem::path> part_folders(const std::filesystem::path& path);
 
 }  // namespace isobrick

@@ -10,6 +10,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_file.h"
+#include "isobrick/io/output_guard.h"
 #include "isobrick/pipeline/export_level_set.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
@@ -214,6 +215,7 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   const VolumeInfo info = describe(level, box, out.string());
+  check_replaces_no_input(out, {&store.info().path, 1});
   OutputFile output(out.string(), options.force);
   if (options.isovalue) {
     export_level_set(store, box, info, options, output, progress);

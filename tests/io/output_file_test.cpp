@@ -90,6 +90,44 @@ TEST(OutputFile, KeepsWhatAppearedInTheMeantime) {
   EXPECT_EQ(dir.list(), Names{"a"});
 }
 
+TEST(OutputFile, RemovesWhatKilledProcessesLeftAndNothingElse) {
+  const TempDir dir;
+  const Names others{"a.partial", "a.partial-1", "a.partial-1-0x", "ab.partial-1-0", "notes"};
+  for (const std::string& name : others) dir.write(name, "mine");
+  dir.write("a.partial-1-0", "left");
+  std::filesystem::create_symlink("notes", dir / "a.partial-1-1");
+  {
+    OutputFile out(dir / "a", false);
+    EXPECT_FALSE(std::filesystem::exists(dir / "a.partial-1-0"));
+    // What is being written stays.
+    OutputFile second(dir / "a", false);
+    second.writer().append("second");
+    out.publish();
+    EXPECT_TRUE(contains(message_of([&] { second.publish(); }), "exists"));
+  }
+  Names expected = others;
+  expected.insert(expected.begin(), "a");
+  expected.insert(expected.begin() + 3, "a.partial-1-1");
+  std::sort(expected.begin(), expected.end());
+  EXPECT_EQ(dir.list(), expected);
+  EXPECT_EQ(dir.read("notes"), "mine");
+}
+
+TEST(OutputFile, RefusesLinksToWhatIsNoFile) {
+  const TempDir dir;
+  for (const char* target : {"/dev/null", "nothing", "."}) {
+    std::filesystem::create_symlink(target, dir / "a");
+    EXPECT_TRUE(contains(message_of([&] { OutputFile(dir / "a", true); }), "symbolic link to"));
+    EXPECT_EQ(dir.list(), Names{"a"});
+    std::filesystem::remove(dir / "a");
+  }
+  // Also what appears while the file is written.
+  OutputFile out(dir / "a", true);
+  std::filesystem::create_symlink("/dev/null", dir / "a");
+  message_of([&] { out.publish(); });
+  EXPECT_TRUE(std::filesystem::is_symlink(dir / "a"));
+}
+
 TEST(OutputFile, RefusesPlacesThatCannotBeWritten) {
   const TempDir dir;
   message_of<Error>([&] { OutputFile(dir / "missing/a", false); });

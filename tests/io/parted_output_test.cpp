@@ -57,9 +57,12 @@ TEST(PartedOutput, ReplacesThePartsOfBefore) {
   };
   make(3, "old");
   make(1, "new");
+  // Never in the folder that the old file names.
+  EXPECT_EQ(dir.list(), (Names{"a", "a.parts-2"}));
+  EXPECT_EQ(dir.read("a.parts-2/part_0.x"), "new0");
+  EXPECT_FALSE(fs::exists(dir / "a.parts-2/part_1.x"));
+  make(2, "third");
   EXPECT_EQ(dir.list(), (Names{"a", "a.parts"}));
-  EXPECT_EQ(dir.read("a.parts/part_0.x"), "new0");
-  EXPECT_FALSE(fs::exists(dir / "a.parts/part_1.x"));
   make(0, "none");
   EXPECT_EQ(dir.list(), Names{"a"});
 }
@@ -78,6 +81,23 @@ TEST(PartedOutput, KeepsWhatIsNotItsOwn) {
   fs::create_symlink("/tmp", dir / "b.parts");
   message_of([&] { PartedOutput(dir / "b", true); });
   EXPECT_EQ(dir.list(), (Names{"a.parts", "b.parts"}));
+}
+
+TEST(PartedOutput, RemovesWhatAKilledProcessLeft) {
+  const TempDir dir;
+  fs::create_directory(dir / "a.parts");
+  dir.write("a.parts/part_0.x", "left");
+  message_of([&] { PartedOutput(dir / "a", false); });
+  // The file under its temporary name shows that nobody finished this output.
+  dir.write("a.partial-1-0", "left");
+  fs::create_directory(dir / "a.parts.partial-1-1");
+  dir.write("a.parts.partial-1-1/part_0.x", "left");
+  fs::create_directory(dir / "a.parts.partial-1-2");
+  dir.write("a.parts.partial-1-2/thesis.tex", "mine");
+  PartedOutput out(dir / "a", false);
+  write_parts(out, 1, "new");
+  out.publish();
+  EXPECT_EQ(dir.list(), (Names{"a", "a.parts", "a.parts.partial-1-2"}));
 }
 
 TEST(PartedOutput, WhatAppearedInTheMeantimeStays) {

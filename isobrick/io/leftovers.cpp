@@ -1,0 +1,115 @@
+#include "isobrick/io/leftovers.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <filesystem>
+#include <vector>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_number(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// "4711-0": process and counter.
+bool is_process_suffix(std::string_view text) {
+  const std::size_t dash = text.find('-');
+  return dash != std::string_view::npos && is_number(text.substr(0, dash)) &&
+         is_number(text.substr(dash + 1));
+}
+
+/// Locks what was just created; false when somebody took it for a leftover in between. Where a
+/// file system has no locks nobody can take it.
+bool keep(const UniqueFd& fd) {
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) return false;
+  struct stat status {};
+  return ::fstat(fd.get(), &status) == 0 && status.st_nlink > 0;
+}
+
+/// Calls create(name) → errno-setting descriptor until a name is free.
+template <class Create>
+Temporary create_beside(const std::string& path, const Create& create) {
+  static std::atomic<unsigned> counter{0};
+  for (int attempt = 0;; ++attempt) {
+    std::string name = fmt::format("{}.partial-{}-{}", path, ::getpid(), counter++);
+    UniqueFd fd(create(name.c_str()));
+    if (fd.get() >= 0 && keep(fd)) return {std::move(fd), std::move(name)};
+    if ((fd.get() < 0 && errno != EEXIST) || attempt == 100)
+      throw system_error("create", path, errno);
+  }
+}
+
+bool only_parts(const fs::path& folder) {
+  std::error_code failure;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, failure))
+    if (!is_part_name(entry.path().filename().native())) return false;
+  return !failure;
+}
+
+/// Removes a file or folder that nobody holds; whether it did.
+bool remove_if_left(const fs::path& path) {
+  const bool folder = fs::is_directory(fs::symlink_status(path));
+  const int flags = folder ? O_RDONLY | O_DIRECTORY : O_RDWR | O_NONBLOCK;
+  const UniqueFd fd(::open(path.c_str(), flags | O_NOFOLLOW | O_CLOEXEC));
+  struct stat status {};
+  if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0) return false;
+  if (!folder && !S_ISREG(status.st_mode)) return false;
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) return false;
+  std::error_code failure;
+  if (!folder) return fs::remove(path, failure);
+  return only_parts(path) && fs::remove_all(path, failure) > 0 && !failure;
+}
+
+}  // namespace
+
+Temporary create_temporary_file(const std::string& path) {
+  // O_EXCL: never through a link that somebody else put there.
+  return create_beside(path, [](const char* name) {
+    return ::open(name, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  });
+}
+
+Temporary create_temporary_folder(const std::string& path) {
+  return create_beside(path, [](const char* name) {
+    if (::mkdir(name, 0777) != 0) return -1;
+    return ::open(name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  });
+}
+
+bool remove_leftovers(const std::string& path) {
+  const fs::path output(path);
+  const fs::path folder = output.has_parent_path() ? output.parent_path() : fs::path(".");
+  const std::string prefix = output.filename().string() + ".partial-";
+  std::vector<fs::path> left;
+  std::error_code failure;
+  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with(prefix) && is_process_suffix(std::string_view(name).substr(prefix.size())))
+      left.push_back(entry->path());
+  }
+  bool any = false;
+  for (const fs::path& leftover : left) any |= remove_if_left(leftover);
+  return any;
+}
+
+bool is_part_name(std::string_view name) {
+  constexpr std::string_view prefix = "part_";
+  if (!name.starts_with(prefix)) return false;
+  const std::size_t dot = name.find('.');
+  return dot != std::string_view::npos && is_number(name.substr(prefix.size(), dot - prefix.size()));
+}
+
+}  // namespace isobrick

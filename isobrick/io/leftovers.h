@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "isobrick/io/file.h"
+
+// Outputs grow under names such as mesh.ply.partial-4711-0. A process holds a lock on what it
+// writes so, and the lock ends with the process: what is not locked is what a killed one left.
+
+namespace isobrick {
+
+/// A file or folder under such a name, locked as long as `fd` is open.
+struct Temporary {
+  UniqueFd fd;
+  std::string path;
+};
+
+/// Creates a file that only this call can have made. Throws Error.
+Temporary create_temporary_file(const std::string& path);
+Temporary create_temporary_folder(const std::string& path);
+
+/// Removes the temporary files that killed processes left of the output `path`; whether there
+/// were any. Folders are removed if they hold nothing but parts (is_part_name).
+bool remove_leftovers(const std::string& path);
+
+/// Whether a file can be a part of an output in several files: part_3.vtp.
+bool is_part_name(std::string_view name);
+
+}  // namespace isobrick
