@@ -1,5 +1,6 @@
 #include "isobrick/pipeline/convert.h"
 
+#include <filesystem>
 #include <memory>
 
 #include "isobrick/bricks/metadata_files.h"
@@ -51,10 +52,21 @@ std::unique_ptr<VolumeSource> open_input(const Arguments& arguments) {
   return open_source(arguments.in, volume);
 }
 
+/// What the input's name means on the disk: of FILE:/NAME the file, of standard input nothing.
+std::vector<std::filesystem::path> input_paths(const std::string& name) {
+  std::error_code none;
+  for (std::size_t end = name.size(); end != std::string::npos && end > 0;
+       end = name.rfind(":/", end - 1))
+    if (std::filesystem::exists(name.substr(0, end), none)) return {name.substr(0, end)};
+  return {};
+}
+
 int run(const Arguments& arguments, Console& console) {
   check_store_name(arguments.out);
   const auto source = open_input(arguments);
-  const ConvertReport report = convert(*source, arguments.out, arguments.store, console.progress());
+  ConvertOptions options = arguments.store;
+  options.inputs = input_paths(arguments.in);
+  const ConvertReport report = convert(*source, arguments.out, options, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
   return 0;
 }

@@ -23,12 +23,15 @@ std::vector<std::byte> encode_index_part(std::optional<int> zstd_level,
   return encode_bytes(CodecChain::ours(zstd_level), bytes);
 }
 
-IndexChunkWriter::IndexChunkWriter(std::filesystem::path path, std::size_t parts)
-    : path_(std::move(path)), file_(StoreFile::create(temporary_name(path_))), places_(parts) {}
+IndexChunkWriter::IndexChunkWriter(Publisher& publisher, std::filesystem::path path,
+                                   std::size_t parts)
+    : publisher_(publisher),
+      path_(std::move(path)),
+      file_(publisher.create_temporary(path_)),
+      places_(parts) {}
 
 IndexChunkWriter::~IndexChunkWriter() {
-  std::error_code ignored;
-  if (file_) std::filesystem::remove(temporary_name(path_), ignored);
+  if (file_) publisher_.discard_temporary(path_);
 }
 
 void IndexChunkWriter::append(std::size_t part, std::span<const std::byte> encoded) {
@@ -37,11 +40,11 @@ void IndexChunkWriter::append(std::size_t part, std::span<const std::byte> encod
   end_ += encoded.size();
 }
 
-void IndexChunkWriter::publish(Publisher& publisher) {
+void IndexChunkWriter::publish() {
   const std::vector<std::byte> places = places_.encode();
   file_.write_at(end_, places);
-  publisher.count(end_ + places.size());
-  publisher.publish(std::move(file_), path_);
+  publisher_.count(end_ + places.size());
+  publisher_.publish(std::move(file_), path_);
 }
 
 IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed)

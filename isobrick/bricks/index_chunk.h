@@ -28,7 +28,8 @@ std::vector<std::byte> encode_index_part(std::optional<int> zstd_level,
 /// Writes one index chunk under its temporary name, part after part.
 class IndexChunkWriter {
  public:
-  IndexChunkWriter(std::filesystem::path path, std::size_t parts);
+  /// The chunk will be `path`, in the folder of `publisher`.
+  IndexChunkWriter(Publisher& publisher, std::filesystem::path path, std::size_t parts);
   /// Removes what was not published.
   ~IndexChunkWriter();
   IndexChunkWriter(const IndexChunkWriter&) = delete;
@@ -36,10 +37,11 @@ class IndexChunkWriter {
 
   /// Each part once at most; those that never come are absent.
   void append(std::size_t part, std::span<const std::byte> encoded);
-  /// Ends the file and hands it over.
-  void publish(Publisher& publisher);
+  /// Ends the file and hands it to the publisher.
+  void publish();
 
  private:
+  Publisher& publisher_;
   std::filesystem::path path_;
   StoreFile file_;
   ShardIndex places_;

@@ -13,7 +13,7 @@ constexpr std::size_t kMaxWaiting = std::size_t{64} << 10;
 
 }  // namespace
 
-Publisher::Publisher(std::filesystem::path root) : root_(std::move(root)) {}
+Publisher::Publisher(const std::filesystem::path& root) : folder_(root) {}
 
 Publisher::~Publisher() {
   {
@@ -24,20 +24,24 @@ Publisher::~Publisher() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void Publisher::Job::run() {
-  if (kind == Kind::sync_directory) return isobrick::sync_directory(path);
-  if (kind == Kind::sync_file) return file.sync();
+void Publisher::run(Job& job) const {
+  if (job.kind == Job::Kind::sync_directory) return folder_.sync_folder(job.path);
+  if (job.kind == Job::Kind::sync_file) return job.file.sync();
   try {
-    if (kind == Kind::write) {
-      file = StoreFile::create(temporary_name(path));
-      file.write_at(0, content);
+    if (job.kind == Job::Kind::write) {
+      job.file = create_temporary(job.path);
+      job.file.write_at(0, job.content);
     }
-    publish_file(std::move(file), path);
+    publish_now(std::move(job.file), job.path);
   } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary_name(path), ignored);
+    discard_temporary(job.path);
     throw;
   }
+}
+
+void Publisher::publish_now(StoreFile temporary, const std::filesystem::path& path) const {
+  temporary.sync();
+  folder_.rename_file(temporary_name(path), path);
 }
 
 void Publisher::run() {
@@ -51,7 +55,7 @@ void Publisher::run() {
     lock.unlock();
     std::exception_ptr failure;
     try {
-      job.run();
+      run(job);
     } catch (...) {
       failure = std::current_exception();
     }
@@ -77,9 +81,13 @@ void Publisher::add(Job job, const std::filesystem::path& parent) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return queue_.size() < kMaxQueue; });
   rethrow_failure();
-  // The folders above may be new as well, so their own entries must be synced too.
-  for (auto folder = parent; directories_.insert(folder).second; folder = folder.parent_path())
-    if (folder == root_ || !folder.has_relative_path()) break;
+  // The folders above may be new as well, so their own entries must be synced too; those above
+  // the root are not ours. The root may be written in several ways ("a", "a/"): what is below it
+  // is not.
+  std::filesystem::path below = parent.lexically_relative(folder_.root());
+  if (below == ".") below.clear();
+  while (directories_.insert(folder_.root() / below).second && !below.empty())
+    below = below.parent_path();
   queue_.push_back(std::move(job));
   start_thread();
 }
@@ -94,9 +102,21 @@ void Publisher::sync(StoreFile file) {
   add({Job::Kind::sync_file, std::move(file), {}, {}}, parent);
 }
 
+StoreFile Publisher::create_temporary(const std::filesystem::path& path) const {
+  const std::filesystem::path name = temporary_name(path);
+  return {folder_.create_file(name), name};
+}
+
+void Publisher::discard_temporary(const std::filesystem::path& path) const noexcept {
+  try {
+    folder_.remove_file(temporary_name(path));
+  } catch (const std::exception&) {
+  }
+}
+
 StoreFile Publisher::write_temporary(const std::filesystem::path& path,
                                      std::span<const std::byte> content) {
-  StoreFile file = StoreFile::create(temporary_name(path));
+  StoreFile file = create_temporary(path);
   file.write_at(0, content);
   count(content.size());
   return file;

@@ -14,23 +14,32 @@
 #include <vector>
 
 #include "isobrick/bricks/store_file.h"
+#include "isobrick/io/output_folder.h"
 
 namespace isobrick {
 
-/// Syncs finished files and gives them their final names, on threads of its own
+/// Syncs finished files of a folder and gives them their final names, on threads of its own
 /// so that nobody waits for the disk; the queue is bounded all the same. Several
 /// threads, because a file system commits syncs that come together at once.
 /// Failures come out of the next call.
 class Publisher {
  public:
-  explicit Publisher(std::filesystem::path root);
+  /// All files are below `root`, which exists.
+  explicit Publisher(const std::filesystem::path& root);
   /// Finishes what was given; failures are lost, so call wait() first.
   ~Publisher();
+
+  /// Where the files are.
+  const OutputFolder& folder() const { return folder_; }
 
   /// Takes a file written under its temporary name.
   void publish(StoreFile temporary, std::filesystem::path path);
   /// Takes a file that only needs to be synced, and keeps the name that it has.
   void sync(StoreFile file);
+  /// Creates the temporary file of `path`.
+  StoreFile create_temporary(const std::filesystem::path& path) const;
+  /// Removes it, if it is there; throws nothing.
+  void discard_temporary(const std::filesystem::path& path) const noexcept;
   /// Writes a whole file under the temporary name of `path`, and no more.
   StoreFile write_temporary(const std::filesystem::path& path, std::span<const std::byte> content);
   /// Writes a whole file under a temporary name and publishes it, small ones on
@@ -52,16 +61,18 @@ class Publisher {
     StoreFile file;
     std::filesystem::path path;      ///< the final one
     std::vector<std::byte> content;  ///< of a file that is still to be written
-    void run();
   };
   void add(Job job, const std::filesystem::path& parent);
   void run();
+  void run(Job& job) const;
+  /// Gives a temporary file its final name once it is on disk.
+  void publish_now(StoreFile temporary, const std::filesystem::path& path) const;
   /// Wakes a thread, or makes one when all have something to do.
   void start_thread();
   void drain(std::unique_lock<std::mutex>& lock);
   void rethrow_failure();
 
-  std::filesystem::path root_;
+  OutputFolder folder_;
   std::atomic<std::uint64_t> bytes_ = 0;
   std::mutex mutex_;
   std::condition_variable changed_;

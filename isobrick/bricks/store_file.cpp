@@ -24,52 +24,26 @@ off_t checked_offset(std::uint64_t offset, std::size_t size, const std::filesyst
 
 }  // namespace
 
-StoreFile::~StoreFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
-}
-
 StoreFile StoreFile::open_if_exists(const std::filesystem::path& path) {
   const auto no_file = [&] {
     return DamageError(fmt::format("'{}' is not a regular file", path.string()));
   };
   // Without O_NONBLOCK a FIFO here would wait for somebody who writes to it.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor < 0) {
+  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (fd.get() < 0) {
     if (errno == ENOENT) return {};
     if (errno == ENXIO) throw no_file();  // a socket, or a device that is not there
     throw system_error("open", path.string(), errno);
   }
-  StoreFile file(descriptor, path);
   struct stat status {};
-  if (::fstat(descriptor, &status) != 0) throw system_error("examine", path.string(), errno);
+  if (::fstat(fd.get(), &status) != 0) throw system_error("examine", path.string(), errno);
   if (!S_ISREG(status.st_mode)) throw no_file();
-  return file;
-}
-
-StoreFile StoreFile::create(const std::filesystem::path& path) {
-  constexpr int flags = O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC;
-  int descriptor = ::open(path.c_str(), flags, 0666);
-  if (descriptor < 0 && errno == ENOENT) {
-    // Folders are made only when missing: most files have theirs already.
-    std::error_code failure;
-    std::filesystem::create_directories(path.parent_path(), failure);
-    if (failure)
-      throw system_error("create directory", path.parent_path().string(), failure.value());
-    descriptor = ::open(path.c_str(), flags, 0666);
-  }
-  if (descriptor < 0) throw system_error("create", path.string(), errno);
-  return {descriptor, path};
-}
-
-StoreFile StoreFile::open_for_writing(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-  if (descriptor < 0) throw system_error("open", path.string(), errno);
-  return {descriptor, path};
+  return {std::move(fd), path};
 }
 
 std::uint64_t StoreFile::size() const {
   struct stat status {};
-  if (::fstat(descriptor_, &status) != 0) throw system_error("examine", path_.string(), errno);
+  if (::fstat(fd_.get(), &status) != 0) throw system_error("examine", path_.string(), errno);
   return static_cast<std::uint64_t>(status.st_size);
 }
 
@@ -77,7 +51,7 @@ void StoreFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const 
   checked_offset(offset, bytes.size(), path_);
   while (!bytes.empty()) {
     const ssize_t count =
-        ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+        ::pread(fd_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (count < 0) {
       if (errno == EINTR) continue;
       throw system_error(fmt::format("read {} bytes at {} of", bytes.size(), offset),
@@ -92,7 +66,7 @@ void StoreFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) const 
 }
 
 void StoreFile::will_need(std::uint64_t offset, std::uint64_t size) const {
-  ::posix_fadvise(descriptor_, static_cast<off_t>(offset), static_cast<off_t>(size),
+  ::posix_fadvise(fd_.get(), static_cast<off_t>(offset), static_cast<off_t>(size),
                   POSIX_FADV_WILLNEED);
 }
 
@@ -100,7 +74,7 @@ void StoreFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes)
   checked_offset(offset, bytes.size(), path_);
   while (!bytes.empty()) {
     const ssize_t count =
-        ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+        ::pwrite(fd_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (count < 0) {
       if (errno == EINTR) continue;
       throw system_error("write", path_.string(), errno);
@@ -111,11 +85,11 @@ void StoreFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes)
 }
 
 void StoreFile::sync() {
-  if (::fsync(descriptor_) != 0) throw system_error("sync", path_.string(), errno);
+  if (::fsync(fd_.get()) != 0) throw system_error("sync", path_.string(), errno);
 }
 
 void StoreFile::start_writeback(std::uint64_t offset, std::uint64_t size) {
-  ::sync_file_range(descriptor_, static_cast<off_t>(offset), static_cast<off_t>(size),
+  ::sync_file_range(fd_.get(), static_cast<off_t>(offset), static_cast<off_t>(size),
                     SYNC_FILE_RANGE_WRITE);
 }
 
@@ -142,27 +116,6 @@ std::filesystem::path temporary_name(const std::filesystem::path& path) {
 
 bool is_temporary_name(const std::filesystem::path& path) {
   return path.extension() == kTemporarySuffix;
-}
-
-void rename_file(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (::rename(from.c_str(), to.c_str()) != 0)
-    throw system_error("rename a finished file to", to.string(), errno);
-}
-
-void publish_file(StoreFile temporary, const std::filesystem::path& path) {
-  temporary.sync();
-  rename_file(temporary.path(), path);
-}
-
-void sync_directory(const std::filesystem::path& directory) {
-  const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  // Entries may be made in a directory that one may not read; others sync it then.
-  if (descriptor < 0 && errno == EACCES) return;
-  if (descriptor < 0) throw system_error("open", directory.string(), errno);
-  const StoreFile file(descriptor, directory);
-  // Some file systems cannot sync a directory and say EINVAL; there is nothing more to do then.
-  if (::fsync(descriptor) != 0 && errno != EINVAL)
-    throw system_error("sync", directory.string(), errno);
 }
 
 }  // namespace isobrick

@@ -112,7 +112,7 @@ void StoreReader::Impl::open(const std::filesystem::path& path, const Selection&
   info.ours = image.ours;
   info.metadata_crc32c = metadata.crc32c;
   volume_choice = choose_volume(path, image, metadata.levels.front().array, selection);
-  info.additions = path / volume_choice.folder;
+  info.additions = volume_choice.folder.empty() ? path : path / volume_choice.folder;
   for (std::size_t i = 0; i < image.levels.size(); ++i)
     open_level(image.levels[i], std::move(metadata.levels[i]));
   std::optional<bool> may_have_nan = image.may_have_nan;

@@ -1,5 +1,6 @@
 #include "isobrick/bricks/store_writer.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <atomic>
@@ -151,6 +152,7 @@ struct StoreWriter::Impl {
   void write(OpenShard& shard, std::span<const std::byte> bytes);
   std::uint32_t checksum_of(const ImageMetadata& image) const;
   void publish_root(const ImageMetadata& image);
+  void reopen(OpenShard& shard);
 
   std::filesystem::path dir;
   StoreLayout layout;
@@ -185,20 +187,20 @@ void StoreWriter::Impl::begin() {
   const bool empty = std::filesystem::is_empty(dir, failure);
   if (failure) throw system_error("read directory", dir.string(), failure.value());
   if (!empty && !resume) throw Error(fmt::format("'{}' exists and is not empty", dir.string()));
+  publisher = std::make_unique<Publisher>(dir);
   if (!empty) {
     check_resume();
     for (const auto& entry : std::filesystem::recursive_directory_iterator(dir))
-      if (entry.is_regular_file() && is_temporary_name(entry.path()))
-        std::filesystem::remove(entry.path());
+      if (!entry.is_directory() && is_temporary_name(entry.path()))
+        publisher->folder().remove_file(entry.path());
   }
-  publisher = std::make_unique<Publisher>(dir);
   if (empty) {
     // It has its name before any other file is there. That it is durable is not
     // waited for: what a power failure can take with it was begun a moment ago.
     const std::string text = layout_marker(layout).dump(1) + "\n";
     StoreFile marker =
         publisher->write_temporary(dir / kLayoutMarker, std::as_bytes(std::span(text)));
-    rename_file(marker.path(), dir / kLayoutMarker);
+    publisher->folder().rename_file(marker.path(), dir / kLayoutMarker);
     publisher->sync(std::move(marker));
   }
   for (std::size_t i = 0; i < layout.levels.size(); ++i) {
@@ -221,22 +223,23 @@ void StoreWriter::Impl::begin() {
 std::shared_ptr<OpenShard> StoreWriter::Impl::open_shard(int i, Int3 s) {
   Level& l = level(i);
   const std::lock_guard lock(mutex);
-  auto& shard = open_shards[{i, linear_index(s, l.shards)}];
-  if (!shard) {
-    shard = std::make_shared<OpenShard>(static_cast<std::size_t>(volume(l.bricks_per_shard)));
-    shard->path = shard_path(l, s);
-  }
+  const std::pair key(i, linear_index(s, l.shards));
+  if (const auto found = open_shards.find(key); found != open_shards.end()) return found->second;
+  // Made first: where memory is short, no entry stays without its shard.
+  auto shard = std::make_shared<OpenShard>(static_cast<std::size_t>(volume(l.bricks_per_shard)));
+  shard->path = shard_path(l, s);
+  open_shards.emplace(key, shard);
   return shard;
 }
 
 void StoreWriter::Impl::write(OpenShard& shard, std::span<const std::byte> bytes) {
   if (!shard.created) {
-    shard.file = StoreFile::create(temporary_name(shard.path));
+    shard.file = publisher->create_temporary(shard.path);
     shard.created = true;
     shard.counted = ++open_files <= kMaxOpenShards;
     if (!shard.counted) --open_files;
   } else if (!shard.file) {
-    shard.file = StoreFile::open_for_writing(temporary_name(shard.path));
+    reopen(shard);
   }
   shard.file.write_at(shard.end, bytes);
   shard.end += bytes.size();
@@ -248,22 +251,27 @@ void StoreWriter::Impl::write(OpenShard& shard, std::span<const std::byte> bytes
   if (!shard.counted) shard.file = StoreFile();
 }
 
+void StoreWriter::Impl::reopen(OpenShard& shard) {
+  const std::filesystem::path name = temporary_name(shard.path);
+  shard.file = StoreFile(publisher->folder().open_file(name, O_RDWR), name);
+  if (!shard.file) throw Error(fmt::format("'{}' has gone while it was written", name.string()));
+}
+
 StoreWriter::StoreWriter(const std::filesystem::path& dir, const StoreLayout& layout, bool resume)
     : impl_(std::make_unique<Impl>(dir, layout, resume)) {
   impl_->begin();
 }
 
 StoreWriter::~StoreWriter() {
-  for (const auto& [key, shard] : impl_->open_shards) {
-    std::error_code ignored;
-    if (shard->created) std::filesystem::remove(temporary_name(shard->path), ignored);
-  }
+  for (const auto& [key, shard] : impl_->open_shards)
+    if (shard->created) impl_->publisher->discard_temporary(shard->path);
 }
 
 bool StoreWriter::shard_is_whole(int level, Int3 s) const {
   const Impl::Level& l = impl_->level(level);
   if (!impl_->resume) return false;
-  const StoreFile file = StoreFile::open_if_exists(impl_->shard_path(l, s));
+  const std::filesystem::path path = impl_->shard_path(l, s);
+  const StoreFile file(impl_->publisher->folder().open_file(path, O_RDONLY), path);
   if (!file) return false;
   if (!l.metadata.sharding) return true;  // it has its name only when it is whole
   const std::uint64_t size = file.size();
@@ -311,14 +319,12 @@ void StoreWriter::finish_shard(int level, Int3 s) {
   }
   if (!shard || !shard->created) {
     // All absent: no file. An earlier run may have left a damaged one.
-    std::error_code failure;
-    if (impl_->resume) std::filesystem::remove(impl_->shard_path(l, s), failure);
-    if (failure) throw system_error("remove", impl_->shard_path(l, s).string(), failure.value());
+    if (impl_->resume) impl_->publisher->folder().remove_file(impl_->shard_path(l, s));
     return;
   }
   const std::lock_guard lock(shard->mutex);
   if (l.metadata.sharding) impl_->write(*shard, shard->index.encode());
-  if (!shard->file) shard->file = StoreFile::open_for_writing(temporary_name(shard->path));
+  if (!shard->file) impl_->reopen(*shard);
   if (shard->counted) --impl_->open_files;
   impl_->publisher->publish(std::move(shard->file), shard->path);
   const std::lock_guard map_lock(impl_->mutex);
@@ -350,7 +356,7 @@ void StoreWriter::Impl::publish_root(const ImageMetadata& image) {
   const std::filesystem::path root = dir / file.name;
   publisher->sync(publisher->write_temporary(root, std::as_bytes(std::span(file.json))));
   publisher->wait();
-  rename_file(temporary_name(root), root);
+  publisher->folder().rename_file(temporary_name(root), root);
 }
 
 void StoreWriter::finish(bool may_have_nan,
@@ -386,10 +392,8 @@ void StoreWriter::finish(bool may_have_nan,
     impl_->publish_root(image);
   }
   if (more) more();
-  std::error_code failure;
-  std::filesystem::remove(impl_->dir / kLayoutMarker, failure);
-  if (failure) throw system_error("remove", (impl_->dir / kLayoutMarker).string(), failure.value());
-  sync_directory(impl_->dir);
+  publisher.folder().remove_file(impl_->dir / kLayoutMarker);
+  publisher.folder().sync_folder(impl_->dir);
 }
 
 std::uint64_t StoreWriter::bytes() const { return impl_->publisher->bytes(); }

@@ -6,9 +6,10 @@
 
 #include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/range_array.h"
+#include "isobrick/bricks/store_entries.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/exchange.h"
 #include "isobrick/pipeline/level_scan.h"
-#include "isobrick/pipeline/replace_folder.h"
 
 namespace isobrick {
 namespace {
@@ -22,6 +23,15 @@ constexpr std::uint64_t kEnoughForAPiece = std::uint64_t{256} << 20;
 fs::path partial(fs::path folder) {
   folder += ".partial";
   return folder;
+}
+
+/// Calls f(folder, where it lies in a store) for both range arrays of every level.
+template <class F>
+void for_each_range_folder(const StoreInfo& info, F&& f) {
+  for (int level = 0; level < static_cast<int>(info.levels.size()); ++level) {
+    f(block_range_folder(info.additions, level), block_range_folder("", level));
+    f(brick_range_folder(info.additions, level), brick_range_folder("", level));
+  }
 }
 
 /// Bytes for the samples of a piece: what the budget leaves.
@@ -70,11 +80,12 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
     total +=
         static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
-  for (int level = 0; level < levels; ++level)
-    for (const fs::path& folder :
-         {block_range_folder(info.additions, level), brick_range_folder(info.additions, level)})
-      fs::remove_all(partial(folder));  // of a run that was interrupted
-  Publisher publisher(info.additions);
+  Publisher publisher(info.path);
+  for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
+    check_replaceable(folder, place);
+    check_replaceable(partial(folder), place);
+    publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
+  });
   progress.begin("ranges", total);
   bool has_nan = false;
   for (int level = 0; level < levels; ++level)
@@ -84,10 +95,11 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
         publisher, progress);
   publisher.wait();
   progress.end();
-  for (int level = 0; level < levels; ++level)
-    for (const fs::path& folder :
-         {block_range_folder(info.additions, level), brick_range_folder(info.additions, level)})
-      replace_folder(partial(folder), folder);
+  for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
+    publisher.folder().replace_folder(partial(folder), folder);
+    check_replaceable(set_aside_name(folder), place);
+    publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left
+  });
   if (info.ours) return;  // its metadata says the rest
   publisher.write(
       added_ranges_file(info.additions),

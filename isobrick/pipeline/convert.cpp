@@ -40,7 +40,7 @@ class Conversion {
  public:
   /// By one of `plan` and `sparse`; the other is null.
   Conversion(VolumeSource& source, const StoreLayout& layout, const ConvertPlan* plan,
-             SparsePyramid* sparse, const ConvertStaging& staging, const ConvertOptions& options,
+             SparsePyramid* sparse, ConvertStaging& staging, const ConvertOptions& options,
              Progress& progress)
       : source_(source),
         layout_(layout),
@@ -73,7 +73,7 @@ class Conversion {
   const ConvertOptions& options_;
   const ConvertPlan* plan_;
   SparsePyramid* sparse_;
-  const ConvertStaging& staging_;
+  ConvertStaging& staging_;
   Progress& progress_;
   StoreWriter store_;
   ConvertJournal journal_;
@@ -100,13 +100,15 @@ ConvertReport Conversion::run() {
     // Infinities of both signs make a NaN that only a coarser level has.
     has_nan |= writer->has_nan();
   }
-  // The journal goes last: until then a resume compares the input with it.
+  // Published while it can still be resumed: a kill in between leaves nothing that the next run
+  // does not know. The journal goes last: until then a resume compares the input with it.
   store_.finish(
       has_nan, [&] { return display_window(StoreReader(staging_.path())); },
       [&] {
         add_chosen_index(report);
-        journal_.remove();
+        staging_.publish();
       });
+  journal_.remove();
   report.bytes_in = bytes_of(source_.info().extent, source_.info().type);
   report.bytes_out = store_.bytes() + report.index_bytes;
   report.levels = level_count();
@@ -215,14 +217,13 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
     sparse.emplace(source, layout, options, threads);
   else
     plan.emplace(layout, options.memory, threads, source.random_access(), source.memory());
-  ConvertStaging staging(out, options.resume, options.force);
+  ConvertStaging staging(out, options.resume, options.force, options.inputs);
   Workers workers(plan ? plan->threads() : sparse->threads());
   ConvertReport report = workers.execute([&] {
     return Conversion(source, layout, plan ? &*plan : nullptr, sparse ? &*sparse : nullptr, staging,
                       options, progress)
         .run();
   });
-  staging.publish();
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;
 }

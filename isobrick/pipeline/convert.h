@@ -28,6 +28,7 @@ struct ConvertOptions {
   int threads = 0;                                ///< 0: all cores
   bool resume = false;             ///< go on with an interrupted conversion of the same input
   bool force = false;              ///< replace a store that exists (only when the new one is whole)
+  std::vector<std::filesystem::path> inputs;  ///< what is read: never replaced
   std::optional<IndexKind> index;  ///< also add one of this kind to all levels
   Index leaf = kDefaultLeaf;       ///< of that index
 };
@@ -43,7 +44,8 @@ struct ConvertReport {
 
 /// Writes `source` as a store at `out`: works in `out` + ".partial" and renames
 /// at the end. Reads each input sample once. Throws UsageError when the budget
-/// is too small for one row of bricks (naming the least that does).
+/// is too small for one row of bricks (naming the least that does), and where
+/// ConvertStaging does.
 ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& progress);
 

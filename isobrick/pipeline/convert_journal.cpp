@@ -2,11 +2,11 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
+#include <span>
 
+#include "isobrick/bricks/store_names.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -25,14 +25,22 @@ std::uint64_t mix(std::uint64_t place, std::uint32_t crc) {
 
 ConvertJournal::ConvertJournal(const std::filesystem::path& store, const Lattice& lattice,
                                bool resume)
-    : path_(store / "convert.journal"), lattice_(lattice) {
-  fd_ =
-      UniqueFd(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | (resume ? 0 : O_TRUNC), 0666));
-  if (fd_.get() < 0) throw system_error("create", path_.string(), errno);
-  earlier_.resize(static_cast<std::size_t>(lattice.bricks().z));
-  const ssize_t n = ::pread(fd_.get(), earlier_.data(), earlier_.size() * sizeof(earlier_[0]), 0);
-  if (n < 0) throw system_error("read", path_.string(), errno);
-  earlier_.resize(static_cast<std::size_t>(n) / sizeof(earlier_[0]));
+    : folder_(store), path_(store / kConvertJournal), lattice_(lattice) {
+  if (resume) read_earlier();
+  // Always a file of our own making.
+  const std::filesystem::path temporary = temporary_name(path_);
+  file_ = StoreFile(folder_.create_file(temporary), path_);
+  file_.write_at(0, std::as_bytes(std::span(earlier_)));
+  folder_.rename_file(temporary, path_);
+}
+
+void ConvertJournal::read_earlier() {
+  const StoreFile file(folder_.open_file(path_, O_RDONLY), path_);
+  if (!file) return;
+  const auto layers = static_cast<std::uint64_t>(lattice_.bricks().z);
+  earlier_.resize(
+      static_cast<std::size_t>(std::min(file.size() / sizeof(earlier_[0]), layers)));
+  file.read_at(0, std::as_writable_bytes(std::span(earlier_)));
 }
 
 void ConvertJournal::add(Int3 brick, std::uint32_t crc) {
@@ -57,11 +65,9 @@ void ConvertJournal::record(Index layer, std::uint64_t sum) {
         "differ; --force starts anew",
         path_.parent_path().string(), z0, std::min(z0 + lattice_.brick.z, lattice_.extent.z) - 1));
   }
-  if (::pwrite(fd_.get(), &sum, sizeof(sum), static_cast<off_t>(i * sizeof(sum))) !=
-      static_cast<ssize_t>(sizeof(sum)))
-    throw system_error("write", path_.string(), errno);
+  file_.write_at(i * sizeof(sum), std::as_bytes(std::span(&sum, 1)));
 }
 
-void ConvertJournal::remove() { ::unlink(path_.c_str()); }
+void ConvertJournal::remove() { folder_.remove_file(path_); }
 
 }  // namespace isobrick

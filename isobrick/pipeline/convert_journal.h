@@ -5,8 +5,9 @@
 #include <map>
 #include <vector>
 
+#include "isobrick/bricks/store_file.h"
 #include "isobrick/core/lattice.h"
-#include "isobrick/io/file.h"
+#include "isobrick/io/output_folder.h"
 
 namespace isobrick {
 
@@ -24,15 +25,17 @@ class ConvertJournal {
   /// All bricks that lie below z1 were added. Throws Error when they differ
   /// from what is on record.
   void close(Index z1);
-  /// The store is about to become whole: the record goes.
+  /// The store is whole and has its name: the record goes.
   void remove();
 
  private:
+  void read_earlier();
   void record(Index layer, std::uint64_t sum);
 
+  OutputFolder folder_;
   std::filesystem::path path_;
   Lattice lattice_;
-  UniqueFd fd_;
+  StoreFile file_;
   std::vector<std::uint64_t> earlier_;
   std::map<Index, std::uint64_t> open_;  ///< layers not closed yet
   Index next_ = 0;

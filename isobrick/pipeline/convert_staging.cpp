@@ -3,14 +3,16 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
-#include <unistd.h>
+#include <sys/stat.h>
 
 #include <cerrno>
 
+#include "isobrick/bricks/store_entries.h"
 #include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/core/error.h"
-#include "isobrick/pipeline/replace_folder.h"
+#include "isobrick/io/exchange.h"
+#include "isobrick/io/output_guard.h"
 
 namespace isobrick {
 namespace {
@@ -21,10 +23,10 @@ bool is_there(const fs::path& path) {
   return fs::symlink_status(path).type() != fs::file_type::not_found;
 }
 
-/// A Zarr group (or an empty folder): something that is ours to replace.
-bool is_store(const fs::path& path) {
-  return fs::is_directory(path) && (fs::is_empty(path) || fs::exists(path / "zarr.json") ||
-                                    (fs::exists(path / ".zgroup") && fs::exists(path / ".zattrs")));
+bool is_folder(const fs::path& path) { return fs::is_directory(fs::symlink_status(path)); }
+
+bool has_marker(const fs::path& folder) {
+  return is_folder(folder) && is_there(folder / kLayoutMarker);
 }
 
 /// Whether a conversion stopped before its first file, the marker, was whole.
@@ -34,40 +36,94 @@ bool nothing_to_resume(const fs::path& staging) {
   return true;
 }
 
-}  // namespace
-
-ConvertStaging::ConvertStaging(fs::path out, bool resume, bool force)
-    : out_(std::move(out)), force_(force) {
-  if (!out_.has_filename()) out_ = out_.parent_path();  // a slash at the end
-  if (out_.empty() || out_.filename() == "." || out_.filename() == "..")
-    throw UsageError(fmt::format("'{}' is no name for a store", out_.string()));
-  staging_ = out_;
-  staging_ += ".partial";
-  check_out(force);
-  prepare(resume, force);
+fs::path checked_name(fs::path out) {
+  if (!out.has_filename()) out = out.parent_path();  // a slash at the end
+  if (out.empty() || out.filename() == "." || out.filename() == "..")
+    throw UsageError(fmt::format("'{}' is no name for a store", out.string()));
+  return out;
 }
 
-void ConvertStaging::check_out(bool force) const {
+fs::path parent_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+/// Keeps other conversions away from a folder.
+UniqueFd lock_folder(const OutputFolder& parent, const fs::path& folder) {
+  UniqueFd lock = parent.make_folder(folder);
+  struct stat locked {}, named {};
+  const bool taken = ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  // Another process may have moved it to its place before it let go of it.
+  const bool moved = !taken && (::fstat(lock.get(), &locked) != 0 ||
+                                ::lstat(folder.c_str(), &named) != 0 ||
+                                locked.st_ino != named.st_ino);
+  if (taken || moved)
+    throw Error(fmt::format("another conversion is writing '{}'", folder.string()));
+  return lock;
+}
+
+}  // namespace
+
+ConvertStaging::ConvertStaging(fs::path out, bool resume, bool force, std::vector<fs::path> inputs)
+    : out_(checked_name(std::move(out))),
+      staging_(out_.string() + ".partial"),
+      aside_(set_aside_name(out_)),
+      force_(force),
+      inputs_(std::move(inputs)),
+      parent_(parent_of(out_)) {
+  end_publication(resume);
+  check_out(resume);
+  prepare(resume);
+}
+
+void ConvertStaging::end_publication(bool resume) {
+  // Where folders change places in three steps, there may have been time for the first only.
+  if (!is_there(out_) && has_marker(staging_) && is_folder(aside_) &&
+      why_not_our_store(aside_).empty())
+    parent_.rename_file(aside_, out_);
+  const bool unfinished = has_marker(out_) && !has_marker(staging_);
+  const bool journal_left = !has_marker(out_) && is_there(out_ / kConvertJournal);
+  if (!(unfinished || journal_left) || !why_not_our_store(out_).empty()) return;
+  if (journal_left) return parent_.remove_file(out_ / kConvertJournal);
+  lock_ = lock_folder(parent_, out_);
+  remove_replaced(aside_);
+  remove_replaced(staging_);
+  parent_.sync_folder(parent_.root());
+  if (resume) return parent_.rename_file(out_, staging_);
+  parent_.remove_file(out_ / kLayoutMarker);
+  parent_.remove_file(out_ / kConvertJournal);
+  lock_ = UniqueFd();
+}
+
+/// Removes the rest of a store that a new one has replaced.
+void ConvertStaging::remove_replaced(const fs::path& folder) const {
+  check_replaceable(folder, "", inputs_);
+  parent_.remove_folder(folder);
+}
+
+void ConvertStaging::check_out(bool resume) const {
   if (!is_there(out_)) return;
   if (fs::is_symlink(fs::symlink_status(out_)))
     throw UsageError(
         fmt::format("'{}' is a symbolic link; name the folder that it means", out_.string()));
-  if (!force) throw UsageError(fmt::format("'{}' exists; --force replaces it", out_.string()));
-  if (!is_store(out_))
-    throw UsageError(fmt::format("'{}' is no store: it is not replaced", out_.string()));
+  if (!force_ && resume && has_marker(staging_))
+    throw UsageError(fmt::format("'{}' exists; --resume --force goes on with '{}' and replaces it",
+                                 out_.string(), staging_.string()));
+  if (!force_)
+    throw UsageError(fmt::format("'{}' exists{}; --force replaces it", out_.string(),
+                                 resume ? ", so that there is nothing to resume" : ""));
+  if (const std::string why = why_not_our_store(out_); !why.empty())
+    throw UsageError(
+        fmt::format("'{}' is no store that --force replaces: {}; choose another name or move it "
+                    "away",
+                    out_.string(), why));
+  check_replaces_no_input(out_, inputs_);
 }
 
-void ConvertStaging::prepare(bool resume, bool force) {
-  std::error_code failure;
-  if (fs::create_directory(staging_, failure)) {
-    lock();
-    return;
-  }
-  if (failure) throw system_error("create", staging_.string(), failure.value());
-  if (!fs::is_directory(fs::symlink_status(staging_)))
+void ConvertStaging::prepare(bool resume) {
+  if (is_there(staging_) && !is_folder(staging_))
     throw UsageError(fmt::format("'{}' is in the way", staging_.string()));
-  lock();
-  const bool begun = is_there(staging_ / kLayoutMarker);
+  if (lock_.get() < 0) lock_ = lock_folder(parent_, staging_);
+  const bool begun = has_marker(staging_);
   resumed_ = resume && begun;
   if (resumed_ || fs::is_empty(staging_)) return;
   // Whatever else is there, no conversion left it: it is not ours to remove.
@@ -75,25 +131,27 @@ void ConvertStaging::prepare(bool resume, bool force) {
     throw UsageError(
         fmt::format("'{}' is in the way and is no interrupted conversion; move it elsewhere",
                     staging_.string()));
-  if (!resume && !force)
+  if (!resume && !force_)
     throw UsageError(
         fmt::format("an interrupted conversion is in '{}'; --resume goes on with it, "
                     "--force starts anew",
                     staging_.string()));
-  for (const fs::directory_entry& entry : fs::directory_iterator(staging_))
-    fs::remove_all(entry.path());
+  check_replaceable(staging_, "", inputs_);
+  clear();
 }
 
-void ConvertStaging::lock() {
-  lock_ = UniqueFd(::open(staging_.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
-  if (lock_.get() < 0) throw system_error("open", staging_.string(), errno);
-  if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-    throw Error(fmt::format("another conversion is writing '{}'", staging_.string()));
+/// Empties the staging folder; its marker goes last, so that the next run knows what is left.
+void ConvertStaging::clear() const {
+  std::vector<fs::path> entries;
+  for (const fs::directory_entry& entry : fs::directory_iterator(staging_))
+    if (entry.path().filename() != kLayoutMarker) entries.push_back(entry.path());
+  for (const fs::path& entry : entries) parent_.remove_folder(entry);
+  parent_.remove_file(staging_ / kLayoutMarker);
 }
 
 void ConvertStaging::publish() {
-  if (is_there(out_)) check_out(force_);  // it may have appeared since
-  replace_folder(staging_, out_);
+  check_out(false);  // it may have appeared since
+  parent_.replace_folder(staging_, out_);
 }
 
 }  // namespace isobrick

@@ -1,6 +1,5 @@
 #include "isobrick/pipeline/index_build.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
 
@@ -11,14 +10,15 @@
 #include <optional>
 
 #include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/store_entries.h"
 #include "isobrick/bricks/stored_index.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/morton.h"
 #include "isobrick/index/leaf_ranges.h"
-#include "isobrick/io/file.h"
+#include "isobrick/io/exchange.h"
+#include "isobrick/io/output_folder.h"
 #include "isobrick/pipeline/add_ranges.h"
 #include "isobrick/pipeline/index_chunk_builder.h"
-#include "isobrick/pipeline/replace_folder.h"
 #include "isobrick/pipeline/workers.h"
 
 namespace isobrick {
@@ -43,12 +43,7 @@ std::optional<int> zstd_level_of(const StoreInfo& info) {
 
 /// Keeps others from adding to the same store at the same time.
 UniqueFd lock_store(const fs::path& store) {
-  const fs::path folder = store / "isobrick";
-  std::error_code failure;
-  fs::create_directories(folder, failure);
-  if (failure) throw system_error("create", folder.string(), failure.value());
-  UniqueFd lock(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (lock.get() < 0) throw system_error("open", folder.string(), errno);
+  UniqueFd lock = OutputFolder(store).make_folder(store / "isobrick");
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     throw Error(fmt::format("another process is adding to '{}'", store.string()));
   return lock;
@@ -77,11 +72,15 @@ class LevelIndex {
   void prepare(Publisher& publisher);
   void build(std::uint64_t memory, int threads, Publisher& publisher, Progress& progress,
              IndexReport& report) const;
-  void publish() const {
-    if (!finished_) replace_folder(partial_, place_);
+  void publish(const OutputFolder& folder) const {
+    if (!finished_) folder.replace_folder(partial_, place_);
+    // What a kill may have left of an index that was replaced.
+    remove(folder, set_aside_name(place_));
   }
 
  private:
+  fs::path place_in_store() const { return index_folder("", level_, layout_.kind); }
+  void remove(const OutputFolder& root, const fs::path& folder) const;
   bool is_wanted(const fs::path& folder) const;
   void build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher& publisher) const;
 
@@ -105,12 +104,21 @@ bool LevelIndex::is_wanted(const fs::path& folder) const {
   }
 }
 
+void LevelIndex::remove(const OutputFolder& root, const fs::path& folder) const {
+  if (!fs::exists(folder)) return;
+  check_replaceable(folder, place_in_store());
+  root.remove_folder(folder);
+}
+
 void LevelIndex::check() const {
+  for (const fs::path& folder : {place_, partial_}) check_replaceable(folder, place_in_store());
   if (options_.force) return;
-  if (fs::exists(place_) && !(options_.resume && is_wanted(place_)))
+  const bool finished = options_.resume && is_wanted(place_);
+  if (fs::exists(place_) && !finished)
     throw UsageError(fmt::format("'{}' has a {} index; --force replaces it",
                                  store_.info().path.string(), layout_.kind));
-  if (!fs::exists(partial_)) return;
+  // Beside a finished one it is the one that was replaced.
+  if (finished || !fs::exists(partial_)) return;
   if (!options_.resume)
     throw UsageError(
         fmt::format("an interrupted build is in '{}'; --resume goes on with it, --force starts "
@@ -125,26 +133,22 @@ void LevelIndex::check() const {
 
 void LevelIndex::prepare(Publisher& publisher) {
   finished_ = options_.resume && is_wanted(place_);
+  if (finished_ || !(options_.resume && is_wanted(partial_)))
+    remove(publisher.folder(), partial_);
   if (finished_) return;
-  if (!(options_.resume && is_wanted(partial_))) {
-    std::error_code failure;
-    fs::remove_all(partial_, failure);
-    if (failure) throw system_error("remove", partial_.string(), failure.value());
-  }
   for_each_point({{0, 0, 0}, layout_.chunks()}, [&](Int3 c) {
-    std::error_code none;
-    fs::remove(temporary_name(index_chunk_path(partial_, c)), none);
+    publisher.discard_temporary(index_chunk_path(partial_, c));
   });
   publisher.write(index_description(partial_), to_json(layout_));
   publisher.wait();  // before any chunk, which would else be of nobody knows what
 }
 
 void LevelIndex::build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher& publisher) const {
-  IndexChunkWriter writer(index_chunk_path(partial_, c), layout_.parts_of_chunk(c));
+  IndexChunkWriter writer(publisher, index_chunk_path(partial_, c), layout_.parts_of_chunk(c));
   builder.build(
       c, [&](std::vector<std::byte> part) { return encode_index_part(layout_.zstd_level, part); },
       [&](std::size_t part, std::vector<std::byte> encoded) { writer.append(part, encoded); });
-  writer.publish(publisher);
+  writer.publish();
 }
 
 void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, Progress& progress,
@@ -204,13 +208,13 @@ IndexReport build_all(const fs::path& path, const IndexOptions& given, int threa
         volume(ceil_div(store->info().levels[static_cast<std::size_t>(level)].lattice.extent,
                         {IndexLayout::kBrick, IndexLayout::kBrick, IndexLayout::kBrick})));
   }
-  Publisher publisher(store->info().additions);
+  Publisher publisher(path);
   progress.begin("index", bricks);
   for (LevelIndex& level : levels) {
     level.prepare(publisher);
     level.build(options.memory, threads, publisher, progress, report);
   }
-  for (const LevelIndex& level : levels) level.publish();
+  for (const LevelIndex& level : levels) level.publish(publisher.folder());
   progress.end();
   return report;
 }

@@ -22,10 +22,10 @@ class IndexChunkFile : public testing::TestWithParam<std::optional<int>> {
   void write(std::size_t bytes) {
     parts = {part_of(100, 1), {}, part_of(9, 2), {}, part_of(bytes, 3)};
     Publisher publisher(folder / "");
-    IndexChunkWriter writer(path, parts.size());
+    IndexChunkWriter writer(publisher, path, parts.size());
     for (const std::size_t i : {std::size_t{4}, std::size_t{0}, std::size_t{2}})
       writer.append(i, encode_index_part(GetParam(), parts[i]));
-    writer.publish(publisher);
+    writer.publish();
     publisher.wait();
   }
   IndexChunk open() const { return {path, parts.size(), GetParam().has_value()}; }
@@ -88,7 +88,8 @@ TEST_P(IndexChunkFile, EveryFlippedBitAndEveryCutIsNoticed) {
 
 TEST_P(IndexChunkFile, WhatIsNotPublishedLeavesNothing) {
   {
-    IndexChunkWriter writer(path, 3);
+    Publisher publisher(folder / "");
+    IndexChunkWriter writer(publisher, path, 3);
     writer.append(1, part_of(10, 0));
   }
   EXPECT_TRUE(std::filesystem::is_empty(path.parent_path()));
@@ -105,9 +106,9 @@ TEST(IndexChunkPart, AClaimOfManyBytesCostsNoMemory) {
   for (int i = 0; i < 4; ++i) part.push_back(static_cast<std::byte>(crc >> 8 * i));
   const TemporaryFolder folder;
   Publisher publisher(folder / "");
-  IndexChunkWriter writer(folder / "0", 1);
+  IndexChunkWriter writer(publisher, folder / "0", 1);
   writer.append(0, part);
-  writer.publish(publisher);
+  writer.publish();
   publisher.wait();
   const IndexChunk chunk(folder / "0", 1, true);
   std::vector<std::byte> bytes;

@@ -1,4 +1,6 @@
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -157,12 +159,17 @@ TEST_F(Resume, DiskErrorsAreToldWithTheirPath) {
     }
   };
   expect_error("Not a directory", [&] { StoreWriter(folder / "file/a.zarr", layout, false); });
-  if (std::filesystem::exists("/dev/full")) {
-    const std::filesystem::path path = folder / "full.zarr";
-    StoreWriter writer(path, layout, false);
-    std::filesystem::create_directories(path / "0/c/0/0");
-    std::filesystem::create_symlink("/dev/full", path / "0/c/0/0/0.tmp");
-    expect_error("No space left", [&] { write_shard(writer, levels, 0, {0, 0, 0}, 3, 3); });
+  {
+    StoreWriter writer(folder / "full.zarr", layout, false);
+    // A limit on the size of files is as good as a full disk.
+    signal(SIGXFSZ, SIG_IGN);
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+    const rlimit full{16, before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
+    expect_error("0/c/0/0/0.tmp': File too large",
+                 [&] { write_shard(writer, levels, 0, {0, 0, 0}, 3, 3); });
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
   }
   // An error in the background comes out at the latest in finish().
   const std::filesystem::path path = folder / "b.zarr";

@@ -1,5 +1,6 @@
 #include "isobrick/io/exchange.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 
 #include "temp_dir.h"
@@ -17,7 +18,7 @@ TEST(Exchange, FoldersChangePlacesEitherWay) {
     fs::create_directory(dir / "b");
     dir.write("a/x", "new");
     dir.write("b/x", "old");
-    swap(dir / "a", dir / "b");
+    swap(AT_FDCWD, dir / "a", dir / "b");
     EXPECT_EQ(dir.read("a/x"), "old");
     EXPECT_EQ(dir.read("b/x"), "new");
     EXPECT_EQ(dir.list(), (Names{"a", "b"}));
@@ -29,7 +30,7 @@ TEST(Exchange, WhatFailsLeavesBothWhereTheyWere) {
     const TempDir dir;
     fs::create_directory(dir / "b");
     dir.write("b/x", "old");
-    EXPECT_TRUE(contains(message_of<Error>([&] { swap(dir / "a", dir / "b"); }), "exchange"));
+    EXPECT_TRUE(contains(message_of<Error>([&] { swap(AT_FDCWD, dir / "a", dir / "b"); }), "exchange"));
     EXPECT_EQ(dir.list(), Names{"b"});
     EXPECT_EQ(dir.read("b/x"), "old");
   }

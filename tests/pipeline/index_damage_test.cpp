@@ -52,10 +52,10 @@ class IndexDamage : public testing::TestWithParam<IndexKind> {
     }
     parts[part] = std::move(content);
     Publisher publisher(store_);
-    IndexChunkWriter writer(index_chunk_path(index.folder(), {0, 0, 0}), count);
+    IndexChunkWriter writer(publisher, index_chunk_path(index.folder(), {0, 0, 0}), count);
     for (std::size_t i = 0; i < count; ++i)
       if (parts[i]) writer.append(i, encode_index_part(3, *parts[i]));
-    writer.publish(publisher);
+    writer.publish();
     publisher.wait();
   }
 

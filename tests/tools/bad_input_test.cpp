@@ -190,7 +190,7 @@ TEST_F(BadInput, AFolderThatIsNotThereIsNamed) {
   expect_refused(run({"export", store, path("no/such/x.raw")}), 1, {"cannot create", "no/such"});
   write_file(path("in_2x2x2_uint8.raw"), "01234567");
   expect_refused(run({"convert", path("in_2x2x2_uint8.raw"), path("no/such/x.zarr")}), 1,
-                 {"cannot create", "no/such"});
+                 {"cannot open the folder", "no/such"});
 }
 
 // The standard library's own words for it are none of ours.
