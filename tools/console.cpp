@@ -158,6 +158,12 @@ void print_error(std::string_view command, std::string_view what) {
   say(line);
 }
 
+void print_out_of_memory(std::string_view command) noexcept {
+  say(command.empty() ? "isobrick" : "isobrick ");
+  say(command);
+  say(": out of memory; a smaller --memory may help\n");
+}
+
 nlohmann::ordered_json to_json(Int3 v) { return {v.x, v.y, v.z}; }
 nlohmann::ordered_json to_json(Vec3d v) { return {v.x, v.y, v.z}; }
 

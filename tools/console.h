@@ -92,6 +92,8 @@ class Console {
 
 /// One line on standard error: "isobrick COMMAND: what"; lost when that cannot be written.
 void print_error(std::string_view command, std::string_view what);
+/// The same where memory is short: takes none.
+void print_out_of_memory(std::string_view command) noexcept;
 
 nlohmann::ordered_json to_json(Int3 v);
 nlohmann::ordered_json to_json(Vec3d v);

@@ -1,5 +1,9 @@
+#include <unistd.h>
+
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <new>
 
 #include <CLI/CLI.hpp>
@@ -49,6 +53,21 @@ int die_of(int signal) {
   return 1;
 }
 
+std::terminate_handler g_usual_end = nullptr;
+
+/// Where memory is short even destructors of libraries throw: that ends the program with a line.
+[[noreturn]] void end_at_once() {
+  try {
+    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::bad_alloc&) {
+    print_out_of_memory("");
+    ::_exit(1);
+  } catch (...) {
+  }
+  g_usual_end();
+  std::abort();
+}
+
 int run(Program& program, int argc, char** argv) {
   try {
     program.app.parse(words_to_parse(program.app, argc, argv));
@@ -68,7 +87,7 @@ int run(Program& program, int argc, char** argv) {
     print_error(name_of(parsed(program)), error.what());
     return 2;
   } catch (const std::bad_alloc&) {
-    print_error(name_of(parsed(program)), "out of memory; a smaller --memory may help");
+    print_out_of_memory(name_of(parsed(program)));
     return 1;
   } catch (const std::exception& error) {
     print_error(name_of(parsed(program)), what_of(error));
@@ -76,18 +95,28 @@ int run(Program& program, int argc, char** argv) {
   }
 }
 
+int run_program(int argc, char** argv) {
+  set_up_streams();
+  CLI::App app("Isosurfaces of volumes larger than memory.", "isobrick");
+  Program program{app, {}, {}};
+  try {
+    define(program);
+  } catch (const std::exception& error) {
+    print_error("", error.what());
+    return 1;
+  }
+  return run(program, argc, argv);
+}
+
 }  // namespace
 }  // namespace isobrick::tools
 
 int main(int argc, char** argv) {
-  isobrick::tools::set_up_streams();
-  CLI::App app("Isosurfaces of volumes larger than memory.", "isobrick");
-  isobrick::tools::Program program{app, {}, {}};
+  isobrick::tools::g_usual_end = std::set_terminate(isobrick::tools::end_at_once);
   try {
-    isobrick::tools::define(program);
-  } catch (const std::exception& error) {
-    isobrick::tools::print_error("", error.what());
+    return isobrick::tools::run_program(argc, argv);
+  } catch (const std::bad_alloc&) {  // also while an error was being told
+    isobrick::tools::print_out_of_memory("");
     return 1;
   }
-  return isobrick::tools::run(program, argc, argv);
 }

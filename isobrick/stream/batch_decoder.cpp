@@ -205,8 +205,8 @@ void BatchDecoder::grow_if_short() {
 void BatchDecoder::grow(std::size_t count) {
   auto slab = memory_.room(count * lattice_.brick_bytes());
   const std::lock_guard lock(mutex_);
-  slots_.add_slots(slab.get(), count);
   slabs_.push_back(std::move(slab));
+  slots_.add_slots(slabs_.back().get(), count);
   memory_bytes_ += count * lattice_.brick_bytes();
   coming_ -= count;
   changed_.notify_all();

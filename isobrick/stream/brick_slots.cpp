@@ -45,15 +45,18 @@ void BrickSlots::add_slots(std::byte* memory, std::size_t count) {
   const std::size_t bytes = lattice_.brick_bytes();
   std::vector<std::byte*> slots;
   for (std::size_t i = count; i > 0; --i) slots.push_back(memory + (i - 1) * bytes);
+  free_.reserve(slots_ + count);
   free_.insert(free_.begin(), slots.begin(), slots.end());
+  slots_ += count;
 }
 
 void BrickSlots::advance(std::uint64_t code) {
   now_ = code;
   while (!idle_.empty() && idle_.begin()->first < now_) {
     const std::uint64_t key = idle_.begin()->second;
-    idle_.erase(idle_.begin());
-    set_idle(key, entries_.at(key));
+    Entry& entry = entries_.at(key);
+    entry.node = idle_.extract(idle_.begin());
+    set_idle(key, entry);
   }
 }
 
@@ -61,7 +64,7 @@ bool BrickSlots::hold(Int3 brick) {
   const auto found = entries_.find(key(brick));
   if (found == entries_.end()) return false;
   Entry& entry = found->second;
-  if (entry.holds++ == 0) idle_.erase({entry.next, found->first});
+  if (entry.holds++ == 0) entry.node = idle_.extract({entry.next, found->first});
   return true;
 }
 
@@ -71,8 +74,8 @@ std::byte* BrickSlots::place(Int3 brick) {
     drop(std::prev(idle_.end())->second);
   }
   std::byte* slot = free_.back();
+  entries_.insert_or_assign(key(brick), Entry{slot, 1, kNever, new_node()});
   free_.pop_back();
-  entries_[key(brick)] = {slot, 1};
   return slot;
 }
 
@@ -89,18 +92,25 @@ void BrickSlots::count_read(Int3 brick) {
   is_seen = true;
 }
 
-void BrickSlots::release(Int3 brick) {
+BrickSlots::IdleSet::node_type BrickSlots::new_node() {
+  IdleSet one;
+  one.emplace();
+  return one.extract(one.begin());
+}
+
+void BrickSlots::release(Int3 brick) noexcept {
   const auto found = entries_.find(key(brick));
   if (--found->second.holds == 0) set_idle(found->first, found->second);
 }
 
-void BrickSlots::set_idle(std::uint64_t key, Entry& entry) {
+void BrickSlots::set_idle(std::uint64_t key, Entry& entry) noexcept {
   entry.next = next_use(lattice_, reach_, point_of(key, lattice_.bricks()), now_);
-  idle_.insert({entry.next, key});
+  entry.node.value() = {entry.next, key};
+  idle_.insert(std::move(entry.node));
   if (entry.next == kNever) drop(key);
 }
 
-void BrickSlots::drop(std::uint64_t key) {
+void BrickSlots::drop(std::uint64_t key) noexcept {
   const auto found = entries_.find(key);
   idle_.erase({found->second.next, key});
   if (found->second.slot) free_.push_back(found->second.slot);

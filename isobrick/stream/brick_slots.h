@@ -45,7 +45,7 @@ class BrickSlots {
   void set_absent(Int3 brick);
   /// The brick was read and decoded.
   void count_read(Int3 brick);
-  void release(Int3 brick);
+  void release(Int3 brick) noexcept;
 
   bool contains(Int3 brick) const { return entries_.count(key(brick)) > 0; }
   /// The samples of a brick that is held; null when it is absent.
@@ -61,23 +61,27 @@ class BrickSlots {
   }
 
  private:
+  using IdleSet = std::set<std::pair<std::uint64_t, std::uint64_t>>;
   struct Entry {
     std::byte* slot = nullptr;
     std::uint32_t holds = 0;
     std::uint64_t next = kNever;  ///< while nobody holds it: code of the next tile to need it
+    IdleSet::node_type node;      ///< while it is held: so that release() needs no memory
   };
   std::uint64_t key(Int3 brick) const {
     return static_cast<std::uint64_t>(linear_index(brick, lattice_.bricks()));
   }
-  void set_idle(std::uint64_t key, Entry& entry);
-  void drop(std::uint64_t key);
+  static IdleSet::node_type new_node();
+  void set_idle(std::uint64_t key, Entry& entry) noexcept;
+  void drop(std::uint64_t key) noexcept;
 
   Lattice lattice_;
   Index reach_;
   std::uint64_t now_ = 0;
   std::unordered_map<std::uint64_t, Entry> entries_;
-  std::set<std::pair<std::uint64_t, std::uint64_t>> idle_;  ///< held by nobody: next use, key
-  std::vector<std::byte*> free_;
+  IdleSet idle_;  ///< held by nobody: next use, key
+  std::size_t slots_ = 0;
+  std::vector<std::byte*> free_;  ///< has room for all slots
   std::vector<bool> seen_;
   std::uint64_t reads_ = 0, bricks_read_ = 0;
 };

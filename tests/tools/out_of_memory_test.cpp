@@ -1,0 +1,57 @@
+#include <csignal>
+
+#include <fmt/format.h>
+
+#include "tests/tools/program.h"
+
+namespace isobrick::test {
+namespace {
+
+class OutOfMemory : public ProgramTest {
+ protected:
+  static Outcome run_without(long at, long length, const Arguments& arguments) {
+    Arguments words{"env", "LD_PRELOAD=" ISOBRICK_ALLOCATION_FAULT,
+                    fmt::format("ISOBRICK_FAULT_AT={}", at),
+                    fmt::format("ISOBRICK_FAULT_LENGTH={}", length), ISOBRICK_PROGRAM};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return run_process(words);
+  }
+
+  /// Whichever allocation fails, alone or with all that follow, the program ends with a line.
+  static void expect_lines(const Arguments& arguments, long step) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "a sanitizer has its own allocations";
+#endif
+    int refused = 0;
+    for (const long length : {1L, 30L, 1L << 40}) {
+      int whole = 0;
+      for (long at = length % 7; whole < 3; at += step) {
+        const Outcome outcome = run_without(at, length, arguments);
+        // A message of the C library itself, where it starts a thread.
+        if (outcome.err.find("glibc") != std::string::npos) continue;
+        EXPECT_TRUE(outcome.exit_code == 0 || outcome.exit_code == 1)
+            << arguments[0] << " without allocation " << at << " for " << length << ": signal "
+            << outcome.signal << ' ' << outcome.err;
+        whole += outcome.exit_code == 0;
+        if (outcome.exit_code != 1) continue;
+        ++refused;
+        EXPECT_TRUE(outcome.err.starts_with("isobrick")) << outcome.err;
+        EXPECT_EQ(outcome.err.find('\n') + 1, outcome.err.size()) << outcome.err;
+      }
+    }
+    EXPECT_GT(refused, 30);
+  }
+};
+
+TEST_F(OutOfMemory, AnExtractionEndsWithALine) {
+  const std::string store = path("a.zarr");
+  ASSERT_EQ(run({"synth", "gyroid", store, "--dims", "60,60,60", "--type", "u8", "--brick", "16"})
+                .exit_code,
+            0);
+  expect_lines({"extract", store, "--isovalue", "128", "-o", path("m.ply"), "--threads", "3",
+                "--force"},
+               61);
+}
+
+}  // namespace
+}  // namespace isobrick::test
