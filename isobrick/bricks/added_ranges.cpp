@@ -9,7 +9,7 @@
 namespace isobrick {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 
 }  // namespace
 
@@ -22,6 +22,9 @@ std::string to_json(const AddedRanges& added) {
   json["isobrick_ranges"] = kVersion;
   json["may_have_nan"] = added.may_have_nan;
   json["image_crc32c"] = added.image_crc32c;
+  json["levels"] = nlohmann::json::array();
+  for (const RangeChecksums& level : added.levels)
+    json["levels"].push_back({{"range_crc32c", level.bricks}, {"block_range_crc32c", level.blocks}});
   return seal_json(std::move(json));
 }
 
@@ -34,10 +37,18 @@ std::optional<AddedRanges> read_added_ranges(const std::filesystem::path& store)
   const CheckedJson json(object, quoted(file));
   if (const Index version = json.at("isobrick_ranges").integer(); version != kVersion)
     json.unsupported(fmt::format(
-        "ranges version {} is not known to this program, which knows {}; use a newer one", version,
-        kVersion));
-  return AddedRanges{json.at("may_have_nan").boolean(),
-                     static_cast<std::uint32_t>(json.at("image_crc32c").integer())};
+        "ranges version {} is not known to this program, which knows {}; remove the file and run "
+        "isobrick index",
+        version, kVersion));
+  AddedRanges added{json.at("may_have_nan").boolean(),
+                    static_cast<std::uint32_t>(json.at("image_crc32c").integer()),
+                    {}};
+  const CheckedJson levels = json.at("levels");
+  for (std::size_t i = 0; i < levels.array_size(); ++i)
+    added.levels.push_back(
+        {static_cast<std::uint32_t>(levels.at(i).at("range_crc32c").integer()),
+         static_cast<std::uint32_t>(levels.at(i).at("block_range_crc32c").integer())});
+  return added;
 }
 
 }  // namespace isobrick

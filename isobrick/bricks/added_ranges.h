@@ -5,15 +5,23 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace isobrick {
 
-/// What is known of an image that others have written once its ranges were
-/// added: isobrick/ranges.json. Their own metadata is left as it is.
+/// The checksums of a level's range arrays, as RangeArrayWriter::finish() gives them.
+struct RangeChecksums {
+  std::uint32_t bricks = 0, blocks = 0;
+  friend bool operator==(const RangeChecksums&, const RangeChecksums&) = default;
+};
+
+/// What a store's ranges are those of: isobrick/ranges.json. The metadata of images that others
+/// have written is left as it is.
 struct AddedRanges {
   bool may_have_nan = true;
   /// metadata_checksum() of the image that the ranges were computed from.
   std::uint32_t image_crc32c = 0;
+  std::vector<RangeChecksums> levels;
 
   friend bool operator==(const AddedRanges&, const AddedRanges&) = default;
 };

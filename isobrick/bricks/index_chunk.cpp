@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstring>
+
 #include "isobrick/bricks/codec.h"
 #include "isobrick/core/error.h"
 
@@ -11,6 +13,19 @@ namespace {
 /// Larger files are not read at once: it is about what a disk reads in the time
 /// of one seek, or of one request to a network.
 constexpr std::uint64_t kSmallFile = std::uint64_t{512} << 10;
+
+/// As the checksum takes it: x, y and z as u64, then the index's checksum.
+std::vector<std::byte> bytes_of(const IndexChunkName& name) {
+  std::vector<std::byte> bytes(3 * sizeof(std::uint64_t) + sizeof name.index_crc32c);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto at = static_cast<std::size_t>(axis) * sizeof(std::uint64_t);
+    const auto value = static_cast<std::uint64_t>(name.chunk[axis]);
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+  }
+  std::memcpy(bytes.data() + 3 * sizeof(std::uint64_t), &name.index_crc32c,
+              sizeof name.index_crc32c);
+  return bytes;
+}
 
 CodecChain chain_of(bool compressed) {
   return CodecChain::ours(compressed ? std::optional(0) : std::nullopt);
@@ -24,9 +39,10 @@ std::vector<std::byte> encode_index_part(std::optional<int> zstd_level,
 }
 
 IndexChunkWriter::IndexChunkWriter(Publisher& publisher, std::filesystem::path path,
-                                   std::size_t parts)
+                                   std::size_t parts, const IndexChunkName& name)
     : publisher_(publisher),
       path_(std::move(path)),
+      name_(name),
       file_(publisher.create_temporary(path_)),
       places_(parts) {}
 
@@ -41,13 +57,14 @@ void IndexChunkWriter::append(std::size_t part, std::span<const std::byte> encod
 }
 
 void IndexChunkWriter::publish() {
-  const std::vector<std::byte> places = places_.encode();
+  const std::vector<std::byte> places = places_.encode(bytes_of(name_));
   file_.write_at(end_, places);
   publisher_.count(end_ + places.size());
   publisher_.publish(std::move(file_), path_);
 }
 
-IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed)
+IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed,
+                       const IndexChunkName& name)
     : file_(StoreFile::open_if_exists(path)), compressed_(compressed), places_(parts) {
   if (!file_) throw DamageError(fmt::format("'{}' is missing", path.string()));
   size_ = file_.size();
@@ -59,9 +76,10 @@ IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, boo
   file_.read_at(size_ - tail, bytes);
   bytes_read_ += tail;
   try {
-    places_ = ShardIndex::decode(bytes, true, size_ - tail);
+    places_ = ShardIndex::decode(bytes, true, size_ - tail, bytes_of(name));
   } catch (const DamageError& e) {
-    throw DamageError(fmt::format("'{}': {}", path.string(), e.what()));
+    throw DamageError(
+        fmt::format("'{}': {}; is it a chunk of another place or store?", path.string(), e.what()));
   }
   // Parts leave no gaps, so their sizes tell the file's.
   if (places_.brick_bytes() != size_ - tail)
@@ -77,9 +95,10 @@ void IndexChunk::read_whole() {
   whole_ = std::move(bytes);
 }
 
-bool IndexChunk::is_whole(const std::filesystem::path& path, std::size_t parts) {
+bool IndexChunk::is_whole(const std::filesystem::path& path, std::size_t parts,
+                          const IndexChunkName& name) {
   try {
-    const IndexChunk chunk(path, parts, false);
+    const IndexChunk chunk(path, parts, false, name);
     return true;
   } catch (const DamageError&) {
     return false;

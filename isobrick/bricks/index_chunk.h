@@ -11,6 +11,7 @@
 #include "isobrick/bricks/publisher.h"
 #include "isobrick/bricks/shard_index.h"
 #include "isobrick/bricks/store_file.h"
+#include "isobrick/core/vec.h"
 
 // The file of an index chunk: parts, each encoded like a brick, and where they
 // are. What a part holds is not known here. docs/store_format.md has the bytes.
@@ -21,6 +22,13 @@ namespace isobrick {
 /// broken files cannot ask for all the memory.
 inline constexpr std::uint64_t kMaxIndexPartBytes = std::uint64_t{64} << 20;
 
+/// Which chunk of which index a file is. This enters the checksum of its places, so that a whole
+/// chunk of another place, index or store is refused.
+struct IndexChunkName {
+  Int3 chunk;
+  std::uint32_t index_crc32c = 0;  ///< the checksum in index.json
+};
+
 /// Encodes a part. Thread-safe.
 std::vector<std::byte> encode_index_part(std::optional<int> zstd_level,
                                          std::span<const std::byte> bytes);
@@ -29,7 +37,8 @@ std::vector<std::byte> encode_index_part(std::optional<int> zstd_level,
 class IndexChunkWriter {
  public:
   /// The chunk will be `path`, in the folder of `publisher`.
-  IndexChunkWriter(Publisher& publisher, std::filesystem::path path, std::size_t parts);
+  IndexChunkWriter(Publisher& publisher, std::filesystem::path path, std::size_t parts,
+                   const IndexChunkName& name);
   /// Removes what was not published.
   ~IndexChunkWriter();
   IndexChunkWriter(const IndexChunkWriter&) = delete;
@@ -43,6 +52,7 @@ class IndexChunkWriter {
  private:
   Publisher& publisher_;
   std::filesystem::path path_;
+  IndexChunkName name_;
   StoreFile file_;
   ShardIndex places_;
   std::uint64_t end_ = 0;
@@ -51,11 +61,13 @@ class IndexChunkWriter {
 /// Reads one index chunk. Thread-safe after construction.
 class IndexChunk {
  public:
-  /// Reads where the parts are. DamageError when the file is missing, or not whole.
-  IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed);
+  /// Reads where the parts are. DamageError when the file is missing, not whole, or another chunk.
+  IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed,
+             const IndexChunkName& name);
 
   /// Whether the file is there with a checksum and a size that are right.
-  static bool is_whole(const std::filesystem::path& path, std::size_t parts);
+  static bool is_whole(const std::filesystem::path& path, std::size_t parts,
+                       const IndexChunkName& name);
 
   const std::filesystem::path& path() const { return file_.path(); }
   /// Bytes of the file.

@@ -8,7 +8,7 @@
 namespace isobrick {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 
 ScalarType parse_type(const CheckedJson& json) {
   const auto type = parse_scalar_type(json.string());
@@ -35,16 +35,20 @@ std::string to_json(const IndexLayout& layout) {
   json["chunk"] = IndexLayout::kChunk * IndexLayout::kBrick;
   json["zstd_level"] = nullptr;
   if (layout.zstd_level) json["zstd_level"] = *layout.zstd_level;
+  json["ranges_crc32c"] = layout.ranges_crc32c;
   return seal_json(std::move(json));
 }
+
+std::uint32_t checksum_of(const IndexLayout& layout) { return seal_of(to_json(layout)); }
 
 IndexLayout parse_index_layout(std::string_view text, const std::string& where) {
   const nlohmann::json object = unseal_json(text, where);
   const CheckedJson json(object, where);
   if (const Index version = json.at("isobrick_index").integer(); version != kVersion)
     json.unsupported(fmt::format(
-        "index version {} is not known to this program, which knows {}; use a newer one", version,
-        kVersion));
+        "index version {} is not known to this program, which knows {}; isobrick index --force "
+        "makes it anew",
+        version, kVersion));
   if (json.at("brick").integer() != IndexLayout::kBrick ||
       json.at("chunk").integer() != IndexLayout::kChunk * IndexLayout::kBrick)
     json.damaged("index bricks have 64 cells, chunks 512");
@@ -56,6 +60,7 @@ IndexLayout parse_index_layout(std::string_view text, const std::string& where) 
   layout.extent = parse_extent(json.at("shape"));
   if (!json.at("zstd_level").raw().is_null())
     layout.zstd_level = static_cast<int>(json.at("zstd_level").integer());
+  layout.ranges_crc32c = static_cast<std::uint32_t>(json.at("ranges_crc32c").integer());
   return layout;
 }
 

@@ -23,6 +23,8 @@ struct IndexLayout {
   ScalarType type = ScalarType::u8;
   Int3 extent;                    ///< samples of the level
   std::optional<int> zstd_level;  ///< nothing: parts are stored as they are
+  /// LevelInfo::block_ranges_crc32c of the level that it was made of: that of no other store.
+  std::uint32_t ranges_crc32c = 0;
 
   friend bool operator==(const IndexLayout&, const IndexLayout&) = default;
 
@@ -54,8 +56,9 @@ constexpr bool is_index_leaf(Index leaf) {
   return leaf == 1 || leaf == 2 || leaf == 4 || leaf == 8 || leaf == 16;
 }
 
-/// The text of index.json.
+/// The text of index.json, and the checksum in it.
 std::string to_json(const IndexLayout& layout);
+std::uint32_t checksum_of(const IndexLayout& layout);
 
 /// Reads index.json; `where` names the file. DamageError for what is broken,
 /// Error for a version that this program does not know.

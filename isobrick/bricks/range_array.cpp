@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/codec.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -21,6 +22,18 @@ constexpr Index kMaxItemsAtOnce = Index{1} << 28;
 std::filesystem::path chunk_path(const std::filesystem::path& folder, const ArrayMetadata& metadata,
                                  Int3 c) {
   return folder / metadata.chunk_key(std::array<Index, 4>{c.z, c.y, c.x, 0});
+}
+
+std::filesystem::path checksums_file(const std::filesystem::path& folder) {
+  return folder / "checksums";
+}
+
+/// The last that an encoded chunk holds. The checksum of all of it would always be the same.
+std::uint32_t stored_checksum(std::span<const std::byte> encoded) {
+  std::uint32_t crc = 0;
+  if (encoded.size() >= sizeof crc)
+    std::memcpy(&crc, encoded.last(sizeof crc).data(), sizeof crc);
+  return crc;
 }
 
 std::size_t chunk_bytes(ScalarType type) {
@@ -66,7 +79,8 @@ RangeArrayWriter::RangeArrayWriter(std::filesystem::path folder, Int3 items, Sca
     : folder_(std::move(folder)),
       items_(items),
       metadata_(range_array_metadata(items, type)),
-      publisher_(publisher) {}
+      publisher_(publisher),
+      checksums_(static_cast<std::size_t>(volume(ceil_div(items, kChunk)))) {}
 
 void RangeArrayWriter::put(Box3 box, std::span<const std::byte> pairs) {
   check_box(box, items_);
@@ -103,18 +117,27 @@ void RangeArrayWriter::put(Box3 box, std::span<const std::byte> pairs) {
 }
 
 void RangeArrayWriter::write_chunk(Int3 c, const Chunk& chunk) {
-  publisher_.write(chunk_path(folder_, metadata_, c), encode_bytes(metadata_.codecs, chunk.bytes));
+  const std::vector<std::byte> encoded = encode_bytes(metadata_.codecs, chunk.bytes);
+  // Each chunk is written once, so that nobody else has this place.
+  checksums_[static_cast<std::size_t>(linear_index(c, ceil_div(items_, kChunk)))] =
+      stored_checksum(encoded);
+  publisher_.write(chunk_path(folder_, metadata_, c), encoded);
 }
 
-void RangeArrayWriter::finish() {
+std::optional<std::uint32_t> RangeArrayWriter::finish() {
   const std::lock_guard lock(mutex_);
-  if (written_ == 0 && chunks_.empty()) return;
+  if (written_ == 0 && chunks_.empty()) return std::nullopt;
   if (!chunks_.empty() || written_ != volume(ceil_div(items_, kChunk)))
     throw Error(fmt::format("'{}': only some of the ranges were given", folder_.string()));
+  std::vector<std::uint32_t> all = checksums_;
+  all.push_back(crc32c(std::as_bytes(std::span(checksums_))));
+  publisher_.write(checksums_file(folder_), std::as_bytes(std::span(all)));
   publisher_.write(folder_ / "zarr.json", to_json(metadata_));
+  return all.back();
 }
 
-RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, ScalarType type)
+RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, ScalarType type,
+                                   std::uint32_t crc32c)
     : folder_(std::move(folder)), items_(items) {
   const std::filesystem::path file = folder_ / "zarr.json";
   bool exists = false;
@@ -126,10 +149,34 @@ RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, Sca
   if (metadata_.shape != expected.shape || metadata_.chunk != expected.chunk ||
       metadata_.type != expected.type || metadata_.sharding)
     throw DamageError(where + ": shape, chunks or type are not those of this level's ranges");
+  read_checksums(crc32c);
+}
+
+/// What is wrong is said where ranges are read: they can be computed anew.
+void RangeArrayReader::read_checksums(std::uint32_t expected) {
+  const std::filesystem::path file = checksums_file(folder_);
+  const auto count = static_cast<std::size_t>(volume(ceil_div(items_, kChunk)));
+  const std::size_t bytes = (count + 1) * sizeof(std::uint32_t);
+  bool exists = false;
+  const std::string text = read_small_file(file, bytes, &exists);
+  if (!exists) {
+    wrong_ = fmt::format("'{}' is missing", file.string());
+    return;
+  }
+  std::vector<std::uint32_t> all(count + 1);
+  if (text.size() == bytes) std::memcpy(all.data(), text.data(), bytes);
+  const std::uint32_t last = all.back();
+  all.pop_back();
+  if (text.size() != bytes || crc32c(std::as_bytes(std::span(all))) != last)
+    wrong_ = fmt::format("'{}' is damaged", file.string());
+  else if (last != expected)
+    wrong_ = fmt::format("'{}' is that of another level or store", file.string());
+  checksums_ = std::move(all);
 }
 
 RangeTable RangeArrayReader::read(Box3 box, std::atomic<std::uint64_t>& bytes_read) const {
   check_box(box, items_);
+  if (!wrong_.empty()) throw DamageError(wrong_);
   if (volume(box.extent()) > kMaxItemsAtOnce)
     throw Error(fmt::format("'{}': {} ranges are too many at once", folder_.string(),
                             volume(box.extent())));
@@ -151,6 +198,10 @@ RangeTable RangeArrayReader::read(Box3 box, std::atomic<std::uint64_t>& bytes_re
     } catch (const DamageError& e) {
       throw DamageError(fmt::format("'{}': {}", path.string(), e.what()));
     }
+    if (stored_checksum(std::as_bytes(std::span(encoded))) !=
+        checksums_[static_cast<std::size_t>(linear_index(c, ceil_div(items_, kChunk)))])
+      throw DamageError(
+          fmt::format("'{}' is the chunk of another place, level or store", path.string()));
     visit_scalar(metadata_.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
       for (Index z = part.lo.z; z < part.hi.z; ++z)

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <span>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -30,8 +32,9 @@ class RangeArrayWriter {
 
   /// Pairs (lo, hi), C order [z, y, x, 2] over `box`; each item exactly once.
   void put(Box3 box, std::span<const std::byte> pairs);
-  /// Writes the metadata if there are ranges at all. Throws Error when only some are.
-  void finish();
+  /// Writes the chunks' checksums and the metadata if there are ranges at all; the checksum of
+  /// those checksums, which tells these ranges from others. Throws Error when only some are there.
+  std::optional<std::uint32_t> finish();
 
  private:
   struct Chunk {
@@ -47,21 +50,27 @@ class RangeArrayWriter {
   std::mutex mutex_;
   std::map<std::tuple<Index, Index, Index>, Chunk> chunks_;  // begun but not complete
   Index written_ = 0;                                        // chunks
+  std::vector<std::uint32_t> checksums_;                     // of all chunks, C order [z, y, x]
 };
 
 /// Reads one range array.
 class RangeArrayReader {
  public:
   /// Throws Error when the array does not exist, DamageError when it is not the
-  /// range array of so many items.
-  RangeArrayReader(std::filesystem::path folder, Int3 items, ScalarType type);
+  /// range array of so many items. `crc32c` is what RangeArrayWriter::finish() returned.
+  RangeArrayReader(std::filesystem::path folder, Int3 items, ScalarType type, std::uint32_t crc32c);
 
+  /// Throws DamageError naming the file when it is damaged, or a chunk of another place or store.
   RangeTable read(Box3 box, std::atomic<std::uint64_t>& bytes_read) const;
 
  private:
+  void read_checksums(std::uint32_t crc32c);
+
   std::filesystem::path folder_;
   Int3 items_;
   ArrayMetadata metadata_;
+  std::vector<std::uint32_t> checksums_;  ///< of all chunks, C order [z, y, x]
+  std::string wrong_;                     ///< why there are none; empty: all is well
 };
 
 }  // namespace isobrick

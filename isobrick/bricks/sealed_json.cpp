@@ -33,4 +33,8 @@ nlohmann::json unseal_json(std::string_view text, const std::string& where) {
   return object;
 }
 
+std::uint32_t seal_of(std::string_view text) {
+  return parse_json(text, "").at(kKey).get<std::uint32_t>();
+}
+
 }  // namespace isobrick

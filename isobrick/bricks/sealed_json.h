@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -14,5 +15,8 @@ std::string seal_json(nlohmann::json object);
 /// The object in `text`, without its checksum. Throws DamageError naming `where`
 /// when the checksum is missing or another.
 nlohmann::json unseal_json(std::string_view text, const std::string& where);
+
+/// The checksum that seal_json() put into `text`.
+std::uint32_t seal_of(std::string_view text);
 
 }  // namespace isobrick

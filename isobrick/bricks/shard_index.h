@@ -27,11 +27,12 @@ class ShardIndex {
   static std::uint64_t encoded_size(std::uint64_t bricks, bool with_crc) {
     return bricks * kEntryBytes + (with_crc ? kCrcBytes : 0);
   }
-  std::vector<std::byte> encode() const;
+  /// `bound` enters the checksum though it is not stored: what else must be right.
+  std::vector<std::byte> encode(std::span<const std::byte> bound = {}) const;
   /// Checks the checksum and that each brick lies within the `file_size` bytes
   /// of the shard. Throws DamageError saying what is wrong, not where.
   static ShardIndex decode(std::span<const std::byte> bytes, bool with_crc,
-                           std::uint64_t file_size);
+                           std::uint64_t file_size, std::span<const std::byte> bound = {});
 
   std::span<const Entry> entries() const { return entries_; }
   Entry& operator[](std::size_t i) { return entries_[i]; }

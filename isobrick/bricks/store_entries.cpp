@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Every file of a store; # is a number, KIND a kind of index. docs/store_format.md has them.
-constexpr std::array<std::string_view, 16> kFiles{
+constexpr std::array<std::string_view, 18> kFiles{
     "zarr.json",
     ".zgroup",
     ".zattrs",
@@ -30,8 +30,10 @@ constexpr std::array<std::string_view, 16> kFiles{
     "#/c/#/#/#",
     "#/#/#/#",
     "isobrick/zarr.json",
+    "isobrick/ranges.json",
     "isobrick/#/zarr.json",
     "isobrick/#/RANGES/zarr.json",
+    "isobrick/#/RANGES/checksums",
     "isobrick/#/RANGES/c/#/#/#/#",
     "isobrick/#/index/KIND/index.json",
     "isobrick/#/index/KIND/c/#/#/#"};

@@ -70,9 +70,9 @@ struct StoreReader::Impl {
   };
 
   void open(const std::filesystem::path& path, const Selection& selection);
-  bool find_ranges(std::optional<bool>& may_have_nan) const;
+  std::optional<AddedRanges> find_ranges() const;
   void open_level(const ImageMetadata::Level& described, MetadataFiles::Level&& read);
-  void open_ranges(int level);
+  void open_ranges(int level, const RangeChecksums& checksums);
   void check_brick(int level, Int3 b) const;
   [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
   void widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
@@ -116,8 +116,11 @@ void StoreReader::Impl::open(const std::filesystem::path& path, const Selection&
   for (std::size_t i = 0; i < image.levels.size(); ++i)
     open_level(image.levels[i], std::move(metadata.levels[i]));
   std::optional<bool> may_have_nan = image.may_have_nan;
-  if (image.ours || find_ranges(may_have_nan))
-    for (std::size_t i = 0; i < levels.size(); ++i) open_ranges(static_cast<int>(i));
+  if (const std::optional<AddedRanges> ranges = find_ranges()) {
+    if (!image.ours) may_have_nan = ranges->may_have_nan;
+    for (std::size_t i = 0; i < levels.size(); ++i)
+      open_ranges(static_cast<int>(i), ranges->levels[i]);
+  }
   info.type = info.levels[0].lattice.type;
   info.grid_class = image.grid_class;
   info.grid_name = image.grid_name;
@@ -126,27 +129,33 @@ void StoreReader::Impl::open(const std::filesystem::path& path, const Selection&
   info.may_have_nan = is_floating(info.type) && may_have_nan.value_or(true);
 }
 
-// Whether ranges were added to an image of others as it is now: if its metadata
-// was changed since, they are of another image.
-bool StoreReader::Impl::find_ranges(std::optional<bool>& may_have_nan) const {
-  const std::optional<AddedRanges> added = read_added_ranges(info.additions);
-  if (!added || added->image_crc32c != info.metadata_crc32c) return false;
-  may_have_nan = added->may_have_nan;
-  return true;
+// The ranges of the image as it is now: if its metadata was changed since, they are of another.
+std::optional<AddedRanges> StoreReader::Impl::find_ranges() const {
+  std::optional<AddedRanges> added = read_added_ranges(info.additions);
+  if (!added) return std::nullopt;
+  if (added->image_crc32c == info.metadata_crc32c && added->levels.size() == levels.size())
+    return added;
+  if (info.ours)
+    throw DamageError(fmt::format("{}: is that of another store",
+                                  quoted(added_ranges_file(info.additions))));
+  return std::nullopt;
 }
 
 // Ranges of other extents than the level's show a shape that cannot be right
 // before anybody walks over it.
-void StoreReader::Impl::open_ranges(int level) {
+void StoreReader::Impl::open_ranges(int level, const RangeChecksums& checksums) {
   const Lattice& samples = lattice(level);
-  const auto open = [&](const std::filesystem::path& folder, Int3 items) {
+  const auto open = [&](const std::filesystem::path& folder, Int3 items, std::uint32_t crc32c) {
     using Ranges = std::shared_ptr<const RangeArrayReader>;
     if (!std::filesystem::exists(folder / "zarr.json")) return Ranges();
-    return Ranges(std::make_shared<const RangeArrayReader>(folder, items, samples.type));
+    return Ranges(std::make_shared<const RangeArrayReader>(folder, items, samples.type, crc32c));
   };
   Level& l = levels[static_cast<std::size_t>(level)];
-  l.brick_ranges = open(brick_range_folder(info.additions, level), samples.bricks());
-  l.block_ranges = open(block_range_folder(info.additions, level), samples.blocks());
+  l.brick_ranges = open(brick_range_folder(info.additions, level), samples.bricks(),
+                        checksums.bricks);
+  l.block_ranges = open(block_range_folder(info.additions, level), samples.blocks(),
+                        checksums.blocks);
+  info.levels[static_cast<std::size_t>(level)].block_ranges_crc32c = checksums.blocks;
 }
 
 void StoreReader::Impl::open_level(const ImageMetadata::Level& described,

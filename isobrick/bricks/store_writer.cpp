@@ -9,6 +9,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/image_metadata.h"
@@ -371,10 +372,11 @@ void StoreWriter::finish(bool may_have_nan,
           fmt::format("'{}' was not finished", impl_->open_shards.begin()->second->path.string()));
   }
   publisher.write(impl_->dir / "isobrick" / "zarr.json", group_json());
+  AddedRanges ranges{.may_have_nan = may_have_nan, .image_crc32c = 0, .levels = {}};
   for (std::size_t i = 0; i < impl_->levels.size(); ++i) {
     Impl::Level& l = impl_->levels[i];
-    l.brick_ranges->finish();
-    l.block_ranges->finish();
+    const auto bricks = l.brick_ranges->finish(), blocks = l.block_ranges->finish();
+    if (bricks && blocks) ranges.levels.push_back({*bricks, *blocks});
     publisher.write(impl_->dir / "isobrick" / std::to_string(i) / "zarr.json", group_json());
     if (layout.ome == OmeVersion::v04)
       publisher.write(l.folder / ".zarray", to_zarray(l.metadata));
@@ -385,6 +387,9 @@ void StoreWriter::finish(bool may_have_nan,
   image.may_have_nan = may_have_nan;
   if (layout.ome == OmeVersion::v04) publisher.write(impl_->dir / ".zgroup", zgroup_json());
   image.checksum = impl_->checksum_of(image);
+  ranges.image_crc32c = *image.checksum;
+  if (ranges.levels.size() == impl_->levels.size())
+    publisher.write(added_ranges_file(impl_->dir), to_json(ranges));
   // Only now, with everything on disk, does the directory become a store.
   impl_->publish_root(image);
   if (window) {

@@ -54,11 +54,17 @@ StoredIndex::StoredIndex(const StoreReader& store, int level, const std::string&
   if (layout_.kind != kind || layout_.type != lattice.type || layout_.extent != lattice.extent)
     throw DamageError(fmt::format("{}: kind, type or shape are not those of level {}'s {} index",
                                   quoted(file), level, kind));
+  if (layout_.ranges_crc32c !=
+      store.info().levels.at(static_cast<std::size_t>(level)).block_ranges_crc32c)
+    throw DamageError(fmt::format("{}: is the index of other samples; {} --kind {} --force makes it "
+                                  "anew",
+                                  quoted(file), index_command(store.info()), kind));
+  crc32c_ = checksum_of(layout_);
 }
 
 IndexChunk StoredIndex::open(Int3 chunk) const {
   return {index_chunk_path(folder_, chunk), layout_.parts_of_chunk(chunk),
-          layout_.zstd_level.has_value()};
+          layout_.zstd_level.has_value(), name_of(chunk)};
 }
 
 std::uint64_t index_bytes(const StoredIndex& index) {

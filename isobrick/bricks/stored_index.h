@@ -30,12 +30,14 @@ class StoredIndex {
 
   const IndexLayout& layout() const { return layout_; }
   const std::filesystem::path& folder() const { return folder_; }
+  IndexChunkName name_of(Int3 chunk) const { return {chunk, crc32c_}; }
   /// Throws DamageError as IndexChunk does.
   IndexChunk open(Int3 chunk) const;
 
  private:
   std::filesystem::path folder_;
   IndexLayout layout_;
+  std::uint32_t crc32c_ = 0;  ///< of its description
 };
 
 /// The bytes of all files of an index.

@@ -49,9 +49,9 @@ std::uint64_t piece_bytes(const Lattice& lattice, std::uint64_t memory, int thre
   return std::min(memory - fixed, kEnoughForAPiece);
 }
 
-/// Writes both range arrays of a level beside their places; whether there was NaN.
-bool write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
-                  Progress& progress) {
+/// Writes both range arrays of a level beside their places, and what tells them into `added`.
+void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
+                  Progress& progress, AddedRanges& added) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const fs::path& root = store.info().additions;
   RangeArrayWriter blocks(partial(block_range_folder(root, level)), lattice.blocks(), lattice.type,
@@ -64,9 +64,8 @@ bool write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publ
       [&](Box3 items, std::span<const std::byte> pairs) { blocks.put(items, pairs); },
       [&](Box3 items, std::span<const std::byte> pairs) { bricks.put(items, pairs); },
       [&](std::uint64_t done) { progress.advance(done); });
-  blocks.finish();
-  bricks.finish();
-  return ranges->has_nan();
+  added.levels.push_back({.bricks = *bricks.finish(), .blocks = *blocks.finish()});
+  added.may_have_nan |= ranges->has_nan();
 }
 
 }  // namespace
@@ -87,12 +86,11 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
     publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
   });
   progress.begin("ranges", total);
-  bool has_nan = false;
+  AddedRanges added{.may_have_nan = false, .image_crc32c = info.metadata_crc32c, .levels = {}};
   for (int level = 0; level < levels; ++level)
-    has_nan |= write_ranges(
-        store, level,
-        piece_bytes(info.levels[static_cast<std::size_t>(level)].lattice, memory, threads),
-        publisher, progress);
+    write_ranges(store, level,
+                 piece_bytes(info.levels[static_cast<std::size_t>(level)].lattice, memory, threads),
+                 publisher, progress, added);
   publisher.wait();
   progress.end();
   for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
@@ -100,10 +98,7 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
     check_replaceable(set_aside_name(folder), place);
     publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left
   });
-  if (info.ours) return;  // its metadata says the rest
-  publisher.write(
-      added_ranges_file(info.additions),
-      to_json(AddedRanges{.may_have_nan = has_nan, .image_crc32c = info.metadata_crc32c}));
+  publisher.write(added_ranges_file(info.additions), to_json(added));
   publisher.wait();
 }
 

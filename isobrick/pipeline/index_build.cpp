@@ -64,6 +64,8 @@ class LevelIndex {
     layout_.type = store.info().type;
     layout_.extent = store.info().levels[static_cast<std::size_t>(level)].lattice.extent;
     layout_.zstd_level = zstd_level_of(store.info());
+    layout_.ranges_crc32c =
+        store.info().levels[static_cast<std::size_t>(level)].block_ranges_crc32c;
   }
 
   /// Throws UsageError when something is there and nobody said what to do with it.
@@ -144,7 +146,8 @@ void LevelIndex::prepare(Publisher& publisher) {
 }
 
 void LevelIndex::build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher& publisher) const {
-  IndexChunkWriter writer(publisher, index_chunk_path(partial_, c), layout_.parts_of_chunk(c));
+  IndexChunkWriter writer(publisher, index_chunk_path(partial_, c), layout_.parts_of_chunk(c),
+                          {c, checksum_of(layout_)});
   builder.build(
       c, [&](std::vector<std::byte> part) { return encode_index_part(layout_.zstd_level, part); },
       [&](std::size_t part, std::vector<std::byte> encoded) { writer.append(part, encoded); });
@@ -154,11 +157,13 @@ void LevelIndex::build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher
 void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, Progress& progress,
                        IndexReport& report) const {
   const IndexChunkBuilder builder(store_, level_, layout_, options_.kind, memory, threads);
+  const std::uint32_t checksum = checksum_of(layout_);
   std::uint64_t bytes = 0;
   for_each_morton(layout_.chunks(), [&](Int3 c) {
     const fs::path path = index_chunk_path(finished_ ? place_ : partial_, c);
     const bool kept =
-        finished_ || (options_.resume && IndexChunk::is_whole(path, layout_.parts_of_chunk(c)));
+        finished_ || (options_.resume &&
+                      IndexChunk::is_whole(path, layout_.parts_of_chunk(c), {c, checksum}));
     if (!kept) build_chunk(builder, c, publisher);
     ++report.chunks;
     report.chunks_kept += kept;

@@ -16,19 +16,21 @@ std::vector<std::byte> part_of(std::size_t bytes, unsigned seed) {
   return part;
 }
 
+constexpr IndexChunkName kName{{2, 1, 0}, 0x12345678};
+
 class IndexChunkFile : public testing::TestWithParam<std::optional<int>> {
  protected:
   /// Parts 0, 2 and 4 of 5; the last one as large as `bytes`.
   void write(std::size_t bytes) {
     parts = {part_of(100, 1), {}, part_of(9, 2), {}, part_of(bytes, 3)};
     Publisher publisher(folder / "");
-    IndexChunkWriter writer(publisher, path, parts.size());
+    IndexChunkWriter writer(publisher, path, parts.size(), kName);
     for (const std::size_t i : {std::size_t{4}, std::size_t{0}, std::size_t{2}})
       writer.append(i, encode_index_part(GetParam(), parts[i]));
     writer.publish();
     publisher.wait();
   }
-  IndexChunk open() const { return {path, parts.size(), GetParam().has_value()}; }
+  IndexChunk open() const { return {path, parts.size(), GetParam().has_value(), kName}; }
 
   void expect_refused(std::size_t at) const {
     EXPECT_THROW(
@@ -49,8 +51,8 @@ class IndexChunkFile : public testing::TestWithParam<std::optional<int>> {
 TEST_P(IndexChunkFile, PartsComeBack) {
   for (const std::size_t bytes : {std::size_t{1}, std::size_t{5000}, std::size_t{3} << 20}) {
     write(bytes);
-    EXPECT_TRUE(IndexChunk::is_whole(path, parts.size()));
-    EXPECT_FALSE(IndexChunk::is_whole(path, parts.size() + 1));
+    EXPECT_TRUE(IndexChunk::is_whole(path, parts.size(), kName));
+    EXPECT_FALSE(IndexChunk::is_whole(path, parts.size() + 1, kName));
     for (const bool whole : {false, true}) {
       IndexChunk chunk = open();
       if (whole) chunk.read_whole();
@@ -78,7 +80,7 @@ TEST_P(IndexChunkFile, EveryFlippedBitAndEveryCutIsNoticed) {
     expect_refused(at);
     write_file(path, whole.substr(0, at));
     expect_refused(at);
-    EXPECT_FALSE(IndexChunk::is_whole(path, parts.size()));
+    EXPECT_FALSE(IndexChunk::is_whole(path, parts.size(), kName));
   }
   write_file(path, whole + '\0');
   expect_refused(whole.size());
@@ -86,10 +88,20 @@ TEST_P(IndexChunkFile, EveryFlippedBitAndEveryCutIsNoticed) {
   EXPECT_THROW(open(), DamageError);
 }
 
+TEST_P(IndexChunkFile, AnotherPlaceOrIndexIsNoticed) {
+  write(300);
+  for (const IndexChunkName& other :
+       {IndexChunkName{{1, 2, 0}, kName.index_crc32c}, IndexChunkName{{2, 1, 1}, kName.index_crc32c},
+        IndexChunkName{kName.chunk, kName.index_crc32c + 1}}) {
+    EXPECT_THROW(IndexChunk(path, parts.size(), GetParam().has_value(), other), DamageError);
+    EXPECT_FALSE(IndexChunk::is_whole(path, parts.size(), other));
+  }
+}
+
 TEST_P(IndexChunkFile, WhatIsNotPublishedLeavesNothing) {
   {
     Publisher publisher(folder / "");
-    IndexChunkWriter writer(publisher, path, 3);
+    IndexChunkWriter writer(publisher, path, 3, kName);
     writer.append(1, part_of(10, 0));
   }
   EXPECT_TRUE(std::filesystem::is_empty(path.parent_path()));
@@ -106,11 +118,11 @@ TEST(IndexChunkPart, AClaimOfManyBytesCostsNoMemory) {
   for (int i = 0; i < 4; ++i) part.push_back(static_cast<std::byte>(crc >> 8 * i));
   const TemporaryFolder folder;
   Publisher publisher(folder / "");
-  IndexChunkWriter writer(publisher, folder / "0", 1);
+  IndexChunkWriter writer(publisher, folder / "0", 1, kName);
   writer.append(0, part);
   writer.publish();
   publisher.wait();
-  const IndexChunk chunk(folder / "0", 1, true);
+  const IndexChunk chunk(folder / "0", 1, true, kName);
   std::vector<std::byte> bytes;
   try {
     chunk.read(0, bytes);
@@ -123,7 +135,7 @@ TEST(IndexChunkPart, AClaimOfManyBytesCostsNoMemory) {
 
 TEST(IndexLayoutJson, RoundTrip) {
   for (const std::optional<int> zstd : {std::optional<int>(), std::optional(7)}) {
-    const IndexLayout layout{"octree", 4, ScalarType::f32, {1000, 70, 3}, zstd};
+    const IndexLayout layout{"octree", 4, ScalarType::f32, {1000, 70, 3}, zstd, 5};
     EXPECT_EQ(parse_index_layout(to_json(layout), "here"), layout);
   }
 }
@@ -147,7 +159,7 @@ TEST(IndexLayoutJson, UnknownVersionsAndOtherGeometryAreRefused) {
     json[key] = value;
     return seal_json(json);
   };
-  EXPECT_THROW(parse_index_layout(with("isobrick_index", 2), "here"), Error);
+  EXPECT_THROW(parse_index_layout(with("isobrick_index", 3), "here"), Error);
   for (const auto& [key, value] : std::vector<std::pair<const char*, nlohmann::json>>{
            {"leaf", 3}, {"brick", 32}, {"chunk", 64}, {"data_type", "u8"}, {"shape", {1, 2}}})
     EXPECT_THROW(parse_index_layout(with(key, value), "here"), DamageError) << key;
@@ -168,7 +180,7 @@ TEST(IndexLayout, Geometry) {
 TEST(AddedRangesJson, RoundTripAndChanges) {
   const TemporaryFolder folder;
   EXPECT_FALSE(read_added_ranges(folder / "a"));
-  const AddedRanges added{.may_have_nan = false, .image_crc32c = 0xfedcba98};
+  const AddedRanges added{.may_have_nan = false, .image_crc32c = 0xfedcba98, .levels = {{1, 2}, {3, 0xfedcba97}}};
   const std::string text = to_json(added);
   write_file(added_ranges_file(folder / "a"), text);
   EXPECT_EQ(read_added_ranges(folder / "a"), added);

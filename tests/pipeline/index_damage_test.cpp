@@ -52,7 +52,8 @@ class IndexDamage : public testing::TestWithParam<IndexKind> {
     }
     parts[part] = std::move(content);
     Publisher publisher(store_);
-    IndexChunkWriter writer(publisher, index_chunk_path(index.folder(), {0, 0, 0}), count);
+    IndexChunkWriter writer(publisher, index_chunk_path(index.folder(), {0, 0, 0}), count,
+                            index.name_of({0, 0, 0}));
     for (std::size_t i = 0; i < count; ++i)
       if (parts[i]) writer.append(i, encode_index_part(3, *parts[i]));
     writer.publish();
