@@ -49,6 +49,7 @@ BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& pl
       threads_count_(threads),
       bricks_of_job_(std::clamp<std::size_t>(kBytesOfJob / lattice_.brick_bytes(), 1, 64)),
       memory_(memory),
+      check_(store, level),
       slots_(lattice_, reach) {
   {
     const std::lock_guard lock(mutex_);
@@ -223,7 +224,9 @@ void BatchDecoder::work(int thread) {
 void BatchDecoder::decode(int thread, DecodedBatch& batch, const std::vector<Load>& loads) {
   for (const Load& load : loads) {
     std::byte* const to = memory_.begin(thread, load.place);
-    if (store_.read_brick(level_, load.brick, to)) {
+    const bool present = store_.read_brick(level_, load.brick, to);
+    check_.check(load.brick, present ? to : nullptr);
+    if (present) {
       memory_.end(thread, load.place);
     } else {
       const std::lock_guard lock(mutex_);

@@ -14,6 +14,7 @@
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/flat_map.h"
+#include "isobrick/stream/brick_check.h"
 #include "isobrick/stream/brick_memory.h"
 #include "isobrick/stream/brick_slots.h"
 #include "isobrick/stream/job_queue.h"
@@ -105,6 +106,7 @@ class BatchDecoder {
   const int threads_count_;
   const std::size_t bricks_of_job_;
   BrickMemory& memory_;
+  const BrickCheck check_;
 
   // Decoders take jobs and mostly end them without the lock of the books, which planning and
   // handing on hold for long.

@@ -44,6 +44,7 @@ BrickCache::BrickCache(const StoreReader& store, int level, Index reach, std::si
       level_(level),
       lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
       capacity_(capacity),
+      check_(store, level),
       slots_(lattice_, reach) {}
 
 std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, Int3 last) {
@@ -58,8 +59,10 @@ std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, In
     begun->bricks_.push_back(b);
   }
   for (CachedBricks::Load& load : begun->loads_)
-    begun->tasks_.run(
-        [this, &load] { load.present = store_.read_brick(level_, load.brick, load.samples); });
+    begun->tasks_.run([this, &load] {
+      load.present = store_.read_brick(level_, load.brick, load.samples);
+      check_.check(load.brick, load.present ? load.samples : nullptr);
+    });
   return begun;
 }
 

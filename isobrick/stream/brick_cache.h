@@ -12,6 +12,7 @@
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/tile.h"
+#include "isobrick/stream/brick_check.h"
 #include "isobrick/stream/brick_slots.h"
 
 namespace isobrick {
@@ -86,6 +87,7 @@ class BrickCache {
   const int level_;
   const Lattice lattice_;
   const std::size_t capacity_;
+  const BrickCheck check_;
   BrickSlots slots_;
   struct Free {
     void operator()(std::byte* slab) const { std::free(slab); }
