@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include <optional>
 
 #include "isobrick/bricks/checked_json.h"
@@ -28,11 +30,39 @@ std::optional<std::string> read_text(const fs::path& file) {
   return exists ? std::optional(std::move(text)) : std::nullopt;
 }
 
+/// An array of version 2 with the names that xarray and others give its dimensions in .zattrs.
+std::string with_dimension_names(std::string array, const fs::path& folder) {
+  const auto text = read_text(folder / ".zattrs");
+  if (!text) return array;
+  const nlohmann::json attributes = parse_json(*text, quoted(folder / ".zattrs"));
+  if (!attributes.is_object() || !attributes.contains("_ARRAY_DIMENSIONS")) return array;
+  nlohmann::json named = nlohmann::json::parse(array);
+  named["dimension_names"] = attributes["_ARRAY_DIMENSIONS"];
+  return named.dump();
+}
+
+/// Dimensions named x, y and z in another order would be taken for z, y, x: a mirrored volume.
+void check_order(const ArrayMetadata& array, const std::string& where) {
+  std::string letters, all;  // of each dimension one; '-': none of space
+  for (const std::string& name : array.dimension_names) {
+    const char letter = name.size() == 1 ? static_cast<char>(name[0] | 0x20) : '-';
+    letters += letter >= 'x' && letter <= 'z' ? letter : '-';
+    all += (all.empty() ? "" : ", ") + name;
+  }
+  const bool named = std::ranges::count(letters, '-') + 3 == std::ssize(letters);
+  if (named && !letters.ends_with("zyx"))
+    throw Error(
+        fmt::format("{}: its dimensions are {}: only arrays whose last are z, y, x are read; write "
+                    "it transposed",
+                    where, all));
+}
+
 std::optional<Text> read_array(const fs::path& folder) {
   if (auto text = read_text(folder / "zarr.json"))
     return Text{folder / "zarr.json", std::move(*text)};
   const fs::path file = folder / ".zarray";
-  if (const auto text = read_text(file)) return Text{file, v3_from_zarray(*text, quoted(file))};
+  if (const auto text = read_text(file))
+    return Text{file, with_dimension_names(v3_from_zarray(*text, quoted(file)), folder)};
   return std::nullopt;
 }
 
@@ -128,8 +158,10 @@ MetadataFiles read_metadata_files(const fs::path& path) {
   }
   files.crc32c = metadata_checksum(root.json, texts, quoted(root.file));
   check_ours(files, path);
-  for (std::size_t i = 0; i < texts.size(); ++i)
+  for (std::size_t i = 0; i < texts.size(); ++i) {
     files.levels[i].array = parse_array_metadata(texts[i], quoted(files.levels[i].file));
+    check_order(files.levels[i].array, quoted(files.levels[i].file));
+  }
   return files;
 }
 

@@ -78,9 +78,14 @@ ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes
     if (axis.role == AxisRole::space) {
       if (next == 3)
         throw UsageError(fmt::format("'{}' has more than 3 dimensions of space", path));
-      view.extent[next] = axis.size;
-      view.stride[next] = view.total;
-      view.kept[static_cast<std::size_t>(next++)] = i;
+      const int to = axis.direction.value_or(next);
+      if (view.extent[to] != 0)
+        throw UsageError(
+            fmt::format("'{}': two of its axes are called {}", path, "xyz"[to]));
+      view.extent[to] = axis.size;
+      view.stride[to] = view.total;
+      view.kept[static_cast<std::size_t>(to)] = i;
+      ++next;
     } else if (axis.size > 1) {
       view.first += view.total * (axis.role == AxisRole::channel ? channel : time);
     }

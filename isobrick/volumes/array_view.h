@@ -18,6 +18,9 @@ enum class AxisRole : std::uint8_t { space, channel, time };
 struct ArrayAxis {
   Index size = 0;
   AxisRole role = AxisRole::space;
+  /// Of an axis of space: 0, 1, 2 for x, y, z where the file names it. Nothing: the fastest of them
+  /// is x, the slowest z.
+  std::optional<int> direction = std::nullopt;
 };
 
 /// The volume that a selection leaves of an array of several dimensions.
@@ -33,7 +36,7 @@ struct ArrayView {
 
 /// Selects a volume from an array whose fastest axis is the first of `axes`.
 /// Exactly three are space. Throws UsageError, beginning with `path`, for sizes
-/// that are not positive or overflow, for channels and times that must be chosen
+/// that are not positive or overflow, for two axes of one direction, for channels and times that must be chosen
 /// and were not, and for choices that are not there.
 ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes,
                         const Selection& selection);

@@ -21,11 +21,12 @@ class Hdf5Dataset {
   ~Hdf5Dataset();
 
   ScalarType type() const;
-  /// Fastest first. Roles are those that labels of the dimensions say.
+  /// Fastest first. Roles and directions are those that labels of the dimensions say.
   const std::vector<ArrayAxis>& axes() const;
   /// Whether labels said all roles.
   bool labelled() const;
-  /// The attribute `element_size_um` that Fiji and ilastik write, or zeros.
+  /// The attribute `element_size_um` that Fiji and ilastik write, of the axes of space, fastest
+  /// first; or zeros.
   Vec3d element_size() const;
   /// Bytes that reading takes: a few chunks, and a layer of them if that is not much.
   std::size_t memory() const;

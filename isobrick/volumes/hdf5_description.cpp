@@ -59,6 +59,11 @@ std::optional<AxisRole> role_of(const std::string& label) {
   return std::nullopt;
 }
 
+std::optional<int> direction_of(const std::string& label) {
+  return label.size() == 1 && label[0] >= 'x' && label[0] <= 'z' ? std::optional(label[0] - 'x')
+                                                                 : std::nullopt;
+}
+
 /// The strings of the attribute DIMENSION_LABELS, slowest dimension first; empty
 /// where it is missing or not as it should be.
 std::vector<std::string> read_labels(hid_t dataset, std::size_t dimensions) {
@@ -215,6 +220,8 @@ std::vector<ArrayAxis> read_hdf5_axes(const std::string& path, hid_t dataset, bo
       throw UsageError(fmt::format("'{}': a dimension of {} is too large", path, sizes[i]));
     axes.push_back({static_cast<Index>(sizes[i]), role.value_or(AxisRole::space)});
   }
+  for (std::size_t i = 0; labelled && i < axes.size(); ++i)
+    axes[i].direction = direction_of(labels[axes.size() - 1 - i]);
   return axes;
 }
 

@@ -172,6 +172,18 @@ TEST_F(Foreign, WhatIsNotSupportedIsNamed) {
   metadata.chunk = {1, 2, 2, 3};
   write_metadata();
   expect("4 dimensions");
+  metadata.shape = {4, 5, 7};
+  metadata.chunk = {2, 2, 3};
+  for (const auto& names : {std::vector<std::string>{"x", "y", "z"}, {"Y", "Z", "X"}}) {
+    metadata.dimension_names = names;
+    write_metadata();
+    expect(metadata.dimension_names[0] + ", ");
+    expect("only arrays whose last are z, y, x");
+  }
+  metadata.dimension_names = {"row", "y", "x"};  // says nothing of the order
+  write_metadata();
+  EXPECT_NO_THROW(StoreReader{path});
+  metadata.dimension_names.clear();
   metadata.shape = {Index{1} << 61, 4, 5};
   metadata.chunk = {1, 1, 1};
   write_metadata();

@@ -101,6 +101,20 @@ TEST_F(ZarrV2, AnArrayIsAnImageOfOneLevel) {
     }
 }
 
+TEST_F(ZarrV2, DimensionsInAnotherOrderAreRefused) {
+  write_array(path, {4, 5, 7}, {2, 2, 3});
+  write_file(path / ".zattrs", R"({"_ARRAY_DIMENSIONS": ["z", "y", "x"]})");
+  EXPECT_NO_THROW(StoreReader{path});
+  write_file(path / ".zattrs", R"({"_ARRAY_DIMENSIONS": ["x", "y", "z"]})");
+  try {
+    StoreReader{path};
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("its dimensions are x, y, z"), std::string::npos)
+        << e.what();
+  }
+}
+
 TEST_F(ZarrV2, AnImageHasItsTransforms) {
   const auto transform = [](const char* type, std::vector<double> values) {
     return json{{"type", type}, {type, values}};

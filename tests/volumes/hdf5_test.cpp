@@ -145,6 +145,100 @@ TEST_F(Hdf5, FiltersOfAllKinds) {
       }
 }
 
+/// Labels of the dimensions, slowest first, as h5py writes them.
+void set_labels(hid_t data, const std::vector<const char*>& labels) {
+  const hsize_t count = labels.size();
+  const hid_t text = H5Tcopy(H5T_C_S1), space = H5Screate_simple(1, &count, nullptr);
+  H5Tset_size(text, H5T_VARIABLE);
+  const hid_t attribute =
+      H5Acreate2(data, "DIMENSION_LABELS", text, space, H5P_DEFAULT, H5P_DEFAULT);
+  EXPECT_GE(H5Awrite(attribute, text, labels.data()), 0);
+  H5Aclose(attribute);
+  H5Sclose(space);
+  H5Tclose(text);
+}
+
+/// What sample_bytes() has, at the places that labels say, in channel 1 of 2 where there are any;
+/// the sizes of its elements are 1, 2, … in the order x, y, z.
+std::string write_labelled(const std::string& path, const std::vector<const char*>& labels,
+                           hsize_t chunk) {
+  const std::string samples = sample_bytes(ScalarType::i16, kWhole, kExtent);
+  std::vector<hsize_t> sizes, chunks;
+  std::vector<double> element;
+  for (const char* label : labels) {
+    const int axis = label[0] - 'x';
+    sizes.push_back(label[0] == 'c' ? 2 : static_cast<hsize_t>(kExtent[axis]));
+    chunks.push_back(std::min(sizes.back(), chunk));
+    if (label[0] != 'c') element.push_back(axis + 1);
+  }
+  std::vector<std::int16_t> turned;
+  std::vector<hsize_t> at(sizes.size(), 0);
+  for (bool more = true; more;) {
+    Int3 p;
+    hsize_t channel = 1;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      if (labels[i][0] == 'c')
+        channel = at[i];
+      else
+        p[labels[i][0] - 'x'] = static_cast<Index>(at[i]);
+    }
+    std::int16_t value = -1;
+    if (channel == 1)
+      std::memcpy(&value, samples.data() + 2 * linear_index(p, kExtent), sizeof value);
+    turned.push_back(value);
+    std::size_t i = at.size();
+    while (i > 0 && ++at[i - 1] == sizes[i - 1]) at[--i] = 0;
+    more = i > 0;
+  }
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t how = H5Pcreate(H5P_DATASET_CREATE);
+  const hid_t space = H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr);
+  if (chunk > 0) H5Pset_chunk(how, static_cast<int>(sizes.size()), chunks.data());
+  const hid_t data =
+      H5Dcreate2(file, "v", H5T_NATIVE_INT16, space, H5P_DEFAULT, how, H5P_DEFAULT);
+  EXPECT_GE(H5Dwrite(data, H5T_NATIVE_INT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, turned.data()), 0);
+  set_labels(data, labels);
+  const hsize_t three = 3;
+  const hid_t numbers = H5Screate_simple(1, &three, nullptr);
+  const hid_t attribute = H5Acreate2(data, "element_size_um", H5T_NATIVE_DOUBLE, numbers,
+                                     H5P_DEFAULT, H5P_DEFAULT);
+  EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_DOUBLE, element.data()), 0);
+  H5Aclose(attribute);
+  H5Sclose(numbers);
+  H5Dclose(data);
+  H5Sclose(space);
+  H5Pclose(how);
+  H5Fclose(file);
+  return path;
+}
+
+TEST_F(Hdf5, LabelsSayWhichDimensionIsWhich) {
+  using Labels = std::vector<const char*>;
+  for (const Labels& labels :
+       {Labels{"z", "y", "x"}, Labels{"x", "y", "z"}, Labels{"x", "z", "y"}, Labels{"y", "x", "z"},
+        Labels{"c", "x", "y", "z"}, Labels{"x", "y", "z", "c"}, Labels{"z", "x", "c", "y"}})
+    for (const hsize_t chunk : {0, 4}) {
+      const auto path = write_labelled(dir / "v.h5", labels, chunk);
+      VolumeRequest said;
+      if (labels.size() > 3) said.selection.channel = 1;
+      const auto source = open_source(path, said);
+      EXPECT_EQ(source->info().extent, kExtent);
+      EXPECT_EQ(source->info().transform.spacing, (Vec3d{1, 2, 3}));
+      EXPECT_EQ(read_box(*source, kWhole), sample_bytes(ScalarType::i16, kWhole, kExtent));
+      const Box3 inner{{3, 2, 1}, {17, 16, 4}};
+      EXPECT_EQ(read_box(*source, inner), sample_bytes(ScalarType::i16, inner, kExtent));
+    }
+  // Labels that say nothing of ours leave the order as it is; two alike are refused.
+  const auto twice = write_labelled(dir / "twice.h5", {"z", "y", "x"}, 0);
+  const hid_t file = H5Fopen(twice.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const hid_t data = H5Dopen2(file, "v", H5P_DEFAULT);
+  H5Adelete(data, "DIMENSION_LABELS");
+  set_labels(data, {"x", "y", "x"});
+  H5Dclose(data);
+  H5Fclose(file);
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(twice, {}); }), "are called x"));
+}
+
 TEST_F(Hdf5, ChunksThatWereNeverWritten) {
   const std::int16_t fill = -7;
   const auto set = [&](hid_t how) {
