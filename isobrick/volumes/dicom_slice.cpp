@@ -10,10 +10,13 @@
 #include <dcmtk/dcmjpls/djdecode.h>
 #include <dcmtk/oflog/oflog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <mutex>
+#include <numeric>
 #include <type_traits>
+#include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/printable.h"
@@ -119,7 +122,31 @@ ScalarType read_type(const std::string& path, const Attributes& a, int& bits) {
   refuse(path, fmt::format("samples of {} bits are not supported", allocated));
 }
 
-void read_geometry(const Attributes& a, DicomSlice& slice) {
+/// From one frame of a dose to the next, along the normal; 0 where the file does not say it.
+double read_frame_step(const std::string& path, const Attributes& a, Index frames) {
+  std::vector<double> steps;
+  auto before = a.real(DCM_GridFrameOffsetVector, 0);
+  if (!before) return 0;
+  for (Index i = 1; i < frames; ++i) {
+    const auto offset = a.real(DCM_GridFrameOffsetVector, static_cast<unsigned long>(i));
+    if (!offset)
+      refuse(path, fmt::format("GridFrameOffsetVector has {} numbers for {} frames", i, frames));
+    steps.push_back(*offset - *before);
+    before = offset;
+  }
+  if (steps.empty()) return 0;
+  std::vector<double> sorted = steps;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (*middle == 0 || std::abs(steps[i] - *middle) > 0.02 * std::abs(*middle) + 1e-3)
+      refuse(path, fmt::format("the frames are not evenly spaced: frame {} lies {:.4g} mm behind "
+                               "the one before, elsewhere the step is {:.4g} mm",
+                               i + 2, steps[i], *middle));
+  return std::accumulate(steps.begin(), steps.end(), 0.0) / static_cast<double>(steps.size());
+}
+
+void read_geometry(const std::string& path, const Attributes& a, DicomSlice& slice) {
   const DcmTagKey& tag = a.has(DCM_PixelSpacing) ? DCM_PixelSpacing : DCM_ImagerPixelSpacing;
   // First from row to row, then from column to column.
   slice.spacing.y = a.real(tag, 0).value_or(1);
@@ -127,6 +154,8 @@ void read_geometry(const Attributes& a, DicomSlice& slice) {
   slice.spacing.z =
       a.real(DCM_SpacingBetweenSlices).value_or(a.real(DCM_SliceThickness).value_or(1));
   if (slice.spacing.z <= 0) slice.spacing.z = 1;
+  if (const double step = read_frame_step(path, a, slice.extent.z); step != 0)
+    slice.spacing.z = step;
   slice.position = a.vector(DCM_ImagePositionPatient);
   const auto row = a.vector(DCM_ImageOrientationPatient, 0),
              column = a.vector(DCM_ImageOrientationPatient, 3);
@@ -174,7 +203,8 @@ std::optional<DicomSlice> read_dicom_slice(const std::string& path) {
   slice.scale = {a.real(DCM_RescaleSlope).value_or(1), a.real(DCM_RescaleIntercept).value_or(0)};
   slice.time = a.whole(DCM_TemporalPositionIdentifier, 0);
   slice.instance = a.whole(DCM_InstanceNumber, 0);
-  read_geometry(a, slice);
+  if (const auto dose = a.real(DCM_DoseGridScaling)) slice.scale = {*dose, 0};
+  read_geometry(path, a, slice);
   return slice;
 }
 

@@ -18,7 +18,9 @@ struct DicomSlice {
   ScalarType type = ScalarType::u8;  ///< as stored
   int bits = 8;                      ///< that are used of each sample, the lowest
   ValueScale scale;
-  Vec3d spacing{1, 1, 1};               ///< of columns, rows, frames or slices
+  /// Of columns, rows, frames or slices. That of frames is negative where they go against the
+  /// normal, row × column.
+  Vec3d spacing{1, 1, 1};
   std::optional<Vec3d> position;        ///< of the first sample in space, millimetres
   Vec3d row{1, 0, 0}, column{0, 1, 0};  ///< directions in which x and y grow
   Index time = 0, instance = 0;         ///< TemporalPositionIdentifier, InstanceNumber

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <semaphore>
 #include <thread>
@@ -70,7 +71,7 @@ class DicomSource final : public VolumeSource {
       throw;
     }
     room_.release();
-    if (scaled_) scale_in_place(slice.type, count, slice.scale, out);
+    if (scaled_) scale_in_place(slice.type, info_.type, count, slice.scale, out);
   }
 
   void copy_part(const std::byte* plane, Box3 box, std::byte* out) const {
@@ -161,6 +162,32 @@ std::vector<DicomSlice> choose_time(const std::string& name, std::vector<DicomSl
   return chosen;
 }
 
+/// The usual one of several steps: their median.
+double usual_step(const std::vector<DicomSlice>& slices) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < slices.size(); ++i)
+    steps.push_back(height_of(slices[i]) - height_of(slices[i - 1]));
+  // The lower one of two: a missing slice makes a step longer.
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+[[noreturn]] void refuse_step(const std::string& name, const DicomSlice& before,
+                              const DicomSlice& after, double step, double usual) {
+  const double steps = std::round(step / usual);
+  if (steps >= 2 && std::abs(step - steps * usual) <= 0.02 * step + 1e-3)
+    throw UsageError(fmt::format(
+        "'{}': {} missing between '{}' and '{}', which are {:.4g} mm apart: elsewhere the step is "
+        "{:.4g} mm",
+        name, steps == 2 ? "a slice is" : fmt::format("{} slices are", steps - 1), before.path,
+        after.path, step, usual));
+  throw UsageError(fmt::format(
+      "'{}': the slices are not evenly spaced: '{}' lies {:.4g} mm behind '{}', elsewhere the step "
+      "is {:.4g} mm",
+      name, after.path, step, before.path, usual));
+}
+
 /// From one slice to the next, which must be the same throughout and along the
 /// normal.
 double find_step(const std::string& name, const std::vector<DicomSlice>& slices) {
@@ -168,16 +195,13 @@ double find_step(const std::string& name, const std::vector<DicomSlice>& slices)
   const Vec3d normal = cross(slices[0].row, slices[0].column);
   const auto last = static_cast<double>(slices.size() - 1);
   const double step = (height_of(slices.back()) - height_of(slices[0])) / last;
+  const double usual = usual_step(slices);
   for (std::size_t i = 1; i < slices.size(); ++i) {
     const Vec3d way = *slices[i].position - *slices[i - 1].position;
     const double up = dot(way, normal);
     // Positions are written with few digits.
-    const double tolerance = 0.02 * step + 1e-3;
-    if (std::abs(up - step) > tolerance)
-      throw UsageError(
-          fmt::format("'{}': the slices are not evenly spaced (a slice may be missing): "
-                      "'{}' lies {:.4g} behind '{}', on average it is {:.4g}",
-                      name, slices[i].path, up, slices[i - 1].path, step));
+    const double tolerance = 0.02 * usual + 1e-3;
+    if (std::abs(up - usual) > tolerance) refuse_step(name, slices[i - 1], slices[i], up, usual);
     if (length(way - normal * up) > tolerance)
       throw UsageError(
           fmt::format("'{}': '{}' is shifted sideways against '{}' (a tilted gantry?), "
@@ -185,6 +209,20 @@ double find_step(const std::string& name, const std::vector<DicomSlice>& slices)
                       name, slices[i].path, slices[i - 1].path));
   }
   return step;
+}
+
+/// What samples become by the slices' scales: integers stay integers where the scales let them.
+ScalarType real_type(const std::vector<DicomSlice>& slices) {
+  const DicomSlice& first = slices[0];
+  std::vector<ValueScale> scales;
+  for (const DicomSlice& slice : slices) scales.push_back(slice.scale);
+  const bool is_signed = visit_scalar(first.type, [](auto tag) {
+    return std::numeric_limits<typename decltype(tag)::type>::is_signed;
+  });
+  const double span = std::exp2(first.bits);
+  return integer_scaled_type(first.type, is_signed ? -span / 2 : 0,
+                             (is_signed ? span / 2 : span) - 1, scales)
+      .value_or(scaled_type(first.type));
 }
 
 }  // namespace
@@ -214,7 +252,7 @@ std::unique_ptr<VolumeSource> open_dicom(const std::string& name,
   transform.unit = "millimeter";
   const Index planes = slices.size() == 1 ? first.extent.z : static_cast<Index>(slices.size());
   VolumeInfo info = describe_volume(name, {first.extent.x, first.extent.y, planes},
-                                    scaled ? scaled_type(first.type) : first.type, transform, said);
+                                    scaled ? real_type(slices) : first.type, transform, said);
   return std::make_unique<DicomSource>(std::move(info), std::move(slices), scaled);
 }
 

@@ -1,7 +1,9 @@
 #include "isobrick/volumes/scaled_source.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
-#include <type_traits>
+#include <limits>
 #include <utility>
 
 namespace isobrick {
@@ -24,7 +26,7 @@ class ScaledSource final : public VolumeSource {
     const ScalarType type = stored_->info().type;
     const auto count = static_cast<std::size_t>(volume(box.extent()));
     stored_->read(box, out + count * (size_of(info_.type) - size_of(type)));
-    scale_in_place(type, count, scale_, out);
+    scale_in_place(type, info_.type, count, scale_, out);
   }
 
  private:
@@ -35,20 +37,47 @@ class ScaledSource final : public VolumeSource {
 
 }  // namespace
 
-void scale_in_place(ScalarType stored, std::size_t count, ValueScale scale, std::byte* out) {
-  visit_scalar(stored, [&](auto tag) {
-    using From = typename decltype(tag)::type;
-    using To = std::conditional_t<std::is_same_v<From, double>, double, float>;
-    static_assert(sizeof(To) >= sizeof(From));
-    // The stored sample that is read next never lies before what is written.
-    const std::byte* from = out + count * (sizeof(To) - sizeof(From));
-    for (std::size_t i = 0; i < count; ++i) {
-      From v;
-      std::memcpy(&v, from + i * sizeof(From), sizeof(From));
-      const To scaled = static_cast<To>(static_cast<double>(v) * scale.slope + scale.intercept);
-      std::memcpy(out + i * sizeof(To), &scaled, sizeof(To));
-    }
+void scale_in_place(ScalarType stored, ScalarType scaled, std::size_t count, ValueScale scale,
+                    std::byte* out) {
+  visit_scalar(stored, [&](auto stored_tag) {
+    visit_scalar(scaled, [&](auto scaled_tag) {
+      using From = typename decltype(stored_tag)::type;
+      using To = typename decltype(scaled_tag)::type;
+      if constexpr (sizeof(To) >= sizeof(From)) {
+        // The stored sample that is read next never lies before what is written.
+        const std::byte* from = out + count * (sizeof(To) - sizeof(From));
+        for (std::size_t i = 0; i < count; ++i) {
+          From v;
+          std::memcpy(&v, from + i * sizeof(From), sizeof(From));
+          const To value = static_cast<To>(static_cast<double>(v) * scale.slope + scale.intercept);
+          std::memcpy(out + i * sizeof(To), &value, sizeof(To));
+        }
+      }
+    });
   });
+}
+
+std::optional<ScalarType> integer_scaled_type(ScalarType stored, double lo, double hi,
+                                              std::span<const ValueScale> scales) {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const ValueScale& scale : scales) {
+    if (scale.slope != std::trunc(scale.slope) || scale.intercept != std::trunc(scale.intercept))
+      return std::nullopt;
+    for (const double end : {lo, hi}) {
+      least = std::min(least, end * scale.slope + scale.intercept);
+      most = std::max(most, end * scale.slope + scale.intercept);
+    }
+  }
+  for (const ScalarType type : {stored, ScalarType::u8, ScalarType::i8, ScalarType::u16,
+                                ScalarType::i16, ScalarType::u32, ScalarType::i32}) {
+    const bool fits = visit_scalar(type, [&](auto tag) {
+      using Limits = std::numeric_limits<typename decltype(tag)::type>;
+      return Limits::is_integer && least >= static_cast<double>(Limits::min()) &&
+             most <= static_cast<double>(Limits::max());
+    });
+    if (fits && size_of(type) >= size_of(stored)) return type;
+  }
+  return std::nullopt;
 }
 
 std::unique_ptr<VolumeSource> scale_source(std::unique_ptr<VolumeSource> stored, ValueScale scale) {

@@ -7,7 +7,9 @@
 #include <dcmtk/dcmjpeg/djencode.h>
 #include <dcmtk/dcmjpls/djencode.h>
 
+#include <cstring>
 #include <filesystem>
+#include <functional>
 
 #include "damaged_files.h"
 #include "isobrick/volumes/open_source.h"
@@ -26,9 +28,10 @@ class Dicom : public ::testing::Test {
     DcmRLEEncoderRegistration::registerCodecs();
   }
 
-  /// Planes [z0, z1) of samples of u16 as one file.
+  /// Planes [z0, z1) of samples of u16 as one file, with what `more` adds.
   std::string write(const std::string& name, Index z0, Index z1,
-                    E_TransferSyntax syntax = EXS_LittleEndianExplicit) const {
+                    E_TransferSyntax syntax = EXS_LittleEndianExplicit,
+                    const std::function<void(DcmDataset&)>& more = nullptr) const {
     DcmFileFormat file;
     DcmDataset& data = *file.getDataset();
     data.putAndInsertString(DCM_SOPClassUID, UID_CTImageStorage);
@@ -48,6 +51,7 @@ class Dicom : public ::testing::Test {
     data.putAndInsertString(DCM_ImageOrientationPatient, "0\\1\\0\\-1\\0\\0");
     data.putAndInsertString(DCM_ImagePositionPatient,
                             ("10\\20\\" + std::to_string(3 * z0)).c_str());
+    if (more) more(data);
     const Box3 box{{0, 0, z0}, {kExtent.x, kExtent.y, z1}};
     const std::string samples = sample_bytes(ScalarType::u16, box, kExtent);
     std::vector<Uint16> words(samples.size() / 2);
@@ -82,6 +86,77 @@ TEST_F(Dicom, PlainAndCompressed) {
     const Box3 inner{{3, 2, 1}, {17, 16, 4}};
     EXPECT_EQ(read_box(*series, inner), sample_bytes(ScalarType::u16, inner, kExtent));
   }
+}
+
+/// sample_bytes() of u16, each v → v · slope + intercept as T.
+template <class T>
+std::string scaled_bytes(double slope, double intercept) {
+  const std::string stored = sample_bytes(ScalarType::u16, kWhole, kExtent);
+  std::string bytes;
+  for (std::size_t i = 0; i < stored.size(); i += 2) {
+    std::uint16_t v;
+    std::memcpy(&v, stored.data() + i, sizeof v);
+    const T real = static_cast<T>(v * slope + intercept);
+    bytes.append(reinterpret_cast<const char*>(&real), sizeof real);
+  }
+  return bytes;
+}
+
+TEST_F(Dicom, WholeScalesLeaveIntegers) {
+  const auto with = [&](const char* slope, const char* intercept, Uint16 bits) {
+    return open_source(write("s", 0, kExtent.z, EXS_LittleEndianExplicit,
+                             [&](DcmDataset& data) {
+                               data.putAndInsertString(DCM_RescaleSlope, slope);
+                               data.putAndInsertString(DCM_RescaleIntercept, intercept);
+                               data.putAndInsertUint16(DCM_BitsStored, bits);
+                               data.putAndInsertUint16(DCM_HighBit, Uint16(bits - 1));
+                             }),
+                       {});
+  };
+  const auto hounsfield = with("1", "-1024", 16);
+  EXPECT_EQ(hounsfield->info().type, ScalarType::i32) << "-1024 to 64511";
+  EXPECT_EQ(read_box(*hounsfield, kWhole), scaled_bytes<std::int32_t>(1, -1024));
+  EXPECT_EQ(with("1.0", "-1024.0", 15)->info().type, ScalarType::i16);
+  EXPECT_EQ(with("1", "0", 12)->info().type, ScalarType::u16);
+  EXPECT_EQ(with("1", "100", 12)->info().type, ScalarType::u16);
+  EXPECT_EQ(with("1e6", "0", 16)->info().type, ScalarType::f32) << "too large for 32 bits";
+  const auto fractions = with("0.5", "-1024", 16);
+  EXPECT_EQ(fractions->info().type, ScalarType::f32);
+  EXPECT_EQ(read_box(*fractions, kWhole), scaled_bytes<float>(0.5, -1024));
+}
+
+TEST_F(Dicom, ADoseHasItsOffsetsAndItsScaling) {
+  const auto dose = [&](const char* offsets) {
+    return write("dose", 0, kExtent.z, EXS_LittleEndianExplicit, [&](DcmDataset& data) {
+      data.putAndInsertString(DCM_SOPClassUID, UID_RTDoseStorage);
+      data.putAndInsertString(DCM_GridFrameOffsetVector, offsets);
+      data.putAndInsertString(DCM_DoseGridScaling, "0.25");
+    });
+  };
+  const auto up = open_source(dose("0\\2.5\\5\\7.5\\10"), {});
+  EXPECT_EQ(up->info().transform.spacing, (Vec3d{0.5, 2, 2.5}));
+  EXPECT_EQ(up->info().transform.apply({0, 0, 2}), (Vec3d{10, 20, 5}));
+  EXPECT_EQ(up->info().type, ScalarType::f32);
+  EXPECT_EQ(read_box(*up, kWhole), scaled_bytes<float>(0.25, 0));
+  const auto down = open_source(dose("100\\97\\94\\91\\88"), {});
+  EXPECT_EQ(down->info().transform.apply({0, 0, 2}), (Vec3d{10, 20, -6}));
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(dose("0\\2\\4\\7\\9"), {}); }),
+                       "frame 4 lies 3 mm behind"));
+  const std::string few = message_of<UsageError>([&] { open_source(dose("0\\2\\4"), {}); });
+  EXPECT_TRUE(contains(few, "3 numbers for 5 frames")) << few;
+}
+
+TEST_F(Dicom, AMissingSliceIsNamed) {
+  const char* names[] = {"s0", "s1", "s2", "s3", "s4", "s5", "s6"};
+  for (const Index z : {0, 1, 2, 4}) write(names[z], z, z + 1);
+  const std::string text = message_of<UsageError>([&] { open_source(dir / ".", {}); });
+  EXPECT_TRUE(contains(text, "a slice is missing between")) << text;
+  EXPECT_TRUE(contains(text, "s2' and '")) << text;
+  EXPECT_TRUE(contains(text, "s4', which are 6 mm apart: elsewhere the step is 3 mm")) << text;
+  std::filesystem::remove(dir / "s1");
+  for (const Index z : {5, 6}) write(names[z], z, z + 1);
+  const std::string first = message_of<UsageError>([&] { open_source(dir / ".", {}); });
+  EXPECT_TRUE(contains(first, "s0' and '")) << first;
 }
 
 TEST_F(Dicom, DamagedFiles) {

@@ -17,6 +17,18 @@ except ImportError as error:
     sys.exit(77)
 
 
+def integer_type(data, stored, scales):
+    """The least type that holds all that the bits in use can say."""
+    bits, signed = data.BitsStored, data.PixelRepresentation == 1
+    ends = (-2 ** (bits - 1), 2 ** (bits - 1) - 1) if signed else (0, 2 ** bits - 1)
+    real = [end * slope + inter for end in ends for slope, inter in scales]
+    for name in (stored.str[1:], "u1", "i1", "u2", "i2", "u4", "i4"):
+        limits = numpy.iinfo(name)
+        if limits.dtype.itemsize >= stored.itemsize and limits.min <= min(real) <= max(real) <= limits.max:
+            return name
+    return "f4"
+
+
 def read(folder):
     """Samples and matrix of a series, by pydicom alone."""
     slices = [pydicom.dcmread(path) for path in folder.iterdir()]
@@ -32,8 +44,11 @@ def read(folder):
     scales = [(float(s.get("RescaleSlope", 1)), float(s.get("RescaleIntercept", 0))) for s in slices]
     samples = numpy.stack([s.pixel_array for s in slices])
     if any(scale != (1, 0) for scale in scales):
+        stored = samples.dtype
         samples = numpy.stack([plane * slope + inter for plane, (slope, inter)
-                               in zip(samples.astype("f8"), scales)]).astype("f4")
+                               in zip(samples.astype("f8"), scales)])
+        whole = all(slope % 1 == 0 and inter % 1 == 0 for slope, inter in scales)
+        samples = samples.astype(integer_type(slices[0], stored, scales) if whole else "f4")
     return samples, affine
 
 
@@ -123,7 +138,7 @@ def check_refused(state):
     write(folder, samples, ExplicitVRLittleEndian)
     next(path for path in folder.iterdir()
          if pydicom.dcmread(path).InstanceNumber == 3).unlink()
-    state.refused("a gap", folder, "not evenly spaced")
+    state.refused("a gap", folder, "a slice is missing")
     for name, text in (("broken", b"\0" * 128 + b"DICM" + b"x" * 300),):
         write(folder, samples, ExplicitVRLittleEndian)
         (folder / f"{name}.dcm").write_bytes(text)
