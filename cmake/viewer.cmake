@@ -6,7 +6,7 @@ find_package(glm QUIET)
 find_package(glfw3 QUIET)
 find_path(ISOBRICK_STB_INCLUDE stb/stb_truetype.h)
 find_file(ISOBRICK_FONT DejaVuSans.ttf PATHS /usr/share/fonts /usr/local/share/fonts
-  PATH_SUFFIXES truetype/dejavu dejavu TTF)
+  PATH_SUFFIXES truetype/dejavu dejavu dejavu-sans-fonts TTF)
 mark_as_advanced(ISOBRICK_STB_INCLUDE ISOBRICK_FONT)
 if(epoxy_FOUND AND imgui_FOUND AND TARGET glm::glm AND TARGET glfw AND ISOBRICK_STB_INCLUDE
    AND ISOBRICK_FONT)

@@ -124,5 +124,55 @@ TEST_F(Setup, FailsOnlyWhenWhatIsNeededCannotBeInstalled) {
   EXPECT_NE(outcome.err.find("tests are skipped"), std::string::npos) << outcome.err;
 }
 
+TEST_F(Setup, OneUsefulPackageThatCannotBeHadDoesNotLoseTheOthers) {
+  if (geteuid() != 0) GTEST_SKIP() << "not root";
+  missing("libtiff-dev | libopenvdb-dev | libhdf5-dev");
+  add("apt-get",
+      "case \"$*\" in *libopenvdb-dev*) exit 100 ;; esac\necho \"$*\" >> " + path("log"));
+  const Outcome outcome = run_process(setup({}));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* package : {"libtiff-dev", "libhdf5-dev"})
+    EXPECT_NE(log().find(std::string("--no-install-recommends ") + package + "\n"),
+              std::string::npos)
+        << log();
+  EXPECT_NE(outcome.err.find("without libopenvdb-dev some formats"), std::string::npos)
+      << outcome.err;
+}
+
+TEST_F(Setup, ElsewhereItNamesTheCommandThatInstalls) {
+  fs::remove(path("bin/apt-get"));
+  fs::remove(path("bin/dpkg-query"));
+  Outcome outcome = as_user_setup();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("libisal-dev"), std::string::npos) << outcome.err;
+
+  add("pacman", "[ \"$2\" = fmt ]");  // which is there
+  outcome = as_user_setup();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("needed: pacman -S --needed onetbb libpng nlohmann-json"
+                             " cli11 isa-l highway\n"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("AUR"), std::string::npos) << outcome.err;
+
+  fs::remove(path("bin/ninja"));
+  add("dnf", "");
+  add("rpm", "[ \"$3\" = json-devel ]");
+  outcome = as_user_setup({"--tests"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("needed: dnf install ninja-build tbb-devel libzstd-devel libpng-devel"
+                             " fmt-devel cli11-devel isa-l-devel highway-devel gtest-devel\n"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("pictures and tests: dnf install blosc-devel"), std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("(Debian's names): libimgui-dev"), std::string::npos) << outcome.err;
+  EXPECT_EQ(log(), "");
+
+  add("rpm", "");
+  add("ninja", "");
+  EXPECT_EQ(as_user_setup({"--tests"}).err, "");
+}
+
 }  // namespace
 }  // namespace isobrick::test
