@@ -7,7 +7,11 @@
 
 #include <fmt/format.h>
 #include <imgui.h>
+#if __has_include(<imgui_stdlib.h>)
 #include <imgui_stdlib.h>
+#else
+#include <misc/cpp/imgui_stdlib.h>
+#endif
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"

@@ -110,6 +110,7 @@ FlyKeys ViewerWindow::Events::fly_keys() const {
           down(GLFW_KEY_W) - down(GLFW_KEY_S)};
 }
 
+#if IMGUI_VERSION_NUM < 18700
 void ViewerWindow::Events::hold_tapped_keys() {
   for (const int key : tapped_) ImGui::GetIO().KeysDown[key] = true;
 }
@@ -120,10 +121,18 @@ void ViewerWindow::Events::release_tapped_keys() {
   tapped_.clear();
 }
 
+void ViewerWindow::Events::tap(int key) {
+  if (key >= 0 && key < IM_ARRAYSIZE(ImGuiIO::KeysDown)) tapped_.push_back(key);
+}
+#else  // ImGui queues events itself, so that the shortest press lasts a frame.
+void ViewerWindow::Events::hold_tapped_keys() {}
+void ViewerWindow::Events::release_tapped_keys() {}
+void ViewerWindow::Events::tap(int) {}
+#endif
+
 void ViewerWindow::Events::on_key(int key, int action, int mods) {
   owner_.changed_ = true;
-  if (action == GLFW_PRESS && key >= 0 && key < IM_ARRAYSIZE(ImGuiIO::KeysDown))
-    tapped_.push_back(key);
+  if (action == GLFW_PRESS) tap(key);
   const bool typing = ImGui::GetIO().WantTextInput;
   Navigator& navigator = owner_.state_.navigator;
   navigator.press(!typing && navigator.mode == NavigationMode::fly ? fly_keys() : FlyKeys{});

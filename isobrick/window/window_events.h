@@ -25,6 +25,7 @@ class ViewerWindow::Events {
   void on_pointer(double x, double y);
   void on_wheel(double steps);
   void on_key(int key, int action, int mods);
+  void tap(int key);
   void on_press(int key, int mods, bool again);
   void move_isovalue(double steps);
   void next_mode();

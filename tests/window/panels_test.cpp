@@ -1,8 +1,8 @@
 #include "isobrick/window/panels.h"
 
-#include <imgui.h>
-// ImVec2 can be added up there.
+// ImVec2 can be added up with this.
 #define IMGUI_DEFINE_MATH_OPERATORS
+#include <imgui.h>
 #include <imgui_internal.h>
 
 #include <filesystem>
@@ -69,13 +69,28 @@ class Panels : public Picture {
     frame();
   }
   void press(ImGuiKey key) {
-    ImGuiIO& io = ImGui::GetIO();
-    const int code = io.KeyMap[key] = 300 + key;
-    io.KeysDown[code] = true;
+    hold(key, true);
     frame();
-    io.KeysDown[code] = false;
+    hold(key, false);
     frame();
   }
+#if IMGUI_VERSION_NUM < 18700
+  static void hold(ImGuiKey key, bool down) {
+    ImGuiIO& io = ImGui::GetIO();
+    io.KeyMap[key] = 300 + key;
+    io.KeysDown[300 + key] = down;
+  }
+  static void hold_control(bool down) { ImGui::GetIO().KeyCtrl = down; }
+#else
+  static void hold(ImGuiKey key, bool down) { ImGui::GetIO().AddKeyEvent(key, down); }
+  static void hold_control(bool down) {
+#if IMGUI_VERSION_NUM < 18900
+    hold(ImGuiKey_ModCtrl, down);
+#else
+    hold(ImGuiMod_Ctrl, down);
+#endif
+  }
+#endif
 
   /// Where in a window each widget is under the pointer.
   std::map<ImGuiID, std::vector<ImVec2>> widgets(const char* window = "###panel") {
@@ -164,9 +179,9 @@ TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
   ImGuiIO& io = ImGui::GetIO();
   const ImVec2 field = place_of({"Surfaces", "##isovalue"}, 0);
   const auto type = [&](const char* text) {
-    io.KeyCtrl = true;
+    hold_control(true);
     click(field);  // selects all
-    io.KeyCtrl = false;
+    hold_control(false);
     for (; *text != 0; ++text) {
       io.AddInputCharacter(static_cast<unsigned>(*text));
       frame();
