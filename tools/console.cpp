@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -14,18 +13,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/cancel.h"
 #include "isobrick/core/error.h"
 #include "tools/format.h"
+#include "tools/interrupt.h"
 
 namespace isobrick::tools {
 namespace {
-
-volatile std::sig_atomic_t g_signal = 0;
-
-void throw_if_interrupted() {
-  if (g_signal != 0) throw Interrupted(g_signal);
-}
 
 int terminal_columns() {
   winsize size{};
@@ -45,8 +38,6 @@ void say(std::string_view text) noexcept {
 
 }  // namespace
 
-int interrupting_signal() { return g_signal; }
-
 void set_up_streams() {
   // Each takes the lowest number free; the direction makes every use fail as
   // it would have failed on the closed stream.
@@ -54,19 +45,6 @@ void set_up_streams() {
     if (fcntl(fd, F_GETFD) < 0 && errno == EBADF &&
         open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0)
       return;
-}
-
-void set_up_signals() {
-  struct sigaction action {};
-  action.sa_handler = [](int signal) {
-    g_signal = signal;
-    request_cancel();
-  };
-  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  // A file that outgrows its limit is an error with a line, not a death.
-  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 std::string progress_line(std::string_view stage, std::uint64_t done, std::uint64_t total,

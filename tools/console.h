@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <exception>
 #include <string>
 #include <string_view>
 
@@ -18,24 +17,6 @@ struct Speech {
   bool json = false;
   bool quiet = false;
 };
-
-/// Thrown out of the progress calls after SIGINT or SIGTERM, so that everything
-/// on the way out removes its temporary files.
-class Interrupted : public std::exception {
- public:
-  explicit Interrupted(int signal) : signal_(signal) {}
-  int signal() const { return signal_; }
-  const char* what() const noexcept override { return "interrupted"; }
-
- private:
-  int signal_;
-};
-
-/// From now on the first SIGINT or SIGTERM is thrown by the progress calls; a
-/// second one kills at once. A file size limit becomes an ordinary write error.
-void set_up_signals();
-/// The signal that came first, or 0.
-int interrupting_signal();
 
 /// Keeps files that are opened from becoming a standard stream that is closed,
 /// which would send messages into them.

@@ -66,6 +66,7 @@ int run(const Arguments& arguments, Console& console) {
   const auto source = open_input(arguments);
   ConvertOptions options = arguments.store;
   options.inputs = input_paths(arguments.in);
+  note_conversion(arguments.out);
   const ConvertReport report = convert(*source, arguments.out, options, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
   return 0;

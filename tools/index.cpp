@@ -6,6 +6,7 @@
 #include "isobrick/pipeline/index_build.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
+#include "tools/interrupt.h"
 #include "tools/open_store.h"
 
 namespace isobrick::tools {
@@ -38,6 +39,7 @@ std::string text_of(const Arguments& arguments, const IndexReport& report) {
 
 int run(const Arguments& arguments, Console& console) {
   check_store(arguments.store);
+  set_interrupt_note([] { return "the same command with --resume goes on with what is done"; });
   const IndexReport report = add_index(arguments.store, arguments.index, console.progress());
   const nlohmann::ordered_json object{
       {"command", "index"},

@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -13,6 +12,7 @@
 #include "tools/command_line.h"
 #include "tools/console.h"
 #include "tools/help.h"
+#include "tools/interrupt.h"
 #include "tools/options.h"
 
 namespace isobrick::tools {
@@ -46,10 +46,8 @@ const Command* parsed(const Program& program) {
 
 std::string name_of(const Command* command) { return command ? command->app->get_name() : ""; }
 
-/// Ends as the signal would have ended the process, so that shells see it.
 int die_of(int signal) {
-  std::signal(signal, SIG_DFL);
-  std::raise(signal);
+  end_by_signal(signal);
   return 1;
 }
 
@@ -71,9 +69,11 @@ std::terminate_handler g_usual_end = nullptr;
 int run(Program& program, int argc, char** argv) {
   try {
     program.app.parse(words_to_parse(program.app, argc, argv));
-    set_up_signals();
+    set_up_signals(name_of(parsed(program)));
     Console console(program.speech);
-    return parsed(program)->run(console);
+    const int status = parsed(program)->run(console);
+    end_interrupts();
+    return status;
   } catch (const CLI::ParseError& error) {
     // --help and --version come this way too.
     if (error.get_exit_code() == 0) return program.app.exit(error);

@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <limits>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/bricks/store_names.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
+#include "tools/interrupt.h"
 
 namespace isobrick::tools {
 
@@ -186,6 +189,19 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_threads(app, options.threads);
   add_flag(app, "--resume", options.resume, "Go on with an interrupted conversion of this input");
   add_force(app, options.force);
+}
+
+void note_conversion(const std::string& output) {
+  set_interrupt_note([output]() -> std::string {
+    std::string folder = output;
+    while (folder.size() > 1 && folder.ends_with('/')) folder.pop_back();
+    folder += ".partial";
+    std::error_code none;
+    if (!std::filesystem::exists(std::filesystem::path(folder) / kLayoutMarker, none))
+      return "the same command begins anew";
+    return fmt::format("what is done is in '{}': the same command with --resume goes on with it",
+                       folder);
+  });
 }
 
 void report_conversion(Console& console, const std::string& command, const std::string& input,

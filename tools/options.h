@@ -105,6 +105,9 @@ void add_selection(CLI::App* app, Selection& selection);
 /// How a store is written: what `convert` and `synth` share.
 void add_store_options(CLI::App* app, ConvertOptions& options);
 
+/// From now on an interrupt is reported with what it leaves of a conversion to `output`.
+void note_conversion(const std::string& output);
+
 /// Says what a conversion by `command` did.
 void report_conversion(Console& console, const std::string& command, const std::string& input,
                        const std::string& output, const VolumeInfo& volume,

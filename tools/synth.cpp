@@ -91,7 +91,10 @@ int run(const Arguments& arguments, Console& console) {
   const auto source = make_synth(synth);
   const ConvertOptions& options = arguments.store;
   const bool raw = extension_of(arguments.out) == ".raw";
-  if (!raw) check_store_name(arguments.out);
+  if (!raw) {
+    check_store_name(arguments.out);
+    note_conversion(arguments.out);
+  }
   const ConvertReport report = raw ? write_raw(*source, arguments.out, options, console.progress())
                                    : convert(*source, arguments.out, options, console.progress());
   report_conversion(console, "synth", std::string(name_of(synth.kind)), arguments.out,

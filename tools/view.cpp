@@ -15,6 +15,7 @@
 #include "isobrick/window/screenshot.h"
 #include "isobrick/window/viewer_window.h"
 #include "tools/format.h"
+#include "tools/interrupt.h"
 #include "tools/output_name.h"
 #include "tools/picture_options.h"
 
@@ -167,6 +168,7 @@ int run(const Arguments& arguments, Console& console) {
   options.index = arguments.index;
   options.camera = arguments.picture.camera;
   options.settings = settings_of(arguments);
+  set_interrupt_note([] { return "the window is closed"; });
   {
     ViewerWindow window(options);
     window.open(arguments.store);

@@ -9,9 +9,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <filesystem>
+#include <mutex>
+#include <new>
 #include <vector>
 
+#include "isobrick/core/cancel.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -30,6 +34,34 @@ bool is_process_suffix(std::string_view text) {
          is_number(text.substr(dash + 1));
 }
 
+std::recursive_timed_mutex& publication_mutex() {
+  static auto* const mutex = new std::recursive_timed_mutex;  // as taken_names()
+  return *mutex;
+}
+
+/// The temporary names that this process took; no other process has the same. What they named may
+/// be published or removed since.
+struct TakenNames {
+  std::mutex mutex;
+  std::vector<std::string> names;
+};
+
+TakenNames& taken_names() {
+  static TakenNames* const instance = new TakenNames;  // threads may outlive main()
+  return *instance;
+}
+
+void note_taken(const std::string& name) {
+  TakenNames& taken = taken_names();
+  const std::lock_guard lock(taken.mutex);
+  // Those of earlier outputs, so that the list stays short in a process that lives long.
+  std::erase_if(taken.names, [](const std::string& earlier) {
+    std::error_code failure;
+    return fs::symlink_status(earlier, failure).type() == fs::file_type::not_found;
+  });
+  taken.names.push_back(name);
+}
+
 /// Locks what was just created; false when somebody took it for a leftover in between. Where a
 /// file system has no locks nobody can take it.
 bool keep(const UniqueFd& fd) {
@@ -45,7 +77,10 @@ Temporary create_beside(const std::string& path, const Create& create) {
   for (int attempt = 0;; ++attempt) {
     std::string name = fmt::format("{}.partial-{}-{}", path, ::getpid(), counter++);
     UniqueFd fd(create(name.c_str()));
-    if (fd.get() >= 0 && keep(fd)) return {std::move(fd), std::move(name)};
+    if (fd.get() >= 0 && keep(fd)) {
+      note_taken(name);
+      return {std::move(fd), std::move(name)};
+    }
     if ((fd.get() < 0 && errno != EEXIST) || attempt == 100)
       throw system_error("create", path, errno);
   }
@@ -105,11 +140,34 @@ bool remove_leftovers(const std::string& path) {
   return any;
 }
 
+Publication::Publication() {
+  publication_mutex().lock();
+  if (!cancel_requested()) return;
+  publication_mutex().unlock();
+  throw Cancelled("interrupted");
+}
+
+Publication::~Publication() { publication_mutex().unlock(); }
+
+void remove_unfinished() noexcept {
+  // Not unlocked: nothing is published any more. A rename that hangs is not waited for.
+  if (!publication_mutex().try_lock_for(std::chrono::milliseconds(200))) return;
+  TakenNames& taken = taken_names();
+  const std::lock_guard lock(taken.mutex);
+  for (const std::string& name : taken.names) try {
+      std::error_code ignored;
+      fs::remove_all(name, ignored);
+    } catch (const std::bad_alloc&) {
+      // The next run of the same output removes it.
+    }
+}
+
 bool is_part_name(std::string_view name) {
   constexpr std::string_view prefix = "part_";
   if (!name.starts_with(prefix)) return false;
   const std::size_t dot = name.find('.');
-  return dot != std::string_view::npos && is_number(name.substr(prefix.size(), dot - prefix.size()));
+  return dot != std::string_view::npos &&
+         is_number(name.substr(prefix.size(), dot - prefix.size()));
 }
 
 }  // namespace isobrick

@@ -24,6 +24,20 @@ Temporary create_temporary_folder(const std::string& path);
 /// were any. Folders are removed if they hold nothing but parts (is_part_name).
 bool remove_leftovers(const std::string& path);
 
+/// Held while an output takes its final name. Throws Cancelled when an end was requested
+/// (core/cancel.h). One thread may hold several.
+class Publication {
+ public:
+  Publication();
+  ~Publication();
+  Publication(const Publication&) = delete;
+  Publication& operator=(const Publication&) = delete;
+};
+
+/// For a process that ends without its destructors: removes what it created under temporary names
+/// and has not published, and lets no publication begin any more.
+void remove_unfinished() noexcept;
+
 /// Whether a file can be a part of an output in several files: part_3.vtp.
 bool is_part_name(std::string_view name);
 

@@ -154,8 +154,7 @@ void check_output(const std::string& path, bool force) {
   if (is_link && ::stat(path.c_str(), &status) != 0)
     throw UsageError(fmt::format("'{}' is a symbolic link to nothing; remove it", path));
   const char* link = is_link ? " a symbolic link to" : "";
-  if (S_ISDIR(status.st_mode))
-    throw UsageError(fmt::format("'{}' is{} a directory", path, link));
+  if (S_ISDIR(status.st_mode)) throw UsageError(fmt::format("'{}' is{} a directory", path, link));
   // Renaming over a device or a pipe, or over a link to one, would replace it by a file.
   if (!S_ISREG(status.st_mode))
     throw UsageError(fmt::format("'{}' is{} {} regular file", path, link,
@@ -179,6 +178,7 @@ OutputFile::~OutputFile() {
 
 void OutputFile::publish() {
   writer_.finish();
+  const Publication turn;
   if (path_ == kStandardOutput) return;
   if (force_) check_output(path_, true);  // something else may have appeared
   int result = ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(),

@@ -95,6 +95,7 @@ class OutputFile {
   const std::string& temporary_path() const { return temporary_; }
 
   /// Flushes and renames. Replaces a file that appeared in the meantime only with `force`.
+  /// Throws Cancelled when an end was requested.
   void publish();
 
  private:

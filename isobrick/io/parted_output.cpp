@@ -94,6 +94,7 @@ std::string PartedOutput::reference(std::size_t part, std::string_view extension
 }
 
 void PartedOutput::publish() {
+  const Publication turn;
   if (parts_ > 0) {
     move_to_free_place(temporary_.path, folder_);
     temporary_.path = folder_;  // goes with the file if that cannot be published

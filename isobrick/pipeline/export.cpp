@@ -9,6 +9,7 @@
 #include <span>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/leftovers.h"
 #include "isobrick/io/output_file.h"
 #include "isobrick/io/output_guard.h"
 #include "isobrick/pipeline/export_level_set.h"
@@ -236,6 +237,7 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
     header.emplace(out, info, options.force);
   export_dense(samples, piece, workers, output, progress);
   output.writer().finish();
+  const Publication turn;
   if (header) header->remove_old();
   output.publish();
   if (header) header->publish();

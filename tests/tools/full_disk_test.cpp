@@ -1,4 +1,5 @@
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 
 #include <fmt/format.h>
@@ -43,10 +44,12 @@ class FullDisk : public ProgramTest {
   }
 
   /// The program's words with faults injected, see write_fault.cpp.
-  static Outcome run_with_fault(const Arguments& arguments, long long after, int fault) {
+  static Outcome run_with_fault(const Arguments& arguments, long long after, int fault,
+                                int signal = 0) {
     Arguments words{"env", "LD_PRELOAD=" ISOBRICK_WRITE_FAULT,
                     fmt::format("ISOBRICK_FAULT_AFTER={}", after),
                     fmt::format("ISOBRICK_FAULT_ERRNO={}", fault),
+                    fmt::format("ISOBRICK_FAULT_SIGNAL={}", signal),
                     // A sanitizer wants to be the first library.
                     "ASAN_OPTIONS=verify_asan_link_order=0", ISOBRICK_PROGRAM};
     words.insert(words.end(), arguments.begin(), arguments.end());
@@ -95,6 +98,25 @@ TEST_F(FullDisk, WhatIsReportedOnlyWhenAFileIsClosedCountsToo) {
                    {"Input/output error", writer.output});
     EXPECT_TRUE(read_file(path(writer.output)) == whole);
     EXPECT_EQ(files(), before);
+  }
+}
+
+// Libraries write at their own pace, and the last bytes come when the work is done.
+TEST_F(FullDisk, ASignalWhileAFileIsWrittenLeavesTheOneThatWasThere) {
+  for (const Writer& writer : writers()) {
+    SCOPED_TRACE(writer.words[0] + ' ' + writer.output);
+    if (!possible(writer)) continue;
+    const std::string whole = read_file(path(writer.output));
+    const std::vector<std::string> before = files();
+    for (const long long after : {0LL, static_cast<long long>(whole.size()) - 1}) {
+      const Outcome outcome =
+          run_with_fault(with_output(writer, path(writer.output)), after, EIO, SIGTERM);
+      if (outcome.exit_code == 0 && after > 0 && writer.output == "out.pvtp") continue;
+      EXPECT_EQ(outcome.signal, SIGTERM) << "after " << after;
+      EXPECT_NE(outcome.err.find("interrupted"), std::string::npos) << outcome.err;
+      EXPECT_TRUE(read_file(path(writer.output)) == whole) << "after " << after;
+      EXPECT_EQ(files(), before) << "after " << after;
+    }
   }
 }
 

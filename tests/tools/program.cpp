@@ -119,10 +119,13 @@ Outcome run_process(const Arguments& words, const Surroundings& surroundings) {
   std::thread second([&] { outcome.out = drain(out.ours); });
   if (surroundings.interrupt_after > 0) {
     std::this_thread::sleep_for(std::chrono::duration<double>(surroundings.interrupt_after));
-    kill(pid, SIGINT);
+    kill(pid, surroundings.interrupt_by);
   }
+  const auto signalled = std::chrono::steady_clock::now();
   int status = 0;
   waitpid(pid, &status, 0);
+  outcome.seconds_since_signal =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - signalled).count();
   listener.join();
   second.join();
   if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);

@@ -20,6 +20,7 @@ struct Outcome {
   int exit_code = -1;  ///< -1: a signal ended it
   int signal = 0;
   std::string out, err;
+  double seconds_since_signal = 0;  ///< from `interrupt_after` to the end
 };
 
 /// How to run a process, where that is unusual.
@@ -28,7 +29,8 @@ struct Surroundings {
   std::filesystem::path output = {};          ///< standard output; empty: captured
   bool terminal = false;                      ///< standard error is a terminal
   long file_blocks = 0;                       ///< no file may grow beyond these × 512 bytes
-  double interrupt_after = 0;                 ///< seconds until SIGINT
+  double interrupt_after = 0;                 ///< seconds until the signal
+  int interrupt_by = 2;                       ///< SIGINT
 };
 
 using Arguments = std::vector<std::string>;

@@ -1,9 +1,11 @@
 // Preloaded into the program: regular files take ISOBRICK_FAULT_AFTER bytes in all, then every
 // write fails with the error number ISOBRICK_FAULT_ERRNO. A negative number of bytes lets writes
-// succeed, and closing a file that is open for writing fail.
+// succeed, and closing a file that is open for writing fail. With ISOBRICK_FAULT_SIGNAL nothing
+// fails, but the process gets that signal with the write that goes beyond those bytes.
 
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <sys/uio.h>
 #include <unistd.h>
@@ -18,6 +20,7 @@ namespace {
 struct Fault {
   std::atomic<long long> left{0};
   int number = 0;  ///< 0: none
+  int signal = 0;  ///< 0: none
   bool at_close = false;
 
   Fault() {
@@ -26,6 +29,7 @@ struct Fault {
     if (after == nullptr || text == nullptr) return;
     left = std::atoll(after);
     number = std::atoi(text);
+    if (const char* sent = std::getenv("ISOBRICK_FAULT_SIGNAL")) signal = std::atoi(sent);
     at_close = left < 0;
   }
 };
@@ -46,6 +50,10 @@ ssize_t granted(int fd, std::size_t size) {
   const auto wanted = static_cast<long long>(size);
   if (size == 0 || fault().at_close || !is_output(fd)) return wanted;
   const long long before = fault().left.fetch_sub(wanted);
+  if (fault().signal != 0) {
+    if (before >= 0 && before < wanted) ::kill(::getpid(), fault().signal);
+    return wanted;
+  }
   if (before > 0) return std::min(before, wanted);
   errno = fault().number;
   return -1;
