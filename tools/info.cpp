@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -27,10 +28,18 @@ std::uint64_t directory_bytes(const fs::path& path) {
   return bytes;
 }
 
-/// Bricks of a level that are stored, counted shard by shard.
-std::uint64_t stored_bricks(const StoreReader& store, int level) {
+/// Files and bricks of a level that are looked for: seconds.
+constexpr Index kMaxLookups = Index{1} << 20;
+constexpr Index kMaxBricks = Index{1} << 26;
+
+/// Bricks of a level that are stored, counted shard by shard; nothing where there are too many to
+/// look for.
+std::optional<std::uint64_t> stored_bricks(const StoreReader& store, int level) {
   const LevelInfo& info = store.info().levels[static_cast<std::size_t>(level)];
   const Box3 all{{0, 0, 0}, info.lattice.bricks()};
+  if (volume(all.hi) > kMaxBricks ||
+      volume(ceil_div(info.lattice.extent, info.shard)) > kMaxLookups)
+    return std::nullopt;
   const Int3 shard = ceil_div(info.shard, info.lattice.brick);
   std::uint64_t stored = 0;
   for_each_point({{0, 0, 0}, ceil_div(all.hi, shard)}, [&](Int3 s) {
@@ -71,16 +80,17 @@ std::vector<IndexFacts> indexes_of(const StoreReader& store) {
 /// All that `info` tells, gathered before anything is said.
 struct Facts {
   std::uint64_t bytes = 0, raw_bytes = 0;
-  std::vector<std::uint64_t> stored;  ///< bricks, a level
+  std::vector<std::optional<std::uint64_t>> stored;  ///< bricks, a level
   ValueRange<double> range;
-  Histogram histogram;
+  std::optional<Histogram> histogram;
+  std::string no_histogram;  ///< why there is none
   bool has_ranges = false;
   std::vector<IndexFacts> indexes;
 
   double ratio() const { return static_cast<double>(raw_bytes) / static_cast<double>(bytes); }
 };
 
-Facts gather(const StoreReader& store, Progress& progress) {
+Facts gather(const StoreReader& store, std::uint64_t memory, Progress& progress) {
   const StoreInfo& info = store.info();
   const Lattice& finest = info.levels.front().lattice;
   Facts facts;
@@ -90,7 +100,8 @@ Facts gather(const StoreReader& store, Progress& progress) {
     facts.stored.push_back(stored_bricks(store, level));
   facts.has_ranges = store.has_ranges(0);
   if (facts.has_ranges) facts.range = value_range(store, 0);
-  facts.histogram = histogram(store, progress);
+  facts.no_histogram = why_no_histogram(store, memory);
+  if (facts.no_histogram.empty()) facts.histogram = histogram(store, progress);
   facts.indexes = indexes_of(store);
   return facts;
 }
@@ -104,7 +115,8 @@ ordered_json levels_json(const StoreInfo& info, const Facts& facts) {
                       {"brick", to_json(level.lattice.brick)},
                       {"shard", to_json(level.shard)},
                       {"bricks", volume(level.lattice.bricks())},
-                      {"bricks_stored", facts.stored[i]}});
+                      {"bricks_stored",
+                       facts.stored[i] ? ordered_json(*facts.stored[i]) : ordered_json(nullptr)}});
   }
   return levels;
 }
@@ -131,26 +143,28 @@ ordered_json indexes_json(const Facts& facts) {
 
 ordered_json json_of(const StoreInfo& info, const Facts& facts) {
   const LevelInfo& finest = info.levels.front();
-  ordered_json object{{"command", "info"},
-                      {"store", info.path.string()},
-                      {"extent", to_json(finest.lattice.extent)},
-                      {"type", zarr_name(info.type)},
-                      {"spacing", to_json(finest.transform.spacing)},
-                      {"origin", to_json(finest.transform.origin)},
-                      {"direction", finest.transform.direction},
-                      {"unit", finest.transform.unit},
-                      {"codec", info.codec},
-                      {"fill_value", info.fill_value},
-                      {"grid_class", info.grid_class},
-                      {"grid_name", info.grid_name},
-                      {"levels", levels_json(info, facts)},
-                      {"bytes", facts.bytes},
-                      {"raw_bytes", facts.raw_bytes},
-                      {"ratio", facts.ratio()},
-                      {"value_range", nullptr},
-                      {"histogram", histogram_json(facts.histogram)},
-                      {"index_kinds", ordered_json::array()},
-                      {"indexes", indexes_json(facts)}};
+  ordered_json object{
+      {"command", "info"},
+      {"store", info.path.string()},
+      {"extent", to_json(finest.lattice.extent)},
+      {"type", zarr_name(info.type)},
+      {"spacing", to_json(finest.transform.spacing)},
+      {"origin", to_json(finest.transform.origin)},
+      {"direction", finest.transform.direction},
+      {"unit", finest.transform.unit},
+      {"codec", info.codec},
+      {"fill_value", info.fill_value},
+      {"grid_class", info.grid_class},
+      {"grid_name", info.grid_name},
+      {"levels", levels_json(info, facts)},
+      {"bytes", facts.bytes},
+      {"raw_bytes", facts.raw_bytes},
+      {"ratio", facts.ratio()},
+      {"value_range", nullptr},
+      {"histogram", facts.histogram ? histogram_json(*facts.histogram) : ordered_json(nullptr)},
+      {"peak_resident_bytes", peak_resident_bytes()},
+      {"index_kinds", ordered_json::array()},
+      {"indexes", indexes_json(facts)}};
   for (const IndexFacts& index : facts.indexes) object["index_kinds"].push_back(index.kind);
   if (!facts.range.empty()) object["value_range"] = {facts.range.lo, facts.range.hi};
   return object;
@@ -161,9 +175,11 @@ std::string levels_text(const StoreInfo& info, const Facts& facts) {
   for (std::size_t i = 0; i < info.levels.size(); ++i) {
     const Lattice& lattice = info.levels[i].lattice;
     const auto bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
-    text += fmt::format("level {:<6} {}; bricks of {}: {}, {} absent\n", i,
-                        human_extent(lattice.extent), human_extent(lattice.brick),
-                        human_count(bricks), human_count(bricks - facts.stored[i]));
+    const auto stored = facts.stored[i];
+    text += fmt::format("level {:<6} {}; bricks of {}: {}, {}\n", i, human_extent(lattice.extent),
+                        human_extent(lattice.brick), human_count(bricks),
+                        stored ? human_count(bricks - *stored) + " absent"
+                               : "too many to look for the absent ones");
   }
   return text;
 }
@@ -182,10 +198,20 @@ std::string indexes_text(const Facts& facts) {
   return text;
 }
 
+std::string histogram_text(const StoreInfo& info, const Facts& facts) {
+  if (!facts.histogram) return fmt::format("histogram    none: {}\n", facts.no_histogram);
+  const Histogram& h = *facts.histogram;
+  std::string text = fmt::format("histogram    of level {}, square-root scale\n{}", h.level,
+                                 draw(h, 6, info.type));
+  if (h.not_a_number + h.infinite > 0)
+    text += fmt::format("  left out: {} NaN, {} infinite\n", human_count(h.not_a_number),
+                        human_count(h.infinite));
+  return text;
+}
+
 std::string text_of(const StoreInfo& info, const Facts& facts) {
   const Transform& transform = info.levels.front().transform;
   const Vec3d spacing = transform.spacing, origin = transform.origin;
-  const Histogram& h = facts.histogram;
   std::string text = fmt::format("store        {}\n", info.path.string());
   text += fmt::format("extent       {} samples of {}\n",
                       human_extent(info.levels.front().lattice.extent), zarr_name(info.type));
@@ -207,12 +233,7 @@ std::string text_of(const StoreInfo& info, const Facts& facts) {
               : fmt::format("value range  {} to {}\n", sample_text(facts.range.lo, info.type),
                             sample_text(facts.range.hi, info.type));
   text += indexes_text(facts);
-  text += fmt::format("histogram    of level {}, square-root scale\n{}", h.level,
-                      draw(h, 6, info.type));
-  if (h.not_a_number + h.infinite > 0)
-    text += fmt::format("  left out: {} NaN, {} infinite\n", human_count(h.not_a_number),
-                        human_count(h.infinite));
-  return text;
+  return text + histogram_text(info, facts);
 }
 
 }  // namespace
@@ -221,6 +242,7 @@ void add_info(Program& program) {
   struct Arguments {
     std::string path;
     Selection selection;
+    std::uint64_t memory = std::uint64_t{1} << 30;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
@@ -229,12 +251,13 @@ void add_info(Program& program) {
       "isobrick info head.zarr");
   add_path(app, "STORE", arguments->path, "Store to look at, or another program's Zarr");
   add_selection(app, arguments->selection);
+  add_memory(app, arguments->memory);
   program.commands.push_back(
       {app, [arguments](Console& console) {
          check_store(arguments->path);
          if (list_volumes(arguments->path, arguments->selection, console)) return 0;
          const StoreReader store = open_store(arguments->path, arguments->selection);
-         const Facts facts = gather(store, console.progress());
+         const Facts facts = gather(store, arguments->memory, console.progress());
          console.result(json_of(store.info(), facts), text_of(store.info(), facts));
          return 0;
        }});

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/format.h"
+#include "tools/interrupt.h"
 #include "tools/open_store.h"
 #include "tools/options.h"
 
@@ -17,6 +18,7 @@ namespace {
 struct Arguments {
   std::string store;
   Selection selection;
+  std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
 };
 
@@ -49,8 +51,9 @@ nlohmann::ordered_json indexes_json(const VerifyReport& report) {
 
 int run(const Arguments& arguments, Console& console) {
   check_store(arguments.store);
-  const VerifyReport report =
-      verify(arguments.store, arguments.threads, console.progress(), arguments.selection);
+  set_interrupt_note([] { return "nobody knows whether the store is whole"; });
+  const VerifyReport report = verify(arguments.store, arguments.threads, console.progress(),
+                                     arguments.selection, arguments.memory);
   const nlohmann::ordered_json object{{"command", "verify"},
                                       {"store", arguments.store},
                                       {"whole", report.damage_count == 0},
@@ -58,11 +61,12 @@ int run(const Arguments& arguments, Console& console) {
                                       {"bytes_read", report.bytes},
                                       {"indexes", indexes_json(report)},
                                       {"damage_count", report.damage_count},
-                                      {"damages", report.damages}};
+                                      {"damages", report.damages},
+                                      {"peak_resident_bytes", peak_resident_bytes()}};
   console.result(object, text_of(arguments.store, report));
   if (report.damage_count == 0) return 0;
-  throw DamageError(fmt::format("'{}' is damaged in {} place{}", arguments.store,
-                                human_count(report.damage_count),
+  throw DamageError(fmt::format("'{}' is damaged or cannot be looked at in {} place{}",
+                                arguments.store, human_count(report.damage_count),
                                 report.damage_count == 1 ? "" : "s"));
 }
 
@@ -75,6 +79,7 @@ void add_verify(Program& program) {
                                  "isobrick verify head.zarr");
   add_path(app, "STORE", arguments->store, "Store to check");
   add_selection(app, arguments->selection);
+  add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_run(program, app, arguments, run);
 }

@@ -36,6 +36,25 @@ std::vector<std::string> stored_index_kinds(const fs::path& store, int level) {
   return kinds;
 }
 
+std::vector<std::string> index_folder_kinds(const fs::path& store, int level) {
+  const fs::path folder = index_folder(store, level, "").parent_path();
+  const auto check = [&](const std::error_code& failure) {
+    if (failure) throw system_error("look into the folder", folder.string(), failure.value());
+  };
+  std::error_code failure;
+  fs::directory_iterator entry(folder, failure);
+  if (failure == std::errc::no_such_file_or_directory) return {};
+  check(failure);
+  std::vector<std::string> kinds;
+  for (; entry != fs::directory_iterator(); entry.increment(failure)) {
+    check(failure);
+    if (!entry->path().has_extension()) kinds.push_back(entry->path().filename().string());
+  }
+  check(failure);
+  std::sort(kinds.begin(), kinds.end());
+  return kinds;
+}
+
 bool has_index(const fs::path& store, int level, const std::string& kind) {
   std::error_code none;
   return fs::exists(index_description(index_folder(store, level, kind)), none);
@@ -56,9 +75,10 @@ StoredIndex::StoredIndex(const StoreReader& store, int level, const std::string&
                                   quoted(file), level, kind));
   if (layout_.ranges_crc32c !=
       store.info().levels.at(static_cast<std::size_t>(level)).block_ranges_crc32c)
-    throw DamageError(fmt::format("{}: is the index of other samples; {} --kind {} --force makes it "
-                                  "anew",
-                                  quoted(file), index_command(store.info()), kind));
+    throw DamageError(
+        fmt::format("{}: is the index of other samples; {} --kind {} --force makes it "
+                    "anew",
+                    quoted(file), index_command(store.info()), kind));
   crc32c_ = checksum_of(layout_);
 }
 

@@ -19,6 +19,9 @@ std::filesystem::path index_chunk_path(const std::filesystem::path& folder, Int3
 
 /// The kinds of index that a level has, sorted; what is still being built is none.
 std::vector<std::string> stored_index_kinds(const std::filesystem::path& store, int level);
+/// The kinds of which the level has a folder, whole or not, sorted. Throws Error where that cannot
+/// be looked at.
+std::vector<std::string> index_folder_kinds(const std::filesystem::path& store, int level);
 bool has_index(const std::filesystem::path& store, int level, const std::string& kind);
 
 /// One index of one level. Thread-safe after construction.

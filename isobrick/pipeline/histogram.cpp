@@ -1,9 +1,13 @@
 #include "isobrick/pipeline/histogram.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
+
+#include "isobrick/pipeline/slab_reader.h"
 
 namespace isobrick {
 namespace {
@@ -18,6 +22,11 @@ int choose_level(const StoreInfo& info) {
   return static_cast<int>(std::min<std::ptrdiff_t>(
       found - info.levels.begin(), static_cast<std::ptrdiff_t>(info.levels.size()) - 1));
 }
+
+/// Program, libraries and stacks.
+constexpr std::uint64_t kProgramBytes = std::uint64_t{40} << 20;
+/// Chunk files that are looked for: seconds.
+constexpr Index kMaxLookups = Index{1} << 20;
 
 /// Calls f(value, times) for every sample of a level, brick by brick.
 template <class F>
@@ -74,6 +83,20 @@ std::size_t bin_of(const Histogram& h, double value) {
 }
 
 }  // namespace
+
+std::string why_no_histogram(const StoreReader& store, std::uint64_t memory) {
+  const int level = choose_level(store.info());
+  const LevelInfo& info = store.info().levels[static_cast<std::size_t>(level)];
+  const Index shards = volume(ceil_div(info.lattice.extent, info.shard));
+  if (shards > kMaxLookups)
+    return fmt::format("level {} has {} chunk files; at most {} are looked for", level, shards,
+                       kMaxLookups);
+  const std::uint64_t bytes =
+      kProgramBytes + slab_memory(store.info(), level, 1) + info.lattice.brick_bytes();
+  if (bytes > memory)
+    return fmt::format("a chunk of level {} takes {} MiB of memory", level, (bytes >> 20) + 1);
+  return "";
+}
 
 Histogram histogram(const StoreReader& store, Progress& progress, int most_bins) {
   Histogram h;

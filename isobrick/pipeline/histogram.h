@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
@@ -16,6 +17,10 @@ struct Histogram {
   std::vector<std::uint64_t> counts;  ///< from lo upwards; empty when no sample is finite
   std::uint64_t not_a_number = 0, infinite = 0;
 };
+
+/// Why the histogram of a store takes more than `memory` bytes, or too many look-ups of files;
+/// empty when it does not.
+std::string why_no_histogram(const StoreReader& store, std::uint64_t memory);
 
 /// The histogram, in at most so many bins, of the finest level with at most 2²⁴ samples (or
 /// else of the coarsest), read brick by brick.

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <set>
+#include <unordered_set>
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/bricks/stored_index.h"
@@ -18,8 +19,15 @@ namespace isobrick {
 namespace {
 
 constexpr std::size_t kMaxDamages = 1000;
-/// Samples in memory at a time.
-constexpr std::size_t kPieceBytes = std::size_t{128} << 20;
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+/// Samples in memory at a time: more are no faster.
+constexpr std::uint64_t kPieceBytes = 128 * kMiB;
+/// Program, libraries and stacks, damages, and bricks that cannot be read.
+constexpr std::uint64_t kProgramBytes = 48 * kMiB;
+/// Of damages beyond these, ranges that see them are not told from those that do not.
+constexpr std::size_t kMaxUnreadable = std::size_t{1} << 17;
+/// Shards of a level that are looked for, each a file: a minute or two.
+constexpr Index kMaxLookups = Index{1} << 24;
 
 /// Collects damages. A broken shard index says the same for each of its
 /// bricks: that is one damage. Thread-safe.
@@ -48,10 +56,9 @@ class LevelCheck {
       : store_(store),
         level_(level),
         lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
-        damages_(damages),
-        unreadable_(static_cast<std::size_t>(volume(lattice_.bricks()))) {}
+        damages_(damages) {}
 
-  void run(Progress& progress);
+  void run(std::uint64_t piece_bytes, Progress& progress);
 
  private:
   void fail(Int3 brick, const std::string& what);
@@ -63,25 +70,25 @@ class LevelCheck {
   const Lattice& lattice_;
   DamageList& damages_;
   std::mutex mutex_;
-  std::vector<bool> unreadable_;  ///< bricks
-  bool any_unreadable_ = false;
+  std::unordered_set<Index> unreadable_;  ///< bricks, at most kMaxUnreadable
 };
 
 void LevelCheck::fail(Int3 brick, const std::string& what) {
   damages_.add(what);
   const std::lock_guard lock(mutex_);
-  unreadable_[static_cast<std::size_t>(linear_index(brick, lattice_.bricks()))] = true;
-  any_unreadable_ = true;
+  if (unreadable_.size() < kMaxUnreadable)
+    unreadable_.insert(linear_index(brick, lattice_.bricks()));
 }
 
 /// Whether the item's cells touch a sample of a brick that could not be read.
 bool LevelCheck::sees_unreadable(Int3 item, Int3 edge) const {
-  if (!any_unreadable_) return false;
+  if (unreadable_.empty()) return false;
+  if (unreadable_.size() == kMaxUnreadable) return true;
   const Box3 seen =
       intersect({item * edge, (item + Int3{1, 1, 1}) * edge + Int3{1, 1, 1}}, lattice_.box());
   bool found = false;
   for_each_point(lattice_.bricks_of(seen), [&](Int3 brick) {
-    found |= unreadable_[static_cast<std::size_t>(linear_index(brick, lattice_.bricks()))];
+    found |= unreadable_.contains(linear_index(brick, lattice_.bricks()));
   });
   return found;
 }
@@ -115,20 +122,80 @@ void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pai
   });
 }
 
-void LevelCheck::run(Progress& progress) {
+void LevelCheck::run(std::uint64_t piece_bytes, Progress& progress) {
   const auto ranges = make_level_ranges(lattice_);
   scan_level(
-      store_, level_, kPieceBytes, *ranges,
+      store_, level_, piece_bytes, *ranges,
       [&](Int3 brick, const std::string& what) { fail(brick, what); },
       [&](Box3 items, std::span<const std::byte> pairs) { compare(true, items, pairs); },
       [&](Box3 items, std::span<const std::byte> pairs) { compare(false, items, pairs); },
       [&](std::uint64_t done) { progress.advance(done); });
 }
 
+/// How the samples of a level are read within a budget.
+struct LevelBudget {
+  int threads;
+  std::uint64_t piece_bytes;
+};
+
+LevelBudget budget_of(const StoreInfo& store, int level, int threads, std::uint64_t memory) {
+  const Lattice& lattice = store.levels[static_cast<std::size_t>(level)].lattice;
+  const auto least = [&](int n) {
+    return kProgramBytes + slab_memory(store, level, n) +
+           level_ranges_bytes(lattice, lattice.brick.z) + lattice.brick_bytes();
+  };
+  while (threads > 1 && least(threads) > memory) --threads;
+  if (least(threads) > memory)
+    throw UsageError(fmt::format(
+        "a memory budget of {} MiB is too small: level {} has bricks of {} × {} × {} samples and "
+        "needs {} MiB at least",
+        memory / kMiB, level, lattice.brick.x, lattice.brick.y, lattice.brick.z,
+        least(threads) / kMiB + 1));
+  return {threads, std::min(kPieceBytes, memory - least(threads) + lattice.brick_bytes())};
+}
+
+/// Checks the bricks and ranges of a level, unless they are too many to look for.
+void verify_level(const StoreReader& store, int level, int threads, std::uint64_t memory,
+                  DamageList& damages, Progress& progress) {
+  const LevelInfo& info = store.info().levels[static_cast<std::size_t>(level)];
+  const Index shards = volume(ceil_div(info.lattice.extent, info.shard));
+  if (shards > kMaxLookups)
+    return damages.add(
+        fmt::format("level {}: not looked at: of its {} chunk files at most {} are looked for",
+                    level, shards, kMaxLookups));
+  const LevelBudget budget = budget_of(store.info(), level, threads, memory);
+  Workers(budget.threads).execute([&] {
+    LevelCheck(store, level, damages).run(budget.piece_bytes, progress);
+  });
+}
+
+/// The kinds of index of each level. That a level lacks one which another has is damage, and so is
+/// what cannot be looked at.
+std::vector<std::vector<std::string>> find_indexes(const StoreReader& store, DamageList& damages) {
+  std::vector<std::vector<std::string>> levels(store.info().levels.size());
+  std::set<std::string> all;
+  bool seen = true;
+  for (std::size_t level = 0; level < levels.size(); ++level) try {
+      levels[level] = index_folder_kinds(store.info().additions, static_cast<int>(level));
+      all.insert(levels[level].begin(), levels[level].end());
+    } catch (const Error& e) {
+      damages.add(fmt::format("level {}: {}", level, e.what()));
+      seen = false;
+    }
+  for (std::size_t level = 0; seen && level < levels.size(); ++level)
+    for (const std::string& kind : all)
+      if (std::ranges::find(levels[level], kind) == levels[level].end())
+        damages.add(
+            fmt::format("level {}: its {} index is gone, which another level has; {} "
+                        "--kind {} --force makes it anew",
+                        level, kind, index_command(store.info()), kind));
+  return levels;
+}
+
 }  // namespace
 
 VerifyReport verify(const std::filesystem::path& path, int threads, Progress& progress,
-                    const Selection& selection) {
+                    const Selection& selection, std::uint64_t memory) {
   DamageList damages;
   std::unique_ptr<StoreReader> store;
   try {
@@ -145,16 +212,17 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
         static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
   progress.begin("verify", bytes);
-  Workers workers(threads);
+  threads = Workers(threads).threads();
   for (std::size_t level = 0; level < levels.size(); ++level)
-    workers.execute([&] { LevelCheck(*store, static_cast<int>(level), damages).run(progress); });
+    verify_level(*store, static_cast<int>(level), threads, memory, damages, progress);
   progress.end();
   std::uint64_t index_bytes = 0;
-  for (int level = 0; level < static_cast<int>(levels.size()); ++level)
-    for (const std::string& kind : stored_index_kinds(store->info().additions, level)) {
+  const auto indexes = find_indexes(*store, damages);
+  for (std::size_t i = 0; i < indexes.size(); ++i)
+    for (const std::string& kind : indexes[i]) {
+      const int level = static_cast<int>(i);
       const auto add = [&](const std::string& line) { damages.add(line); };
-      index_bytes += workers.execute(
-          [&] { return verify_index(*store, level, kind, workers.threads(), add, progress); });
+      index_bytes += verify_index(*store, level, kind, threads, memory, add, progress);
       damages.report().indexes.push_back({level, kind});
     }
   damages.report().bytes = store->bytes_read() + index_bytes;

@@ -23,9 +23,11 @@ struct VerifyReport {
 };
 
 /// Reads all of a store: metadata, shard indices, every brick's checksum and
-/// size, the ranges against the samples, and every index against both. Only an unreadable root
-/// throws.
+/// size, the ranges against the samples, and every index against both. What cannot be looked at
+/// counts as damage. Within `memory` bytes, with fewer threads where they take too much of it.
+/// Throws when the root cannot be read, and UsageError when the budget is too small, with the
+/// least that is not.
 VerifyReport verify(const std::filesystem::path& store, int threads, Progress& progress,
-                    const Selection& selection = {});
+                    const Selection& selection = {}, std::uint64_t memory = std::uint64_t{1} << 30);
 
 }  // namespace isobrick

@@ -9,13 +9,15 @@
 #include "isobrick/core/error.h"
 #include "isobrick/core/morton.h"
 #include "isobrick/pipeline/index_chunk_builder.h"
+#include "isobrick/pipeline/workers.h"
 #include "isobrick/stream/index_search.h"
 
 namespace isobrick {
 namespace {
 
-/// For making the parts anew.
-constexpr std::uint64_t kMemory = std::uint64_t{512} << 20;
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+/// For making the parts anew: more is no faster.
+constexpr std::uint64_t kEnough = 512 * kMiB;
 
 /// What a part must be: these bytes, absent (null), or nobody knows.
 struct Expected {
@@ -125,7 +127,8 @@ void IndexCheck::run(Int3 c, const IndexChunkBuilder& builder) {
 }  // namespace
 
 std::uint64_t verify_index(const StoreReader& store, int level, const std::string& kind,
-                           int threads, const std::function<void(const std::string&)>& damage,
+                           int threads, std::uint64_t memory,
+                           const std::function<void(const std::string&)>& damage,
                            Progress& progress) {
   const auto known = parse_index_kind(kind);
   if (!known || *known == IndexKind::linear) {
@@ -137,17 +140,27 @@ std::uint64_t verify_index(const StoreReader& store, int level, const std::strin
     IndexCheck check(store, level, *known, damage);
     const IndexLayout& layout = check.layout();
     const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-    const std::uint64_t memory =
-        std::max(kMemory, IndexChunkBuilder::least_memory(lattice, layout.leaf, threads));
-    const IndexChunkBuilder builder(store, level, layout, *known, memory, threads);
+    const auto least = [&] {
+      return IndexChunkBuilder::least_memory(lattice, layout.leaf, threads);
+    };
+    while (threads > 1 && least() > memory) --threads;
+    if (least() > memory)
+      throw UsageError(
+          fmt::format("the memory budget is too small: the {} index of level {} needs {} MiB more",
+                      kind, level, (least() - memory) / kMiB + 1));
+    const IndexChunkBuilder builder(store, level, layout, *known, std::min(memory, kEnough),
+                                    threads);
+    Workers workers(threads);
     progress.begin(fmt::format("verify {} index", kind),
                    static_cast<std::uint64_t>(volume(layout.bricks())));
     for_each_morton(layout.chunks(), [&](Int3 c) {
-      check.run(c, builder);
+      workers.execute([&] { check.run(c, builder); });
       progress.advance(static_cast<std::uint64_t>(volume(layout.bricks_of_chunk(c).extent())));
     });
     progress.end();
     return check.bytes_read();
+  } catch (const UsageError&) {
+    throw;
   } catch (const Error& e) {
     damage(fmt::format("level {}: {}", level, e.what()));
     return 0;

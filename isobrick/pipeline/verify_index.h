@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -11,10 +12,11 @@ namespace isobrick {
 
 /// Reads all of one index: every part's checksum and structure, and whether it is
 /// what the store's ranges and samples make. `damage` is told a line for each that
-/// is wrong; called from one thread at a time. Parallel in the caller's arena.
-/// Returns the bytes read.
+/// is wrong; called from one thread at a time. Within `memory` bytes, with fewer threads where they
+/// take too much of it; UsageError when that is too little. Returns the bytes read.
 std::uint64_t verify_index(const StoreReader& store, int level, const std::string& kind,
-                           int threads, const std::function<void(const std::string&)>& damage,
+                           int threads, std::uint64_t memory,
+                           const std::function<void(const std::string&)>& damage,
                            Progress& progress);
 
 }  // namespace isobrick
