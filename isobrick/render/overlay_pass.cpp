@@ -15,6 +15,7 @@ namespace isobrick {
 namespace {
 
 constexpr float kFontHeight = 40;
+constexpr float kSmallestText = 11;  ///< pixels of a line, where the display is not scaled
 
 const char* const kVertex = R"(
 layout(location = 0) in vec3 place;  // pixels from the top left; depth or its reciprocal
@@ -38,6 +39,7 @@ void main() {
 const char* const kFragment = R"(
 layout(binding = 0) uniform sampler2D atlas;
 layout(binding = 1) uniform sampler2D near_depths;
+layout(location = 0) uniform float left;
 in vec2 uv;
 noperspective in float depth;
 flat in vec2 line_size;
@@ -54,7 +56,7 @@ void main() {
   float alpha = clamp(line_size.x + 0.5 - length(off), 0.0, 1.0);
   if (depth > 0) {
     float far = depth_range.z > 0.5 ? depth : 1 / depth;
-    vec2 place = gl_FragCoord.xy * vec2(textureSize(near_depths, 0)) / viewport.xy;
+    vec2 place = (gl_FragCoord.xy - vec2(left, 0)) * vec2(textureSize(near_depths, 0)) / viewport.xy;
     float seen = texelFetch(near_depths, ivec2(place), 0).r;
     if (seen > 0 && seen < far - 2 * pixel_length(far)) alpha *= 0.14;
   }
@@ -177,7 +179,7 @@ void OverlayPass::add_text(const std::string& text, double x, double y, double l
 }
 
 float OverlayPass::unit_height() const {
-  return std::max(static_cast<float>(std::min(width_, height_)) / 45, 11.0f);
+  return std::max(static_cast<float>(std::min(width_, height_)) / 45, kSmallestText * scale_);
 }
 
 void OverlayPass::add_axes() {
@@ -216,18 +218,21 @@ void OverlayPass::add_scale_bar(const std::string& unit) {
 }
 
 void OverlayPass::run(const Overlays& overlays, const Camera& camera, unsigned framebuffer,
-                      int width, int height, const GlTexture& near_depth) {
+                      int width, int height, const GlTexture& near_depth, int left) {
   camera_ = camera;
+  scale_ = overlays.scale;
   width_ = width;
   height_ = height;
   corners_.clear();
-  for (const Overlays::Line& l : overlays.lines) add_line(l.line, l.colour, l.width);
+  for (const Overlays::Line& l : overlays.lines) add_line(l.line, l.colour, l.width * scale_);
   if (overlays.axes) add_axes();
   if (overlays.scale_bar) add_scale_bar(*overlays.scale_bar);
   if (corners_.empty()) return;
   fill_buffer(buffer_, std::as_bytes(std::span(corners_)));
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  glViewport(left, 0, width, height);
   glUseProgram(program_.get());
+  glUniform1f(0, static_cast<float>(left));
   glBindVertexArray(vertices_.get());
   glBindTextureUnit(0, atlas_.get());
   glBindTextureUnit(1, near_depth.get());

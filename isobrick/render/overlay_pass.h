@@ -24,6 +24,7 @@ struct Overlays {
   std::vector<Line> lines;
   bool axes = false;                     ///< of the world, in the lower left corner
   std::optional<std::string> scale_bar;  ///< a round length in the lower right corner: its unit
+  float scale = 1;                       ///< PictureSettings::overlay_scale
 
   bool empty() const { return lines.empty() && !axes && !scale_bar; }
 };
@@ -33,10 +34,11 @@ class OverlayPass {
  public:
   OverlayPass();
 
-  /// Draws them into a framebuffer of that size, which shows what `camera` sees; faint behind
-  /// what `near_depth` has, of a picture of any size. Its frame is bound.
+  /// Draws them into a part of a framebuffer of that size, `left` pixels from its left side, which
+  /// shows what `camera` sees; faint behind what `near_depth` has, of a picture of any size. Its
+  /// frame is bound.
   void run(const Overlays& overlays, const Camera& camera, unsigned framebuffer, int width,
-           int height, const GlTexture& near_depth);
+           int height, const GlTexture& near_depth, int left = 0);
 
  private:
   void add_line(const WorldLine& line, Vec3f colour, float width);
@@ -64,6 +66,7 @@ class OverlayPass {
 
   Camera camera_;
   int width_ = 0, height_ = 0;
+  float scale_ = 1;
   std::vector<Corner> corners_;
   FontAtlas font_;
   GlTexture atlas_;

@@ -51,7 +51,7 @@ struct Renderer::State {
   bool draw_surfaces(const DrawSwitches& switches, bool blended, std::uint64_t& work);
   void choose_result(bool in_one_go);
   bool go_on(std::uint64_t most);
-  void draw_overlays_later(unsigned framebuffer, int width, int height);
+  void draw_overlays_later(unsigned framebuffer, int width, int height, int left);
 
   GlDevice device;
   int largest_edge = 0;
@@ -178,6 +178,7 @@ bool Renderer::State::go_on(std::uint64_t most) {
   next->has_front = false;
   if (any_transparent && targets->ids) next->take_front(targets->front);
   shown_later = {};
+  overlays.scale = settings.overlay_scale;
   if (settings.overlays_later)
     shown_later = std::move(overlays);
   else
@@ -189,13 +190,14 @@ bool Renderer::State::go_on(std::uint64_t most) {
   return true;
 }
 
-void Renderer::State::draw_overlays_later(unsigned framebuffer, int width, int height) {
+void Renderer::State::draw_overlays_later(unsigned framebuffer, int width, int height, int left) {
   if (shown_later.empty() || width < 1 || height < 1) return;
   const FrameBlock block = make_frame(shown_camera, width, height, shown_settings);
   const DrawSwitches switches(block);
   fill_buffer(later_buffer, std::as_bytes(std::span(&block, 1)));
   glBindBufferBase(GL_UNIFORM_BUFFER, 0, later_buffer.get());
-  passes.overlays.run(shown_later, shown_camera, framebuffer, width, height, shown->near_depth);
+  passes.overlays.run(shown_later, shown_camera, framebuffer, width, height, shown->near_depth,
+                      left);
 }
 
 Renderer::Renderer() : state_(std::make_unique<State>()) {}
@@ -299,13 +301,13 @@ std::vector<std::uint8_t> Renderer::read_pixels() const {
 
 unsigned Renderer::texture() const { return state_->shown ? state_->shown->picture.get() : 0; }
 
-void Renderer::copy_to(unsigned framebuffer, int to_width, int to_height) const {
+void Renderer::copy_to(unsigned framebuffer, int to_width, int to_height, int left) const {
   if (!has_picture()) return;
   const bool same = to_width == width() && to_height == height();
   glBlitNamedFramebuffer(state_->shown->picture_target.get(), framebuffer, 0, 0, width(), height(),
-                         0, 0, to_width, to_height, GL_COLOR_BUFFER_BIT,
+                         left, 0, left + to_width, to_height, GL_COLOR_BUFFER_BIT,
                          same ? GL_NEAREST : GL_LINEAR);
-  state_->draw_overlays_later(framebuffer, to_width, to_height);
+  state_->draw_overlays_later(framebuffer, to_width, to_height, left);
   check_gl("showing the picture");
 }
 

@@ -29,6 +29,9 @@ struct PictureSettings {
   /// Lines, axes and the scale bar are drawn where the picture is copied to, and at that size: it
   /// is smaller than what it is shown in. The picture itself has none then.
   bool overlays_later = false;
+  /// Of a display that is scaled: lines are so many times as thick, text and axes at least so many
+  /// times the smallest that can be read.
+  float overlay_scale = 1;
   /// Meshes are drawn as they come. It shows at pixels where two are equally far, and of
   /// transparent ones in the last bits. Without, those that lie together in memory take one call.
   bool in_order = true;
@@ -141,9 +144,9 @@ class Renderer {
   std::vector<std::uint8_t> read_pixels() const;
   /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for ImGui::Image say.
   unsigned texture() const;
-  /// Copies it into a framebuffer (0: the window's), lower left corner at (0, 0), enlarged or
+  /// Copies it into a framebuffer (0: the window's), lower left corner at (left, 0), enlarged or
   /// reduced to this size; see PictureSettings::overlays_later.
-  void copy_to(unsigned framebuffer, int to_width, int to_height) const;
+  void copy_to(unsigned framebuffer, int to_width, int to_height, int left = 0) const;
 
   /// What the picture shows at pixel (x, y), rows from the top; nothing on the background.
   std::optional<Picked> pick(int x, int y) const;

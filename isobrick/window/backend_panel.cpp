@@ -10,7 +10,7 @@ void draw_backend_panel(ViewerState& state) {
   // In the order of Backend.
   const char* const names[] = {"auto", "cpu", "cuda"};
   int chosen = static_cast<int>(device.backend());
-  ImGui::SetNextItemWidth(130);
+  ImGui::SetNextItemWidth(scaled(130));
   if (ImGui::Combo("makes meshes", &chosen, names, 3)) {
     try {
       device.use(static_cast<Backend>(chosen));

@@ -18,7 +18,7 @@ void across_axes(ViewSettings& settings) {
     ImGui::PushID(kAxes[axis]);
     ImGui::Checkbox(kAxes[axis], &cut.on);
     ImGui::SameLine();
-    ImGui::SetNextItemWidth(150);
+    ImGui::SetNextItemWidth(scaled(150));
     ImGui::SliderFloat("##place", &cut.place, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::SameLine();
     if (ImGui::SmallButton(cut.beyond ? "above" : "below")) cut.beyond = !cut.beyond;
@@ -53,7 +53,7 @@ bool one_plane(PlaneSettings& plane, const WorldBox& box, Vec3d ahead) {
   ImGui::Checkbox("##on", &plane.on);
   ImGui::SameLine();
   const auto [lo, hi] = places(box, kept.normal);
-  ImGui::SetNextItemWidth(150);
+  ImGui::SetNextItemWidth(scaled(150));
   ImGui::SliderScalar("##place", ImGuiDataType_Double, &kept.least, &lo, &hi, "%.4g");
   ImGui::SameLine();
   if (ImGui::SmallButton("Flip")) kept = {kept.normal * -1.0, -kept.least};
@@ -62,7 +62,7 @@ bool one_plane(PlaneSettings& plane, const WorldBox& box, Vec3d ahead) {
   ImGui::SameLine();
   const bool stays = !ImGui::SmallButton("x");
   std::array<double, 3> normal{kept.normal.x, kept.normal.y, kept.normal.z};
-  ImGui::SetNextItemWidth(220);
+  ImGui::SetNextItemWidth(scaled(220));
   if (ImGui::InputScalarN("direction", ImGuiDataType_Double, normal.data(), 3, nullptr, nullptr,
                           "%.3f", ImGuiInputTextFlags_EnterReturnsTrue))
     turn(kept, box, unit({normal[0], normal[1], normal[2]}, kept.normal));

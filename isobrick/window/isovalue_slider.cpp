@@ -79,11 +79,11 @@ void draw_isovalue_slider(ViewerState& state, float width, float height) {
   for (std::size_t i = 0; i < state.settings.surfaces.size(); ++i) {
     const float x = axis.place(state.settings.surfaces[i].isovalue);
     draw.AddLine({x, top}, {x, bottom}, colour_of(state.settings.surfaces[i]),
-                 i == state.selected ? 3.f : 1.5f);
+                 scaled(i == state.selected ? 3.f : 1.5f));
   }
   const float pointer = ImGui::GetIO().MousePos.x;
   if (ImGui::IsItemHovered() || ImGui::IsItemActive()) {
-    draw.AddLine({pointer, top}, {pointer, bottom}, kCursor);
+    draw.AddLine({pointer, top}, {pointer, bottom}, kCursor, scaled(1));
     tell(state, axis.value(pointer));
   }
   if (!ImGui::IsItemActive() || state.settings.surfaces.empty()) return;

@@ -22,7 +22,6 @@
 namespace isobrick {
 namespace {
 
-constexpr float kPanelWidth = 390;
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
 void text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
@@ -58,7 +57,7 @@ void type_isovalue(ViewerState& state, std::size_t number) {
 
 void surfaces_panel(ViewerState& state) {
   auto& surfaces = state.settings.surfaces;
-  draw_isovalue_slider(state, ImGui::GetContentRegionAvail().x, 90);
+  draw_isovalue_slider(state, ImGui::GetContentRegionAvail().x, scaled(90));
   std::optional<std::size_t> removed;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     SurfaceSettings& s = surfaces[i];
@@ -69,10 +68,10 @@ void surfaces_panel(ViewerState& state) {
     ImGui::SameLine();
     ImGui::ColorEdit3("##colour", &s.colour.x, ImGuiColorEditFlags_NoInputs);
     ImGui::SameLine();
-    ImGui::SetNextItemWidth(90);
+    ImGui::SetNextItemWidth(scaled(90));
     type_isovalue(state, i);
     ImGui::SameLine();
-    ImGui::SetNextItemWidth(70);
+    ImGui::SetNextItemWidth(scaled(70));
     ImGui::SliderFloat("##opacity", &s.opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::SameLine();
     if (ImGui::SmallButton("x") && surfaces.size() > 1) removed = i;
@@ -97,7 +96,7 @@ void slices_panel(ViewerState& state) {
     ImGui::PushID(kAxes[axis]);
     ImGui::Checkbox(kAxes[axis], &slice.shown);
     ImGui::SameLine();
-    ImGui::SetNextItemWidth(200);
+    ImGui::SetNextItemWidth(scaled(200));
     ImGui::SliderFloat("##place", &slice.place, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::PopID();
   }
@@ -186,7 +185,7 @@ void bookmarks_panel(ViewerState& state) {
   std::optional<std::size_t> removed;
   for (std::size_t i = 0; i < list.size(); ++i) {
     ImGui::PushID(static_cast<int>(i));
-    if (ImGui::Selectable(list[i].name.c_str(), false, 0, {kPanelWidth - 60, 0})) {
+    if (ImGui::Selectable(list[i].name.c_str(), false, 0, {ImGui::GetContentRegionAvail().x - scaled(40), 0})) {
       const WorldBall scene = state.navigator.camera.scene;
       state.navigator.stop();
       state.navigator.camera = list[i].camera;
@@ -200,7 +199,7 @@ void bookmarks_panel(ViewerState& state) {
   }
   if (removed) attempt(state, [&] { state.bookmarks->remove(*removed); });
   std::string& name = state.new_bookmark;
-  ImGui::SetNextItemWidth(180);
+  ImGui::SetNextItemWidth(scaled(180));
   ImGui::InputText("##name", &name);
   ImGui::SameLine();
   if (ImGui::SmallButton("Keep this view") && !name.empty())
@@ -235,7 +234,7 @@ void status_panel(ViewerState& state) {
   const PictureState& p = state.picture->state();
   ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
                    static_cast<int>(state.frame_number % state.frame_times.size()), nullptr, 0, 50,
-                   {ImGui::GetContentRegionAvail().x, 36});
+                   {ImGui::GetContentRegionAvail().x, scaled(36)});
   text(fmt::format("{:.0f} frames/s, drawn in {:.1f} ms",
                    state.frame_seconds > 0 ? 1 / state.frame_seconds : 0,
                    state.draw_seconds * 1e3));
@@ -262,7 +261,7 @@ void import_progress(ImportJob& import) {
   const ImportJob::State s = import.state();
   text(fmt::format("{}\nto {}", import.input().string(), import.store().string()));
   const float part = s.total > 0 ? static_cast<float>(s.done) / static_cast<float>(s.total) : 0;
-  ImGui::ProgressBar(std::min(part, 1.f), {400, 0}, s.stage.c_str());
+  ImGui::ProgressBar(std::min(part, 1.f), {scaled(400), 0}, s.stage.c_str());
   if (ImGui::Button("Cancel")) import.cancel();
 }
 
@@ -283,10 +282,10 @@ void messages_panel(ViewerState& state) {
   }
   // Beside the panel where there is room, and always above it.
   const ImVec2 all = ImGui::GetMainViewport()->Size;
-  const float taken = state.panels && all.x > 2 * kPanelWidth ? kPanelWidth + 10 : 0;
+  const float taken = state.panels && all.x > 2 * state.panel_width ? state.panel_width : 0;
   const float width = 0.9f * (all.x - taken);
   ImGui::SetNextWindowPos({(all.x + taken) / 2, all.y - 20}, ImGuiCond_Always, {0.5f, 1});
-  ImGui::SetNextWindowSizeConstraints({std::min(300.f, width), 0}, {width, all.y * 0.4f});
+  ImGui::SetNextWindowSizeConstraints({std::min(scaled(300), width), 0}, {width, all.y * 0.4f});
   // A new one comes to the front, but takes nobody's field or slider away.
   const bool busy = ImGui::IsAnyItemActive() || ImGui::GetIO().WantTextInput;
   if (!busy && std::exchange(state.messages_shown, state.messages.size()) != state.messages.size())
@@ -294,9 +293,13 @@ void messages_panel(ViewerState& state) {
   ImGui::Begin("Messages", nullptr,
                ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_AlwaysAutoResize |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing);
-  ImGui::PushTextWrapPos(width - 20);
-  for (const std::string& message : state.messages) text(message);
+  ImGui::PushTextWrapPos(width - scaled(20));
+  for (const Message& message : state.messages) text(message.text);
   ImGui::PopTextWrapPos();
+  // Whoever reads them gets the whole time again.
+  if (ImGui::IsWindowHovered())
+    for (Message& message : state.messages)
+      message.until = std::chrono::steady_clock::now() + state.message_time;
   if (ImGui::Button("Dismiss")) state.messages.clear();
   ImGui::End();
 }
@@ -316,24 +319,16 @@ void section(const char* name, bool open, Body&& body, ViewerState& state) {
   ImGui::PopID();
 }
 
-/// A window that has become smaller leaves the panel's title within reach.
-void keep_in_view() {
-  const ImVec2 all = ImGui::GetMainViewport()->Size, at = ImGui::GetWindowPos();
-  const ImVec2 within(
-      std::clamp(at.x, std::min(60 - ImGui::GetWindowWidth(), 0.f), std::max(all.x - 60, 0.f)),
-      std::clamp(at.y, 0.f, std::max(all.y - 30, 0.f)));
-  if (within.x != at.x || within.y != at.y) ImGui::SetWindowPos(within);
-}
-
+/// Along the left side of the window; the picture has the rest.
 void main_panel(ViewerState& state) {
-  const ImGuiViewport* viewport = ImGui::GetMainViewport();
-  ImGui::SetNextWindowPos({10, 10}, ImGuiCond_FirstUseEver);
-  // The axes in the lower left corner are to be seen.
-  const float axes = viewport->Size.y / 5;
-  ImGui::SetNextWindowSize({kPanelWidth, std::max(viewport->Size.y - axes - 20, 200.f)},
-                           ImGuiCond_FirstUseEver);
-  ImGui::Begin(fmt::format("{}###panel", state.path.filename().string()).c_str());
-  keep_in_view();
+  const ImVec2 all = ImGui::GetMainViewport()->Size;
+  const float least = scaled(250);
+  ImGui::SetNextWindowPos({0, 0}, ImGuiCond_Always);
+  ImGui::SetNextWindowSize({scaled(kPanelWidth), all.y}, ImGuiCond_FirstUseEver);
+  ImGui::SetNextWindowSizeConstraints({least, all.y}, {std::max(least, all.x * 0.6f), all.y});
+  ImGui::Begin(fmt::format("{}###panel", state.path.filename().string()).c_str(), nullptr,
+               ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
+  state.panel_width = ImGui::GetWindowWidth();
   section("Surfaces", true, surfaces_panel, state);
   section("Camera and look", false, look_panel, state);
   section("Cuts and region", false, draw_cuts_panel, state);
@@ -342,28 +337,32 @@ void main_panel(ViewerState& state) {
   section("Bookmarks", false, bookmarks_panel, state);
   section("Streaming", true, streaming_panel, state);
   if (ImGui::SmallButton("Picture")) state.requests.screenshot = "isobrick.png";
-  ImGui::End();
-}
-
-void welcome_panel() {
-  const ImGuiViewport* viewport = ImGui::GetMainViewport();
-  ImGui::SetNextWindowPos({viewport->Size.x / 2, viewport->Size.y / 2}, ImGuiCond_Always,
-                          {0.5f, 0.5f});
-  ImGui::Begin("Isobrick", nullptr,
-               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
-                   ImGuiWindowFlags_NoSavedSettings);
-  ImGui::TextUnformatted("Drop a store or a volume of any format here.");
+  ImGui::SameLine();
+  if (ImGui::SmallButton("Help (F1)")) state.help = !state.help;
   ImGui::End();
 }
 
 }  // namespace
 
+float scaled(float pixels) { return pixels * ImGui::GetFontSize() / kFontPixels; }
+
+void draw_notice(const std::string& text) {
+  const ImVec2 all = ImGui::GetMainViewport()->Size;
+  ImGui::SetNextWindowPos({all.x / 2, all.y / 2}, ImGuiCond_Always, {0.5f, 0.5f});
+  ImGui::Begin("Isobrick", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                   ImGuiWindowFlags_NoSavedSettings);
+  ImGui::TextUnformatted(text.c_str());
+  ImGui::End();
+}
+
 void draw_panels(ViewerState& state) {
   messages_panel(state);
   if (state.picture == nullptr)
-    welcome_panel();
+    draw_notice("Drop a store, or a volume of any format, on this window.\nF1 shows keys and mouse.");
   else if (state.panels)
     main_panel(state);
+  draw_help(state);
   // ImGui 1.86 stops at a window that is new after a modal one that is new, too, and at one
   // that comes while a modal one is open but no more begun.
   import_panel(state);

@@ -6,6 +6,7 @@
 #include "isobrick/core/length_unit.h"
 #include "isobrick/render/vectors.h"
 #include "isobrick/viewer/probe.h"
+#include "isobrick/window/panels.h"
 
 namespace isobrick {
 namespace {
@@ -29,30 +30,31 @@ std::optional<PickedPoint> pick_point(StorePicture& picture, int x, int y) {
   return point;
 }
 
-void draw_measure(const ViewerState& state, int width, int height) {
-  if (state.measured.empty() || state.picture == nullptr || width <= 0 || height <= 0) return;
+void draw_measure(const ViewerState& state, const PictureArea& area) {
+  if (state.measured.empty() || state.picture == nullptr) return;
   const ImVec2 size = ImGui::GetIO().DisplaySize;
   const auto place = [&](Vec3d world) {
-    const Vec3d p = state.navigator.camera.project(world, width, height);
-    return ImVec2(static_cast<float>(p.x) * size.x / static_cast<float>(width),
-                  static_cast<float>(p.y) * size.y / static_cast<float>(height));
+    const Vec3d p = state.navigator.camera.project(world, area.width, area.height);
+    return ImVec2((static_cast<float>(p.x) + static_cast<float>(area.left)) * size.x /
+                      static_cast<float>(area.window_width),
+                  static_cast<float>(p.y) * size.y / static_cast<float>(area.height));
   };
   ImDrawList& draw = *ImGui::GetBackgroundDrawList();
   const ImVec2 first = place(state.measured[0]);
   if (state.measured.size() == 2) {
     const ImVec2 second = place(state.measured[1]);
-    draw.AddLine(first, second, kInk, 4);
-    draw.AddLine(first, second, kPaper, 2);
+    draw.AddLine(first, second, kInk, scaled(4));
+    draw.AddLine(first, second, kPaper, scaled(2));
     const std::string text =
         fmt::format("{:.6g} {}", length(state.measured[1] - state.measured[0]),
                     unit_symbol(state.picture->scene().tree().grid().transform().unit));
-    const ImVec2 middle((first.x + second.x) / 2 + 8, (first.y + second.y) / 2);
+    const ImVec2 middle((first.x + second.x) / 2 + scaled(8), (first.y + second.y) / 2);
     draw.AddText({middle.x + 1, middle.y + 1}, kInk, text.c_str());
     draw.AddText(middle, kPaper, text.c_str());
   }
   for (const Vec3d& point : state.measured) {
-    draw.AddCircleFilled(place(point), 6, kInk);
-    draw.AddCircleFilled(place(point), 4, kPaper);
+    draw.AddCircleFilled(place(point), scaled(6), kInk);
+    draw.AddCircleFilled(place(point), scaled(4), kPaper);
   }
 }
 

@@ -10,7 +10,6 @@ namespace isobrick {
 std::optional<PickedPoint> pick_point(StorePicture& picture, int x, int y);
 
 /// Draws the points and the line of a measurement over the picture, with Dear ImGui.
-/// `width`, `height`: of the picture, pixels.
-void draw_measure(const ViewerState& state, int width, int height);
+void draw_measure(const ViewerState& state, const PictureArea& area);
 
 }  // namespace isobrick

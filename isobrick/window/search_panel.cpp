@@ -19,7 +19,7 @@ void draw_search_panel(ViewerState& state) {
   const NodeSearch::State now = search.state();
   // What was refused is not what answers; the next store may have room for it.
   int chosen = static_cast<int>(now.refused.empty() ? state.index : now.kind);
-  ImGui::SetNextItemWidth(130);
+  ImGui::SetNextItemWidth(scaled(130));
   if (ImGui::Combo("finds active nodes", &chosen, kNames.data(), static_cast<int>(kNames.size()))) {
     state.index = kIndexKinds[chosen];
     search.use(state.index);

@@ -72,6 +72,8 @@ struct PictureWay {
   /// It is shown in something larger: box, axes and scale bar are drawn there, and as large as
   /// always.
   bool smaller = false;
+  /// Of the display: text, axes and lines are so much larger at least.
+  float overlay_scale = 1;
   /// The same picture every time, whichever mesh came first. A device takes longer for it; in
   /// software it is always so.
   bool in_order = false;

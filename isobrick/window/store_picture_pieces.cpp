@@ -62,6 +62,7 @@ void StorePicture::begin_picture(const Asked& asked) {
       picture_settings(settings, scene_->tree().grid().transform(), last_sample(*store_));
   picture.in_order = asked.way.in_order || setup_->software();
   picture.overlays_later = asked.way.smaller;
+  picture.overlay_scale = asked.way.overlay_scale;
   renderer().begin(asked.camera, asked.width, asked.height, picture);
   draw_surfaces(settings, picture, work_->state);
   slices_.draw(renderer(), settings, work_->state.damage);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -33,6 +34,19 @@ struct Requests {
   std::optional<std::filesystem::path> screenshot;
 };
 
+/// A message to the user, for a while.
+struct Message {
+  std::string text;
+  std::chrono::steady_clock::time_point until;
+};
+
+/// The part of the window that shows the picture, all that the panel leaves: pixels of the
+/// framebuffer.
+struct PictureArea {
+  int left = 0, width = 1, height = 1;
+  int window_width = 1;
+};
+
 /// An isovalue that is being typed.
 struct TypedIsovalue {
   std::size_t surface = 0;
@@ -52,7 +66,8 @@ struct ViewerState {
   std::unique_ptr<Bookmarks> bookmarks;
   std::string new_bookmark;  ///< the name that is being typed
   std::unique_ptr<ImportJob> import;
-  std::vector<std::string> messages;  ///< what went wrong, the latest last
+  std::vector<Message> messages;       ///< the latest last
+  std::chrono::milliseconds message_time{15'000};  ///< for which a message is shown
   std::size_t messages_shown = 0;     ///< so many of them the panel has shown
   std::optional<TypedIsovalue> typed;
   std::uint64_t bricks_wanted = 0;  ///< as counted last
@@ -60,13 +75,21 @@ struct ViewerState {
   std::optional<PickedPoint> picked;
   bool measuring = false;
   std::vector<Vec3d> measured;  ///< world positions, two at most
-  bool panels = true;
+  bool panels = true, help = false;
+  float panel_width = 0;  ///< coordinates of the window
   Requests requests;
   double frame_seconds = 0, draw_seconds = 0;  ///< of the last picture
   std::array<float, 120> frame_times{};        ///< milliseconds, a ring
-  std::size_t frame_number = 0;
+  std::size_t frame_number = 0;  ///< of those shown so far
 
-  void say(std::string message) { messages.push_back(std::move(message)); }
+  void say(std::string message) {
+    messages.push_back({std::move(message), std::chrono::steady_clock::now() + message_time});
+  }
+  /// Drops messages that have been shown long enough.
+  void drop_old_messages() {
+    const auto now = std::chrono::steady_clock::now();
+    std::erase_if(messages, [&](const Message& message) { return message.until <= now; });
+  }
 };
 
 }  // namespace isobrick

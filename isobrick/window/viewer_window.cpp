@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -17,8 +18,10 @@
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"
+#include "isobrick/render/font_atlas.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/render/vectors.h"
+#include "isobrick/window/panels.h"
 #include "isobrick/window/pick.h"
 #include "isobrick/window/screenshot.h"
 #include "isobrick/window/window_events.h"
@@ -40,6 +43,8 @@ GLFWwindow* make_window(const WindowOptions& options) {
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_DEPTH_BITS, 0);  // the renderer has its own
+  glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);  // until there is something to be seen
   GLFWwindow* window =
       glfwCreateWindow(options.width, options.height, "Isobrick", nullptr, nullptr);
   if (window == nullptr) {
@@ -50,7 +55,23 @@ GLFWwindow* make_window(const WindowOptions& options) {
   return window;
 }
 
-void set_up_imgui(GLFWwindow* window) {
+/// What names of files and our own texts are written with: Latin, Greek, Cyrillic, punctuation,
+/// arrows, signs of mathematics.
+constexpr ImWchar kGlyphs[] = {0x20,   0x17f,  0x370,  0x3ff,  0x400,  0x45f, 0x2010,
+                               0x2044, 0x20ac, 0x20ac, 0x2190, 0x2195, 0x2212, 0x2212,
+                               0x2248, 0x2265, 0};
+
+void load_font(float scale) {
+  const std::string_view bytes = font_bytes();
+  ImFontConfig config;
+  config.FontDataOwnedByAtlas = false;  // and so it is only read
+  ImGui::GetIO().Fonts->AddFontFromMemoryTTF(const_cast<char*>(bytes.data()),
+                                             static_cast<int>(bytes.size()), kFontPixels * scale,
+                                             &config, kGlyphs);
+}
+
+/// Returns the display's scale.
+float set_up_imgui(GLFWwindow* window) {
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // nothing is left in whatever folder this is
   ImGui::StyleColorsDark();
@@ -58,9 +79,10 @@ void set_up_imgui(GLFWwindow* window) {
   float scale = 1, other = 1;
   glfwGetWindowContentScale(window, &scale, &other);
   ImGui::GetStyle().ScaleAllSizes(scale);
-  ImGui::GetIO().FontGlobalScale = scale;
+  load_font(scale);
   ImGui_ImplGlfw_InitForOpenGL(window, true);
   ImGui_ImplOpenGL3_Init("#version 450");
+  return scale;
 }
 
 }  // namespace
@@ -69,13 +91,17 @@ ViewerWindow::ViewerWindow(WindowOptions options)
     : options_(std::move(options)), window_(make_window(options_)) {
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
+  // Before ImGui's, which calls those that it finds.
+  events_ = std::make_unique<Events>(*this);
+  scale_ = set_up_imgui(window_);
+  state_.panel_width = kPanelWidth * scale_;
+  // Compiling shaders takes a while.
+  glfwShowWindow(window_);
+  show_notice("Starting …");
   PictureSize size;
   glfwGetFramebufferSize(window_, &size.width, &size.height);
   size = {std::max(size.width, 1), std::max(size.height, 1)};
   setup_ = std::make_shared<PictureSetup>(options_.budgets, glfwPostEmptyEvent, size);
-  // Before ImGui's, which calls those that it finds.
-  events_ = std::make_unique<Events>(*this);
-  set_up_imgui(window_);
   last_time_ = glfwGetTime();
   state_.index = options_.index;
 }
@@ -93,13 +119,25 @@ ViewerWindow::~ViewerWindow() {
   glfwTerminate();
 }
 
-double ViewerWindow::aspect() const {
-  int width = 1, height = 1;
+PictureArea ViewerWindow::picture_area() const {
+  int width = 1, height = 1, across = 1, down = 1;
   glfwGetFramebufferSize(window_, &width, &height);
-  return static_cast<double>(std::max(width, 1)) / std::max(height, 1);
+  glfwGetWindowSize(window_, &across, &down);
+  const bool beside = state_.picture != nullptr && state_.panels &&
+                      static_cast<float>(across) > 2 * state_.panel_width;
+  const double part = beside ? static_cast<double>(state_.panel_width) / std::max(across, 1) : 0;
+  const int left = static_cast<int>(std::lround(part * width));
+  return {left, std::max(width - left, 1), std::max(height, 1), std::max(width, 1)};
+}
+
+double ViewerWindow::aspect() const {
+  const PictureArea area = picture_area();
+  return static_cast<double>(area.width) / area.height;
 }
 
 void ViewerWindow::open(const std::filesystem::path& path) {
+  if (state_.picture == nullptr)
+    show_notice(fmt::format("Opening '{}' …", path.filename().string()));
   auto store = std::make_shared<const StoreReader>(path);
   auto facts = std::make_unique<IsovalueFacts>(store);
   // Last: once it is made, that of the store before has gone from the renderer.
@@ -223,7 +261,9 @@ ViewerWindow::Click ViewerWindow::click_at(double x, double y) const {
               .settings = state_.settings,
               .measuring = state_.measuring,
               .point = {}};
-  glfwGetFramebufferSize(window_, &click.width, &click.height);
+  const PictureArea area = picture_area();
+  click.width = area.width;
+  click.height = area.height;
   return click;
 }
 
@@ -236,7 +276,8 @@ std::size_t ViewerWindow::measure(Vec3d world) {
 
 void ViewerWindow::click(double x, double y) {
   if (state_.picture == nullptr) return;
-  Click click = click_at(x, y);
+  const PictureArea area = picture_area();
+  Click click = click_at((x * area.window_width - area.left) / area.width, y);
   state_.picked = pick(click);
   if (state_.measuring && state_.picked) click.point = measure(state_.picked->world);
   // Those before were of a measurement that is over, or of none.

@@ -41,8 +41,8 @@ class ViewerWindow {
   void drop(const std::filesystem::path& path);
 
   /// Waits for something to happen, at most so long and not at all while anything moves (some
-  /// milliseconds while meshes come in), and shows the next picture. False once the window is
-  /// closed.
+  /// milliseconds while meshes come in), and shows the next frame if anything has changed. False
+  /// once the window is closed.
   bool step(double most_seconds = 0.1);
   /// Until the window is closed, or an end is asked for (core/cancel.h).
   void run();
@@ -52,7 +52,7 @@ class ViewerWindow {
 
  private:
   class Events;
-  /// Parts of the window's width and height, and what was seen then.
+  /// Parts of the picture's width and height, and what was seen then.
   struct Click {
     double x, y;
     int width, height;
@@ -62,10 +62,24 @@ class ViewerWindow {
     std::optional<std::size_t> point;  ///< of the measurement, that it made
   };
 
+  /// What is seen beside the picture; another one is a reason for another frame.
+  struct FrameKey {
+    std::uint64_t pictures = 0;  ///< finished so far
+    std::size_t messages = 0;
+    bool rests = false, histogram = false, converting = false, panels = false, help = false;
+    friend bool operator==(const FrameKey&, const FrameKey&) = default;
+  };
+
   void wait(double most_seconds);
   void wait_for_meshes(double most_seconds);
-  bool draw_picture(int width, int height);
+  void draw_picture(int width, int height);
   void draw_frame(bool asked);
+  void begin_frame();
+  void end_frame();
+  void show_notice(const std::string& text);
+  FrameKey frame_key() const;
+  bool is_due() const;
+  PictureArea picture_area() const;
   void pace(double seconds);
   void tell_damage();
   bool rests() const;
@@ -76,6 +90,7 @@ class ViewerWindow {
   Click click_at(double x, double y) const;
   std::optional<PickedPoint> pick(const Click& click);
   std::size_t measure(Vec3d world);
+  /// At parts of the window's width and height.
   void click(double x, double y);
   void save_picture(const std::filesystem::path& file);
   bool moving() const;
@@ -92,9 +107,11 @@ class ViewerWindow {
   double opened_ = 0;    ///< when the store was
   bool covered_ = false;  ///< the store's surface has been shown
   double shown_ = 0;      ///< when the last frame was
+  FrameKey shown_key_;    ///< of that frame
   bool changed_ = true;  ///< something has happened: the next frame may differ from the last
   bool told_ = false;    ///< something had happened before the last step
   bool more_ = false;    ///< the picture would go on by itself
+  float scale_ = 1;      ///< of the display: 2 where everything is twice as large
   bool failed_ = false;  ///< the last picture has thrown: it is tried again, but not at once
   /// On a picture that was not at rest, whose surface may be a coarser one: they are looked at
   /// again once the picture rests, if it is still of the same.

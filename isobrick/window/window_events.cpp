@@ -36,6 +36,13 @@ ViewerWindow::Events::Events(ViewerWindow& owner) : owner_(owner) {
   glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
     with_window(w, [&](ViewerWindow& v) { v.events_->on_key(key, action, mods); });
   });
+  // Where "?" lies depends on the keyboard.
+  glfwSetCharCallback(window, [](GLFWwindow* w, unsigned character) {
+    with_window(w, [&](ViewerWindow& v) {
+      v.changed_ = true;
+      if (character == '?' && !ImGui::GetIO().WantTextInput) v.state_.help = !v.state_.help;
+    });
+  });
   glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
     with_window(w, [&](ViewerWindow& v) {
       if (count > 0) v.drop(paths[0]);
@@ -173,8 +180,11 @@ void ViewerWindow::Events::on_press(int key, int mods, bool again) {
       if (!state.settings.surfaces.empty())
         state.selected = (state.selected + 1) % state.settings.surfaces.size();
       return;
+    case GLFW_KEY_F1: state.help = !state.help; return;
     case GLFW_KEY_ESCAPE:
-      if (state.import != nullptr)
+      if (state.help)
+        state.help = false;
+      else if (state.import != nullptr)
         state.import->cancel();
       else
         state.requests.close = true;

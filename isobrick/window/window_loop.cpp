@@ -30,10 +30,21 @@ constexpr double kNothingNew = 0.008;
 /// to the next: frames would keep software from drawing, and where a display sets the pace a
 /// picture of what has come would wait for its turn, after that of a frame that showed nothing new.
 constexpr double kLongestUnseen = 0.25;
+/// Where nothing happens, from one look at what others have done (a signal, a count) to the next.
+constexpr double kIdleStep = 0.25;
 /// Messages about damage that are shown one by one.
 constexpr std::size_t kMostTold = 3;
 /// Moving pictures may be coarser for so long after the last motion.
 constexpr double kSettleSeconds = 0.25;
+
+/// Whether anything but colours differs: those change no mesh, and nobody waits for them.
+bool values_differ(ViewSettings a, const ViewSettings& b) {
+  a.background_top = b.background_top;
+  a.background_bottom = b.background_bottom;
+  for (std::size_t i = 0; i < std::min(a.surfaces.size(), b.surfaces.size()); ++i)
+    a.surfaces[i].colour = b.surfaces[i].colour;
+  return a != b;
+}
 
 }  // namespace
 
@@ -58,30 +69,28 @@ bool ViewerWindow::moving() const {
   return state_.navigator.moving() || glfwGetTime() < settled_at();
 }
 
-/// Makes the picture, or goes on with it. Whether there may be anything new to be seen.
-bool ViewerWindow::draw_picture(int width, int height) {
+/// Makes the picture, or goes on with it.
+void ViewerWindow::draw_picture(int width, int height) {
   StorePicture& picture = *state_.picture;
   const double begin = glfwGetTime();
   // The first picture of a store should not wait for a good one.
   covered_ |= picture.state().covers;
   const bool fluent = moving() || !covered_;
   PictureWay way = PictureWay::in_window(state_.pacer, setup_->software(), fluent);
+  way.overlay_scale = scale_;
   way.piece_seconds = options_.piece_seconds.value_or(way.piece_seconds);
   const int smaller = fluent ? state_.pacer.smaller() : 1;
   try {
     picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
                  std::max(height / smaller, 1), state_.settings, way);
   } catch (const std::exception& e) {
-    if (state_.messages.empty() || state_.messages.back() != e.what()) state_.say(e.what());
-    failed_ = true;
-    return true;
+    if (!std::exchange(failed_, true)) state_.say(e.what());
+    return;
   }
   failed_ = false;
   pace(glfwGetTime() - begin);
   tell_damage();
   settle_clicks();
-  const PictureState& state = picture.state();
-  return !state.drawing && (picture.drew() || state.complete || moving());
 }
 
 bool ViewerWindow::minimised() const {
@@ -90,36 +99,77 @@ bool ViewerWindow::minimised() const {
   return width == 0 || height == 0 || glfwGetWindowAttrib(window_, GLFW_ICONIFIED) == GLFW_TRUE;
 }
 
-void ViewerWindow::draw_frame(bool asked) {
-  if (minimised()) return;
+ViewerWindow::FrameKey ViewerWindow::frame_key() const {
+  FrameKey key{.messages = state_.messages.size(),
+               .converting = state_.import != nullptr,
+               .panels = state_.panels,
+               .help = state_.help};
+  if (state_.picture == nullptr) return key;
+  key.pictures = state_.picture->counters().finished;
+  key.rests = rests();
+  key.histogram = state_.facts->histogram() != nullptr;
+  return key;
+}
+
+/// Whether what tells how far something is, or a cursor that blinks, needs another frame.
+bool ViewerWindow::is_due() const {
+  const bool under_way = state_.import != nullptr || ImGui::GetIO().WantTextInput ||
+                         (state_.picture != nullptr && !rests());
+  return under_way && glfwGetTime() - shown_ >= kLongestUnseen;
+}
+
+void ViewerWindow::begin_frame() {
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
-  const bool other = state_.picture == nullptr || draw_picture(width, height);
-  // Until then nothing changes but what tells how much there is.
-  if (!other && !asked && glfwGetTime() - shown_ < kLongestUnseen) return;
-  shown_ = glfwGetTime();
   glClearColor(0.2f, 0.21f, 0.23f, 1);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glViewport(0, 0, width, height);
   glClear(GL_COLOR_BUFFER_BIT);
-  if (state_.picture != nullptr) state_.picture->renderer().copy_to(0, width, height);
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   events_->hold_tapped_keys();
   ImGui::NewFrame();
-  const ViewSettings settings = state_.settings;
-  const Camera camera = state_.navigator.camera;
-  draw_panels(state_);
-  // A slider that is dragged, and no click on a widget, is a motion.
-  if (ImGui::IsMouseDown(ImGuiMouseButton_Left) && ImGui::IsAnyItemActive() &&
-      (settings != state_.settings || camera != state_.navigator.camera))
-    events_->moved();
-  draw_measure(state_, width, height);
+}
+
+void ViewerWindow::end_frame() {
   ImGui::Render();
   events_->release_tapped_keys();
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glfwSwapBuffers(window_);
+}
+
+/// A frame with a line of text, before something that takes long.
+void ViewerWindow::show_notice(const std::string& text) {
+  begin_frame();
+  draw_notice(text);
+  end_frame();
+}
+
+/// Unless it would show nothing new. `asked`: somebody has done something.
+void ViewerWindow::draw_frame(bool asked) {
+  if (minimised()) return;
+  const PictureArea area = picture_area();
+  if (state_.picture != nullptr) draw_picture(area.width, area.height);
+  const FrameKey key = frame_key();
+  if (!asked && key == shown_key_ && !is_due()) return;
+  shown_key_ = key;
+  const double now = glfwGetTime();
+  state_.frame_seconds = now - std::exchange(shown_, now);
+  state_.frame_times[state_.frame_number++ % state_.frame_times.size()] =
+      static_cast<float>(state_.frame_seconds * 1e3);
+  begin_frame();
+  if (state_.picture != nullptr)
+    state_.picture->renderer().copy_to(0, area.width, area.height, area.left);
+  const ViewSettings settings = state_.settings;
+  const Camera camera = state_.navigator.camera;
+  draw_panels(state_);
+  // A slider that is dragged, and no click on a widget, is a motion.
+  if (ImGui::IsMouseDown(ImGuiMouseButton_Left) && ImGui::IsAnyItemActive() &&
+      (values_differ(settings, state_.settings) || camera != state_.navigator.camera))
+    events_->moved();
+  draw_measure(state_, area);
+  end_frame();
 }
 
 /// What a picture, or a piece of one, that took this thread so long says of the next one.
@@ -173,11 +223,9 @@ bool ViewerWindow::step(double most_seconds) {
   const bool told = std::exchange(changed_, false), asked = std::exchange(told_, told) || told;
   more_ = false;
   const double now = glfwGetTime();
-  state_.frame_seconds = now - last_time_;
-  state_.frame_times[state_.frame_number++ % state_.frame_times.size()] =
-      static_cast<float>(state_.frame_seconds * 1e3);
-  last_time_ = now;
-  state_.navigator.update(std::min(state_.frame_seconds, kLongestStep));
+  const double seconds = now - std::exchange(last_time_, now);
+  state_.navigator.update(std::min(seconds, kLongestStep));
+  state_.drop_old_messages();
   handle_import();
   handle_requests();
   draw_frame(asked);
@@ -185,7 +233,7 @@ bool ViewerWindow::step(double most_seconds) {
 }
 
 void ViewerWindow::run() {
-  while (!cancel_requested() && step()) {
+  while (!cancel_requested() && step(kIdleStep)) {
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <map>
+#include <thread>
 
 #include "tests/window/picture_test.h"
 
@@ -282,15 +283,79 @@ TEST_F(Panels, AConversionCanBeCancelled) {
   EXPECT_FALSE(std::filesystem::exists(dir_ / "a.zarr"));
 }
 
-TEST_F(Panels, ThePanelStaysWithinReach) {
-  ImGui::SetWindowPos("###panel", {500, 1100});
+TEST_F(Panels, ThePanelKeepsToTheLeftSide) {
+  for (const ImVec2 size : {ImVec2(1000, 800), ImVec2(300, 200), ImVec2(1600, 900)}) {
+    ImGui::GetIO().DisplaySize = size;
+    frame();
+    frame();
+    const ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
+    EXPECT_EQ(panel->Pos.x, 0);
+    EXPECT_EQ(panel->Pos.y, 0);
+    EXPECT_EQ(panel->Size.y, size.y);
+    EXPECT_EQ(state_.panel_width, panel->Size.x);
+  }
+}
+
+TEST_F(Panels, GrowWithTheFont) {
+  const float before = scaled(90);
+  const auto width_of = [&](const char* widget) {
+    const auto all = widgets();
+    ImGuiID id = ImGui::FindWindowByName("###panel")->ID;
+    const int first = 0;
+    id = ImHashStr("Surfaces", 0, id);
+    id = ImHashData(&first, sizeof first, id);
+    id = ImHashStr(widget, 0, id);
+    const auto& places = all.at(id);
+    float lo = places[0].x, hi = lo;
+    for (const ImVec2& p : places) {
+      lo = std::min(lo, p.x);
+      hi = std::max(hi, p.x);
+    }
+    return hi - lo;
+  };
+  ImGui::GetIO().DisplaySize = {1400, 2800};
+  const float one = width_of("##isovalue");
+  ImGui::GetIO().FontGlobalScale = 2;
   frame();
-  ImGui::GetIO().DisplaySize = {300, 200};
+  EXPECT_EQ(scaled(90), 2 * before);
+  ImGui::SetWindowSize("###panel", {scaled(kPanelWidth), 2700});
+  frame();
+  EXPECT_NEAR(width_of("##isovalue"), 2 * one, 2 * kAcross);
+}
+
+TEST_F(Panels, MessagesGoAwayUnlessSomebodyReadsThem) {
+  state_.message_time = std::chrono::milliseconds(50);
+  state_.say("something");
   frame();
   frame();
-  const ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
-  EXPECT_LT(panel->Pos.x, 300);
-  EXPECT_LT(panel->Pos.y, 200);
+  state_.drop_old_messages();
+  EXPECT_EQ(state_.messages.size(), 1u);
+  const ImGuiWindow* window = ImGui::FindWindowByName("Messages");
+  point(window->Pos.x + 20, window->Pos.y + window->Size.y - 10);
+  std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  frame();
+  state_.drop_old_messages();
+  EXPECT_EQ(state_.messages.size(), 1u) << "the pointer is on it";
+  point(5, 5);
+  std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  frame();
+  state_.drop_old_messages();
+  EXPECT_TRUE(state_.messages.empty());
+}
+
+TEST_F(Panels, HelpShowsKeysAndCloses) {
+  EXPECT_EQ(ImGui::FindWindowByName("Keys and mouse"), nullptr);
+  click(place_of({"Help (F1)"}));
+  EXPECT_TRUE(state_.help);
+  frame();
+  const ImGuiWindow* help = ImGui::FindWindowByName("Keys and mouse");
+  ASSERT_NE(help, nullptr);
+  EXPECT_TRUE(help->Active);
+  EXPECT_GT(help->Size.y, 20 * ImGui::GetFontSize());
+  state_.help = false;
+  frame();
+  frame();
+  EXPECT_FALSE(help->Active);
 }
 
 TEST_F(Panels, TheStatusNamesBricks) {

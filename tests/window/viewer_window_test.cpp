@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <epoxy/gl.h>
+#include <imgui.h>
+
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -12,6 +17,7 @@
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/render/vectors.h"
 #include "isobrick/volumes/synth_source.h"
+#include "isobrick/window/panels.h"
 #include "tests/window/window_test.h"
 
 namespace isobrick {
@@ -19,7 +25,7 @@ namespace {
 
 constexpr int kWidth = test::kWindowWidth, kHeight = test::kWindowHeight;
 using Window = test::WindowTest;
-constexpr int kFieldRow = 165;  ///< of the first isovalue, on the panel
+constexpr int kFieldRow = 155;  ///< of the first isovalue, on the panel
 
 TEST_F(Window, ShowsAStore) {
   ViewerWindow& window = open();
@@ -141,7 +147,7 @@ TEST_F(Window, SaysWhatIsDamaged) {
   ASSERT_FALSE(window.state().picture->state().damage.empty());
   const auto is_said = [&](const std::string& text) {
     return std::any_of(window.state().messages.begin(), window.state().messages.end(),
-                       [&](const std::string& message) { return message.find(text) == 0; });
+                       [&](const Message& message) { return message.text.find(text) == 0; });
   };
   EXPECT_TRUE(is_said(window.state().picture->state().damage[0]));
   until([&] { return is_said("the histogram cannot be counted: "); });
@@ -151,6 +157,220 @@ TEST_F(Window, SaysWhatIsDamaged) {
   steps(5);
   EXPECT_TRUE(window.state().messages.empty()) << "said once";
   EXPECT_LE(said, 5u);
+}
+
+/// A finished picture of many triangles, and a pacer that has no time for them.
+class FinishedPicture : public Window {
+ protected:
+  void SetUp() override {
+    Window::SetUp();
+    if (IsSkipped()) return;
+    const auto source =
+        make_synth({.kind = SynthKind::gyroid, .extent = {150, 150, 150}, .frequency = 4});
+    NoProgress progress;
+    convert(*source, dir_ / "many.zarr", {.brick = 32}, progress);
+    ViewerWindow& window = open();
+    window.open(dir_ / "many.zarr");
+    window.state().settings.pixel_error = 0.3f;
+    window.state().panels = true;
+    rest();
+    for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
+    triangles_ = triangles();
+    ASSERT_GT(triangles_, 50'000u);
+  }
+  std::uint64_t triangles() const { return window_->state().picture->state().triangles; }
+  void rest() {
+    until([&] { return rests(); });
+    steps(3);
+    until([&] { return rests(); });
+  }
+  /// Presses there, holds, lets go; the least triangles of a picture meanwhile.
+  std::uint64_t least_while_clicking(int x, int y) {
+    moved_ = false;
+    std::uint64_t least = triangles();
+    const auto step = [&](int n) {
+      for (int i = 0; i < n; ++i) {
+        steps(1);
+        least = std::min(least, triangles());
+        moved_ |= window_->state().picture->state().moving;
+      }
+    };
+    display_->move_pointer(x, y);
+    step(2);
+    display_->button(1, true);
+    step(15);
+    display_->button(1, false);
+    step(15);
+    return least;
+  }
+  /// What sliders of values and the camera change: they may lower a picture.
+  auto values() const {
+    const ViewSettings& s = window_->state().settings;
+    std::vector<float> places{s.pixel_error, s.surfaces[0].opacity, s.window_lo, s.window_hi};
+    for (const CutSettings& cut : s.cuts) places.push_back(cut.place);
+    for (const SliceSettings& slice : s.slices) places.push_back(slice.place);
+    for (const Vec3f corner : {s.region_lo, s.region_hi})
+      places.insert(places.end(), {corner.x, corner.y, corner.z});
+    return std::tuple(window_->state().navigator.camera, s.surfaces[0].isovalue, places);
+  }
+  std::uint64_t triangles_ = 0;
+  bool moved_ = false;  ///< a picture was one in motion
+};
+
+TEST_F(FinishedPicture, IsNotLoweredByClicksOnWidgets) {
+  // Of the first column of the panel: sections, radio buttons, boxes, buttons, and what is beside.
+  int clicks = 0;
+  for (int y = 35; y < kHeight; y += 24) {
+    if (y > 25 && y < 150) continue;  // the histogram is a slider
+    for (const int x : {20, 50, 260}) {
+      window_->state().settings.surfaces[0].shown = true;
+      const auto before = values();
+      const std::uint64_t least = least_while_clicking(x, y);
+      if (values() == before) {
+        ++clicks;
+        EXPECT_FALSE(moved_) << x << ' ' << y;
+        EXPECT_GE(least, triangles_) << x << ' ' << y;
+      } else {
+        rest();
+        triangles_ = triangles();
+      }
+      if (window_->state().settings.surfaces.size() > 1) window_->state().settings.surfaces.resize(1);
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_GT(clicks, 25);
+}
+
+TEST_F(FinishedPicture, IsLoweredByASliderAndNeverCalledCompleteThen) {
+  display_->move_pointer(100, 80);
+  steps(2);
+  display_->button(1, true);
+  bool lowered = false;
+  for (int i = 1; i <= 20; ++i) {
+    display_->move_pointer(100 + 3 * i, 80);
+    steps(1);
+    const PictureState& state = window_->state().picture->state();
+    if (!state.moving) continue;
+    lowered |= state.triangles < triangles_ / 2;
+    EXPECT_FALSE(state.complete);
+  }
+  EXPECT_TRUE(lowered);
+  // A hand that holds still sees all of it, with the button down.
+  rest();
+  EXPECT_GT(triangles(), triangles_ / 2);
+  display_->button(1, false);
+  steps(3);
+}
+
+TEST_F(FinishedPicture, ComesBackWhereTheHandHoldsStill) {
+  display_->move_pointer(520, 240);
+  steps(2);
+  display_->button(1, true);
+  bool lowered = false;
+  for (int i = 1; i <= 10; ++i) {
+    display_->move_pointer(520 + 5 * i, 240);
+    steps(1);
+    lowered |= window_->state().picture->state().moving && triangles() < triangles_ / 2;
+  }
+  EXPECT_TRUE(lowered);
+  rest();
+  EXPECT_GT(triangles(), triangles_ / 2);
+  display_->button(1, false);
+  steps(3);
+}
+
+TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
+  ViewerWindow& window = open();
+  window.state().panels = true;
+  steps(3);
+  until([&] { return rests(); });
+  EXPECT_LE(window.state().panel_width, 0.6f * kWidth + 1);
+  EXPECT_EQ(window.state().picture->renderer().width(), kWidth)
+      << "a panel of more than half is over it";
+  ImGui::SetWindowSize("###panel", {250, static_cast<float>(kHeight)});
+  display_->move_pointer(kWidth / 2, 20);  // nothing is drawn before something happens
+  steps(3);
+  until([&] { return rests() && window.state().picture->renderer().width() == kWidth - 250; });
+  EXPECT_EQ(window.state().picture->renderer().height(), kHeight);
+  // The middle of what is left shows the middle of the sphere, also for a click there.
+  display_->tap(XK_r);
+  steps(3);
+  until([&] { return rests(); });
+  click(250 + (kWidth - 250) / 2, kHeight / 2);
+  ASSERT_TRUE(window.state().picked);
+  const Vec3d middle{47.5, 47.5, 47.5};
+  const Camera& camera = window.state().navigator.camera;
+  const Vec3d across = window.state().picked->world - middle;
+  EXPECT_LT(std::abs(dot(across, camera.right)), 2);
+  EXPECT_LT(std::abs(dot(across, camera.up)), 2);
+  // `R` fits the whole volume into it.
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3d p = camera.project({corner & 1 ? 95.0 : 0, corner & 2 ? 95.0 : 0, corner & 4 ? 95.0 : 0},
+                                   kWidth - 250, kHeight);
+    EXPECT_TRUE(p.x >= 0 && p.x <= kWidth - 250 && p.y >= 0 && p.y <= kHeight) << corner;
+  }
+  display_->tap(XK_h);
+  until([&] { return rests() && window.state().picture->renderer().width() == kWidth; });
+}
+
+TEST_F(Window, ShowsHelpForF1AndQuestionMark) {
+  ViewerWindow& window = open();
+  display_->tap(XK_F1);
+  until([&] { return window.state().help; });
+  display_->tap(XK_Escape);
+  until([&] { return !window.state().help; });
+  display_->key(XK_Shift_L, true);
+  display_->tap(XK_slash);
+  display_->key(XK_Shift_L, false);
+  until([&] { return window.state().help; });
+  EXPECT_TRUE(window.step(0)) << "Escape has closed the window";
+}
+
+TEST_F(Window, ShowsNoFrameWhereNothingChanges) {
+  ViewerWindow& window = open();
+  window.state().panels = true;
+  until([&] { return rests() && window.state().facts->histogram() != nullptr; });
+  steps(20);
+  const std::size_t before = window.state().frame_number;
+  const std::clock_t used = std::clock();
+  for (int i = 0; i < 8; ++i) ASSERT_TRUE(window.step(0.25));
+  EXPECT_EQ(window.state().frame_number, before);
+  EXPECT_LT(static_cast<double>(std::clock() - used) / CLOCKS_PER_SEC, 0.06) << "of two seconds";
+  display_->move_pointer(100, 300);
+  steps(3);
+  EXPECT_GT(window.state().frame_number, before);
+}
+
+TEST_F(Window, IsNotBlackAtFirst) {
+  WindowOptions options;
+  options.width = kWidth;
+  options.height = kHeight;
+  ViewerWindow window(options);
+  glReadBuffer(GL_FRONT);
+  std::array<std::uint8_t, 4> pixel{};
+  glReadPixels(5, 5, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, pixel.data());
+  EXPECT_GT(pixel[0], 30) << "the background of a first frame";
+}
+
+TEST_F(Window, HasTheCharactersThatItWrites) {
+  open();
+  for (const ImWchar character : std::initializer_list<ImWchar>{0x2026, 0xb5, 0xb0, 0x2212, 0x3b1, 0x416})
+    EXPECT_NE(ImGui::GetFont()->FindGlyphNoFallback(character), nullptr) << character;
+}
+
+TEST(ScaledWindow, DoublesEverything) {
+  if (!VirtualDisplay::available()) GTEST_SKIP() << "there is no Xvfb";
+  const VirtualDisplay display(1000, 700, 192);
+  WindowOptions options;
+  options.width = 400;
+  options.height = 300;
+  ViewerWindow window(options);
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window.handle(), &width, &height);
+  EXPECT_EQ(width, 800);
+  EXPECT_EQ(window.state().panel_width, 2 * kPanelWidth);
+  EXPECT_EQ(ImGui::GetFont()->FontSize, 2 * kFontPixels);
+  EXPECT_GT(ImGui::GetStyle().FramePadding.x, 1.9f * ImGuiStyle().FramePadding.x);
 }
 
 TEST_F(Window, SurvivesOtherSizesAndNone) {

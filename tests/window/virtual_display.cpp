@@ -1,5 +1,6 @@
 #include "tests/window/virtual_display.h"
 
+#include <X11/Xatom.h>
 #include <X11/Xlib.h>
 #include <X11/Xutil.h>
 #include <X11/extensions/XTest.h>
@@ -42,7 +43,8 @@ struct VirtualDisplay::State {
 
 bool VirtualDisplay::available() { return std::system("command -v Xvfb >/dev/null 2>&1") == 0; }
 
-VirtualDisplay::VirtualDisplay(int width, int height) : state_(std::make_unique<State>()) {
+VirtualDisplay::VirtualDisplay(int width, int height, int dots_per_inch)
+    : state_(std::make_unique<State>()) {
   if (const char* display = std::getenv("DISPLAY")) state_->before = display;
   int pipes[2];
   if (pipe(pipes) != 0) throw std::runtime_error("no pipe");
@@ -64,6 +66,13 @@ VirtualDisplay::VirtualDisplay(int width, int height) : state_(std::make_unique<
   setenv("DISPLAY", name.c_str(), 1);
   state_->display = XOpenDisplay(nullptr);
   if (state_->display == nullptr) throw std::runtime_error("no connection to Xvfb");
+  // Where desktops say how large everything is to be; GLFW looks there.
+  const std::string resources = "Xft.dpi:\t" + std::to_string(dots_per_inch) + "\n";
+  XChangeProperty(state_->display, DefaultRootWindow(state_->display), XA_RESOURCE_MANAGER,
+                  XA_STRING, 8, PropModeReplace,
+                  reinterpret_cast<const unsigned char*>(resources.data()),
+                  static_cast<int>(resources.size()));
+  XSync(state_->display, False);
 }
 
 VirtualDisplay::~VirtualDisplay() = default;

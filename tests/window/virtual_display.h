@@ -12,7 +12,7 @@ namespace isobrick {
 class VirtualDisplay {
  public:
   /// Throws std::runtime_error when Xvfb does not start.
-  VirtualDisplay(int width, int height);
+  VirtualDisplay(int width, int height, int dots_per_inch = 96);
   ~VirtualDisplay();
   VirtualDisplay(const VirtualDisplay&) = delete;
   VirtualDisplay& operator=(const VirtualDisplay&) = delete;

@@ -65,8 +65,8 @@ TEST_F(WindowEnd, PicturesReplaceNoOther) {
   }
   std::filesystem::current_path(before);
   ASSERT_EQ(window.state().messages.size(), 2u);
-  EXPECT_TRUE(contains(window.state().messages[0], "/isobrick.png'"));
-  EXPECT_TRUE(contains(window.state().messages[1], "/isobrick-2.png'"));
+  EXPECT_TRUE(contains(window.state().messages[0].text, "/isobrick.png'"));
+  EXPECT_TRUE(contains(window.state().messages[1].text, "/isobrick-2.png'"));
   EXPECT_TRUE(std::filesystem::exists(dir_ / "isobrick-2.png"));
 }
 
