@@ -140,8 +140,13 @@ struct LevelBudget {
 
 LevelBudget budget_of(const StoreInfo& store, int level, int threads, std::uint64_t memory) {
   const Lattice& lattice = store.levels[static_cast<std::size_t>(level)].lattice;
+  const Int3 blocks = lattice.blocks(), bricks = lattice.bricks();
+  // A layer of stored ranges, to compare with.
+  const auto table =
+      static_cast<std::uint64_t>(std::max(blocks.x * blocks.y, bricks.x * bricks.y)) *
+      sizeof(ValueRange<double>);
   const auto least = [&](int n) {
-    return kProgramBytes + slab_memory(store, level, n) +
+    return kProgramBytes + slab_memory(store, level, n) + table +
            level_ranges_bytes(lattice, lattice.brick.z) + lattice.brick_bytes();
   };
   while (threads > 1 && least(threads) > memory) --threads;
