@@ -19,7 +19,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"io", {"core"}},
     {"volumes", {"core", "io"}},
     {"meshes", {"core", "io", "surface/mesh.h"}},
-    {"bricks", {"core"}},
+    {"bricks", {"core", "io"}},
     {"index", {"core"}},
     {"surface", {"core"}},
     {"stream", {"core", "bricks", "index"}},
