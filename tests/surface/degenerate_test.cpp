@@ -71,6 +71,14 @@ TYPED_TEST(DropDegenerate, ChunksStandAlone) {
   EXPECT_EQ(unused_vertices(local), 0u);
 }
 
+// docs/extraction.md and docs/meshes.md state it.
+TEST(DropDegenerateAt, TwoFourSixOrEightTrianglesShareASide) {
+  const auto field = coarse_noise<std::uint8_t>({66, 35, 40}, 13);
+  const std::set<std::size_t> manifold{2}, touching{2, 4, 6, 8};
+  EXPECT_EQ(triangles_at_sides(extract(field, {.isovalue = 2})), manifold);
+  EXPECT_EQ(triangles_at_sides(extract(field, {.isovalue = 2, .drop_degenerate = true})), touching);
+}
+
 // The budget of an extraction counts on this for any input.
 TEST(DropDegenerateAt, BoundariesAreNoLargerThanTheirBound) {
   TileBoundary boundary;

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 #include <tuple>
+#include <utility>
 
 #include "isobrick/surface/cell_math.h"
 #include "tests/surface/field.h"
@@ -52,6 +55,16 @@ inline bool sides_balance(const Mesh& mesh) {
   std::sort(forward.begin(), forward.end());
   std::sort(backward.begin(), backward.end());
   return forward == backward;
+}
+
+/// How many triangles share a side: every number that occurs.
+inline std::set<std::size_t> triangles_at_sides(const Mesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> sides;
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t i = 0; i < 3; ++i) ++sides[std::minmax(t[i], t[(i + 1) % 3])];
+  std::set<std::size_t> numbers;
+  for (const auto& [side, number] : sides) numbers.insert(number);
+  return numbers;
 }
 
 inline std::size_t unused_vertices(const Mesh& mesh) {

@@ -131,6 +131,22 @@ TEST_F(VtkXml, ReadsPlainSamples) {
   EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
 }
 
+// VTK's writer repeats the whole extent in each piece that it is asked for.
+TEST_F(VtkXml, OfInlinePiecesTheFirstIsReadIfItIsTheWhole) {
+  const auto with_two_pieces = [](std::string text) {
+    const std::size_t begin = text.find("<Piece"), end = text.find("</ImageData>");
+    return text.insert(end, text.substr(begin, end - begin));
+  };
+  EXPECT_TRUE(contains(refuse(with_two_pieces(parts.text())), "several pieces"));
+  parts.file = "byte_order=\"LittleEndian\"";
+  parts.array = "type=\"Int16\" Name=\"a\" format=\"binary\">" + base64(number(280) + samples()) +
+                "</DataArray";
+  std::string text = with_two_pieces(parts.text());
+  EXPECT_EQ(read_box(*open(text), kWhole), samples());
+  text.replace(text.find("Piece Extent=\"0 6"), 17, "Piece Extent=\"0 3");
+  EXPECT_TRUE(contains(refuse(text), "not the whole extent"));
+}
+
 TEST_F(VtkXml, CellDataLieAtTheCentres) {
   std::string text = parts.text();
   for (const char* tag : {"<PointData", "</PointData"})
