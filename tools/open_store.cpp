@@ -9,6 +9,7 @@
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/shell_word.h"
+#include "isobrick/meshes/mesh_name.h"
 #include "isobrick/volumes/raw_name.h"
 #include "isobrick/volumes/volume_format.h"
 #include "tools/format.h"
@@ -52,13 +53,12 @@ std::string raw_options(const fs::path& path) {
 
 [[noreturn]] void refuse_file(const fs::path& path) {
   const std::string name = path.string();
-  for (const char* extension : {".ply", ".stl", ".obj", ".glb", ".vtp", ".pvtp"})
-    if (extension_of(path) == extension) {
-      fs::path picture = path;
-      refuse(name, "it is a mesh",
-             fmt::format("run: isobrick render {} -o {}", shell_word(name),
-                         shell_word(picture.replace_extension(".png").string())));
-    }
+  if (has_mesh_name(path)) {
+    fs::path picture = path;
+    refuse(name, "it is a mesh",
+           fmt::format("run: isobrick render {} -o {}", shell_word(name),
+                       shell_word(picture.replace_extension(".png").string())));
+  }
   const VolumeFormat format = recognise_format(name);
   refuse(name, fmt::format("it is {}", kFormatNames[static_cast<std::size_t>(format)]),
          convert_command(path, format == VolumeFormat::raw ? raw_options(path) : ""));

@@ -16,6 +16,7 @@
 #include "isobrick/window/viewer_window.h"
 #include "tools/format.h"
 #include "tools/interrupt.h"
+#include "tools/open_store.h"
 #include "tools/output_name.h"
 #include "tools/picture_options.h"
 
@@ -106,6 +107,7 @@ Drawn draw_shots(StorePicture& picture, const std::vector<Shot>& shots, PictureS
 
 /// Draws into files.
 int draw(const Arguments& arguments, Console& console) {
+  check_store(arguments.store);
   const auto store = std::make_shared<const StoreReader>(arguments.store);
   const GlContext context;
   StorePicture picture(store, arguments.budgets, {});
@@ -157,10 +159,13 @@ int draw(const Arguments& arguments, Console& console) {
 }
 
 int run(const Arguments& arguments, Console& console) {
-  if (!arguments.screenshot.empty() || !arguments.turntable.empty())
+  if (!arguments.screenshot.empty() || !arguments.turntable.empty()) {
+    if (arguments.store.empty())
+      throw UsageError("STORE is required to draw into files; see 'isobrick view --help'");
     return draw(arguments, console);
-  // One that cannot be opened is said before anything is about windows.
-  static_cast<void>(StoreReader(arguments.store));
+  }
+  // A store that cannot be opened is reported before anything about windows.
+  if (!arguments.store.empty()) static_cast<void>(open_store(arguments.store));
   WindowOptions options;
   options.width = arguments.picture.size.width;
   options.height = arguments.picture.size.height;
@@ -171,7 +176,7 @@ int run(const Arguments& arguments, Console& console) {
   set_interrupt_note([] { return "the window is closed"; });
   {
     ViewerWindow window(options);
-    window.open(arguments.store);
+    if (!arguments.store.empty()) window.open(arguments.store);
     window.run();
   }  // a conversion that still ran has left nothing
   if (const int signal = interrupting_signal(); signal != 0) throw Interrupted(signal);
@@ -224,7 +229,9 @@ void add_view(Program& program) {
   CLI::App* app = add_subcommand(
       program, "view", "Look at a store: move the isovalue, fly through it, take pictures.",
       "isobrick view head.zarr --isovalue 500");
-  add_path(app, "STORE", arguments->store, "Store to look at");
+  add_text(app,
+           {"STORE", "", "Store to look at; without one the window waits for a file to be dropped"},
+           [&store = arguments->store](const std::string& text) { store = text; });
   add_repeated(app, {"--isovalue", "V", "Surface to begin with; may be repeated", "in the middle"},
                [&values = arguments->isovalues](const std::string& text) {
                  values.push_back(parse_number(text));

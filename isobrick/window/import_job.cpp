@@ -10,6 +10,8 @@
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"
+#include "isobrick/core/shell_word.h"
+#include "isobrick/meshes/mesh_name.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
 #include "isobrick/volumes/volume_format.h"
@@ -58,6 +60,12 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
   VolumeRequest request;
   const std::string input = input_.string();
   if (is_zarr(input)) return open_store_source(input, request, options_.threads);
+  if (has_mesh_name(input_)) {
+    fs::path picture = input_;
+    throw Error(fmt::format("'{}' is a mesh, no volume; draw it: isobrick render {} -o {}", input,
+                            shell_word(input),
+                            shell_word(picture.replace_extension(".png").string())));
+  }
   request.memory = options_.memory;
   // A folder of slices has no format of its own.
   if (fs::is_regular_file(input_) && recognise_format(input) == VolumeFormat::vdb)

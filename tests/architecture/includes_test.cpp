@@ -28,7 +28,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"render", {"core", "io", "meshes", "surface/mesh.h"}},
     {"viewer", {"core", "volumes", "bricks", "index", "surface", "stream", "gpu", "pipeline"}},
     {"window",
-     {"core", "io", "volumes", "bricks", "index", "stream", "gpu", "pipeline", "render", "viewer"}},
+     {"core", "io", "meshes", "volumes", "bricks", "index", "stream", "gpu", "pipeline", "render",
+      "viewer"}},
 };
 
 fs::path library() { return fs::path(ISOBRICK_SOURCE_DIR) / "isobrick"; }

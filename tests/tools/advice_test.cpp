@@ -51,6 +51,20 @@ TEST_F(Advice, SaysWhatTheFileIs) {
   refused("slices", {"a folder that holds Zarr", "name that, such as " + store});
 }
 
+TEST_F(Advice, OfTheViewerIsThatOfInfo) {
+  if (run({"help", "view"}).out.find("not in this program") != std::string::npos)
+    GTEST_SKIP() << "built without pictures";
+  write_file(path("scan.raw"), "abc");
+  write_file(path("smoke.vdb"), std::string(" BDV\0\0\0\0", 8));
+  for (const std::string name : {"scan.raw", "smoke.vdb", "no.zarr"}) {
+    const std::string told = run({"info", path(name)}).err;
+    const std::string expected = "isobrick view" + told.substr(told.find(':'));
+    EXPECT_EQ(run({"view", path(name)}).err, expected);
+    EXPECT_EQ(run({"view", path(name), "--screenshot", path("a.png")}).err, expected);
+  }
+  expect_refused(run({"view", "--screenshot", path("a.png")}), 2, {"STORE is required"});
+}
+
 TEST_F(Advice, OfRangesThatAreMissing) {
   const std::string store = make_store("a");
   // Without its attributes it is an image of another program.

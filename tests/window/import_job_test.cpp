@@ -60,6 +60,16 @@ TEST(ImportJob, SaysHowRawFilesAreNamed) {
   EXPECT_TRUE(contains(finished(job).failure, "256x256x128_uint8.raw"));
 }
 
+TEST(ImportJob, NamesAMeshAsOne) {
+  const TempDir dir;
+  dir.write("head.STL", ramp(1000));
+  const ImportJob job(dir / "head.STL", dir / "head.zarr", {});
+  const std::string failure = finished(job).failure;
+  EXPECT_TRUE(contains(failure, "head.STL' is a mesh")) << failure;
+  EXPECT_TRUE(contains(failure, "isobrick render ")) << failure;
+  EXPECT_EQ(dir.list(), std::vector<std::string>{"head.STL"});
+}
+
 /// A folder of slices is opened as one, whatever it holds.
 TEST(ImportJob, TakesFolders) {
   const TempDir dir;

@@ -77,6 +77,12 @@ TEST_F(WindowEnd, TheProgramEndsOfASignal) {
       "--size",  "320x240", "--no-occlusion"};
   EXPECT_EQ(test::run_process(words, {.interrupt_after = 2}).signal, SIGINT);
 }
+
+TEST_F(WindowEnd, WithoutAStoreTheProgramWaitsForOne) {
+  const test::Arguments words{"timeout", "-s", "KILL", "30", ISOBRICK_PROGRAM, "view"};
+  const test::Outcome outcome = test::run_process(words, {.interrupt_after = 2});
+  EXPECT_EQ(outcome.signal, SIGINT) << outcome.err;
+}
 #endif
 
 }  // namespace
