@@ -10,14 +10,13 @@
 #include "isobrick/core/error.h"
 #include "isobrick/io/exchange.h"
 #include "isobrick/pipeline/level_scan.h"
+#include "isobrick/pipeline/program_memory.h"
 
 namespace isobrick {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Program, libraries, shard indices and stacks.
-constexpr std::uint64_t kProgramBytes = std::uint64_t{96} << 20;
 constexpr std::uint64_t kEnoughForAPiece = std::uint64_t{256} << 20;
 
 fs::path partial(fs::path folder) {
@@ -35,17 +34,23 @@ void for_each_range_folder(const StoreInfo& info, F&& f) {
 }
 
 /// Bytes for the samples of a piece: what the budget leaves.
-std::uint64_t piece_bytes(const Lattice& lattice, std::uint64_t memory, int threads) {
+/// `others` go for what decoding takes beyond bricks; the caller has taken them off.
+std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uint64_t others,
+                          int threads) {
+  const Lattice& lattice = level.lattice;
   const std::uint64_t brick = lattice.brick_bytes();
   // A brick being decoded: itself and its encoded bytes, once a thread.
-  const std::uint64_t fixed = kProgramBytes + static_cast<std::uint64_t>(threads) * brick * 9 / 4 +
+  const std::uint64_t fixed = kProgramBytes + level.index_bytes +
+                              static_cast<std::uint64_t>(threads) * brick * 9 / 4 +
                               level_ranges_bytes(lattice, lattice.brick.z) +
                               level_ranges_bytes(lattice, StoreReader::kRangeChunk * kBlockEdge);
   if (memory < fixed + brick)
     throw UsageError(fmt::format(
-        "a memory budget of {} bytes is too small: computing the ranges needs at least {} bytes "
-        "(--memory {}M)",
-        memory, fixed + brick, ((fixed + brick) >> 20) + 1));
+        "a memory budget of {:.1f} MiB is too small: computing the ranges needs at least --memory "
+        "{}M, {:.1f} MiB of it for the program and its libraries, the rest for bricks of {} × {} × "
+        "{} samples, decoded on {} threads, and their ranges",
+        in_mib(memory + others), mib_above(fixed + brick + others), in_mib(kProgramBytes),
+        lattice.brick.x, lattice.brick.y, lattice.brick.z, threads));
   return std::min(memory - fixed, kEnoughForAPiece);
 }
 
@@ -73,9 +78,10 @@ void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publ
 void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Progress& progress) {
   const StoreInfo& info = store.info();
   const auto levels = static_cast<int>(info.levels.size());
+  const std::uint64_t others = decode_extra(info, threads);
   std::uint64_t total = 0;
   for (const LevelInfo& level : info.levels) {
-    piece_bytes(level.lattice, memory, threads);
+    piece_bytes(level, memory, others, threads);
     total +=
         static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
@@ -89,7 +95,7 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
   AddedRanges added{.may_have_nan = false, .image_crc32c = info.metadata_crc32c, .levels = {}};
   for (int level = 0; level < levels; ++level)
     write_ranges(store, level,
-                 piece_bytes(info.levels[static_cast<std::size_t>(level)].lattice, memory, threads),
+                 piece_bytes(info.levels[static_cast<std::size_t>(level)], memory, others, threads),
                  publisher, progress, added);
   publisher.wait();
   progress.end();

@@ -8,6 +8,7 @@
 #include "isobrick/bricks/codec.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/downsample.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/range_scan.h"
 #include "isobrick/pipeline/slab_piece.h"
 
@@ -15,8 +16,6 @@ namespace isobrick {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
-/// Program, libraries and stacks.
-constexpr std::size_t kProgramBytes = 24 * kMiB;
 /// What a reader takes.
 constexpr int kMaxLevels = 64;
 
@@ -141,9 +140,10 @@ ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int th
   const std::size_t least = encoding_bytes() + samples;
   if (memory < least)
     throw UsageError(
-        fmt::format("a memory budget of {} MiB is too small: bricks of {}³ samples need {} MiB at "
-                    "least",
-                    memory / kMiB, lattice.brick.x, least / kMiB + 1));
+        fmt::format("a memory budget of {:.1f} MiB is too small: bricks of {}³ samples need "
+                    "--memory {}M at least, {} MiB of it for the program and its libraries, the "
+                    "rest for a layer of bricks, its ranges and encoding them",
+                    in_mib(memory), lattice.brick.x, mib_above(least), kProgramBytes / kMiB));
   room_ = static_cast<std::size_t>(memory) - encoding_bytes();
 }
 

@@ -17,13 +17,12 @@
 #include "isobrick/pipeline/brick_output.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/in_order.h"
+#include "isobrick/pipeline/program_memory.h"
 
 namespace isobrick {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
-/// Program, libraries and stacks.
-constexpr std::size_t kProgramBytes = 24 * kMiB;
 /// Bricks that one brick of the next level is made of, at most.
 constexpr std::size_t kChildren = 8;
 /// What is kept of each brick while it waits: its place, its parent's, and its shard's.

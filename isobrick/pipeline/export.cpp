@@ -13,6 +13,7 @@
 #include "isobrick/io/output_file.h"
 #include "isobrick/io/output_guard.h"
 #include "isobrick/pipeline/export_level_set.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/slab_file.h"
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
@@ -27,8 +28,6 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "raw files are written as they are");
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
-/// Program, libraries and stacks.
-constexpr std::size_t kProgramBytes = 40 * kMiB;
 /// Larger pieces are no faster.
 constexpr std::size_t kPieceBytes = 256 * kMiB;
 
@@ -58,8 +57,10 @@ Int3 piece_within(const Lattice& lattice, Int3 extent, std::uint64_t memory, std
   const std::uint64_t least = fixed + lattice.brick_bytes();
   if (memory < least)
     throw UsageError(
-        fmt::format("a memory budget of {} MiB is too small: {} MiB are needed at least",
-                    memory / kMiB, least / kMiB + 1));
+        fmt::format("a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {} "
+                    "MiB of it for the program and its libraries, the rest for bricks and for "
+                    "decoding them on all threads",
+                    in_mib(memory), mib_above(least), kProgramBytes / kMiB));
   const std::size_t room = std::min(static_cast<std::size_t>(memory - fixed), kPieceBytes);
   return largest_piece(extent, lattice.brick, room / lattice.sample_bytes());
 }

@@ -9,14 +9,15 @@
 #include "isobrick/bricks/level_set.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/gpu_backend.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/stream/brick_slots.h"
 #include "isobrick/stream/tile_stream.h"
 
 namespace isobrick {
 namespace {
 
-/// The program, its libraries and one range chunk.
-constexpr std::uint64_t kBase = std::uint64_t{48} << 20;
+/// The ranges of bricks that are compared with decoded ones, and one chunk being read.
+constexpr std::uint64_t kRanges = std::uint64_t{6} << 20;
 /// A brick being read: its encoded bytes, in the worst case a little more than
 /// the decoded ones, and the codec's own window, once a thread.
 constexpr std::uint64_t kDecoder = std::uint64_t{2} << 20;
@@ -53,9 +54,20 @@ constexpr std::uint64_t kCudaDriver = std::uint64_t{128} << 20;
 /// What every extraction takes besides its surface and its bricks.
 std::uint64_t fixed_bytes(const ExtractRequest& request) {
   const Lattice& lattice = request.level->lattice;
-  return kBase + request.level->index_bytes + BrickSlots::bytes(lattice) +
+  return kProgramBytes + kRanges + request.level->index_bytes + BrickSlots::bytes(lattice) +
          static_cast<std::uint64_t>(request.threads) * (kDecoder + lattice.brick_bytes()) +
          request.search_memory;
+}
+
+[[noreturn]] void refuse_budget(const ExtractRequest& request, std::uint64_t budget,
+                                std::uint64_t least, std::uint64_t output) {
+  const std::uint64_t decoding = fixed_bytes(request) - kProgramBytes;
+  throw UsageError(fmt::format(
+      "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {:.1f} MiB of "
+      "it for the program and its libraries, {:.1f} for decoding on {} threads, {:.1f} for the "
+      "output, the rest for bricks and the triangles of a tile",
+      in_mib(budget), mib_above(least), in_mib(kProgramBytes), in_mib(decoding), request.threads,
+      in_mib(output)));
 }
 
 /// Bricks that a cache can use: neighbours come on top of the active ones.
@@ -114,10 +126,7 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
 
   const std::uint64_t fixed = fixed_bytes(request) + boundary_bytes(lattice, drop) + other_bytes;
   const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
-  if (budget < least)
-    throw UsageError(fmt::format(
-        "a memory budget of {} bytes is too small: this needs at least {} bytes (--memory {}M)",
-        budget, least, (least >> 20) + 1));
+  if (budget < least) refuse_budget(request, budget, least, other_bytes);
 
   ExtractPlan plan;
   const std::uint64_t spare = budget - least;

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/slab_reader.h"
 
 namespace isobrick {
@@ -23,8 +24,6 @@ int choose_level(const StoreInfo& info) {
       found - info.levels.begin(), static_cast<std::ptrdiff_t>(info.levels.size()) - 1));
 }
 
-/// Program, libraries and stacks.
-constexpr std::uint64_t kProgramBytes = std::uint64_t{40} << 20;
 /// Chunk files that are looked for: seconds.
 constexpr Index kMaxLookups = Index{1} << 20;
 

@@ -19,6 +19,7 @@
 #include "isobrick/io/output_folder.h"
 #include "isobrick/pipeline/add_ranges.h"
 #include "isobrick/pipeline/index_chunk_builder.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/workers.h"
 
 namespace isobrick {
@@ -199,7 +200,7 @@ IndexReport build_all(const fs::path& path, const IndexOptions& given, int threa
   // What decoding takes beyond bricks is nobody else's.
   IndexOptions options = given;
   options.memory -= std::min(options.memory, decode_extra(store->info(), threads));
-  check_index_options(options, store->info().levels.front().lattice);
+  check_index_options(given, store->info().levels.front().lattice, given.memory - options.memory);
   const UniqueFd lock = lock_store(path);
   const auto level_count = static_cast<int>(store->info().levels.size());
   for (int level = 0; level < level_count; ++level) LevelIndex(*store, level, options).check();
@@ -226,19 +227,22 @@ IndexReport build_all(const fs::path& path, const IndexOptions& given, int threa
 
 }  // namespace
 
-void check_index_options(const IndexOptions& options, const Lattice& lattice) {
+void check_index_options(const IndexOptions& options, const Lattice& lattice,
+                         std::uint64_t others) {
   if (options.kind == IndexKind::linear)
     throw UsageError("a linear scan needs no index: that is what a store's ranges are for");
   if (!is_leaf(options.leaf))
     throw UsageError(
         fmt::format("a leaf has 1, 2, 4, 8 or 16 cells along an edge, not {}", options.leaf));
   const int threads = Workers(options.threads).threads();
-  const std::uint64_t least = IndexChunkBuilder::least_memory(lattice, options.leaf, threads);
+  const std::uint64_t least =
+      others + IndexChunkBuilder::least_memory(lattice, options.leaf, threads);
   if (options.memory < least)
     throw UsageError(fmt::format(
-        "a memory budget of {} bytes is too small: an index with leaf {} needs at least {} bytes "
-        "(--memory {}M)",
-        options.memory, options.leaf, least, (least >> 20) + 1));
+        "a memory budget of {:.1f} MiB is too small: an index with leaf {} needs --memory {}M at "
+        "least, {} MiB of it for the program and its libraries, the rest for {} threads that read "
+        "and build",
+        in_mib(options.memory), options.leaf, mib_above(least), kProgramBytes >> 20, threads));
 }
 
 IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& progress) {

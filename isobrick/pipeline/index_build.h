@@ -36,7 +36,8 @@ struct IndexReport {
 
 /// Throws UsageError for a kind or leaf that stores cannot have, and for a budget
 /// that is too small for such an index of `lattice`, naming the least that does.
-void check_index_options(const IndexOptions& options, const Lattice& lattice);
+void check_index_options(const IndexOptions& options, const Lattice& lattice,
+                         std::uint64_t others = 0);
 
 /// Adds an index of all levels to a store, that of another program too: ranges
 /// that it lacks are computed first, and with `force` those of an image of others

@@ -11,6 +11,7 @@
 #include "isobrick/core/morton.h"
 #include "isobrick/index/leaf_ranges.h"
 #include "isobrick/index/span_index.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/slab_reader.h"
 
 namespace isobrick {
@@ -18,8 +19,6 @@ namespace {
 
 constexpr Index kEdge = IndexLayout::kBrick;
 constexpr Index kBrickBlocks = kEdge / kBlockEdge;
-/// Program, libraries, a chunk of ranges and stacks.
-constexpr std::uint64_t kProgramBytes = std::uint64_t{40} << 20;
 
 /// The samples of a cube of so many index bricks along each edge, with the layer
 /// of their upper neighbours.
