@@ -1,5 +1,7 @@
 #include "isobrick/window/import_job.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,6 +13,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"
 #include "isobrick/core/shell_word.h"
+#include "isobrick/io/file.h"
 #include "isobrick/meshes/mesh_name.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
@@ -26,6 +29,7 @@ class ImportJob::Reporter final : public Progress {
   explicit Reporter(ImportJob& job) : job_(job) {}
 
   void begin(std::string_view stage, std::uint64_t total) override {
+    job_.begun_ = true;
     check();
     const std::scoped_lock lock(job_.mutex_);
     job_.state_.stage = stage;
@@ -79,6 +83,16 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
   return open_source(input, request);
 }
 
+/// A conversion keeps what it has so that it can be resumed; a cancelled drop is not. What another
+/// process has taken over meanwhile, and so has locked, stays.
+void ImportJob::discard() const {
+  const fs::path partial = store_.string() + ".partial";
+  const UniqueFd folder(::open(partial.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+  if (folder.get() < 0 || ::flock(folder.get(), LOCK_EX | LOCK_NB) != 0) return;
+  std::error_code ignored;
+  fs::remove_all(partial, ignored);
+}
+
 void ImportJob::run() {
   std::string failure;
   bool cancelled = false;
@@ -91,9 +105,7 @@ void ImportJob::run() {
   } catch (const std::exception& e) {
     failure = what_of(e);
   }
-  // A conversion keeps what it has so that it can be resumed; a cancelled drop is not.
-  std::error_code ignored;
-  if (cancelled || !failure.empty()) fs::remove_all(store_.string() + ".partial", ignored);
+  if (begun_ && (cancelled || !failure.empty())) discard();
   const std::scoped_lock lock(mutex_);
   state_.finished = true;
   state_.cancelled = cancelled;

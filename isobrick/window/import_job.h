@@ -41,6 +41,7 @@ class ImportJob {
  private:
   class Reporter;
   void run();
+  void discard() const;
   std::unique_ptr<VolumeSource> open();
 
   std::filesystem::path input_, store_;
@@ -48,6 +49,7 @@ class ImportJob {
   mutable std::mutex mutex_;
   State state_;
   std::atomic<bool> cancel_ = false;
+  bool begun_ = false;  ///< the conversion has a folder of its own; of the thread
   std::thread thread_;  ///< last: it uses the others
 };
 

@@ -1,12 +1,15 @@
 #include "isobrick/window/import_job.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 
 #include <chrono>
 #include <filesystem>
 #include <thread>
 
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/io/file.h"
 #include "isobrick/volumes/open_source.h"
 #include "tests/io/temp_dir.h"
 
@@ -51,6 +54,24 @@ TEST(ImportJob, LeavesNothingWhenItIsCancelled) {
     while (job.state().done == 0 && !job.state().finished) std::this_thread::yield();
   }
   EXPECT_EQ(dir.list().size(), 1u);
+}
+
+/// Another process may begin to write the same store after its name was chosen.
+TEST(ImportJob, LeavesWhatAnotherConversionHas) {
+  const TempDir dir;
+  dir.write("ramp_40x30x20_uint8.raw", ramp(40 * 30 * 20));
+  const std::string partial = dir / "ramp.zarr.partial";
+  std::filesystem::create_directory(partial);
+  dir.write("ramp.zarr.partial/.isobrick-layout.json", "{}");
+  for (const bool held : {true, false}) {
+    const UniqueFd folder(::open(partial.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    ASSERT_EQ(::flock(folder.get(), held ? LOCK_EX | LOCK_NB : LOCK_UN), 0);
+    const ImportJob job(dir / "ramp_40x30x20_uint8.raw", dir / "ramp.zarr", {});
+    const std::string failure = finished(job).failure;
+    EXPECT_EQ(contains(failure, "another conversion is writing"), held) << failure;
+    EXPECT_FALSE(failure.empty());
+    EXPECT_TRUE(std::filesystem::exists(partial + "/.isobrick-layout.json"));
+  }
 }
 
 TEST(ImportJob, SaysHowRawFilesAreNamed) {
