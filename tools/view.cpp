@@ -2,6 +2,7 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -19,6 +20,7 @@
 #include "tools/open_store.h"
 #include "tools/output_name.h"
 #include "tools/picture_options.h"
+#include "tools/store_region.h"
 
 namespace isobrick::tools {
 namespace {
@@ -30,9 +32,25 @@ struct Arguments {
   ViewSettings settings;
   int frames = 120;
   bool plain = false, force = false;
+  Selection selection;
+  std::optional<RoiText> roi;
   PictureBudgets budgets;
   IndexKind index = IndexKind::linear;
 };
+
+/// Shows only --roi, which counts the samples of level 0.
+void set_region(const StoreReader& store, const Arguments& arguments, ViewSettings& settings) {
+  if (!arguments.roi) return;
+  const Box3 box = store_region(store, 0, arguments.roi);
+  const Vec3d last = last_sample(store);
+  settings.region_on = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(last[axis] > 0)) continue;
+    settings.region_lo[axis] = static_cast<float>(static_cast<double>(box.lo[axis]) / last[axis]);
+    settings.region_hi[axis] =
+        static_cast<float>(static_cast<double>(box.hi[axis] - 1) / last[axis]);
+  }
+}
 
 ViewSettings settings_of(const Arguments& arguments) {
   ViewSettings settings = arguments.settings;
@@ -108,7 +126,7 @@ Drawn draw_shots(StorePicture& picture, const std::vector<Shot>& shots, PictureS
 /// Draws into files.
 int draw(const Arguments& arguments, Console& console) {
   check_store(arguments.store);
-  const auto store = std::make_shared<const StoreReader>(arguments.store);
+  const auto store = std::make_shared<const StoreReader>(arguments.store, arguments.selection);
   const GlContext context;
   StorePicture picture(store, arguments.budgets, {});
   const WorldBox box = picture.bounds();
@@ -122,6 +140,7 @@ int draw(const Arguments& arguments, Console& console) {
   if (const std::string refused = search.state().refused; !refused.empty())
     console.note(refused + ": a linear scan is used");
   ViewSettings settings = settings_of(arguments);
+  set_region(*store, arguments, settings);
   choose_values(settings, picture.scene().tree());
   const Drawn drawn = draw_shots(picture, shots, arguments.picture.size, settings, arguments.force,
                                  console.progress());
@@ -164,8 +183,6 @@ int run(const Arguments& arguments, Console& console) {
       throw UsageError("STORE is required to draw into files; see 'isobrick view --help'");
     return draw(arguments, console);
   }
-  // A store that cannot be opened is reported before anything about windows.
-  if (!arguments.store.empty()) static_cast<void>(open_store(arguments.store));
   WindowOptions options;
   options.width = arguments.picture.size.width;
   options.height = arguments.picture.size.height;
@@ -174,9 +191,12 @@ int run(const Arguments& arguments, Console& console) {
   options.camera = arguments.picture.camera;
   options.settings = settings_of(arguments);
   set_interrupt_note([] { return "the window is closed"; });
+  // A store that cannot be opened is reported before anything about windows.
+  if (!arguments.store.empty())
+    set_region(open_store(arguments.store, arguments.selection), arguments, options.settings);
   {
     ViewerWindow window(options);
-    if (!arguments.store.empty()) window.open(arguments.store);
+    if (!arguments.store.empty()) window.open(arguments.store, arguments.selection);
     window.run();
   }  // a conversion that still ran has left nothing
   if (const int signal = interrupting_signal(); signal != 0) throw Interrupted(signal);
@@ -236,6 +256,10 @@ void add_view(Program& program) {
                [&values = arguments->isovalues](const std::string& text) {
                  values.push_back(parse_number(text));
                });
+  add_selection(app, arguments->selection);
+  add_parsed(app, arguments->roi, parse_roi,
+             {"--roi", "X0:X1,Y0:Y1,Z0:Z1",
+              "Show only these samples of level 0, half-open; parts may be left out"});
   add_picture_options(app, arguments->picture, "surface");
   add_inside(app, arguments->budgets.inside);
   add_what_to_draw(app, *arguments);

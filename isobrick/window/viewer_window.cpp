@@ -135,10 +135,10 @@ double ViewerWindow::aspect() const {
   return static_cast<double>(area.width) / area.height;
 }
 
-void ViewerWindow::open(const std::filesystem::path& path) {
+void ViewerWindow::open(const std::filesystem::path& path, const Selection& selection) {
   if (state_.picture == nullptr)
     show_notice(fmt::format("Opening '{}' …", path.filename().string()));
-  auto store = std::make_shared<const StoreReader>(path);
+  auto store = std::make_shared<const StoreReader>(path, selection);
   auto facts = std::make_unique<IsovalueFacts>(store);
   // Last: once it is made, that of the store before has gone from the renderer.
   auto picture =
@@ -176,6 +176,7 @@ void ViewerWindow::open(const std::filesystem::path& path) {
   // The next store is seen whole and with its own isovalue.
   options_.camera = {};
   options_.settings.surfaces.clear();
+  options_.settings.region_on = false;
   changed_ = true;
 }
 

@@ -35,8 +35,9 @@ class ViewerWindow {
   ViewerWindow(const ViewerWindow&) = delete;
   ViewerWindow& operator=(const ViewerWindow&) = delete;
 
-  /// Shows a store. Throws what opening it throws; what was shown before stays then.
-  void open(const std::filesystem::path& store);
+  /// Shows a store, or the chosen volume of an image with channels or times. Throws what opening it
+  /// throws; what was shown before stays then.
+  void open(const std::filesystem::path& store, const Selection& selection = {});
   /// Shows a store, or converts another format and shows that; failures are shown.
   void drop(const std::filesystem::path& path);
 

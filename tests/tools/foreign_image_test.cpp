@@ -62,6 +62,26 @@ class ForeignImage : public ProgramTest {
   }
 };
 
+TEST_F(ForeignImage, ViewShowsTheChannelAndTheRegionThatAreChosen) {
+  if (run({"help", "view"}).out.find("not in this program") != std::string::npos)
+    GTEST_SKIP() << "built without pictures";
+  const std::string image = write_image();
+  expect_refused(run({"view", image, "--screenshot", path("a.png")}), 2, {"--channel"});
+  ASSERT_EQ(run({"index", image, "--channel", "1"}).exit_code, 0);
+  const auto triangles = [&](const std::string& name, const Arguments& more) {
+    Arguments arguments{"view",   image,     "--channel",    "1",       "--isovalue", "5",
+                        "--size", "160x120", "--screenshot", path(name)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_json(arguments)["most_triangles"].get<int>();
+  };
+  EXPECT_GT(triangles("whole.png", {"--pixel-error", "0.1"}), 100);
+  triangles("half.png", {"--pixel-error", "0.1", "--roi", "0:6,:,:"});
+  EXPECT_NE(read_file(path("half.png")), read_file(path("whole.png")));
+  expect_refused(
+      run({"view", image, "--channel", "1", "--roi", "0:13,:,:", "--screenshot", path("b.png")}), 2,
+      {"13"});
+}
+
 TEST_F(ForeignImage, InfoListsChannelsInsteadOfRefusing) {
   const std::string image = write_image();
   const Outcome outcome = run({"info", image});
