@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -22,7 +25,43 @@ struct Header {
   ScalarType type = ScalarType::u8;
   Transform transform;
   bool text = false;
+  bool fractions = false;  ///< the text holds u8 as fractions of 255
   std::uint64_t begin = 0;
+};
+
+/// Samples of u8 from a text of fractions of 255, as COLOR_SCALARS has them.
+class FractionStream final : public ByteStream {
+ public:
+  explicit FractionStream(std::unique_ptr<ByteStream> text)
+      : numbers_(make_text_stream(std::move(text), ScalarType::f32)) {}
+
+  std::size_t read(std::byte* out, std::size_t size) override {
+    std::size_t done = 0;
+    while (done < size) {
+      std::array<float, 1024> part;
+      const std::size_t wanted = std::min(size - done, part.size());
+      const std::size_t got =
+          numbers_->read(reinterpret_cast<std::byte*>(part.data()), wanted * sizeof(float)) /
+          sizeof(float);
+      for (std::size_t i = 0; i < got; ++i) out[done++] = byte_of(part[i]);
+      if (got < wanted) break;
+    }
+    return done;
+  }
+
+  std::string name() const override { return numbers_->name(); }
+  std::uint64_t most_bytes() const override { return numbers_->most_bytes() / sizeof(float); }
+  std::size_t memory() const override { return numbers_->memory(); }
+
+ private:
+  std::byte byte_of(float fraction) const {
+    if (!(fraction >= 0 && fraction <= 1))
+      throw Error(fmt::format("{}: the fraction {} among its COLOR_SCALARS is not from 0 to 1",
+                              name(), fraction));
+    return static_cast<std::byte>(std::lround(fraction * 255));
+  }
+
+  std::unique_ptr<ByteStream> numbers_;
 };
 
 ScalarType read_type(const std::string& path, const std::string& name) {
@@ -81,8 +120,7 @@ class Parser {
     } else if (tuples_ && key == "scalars") {
       take_scalars(words);
     } else if (tuples_ && key == "color_scalars") {
-      if (header_.text)
-        header_error(path_, "COLOR_SCALARS as text, which are fractions, are not supported");
+      header_.fractions = header_.text;
       header_.type = ScalarType::u8;
       components_ = parse_integer(path_, key, word(words, 2));
       found_ = true;
@@ -161,8 +199,9 @@ std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path, const Vol
   if (header.text) {
     const std::uint64_t total = static_cast<std::uint64_t>(header.view.total) * sample;
     auto text = make_file_stream(std::move(file), path, header.begin, size);
-    return make_stream_source(std::move(layout), make_text_stream(std::move(text), header.type),
-                              total, AfterEnd::unread);
+    auto samples = header.fractions ? std::make_unique<FractionStream>(std::move(text))
+                                    : make_text_stream(std::move(text), header.type);
+    return make_stream_source(std::move(layout), std::move(samples), total, AfterEnd::unread);
   }
   layout.offset += header.begin;
   layout.swap = sample > 1 && kNativeOrder != ByteOrder::big;

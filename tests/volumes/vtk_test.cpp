@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstdio>
 
 #include "damaged_files.h"
 #include "isobrick/volumes/open_source.h"
@@ -216,6 +217,27 @@ TEST_F(Vtk, Legacy) {
   std::string field = kLegacy;
   field.replace(field.find("SCALARS"), std::string::npos, "FIELD f 1\ns 1 140 short\n");
   EXPECT_EQ(read_box(*open(field + samples(true)), kWhole), samples());
+}
+
+TEST_F(Vtk, LegacyColoursAsTextAreFractionsOf255) {
+  const std::string header =
+      "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 8\n"
+      "POINT_DATA 2048\nCOLOR_SCALARS c 1\n";
+  std::string text, bytes;
+  for (int i = 0; i < 2048; ++i) {
+    char word[32];
+    std::snprintf(word, sizeof(word), "%g ",
+                  static_cast<double>(static_cast<float>(i % 256) / 255.0f));
+    text += word;
+    bytes += static_cast<char>(i % 256);
+  }
+  const auto source = open(header + text);
+  EXPECT_EQ(source->info().type, ScalarType::u8);
+  EXPECT_EQ(read_box(*source, {{0, 0, 0}, {16, 16, 8}}), bytes);
+  EXPECT_TRUE(contains(refuse(header + "1.5 " + text), "not from 0 to 1"));
+  EXPECT_TRUE(contains(refuse(header + "-0.5 " + text), "not from 0 to 1"));
+  EXPECT_TRUE(contains(refuse(header + "nan " + text), "not from 0 to 1"));
+  refuse(header + "0.5 0.25");
 }
 
 TEST_F(Vtk, HostileLegacyFiles) {
