@@ -219,6 +219,8 @@ std::uint64_t read_offset(const std::string& path, const Numbers& n, const Versi
 
 bool is_nifti(std::span<const std::byte> head) { return find_version(head).number != 0; }
 
+bool is_nifti_pair(std::span<const std::byte> head) { return find_version(head).detached; }
+
 NiftiHeader parse_nifti_header(const std::string& path, std::span<const std::byte> head,
                                const Selection& selection) {
   const Version version = find_version(head);

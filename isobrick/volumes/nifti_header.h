@@ -28,6 +28,9 @@ inline constexpr std::size_t kNiftiHeaderBytes = 540;
 /// Whether a file that begins so is NIfTI-1 or NIfTI-2, of either byte order.
 bool is_nifti(std::span<const std::byte> head);
 
+/// Whether it is the header of a pair, whose samples lie in another file.
+bool is_nifti_pair(std::span<const std::byte> head);
+
 /// Parses a header and selects one volume where there are several. `path` is for
 /// messages. Throws UsageError.
 NiftiHeader parse_nifti_header(const std::string& path, std::span<const std::byte> head,

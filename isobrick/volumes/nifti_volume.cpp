@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cctype>
 #include <filesystem>
 #include <utility>
 
@@ -12,6 +13,7 @@
 #include "isobrick/volumes/nifti_header.h"
 #include "isobrick/volumes/raw_source.h"
 #include "isobrick/volumes/stream_source.h"
+#include "isobrick/volumes/text_header.h"
 
 namespace isobrick {
 namespace {
@@ -25,18 +27,23 @@ std::unique_ptr<ByteStream> open_stream(const std::string& path, bool packed) {
   return packed ? make_inflate_stream(std::move(stream), Wrapper::gzip) : std::move(stream);
 }
 
-/// Where the samples of a header's file lie: beside it, under the name of an image.
-std::string image_path(const std::string& path) {
-  const fs::path header(path);
-  const bool packed = header.extension() == ".gz";
-  fs::path image = packed ? header.stem() : header.filename();
-  image.replace_extension(image.extension() == ".HDR" ? ".IMG" : ".img");
-  image = header.parent_path() / image;
+/// The other file of a pair: beside `path`, with the extension `lower`, or `upper` where
+/// that of `path` is in capitals; compressed or not.
+std::string path_beside(const fs::path& path, const char* lower, const char* upper) {
+  const bool packed = path.extension() == ".gz";
+  fs::path image = packed ? path.stem() : path.filename();
+  const std::string own = image.extension().string();
+  image.replace_extension(
+      own.size() > 1 && std::isupper(static_cast<unsigned char>(own[1])) != 0 ? upper : lower);
+  image = path.parent_path() / image;
   fs::path other = image;
   (packed ? image : other) += ".gz";
   std::error_code ignored;
   return (fs::exists(image, ignored) || !fs::exists(other, ignored) ? image : other).string();
 }
+
+/// Where the samples of a header's file lie.
+std::string image_path(const std::string& path) { return path_beside(path, ".img", ".IMG"); }
 
 bool is_packed(const std::string& path) {
   const InputFile file = open_input(path);
@@ -45,7 +52,25 @@ bool is_packed(const std::string& path) {
   return magic == std::array{std::byte{0x1f}, std::byte{0x8b}};
 }
 
+/// Whether a file has the header of a pair.
+bool is_header_of_pair(const std::string& path) {
+  std::array<std::byte, kNiftiHeaderBytes> head;
+  try {
+    const std::size_t got = open_stream(path, is_packed(path))->read(head.data(), head.size());
+    return is_nifti_pair({head.data(), got});
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 }  // namespace
+
+std::string nifti_header_beside(const std::string& path) {
+  const std::string name = lower(path);
+  if (!name.ends_with(".img") && !name.ends_with(".img.gz")) return {};
+  const std::string header = path_beside(path, ".hdr", ".HDR");
+  return is_header_of_pair(header) ? header : std::string();
+}
 
 std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& said) {
   refuse_raw_description(path, "a NIfTI file", said);

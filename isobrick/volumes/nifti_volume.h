@@ -11,4 +11,8 @@ namespace isobrick {
 /// each also compressed as a whole (`.nii.gz`).
 std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& said);
 
+/// The header that lies beside an image of a pair ("head.hdr" for "head.img", either
+/// compressed or not); empty where the path is no such image's or no header lies there.
+std::string nifti_header_beside(const std::string& path);
+
 }  // namespace isobrick

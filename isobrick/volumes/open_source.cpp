@@ -46,6 +46,10 @@ std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeR
     refuse_grid(path, said);
     return open_raw(path, said);
   }
+  if (const std::string header = nifti_header_beside(path); !header.empty()) {
+    refuse_grid(path, said);
+    return open_nifti(header, said);
+  }
   const VolumeFormat format = recognise_format(file);
   if (format == VolumeFormat::nanovdb)
     throw UsageError(fmt::format(

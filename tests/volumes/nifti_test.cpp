@@ -122,6 +122,23 @@ TEST_F(Nifti, HeaderAndImageApart) {
   dir.write("w.hdr.gz", gzip(header));
   dir.write("w.img.gz", gzip(samples()));
   EXPECT_EQ(read_box(*open_source(dir / "w.hdr.gz", {}), kWhole), samples());
+  for (const char* image : {"v.img", "w.img.gz"}) {
+    const auto source = open_source(dir / image, {});
+    EXPECT_EQ(source->info().type, ScalarType::i16);
+    EXPECT_EQ(read_box(*source, kWhole), samples());
+  }
+}
+
+TEST_F(Nifti, ImagesOfNoPairAreRaw) {
+  VolumeRequest raw;
+  raw.extent = kExtent;
+  raw.type = ScalarType::i16;
+  dir.write("alone.img", samples());
+  EXPECT_EQ(read_box(*open_source(dir / "alone.img", raw), kWhole), samples());
+  dir.write("other.img", samples());
+  dir.write("other.hdr", "ENVI\n");
+  EXPECT_EQ(read_box(*open_source(dir / "other.img", raw), kWhole), samples());
+  EXPECT_THROW(open_source(dir / "other.img", {}), UsageError);
 }
 
 TEST_F(Nifti, ScaledValuesAreF32) {
