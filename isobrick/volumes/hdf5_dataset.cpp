@@ -13,6 +13,7 @@
 #include "isobrick/volumes/hdf5_chunks.h"
 #include "isobrick/volumes/hdf5_description.h"
 #include "isobrick/volumes/hdf5_library.h"
+#include "isobrick/volumes/hdf5_lzf.h"
 
 namespace isobrick {
 namespace {
@@ -131,6 +132,7 @@ std::optional<std::uint32_t> Hdf5Dataset::Handles::fetch_chunk(const std::vector
 
 void Hdf5Dataset::Handles::open(const std::string& name, int threads) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  register_hdf5_lzf();
   open_input(path);  // says better than the library why a file cannot be opened
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access, false, true);

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/printable.h"
+#include "isobrick/volumes/hdf5_lzf.h"
 #include "isobrick/volumes/text_header.h"
 
 namespace isobrick {
@@ -172,15 +174,15 @@ std::optional<Hdf5Encoding> read_hdf5_encoding(hid_t creation) {
   // Chunks at the border may be stored without filters; they are not marked.
   if (H5Pget_chunk_opts(creation, &options) < 0 || options != 0) return std::nullopt;
   Hdf5Encoding encoding;
+  bool compressed = false;
   for (int i = 0; i < H5Pget_nfilters(creation); ++i) {
     unsigned flags = 0, values[1] = {0};
     std::size_t count = 1;
     const H5Z_filter_t filter = H5Pget_filter2(creation, static_cast<unsigned>(i), &flags, &count,
                                                values, 0, nullptr, nullptr);
-    const auto& known = encoding.filters;
-    if (filter == H5Z_FILTER_DEFLATE &&
-        std::find(known.begin(), known.end(), Hdf5Filter::deflate) == known.end()) {
-      encoding.filters.push_back(Hdf5Filter::deflate);
+    if (filter == H5Z_FILTER_DEFLATE || filter == kHdf5LzfFilter) {
+      if (std::exchange(compressed, true)) return std::nullopt;
+      encoding.filters.push_back(filter == kHdf5LzfFilter ? Hdf5Filter::lzf : Hdf5Filter::deflate);
     } else if (filter == H5Z_FILTER_SHUFFLE && count > 0 && values[0] > 0) {
       if (encoding.element != 1 && encoding.element != values[0]) return std::nullopt;
       encoding.element = values[0];

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/volumes/hdf5_lzf.h"
 
 namespace isobrick {
 namespace {
@@ -68,6 +69,11 @@ void undo_deflate(Hdf5ChunkBuffers& buffers, std::size_t size) {
   std::swap(buffers.bytes, buffers.other);
 }
 
+void undo_lzf(Hdf5ChunkBuffers& buffers, std::size_t size) {
+  unpack_lzf({buffers.bytes.data(), buffers.bytes.size()}, size, buffers.other);
+  std::swap(buffers.bytes, buffers.other);
+}
+
 /// Byte b of all elements follows byte b - 1 of all; what is left over is as it was.
 template <std::size_t kElement>
 void unshuffle(const std::byte* from, std::size_t count, std::byte* to) {
@@ -93,7 +99,7 @@ void undo_shuffle(Hdf5ChunkBuffers& buffers, std::size_t element) {
   std::swap(buffers.bytes, buffers.other);
 }
 
-/// Bytes that a chunk had before filter `at` was applied, which is the deflate.
+/// Bytes that a chunk had before filter `at` was applied, which compresses.
 std::size_t size_before(const Hdf5Encoding& encoding, std::uint32_t skipped, std::size_t at) {
   std::size_t size = encoding.chunk_bytes;
   for (std::size_t i = 0; i < at; ++i)
@@ -114,6 +120,7 @@ void undo_filters(const Hdf5Encoding& encoding, std::uint32_t skipped, Hdf5Chunk
     if ((skipped >> i & 1) != 0) continue;
     switch (encoding.filters[i]) {
       case Hdf5Filter::deflate: undo_deflate(buffers, size_before(encoding, skipped, i)); break;
+      case Hdf5Filter::lzf: undo_lzf(buffers, size_before(encoding, skipped, i)); break;
       case Hdf5Filter::shuffle: undo_shuffle(buffers, encoding.element); break;
       case Hdf5Filter::fletcher32: undo_fletcher32(buffers.bytes); break;
     }

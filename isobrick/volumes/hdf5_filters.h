@@ -9,11 +9,11 @@
 namespace isobrick {
 
 /// The filters of HDF5 that are undone here, without libhdf5 and on any thread.
-enum class Hdf5Filter : std::uint8_t { deflate, shuffle, fletcher32 };
+enum class Hdf5Filter : std::uint8_t { deflate, lzf, shuffle, fletcher32 };
 
 /// How the samples of a chunk became bytes.
 struct Hdf5Encoding {
-  std::vector<Hdf5Filter> filters;  ///< in the order of writing; deflate at most once
+  std::vector<Hdf5Filter> filters;  ///< in the order of writing; one at most compresses
   std::size_t element = 1;          ///< bytes of what shuffle takes apart
   std::size_t chunk_bytes = 0;      ///< of a chunk's samples, at most kMostHdf5Chunk
 

@@ -194,14 +194,13 @@ std::string write_labelled(const std::string& path, const std::vector<const char
   const hid_t how = H5Pcreate(H5P_DATASET_CREATE);
   const hid_t space = H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr);
   if (chunk > 0) H5Pset_chunk(how, static_cast<int>(sizes.size()), chunks.data());
-  const hid_t data =
-      H5Dcreate2(file, "v", H5T_NATIVE_INT16, space, H5P_DEFAULT, how, H5P_DEFAULT);
+  const hid_t data = H5Dcreate2(file, "v", H5T_NATIVE_INT16, space, H5P_DEFAULT, how, H5P_DEFAULT);
   EXPECT_GE(H5Dwrite(data, H5T_NATIVE_INT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, turned.data()), 0);
   set_labels(data, labels);
   const hsize_t three = 3;
   const hid_t numbers = H5Screate_simple(1, &three, nullptr);
-  const hid_t attribute = H5Acreate2(data, "element_size_um", H5T_NATIVE_DOUBLE, numbers,
-                                     H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t attribute =
+      H5Acreate2(data, "element_size_um", H5T_NATIVE_DOUBLE, numbers, H5P_DEFAULT, H5P_DEFAULT);
   EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_DOUBLE, element.data()), 0);
   H5Aclose(attribute);
   H5Sclose(numbers);
@@ -275,6 +274,60 @@ TEST_F(Hdf5, ChunksThatSkippedAFilter) {
   const auto source = open_source(dir / "v.h5", {});
   const std::string read = read_box(*source, {{6, 5, 2}, {12, 10, 4}});
   EXPECT_EQ(read, std::string(chunk.begin(), chunk.end()));
+}
+
+/// h5py's filter: its own version, LibLZF's, and the bytes of a chunk.
+void set_lzf(hid_t how) {
+  const unsigned values[] = {4, 0x0105, 2 * 5 * 6};
+  // A filter that only reads, as the module's, would keep the dataset from being made.
+  if (H5Zfilter_avail(32000) > 0) H5Zunregister(32000);
+  H5Pset_filter(how, 32000, H5Z_FLAG_OPTIONAL, 3, values);
+}
+
+/// One chunk of 60 bytes as LibLZF packs it: four literals, then references that
+/// overlap what they write, with and without a byte for their length.
+const std::string kLzfChunk{
+    "\x03"
+    "abcd\x20\x03\xe0\x2c\x03",
+    10};
+const std::string kLzfSamples = [] {
+  std::string samples;
+  while (samples.size() < 60) samples += "abcd";
+  return samples;
+}();
+
+TEST_F(Hdf5, LzfOfH5py) {
+  const std::pair<std::uint32_t, std::function<void(hid_t)>> filters[] = {
+      {0, set_lzf},
+      {2,  // compressed twice, which is left to the library; deflate is skipped
+       [](hid_t how) {
+         set_lzf(how);
+         H5Pset_deflate(how, 6);
+       }}};
+  for (const auto& [skipped, set] : filters) {
+    create(dir / "v.h5", H5T_STD_U8LE, set, [&, mask = skipped](hid_t data) {
+      const hsize_t at[3] = {2, 5, 6};
+      ASSERT_GE(H5Dwrite_chunk(data, H5P_DEFAULT, mask, at, kLzfChunk.size(), kLzfChunk.data()), 0);
+    });
+    EXPECT_EQ(read_box(*open_source(dir / "v.h5", {}), {{6, 5, 2}, {12, 10, 4}}), kLzfSamples);
+  }
+}
+
+TEST_F(Hdf5, DamagedLzfIsNamed) {
+  std::vector<std::string> damaged{kLzfChunk + "\x01", kLzfChunk + std::string("\0x", 2),
+                                   std::string("\x20\x03", 2) + kLzfChunk};
+  for (std::size_t size = 1; size < kLzfChunk.size(); ++size)
+    damaged.push_back(kLzfChunk.substr(0, size));
+  for (const std::string& bytes : damaged) {
+    create(dir / "v.h5", H5T_STD_U8LE, set_lzf, [&](hid_t data) {
+      const hsize_t at[3] = {2, 5, 6};
+      ASSERT_GE(H5Dwrite_chunk(data, H5P_DEFAULT, 0, at, bytes.size(), bytes.data()), 0);
+    });
+    const auto source = open_source(dir / "v.h5", {});
+    const std::string message = message_of<DamageError>([&] { read_box(*source, kWhole); });
+    EXPECT_TRUE(contains(message, "the chunk at [2, 5, 6]")) << message;
+    EXPECT_TRUE(contains(message, "LZF")) << message;
+  }
 }
 
 TEST_F(Hdf5, DamagedChunksAreNamed) {
