@@ -13,6 +13,7 @@
 #include "tools/output_name.h"
 #include "tools/parse.h"
 #include "tools/store_region.h"
+#include "tools/value_range.h"
 
 namespace isobrick::tools {
 namespace {
@@ -74,6 +75,10 @@ int run(const Arguments& arguments, Console& console) {
     throw UsageError("--inside is a side of an isosurface: say its --isovalue, too");
   options.half_band = arguments.half_band.value_or(options.half_band);
   export_volume(store, arguments.out, options, console.progress());
+  if (options.isovalue)
+    if (const std::string why = why_out_of_range(store, options.level, *options.isovalue);
+        !why.empty())
+      console.note(why);
   const ScalarType type = store.info().type;
   const std::uint64_t bytes = is_standard_output(arguments.out)
                                   ? static_cast<std::uint64_t>(volume(box.extent())) * size_of(type)

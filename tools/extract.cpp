@@ -211,11 +211,7 @@ std::string why_empty(const ExtractOptions& options, const ExtractReport& report
                       const StoreReader& store) {
   const std::string empty = fmt::format("isovalue {}: the surface is empty", options.isovalue);
   if (report.degenerate_triangles > 0) return empty + ", all triangles are degenerate";
-  const ValueRange<double> range = value_range(store, options.level);
-  if (range.empty()) return empty + ", no sample is a number";
-  const ScalarType type = store.info().type;
-  return fmt::format("{}; the samples of level {} lie within {} and {}", empty, options.level,
-                     sample_text(range.lo, type), sample_text(range.hi, type));
+  return empty + "; " + range_text(store, options.level);
 }
 
 ExtractReport make(const ExtractedSurface& surface, const Sinks& sinks, const Arguments& arguments,
@@ -345,8 +341,8 @@ void add_extract(Program& program) {
   add_text(app,
            {"-o,--output", "MESH",
             "Mesh to write, .ply, .stl, .obj, .glb, .vtp or .pvtp; several isovalues make "
-             "head_500.ply and so on; - with --format obj for standard output (this, --preview "
-             "or --estimate is needed)"},
+            "head_500.ply and so on; - with --format obj for standard output (this, --preview "
+            "or --estimate is needed)"},
            [&output = arguments->output](const std::string& text) { output = text; });
   add_parsed(app, arguments->format, parse_mesh_format,
              {"--format", "ply|stl|obj|glb|vtp|pvtp", "Format of the mesh", "by its extension"});

@@ -14,4 +14,11 @@ ValueRange<double> value_range(const StoreReader& store, int level);
 /// The fewest digits that read back as this sample of a volume.
 std::string sample_text(double value, ScalarType type);
 
+/// "the samples of level 0 lie within 0 and 255", for an isovalue without a surface.
+std::string range_text(const StoreReader& store, int level);
+
+/// Why an isovalue has no surface; empty where samples lie on both its sides, or nobody knows
+/// because the level has no ranges.
+std::string why_out_of_range(const StoreReader& store, int level, double isovalue);
+
 }  // namespace isobrick::tools

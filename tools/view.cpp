@@ -21,6 +21,7 @@
 #include "tools/output_name.h"
 #include "tools/picture_options.h"
 #include "tools/store_region.h"
+#include "tools/value_range.h"
 
 namespace isobrick::tools {
 namespace {
@@ -145,6 +146,9 @@ int draw(const Arguments& arguments, Console& console) {
   const Drawn drawn = draw_shots(picture, shots, arguments.picture.size, settings, arguments.force,
                                  console.progress());
   for (const std::string& message : drawn.damage) console.note(message);
+  for (const SurfaceSettings& surface : settings.surfaces)
+    if (const std::string why = why_out_of_range(*store, 0, surface.isovalue); !why.empty())
+      console.note(why);
   if (drawn.limited_by_budget)
     console.note(
         "coarser than --pixel-error asks for: there is no room for more triangles; a larger "

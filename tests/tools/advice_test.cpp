@@ -89,12 +89,29 @@ TEST_F(Advice, OfAnIsovalueThatNoSampleReaches) {
   const std::string store = path("a.zarr");
   ASSERT_EQ(run({"convert", path("a_2x2x2_int16.raw"), store}).exit_code, 0);
   const nlohmann::json range = run_json({"info", store})["value_range"];
+  const std::string why =
+      "isovalue 40000: the surface is empty; the samples of level 0 lie within " +
+      std::to_string(range[0].get<int>()) + " and " + std::to_string(range[1].get<int>()) + "\n";
   const Outcome outcome = run({"extract", store, "--isovalue", "40000", "-o", path("a.ply")});
   EXPECT_EQ(outcome.exit_code, 0);
-  EXPECT_EQ(outcome.err,
-            "isovalue 40000: the surface is empty; the samples of level 0 lie within " +
-                std::to_string(range[0].get<int>()) + " and " +
-                std::to_string(range[1].get<int>()) + "\n");
+  EXPECT_EQ(outcome.err, why);
+  const Outcome level_set = run({"export", store, path("a.vdb"), "--isovalue", "40000"});
+  if (level_set.exit_code == 0) {  // else there is no OpenVDB
+    EXPECT_EQ(level_set.err, why);
+  }
+  // Nothing lies below the least sample, and nothing above the largest.
+  const auto extracted = [&](int isovalue) {
+    return run({"extract", store, "--isovalue", std::to_string(isovalue), "-o", path("b.ply"),
+                "--force"})
+        .err;
+  };
+  EXPECT_NE(extracted(range[0].get<int>()), "");
+  EXPECT_EQ(extracted(range[1].get<int>()), "");
+  const Outcome picture =
+      run({"view", store, "--isovalue", "40000", "--screenshot", path("a.png"), "--size", "64x64"});
+  if (picture.exit_code == 0) {  // else nothing can draw here
+    EXPECT_EQ(picture.err, why);
+  }
 }
 
 }  // namespace
