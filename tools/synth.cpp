@@ -9,8 +9,10 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "isobrick/core/error.h"
 #include "isobrick/io/output_file.h"
 #include "tools/format.h"
+#include "tools/mesh_space.h"
 #include "tools/options.h"
 #include "tools/output_name.h"
 
@@ -56,6 +58,15 @@ Int3 piece_extent(Int3 extent, std::size_t sample_bytes, std::uint64_t bytes) {
   return {extent.x, rows, planes};
 }
 
+/// A field takes hours to compute: that its disk is too small is known before.
+void check_space(const std::string& path, std::uint64_t bytes) {
+  const std::uint64_t free = free_space(path);
+  if (free < bytes)
+    throw Error(fmt::format("'{}' takes {}, and its disk has {} free: choose another, or smaller "
+                            "--dims",
+                            path, human_bytes(bytes), human_bytes(free)));
+}
+
 ConvertReport write_raw(VolumeSource& source, const std::string& path,
                         const ConvertOptions& options, Progress& progress) {
   if (options.resume) throw UsageError("--resume is for stores; a raw file is written anew");
@@ -64,6 +75,7 @@ ConvertReport write_raw(VolumeSource& source, const std::string& path,
   const std::size_t sample_bytes = size_of(source.info().type);
   const Int3 piece = piece_extent(extent, sample_bytes,
                                   std::min<std::uint64_t>(options.memory, std::uint64_t{1} << 26));
+  check_space(path, static_cast<std::uint64_t>(volume(extent)) * sample_bytes);
   std::vector<std::byte> samples(static_cast<std::size_t>(volume(piece)) * sample_bytes);
   OutputFile out(path, options.force);
   const auto start = std::chrono::steady_clock::now();

@@ -193,6 +193,13 @@ TEST_F(BadInput, AFolderThatIsNotThereIsNamed) {
                  {"cannot open the folder", "no/such"});
 }
 
+TEST_F(BadInput, ASyntheticVolumeThatDoesNotFitTheDiskIsNotBegun) {
+  expect_refused(
+      run({"synth", "gyroid", path("x.raw"), "--dims", "90000,90000,90000", "--type", "f64"}), 1,
+      {"x.raw' takes ", ", and its disk has", "free: choose another, or smaller --dims"});
+  EXPECT_TRUE(files().empty());
+}
+
 // The standard library's own words for it are none of ours.
 TEST_F(BadInput, APathThatCannotBeOneIsNamed) {
   const std::string store = make_store("a"), name = path(std::string(300, 'n'));
