@@ -228,7 +228,7 @@ TEST_F(BadInput, FormatsOfMeshes) {
                  {"--quantize", "GLB", "PLY"});
   expect_refused(run(extract + Arguments{"-o", path("a\nb.pvtp")}), 2, {"XML"});
   // A budget that leaves no room for cutting the mesh in parts.
-  const Arguments tight{"--memory", "80M", "--threads", "1"};
+  const Arguments tight{"--memory", "56M", "--threads", "1"};
   EXPECT_EQ(run(extract + Arguments{"-o", path("b.ply")} + tight).exit_code, 0);
   expect_refused(run(extract + Arguments{"-o", path("a.pvtp")} + tight), 2, {"--memory"});
   EXPECT_EQ(files().size(), names.size() + 1);
