@@ -145,6 +145,33 @@ TEST_F(Docs, NextLinesOfTheQuickstartRun) {
   EXPECT_GE(commands, 3);
 }
 
+// With stand-ins for the set-up, the build and the program.
+TEST_F(Docs, TheQuickstartGoesOnWithoutAViewer) {
+  const auto add = [&](const std::string& name, const std::string& script) {
+    fs::create_directories(fs::path(path(name)).parent_path());
+    write_file(path(name), "#!/bin/sh\n" + script + "\n");
+    fs::permissions(path(name), fs::perms::owner_all);
+  };
+  const auto quickstart = [&](const std::string& help_of_view) {
+    add("build/release/bin/isobrick",
+        "[ \"$*\" = 'help view' ] && echo '" + help_of_view + "' || echo \"ran $*\"");
+    return run_process(
+        {"env", "PATH=" + path("bin") + ":/usr/bin:/bin", path("scripts/quickstart")});
+  };
+  add("scripts/setup", "");
+  add("bin/cmake", "");
+  fs::copy_file(fs::path(ISOBRICK_SOURCE) / "scripts/quickstart", path("scripts/quickstart"));
+  const Outcome with = quickstart("Look at a store");
+  EXPECT_EQ(with.exit_code, 0) << with.err;
+  EXPECT_NE(with.out.find(" --preview "), std::string::npos) << with.out;
+  const Outcome without = quickstart("(not in this program)");
+  EXPECT_EQ(without.exit_code, 0) << without.err;
+  EXPECT_NE(without.out.find("ran extract build/quickstart/head.zarr"), std::string::npos)
+      << without.out;
+  EXPECT_EQ(without.out.find(" --preview"), std::string::npos) << without.out;
+  EXPECT_EQ(without.out.find("head_500.png"), std::string::npos) << without.out;
+}
+
 TEST_F(Docs, BenchesSayHowTheyAreBuilt) {
   int benches = 0;
   for (const auto& entry : fs::recursive_directory_iterator(fs::path(ISOBRICK_SOURCE) / "bench")) {
