@@ -22,7 +22,8 @@ constexpr std::size_t kBuffer = 65536;
 /// No number that anybody writes is longer.
 constexpr std::size_t kMostWord = 400;
 
-bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0'; }
+/// A comma counts as one: teem reads "1, 2, 3" too.
+bool is_blank(char c) { return c == ' ' || c == ',' || (c >= '\t' && c <= '\r') || c == '\0'; }
 
 /// A number as strtod() rounds it, in any locale.
 double rounded(std::string_view number) {

@@ -7,8 +7,8 @@
 
 namespace isobrick {
 
-/// Samples of `type` in native byte order, from numbers in a text that blanks
-/// or line ends separate. Throws Error, with the position, for words that are no
+/// Samples of `type` in native byte order, from numbers in a text that blanks,
+/// commas or line ends separate. Throws Error, with the position, for words that are no
 /// number of the type. Whole numbers may be written with a fraction of zeros; floating ones
 /// beyond the type's range are infinite or zero.
 std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, ScalarType type);

@@ -203,16 +203,37 @@ Encoding read_encoding(const Fields& fields) {
                                           printable(name, 60)));
 }
 
+/// Checks the word that may follow the others of a list or a pattern: how many dimensions
+/// the samples of each file have. The files follow one another whatever it is.
+void check_subdim(const Fields& fields, std::string_view word) {
+  const Index subdim = parse_integer(fields.path(), "data file", word);
+  const Index dimension = parse_integer(fields.path(), "dimension", fields.need("dimension"));
+  if (subdim < 1 || subdim > dimension)
+    header_error(fields.path(),
+                 fmt::format("'data file': files of {} dimensions cannot make one of {}", subdim,
+                             dimension));
+}
+
+/// PATTERN FIRST LAST STEP [SUBDIM]
+std::vector<std::string> read_data_pattern(const Fields& fields, std::string_view text) {
+  const auto words = split_words(text);
+  if (words.size() != 5) return resolve_data_pattern(fields.path(), text);
+  check_subdim(fields, words[4]);
+  const auto length = static_cast<std::size_t>(words[4].data() - text.data());
+  return resolve_data_pattern(fields.path(), trim(text.substr(0, length)));
+}
+
 std::vector<std::string> read_data_paths(const Fields& fields) {
   const auto data = fields.find("datafile");
   if (!data) return {fields.path()};
   if (data->starts_with("LIST") && (data->size() == 4 || (*data)[4] == ' ')) {
+    if (const auto subdim = trim(data->substr(4)); !subdim.empty()) check_subdim(fields, subdim);
     std::vector<std::string> paths;
     for (const auto name : fields.list()) paths.push_back(resolve_data_file(fields.path(), name));
     if (paths.empty()) header_error(fields.path(), "the list of data files is empty");
     return paths;
   }
-  if (data->find('%') != std::string_view::npos) return resolve_data_pattern(fields.path(), *data);
+  if (data->find('%') != std::string_view::npos) return read_data_pattern(fields, *data);
   return {resolve_data_file(fields.path(), *data)};
 }
 

@@ -125,7 +125,8 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
     header_error(path, fmt::format("{} is not 'PATTERN FIRST LAST [STEP]'", quoted(text)));
   const auto number = [&](std::size_t i) { return parse_integer(path, "data file", words[i]); };
   const Index first = number(1), last = number(2), step = words.size() == 4 ? number(3) : 1;
-  const bool ordered = first >= 0 && last >= first && step >= 1;
+  const bool ordered =
+      first >= 0 && last >= 0 && (step > 0 ? last >= first : step < 0 && last <= first);
   const Index count = ordered ? std::min((last - first) / step, kMostFiles) + 1 : 0;
   // A number in a name takes no more characters than the largest one or the widest pattern.
   const std::size_t name = path.size() + words[0].size() + static_cast<std::size_t>(kMostDigits);

@@ -75,7 +75,7 @@ double parse_real(const std::string& path, std::string_view field, std::string_v
 std::string resolve_data_file(const std::string& path, std::string_view name);
 
 /// The data files that "PATTERN FIRST LAST [STEP]" means, PATTERN as of printf
-/// with one number ("slice%03d.raw").
+/// with one number ("slice%03d.raw"). The numbers fall where STEP is negative.
 std::vector<std::string> resolve_data_pattern(const std::string& path, std::string_view text);
 
 /// Sets direction and spacing from the world vectors of one step along each

@@ -77,6 +77,19 @@ TEST_F(TextVolume, NrrdInSeveralFiles) {
   expect_whole("list.nhdr");
   dir.write("pattern.nhdr", common + "data file: s%d.raw 8 11 1\n");
   expect_whole("pattern.nhdr");
+  for (const char* subdim : {"1", "2", "3"}) {
+    dir.write("pattern.nhdr", common + "data file: s%d.raw 8 11 1 " + subdim + "\n");
+    expect_whole("pattern.nhdr");
+    dir.write("list.nhdr",
+              common + "data file: LIST " + subdim + "\ns8.raw\ns9.raw\ns10.raw\ns11.raw\n");
+    expect_whole("list.nhdr");
+  }
+  for (const char* subdim : {"0", "4", "-1", "x"}) {
+    dir.write("bad.nhdr", common + "data file: s%d.raw 8 11 1 " + subdim + "\n");
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / "bad.nhdr", {}); }), "data file"));
+    dir.write("bad.nhdr", common + "data file: LIST " + subdim + "\ns8.raw\n");
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / "bad.nhdr", {}); }), "data file"));
+  }
   dir.write("three.nhdr", common + "data file: s%d.raw 8 10\n");
   EXPECT_TRUE(contains(message_of([&] { open_source(dir / "three.nhdr", {}); }), "at most 210"));
   dir.write("five.nhdr", common + "data file: LIST\ns8.raw\ns9.raw\ns10.raw\ns11.raw\ns11.raw\n");
@@ -84,10 +97,24 @@ TEST_F(TextVolume, NrrdInSeveralFiles) {
   dir.write("s9.raw", "#\n" + all.substr(plane, plane - 2));
   EXPECT_TRUE(contains(message_of([&] { open_and_read("list.nhdr"); }), "s9.raw"));
   for (const char* pattern :
-       {"s%s.raw 1 2", "s%d.raw 1", "s%d.raw 2 1", "s%d%d.raw 1 2", "s%9999d.raw 1 2",
-        "s%999d.raw 1 2", "s%021d.raw 1 2", "s%d.raw 0 9223372036854775807", "s%d.raw 0 1000000"}) {
+       {"s%s.raw 1 2", "s%d.raw 1", "s%d.raw 2 1", "s%d.raw 1 2 -1", "s%d.raw 1 2 0",
+        "s%d.raw 1 2 1 2 3", "s%d%d.raw 1 2", "s%9999d.raw 1 2", "s%999d.raw 1 2", "s%021d.raw 1 2",
+        "s%d.raw 0 9223372036854775807", "s%d.raw 0 1000000"}) {
     dir.write("bad.nhdr", common + "data file: " + pattern + "\n");
     message_of([&] { open_source(dir / "bad.nhdr", {}); });
+  }
+}
+
+TEST_F(TextVolume, NrrdInFilesWhoseNumbersFall) {
+  const std::string all = whole(ScalarType::i16);
+  const std::size_t plane = all.size() / 4;
+  for (std::size_t z = 0; z < 4; ++z)
+    dir.write(std::string("s").append(std::to_string(20 - 5 * z)).append(".raw"),
+              all.substr(z * plane, plane));
+  const std::string common = nrrd("encoding: raw\nendian: little\n");
+  for (const char* numbers : {"20 5 -5", "20 4 -5", "20 5 -5 2"}) {
+    dir.write("v.nhdr", common + "data file: s%d.raw " + numbers + "\n");
+    expect_whole("v.nhdr");
   }
 }
 
@@ -130,6 +157,10 @@ TEST_F(TextVolume, NrrdAsText) {
   EXPECT_EQ(v[5], std::numeric_limits<float>::infinity());
   EXPECT_EQ(v[6], std::numeric_limits<float>::infinity());
   EXPECT_EQ(v[7], 7);
+  dir.write("c.nrrd",
+            "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: text\n\n"
+            "1, 2,3 ,4\n5,6,7,8,\n");
+  EXPECT_EQ(open_and_read("c.nrrd"), std::string({1, 2, 3, 4, 5, 6, 7, 8}));
   dir.write("d.nrrd",
             "NRRD0001\ntype: double\ndimension: 3\nsizes: 2 2 2\nencoding: ascii\n\n"
             "1e400 -1e400 1e-400 -1e-400 1e308 5e-324 0 -0");
