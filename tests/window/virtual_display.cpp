@@ -94,6 +94,15 @@ void VirtualDisplay::focus_under_pointer() {
   XSync(state_->display, False);
 }
 
+unsigned long VirtualDisplay::pixel(GLFWwindow* window, int x, int y) {
+  XImage* const image =
+      XGetImage(state_->display, glfwGetX11Window(window), x, y, 1, 1, AllPlanes, ZPixmap);
+  if (image == nullptr) throw std::runtime_error("nothing can be read from the window");
+  const unsigned long value = XGetPixel(image, 0, 0);
+  XDestroyImage(image);
+  return value & 0xffffff;
+}
+
 void VirtualDisplay::move_pointer(int x, int y) {
   XTestFakeMotionEvent(state_->display, -1, x, y, CurrentTime);
   XSync(state_->display, False);

@@ -26,6 +26,8 @@ class VirtualDisplay {
 
   /// Keys go to the window under the pointer from now on, as there is no window manager.
   void focus_under_pointer();
+  /// What the display shows there of a window: 0xRRGGBB.
+  unsigned long pixel(GLFWwindow* window, int x, int y);
   void move_pointer(int x, int y);
   void button(int number, bool down);  ///< 1 left, 2 middle, 3 right, 4 and 5 the wheel
   void key(unsigned long keysym, bool down);
