@@ -4,12 +4,36 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <istream>
 #include <new>
+#include <sstream>
 #include <stdexcept>
 
 #include "isobrick/core/printable.h"
+#include "isobrick/volumes/vdb_half_grid.h"
 
 namespace isobrick {
+
+namespace {
+
+/// What a file begins with, up to its metadata. Version 225 only adds a type of grid: an
+/// OpenVDB that does not know it reads it as its own newest version, but would first
+/// print a warning to standard output.
+std::string read_prologue(std::istream& in) {
+  constexpr std::size_t kVersion = 8;
+  constexpr std::size_t kSize = kVersion + 3 * sizeof(std::uint32_t) + 1 + 36;
+  std::string bytes(kSize, '\0');
+  in.read(bytes.data(), static_cast<std::streamsize>(kSize));
+  std::uint32_t version;
+  std::memcpy(&version, &bytes[kVersion], sizeof version);
+  version = std::min<std::uint32_t>(version, openvdb::OPENVDB_FILE_VERSION);
+  std::memcpy(&bytes[kVersion], &version, sizeof version);
+  return bytes;
+}
+
+}  // namespace
 
 VdbArchive::VdbArchive(const std::string& path)
     : path_(path),
@@ -17,8 +41,10 @@ VdbArchive::VdbArchive(const std::string& path)
       metadata_(std::make_shared<openvdb::io::StreamMetadata>()),
       in_(&buffer_) {
   openvdb::initialize();
+  register_vdb_half_grid();
   in_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
-  readHeader(in_);
+  std::istringstream header(read_prologue(in_));
+  readHeader(header);
   metadata_->setSeekable(true);
   openvdb::io::setStreamMetadataPtr(in_, metadata_, false);
   setFormatVersion(in_);

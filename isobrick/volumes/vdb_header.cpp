@@ -19,7 +19,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "OpenVDB's files are little endian");
 
 constexpr std::string_view kMagic{" BDV\0\0\0\0", 8};
-constexpr std::uint32_t kOldest = 222, kNewest = 224;
+constexpr std::uint32_t kOldest = 222, kNewest = 225;
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
 /// Between a name and the number of its repetition.
 constexpr char kSeparator = '\x1e';
@@ -185,9 +185,9 @@ std::vector<VdbGrid> read_vdb_header(const std::string& path) {
 }
 
 bool is_readable(const VdbGrid& grid) {
-  static constexpr std::array<std::string_view, 6> kTypes{"Tree_float_5_4_3", "Tree_double_5_4_3",
-                                                          "Tree_int32_5_4_3", "Tree_int64_5_4_3",
-                                                          "Tree_bool_5_4_3",  "Tree_mask_5_4_3"};
+  static constexpr std::array<std::string_view, 7> kTypes{
+      "Tree_half_5_4_3",  "Tree_float_5_4_3", "Tree_double_5_4_3", "Tree_int32_5_4_3",
+      "Tree_int64_5_4_3", "Tree_bool_5_4_3",  "Tree_mask_5_4_3"};
   return std::find(kTypes.begin(), kTypes.end(), grid.type) != kTypes.end();
 }
 
@@ -203,10 +203,10 @@ const VdbGrid& choose_vdb_grid(const std::string& path, const std::vector<VdbGri
     throw UsageError(
         fmt::format("'{}' has no grid '{}'; it has {}", path, shown(*name), list(grids)));
   if (count == 0 || !is_readable(*chosen))
-    throw UsageError(
-        fmt::format("'{}': only grids of float, double, int32, int64, bool and mask can be read, "
-                    "not {}",
-                    path, name ? chosen->value_type() : list(grids)));
+    throw UsageError(fmt::format(
+        "'{}': only grids of half, float, double, int32, int64, bool and mask can be read, "
+        "not {}",
+        path, name ? chosen->value_type() : list(grids)));
   if (count > 1)
     throw UsageError(fmt::format("'{}' holds several grids: choose one with --grid NAME: {}", path,
                                  list(grids)));

@@ -24,9 +24,10 @@ bool same_bits(const T& a, const T& b) {
 /// A value as a sample; a NaN becomes the one that fill values are.
 template <class Out, class T>
 Out to_sample(const T& value) {
-  if constexpr (std::is_floating_point_v<Out> && std::is_floating_point_v<T>)
-    if (value != value) return std::numeric_limits<Out>::quiet_NaN();
-  return static_cast<Out>(value);
+  const auto sample = static_cast<Out>(value);
+  if constexpr (std::is_floating_point_v<Out>)
+    if (sample != sample) return std::numeric_limits<Out>::quiet_NaN();
+  return sample;
 }
 
 /// Whether `box` (inclusive, in index coordinates, inside the node) meets neither

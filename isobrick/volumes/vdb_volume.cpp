@@ -13,6 +13,7 @@
 #include "isobrick/volumes/text_header.h"
 #include "isobrick/volumes/vdb_archive.h"
 #include "isobrick/volumes/vdb_grid.h"
+#include "isobrick/volumes/vdb_half_grid.h"
 #include "isobrick/volumes/vdb_header.h"
 #include "isobrick/volumes/vdb_leaves.h"
 #include "isobrick/volumes/vdb_tree.h"
@@ -184,7 +185,9 @@ std::unique_ptr<VolumeSource> open_numbers(const Opening& in) {
     return make_source<Out, Tree, Leaves>(in, grid->constTreePtr(), leaves, memory);
   };
   using Value = typename Tree::ValueType;
-  if constexpr (!std::is_same_v<Value, std::int64_t>) {
+  if constexpr (std::is_same_v<Value, openvdb::math::half>) {
+    return as(float{});
+  } else if constexpr (!std::is_same_v<Value, std::int64_t>) {
     return as(Value{});
   } else {
     const auto range = value_range(grid->constTree(), typename Leaves::Reader(*leaves));
@@ -232,6 +235,7 @@ std::unique_ptr<VolumeSource> open_vdb(const std::string& file, const VolumeRequ
     VdbArchive archive(file);
     const Opening in{file, said, grid, archive, archive.read_grid(grids, grid)};
     std::unique_ptr<VolumeSource> source = open_numbers<openvdb::FloatGrid>(in);
+    if (!source) source = open_numbers<VdbHalfGrid>(in);
     if (!source) source = open_numbers<openvdb::DoubleGrid>(in);
     if (!source) source = open_numbers<openvdb::Int32Grid>(in);
     if (!source) source = open_numbers<openvdb::Int64Grid>(in);

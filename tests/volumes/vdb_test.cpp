@@ -2,15 +2,24 @@
 #include <openvdb/openvdb.h>
 
 #include <bit>
+#include <cstring>
+#include <filesystem>
 
 #include "damaged_files.h"
 #include "isobrick/volumes/open_source.h"
+#include "isobrick/volumes/vdb_half_grid.h"
 #include "isobrick/volumes/vdb_writer.h"
 
 namespace isobrick {
 namespace {
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+
+/// A small number as a value, which may be a half: those are made of floats.
+template <class Value>
+Value number(int i) {
+  return static_cast<Value>(static_cast<float>(i));
+}
 
 /// Values of their own for voxels, tiles of several sizes and inactive voxels.
 template <class Grid>
@@ -22,9 +31,8 @@ typename Grid::Ptr make_grid(typename Grid::ValueType background) {
   grid->tree().fill(openvdb::CoordBBox({-20, -8, 16}, {-5, 7, 31}), static_cast<Value>(3), false);
   auto accessor = grid->getAccessor();
   for (int i = 0; i < 300; ++i)
-    accessor.setValue({i * 7 % 31 - 20, i * 5 % 23 - 8, i * 3 % 40}, static_cast<Value>(i % 50));
-  for (int i = 0; i < 50; ++i)
-    accessor.setValueOff({i % 31 - 20, 9, i * 3 % 40}, static_cast<Value>(i));
+    accessor.setValue({i * 7 % 31 - 20, i * 5 % 23 - 8, i * 3 % 40}, number<Value>(i % 50));
+  for (int i = 0; i < 50; ++i) accessor.setValueOff({i % 31 - 20, 9, i * 3 % 40}, number<Value>(i));
   return grid;
 }
 
@@ -44,7 +52,7 @@ void add_inactive_values(Grid& grid) {
     for (int i = 0; i < 512; ++i) {
       const openvdb::Coord at{x + (i >> 6), i >> 3 & 7, i & 7};
       if (i % 3 == 0)
-        accessor.setValue(at, static_cast<Value>(i));
+        accessor.setValue(at, number<Value>(i));
       else
         accessor.setValueOff(at, way[static_cast<std::size_t>(i * 7 % 11) % way.size()]);
     }
@@ -59,6 +67,14 @@ class Vdb : public ::testing::Test {
   std::string write(const openvdb::GridCPtrVec& grids) const {
     openvdb::io::File(dir / "v.vdb").write(grids);
     return dir / "v.vdb";
+  }
+
+  /// The file that was written last, as if its version were another.
+  std::string with_version(std::uint32_t version) const {
+    std::string bytes = dir.read("v.vdb");
+    std::memcpy(bytes.data() + 8, &version, sizeof version);
+    std::filesystem::remove(dir / "v.vdb");
+    return dir.write("v.vdb", bytes);
   }
 
   /// Every voxel of the box of active ones against OpenVDB's accessor.
@@ -100,6 +116,33 @@ TEST_F(Vdb, AllTypes) {
   const auto m = openvdb::MaskGrid::create();
   m->tree().topologyUnion(f->tree());
   expect_same<std::uint8_t>(*m, write({m}));
+}
+
+TEST_F(Vdb, GridsOfHalf) {
+  namespace io = openvdb::io;
+  register_vdb_half_grid();
+  const auto grid = make_grid<VdbHalfGrid>(openvdb::math::half(-2.5F));
+  add_inactive_values(*grid);
+  for (const std::uint32_t values : {io::COMPRESS_NONE, io::COMPRESS_ZIP, io::COMPRESS_BLOSC})
+    for (const std::uint32_t mask : {std::uint32_t{0}, std::uint32_t{io::COMPRESS_ACTIVE_MASK}}) {
+      io::File file(dir / "v.vdb");
+      file.setCompression(values | mask);
+      file.write({grid});
+      expect_same<float>(*grid, with_version(225));
+    }
+  EXPECT_EQ(open_source(dir / "v.vdb", {})->info().fill_value, -2.5);
+}
+
+TEST_F(Vdb, Version225IsLaidOutAs224) {
+  const auto grid = make_grid<openvdb::FloatGrid>(-2.5F);
+  write({grid});
+  ::testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStdout();
+  expect_same<float>(*grid, with_version(225));
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  const std::string message = message_of<Error>([&] { open_source(with_version(226), {}); });
+  EXPECT_TRUE(contains(message, "version 226; 222 to 225")) << message;
 }
 
 TEST_F(Vdb, LongIntegersTakeTheTypeThatHoldsThem) {
