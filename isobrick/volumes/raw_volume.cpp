@@ -206,19 +206,28 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
 
 namespace {
 
+constexpr const char* kStdinName = "standard input";
+
+/// Throws the UsageError of samples whose extent or type is not known, with what to add.
+[[noreturn]] void refuse_unknown(const std::string& path, bool extent, bool type) {
+  const bool is_file = path != kStdinName;
+  throw UsageError(fmt::format(
+      "the {} of {} {} not known: add {}{}{}{}",
+      extent ? "type"
+      : type ? "extent"
+             : "extent and type",
+      is_file ? fmt::format("'{}'", path) : path, extent || type ? "is" : "are",
+      extent ? "" : "--dims X,Y,Z", extent || type ? "" : " ", type ? "" : "--type TYPE",
+      is_file ? ", name the file like 'scan_256x256x128_uint8.raw', or give a .nhdr or .mhd header"
+              : ""));
+}
+
 /// Extent and type that are said, else those in the name.
 TextHeader describe_by_name(const std::string& path, const VolumeRequest& said) {
   const RawName name = parse_raw_name(fs::path(path).stem().string());
   const auto extent = said.extent ? said.extent : name.extent;
   const auto type = said.type ? said.type : name.type;
-  if (!extent || !type)
-    throw UsageError(
-        fmt::format("the {} of '{}' {} not known: say so, name the file like "
-                    "'scan_256x256x128_uint8.raw', or give a .nhdr or .mhd header",
-                    extent ? "type"
-                    : type ? "extent"
-                           : "extent and type",
-                    path, extent || type ? "is" : "are"));
+  if (!extent || !type) refuse_unknown(path, extent.has_value(), type.has_value());
   refuse_selection(path, said);
   TextHeader header;
   header.path = path;
@@ -239,7 +248,7 @@ std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequ
 }
 
 std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& said) {
-  const std::string name = "standard input";
+  const std::string name = kStdinName;
   const TextHeader header = describe_by_name(name, said);
   const std::uint64_t offset = said.offset.value_or(0);
   if (offset > std::numeric_limits<std::uint64_t>::max() / 2)

@@ -99,7 +99,14 @@ TEST(StdinSource, MuchTooLongIsNotReadToItsEnd) {
 
 TEST(StdinSource, ExtentAndTypeMustBeSaid) {
   const StdinPipe pipe("");
-  EXPECT_TRUE(contains(message_of([] { open_source("-", {}); }), "standard input"));
+  const auto ends_with = [](const VolumeRequest& said, const char* end) {
+    const auto message = message_of([&] { open_source("-", said); });
+    EXPECT_TRUE(contains(message, "standard input") && message.ends_with(end)) << message;
+  };
+  ends_with({}, "add --dims X,Y,Z --type TYPE");
+  ends_with({.extent = kExtent}, "the type of standard input is not known: add --type TYPE");
+  ends_with({.type = ScalarType::u8},
+            "the extent of standard input is not known: add --dims X,Y,Z");
 }
 
 }  // namespace
