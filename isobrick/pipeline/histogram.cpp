@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "isobrick/core/error.h"
 #include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/slab_reader.h"
 
@@ -27,9 +28,11 @@ int choose_level(const StoreInfo& info) {
 /// Chunk files that are looked for: seconds.
 constexpr Index kMaxLookups = Index{1} << 20;
 
-/// Calls f(value, times) for every sample of a level, brick by brick.
-template <class F>
-void for_each_sample(const StoreReader& store, int level, Progress& progress, F&& f) {
+/// Calls f(value, times) for every sample of a level, brick by brick; damaged(what) for a brick
+/// that cannot be read.
+template <class F, class Damaged>
+void for_each_sample(const StoreReader& store, int level, Progress& progress, F&& f,
+                     Damaged&& damaged) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Int3 bricks = lattice.bricks();
   std::vector<std::byte> samples(lattice.brick_bytes());
@@ -37,9 +40,16 @@ void for_each_sample(const StoreReader& store, int level, Progress& progress, F&
                  static_cast<std::uint64_t>(volume(lattice.extent)) * lattice.sample_bytes());
   for_each_point({{0, 0, 0}, bricks}, [&](Int3 b) {
     const Int3 extent = lattice.brick_box(b).extent();
-    if (!store.read_brick(level, b, samples.data()))
+    bool present = false, readable = true;
+    try {
+      present = store.read_brick(level, b, samples.data());
+    } catch (const Error& error) {
+      damaged(error);
+      readable = false;
+    }
+    if (readable && !present)
       f(store.info().fill_value, static_cast<std::uint64_t>(volume(extent)));
-    else
+    else if (readable)
       visit_scalar(lattice.type, [&](auto tag) {
         using T = typename decltype(tag)::type;
         for_each_point({{0, 0, 0}, extent}, [&](Int3 p) {
@@ -97,22 +107,33 @@ std::string why_no_histogram(const StoreReader& store, std::uint64_t memory) {
   return "";
 }
 
-Histogram histogram(const StoreReader& store, Progress& progress, int most_bins) {
+Histogram histogram(const StoreReader& store, Progress& progress, int most_bins, bool leaves_out) {
   Histogram h;
   h.level = choose_level(store.info());
   ValueRange<double> range;
-  for_each_sample(store, h.level, progress, [&](double value, std::uint64_t times) {
-    if (std::isfinite(value))
-      range.include(value);
-    else
-      (std::isnan(value) ? h.not_a_number : h.infinite) += times;
-  });
+  for_each_sample(
+      store, h.level, progress,
+      [&](double value, std::uint64_t times) {
+        if (std::isfinite(value))
+          range.include(value);
+        else
+          (std::isnan(value) ? h.not_a_number : h.infinite) += times;
+      },
+      [&](const Error& error) {
+        if (!leaves_out) throw;
+        if (h.left_out++ == 0) h.damage = error.what();
+      });
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(h.level)].lattice;
+  if (h.left_out == static_cast<std::uint64_t>(volume(lattice.bricks()))) throw Error(h.damage);
   h.lo = range.lo;
   h.hi = range.hi;
   lay_bins(h, !is_floating(store.info().type), most_bins);
-  for_each_sample(store, h.level, progress, [&](double value, std::uint64_t times) {
-    if (std::isfinite(value)) h.counts[bin_of(h, value)] += times;
-  });
+  for_each_sample(
+      store, h.level, progress,
+      [&](double value, std::uint64_t times) {
+        if (std::isfinite(value) && !h.counts.empty()) h.counts[bin_of(h, value)] += times;
+      },
+      [](const Error&) {});
   return h;
 }
 

@@ -16,6 +16,8 @@ struct Histogram {
   double bin_width = 0;               ///< 0: all finite samples are equal
   std::vector<std::uint64_t> counts;  ///< from lo upwards; empty when no sample is finite
   std::uint64_t not_a_number = 0, infinite = 0;
+  std::uint64_t left_out = 0;  ///< bricks that cannot be read
+  std::string damage;          ///< what is wrong with the first of them
 };
 
 /// Why the histogram of a store takes more than `memory` bytes, or too many look-ups of files;
@@ -23,7 +25,9 @@ struct Histogram {
 std::string why_no_histogram(const StoreReader& store, std::uint64_t memory);
 
 /// The histogram, in at most so many bins, of the finest level with at most 2²⁴ samples (or
-/// else of the coarsest), read brick by brick.
-Histogram histogram(const StoreReader& store, Progress& progress, int most_bins = 64);
+/// else of the coarsest), read brick by brick. Throws Error for a brick that cannot be read, unless
+/// those are to be left out and others are left.
+Histogram histogram(const StoreReader& store, Progress& progress, int most_bins = 64,
+                    bool leaves_out = false);
 
 }  // namespace isobrick

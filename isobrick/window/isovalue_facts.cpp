@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"
 #include "isobrick/core/progress.h"
@@ -34,14 +36,17 @@ IsovalueFacts::IsovalueFacts(std::shared_ptr<const StoreReader> store)
     try {
       Stoppable progress(stop_);
       auto counted =
-          std::make_shared<const Histogram>(isobrick::histogram(*store, progress, kBins));
+          std::make_shared<const Histogram>(isobrick::histogram(*store, progress, kBins, true));
       const std::scoped_lock lock(mutex_);
+      if (counted->left_out > 0)
+        failure_ = fmt::format("the histogram lacks bricks that cannot be read, {} of level {}: {}",
+                               counted->left_out, counted->level, counted->damage);
       histogram_ = std::move(counted);
     } catch (const Cancelled&) {
       // Nobody waits for it any more.
     } catch (const std::exception& error) {
       const std::scoped_lock lock(mutex_);
-      failure_ = what_of(error);
+      failure_ = "the histogram cannot be counted: " + what_of(error);
     }
   });
 }

@@ -50,8 +50,7 @@ bool values_differ(ViewSettings a, const ViewSettings& b) {
 
 /// Says once what cannot be shown.
 void ViewerWindow::tell_damage() {
-  if (const std::string why = state_.facts->take_failure(); !why.empty())
-    state_.say("the histogram cannot be counted: " + why);
+  if (const std::string why = state_.facts->take_failure(); !why.empty()) state_.say(why);
   for (const std::string& message : state_.picture->state().damage) {
     if (told_damage_.size() > kMostTold) return;
     if (!told_damage_.insert(message).second) continue;

@@ -150,7 +150,8 @@ TEST_F(Window, SaysWhatIsDamaged) {
                        [&](const Message& message) { return message.text.find(text) == 0; });
   };
   EXPECT_TRUE(is_said(window.state().picture->state().damage[0]));
-  until([&] { return is_said("the histogram cannot be counted: "); });
+  until([&] { return is_said("the histogram lacks bricks that cannot be read, 1 of level 0: "); });
+  EXPECT_NE(window.state().facts->histogram(), nullptr);
   const std::size_t said = window.state().messages.size();
   window.state().messages.clear();
   window.state().settings.edges = true;
