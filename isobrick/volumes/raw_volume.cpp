@@ -76,9 +76,10 @@ std::uint64_t after_lines(const InputFile& file, const std::string& path, std::u
   return begin + at;
 }
 
-/// What else would make the size right, as " (would fit …)".
-std::string size_hint(const VolumeInfo& info, std::uint64_t samples, std::uint64_t offset,
-                      std::uint64_t size) {
+/// What else would make the size right, as " (would fit …)". Behind a header in the same file
+/// another offset would only shift the samples.
+std::string size_hint(const TextHeader& header, const VolumeInfo& info, std::uint64_t samples,
+                      std::uint64_t offset, std::uint64_t size) {
   const std::uint64_t count = samples / size_of(info.type);
   std::string types;
   for (const ScalarType type : kScalarTypes)
@@ -86,26 +87,28 @@ std::string size_hint(const VolumeInfo& info, std::uint64_t samples, std::uint64
       types += fmt::format("{}{}", types.empty() ? "" : " or ", short_name(type));
   if (!types.empty()) return fmt::format(" (would fit --type {})", types);
   constexpr std::uint64_t likely_header = 64 * 1024;
-  if (size >= samples && size - samples <= likely_header)
+  if (header.data_begin == 0 && size >= samples && size - samples <= likely_header)
     return fmt::format(" (would fit --offset {})", size - samples);
   return {};
 }
 
 /// The file must hold `samples` bytes from the layout's offset on.
-void check_size(const VolumeInfo& info, std::uint64_t offset, std::uint64_t samples,
-                std::uint64_t size) {
+void check_size(const TextHeader& header, const VolumeInfo& info, std::uint64_t offset,
+                std::uint64_t samples, std::uint64_t size) {
   if (offset <= size && size - offset == samples) return;
   const std::string at = offset ? fmt::format(" after offset {}", offset) : "";
   const bool whole =
       samples == static_cast<std::uint64_t>(volume(info.extent)) * size_of(info.type);
-  throw UsageError(fmt::format("'{}' has {} bytes, but {} samples{}{} make {}{}", info.name, size,
+  const bool apart = header.path != header.data_paths[0];
+  throw UsageError(fmt::format("'{}' has {} bytes, but {} samples{}{}{} make {}{}", info.name, size,
                                describe(info.extent, info.type),
+                               apart ? fmt::format(" as '{}' has them", header.path) : "",
                                whole ? "" : " of each channel and time", at,
                                // Only in words if the sum would wrap around.
                                offset > std::numeric_limits<std::uint64_t>::max() - samples
                                    ? std::string("far more")
                                    : fmt::format("{}", offset + samples),
-                               size_hint(info, samples, offset, size)));
+                               size_hint(header, info, samples, offset, size)));
 }
 
 /// Opens samples that lie as they are in one file: what is said goes before what
@@ -128,7 +131,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
     offset = std::max(offset, file.size > total ? file.size - total : 0);
   else
     offset = after_lines(file, path, header.data_begin, header.skip_lines) + header.skip_bytes;
-  check_size(layout.info, offset, total, file.size);
+  check_size(header, layout.info, offset, total, file.size);
   layout.offset = offset;
   if (!said.extent) {
     layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);

@@ -66,6 +66,23 @@ TEST_F(TextVolume, NrrdAttachedAndPacked) {
   EXPECT_LT(packed->memory(), 1u << 20);
 }
 
+TEST_F(TextVolume, AWrongSizeNamesBothHalvesAndNoOffsetThatShiftsSamples) {
+  const std::string more = whole(ScalarType::i16) + "0123456789";
+  const auto told = [&](const char* name) {
+    return message_of<UsageError>([&] { open_source(dir / name, {}); });
+  };
+  dir.write("attached.nrrd", nrrd("encoding: raw\nendian: little\n\n") + more);
+  const std::string attached = told("attached.nrrd");
+  EXPECT_TRUE(contains(attached, "make ")) << attached;
+  EXPECT_FALSE(contains(attached, "--offset")) << attached;
+  dir.write("v.raw", more);
+  dir.write("v.nhdr", nrrd("encoding: raw\nendian: little\ndata file: v.raw\n"));
+  const std::string apart = told("v.nhdr");
+  EXPECT_TRUE(contains(apart, "v.raw' has 290 bytes")) << apart;
+  EXPECT_TRUE(contains(apart, "v.nhdr' has them")) << apart;
+  EXPECT_TRUE(contains(apart, "would fit --offset 10")) << apart;
+}
+
 TEST_F(TextVolume, NrrdInSeveralFiles) {
   const std::string all = whole(ScalarType::i16);
   const std::size_t plane = all.size() / 4;
