@@ -6,6 +6,7 @@
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/verify.h"
 #include "tests/pipeline/convert_store.h"
+#include "tests/pipeline/least_budget.h"
 
 namespace isobrick {
 namespace {
@@ -99,9 +100,7 @@ std::uint64_t least_budget(VolumeSource& source, ConvertOptions options,
   try {
     convert_quietly(source, folder / "none", options);
   } catch (const UsageError& e) {
-    const std::string what = e.what();
-    const auto at = what.find("need ");
-    return at == std::string::npos ? 0 : std::stoull(what.substr(at + 5)) << 20;
+    return least_budget_in(e.what());
   }
   return 0;
 }

@@ -135,7 +135,7 @@ TEST_F(Export, TheGridAndTheDecodersShareOneBudget) {
   };
   // A brick of 8 MiB, four for the decoders; then another one for the grid.
   try {
-    write_grid(85 * kMiB);
+    write_grid(65 * kMiB);
     FAIL() << "the grid was not counted";
   } catch (const UsageError& e) {
     const std::string what = e.what();

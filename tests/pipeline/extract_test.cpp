@@ -9,6 +9,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/convert.h"
 #include "tests/pipeline/convert_doubles.h"
+#include "tests/pipeline/least_budget.h"
 #include "tests/surface/field.h"
 
 namespace isobrick::test {
@@ -145,10 +146,7 @@ TEST_F(Extract, TheLeastBudgetWorksAndLessIsRefusedByName) {
     run(reader, {.isovalue = 60, .memory = 1 << 20, .threads = 2}, tight);
     FAIL();
   } catch (const UsageError& e) {
-    const std::string text = e.what();
-    const auto at = text.find("at least ");
-    ASSERT_NE(at, std::string::npos) << text;
-    least = std::stoull(text.substr(at + 9));
+    least = least_budget_in(e.what());
   }
   MemorySink least_sink;
   const ExtractReport report =
@@ -156,7 +154,7 @@ TEST_F(Extract, TheLeastBudgetWorksAndLessIsRefusedByName) {
   EXPECT_EQ(least_sink.mesh, roomy.mesh);
   EXPECT_GE(report.brick_reads, report.bricks_read);
   MemorySink refused;
-  EXPECT_THROW(run(reader, {.isovalue = 60, .memory = least - 1, .threads = 2}, refused),
+  EXPECT_THROW(run(reader, {.isovalue = 60, .memory = least - (1 << 20), .threads = 2}, refused),
                UsageError);
 }
 
