@@ -3,7 +3,11 @@
 #include <filesystem>
 #include <memory>
 
+#include <fmt/format.h>
+
 #include "isobrick/bricks/metadata_files.h"
+#include "isobrick/core/error.h"
+#include "isobrick/io/output_folder.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
 #include "tools/options.h"
@@ -61,13 +65,36 @@ std::vector<std::filesystem::path> input_paths(const std::string& name) {
   return {};
 }
 
+/// Standard input cannot be read again: where it is not as long as was said, nothing stays that a
+/// resume could go on with.
+ConvertReport convert_stream(VolumeSource& source, const std::string& out,
+                             const ConvertOptions& options, Console& console) {
+  const std::filesystem::path partial = out + ".partial";
+  const bool earlier = std::filesystem::exists(std::filesystem::symlink_status(partial));
+  try {
+    return convert(source, out, options, console.progress());
+  } catch (const UsageError& error) {
+    const std::string what = error.what();
+    if (earlier || !what.starts_with("standard input")) throw;
+    const std::filesystem::path folder =
+        partial.has_parent_path() ? partial.parent_path() : std::filesystem::path(".");
+    OutputFolder(folder).remove_folder(partial);
+    const VolumeInfo& info = source.info();
+    throw UsageError(fmt::format("{}; --dims {},{},{}, --type {} and --offset say how many", what,
+                                 info.extent.x, info.extent.y, info.extent.z,
+                                 short_name(info.type)));
+  }
+}
+
 int run(const Arguments& arguments, Console& console) {
   check_store_name(arguments.out);
   const auto source = open_input(arguments);
   ConvertOptions options = arguments.store;
   options.inputs = input_paths(arguments.in);
   note_conversion(arguments.out);
-  const ConvertReport report = convert(*source, arguments.out, options, console.progress());
+  const ConvertReport report = arguments.in == "-"
+                                   ? convert_stream(*source, arguments.out, options, console)
+                                   : convert(*source, arguments.out, options, console.progress());
   report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
   return 0;
 }

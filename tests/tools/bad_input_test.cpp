@@ -193,6 +193,17 @@ TEST_F(BadInput, AFolderThatIsNotThereIsNamed) {
                  {"cannot open the folder", "no/such"});
 }
 
+TEST_F(BadInput, StandardInputOfAnotherLengthLeavesNothing) {
+  for (const std::size_t bytes : {100'000, 200'000}) {
+    write_file(path("in"), noise(bytes));
+    const Outcome outcome =
+        run({"convert", "-", path("q.zarr"), "--dims", "50,50,50", "--type", "u8"},
+            {.input = path("in")});
+    expect_refused(outcome, 2, {"standard input", "125000", "--dims 50,50,50", "--type u8"});
+    EXPECT_EQ(files(), Arguments{"in"});
+  }
+}
+
 TEST_F(BadInput, ASyntheticVolumeThatDoesNotFitTheDiskIsNotBegun) {
   expect_refused(
       run({"synth", "gyroid", path("x.raw"), "--dims", "90000,90000,90000", "--type", "f64"}), 1,
