@@ -98,4 +98,12 @@ Index CheckedJson::positive() const {
   return value;
 }
 
+void CheckedJson::check_version(const char* what, Index known, const char* renewal) const {
+  const Index version = integer();
+  if (version != known)
+    unsupported(fmt::format("{} version {} is not known to this program, which knows {}; {}", what,
+                            version, known,
+                            version < known ? renewal : "use a newer version of isobrick"));
+}
+
 }  // namespace isobrick

@@ -34,6 +34,9 @@ class CheckedJson {
   Index integer() const;
   /// An integer in [1, 2⁶²].
   Index positive() const;
+  /// Throws Error unless this version of `what` is `known`; `renewal` says what to do about an
+  /// older one.
+  void check_version(const char* what, Index known, const char* renewal) const;
 
  private:
   const Json* value_;

@@ -182,11 +182,7 @@ void parse_channel_names(const nlohmann::json& ome, ImageMetadata& image) {
 }
 
 void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
-  if (const Index version = ours.at("version").integer(); version != kStoreVersion)
-    ours.unsupported(fmt::format(
-        "store version {} is not known to this program, which knows {}; {}", version,
-        kStoreVersion,
-        version < kStoreVersion ? "convert the volume anew" : "use a newer one"));
+  ours.at("version").check_version("store", kStoreVersion, "convert the volume anew");
   if (ours.has("may_have_nan")) image.may_have_nan = ours.at("may_have_nan").boolean();
   if (ours.has("grid_class")) image.grid_class = ours.string_at("grid_class");
   if (ours.has("grid_name")) image.grid_name = ours.string_at("grid_name");

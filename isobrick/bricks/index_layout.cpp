@@ -44,11 +44,8 @@ std::uint32_t checksum_of(const IndexLayout& layout) { return seal_of(to_json(la
 IndexLayout parse_index_layout(std::string_view text, const std::string& where) {
   const nlohmann::json object = unseal_json(text, where);
   const CheckedJson json(object, where);
-  if (const Index version = json.at("isobrick_index").integer(); version != kVersion)
-    json.unsupported(fmt::format(
-        "index version {} is not known to this program, which knows {}; isobrick index --force "
-        "makes it anew",
-        version, kVersion));
+  json.at("isobrick_index")
+      .check_version("index", kVersion, "isobrick index --force makes it anew");
   if (json.at("brick").integer() != IndexLayout::kBrick ||
       json.at("chunk").integer() != IndexLayout::kChunk * IndexLayout::kBrick)
     json.damaged("index bricks have 64 cells, chunks 512");

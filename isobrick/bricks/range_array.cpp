@@ -31,8 +31,7 @@ std::filesystem::path checksums_file(const std::filesystem::path& folder) {
 /// The last that an encoded chunk holds. The checksum of all of it would always be the same.
 std::uint32_t stored_checksum(std::span<const std::byte> encoded) {
   std::uint32_t crc = 0;
-  if (encoded.size() >= sizeof crc)
-    std::memcpy(&crc, encoded.last(sizeof crc).data(), sizeof crc);
+  if (encoded.size() >= sizeof crc) std::memcpy(&crc, encoded.last(sizeof crc).data(), sizeof crc);
   return crc;
 }
 
@@ -152,7 +151,7 @@ RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, Sca
   read_checksums(crc32c);
 }
 
-/// What is wrong is said where ranges are read: they can be computed anew.
+/// Reading ranges reports what is wrong here: a caller can compute them anew.
 void RangeArrayReader::read_checksums(std::uint32_t expected) {
   const std::filesystem::path file = checksums_file(folder_);
   const auto count = static_cast<std::size_t>(volume(ceil_div(items_, kChunk)));
@@ -163,12 +162,17 @@ void RangeArrayReader::read_checksums(std::uint32_t expected) {
     wrong_ = fmt::format("'{}' is missing", file.string());
     return;
   }
+  const std::string damaged = fmt::format("'{}' is damaged", file.string());
+  if (text.size() != bytes) {
+    wrong_ = damaged;
+    return;
+  }
   std::vector<std::uint32_t> all(count + 1);
-  if (text.size() == bytes) std::memcpy(all.data(), text.data(), bytes);
+  std::memcpy(all.data(), text.data(), bytes);
   const std::uint32_t last = all.back();
   all.pop_back();
-  if (text.size() != bytes || crc32c(std::as_bytes(std::span(all))) != last)
-    wrong_ = fmt::format("'{}' is damaged", file.string());
+  if (crc32c(std::as_bytes(std::span(all))) != last)
+    wrong_ = damaged;
   else if (last != expected)
     wrong_ = fmt::format("'{}' is that of another level or store", file.string());
   checksums_ = std::move(all);

@@ -7,13 +7,13 @@
 #include <chrono>
 #include <cmath>
 
-#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/lru_cache.h"
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/shard_index.h"
 #include "isobrick/bricks/store_file.h"
+#include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/bricks/volume_choice.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/pod_buffer.h"
@@ -70,7 +70,7 @@ struct StoreReader::Impl {
   };
 
   void open(const std::filesystem::path& path, const Selection& selection);
-  std::optional<AddedRanges> find_ranges() const;
+  std::optional<StoredRanges> find_ranges() const;
   void open_level(const ImageMetadata::Level& described, MetadataFiles::Level&& read);
   void open_ranges(int level, const RangeChecksums& checksums);
   void check_brick(int level, Int3 b) const;
@@ -116,7 +116,7 @@ void StoreReader::Impl::open(const std::filesystem::path& path, const Selection&
   for (std::size_t i = 0; i < image.levels.size(); ++i)
     open_level(image.levels[i], std::move(metadata.levels[i]));
   std::optional<bool> may_have_nan = image.may_have_nan;
-  if (const std::optional<AddedRanges> ranges = find_ranges()) {
+  if (const std::optional<StoredRanges> ranges = find_ranges()) {
     if (!image.ours) may_have_nan = ranges->may_have_nan;
     for (std::size_t i = 0; i < levels.size(); ++i)
       open_ranges(static_cast<int>(i), ranges->levels[i]);
@@ -130,14 +130,14 @@ void StoreReader::Impl::open(const std::filesystem::path& path, const Selection&
 }
 
 // The ranges of the image as it is now: if its metadata was changed since, they are of another.
-std::optional<AddedRanges> StoreReader::Impl::find_ranges() const {
-  std::optional<AddedRanges> added = read_added_ranges(info.additions);
-  if (!added) return std::nullopt;
-  if (added->image_crc32c == info.metadata_crc32c && added->levels.size() == levels.size())
-    return added;
+std::optional<StoredRanges> StoreReader::Impl::find_ranges() const {
+  std::optional<StoredRanges> stored = read_stored_ranges(info.additions);
+  if (!stored) return std::nullopt;
+  if (stored->image_crc32c == info.metadata_crc32c && stored->levels.size() == levels.size())
+    return stored;
   if (info.ours)
-    throw DamageError(fmt::format("{}: is that of another store",
-                                  quoted(added_ranges_file(info.additions))));
+    throw DamageError(fmt::format("{}: these are the ranges of another store",
+                                  quoted(ranges_file(info.additions))));
   return std::nullopt;
 }
 
@@ -151,10 +151,10 @@ void StoreReader::Impl::open_ranges(int level, const RangeChecksums& checksums) 
     return Ranges(std::make_shared<const RangeArrayReader>(folder, items, samples.type, crc32c));
   };
   Level& l = levels[static_cast<std::size_t>(level)];
-  l.brick_ranges = open(brick_range_folder(info.additions, level), samples.bricks(),
-                        checksums.bricks);
-  l.block_ranges = open(block_range_folder(info.additions, level), samples.blocks(),
-                        checksums.blocks);
+  l.brick_ranges =
+      open(brick_range_folder(info.additions, level), samples.bricks(), checksums.bricks);
+  l.block_ranges =
+      open(block_range_folder(info.additions, level), samples.blocks(), checksums.blocks);
   info.levels[static_cast<std::size_t>(level)].block_ranges_crc32c = checksums.blocks;
 }
 

@@ -30,7 +30,7 @@ struct LevelInfo {
   /// Bytes of this level's shard indices that the reader keeps at most: all of a usual
   /// volume, bounded of a huge one.
   std::uint64_t index_bytes = 0;
-  /// Tells the ranges of this level's blocks from any others; 0 where there are none.
+  /// A checksum of the ranges of this level's blocks; 0 where there are none.
   std::uint32_t block_ranges_crc32c = 0;
 };
 

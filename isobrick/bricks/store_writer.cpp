@@ -9,7 +9,6 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/image_metadata.h"
@@ -19,6 +18,7 @@
 #include "isobrick/bricks/shard_index.h"
 #include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
+#include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/bricks/zarr_v2.h"
 #include "isobrick/core/error.h"
 
@@ -372,7 +372,7 @@ void StoreWriter::finish(bool may_have_nan,
           fmt::format("'{}' was not finished", impl_->open_shards.begin()->second->path.string()));
   }
   publisher.write(impl_->dir / "isobrick" / "zarr.json", group_json());
-  AddedRanges ranges{.may_have_nan = may_have_nan, .image_crc32c = 0, .levels = {}};
+  StoredRanges ranges{.may_have_nan = may_have_nan, .image_crc32c = 0, .levels = {}};
   for (std::size_t i = 0; i < impl_->levels.size(); ++i) {
     Impl::Level& l = impl_->levels[i];
     const auto bricks = l.brick_ranges->finish(), blocks = l.block_ranges->finish();
@@ -389,7 +389,7 @@ void StoreWriter::finish(bool may_have_nan,
   image.checksum = impl_->checksum_of(image);
   ranges.image_crc32c = *image.checksum;
   if (ranges.levels.size() == impl_->levels.size())
-    publisher.write(added_ranges_file(impl_->dir), to_json(ranges));
+    publisher.write(ranges_file(impl_->dir), to_json(ranges));
   // Only now, with everything on disk, does the directory become a store.
   impl_->publish_root(image);
   if (window) {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/store_entries.h"
+#include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/exchange.h"
 #include "isobrick/pipeline/level_scan.h"
@@ -54,9 +54,9 @@ std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uin
   return std::min(memory - fixed, kEnoughForAPiece);
 }
 
-/// Writes both range arrays of a level beside their places, and what tells them into `added`.
+/// Writes both range arrays of a level beside their places, and their checksums into `stored`.
 void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
-                  Progress& progress, AddedRanges& added) {
+                  Progress& progress, StoredRanges& stored) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const fs::path& root = store.info().additions;
   RangeArrayWriter blocks(partial(block_range_folder(root, level)), lattice.blocks(), lattice.type,
@@ -69,8 +69,8 @@ void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publ
       [&](Box3 items, std::span<const std::byte> pairs) { blocks.put(items, pairs); },
       [&](Box3 items, std::span<const std::byte> pairs) { bricks.put(items, pairs); },
       [&](std::uint64_t done) { progress.advance(done); });
-  added.levels.push_back({.bricks = *bricks.finish(), .blocks = *blocks.finish()});
-  added.may_have_nan |= ranges->has_nan();
+  stored.levels.push_back({.bricks = *bricks.finish(), .blocks = *blocks.finish()});
+  stored.may_have_nan |= ranges->has_nan();
 }
 
 }  // namespace
@@ -92,11 +92,11 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
     publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
   });
   progress.begin("ranges", total);
-  AddedRanges added{.may_have_nan = false, .image_crc32c = info.metadata_crc32c, .levels = {}};
+  StoredRanges stored{.may_have_nan = false, .image_crc32c = info.metadata_crc32c, .levels = {}};
   for (int level = 0; level < levels; ++level)
     write_ranges(store, level,
                  piece_bytes(info.levels[static_cast<std::size_t>(level)], memory, others, threads),
-                 publisher, progress, added);
+                 publisher, progress, stored);
   publisher.wait();
   progress.end();
   for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
@@ -104,7 +104,7 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
     check_replaceable(set_aside_name(folder), place);
     publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left
   });
-  publisher.write(added_ranges_file(info.additions), to_json(added));
+  publisher.write(ranges_file(info.additions), to_json(stored));
   publisher.wait();
 }
 

@@ -4,8 +4,8 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/image_metadata.h"
+#include "isobrick/bricks/stored_ranges.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace isobrick::test {
@@ -212,9 +212,9 @@ TEST(Damage, AHostileShapeIsRefusedAtOnce) {
     root["attributes"]["isobrick"]["metadata_crc32c"] =
         metadata_checksum(root.dump(), std::array{array.dump()}, "file");
     write_file(path / "zarr.json", root.dump());
-    AddedRanges ranges = *read_added_ranges(path);
+    StoredRanges ranges = *read_stored_ranges(path);
     ranges.image_crc32c = root["attributes"]["isobrick"]["metadata_crc32c"].get<std::uint32_t>();
-    write_file(added_ranges_file(path), to_json(ranges));
+    write_file(ranges_file(path), to_json(ranges));
     const auto begin = std::chrono::steady_clock::now();
     try {
       const StoreReader store(path);

@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/index_layout.h"
 #include "isobrick/bricks/sealed_json.h"
+#include "isobrick/bricks/stored_ranges.h"
 #include "tests/bricks/store_fixture.h"
+#include "tests/io/temp_dir.h"
 
 namespace isobrick::test {
 namespace {
@@ -90,9 +91,9 @@ TEST_P(IndexChunkFile, EveryFlippedBitAndEveryCutIsNoticed) {
 
 TEST_P(IndexChunkFile, AnotherPlaceOrIndexIsNoticed) {
   write(300);
-  for (const IndexChunkName& other :
-       {IndexChunkName{{1, 2, 0}, kName.index_crc32c}, IndexChunkName{{2, 1, 1}, kName.index_crc32c},
-        IndexChunkName{kName.chunk, kName.index_crc32c + 1}}) {
+  for (const IndexChunkName& other : {IndexChunkName{{1, 2, 0}, kName.index_crc32c},
+                                      IndexChunkName{{2, 1, 1}, kName.index_crc32c},
+                                      IndexChunkName{kName.chunk, kName.index_crc32c + 1}}) {
     EXPECT_THROW(IndexChunk(path, parts.size(), GetParam().has_value(), other), DamageError);
     EXPECT_FALSE(IndexChunk::is_whole(path, parts.size(), other));
   }
@@ -177,20 +178,34 @@ TEST(IndexLayout, Geometry) {
   EXPECT_EQ(volume(flat.chunks()), 0);
 }
 
-TEST(AddedRangesJson, RoundTripAndChanges) {
+TEST(StoredRangesJson, RoundTripAndChanges) {
   const TemporaryFolder folder;
-  EXPECT_FALSE(read_added_ranges(folder / "a"));
-  const AddedRanges added{.may_have_nan = false, .image_crc32c = 0xfedcba98, .levels = {{1, 2}, {3, 0xfedcba97}}};
-  const std::string text = to_json(added);
-  write_file(added_ranges_file(folder / "a"), text);
-  EXPECT_EQ(read_added_ranges(folder / "a"), added);
+  EXPECT_FALSE(read_stored_ranges(folder / "a"));
+  const StoredRanges ranges{
+      .may_have_nan = false, .image_crc32c = 0xfedcba98, .levels = {{1, 2}, {3, 0xfedcba97}}};
+  const std::string text = to_json(ranges);
+  write_file(ranges_file(folder / "a"), text);
+  EXPECT_EQ(read_stored_ranges(folder / "a"), ranges);
   for (std::size_t at = 0; at < text.size(); ++at) {
     if (text[at] == ' ' || text[at] == '\n') continue;
     std::string changed = text;
     changed[at] = static_cast<char>(changed[at] ^ 0x11);
-    write_file(added_ranges_file(folder / "a"), changed);
-    EXPECT_THROW(read_added_ranges(folder / "a"), DamageError) << changed;
+    write_file(ranges_file(folder / "a"), changed);
+    EXPECT_THROW(read_stored_ranges(folder / "a"), DamageError) << changed;
   }
+}
+
+TEST(StoredRangesJson, ANewerVersionWantsANewerProgram) {
+  const TemporaryFolder folder;
+  const std::string text = to_json(StoredRanges{});
+  const auto message_for = [&](int version) {
+    nlohmann::json json = unseal_json(text, "");
+    json["isobrick_ranges"] = version;
+    write_file(ranges_file(folder / "a"), seal_json(json));
+    return message_of<Error>([&] { read_stored_ranges(folder / "a"); });
+  };
+  EXPECT_TRUE(message_for(1).ends_with("remove the file and run isobrick index")) << message_for(1);
+  EXPECT_TRUE(message_for(9).ends_with("use a newer version of isobrick")) << message_for(9);
 }
 
 }  // namespace

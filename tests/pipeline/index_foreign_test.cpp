@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/image_metadata.h"
 #include "isobrick/bricks/stored_index.h"
+#include "isobrick/bricks/stored_ranges.h"
 #include "tests/pipeline/index_fixture.h"
 
 namespace isobrick::test {
@@ -154,9 +154,9 @@ TEST_F(ForeignIndex, DamagedBookkeepingIsRefused) {
   const Int3 extent{70, 40, 50};
   write_foreign(foreign_, extent, {20, 20, 20}, make_samples<float>(extent, 5));
   add_index_quietly(foreign_, {});
-  std::string text = content_of(added_ranges_file(foreign_));
+  std::string text = content_of(ranges_file(foreign_));
   text.replace(text.find("false"), 5, "true");
-  std::ofstream(added_ranges_file(foreign_)) << text;
+  std::ofstream(ranges_file(foreign_)) << text;
   EXPECT_THROW(StoreReader{foreign_}, DamageError);
   EXPECT_EQ(verify_quietly(foreign_).damage_count, 1u);
 }

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/added_ranges.h"
 #include "isobrick/bricks/stored_index.h"
+#include "isobrick/bricks/stored_ranges.h"
 #include "tests/bricks/hex.h"
 #include "tests/pipeline/index_fixture.h"
 
@@ -32,7 +32,8 @@ TEST_F(IndexGolden, Octree) {
   ASSERT_EQ(tree.size(), 2u);
   // Both checksums depend on how well zstd compresses the ranges.
   const StoredIndex index(StoreReader(store_), 0, "octree");
-  EXPECT_EQ(tree.at("index.json"), fmt::format(R"({{
+  EXPECT_EQ(tree.at("index.json"),
+            fmt::format(R"({{
   "brick": 64,
   "chunk": 512,
   "crc32c": {},
@@ -49,8 +50,7 @@ TEST_F(IndexGolden, Octree) {
   "zstd_level": null
 }}
 )",
-                                               checksum_of(index.layout()),
-                                               index.layout().ranges_crc32c));
+                        checksum_of(index.layout()), index.layout().ranges_crc32c));
   const std::string chunk = hex(tree.at("c/0/0/0"));
   EXPECT_EQ(chunk.substr(0, chunk.size() - 8),
             // The directory: an octree of one brick with the range [10, 30], CRC-32C.
@@ -68,10 +68,10 @@ TEST_F(IndexGolden, Octree) {
             "3c000000000000003c00000000000000");
 }
 
-TEST_F(IndexGolden, AddedRanges) {
-  EXPECT_EQ(to_json(AddedRanges{
-                .may_have_nan = false, .image_crc32c = 305419896, .levels = {{1, 2}}}),
-            R"({
+TEST_F(IndexGolden, StoredRanges) {
+  EXPECT_EQ(
+      to_json(StoredRanges{.may_have_nan = false, .image_crc32c = 305419896, .levels = {{1, 2}}}),
+      R"({
   "crc32c": 3894405433,
   "image_crc32c": 305419896,
   "isobrick_ranges": 2,

@@ -15,23 +15,23 @@ struct RangeChecksums {
   friend bool operator==(const RangeChecksums&, const RangeChecksums&) = default;
 };
 
-/// What a store's ranges are those of: isobrick/ranges.json. The metadata of images that others
-/// have written is left as it is.
-struct AddedRanges {
+/// Which image the ranges in a store belong to, and their checksums: isobrick/ranges.json. The
+/// metadata of images of other programs stays as it is.
+struct StoredRanges {
   bool may_have_nan = true;
   /// metadata_checksum() of the image that the ranges were computed from.
   std::uint32_t image_crc32c = 0;
   std::vector<RangeChecksums> levels;
 
-  friend bool operator==(const AddedRanges&, const AddedRanges&) = default;
+  friend bool operator==(const StoredRanges&, const StoredRanges&) = default;
 };
 
-std::filesystem::path added_ranges_file(const std::filesystem::path& store);
+std::filesystem::path ranges_file(const std::filesystem::path& store);
 
-std::string to_json(const AddedRanges& added);
+std::string to_json(const StoredRanges& stored);
 
 /// Reads ranges.json of a store; nothing when there is none. DamageError for
 /// what is broken, Error for a version that this program does not know.
-std::optional<AddedRanges> read_added_ranges(const std::filesystem::path& store);
+std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store);
 
 }  // namespace isobrick

@@ -1,0 +1,52 @@
+#include "isobrick/bricks/stored_ranges.h"
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/sealed_json.h"
+#include "isobrick/bricks/store_file.h"
+
+namespace isobrick {
+namespace {
+
+constexpr int kVersion = 2;
+
+}  // namespace
+
+std::filesystem::path ranges_file(const std::filesystem::path& store) {
+  return store / "isobrick" / "ranges.json";
+}
+
+std::string to_json(const StoredRanges& stored) {
+  nlohmann::json json;
+  json["isobrick_ranges"] = kVersion;
+  json["may_have_nan"] = stored.may_have_nan;
+  json["image_crc32c"] = stored.image_crc32c;
+  json["levels"] = nlohmann::json::array();
+  for (const RangeChecksums& level : stored.levels)
+    json["levels"].push_back(
+        {{"range_crc32c", level.bricks}, {"block_range_crc32c", level.blocks}});
+  return seal_json(std::move(json));
+}
+
+std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store) {
+  const std::filesystem::path file = ranges_file(store);
+  bool exists = false;
+  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  if (!exists) return std::nullopt;
+  const nlohmann::json object = unseal_json(text, quoted(file));
+  const CheckedJson json(object, quoted(file));
+  json.at("isobrick_ranges")
+      .check_version("ranges", kVersion, "remove the file and run isobrick index");
+  StoredRanges stored{json.at("may_have_nan").boolean(),
+                      static_cast<std::uint32_t>(json.at("image_crc32c").integer()),
+                      {}};
+  const CheckedJson levels = json.at("levels");
+  for (std::size_t i = 0; i < levels.array_size(); ++i)
+    stored.levels.push_back(
+        {static_cast<std::uint32_t>(levels.at(i).at("range_crc32c").integer()),
+         static_cast<std::uint32_t>(levels.at(i).at("block_range_crc32c").integer())});
+  return stored;
+}
+
+}  // namespace isobrick
