@@ -9,6 +9,7 @@
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
+#include "isobrick/core/digits.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_guard.h"
 
@@ -18,31 +19,26 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Every file of a store; # is a number, KIND a kind of index. docs/store_format.md has them.
-constexpr std::array<std::string_view, 18> kFiles{
-    "zarr.json",
-    ".zgroup",
-    ".zattrs",
-    kLayoutMarker,
-    kConvertJournal,
-    "spool",
-    "#/zarr.json",
-    "#/.zarray",
-    "#/c/#/#/#",
-    "#/#/#/#",
-    "isobrick/zarr.json",
-    "isobrick/ranges.json",
-    "isobrick/#/zarr.json",
-    "isobrick/#/RANGES/zarr.json",
-    "isobrick/#/RANGES/checksums",
-    "isobrick/#/RANGES/c/#/#/#/#",
-    "isobrick/#/index/KIND/index.json",
-    "isobrick/#/index/KIND/c/#/#/#"};
+constexpr std::array<std::string_view, 18> kFiles{"zarr.json",
+                                                  ".zgroup",
+                                                  ".zattrs",
+                                                  kLayoutMarker,
+                                                  kConvertJournal,
+                                                  "spool",
+                                                  "#/zarr.json",
+                                                  "#/.zarray",
+                                                  "#/c/#/#/#",
+                                                  "#/#/#/#",
+                                                  "isobrick/zarr.json",
+                                                  "isobrick/ranges.json",
+                                                  "isobrick/#/zarr.json",
+                                                  "isobrick/#/RANGES/zarr.json",
+                                                  "isobrick/#/RANGES/checksums",
+                                                  "isobrick/#/RANGES/c/#/#/#/#",
+                                                  "isobrick/#/index/KIND/index.json",
+                                                  "isobrick/#/index/KIND/c/#/#/#"};
 constexpr std::array<std::string_view, 4> kKinds{"interval", "kdtree", "quadtree", "octree"};
 constexpr std::array<std::string_view, 2> kRanges{"range", "block_range"};
-
-bool is_number(std::string_view text) {
-  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
-}
 
 /// `name` without `suffix`, if it ends so.
 std::string_view without(std::string_view name, std::string_view suffix) {
@@ -52,7 +48,7 @@ std::string_view without(std::string_view name, std::string_view suffix) {
 
 /// The name as kFiles has it.
 std::string name_pattern(const std::string& name) {
-  if (is_number(name)) return "#";
+  if (is_digits(name)) return "#";
   if (name.starts_with("spool.partial-")) return "spool";
   const std::string_view folder = without(without(name, ".partial"), ".replaced");
   if (std::ranges::find(kKinds, folder) != kKinds.end()) return "KIND";

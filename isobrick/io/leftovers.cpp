@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "isobrick/core/cancel.h"
+#include "isobrick/core/digits.h"
 #include "isobrick/core/error.h"
 
 namespace isobrick {
@@ -23,15 +24,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_number(std::string_view text) {
-  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
-}
-
 /// "4711-0": process and counter.
 bool is_process_suffix(std::string_view text) {
   const std::size_t dash = text.find('-');
-  return dash != std::string_view::npos && is_number(text.substr(0, dash)) &&
-         is_number(text.substr(dash + 1));
+  return dash != std::string_view::npos && is_digits(text.substr(0, dash)) &&
+         is_digits(text.substr(dash + 1));
 }
 
 std::recursive_timed_mutex& publication_mutex() {
@@ -167,7 +164,7 @@ bool is_part_name(std::string_view name) {
   if (!name.starts_with(prefix)) return false;
   const std::size_t dot = name.find('.');
   return dot != std::string_view::npos &&
-         is_number(name.substr(prefix.size(), dot - prefix.size()));
+         is_digits(name.substr(prefix.size(), dot - prefix.size()));
 }
 
 }  // namespace isobrick

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string_view>
+
+namespace isobrick {
+
+/// Whether `text` is one decimal digit or more, and nothing else.
+inline bool is_digits(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+}  // namespace isobrick
