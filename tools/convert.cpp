@@ -8,6 +8,7 @@
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_folder.h"
+#include "isobrick/pipeline/convert_staging.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
 #include "tools/options.h"
@@ -65,23 +66,23 @@ std::vector<std::filesystem::path> input_paths(const std::string& name) {
   return {};
 }
 
-/// Standard input cannot be read again: where it is not as long as was said, nothing stays that a
-/// resume could go on with.
+/// Standard input cannot be read again: where it has another length than the options say, nothing
+/// stays for a resume.
 ConvertReport convert_stream(VolumeSource& source, const std::string& out,
                              const ConvertOptions& options, Console& console) {
-  const std::filesystem::path partial = out + ".partial";
-  const bool earlier = std::filesystem::exists(std::filesystem::symlink_status(partial));
+  namespace fs = std::filesystem;
+  const fs::path partial = staging_path(out);
+  const auto is_there = [&] { return fs::exists(fs::symlink_status(partial)); };
+  const bool earlier = is_there();
   try {
     return convert(source, out, options, console.progress());
   } catch (const UsageError& error) {
-    const std::string what = error.what();
-    if (earlier || !what.starts_with("standard input")) throw;
-    const std::filesystem::path folder =
-        partial.has_parent_path() ? partial.parent_path() : std::filesystem::path(".");
-    OutputFolder(folder).remove_folder(partial);
+    // Options and output are checked before the folder is made: this is about the samples.
+    if (earlier || !is_there()) throw;
+    OutputFolder(partial.has_parent_path() ? partial.parent_path() : ".").remove_folder(partial);
     const VolumeInfo& info = source.info();
-    throw UsageError(fmt::format("{}; --dims {},{},{}, --type {} and --offset say how many", what,
-                                 info.extent.x, info.extent.y, info.extent.z,
+    throw UsageError(fmt::format("{}; --dims {},{},{}, --type {} and --offset say how many",
+                                 error.what(), info.extent.x, info.extent.y, info.extent.z,
                                  short_name(info.type)));
   }
 }

@@ -10,6 +10,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/core/shell_word.h"
 #include "isobrick/meshes/mesh_name.h"
+#include "isobrick/pipeline/convert_staging.h"
 #include "isobrick/volumes/raw_name.h"
 #include "isobrick/volumes/volume_format.h"
 #include "tools/format.h"
@@ -38,8 +39,8 @@ std::string convert_command(const fs::path& volume, const std::string& options =
 }
 
 [[noreturn]] void refuse_missing(const std::string& path) {
-  if (fs::exists(path + ".partial"))
-    refuse(path, fmt::format("its conversion was interrupted ('{}.partial')", path),
+  if (fs::exists(staging_path(path)))
+    refuse(path, fmt::format("its conversion was interrupted ('{}')", staging_path(path).string()),
            fmt::format("run: isobrick convert VOLUME {} --resume", shell_word(path)));
   refuse(path, "nothing has that name",
          fmt::format("make one: isobrick convert VOLUME {}", shell_word(path)));

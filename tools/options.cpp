@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isobrick/bricks/store_names.h"
+#include "isobrick/pipeline/convert_staging.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/interrupt.h"
@@ -193,14 +194,12 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
 
 void note_conversion(const std::string& output) {
   set_interrupt_note([output]() -> std::string {
-    std::string folder = output;
-    while (folder.size() > 1 && folder.ends_with('/')) folder.pop_back();
-    folder += ".partial";
+    const std::filesystem::path folder = staging_path(output);
     std::error_code none;
-    if (!std::filesystem::exists(std::filesystem::path(folder) / kLayoutMarker, none))
+    if (!std::filesystem::exists(folder / kLayoutMarker, none))
       return "the same command begins anew";
     return fmt::format("what is done is in '{}': the same command with --resume goes on with it",
-                       folder);
+                       folder.string());
   });
 }
 

@@ -36,8 +36,12 @@ bool nothing_to_resume(const fs::path& staging) {
   return true;
 }
 
+fs::path without_last_slash(fs::path path) {
+  return path.has_filename() ? path : path.parent_path();
+}
+
 fs::path checked_name(fs::path out) {
-  if (!out.has_filename()) out = out.parent_path();  // a slash at the end
+  out = without_last_slash(std::move(out));
   if (out.empty() || out.filename() == "." || out.filename() == "..")
     throw UsageError(fmt::format("'{}' is no name for a store", out.string()));
   return out;
@@ -50,12 +54,13 @@ fs::path parent_of(const fs::path& path) {
 /// Keeps other conversions away from a folder.
 UniqueFd lock_folder(const OutputFolder& parent, const fs::path& folder) {
   UniqueFd lock = parent.make_folder(folder);
-  struct stat locked {}, named {};
+  struct stat locked {
+  }, named{};
   const bool taken = ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
   // Another process may have moved it to its place before it let go of it.
-  const bool moved = !taken && (::fstat(lock.get(), &locked) != 0 ||
-                                ::lstat(folder.c_str(), &named) != 0 ||
-                                locked.st_ino != named.st_ino);
+  const bool moved =
+      !taken && (::fstat(lock.get(), &locked) != 0 || ::lstat(folder.c_str(), &named) != 0 ||
+                 locked.st_ino != named.st_ino);
   if (taken || moved)
     throw Error(fmt::format("another conversion is writing '{}'", folder.string()));
   return lock;
@@ -63,9 +68,11 @@ UniqueFd lock_folder(const OutputFolder& parent, const fs::path& folder) {
 
 }  // namespace
 
+fs::path staging_path(const fs::path& out) { return without_last_slash(out).string() + ".partial"; }
+
 ConvertStaging::ConvertStaging(fs::path out, bool resume, bool force, std::vector<fs::path> inputs)
     : out_(checked_name(std::move(out))),
-      staging_(out_.string() + ".partial"),
+      staging_(staging_path(out_)),
       aside_(set_aside_name(out_)),
       force_(force),
       inputs_(std::move(inputs)),

@@ -9,8 +9,10 @@
 
 namespace isobrick {
 
-/// Where a store grows until it takes its place: `out` + ".partial". It stays
-/// when a conversion fails, for a resume.
+/// Where the store `out` grows until it takes its place: `out` + ".partial".
+std::filesystem::path staging_path(const std::filesystem::path& out);
+
+/// The folder at staging_path(). It stays when a conversion fails, for a resume.
 ///
 /// A store keeps the marker of an unfinished conversion until it has its place and the one that
 /// was there is gone. So a marker at `out` says that a process was killed while it published:
@@ -19,11 +21,11 @@ class ConvertStaging {
  public:
   /// First ends what a killed process began to publish; with `resume` its store goes back to
   /// ".partial", so that the input is compared like that of any other interrupted conversion.
-  /// Throws UsageError when `out` exists (and with `force` when it is not a store of ours and
-  /// nothing else, or holds one of `inputs` or the current directory) or is a symbolic link, when
-  /// something else than an interrupted conversion is in the way, or when an interrupted
-  /// conversion is there that neither `resume` nor `force` says what to do with; Error when
-  /// another process is writing it.
+  /// Throws UsageError when `out` is a symbolic link, or exists and `force` may not replace it:
+  /// `force` replaces a store of ours that has nothing else in it, none of `inputs` and not the
+  /// current directory. Throws UsageError too when anything but an interrupted conversion is at
+  /// ".partial", or when one is there and neither `resume` nor `force` says what to do. Throws
+  /// Error when another process is writing it.
   ConvertStaging(std::filesystem::path out, bool resume, bool force,
                  std::vector<std::filesystem::path> inputs);
 

@@ -15,6 +15,7 @@
 #include "isobrick/core/shell_word.h"
 #include "isobrick/io/file.h"
 #include "isobrick/meshes/mesh_name.h"
+#include "isobrick/pipeline/convert_staging.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
 #include "isobrick/volumes/volume_format.h"
@@ -86,7 +87,7 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
 /// A conversion keeps what it has so that it can be resumed; a cancelled drop is not. What another
 /// process has taken over meanwhile, and so has locked, stays.
 void ImportJob::discard() const {
-  const fs::path partial = store_.string() + ".partial";
+  const fs::path partial = staging_path(store_);
   const UniqueFd folder(::open(partial.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
   if (folder.get() < 0 || ::flock(folder.get(), LOCK_EX | LOCK_NB) != 0) return;
   std::error_code ignored;
@@ -136,7 +137,7 @@ fs::path store_for(const fs::path& input) {
   const std::string stem = full.stem().string();
   fs::path store = folder / (stem + ".zarr");
   const auto taken = [](const fs::path& path) {
-    return fs::exists(path) || fs::exists(path.string() + ".partial");
+    return fs::exists(path) || fs::exists(staging_path(path));
   };
   for (int number = 2; taken(store); ++number)
     store = folder / fmt::format("{}-{}.zarr", stem, number);
