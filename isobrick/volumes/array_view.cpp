@@ -80,8 +80,7 @@ ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes
         throw UsageError(fmt::format("'{}' has more than 3 dimensions of space", path));
       const int to = axis.direction.value_or(next);
       if (view.extent[to] != 0)
-        throw UsageError(
-            fmt::format("'{}': two of its axes are called {}", path, "xyz"[to]));
+        throw UsageError(fmt::format("'{}': two of its axes are called {}", path, "xyz"[to]));
       view.extent[to] = axis.size;
       view.stride[to] = view.total;
       view.kept[static_cast<std::size_t>(to)] = i;

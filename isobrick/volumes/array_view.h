@@ -36,8 +36,8 @@ struct ArrayView {
 
 /// Selects a volume from an array whose fastest axis is the first of `axes`.
 /// Exactly three are space. Throws UsageError, beginning with `path`, for sizes
-/// that are not positive or overflow, for two axes of one direction, for channels and times that must be chosen
-/// and were not, and for choices that are not there.
+/// that are not positive or overflow and for two axes of one direction. It throws one too where
+/// a channel or a time must be chosen, and where the chosen one does not exist.
 ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes,
                         const Selection& selection);
 

@@ -135,14 +135,12 @@ double read_frame_step(const std::string& path, const Attributes& a, Index frame
     before = offset;
   }
   if (steps.empty()) return 0;
-  std::vector<double> sorted = steps;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double usual = usual_step(steps);
   for (std::size_t i = 0; i < steps.size(); ++i)
-    if (*middle == 0 || std::abs(steps[i] - *middle) > 0.02 * std::abs(*middle) + 1e-3)
+    if (usual == 0 || std::abs(steps[i] - usual) > step_tolerance(usual))
       refuse(path, fmt::format("the frames are not evenly spaced: frame {} lies {:.4g} mm behind "
                                "the one before, elsewhere the step is {:.4g} mm",
-                               i + 2, steps[i], *middle));
+                               i + 2, steps[i], usual));
   return std::accumulate(steps.begin(), steps.end(), 0.0) / static_cast<double>(steps.size());
 }
 
@@ -179,6 +177,16 @@ void fill_high_bits(std::byte* samples, std::size_t count, int bits) {
 }
 
 }  // namespace
+
+double usual_step(std::vector<double> steps) {
+  // The shorter one of two: a missing slice makes a step longer.
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
+  std::nth_element(steps.begin(), middle, steps.end(),
+                   [](double a, double b) { return std::abs(a) < std::abs(b); });
+  return *middle;
+}
+
+double step_tolerance(double step) { return 0.02 * std::abs(step) + 1e-3; }
 
 std::optional<DicomSlice> read_dicom_slice(const std::string& path) {
   DcmFileFormat file;

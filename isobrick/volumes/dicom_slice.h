@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/vec.h"
@@ -25,6 +26,12 @@ struct DicomSlice {
   Vec3d row{1, 0, 0}, column{0, 1, 0};  ///< directions in which x and y grow
   Index time = 0, instance = 0;         ///< TemporalPositionIdentifier, InstanceNumber
 };
+
+/// The usual one of steps between slices: the lower median of their sizes. At least one.
+double usual_step(std::vector<double> steps);
+
+/// How far steps may differ from `step` and still be even: files write positions with few digits.
+double step_tolerance(double step);
 
 /// Reads a file without its samples; nothing for a DICOMDIR and what else is no
 /// image. Throws UsageError for what is not supported, DamageError where the file

@@ -162,21 +162,18 @@ std::vector<DicomSlice> choose_time(const std::string& name, std::vector<DicomSl
   return chosen;
 }
 
-/// The usual one of several steps: their median.
-double usual_step(const std::vector<DicomSlice>& slices) {
+/// From each slice to the next.
+std::vector<double> steps_of(const std::vector<DicomSlice>& slices) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < slices.size(); ++i)
     steps.push_back(height_of(slices[i]) - height_of(slices[i - 1]));
-  // The lower one of two: a missing slice makes a step longer.
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps;
 }
 
 [[noreturn]] void refuse_step(const std::string& name, const DicomSlice& before,
                               const DicomSlice& after, double step, double usual) {
   const double steps = std::round(step / usual);
-  if (steps >= 2 && std::abs(step - steps * usual) <= 0.02 * step + 1e-3)
+  if (steps >= 2 && std::abs(step - steps * usual) <= step_tolerance(step))
     throw UsageError(fmt::format(
         "'{}': {} missing between '{}' and '{}', which are {:.4g} mm apart: elsewhere the step is "
         "{:.4g} mm",
@@ -195,12 +192,11 @@ double find_step(const std::string& name, const std::vector<DicomSlice>& slices)
   const Vec3d normal = cross(slices[0].row, slices[0].column);
   const auto last = static_cast<double>(slices.size() - 1);
   const double step = (height_of(slices.back()) - height_of(slices[0])) / last;
-  const double usual = usual_step(slices);
+  const double usual = usual_step(steps_of(slices));
   for (std::size_t i = 1; i < slices.size(); ++i) {
     const Vec3d way = *slices[i].position - *slices[i - 1].position;
     const double up = dot(way, normal);
-    // Positions are written with few digits.
-    const double tolerance = 0.02 * usual + 1e-3;
+    const double tolerance = step_tolerance(usual);
     if (std::abs(up - usual) > tolerance) refuse_step(name, slices[i - 1], slices[i], up, usual);
     if (length(way - normal * up) > tolerance)
       throw UsageError(

@@ -34,8 +34,8 @@ std::optional<bool> hdf5_swapped(hid_t dataset, ScalarType type);
 /// The sizes, fastest first, with the roles that the attribute DIMENSION_LABELS says;
 /// `labelled` becomes whether it says all: then those of space have their directions.
 std::vector<ArrayAxis> read_hdf5_axes(const std::string& path, hid_t dataset, bool& labelled);
-/// The attribute `element_size_um` that Fiji and ilastik write, of the axes of space, fastest first;
-/// or zeros.
+/// The attribute `element_size_um` that Fiji and ilastik write, of the axes of space, fastest
+/// first; or zeros.
 Vec3d read_hdf5_element_size(hid_t dataset);
 
 /// Throws UsageError for samples in other files, and for filters that are not there.
