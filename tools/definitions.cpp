@@ -49,6 +49,10 @@ std::vector<OptionView> views_of(const CLI::App& app, bool positional) {
 
 }  // namespace
 
+std::string in_brackets_if(bool optional, const std::string& text) {
+  return optional ? '[' + text + ']' : text;
+}
+
 CommandView view_of(const CLI::App& app) {
   const std::string footer = app.get_footer();  // "Example:" and a line
   return {app.get_name(), app.get_description(),

@@ -29,6 +29,9 @@ struct CommandView {
 
 CommandView view_of(const CLI::App& app);
 
+/// What may be left out, as usage lines write it: "[TEXT]".
+std::string in_brackets_if(bool optional, const std::string& text);
+
 /// Names of the subcommands in the order of their definition.
 std::vector<std::string> command_names(const CLI::App& app);
 

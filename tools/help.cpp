@@ -10,10 +10,6 @@
 namespace isobrick::tools {
 namespace {
 
-std::string in_brackets_if(bool optional, const std::string& text) {
-  return optional ? fmt::format("[{}]", text) : text;
-}
-
 class HelpFormatter final : public CLI::Formatter {
  public:
   HelpFormatter() { column_width(30); }

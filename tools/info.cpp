@@ -28,8 +28,7 @@ std::uint64_t directory_bytes(const fs::path& path) {
   return bytes;
 }
 
-/// Files and bricks of a level that are looked for: seconds.
-constexpr Index kMaxLookups = Index{1} << 20;
+/// Bricks of a level that are looked for: seconds.
 constexpr Index kMaxBricks = Index{1} << 26;
 
 /// Bricks of a level that are stored, counted shard by shard; nothing where there are too many to

@@ -24,10 +24,6 @@ std::string roff(const std::string& text) {
 std::string bold(const std::string& text) { return fmt::format("\\fB{}\\fR", roff(text)); }
 std::string italic(const std::string& text) { return fmt::format("\\fI{}\\fR", roff(text)); }
 
-std::string in_brackets_if(bool optional, const std::string& text) {
-  return optional ? fmt::format("[{}]", text) : text;
-}
-
 std::string entry(const std::string& head, const OptionView& option) {
   std::string text = ".TP\n" + head + "\n" + roff(option.help) + ".";
   if (option.required && option.names[0].starts_with('-')) text += " Required.";

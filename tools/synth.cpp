@@ -62,9 +62,10 @@ Int3 piece_extent(Int3 extent, std::size_t sample_bytes, std::uint64_t bytes) {
 void check_space(const std::string& path, std::uint64_t bytes) {
   const std::uint64_t free = free_space(path);
   if (free < bytes)
-    throw Error(fmt::format("'{}' takes {}, and its disk has {} free: choose another, or smaller "
-                            "--dims",
-                            path, human_bytes(bytes), human_bytes(free)));
+    throw Error(
+        fmt::format("'{}' takes {}, and its disk has {} free: choose another, or smaller "
+                    "--dims",
+                    path, human_bytes(bytes), human_bytes(free)));
 }
 
 ConvertReport write_raw(VolumeSource& source, const std::string& path,

@@ -26,11 +26,11 @@ struct ConvertOptions {
   Downsampling downsampling = Downsampling::mean;
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
-  bool resume = false;             ///< go on with an interrupted conversion of the same input
-  bool force = false;              ///< replace a store that exists (only when the new one is whole)
+  bool resume = false;  ///< go on with an interrupted conversion of the same input
+  bool force = false;   ///< replace a store that exists (only when the new one is whole)
   std::vector<std::filesystem::path> inputs;  ///< what is read: never replaced
-  std::optional<IndexKind> index;  ///< also add one of this kind to all levels
-  Index leaf = kDefaultLeaf;       ///< of that index
+  std::optional<IndexKind> index;             ///< also add one of this kind to all levels
+  Index leaf = kDefaultLeaf;                  ///< of that index
 };
 
 /// What a conversion did.

@@ -38,8 +38,7 @@ void ConvertJournal::read_earlier() {
   const StoreFile file(folder_.open_file(path_, O_RDONLY), path_);
   if (!file) return;
   const auto layers = static_cast<std::uint64_t>(lattice_.bricks().z);
-  earlier_.resize(
-      static_cast<std::size_t>(std::min(file.size() / sizeof(earlier_[0]), layers)));
+  earlier_.resize(static_cast<std::size_t>(std::min(file.size() / sizeof(earlier_[0]), layers)));
   file.read_at(0, std::as_writable_bytes(std::span(earlier_)));
 }
 

@@ -56,11 +56,11 @@ std::uint64_t fixed_bytes(const StoreInfo& store, int level, int threads) {
 Int3 piece_within(const Lattice& lattice, Int3 extent, std::uint64_t memory, std::uint64_t fixed) {
   const std::uint64_t least = fixed + lattice.brick_bytes();
   if (memory < least)
-    throw UsageError(
-        fmt::format("a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {} "
-                    "MiB of it for the program and its libraries, the rest for bricks and for "
-                    "decoding them on all threads",
-                    in_mib(memory), mib_above(least), kProgramBytes / kMiB));
+    throw UsageError(fmt::format(
+        "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {} "
+        "MiB of it for the program and its libraries, the rest for bricks and for "
+        "decoding them on all threads",
+        in_mib(memory), mib_above(least), kProgramBytes / kMiB));
   const std::size_t room = std::min(static_cast<std::size_t>(memory - fixed), kPieceBytes);
   return largest_piece(extent, lattice.brick, room / lattice.sample_bytes());
 }

@@ -20,6 +20,9 @@ struct Histogram {
   std::string damage;          ///< what is wrong with the first of them
 };
 
+/// Chunk files of a level that a command which answers in seconds looks for one by one.
+inline constexpr Index kMaxLookups = Index{1} << 20;
+
 /// Why the histogram of a store takes more than `memory` bytes, or too many look-ups of files;
 /// empty when it does not.
 std::string why_no_histogram(const StoreReader& store, std::uint64_t memory);

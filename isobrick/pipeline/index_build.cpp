@@ -85,7 +85,8 @@ class LevelIndex {
   fs::path place_in_store() const { return index_folder("", level_, layout_.kind); }
   void remove(const OutputFolder& root, const fs::path& folder) const;
   bool is_wanted(const fs::path& folder) const;
-  void build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher& publisher) const;
+  void build_chunk(const IndexChunkBuilder& builder, const IndexChunkName& name,
+                   Publisher& publisher) const;
 
   const StoreReader& store_;
   int level_;
@@ -136,19 +137,19 @@ void LevelIndex::check() const {
 
 void LevelIndex::prepare(Publisher& publisher) {
   finished_ = options_.resume && is_wanted(place_);
-  if (finished_ || !(options_.resume && is_wanted(partial_)))
-    remove(publisher.folder(), partial_);
+  if (finished_ || !(options_.resume && is_wanted(partial_))) remove(publisher.folder(), partial_);
   if (finished_) return;
-  for_each_point({{0, 0, 0}, layout_.chunks()}, [&](Int3 c) {
-    publisher.discard_temporary(index_chunk_path(partial_, c));
-  });
+  for_each_point({{0, 0, 0}, layout_.chunks()},
+                 [&](Int3 c) { publisher.discard_temporary(index_chunk_path(partial_, c)); });
   publisher.write(index_description(partial_), to_json(layout_));
   publisher.wait();  // before any chunk, which would else be of nobody knows what
 }
 
-void LevelIndex::build_chunk(const IndexChunkBuilder& builder, Int3 c, Publisher& publisher) const {
+void LevelIndex::build_chunk(const IndexChunkBuilder& builder, const IndexChunkName& name,
+                             Publisher& publisher) const {
+  const Int3 c = name.chunk;
   IndexChunkWriter writer(publisher, index_chunk_path(partial_, c), layout_.parts_of_chunk(c),
-                          {c, checksum_of(layout_)});
+                          name);
   builder.build(
       c, [&](std::vector<std::byte> part) { return encode_index_part(layout_.zstd_level, part); },
       [&](std::size_t part, std::vector<std::byte> encoded) { writer.append(part, encoded); });
@@ -162,10 +163,10 @@ void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, 
   std::uint64_t bytes = 0;
   for_each_morton(layout_.chunks(), [&](Int3 c) {
     const fs::path path = index_chunk_path(finished_ ? place_ : partial_, c);
-    const bool kept =
-        finished_ || (options_.resume &&
-                      IndexChunk::is_whole(path, layout_.parts_of_chunk(c), {c, checksum}));
-    if (!kept) build_chunk(builder, c, publisher);
+    const IndexChunkName name{c, checksum};
+    const bool kept = finished_ || (options_.resume &&
+                                    IndexChunk::is_whole(path, layout_.parts_of_chunk(c), name));
+    if (!kept) build_chunk(builder, name, publisher);
     ++report.chunks;
     report.chunks_kept += kept;
     const Int3 bricks = layout_.bricks_of_chunk(c).extent();

@@ -35,7 +35,8 @@ struct IndexReport {
 };
 
 /// Throws UsageError for a kind or leaf that stores cannot have, and for a budget
-/// that is too small for such an index of `lattice`, naming the least that does.
+/// that is too small for such an index of `lattice`, naming the least that does: that of the
+/// command, of which `others` bytes are in use already.
 void check_index_options(const IndexOptions& options, const Lattice& lattice,
                          std::uint64_t others = 0);
 

@@ -22,9 +22,9 @@ constexpr std::size_t kMaxDamages = 1000;
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 /// Samples in memory at a time: more are no faster.
 constexpr std::uint64_t kPieceBytes = 128 * kMiB;
-/// Program, libraries and stacks, damages, and bricks that cannot be read.
-constexpr std::uint64_t kProgramBytes = 48 * kMiB;
-/// Of damages beyond these, ranges that see them are not told from those that do not.
+/// Of the lists of damages and of bricks that cannot be read.
+constexpr std::uint64_t kListBytes = 8 * kMiB;
+/// Beyond so many unreadable bricks, every range counts as one that covers such a brick.
 constexpr std::size_t kMaxUnreadable = std::size_t{1} << 17;
 /// Shards of a level that are looked for, each a file: a minute or two.
 constexpr Index kMaxLookups = Index{1} << 24;
@@ -146,7 +146,7 @@ LevelBudget budget_of(const StoreInfo& store, int level, int threads, std::uint6
       static_cast<std::uint64_t>(std::max(blocks.x * blocks.y, bricks.x * bricks.y)) *
       sizeof(ValueRange<double>);
   const auto least = [&](int n) {
-    return kProgramBytes + slab_memory(store, level, n) + table +
+    return kProgramBytes + kListBytes + slab_memory(store, level, n) + table +
            level_ranges_bytes(lattice, lattice.brick.z) + lattice.brick_bytes();
   };
   while (threads > 1 && least(threads) > memory) --threads;

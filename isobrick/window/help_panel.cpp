@@ -40,8 +40,7 @@ constexpr std::array kLines{
 void draw_help(ViewerState& state) {
   if (!state.help) return;
   const ImVec2 all = ImGui::GetMainViewport()->Size;
-  const bool beside = state.picture != nullptr && state.panels && all.x > 2 * state.panel_width;
-  const float left = beside ? state.panel_width : 0;
+  const float left = state.panel_room(all.x);
   ImGui::SetNextWindowPos({(left + all.x) / 2, all.y / 2}, ImGuiCond_Appearing, {0.5f, 0.5f});
   ImGui::SetNextWindowSizeConstraints({0, 0}, {all.x, all.y});
   if (ImGui::Begin("Keys and mouse", &state.help,

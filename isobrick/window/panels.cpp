@@ -185,7 +185,8 @@ void bookmarks_panel(ViewerState& state) {
   std::optional<std::size_t> removed;
   for (std::size_t i = 0; i < list.size(); ++i) {
     ImGui::PushID(static_cast<int>(i));
-    if (ImGui::Selectable(list[i].name.c_str(), false, 0, {ImGui::GetContentRegionAvail().x - scaled(40), 0})) {
+    if (ImGui::Selectable(list[i].name.c_str(), false, 0,
+                          {ImGui::GetContentRegionAvail().x - scaled(40), 0})) {
       const WorldBall scene = state.navigator.camera.scene;
       state.navigator.stop();
       state.navigator.camera = list[i].camera;
@@ -239,8 +240,8 @@ void status_panel(ViewerState& state) {
                    state.frame_seconds > 0 ? 1 / state.frame_seconds : 0,
                    state.draw_seconds * 1e3));
   if (p.moving && p.limited)
-    text(fmt::format("preview: {} triangles at most, 1/{} of the size",
-                     state.pacer.max_triangles(), state.pacer.smaller()));
+    text(fmt::format("preview: {} triangles at most, 1/{} of the size", state.pacer.max_triangles(),
+                     state.pacer.smaller()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
   text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
@@ -282,7 +283,7 @@ void messages_panel(ViewerState& state) {
   }
   // Beside the panel where there is room, and always above it.
   const ImVec2 all = ImGui::GetMainViewport()->Size;
-  const float taken = state.panels && all.x > 2 * state.panel_width ? state.panel_width : 0;
+  const float taken = state.panel_room(all.x);
   const float width = 0.9f * (all.x - taken);
   ImGui::SetNextWindowPos({(all.x + taken) / 2, all.y - 20}, ImGuiCond_Always, {0.5f, 1});
   ImGui::SetNextWindowSizeConstraints({std::min(scaled(300), width), 0}, {width, all.y * 0.4f});
@@ -296,7 +297,7 @@ void messages_panel(ViewerState& state) {
   ImGui::PushTextWrapPos(width - scaled(20));
   for (const Message& message : state.messages) text(message.text);
   ImGui::PopTextWrapPos();
-  // Whoever reads them gets the whole time again.
+  // While the pointer is on them they stay.
   if (ImGui::IsWindowHovered())
     for (Message& message : state.messages)
       message.until = std::chrono::steady_clock::now() + state.message_time;
@@ -359,7 +360,8 @@ void draw_notice(const std::string& text) {
 void draw_panels(ViewerState& state) {
   messages_panel(state);
   if (state.picture == nullptr)
-    draw_notice("Drop a store, or a volume of any format, on this window.\nF1 shows keys and mouse.");
+    draw_notice(
+        "Drop a store, or a volume of any format, on this window.\nF1 shows keys and mouse.");
   else if (state.panels)
     main_panel(state);
   draw_help(state);

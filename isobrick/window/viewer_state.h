@@ -66,9 +66,9 @@ struct ViewerState {
   std::unique_ptr<Bookmarks> bookmarks;
   std::string new_bookmark;  ///< the name that is being typed
   std::unique_ptr<ImportJob> import;
-  std::vector<Message> messages;       ///< the latest last
+  std::vector<Message> messages;                   ///< the latest last
   std::chrono::milliseconds message_time{15'000};  ///< for which a message is shown
-  std::size_t messages_shown = 0;     ///< so many of them the panel has shown
+  std::size_t messages_shown = 0;                  ///< so many of them the panel has shown
   std::optional<TypedIsovalue> typed;
   std::uint64_t bricks_wanted = 0;  ///< as counted last
   double count_wanted_at = 0;       ///< when next: time of Dear ImGui
@@ -80,8 +80,13 @@ struct ViewerState {
   Requests requests;
   double frame_seconds = 0, draw_seconds = 0;  ///< of the last picture
   std::array<float, 120> frame_times{};        ///< milliseconds, a ring
-  std::size_t frame_number = 0;  ///< of those shown so far
+  std::size_t frame_number = 0;                ///< of those shown so far
 
+  /// How much of the left of a window of this width the panel takes from what it shows beside it:
+  /// nothing where there is too little room.
+  float panel_room(float width) const {
+    return picture != nullptr && panels && width > 2 * panel_width ? panel_width : 0;
+  }
   void say(std::string message) {
     messages.push_back({std::move(message), std::chrono::steady_clock::now() + message_time});
   }

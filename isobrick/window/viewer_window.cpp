@@ -57,9 +57,9 @@ GLFWwindow* make_window(const WindowOptions& options) {
 
 /// What names of files and our own texts are written with: Latin, Greek, Cyrillic, punctuation,
 /// arrows, signs of mathematics.
-constexpr ImWchar kGlyphs[] = {0x20,   0x17f,  0x370,  0x3ff,  0x400,  0x45f, 0x2010,
-                               0x2044, 0x20ac, 0x20ac, 0x2190, 0x2195, 0x2212, 0x2212,
-                               0x2248, 0x2265, 0};
+constexpr ImWchar kGlyphs[] = {0x20,   0x17f,  0x370,  0x3ff,  0x400,  0x45f,
+                               0x2010, 0x2044, 0x20ac, 0x20ac, 0x2190, 0x2195,
+                               0x2212, 0x2212, 0x2248, 0x2265, 0};
 
 void load_font(float scale) {
   const std::string_view bytes = font_bytes();
@@ -123,9 +123,8 @@ PictureArea ViewerWindow::picture_area() const {
   int width = 1, height = 1, across = 1, down = 1;
   glfwGetFramebufferSize(window_, &width, &height);
   glfwGetWindowSize(window_, &across, &down);
-  const bool beside = state_.picture != nullptr && state_.panels &&
-                      static_cast<float>(across) > 2 * state_.panel_width;
-  const double part = beside ? static_cast<double>(state_.panel_width) / std::max(across, 1) : 0;
+  const double part =
+      static_cast<double>(state_.panel_room(static_cast<float>(across))) / std::max(across, 1);
   const int left = static_cast<int>(std::lround(part * width));
   return {left, std::max(width - left, 1), std::max(height, 1), std::max(width, 1)};
 }
