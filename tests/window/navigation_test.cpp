@@ -112,8 +112,8 @@ struct Previews {
   void draw() {
     const double s = pacer.smaller();
     triangles = std::min(full, static_cast<double>(pacer.max_triangles()));
-    seconds = pixels / (s * s) + triangles / 1e6 * seconds_per_million +
-              (pacer.plain() ? 0 : occlusion);
+    seconds =
+        pixels / (s * s) + triangles / 1e6 * seconds_per_million + (pacer.plain() ? 0 : occlusion);
     pacer.drawn(seconds, static_cast<std::uint64_t>(triangles), triangles < full);
   }
 };

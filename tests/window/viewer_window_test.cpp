@@ -160,127 +160,6 @@ TEST_F(Window, SaysWhatIsDamaged) {
   EXPECT_LE(said, 5u);
 }
 
-/// A finished picture of many triangles, and a pacer that has no time for them.
-class FinishedPicture : public Window {
- protected:
-  void SetUp() override {
-    Window::SetUp();
-    if (IsSkipped()) return;
-    const auto source =
-        make_synth({.kind = SynthKind::gyroid, .extent = {150, 150, 150}, .frequency = 4});
-    NoProgress progress;
-    convert(*source, dir_ / "many.zarr", {.brick = 32}, progress);
-    ViewerWindow& window = open();
-    window.open(dir_ / "many.zarr");
-    window.state().settings.pixel_error = 0.3f;
-    window.state().panels = true;
-    rest();
-    for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
-    triangles_ = triangles();
-    ASSERT_GT(triangles_, 50'000u);
-  }
-  std::uint64_t triangles() const { return window_->state().picture->state().triangles; }
-  void rest() {
-    until([&] { return rests(); });
-    steps(3);
-    until([&] { return rests(); });
-  }
-  /// Presses there, holds, lets go; the least triangles of a picture meanwhile.
-  std::uint64_t least_while_clicking(int x, int y) {
-    moved_ = false;
-    std::uint64_t least = triangles();
-    const auto step = [&](int n) {
-      for (int i = 0; i < n; ++i) {
-        steps(1);
-        least = std::min(least, triangles());
-        moved_ |= window_->state().picture->state().moving;
-      }
-    };
-    display_->move_pointer(x, y);
-    step(2);
-    display_->button(1, true);
-    step(15);
-    display_->button(1, false);
-    step(15);
-    return least;
-  }
-  /// What sliders of values and the camera change: they may lower a picture.
-  auto values() const {
-    const ViewSettings& s = window_->state().settings;
-    std::vector<float> places{s.pixel_error, s.surfaces[0].opacity, s.window_lo, s.window_hi};
-    for (const CutSettings& cut : s.cuts) places.push_back(cut.place);
-    for (const SliceSettings& slice : s.slices) places.push_back(slice.place);
-    for (const Vec3f corner : {s.region_lo, s.region_hi})
-      places.insert(places.end(), {corner.x, corner.y, corner.z});
-    return std::tuple(window_->state().navigator.camera, s.surfaces[0].isovalue,
-                      s.surfaces[0].shown, places);
-  }
-  std::uint64_t triangles_ = 0;
-  bool moved_ = false;  ///< a picture was one in motion
-};
-
-TEST_F(FinishedPicture, IsNotLoweredByClicksOnWidgets) {
-  // Of the first column of the panel: sections, radio buttons, boxes, buttons, and what is beside.
-  int clicks = 0;
-  for (int y = 35; y < kHeight; y += 24) {
-    if (y > 25 && y < 150) continue;  // the histogram is a slider
-    for (const int x : {20, 50, 260}) {
-      window_->state().settings.surfaces[0].shown = true;
-      const auto before = values();
-      const std::uint64_t least = least_while_clicking(x, y);
-      if (values() == before) {
-        ++clicks;
-        EXPECT_FALSE(moved_) << x << ' ' << y;
-        EXPECT_GE(least, triangles_) << x << ' ' << y;
-      } else {
-        rest();
-        triangles_ = triangles();
-      }
-      if (window_->state().settings.surfaces.size() > 1) window_->state().settings.surfaces.resize(1);
-      if (HasFailure()) return;
-    }
-  }
-  EXPECT_GT(clicks, 25);
-}
-
-TEST_F(FinishedPicture, IsLoweredByASliderAndNeverCalledCompleteThen) {
-  display_->move_pointer(100, 80);
-  steps(2);
-  display_->button(1, true);
-  bool lowered = false;
-  for (int i = 1; i <= 20; ++i) {
-    display_->move_pointer(100 + 3 * i, 80);
-    steps(1);
-    const PictureState& state = window_->state().picture->state();
-    if (!state.moving) continue;
-    lowered |= state.triangles < triangles_ / 2;
-    EXPECT_FALSE(state.complete);
-  }
-  EXPECT_TRUE(lowered);
-  // A hand that holds still sees all of it, with the button down.
-  rest();
-  EXPECT_GT(triangles(), triangles_ / 2);
-  display_->button(1, false);
-  steps(3);
-}
-
-TEST_F(FinishedPicture, ComesBackWhereTheHandHoldsStill) {
-  display_->move_pointer(520, 240);
-  steps(2);
-  display_->button(1, true);
-  bool lowered = false;
-  for (int i = 1; i <= 10; ++i) {
-    display_->move_pointer(520 + 5 * i, 240);
-    steps(1);
-    lowered |= window_->state().picture->state().moving && triangles() < triangles_ / 2;
-  }
-  EXPECT_TRUE(lowered);
-  rest();
-  EXPECT_GT(triangles(), triangles_ / 2);
-  display_->button(1, false);
-  steps(3);
-}
-
 TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   ViewerWindow& window = open();
   window.state().panels = true;
@@ -307,8 +186,9 @@ TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   EXPECT_LT(std::abs(dot(across, camera.up)), 2);
   // `R` fits the whole volume into it.
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p = camera.project({corner & 1 ? 95.0 : 0, corner & 2 ? 95.0 : 0, corner & 4 ? 95.0 : 0},
-                                   kWidth - 250, kHeight);
+    const Vec3d p =
+        camera.project({corner & 1 ? 95.0 : 0, corner & 2 ? 95.0 : 0, corner & 4 ? 95.0 : 0},
+                       kWidth - 250, kHeight);
     EXPECT_TRUE(p.x >= 0 && p.x <= kWidth - 250 && p.y >= 0 && p.y <= kHeight) << corner;
   }
   display_->tap(XK_h);
@@ -353,7 +233,8 @@ TEST_F(Window, IsNotBlackAtFirst) {
 
 TEST_F(Window, HasTheCharactersThatItWrites) {
   open();
-  for (const ImWchar character : std::initializer_list<ImWchar>{0x2026, 0xb5, 0xb0, 0x2212, 0x3b1, 0x416})
+  for (const ImWchar character :
+       std::initializer_list<ImWchar>{0x2026, 0xb5, 0xb0, 0x2212, 0x3b1, 0x416})
     EXPECT_NE(ImGui::GetFont()->FindGlyphNoFallback(character), nullptr) << character;
 }
 
