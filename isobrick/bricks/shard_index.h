@@ -31,8 +31,8 @@ class ShardIndex {
   std::vector<std::byte> encode(std::span<const std::byte> bound = {}) const;
   /// Checks the checksum and that each brick lies within the `file_size` bytes
   /// of the shard. Throws DamageError saying what is wrong, not where.
-  static ShardIndex decode(std::span<const std::byte> bytes, bool with_crc,
-                           std::uint64_t file_size, std::span<const std::byte> bound = {});
+  static ShardIndex decode(std::span<const std::byte> bytes, bool with_crc, std::uint64_t file_size,
+                           std::span<const std::byte> bound = {});
 
   std::span<const Entry> entries() const { return entries_; }
   Entry& operator[](std::size_t i) { return entries_[i]; }

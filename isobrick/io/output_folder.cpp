@@ -26,8 +26,7 @@ constexpr int kFolder = O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
 [[noreturn]] void fail(const char* what, int folder, const std::string& name, const fs::path& path,
                        int errno_value) {
   struct stat status {};
-  if (::fstatat(folder, name.c_str(), &status, AT_SYMLINK_NOFOLLOW) == 0 &&
-      S_ISLNK(status.st_mode))
+  if (::fstatat(folder, name.c_str(), &status, AT_SYMLINK_NOFOLLOW) == 0 && S_ISLNK(status.st_mode))
     throw Error(
         fmt::format("'{}' is a symbolic link, and nothing is written through a link in a store; "
                     "put what it means in its place",
@@ -38,8 +37,8 @@ constexpr int kFolder = O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
 /// The components of `path` below `root`. What is below "." may be named without it.
 std::vector<std::string> names_below(const fs::path& root, const fs::path& path) {
   const bool named = root != "." || (path.begin() != path.end() && *path.begin() == ".");
-  const auto [r, p] = std::mismatch(named ? root.begin() : root.end(), root.end(), path.begin(),
-                                    path.end());
+  const auto [r, p] =
+      std::mismatch(named ? root.begin() : root.end(), root.end(), path.begin(), path.end());
   if (r != root.end())
     throw Error(fmt::format("'{}' is not in '{}'", path.string(), root.string()));
   std::vector<std::string> names;
@@ -96,8 +95,7 @@ struct OutputFolder::Place {
 };
 
 OutputFolder::OutputFolder(const fs::path& root)
-    : root_(without_slash(root)),
-      fd_(::open(root_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    : root_(without_slash(root)), fd_(::open(root_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (fd_.get() < 0) throw system_error("open the folder", root_.string(), errno);
 }
 

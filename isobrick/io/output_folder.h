@@ -8,7 +8,7 @@ namespace isobrick {
 
 /// A folder that is written to, such as a store. Every path that a function takes is that of
 /// something below the folder, written as root() / …. No function follows a symbolic link below
-/// the root, whoever put it there: nothing outside is created, changed or removed. The folder
+/// the root: nothing outside is created, changed or removed. The folder
 /// stays the same one when it is renamed. Thread-safe.
 class OutputFolder {
  public:

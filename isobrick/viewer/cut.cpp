@@ -35,8 +35,8 @@ class Candidates {
   bool empty() const { return losing_.empty() && others_.empty(); }
   /// `thin_first`: one that loses thin structure, if there is any.
   NodeKey pop(bool thin_first) {
-    const bool thin = !losing_.empty() &&
-                      (thin_first || others_.empty() || others_.top() < losing_.top());
+    const bool thin =
+        !losing_.empty() && (thin_first || others_.empty() || others_.top() < losing_.top());
     auto& queue = thin ? losing_ : others_;
     const NodeKey key = queue.top().key;
     queue.pop();

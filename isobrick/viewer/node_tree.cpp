@@ -49,8 +49,8 @@ NodeTree::NodeTree(const BrickSource& source) : grid_(source.info()) {
   for (int v = 0; v < grid_.levels(); ++v) {
     const Int3 all = grid_.level(v).nodes;
     nodes_.emplace_back(static_cast<std::size_t>(volume(all)));
-    parts_.emplace_back(
-        v > 0 ? static_cast<std::size_t>(volume(grid_.level(parts_level(v)).nodes)) : 0);
+    parts_.emplace_back(v > 0 ? static_cast<std::size_t>(volume(grid_.level(parts_level(v)).nodes))
+                              : 0);
     for_each_point({{0, 0, 0}, ceil_div(all, {kGroup, kGroup, kGroup})}, [&](Int3 g) {
       groups.emplace_back(v,
                           intersect({g * kGroup, (g + Int3{1, 1, 1}) * kGroup}, {{0, 0, 0}, all}));

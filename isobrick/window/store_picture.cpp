@@ -298,8 +298,8 @@ void StorePicture::update_state(const Asked& asked) {
   state_.limited_by_budget = state_.limited && asked.way.max_triangles == FramePacer::kAllTriangles;
   state_.covers = shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
   state_.more = imported_ || put_off_ || device_->more();
-  state_.complete = !asked.way.moving && !work_ && !put_off_ && shown_ != nullptr && scene_->is_newest(*shown_) &&
-                    (shown_->complete || scene_->idle());
+  state_.complete = !asked.way.moving && !work_ && !put_off_ && shown_ != nullptr &&
+                    scene_->is_newest(*shown_) && (shown_->complete || scene_->idle());
 }
 
 void StorePicture::draw_complete(const Camera& camera, int width, int height,

@@ -49,8 +49,8 @@ struct PictureState {
   bool moving = false;              ///< a preview: drawn as PictureWay::moving
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
   bool more = false;                ///< the next draw() has something to do, whatever comes
-  bool limited = false;            ///< by PictureWay::max_triangles, or by memory
-  bool limited_by_budget = false;  ///< with more memory it would be finer
+  bool limited = false;             ///< by PictureWay::max_triangles, or by memory
+  bool limited_by_budget = false;   ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
 };
 

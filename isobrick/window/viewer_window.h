@@ -105,15 +105,15 @@ class ViewerWindow {
   std::unique_ptr<Events> events_;
   ViewerState state_;
   double last_time_ = 0;
-  double opened_ = 0;    ///< when the store was
+  double opened_ = 0;     ///< when the store was
   bool covered_ = false;  ///< the store's surface has been shown
   double shown_ = 0;      ///< when the last frame was
   FrameKey shown_key_;    ///< of that frame
-  bool changed_ = true;  ///< something has happened: the next frame may differ from the last
-  bool told_ = false;    ///< something had happened before the last step
-  bool more_ = false;    ///< the picture would go on by itself
-  float scale_ = 1;      ///< of the display: 2 where everything is twice as large
-  bool failed_ = false;  ///< the last picture has thrown: it is tried again, but not at once
+  bool changed_ = true;   ///< something has happened: the next frame may differ from the last
+  bool told_ = false;     ///< something had happened before the last step
+  bool more_ = false;     ///< the picture would go on by itself
+  float scale_ = 1;       ///< of the display: 2 where everything is twice as large
+  bool failed_ = false;   ///< the last picture has thrown: it is tried again, but not at once
   /// On a picture that was not at rest, whose surface may be a coarser one: they are looked at
   /// again once the picture rests, if it is still of the same.
   std::vector<Click> clicks_;

@@ -190,8 +190,8 @@ void ViewerWindow::wait(double most_seconds) {
   if (there && moving()) {
     // Until the hand moves on, or holds still for good.
     if (!changed_ && !more_ && !state_.navigator.moving() && !state_.picture->drew())
-      return glfwWaitEventsTimeout(
-          std::clamp(settled_at() - glfwGetTime(), kNothingNew, std::max(most_seconds, kNothingNew)));
+      return glfwWaitEventsTimeout(std::clamp(settled_at() - glfwGetTime(), kNothingNew,
+                                              std::max(most_seconds, kNothingNew)));
     return glfwPollEvents();
   }
   if (!changed_ && !more_ && (!there || state_.picture->state().complete))

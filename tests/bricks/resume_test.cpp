@@ -167,8 +167,9 @@ TEST_F(Resume, DiskErrorsAreToldWithTheirPath) {
     ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
     const rlimit full{16, before.rlim_max};
     ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
-    expect_error("0/c/0/0/0.tmp': File too large",
-                 [&] { write_shard(writer, levels, 0, {0, 0, 0}, 3, 3); });
+    expect_error("0/c/0/0/0.tmp': File too large", [&] {
+      write_shard(writer, levels, 0, {0, 0, 0}, 3, 3);
+    });
     ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
   }
   // An error in the background comes out at the latest in finish().

@@ -72,8 +72,8 @@ TEST_F(StoreEntries, APartOfAStoreHasItsOwnPlace) {
 }
 
 TEST_F(StoreEntries, TheMetadataShowsWhoWroteIt) {
-  for (const char* text : {"", "{}", "[]", "3", R"({"attributes":{"ome":{}}})",
-                           R"({"attributes":3})"}) {
+  for (const char* text :
+       {"", "{}", "[]", "3", R"({"attributes":{"ome":{}}})", R"({"attributes":3})"}) {
     write_file(store_ / "zarr.json", text);
     EXPECT_NE(why_not_our_store(store_).find("zarr.json"), std::string::npos) << text;
   }

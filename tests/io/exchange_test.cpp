@@ -30,7 +30,8 @@ TEST(Exchange, WhatFailsLeavesBothWhereTheyWere) {
     const TempDir dir;
     fs::create_directory(dir / "b");
     dir.write("b/x", "old");
-    EXPECT_TRUE(contains(message_of<Error>([&] { swap(AT_FDCWD, dir / "a", dir / "b"); }), "exchange"));
+    EXPECT_TRUE(
+        contains(message_of<Error>([&] { swap(AT_FDCWD, dir / "a", dir / "b"); }), "exchange"));
     EXPECT_EQ(dir.list(), Names{"b"});
     EXPECT_EQ(dir.read("b/x"), "old");
   }

@@ -26,8 +26,8 @@ TEST(OutputFolder, CreatesFilesAnew) {
   fs::create_hard_link(dir / "precious", dir / "root/hard");
   ASSERT_EQ(::mkfifo((dir / "root/pipe").c_str(), 0600), 0);
   const OutputFolder folder(dir / "root");
-  for (const std::string name : {"root/link", "root/dangling", "root/hard", "root/pipe",
-                                 "root/a/b/new"}) {
+  for (const std::string name :
+       {"root/link", "root/dangling", "root/hard", "root/pipe", "root/a/b/new"}) {
     fill(folder.create_file(dir / name), "x");
     EXPECT_EQ(dir.read(name), "x");
     EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(dir / name)));

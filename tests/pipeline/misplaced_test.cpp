@@ -41,7 +41,7 @@ class Misplaced : public testing::Test {
     return mesh_of(store_, {.isovalue = kIsovalue}, kind);
   }
 
-  /// Whether whoever reads the store is told, by every way to search it, or gets the right mesh.
+  /// Every way to search the store reports the damage or makes the right mesh.
   void expect_told_or_right(const std::string& what) {
     for (const std::optional<IndexKind> kind :
          {std::optional<IndexKind>(), std::optional(IndexKind::octree),
@@ -110,8 +110,8 @@ TEST_F(Misplaced, FilesOfAnotherStore) {
 }
 
 TEST_F(Misplaced, RangesOfAnotherStoreAsAWhole) {
-  for (const char* folder : {"isobrick/0/range", "isobrick/0/block_range", "isobrick/0/index/octree",
-                             "isobrick/0/index/interval"}) {
+  for (const char* folder : {"isobrick/0/range", "isobrick/0/block_range",
+                             "isobrick/0/index/octree", "isobrick/0/index/interval"}) {
     fs::rename(store_ / folder, folder_ / "kept");
     fs::copy(twin_ / folder, store_ / folder, fs::copy_options::recursive);
     expect_told_or_right(folder);

@@ -15,8 +15,8 @@ class Force : public ProgramTest {
   Force() { write_file(path("a.raw"), noise(20 * 20 * 20)); }
 
   Arguments convert(const std::string& input, const std::string& output) const {
-    return {"convert", input, output, "--dims", "20,20,20", "--type", "u8", "--brick", "16",
-            "--force"};
+    return {"convert", input, output,    "--dims", "20,20,20",
+            "--type",  "u8",  "--brick", "16",     "--force"};
   }
 
   using Tree = std::map<std::string, std::string>;
@@ -128,9 +128,9 @@ TEST_F(Force, KeepsTheStoreThatIsRead) {
   const std::string store = make_store("a");
   const std::string shard = "/0/c/0/0/0";
   expect_kept({"export", store, store + shard, "--force"}, {shard, "part of the input"});
-  expect_kept({"extract", store, "--isovalue", "127", "-o", store + shard, "--format", "ply",
-               "--force"},
-              {shard, "part of the input"});
+  expect_kept(
+      {"extract", store, "--isovalue", "127", "-o", store + shard, "--format", "ply", "--force"},
+      {shard, "part of the input"});
   for (const std::string file : {"/zarr.json", "/0/zarr.json", "/0/c/0/0/0"}) {
     fs::create_symlink(store + file, path("link"));
     expect_kept({"export", store, path("link"), "--force"}, {"link", "part of the input"});
@@ -172,9 +172,9 @@ TEST_F(Force, KeepsWhatIsNoRegularFile) {
       expect_refused(outcome, 2, {command[0] == "render" ? "" : name});
     }
     fs::create_symlink(name, path("s.raw"));
-    expect_refused(run({"synth", "gyroid", path("s.raw"), "--dims", "8,8,8", "--type", "u8",
-                        "--force"}),
-                   2, {"s.raw"});
+    expect_refused(
+        run({"synth", "gyroid", path("s.raw"), "--dims", "8,8,8", "--type", "u8", "--force"}), 2,
+        {"s.raw"});
     fs::remove(path("s.raw"));
     EXPECT_TRUE(fs::exists(fs::symlink_status(path(name)))) << name;
     EXPECT_FALSE(fs::is_regular_file(fs::symlink_status(path(name)))) << name;

@@ -38,8 +38,8 @@ class Killed : public ProgramTest {
   }
 
   Arguments convert(const std::string& input, const Arguments& more) {
-    Arguments all{"convert", path(input), path("out.zarr"), "--dims",  "20,20,20", "--type", "u8",
-                  "--brick", "16",        "--levels",       "1",       "--threads", "1"};
+    Arguments all{"convert", path(input), path("out.zarr"), "--dims", "20,20,20",  "--type", "u8",
+                  "--brick", "16",        "--levels",       "1",      "--threads", "1"};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }

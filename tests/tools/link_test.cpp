@@ -46,8 +46,8 @@ class Link : public ProgramTest {
   }
 
   Arguments convert(const Arguments& more = {}) const {
-    Arguments all{"convert", path("a.raw"), path("a.zarr"), "--dims", "20,20,20", "--type", "u8",
-                  "--brick", "16"};
+    Arguments all{"convert", path("a.raw"), path("a.zarr"), "--dims", "20,20,20",
+                  "--type",  "u8",          "--brick",      "16"};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
@@ -75,9 +75,9 @@ TEST_F(Link, AnIndexReplacesLinksWithTheNamesOfItsFiles) {
 }
 
 TEST_F(Link, AFolderOfAStoreIsNoLink) {
-  for (const char* folder : {"/isobrick", "/isobrick/0", "/isobrick/0/index",
-                             "/isobrick/0/index/octree", "/isobrick/0/index/octree.partial",
-                             "/isobrick/0/range.partial", "/isobrick/0/block_range"})
+  for (const char* folder :
+       {"/isobrick", "/isobrick/0", "/isobrick/0/index", "/isobrick/0/index/octree",
+        "/isobrick/0/index/octree.partial", "/isobrick/0/range.partial", "/isobrick/0/block_range"})
     for (const char* flag : {"--resume", "--force"}) {
       const std::string image = make_foreign("f");
       link_folder(image + folder);

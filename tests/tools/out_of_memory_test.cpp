@@ -48,9 +48,9 @@ TEST_F(OutOfMemory, AnExtractionEndsWithALine) {
   ASSERT_EQ(run({"synth", "gyroid", store, "--dims", "60,60,60", "--type", "u8", "--brick", "16"})
                 .exit_code,
             0);
-  expect_lines({"extract", store, "--isovalue", "128", "-o", path("m.ply"), "--threads", "3",
-                "--force"},
-               61);
+  expect_lines(
+      {"extract", store, "--isovalue", "128", "-o", path("m.ply"), "--threads", "3", "--force"},
+      61);
 }
 
 }  // namespace

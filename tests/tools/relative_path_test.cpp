@@ -32,7 +32,7 @@ TEST_F(RelativePath, IndexTakesAnyNameOfAStore) {
 
 TEST_F(RelativePath, ConversionsTakeAnyName) {
   write_file(path("a.raw"), noise(20 * 20 * 20));
-  const Arguments convert{"convert", "a.raw", "a.zarr", "--dims", "20,20,20",
+  const Arguments convert{"convert", "a.raw", "a.zarr",  "--dims", "20,20,20",
                           "--type",  "u8",    "--index", "octree"};
   const auto with = [&](Arguments words, const Arguments& more) {
     words.insert(words.end(), more.begin(), more.end());

@@ -212,8 +212,9 @@ TEST(ThinStructure, ComesBeforeLongerCells) {
   EXPECT_TRUE(preview.limited_by_budget);
   expect_sound(tree.grid(), preview, active);
   int lost_at_first = 0;
-  for_each_point({{0, 0, 0}, tree.grid().level(1).nodes},
-                 [&](Int3 p) { lost_at_first += tree.loses({1, p}, isovalue); });
+  for_each_point({{0, 0, 0}, tree.grid().level(1).nodes}, [&](Int3 p) {
+    lost_at_first += tree.loses({1, p}, isovalue);
+  });
   ASSERT_GT(lost_at_first, 1);
   int coarse = 0, lost = 0;
   for (const CutNode& node : preview.nodes) {

@@ -145,16 +145,19 @@ TEST_F(Hdf5, FiltersOfAllKinds) {
       }
 }
 
-/// Labels of the dimensions, slowest first, as h5py writes them.
-void set_labels(hid_t data, const std::vector<const char*>& labels) {
-  const hsize_t count = labels.size();
-  const hid_t text = H5Tcopy(H5T_C_S1), space = H5Screate_simple(1, &count, nullptr);
-  H5Tset_size(text, H5T_VARIABLE);
-  const hid_t attribute =
-      H5Acreate2(data, "DIMENSION_LABELS", text, space, H5P_DEFAULT, H5P_DEFAULT);
-  EXPECT_GE(H5Awrite(attribute, text, labels.data()), 0);
+void set_attribute(hid_t data, const char* name, hid_t type, hsize_t count, const void* values) {
+  const hid_t space = H5Screate_simple(1, &count, nullptr);
+  const hid_t attribute = H5Acreate2(data, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+  EXPECT_GE(H5Awrite(attribute, type, values), 0);
   H5Aclose(attribute);
   H5Sclose(space);
+}
+
+/// Labels of the dimensions, slowest first, as h5py writes them.
+void set_labels(hid_t data, const std::vector<const char*>& labels) {
+  const hid_t text = H5Tcopy(H5T_C_S1);
+  H5Tset_size(text, H5T_VARIABLE);
+  set_attribute(data, "DIMENSION_LABELS", text, labels.size(), labels.data());
   H5Tclose(text);
 }
 
@@ -197,13 +200,7 @@ std::string write_labelled(const std::string& path, const std::vector<const char
   const hid_t data = H5Dcreate2(file, "v", H5T_NATIVE_INT16, space, H5P_DEFAULT, how, H5P_DEFAULT);
   EXPECT_GE(H5Dwrite(data, H5T_NATIVE_INT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, turned.data()), 0);
   set_labels(data, labels);
-  const hsize_t three = 3;
-  const hid_t numbers = H5Screate_simple(1, &three, nullptr);
-  const hid_t attribute =
-      H5Acreate2(data, "element_size_um", H5T_NATIVE_DOUBLE, numbers, H5P_DEFAULT, H5P_DEFAULT);
-  EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_DOUBLE, element.data()), 0);
-  H5Aclose(attribute);
-  H5Sclose(numbers);
+  set_attribute(data, "element_size_um", H5T_NATIVE_DOUBLE, 3, element.data());
   H5Dclose(data);
   H5Sclose(space);
   H5Pclose(how);
