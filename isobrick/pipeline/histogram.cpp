@@ -25,9 +25,6 @@ int choose_level(const StoreInfo& info) {
       found - info.levels.begin(), static_cast<std::ptrdiff_t>(info.levels.size()) - 1));
 }
 
-/// Chunk files that are looked for: seconds.
-constexpr Index kMaxLookups = Index{1} << 20;
-
 /// Calls f(value, times) for every sample of a level, brick by brick; damaged(what) for a brick
 /// that cannot be read.
 template <class F, class Damaged>

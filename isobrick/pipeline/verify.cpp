@@ -12,6 +12,7 @@
 #include "isobrick/bricks/stored_index.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/level_scan.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/verify_index.h"
 #include "isobrick/pipeline/workers.h"
 
