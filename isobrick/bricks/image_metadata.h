@@ -64,7 +64,7 @@ std::string to_json(const ImageMetadata& image);
 ImageMetadata parse_image_metadata(std::string_view text, const std::string& where);
 
 /// CRC-32C over the values that the root's zarr.json and those of its levels
-/// hold, in the order of the levels; docs/store_format.md says over which and
+/// hold, in the order of the levels; docs/reference/store_format.md says over which and
 /// how. The root's own checksum does not enter it, nor does how the JSON is laid
 /// out. Images of others, without `attributes.isobrick`, have one, too.
 /// `where` names the root's file.

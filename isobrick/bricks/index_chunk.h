@@ -14,7 +14,7 @@
 #include "isobrick/core/vec.h"
 
 // The file of an index chunk: parts, each encoded like a brick, and where they
-// are. What a part holds is not known here. docs/store_format.md has the bytes.
+// are. What a part holds is not known here. docs/reference/store_format.md has the bytes.
 
 namespace isobrick {
 

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Every file of a store; # is a number, KIND a kind of index. docs/store_format.md has them.
+/// Every file of a store; # is a number, KIND a kind of index: docs/reference/store_format.md.
 constexpr std::array<std::string_view, 18> kFiles{"zarr.json",
                                                   ".zgroup",
                                                   ".zattrs",

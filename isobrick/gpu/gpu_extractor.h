@@ -37,7 +37,7 @@ struct StreamReport {
 
 /// Marching cubes on a device, for volumes that need not fit it: tiles in, the CPU's mesh
 /// out, byte for byte. Upload, kernels, download and whoever takes the mesh work at the same
-/// time, on some hundred tiles each. docs/gpu.md says how.
+/// time, on some hundred tiles each. docs/design/gpu.md says how.
 class GpuExtractor {
  public:
   /// Buffers of the given sizes on the device, which open_device has made ready; of smaller

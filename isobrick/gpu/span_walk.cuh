@@ -8,7 +8,7 @@
 
 // How warps search the arrays of an index together. Each structure is cut into
 // as many parts as there are warps, so that no warp waits for another one and
-// none has a list of what is still to be visited; docs/index.md has the picture.
+// none has a list of what is still to be visited; docs/design/search.md has the picture.
 
 namespace isobrick::gpu {
 

@@ -8,7 +8,7 @@
 // samples lay around it, but of the 26 that are not its own only the samples within one
 // step of its 33³ are ever looked at. Eight tiles share the pages for those: each has
 // four columns, rows or planes of them for itself (of the edges and corners, four by four).
-// docs/gpu.md has the picture.
+// docs/design/gpu.md has the picture.
 
 namespace isobrick::gpu {
 

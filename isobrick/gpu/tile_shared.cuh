@@ -6,7 +6,7 @@
 #include "isobrick/gpu/ptx.cuh"
 #include "isobrick/gpu/tile_params.h"
 
-// How a block of threads works on one tile; docs/gpu.md has the whole picture.
+// How a block of threads works on one tile; docs/design/gpu.md has the whole picture.
 
 namespace isobrick::gpu {
 

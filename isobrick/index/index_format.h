@@ -14,7 +14,7 @@
 
 // An index is one block of bytes: a header, then the arrays of its kind, each at
 // a multiple of 8. Where an array lies follows from the counts in the header, so
-// no offset into the block is ever stored. docs/index.md has the layouts.
+// no offset into the block is ever stored. docs/reference/index_format.md has the layouts.
 
 namespace isobrick {
 

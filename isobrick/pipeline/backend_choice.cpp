@@ -9,7 +9,7 @@ namespace isobrick {
 namespace {
 
 /// What a thread takes for the surface in an active block, and what a device takes to set up
-/// (docs/gpu.md has the measurements). The GPU must save a good part of the latter.
+/// (measured: docs/experiments/2026-11-gpu.md). The GPU must save a good part of the latter.
 constexpr double kSecondsOfBlock = 10e-6, kSecondsToSetUp = 0.5;
 
 bool is_worth_it(const ExtractRequest& request, std::uint64_t active_blocks) {

@@ -12,7 +12,7 @@
 namespace isobrick {
 
 /// Cells along each edge of an item where nobody says otherwise: the blocks by
-/// which an extraction skips, whose ranges every store has. docs/index.md.
+/// which an extraction skips, whose ranges every store has. docs/design/search.md.
 inline constexpr Index kDefaultLeaf = 16;
 
 /// An index to add to a store.

@@ -11,7 +11,7 @@ namespace {
 
 /// The stored index that finds blocks fastest, if one does at all: finer leaves
 /// than the blocks themselves only add to what is read. The order is that of the
-/// figures in docs/index.md.
+/// figures in docs/experiments/2026-11-index.md.
 SearchBy fastest(const StoreReader& store, int level) {
   for (const IndexKind kind :
        {IndexKind::octree, IndexKind::kdtree, IndexKind::interval, IndexKind::quadtree}) {

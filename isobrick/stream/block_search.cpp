@@ -31,7 +31,7 @@ class RangeSearch final : public BlockSearch {
 };
 
 /// Asks the index first how much of a chunk is active. Where that is more than
-/// kFew, looking at all ranges is faster: docs/index.md has the figures.
+/// kFew, looking at all ranges is faster: docs/experiments/2026-11-index.md has the figures.
 class FewSearch final : public BlockSearch {
  public:
   FewSearch(const StoreReader& store, int level, IndexKind kind)

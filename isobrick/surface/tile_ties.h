@@ -11,7 +11,7 @@
 // Leaving degenerate triangles out. A sample that equals the isovalue, a *tie*,
 // draws the vertices of all crossing edges around it to itself. Here they become
 // one vertex, and triangles with two corners in one vertex are left out. See
-// docs/extraction.md.
+// docs/design/surface.md.
 
 namespace isobrick {
 

@@ -9,7 +9,7 @@
 namespace isobrick {
 
 /// Opens a volume: a file of a known format (recognised by its content before
-/// its extension; docs/formats.md lists them), a raw file, or standard input ("-").
+/// its extension; docs/reference/formats.md lists them), a raw file, or standard input ("-").
 /// Throws UsageError when what the file and the caller say makes no volume: no
 /// known extent or type, sizes that are zero, overflow or contradict the file's
 /// size, a channel that must be chosen; Error when the file cannot be read.

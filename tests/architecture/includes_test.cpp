@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Who may include whom, besides itself: the table of docs/architecture.md.
+/// What a folder may include besides itself: the table of docs/design/architecture.md.
 /// A row names folders, or single headers where only those are allowed.
 const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"core", {}},

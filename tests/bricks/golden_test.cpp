@@ -6,7 +6,7 @@
 #include "tests/bricks/store_fixture.h"
 
 // The bytes of a tiny store, frozen: whatever changes them changes the format,
-// which needs a new version in docs/store_format.md.
+// which needs a new version in docs/reference/store_format.md.
 
 namespace isobrick::test {
 namespace {

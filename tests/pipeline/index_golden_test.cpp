@@ -8,7 +8,7 @@
 #include "tests/pipeline/index_fixture.h"
 
 // The bytes of tiny indices, frozen: whatever changes them changes the format,
-// which needs a new version in docs/store_format.md.
+// which needs a new version in docs/reference/store_format.md.
 
 namespace isobrick::test {
 namespace {

@@ -71,7 +71,7 @@ TYPED_TEST(DropDegenerate, ChunksStandAlone) {
   EXPECT_EQ(unused_vertices(local), 0u);
 }
 
-// docs/extraction.md and docs/meshes.md state it.
+// docs/design/surface.md and docs/reference/meshes.md state it.
 TEST(DropDegenerateAt, TwoFourSixOrEightTrianglesShareASide) {
   const auto field = coarse_noise<std::uint8_t>({66, 35, 40}, 13);
   const std::set<std::size_t> manifold{2}, touching{2, 4, 6, 8};
