@@ -6,8 +6,8 @@
 
 #include "tests/tools/program.h"
 
-// Every command line of README, of --help and of the quickstart runs from top to bottom in one
-// folder, with relative names, on the volume that comes with the sources.
+// Every command line of README, of the guide, of --help and of the quickstart runs from top to
+// bottom in one folder, with relative names, on the volume that comes with the sources.
 namespace isobrick::test {
 namespace {
 
@@ -40,15 +40,22 @@ std::vector<std::string> spans_of(const std::string& line) {
   return spans;
 }
 
+/// The first line of a block of examples that need files of the reader's.
+constexpr std::string_view kOwnFiles = "# with files of your own";
+
 /// Command lines of a Markdown file in their order: whole lines of its blocks, spans elsewhere.
+/// Leaves out the blocks that begin with kOwnFiles.
 std::vector<std::string> commands_of_markdown(const std::string& text) {
   std::vector<std::string> commands;
-  bool in_block = false;
+  bool in_block = false, own_files = false;
   for (const std::string& line : lines_of(text)) {
     if (line.starts_with("```")) {
       in_block = !in_block;
+      own_files = false;
     } else if (in_block) {
-      if (calls_isobrick(line) || line.starts_with("zstd ")) commands.push_back(line);
+      own_files = own_files || line.starts_with(kOwnFiles);
+      if (!own_files && (calls_isobrick(line) || line.starts_with("zstd ")))
+        commands.push_back(line);
     } else {
       for (const std::string& span : spans_of(line))
         if (calls_isobrick(span) && span != "isobrick completion --help") commands.push_back(span);
@@ -66,25 +73,39 @@ class Docs : public ProgramTest {
     has_pictures_ = run({"help", "view"}).out.find("not in this program") == std::string::npos;
   }
 
-  /// Runs a line as a user's shell does, in the scratch folder.
-  void expect_runs(std::string line) const {
+  /// Runs a line as a user's shell does, in the scratch folder. False where the program was built
+  /// without what the line needs.
+  bool expect_runs(std::string line) const {
     SCOPED_TRACE(line);
     line = line.substr(0, line.find(" #"));
     const bool draws = line.find("isobrick render") != std::string::npos ||
                        line.find("isobrick view") != std::string::npos ||
                        line.find("--preview") != std::string::npos;
-    if (draws && !has_pictures_) return;
-    if (line.find("man -l") != std::string::npos && !available("man")) return;
+    if (draws && !has_pictures_) return true;
+    if (line.find("man -l") != std::string::npos && !available("man")) return true;
     // There is no display here.
-    if (line.starts_with("isobrick view") && line.find(" --screenshot") == std::string::npos)
-      line.insert(line.find(" --isovalue"), " --screenshot view.png");
+    if (line.starts_with("isobrick view ") && line.find(" --screenshot") == std::string::npos &&
+        line.find(" --turntable") == std::string::npos)
+      line += " --screenshot view.png --force";
     const std::string folder = path("");
     const Outcome outcome =
         run_process({"env", fmt::format("HOME={}", folder), "bash", "-o", "pipefail", "-c",
                      fmt::format("cd '{}'; PATH='{}':$PATH; {}", folder,
                                  fs::path(ISOBRICK_PROGRAM).parent_path().string(), line)});
-    if (outcome.err.find("built without") != std::string::npos) return;
+    if (outcome.err.find("built without") != std::string::npos) return false;
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return true;
+  }
+
+  /// Runs the lines of a page of the guide, up to one that needs what this program lacks.
+  int expect_page_runs(const fs::path& page) const {
+    SCOPED_TRACE(page.filename());
+    int lines = 0;
+    for (const std::string& command : commands_of_markdown(read_file(page))) {
+      if (!expect_runs(command)) break;
+      ++lines;
+    }
+    return lines;
   }
 
   void unpack(const std::string& name) const {
@@ -108,6 +129,17 @@ TEST_F(Docs, LinesOfTheReadmeRun) {
                            "verify", "synth", "man", "completion"})
     EXPECT_TRUE(subcommands.contains(name)) << name;
   EXPECT_TRUE(fs::exists(path("skull.pvtp")));
+}
+
+// The first steps, then every other page in the folder that they leave.
+TEST_F(Docs, LinesOfTheGuideRun) {
+  const fs::path guide = fs::path(ISOBRICK_SOURCE) / "docs/guide";
+  EXPECT_GT(expect_page_runs(guide / "first_steps.md"), 5);
+  std::set<fs::path> pages;
+  for (const auto& entry : fs::directory_iterator(guide))
+    if (entry.path().filename() != "first_steps.md") pages.insert(entry.path());
+  for (const fs::path& page : pages) expect_page_runs(page);
+  EXPECT_GT(pages.size(), 7u);
 }
 
 TEST_F(Docs, ExamplesOfHelpRun) {
