@@ -1,14 +1,11 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <chrono>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
-#include "bench/machine_pace.h"
 #include "isobrick/window/store_picture.h"
 
 namespace isobrick::bench {
@@ -42,31 +39,14 @@ class Times {
 /// How long pictures take, and what the slowest of them consist of.
 class PicturesTimes {
  public:
-  /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds. Now it ends.
+  /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds.
   void add(double total, const PictureTimes& steps, double finish) {
     total_.add(total);
-    pictures_.push_back({pictures_.size(), total, steps, finish, MachinePace::Clock::now()});
+    pictures_.push_back({pictures_.size(), total, steps, finish});
   }
 
-  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth, which
-  /// ones these are, counted from 0, and how many times slower than usual the processor was then.
-  /// "at_pace": those during which it was at most `kOffPace` times slower.
-  nlohmann::ordered_json summary(const MachinePace& pace) {
-    auto json = summary();
-    if (pictures_.empty()) return json;
-    Times at_pace;
-    for (std::size_t i = 0; i < pictures_.size(); ++i) {
-      const Picture& p = pictures_[i];
-      const std::chrono::duration<double> total(p.total);
-      const double slower = pace.slower(
-          p.end - std::chrono::duration_cast<MachinePace::Clock::duration>(total), p.end);
-      if (slower <= kOffPace) at_pace.add(p.total);
-      if (i < slowest()) json["slowest"]["processor_slower"].push_back(slower);
-    }
-    json["at_pace"] = at_pace.summary();
-    return json;
-  }
-  /// Without what depends on the processor's pace.
+  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth.
+  /// "numbers": which pictures those are, counted from 0.
   nlohmann::ordered_json summary() {
     auto json = total_.summary();
     if (pictures_.empty()) return json;
@@ -85,9 +65,7 @@ class PicturesTimes {
     double total;
     PictureTimes steps;
     double finish;
-    MachinePace::Clock::time_point end;
   };
-  static constexpr double kOffPace = 3;
 
   std::size_t slowest() const { return (pictures_.size() + 99) / 100; }
 

@@ -91,7 +91,7 @@ class Session {
 
   /// Since it was last asked: frames, and whole pictures but for those at rest.
   nlohmann::ordered_json take_times() {
-    nlohmann::ordered_json json = std::exchange(frames_, {}).summary(pace_);
+    nlohmann::ordered_json json = std::exchange(frames_, {}).summary();
     json["whole_pictures"] = std::exchange(pictures_, {}).summary();
     return json;
   }
@@ -131,7 +131,6 @@ class Session {
   Times pictures_;
   const bool software_ = current_gl_device().software;
   FramePacer pacer_ = FramePacer::for_device(software_);
-  MachinePace pace_;
 };
 
 }  // namespace isobrick::bench
