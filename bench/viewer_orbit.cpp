@@ -77,8 +77,7 @@ class Flight {
       Stopwatch watch;
       const double submitted =
           draw({.max_triangles = pacer_.max_triangles(),
-                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no,
-                .patience_seconds = kPatienceSeconds},
+                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no},
                pacer_.smaller());
       const double seconds = watch.lap();
       const PictureState& state = picture_->state();
@@ -103,7 +102,6 @@ class Flight {
     do {
       PictureWay way;
       way.piece_seconds = arguments_.piece_seconds;
-      way.patience_seconds = kPatienceSeconds;
       if (pacer_.plain()) way.plain = PictureWay::Plain::until_complete;
       Stopwatch watch;
       picture_->draw(camera_, arguments_.width, arguments_.height, settings_, way);

@@ -4,7 +4,22 @@
 #include <cmath>
 #include <utility>
 
+#include "isobrick/core/stopwatch.h"
+
 namespace isobrick {
+namespace {
+
+/// A cut that differs in less asks the stream for the same meshes.
+bool same_cut(const Cut& a, const Cut& b) {
+  return a.isovalues == b.isovalues &&
+         std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
+                    [](const CutNode& p, const CutNode& q) {
+                      return p.key == q.key && p.coarser == q.coarser && p.visible == q.visible &&
+                             p.cut_away == q.cut_away;
+                    });
+}
+
+}  // namespace
 
 Vec3d middle_of(const NodeGrid& grid) {
   const Int3 cells = grid.cells();
@@ -20,46 +35,46 @@ Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
   options.brick_bytes -= index;
   search_ = std::make_unique<NodeSearch>(tree_, source->info().type, index, options.on_change);
   stream_ = std::make_unique<SceneStream>(std::move(source), tree_, std::move(options));
-  worker_ = std::make_unique<CutWorker>(*tree_, *search_, *stream_);
 }
 
-bool Scene::update(const std::vector<double>& isovalues, const View& view, const CutBudget& budget,
-                   double patience) {
-  const bool first = drawn_ == nullptr, again = std::exchange(again_, true);
-  up_to_date_ = worker_->wait(0);
+void Scene::update(const std::vector<double>& isovalues, const View& view,
+                   const CutBudget& budget) {
+  isovalues_ = isovalues;
+  // A cut at the limit of its budget must not follow every mesh that is made.
+  const double measured = stream_->counters().triangles_per_block;
+  if (measured > 0 && std::abs(measured - triangles_per_block_) > 0.2 * triangles_per_block_)
+    triangles_per_block_ = measured;
   CutRequest request{isovalues, view, budget};
-  if (up_to_date_) {
-    // A cut at the limit of its budget must not follow every mesh that is made.
-    const double measured = counters().triangles_per_block;
-    if (measured > 0 && std::abs(measured - per_block_) > 0.2 * per_block_) per_block_ = measured;
+  if (triangles_per_block_ > 0) request.budget.triangles_per_block = triangles_per_block_;
+  const bool same = chosen_ == request;
+  if (same && search_->found(isovalues)) return;
+
+  Stopwatch watch;
+  CutTimes times;
+  const ActiveNodes& active = search_->find(isovalues);
+  times.search = watch.lap();
+  if (!same) {
+    chosen_.reset();
+    Cut next = select(active, view, request.budget);
+    times.cut = watch.lap();
+    if (!same_cut(next, cut_)) {
+      stream_->set_cut(next);
+      cut_ = std::move(next);
+    }
+    times.plan = watch.lap();
+    chosen_ = std::move(request);
   }
-  if (per_block_ > 0) request.budget.triangles_per_block = per_block_;
-  if (again || request != asked_ || (up_to_date_ && !search_->found(isovalues))) {
-    if (first) drawn_ = stream_->drawable();
-    asked_ = request;
-    worker_->ask(std::move(request));
+  times_ = times;
+}
+
+Cut Scene::select(const ActiveNodes& active, const View& view, const CutBudget& budget) {
+  if (!selector_) selector_.emplace(*tree_);
+  try {
+    return selector_->select(active, view, budget);
+  } catch (...) {
+    selector_.reset();  // it may have stopped half way
+    throw;
   }
-  up_to_date_ = false;
-  up_to_date_ = worker_->wait(first ? std::numeric_limits<double>::infinity() : patience);
-  again_ = false;
-  cut_ = worker_->cut();
-  return up_to_date_;
-}
-
-std::shared_ptr<const Drawable> Scene::drawable() {
-  auto now = up_to_date_ ? stream_->drawable() : worker_->before();
-  if (now != nullptr && (drawn_ == nullptr || now->version >= drawn_->version))
-    drawn_ = std::move(now);
-  return drawn_;
-}
-
-bool Scene::is_newest(const Drawable& drawable) const {
-  return up_to_date_ && stream_->is_newest(drawable);
-}
-
-const StreamCounters& Scene::counters() {
-  if (up_to_date_) counters_ = stream_->counters();
-  return counters_;
 }
 
 }  // namespace isobrick

@@ -52,7 +52,7 @@ std::string human_count(double n) {
 
 void tell(const ViewerState& state, double isovalue) {
   const IsovalueCounts& counts = state.facts->counts();
-  const StreamCounters& made = state.picture->scene().counters();
+  const StreamCounters made = state.picture->scene().stream().counters();
   ImGui::SetTooltip("%s", fmt::format("{:.6g}\nabout {} triangles\nin {} of {} bricks of level 0",
                                       isovalue, human_count(state.facts->triangles(isovalue, made)),
                                       counts.active_bricks(isovalue), counts.bricks())

@@ -231,7 +231,7 @@ const char* stage_of(const PictureState& p) {
 }
 
 void status_panel(ViewerState& state) {
-  const StreamCounters& c = state.picture->scene().counters();
+  const StreamCounters c = state.picture->scene().stream().counters();
   const PictureState& p = state.picture->state();
   ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
                    static_cast<int>(state.frame_number % state.frame_times.size()), nullptr, 0, 50,

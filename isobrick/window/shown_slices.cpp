@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <optional>
 
 namespace isobrick {
 namespace {
@@ -42,33 +41,20 @@ std::vector<float> floats_of(const SliceSamples& slice) {
 ShownSlices::ShownSlices(const PictureBudgets& budgets, Vec3d last, ScalarType type)
     : last_(last), most_bytes_(slice_bytes(budgets, type)) {}
 
-/// Nothing: it is not shown.
-std::optional<double> ShownSlices::position(const ViewSettings& settings, int axis) const {
-  const SliceSettings& slice = settings.slices[static_cast<std::size_t>(axis)];
-  if (!slice.shown) return std::nullopt;
-  return slice.place * last_[axis];
-}
-
-bool ShownSlices::others_wanted(const ViewSettings& settings) const {
-  for (int axis = 0; axis < 3; ++axis)
-    if (slices_[static_cast<std::size_t>(axis)].asked != position(settings, axis)) return true;
-  return false;
-}
-
 void ShownSlices::update(SceneStream& stream, const ViewSettings& settings) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto slot = static_cast<std::size_t>(axis);
     Slice& shown = slices_[slot];
     if (!settings.slices[slot].shown) {
-      if (shown.asked) stream.set_slice(axis, std::nullopt);
+      if (shown.requested) stream.set_slice(axis, std::nullopt);
       shown = {};
       continue;
     }
     SliceRequest request;
     request.axis = axis;
     request.bytes = most_bytes_;
-    request.position = *position(settings, axis);
-    shown.asked = request.position;
+    request.position = settings.slices[slot].place * last_[axis];
+    shown.requested = true;
     stream.set_slice(axis, request);
     const auto slice = stream.slice(axis);
     if (slice != nullptr && slice != shown.from) shown = {slice, floats_of(*slice), true};

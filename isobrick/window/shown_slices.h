@@ -28,8 +28,6 @@ class ShownSlices {
   /// Asks for the samples that settings want, and takes those that have come; until new ones are
   /// there the last ones stay.
   void update(SceneStream& stream, const ViewSettings& settings);
-  /// Whether settings want other ones than the last update() asked for.
-  bool others_wanted(const ViewSettings& settings) const;
   /// What is there, across x, y, z; null: nothing.
   Samples samples() const;
   /// Draws them; appends what is wrong with them to `damage`.
@@ -42,10 +40,8 @@ class ShownSlices {
   struct Slice {
     std::shared_ptr<const SliceSamples> from;
     std::vector<float> samples;
-    std::optional<double> asked;  ///< position
+    bool requested = false;
   };
-
-  std::optional<double> position(const ViewSettings& settings, int axis) const;
 
   Vec3d last_;
   std::uint64_t most_bytes_;  ///< of the samples of one

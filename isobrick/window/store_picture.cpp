@@ -50,7 +50,6 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
 PictureWay PictureWay::in_window(const FramePacer& pacer, bool software, bool moving) {
   PictureWay way{.max_triangles = moving ? pacer.max_triangles() : FramePacer::kAllTriangles,
                  .piece_seconds = software || moving ? kPieceSeconds : kDevicePieceSeconds,
-                 .patience_seconds = kPatienceSeconds,
                  .moving = moving,
                  .smaller = moving && pacer.smaller() > 1};
   // Nor should pictures that follow while meshes come in wait for a good one.
@@ -114,7 +113,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
   const std::uint64_t there =
       device_->turns() != nullptr ? DeviceMeshes::cache_bytes(device_->held()) : upload_memory();
   budget.mesh_bytes = std::min(there, budgets_.memory / 2) / 2;
-  scene_->update(isovalues, view, budget, way.patience_seconds);
+  scene_->update(isovalues, view, budget);
 }
 
 void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
@@ -150,8 +149,7 @@ bool StorePicture::may_be_plain(const Asked& asked) const {
     return asked.way.plain == PictureWay::Plain::yes;
   if (setup_->software()) return !state_.complete;
   // A full budget may leave the newest incomplete.
-  return shown_ != asked.newest ||
-         !(asked.idle || (scene_->up_to_date() && asked.newest->complete));
+  return shown_ != asked.newest || !(asked.idle || asked.newest->complete);
 }
 
 void StorePicture::drop_unused() {
@@ -204,9 +202,7 @@ void StorePicture::choose_picture(const Asked& asked) {
   const bool enough = (owed || imported_) && shown_ != nullptr;
   if (!enough && (other_view || asked.idle || !can_wait(*asked.newest))) upload(asked.newest);
   times_.upload = watch.lap();
-  // The stream answers late while it is given a cut.
-  if (scene_->up_to_date() || slices_.others_wanted(asked.settings))
-    slices_.update(scene_->stream(), asked.settings);
+  slices_.update(scene_->stream(), asked.settings);
   times_.slices = watch.lap();
   const bool plain = may_be_plain(asked);
   Pictured next{.shows = plain ? asked.shows_plain : asked.shows,

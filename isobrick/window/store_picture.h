@@ -31,8 +31,6 @@ inline constexpr double kDevicePieceSeconds = 0.008;
 /// Of a piece's time: for less another piece is not begun; after more of other work a picture
 /// waits.
 inline constexpr double kLeastPart = 0.25;
-/// What windows take for PictureWay::patience_seconds: some times what it takes.
-inline constexpr double kPatienceSeconds = 0.002;
 
 /// What a picture shows and what it still lacks.
 struct PictureState {
@@ -63,9 +61,6 @@ struct PictureWay {
   /// A picture that would take longer is drawn in pieces of about so many seconds, one with each
   /// draw(): the same picture, shown when it is whole, dropped when the view changes before.
   double piece_seconds = std::numeric_limits<double>::infinity();
-  /// What is to be shown is chosen beside the thread that draws; after so long the picture goes on
-  /// with what was chosen before. See Scene::update().
-  double patience_seconds = std::numeric_limits<double>::infinity();
   /// The view changes all the time: a picture that has been begun is finished all the same, unless
   /// there are much fewer triangles to draw by now.
   bool moving = false;
@@ -93,7 +88,7 @@ struct PictureCounters {
 /// `finish` are 0.
 struct PictureTimes {
   double device = 0;    ///< taking over a device, or a part of its memory
-  double scene = 0;     ///< waiting until nodes are chosen
+  double scene = 0;     ///< choosing nodes
   double drawable = 0;  ///< asking what can be drawn
   double upload = 0;    ///< taking meshes to the device
   double slices = 0;

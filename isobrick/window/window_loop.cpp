@@ -205,7 +205,6 @@ void ViewerWindow::wait(double most_seconds) {
 void ViewerWindow::wait_for_meshes(double most_seconds) {
   if (state_.picture == nullptr || state_.picture->drew()) return;
   if (state_.picture->state().drawing || state_.picture->state().more) return;
-  if (!state_.picture->scene().up_to_date()) return;  // the next step waits for the choice
   // Each mesh that comes in ends a wait, and is not worth a step; the last one is, and what a user
   // does.
   const SceneStream& stream = state_.picture->scene().stream();
