@@ -1,0 +1,128 @@
+#include "isobrick/window/frame_pacer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+
+namespace isobrick {
+namespace {
+
+/// Previews of a surface: `full` triangles, of which a million take `seconds_per_million`.
+struct Previews {
+  FramePacer& pacer;
+  double full, pixels, seconds_per_million, occlusion = 0;
+  double seconds = 0, triangles = 0;
+
+  void draw() {
+    const double s = pacer.smaller();
+    triangles = std::min(full, static_cast<double>(pacer.max_triangles()));
+    seconds =
+        pixels / (s * s) + triangles / 1e6 * seconds_per_million + (pacer.plain() ? 0 : occlusion);
+    pacer.drawn(seconds, static_cast<std::uint64_t>(triangles), triangles < full);
+  }
+};
+
+TEST(FramePacer, PreviewsUseTheWholeTime) {
+  for (const double full : {6e5, 6e6})
+    for (const double pixels : {0.0, 0.01}) {
+      FramePacer pacer(0.05);
+      pacer.drawn_still(pixels + full / 1e6 + 0.3, static_cast<std::uint64_t>(full));
+      Previews previews{pacer, full, pixels, 1};
+      for (int i = 0; i < 15; ++i) {
+        previews.draw();
+        EXPECT_LT(previews.seconds, 0.05) << full << ": from the first one on";
+      }
+      EXPECT_GE(previews.seconds, 0.0375) << full;
+      EXPECT_EQ(pacer.smaller(), 1);
+    }
+}
+
+TEST(FramePacer, PicturesThatAreQuickEnoughLoseNothing) {
+  FramePacer pacer = FramePacer::for_device(true);
+  EXPECT_TRUE(pacer.plain()) << "until one in full was quick";
+  pacer.drawn_still(0.02, 600'000);
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
+    EXPECT_EQ(pacer.smaller(), 1);
+    EXPECT_FALSE(pacer.plain());
+    pacer.drawn(0.03, 600'000, false);
+  }
+}
+
+TEST(FramePacer, LeavesOcclusionOutBeforeDetail) {
+  FramePacer pacer(0.05);
+  pacer.drawn(0.08, 100'000, false);
+  EXPECT_TRUE(pacer.plain());
+  EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
+  for (int i = 0; i < 5; ++i) pacer.drawn(0.03, 100'000, false);
+  EXPECT_TRUE(pacer.plain()) << "until a picture at rest leaves time for it";
+  EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
+  pacer.drawn_still(0.04, 100'000);
+  EXPECT_TRUE(pacer.plain()) << "a preview takes longer than that";
+  pacer.drawn_still(0.03, 100'000);
+  EXPECT_FALSE(pacer.plain());
+}
+
+TEST(FramePacer, HalvesTrianglesThatTakeTooLong) {
+  FramePacer pacer = FramePacer::for_device(false);
+  pacer.drawn(0.1, 8'000'000, false);  // occlusion goes
+  pacer.drawn(0.1, 8'000'000, false);
+  EXPECT_EQ(pacer.max_triangles(), 4'000'000u);
+  pacer.drawn(0.1, 3'000'000, true);
+  EXPECT_EQ(pacer.max_triangles(), 1'500'000u);
+  pacer.drawn(0.012, 1'500'000, true);
+  EXPECT_EQ(pacer.max_triangles(), 1'500'000u) << "as long as a frame may take";
+}
+
+TEST(FramePacer, SettlesWhereTrianglesTakeTheTime) {
+  FramePacer pacer = FramePacer::for_device(false);
+  Previews previews{pacer, 1e7, 0, 4e-3};
+  for (int i = 0; i < 200; ++i) {
+    previews.draw();
+    EXPECT_EQ(pacer.smaller(), 1);
+    if (i <= 20) continue;
+    EXPECT_LE(previews.seconds, 0.0125);
+    EXPECT_GE(previews.seconds, 0.75 * 0.0125);
+  }
+}
+
+TEST(FramePacer, MakesPicturesSmallerWhereTheirPixelsTakeTheTime) {
+  // As llvmpipe: 70 ms for the pixels of a plain picture, 60 ms more for its triangles.
+  FramePacer pacer(0.05);
+  Previews previews{pacer, 60'000, 0.07, 1, 0.2};
+  for (int i = 0; i < 60; ++i) {
+    previews.draw();
+    if (i > 10) {
+      EXPECT_LT(previews.seconds, 0.05);
+    }
+  }
+  EXPECT_GT(pacer.smaller(), 1);
+  EXPECT_LT(pacer.smaller(), 4);
+  EXPECT_GT(previews.triangles, 20'000) << "there is time for them";
+  for (int i = 0; i < 100; ++i) pacer.drawn(0.002, 60'000, previews.triangles < 60'000);
+  EXPECT_EQ(pacer.smaller(), 1);
+}
+
+TEST(FramePacer, LeavesAlmostNothingWhereAllTakesTooLong) {
+  FramePacer pacer = FramePacer::for_device(true);
+  for (int i = 0; i < 30; ++i)
+    pacer.drawn(2, std::min<std::uint64_t>(pacer.max_triangles(), 1e6), true);
+  EXPECT_EQ(pacer.smaller(), 4);
+  EXPECT_EQ(pacer.max_triangles(), 2'000u);
+}
+
+TEST(FramePacer, RefinesAgainWhereThereIsTime) {
+  FramePacer pacer(0.05);
+  Previews slow{pacer, 1e5, 0.2, 1};
+  for (int i = 0; i < 10; ++i) slow.draw();
+  EXPECT_LT(pacer.max_triangles(), 50'000u);
+  EXPECT_GT(pacer.smaller(), 1);
+  Previews quick{pacer, 1e5, 0, 0.04};
+  for (int i = 0; i < 100; ++i) quick.draw();
+  EXPECT_EQ(quick.triangles, 1e5);
+  EXPECT_EQ(pacer.smaller(), 1);
+}
+
+}  // namespace
+}  // namespace isobrick
