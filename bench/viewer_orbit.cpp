@@ -17,6 +17,7 @@
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "bench/guarded_main.h"
@@ -39,7 +40,7 @@ struct Arguments {
   int width = 1280, height = 800;
   double seconds = 8;  ///< of each phase, once around
   double memory_gib = 2;
-  double piece_seconds = kPieceSeconds;
+  std::optional<double> piece_seconds;
   bool no_rest = false, pictures = false;
 };
 
@@ -100,9 +101,8 @@ class Flight {
     const std::uint64_t before = picture_->counters().finished;
     double all = 0, until_there = 0;
     do {
-      PictureWay way;
-      way.piece_seconds = arguments_.piece_seconds;
-      if (pacer_.plain()) way.plain = PictureWay::Plain::until_complete;
+      PictureWay way = PictureWay::in_window(pacer_, current_gl_device().software, false);
+      way.piece_seconds = arguments_.piece_seconds.value_or(way.piece_seconds);
       Stopwatch watch;
       picture_->draw(camera_, arguments_.width, arguments_.height, settings_, way);
       const double step = watch.lap();

@@ -8,9 +8,9 @@
 //
 // A picture's time ends with glFinish. Pictures are started at most 60 times a second, as a
 // display would have them; the one that shows everything when all is there, since a display has
-// room for one more that waits for its turn. A frame is what input waits for: a whole picture while
-// something moves, otherwise a piece of one or what is done between two; those of less than a
-// millisecond do not count.
+// room for one more that waits for its turn. A frame is what input waits for: a whole picture, in
+// software a piece of one, or what is done between two; those of less than a millisecond do not
+// count.
 // Built as bench/README.md says.
 
 #include <epoxy/gl.h>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <utility>
 
 #include <epoxy/gl.h>
@@ -48,10 +49,11 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
 }  // namespace
 
 PictureWay PictureWay::in_window(const FramePacer& pacer, bool software, bool moving) {
-  PictureWay way{.max_triangles = moving ? pacer.max_triangles() : FramePacer::kAllTriangles,
-                 .piece_seconds = software || moving ? kPieceSeconds : kDevicePieceSeconds,
-                 .moving = moving,
-                 .smaller = moving && pacer.smaller() > 1};
+  PictureWay way{
+      .max_triangles = moving ? pacer.max_triangles() : FramePacer::kAllTriangles,
+      .piece_seconds = software ? kPieceSeconds : std::numeric_limits<double>::infinity(),
+      .moving = moving,
+      .smaller = moving && pacer.smaller() > 1};
   // Nor should pictures that follow while meshes come in wait for a good one.
   if (pacer.plain()) way.plain = moving ? Plain::yes : Plain::until_complete;
   return way;
@@ -70,8 +72,7 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
       setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)),
       uploads_(setup_->pool(),
                setup_->software() ? MeshUploads::Unused::go : MeshUploads::Unused::stay),
-      slices_(budgets, last_sample(*store_), store_->info().type),
-      pieces_(setup_->software()) {
+      slices_(budgets, last_sample(*store_), store_->info().type) {
   scene_ = reading_.get();
   device_ = std::make_unique<DeviceMeshes>(scene_->stream(), setup_->device());
   device_->use(budgets.backend);
@@ -185,21 +186,13 @@ bool StorePicture::shows_all_there_is(const Pictured& next, const Asked& asked) 
          pictured_.isovalues == next.isovalues && next.isovalues != scene_->isovalues();
 }
 
-/// Whether taking things to the device has been enough for a frame: the next one can show them.
-bool StorePicture::can_be_put_off(const Pictured& next, const Asked& asked) const {
-  return times_.device + times_.upload > kLeastPart * asked.way.piece_seconds && state_.covers &&
-         next.isovalues == pictured_.isovalues &&
-         (pictured_.shows == asked.shows || pictured_.shows == asked.shows_plain);
-}
-
 /// Unless it would show nothing new.
 void StorePicture::choose_picture(const Asked& asked) {
   Stopwatch watch;
   const bool plain_serves =
       asked.way.plain != PictureWay::Plain::no && pictured_.shows == asked.shows_plain;
   const bool other_view = pictured_.shows != asked.shows && !plain_serves;
-  const bool owed = std::exchange(put_off_, false);
-  const bool enough = (owed || imported_) && shown_ != nullptr;
+  const bool enough = imported_ && shown_ != nullptr;
   if (!enough && (other_view || asked.idle || !can_wait(*asked.newest))) upload(asked.newest);
   times_.upload = watch.lap();
   slices_.update(scene_->stream(), asked.settings);
@@ -212,8 +205,6 @@ void StorePicture::choose_picture(const Asked& asked) {
   if (shown_ != nullptr) next.isovalues = shown_->isovalues;
   // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
   if (shows_all_there_is(next, asked)) return;
-  put_off_ = !owed && can_be_put_off(next, asked);
-  if (put_off_) return;
   if (pictured_.slices != next.slices || !same_meshes(pictured_.meshes.get(), shown_.get())) {
     pictured_.stale = true;
     pictured_.meshes.reset();
@@ -232,7 +223,7 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
     glFinish();
     if (work_) drop_picture();
     pictured_ = {};  // half a picture is none
-    drew_ = imported_ = put_off_ = false;
+    drew_ = imported_ = false;
     state_.drawing = state_.more = state_.complete = false;
     state_.drawn_part = 0;
     throw;
@@ -245,7 +236,7 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
   drew_ = false;
   Stopwatch watch;
   // Until there is a picture of what is asked for, every other time is for what has arrived.
-  imported_ = !work_ && !put_off_ && (state_.covers || !imported_) && device_->update();
+  imported_ = !work_ && (state_.covers || !imported_) && device_->update();
   times_ = {.device = watch.lap()};
   update_scene(camera, width, height, settings, way);
   times_.scene = watch.lap();
@@ -293,8 +284,8 @@ void StorePicture::update_state(const Asked& asked) {
   state_.limited = scene_->cut().limited_by_budget;
   state_.limited_by_budget = state_.limited && asked.way.max_triangles == FramePacer::kAllTriangles;
   state_.covers = shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
-  state_.more = imported_ || put_off_ || device_->more();
-  state_.complete = !asked.way.moving && !work_ && !put_off_ && shown_ != nullptr &&
+  state_.more = imported_ || device_->more();
+  state_.complete = !asked.way.moving && !work_ && shown_ != nullptr &&
                     scene_->is_newest(*shown_) && (shown_->complete || scene_->idle());
 }
 

@@ -23,14 +23,8 @@
 
 namespace isobrick {
 
-/// So long a piece of a picture takes, about, that is drawn in pieces: input is answered in
-/// between.
+/// How long a piece of a picture may take where OpenGL is software: input is answered in between.
 inline constexpr double kPieceSeconds = 0.045;
-/// The same where a device draws and nothing moves: half a frame of a display.
-inline constexpr double kDevicePieceSeconds = 0.008;
-/// Of a piece's time: for less another piece is not begun; after more of other work a picture
-/// waits.
-inline constexpr double kLeastPart = 0.25;
 
 /// What a picture shows and what it still lacks.
 struct PictureState {
@@ -59,7 +53,8 @@ struct PictureWay {
   /// software, which draws slowly, that is one picture later: first a plain one of all.
   enum class Plain : std::uint8_t { no, until_complete, yes } plain = Plain::no;
   /// A picture that would take longer is drawn in pieces of about so many seconds, one with each
-  /// draw(): the same picture, shown when it is whole, dropped when the view changes before.
+  /// draw(): the same picture, shown when it is whole, dropped when the view changes before. Only
+  /// software needs them: a device draws a whole picture in about a frame.
   double piece_seconds = std::numeric_limits<double>::infinity();
   /// The view changes all the time: a picture that has been begun is finished all the same, unless
   /// there are much fewer triangles to draw by now.
@@ -119,9 +114,8 @@ class StorePicture {
   WorldBox bounds() const;
 
   /// Makes the picture in the renderer, of what is there by now, or goes on with it; leaves the one
-  /// before until it is whole, and where it would show the same. A picture of the same view that
-  /// shows more is left to the next draw() when it took long to take that to the device. Throws
-  /// what Scene, Renderer and DeviceMeshes do; what had been begun is dropped then.
+  /// before until it is whole, and where it would show the same. Throws what Scene, Renderer and
+  /// DeviceMeshes do; what had been begun is dropped then.
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
             const PictureWay& way = {});
   const PictureState& state() const { return state_; }
@@ -185,11 +179,10 @@ class StorePicture {
   void drop_unused();
   bool still_wanted(const Work& work, const Asked& asked) const;
   bool shows_all_there_is(const Pictured& next, const Asked& asked) const;
-  bool can_be_put_off(const Pictured& next, const Asked& asked) const;
   void choose_picture(const Asked& asked);
   void begin_picture(const Asked& asked);
-  void draw_piece(double most_seconds);
-  void wait_drawn(std::optional<GlFence> fence);
+  void draw_piece(double limit_seconds);
+  void wait_drawn(bool everything);
   void finish_picture();
   void drop_picture();
   std::optional<std::size_t> surface_of(const DrawnNode& node, const ViewSettings& settings) const;
@@ -216,7 +209,6 @@ class StorePicture {
   double picture_seconds_ = 0;
   bool drew_ = false;
   bool imported_ = false;  ///< a piece of a device's memory, in the last draw()
-  bool put_off_ = false;   ///< a picture, to the next draw(), which takes nothing to the device
   PictureCounters counters_;
   PictureState state_;
   PictureTimes times_;

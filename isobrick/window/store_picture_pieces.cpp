@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -12,6 +13,11 @@
 // How a picture that has been chosen is made, in pieces; store_picture.cpp chooses it.
 
 namespace isobrick {
+namespace {
+
+constexpr std::uint64_t kWholePicture = std::numeric_limits<std::uint64_t>::max();
+
+}  // namespace
 
 /// Which of the settings' surfaces a mesh of `shown_` belongs to. That may have been made when
 /// others were asked for: where there were as many, one has another isovalue by now.
@@ -71,40 +77,36 @@ void StorePicture::begin_picture(const Asked& asked) {
   times_.draw = watch.lap();
 }
 
-/// Until the piece before is drawn, with a fence behind the one that has just been told; without
-/// one: until all is.
-void StorePicture::wait_drawn(std::optional<GlFence> fence) {
-  Stopwatch watch;
-  if (!fence) {
+/// Waits until OpenGL has drawn the piece before the one that was just submitted, or everything.
+/// llvmpipe draws in part on this thread and in part beside it: the rest of a piece is drawn
+/// beside the next one.
+void StorePicture::wait_drawn(bool everything) {
+  if (everything) {
     glFinish();  // see DeviceMeshes::drawn(); and drawing counts for the pause after it
-    piece_fence_.reset();
-    return pieces_.drawn_all(watch.lap());
+    return piece_fence_.reset();
   }
+  GlFence behind_this = GlFence::insert();
   if (piece_fence_) piece_fence_->wait();
-  piece_fence_ = std::move(fence);
-  pieces_.drawn_before_last(watch.lap());
+  piece_fence_ = std::move(behind_this);
 }
 
-/// As much as there is time for. In software the last piece alone is waited for at once: what is
-/// told is drawn in part by the thread that tells it, and the rest beside the next piece.
-void StorePicture::draw_piece(double most) {
-  double left = most;
-  for (;;) {
-    Stopwatch watch;
-    const std::uint64_t before = renderer().work_left();
-    const bool finished = renderer().end_piece(pieces_.work(left, before));
-    std::optional<GlFence> fence;
-    if (!finished && setup_->software()) fence = GlFence::insert();
-    const double told = watch.lap();
-    pieces_.told(before - renderer().work_left(), told);
-    wait_drawn(std::move(fence));
-    const double waited = watch.lap();
-    times_.draw += told;
-    times_.finish += waited;
-    left -= told + waited;
-    if (finished) return finish_picture();
-    if (left < kLeastPart * most) break;
+/// Draws the rest of the picture, or a piece of it where `limit` is finite.
+void StorePicture::draw_piece(double limit) {
+  const bool in_pieces = std::isfinite(limit);
+  Stopwatch watch;
+  const bool finished = renderer().end_piece(in_pieces ? pieces_.work() : kWholePicture);
+  const double submitted = watch.lap();
+  const int pieces = (piece_fence_ ? 1 : 0) + (finished ? 1 : 0);  // that are waited for
+  wait_drawn(finished);
+  const double waited = watch.lap();
+  times_.draw += submitted;
+  times_.finish += waited;
+  if (in_pieces && pieces > 0) {
+    const double seconds = (submitted + waited) / pieces;
+    // The last piece is a small one, which makes no other larger.
+    if (!finished || seconds > limit) pieces_.drawn(seconds, limit);
   }
+  if (finished) return finish_picture();
   ++counters_.pieces;
   work_->seconds += times_.draw + times_.finish;
 }
@@ -127,7 +129,7 @@ void StorePicture::finish_picture() {
 /// Waits for the piece that is still being drawn, if any: then its meshes may go.
 void StorePicture::drop_picture() {
   ++counters_.dropped;
-  if (piece_fence_) wait_drawn({});
+  if (piece_fence_) wait_drawn(true);
   work_.reset();
   device_->forget();
 }

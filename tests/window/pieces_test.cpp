@@ -108,37 +108,6 @@ TEST_F(Pieces, OfPicturesWithoutTrianglesAreFinishedWhileTheViewKeepsChanging) {
   EXPECT_EQ(picture_->counters().dropped, before.dropped);
 }
 
-TEST_F(Pieces, WaitForTheNextFrameWhenThisOneHasTakenMeshesToTheDevice) {
-  const PictureBudgets budgets{.backend = Backend::cpu};
-  open(SynthKind::gyroid, {96, 96, 96}, budgets);
-  settings_.pixel_error = 0.5f;
-  const auto expected = pixels();
-  show(budgets);
-  PictureWay way{.max_triangles = 2000, .piece_seconds = 1e-9};  // whatever is done takes longer
-  const auto told = [&] { return picture_->counters().finished + picture_->counters().pieces; };
-  int put_off = 0;
-  const auto complete = [&] {
-    bool owed = false;
-    for (int i = 0; i == 0 || !picture_->state().complete; ++i) {
-      const std::uint64_t before = told();
-      picture_->draw(camera_, kWidth, kHeight, settings_, way);
-      ASSERT_TRUE(told() > before || !owed) << "once is enough";
-      owed = picture_->state().more;
-      if (!owed) continue;
-      ++put_off;
-      EXPECT_EQ(told(), before);
-      EXPECT_FALSE(picture_->state().complete);
-    }
-  };
-  complete();
-  EXPECT_NE(picture_->renderer().read_pixels(), expected);
-  put_off = 0;
-  way.max_triangles = FramePacer::kAllTriangles;
-  complete();
-  EXPECT_GT(put_off, 0);
-  EXPECT_EQ(picture_->renderer().read_pixels(), expected);
-}
-
 TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
   open(SynthKind::gyroid, {96, 96, 96}, {.backend = Backend::cpu});
   const auto first = pixels();
@@ -165,14 +134,6 @@ TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
   EXPECT_EQ(picture_->renderer().read_pixels(), first);
   EXPECT_NE(pixels(), first);
   camera_ = front;
-  EXPECT_EQ(pixels(), first);
-  // One that has been put off as well.
-  const PictureWay hasty{.max_triangles = 2000, .piece_seconds = 1e-6};
-  for (int i = 0; !picture_->state().more; ++i) {
-    ASSERT_LT(i, 100000);
-    picture_->draw(camera_, kWidth, kHeight, settings_, hasty);
-  }
-  fail();
   EXPECT_EQ(pixels(), first);
 }
 
