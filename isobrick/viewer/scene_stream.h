@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "isobrick/stream/resident_bricks.h"
 #include "isobrick/viewer/cut.h"
@@ -13,6 +15,8 @@
 #include "isobrick/viewer/slice_image.h"
 
 namespace isobrick {
+
+struct StreamState;
 
 struct StreamOptions {
   int threads = 0;  ///< that read, decode and mesh; 0: all cores but one
@@ -98,8 +102,8 @@ class SceneStream {
   ResidentBricks& bricks() const;
 
  private:
-  struct Shared;
-  std::shared_ptr<Shared> shared_;
+  std::shared_ptr<StreamState> state_;
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace isobrick

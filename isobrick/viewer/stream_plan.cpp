@@ -23,7 +23,7 @@ class Planner {
   void run(double soon) {
     for (const double isovalue : cut_.isovalues)
       for (const CutNode& node : cut_.nodes) add(node, isovalue);
-    plan_.straight = 2 * bare_.size() > held_ && static_cast<double>(plan_.jobs.size()) <= soon;
+    plan_.skips_levels = 2 * bare_.size() > held_ && static_cast<double>(plan_.jobs.size()) <= soon;
     for (const Bare& bare : bare_) {
       if (bare.isovalue != ancestors_of_) ancestors_.clear();
       ancestors_of_ = bare.isovalue;
@@ -67,7 +67,7 @@ class Planner {
         ancestor.stands_in = true;
         return;
       }
-      if (plan_.straight && n.level < top) continue;
+      if (plan_.skips_levels && n.level < top) continue;
       if (!tree_.active(n, isovalue)) continue;
       ancestor.job = jobs.size();
       jobs.push_back({n, isovalue, 0, node.visible, false, node.pixels, node.distance});

@@ -28,8 +28,9 @@ struct MeshPlan {
   /// longest cells on the picture, then near ones. Nodes without any mesh bring the ancestors along
   /// that will stand in for them, of levels that are stored.
   std::vector<MeshJob> jobs;
-  /// Of ancestors only the coarsest that are stored, because all the rest comes soon.
-  bool straight = false;
+  /// Intermediate levels are skipped: of ancestors only the coarsest that are stored are made,
+  /// because all the rest comes soon.
+  bool skips_levels = false;
 };
 
 /// `soon`: how many meshes are made so quickly that nothing needs to stand in for them but the

@@ -57,8 +57,8 @@ TEST_F(PlanTest, WhatComesSoonBringsTheCoarsestLevelAlone) {
   ASSERT_GT(tree_.grid().coarsest_stored(), 1);
   ASSERT_GT(tree_.grid().levels(), tree_.grid().coarsest_stored() + 1);
   const MeshPlan slow = plan(0), quick = plan(1e6);
-  EXPECT_FALSE(slow.straight);
-  EXPECT_TRUE(quick.straight);
+  EXPECT_FALSE(slow.skips_levels);
+  EXPECT_TRUE(quick.skips_levels);
   EXPECT_GT(ancestors(slow, false), ancestors(slow, true));
   EXPECT_EQ(ancestors(quick, false), ancestors(quick, true));
   EXPECT_EQ(ancestors(quick, true), ancestors(slow, true));
@@ -73,7 +73,7 @@ TEST_F(PlanTest, WhereMostIsThereAllLevelsStandIn) {
   for (const MeshJob& job : all.jobs)
     if (job.key.level < tree_.grid().coarsest_stored() && (left == 0 || --left == 0)) make(job);
   const MeshPlan rest = plan(1e6);
-  EXPECT_FALSE(rest.straight);
+  EXPECT_FALSE(rest.skips_levels);
   EXPECT_LT(rest.jobs.size(), all.jobs.size());
   EXPECT_GT(ancestors(rest, false), ancestors(rest, true));
 }

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+
+#include "isobrick/core/thread_annotations.h"
+
+namespace isobrick {
+
+/// Counts activities that somebody who closes something waits for. Thread-safe.
+class ActivityCount {
+ public:
+  /// False once it is closed: the activity must not begin.
+  bool begin() {
+    const MutexLock lock(mutex_);
+    if (closed_) return false;
+    ++count_;
+    return true;
+  }
+  void end() {
+    const MutexLock lock(mutex_);
+    if (--count_ == 0) none_.notify_all();
+  }
+  void close() {
+    const MutexLock lock(mutex_);
+    closed_ = true;
+  }
+  /// Waits until there is none; whether there is none.
+  bool wait_for_none(std::chrono::steady_clock::time_point deadline) {
+    const MutexLock lock(mutex_);
+    while (count_ > 0)
+      if (!none_.wait_until(mutex_, deadline)) break;
+    return count_ == 0;
+  }
+
+ private:
+  Mutex mutex_;
+  CondVar none_;
+  int count_ ISOBRICK_GUARDED_BY(mutex_) = 0;
+  bool closed_ ISOBRICK_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace isobrick

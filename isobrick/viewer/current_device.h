@@ -1,0 +1,50 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "isobrick/core/thread_annotations.h"
+#include "isobrick/viewer/device_mesher.h"
+
+namespace isobrick {
+
+/// The device that makes a stream's meshes, until it fails. Thread-safe.
+class CurrentDevice {
+ public:
+  /// Null: none. One that has failed is not taken.
+  void set(std::shared_ptr<DeviceMesher> device) {
+    std::string failure = device ? device->failure() : std::string();
+    if (!failure.empty()) device.reset();
+    const MutexLock lock(mutex_);
+    failure_ = std::move(failure);
+    std::swap(device_, device);  // the one before goes without the lock
+  }
+  std::shared_ptr<DeviceMesher> get() const {
+    const MutexLock lock(mutex_);
+    return device_;
+  }
+  bool is_set() const {
+    const MutexLock lock(mutex_);
+    return device_ != nullptr;
+  }
+  /// Lets go of a device that has failed, unless there is another one by now.
+  void drop(const std::shared_ptr<DeviceMesher>& failed, const std::string& failure) {
+    const MutexLock lock(mutex_);
+    if (device_ != failed) return;
+    device_.reset();
+    failure_ = failure;
+  }
+  /// Why the last device makes no more; or empty.
+  std::string failure() const {
+    const MutexLock lock(mutex_);
+    return failure_;
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::shared_ptr<DeviceMesher> device_ ISOBRICK_GUARDED_BY(mutex_);
+  std::string failure_ ISOBRICK_GUARDED_BY(mutex_);
+};
+
+}  // namespace isobrick

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "isobrick/core/thread_annotations.h"
+
+namespace isobrick {
+
+/// Decides when a plan skips intermediate levels: where most of a cut is new and all of it comes
+/// soon, meshes of levels between the coarsest one and the cut's would be replaced at once.
+/// Thread-safe.
+class LevelSkipping {
+ public:
+  /// For so many threads that make meshes.
+  explicit LevelSkipping(int threads) : threads_(threads) {}
+
+  /// Another isovalue was requested. While it is being slid nothing is skipped.
+  void isovalue_changed() {
+    const MutexLock lock(mutex_);
+    const auto now = Clock::now();
+    changed_twice_ = last_isovalue_ && now - *last_isovalue_ < kSliding;
+    last_isovalue_ = now;
+    skipping_until_.reset();
+  }
+  /// A mesh took a thread so long.
+  void mesh_took(double seconds) {
+    const MutexLock lock(mutex_);
+    seconds_per_mesh_ += (seconds - seconds_per_mesh_) * kWeight;
+  }
+
+  /// How many meshes come soon enough for a plan that skips; see plan_jobs().
+  double soon() const {
+    const MutexLock lock(mutex_);
+    if (changed_twice_ && Clock::now() - *last_isovalue_ < kSliding) return 0;
+    return kSoon.count() / seconds_per_mesh_ * threads_;
+  }
+  /// Whether the plan that is worked on now skips levels.
+  void planned(bool skips) {
+    const MutexLock lock(mutex_);
+    if (!skips)
+      skipping_until_.reset();
+    else if (!skipping_until_)
+      skipping_until_ = Clock::now() + kLate;
+  }
+  /// Whether meshes of a plan that skips have not come soon enough: the levels between are needed.
+  bool late() const {
+    const MutexLock lock(mutex_);
+    return skipping_until_ && Clock::now() > *skipping_until_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::duration<double> kSoon{0.1};
+  static constexpr std::chrono::milliseconds kLate{300};
+  /// An isovalue that changes again within this time is being slid.
+  static constexpr std::chrono::milliseconds kSliding{300};
+  /// Of one mesh in the mean of those before.
+  static constexpr double kWeight = 1.0 / 32;
+
+  const double threads_;
+  mutable Mutex mutex_;
+  double seconds_per_mesh_ ISOBRICK_GUARDED_BY(mutex_) = 0.003;  ///< a guess, then a mean
+  bool changed_twice_ ISOBRICK_GUARDED_BY(mutex_) = false;  ///< the last time soon after another
+  std::optional<Clock::time_point> last_isovalue_ ISOBRICK_GUARDED_BY(mutex_);
+  std::optional<Clock::time_point> skipping_until_ ISOBRICK_GUARDED_BY(mutex_);
+};
+
+}  // namespace isobrick

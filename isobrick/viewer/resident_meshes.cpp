@@ -1,0 +1,110 @@
+#include "isobrick/viewer/resident_meshes.h"
+
+#include <cstddef>
+#include <utility>
+
+namespace isobrick {
+namespace {
+
+/// Where a device has no room: the part of its budget that older meshes give back.
+constexpr std::uint64_t kPartForNew = 8;
+
+}  // namespace
+
+void ResidentMeshes::set_cut(const Cut& cut, CutIndex index) {
+  // An isovalue that moves on with every picture must not leave what was shown before the
+  // first one: the last that covers stays.
+  if (cut_.isovalues != cut.isovalues) (void)drawable();
+  cut_ = cut;
+  index_.emplace(std::move(index));
+  ++version_;
+}
+
+MeshPlan ResidentMeshes::plan(const NodeMesher& mesher, double soon) {
+  cache_.begin_use();
+  MeshPlan plan = plan_jobs(*tree_, cut_, cache_, mesher, soon);
+  make_room();
+  return plan;
+}
+
+void ResidentMeshes::put(std::shared_ptr<const NodeMesh> mesh) {
+  if (closed_) return;
+  cache_.put(std::move(mesh));
+  make_room();
+  ++version_;
+}
+
+void ResidentMeshes::make_device_room() {
+  const std::uint64_t budget = cache_.device_budget(), part = budget / kPartForNew;
+  if (cache_.device_bytes() + part <= budget) return;
+  keep_shown();
+  cache_.shrink_device(part);
+}
+
+void ResidentMeshes::set_device_budget(std::uint64_t bytes) {
+  cache_.set_device_budget(bytes);
+  make_room();
+}
+
+/// What is shown takes room, too, whatever is wanted now.
+void ResidentMeshes::keep_shown() {
+  for (const auto& place : shown_)
+    for (const DrawnNode& node : place)
+      cache_.find(node.mesh->key, node.mesh->isovalue, node.mesh->coarser);
+}
+
+void ResidentMeshes::make_room() {
+  full_ = false;
+  if (cache_.keeps_budgets()) return;
+  keep_shown();
+  full_ = !cache_.shrink();
+}
+
+std::shared_ptr<const Drawable> ResidentMeshes::drawable() {
+  if (!drawn_ || drawn_->version != version_) rebuild_drawable();
+  return drawn_;
+}
+
+/// Shows the isovalue that a place shows already, as this cut wants it.
+void ResidentMeshes::show_before(std::size_t place) {
+  std::vector<DrawnNode> nodes;
+  bool complete = true;
+  if (append_drawable(*tree_, *index_, shown_[place].front().mesh->isovalue,
+                      static_cast<int>(place), cache_, nodes, complete))
+    shown_[place] = std::move(nodes);
+}
+
+void ResidentMeshes::rebuild_drawable() {
+  auto next = std::make_shared<Drawable>();
+  next->version = version_;
+  next->complete = next->covers = true;
+  next->isovalues = cut_.isovalues;
+  cache_.begin_use();
+  shown_.resize(cut_.isovalues.size());
+  for (std::size_t i = 0; index_ && i < cut_.isovalues.size(); ++i) {
+    std::vector<DrawnNode> nodes;
+    const bool covers = append_drawable(*tree_, *index_, cut_.isovalues[i], static_cast<int>(i),
+                                        cache_, nodes, next->complete);
+    next->complete &= covers;
+    next->covers &= covers;
+    // The isovalue before is shown for as long as the new one has holes.
+    const bool old = !shown_[i].empty() && shown_[i].front().mesh->isovalue != cut_.isovalues[i];
+    if (covers || !old)
+      shown_[i] = std::move(nodes);
+    else
+      show_before(i);
+    next->nodes.insert(next->nodes.end(), shown_[i].begin(), shown_[i].end());
+  }
+  for (const DrawnNode& node : next->nodes) next->triangles += node.mesh->triangles();
+  drawn_ = std::move(next);
+  make_room();
+}
+
+void ResidentMeshes::close() {
+  closed_ = true;
+  cache_ = MeshCache(0, 0);
+  shown_.clear();
+  drawn_.reset();
+}
+
+}  // namespace isobrick

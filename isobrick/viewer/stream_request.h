@@ -1,0 +1,41 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <utility>
+
+#include "isobrick/viewer/slice_image.h"
+#include "isobrick/viewer/stream_plan.h"
+
+namespace isobrick {
+
+/// A mesh, or the slice of a slot, that a thread is to make; and the cancellation token that the
+/// thread checks. Thread-safe.
+class StreamRequest final : public Wanted {
+ public:
+  explicit StreamRequest(MeshJob mesh) : mesh_(std::move(mesh)) {}
+  StreamRequest(int slot, const SliceRequest& slice) : slot_(slot), slice_(slice) {}
+
+  void check() const override {
+    if (cancelled()) throw Abandoned();
+  }
+  bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
+  void set_cancelled(bool cancelled) { cancelled_ = cancelled; }
+
+  /// A device makes what it was sent, whether it is cancelled or not.
+  bool sent_to_device() const { return sent_; }
+  void set_sent_to_device(bool sent) { sent_ = sent; }
+
+  bool is_slice() const { return slot_.has_value(); }
+  const MeshJob& mesh() const { return mesh_; }
+  int slot() const { return *slot_; }
+  const SliceRequest& slice() const { return slice_; }
+
+ private:
+  const MeshJob mesh_;
+  const std::optional<int> slot_;
+  const SliceRequest slice_;
+  std::atomic<bool> cancelled_ = false, sent_ = false;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,54 @@
+#include "isobrick/viewer/stream_state.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+namespace isobrick {
+namespace {
+
+int thread_count(int requested) {
+  if (requested > 0) return requested;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()) - 1);
+}
+
+}  // namespace
+
+StreamState::StreamState(std::shared_ptr<const BrickSource> s, std::shared_ptr<const NodeTree> t,
+                         StreamOptions o)
+    : source(std::move(s)),
+      tree(std::move(t)),
+      options(std::move(o)),
+      threads(thread_count(options.threads)),
+      bricks(source, options.brick_bytes),
+      planner(tree->grid(), bricks, options.origin, options.inside),
+      meshes(tree, options.mesh_bytes, options.device_bytes) {}
+
+void StreamState::plan(bool late) {
+  bricks.forget_needs();
+  MeshPlan next = meshes.plan(planner, late ? 0 : skipping.soon());
+  skipping.planned(next.skips_levels && !next.jobs.empty());
+  pause_if_full();
+  queue.replace_meshes(std::move(next.jobs));
+}
+
+void StreamState::add_mesh(NodeMesh mesh, const DeviceMesher* by) {
+  statistics.add(mesh, tree->active_blocks(mesh.key, mesh.isovalue), by != nullptr);
+  // What came to host memory for want of room on the device has to be uploaded: older meshes make
+  // room instead, once for all that came so.
+  const bool had_no_room =
+      by != nullptr && !mesh.device && !mesh.empty() && !by->shared_blocks().empty();
+  auto shared = std::make_shared<const NodeMesh>(std::move(mesh));
+  const MutexLock lock(meshes_mutex);
+  if (had_no_room) meshes.make_device_room();
+  meshes.put(std::move(shared));
+  pause_if_full();
+}
+
+void StreamState::notify_change() {
+  if (!options.on_change || !notifications.begin()) return;
+  options.on_change();
+  notifications.end();
+}
+
+}  // namespace isobrick

@@ -1,0 +1,141 @@
+#include "isobrick/viewer/stream_worker.h"
+
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "isobrick/core/error.h"
+#include "isobrick/core/stopwatch.h"
+
+namespace isobrick {
+namespace {
+
+NodeMesh empty_mesh(const MeshJob& job) {
+  NodeMesh mesh;
+  mesh.key = job.key;
+  mesh.isovalue = job.isovalue;
+  mesh.coarser = job.coarser;
+  return mesh;
+}
+
+/// Gets what a device has made, on the device's thread.
+void receive(StreamState& state, const RequestQueue::RequestPtr& request, NodeMesh&& mesh,
+             const std::string& failure, std::shared_ptr<DeviceMesher> by) {
+  const bool made = failure.empty();
+  if (made)
+    state.add_mesh(std::move(mesh), by.get());
+  else
+    state.device.drop(by, failure);
+  // Before the request ends: this is the device's thread, which should not be the last to hold the
+  // device.
+  by.reset();
+  if (!made) return state.queue.retry(request);
+  state.queue.finish(request);
+  state.notify_change();
+}
+
+}  // namespace
+
+StreamWorker::StreamWorker(std::shared_ptr<StreamState> state)
+    : state_(std::move(state)),
+      mesher_(state_->tree->grid(), state_->bricks, state_->options.origin,
+              state_->options.inside) {}
+
+void StreamWorker::run() {
+  while (const RequestPtr request = state_->queue.take()) {
+    if (request->is_slice())
+      make_slice(request);
+    else
+      make_mesh(request);
+  }
+}
+
+void StreamWorker::make_mesh(const RequestPtr& request) {
+  prefetch_bricks();
+  const double before = mesher_.seconds();
+  Stopwatch watch;
+  std::optional<NodeMesh> mesh = mesh_of(request);
+  const double seconds = watch.lap();
+  const bool sent = request->sent_to_device();
+  state_->statistics.add_seconds(mesher_.seconds() - before);
+  if (mesh || sent) state_->skipping.mesh_took(seconds);
+  plan_if_late();
+  if (sent) return;  // receive() ends it, perhaps has already
+  const bool made = mesh.has_value();
+  if (made) state_->add_mesh(std::move(*mesh), nullptr);
+  state_->queue.finish(request);
+  if (made) state_->notify_change();
+}
+
+/// For a mesh so far back that other threads take all those before it at the same time.
+void StreamWorker::prefetch_bricks() {
+  const auto others = static_cast<std::size_t>(state_->threads) - 1;
+  const std::optional<MeshJob> next = state_->queue.mesh_after(others);
+  if (!next) return;
+  try {
+    mesher_.will_need(next->key, next->isovalue, next->coarser);
+  } catch (const Error&) {  // reported by the thread that reads it
+  }
+}
+
+/// What was made here; nothing when the request was cancelled, or sent to a device.
+std::optional<NodeMesh> StreamWorker::mesh_of(const RequestPtr& request) {
+  const MeshJob& job = request->mesh();
+  try {
+    const auto read = [&](NodeMesher::Form form) {
+      return mesher_.grid(job.key, job.isovalue, job.coarser, *request, form);
+    };
+    // The device itself is looked up after reading: a read that is held up keeps none.
+    GridView grid = read(state_->device.is_set() ? NodeMesher::Form::stored_if_possible
+                                                 : NodeMesher::Form::values);
+    request->check();
+    if (send(grid, request)) return std::nullopt;
+    if (grid.stored.samples != nullptr) grid = read(NodeMesher::Form::values);
+    return mesher_.extract(grid, empty_mesh(job));
+  } catch (const Abandoned&) {
+    return std::nullopt;
+  } catch (const std::exception& e) {
+    NodeMesh damaged = empty_mesh(job);
+    damaged.damage = e.what();
+    return damaged;
+  }
+}
+
+/// False where there is no device, or it has failed.
+bool StreamWorker::send(const GridView& grid, const RequestPtr& request) {
+  const std::shared_ptr<DeviceMesher> device = state_->device.get();
+  if (!device) return false;
+  request->set_sent_to_device(true);
+  const bool taken = device->make(
+      grid, empty_mesh(request->mesh()),
+      [state = state_, request, by = device](NodeMesh&& mesh, const std::string& failure) mutable {
+        receive(*state, request, std::move(mesh), failure, std::move(by));
+      });
+  if (taken) return true;
+  request->set_sent_to_device(false);
+  state_->device.drop(device, device->failure());
+  return false;
+}
+
+void StreamWorker::plan_if_late() {
+  if (!state_->skipping.late() || state_->queue.counters().waiting_meshes == 0) return;
+  const MutexLock lock(state_->meshes_mutex);
+  if (state_->skipping.late()) state_->plan(true);  // no other thread was first
+}
+
+void StreamWorker::make_slice(const RequestPtr& request) {
+  std::shared_ptr<SliceSamples> image;
+  try {
+    image = std::make_shared<SliceSamples>(read_slice(state_->bricks, request->slice(), *request));
+  } catch (const Abandoned&) {
+  } catch (const std::exception& e) {
+    image = std::make_shared<SliceSamples>();
+    image->request = request->slice();
+    image->damage = e.what();
+  }
+  const bool wanted = state_->slices.put(*request, std::move(image));
+  state_->queue.finish(request);
+  if (wanted) state_->notify_change();
+}
+
+}  // namespace isobrick
