@@ -1,14 +1,14 @@
 #include <algorithm>
 #include <array>
-#include <condition_variable>
-#include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/stopwatch.h"
+#include "isobrick/core/thread_annotations.h"
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/grid_batch.h"
 #include "isobrick/gpu/mesh_memory.h"
@@ -102,6 +102,9 @@ class Work {
   std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
   void make(std::vector<Job>& jobs, DeviceMesher::Times& now);
   void add(const DeviceMesher::Times& now);
+  std::optional<int> free_slot();
+  std::vector<Job> next_jobs();
+  void free_slots(const std::vector<Job>& jobs, const std::string& failure);
   void write_again(std::vector<Job*>& jobs);
   void learn(const gpu::GridMeshSize& size);
 
@@ -109,38 +112,42 @@ class Work {
   /// Room that is taken for a mesh whose size is not known yet.
   std::uint32_t likely_vertices_ = 1u << 14, likely_triangles_ = 1u << 15;
 
-  std::mutex mutex_;
-  std::condition_variable freed_, taken_;
-  std::vector<int> free_;  ///< slots
-  std::vector<Job> jobs_;
-  std::string failure_;  ///< empty: none
-  bool end_ = false;
-  DeviceMesher::Times times_;
+  Mutex mutex_;
+  CondVar freed_, taken_;
+  std::vector<int> free_ ISOBRICK_GUARDED_BY(mutex_);  ///< slots
+  std::vector<Job> jobs_ ISOBRICK_GUARDED_BY(mutex_);
+  std::string failure_ ISOBRICK_GUARDED_BY(mutex_);  ///< empty: none
+  bool end_ ISOBRICK_GUARDED_BY(mutex_) = false;
+  DeviceMesher::Times times_ ISOBRICK_GUARDED_BY(mutex_);
 };
 
 DeviceMesher::Times Work::times() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return times_;
 }
 
 std::string Work::failure() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return failure_;
 }
 
+/// Waits for it; nothing once the device has failed.
+std::optional<int> Work::free_slot() {
+  const MutexLock lock(mutex_);
+  while (failure_.empty() && free_.empty()) freed_.wait(mutex_);
+  if (!failure_.empty()) return std::nullopt;
+  const int slot = free_.back();
+  free_.pop_back();
+  return slot;
+}
+
 bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done) {
-  int slot = 0;
+  const std::optional<int> slot = free_slot();
+  if (!slot) return false;
+  batch_.stage(*slot, grid);
   {
-    std::unique_lock lock(mutex_);
-    freed_.wait(lock, [&] { return !failure_.empty() || !free_.empty(); });
-    if (!failure_.empty()) return false;
-    slot = free_.back();
-    free_.pop_back();
-  }
-  batch_.stage(slot, grid);
-  {
-    const std::lock_guard lock(mutex_);
-    jobs_.push_back({slot, std::move(mesh), std::move(done), {}});
+    const MutexLock lock(mutex_);
+    jobs_.push_back({*slot, std::move(mesh), std::move(done), {}});
   }
   taken_.notify_one();
   return true;
@@ -148,10 +155,26 @@ bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done
 
 void Work::end() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_ = true;
   }
   taken_.notify_one();
+}
+
+/// Waits for them; none once all is done and the end has come.
+std::vector<Job> Work::next_jobs() {
+  const MutexLock lock(mutex_);
+  while (!end_ && jobs_.empty()) taken_.wait(mutex_);
+  return std::exchange(jobs_, {});
+}
+
+void Work::free_slots(const std::vector<Job>& jobs, const std::string& failure) {
+  {
+    const MutexLock lock(mutex_);
+    failure_ = failure;
+    for (const Job& job : jobs) free_.push_back(job.slot);
+  }
+  freed_.notify_all();
 }
 
 void Work::run() {
@@ -161,33 +184,26 @@ void Work::run() {
   } catch (const std::exception& e) {
     failure = e.what();
   }
-  std::unique_lock lock(mutex_);
   for (;;) {
-    taken_.wait(lock, [&] { return end_ || !jobs_.empty(); });
-    if (jobs_.empty()) return;
-    std::vector<Job> jobs = std::exchange(jobs_, {});
-    lock.unlock();
+    std::vector<Job> jobs = next_jobs();
+    if (jobs.empty()) return;
     DeviceMesher::Times now{.launches = 1, .grids = jobs.size()};
     try {
       if (failure.empty()) make(jobs, now);
     } catch (const std::exception& e) {
       failure = e.what();
     }
-    lock.lock();
-    failure_ = failure;
-    for (const Job& job : jobs) free_.push_back(job.slot);
-    lock.unlock();
-    freed_.notify_all();
+    free_slots(jobs, failure);
     Stopwatch watch;
     for (Job& job : jobs) job.done(std::move(job.mesh), failure);
     jobs.clear();
     now.hand_out = watch.lap();
-    lock.lock();
     add(now);
   }
 }
 
 void Work::add(const DeviceMesher::Times& now) {
+  const MutexLock lock(mutex_);
   times_.launches += now.launches;
   times_.grids += now.grids;
   times_.turn += now.turn;

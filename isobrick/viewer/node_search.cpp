@@ -52,12 +52,12 @@ NodeSearch::NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type,
   const auto start = Clock::now();
   Bytes bytes = build(IndexKind::linear);
   set_index(IndexKind::linear, std::move(bytes), seconds_since(start));
-  builder_ = std::thread([this] { build_what_is_wanted(); });
+  builder_ = std::thread([this] { build_requested(); });
 }
 
 NodeSearch::~NodeSearch() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stop_ = true;
   }
   change_.notify_all();
@@ -104,51 +104,59 @@ void NodeSearch::set_index(IndexKind kind, Bytes bytes, double seconds) {
 
 void NodeSearch::use(IndexKind kind) {
   {
-    const std::lock_guard lock(mutex_);
-    wanted_ = kind;
+    const MutexLock lock(mutex_);
+    requested_ = kind;
     state_.refused.clear();
-    state_.building = wanted_ != state_.kind;
+    state_.building = requested_ != state_.kind;
   }
   change_.notify_all();
 }
 
 void NodeSearch::wait() {
-  std::unique_lock lock(mutex_);
-  change_.wait(lock, [&] { return !state_.building; });
+  const MutexLock lock(mutex_);
+  while (state_.building) change_.wait(mutex_);
 }
 
-void NodeSearch::build_what_is_wanted() {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    change_.wait(lock, [&] { return stop_ || state_.building; });
-    if (stop_) return;
-    const IndexKind kind = wanted_;
-    const std::uint64_t need = building_bytes(kind, state_.nodes) + state_.bytes;
+/// Waits for it; nothing: there will be none.
+std::optional<IndexKind> NodeSearch::next_to_build() {
+  const MutexLock lock(mutex_);
+  while (!stop_ && !state_.building) change_.wait(mutex_);
+  if (stop_) return std::nullopt;
+  return requested_;
+}
+
+/// False when another kind has been requested meanwhile.
+bool NodeSearch::finish_building(IndexKind kind, std::optional<Bytes> built, double seconds,
+                                 std::string refused) {
+  const MutexLock lock(mutex_);
+  if (requested_ != kind) return false;
+  if (built) set_index(kind, std::move(*built), seconds);
+  state_.building = false;
+  state_.refused = std::move(refused);
+  change_.notify_all();
+  return true;
+}
+
+void NodeSearch::build_requested() {
+  while (const std::optional<IndexKind> kind = next_to_build()) {
+    const State now = state();
+    const std::uint64_t need = building_bytes(*kind, now.nodes) + now.bytes;
     std::string refused;
-    if (need > most_bytes_) {
-      refused = fmt::format("the {} index of {} nodes takes {} to build, of {}", name_of(kind),
-                            state_.nodes, size_text(need), size_text(most_bytes_));
-    } else {
-      lock.unlock();
-      const auto start = Clock::now();
-      Bytes bytes = build(kind);
-      const double seconds = seconds_since(start);
-      lock.lock();
-      if (wanted_ != kind) continue;  // yet another one, or that which there was
-      set_index(kind, std::move(bytes), seconds);
-    }
-    state_.building = false;
-    state_.refused = std::move(refused);
-    change_.notify_all();
-    if (!on_change_) continue;
-    lock.unlock();
-    on_change_();
-    lock.lock();
+    std::optional<Bytes> built;
+    const auto start = Clock::now();
+    if (need > most_bytes_)
+      refused = fmt::format("the {} index of {} nodes takes {} to build, of {}", name_of(*kind),
+                            now.nodes, size_text(need), size_text(most_bytes_));
+    else
+      built = build(*kind);
+    const double seconds = seconds_since(start);
+    const bool changed = finish_building(*kind, std::move(built), seconds, std::move(refused));
+    if (changed && on_change_) on_change_();
   }
 }
 
 std::shared_ptr<const NodeSearch::Bytes> NodeSearch::index() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return index_;
 }
 
@@ -167,14 +175,14 @@ const ActiveNodes& NodeSearch::find(std::span<const double> isovalues) {
   const double seconds = seconds_since(start);
   active_.set(isovalues, std::move(finest));
   searched_ = std::move(index);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   state_.search_seconds = seconds;
   state_.active = active_.count();
   return active_;
 }
 
 NodeSearch::State NodeSearch::state() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return state_;
 }
 

@@ -1,17 +1,17 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "isobrick/core/scalar.h"
+#include "isobrick/core/thread_annotations.h"
 #include "isobrick/index/index_kind.h"
 #include "isobrick/viewer/active_nodes.h"
 #include "isobrick/viewer/node_tree.h"
@@ -65,20 +65,23 @@ class NodeSearch {
   static std::uint64_t building_bytes(IndexKind kind, std::uint64_t nodes);
   std::shared_ptr<const Bytes> index() const;
   Bytes build(IndexKind kind) const;
-  void set_index(IndexKind kind, Bytes bytes, double seconds);
-  void build_what_is_wanted();
+  void set_index(IndexKind kind, Bytes bytes, double seconds) ISOBRICK_REQUIRES(mutex_);
+  void build_requested();
+  std::optional<IndexKind> next_to_build();
+  bool finish_building(IndexKind kind, std::optional<Bytes> built, double seconds,
+                       std::string refused);
 
   std::shared_ptr<const NodeTree> tree_;
   ScalarType type_;
   std::uint64_t most_bytes_;
   std::function<void()> on_change_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable change_;
-  bool stop_ = false;
-  IndexKind wanted_ = IndexKind::linear;
-  std::shared_ptr<const Bytes> index_;
-  State state_;
+  mutable Mutex mutex_;
+  CondVar change_;
+  bool stop_ ISOBRICK_GUARDED_BY(mutex_) = false;
+  IndexKind requested_ ISOBRICK_GUARDED_BY(mutex_) = IndexKind::linear;
+  std::shared_ptr<const Bytes> index_ ISOBRICK_GUARDED_BY(mutex_);
+  State state_ ISOBRICK_GUARDED_BY(mutex_);
 
   // Of find() alone.
   ActiveNodes active_;

@@ -32,14 +32,14 @@ class ImportJob::Reporter final : public Progress {
   void begin(std::string_view stage, std::uint64_t total) override {
     job_.begun_ = true;
     check();
-    const std::scoped_lock lock(job_.mutex_);
+    const MutexLock lock(job_.mutex_);
     job_.state_.stage = stage;
     job_.state_.done = 0;
     job_.state_.total = total;
   }
   void advance(std::uint64_t done) override {
     check();
-    const std::scoped_lock lock(job_.mutex_);
+    const MutexLock lock(job_.mutex_);
     job_.state_.done += done;
   }
   void end() override {}
@@ -76,7 +76,7 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
   if (fs::is_regular_file(input_) && recognise_format(input) == VolumeFormat::vdb)
     request.grid = grid_to_show(read_vdb_header(input));
   if (request.grid) {
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     state_.note =
         fmt::format("'{}' has several grids; this is '{}' (others: isobrick convert --grid)",
                     input_.filename().string(), *request.grid);
@@ -107,14 +107,14 @@ void ImportJob::run() {
     failure = what_of(e);
   }
   if (begun_ && (cancelled || !failure.empty())) discard();
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   state_.finished = true;
   state_.cancelled = cancelled;
   state_.failure = std::move(failure);
 }
 
 ImportJob::State ImportJob::state() const {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   return state_;
 }
 

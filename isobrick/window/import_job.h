@@ -5,12 +5,12 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "isobrick/core/thread_annotations.h"
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/volumes/vdb_header.h"
 
@@ -46,8 +46,8 @@ class ImportJob {
 
   std::filesystem::path input_, store_;
   ConvertOptions options_;
-  mutable std::mutex mutex_;
-  State state_;
+  mutable Mutex mutex_;
+  State state_ ISOBRICK_GUARDED_BY(mutex_);
   std::atomic<bool> cancel_ = false;
   bool begun_ = false;  ///< the conversion has a folder of its own; of the thread
   std::thread thread_;  ///< last: it uses the others

@@ -37,7 +37,7 @@ IsovalueFacts::IsovalueFacts(std::shared_ptr<const StoreReader> store)
       Stoppable progress(stop_);
       auto counted =
           std::make_shared<const Histogram>(isobrick::histogram(*store, progress, kBins, true));
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       if (counted->left_out > 0)
         failure_ = fmt::format("the histogram lacks bricks that cannot be read, {} of level {}: {}",
                                counted->left_out, counted->level, counted->damage);
@@ -45,7 +45,7 @@ IsovalueFacts::IsovalueFacts(std::shared_ptr<const StoreReader> store)
     } catch (const Cancelled&) {
       // Nobody waits for it any more.
     } catch (const std::exception& error) {
-      const std::scoped_lock lock(mutex_);
+      const MutexLock lock(mutex_);
       failure_ = "the histogram cannot be counted: " + what_of(error);
     }
   });
@@ -57,12 +57,12 @@ IsovalueFacts::~IsovalueFacts() {
 }
 
 std::shared_ptr<const Histogram> IsovalueFacts::histogram() const {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   return histogram_;
 }
 
 std::string IsovalueFacts::take_failure() {
-  const std::scoped_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   return std::exchange(failure_, {});
 }
 

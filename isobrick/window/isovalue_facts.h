@@ -3,10 +3,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 
+#include "isobrick/core/thread_annotations.h"
 #include "isobrick/pipeline/histogram.h"
 #include "isobrick/viewer/isovalue_counts.h"
 #include "isobrick/viewer/scene_stream.h"
@@ -34,9 +34,9 @@ class IsovalueFacts {
  private:
   IsovalueCounts counts_;
   std::atomic<bool> stop_ = false;
-  mutable std::mutex mutex_;
-  std::shared_ptr<const Histogram> histogram_;
-  std::string failure_;
+  mutable Mutex mutex_;
+  std::shared_ptr<const Histogram> histogram_ ISOBRICK_GUARDED_BY(mutex_);
+  std::string failure_ ISOBRICK_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 
