@@ -65,7 +65,7 @@ void IndexChunkWriter::publish() {
 
 IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed,
                        const IndexChunkName& name)
-    : file_(StoreFile::open_if_exists(path)), compressed_(compressed), places_(parts) {
+    : file_(open_if_exists(path)), compressed_(compressed), places_(parts) {
   if (!file_) throw DamageError(fmt::format("'{}' is missing", path.string()));
   size_ = file_.size();
   const std::uint64_t tail = ShardIndex::encoded_size(parts, true);

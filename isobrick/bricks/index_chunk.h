@@ -10,8 +10,8 @@
 
 #include "isobrick/bricks/publisher.h"
 #include "isobrick/bricks/shard_index.h"
-#include "isobrick/bricks/store_file.h"
 #include "isobrick/core/vec.h"
+#include "isobrick/io/file.h"
 
 // The file of an index chunk: parts, each encoded like a brick, and where they
 // are. What a part holds is not known here. docs/reference/store_format.md has the bytes.
@@ -53,7 +53,7 @@ class IndexChunkWriter {
   Publisher& publisher_;
   std::filesystem::path path_;
   IndexChunkName name_;
-  StoreFile file_;
+  File file_;
   ShardIndex places_;
   std::uint64_t end_ = 0;
 };
@@ -90,7 +90,7 @@ class IndexChunk {
   std::span<const std::byte> encoded(const ShardIndex::Entry& place,
                                      std::vector<std::byte>& buffer) const;
 
-  StoreFile file_;
+  File file_;
   bool compressed_;
   std::uint64_t size_ = 0;
   ShardIndex places_;

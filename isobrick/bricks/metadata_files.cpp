@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-
 #include <optional>
 
 #include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/bricks/zarr_v2.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
 
 namespace isobrick {
 namespace {
@@ -25,9 +24,7 @@ struct Text {
 };
 
 std::optional<std::string> read_text(const fs::path& file) {
-  bool exists = false;
-  std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-  return exists ? std::optional(std::move(text)) : std::nullopt;
+  return read_small_file(file, kMaxMetadataBytes);
 }
 
 /// An array of version 2 with the names that xarray and others give its dimensions in .zattrs.

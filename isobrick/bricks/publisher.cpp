@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "isobrick/bricks/store_names.h"
+
 namespace isobrick {
 namespace {
 
@@ -39,7 +41,7 @@ void Publisher::run(Job& job) const {
   }
 }
 
-void Publisher::publish_now(StoreFile temporary, const std::filesystem::path& path) const {
+void Publisher::publish_now(File temporary, const std::filesystem::path& path) const {
   temporary.sync();
   folder_.rename_file(temporary_name(path), path);
 }
@@ -92,19 +94,18 @@ void Publisher::add(Job job, const std::filesystem::path& parent) {
   start_thread();
 }
 
-void Publisher::publish(StoreFile temporary, std::filesystem::path path) {
+void Publisher::publish(File temporary, std::filesystem::path path) {
   const std::filesystem::path parent = path.parent_path();
   add({Job::Kind::publish, std::move(temporary), std::move(path), {}}, parent);
 }
 
-void Publisher::sync(StoreFile file) {
+void Publisher::sync(File file) {
   const std::filesystem::path parent = file.path().parent_path();
   add({Job::Kind::sync_file, std::move(file), {}, {}}, parent);
 }
 
-StoreFile Publisher::create_temporary(const std::filesystem::path& path) const {
-  const std::filesystem::path name = temporary_name(path);
-  return {folder_.create_file(name), name};
+File Publisher::create_temporary(const std::filesystem::path& path) const {
+  return folder_.create_file(temporary_name(path));
 }
 
 void Publisher::discard_temporary(const std::filesystem::path& path) const noexcept {
@@ -114,9 +115,9 @@ void Publisher::discard_temporary(const std::filesystem::path& path) const noexc
   }
 }
 
-StoreFile Publisher::write_temporary(const std::filesystem::path& path,
-                                     std::span<const std::byte> content) {
-  StoreFile file = create_temporary(path);
+File Publisher::write_temporary(const std::filesystem::path& path,
+                                std::span<const std::byte> content) {
+  File file = create_temporary(path);
   file.write_at(0, content);
   count(content.size());
   return file;

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/bricks/store_file.h"
+#include "isobrick/io/file.h"
 #include "isobrick/io/output_folder.h"
 
 namespace isobrick {
@@ -33,15 +33,15 @@ class Publisher {
   const OutputFolder& folder() const { return folder_; }
 
   /// Takes a file written under its temporary name.
-  void publish(StoreFile temporary, std::filesystem::path path);
+  void publish(File temporary, std::filesystem::path path);
   /// Takes a file that only needs to be synced, and keeps the name that it has.
-  void sync(StoreFile file);
+  void sync(File file);
   /// Creates the temporary file of `path`.
-  StoreFile create_temporary(const std::filesystem::path& path) const;
+  File create_temporary(const std::filesystem::path& path) const;
   /// Removes it, if it is there; throws nothing.
   void discard_temporary(const std::filesystem::path& path) const noexcept;
   /// Writes a whole file under the temporary name of `path`, and no more.
-  StoreFile write_temporary(const std::filesystem::path& path, std::span<const std::byte> content);
+  File write_temporary(const std::filesystem::path& path, std::span<const std::byte> content);
   /// Writes a whole file under a temporary name and publishes it, small ones on
   /// the publisher's threads.
   void write(const std::filesystem::path& path, std::span<const std::byte> content);
@@ -58,7 +58,7 @@ class Publisher {
   struct Job {
     enum class Kind : std::uint8_t { publish, sync_file, sync_directory, write };
     Kind kind = Kind::publish;
-    StoreFile file;
+    File file;
     std::filesystem::path path;      ///< the final one
     std::vector<std::byte> content;  ///< of a file that is still to be written
   };
@@ -66,7 +66,7 @@ class Publisher {
   void run();
   void run(Job& job) const;
   /// Gives a temporary file its final name once it is on disk.
-  void publish_now(StoreFile temporary, const std::filesystem::path& path) const;
+  void publish_now(File temporary, const std::filesystem::path& path) const;
   /// Wakes a thread, or makes one when all have something to do.
   void start_thread();
   void drain(std::unique_lock<std::mutex>& lock);

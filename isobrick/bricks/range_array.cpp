@@ -9,6 +9,7 @@
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/codec.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
 
 namespace isobrick {
 namespace {
@@ -139,11 +140,10 @@ RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, Sca
                                    std::uint32_t crc32c)
     : folder_(std::move(folder)), items_(items) {
   const std::filesystem::path file = folder_ / "zarr.json";
-  bool exists = false;
-  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-  if (!exists) throw Error(fmt::format("the store has no ranges: there is no '{}'", file.string()));
+  const auto text = read_small_file(file, kMaxMetadataBytes);
+  if (!text) throw Error(fmt::format("the store has no ranges: there is no '{}'", file.string()));
   const std::string where = quoted(file);
-  metadata_ = parse_array_metadata(text, where);
+  metadata_ = parse_array_metadata(*text, where);
   const ArrayMetadata expected = range_array_metadata(items, type);
   if (metadata_.shape != expected.shape || metadata_.chunk != expected.chunk ||
       metadata_.type != expected.type || metadata_.sharding)
@@ -156,19 +156,18 @@ void RangeArrayReader::read_checksums(std::uint32_t expected) {
   const std::filesystem::path file = checksums_file(folder_);
   const auto count = static_cast<std::size_t>(volume(ceil_div(items_, kChunk)));
   const std::size_t bytes = (count + 1) * sizeof(std::uint32_t);
-  bool exists = false;
-  const std::string text = read_small_file(file, bytes, &exists);
-  if (!exists) {
+  const auto text = read_small_file(file, bytes);
+  if (!text) {
     wrong_ = fmt::format("'{}' is missing", file.string());
     return;
   }
   const std::string damaged = fmt::format("'{}' is damaged", file.string());
-  if (text.size() != bytes) {
+  if (text->size() != bytes) {
     wrong_ = damaged;
     return;
   }
   std::vector<std::uint32_t> all(count + 1);
-  std::memcpy(all.data(), text.data(), bytes);
+  std::memcpy(all.data(), text->data(), bytes);
   const std::uint32_t last = all.back();
   all.pop_back();
   if (crc32c(std::as_bytes(std::span(all))) != last)
@@ -190,19 +189,18 @@ RangeTable RangeArrayReader::read(Box3 box, std::atomic<std::uint64_t>& bytes_re
   std::vector<std::byte> decoded(size);
   for_each_chunk(box, [&](Int3 c, Box3 part) {
     const std::filesystem::path path = chunk_path(folder_, metadata_, c);
-    bool exists = false;
-    const std::string encoded = read_small_file(path, 2 * size + 1024, &exists);
+    const auto content = read_small_file(path, 2 * size + 1024);
     // Chunks are written even where all ranges are alike, so none may be missing.
-    if (!exists) throw DamageError(fmt::format("'{}' is missing", path.string()));
+    if (!content) throw DamageError(fmt::format("'{}' is missing", path.string()));
+    const auto encoded = std::as_bytes(std::span(*content));
     bytes_read += encoded.size();
     table.bytes_read += encoded.size();
     try {
-      decode_bytes(metadata_.codecs, size_of(metadata_.type), std::as_bytes(std::span(encoded)),
-                   decoded);
+      decode_bytes(metadata_.codecs, size_of(metadata_.type), encoded, decoded);
     } catch (const DamageError& e) {
       throw DamageError(fmt::format("'{}': {}", path.string(), e.what()));
     }
-    if (stored_checksum(std::as_bytes(std::span(encoded))) !=
+    if (stored_checksum(encoded) !=
         checksums_[static_cast<std::size_t>(linear_index(c, ceil_div(items_, kChunk)))])
       throw DamageError(
           fmt::format("'{}' is the chunk of another place, level or store", path.string()));

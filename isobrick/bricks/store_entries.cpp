@@ -7,10 +7,10 @@
 #include <string_view>
 
 #include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/core/digits.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
 #include "isobrick/io/output_guard.h"
 
 namespace isobrick {
@@ -79,10 +79,9 @@ bool is_known(const fs::path& path, fs::file_type type) {
 std::string why_not_our_metadata(const fs::path& folder) {
   for (const char* name : {"zarr.json", ".zattrs"}) {
     const fs::path file = folder / name;
-    bool exists = false;
-    const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-    if (!exists) continue;
-    const nlohmann::json root = parse_json(text, quoted(file));
+    const auto text = read_small_file(file, kMaxMetadataBytes);
+    if (!text) continue;
+    const nlohmann::json root = parse_json(*text, quoted(file));
     const nlohmann::json attributes = root.is_object() ? root.value("attributes", root) : root;
     const bool ours = attributes.is_object() && attributes.contains("isobrick");
     return ours ? "" : fmt::format("its {} is another program's", name);

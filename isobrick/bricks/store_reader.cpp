@@ -12,12 +12,12 @@
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/shard_index.h"
-#include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/bricks/volume_choice.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/pod_buffer.h"
 #include "isobrick/core/shell_word.h"
+#include "isobrick/io/file.h"
 
 namespace isobrick {
 namespace {
@@ -65,7 +65,7 @@ struct StoreReader::Impl {
     std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // null: none
   };
   struct Place {
-    std::shared_ptr<const StoreFile> file;
+    std::shared_ptr<const File> file;
     std::uint64_t offset = 0, size = 0;
   };
 
@@ -78,7 +78,7 @@ struct StoreReader::Impl {
   void widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
                    std::byte* out) const;
   std::filesystem::path shard_path(int level, Int3 s) const;
-  std::shared_ptr<const StoreFile> shard_file(int level, Int3 s);
+  std::shared_ptr<const File> shard_file(int level, Int3 s);
   std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
   void check_missing_shard(int level, Int3 s);
   std::optional<Place> find(int level, Int3 b);
@@ -100,7 +100,7 @@ struct StoreReader::Impl {
   std::atomic<std::uint64_t> bytes_read = 0;
   std::atomic<std::uint64_t> brick_bytes_read = 0, brick_bytes_decoded = 0;
   std::atomic<Clock::rep> read_ticks = 0, decode_ticks = 0;
-  LruCache<StoreFile> files{kMaxOpenFiles};
+  LruCache<File> files{kMaxOpenFiles};
   LruCache<ShardIndex> indices{kIndexCacheBytes};
 };
 
@@ -228,9 +228,9 @@ std::filesystem::path StoreReader::Impl::shard_path(int level, Int3 s) const {
   return at(level).folder / at(level).metadata.chunk_key(coordinates);
 }
 
-std::shared_ptr<const StoreFile> StoreReader::Impl::shard_file(int level, Int3 s) {
+std::shared_ptr<const File> StoreReader::Impl::shard_file(int level, Int3 s) {
   return files.get(key(level, s), [&] {
-    auto file = std::make_shared<const StoreFile>(StoreFile::open_if_exists(shard_path(level, s)));
+    auto file = std::make_shared<const File>(open_if_exists(shard_path(level, s)));
     return std::pair(std::move(file), std::uint64_t{1});
   });
 }

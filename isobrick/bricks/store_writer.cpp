@@ -16,11 +16,11 @@
 #include "isobrick/bricks/publisher.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/shard_index.h"
-#include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/bricks/zarr_v2.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
 
 namespace isobrick {
 namespace {
@@ -116,7 +116,7 @@ struct OpenShard {
   explicit OpenShard(std::size_t bricks) : index(bricks) {}
   std::mutex mutex;
   std::filesystem::path path;
-  StoreFile file;  // empty when closed between bricks
+  File file;  // empty when closed between bricks
   bool created = false;
   bool counted = false;  // one of kMaxOpenShards
   std::uint64_t end = 0;
@@ -166,12 +166,11 @@ struct StoreWriter::Impl {
 };
 
 void StoreWriter::Impl::check_resume() {
-  bool exists = false;
   const std::filesystem::path marker_path = dir / kLayoutMarker;
-  const std::string text = read_small_file(marker_path, kMaxMetadataBytes, &exists);
-  if (!exists)
+  const auto text = read_small_file(marker_path, kMaxMetadataBytes);
+  if (!text)
     throw Error(fmt::format("'{}' is no store whose conversion was interrupted", dir.string()));
-  const nlohmann::json begun = parse_json(text, quoted(marker_path));
+  const nlohmann::json begun = parse_json(*text, quoted(marker_path));
   const nlohmann::json wanted = layout_marker(layout);
   if (begun == wanted) return;
   const nlohmann::json differences = nlohmann::json::diff(begun, wanted);
@@ -199,8 +198,7 @@ void StoreWriter::Impl::begin() {
     // It has its name before any other file is there. That it is durable is not
     // waited for: what a power failure can take with it was begun a moment ago.
     const std::string text = layout_marker(layout).dump(1) + "\n";
-    StoreFile marker =
-        publisher->write_temporary(dir / kLayoutMarker, std::as_bytes(std::span(text)));
+    File marker = publisher->write_temporary(dir / kLayoutMarker, std::as_bytes(std::span(text)));
     publisher->folder().rename_file(marker.path(), dir / kLayoutMarker);
     publisher->sync(std::move(marker));
   }
@@ -249,12 +247,12 @@ void StoreWriter::Impl::write(OpenShard& shard, std::span<const std::byte> bytes
     shard.writeback_end = shard.end;
   }
   publisher->count(bytes.size());
-  if (!shard.counted) shard.file = StoreFile();
+  if (!shard.counted) shard.file = File();
 }
 
 void StoreWriter::Impl::reopen(OpenShard& shard) {
   const std::filesystem::path name = temporary_name(shard.path);
-  shard.file = StoreFile(publisher->folder().open_file(name, O_RDWR), name);
+  shard.file = publisher->folder().open_file(name, O_RDWR);
   if (!shard.file) throw Error(fmt::format("'{}' has gone while it was written", name.string()));
 }
 
@@ -272,7 +270,7 @@ bool StoreWriter::shard_is_whole(int level, Int3 s) const {
   const Impl::Level& l = impl_->level(level);
   if (!impl_->resume) return false;
   const std::filesystem::path path = impl_->shard_path(l, s);
-  const StoreFile file(impl_->publisher->folder().open_file(path, O_RDONLY), path);
+  const File file = impl_->publisher->folder().open_file(path, O_RDONLY);
   if (!file) return false;
   if (!l.metadata.sharding) return true;  // it has its name only when it is whole
   const std::uint64_t size = file.size();

@@ -6,6 +6,7 @@
 
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
 
 namespace isobrick {
 
@@ -63,12 +64,11 @@ bool has_index(const fs::path& store, int level, const std::string& kind) {
 StoredIndex::StoredIndex(const StoreReader& store, int level, const std::string& kind)
     : folder_(index_folder(store.info().additions, level, kind)) {
   const fs::path file = index_description(folder_);
-  bool exists = false;
-  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-  if (!exists)
+  const auto text = read_small_file(file, kMaxMetadataBytes);
+  if (!text)
     throw Error(
         fmt::format("level {} has no {} index: there is no '{}'", level, kind, file.string()));
-  layout_ = parse_index_layout(text, quoted(file));
+  layout_ = parse_index_layout(*text, quoted(file));
   const Lattice& lattice = store.info().levels.at(static_cast<std::size_t>(level)).lattice;
   if (layout_.kind != kind || layout_.type != lattice.type || layout_.extent != lattice.extent)
     throw DamageError(fmt::format("{}: kind, type or shape are not those of level {}'s {} index",

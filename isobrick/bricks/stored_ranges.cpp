@@ -4,7 +4,7 @@
 
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/sealed_json.h"
-#include "isobrick/bricks/store_file.h"
+#include "isobrick/io/file.h"
 
 namespace isobrick {
 namespace {
@@ -31,10 +31,9 @@ std::string to_json(const StoredRanges& stored) {
 
 std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store) {
   const std::filesystem::path file = ranges_file(store);
-  bool exists = false;
-  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
-  if (!exists) return std::nullopt;
-  const nlohmann::json object = unseal_json(text, quoted(file));
+  const auto text = read_small_file(file, kMaxMetadataBytes);
+  if (!text) return std::nullopt;
+  const nlohmann::json object = unseal_json(*text, quoted(file));
   const CheckedJson json(object, quoted(file));
   json.at("isobrick_ranges")
       .check_version("ranges", kVersion, "remove the file and run isobrick index");

@@ -18,26 +18,28 @@ namespace {
 
 class FileStream final : public ByteStream {
  public:
-  FileStream(InputFile file, std::string path, std::uint64_t begin, std::uint64_t end)
-      : file_(std::move(file)), path_(std::move(path)), position_(begin), end_(end), begin_(begin) {
-    ::posix_fadvise(file_.fd.get(), static_cast<off_t>(begin), static_cast<off_t>(end - begin),
+  FileStream(File file, std::uint64_t begin)
+      : file_(std::move(file)),
+        end_(file_.size()),
+        begin_(std::min(begin, end_)),
+        position_(begin_) {
+    ::posix_fadvise(file_.fd(), static_cast<off_t>(begin_), static_cast<off_t>(end_ - begin_),
                     POSIX_FADV_SEQUENTIAL);
   }
 
   std::size_t read(std::byte* out, std::size_t size) override {
     size = static_cast<std::size_t>(std::min<std::uint64_t>(size, end_ - position_));
-    read_at(file_.fd.get(), path_, position_, out, size);
+    file_.read_at(position_, {out, size});
     position_ += size;
     return size;
   }
 
-  std::string name() const override { return "'" + path_ + "'"; }
+  std::string name() const override { return quoted(file_.path()); }
   std::uint64_t most_bytes() const override { return end_ - begin_; }
 
  private:
-  InputFile file_;
-  std::string path_;
-  std::uint64_t position_, end_, begin_;
+  File file_;
+  std::uint64_t end_, begin_, position_;
 };
 
 class StdinStream final : public ByteStream {
@@ -84,9 +86,8 @@ class StdinStream final : public ByteStream {
 
 }  // namespace
 
-std::unique_ptr<ByteStream> make_file_stream(InputFile file, std::string path, std::uint64_t begin,
-                                             std::uint64_t end) {
-  return std::make_unique<FileStream>(std::move(file), std::move(path), begin, end);
+std::unique_ptr<ByteStream> make_file_stream(File file, std::uint64_t begin) {
+  return std::make_unique<FileStream>(std::move(file), begin);
 }
 
 std::unique_ptr<ByteStream> make_stdin_stream() { return std::make_unique<StdinStream>(); }

@@ -10,10 +10,10 @@
 namespace isobrick {
 
 MappedFile::MappedFile(const std::string& path) {
-  const InputFile file = open_input(path);
-  size_ = static_cast<std::size_t>(file.size);
+  const File file = open_input(path);
+  size_ = static_cast<std::size_t>(file.size());
   if (size_ == 0) return;
-  void* first = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file.fd.get(), 0);
+  void* first = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file.fd(), 0);
   if (first == MAP_FAILED) throw system_error("map", path, errno);
   first_ = static_cast<const std::byte*>(first);
 }

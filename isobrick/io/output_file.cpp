@@ -20,15 +20,14 @@ namespace isobrick {
 namespace {
 
 FileWriter open_standard_output() {
-  UniqueFd fd(::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0));
+  UniqueFd fd = duplicate(STDOUT_FILENO);
   if (fd.get() < 0) throw system_error("write to", "standard output", errno);
-  return FileWriter(std::move(fd), "standard output");
+  return FileWriter({std::move(fd), "standard output"});
 }
 
 }  // namespace
 
-FileWriter::FileWriter(UniqueFd fd, std::string path, std::size_t memory)
-    : fd_(std::move(fd)), path_(std::move(path)) {
+FileWriter::FileWriter(File file, std::size_t memory) : file_(std::move(file)) {
   make_buffer(std::max(memory, kBuffer));
 }
 
@@ -70,13 +69,13 @@ void FileWriter::flush() {
 void FileWriter::finish() {
   flush();
   // A network's file system may store only now, and say only to who closes that it could not.
-  const int copy = ::fcntl(fd_.get(), F_DUPFD_CLOEXEC, 0);
+  const int copy = duplicate(file_.fd()).release();
   if (copy < 0 || ::close(copy) != 0) fail(errno);
 }
 
 void FileWriter::write_all(const std::byte* bytes, std::size_t size) {
   while (size > 0) {
-    const ssize_t put = ::write(fd_.get(), bytes, std::min(size, std::size_t{1} << 30));
+    const ssize_t put = ::write(file_.fd(), bytes, std::min(size, std::size_t{1} << 30));
     if (put < 0 && errno == EINTR) continue;
     if (put < 0) fail(errno);
     written_ += static_cast<std::uint64_t>(put);
@@ -86,7 +85,8 @@ void FileWriter::write_all(const std::byte* bytes, std::size_t size) {
 }
 
 void FileWriter::fail(int errno_value) const {
-  throw system_error(fmt::format("write after {} bytes to", written_), path_, errno_value);
+  throw system_error(fmt::format("write after {} bytes to", written_), file_.path().string(),
+                     errno_value);
 }
 
 void FileWriter::append_range(FileWriter& other, std::uint64_t offset, std::uint64_t size) {
@@ -98,7 +98,7 @@ void FileWriter::append_range(FileWriter& other, std::uint64_t offset, std::uint
   const auto end = static_cast<off_t>(offset + size);
   while (from < end) {
     const ssize_t moved =
-        ::copy_file_range(other.fd_.get(), &from, fd_.get(), nullptr,
+        ::copy_file_range(other.file_.fd(), &from, file_.fd(), nullptr,
                           std::min<std::size_t>(static_cast<std::size_t>(end - from), 1u << 30), 0);
     if (moved > 0) {
       written_ += static_cast<std::uint64_t>(moved);
@@ -111,7 +111,7 @@ void FileWriter::append_range(FileWriter& other, std::uint64_t offset, std::uint
   }
   while (from < end) {
     const std::size_t piece = std::min(static_cast<std::size_t>(end - from), kBuffer);
-    read_at(other.fd_.get(), other.path_, static_cast<std::uint64_t>(from), buffer_.get(), piece);
+    other.file_.read_at(static_cast<std::uint64_t>(from), {buffer_.get(), piece});
     write_all(buffer_.get(), piece);
     from += static_cast<off_t>(piece);
   }
@@ -119,31 +119,21 @@ void FileWriter::append_range(FileWriter& other, std::uint64_t offset, std::uint
 
 void FileWriter::patch(std::uint64_t offset, std::string_view bytes) {
   flush();
-  while (!bytes.empty()) {
-    const ssize_t put = ::pwrite(fd_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
-    if (put < 0 && errno == EINTR) continue;
-    if (put < 0) fail(errno);
-    offset += static_cast<std::uint64_t>(put);
-    bytes.remove_prefix(static_cast<std::size_t>(put));
-  }
+  file_.write_at(offset, std::as_bytes(std::span(bytes)));
 }
 
 void FileWriter::read_back(std::uint64_t offset, std::span<std::byte> bytes) {
   flush();
-  read_at(fd_.get(), path_, offset, bytes.data(), bytes.size());
+  file_.read_at(offset, bytes);
 }
 
 void FileWriter::restart() {
   used_ = 0;
   written_ = 0;
-  if (::ftruncate(fd_.get(), 0) != 0 || ::lseek(fd_.get(), 0, SEEK_SET) != 0) fail(errno);
+  if (::ftruncate(file_.fd(), 0) != 0 || ::lseek(file_.fd(), 0, SEEK_SET) != 0) fail(errno);
 }
 
-UniqueFd FileWriter::share() const {
-  UniqueFd fd(::fcntl(fd_.get(), F_DUPFD_CLOEXEC, 0));
-  if (fd.get() < 0) throw system_error("open once more", path_, errno);
-  return fd;
-}
+File FileWriter::share() const { return file_.share(); }
 
 void check_output(const std::string& path, bool force) {
   if (path.empty()) throw UsageError("the output has no name");
@@ -169,7 +159,7 @@ OutputFile::OutputFile(std::string path, bool force)
         remove_leftovers(path_);
         Temporary temporary = create_temporary_file(path_);
         temporary_ = std::move(temporary.path);
-        return FileWriter(std::move(temporary.fd), path_);
+        return FileWriter({std::move(temporary.fd), path_});
       }()) {}
 
 OutputFile::~OutputFile() {
@@ -198,7 +188,7 @@ FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {
       path == kStandardOutput ? (std::filesystem::temp_directory_path() / "isobrick").string()
                               : path);
   ::unlink(temporary.path.c_str());
-  return FileWriter(std::move(temporary.fd), path, memory);
+  return FileWriter({std::move(temporary.fd), path}, memory);
 }
 
 }  // namespace isobrick

@@ -15,9 +15,9 @@ namespace isobrick {
 /// Appends to a file through a large buffer.
 class FileWriter {
  public:
-  /// `path` is for messages. The first `memory` bytes stay in memory, as long as there are no
+  /// The first `memory` bytes stay in memory, as long as there are no
   /// more and nothing asks for them to be in the file; at least kBuffer, and no more afterwards.
-  FileWriter(UniqueFd fd, std::string path, std::size_t memory = kBuffer);
+  explicit FileWriter(File file, std::size_t memory = kBuffer);
 
   /// Room for `size` <= kBuffer bytes, to be filled in place and then committed.
   std::byte* reserve(std::size_t size);
@@ -40,9 +40,9 @@ class FileWriter {
   /// Flushes, and throws what file systems report only when a file is closed. Nothing follows.
   void finish();
 
-  /// Another descriptor of the same file, for who writes at places instead of
-  /// appending; the two ways do not mix.
-  UniqueFd share() const;
+  /// The same file once more, to be read or written at offsets. What is still in the buffer is not
+  /// in it: flush() first. Appending and writing at offsets do not mix.
+  File share() const;
 
   /// Bytes appended so far.
   std::uint64_t size() const { return written_ + used_; }
@@ -58,8 +58,7 @@ class FileWriter {
     void operator()(std::byte* buffer) const { std::free(buffer); }
   };
 
-  UniqueFd fd_;
-  std::string path_;
+  File file_;
   std::size_t capacity_ = 0;  ///< of the buffer; kBuffer when something has been written
   std::unique_ptr<std::byte, Free> buffer_;
   std::size_t used_ = 0;

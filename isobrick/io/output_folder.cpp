@@ -63,10 +63,11 @@ struct CloseFolder {
 
 /// Removes all that `fd` holds; 0, or the errno of what failed.
 int remove_entries(UniqueFd fd) {
-  // fdopendir() keeps the descriptor.
-  const int own = ::fcntl(fd.get(), F_DUPFD_CLOEXEC, 0);
-  const std::unique_ptr<DIR, CloseFolder> folder(own < 0 ? nullptr : ::fdopendir(own));
+  UniqueFd copy = duplicate(fd.get());
+  const std::unique_ptr<DIR, CloseFolder> folder(copy.get() < 0 ? nullptr
+                                                                : ::fdopendir(copy.get()));
   if (!folder) return errno;
+  copy.release();  // closedir() closes it
   std::vector<std::string> names;
   while (const dirent* entry = ::readdir(folder.get()))
     if (const std::string name = entry->d_name; name != "." && name != "..") names.push_back(name);
@@ -101,7 +102,7 @@ OutputFolder::OutputFolder(const fs::path& root)
 
 OutputFolder::Place OutputFolder::find(const fs::path& path, bool make_folders) const {
   const std::vector<std::string> names = names_below(root_, path);
-  Place place{UniqueFd(::fcntl(fd_.get(), F_DUPFD_CLOEXEC, 0)), ""};
+  Place place{duplicate(fd_.get()), ""};
   if (place.folder.get() < 0) throw system_error("open", root_.string(), errno);
   fs::path above = root_;
   for (std::size_t i = 0; i + 1 < names.size(); ++i) {
@@ -116,32 +117,28 @@ OutputFolder::Place OutputFolder::find(const fs::path& path, bool make_folders) 
   return place;
 }
 
-UniqueFd OutputFolder::create_file(const fs::path& path) const {
+File OutputFolder::create_file(const fs::path& path) const {
   const Place place = find(path, true);
   for (int attempt = 0;; ++attempt) {
     // O_EXCL follows no link, and no hard link either.
     UniqueFd fd(::openat(place.folder.get(), place.name.c_str(),
                          O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
-    if (fd.get() >= 0) return fd;
+    if (fd.get() >= 0) return {std::move(fd), path};
     if (errno != EEXIST || attempt == 100) throw system_error("create", path.string(), errno);
     if (::unlinkat(place.folder.get(), place.name.c_str(), 0) != 0 && errno != ENOENT)
       throw system_error("replace", path.string(), errno);
   }
 }
 
-UniqueFd OutputFolder::open_file(const fs::path& path, int access) const {
+File OutputFolder::open_file(const fs::path& path, int access) const {
   const Place place = find(path, false);
-  if (place.folder.get() < 0) return UniqueFd();
+  if (place.folder.get() < 0) return {};
   // Without O_NONBLOCK a FIFO here would wait for somebody at its other end.
   UniqueFd fd(::openat(place.folder.get(), place.name.c_str(),
                        access | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  if (fd.get() < 0 && errno == ENOENT) return fd;
+  if (fd.get() < 0 && errno == ENOENT) return {};
   if (fd.get() < 0) fail("open", place.folder.get(), place.name, path, errno);
-  struct stat status {};
-  if (::fstat(fd.get(), &status) != 0) throw system_error("examine", path.string(), errno);
-  if (!S_ISREG(status.st_mode))
-    throw DamageError(fmt::format("'{}' is not a regular file", path.string()));
-  return fd;
+  return require_regular({std::move(fd), path});
 }
 
 UniqueFd OutputFolder::make_folder(const fs::path& path) const {

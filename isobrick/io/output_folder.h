@@ -20,10 +20,10 @@ class OutputFolder {
 
   /// Creates a file, open for reading and writing, and the folders above it as needed. What has
   /// the name already is removed, not emptied: it may be a link.
-  UniqueFd create_file(const std::filesystem::path& path) const;
-  /// Opens an existing regular file with `access` (O_RDONLY or O_RDWR). Without one the
-  /// descriptor is negative. Throws Error for anything else, a link included.
-  UniqueFd open_file(const std::filesystem::path& path, int access) const;
+  File create_file(const std::filesystem::path& path) const;
+  /// Opens an existing regular file with `access` (O_RDONLY or O_RDWR); no file when there is none.
+  /// Throws Error for anything else, a link included.
+  File open_file(const std::filesystem::path& path, int access) const;
   /// Opens a folder, which is made when missing.
   UniqueFd make_folder(const std::filesystem::path& path) const;
 

@@ -86,7 +86,7 @@ FileWriter PartedOutput::create_part(std::string_view extension) {
   UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (fd.get() < 0) throw system_error("create", path.string(), errno);
   ++parts_;
-  return FileWriter(std::move(fd), (folder_ / path.filename()).string());
+  return FileWriter({std::move(fd), folder_ / path.filename()});
 }
 
 std::string PartedOutput::reference(std::size_t part, std::string_view extension) const {

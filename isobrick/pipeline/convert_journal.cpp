@@ -29,13 +29,14 @@ ConvertJournal::ConvertJournal(const std::filesystem::path& store, const Lattice
   if (resume) read_earlier();
   // Always a file of our own making.
   const std::filesystem::path temporary = temporary_name(path_);
-  file_ = StoreFile(folder_.create_file(temporary), path_);
+  file_ = folder_.create_file(temporary);
+  file_.set_path(path_);
   file_.write_at(0, std::as_bytes(std::span(earlier_)));
   folder_.rename_file(temporary, path_);
 }
 
 void ConvertJournal::read_earlier() {
-  const StoreFile file(folder_.open_file(path_, O_RDONLY), path_);
+  const File file = folder_.open_file(path_, O_RDONLY);
   if (!file) return;
   const auto layers = static_cast<std::uint64_t>(lattice_.bricks().z);
   earlier_.resize(static_cast<std::size_t>(std::min(file.size() / sizeof(earlier_[0]), layers)));

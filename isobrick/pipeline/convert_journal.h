@@ -5,8 +5,8 @@
 #include <map>
 #include <vector>
 
-#include "isobrick/bricks/store_file.h"
 #include "isobrick/core/lattice.h"
+#include "isobrick/io/file.h"
 #include "isobrick/io/output_folder.h"
 
 namespace isobrick {
@@ -35,7 +35,7 @@ class ConvertJournal {
   OutputFolder folder_;
   std::filesystem::path path_;
   Lattice lattice_;
-  StoreFile file_;
+  File file_;
   std::vector<std::uint64_t> earlier_;
   std::map<Index, std::uint64_t> open_;  ///< layers not closed yet
   Index next_ = 0;

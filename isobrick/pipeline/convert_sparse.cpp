@@ -33,9 +33,8 @@ class BrickSpool {
  public:
   /// For at most so many bricks.
   BrickSpool(const std::filesystem::path& folder, std::size_t brick_bytes, std::size_t bricks)
-      : path_((folder / "spool").string()),
-        writer_(open_scratch_beside(path_)),
-        fd_(writer_.share()),
+      : writer_(open_scratch_beside((folder / "spool").string())),
+        file_(writer_.share()),
         brick_bytes_(brick_bytes) {
     bricks_.reserve(bricks);
   }
@@ -47,15 +46,14 @@ class BrickSpool {
   void finish() { writer_.flush(); }
   /// After finish(), from any thread.
   void read(std::size_t place, std::byte* out) const {
-    read_at(fd_.get(), path_, place * brick_bytes_, out, brick_bytes_);
+    file_.read_at(place * brick_bytes_, {out, brick_bytes_});
   }
   /// Leaves none. `factors`: from their level to the next one.
   SparseBricks take_bricks(Int3 factors) { return {std::move(bricks_), factors}; }
 
  private:
-  std::string path_;
   FileWriter writer_;
-  UniqueFd fd_;
+  File file_;
   std::size_t brick_bytes_;
   std::vector<SparseBrick> bricks_;
 };

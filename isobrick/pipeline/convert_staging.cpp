@@ -8,7 +8,6 @@
 #include <cerrno>
 
 #include "isobrick/bricks/store_entries.h"
-#include "isobrick/bricks/store_file.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/exchange.h"

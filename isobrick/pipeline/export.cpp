@@ -154,8 +154,7 @@ class DenseOutput {
       : output_(output), sample_bytes_(sample_bytes) {
     if (output.path() == kStandardOutput) return;
     output.writer().flush();
-    file_.emplace(output.writer().share(), output.path(), extent, sample_bytes,
-                  output.writer().size());
+    file_.emplace(output.writer().share(), extent, sample_bytes, output.writer().size());
     file_->reserve();
   }
 

@@ -98,11 +98,10 @@ class LevelIndex {
 
 /// Whether the description in `folder` is that of the index to build.
 bool LevelIndex::is_wanted(const fs::path& folder) const {
-  bool exists = false;
   const fs::path file = index_description(folder);
-  const std::string text = read_small_file(file, kMaxMetadataBytes, &exists);
+  const auto text = read_small_file(file, kMaxMetadataBytes);
   try {
-    return exists && parse_index_layout(text, quoted(file)) == layout_;
+    return text && parse_index_layout(*text, quoted(file)) == layout_;
   } catch (const DamageError&) {
     return false;
   }

@@ -28,40 +28,24 @@ void for_each_run(Box3 box, Int3 extent, std::size_t sample_bytes, F&& f) {
         bytes);
 }
 
-void write_at(int fd, const std::string& path, std::uint64_t offset, const std::byte* bytes,
-              std::size_t size) {
-  while (size > 0) {
-    const ssize_t n = ::pwrite(fd, bytes, size, static_cast<off_t>(offset));
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw system_error("write", path, errno);
-    bytes += n;
-    offset += static_cast<std::uint64_t>(n);
-    size -= static_cast<std::size_t>(n);
-  }
-}
-
-UniqueFd open_nameless(const std::filesystem::path& beside) {
+File open_nameless(const std::filesystem::path& beside) {
+  const std::string described = "a temporary file beside '" + beside.string() + "'";
   const std::filesystem::path parent = beside.parent_path();
   const std::string folder = parent.empty() ? "." : parent.string();
   UniqueFd fd(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
-  if (fd.get() >= 0) return fd;
+  if (fd.get() >= 0) return {std::move(fd), described};
   // Not every file system has nameless files.
   std::string name = beside.string() + ".spool-XXXXXX";
   UniqueFd named(::mkostemp(name.data(), O_CLOEXEC));
   if (named.get() < 0) throw system_error("create a temporary file in", folder, errno);
   ::unlink(name.c_str());
-  return named;
+  return {std::move(named), described};
 }
 
 }  // namespace
 
-SlabFile::SlabFile(UniqueFd fd, std::string path, Int3 extent, std::size_t sample_bytes,
-                   std::uint64_t begin)
-    : fd_(std::move(fd)),
-      path_(std::move(path)),
-      extent_(extent),
-      sample_bytes_(sample_bytes),
-      begin_(begin) {}
+SlabFile::SlabFile(File file, Int3 extent, std::size_t sample_bytes, std::uint64_t begin)
+    : file_(std::move(file)), extent_(extent), sample_bytes_(sample_bytes), begin_(begin) {}
 
 std::uint64_t SlabFile::bytes() const {
   return static_cast<std::uint64_t>(volume(extent_)) * sample_bytes_;
@@ -69,29 +53,28 @@ std::uint64_t SlabFile::bytes() const {
 
 void SlabFile::reserve() const {
   const int failure =
-      ::posix_fallocate(fd_.get(), static_cast<off_t>(begin_), static_cast<off_t>(bytes()));
+      ::posix_fallocate(file_.fd(), static_cast<off_t>(begin_), static_cast<off_t>(bytes()));
   // A file system that cannot reserve shows a full disk when it is written to.
   if (failure != 0 && failure != EOPNOTSUPP && failure != EINVAL)
-    throw system_error(fmt::format("make room for {} bytes for", bytes()), path_, failure);
+    throw system_error(fmt::format("make room for {} bytes for", bytes()), file_.path().string(),
+                       failure);
 }
 
-void SlabFile::write(Box3 box, const std::byte* samples) const {
+void SlabFile::write(Box3 box, const std::byte* samples) {
   for_each_run(box, extent_, sample_bytes_,
                [&](std::uint64_t offset, std::size_t inside, std::size_t bytes) {
-                 write_at(fd_.get(), path_, begin_ + offset, samples + inside, bytes);
+                 file_.write_at(begin_ + offset, {samples + inside, bytes});
                });
 }
 
 void SlabFile::read(Box3 box, std::byte* samples) const {
   for_each_run(box, extent_, sample_bytes_,
                [&](std::uint64_t offset, std::size_t inside, std::size_t bytes) {
-                 read_at(fd_.get(), path_, begin_ + offset, samples + inside, bytes);
+                 file_.read_at(begin_ + offset, {samples + inside, bytes});
                });
 }
 
 SpooledVolume::SpooledVolume(const std::filesystem::path& beside, VolumeInfo info)
-    : info_(std::move(info)),
-      file_(open_nameless(beside), "a temporary file beside '" + beside.string() + "'",
-            info_.extent, size_of(info_.type)) {}
+    : info_(std::move(info)), file_(open_nameless(beside), info_.extent, size_of(info_.type)) {}
 
 }  // namespace isobrick

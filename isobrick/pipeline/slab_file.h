@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <string>
 
 #include "isobrick/core/vec.h"
 #include "isobrick/io/file.h"
@@ -15,20 +14,18 @@ namespace isobrick {
 /// in any order and by any thread.
 class SlabFile {
  public:
-  /// `path` is for messages; the array begins `begin` bytes into the file.
-  SlabFile(UniqueFd fd, std::string path, Int3 extent, std::size_t sample_bytes,
-           std::uint64_t begin = 0);
+  /// The array begins `begin` bytes into the file.
+  SlabFile(File file, Int3 extent, std::size_t sample_bytes, std::uint64_t begin = 0);
 
   /// Takes the room on disk for all of it, so that a full disk shows at once.
   void reserve() const;
-  void write(Box3 box, const std::byte* samples) const;
+  void write(Box3 box, const std::byte* samples);
   void read(Box3 box, std::byte* samples) const;
 
   std::uint64_t bytes() const;
 
  private:
-  UniqueFd fd_;
-  std::string path_;
+  File file_;
   Int3 extent_;
   std::size_t sample_bytes_;
   std::uint64_t begin_;

@@ -129,8 +129,8 @@ class VectorFile {
   std::uint64_t count() const { return count_; }
   std::shared_ptr<MappedFile> map() {
     out_.flush();
-    const UniqueFd fd = out_.share();
-    return std::make_shared<MappedFile>(fmt::format("/proc/self/fd/{}", fd.get()));
+    const File file = out_.share();
+    return std::make_shared<MappedFile>(fmt::format("/proc/self/fd/{}", file.fd()));
   }
 
  private:

@@ -194,20 +194,17 @@ std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path, const Vol
   layout.info = describe_volume(path, header.view.extent, header.type, header.transform, said);
   layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
   layout.stride = header.view.stride;
-  InputFile file = open_input(path);
-  const std::uint64_t size = file.size;
+  File file = open_input(path);
   if (header.text) {
     const std::uint64_t total = static_cast<std::uint64_t>(header.view.total) * sample;
-    auto text = make_file_stream(std::move(file), path, header.begin, size);
+    auto text = make_file_stream(std::move(file), header.begin);
     auto samples = header.fractions ? std::make_unique<FractionStream>(std::move(text))
                                     : make_text_stream(std::move(text), header.type);
     return make_stream_source(std::move(layout), std::move(samples), total, AfterEnd::unread);
   }
   layout.offset += header.begin;
   layout.swap = sample > 1 && kNativeOrder != ByteOrder::big;
-  if (size < layout.end())
-    throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
-                                 path, size, layout.end()));
+  check_header_promise(layout, file);
   return make_raw_source(std::move(layout), std::move(file));
 }
 

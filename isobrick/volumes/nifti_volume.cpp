@@ -21,9 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::unique_ptr<ByteStream> open_stream(const std::string& path, bool packed) {
-  InputFile file = open_input(path);
-  const std::uint64_t size = file.size;
-  auto stream = make_file_stream(std::move(file), path, 0, size);
+  auto stream = make_file_stream(open_input(path));
   return packed ? make_inflate_stream(std::move(stream), Wrapper::gzip) : std::move(stream);
 }
 
@@ -45,12 +43,7 @@ std::string path_beside(const fs::path& path, const char* lower, const char* upp
 /// Where the samples of a header's file lie.
 std::string image_path(const std::string& path) { return path_beside(path, ".img", ".IMG"); }
 
-bool is_packed(const std::string& path) {
-  const InputFile file = open_input(path);
-  std::array<std::byte, 2> magic{};
-  if (file.size >= 2) read_at(file.fd.get(), path, 0, magic.data(), 2);
-  return magic == std::array{std::byte{0x1f}, std::byte{0x8b}};
-}
+bool is_packed(const std::string& path) { return open_input(path).text_at(0, 2) == "\x1f\x8b"; }
 
 /// Whether a file has the header of a pair.
 bool is_header_of_pair(const std::string& path) {
@@ -89,10 +82,8 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
     return scale_source(
         make_stream_source(std::move(layout), open_stream(data_path, true), end, AfterEnd::ignored),
         header.scale);
-  InputFile file = open_input(data_path);
-  if (file.size < layout.end())
-    throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
-                                 data_path, file.size, layout.end()));
+  File file = open_input(data_path);
+  check_header_promise(layout, file);
   return scale_source(make_raw_source(std::move(layout), std::move(file)), header.scale);
 }
 

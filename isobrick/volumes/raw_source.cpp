@@ -1,18 +1,20 @@
 #include "isobrick/volumes/raw_source.h"
 
-#include <fcntl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstring>
 #include <utility>
 #include <vector>
 
+#include "isobrick/core/error.h"
+
 namespace isobrick {
 namespace {
 
 class RawSource final : public VolumeSource {
  public:
-  RawSource(SampleLayout layout, InputFile file)
+  RawSource(SampleLayout layout, File file)
       : layout_(std::move(layout)),
         sample_(size_of(layout_.info.type)),
         row_(sample_ * static_cast<std::uint64_t>(layout_.info.extent.x)),
@@ -34,13 +36,12 @@ class RawSource final : public VolumeSource {
     if (box.empty()) return;
     const std::uint64_t from = layout_.offset_of(box.lo);
     const std::uint64_t to = layout_.offset_of(box.hi - Int3{1, 1, 1}) + sample_;
-    ::posix_fadvise(file_.fd.get(), static_cast<off_t>(from), static_cast<off_t>(to - from),
-                    POSIX_FADV_WILLNEED);
+    file_.will_need(from, to - from);
   }
 
  private:
   void fetch(std::uint64_t offset, std::byte* out, std::uint64_t size) const {
-    read_at(file_.fd.get(), layout_.info.name, offset, out, size);
+    file_.read_at(offset, {out, static_cast<std::size_t>(size)});
   }
 
   /// Parts of rows of a dense volume.
@@ -79,13 +80,20 @@ class RawSource final : public VolumeSource {
   SampleLayout layout_;
   std::size_t sample_;
   std::uint64_t row_;
-  InputFile file_;
+  File file_;
 };
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> make_raw_source(SampleLayout layout, InputFile file) {
+std::unique_ptr<VolumeSource> make_raw_source(SampleLayout layout, File file) {
   return std::make_unique<RawSource>(std::move(layout), std::move(file));
+}
+
+void check_header_promise(const SampleLayout& layout, const File& file) {
+  const std::uint64_t size = file.size();
+  if (size < layout.end())
+    throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
+                                 file.path().string(), size, layout.end()));
 }
 
 }  // namespace isobrick

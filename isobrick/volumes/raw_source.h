@@ -9,6 +9,9 @@ namespace isobrick {
 
 /// Reads boxes of a file in any order, from any number of threads. The caller
 /// has checked that the file is long enough.
-std::unique_ptr<VolumeSource> make_raw_source(SampleLayout layout, InputFile file);
+std::unique_ptr<VolumeSource> make_raw_source(SampleLayout layout, File file);
+
+/// Throws UsageError when the file ends before the last sample that its header describes.
+void check_header_promise(const SampleLayout& layout, const File& file);
 
 }  // namespace isobrick

@@ -60,11 +60,10 @@ std::optional<ByteOrder> order_of(const TextHeader& header, ScalarType type,
 }
 
 /// Where the text lines end that a NRRD header says to skip.
-std::uint64_t after_lines(const InputFile& file, const std::string& path, std::uint64_t begin,
+std::uint64_t after_lines(const File& file, const std::string& path, std::uint64_t begin,
                           std::uint64_t lines) {
   if (lines == 0) return begin;
-  std::string text(std::min(file.size - std::min(begin, file.size), kMostHeader), '\0');
-  read_at(file.fd.get(), path, begin, reinterpret_cast<std::byte*>(text.data()), text.size());
+  const std::string text = file.text_at(begin, kMostHeader);
   std::size_t at = 0;
   for (std::uint64_t i = 0; i < lines; ++i) {
     at = text.find('\n', at);
@@ -114,7 +113,7 @@ void check_size(const TextHeader& header, const VolumeInfo& info, std::uint64_t 
 /// Opens samples that lie as they are in one file: what is said goes before what
 /// the header says.
 std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const VolumeRequest& said,
-                                             InputFile file) {
+                                             File file) {
   const std::string& path = header.data_paths[0];
   const ScalarType type = said.type.value_or(header.type);
   SampleLayout layout;
@@ -124,14 +123,15 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
   const auto total =
       static_cast<std::uint64_t>(said.extent ? volume(*said.extent) : header.view.total) *
       size_of(type);
+  const std::uint64_t size = file.size();
   std::uint64_t offset = header.data_begin;
   if (said.offset)
     offset = *said.offset;
   else if (header.data_at_end)
-    offset = std::max(offset, file.size > total ? file.size - total : 0);
+    offset = std::max(offset, size > total ? size - total : 0);
   else
     offset = after_lines(file, path, header.data_begin, header.skip_lines) + header.skip_bytes;
-  check_size(header, layout.info, offset, total, file.size);
+  check_size(header, layout.info, offset, total, size);
   layout.offset = offset;
   if (!said.extent) {
     layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);
@@ -142,18 +142,18 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
 
 /// The bytes of one data file, from where its samples begin.
 std::unique_ptr<ByteStream> open_bytes(const TextHeader& header, const std::string& path) {
-  InputFile file = open_input(path);
+  File file = open_input(path);
   const std::uint64_t begin = after_lines(file, path, header.data_begin, header.skip_lines);
-  const std::uint64_t end = file.size;
+  const std::uint64_t end = file.size();
   const bool packed = header.encoding == Encoding::gzip || header.encoding == Encoding::zlib;
   if (packed && begin == end) header_error(header.path, "no samples follow");
   std::byte first{};
-  if (packed) read_at(file.fd.get(), path, begin, &first, 1);
+  if (packed) file.read_at(begin, {&first, 1});
   const std::uint64_t skip = packed ? 0 : header.skip_bytes;
   if (begin > end || end - begin < skip)
     header_error(header.path,
                  fmt::format("'{}' has {} bytes, fewer than are to be skipped", path, end));
-  auto stream = make_file_stream(std::move(file), path, begin + skip, end);
+  auto stream = make_file_stream(std::move(file), begin + skip);
   if (!packed) return stream;
   // MetaImage's writers have wrapped deflated data either way.
   constexpr std::byte kGzip{0x1f};
@@ -245,7 +245,7 @@ TextHeader describe_by_name(const std::string& path, const VolumeRequest& said) 
 }  // namespace
 
 std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& said) {
-  InputFile file = open_input(path);
+  File file = open_input(path);
   if (const auto header = find_header_beside(path, said)) return open_text_volume(*header, said);
   return open_described(describe_by_name(path, said), said, std::move(file));
 }

@@ -16,7 +16,7 @@ namespace isobrick {
 namespace {
 
 /// As much of a header as a message should show.
-std::string quoted(std::string_view text) {
+std::string excerpt(std::string_view text) {
   return fmt::format("'{}{}'", printable(text, 60), text.size() > 60 ? "…" : "");
 }
 
@@ -42,10 +42,9 @@ void header_error(const std::string& path, const std::string& what) {
 }
 
 HeaderLines::HeaderLines(const std::string& path) : path_(path) {
-  const InputFile file = open_input(path);
-  file_size_ = file.size;
-  text_.resize(static_cast<std::size_t>(std::min(file.size, kMostHeader)));
-  read_at(file.fd.get(), path, 0, reinterpret_cast<std::byte*>(text_.data()), text_.size());
+  const File file = open_input(path);
+  file_size_ = file.size();
+  text_ = file.text_at(0, kMostHeader);
   rest_ = text_;
 }
 
@@ -90,9 +89,9 @@ Index parse_integer(const std::string& path, std::string_view field, std::string
   Index value = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error == std::errc::result_out_of_range)
-    header_error(path, fmt::format("{}: {} is too large", field, quoted(word)));
+    header_error(path, fmt::format("{}: {} is too large", field, excerpt(word)));
   if (error != std::errc{} || end != word.data() + word.size())
-    header_error(path, fmt::format("{}: {} is not a whole number", field, quoted(word)));
+    header_error(path, fmt::format("{}: {} is not a whole number", field, excerpt(word)));
   return value;
 }
 
@@ -102,7 +101,7 @@ double parse_real(const std::string& path, std::string_view field, std::string_v
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc{} || end != word.data() + word.size() ||
       !(std::isfinite(value) || (nan_allowed && std::isnan(value))))
-    header_error(path, fmt::format("{}: {} is not a usable number", field, quoted(word)));
+    header_error(path, fmt::format("{}: {} is not a usable number", field, excerpt(word)));
   return value;
 }
 
@@ -112,7 +111,7 @@ std::string resolve_data_file(const std::string& path, std::string_view name) {
   if (data.is_absolute() || std::find(data.begin(), data.end(), "..") != data.end())
     header_error(path, fmt::format("the data file {} is outside the header's folder; give the "
                                    "data file itself with its extent and type",
-                                   quoted(name)));
+                                   excerpt(name)));
   return (std::filesystem::path(path).parent_path() / data).string();
 }
 
@@ -122,7 +121,7 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
   constexpr Index kMostDigits = 20;
   const auto words = split_words(text);
   if (words.size() != 3 && words.size() != 4)
-    header_error(path, fmt::format("{} is not 'PATTERN FIRST LAST [STEP]'", quoted(text)));
+    header_error(path, fmt::format("{} is not 'PATTERN FIRST LAST [STEP]'", excerpt(text)));
   const auto number = [&](std::size_t i) { return parse_integer(path, "data file", words[i]); };
   const Index first = number(1), last = number(2), step = words.size() == 4 ? number(3) : 1;
   const bool ordered =
@@ -131,7 +130,7 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
   // A number in a name takes no more characters than the largest one or the widest pattern.
   const std::size_t name = path.size() + words[0].size() + static_cast<std::size_t>(kMostDigits);
   if (count < 1 || count > kMostFiles || static_cast<std::size_t>(count) * name > kMostText)
-    header_error(path, fmt::format("the numbers of {} make no sense", quoted(text)));
+    header_error(path, fmt::format("the numbers of {} make no sense", excerpt(text)));
   const std::string_view pattern = words[0];
   const std::size_t percent = pattern.find('%');
   const std::size_t end = pattern.find_first_not_of("0123456789", percent + 1);
@@ -139,11 +138,11 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
   if (end == std::string_view::npos || pattern[end] != 'd' ||
       pattern.find('%', end) != std::string_view::npos || width.size() > 3)
     header_error(path,
-                 fmt::format("{} is no pattern with one number such as %03d", quoted(pattern)));
+                 fmt::format("{} is no pattern with one number such as %03d", excerpt(pattern)));
   const Index digits = width.empty() ? 0 : parse_integer(path, "data file", width);
   if (digits > kMostDigits)
     header_error(path,
-                 fmt::format("{}: numbers of {} digits make no sense", quoted(pattern), digits));
+                 fmt::format("{}: numbers of {} digits make no sense", excerpt(pattern), digits));
   std::vector<std::string> names;
   for (Index i = 0; i < count; ++i) {
     std::string text_of_number = std::to_string(first + i * step);

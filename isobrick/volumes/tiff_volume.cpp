@@ -191,10 +191,11 @@ std::unique_ptr<VolumeSource> open_behind_first(const std::string& path, const P
   layout.offset = plain.offset + static_cast<std::uint64_t>(view.first) * size_of(pages.page.type);
   layout.swap = plain.swap && size_of(pages.page.type) > 1;
   layout.stride = view.stride;
-  InputFile input = open_input(path);
-  if (plain.offset > input.size || input.size < layout.end())
+  File input = open_input(path);
+  const std::uint64_t size = input.size();
+  if (plain.offset > size || size < layout.end())
     throw UsageError(fmt::format("'{}' has {} bytes, but its description promises samples up to {}",
-                                 path, input.size, layout.end()));
+                                 path, size, layout.end()));
   return make_raw_source(std::move(layout), std::move(input));
 }
 

@@ -39,9 +39,10 @@ std::string text_of(const Metadata& metadata, const std::string& name) {
 /// Walks through the fields of a file.
 class Fields {
  public:
-  explicit Fields(const std::string& path) : path_(path), file_(open_input(path)) {}
+  explicit Fields(const std::string& path)
+      : path_(path), file_(open_input(path)), size_(file_.size()) {}
 
-  std::uint64_t size() const { return file_.size; }
+  std::uint64_t size() const { return size_; }
   std::uint64_t at() const { return at_; }
   void seek(std::uint64_t at) { at_ = at; }
 
@@ -52,7 +53,7 @@ class Fields {
   std::string bytes(std::size_t count) {
     if (at_ > size() || count > size() - at_) damaged("it ends within its header");
     std::string text(count, '\0');
-    read_at(file_.fd.get(), path_, at_, reinterpret_cast<std::byte*>(text.data()), count);
+    file_.read_at(at_, std::as_writable_bytes(std::span(text)));
     at_ += count;
     return text;
   }
@@ -87,7 +88,8 @@ class Fields {
 
  private:
   const std::string& path_;
-  InputFile file_;
+  File file_;
+  std::uint64_t size_;
   std::uint64_t at_ = 0;
 };
 

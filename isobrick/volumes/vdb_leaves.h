@@ -116,8 +116,7 @@ class VdbLeaves {
   /// More than any leaf has, however it was written.
   static constexpr std::uint64_t kMostBytes = 1 << 16;
 
-  std::string path_;
-  InputFile file_;
+  File file_;
   bool as_half_;
   openvdb::io::StreamMetadata how_;   ///< version, compression and background
   std::vector<std::uint64_t> begin_;  ///< of each leaf; one more at the end
@@ -125,10 +124,7 @@ class VdbLeaves {
 
 template <class Tree>
 VdbLeaves<Tree>::VdbLeaves(const std::string& path, std::istream& in, Tree& tree, bool as_half)
-    : path_(path),
-      file_(open_input(path)),
-      as_half_(as_half),
-      how_(*openvdb::io::getStreamMetadataPtr(in)) {
+    : file_(open_input(path)), as_half_(as_half), how_(*openvdb::io::getStreamMetadataPtr(in)) {
   how_.setBackgroundPtr(&tree.background());
   const std::uint64_t leaves = tree.leafCount();
   if (leaves > std::numeric_limits<openvdb::Index32>::max())
@@ -214,8 +210,7 @@ void VdbLeaves<Tree>::Reader::read(std::span<const Leaf* const> leaves, const F&
     while (count < leaves.size() && leaves[count]->transientData() == first + count) ++count;
     const std::uint64_t* begin = leaves_.begin_.data() + first;
     bytes_.resize(begin[count] - begin[0]);
-    read_at(leaves_.file_.fd.get(), leaves_.path_, begin[0],
-            reinterpret_cast<std::byte*>(bytes_.data()), bytes_.size());
+    leaves_.file_.read_at(begin[0], std::as_writable_bytes(std::span(bytes_)));
     for (std::size_t i = 0; i < count; ++i) {
       read_leaf(std::span(bytes_).subspan(begin[i] - begin[0], begin[i + 1] - begin[i]),
                 leaves[i]->valueMask(), values);

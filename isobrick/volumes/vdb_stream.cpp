@@ -10,12 +10,12 @@ constexpr std::size_t kBufferBytes = std::size_t{1} << 16;
 }  // namespace
 
 VdbFileBuffer::VdbFileBuffer(const std::string& path)
-    : path_(path), file_(open_input(path)), buffer_(kBufferBytes) {}
+    : file_(open_input(path)), size_(file_.size()), buffer_(kBufferBytes) {}
 
 VdbFileBuffer::int_type VdbFileBuffer::underflow() {
-  const std::size_t size = std::min<std::uint64_t>(buffer_.size(), file_.size - end_);
+  const std::size_t size = std::min<std::uint64_t>(buffer_.size(), size_ - end_);
   if (size == 0) return traits_type::eof();
-  read_at(file_.fd.get(), path_, end_, reinterpret_cast<std::byte*>(buffer_.data()), size);
+  file_.read_at(end_, std::as_writable_bytes(std::span(buffer_).first(size)));
   end_ += size;
   setg(buffer_.data(), buffer_.data(), buffer_.data() + size);
   return traits_type::to_int_type(buffer_.front());
@@ -23,7 +23,7 @@ VdbFileBuffer::int_type VdbFileBuffer::underflow() {
 
 VdbFileBuffer::pos_type VdbFileBuffer::seekoff(off_type offset, std::ios_base::seekdir from,
                                                std::ios_base::openmode which) {
-  if (from == std::ios_base::end) return seekpos(static_cast<off_type>(file_.size) + offset, which);
+  if (from == std::ios_base::end) return seekpos(static_cast<off_type>(size_) + offset, which);
   if (from == std::ios_base::beg) return seekpos(offset, which);
   const auto at = static_cast<off_type>(end_) - (egptr() - gptr());
   off_type target;
@@ -33,7 +33,7 @@ VdbFileBuffer::pos_type VdbFileBuffer::seekoff(off_type offset, std::ios_base::s
 
 VdbFileBuffer::pos_type VdbFileBuffer::seekpos(pos_type to, std::ios_base::openmode) {
   const off_type at = to;
-  if (at < 0 || static_cast<std::uint64_t>(at) > file_.size) return pos_type(off_type{-1});
+  if (at < 0 || static_cast<std::uint64_t>(at) > size_) return pos_type(off_type{-1});
   const auto first = static_cast<off_type>(end_) - (egptr() - eback());
   if (at >= first && static_cast<std::uint64_t>(at) <= end_) {
     setg(eback(), eback() + (at - first), egptr());

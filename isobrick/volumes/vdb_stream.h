@@ -28,8 +28,8 @@ class VdbFileBuffer final : public std::streambuf {
   pos_type seekpos(pos_type at, std::ios_base::openmode which) override;
 
  private:
-  std::string path_;
-  InputFile file_;
+  File file_;
+  std::uint64_t size_;  ///< of the file
   std::vector<char> buffer_;
   std::uint64_t end_ = 0;  ///< of what is in the buffer
 };

@@ -1,6 +1,5 @@
 #include "isobrick/volumes/volume_format.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -19,12 +18,7 @@ namespace {
 
 constexpr std::size_t kHeadBytes = 4096;
 
-std::string read_head(const std::string& path) {
-  const InputFile file = open_input(path);
-  std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size, kHeadBytes)), '\0');
-  read_at(file.fd.get(), path, 0, reinterpret_cast<std::byte*>(head.data()), head.size());
-  return head;
-}
+std::string read_head(const std::string& path) { return open_input(path).text_at(0, kHeadBytes); }
 
 /// A MetaImage begins with one of the keys that its writers put first.
 bool is_meta_image(std::string_view head) {
@@ -40,12 +34,10 @@ std::span<const std::byte> bytes_of(std::string_view text) {
 
 /// The beginning of what a compressed file unpacks to; empty when it is damaged.
 std::string unpack_head(const std::string& path) {
-  InputFile file = open_input(path);
-  const std::uint64_t size = file.size;
+  auto packed = make_file_stream(open_input(path));
   std::string head(kHeadBytes, '\0');
   try {
-    const auto stream =
-        make_inflate_stream(make_file_stream(std::move(file), path, 0, size), Wrapper::gzip);
+    const auto stream = make_inflate_stream(std::move(packed), Wrapper::gzip);
     head.resize(stream->read(reinterpret_cast<std::byte*>(head.data()), head.size()));
     return head;
   } catch (const Error&) {

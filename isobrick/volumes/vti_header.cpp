@@ -37,12 +37,13 @@ class Reader {
   }
 
   void read() {
-    const InputFile file = open_input(path_);
+    const File file = open_input(path_);
+    const std::uint64_t end = file.size();
     constexpr std::uint64_t kPiece = 1 << 16, kMostToken = 1 << 20;
     std::vector<char> buffer(kPiece);
-    for (std::uint64_t at = 0; at < file.size && !done_; at += kPiece) {
-      const auto size = static_cast<std::size_t>(std::min(kPiece, file.size - at));
-      read_at(file.fd.get(), path_, at, reinterpret_cast<std::byte*>(buffer.data()), size);
+    for (std::uint64_t at = 0; at < end && !done_; at += kPiece) {
+      const auto size = static_cast<std::size_t>(std::min(kPiece, end - at));
+      file.read_at(at, std::as_writable_bytes(std::span(buffer).first(size)));
       const auto status = XML_Parse(parser_.get(), buffer.data(), static_cast<int>(size), 0);
       if (failure_) std::rethrow_exception(failure_);
       if (done_) return;
@@ -257,10 +258,7 @@ Transform read_transform(const std::string& path, const Attributes& image, Int3 
 /// Where the first character is that is no blank.
 std::uint64_t after_blanks(const std::string& path, std::uint64_t at) {
   constexpr std::uint64_t kMostBlanks = 4096;
-  const InputFile file = open_input(path);
-  std::string text(
-      static_cast<std::size_t>(std::min(file.size - std::min(at, file.size), kMostBlanks)), '\0');
-  read_at(file.fd.get(), path, at, reinterpret_cast<std::byte*>(text.data()), text.size());
+  const std::string text = open_input(path).text_at(at, kMostBlanks);
   return at + std::min(text.find_first_not_of(" \t\r\n"), text.size());
 }
 
@@ -299,11 +297,9 @@ void read_samples_of(const std::string& path, const Reader& reader, VtiHeader& h
   }
   // The underscore marks where the offsets count from.
   const std::uint64_t mark = after_blanks(path, reader.appended_content());
-  const InputFile file = open_input(path);
-  std::byte c{};
-  if (mark < file.size) read_at(file.fd.get(), path, mark, &c, 1);
-  if (c != std::byte{'_'}) header_error(path, "the appended data do not begin with '_'");
-  if (header.begin > file.size - mark - 1)
+  const File file = open_input(path);
+  if (file.text_at(mark, 1) != "_") header_error(path, "the appended data do not begin with '_'");
+  if (header.begin > file.size() - mark - 1)
     header_error(path, "the array's offset is behind the end");
   header.begin += mark + 1;
 }

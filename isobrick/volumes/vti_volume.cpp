@@ -25,11 +25,11 @@ bool must_swap(const VtiHeader& header) { return header.order != kNativeOrder; }
 /// beginning.
 std::unique_ptr<ByteStream> open_encoded(const std::string& path, const VtiHeader& header,
                                          std::uint64_t from) {
-  InputFile file = open_input(path);
-  const std::uint64_t end = file.size;
+  File file = open_input(path);
+  const std::uint64_t end = file.size();
   if (header.begin > end || from > end - header.begin)
     throw UsageError(fmt::format("'{}' ends before its array of samples", path));
-  auto stream = make_file_stream(std::move(file), path, header.begin + from, end);
+  auto stream = make_file_stream(std::move(file), header.begin + from);
   return header.encoding == VtiEncoding::base64 ? make_base64_stream(std::move(stream))
                                                 : std::move(stream);
 }
@@ -66,11 +66,8 @@ std::unique_ptr<ByteStream> open_compressed(const std::string& path, const VtiHe
 std::unique_ptr<ByteStream> open_array(const std::string& path, const VtiHeader& header,
                                        std::uint64_t expected) {
   if (header.encoding == VtiEncoding::ascii) {
-    InputFile file = open_input(path);
-    const std::uint64_t end = file.size;
-    return make_text_stream(
-        make_element_stream(make_file_stream(std::move(file), path, header.begin, end)),
-        header.type);
+    auto text = make_file_stream(open_input(path), header.begin);
+    return make_text_stream(make_element_stream(std::move(text)), header.type);
   }
   if (header.compressed) return open_compressed(path, header);
   auto stream = open_encoded(path, header, 0);
@@ -100,10 +97,8 @@ std::unique_ptr<VolumeSource> open_vti(const std::string& path, const std::strin
                                   ? AfterEnd::unread
                                   : AfterEnd::refused);
   layout.offset += header.begin + static_cast<std::uint64_t>(header.size_bytes);
-  InputFile file = open_input(path);
-  if (file.size < layout.end())
-    throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
-                                 path, file.size, layout.end()));
+  File file = open_input(path);
+  check_header_promise(layout, file);
   return make_raw_source(std::move(layout), std::move(file));
 }
 

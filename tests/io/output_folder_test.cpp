@@ -13,8 +13,8 @@ namespace {
 namespace fs = std::filesystem;
 using Names = std::vector<std::string>;
 
-void fill(const UniqueFd& fd, const std::string& text) {
-  EXPECT_EQ(::write(fd.get(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
+void fill(const File& file, const std::string& text) {
+  EXPECT_EQ(::write(file.fd(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
 }
 
 TEST(OutputFolder, CreatesFilesAnew) {
