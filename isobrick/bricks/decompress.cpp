@@ -1,7 +1,6 @@
 #include "isobrick/bricks/decompress.h"
 
 #include <fmt/format.h>
-#include <isa-l/igzip_lib.h>
 #include <zstd.h>
 #ifdef ISOBRICK_WITH_BLOSC
 #include <blosc.h>
@@ -16,6 +15,7 @@
 #include <memory>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/inflate.h"
 
 namespace isobrick {
 namespace {
@@ -37,23 +37,16 @@ std::size_t decompress_zstd(std::span<const std::byte> encoded, std::span<std::b
   return size;
 }
 
-/// A deflate stream with the frame of gzip or zlib, whose checksum is compared.
-std::size_t inflate(std::uint32_t frame, std::span<const std::byte> encoded,
-                    std::span<std::byte> out) {
-  thread_local const auto state = std::make_unique<inflate_state>();
-  isal_inflate_init(state.get());
-  state->crc_flag = frame;
-  state->next_in = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(encoded.data()));
-  state->avail_in = static_cast<std::uint32_t>(encoded.size());
-  state->next_out = reinterpret_cast<std::uint8_t*>(out.data());
-  state->avail_out = static_cast<std::uint32_t>(out.size());
-  const int result = isal_inflate(state.get());
-  if (result != ISAL_DECOMP_OK)
-    throw DamageError(fmt::format("no valid deflate stream (code {})", result));
-  if (state->block_state != ISAL_BLOCK_FINISH)
-    throw DamageError(state->avail_out == 0 ? "the deflate stream is longer than its samples"
-                                            : "the deflate stream is cut off");
-  return out.size() - state->avail_out;
+std::size_t decompress_deflate(Wrapper wrapper, std::span<const std::byte> encoded,
+                               std::span<std::byte> out) {
+  const Inflated done = inflate(wrapper, encoded, out);
+  switch (done.end) {
+    case Inflated::End::complete: return done.size;
+    case Inflated::End::no_room: throw DamageError("the deflate stream is longer than its samples");
+    case Inflated::End::cut_off: throw DamageError("the deflate stream is cut off");
+    case Inflated::End::invalid: break;
+  }
+  throw DamageError(fmt::format("no valid deflate stream (code {})", done.code));
 }
 
 std::size_t decompress_lz4([[maybe_unused]] std::span<const std::byte> encoded,
@@ -116,8 +109,8 @@ std::size_t decompress(ByteCodec codec, std::span<const std::byte> encoded,
     throw DamageError(fmt::format("{} compressed bytes are too many", encoded.size()));
   switch (codec) {
     case ByteCodec::zstd: return decompress_zstd(encoded, out);
-    case ByteCodec::gzip: return inflate(ISAL_GZIP, encoded, out);
-    case ByteCodec::zlib: return inflate(ISAL_ZLIB, encoded, out);
+    case ByteCodec::gzip: return decompress_deflate(Wrapper::gzip, encoded, out);
+    case ByteCodec::zlib: return decompress_deflate(Wrapper::zlib, encoded, out);
     case ByteCodec::lz4: return decompress_lz4(encoded, out);
     case ByteCodec::blosc: return decompress_blosc(encoded, out);
     case ByteCodec::crc32c: break;

@@ -3,13 +3,9 @@
 #include <memory>
 
 #include "isobrick/io/byte_stream.h"
+#include "isobrick/io/inflate.h"
 
 namespace isobrick {
-
-enum class Wrapper : unsigned char {
-  gzip,  ///< one or more members; what follows them is passed over
-  zlib,
-};
 
 /// What `packed` unpacks to, checksums compared. Throws DamageError where the
 /// compressed bytes are damaged or end too early.

@@ -1,15 +1,16 @@
 #include "isobrick/io/zlib_block_stream.h"
 
 #include <fmt/format.h>
-#include <isa-l/igzip_lib.h>
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/byte_order.h"
+#include "isobrick/io/inflate.h"
 
 namespace isobrick {
 namespace {
@@ -94,17 +95,11 @@ class ZlibBlockStream final : public ByteStream {
                       "{} unpacked",
                       name(), index_, packed, bytes));
     packed_->read_exactly(input_.data(), static_cast<std::size_t>(packed));
-    inflate_state state;
-    isal_inflate_init(&state);
-    state.crc_flag = ISAL_ZLIB;
-    state.next_in = reinterpret_cast<std::uint8_t*>(input_.data());
-    state.avail_in = static_cast<std::uint32_t>(packed);
-    state.next_out = reinterpret_cast<std::uint8_t*>(out);
-    state.avail_out = static_cast<std::uint32_t>(bytes);
-    const int result = isal_inflate_stateless(&state);
-    if (result != ISAL_DECOMP_OK || state.avail_out != 0 || state.block_state != ISAL_BLOCK_FINISH)
+    const Inflated done = inflate(
+        Wrapper::zlib, std::span(input_).first(static_cast<std::size_t>(packed)), {out, bytes});
+    if (!done.filled(bytes))
       throw DamageError(
-          fmt::format("{}: compressed block {} is damaged (code {})", name(), index_, result));
+          fmt::format("{}: compressed block {} is damaged (code {})", name(), index_, done.code));
     ++index_;
   }
 

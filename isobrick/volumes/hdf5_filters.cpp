@@ -1,13 +1,13 @@
 #include "isobrick/volumes/hdf5_filters.h"
 
 #include <fmt/format.h>
-#include <isa-l/igzip_lib.h>
 
 #include <algorithm>
 #include <cstring>
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/inflate.h"
 #include "isobrick/volumes/hdf5_lzf.h"
 
 namespace isobrick {
@@ -56,16 +56,10 @@ void undo_fletcher32(PodBuffer<std::byte>& bytes) {
 
 void undo_deflate(Hdf5ChunkBuffers& buffers, std::size_t size) {
   buffers.other.resize(size);
-  inflate_state state;
-  isal_inflate_init(&state);
-  state.crc_flag = ISAL_ZLIB;
-  state.next_in = reinterpret_cast<std::uint8_t*>(buffers.bytes.data());
-  state.avail_in = static_cast<std::uint32_t>(buffers.bytes.size());
-  state.next_out = reinterpret_cast<std::uint8_t*>(buffers.other.data());
-  state.avail_out = static_cast<std::uint32_t>(size);
-  const int result = isal_inflate_stateless(&state);
-  if (result != ISAL_DECOMP_OK || state.avail_out != 0 || state.block_state != ISAL_BLOCK_FINISH)
-    throw DamageError(fmt::format("it does not unpack to {} bytes (code {})", size, result));
+  const Inflated done = inflate(Wrapper::zlib, {buffers.bytes.data(), buffers.bytes.size()},
+                                {buffers.other.data(), size});
+  if (!done.filled(size))
+    throw DamageError(fmt::format("it does not unpack to {} bytes (code {})", size, done.code));
   std::swap(buffers.bytes, buffers.other);
 }
 
