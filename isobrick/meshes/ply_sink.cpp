@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
 
 #include "isobrick/core/error.h"
+#include "isobrick/meshes/append_items.h"
 #include "isobrick/meshes/vertex_rows.h"
 
 namespace isobrick {
@@ -19,18 +19,10 @@ static_assert(sizeof(Triangle) == 12);
 constexpr std::size_t kFaceBytes = 13;
 
 void append_faces(FileWriter& out, std::span<const Triangle> triangles) {
-  constexpr std::size_t batch = FileWriter::kBuffer / kFaceBytes;
-  while (!triangles.empty()) {
-    const std::size_t count = std::min(batch, triangles.size());
-    std::byte* to = out.reserve(count * kFaceBytes);
-    for (const Triangle& triangle : triangles.first(count)) {
-      *to = std::byte{3};
-      std::memcpy(to + 1, triangle.data(), sizeof(Triangle));
-      to += kFaceBytes;
-    }
-    out.commit(count * kFaceBytes);
-    triangles = triangles.subspan(count);
-  }
+  append_items<kFaceBytes>(out, triangles.size(), [&](std::byte* to, std::uint64_t i) {
+    *to = std::byte{3};
+    std::memcpy(to + 1, triangles[i].data(), sizeof(Triangle));
+  });
 }
 
 }  // namespace

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "isobrick/core/error.h"
+#include "isobrick/meshes/append_items.h"
 
 namespace isobrick {
 namespace {
@@ -49,20 +49,14 @@ void StlSink::write(const MeshChunk& chunk) {
         fmt::format("'{}': the mesh has more than 4294967295 triangles, which STL cannot "
                     "count; write PLY instead or extract parts with --roi",
                     out_.path()));
-  constexpr std::size_t batch = FileWriter::kBuffer / kFacetBytes;
-  for (auto rest = chunk.triangles; !rest.empty();) {
-    const std::size_t count = std::min(batch, rest.size());
-    std::byte* to = out_.writer().reserve(count * kFacetBytes);
-    for (const Triangle& t : rest.first(count)) {
-      const Vec3f a = chunk.positions[t[0]], b = chunk.positions[t[1]], c = chunk.positions[t[2]];
-      const Vec3f facet[4] = {facet_normal(a, b, c), a, b, c};
-      std::memcpy(to, facet, sizeof(facet));
-      std::memset(to + sizeof(facet), 0, kFacetBytes - sizeof(facet));
-      to += kFacetBytes;
-    }
-    out_.writer().commit(count * kFacetBytes);
-    rest = rest.subspan(count);
-  }
+  append_items<kFacetBytes>(
+      out_.writer(), chunk.triangles.size(), [&](std::byte* to, std::uint64_t i) {
+        const Triangle& t = chunk.triangles[i];
+        const Vec3f a = chunk.positions[t[0]], b = chunk.positions[t[1]], c = chunk.positions[t[2]];
+        const Vec3f facet[4] = {facet_normal(a, b, c), a, b, c};
+        std::memcpy(to, facet, sizeof(facet));
+        std::memset(to + sizeof(facet), 0, kFacetBytes - sizeof(facet));
+      });
 }
 
 void StlSink::finish() {

@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
+
+#include "isobrick/meshes/append_items.h"
 
 namespace isobrick {
 namespace {
@@ -25,16 +26,10 @@ std::string data_array(std::string_view type, std::string_view name, int compone
 
 template <class Number, class F>
 void append_numbers(FileWriter& out, std::uint64_t count, const F& number) {
-  constexpr std::uint64_t batch = FileWriter::kBuffer / sizeof(Number);
-  for (std::uint64_t first = 0; first < count; first += batch) {
-    const std::uint64_t end = std::min(count, first + batch);
-    std::byte* to = out.reserve(static_cast<std::size_t>(end - first) * sizeof(Number));
-    for (std::uint64_t i = first; i < end; ++i, to += sizeof(Number)) {
-      const auto value = static_cast<Number>(number(i));
-      std::memcpy(to, &value, sizeof(Number));
-    }
-    out.commit(static_cast<std::size_t>(end - first) * sizeof(Number));
-  }
+  append_items<sizeof(Number)>(out, count, [&](std::byte* to, std::uint64_t i) {
+    const auto value = static_cast<Number>(number(i));
+    std::memcpy(to, &value, sizeof(Number));
+  });
 }
 
 template <class F>
