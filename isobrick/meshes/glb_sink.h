@@ -4,11 +4,8 @@
 #include <limits>
 #include <string>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/io/parted_output.h"
 #include "isobrick/meshes/glb_scene.h"
-#include "isobrick/meshes/mesh_parts.h"
-#include "isobrick/surface/mesh.h"
+#include "isobrick/meshes/parted_mesh_sink.h"
 
 namespace isobrick {
 
@@ -20,39 +17,30 @@ struct GlbOptions {
   /// What does not fit one file of this size (the length in its header has 32
   /// bits) is cut into parts.
   std::uint64_t file_bytes = std::numeric_limits<std::uint32_t>::max();
-  std::uint64_t part_triangles = std::uint64_t{1} << 20;
+  std::uint64_t part_triangles = PartedMeshSink::kPartTriangles;
 };
 
 /// Writes a welded mesh as binary glTF 2.0, coordinates in world units as they
 /// are. One primitive in one file; beyond GlbOptions::file_bytes one primitive a
 /// part, with a buffer each in the folder `path`.parts, vertices that several
 /// parts name repeated in each. A mesh without triangles is an empty scene.
-class GlbSink final : public MeshSink {
+class GlbSink final : public PartedMeshSink {
  public:
   /// See PartedOutput for what `path` and `force` may throw.
   GlbSink(std::string path, bool force, const GlbOptions& options = {});
 
-  Indexing indexing() const override { return Indexing::welded; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
-  std::uint64_t bytes() const override {
-    return rows_.size() + triangles_.size() + part_bytes_ + out_.index().writer().size();
-  }
-  std::uint64_t memory() const override { return part_memory(options_.part_triangles); }
 
  private:
   GlbPrimitive append_part(FileWriter& out, const MeshPart& part);
   void finish_whole(const GlbPrimitive& primitive);
   void finish_parts();
 
-  GlbOptions options_;
-  PartedOutput out_;
-  FileWriter rows_, triangles_;  ///< the whole mesh, until its size and bounds are known
-  MeshSize size_;
+  std::uint64_t file_bytes_;
   Bounds3f bounds_;
   GlbVertices vertices_;
-  std::uint64_t part_bytes_ = 0;
 };
 
 }  // namespace isobrick

@@ -100,9 +100,8 @@ void for_each_row_run(const VertexRows& rows, const MeshPart& part,
   const auto add = [&](std::uint64_t first, std::uint64_t count) {
     while (count > 0) {
       const std::uint64_t now = std::min(count, most - filled);
-      rows.file.read_back(
-          rows.offset + first * rows.row_bytes,
-          {buffer.get() + filled * rows.row_bytes, static_cast<std::size_t>(now) * rows.row_bytes});
+      rows.file.read_back(first * rows.row_bytes, {buffer.get() + filled * rows.row_bytes,
+                                                   static_cast<std::size_t>(now) * rows.row_bytes});
       filled += now;
       first += now;
       count -= now;

@@ -34,10 +34,9 @@ void for_each_part(FileWriter& triangles, MeshSize mesh, std::uint64_t part_tria
 /// Bytes that for_each_part holds at most.
 std::uint64_t part_memory(std::uint64_t part_triangles);
 
-/// Rows of vertices of fixed length in a file.
+/// A file of vertices, rows of fixed length.
 struct VertexRows {
   FileWriter& file;
-  std::uint64_t offset = 0;  ///< of the first row
   std::size_t row_bytes = 0;
 };
 

@@ -7,6 +7,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/xml_text.h"
+#include "isobrick/meshes/append_items.h"
 #include "isobrick/meshes/mesh_parts.h"
 #include "isobrick/meshes/vertex_rows.h"
 
@@ -29,29 +30,9 @@ std::string named_in_xml(std::string path) {
 /// Appends the floats [first, first + 3) of each row.
 void append_column(FileWriter& out, std::span<const std::byte> rows, std::size_t row,
                    std::size_t first) {
-  const std::size_t count = rows.size() / row;
-  std::byte* to = out.reserve(count * sizeof(Vec3f));
-  for (std::size_t i = 0; i < count; ++i)
-    std::memcpy(to + i * sizeof(Vec3f), rows.data() + i * row + first, sizeof(Vec3f));
-  out.commit(count * sizeof(Vec3f));
-}
-
-void write_part(FileWriter& out, const VertexRows& rows, FileWriter& triangles,
-                const MeshPart& part) {
-  const VtpLayout layout{{part.vertices(), part.triangles}, rows.row_bytes == row_bytes(true)};
-  out.append(layout.header());
-  for (std::size_t column = 0; column < rows.row_bytes; column += sizeof(Vec3f)) {
-    append_length(out, layout.point_bytes());
-    for_each_row_run(rows, part, [&](std::span<const std::byte> run) {
-      append_column(out, run, rows.row_bytes, column);
-    });
-  }
-  append_length(out, layout.connectivity_bytes());
-  for_each_triangle_run(triangles, part, [&](std::span<const Triangle> run) {
-    append_connectivity(out, layout, run);
+  append_items<sizeof(Vec3f)>(out, rows.size() / row, [&](std::byte* to, std::uint64_t i) {
+    std::memcpy(to, rows.data() + i * row + first, sizeof(Vec3f));
   });
-  append_vtp_end(out, layout);
-  out.finish();
 }
 
 }  // namespace
@@ -99,31 +80,28 @@ void VtpSink::finish() {
 }
 
 PvtpSink::PvtpSink(std::string path, bool force, std::uint64_t part_triangles)
-    : out_(named_in_xml(std::move(path)), force),
-      rows_(open_scratch_beside(out_.index().path())),
-      triangles_(open_scratch_beside(out_.index().path())),
-      part_triangles_(part_triangles) {}
+    : PartedMeshSink(named_in_xml(std::move(path)), force, part_triangles) {}
 
-std::uint64_t PvtpSink::memory() const { return part_memory(part_triangles_); }
-
-void PvtpSink::begin(const MeshHeader& header) { has_normals_ = header.has_normals; }
-
-void PvtpSink::write(const MeshChunk& chunk) {
-  size_.vertices += chunk.positions.size();
-  size_.triangles += chunk.triangles.size();
-  append_rows(rows_, chunk);
-  triangles_.append(std::as_bytes(chunk.triangles));
+void PvtpSink::write_part(FileWriter& out, const MeshPart& part) {
+  const VtpLayout layout{{part.vertices(), part.triangles}, has_normals()};
+  const std::size_t row = row_bytes(has_normals());
+  out.append(layout.header());
+  for (std::size_t column = 0; column < row; column += sizeof(Vec3f)) {
+    append_length(out, layout.point_bytes());
+    for_each_row_run(part,
+                     [&](std::span<const std::byte> run) { append_column(out, run, row, column); });
+  }
+  append_length(out, layout.connectivity_bytes());
+  for_each_triangle_run(
+      part, [&](std::span<const Triangle> run) { append_connectivity(out, layout, run); });
+  append_vtp_end(out, layout);
 }
 
 void PvtpSink::finish() {
-  const VertexRows rows{rows_, 0, row_bytes(has_normals_)};
-  for_each_part(triangles_, size_, part_triangles_, [&](const MeshPart& part) {
-    FileWriter out = out_.create_part(kPartExtension);
-    write_part(out, rows, triangles_, part);
-    part_bytes_ += out.size();
-  });
-  out_.index().writer().append(index_text());
-  out_.publish();
+  write_parts(kPartExtension,
+              [this](FileWriter& out, const MeshPart& part) { write_part(out, part); });
+  output().index().writer().append(index_text());
+  output().publish();
 }
 
 std::string PvtpSink::index_text() const {
@@ -132,7 +110,7 @@ std::string PvtpSink::index_text() const {
       "<VTKFile type=\"PPolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n"
       "  <PPolyData GhostLevel=\"0\">\n";
-  if (has_normals_)
+  if (has_normals())
     text +=
         "    <PPointData Normals=\"Normals\">\n"
         "      <PDataArray type=\"Float32\" Name=\"Normals\" NumberOfComponents=\"3\"/>\n"
@@ -141,9 +119,9 @@ std::string PvtpSink::index_text() const {
       "    <PPoints>\n"
       "      <PDataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\"/>\n"
       "    </PPoints>\n";
-  for (std::size_t i = 0; i < out_.parts(); ++i)
-    text +=
-        fmt::format("    <Piece Source=\"{}\"/>\n", xml_escaped(out_.reference(i, kPartExtension)));
+  for (std::size_t i = 0; i < output().parts(); ++i)
+    text += fmt::format("    <Piece Source=\"{}\"/>\n",
+                        xml_escaped(output().reference(i, kPartExtension)));
   return text + "  </PPolyData>\n</VTKFile>\n";
 }
 

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "isobrick/io/output_file.h"
+#include "isobrick/io/parted_output.h"
+#include "isobrick/meshes/mesh_parts.h"
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// Keeps a welded mesh in scratch files until it is whole; then a format writes it, in one file or
+/// in parts of `part_triangles`.
+class PartedMeshSink : public MeshSink {
+ public:
+  static constexpr std::uint64_t kPartTriangles = std::uint64_t{1} << 20;
+
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader& header) override { has_normals_ = header.has_normals; }
+  void write(const MeshChunk& chunk) override;
+  std::uint64_t bytes() const override;
+  std::uint64_t memory() const override { return part_memory(part_triangles_); }
+
+ protected:
+  /// See PartedOutput for what `path` and `force` may throw.
+  PartedMeshSink(std::string path, bool force, std::uint64_t part_triangles);
+
+  bool has_normals() const { return has_normals_; }
+  MeshSize size() const { return size_; }
+  PartedOutput& output() { return out_; }
+  const PartedOutput& output() const { return out_; }
+
+  /// Creates a file for each part of the mesh, in order, and calls write_part(file, part).
+  void write_parts(std::string_view extension,
+                   const std::function<void(FileWriter&, const MeshPart&)>& write_part);
+  /// Appends the whole mesh: rows of float x y z [nx ny nz], then triangles of UInt32.
+  void append_whole(FileWriter& out);
+  /// Calls take(bytes) for runs of a part's rows; see mesh_parts.h.
+  void for_each_row_run(const MeshPart& part,
+                        const std::function<void(std::span<const std::byte>)>& take);
+  /// Calls take(triangles) for runs of a part's triangles; see mesh_parts.h.
+  void for_each_triangle_run(const MeshPart& part,
+                             const std::function<void(std::span<const Triangle>)>& take);
+
+ private:
+  PartedOutput out_;
+  FileWriter rows_, triangles_;  ///< scratch files of the whole mesh
+  std::uint64_t part_triangles_, part_bytes_ = 0;
+  MeshSize size_;
+  bool has_normals_ = false;
+};
+
+}  // namespace isobrick
