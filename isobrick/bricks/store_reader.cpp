@@ -8,9 +8,11 @@
 #include <cmath>
 
 #include "isobrick/bricks/array_metadata.h"
+#include "isobrick/bricks/level_description.h"
 #include "isobrick/bricks/lru_cache.h"
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/bricks/range_array.h"
+#include "isobrick/bricks/shard_grid.h"
 #include "isobrick/bricks/shard_index.h"
 #include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/bricks/volume_choice.h"
@@ -25,24 +27,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t kMaxOpenFiles = 128;
-constexpr std::uint64_t kIndexCacheBytes = std::uint64_t{64} << 20;
-constexpr Index kMaxShards = Index{1} << 56;  // so that a shard and its level make one key
-
-Int3 last_xyz(std::span<const Index> extents) {
-  const std::size_t n = extents.size();
-  return {extents[n - 1], extents[n - 2], extents[n - 3]};
-}
-
-/// What an index of so many bricks weighs in the cache.
-std::uint64_t index_weight(std::uint64_t bricks) {
-  return 64 + ShardIndex::encoded_size(bricks, true);
-}
-
-/// What the cache holds of a level whose shards are so many.
-std::uint64_t most_index_bytes(std::uint64_t shards, std::uint64_t bricks_of_shard) {
-  const std::uint64_t one = index_weight(bricks_of_shard);
-  return shards <= kIndexCacheBytes / one ? shards * one : std::max(one, kIndexCacheBytes);
-}
 
 // No encoder makes a brick much larger than it is; a length beyond is damage,
 // and must not make us ask for that much memory.
@@ -61,7 +45,7 @@ struct StoreReader::Impl {
     ArrayMetadata metadata;
     std::filesystem::path folder;
     VolumePlace place;
-    Int3 shards, bricks_per_shard;
+    ShardGrid grid;
     std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // null: none
   };
   struct Place {
@@ -84,9 +68,7 @@ struct StoreReader::Impl {
   std::optional<Place> find(int level, Int3 b);
   RangeTable ranges(int level, Box3 box, bool blocks);
   std::uint64_t key(int level, Int3 s) const {
-    return static_cast<std::uint64_t>(
-               linear_index(s, levels[static_cast<std::size_t>(level)].shards)) *
-               64 +
+    return static_cast<std::uint64_t>(linear_index(s, at(level).grid.shards)) * 64 +
            static_cast<std::uint64_t>(level);
   }
   const Level& at(int level) const { return levels[static_cast<std::size_t>(level)]; }
@@ -162,38 +144,17 @@ void StoreReader::Impl::open_level(const ImageMetadata::Level& described,
                                    MetadataFiles::Level&& read) {
   Level level;
   level.folder = std::move(read.folder);
-  const std::string where = quoted(read.file);
   level.metadata = std::move(read.array);
-  const ArrayMetadata& array = level.metadata;
-  level.place = place_volume(array, volume_choice.place, where);
-  LevelInfo out;
-  out.lattice.extent = last_xyz(array.shape);
-  out.lattice.brick = last_xyz(array.brick());
-  out.lattice.type = array.type;
-  out.shard = last_xyz(array.chunk);
-  out.transform = described.transform;
-  if (level.place.chunk_volumes > 1)
-    out.decode_extra = 2 * level.place.chunk_volumes * out.lattice.brick_bytes();
-  if (!checked_volume(out.lattice.extent))
-    throw DamageError(where + ": the shape is out of bounds");
-  for (int axis = 0; axis < 3; ++axis)
-    if (out.lattice.extent[axis] > kMaxAxisSamples)
-      throw Error(fmt::format("{}: more than {} samples along an axis are not supported", where,
-                              kMaxAxisSamples));
-  level.shards = ceil_div(out.lattice.extent, out.shard);
-  level.bricks_per_shard = ceil_div(out.shard, out.lattice.brick);
-  if (volume(level.shards) > kMaxShards) throw Error(where + ": too many shards");
-  if (array.sharding)
-    out.index_bytes = most_index_bytes(
-        static_cast<std::uint64_t>(volume(level.shards)),
-        static_cast<std::uint64_t>(volume(level.bricks_per_shard)) * level.place.shard_volumes);
+  const std::string where = quoted(read.file);
+  level.place = place_volume(level.metadata, volume_choice.place, where);
+  info.levels.push_back(describe_level(level.metadata, level.place, described.transform, where));
+  level.grid = ShardGrid(info.levels.back());
   if (!levels.empty()) {
-    const ArrayMetadata& finest = levels[0].metadata;
+    const ArrayMetadata &array = level.metadata, &finest = levels[0].metadata;
     if (array.type != finest.type ||
         fill_bits(array.type, array.fill_value) != fill_bits(finest.type, finest.fill_value))
       throw Error(where + ": levels of different types or fill values are not supported");
   }
-  info.levels.push_back(std::move(out));
   levels.push_back(std::move(level));
 }
 
@@ -240,7 +201,7 @@ std::shared_ptr<const File> StoreReader::Impl::shard_file(int level, Int3 s) {
 // must be the fill value, or hold it where a neighbour's first layer is in them.
 void StoreReader::Impl::check_missing_shard(int level, Int3 s) {
   if (!at(level).brick_ranges || std::isnan(info.fill_value)) return;
-  const Int3 n = at(level).bricks_per_shard, grid = lattice(level).bricks();
+  const Int3 n = at(level).grid.bricks_per_shard, grid = lattice(level).bricks();
   const Box3 box = intersect({s * n, (s + Int3{1, 1, 1}) * n}, {{0, 0, 0}, grid});
   const RangeTable table = ranges(level, box, false);
   for_each_point(box, [&](Int3 b) {
@@ -258,8 +219,7 @@ void StoreReader::Impl::check_missing_shard(int level, Int3 s) {
 
 std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3 s) {
   return indices.get(key(level, s), [&] {
-    const auto bricks = static_cast<std::uint64_t>(volume(at(level).bricks_per_shard)) *
-                        at(level).place.shard_volumes;
+    const std::uint64_t bricks = at(level).grid.shard_bricks() * at(level).place.shard_volumes;
     const auto file = shard_file(level, s);
     // A shard without a file has only absent bricks.
     if (!*file) {
@@ -294,12 +254,12 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 
     check_missing_shard(level, b);
     return std::nullopt;
   }
-  const Int3 n = at(level).bricks_per_shard;
-  const Int3 s{b.x / n.x, b.y / n.y, b.z / n.z};
+  const ShardGrid& grid = at(level).grid;
+  const Int3 s = grid.shard_of(b);
   const auto index = shard_index(level, s);
   if (index->size() == 0) return std::nullopt;
-  const ShardIndex::Entry entry = (*index)[static_cast<std::size_t>(
-      static_cast<Index>(at(level).place.in_shard) * volume(n) + linear_index(b - s * n, n))];
+  const ShardIndex::Entry entry =
+      (*index)[at(level).place.in_shard * grid.shard_bricks() + grid.place_in_shard(b)];
   if (entry.absent()) return std::nullopt;
   return Place{shard_file(level, s), entry.offset, entry.size};
 }

@@ -8,31 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "isobrick/bricks/level_info.h"
+#include "isobrick/bricks/range_table.h"
 #include "isobrick/core/lattice.h"
-#include "isobrick/core/range.h"
 #include "isobrick/core/selection.h"
-#include "isobrick/core/transform.h"
 
 namespace isobrick {
-
-/// More samples along an axis are not supported: meshes number tiles of 32 cells
-/// with 21 bits an axis.
-inline constexpr Index kMaxAxisSamples = Index{1} << 26;
-
-/// One resolution of a store, 0 the finest.
-struct LevelInfo {
-  Lattice lattice;
-  Int3 shard;           ///< samples of a shard
-  Transform transform;  ///< index space of this level to world space
-  /// Bytes that each thread needs to decode a brick, beyond the brick and what it
-  /// is encoded to: nothing unless a chunk holds several channels or times.
-  std::uint64_t decode_extra = 0;
-  /// Bytes of this level's shard indices that the reader keeps at most: all of a usual
-  /// volume, bounded of a huge one.
-  std::uint64_t index_bytes = 0;
-  /// A checksum of the ranges of this level's blocks; 0 where there are none.
-  std::uint32_t block_ranges_crc32c = 0;
-};
 
 /// What a store's metadata says.
 struct StoreInfo {
@@ -78,17 +59,6 @@ struct BrickTimes {
   }
 };
 
-/// Ranges of an aligned box of 16³ blocks (or of bricks), C order [z, y, x]
-/// over `box`, as doubles: exact for all types but 64-bit ones that we don't have.
-struct RangeTable {
-  Box3 box;
-  std::vector<ValueRange<double>> ranges;
-  std::uint64_t bytes_read = 0;  ///< from disk, for this table
-  const ValueRange<double>& at(Int3 p) const {
-    return ranges[static_cast<std::size_t>(linear_index(p - box.lo, box.extent()))];
-  }
-};
-
 /// Reads a store, or an image or array that another program has written as Zarr
 /// version 2 or 3. Thread-safe after construction; keeps shard indices cached
 /// in bounded memory, never samples.
@@ -124,7 +94,7 @@ class StoreReader {
 
   /// Edge, in blocks, of the chunks in which block ranges are stored: reading
   /// an aligned cube of them touches one file.
-  static constexpr Index kRangeChunk = 32;
+  static constexpr Index kRangeChunk = kRangeChunkEdge;
 
   /// Ranges of the bricks in `box` (in bricks) and of the 16³ blocks in `box`
   /// (in blocks). Throws Error when the store has no ranges yet.

@@ -7,33 +7,12 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
-#include "isobrick/bricks/codec.h"
 #include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/downsampling.h"
+#include "isobrick/bricks/store_layout.h"
+#include "isobrick/core/lattice.h"
 
 namespace isobrick {
-
-/// Everything that the metadata of a store will say. All levels share type and codec.
-struct StoreLayout {
-  std::vector<LevelInfo> levels;
-  std::vector<Int3> factors;  ///< of each level but the last: 1 or 2 an axis, to the next one
-  Downsampling downsampling = Downsampling::mean;  ///< what makes the coarser levels
-  OmeVersion ome = OmeVersion::v05;                ///< in 0.4 every shard is one brick
-  std::optional<int> zstd_level = 3;
-  double fill_value = 0;
-  bool may_have_nan = false;
-  std::string name;
-  std::string grid_class;  ///< as OpenVDB calls it, or empty
-  std::string grid_name;   ///< of the OpenVDB grid, or empty
-
-  CodecChain codecs() const {
-    return ome == OmeVersion::v04 ? CodecChain::ours_v2(zstd_level) : CodecChain::ours(zstd_level);
-  }
-};
 
 /// Writes a store into a directory: bricks into shard files under temporary
 /// names, metadata last. Bricks are given encoded, so encoding runs on any

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "isobrick/bricks/codec.h"
+#include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/program_memory.h"

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/range.h"
 #include "isobrick/pipeline/range_scan.h"
 

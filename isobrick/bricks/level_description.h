@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "isobrick/bricks/array_metadata.h"
+#include "isobrick/bricks/level_info.h"
+#include "isobrick/bricks/volume_choice.h"
+
+namespace isobrick {
+
+/// All shard indices that a reader keeps may weigh so many bytes.
+inline constexpr std::uint64_t kIndexCacheBytes = std::uint64_t{64} << 20;
+
+/// What the index of a shard of so many bricks weighs among them.
+std::uint64_t index_weight(std::uint64_t bricks);
+
+/// What the metadata of a level's array mean. `where` names its file. Throws DamageError for an
+/// impossible shape, Error for one that is too large.
+LevelInfo describe_level(const ArrayMetadata& array, const VolumePlace& place,
+                         const Transform& transform, const std::string& where);
+
+}  // namespace isobrick

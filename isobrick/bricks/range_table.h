@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "isobrick/core/lattice.h"
+#include "isobrick/core/range.h"
+
+namespace isobrick {
+
+/// Items along each edge of a chunk of ranges as it is stored.
+inline constexpr Index kRangeChunkEdge = 32;
+
+/// Ranges of an aligned box of 16³ blocks (or of bricks), C order [z, y, x]
+/// over `box`, as doubles: exact for all types but 64-bit ones that we don't have.
+struct RangeTable {
+  Box3 box;
+  std::vector<ValueRange<double>> ranges;
+  std::uint64_t bytes_read = 0;  ///< from disk, for this table
+  const ValueRange<double>& at(Int3 p) const {
+    return ranges[static_cast<std::size_t>(linear_index(p - box.lo, box.extent()))];
+  }
+};
+
+}  // namespace isobrick
