@@ -13,16 +13,13 @@
 
 #include "isobrick/bricks/array_metadata.h"
 #include "isobrick/bricks/publisher.h"
-#include "isobrick/bricks/store_reader.h"
+#include "isobrick/bricks/range_table.h"
 
 namespace isobrick {
 
 /// Where the ranges of bricks and of blocks lie in a store.
 std::filesystem::path brick_range_folder(const std::filesystem::path& store, int level);
 std::filesystem::path block_range_folder(const std::filesystem::path& store, int level);
-
-/// The array [z, y, x, 2] of the ranges of so many items.
-ArrayMetadata range_array_metadata(Int3 items, ScalarType type);
 
 /// Writes one range array. Chunks are collected in memory and written as soon
 /// as all their items are known. Thread-safe.
