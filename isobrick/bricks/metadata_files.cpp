@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <optional>
 
 #include "isobrick/bricks/checked_json.h"
+#include "isobrick/bricks/lone_array.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/bricks/zarr_v2.h"
 #include "isobrick/core/error.h"
@@ -15,7 +15,6 @@ namespace isobrick {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 /// Metadata in the words of Zarr version 3, and where it came from.
 struct Text {
@@ -27,69 +26,16 @@ std::optional<std::string> read_text(const fs::path& file) {
   return read_small_file(file, kMaxMetadataBytes);
 }
 
-/// An array of version 2 with the names that xarray and others give its dimensions in .zattrs.
-std::string with_dimension_names(std::string array, const fs::path& folder) {
-  const auto text = read_text(folder / ".zattrs");
-  if (!text) return array;
-  const nlohmann::json attributes = parse_json(*text, quoted(folder / ".zattrs"));
-  if (!attributes.is_object() || !attributes.contains("_ARRAY_DIMENSIONS")) return array;
-  nlohmann::json named = nlohmann::json::parse(array);
-  named["dimension_names"] = attributes["_ARRAY_DIMENSIONS"];
-  return named.dump();
-}
-
-/// Dimensions named x, y and z in another order would be taken for z, y, x: a mirrored volume.
-void check_order(const ArrayMetadata& array, const std::string& where) {
-  std::string letters, all;  // of each dimension one; '-': none of space
-  for (const std::string& name : array.dimension_names) {
-    const char letter = name.size() == 1 ? static_cast<char>(name[0] | 0x20) : '-';
-    letters += letter >= 'x' && letter <= 'z' ? letter : '-';
-    all += (all.empty() ? "" : ", ") + name;
-  }
-  const bool named = std::ranges::count(letters, '-') + 3 == std::ssize(letters);
-  if (named && !letters.ends_with("zyx"))
-    throw Error(
-        fmt::format("{}: its dimensions are {}: only arrays whose last are z, y, x are read; write "
-                    "it transposed",
-                    where, all));
-}
-
 std::optional<Text> read_array(const fs::path& folder) {
   if (auto text = read_text(folder / "zarr.json"))
     return Text{folder / "zarr.json", std::move(*text)};
-  const fs::path file = folder / ".zarray";
-  if (const auto text = read_text(file))
-    return Text{file, with_dimension_names(v3_from_zarray(*text, quoted(file)), folder)};
-  return std::nullopt;
-}
-
-/// Names of an array's axes before its last three: those that it says itself. Where it says
-/// none, five dimensions are t, c, z, y, x, and other axes have no name ("?").
-std::vector<std::string> leading_names(const ArrayMetadata& array) {
-  const std::size_t count = array.shape.size() - 3;
-  std::vector<std::string> names(count, "?");
-  if (count == 2) names = {"t", "c"};
-  for (std::size_t i = 0; i < count && array.dimension_names.size() == array.shape.size(); ++i)
-    if (const std::string& name = array.dimension_names[i]; !name.empty()) names[i] = name;
-  return names;
-}
-
-/// The group that has nothing but this array, at ".".
-std::string group_of(const ArrayMetadata& array, const std::string& where) {
-  if (array.shape.size() < 3)
-    throw Error(
-        fmt::format("{}: arrays of {} dimensions are no volumes", where, array.shape.size()));
-  Json axes = Json::array();
-  for (const std::string& name : leading_names(array)) axes.push_back({{"name", name}});
-  for (const char* name : {"z", "y", "x"}) axes.push_back({{"name", name}});
-  const std::vector<int> ones(array.shape.size(), 1);
-  Json dataset{{"path", "."}};
-  dataset["coordinateTransformations"] = Json::array({Json{{"type", "scale"}, {"scale", ones}}});
-  Json multiscale{{"axes", std::move(axes)}, {"datasets", Json::array({std::move(dataset)})}};
-  Json group{{"zarr_format", 3}, {"node_type", "group"}};
-  group["attributes"]["ome"] = {{"version", "0.5"},
-                                {"multiscales", Json::array({std::move(multiscale)})}};
-  return group.dump();
+  const fs::path file = folder / ".zarray", attributes = folder / ".zattrs";
+  const auto text = read_text(file);
+  if (!text) return std::nullopt;
+  Text array{file, v3_from_zarray(*text, quoted(file))};
+  if (const auto names = read_text(attributes))
+    array.json = with_dimension_names(array.json, *names, quoted(attributes));
+  return array;
 }
 
 /// A group in the words of version 3, or that of an array alone.
@@ -157,7 +103,7 @@ MetadataFiles read_metadata_files(const fs::path& path) {
   check_ours(files, path);
   for (std::size_t i = 0; i < texts.size(); ++i) {
     files.levels[i].array = parse_array_metadata(texts[i], quoted(files.levels[i].file));
-    check_order(files.levels[i].array, quoted(files.levels[i].file));
+    check_axis_order(files.levels[i].array, quoted(files.levels[i].file));
   }
   return files;
 }

@@ -1,7 +1,5 @@
 #include "isobrick/bricks/stored_ranges.h"
 
-#include <fmt/format.h>
-
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/sealed_json.h"
 #include "isobrick/io/file.h"
@@ -29,12 +27,9 @@ std::string to_json(const StoredRanges& stored) {
   return seal_json(std::move(json));
 }
 
-std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store) {
-  const std::filesystem::path file = ranges_file(store);
-  const auto text = read_small_file(file, kMaxMetadataBytes);
-  if (!text) return std::nullopt;
-  const nlohmann::json object = unseal_json(*text, quoted(file));
-  const CheckedJson json(object, quoted(file));
+StoredRanges parse_stored_ranges(std::string_view text, const std::string& where) {
+  const nlohmann::json object = unseal_json(text, where);
+  const CheckedJson json(object, where);
   json.at("isobrick_ranges")
       .check_version("ranges", kVersion, "remove the file and run isobrick index");
   StoredRanges stored{json.at("may_have_nan").boolean(),
@@ -46,6 +41,13 @@ std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& stor
         {static_cast<std::uint32_t>(levels.at(i).at("range_crc32c").integer()),
          static_cast<std::uint32_t>(levels.at(i).at("block_range_crc32c").integer())});
   return stored;
+}
+
+std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store) {
+  const std::filesystem::path file = ranges_file(store);
+  const auto text = read_small_file(file, kMaxMetadataBytes);
+  if (!text) return std::nullopt;
+  return parse_stored_ranges(*text, quoted(file));
 }
 
 }  // namespace isobrick

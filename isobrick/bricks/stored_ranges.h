@@ -28,10 +28,14 @@ struct StoredRanges {
 
 std::filesystem::path ranges_file(const std::filesystem::path& store);
 
+/// The text of ranges.json.
 std::string to_json(const StoredRanges& stored);
 
-/// Reads ranges.json of a store; nothing when there is none. DamageError for
-/// what is broken, Error for a version that this program does not know.
+/// Reads the text of ranges.json; `where` names the file. DamageError for what is broken, Error for
+/// a version that this program does not know.
+StoredRanges parse_stored_ranges(std::string_view text, const std::string& where);
+
+/// The ranges.json of a store; nullopt when there is none. Throws as parse_stored_ranges() does.
 std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store);
 
 }  // namespace isobrick
