@@ -15,6 +15,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/leftovers.h"
+#include "isobrick/io/rename.h"
 
 namespace isobrick {
 namespace {
@@ -171,15 +172,13 @@ void OutputFile::publish() {
   const Publication turn;
   if (path_ == kStandardOutput) return;
   if (force_) check_output(path_, true);  // something else may have appeared
-  int result = ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(),
-                           force_ ? 0 : RENAME_NOREPLACE);
-  if (result != 0 && !force_ && (errno == EINVAL || errno == ENOSYS)) {
-    // The file system cannot refuse to replace by itself.
-    check_output(path_, force_);
-    result = ::rename(temporary_.c_str(), path_.c_str());
-  }
-  if (result != 0 && errno == EEXIST) check_output(path_, force_);
-  if (result != 0) throw system_error("rename the finished file to", path_, errno);
+  int failure = 0;
+  if (!force_)
+    failure = rename_no_replace(temporary_, path_);
+  else if (::rename(temporary_.c_str(), path_.c_str()) != 0)
+    failure = errno;
+  if (failure == EEXIST) check_output(path_, force_);
+  if (failure != 0) throw system_error("rename the finished file to", path_, failure);
   temporary_.clear();
 }
 

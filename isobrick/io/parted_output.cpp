@@ -2,13 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <stdio.h>
-#include <unistd.h>
 
 #include <cerrno>
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_guard.h"
+#include "isobrick/io/rename.h"
 
 namespace isobrick {
 namespace {
@@ -58,15 +57,6 @@ fs::path free_folder(const fs::path& path) {
   return part_folder(path, number);
 }
 
-/// Moves `from` to `to`, where nothing may be.
-void move_to_free_place(const fs::path& from, const fs::path& to) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
-  // The file system may not know the flag.
-  const bool plain = errno == EINVAL || errno == ENOSYS;
-  if (plain && ::rename(from.c_str(), to.c_str()) == 0) return;
-  throw system_error("rename the finished folder to", to.string(), errno);
-}
-
 }  // namespace
 
 PartedOutput::PartedOutput(std::string path, bool force)
@@ -96,7 +86,8 @@ std::string PartedOutput::reference(std::size_t part, std::string_view extension
 void PartedOutput::publish() {
   const Publication turn;
   if (parts_ > 0) {
-    move_to_free_place(temporary_.path, folder_);
+    if (const int failure = rename_no_replace(temporary_.path, folder_); failure != 0)
+      throw system_error("rename the finished folder to", folder_.string(), failure);
     temporary_.path = folder_;  // goes with the file if that cannot be published
   }
   index_.publish();
