@@ -15,6 +15,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/pod_buffer.h"
+#include "isobrick/io/byte_order.h"
 
 namespace isobrick {
 namespace {
@@ -69,12 +70,6 @@ std::span<const std::byte> check_crc(std::span<const std::byte> encoded) {
   if (const std::uint32_t crc = crc32c(body); crc != stored)
     throw DamageError(fmt::format("checksum is {:08x}, must be {:08x}", crc, stored));
   return body;
-}
-
-void swap_bytes(std::span<std::byte> samples, std::size_t sample_bytes) {
-  if (sample_bytes == 1) return;
-  for (std::size_t i = 0; i + sample_bytes <= samples.size(); i += sample_bytes)
-    std::reverse(samples.data() + i, samples.data() + i + sample_bytes);
 }
 
 }  // namespace
@@ -248,7 +243,7 @@ void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
       throw DamageError(fmt::format("decodes to {} bytes, must be {}", current.size(), out.size()));
     std::copy(current.begin(), current.end(), out.begin());
   }
-  if (chain.big_endian) swap_bytes(out, sample_bytes);
+  if (chain.big_endian) swap_byte_order(out.data(), out.size() / sample_bytes, sample_bytes);
 }
 
 }  // namespace isobrick
