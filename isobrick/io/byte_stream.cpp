@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 #include "isobrick/core/cancel.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/byte_order.h"
 
 namespace isobrick {
 
@@ -23,6 +25,15 @@ void ByteStream::skip(std::uint64_t size) {
 void ByteStream::read_exactly(std::byte* out, std::size_t size) {
   if (const std::size_t got = read(out, size); got < size)
     throw Error(fmt::format("{} ends {} bytes too early", name(), size - got));
+}
+
+std::uint64_t ByteStream::read_unsigned(std::size_t bytes, bool swap) {
+  std::byte raw[sizeof(std::uint64_t)]{};
+  read_exactly(raw, bytes);
+  if (swap) swap_byte_order(raw, 1, bytes);
+  std::uint64_t value = 0;
+  std::memcpy(&value, raw, bytes);
+  return value;
 }
 
 }  // namespace isobrick

@@ -32,6 +32,10 @@ class ByteStream {
 
   /// Fills `out`; throws Error when there are fewer bytes.
   void read_exactly(std::byte* out, std::size_t size);
+
+  /// The next unsigned number of 1, 2, 4 or 8 bytes; `swap`: of the other byte order. Throws Error
+  /// when there are fewer bytes.
+  std::uint64_t read_unsigned(std::size_t bytes, bool swap);
 };
 
 }  // namespace isobrick

@@ -27,6 +27,9 @@ struct Inflated {
   bool filled(std::size_t expected) const { return end == End::complete && size == expected; }
 };
 
+/// Nothing that zlib makes of so many bytes is longer.
+constexpr std::size_t max_deflated(std::size_t bytes) { return bytes + bytes / 1000 + 64; }
+
 /// Inflates one stream that is in memory as a whole, of gzip the first member. Neither span has
 /// 4 GiB or more. Thread-safe.
 Inflated inflate(Wrapper wrapper, std::span<const std::byte> packed, std::span<std::byte> out);

@@ -9,16 +9,12 @@
 #include <vector>
 
 #include "isobrick/core/error.h"
-#include "isobrick/io/byte_order.h"
 #include "isobrick/io/inflate.h"
 
 namespace isobrick {
 namespace {
 
 constexpr std::uint64_t kMostBlock = std::uint64_t{64} << 20;
-
-/// Nothing that zlib makes of `bytes` is longer.
-constexpr std::uint64_t most_packed(std::uint64_t bytes) { return bytes + bytes / 1000 + 64; }
 
 class ZlibBlockStream final : public ByteStream {
  public:
@@ -36,7 +32,7 @@ class ZlibBlockStream final : public ByteStream {
                                    packed_->name(), table_.blocks));
     if (table_.last_bytes == 0) table_.last_bytes = table_.block_bytes;
     block_.resize(table_.block_bytes);
-    input_.resize(most_packed(table_.block_bytes));
+    input_.resize(max_deflated(table_.block_bytes));
   }
 
   std::size_t read(std::byte* out, std::size_t size) override {
@@ -70,16 +66,6 @@ class ZlibBlockStream final : public ByteStream {
   }
 
  private:
-  std::uint64_t next_size() {
-    std::uint64_t size = 0;
-    const auto bytes = static_cast<std::size_t>(table_.entry_bytes);
-    std::byte raw[8];
-    sizes_->read_exactly(raw, bytes);
-    if (table_.swap) swap_byte_order(raw, 1, bytes);
-    std::memcpy(&size, raw, bytes);
-    return size;
-  }
-
   /// Of the next block, unpacked.
   std::size_t next_bytes() const {
     return static_cast<std::size_t>(index_ + 1 == table_.blocks ? table_.last_bytes
@@ -87,7 +73,8 @@ class ZlibBlockStream final : public ByteStream {
   }
 
   void next_block(std::byte* out) {
-    const std::uint64_t packed = next_size();
+    const std::uint64_t packed =
+        sizes_->read_unsigned(static_cast<std::size_t>(table_.entry_bytes), table_.swap);
     const std::size_t bytes = next_bytes();
     if (packed > input_.size())
       throw DamageError(

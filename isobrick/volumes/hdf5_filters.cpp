@@ -105,8 +105,7 @@ std::size_t size_before(const Hdf5Encoding& encoding, std::uint32_t skipped, std
 }  // namespace
 
 std::size_t Hdf5Encoding::most_packed() const {
-  // What zlib makes of bytes that it cannot compress, and checksums.
-  return chunk_bytes + chunk_bytes / 1000 + 64 + filters.size() * kChecksumBytes;
+  return max_deflated(chunk_bytes) + filters.size() * kChecksumBytes;
 }
 
 void undo_filters(const Hdf5Encoding& encoding, std::uint32_t skipped, Hdf5ChunkBuffers& buffers) {

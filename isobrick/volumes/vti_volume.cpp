@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
 #include <limits>
 #include <utility>
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/base64_stream.h"
-#include "isobrick/io/byte_order.h"
 #include "isobrick/io/file_stream.h"
 #include "isobrick/io/text_stream.h"
 #include "isobrick/io/zlib_block_stream.h"
@@ -36,13 +34,7 @@ std::unique_ptr<ByteStream> open_encoded(const std::string& path, const VtiHeade
 
 /// The next number of the kind that says how long something is.
 std::uint64_t read_size(ByteStream& stream, const VtiHeader& header) {
-  const auto bytes = static_cast<std::size_t>(header.size_bytes);
-  std::byte raw[8]{};
-  stream.read_exactly(raw, bytes);
-  if (must_swap(header)) swap_byte_order(raw, 1, bytes);
-  std::uint64_t size = 0;
-  std::memcpy(&size, raw, bytes);
-  return size;
+  return stream.read_unsigned(static_cast<std::size_t>(header.size_bytes), must_swap(header));
 }
 
 std::unique_ptr<ByteStream> open_compressed(const std::string& path, const VtiHeader& header) {
