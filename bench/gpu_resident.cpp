@@ -16,6 +16,7 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <vector>
 
 #include "bench/bandwidth.h"
@@ -25,6 +26,7 @@
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/device_volume.h"
+#include "isobrick/gpu/tile_kernel.h"
 #include "isobrick/index/active_tiles.h"
 #include "isobrick/surface/cpu_extractor.h"
 #include "isobrick/volumes/synth_source.h"
@@ -88,6 +90,12 @@ bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(V)) == 0;
 }
 
+gpu::LaunchShape shape_with(int threads, ScalarType type, const SurfaceOptions& options) {
+  for (const gpu::LaunchShape& shape : gpu::launch_shapes(gpu::kernel_of(type, options)).shapes)
+    if (shape.threads == threads && shape.blocks > 0) return shape;
+  throw UsageError("--threads takes 384, 640 or 1024");
+}
+
 int run(const Arguments& a) {
   const Volume v = read_volume(a);
   if (!a.write_raw.empty()) {
@@ -105,8 +113,12 @@ int run(const Arguments& a) {
 
   gpu::DeviceVolume resident(lattice, bricks, 0);
   gpu::ResidentTuning tuning;
-  tuning.threads = a.threads;
-  if (a.brute_force) tuning.search = gpu::TileSearch::none;
+  tuning.brute_force = a.brute_force;
+  std::optional<gpu::LaunchShape> shape;
+  if (a.threads > 0) {
+    shape = shape_with(a.threads, lattice.type, options);
+    tuning.shape = &*shape;
+  }
   gpu::ResidentExtractor extractor(resident, options, tuning);
   const gpu::DeviceCounts counts = extractor.extract(options.isovalue);
   nlohmann::json out;
@@ -121,8 +133,7 @@ int run(const Arguments& a) {
     out["same_as_cpu"] = same;
     if (!same) fmt::print(stderr, "the mesh differs from the CPU's\n");
   }
-  const std::vector<float> times = repeat_milliseconds(extractor, a.runs, false);
-  const float queued = median(repeat_milliseconds(extractor, a.runs, true));
+  const std::vector<float> times = repeat_milliseconds(extractor, a.runs);
   const Bandwidth bandwidth = measure_bandwidth(std::size_t{1} << 30);
   const double read = static_cast<double>(counts.active_tiles) * 32768 *
                       static_cast<double>(lattice.sample_bytes());
@@ -133,10 +144,6 @@ int run(const Arguments& a) {
   const std::uint64_t extra_bytes = extractor.bytes();
   const double other = std::nextafter(options.isovalue, HUGE_VAL);
   const double wall = changed_isovalue_seconds(extractor, options.isovalue, other, a.runs) * 1e3;
-  tuning.patience = {};  // each launched by itself
-  gpu::ResidentExtractor impatient(resident, options, tuning);
-  const double wall_alone =
-      changed_isovalue_seconds(impatient, options.isovalue, other, a.runs) * 1e3;
   out["extent"] = {v.extent.x, v.extent.y, v.extent.z};
   out["type"] = short_name(v.type);
   out["isovalue"] = options.isovalue;
@@ -149,10 +156,7 @@ int run(const Arguments& a) {
   out["ms_median"] = middle;
   out["ms_least"] = times.front();
   out["ms_most"] = times.back();
-  out["queued_ms_median"] = queued;
-  out["queued_times_floor"] = queued / floor;
   out["wall_ms_median"] = wall;
-  out["wall_alone_ms_median"] = wall_alone;
   out["floor_ms"] = floor;
   out["times_floor"] = middle / floor;
   out["read_bytes_per_s"] = bandwidth.read;

@@ -27,11 +27,10 @@ inline double changed_isovalue_seconds(gpu::ResidentExtractor& extractor, double
 }
 
 /// Milliseconds of the last mesh made again, by events, after three that do not count; sorted.
-inline std::vector<float> repeat_milliseconds(gpu::ResidentExtractor& extractor, int runs,
-                                              bool queued) {
+inline std::vector<float> repeat_milliseconds(gpu::ResidentExtractor& extractor, int runs) {
   std::vector<float> times;
   for (int i = -3; i < runs; ++i) {
-    extractor.repeat(queued);
+    extractor.repeat();
     const float ms = extractor.milliseconds();
     if (i >= 0) times.push_back(ms);
   }

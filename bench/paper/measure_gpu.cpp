@@ -8,11 +8,13 @@
 #include <functional>
 
 #include "bench/median.h"
+#include "bench/paper/block_sizes.h"
 #include "bench/resident_times.h"
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/morton.h"
 #include "isobrick/gpu/span_search.h"
+#include "isobrick/gpu/tile_kernel.h"
 #include "isobrick/index/active_tiles.h"
 #include "isobrick/index/leaf_ranges.h"
 #include "isobrick/index/span_index.h"
@@ -20,8 +22,6 @@
 
 namespace isobrick::bench {
 namespace {
-
-using gpu::TileSearch;
 
 constexpr int kFrames = 101;
 constexpr Index kBrick = 64;  ///< cells along the bricks of the structures over cells
@@ -57,16 +57,13 @@ class GpuMeasurement {
   nlohmann::json run() {
     nlohmann::json out;
     out["volume_bytes"] = resident_.bytes();
-    const std::pair<const char*, TileSearch> searches[] = {
-        {"brute", TileSearch::none},        {"linear", TileSearch::ranges},
-        {"interval", TileSearch::interval}, {"kdtree", TileSearch::kdtree},
-        {"quadtree", TileSearch::quadtree}, {"octree", TileSearch::octree}};
-    for (const auto& [name, search] : searches) out["frames"][name] = frames({.search = search});
+    out["frames"]["brute"] = frames({.brute_force = true});
+    out["frames"]["linear"] = frames({});
     if (volume_.type == ScalarType::u8)
-      for (const int threads : {32, 64, 128, 256, 512, 1024}) {
-        auto& o = out["threads"][std::to_string(threads)];
-        o["brute"] = frames({.search = TileSearch::none, .threads = threads});
-        o["interval"] = frames({.search = TileSearch::interval, .threads = threads});
+      for (const gpu::LaunchShape& shape : block_sizes()) {
+        auto& o = out["threads"][std::to_string(shape.threads)];
+        o["brute"] = frames({.brute_force = true, .shape = &shape});
+        o["linear"] = frames({.shape = &shape});
       }
     for (const IndexKind kind : kIndexKinds)
       out["blocks"][std::string(name_of(kind))] = blocks(kind);
@@ -77,8 +74,8 @@ class GpuMeasurement {
   }
 
  private:
-  /// One isovalue upon the other, and launched each by itself; and those on the device alone.
-  nlohmann::json frames(gpu::ResidentTuning tuning) {
+  /// From a changed isovalue to the mesh, and its part on the device.
+  nlohmann::json frames(const gpu::ResidentTuning& tuning) {
     gpu::ResidentExtractor extractor(resident_, surface_, tuning);
     extractor.extract(volume_.isovalue + 1);
     extractor.extract(volume_.isovalue);
@@ -87,11 +84,8 @@ class GpuMeasurement {
     expect(same_bytes(mesh.positions, expected_.positions) &&
                same_bytes(mesh.triangles, expected_.triangles),
            volume_, "the mesh");
-    tuning.patience = {};
-    gpu::ResidentExtractor impatient(resident_, surface_, tuning);
-    const double device = median(repeat_milliseconds(extractor, kFrames, false)) * 1e-3;
+    const double device = median(repeat_milliseconds(extractor, kFrames)) * 1e-3;
     return {{"contour_s", contour_seconds(extractor)},
-            {"alone_s", contour_seconds(impatient)},
             {"device_s", device},
             {"extra_bytes", extractor.bytes()}};
   }

@@ -61,7 +61,7 @@ struct BrickPool::Impl {
       : device(make_current(id)),
         brick_bytes(of_brick),
         size(count * of_brick),
-        buffers(id, pinned_pieces(of_brick, threads)),
+        buffers(id, {static_cast<std::size_t>(pinned_bytes(of_brick, threads))}),
         memory(size),
         books(threads, buffers_of_thread(of_brick)) {
     if (!memory) throw OutOfDeviceMemory("the GPU has no room for a pool of bricks");

@@ -46,10 +46,6 @@ class BrickPool {
   static constexpr std::uint64_t pinned_bytes(std::size_t brick_bytes, int threads) {
     return static_cast<std::uint64_t>(threads) * buffers_of_thread(brick_bytes) * brick_bytes;
   }
-  /// The pieces of it.
-  static std::vector<std::size_t> pinned_pieces(std::size_t brick_bytes, int threads) {
-    return {static_cast<std::size_t>(pinned_bytes(brick_bytes, threads))};
-  }
 
  private:
   struct Impl;

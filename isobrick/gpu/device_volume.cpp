@@ -73,34 +73,15 @@ void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_val
 void DeviceVolume::Impl::list_tiles() {
   std::vector<std::int32_t> order;
   order.reserve(3 * std::size_t{tile_count});
-  std::vector<std::uint32_t> places(tile_count);
   for_each_morton(lattice.tiles(), [&](Int3 t) {
-    places[static_cast<std::size_t>(linear_index(t, lattice.tiles()))] =
-        static_cast<std::uint32_t>(order.size() / 3);
     for (int axis = 0; axis < 3; ++axis) order.push_back(static_cast<std::int32_t>(t[axis]));
   });
-  order_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
-  check(cudaMemcpyAsync(order_of_tile.data(), places.data(), order_of_tile.bytes(),
-                        cudaMemcpyHostToDevice, stream.get()));
   tiles = DeviceBuffer<std::int32_t>(order.size(), stream);
   check(cudaMemcpyAsync(tiles.data(), order.data(), tiles.bytes(), cudaMemcpyHostToDevice,
                         stream.get()));
   ranges = DeviceBuffer<std::byte>(2 * lattice.sample_bytes() * tile_count, stream);
   launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(), stream.get());
   stream.wait();
-  if (tile_count <= kMostCandidates) keep_ranges_here();
-}
-
-void DeviceVolume::Impl::keep_ranges_here() {
-  for_each_morton(lattice.tiles(), [&](Int3 t) { tiles_here.push_back(t); });
-  visit_device_scalar(lattice.type, [&](auto tag) {
-    using T = typename decltype(tag)::type;
-    std::vector<T> values(2 * std::size_t{tile_count});
-    check(cudaMemcpy(values.data(), ranges.data(), ranges.bytes(), cudaMemcpyDeviceToHost));
-    for (std::size_t i = 0; i < tile_count; ++i)
-      ranges_here.push_back(
-          {static_cast<double>(values[2 * i]), static_cast<double>(values[2 * i + 1])});
-  });
 }
 
 TileParams DeviceVolume::Impl::params() const {
@@ -124,7 +105,7 @@ const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
 
 std::uint64_t DeviceVolume::bytes() const {
   return impl_->pages.bytes() + impl_->columns.bytes() + impl_->page_of_tile.bytes() +
-         impl_->tiles.bytes() + impl_->order_of_tile.bytes() + impl_->ranges.bytes();
+         impl_->tiles.bytes() + impl_->ranges.bytes();
 }
 
 }  // namespace isobrick::gpu

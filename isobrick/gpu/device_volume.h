@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <memory>
 
@@ -31,27 +30,13 @@ class DeviceVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-/// How the active tiles of a volume are found.
-enum class TileSearch : std::uint8_t {
-  ranges,  ///< compares the range of every tile
-  interval,
-  kdtree,
-  quadtree,
-  octree,  ///< through that structure over the tiles; up to 1,024 of them the host searches it
-  none     ///< takes every tile: brute force
-};
+struct LaunchShape;
 
-/// How a resident volume is extracted; none of it shows in the mesh.
+/// How a resident volume is extracted; none of it shows in the mesh. For measuring.
 struct ResidentTuning {
-  TileSearch search = TileSearch::ranges;
-  /// Threads that share a tile: 0 chooses, 384, 640 and 1024 always work, 32, 64,
-  /// 128, 256 and 512 for u8 without normals.
-  int threads = 0;
-  /// Of small volumes (up to 128 tiles of 32³, without NaN) an extraction stays on the device for
-  /// so long, for the next isovalue, where the last ones came sooner than that after each other,
-  /// and `threads` is 0. Other work may have to wait for a millisecond or three times as long as
-  /// this. 0: it does not stay.
-  std::chrono::nanoseconds patience = std::chrono::microseconds(20);
+  bool brute_force = false;  ///< takes every tile instead of comparing ranges
+  /// The thread blocks to use (tile_kernel.h), for all calls; null: those that fit the tiles.
+  const LaunchShape* shape = nullptr;
 };
 
 /// What an extraction on the device made.
@@ -66,8 +51,7 @@ struct DeviceCounts {
 class ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Throws UsageError for what the
-  /// device cannot do yet: dropping degenerate triangles, meshes that are not welded;
-  /// and for threads that have no kernels.
+  /// device cannot do yet: dropping degenerate triangles, meshes that are not welded.
   ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
                     const ResidentTuning& tuning = {});
   ~ResidentExtractor();
@@ -76,18 +60,12 @@ class ResidentExtractor {
   /// buffers and repeats when it does not fit them.
   DeviceCounts extract(double isovalue);
   /// Makes the last mesh once more, without waiting for it; for measuring, after an extract().
-  /// `queued`: once the stream has nothing to do, and it begins only when all of it is there, as
-  /// where launches follow one another.
-  void repeat(bool queued = false);
-  /// Milliseconds of the last repeat() on the stream, with the searches that it makes: the host
-  /// searches up to 4,096 tiles by their ranges, 1,024 through an index. What the host does before
-  /// it has launched is part of it, but not of one that was queued.
+  void repeat();
+  /// Milliseconds of the last repeat() on the stream, the search included; waits for it.
   float milliseconds();
 
   /// Copies the last mesh to the host.
   void download(MeshBuffer& mesh) const;
-  /// How many isovalues have been asked of an extraction that had stayed, which spares a launch.
-  std::uint64_t asked() const;
   /// Bytes of device memory besides the volume's.
   std::uint64_t bytes() const;
 

@@ -8,7 +8,6 @@
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/brick_table.h"
 #include "isobrick/gpu/row_slots.h"
-#include "isobrick/gpu/spare_pages.h"
 #include "isobrick/gpu/stream_collector.h"
 #include "isobrick/gpu/stream_device.h"
 #include "isobrick/gpu/supported.h"
@@ -53,10 +52,7 @@ struct GpuExtractor::Impl {
         pool(std::move(brick_pool)),
         device(l, options, sizes, pool.get()),
         slots(device.sizes().slots, l.tiles()),
-        collector(id, device, welded(), options.normals, std::move(take)) {
-    // Launches may have been halved, which leaves pages that they would have taken.
-    spare_pages().keep_only(id, pinned_regions(l, device.sizes()));
-  }
+        collector(id, device, welded(), options.normals, std::move(take)) {}
 
   /// Where there may be NaN all of an active tile is looked at, because ranges leave NaN out.
   std::span<const TileWork> all_to_look_at(std::span<const TileWork> tiles) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/spare_pages.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -21,21 +20,21 @@ void touch(tbb::task_arena& arena, std::byte* data, std::size_t bytes) {
   });
 }
 
-LockedPieces spare_or_new(int device, const std::vector<std::size_t>& pieces) {
-  if (auto spare = spare_pages().take(device, pieces)) return std::move(*spare);
-  return {device, pieces};
+std::vector<std::size_t> offsets_of(const std::vector<std::size_t>& chunks) {
+  std::vector<std::size_t> offsets{0};
+  for (const std::size_t bytes : chunks)
+    offsets.push_back(offsets.back() + MappedPages::whole_pages(bytes));
+  return offsets;
 }
 
 }  // namespace
 
-PinnedRegion::PinnedRegion(int device, const std::vector<std::size_t>& pieces)
+PinnedRegion::PinnedRegion(int device, const std::vector<std::size_t>& chunks)
     : device_(device),
       threads_(tbb::this_task_arena::max_concurrency()),
-      pieces_(spare_or_new(device, pieces)) {
-  if (pieces_.all_locked())
-    touched_ = locked_ = pieces_.count();
-  else
-    thread_ = std::thread([this] { run(); });
+      offsets_(offsets_of(chunks)),
+      pages_(offsets_.back()) {
+  thread_ = std::thread([this] { run(); });
 }
 
 PinnedRegion::~PinnedRegion() {
@@ -43,8 +42,8 @@ PinnedRegion::~PinnedRegion() {
     const std::lock_guard lock(mutex_);
     stop_ = true;
   }
-  if (thread_.joinable()) thread_.join();
-  spare_pages().give(std::move(pieces_));
+  thread_.join();
+  for (std::size_t chunk = 0; chunk < locked_; ++chunk) (void)cudaHostUnregister(at(chunk));
 }
 
 bool PinnedRegion::stopped() {
@@ -56,11 +55,11 @@ void PinnedRegion::run() {
   try {
     make_current(device_);
     tbb::task_arena arena(threads_);
-    for (std::size_t piece = 0; piece < pieces_.count() && !stopped(); ++piece) {
-      touch(arena, pieces_.at(piece), pieces_.bytes(piece));
+    for (std::size_t chunk = 0; chunk < count() && !stopped(); ++chunk) {
+      touch(arena, at(chunk), bytes(chunk));
       advance(touched_);
       if (stopped()) return;
-      pieces_.lock_next();
+      check(cudaHostRegister(at(chunk), bytes(chunk), cudaHostRegisterMapped));
       advance(locked_);
     }
   } catch (...) {
@@ -76,11 +75,11 @@ void PinnedRegion::advance(std::size_t& count) {
   changed_.notify_all();
 }
 
-std::byte* PinnedRegion::wait_for(std::size_t piece, const std::size_t& count) {
+std::byte* PinnedRegion::wait_for(std::size_t chunk, const std::size_t& count) {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return error_ || piece < count; });
-  if (piece >= count) std::rethrow_exception(error_);
-  return pieces_.at(piece);
+  changed_.wait(lock, [&] { return error_ || chunk < count; });
+  if (chunk >= count) std::rethrow_exception(error_);
+  return at(chunk);
 }
 
 }  // namespace isobrick::gpu

@@ -7,13 +7,6 @@
 
 namespace isobrick::gpu {
 
-/// The device's clock, the same for all of its multiprocessors.
-__device__ inline std::uint64_t global_nanoseconds() {
-  std::uint64_t now;
-  asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(now));
-  return now;
-}
-
 /// The thread's number, read again wherever it is asked for: what follows from it is not
 /// kept in registers throughout a tile.
 __device__ inline unsigned own_thread() {
@@ -61,11 +54,6 @@ __device__ inline std::uint32_t increment_shared(std::uint32_t address) {
                : "r"(address)
                : "memory");
   return before;
-}
-
-/// Fetches a line into the L2 cache.
-__device__ inline void prefetch_l2(const void* from) {
-  asm volatile("prefetch.global.L2 [%0];" ::"l"(from));
 }
 
 /// Where a launch may start before the one before it on the stream has ended: the latter says

@@ -1,4 +1,3 @@
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -12,22 +11,6 @@ namespace {
 /// Mesh to expect of a tile before anything is known: a sheet across it, twice.
 constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
 
-/// Whether what is on the stream waits for more.
-using Gate = std::atomic<bool>;
-class Closed {
- public:
-  Closed(Gate& gate, bool closed) : gate_(gate) { gate_ = closed; }
-  Closed(const Closed&) = delete;
-  Closed& operator=(const Closed&) = delete;
-  ~Closed() {
-    gate_ = false;
-    gate_.notify_all();
-  }
-
- private:
-  Gate& gate_;
-};
-
 }  // namespace
 
 struct ResidentExtractor::Impl {
@@ -37,7 +20,6 @@ struct ResidentExtractor::Impl {
   DeviceCounts made;  ///< by the last extraction
   DeviceCounts last;  ///< what the last launch would have made
   Event start, end;
-  Gate gate = false;
 
   Impl(DeviceVolume& volume, const SurfaceOptions& options, const ResidentTuning& tuning)
       : launcher(volume.impl(), options, tuning) {}
@@ -45,7 +27,6 @@ struct ResidentExtractor::Impl {
   /// Buffers for a mesh of that size. What they held is lost.
   void make_room(std::uint64_t vertices, std::uint64_t triangles) {
     const Stream& stream = launcher.stream();
-    launcher.dismiss();
     made = {};
     if (vertices > room.positions.size()) {
       room.positions = {};
@@ -62,20 +43,15 @@ struct ResidentExtractor::Impl {
   DeviceCounts extract(double value) {
     if (std::isnan(value)) throw UsageError("the isovalue is not a number");
     isovalue = value;
-    StandingLaunch& standing = launcher.standing();
-    const auto asked = StandingLaunch::Clock::now();
-    made = extract(standing.should_stay(asked));
-    standing.note_end(asked, StandingLaunch::Clock::now());
+    made = make();
     return made;
   }
 
-  DeviceCounts extract(bool stay) {
+  DeviceCounts make() {
     // Tiles that have no room are not begun: the first launch tells how many there are.
     for (;;) {
-      if (!launcher.launch(isovalue, room, last, stay)) return {};
-      const std::optional<DeviceCounts> seen = launcher.wait();
-      if (!seen) continue;
-      last = *seen;
+      if (!launcher.launch(isovalue, room, last)) return {};
+      last = launcher.wait();
       const bool begun = last.active_tiles <= launcher.tiles_with_room();
       launcher.make_row_tables(last.active_tiles);
       if (!begun || (last.active_tiles > 0 && room.positions.size() == 0)) {
@@ -92,22 +68,14 @@ struct ResidentExtractor::Impl {
     }
   }
 
-  void repeat(bool queued) {
+  void repeat() {
     const Stream& stream = launcher.stream();
-    launcher.dismiss();
-    if (queued) stream.wait();  // nobody sleeps at a gate that is open for a moment only
-    const Closed closed(gate, queued);
-    if (queued)
-      check(cudaLaunchHostFunc(
-          stream.get(), [](void* waited_for) { static_cast<Gate*>(waited_for)->wait(true); },
-          &gate));
     start.record(stream);
-    launcher.launch(isovalue, room, last, false);
+    launcher.launch(isovalue, room, last);
     end.record(stream);
   }
 
   void download(MeshBuffer& mesh) {
-    launcher.dismiss();
     launcher.stream().wait();
     mesh.clear();
     mesh.positions.resize(made.vertices);
@@ -130,7 +98,7 @@ ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions&
 ResidentExtractor::~ResidentExtractor() = default;
 
 DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
-void ResidentExtractor::repeat(bool queued) { impl_->repeat(queued); }
+void ResidentExtractor::repeat() { impl_->repeat(); }
 
 float ResidentExtractor::milliseconds() {
   impl_->end.wait();
@@ -138,8 +106,6 @@ float ResidentExtractor::milliseconds() {
 }
 
 void ResidentExtractor::download(MeshBuffer& mesh) const { impl_->download(mesh); }
-
-std::uint64_t ResidentExtractor::asked() const { return impl_->launcher.standing().asked(); }
 
 std::uint64_t ResidentExtractor::bytes() const {
   const MeshRoom& room = impl_->room;

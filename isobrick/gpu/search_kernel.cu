@@ -14,18 +14,6 @@ void launch_search(ScalarType type, const SearchParams& params, cudaStream_t str
   check_launch("search_tiles");
 }
 
-void launch_place_ranges(ScalarType type, const std::int32_t* tiles, std::uint32_t count,
-                         const std::int32_t (&grid)[3], const void* ranges, void* placed,
-                         cudaStream_t stream) {
-  visit_device_scalar(type, [&](auto tag) {
-    using Range = ValueRange<typename decltype(tag)::type>;
-    place_ranges<<<(count + kSearchThreads - 1) / kSearchThreads, kSearchThreads, 0, stream>>>(
-        tiles, count, TileGrid{{grid[0], grid[1], grid[2]}}, static_cast<const Range*>(ranges),
-        static_cast<Range*>(placed));
-  });
-  check_launch("place_ranges");
-}
-
 void launch_tile_ranges(ScalarType type, const TileParams& params, const std::int32_t* tiles,
                         std::uint32_t count, void* ranges, cudaStream_t stream) {
   visit_device_scalar(type, [&](auto tag) {

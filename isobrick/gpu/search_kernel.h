@@ -10,11 +10,6 @@ namespace isobrick::gpu {
 /// Finds the tiles that the isovalue stabs, in their order, numbered from 0.
 void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream);
 
-/// Ranges in Morton order to C order [z, y, x] of `grid`.
-void launch_place_ranges(ScalarType type, const std::int32_t* tiles, std::uint32_t count,
-                         const std::int32_t (&grid)[3], const void* ranges, void* placed,
-                         cudaStream_t stream);
-
 /// Ranges of all tiles from their samples: of the 33³ that its cells touch, as
 /// far as the volume goes, NaN left out. Uses items, pages, page_of_tile,
 /// fill_page, tiles and extent of `params`.

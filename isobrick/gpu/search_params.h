@@ -8,19 +8,10 @@
 
 namespace isobrick::gpu {
 
-/// How a search knows which tiles an isovalue stabs.
-enum class TileTest : std::uint8_t {
-  ranges,         ///< compares the range of each
-  mask_by_order,  ///< bit i of the mask: tile i in Morton order
-  mask_by_place,  ///< bit i of the mask: tile i in C order [z, y, x]
-  all             ///< takes them all
-};
-
 /// All tiles of a volume in Morton order, and what the search for active ones leaves.
 struct SearchParams {
-  TileTest test;
-  bool uncut;  ///< the region of interest is the whole volume
-  const std::uint32_t* mask;
+  bool all;                   ///< takes all tiles instead of comparing ranges
+  bool uncut;                 ///< the region of interest is the whole volume
   const std::int32_t* tiles;  ///< x, y, z of each
   const void* ranges;         ///< min and max of each, of the sample type
   std::uint32_t count;

@@ -33,16 +33,9 @@ __device__ inline std::size_t place_of(const std::int32_t* t, const std::int32_t
 
 template <class T>
 __device__ bool is_stabbed(const SearchParams& p, std::uint32_t i) {
-  if (p.test == TileTest::all) return true;
-  if (p.test == TileTest::ranges) {
-    const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
-    return static_cast<double>(range[0]) < p.isovalue &&
-           p.isovalue <= static_cast<double>(range[1]);
-  }
-  const std::size_t bit = p.test == TileTest::mask_by_order
-                              ? i
-                              : place_of(p.tiles + 3 * static_cast<std::size_t>(i), p.grid);
-  return p.mask[bit >> 5] >> (bit & 31) & 1u;
+  if (p.all) return true;
+  const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
+  return static_cast<double>(range[0]) < p.isovalue && p.isovalue <= static_cast<double>(range[1]);
 }
 
 /// Whether the isovalue stabs the tile's range and the region of interest leaves it a cell.
@@ -105,18 +98,6 @@ __global__ void __launch_bounds__(kSearchThreads)
     p.order[place] = {0, 0};
     ++place;
   }
-}
-
-struct TileGrid {
-  std::int32_t extent[3];
-};
-
-template <class T>
-__global__ void __launch_bounds__(kSearchThreads)
-    place_ranges(const std::int32_t* tiles, std::uint32_t count, const TileGrid grid,
-                 const ValueRange<T>* ranges, ValueRange<T>* placed) {
-  const std::uint32_t i = blockIdx.x * kSearchThreads + threadIdx.x;
-  if (i < count) placed[place_of(tiles + 3 * static_cast<std::size_t>(i), grid.extent)] = ranges[i];
 }
 
 template <class T>

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "isobrick/core/error.h"
-#include "isobrick/core/prompt_thread.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -78,7 +77,6 @@ void StreamCollector::finish() {
 }
 
 void StreamCollector::run() {
-  const PromptThread prompt;
   try {
     check(cudaSetDevice(cuda_device_));
     follow();

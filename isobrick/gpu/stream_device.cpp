@@ -133,7 +133,7 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
   lane.unpacked.record(kernel_);
   LaunchShape shape = shapes_.of(count);
   shape.blocks = std::min(shape.blocks, static_cast<int>(count));
-  launch_extraction(kernel_of(lattice_.type, options_), p, cases_, shape, kernel_.get());
+  shape.launch(shape, p, cases_, kernel_.get(), false);
   check(cudaMemcpyAsync(lane.totals, &header->totals, sizeof(SurfaceTotals), cudaMemcpyDeviceToHost,
                         kernel_.get()));
   lane.extracted.record(kernel_);

@@ -97,14 +97,6 @@ std::vector<std::size_t> output_pieces(const StreamSizes& sizes) {
   return std::vector<std::size_t>(kOutputs, sizes.output_bytes);
 }
 
-std::vector<std::vector<std::size_t>> pinned_regions(const Lattice& lattice,
-                                                     const StreamSizes& sizes) {
-  std::vector<std::vector<std::size_t>> regions{output_pieces(sizes)};
-  if (sizes.pool.bricks > 0)
-    regions.push_back(BrickPool::pinned_pieces(lattice.brick_bytes(), sizes.pool.threads));
-  return regions;
-}
-
 std::uint64_t good_pool(const Lattice& lattice, int threads) {
   return std::min(
       static_cast<std::uint64_t>(volume(lattice.bricks())),

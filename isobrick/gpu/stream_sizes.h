@@ -48,11 +48,6 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
 /// The pieces of the page-locked memory that meshes come to.
 std::vector<std::size_t> output_pieces(const StreamSizes& sizes);
 
-/// The pieces of each region of page-locked memory (pinned_region.h) that such an extraction takes:
-/// of its pool, where there is one, and its outputs.
-std::vector<std::vector<std::size_t>> pinned_regions(const Lattice& lattice,
-                                                     const StreamSizes& sizes);
-
 /// Bricks that a pool should have room for when so many threads decode for launches of a
 /// whole volume.
 std::uint64_t good_pool(const Lattice& lattice, int threads);

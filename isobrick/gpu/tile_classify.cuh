@@ -132,8 +132,7 @@ struct SamplesOfRows {
 template <int N, class T>
 __device__ inline void classify_rows(TileShared& s, const TileParams& p,
                                      const Classifier<T>& classifier) {
-  const SlabPlanes planes = planes_of<N>(s.item);
-  for_each_piece<N>(planes.first, planes.read_end, [&](auto rows) {
+  for_each_piece<N>([&](auto rows) {
     const OwnRow at(rows);
     const RowBits bits = SamplesOfRows<T>::read(s, p, rows).bits(classifier);
     if (at.exists()) s.rows[at.row()] = bits;
@@ -147,10 +146,7 @@ __device__ inline void classify_planes(TileShared& s, const TileParams& p,
                                        const Classifier<T>& classifier) {
   const int lane = static_cast<int>(lane_id());
   const auto inside = [&](T v) { return __ballot_sync(kAll, v >= classifier.threshold); };
-  const SlabPlanes planes = planes_of<N>(s.item);
-  const int first = static_cast<int>(warp_id()) - Team<N>::kFirstWithRows;
-  if (first < 0) return;
-  for (int z = planes.first + first; z < planes.read_end; z += Team<N>::kWarps) {
+  for (auto z = static_cast<int>(warp_id()); z < 33; z += BlockConfig<N>::kWarps) {
     const int page = page_of(0, 0, z), start = 1024 * z;
     const T* from = sample_at<T>(s, page, start + lane);
     std::uint32_t word = 0;
@@ -182,14 +178,13 @@ template <int N>
 __device__ inline void clear_lists(TileShared& s, std::uint32_t cells, std::uint32_t vertices) {
   const uint4 zero{0, 0, 0, 0};
   auto& lists = lists_of<N>(s);
-  using Spare = SpareThreads<N>;
   cells = (::min(cells, lists.kListed) + 3) / 4;
   vertices = (::min(vertices, lists.kListed) + 7) / 8;
 #pragma unroll 1
-  for (unsigned i = Spare::own(); i < cells; i += Spare::kCount)
+  for (unsigned i = own_thread(); i < cells; i += N)
     reinterpret_cast<uint4*>(lists.cells)[i] = zero;
 #pragma unroll 1
-  for (unsigned i = Spare::own(); i < vertices; i += Spare::kCount)
+  for (unsigned i = own_thread(); i < vertices; i += N)
     reinterpret_cast<uint4*>(lists.vertex_marks)[i] = zero;
 }
 

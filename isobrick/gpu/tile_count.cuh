@@ -92,8 +92,7 @@ template <int N, bool Inner, class LeaveOut>
 __device__ inline void count_rows_of(TileShared& s, LeaveOut&& leave_out) {
   const Shape shape = s.shape;
   const RowLimits of_lane = RowLimits::of(shape, static_cast<int>(lane_id()));
-  const SlabPlanes planes = planes_of<N>(s.item);
-  for_each_piece<N>(planes.first, planes.counted_end, [&](auto rows) {
+  for_each_piece<N>([&](auto rows) {
     const OwnRow at(rows);
     const int row = at.row();
     RowCount count{0, 0};
@@ -103,7 +102,6 @@ __device__ inline void count_rows_of(TileShared& s, LeaveOut&& leave_out) {
       RowEdges edges = edges_of_row<Inner>(
           s, shape, rows.kPlane ? of_lane : RowLimits::of(shape, y), rows, row, z);
       leave_out(y, z, edges);
-      if (Team<N>::kSlabs > 1 && z >= planes.end) edges.cells = 0;
       if (!Inner && y == 0) s.plane_at_0[0][z] = static_cast<std::uint8_t>(edges.z_at_0);
       if (!Inner && z == 0) s.plane_at_0[1][y] = static_cast<std::uint8_t>(edges.y_at_0);
       s.crossing[0][row] = edges.x;
@@ -134,20 +132,16 @@ __device__ inline void count_rows(TileShared& s, LeaveOut&& leave_out) {
 }
 
 /// Vertices and cells before each plane, found by every warp for itself once all rows are
-/// counted: each lane has those before one of up to 32 planes, the first that are counted.
+/// counted: each lane has those before one of the first 32 planes.
 struct PlaneBases {
   std::uint32_t before;           ///< vertices | cells << 17, which holds what 31 planes have
   std::uint32_t vertices, cells;  ///< of those planes
   std::uint32_t own;              ///< of the plane without its last row: vertices | cells << 16
-  int first;                      ///< the plane of the first lane
 
-  __device__ static PlaneBases of(const TileShared& s, const SlabPlanes& planes) {
+  __device__ static PlaneBases of(const TileShared& s) {
     PlaneBases b;
-    b.first = planes.first;
-    const int plane = planes.first + static_cast<int>(lane_id());
-    const bool counted = plane < planes.counted_end;
-    b.own = counted ? s.plane_sums[plane] : 0;
-    const std::uint32_t last = counted ? s.last_row_sums[plane] : 0;
+    b.own = s.plane_sums[lane_id()];
+    const std::uint32_t last = s.last_row_sums[lane_id()];
     const std::uint32_t v = (b.own & 0xffffu) + (last & 0xffffu), c = (b.own >> 16) + (last >> 16);
     b.vertices = warp_sum(v);
     b.cells = warp_sum(c);
@@ -155,17 +149,8 @@ struct PlaneBases {
     b.before = warp_inclusive_sum(packed) - packed;
     return b;
   }
-  /// Vertices of all counted planes.
-  template <int N>
-  __device__ std::uint32_t counted(const TileShared& s) const {
-    if constexpr (Team<N>::kSlabs > 1) return vertices;
+  __device__ std::uint32_t all_vertices(const TileShared& s) const {
     return vertices + (s.plane_sums[32] & 0xffffu) + (s.last_row_sums[32] & 0xffffu);
-  }
-  /// Of those, the ones that the tile, or slab, makes itself.
-  template <int N>
-  __device__ std::uint32_t made(const TileShared& s, const SlabPlanes& planes) const {
-    if (Team<N>::kSlabs == 1 || planes.end == planes.counted_end) return counted<N>(s);
-    return __shfl_sync(kAll, before, planes.end - first) & 0x1ffffu;
   }
 };
 
@@ -175,16 +160,13 @@ struct Before {
 };
 
 /// What lies before the rows of a piece; in a plane before its first row.
-template <int N>
 __device__ inline Before before_piece(const TileShared&, const PlaneBases& b, PlaneRows rows) {
-  if (Team<N>::kSlabs == 1 && rows.plane == 32) return {b.vertices, b.cells};
-  const std::uint32_t before = __shfl_sync(kAll, b.before, rows.plane - b.first);
+  if (rows.plane == 32) return {b.vertices, b.cells};
+  const std::uint32_t before = __shfl_sync(kAll, b.before, rows.plane);
   return {before & 0x1ffffu, before >> 17};
 }
-template <int N>
 __device__ inline Before before_piece(const TileShared& s, const PlaneBases& b, LastRows rows) {
-  if (Team<N>::kSlabs == 1 && rows.first > 0)
-    return {b.vertices + (s.plane_sums[32] & 0xffffu), b.cells};
+  if (rows.first > 0) return {b.vertices + (s.plane_sums[32] & 0xffffu), b.cells};
   return {(b.before & 0x1ffffu) + (b.own & 0xffffu), (b.before >> 17) + (b.own >> 16)};
 }
 
@@ -229,11 +211,10 @@ inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
 /// Leaves the row table for later tiles and the numbers within the tile in
 /// shared memory, and marks the first vertices and cells.
 template <int N>
-__device__ inline void publish_rows(TileShared& s, const PlaneBases& bases,
-                                    const SlabPlanes& planes, RowTable& table) {
+__device__ inline void publish_rows(TileShared& s, const PlaneBases& bases, RowTable& table) {
   auto& lists = lists_of<N>(s);
-  for_each_piece<N>(planes.first, planes.counted_end, [&](auto rows) {
-    const Before before = before_piece<N>(s, bases, rows);
+  for_each_piece<N>([&](auto rows) {
+    const Before before = before_piece(s, bases, rows);
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();
@@ -246,14 +227,13 @@ __device__ inline void publish_rows(TileShared& s, const PlaneBases& bases,
     s.number[1][row] = base + y + count.y_at_0();
     s.number[2][row] = base + z + count.z_at_0();
     s.cell_base[row] = static_cast<std::uint16_t>(cell);
-    if (Team<N>::kSlabs > 1 && at.z >= planes.end) return;
     mark_row_from_0<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups, base,
                                         count.vertices(), row);
     mark_row_from_0<kMostCellsOfRow>(lists.cells, lists.cell_groups, cell, count.cells(), row);
   });
   if (threadIdx.x == 0) {
-    table.rows[33 * planes.counted_end] = bases.counted<N>(s);
-    s.cell_base[33 * planes.counted_end] = static_cast<std::uint16_t>(s.all_cells);
+    table.rows[kRowsOfTile] = bases.all_vertices(s);
+    s.cell_base[kRowsOfTile] = static_cast<std::uint16_t>(s.all_cells);
   }
 }
 
@@ -265,11 +245,9 @@ __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
   for (unsigned i = own_thread(); i < lists.kListed; i += N) lists.vertex_marks[i] = 0;
   if (threadIdx.x == 0) s.next_vertices = 0;
   __syncthreads();
-  const SlabPlanes planes = planes_of<N>(s.item);
-  const int rows_end = 33 * planes.end;
-  for (int row = 33 * planes.first + static_cast<int>(own_thread()); row < rows_end; row += N) {
+  for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.number[0][row];
-    const std::uint32_t end = row + 1 < rows_end ? s.number[0][row + 1] : s.all_vertices;
+    const std::uint32_t end = row + 1 < kRowsOfTile ? s.number[0][row + 1] : s.all_vertices;
     mark_row<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups,
                                  static_cast<int>(begin - first), static_cast<int>(end - begin),
                                  row);
@@ -283,9 +261,7 @@ __device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
   for (unsigned i = own_thread(); i < lists.kListed; i += N) lists.cells[i] = 0;
   if (threadIdx.x == 0) s.next_cells = 0;
   __syncthreads();
-  const SlabPlanes planes = planes_of<N>(s.item);
-  for (int row = 33 * planes.first + static_cast<int>(own_thread()); row < 33 * planes.end;
-       row += N) {
+  for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
     mark_row<kMostCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(begin - first),
                               static_cast<int>(end - begin), row);

@@ -125,7 +125,7 @@ template <int N, class T, bool Normals, class At0>
 __device__ inline void emit_vertices_of(TileShared& s, const TileParams& p, std::uint32_t first,
                                         std::uint32_t listed, At0 at_0) {
   using Maker = VertexMaker<T>;
-  const Maker maker{s, p, Team<N>::kSlabs > 1 ? s.now.crossing : p.crossing};
+  const Maker maker{s, p, p.crossing};
   const auto& lists = lists_of<N>(s);
   Vec3f* const positions = kept(p.positions + s.vertex_base + first);
   Vec3f* const normals = Normals ? kept(p.normals + s.vertex_base + first) : nullptr;
@@ -163,10 +163,9 @@ inline constexpr std::uint32_t kNumberOfWord =
 /// Fills the tables of places and triangles; once a block.
 template <int N>
 __device__ inline void fill_tables(TileShared& s, const CaseTable* cases) {
-  using Spare = SpareThreads<N>;
-  for (unsigned i = Spare::own(); i < sizeof(CaseTable) / sizeof(uint4); i += Spare::kCount)
+  for (unsigned i = own_thread(); i < sizeof(CaseTable) / sizeof(uint4); i += N)
     reinterpret_cast<uint4*>(&s.cases)[i] = __ldg(reinterpret_cast<const uint4*>(cases) + i);
-  for (unsigned t = Spare::own(); t < 24; t += Spare::kCount) {
+  for (unsigned t = own_thread(); t < 24; t += N) {
     const unsigned e = t % 12, at_0 = t / 12;
     const unsigned axis = e / 4, first = e & 1u, second = e >> 1 & 1u;
     const unsigned row = axis == 0 ? first + 33 * second : axis == 1 ? 33 * second : second;

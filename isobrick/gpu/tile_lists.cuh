@@ -41,8 +41,8 @@ struct WarpPart {
 template <int N>
 __device__ inline WarpPart part_of_warp(std::uint32_t listed) {
   const std::uint32_t all = uniform(listed), warp = uniform(warp_id()), groups = (all + 31) / 32;
-  const std::uint32_t begin = groups * warp / Team<N>::kWarps * 32;
-  const std::uint32_t end = groups * (warp + 1) / Team<N>::kWarps * 32;
+  const std::uint32_t begin = groups * warp / BlockConfig<N>::kWarps * 32;
+  const std::uint32_t end = groups * (warp + 1) / BlockConfig<N>::kWarps * 32;
   return {begin, ::min(end, all)};
 }
 
@@ -50,10 +50,10 @@ __device__ inline WarpPart part_of_warp(std::uint32_t listed) {
 /// each of the others gets `Others`.
 template <int N, int First, int Others>
 __device__ inline WarpPart part_beside_first(std::uint32_t listed) {
-  if constexpr (Team<N>::kWarps == 1) {
+  if constexpr (BlockConfig<N>::kWarps == 1) {
     return part_of_warp<N>(listed);
   } else {
-    constexpr std::uint32_t kParts = Others * (Team<N>::kWarps - 1) + First;
+    constexpr std::uint32_t kParts = Others * (BlockConfig<N>::kWarps - 1) + First;
     const std::uint32_t all = uniform(listed), warp = uniform(warp_id()), groups = (all + 31) / 32;
     const std::uint32_t last = Others * warp + First;
     const std::uint32_t begin = warp == 0 ? 0 : groups * (last - Others) / kParts * 32;

@@ -5,7 +5,6 @@
 #include "isobrick/gpu/tile_emit.cuh"
 #include "isobrick/gpu/tile_nan.cuh"
 #include "isobrick/gpu/tile_order.cuh"
-#include "isobrick/gpu/tile_take.cuh"
 
 // From the inside bits of a tile to its mesh: the steps, and where its warps wait for each other.
 
@@ -13,13 +12,12 @@ namespace isobrick::gpu {
 
 /// A tile without a vertex or a cell tells so and nothing else: whoever asks for its sums adds
 /// nothing, and whoever asks for its rows finds no vertex there.
-template <int N>
 __device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
   if (threadIdx.x != 0) return;
-  publish_sum(order_of<N>(s, p)[s.item].vertices, s.item, 0);
-  publish_sum(order_of<N>(s, p)[s.item].triangles, s.item, 0);
+  publish_sum(p.order[s.item].vertices, s.item, 0);
+  publish_sum(p.order[s.item].triangles, s.item, 0);
   s.number_base = 0;
-  release_rows<N>(s, p);
+  release_rows(s, p);
 }
 
 /// Whether all cells and vertices of a tile are listed at once, and its warps wait for no more
@@ -33,8 +31,7 @@ __device__ inline bool listed_at_once(const TileShared& s) {
 template <int N>
 __device__ inline void init_barriers(TeamBarriers& barriers) {
   if constexpr (!kTeamBarriers) return;
-  // In a slab the first warp finds no cells.
-  init_barrier(barriers.cells, Team<N>::kWarps - (Team<N>::kSlabs > 1 ? 1 : 0));
+  init_barrier(barriers.cells, BlockConfig<N>::kWarps);
   init_barrier(barriers.vertex_base, 1);
   init_barrier(barriers.neighbours, 1);
   barriers.turn = 1;
@@ -49,11 +46,10 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
   });
   __syncthreads();
   if constexpr (Nan) clear_lists<N>(s, ListsOf<N>::kListed, ListsOf<N>::kListed);
-  const SlabPlanes planes = planes_of<N>(s.item);
-  const PlaneBases bases = PlaneBases::of(s, planes);
-  const std::uint32_t vertices = bases.made<N>(s, planes);
+  const PlaneBases bases = PlaneBases::of(s);
+  const std::uint32_t vertices = bases.all_vertices(s);
   if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
-    pass_empty_tile<N>(s, p);
+    pass_empty_tile(s, p);
     __syncthreads();
     return false;
   }
@@ -62,10 +58,10 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     s.all_vertices = vertices;
     s.all_cells = bases.cells;
     if (listed_at_once<N, Nan>(s)) s.barriers.turn ^= 1;
-    publish_sum(order_of<N>(s, p)[s.item].vertices, s.item, s.all_vertices);
+    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
-  publish_rows<N>(s, bases, planes, p.row_tables[s.tile.slot]);
+  publish_rows<N>(s, bases, p.row_tables[s.tile.slot]);
   __syncthreads();
   return true;
 }
@@ -95,41 +91,37 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
   const bool at_once = listed_at_once<N, Nan>(s);
   const std::uint32_t turn = s.barriers.turn;
-  // A slab has few cells and vertices: the warp on which others wait leaves them to the others.
-  constexpr bool kSlab = Team<N>::kSlabs > 1;
-  if (warp_id() == Team<N>::kVertices) {
-    find_vertex_base<N>(s, p);
+  if (warp_id() == BlockConfig<N>::kVertices) {
+    find_vertex_base(s, p);
     if (at_once) arrive(s.barriers.vertex_base);
-    if (lane_id() == 0) release_rows<N>(s, p);
+    if (lane_id() == 0) release_rows(s, p);
   }
   std::uint32_t triangles = 0;
   if (at_once) {
-    if (!kSlab || warp_id() != Team<N>::kVertices) {
-      find_cells<N>(s, cells);
-      arrive(s.barriers.cells);
-    }
+    find_cells<N>(s, cells);
+    arrive(s.barriers.cells);
   } else {
     triangles = count_in_turns<N>(s);
-    // No turn has been between where there is no cell: with NaN, and in slabs, vertices may belong
-    // to cells of others only.
-    if constexpr (Nan || kSlab || !kTeamBarriers) __syncthreads();
+    // No turn has been between where there is no cell: with NaN vertices may belong to cells of
+    // others only.
+    if constexpr (Nan || !kTeamBarriers) __syncthreads();
   }
-  const bool for_vertices = warp_id() == Team<N>::kVertices,
-             for_triangles = warp_id() == Team<N>::kTriangles;
+  const bool for_vertices = warp_id() == BlockConfig<N>::kVertices,
+             for_triangles = warp_id() == BlockConfig<N>::kTriangles;
   Neighbour neighbour{};
-  if (for_vertices) neighbour = kSlab ? Neighbour::kept(s) : Neighbour::of_lane(s, p);
-  if (at_once && ((for_vertices && !kSlab) || for_triangles)) wait(s.barriers.cells, turn);
+  if (for_vertices) neighbour = Neighbour::of_lane(s, p);
+  if (at_once && (for_vertices || for_triangles)) wait(s.barriers.cells, turn);
   if (for_triangles) {
     if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
     if (lane_id() == 0) {
       s.all_triangles = triangles;
-      publish_sum(order_of<N>(s, p)[s.item].triangles, s.item, triangles);
+      publish_sum(p.order[s.item].triangles, s.item, triangles);
     }
-    find_triangle_base<N>(s, p, triangles);
+    find_triangle_base(s, p, triangles);
   }
   if (for_vertices) {
     ask_neighbours<N>(s, p, neighbour);
-    if (at_once && !kSlab) arrive(s.barriers.neighbours);
+    if (at_once) arrive(s.barriers.neighbours);
   } else if (at_once) {
     wait(s.barriers.vertex_base, turn);
   }
@@ -173,23 +165,19 @@ __device__ inline void emit_all_triangles(TileShared& s, const TileParams& p) {
 template <int N>
 __device__ inline bool can_help(TileShared& s) {
   const std::uint32_t taken = BlockWord(s.next_vertices).load(cuda::memory_order_relaxed);
-  return Team<N>::kWarps == 1 || uniform(taken) + Team<N>::kWarps <= (s.all_vertices + 31) / 32;
+  return BlockConfig<N>::kWarps == 1 ||
+         uniform(taken) + BlockConfig<N>::kWarps <= (s.all_vertices + 31) / 32;
 }
 
 /// Of a counted tile.
 template <int N, class T, bool Normals, bool Nan>
 __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
-  constexpr bool kSlab = Team<N>::kSlabs > 1;
   find_places<N, Nan>(s, p);
   const bool at_once = listed_at_once<N, Nan>(s);
-  const bool has_asked = at_once && warp_id() == Team<N>::kVertices;
+  const bool has_asked = at_once && warp_id() == BlockConfig<N>::kVertices;
   // With normals vertices are most of the work, and all warps make them.
-  if (!has_asked || (!kSlab && (Normals || can_help<N>(s)))) emit_all_vertices<N, T, Normals>(s, p);
-  // After the vertices, which read the tile's samples once more. Wider samples of the tiles
-  // in work fill the L2 cache alone, and would be driven out.
-  if constexpr (sizeof(T) == 1 && Team<N>::kSlabs == 1)
-    if (warp_id() == Team<N>::kWarps - 1) prefetch_tile<N, T>(s, p, s.item + gridDim.x);
-  if (!at_once || kSlab) {
+  if (!has_asked || Normals || can_help<N>(s)) emit_all_vertices<N, T, Normals>(s, p);
+  if (!at_once) {
     __syncthreads();
     number_at_0<N>(s);
   } else {
@@ -197,7 +185,7 @@ __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
     number_at_0<N, !Normals>(s);
   }
   // Elsewhere the first warp may still make vertices.
-  if constexpr (!kSlab) __syncthreads();
+  __syncthreads();
   borrow_rows<N>(s);
   place_numbers<N>(s);
   __syncthreads();

@@ -38,7 +38,7 @@ __device__ inline void find_nan(TileShared& s, const TileParams& p) {
   };
   const int beside = lane == 0 ? -1 : 31 + lane;  // lanes 0, 1, 2: the samples beside the 32
   const bool row_exists = exists(0, lane), beside_exists = lane < 3 && exists(0, beside);
-  for (auto row = static_cast<int>(warp_id()); row < kEdge * kEdge; row += Team<N>::kWarps) {
+  for (auto row = static_cast<int>(warp_id()); row < kEdge * kEdge; row += BlockConfig<N>::kWarps) {
     const int y = row % kEdge - 1, z = row / kEdge - 1;
     const bool here = exists(1, y) && exists(2, z);
     const unsigned inner = __ballot_sync(kAll, !(here && row_exists) || is_nan(lane, y, z));

@@ -2,7 +2,7 @@
 
 #include <cuda/atomic>
 
-#include "isobrick/gpu/tile_find.cuh"
+#include "isobrick/gpu/tile_lists.cuh"
 #include "isobrick/gpu/tile_pieces.cuh"
 
 // Third step: where the tile's output goes, and the numbers of vertices that
@@ -71,39 +71,25 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
   return sum;
 }
 
-/// What changes from isovalue to isovalue: of slabs, whose launch may stay, as it is now.
-template <int N>
-__device__ inline OrderState* order_of(const TileShared& s, const TileParams& p) {
-  return Team<N>::kSlabs > 1 ? s.now.order : p.order;
-}
-template <int N>
-__device__ inline std::uint32_t epoch_of(const TileShared& s, const TileParams& p) {
-  return Team<N>::kSlabs > 1 ? s.now.epoch : p.epoch;
-}
-
-/// One word of the launch's report. No order among them, so none waits for another.
-template <int N>
-__device__ inline void say(const TileShared& s, const TileParams& p, LaunchReport::Word word,
-                           std::uint64_t value) {
+/// Writes one word of the launch's report. The words have no order, so none waits for another.
+__device__ inline void report(const TileParams& p, LaunchReport::Word word, std::uint64_t value) {
   HostWord(p.end.report->words[word])
-      .store(LaunchWord::of(value, Team<N>::kSlabs > 1 ? s.now.launch : p.end.launch),
-             cuda::memory_order_relaxed);
+      .store(LaunchWord::of(value, p.end.launch), cuda::memory_order_relaxed);
 }
 
 /// Where the tile's vertices go. One warp.
-template <int N>
 __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
   const std::uint32_t item = s.item;
   const unsigned long long start = *p.number_start;
-  const auto base = sum_before(
-      [&](std::uint32_t i) -> unsigned long long& { return order_of<N>(s, p)[i].vertices; }, item,
-      s.all_vertices);
+  const auto base =
+      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
+                 s.all_vertices);
   if (lane_id() != 0) return;
   s.vertex_base = base;
   s.number_base = static_cast<std::uint32_t>(start + base);
   if (item + 1 < s.items) return;
   if (p.end.report)
-    say<N>(s, p, LaunchReport::kVertices, base + s.all_vertices);
+    report(p, LaunchReport::kVertices, base + s.all_vertices);
   else
     p.totals->vertices = base + s.all_vertices;
   *p.number_end = start + base + s.all_vertices;
@@ -111,44 +97,32 @@ __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
 
 /// Gives the tile's row table to later tiles, once it is known where its vertices go. One
 /// thread.
-template <int N>
 __device__ inline void release_rows(const TileShared& s, const TileParams& p) {
   DeviceWord(p.row_tables[s.tile.slot].base_and_epoch)
-      .store(s.number_base | static_cast<unsigned long long>(epoch_of<N>(s, p)) << 32,
+      .store(s.number_base | static_cast<unsigned long long>(p.epoch) << 32,
              cuda::memory_order_release);
 }
 
 /// Where the tile's triangles go. One warp.
-template <int N>
 __device__ inline void find_triangle_base(TileShared& s, const TileParams& p,
                                           std::uint64_t triangles) {
   const std::uint32_t item = s.item;
-  const auto base = sum_before(
-      [&](std::uint32_t i) -> unsigned long long& { return order_of<N>(s, p)[i].triangles; }, item,
-      triangles);
+  const auto base =
+      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; }, item,
+                 triangles);
   if (lane_id() != 0) return;
   s.triangle_base = base;
   if (item + 1 < s.items) return;
   if (p.end.report)
-    say<N>(s, p, LaunchReport::kTriangles, base + triangles);
+    report(p, LaunchReport::kTriangles, base + triangles);
   else
     p.totals->triangles = base + triangles;
 }
 
 /// Where an active tile of a resident volume leaves its row table; kNone for others.
-__device__ inline std::uint32_t slot_of(const TileShared& s, const TileParams& p, int x, int y,
-                                        int z) {
+__device__ inline std::uint32_t slot_of(const TileParams& p, int x, int y, int z) {
   const std::int64_t place = (static_cast<std::int64_t>(z) * p.tiles[1] + y) * p.tiles[0] + x;
-  return p.candidates.count > 0 ? number_of_candidate(s, p.candidates.order_of_tile[place])
-                                : p.slot_of_tile[place];
-}
-
-/// Where the row table of the tile before is copied to. In a slab others still look for cells
-/// while it comes.
-template <int N>
-__device__ inline RowTable& before_copy_of(TileShared& s) {
-  if constexpr (Team<N>::kSlabs == 1) return s.before_copy;
-  return slab_rows_of<N>(s);
+  return p.slot_of_tile[place];
 }
 
 /// Brings the row table of the tile before to shared memory, on the way while this
@@ -166,17 +140,6 @@ __device__ inline void copy_table(RowTable& copy, const RowTable& table) {
 #endif
 }
 
-__device__ inline std::uint32_t packed(const TileItem& tile) {
-  return FoundTiles::packed(static_cast<std::uint32_t>(tile.x), static_cast<std::uint32_t>(tile.y),
-                            static_cast<std::uint32_t>(tile.z));
-}
-
-/// An active tile of those in slabs, packed.
-template <int N>
-__device__ inline std::uint32_t found_tile(TileShared& s, const TileParams& p, std::uint32_t i) {
-  return s.now.asked ? slab_tiles_of<N>(s).found[i] : p.found_tiles[i];
-}
-
 /// The row table of the lower neighbour that lane 1 … 6 asks, where bits 0, 1, 2 of the lane
 /// say along which axes it is one lower.
 struct Neighbour {
@@ -188,47 +151,12 @@ struct Neighbour {
     const unsigned n = lane_id();
     if (!has_lower(s, n)) return {kNone, false};
     if (!p.links)
-      return {slot_of(s, p, item.x - static_cast<int>(n & 1), item.y - static_cast<int>(n >> 1 & 1),
+      return {slot_of(p, item.x - static_cast<int>(n & 1), item.y - static_cast<int>(n >> 1 & 1),
                       item.z - static_cast<int>(n >> 2)),
               true};
     const std::uint32_t slot = p.links[s.item].before[n - 1];
     if (slot == kNone) return {kNone, false};
     return {slot & ~TileLinks::kSameLaunch, (slot & TileLinks::kSameLaunch) && !p.tables_known};
-  }
-  /// The same of a slab, by the tiles that the host has found. All lanes.
-  template <int N>
-  __device__ static Neighbour of_slab(TileShared& s, const TileParams& p) {
-    static_assert(kMostActiveInSlabs == 2 * 32);
-    constexpr std::uint32_t kSlabs = Team<N>::kSlabs;
-    const std::uint32_t count = s.items / kSlabs;
-    const auto tile_at = [&](unsigned i) { return i < count ? found_tile<N>(s, p, i) : kNone; };
-    const std::uint32_t low = tile_at(lane_id()), high = tile_at(lane_id() + 32);
-    const auto number_of = [&](std::uint32_t tile) {
-      const auto in_low = static_cast<int>(__ballot_sync(kAll, low == tile)),
-                 in_high = static_cast<int>(__ballot_sync(kAll, high == tile));
-      if (in_low) return static_cast<std::uint32_t>(__ffs(in_low) - 1);
-      return in_high ? static_cast<std::uint32_t>(__ffs(in_high) + 31) : kNone;
-    };
-    const std::uint32_t own = packed(s.tile), slab = s.item % kSlabs;
-    Neighbour found{kNone, true};
-#pragma unroll
-    for (unsigned n = 1; n <= 6; ++n) {
-      // Only the first slab shares a plane with tiles below.
-      if (!has_lower(s, n) || (n >= 4 && slab > 0)) continue;
-      const std::uint32_t tile = own - FoundTiles::packed(n & 1, n >> 1 & 1, n >> 2);
-      const std::uint32_t number = number_of(tile);
-      if (lane_id() == n && number != kNone)
-        found.slot = number * kSlabs + (n >= 4 ? kSlabs - 1 : slab);
-    }
-    return found;
-  }
-
-  /// Kept in shared memory until it is asked.
-  __device__ void keep(TileShared& s) const {
-    if (lane_id() < 8) s.neighbour_base[lane_id()] = slot;
-  }
-  __device__ static Neighbour kept(const TileShared& s) {
-    return {lane_id() < 8 ? s.neighbour_base[lane_id()] : kNone, true};
   }
 
  private:
@@ -250,8 +178,8 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
   if (slot != kNone) {
     DeviceWord word(p.row_tables[slot].base_and_epoch);
     unsigned long long seen = word.load(cuda::memory_order_acquire);
-    while (neighbour.wait && seen >> 32 != epoch_of<N>(s, p)) {
-      if (Team<N>::kSlabs == 1) __nanosleep(20);  // slabs are all at work, and about as far
+    while (neighbour.wait && seen >> 32 != p.epoch) {
+      __nanosleep(20);
       seen = word.load(cuda::memory_order_acquire);
     }
     s.neighbour_base[n] = static_cast<std::uint32_t>(seen) - s.number_base;
@@ -263,7 +191,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
   const std::uint32_t before = slot_of_neighbour(1);
   // Where the cells' rows are needed again, the table is read where it is.
   const bool copied = before != kNone && s.all_cells <= ListsOf<N>::kListed;
-  RowTable& copy = before_copy_of<N>(s);
+  RowTable& copy = s.before_copy;
   if (copied) copy_table(copy, p.row_tables[before]);
   if (n == 0) s.before = before == kNone ? nullptr : copied ? &copy : &p.row_tables[before];
   // All on their way before the first is waited for.
@@ -296,8 +224,7 @@ __device__ inline void number_at_0(TileShared& s) {
   const RowTable* before = s.before;
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
-  const SlabPlanes planes = planes_of<N>(s.item);
-  for_each_piece<N, BesideFirst>(planes.first, planes.counted_end, [&](auto rows) {
+  for_each_piece<N, BesideFirst>([&](auto rows) {
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();
@@ -348,10 +275,9 @@ __device__ inline void borrow_rows(TileShared& s) {
     const std::uint32_t corner = s.lower.xz[y];
     s.at_0[0][row] = fx ? number - 1 : base_of(5, corner) + (corner >> 23) - 1;
   };
-  const SlabPlanes planes = planes_of<N>(s.item);
-  for (int t = static_cast<int>(own_thread()); t < 128; t += N) {
-    if (t >= planes.first && t < planes.counted_end && !fy) row_0_of(t);
-    if (t >= 64 && t < 97 && !fz && planes.first == 0) row_of_plane_0(t - 64);
+  for (auto t = static_cast<int>(own_thread()); t < 128; t += N) {
+    if (t < 33 && !fy) row_0_of(t);
+    if (t >= 64 && t < 97 && !fz) row_of_plane_0(t - 64);
   }
 }
 

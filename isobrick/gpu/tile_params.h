@@ -13,8 +13,6 @@ namespace isobrick::gpu {
 inline constexpr std::uint32_t kPageSamples = 32 * 32 * 32;
 /// Samples of its first column, x = 0.
 inline constexpr std::uint32_t kColumnSamples = 32 * 32;
-/// Where tiles are few, so many blocks share one, each of so many threads.
-inline constexpr int kSlabsOfTile = 8, kSlabTeam = 352;
 /// Rows (y, z) of the 33³ samples that the cells of a tile touch.
 inline constexpr int kRowsOfTile = 33 * 33;
 
@@ -29,8 +27,7 @@ inline constexpr std::uint32_t kNone = 0xffffffffu;
 /// What later tiles ask of a tile: the number of the first own vertex of each
 /// row, counted from the tile's first vertex, and where in the row those on
 /// edges along y and along z begin: base | y << 17 | z << 23. One entry more
-/// ends the last row. That of a slab has its planes and the first of the next one; that of a
-/// tile, or slab, without vertices and cells has nothing that anyone asks for.
+/// ends the last row. That of a tile without vertices and cells has nothing that anyone asks for.
 struct alignas(16) RowTable {
   std::uint32_t rows[kRowsOfTile + 1];
   /// The mesh number of the tile's first vertex, and above it the epoch in which it was
@@ -60,34 +57,8 @@ struct SurfaceTotals {
   unsigned long long vertices, triangles;
 };
 
-/// Tiles of volumes that are so small that the host searches them, by ranges or through an index;
-/// of those whose tiles may be shared by several blocks.
-inline constexpr std::uint32_t kMostCandidates = 4096, kMostThroughIndex = 1024, kMostInSlabs = 128;
-/// Active ones of the latter that are shared.
-inline constexpr std::uint32_t kMostActiveInSlabs = 64;
-
-/// Which of so few candidates are active: the host has looked.
-struct FoundTiles {
-  std::uint32_t count = 0;
-  std::uint32_t words[kMostCandidates / 32] = {};  ///< bit i: candidate i
-  std::uint32_t tiles[kMostActiveInSlabs] = {};    ///< of up to kMostInSlabs the first, packed
-
-  static constexpr std::uint32_t packed(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    static_assert(kMostInSlabs <= 1u << 10);
-    return x | y << 10 | z << 20;
-  }
-};
-
-/// All tiles of a volume of so few, in Morton order.
-struct TileCandidates {
-  const std::int32_t* tiles;           ///< x, y, z of each
-  const std::uint32_t* order_of_tile;  ///< [z, y, x] of the volume: its place in that order
-  std::uint32_t count;
-};
-
-/// What the device and the host tell each other, in the host's memory. Each word says by itself
-/// which launch it is about, so that none has to be written after the others, for which the
-/// device would wait until those have crossed the bus.
+/// A word of a report in host memory. Each carries the number of its launch, so no word has to be
+/// written after the others, for which the device would wait until those have crossed the bus.
 struct LaunchWord {
   static constexpr int kValueBits = 40;
 
@@ -105,41 +76,20 @@ static_assert(LaunchWord::is_about(LaunchWord::of(5, (1u << 24) + 1), (1u << 24)
 static_assert(!LaunchWord::is_about(LaunchWord::of(5, 1u << 24), (1u << 24) - 1));
 static_assert(LaunchWord::value_of(LaunchWord::of((1ull << 40) - 1, 77)) == (1ull << 40) - 1);
 
-/// What a launch tells: vertices and triangles made, and active tiles. One that has stood by
-/// says when it leaves without being asked, with the number of the last launch as the value.
+/// What a launch reports: vertices and triangles made, and active tiles.
 struct LaunchReport {
-  enum Word { kVertices, kTriangles, kActiveTiles, kWords, kLeft = kWords };
-  std::uint64_t words[kWords + 1];
-};
-
-/// What is asked of a launch that stands by, which is then the next one: the samples' threshold
-/// and the isovalue as vertices are interpolated, bit by bit, and which candidates are active;
-/// or that it leaves.
-struct alignas(64) LaunchRequest {
-  enum Word { kThreshold, kCrossing, kTiles, kLeave = kTiles + kMostInSlabs / 32, kWords };
+  enum Word { kVertices, kTriangles, kActiveTiles, kWords };
   std::uint64_t words[kWords];
-};
-
-/// How a launch of slabs stays for the next isovalue (stand_by.cuh).
-struct StandBy {
-  LaunchRequest* request;          ///< in the host's memory; null: it does not stay
-  LaunchRequest* passed_on;        ///< in the device's
-  std::uint32_t* ended;            ///< counts how often a block has ended an isovalue
-  std::uint32_t ended_before;      ///< of the launches before
-  std::uint64_t nanoseconds;       ///< that it waits after each isovalue
-  std::uint64_t most_nanoseconds;  ///< after which it asks for no further one
 };
 
 /// How a launch tells the host what it has made, and leaves everything as the next one needs it.
 struct LaunchEnd {
   LaunchReport* report;        ///< or null: totals say it, and nothing is left to be done
   std::uint32_t launch;        ///< goes into the report
-  const std::uint32_t* found;  ///< active tiles, where a search has counted them
+  const std::uint32_t* found;  ///< active tiles, as the search has counted them
   std::uint32_t* done;         ///< zeroed
   std::uint32_t* zero;         ///< words that the next launch needs zeroed, also `done`
   std::uint32_t zero_words;
-  OrderState* next_order;  ///< the next launch's, zeroed by this one; of `next_items`
-  std::uint32_t next_items;
 };
 
 /// The cases as the kernel has them in shared memory: of each, its triangles, with three edges
@@ -152,15 +102,8 @@ struct alignas(16) CaseTable {
 CaseTable make_case_table(bool mirrored);
 
 struct TileParams {
-  /// The tiles, where a launch has found them; otherwise there are candidates.
-  const TileItem* items;
+  const TileItem* items;  ///< the active tiles in Morton order
   const std::uint32_t* item_count;
-  TileCandidates candidates;
-  std::uint32_t found;  ///< active candidates
-  union {
-    alignas(16) std::uint32_t found_words[kMostCandidates / 32];  ///< bit i: candidate i is one
-    std::uint32_t found_tiles[kMostActiveInSlabs];                ///< of slabs: packed
-  };
   const void* pages;
   /// [z, y, x] of `tiles`; kNone: all fill value. Null where page i + 1 is that of tile i.
   const std::uint32_t* page_of_tile;
@@ -180,8 +123,7 @@ struct TileParams {
   bool diagonal;  ///< the map has no term off the diagonal
   RowTable* row_tables;
   OrderState* order;                       ///< one an item, zeroed
-  std::uint32_t* ticket;                   ///< zeroed; null: block i takes item i
-  std::uint32_t begin_at_once;             ///< blocks; others begin later (begin_in_turns); 0: all
+  std::uint32_t* ticket;                   ///< zeroed
   std::uint32_t epoch;                     ///< never 0, new for each isovalue
   const unsigned long long* number_start;  ///< vertices of the launches before
   unsigned long long* number_end;          ///< and of this one, once it is over
@@ -191,7 +133,6 @@ struct TileParams {
   std::uint64_t vertex_capacity, triangle_capacity;
   SurfaceTotals* totals;  ///< where there is no report
   LaunchEnd end;
-  StandBy stand_by;
 };
 
 }  // namespace isobrick::gpu

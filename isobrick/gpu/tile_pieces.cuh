@@ -39,53 +39,20 @@ struct OwnRow {
   __device__ int row() const { return 33 * z + y; }
 };
 
-/// The pieces of a slab: a plane each, of its own, one that it counts and one that it looks at,
-/// and the last rows of all. A warp has one at most.
-template <int N>
-inline constexpr int kPiecesOfSlab = 32 / Team<N>::kSlabs + 3;
-
-/// The threads that do what is to be done beside classifying: those of a slab that have no rows
-/// and do not look for neighbours, else all.
-template <int N>
-struct SpareThreads {
-  static constexpr int kAbove = Team<N>::kFirstWithRows + kPiecesOfSlab<N>;  ///< first warp
-  static_assert(Team<N>::kSlabs == 1 || Team<N>::kWarps > kAbove);
-  static constexpr unsigned kCount = Team<N>::kSlabs == 1 ? N : 32 * (1 + Team<N>::kWarps - kAbove);
-
-  /// The number of this one; beyond any number of things to do where it is none.
-  __device__ static unsigned own() {
-    if constexpr (Team<N>::kSlabs == 1) return own_thread();
-    const unsigned warp = warp_id();
-    return warp == Team<N>::kTriangles ? lane_id()
-           : warp >= kAbove            ? 32 * (1 + warp - kAbove) + lane_id()
-                                       : 1u << 30;
-  }
-};
-
-/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp: of a slab, those of its planes
-/// `first` to `end`; of a whole tile, all. Loops, so that the code of each kind is there once:
-/// warps in different steps share the instruction cache. `BesideFirst`: the first warp of several
-/// has something else to do and gets no planes, but the last rows.
+/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp. Loops, so that the code of each
+/// kind is there once: warps in different steps share the instruction cache. `BesideFirst`: the
+/// first warp of several has something else to do and gets no planes, but the last rows.
 template <int N, bool BesideFirst = false, class F>
-__device__ inline void for_each_piece(int first, int end, F&& f) {
+__device__ inline void for_each_piece(F&& f) {
   auto piece = static_cast<int>(uniform(warp_id()));
-  if constexpr (Team<N>::kSlabs > 1) {
-    piece -= Team<N>::kFirstWithRows;
-    if (piece < 0) return;
-    if (first + piece < end)
-      f(PlaneRows{first + piece});
-    else if (first + piece == end)
-      f(LastRows{first, end});
-  } else {
-    constexpr bool kBeside = BesideFirst && Team<N>::kWarps > 1;
-    constexpr int kStep = Team<N>::kWarps - (kBeside ? 1 : 0);
-    if (kBeside) piece = piece == 0 ? 33 : piece - 1;
+  constexpr bool kBeside = BesideFirst && BlockConfig<N>::kWarps > 1;
+  constexpr int kStep = BlockConfig<N>::kWarps - (kBeside ? 1 : 0);
+  if (kBeside) piece = piece == 0 ? 33 : piece - 1;
 #pragma unroll 1
-    for (; piece < 33; piece += kStep) f(PlaneRows{piece});
-    if (kBeside && uniform(warp_id()) != 0) return;
+  for (; piece < 33; piece += kStep) f(PlaneRows{piece});
+  if (kBeside && uniform(warp_id()) != 0) return;
 #pragma unroll 1
-    for (; piece < kPieces; piece += kBeside ? 1 : kStep) f(LastRows{32 * (piece - 33), 33});
-  }
+  for (; piece < kPieces; piece += kBeside ? 1 : kStep) f(LastRows{32 * (piece - 33), 33});
 }
 
 }  // namespace isobrick::gpu

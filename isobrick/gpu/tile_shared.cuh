@@ -19,22 +19,18 @@ static_assert(kRowPitch % 32 == 11);
 /// Rows are dealt out to warps in pieces of up to 32 (tile_pieces.cuh).
 inline constexpr int kPieces = 33 + 2;
 
-/// How many threads share a tile, or a slab of it, and how its rows are dealt out to them.
+/// A block of N threads that makes the mesh of one tile at a time.
 template <int N>
-struct Team {
+struct BlockConfig {
   static constexpr int kWarps = N / 32;
-  /// Teams to a tile: each makes the mesh of some planes of cells.
-  static constexpr int kSlabs = N == kSlabTeam ? kSlabsOfTile : 1;
-  /// The warps that ask other tiles: where vertices go and what numbers those of neighbours
-  /// have, and where triangles go.
+  /// The warps that wait for other tiles: one for where vertices go and the numbers of the
+  /// neighbours' vertices, one for where triangles go.
   static constexpr unsigned kVertices = 0, kTriangles = kWarps > 1 ? 1 : 0;
-  /// How many teams a multiprocessor has room for.
-  static constexpr int kTeams = N <= 384 ? 3 : N <= 640 ? 2 : 1;
-  /// Vertices or cells that are found at a time; tiles with more take several turns.
+  /// Blocks that a multiprocessor has room for.
+  static constexpr int kBlocks = N <= 384 ? 3 : N <= 640 ? 2 : 1;
+  /// Vertices or cells that are listed at a time; tiles with more take several rounds.
   /// A multiprocessor before Ampere has 64 KiB of shared memory.
-  static constexpr std::uint32_t kMostListed = kSlabs > 1 ? 2048 : kTeams == 3 ? 3360 : 7168;
-  /// The first warp with rows: in a slab the two before ask the others.
-  static constexpr int kFirstWithRows = kSlabs > 1 ? 2 : 0;
+  static constexpr std::uint32_t kMaxListed = kBlocks == 3 ? 3360 : 7168;
 };
 inline constexpr std::uint32_t kListedBeforeAmpere = 512;
 template <int N>
@@ -42,7 +38,7 @@ __host__ __device__ constexpr std::uint32_t listed_at_a_time() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
   return kListedBeforeAmpere;
 #else
-  return Team<N>::kMostListed;
+  return BlockConfig<N>::kMaxListed;
 #endif
 }
 /// A row of inside bits: samples 0 … 31, and sample 32 in the lowest bit.
@@ -68,22 +64,6 @@ struct Shape {
   bool inner;                            ///< nothing is cut along y or z, and at_0 is 0
 };
 
-/// The planes of samples of a slab. A slab numbers the vertices of one plane more than it has,
-/// which its upper cells share with the next slab, and for that looks at yet another.
-struct SlabPlanes {
-  int first, end;  ///< it makes the vertices and cells that begin here
-  int counted_end, read_end;
-};
-/// Of the slab with that number among all; of a tile that one team makes, all planes.
-template <int N>
-__device__ inline SlabPlanes planes_of(std::uint32_t item) {
-  constexpr int kSlabs = Team<N>::kSlabs, kPlanes = 32 / kSlabs;
-  if constexpr (kSlabs == 1) return {0, 33, 33, 33};
-  const auto slab = static_cast<int>(item % kSlabs);
-  const int first = kPlanes * slab, end = slab + 1 == kSlabs ? 33 : first + kPlanes;
-  return {first, end, ::min(end + 1, 33), ::min(end + 2, 33)};
-}
-
 /// What a tile needs of the row tables of the tiles below; 0 where there is none.
 struct LowerRows {
   std::uint32_t y[33], xy[33], z[33], xz[33], yz;
@@ -93,22 +73,6 @@ struct LowerRows {
 struct TeamBarriers {
   unsigned long long vertex_base, cells, neighbours;
   std::uint32_t turn;  ///< of the tile that is worked on, if it needs them
-};
-
-/// What changes while a launch stays for further isovalues (stand_by.cuh); TileParams has what the
-/// first one is.
-struct LaunchNow {
-  OrderState *order, *next_order;
-  std::uint32_t launch, epoch;
-  std::uint64_t began;      ///< on the device's clock
-  std::uint32_t threshold;  ///< its bits
-  float crossing;
-  bool asked, leaves;
-};
-/// The tiles of a volume in slabs, packed: those that are active, once that has been asked for,
-/// and all.
-struct SlabTiles {
-  std::uint32_t found[kMostActiveInSlabs], all[kMostInSlabs];
 };
 
 /// Numbers of vertices count from the tile's first one.
@@ -143,18 +107,14 @@ struct alignas(256) TileShared {
   /// Crossing edges at sample 0 of the lower planes: along z at y = 0, along y at z = 0.
   std::uint8_t plane_at_0[2][33];
   const RowTable* before;  ///< of the tile one lower along x, or null
-  std::uint32_t item;      ///< the number of the tile, or slab, that is worked on
+  std::uint32_t item;      ///< the number of the tile that is worked on
   std::uint32_t items;     ///< how many there are
   std::uint32_t all_triangles;
   std::uint32_t next_cells, next_vertices;  ///< groups of 32 that a warp has taken
   TeamBarriers barriers;
   std::uint32_t done_before;  ///< blocks that were done before this one
-  LaunchNow now;
   TileItem tile;
   Shape shape;
-  /// The active tiles as bits and how many come before each 64, where there are candidates.
-  std::uint32_t active[kMostCandidates / 32];
-  std::uint16_t active_before[kMostCandidates / 64];
 };
 
 /// The row that the first of 32 listed things lies in, and how many of the row
@@ -179,16 +139,6 @@ using ListsOf = Lists<listed_at_a_time<N>()>;
 template <int N>
 __device__ inline ListsOf<N>& lists_of(TileShared& s) {
   return *reinterpret_cast<ListsOf<N>*>(&s + 1);
-}
-
-/// What a slab has behind the lists: a copy of a row table, and tiles.
-template <int N>
-__device__ inline RowTable& slab_rows_of(TileShared& s) {
-  return *reinterpret_cast<RowTable*>(&lists_of<N>(s) + 1);
-}
-template <int N>
-__device__ inline SlabTiles& slab_tiles_of(TileShared& s) {
-  return *reinterpret_cast<SlabTiles*>(&slab_rows_of<N>(s) + 1);
 }
 
 __device__ inline std::uint32_t z_of_row(std::uint32_t row) { return row * 1986u >> 16; }

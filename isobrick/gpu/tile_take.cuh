@@ -2,8 +2,6 @@
 
 #include "isobrick/gpu/streamed_pages.cuh"
 #include "isobrick/gpu/tile_classify.cuh"
-#include "isobrick/gpu/tile_find.cuh"
-#include "isobrick/gpu/tile_order.cuh"
 #include "isobrick/gpu/tile_page.cuh"
 
 // Before the first step: which tile is the next, and where its samples lie.
@@ -47,72 +45,24 @@ __device__ inline void find_pages(TileShared& s, const TileParams& p, const Tile
     s.columns[column] = address(p.pages, start - before + 32);
 }
 
-template <int N>
-__device__ inline TileItem item_of(TileShared& s, const TileParams& p, std::uint32_t number) {
-  if constexpr (Team<N>::kSlabs > 1) {
-    const std::uint32_t tile = found_tile<N>(s, p, number / Team<N>::kSlabs);
-    return {static_cast<std::int32_t>(tile & 1023u), static_cast<std::int32_t>(tile >> 10 & 1023u),
-            static_cast<std::int32_t>(tile >> 20), number};
-  }
-  if (p.candidates.count == 0) return p.items[number];
-  const std::int32_t* tile = p.candidates.tiles + 3 * candidate_of_number(s, number);
-  return {tile[0], tile[1], tile[2], number};
-}
-
-/// Waits for as long as this block is to begin after the first ones. Where a launch fills the
-/// device, the blocks of a multiprocessor would all be in the same step for several tiles, wait
-/// for memory and then for instructions. Before a block takes a tile, so that nobody waits for it.
-__device__ inline void begin_in_turns(const TileParams& p) {
-  if (p.begin_at_once == 0) return;
-  constexpr std::uint64_t kNanosecondsApart = 2500;  // of some 17,000 that a tile takes
-  const std::uint64_t later = kNanosecondsApart * (blockIdx.x / p.begin_at_once);
-  const std::uint64_t start = global_nanoseconds();
-  while (global_nanoseconds() - start < later) __nanosleep(200);
-}
-
-/// Which tile is the next. The first thread; others get anything.
+/// The number of the next tile, for the first thread; others get anything.
 __device__ inline std::uint32_t next_number(const TileParams& p) {
   return threadIdx.x == 0 ? atomicAdd(p.ticket, 1u) : 0;
 }
-/// Which is a block's first.
-__device__ inline std::uint32_t first_number(const TileParams& p) {
-  return p.ticket ? next_number(p) : blockIdx.x;
-}
 
-/// The first warp takes the tile, or slab, with that number.
-template <int N, class T>
+/// The first warp takes the tile with that number.
+template <class T>
 __device__ inline void take_tile(TileShared& s, const TileParams& p, std::uint32_t number) {
   if (warp_id() != 0) return;
   number = __shfl_sync(kAll, number, 0);
   if (lane_id() == 0) s.item = number;
   if (number >= s.items) return;
-  const TileItem tile = item_of<N>(s, p, number);
+  const TileItem tile = p.items[number];
   find_pages<T>(s, p, tile, number);
   if (lane_id() == 0) {
     s.tile = tile;
     s.shape = shape_of(p, tile);
   }
-}
-
-/// Brings the samples of a tile that is about to be taken into the L2 cache. One warp.
-template <int N, class T>
-__device__ inline void prefetch_tile(TileShared& s, const TileParams& p, std::uint32_t number) {
-  if (number >= s.items) return;
-  constexpr std::uint32_t kLine = 128, kBytes = kPageSamples * sizeof(T);
-  const char* from = static_cast<const char*>(p.pages);
-  if (p.links) {
-    from += streamed_page(number, kOwnPage) * static_cast<std::int64_t>(sizeof(T));
-  } else {
-    const TileItem item = item_of<N>(s, p, number);
-    const std::int64_t place =
-        (static_cast<std::int64_t>(item.z) * p.tiles[1] + item.y) * p.tiles[0] + item.x;
-    const std::uint32_t page = page_of_place(p, place);
-    if (page == p.fill_page) return;
-    from += static_cast<std::size_t>(page) * kBytes;
-  }
-  from += kLine * lane_id();
-#pragma unroll
-  for (std::uint32_t at = 0; at < kBytes; at += 32 * kLine) prefetch_l2(from + at);
 }
 
 }  // namespace isobrick::gpu

@@ -57,7 +57,6 @@ ChosenBackend set_up_backend(const ExtractRequest& request, const ExtractOptions
     chosen.decoded.reset();
     chosen.gpu.reset();
   }
-  drop_spare_gpu_memory();  // the budget is all for the CPU
   chosen.plan = plan_memory(request, options.memory, active_bricks, other_bytes);
   chosen.surface = make_cpu_surface(request, chosen.plan.limits, sink);
   return chosen;

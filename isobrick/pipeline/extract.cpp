@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "isobrick/core/morton.h"
-#include "isobrick/core/prompt_thread.h"
 #include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract_plan.h"
@@ -155,7 +154,6 @@ void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
 
 /// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.
 void extract_on_gpu(const Work& work, ChosenBackend& backend) {
-  const PromptThread prompt;
   BatchDecoder& decoder = backend.decoded->decoder;
   SurfaceExtractor* const surface = backend.surface.get();
   for (;;) {
@@ -177,7 +175,7 @@ void extract_on_gpu(const Work& work, ChosenBackend& backend) {
   work.report.bricks_read = decoder.bricks_read();
   work.report.brick_reads = decoder.reads();
   report_search(backend.decoded->planned.tiles, work.report);
-  // What they take goes, or is spare for the next extraction, before the sink ends its file.
+  // Their memory is freed before the sink ends its file.
   backend.surface.reset();
   backend.decoded.reset();
 }

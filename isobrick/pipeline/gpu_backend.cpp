@@ -8,7 +8,6 @@
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/gpu_extractor.h"
 #include "isobrick/gpu/host_memory.h"
-#include "isobrick/gpu/spare_pages.h"
 #include "isobrick/pipeline/chunk_writer.h"
 
 namespace isobrick {
@@ -109,7 +108,6 @@ class CudaSession final : public GpuSession {
     const auto fit = [&](std::uint64_t bricks) {
       sizes_ = gpu::fit_stream_sizes(lattice, request.surface, device_budget, host_budget,
                                      other_host_bytes, {bricks, request.threads});
-      gpu::spare_pages().keep_only(device_, gpu::pinned_regions(lattice, sizes_));
     };
     fit(std::min(most_bricks, gpu::good_pool(lattice, request.threads)));
     bricks_ = std::make_unique<HostBricks>(device_);
@@ -152,6 +150,5 @@ bool built_with_cuda() { return true; }
 int cuda_device_count() { return gpu::device_count(); }
 
 std::unique_ptr<GpuSession> open_gpu(int device) { return std::make_unique<CudaSession>(device); }
-void drop_spare_gpu_memory() { gpu::spare_pages().drop(); }
 
 }  // namespace isobrick

@@ -42,7 +42,5 @@ class GpuSession {
 
 /// Throws Error when the device cannot be made ready, or without the backend.
 std::unique_ptr<GpuSession> open_gpu(int device);
-/// Gives back the host memory that extractions on a GPU have left for the next one.
-void drop_spare_gpu_memory();
 
 }  // namespace isobrick

@@ -9,6 +9,5 @@ int cuda_device_count() { return 0; }
 std::unique_ptr<GpuSession> open_gpu(int) {
   throw Error("this isobrick was built without CUDA; use --backend cpu");
 }
-void drop_spare_gpu_memory() {}
 
 }  // namespace isobrick

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "isobrick/core/morton.h"
-#include "isobrick/core/prompt_thread.h"
 
 namespace isobrick {
 namespace {
@@ -107,8 +106,6 @@ std::uint64_t BatchDecoder::memory_bytes() const {
 void BatchDecoder::plan() {
   try {
     for (TileBatch batch; next_planned(batch);) {
-      // Not while it plans: threads that TBB makes for that would keep such turns.
-      const PromptThread prompt;
       // The disk works on what comes next, while this waits for its turn.
       hint(batch);
       begin(std::make_shared<DecodedBatch>(*this, std::move(batch)));

@@ -11,16 +11,24 @@ namespace {
 
 template <class T>
 void compare(const Field<T>& field, std::vector<double> isovalues, SurfaceOptions options,
-             Index brick = 64, gpu::TileSearch search = gpu::TileSearch::ranges) {
+             Index brick = 64, bool brute_force = false) {
   Resident<T> r(field, options, brick);
   for (const bool normals : {false, true}) {
     r.options.normals = normals;
-    gpu::ResidentExtractor extractor(r.volume, r.options, {.search = search});
+    gpu::ResidentExtractor extractor(r.volume, r.options, {.brute_force = brute_force});
     for (const double isovalue : isovalues) {
       r.expect_mesh(extractor, isovalue);
       if (::testing::Test::HasFailure()) return;
     }
   }
+}
+
+/// Those that the device has room for.
+std::vector<gpu::LaunchShape> all_shapes(ScalarType type, const SurfaceOptions& options) {
+  std::vector<gpu::LaunchShape> shapes;
+  for (const gpu::LaunchShape& shape : gpu::launch_shapes(gpu::kernel_of(type, options)).shapes)
+    if (shape.blocks > 0) shapes.push_back(shape);
+  return shapes;
 }
 
 template <class T>
@@ -35,33 +43,12 @@ TYPED_TEST(GpuResident, SmoothFieldOfOddExtents) {
   compare(this->waves({131, 70, 97}), {mid - 40, mid, mid + 0.5, mid + 30}, {}, 32);
 }
 
-TYPED_TEST(GpuResident, ManyTilesAreFoundByALaunchOfTheirOwn) {
+TYPED_TEST(GpuResident, ManyTilesTakeSeveralBlocksOfTheSearch) {
   const double mid = this->lowest() + 100;
   const Field<TypeParam> field({2, 2080, 2070}, [&](Int3 p) {  // 65 × 65 tiles
     return mid + static_cast<double>((p.x * 31 + p.y / 7 * 13 + p.z * p.z / 50) % 150 - 75);
   });
   compare(field, {mid + 74, mid, this->lowest(), mid - 40}, {});
-  SurfaceOptions options;
-  options.roi = {{0, 31, 100}, {2, 500, 1060}};
-  compare(field, {mid}, options);
-}
-
-/// 64 × 64, as many as the host searches.
-TYPED_TEST(GpuResident, AsManyTilesAsTheHostSearches) {
-  const double mid = this->lowest() + 100;
-  const Field<TypeParam> field({2, 2041, 2040}, [&](Int3 p) {
-    return mid + static_cast<double>((p.x * 31 + p.y / 9 * 13 + p.z * p.z / 40) % 150 - 75);
-  });
-  compare(field, {mid, mid + 74, mid - 40}, {});
-}
-
-/// 33 × 34, which is too many to be found through an index without a launch.
-TYPED_TEST(GpuResident, ManyTilesAreFoundByTheHost) {
-  const double mid = this->lowest() + 100;
-  const auto field = this->waves({3, 1030, 1060});
-  for (const auto search :
-       {gpu::TileSearch::ranges, gpu::TileSearch::kdtree, gpu::TileSearch::octree})
-    compare(field, {mid + 70, mid, this->lowest(), mid - 40}, {}, 64, search);
   SurfaceOptions options;
   options.roi = {{0, 31, 100}, {2, 500, 1060}};
   compare(field, {mid}, options);
@@ -78,22 +65,14 @@ TYPED_TEST(GpuResident, ExtentsThatFillNoTile) {
     compare(this->noise(extent, 7), {this->lowest() + 100}, {});
 }
 
-/// A plane of edges where a slab begins, and no cell above it.
-TYPED_TEST(GpuResident, VolumesThatEndWhereASlabBegins) {
+/// A plane of edges at the volume's upper border, and no cell above it.
+TYPED_TEST(GpuResident, VolumesThatEndInsideATile) {
   const double mid = this->lowest() + 100;
   for (const Int3 extent : {Int3{33, 33, 9}, Int3{48, 49, 17}, Int3{40, 40, 57}})
     compare(this->noise(extent, 11), {mid}, {});
   SurfaceOptions options;
   options.roi = {{3, 0, 40}, {60, 41, 57}};
   compare(this->noise({67, 41, 75}, 3), {mid}, options);
-}
-
-/// Found without a launch, but too many to be shared by blocks: 13 × 13.
-TYPED_TEST(GpuResident, MoreTilesThanHaveSlabs) {
-  const double mid = this->lowest() + 100;
-  const auto field = this->waves({3, 400, 390});
-  compare(field, {mid + 70, mid, mid + 1e9}, {});
-  compare(field, {mid}, {}, 64, gpu::TileSearch::interval);
 }
 
 /// A sample that equals the largest of its type is no reason to make anything above.
@@ -104,25 +83,13 @@ TYPED_TEST(GpuResident, NoSampleReachesAnIsovalueAboveItsType) {
   } else {
     const Field<TypeParam> field({40, 33, 35},
                                  [](Int3 p) { return p.x < 17 ? 0.0 : double{Limits::max()}; });
-    compare(field, {double{Limits::max()} + 1, 1e9}, {}, 64, gpu::TileSearch::none);
+    compare(field, {double{Limits::max()} + 1, 1e9}, {}, 64, true);
   }
 }
 
-TEST(LaunchShapes, SlabsAreForAsManyTilesAsTheHostLists) {
-  gpu::LaunchShapes shapes;
-  for (gpu::LaunchShape& shape : shapes.shapes) shape = {.blocks = 1000, .threads = 384};
-  shapes.slabs = {.blocks = 1000, .threads = gpu::kSlabTeam, .slabs = gpu::kSlabsOfTile};
-  EXPECT_EQ(shapes.in_slabs(gpu::kMostActiveInSlabs).slabs, gpu::kSlabsOfTile);
-  EXPECT_EQ(shapes.in_slabs(gpu::kMostActiveInSlabs + 1).slabs, 1);
-  shapes.slabs.blocks = 15;
-  EXPECT_EQ(shapes.in_slabs(1).slabs, gpu::kSlabsOfTile);
-  EXPECT_EQ(shapes.in_slabs(2).slabs, 1);
-  shapes.slabs.blocks = 0;
-  EXPECT_EQ(shapes.in_slabs(1).slabs, 1);
-}
-
-/// Teams of 640 list more cells at a time, which pays where most tiles have more than 384 list.
-TEST(LaunchShapes, TeamsThatListMoreAreForFullTiles) {
+/// Blocks of 640 threads list more cells at a time, which pays where most tiles have more than
+/// blocks of 384 list.
+TEST(LaunchShapes, BlocksThatListMoreAreForFullTiles) {
   gpu::LaunchShapes shapes;
   shapes.shapes[0] = {.blocks = 132, .threads = 1024, .listed = 7168};
   shapes.shapes[1] = {.blocks = 264, .threads = 640, .listed = 7168};
@@ -149,9 +116,8 @@ TYPED_TEST(GpuResident, EmptyTilesPassOnWhatLiesBefore) {
   options.isovalue = 50;
   options.roi = lattice.box();
   gpu::DeviceVolume volume(lattice, bricks, 0);
-  for (const int threads : {0, 384, 1024}) {
-    gpu::ResidentExtractor extractor(volume, options,
-                                     {.search = gpu::TileSearch::none, .threads = threads});
+  for (const gpu::LaunchShape& shape : all_shapes(lattice.type, options)) {
+    gpu::ResidentExtractor extractor(volume, options, {.brute_force = true, .shape = &shape});
     EXPECT_EQ(extractor.extract(50).active_tiles, 4 * 4 * 5u);
     MeshBuffer mesh;
     extractor.download(mesh);
@@ -218,15 +184,15 @@ TYPED_TEST(GpuResident, ARepeatMakesTheSameMesh) {
   extractor.extract(this->lowest() + 100.5);
   MeshBuffer once, again;
   extractor.download(once);
-  for (const bool queued : {false, true, true}) {
-    extractor.repeat(queued);
+  for (int i = 0; i < 3; ++i) {
+    extractor.repeat();
     EXPECT_GT(extractor.milliseconds(), 0);
     extractor.download(again);
     expect_same(once, again);
   }
 }
 
-TYPED_TEST(GpuResident, AnySearchMakesTheSameMesh) {
+TYPED_TEST(GpuResident, BruteForceMakesTheSameMesh) {
   const auto field = this->waves({131, 70, 197});
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
   const DenseBricks bricks(lattice, field.samples.data());
@@ -235,29 +201,20 @@ TYPED_TEST(GpuResident, AnySearchMakesTheSameMesh) {
   for (const Box3 roi : {lattice.box(), Box3{{5, 33, 40}, {97, 66, 190}}}) {
     options.roi = roi;
     gpu::ResidentExtractor by_ranges(volume, options);
-    for (const auto search :
-         {gpu::TileSearch::none, gpu::TileSearch::interval, gpu::TileSearch::kdtree,
-          gpu::TileSearch::quadtree, gpu::TileSearch::octree}) {
-      gpu::ResidentExtractor extractor(volume, options, {.search = search});
-      for (const double shift : {0.0, 35.5, -60.0, 1e9}) {
-        const auto expected = by_ranges.extract(this->lowest() + 100 + shift);
-        const auto counts = extractor.extract(this->lowest() + 100 + shift);
-        EXPECT_EQ(counts.triangles, expected.triangles);
-        if (search != gpu::TileSearch::none) {
-          EXPECT_EQ(counts.active_tiles, expected.active_tiles);
-        }
-        MeshBuffer one, other;
-        by_ranges.download(one);
-        extractor.download(other);
-        SCOPED_TRACE("search " + std::to_string(static_cast<int>(search)) + ", shift " +
-                     std::to_string(shift));
-        expect_same(one, other);
-      }
+    gpu::ResidentExtractor by_force(volume, options, {.brute_force = true});
+    for (const double shift : {0.0, 35.5, -60.0, 1e9}) {
+      SCOPED_TRACE(shift);
+      const double isovalue = this->lowest() + 100 + shift;
+      EXPECT_EQ(by_force.extract(isovalue).triangles, by_ranges.extract(isovalue).triangles);
+      MeshBuffer one, other;
+      by_ranges.download(one);
+      by_force.download(other);
+      expect_same(one, other);
     }
   }
 }
 
-TYPED_TEST(GpuResident, AnyNumberOfThreadsMakesTheSameMesh) {
+TYPED_TEST(GpuResident, AnySizeOfBlocksMakesTheSameMesh) {
   const auto field = this->noise({67, 41, 35}, 9);
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
   const DenseBricks bricks(lattice, field.samples.data());
@@ -270,21 +227,15 @@ TYPED_TEST(GpuResident, AnyNumberOfThreadsMakesTheSameMesh) {
     usual.extract(this->lowest() + 100);
     MeshBuffer expected;
     usual.download(expected);
-    for (const int threads : {32, 64, 128, 256, 384, 512, 640, 1024}) {
-      SCOPED_TRACE(std::to_string(threads) + " threads");
-      const bool studied = std::is_same_v<TypeParam, std::uint8_t> && !normals;
-      if (threads != 384 && threads != 640 && threads != 1024 && !studied) {
-        EXPECT_THROW(gpu::ResidentExtractor(volume, options, {.threads = threads}), UsageError);
-        continue;
-      }
-      gpu::ResidentExtractor extractor(volume, options, {.threads = threads});
+    for (const gpu::LaunchShape& shape : all_shapes(lattice.type, options)) {
+      SCOPED_TRACE(std::to_string(shape.threads) + " threads");
+      gpu::ResidentExtractor extractor(volume, options, {.shape = &shape});
       extractor.extract(this->lowest() + 100);
       MeshBuffer mesh;
       extractor.download(mesh);
       expect_same(expected, mesh);
     }
   }
-  EXPECT_THROW(gpu::ResidentExtractor(volume, options, {.threads = 100}), UsageError);
 }
 
 TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {

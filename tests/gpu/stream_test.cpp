@@ -8,7 +8,6 @@
 #include "isobrick/gpu/brick_pool.h"
 #include "isobrick/gpu/gpu_extractor.h"
 #include "isobrick/gpu/host_memory.h"
-#include "isobrick/gpu/spare_pages.h"
 #include "tests/gpu/compare.h"
 
 // The streamed mesh is the CPU's, byte for byte, however it is cut into launches.
@@ -115,14 +114,6 @@ class NeededBricks final : public BrickLookup {
   std::vector<char> needed_;
 };
 
-/// What extractions before have left in host memory is nothing that a mesh has.
-void poison_spare_outputs(const gpu::StreamSizes& sizes) {
-  std::optional<gpu::LockedPieces> outputs = gpu::spare_pages().take(0, gpu::output_pieces(sizes));
-  if (!outputs) return;
-  std::fill_n(outputs->at(0), outputs->bytes(), std::byte{0xff});
-  gpu::spare_pages().give(std::move(*outputs));
-}
-
 struct Streamed {
   MeshBuffer mesh;
   gpu::StreamReport report;
@@ -155,7 +146,6 @@ Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOpt
   };
   const gpu::StreamSizes sizes = gpu::stream_sizes(lattice, options, way.tiles, gpu::kLeastLanes,
                                                    pooled ? pooled->sizes() : gpu::PoolSizes{});
-  poison_spare_outputs(sizes);
   gpu::GpuExtractor extractor(0, lattice, options, sizes, take, pooled ? pooled->pool() : nullptr);
   for (std::size_t i = 0; i < tiles.size(); i += std::min(way.call, tiles.size()))
     extractor.extract(tiles.subspan(i, std::min(way.call, tiles.size() - i)), bricks,
@@ -372,20 +362,6 @@ TEST(GpuStreamSizes, APoolIsTakenWhereMostOfItFits) {
                                   much, 0, {100, 4})
                 .pool.bricks,
             0u);
-}
-
-TEST(GpuStreamSizes, WhatIsKeptIsPartOfWhatIsPlanned) {
-  const Lattice lattice{{1024, 1024, 1024}, {64, 64, 64}, ScalarType::u16};
-  const auto bytes = [&](const gpu::PoolSizes& pool) {
-    const gpu::StreamSizes s =
-        gpu::stream_sizes(lattice, {.roi = lattice.box()}, 256, gpu::kMostLanes, pool);
-    std::uint64_t sum = 0;
-    for (const auto& region : gpu::pinned_regions(lattice, s))
-      sum = std::accumulate(region.begin(), region.end(), sum);
-    EXPECT_LT(sum, s.pinned_bytes);
-    return sum;
-  };
-  EXPECT_EQ(bytes({1000, 16}) - bytes({}), gpu::BrickPool::pinned_bytes(lattice.brick_bytes(), 16));
 }
 
 TEST(GpuStreamSizes, WhatHasNoKernelsIsRefused) {

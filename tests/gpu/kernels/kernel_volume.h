@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "isobrick/core/morton.h"
-#include "isobrick/gpu/host_search.h"
 #include "isobrick/gpu/page_gather.h"
 #include "isobrick/surface/world_map.h"
 #include "tests/gpu/compare.h"
@@ -116,23 +115,9 @@ class KernelVolume {
     return expected_mesh(field_, lattice, bricks_, options, isovalue);
   }
 
-  /// Which of the candidates are active.
-  gpu::FoundTiles find(double isovalue) const {
-    std::vector<ValueRange<double>> ranges;
-    for (std::size_t i = 0; i < tiles(); ++i) {
-      const Box3 cells = intersect(samples_of(tiles_[i]), options.roi);
-      const Int3 size = cells.hi - cells.lo;
-      ranges.push_back(size.x > 1 && size.y > 1 && size.z > 1
-                           ? ValueRange<double>{static_cast<double>(ranges_[2 * i]),
-                                                static_cast<double>(ranges_[2 * i + 1])}
-                           : ValueRange<double>{});
-    }
-    return gpu::HostSearch(tiles_, ranges).find(isovalue);
-  }
-  /// What the search for them is told on the device.
+  /// What the search for active tiles is given.
   gpu::SearchParams search_params(double isovalue) const {
     gpu::SearchParams p{};
-    p.test = gpu::TileTest::ranges;
     p.uncut = options.roi == lattice.box();
     p.tiles = coordinates_.data();
     p.ranges = ranges_.data();
@@ -145,7 +130,7 @@ class KernelVolume {
     return p;
   }
 
-  /// What an extraction is told of the volume, with all tiles for candidates.
+  /// What an extraction is given of the volume.
   gpu::TileParams params(double isovalue) const {
     SurfaceOptions o = options;
     o.isovalue = isovalue;
@@ -153,7 +138,6 @@ class KernelVolume {
     p.pages = pages_.data();
     p.columns = columns_.data();
     p.page_of_tile = page_of_tile_.data();
-    p.candidates = {coordinates_.data(), order_of_tile_.data(), tiles()};
     return p;
   }
 
@@ -190,12 +174,9 @@ class KernelVolume {
     return reinterpret_cast<std::byte*>(pages_.data() + i * gpu::kPageSamples);
   }
   void list_tiles() {
-    order_of_tile_.resize(tiles());
-    for (std::uint32_t i = 0; i < tiles(); ++i) {
-      order_of_tile_[static_cast<std::size_t>(linear_index(tiles_[i], lattice.tiles()))] = i;
+    for (const Int3 tile : tiles_)
       for (int axis = 0; axis < 3; ++axis)
-        coordinates_.push_back(static_cast<std::int32_t>(tiles_[i][axis]));
-    }
+        coordinates_.push_back(static_cast<std::int32_t>(tile[axis]));
     ranges_.resize(2 * std::size_t{tiles()});
     emulated::run_tile_ranges(lattice.type, params(0), coordinates_.data(), tiles(),
                               ranges_.data());
@@ -205,59 +186,73 @@ class KernelVolume {
   const BrickLookup& bricks_;
   std::vector<Int3> tiles_;  ///< in Morton order
   std::vector<T> pages_, columns_, ranges_;
-  std::vector<std::uint32_t> page_of_tile_, order_of_tile_;
+  std::vector<std::uint32_t> page_of_tile_;
   std::vector<std::int32_t> coordinates_;
   gpu::CaseTable cases_;
 };
 
-/// What extractions of a volume count and tell with; ResidentLauncher keeps the same.
+/// What extractions of a volume count and report with; ResidentLauncher keeps the same.
 struct KernelState {
-  explicit KernelState(std::uint32_t most_items)
-      : most(most_items), order(2 * std::size_t{most_items}), row_tables(most_items) {}
+  explicit KernelState(std::uint32_t tiles)
+      : items(tiles),
+        slots(tiles),
+        order(tiles),
+        row_tables(tiles),
+        zeroed(2 + (tiles + gpu::kTilesOfSearchBlock - 1) / gpu::kTilesOfSearchBlock) {}
 
-  std::uint32_t most;
-  std::vector<gpu::OrderState> order;  ///< two sets that take turns
+  std::vector<gpu::TileItem> items;
+  std::vector<std::uint32_t> slots;
+  std::vector<gpu::OrderState> order;
   std::vector<gpu::RowTable> row_tables;
   std::uint32_t launches = 0, epoch = 0;
   unsigned long long number_start = 0, number_end = 0;
-  std::uint32_t found = 0;
-  struct {
-    std::uint32_t ticket = 0, done = 0;
-  } zeroed;
+  std::uint32_t found = 0, item_count = 0;
+  /// Tickets of search and extraction, blocks that are done, a word of padding; the search's sums.
+  std::vector<unsigned long long> zeroed;
   gpu::LaunchReport report{};
 
-  /// For the next launch.
-  void give(gpu::TileParams& p, bool block_each) {
-    ++launches;
+  std::uint32_t* zeroed_words() { return reinterpret_cast<std::uint32_t*>(zeroed.data()); }
+
+  /// For the next search.
+  void give(gpu::SearchParams& p) {
+    p.items = items.data();
+    p.found = &found;
+    p.item_count = &item_count;
+    p.item_room = static_cast<std::uint32_t>(items.size());
+    p.slot_of_tile = slots.data();
+    p.order = order.data();
+    p.sums = zeroed.data() + 2;
+    p.ticket = zeroed_words();
+  }
+  /// For the extraction of what that has found.
+  void give(gpu::TileParams& p) {
+    p.items = items.data();
+    p.item_count = &item_count;
+    p.slot_of_tile = slots.data();
     p.epoch = ++epoch;
     p.row_tables = row_tables.data();
-    p.order = order.data() + (launches % 2 == 0 ? most : 0);
+    p.order = order.data();
     p.number_start = &number_start;
     p.number_end = &number_end;
-    p.ticket = block_each ? nullptr : &zeroed.ticket;
-    p.end = {&report, launches, &found, &zeroed.done, &zeroed.ticket, 2, order.data(), most};
-    if (launches % 2 == 1) p.end.next_order += most;
+    p.ticket = zeroed_words() + 1;
+    p.end = {&report,        ++launches,
+             &found,         zeroed_words() + 2,
+             zeroed_words(), static_cast<std::uint32_t>(2 * zeroed.size())};
   }
 
   std::uint64_t word(int i) {
     return std::atomic_ref(report.words[i]).load(std::memory_order_relaxed);
   }
-  /// What the last one has told.
-  void expect_told(const MeshBuffer& mesh, std::uint32_t active) {
+  void expect_reported(const MeshBuffer& mesh) {
     using gpu::LaunchReport, gpu::LaunchWord;
     const std::uint64_t vertices = mesh.positions.size(), triangles = mesh.triangles.size();
     EXPECT_EQ(word(LaunchReport::kVertices), LaunchWord::of(vertices, launches));
     EXPECT_EQ(word(LaunchReport::kTriangles), LaunchWord::of(triangles, launches));
-    EXPECT_EQ(word(LaunchReport::kActiveTiles), LaunchWord::of(active, launches));
+    EXPECT_EQ(word(LaunchReport::kActiveTiles), LaunchWord::of(found, launches));
   }
-  /// As the next one needs it, once the last is over.
+  /// As the next isovalue needs it.
   void expect_zeroed() const {
-    const auto next = launches % 2 == 0 ? order.begin() : order.begin() + most;
-    EXPECT_TRUE(std::all_of(next, next + most, [](const gpu::OrderState& sums) {
-      return sums.vertices == 0 && sums.triangles == 0;
-    }));
-    EXPECT_EQ(zeroed.ticket, 0u);
-    EXPECT_EQ(zeroed.done, 0u);
+    EXPECT_TRUE(std::ranges::all_of(zeroed, [](auto word) { return word == 0; }));
   }
 };
 

@@ -9,40 +9,35 @@ namespace {
 
 using emulated::TileRun;
 
-/// Extracts tiles that the host has found.
+/// Searches the tiles and extracts the active ones.
+template <class T>
+void run_both(const KernelVolume<T>& volume, const TileRun& run, double isovalue,
+              KernelState& state, MeshRoom& room) {
+  gpu::SearchParams search = volume.search_params(isovalue);
+  state.give(search);
+  emulated::run_search(run.type, search, run.seed);
+  gpu::TileParams p = volume.params(isovalue);
+  state.give(p);
+  room.give(p);
+  emulated::run_tiles(run, p, volume.cases());
+}
+
 template <class T>
 void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<double>& isovalues) {
   run.type = scalar_type_of<T>;
   run.normals = volume.options.normals;
   run.may_have_nan = volume.options.may_have_nan;
-  const bool in_slabs = run.threads == gpu::kSlabTeam;
-  const std::uint32_t slabs = in_slabs ? gpu::kSlabsOfTile : 1;
-  KernelState state(volume.tiles() * slabs);
+  KernelState state(volume.tiles());
   std::size_t made = 0;
   for (const double isovalue : isovalues) {
     SCOPED_TRACE("isovalue " + std::to_string(isovalue) + ", " + std::to_string(run.threads) +
                  " threads, " + (run.normals ? "normals, " : "") + "seed " +
                  std::to_string(run.seed));
     const MeshBuffer expected = volume.mesh(isovalue);
-    const gpu::FoundTiles found = volume.find(isovalue);
-    if (found.count == 0) {
-      EXPECT_EQ(expected.positions.size(), 0u);
-      continue;
-    }
-    gpu::TileParams p = volume.params(isovalue);
-    p.found = found.count;
-    if (in_slabs) {
-      std::ranges::copy(found.tiles, p.found_tiles);
-      run.blocks = found.count * slabs;
-    } else {
-      std::ranges::copy(found.words, p.found_words);
-    }
-    state.give(p, run.blocks == found.count * slabs);
     MeshRoom room(expected.positions.size(), expected.triangles.size());
-    room.give(p);
-    emulated::run_tiles(run, p, volume.cases());
+    run_both(volume, run, isovalue, state, room);
     room.expect(expected);
-    state.expect_told(expected, found.count);
+    state.expect_reported(expected);
     state.expect_zeroed();
     ++run.seed;
     made += expected.triangles.size();
@@ -57,9 +52,8 @@ void compare(const Field<T>& field, const TileRun& run, const std::vector<double
              SurfaceOptions options = {}) {
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<T>};
   const DenseBricks bricks(lattice, field.samples.data());
-  const bool both = run.threads == 384 || run.threads == gpu::kSlabTeam;
   for (const bool normals : {false, true}) {
-    if (normals && !both) continue;
+    if (normals && run.threads != 384) continue;
     options.normals = normals;
     compare(KernelVolume<T>(field, bricks, lattice, options), run, isovalues);
   }
@@ -95,8 +89,6 @@ TYPED_TEST(TileKernel, NoiseIsTheHardestInput) {
 
 TYPED_TEST(TileKernel, OneTile) {
   compare(TestFixture::Fields::noise({33, 33, 33}, 4), {.blocks = 1}, {TestFixture::kMid});
-  compare(TestFixture::Fields::noise({33, 33, 33}, 4), {.threads = gpu::kSlabTeam},
-          {TestFixture::kMid});
 }
 
 TYPED_TEST(TileKernel, ExtentsThatFillNoTile) {
@@ -105,16 +97,7 @@ TYPED_TEST(TileKernel, ExtentsThatFillNoTile) {
       return TestFixture::kMid + static_cast<double>((p.x * 31 + p.y * 57 + p.z * 13) % 90 - 40);
     });
     compare(field, {}, {TestFixture::kMid});
-    compare(field, {.threads = gpu::kSlabTeam}, {TestFixture::kMid});
   }
-}
-
-TYPED_TEST(TileKernel, Slabs) {
-  constexpr double mid = TestFixture::kMid;
-  const TileRun run{.threads = gpu::kSlabTeam};
-  compare(TestFixture::Fields::waves({33, 30, 60}), run, {mid - 40, mid, mid + 0.5});
-  compare(TestFixture::Fields::noise({40, 20, 35}, 11), run, {mid});
-  compare(TestFixture::Fields::noise({33, 49, 17}, 12), run, {mid});
 }
 
 TYPED_TEST(TileKernel, RegionOfInterestAndTransform) {
@@ -123,35 +106,27 @@ TYPED_TEST(TileKernel, RegionOfInterestAndTransform) {
   options.transform.spacing = {0.7, 1.3, -2};
   options.transform.origin = {-5, 11, 0.25};
   options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
-  for (const unsigned threads : {384u, unsigned{gpu::kSlabTeam}})
-    for (const Inside inside : {Inside::above, Inside::below}) {
-      options.inside = inside;
-      compare(TestFixture::Fields::noise({55, 35, 44}, 5), {.threads = threads},
-              {TestFixture::kMid}, options);
-    }
+  for (const Inside inside : {Inside::above, Inside::below}) {
+    options.inside = inside;
+    compare(TestFixture::Fields::noise({55, 35, 44}, 5), {}, {TestFixture::kMid}, options);
+  }
 }
 
-/// What has no room is not written, and what there would be is told.
+/// What has no room is not written, but counted and reported.
 TYPED_TEST(TileKernel, TooLittleRoom) {
   const auto field = TestFixture::Fields::waves({67, 41, 40});
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
   const DenseBricks bricks(lattice, field.samples.data());
   const KernelVolume<TypeParam> volume(field, bricks, lattice, {});
   const MeshBuffer expected = volume.mesh(TestFixture::kMid);
-  const gpu::FoundTiles found = volume.find(TestFixture::kMid);
   for (const auto& [vertices, triangles] : {std::pair<std::size_t, std::size_t>{0, 0},
                                             {expected.positions.size() - 1, 0},
                                             {0, expected.triangles.size() - 1}}) {
-    gpu::TileParams p = volume.params(TestFixture::kMid);
-    p.found = found.count;
-    std::ranges::copy(found.words, p.found_words);
     KernelState state(volume.tiles());
-    state.give(p, false);
     MeshRoom room(vertices, triangles);
-    room.give(p);
-    emulated::run_tiles({.type = scalar_type_of<TypeParam>}, p, volume.cases());
+    run_both(volume, {.type = scalar_type_of<TypeParam>}, TestFixture::kMid, state, room);
     room.expect_untouched(vertices, triangles);
-    state.expect_told(expected, found.count);
+    state.expect_reported(expected);
     state.expect_zeroed();
   }
 }
@@ -164,58 +139,21 @@ TYPED_TEST(TileKernel, BricksThatAreAbsent) {
           {TestFixture::kMid});
 }
 
-/// Active tiles that a launch before has found.
-template <class T>
-void compare_searched(const Field<T>& field, SurfaceOptions options, double isovalue) {
-  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<T>};
-  const DenseBricks bricks(lattice, field.samples.data());
-  const KernelVolume<T> volume(field, bricks, lattice, options);
-  const MeshBuffer expected = volume.mesh(isovalue);
-  std::vector<gpu::TileItem> items(volume.tiles());
-  std::vector<std::uint32_t> slots(volume.tiles());
-  std::vector<unsigned long long> sums(2);
-  std::uint32_t count = 0, ticket = 0;
-  KernelState state(volume.tiles());
-  gpu::TileParams p = volume.params(isovalue);
-  p.candidates.count = 0;
-  state.give(p, false);
-  gpu::SearchParams search = volume.search_params(isovalue);
-  search.items = items.data();
-  search.found = &state.found;
-  search.item_count = &count;
-  search.item_room = volume.tiles();
-  search.slot_of_tile = slots.data();
-  search.order = p.order;
-  search.sums = sums.data();
-  search.ticket = &ticket;
-  emulated::run_search(scalar_type_of<T>, search, 1);
-  EXPECT_EQ(count, volume.find(isovalue).count);
-  p.items = items.data();
-  p.item_count = &count;
-  p.slot_of_tile = slots.data();
-  p.begin_at_once = 1;
-  MeshRoom room(expected.positions.size(), expected.triangles.size());
-  room.give(p);
-  emulated::run_tiles({.type = scalar_type_of<T>, .blocks = 3}, p, volume.cases());
-  room.expect(expected);
-  state.expect_told(expected, count);
-  state.expect_zeroed();
-}
-
 /// 33 × 33 tiles, which two blocks search.
-TEST(TileKernelOf, TilesThatALaunchBeforeHasFound) {
+TEST(TileKernelOf, TilesThatSeveralBlocksSearch) {
   const auto value = [](Int3 p) {
     return (p.y / 40 + p.z / 30) % 23 == 0 ? static_cast<double>((p.x * 31 + p.y * 13) % 90) : 9.0;
   };
   SurfaceOptions part;
   part.roi = {{0, 31, 100}, {2, 500, 760}};
   const Int3 extent{2, 1030, 1027};
-  compare_searched(Field<std::uint8_t>(extent, value), {}, 50);
-  compare_searched(Field<std::uint8_t>(extent, value), part, 50);
-  compare_searched(Field<float>(extent, value), {}, 80.5);
+  const TileRun run{.blocks = 3};
+  compare(Field<std::uint8_t>(extent, value), run, {50});
+  compare(Field<std::uint8_t>(extent, value), run, {50}, part);
+  compare(Field<float>(extent, value), run, {80.5});
 }
 
-TEST(TileKernelOf, TeamsOfAnyNumberOfThreads) {
+TEST(TileKernelOf, BlocksOfAnyNumberOfThreads) {
   for (const unsigned threads : {32u, 640u, 1024u}) {
     compare(TestFields<std::uint8_t>::noise({40, 35, 20}, 6), {.threads = threads}, {100});
     compare(TestFields<std::uint8_t>::waves({67, 41, 20}), {.threads = threads}, {100, 130});

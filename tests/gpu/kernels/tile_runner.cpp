@@ -19,18 +19,10 @@ struct Kernel {
 
   static void run(const TileRun& r, const gpu::TileParams& params, const gpu::CaseTable& cases) {
     const T threshold = Threshold<T>(params.isovalue).value;
-    launch(r.blocks, N, gpu::kSharedBytes<kListed, Nan, (gpu::Team<N>::kSlabs > 1)>, r.seed,
+    launch(r.blocks, N, gpu::kSharedBytes<kListed, Nan>, r.seed,
            [&] { gpu::extract_tiles<N, T, Normals, Nan>(params, threshold, &cases); });
   }
 };
-
-template <int N, class F>
-auto with_team(const TileRun& r, F&& f) {
-  return gpu::visit_device_scalar(r.type, [&](auto tag) {
-    using T = typename decltype(tag)::type;
-    return r.normals ? f(Kernel<N, T, true, false>()) : f(Kernel<N, T, false, false>());
-  });
-}
 
 template <class F>
 auto with_kernel(const TileRun& r, F&& f) {
@@ -40,9 +32,12 @@ auto with_kernel(const TileRun& r, F&& f) {
     case 32: return f(Kernel<32, std::uint8_t, false, false>());
     case 640: return f(Kernel<640, std::uint8_t, false, false>());
     case 1024: return f(Kernel<1024, std::uint8_t, false, false>());
-    case gpu::kSlabTeam: return with_team<gpu::kSlabTeam>(r, f);
-    case 384: return with_team<384>(r, f);
-    default: throw std::invalid_argument("no such team");
+    case 384:
+      return gpu::visit_device_scalar(r.type, [&](auto tag) {
+        using T = typename decltype(tag)::type;
+        return r.normals ? f(Kernel<384, T, true, false>()) : f(Kernel<384, T, false, false>());
+      });
+    default: throw std::invalid_argument("no such block size");
   }
 }
 

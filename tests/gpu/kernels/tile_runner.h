@@ -13,7 +13,7 @@ namespace isobrick::emulated {
 struct TileRun {
   ScalarType type;
   bool normals = false, may_have_nan = false;
-  unsigned threads = 384;  ///< 352: slabs
+  unsigned threads = 384;
   unsigned blocks = 2;
   unsigned seed = 1;
 };

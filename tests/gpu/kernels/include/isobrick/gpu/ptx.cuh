@@ -8,13 +8,6 @@
 
 namespace isobrick::gpu {
 
-/// A clock that goes on by being looked at: no two threads see the same time, and none has to wait.
-inline std::uint64_t global_nanoseconds() {
-  static std::atomic<std::uint64_t> now{1};
-  emulated::ThreadBlock::current().pause();
-  return now.fetch_add(50, std::memory_order_relaxed);
-}
-
 inline unsigned own_thread() { return threadIdx.x; }
 
 inline void add_from_below(std::uint32_t& v, int distance) {
@@ -35,8 +28,6 @@ inline std::uint32_t increment_shared(std::uint32_t address) {
   return atomicAdd(reinterpret_cast<std::uint32_t*>(shared_bytes + address), 1u);
 }
 
-inline void prefetch_l2(const void*) {}
-
 inline void let_next_launch_start() {}
 inline void wait_for_launch_before() {}
 
@@ -46,7 +37,8 @@ inline void begin_copy(std::uint32_t to, const void* from) {
 }
 inline void end_copies() {}
 inline void wait_for_copies() {
-  for (const auto& [to, from] : emulated::ThreadBlock::current().copies()) std::memcpy(to, from, 16);
+  for (const auto& [to, from] : emulated::ThreadBlock::current().copies())
+    std::memcpy(to, from, 16);
   emulated::ThreadBlock::current().copies().clear();
 }
 

@@ -1,0 +1,67 @@
+#pragma once
+
+#include "isobrick/core/threshold.h"
+#include "isobrick/gpu/cuda_check.h"
+#include "isobrick/gpu/extract_tiles.cuh"
+#include "isobrick/gpu/tile_kernel.h"
+
+namespace isobrick::gpu {
+
+inline int device_attribute(cudaDeviceAttr attribute) {
+  int device = 0, value = 0;
+  check(cudaGetDevice(&device));
+  check(cudaDeviceGetAttribute(&value, attribute, device));
+  return value;
+}
+
+/// How many blocks of a kernel fill the current device, and how it is launched.
+template <int N, class T, bool Normals, bool Nan = false>
+struct Launcher {
+  static constexpr auto kKernel = extract_tiles<N, T, Normals, Nan>;
+
+  static LaunchShape shape() {
+    const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;
+    LaunchShape shape{.threads = N, .launch = launch};
+    shape.listed = before_ampere ? kListedBeforeAmpere : BlockConfig<N>::kMaxListed;
+    shape.shared_bytes = before_ampere ? kSharedBytes<kListedBeforeAmpere, Nan>
+                                       : kSharedBytes<BlockConfig<N>::kMaxListed, Nan>;
+    shape.blocks = blocks(shape.shared_bytes);
+    return shape;
+  }
+
+ private:
+  static int blocks(std::size_t shared_bytes) {
+    if (static_cast<std::size_t>(device_attribute(cudaDevAttrMaxSharedMemoryPerBlockOptin)) <
+        shared_bytes)
+      return 0;
+    check(cudaFuncSetAttribute(kKernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                               static_cast<int>(shared_bytes)));
+    int each = 0;
+    check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kKernel, N, shared_bytes));
+    return each * device_attribute(cudaDevAttrMultiProcessorCount);
+  }
+  /// Code for older devices does not wait for the launch before (wait_for_launch_before).
+  static bool can_overlap() {
+    cudaFuncAttributes attributes{};
+    check(cudaFuncGetAttributes(&attributes, kKernel));
+    return attributes.ptxVersion >= 90;
+  }
+  static void launch(const LaunchShape& shape, const TileParams& params, const CaseTable* cases,
+                     cudaStream_t stream, bool overlap) {
+    cudaLaunchAttribute attribute{};
+    attribute.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    attribute.val.programmaticStreamSerializationAllowed = 1;
+    cudaLaunchConfig_t config{};
+    config.gridDim = static_cast<unsigned>(shape.blocks);
+    config.blockDim = N;
+    config.dynamicSmemBytes = shape.shared_bytes;
+    config.stream = stream;
+    config.attrs = &attribute;
+    config.numAttrs = overlap && can_overlap() ? 1 : 0;
+    const T threshold = Threshold<T>(params.isovalue).value;
+    check(cudaLaunchKernelEx(&config, kKernel, params, threshold, cases));
+    check_launch("extract_tiles");
+  }
+};
+
+}  // namespace isobrick::gpu
