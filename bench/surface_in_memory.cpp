@@ -52,7 +52,7 @@ void print(const std::string& what, double median, double least, std::uint64_t t
 }
 
 void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_degenerate,
-             [[maybe_unused]] bool alone) {
+             [[maybe_unused]] bool unwelded) {
   const Lattice lattice{v.extent, {brick, brick, brick}, v.type};
   const DenseBricks bricks(lattice, v.samples.data());
   visit_scalar(v.type, [&](auto tag) {
@@ -88,7 +88,7 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_
           const std::chrono::duration<double> took = Clock::now() - start;
           if (i >= 0) ours.push_back(took.count());
 #ifdef ISOBRICK_WITH_VTK
-          if (alone) continue;
+          if (unwelded) continue;
           const auto peer_run = peer.run(isovalue, normals, threads);
           if (i >= 0) theirs.push_back(peer_run.seconds);
           their_triangles = peer_run.triangles;
@@ -127,7 +127,7 @@ int main(int argc, char** argv) {
   Index n = 512, brick = 64;
   double isovalue = 127.5, periods = 6;
   int runs = 9;
-  bool drop_degenerate = false, alone = false;
+  bool drop_degenerate = false, unwelded = false;
   app.add_option("--raw", raw, "a raw volume (else a gyroid)");
   app.add_option("--gyroid", n, "edge of the gyroid, samples");
   app.add_option("--periods", periods, "of the gyroid along each axis");
@@ -135,12 +135,12 @@ int main(int argc, char** argv) {
   app.add_option("--brick", brick);
   app.add_option("--runs", runs);
   app.add_flag("--drop-degenerate", drop_degenerate, "leave degenerate triangles out");
-  app.add_flag("--alone", alone, "leave the peer out");
+  app.add_flag("--unwelded", unwelded, "leave the peer out");
   CLI11_PARSE(app, argc, argv);
 #ifdef ISOBRICK_WITH_VTK
   fmt::print("VTK {}\n", bench::VtkPeer::version());
 #endif
   const auto v = raw.empty() ? bench::gyroid(n, periods) : bench::read_raw(raw);
   fmt::print("{} isovalue {}\n", raw.empty() ? fmt::format("gyroid {}³ u8", n) : raw, isovalue);
-  bench::compare(v, isovalue, brick, runs, drop_degenerate, alone);
+  bench::compare(v, isovalue, brick, runs, drop_degenerate, unwelded);
 }

@@ -7,7 +7,7 @@
 namespace isobrick::bench {
 
 /// vtkFlyingEdges3D over a volume in memory, which it does not copy. VTK 9.1's
-/// headers are not C++20, so this one stands alone as C++17.
+/// headers are not C++20, so this one stands unwelded as C++17.
 class VtkPeer {
  public:
   /// `type` is the number of a ScalarType.

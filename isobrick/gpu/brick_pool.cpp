@@ -12,23 +12,23 @@
 #include "isobrick/gpu/device.h"
 #include "isobrick/gpu/device_arena.h"
 #include "isobrick/gpu/pinned_region.h"
-#include "isobrick/gpu/send_books.h"
 #include "isobrick/gpu/stream.h"
+#include "isobrick/gpu/upload_tracker.h"
 
 namespace isobrick::gpu {
 namespace {
 
-/// Copies that are asked for together: the driver lets one thread in at a time, and the bus is
-/// idle between two requests.
-constexpr std::size_t kGoodRequest = std::size_t{4} << 20;
-/// One request of so many is timed: events with times between copies slow all of them down.
+/// Copies that one request makes: the driver admits one thread at a time, and the bus is idle
+/// between two requests.
+constexpr std::size_t kRequestBytes = std::size_t{4} << 20;
+/// One request of so many is timed: events that record times slow all copies down.
 constexpr std::uint64_t kTimedOf = 16;
-/// Requests that can be told apart; of older ones it is only known that they are over.
+/// Requests with an event of their own; all older ones are known to have completed.
 constexpr std::size_t kEvents = 16;
-/// Looks whether a copy is over before whoever waits for it sleeps between them.
-constexpr int kQuickLooks = 64;
-constexpr std::chrono::microseconds kBetweenLooks{50};
-/// What bricks are before they are sent: noticed when it is taken for samples.
+/// Polls of a copy before the waiting thread sleeps between polls.
+constexpr int kBusyPolls = 64;
+constexpr std::chrono::microseconds kPollInterval{50};
+/// The pool is filled with this: a brick that is read before it was sent shows in the mesh.
 constexpr int kPoison = 0xff;
 
 }  // namespace
@@ -40,17 +40,17 @@ struct BrickPool::Impl {
   DeviceArena memory;
   std::byte* bricks;
   Stream stream;
-  std::size_t good_request;  ///< bricks
-  bool by_kernel;            ///< are bricks copied
-  SendBooks books;
+  std::size_t bricks_of_request;  ///< bricks
+  bool by_kernel;                 ///< are bricks copied
+  UploadTracker uploads;
 
   std::mutex taking;      ///< of `used`
-  std::mutex requesting;  ///< of all below, but for looking at `overs`
+  std::mutex requesting;  ///< of all below; `completions` may be polled without it
   std::uint64_t requests = 0, bricks_sent = 0;
-  struct Over : Event {
-    Over() : Event(cudaEventDisableTiming) {}
+  struct Completion : Event {
+    Completion() : Event(cudaEventDisableTiming) {}
   };
-  std::array<Over, kEvents> overs;
+  std::array<Completion, kEvents> completions;
   Event all_sent{cudaEventDisableTiming}, timed_begin, timed_end;
   std::uint64_t timing = 0;  ///< bricks of the request that is being timed
   double timed_seconds = 0;
@@ -63,43 +63,43 @@ struct BrickPool::Impl {
         size(count * of_brick),
         buffers(id, {static_cast<std::size_t>(pinned_bytes(of_brick, threads))}),
         memory(size),
-        books(threads, buffers_of_thread(of_brick)) {
+        uploads(threads, buffers_of_thread(of_brick)) {
     if (!memory) throw OutOfDeviceMemory("the GPU has no room for a pool of bricks");
     bricks = memory.take<std::byte>(size);
     check(cudaMemsetAsync(bricks, kPoison, size, stream.get()));
-    by_kernel = brick_bytes % CopyPieces::kAlign == 0 && reads_host_memory(device);
-    good_request = std::clamp<std::size_t>(kGoodRequest / of_brick, 1,
-                                           std::max<std::size_t>(1, books.buffers() / 2));
+    by_kernel = brick_bytes % CopyChunks::kAlign == 0 && reads_host_memory(device);
+    bricks_of_request = std::clamp<std::size_t>(kRequestBytes / of_brick, 1,
+                                                std::max<std::size_t>(1, uploads.buffers() / 2));
   }
   /// Copies end before their buffers.
   ~Impl() { (void)cudaStreamSynchronize(stream.get()); }
 
   std::byte* at(std::size_t buffer) { return buffers.touched(0) + buffer * brick_bytes; }
 
-  /// A buffer of the thread's whose brick has been copied. Copies are over soon and mostly before
-  /// anybody waits, so the waiting looks again and again: an event that can be slept for costs the
-  /// driver's thread a core each time, whether anybody sleeps or not.
+  /// A buffer of the thread whose brick has been copied. Most copies complete before anybody waits,
+  /// so a waiting thread polls: a blocking event costs the driver's thread a core each time,
+  /// whether anybody sleeps or not.
   std::size_t free_buffer(int thread) {
-    for (int looks = 0;; ++looks) {
-      if (const auto buffer = books.begin(thread)) return *buffer;
-      const std::size_t oldest = books.oldest(thread);
-      if (books.state_of(oldest) == SendBooks::State::ended) {
+    for (int polls = 0;; ++polls) {
+      if (const auto buffer = uploads.begin(thread)) return *buffer;
+      const std::size_t oldest = uploads.oldest(thread);
+      if (uploads.state_of(oldest) == UploadTracker::State::filled) {
         const std::lock_guard lock(requesting);
         request();
-      } else if (const std::uint64_t number = books.request_of(oldest); is_over(number)) {
-        books.over(number);
-      } else if (looks < kQuickLooks) {
+      } else if (const std::uint64_t number = uploads.request_of(oldest); has_completed(number)) {
+        uploads.completed(number);
+      } else if (polls < kBusyPolls) {
         std::this_thread::yield();
       } else {
-        std::this_thread::sleep_for(kBetweenLooks);
+        std::this_thread::sleep_for(kPollInterval);
       }
     }
   }
 
-  /// Of a request that was made.
-  bool is_over(std::uint64_t request) {
+  /// Whether a request that was made has completed.
+  bool has_completed(std::uint64_t request) {
     make_current(device);
-    const cudaError_t result = cudaEventQuery(overs[request % kEvents].get());
+    const cudaError_t result = cudaEventQuery(completions[request % kEvents].get());
     if (result == cudaErrorNotReady) {
       (void)cudaGetLastError();  // or the next launch would report it
       return false;
@@ -108,7 +108,7 @@ struct BrickPool::Impl {
     return true;
   }
 
-  /// Asks for the copies of what has ended; `requesting` is held.
+  /// Requests the copies of all filled buffers; `requesting` is held.
   void request() {
     if (failure) std::rethrow_exception(failure);
     try {
@@ -120,8 +120,8 @@ struct BrickPool::Impl {
   }
 
   void request_all() {
-    const std::vector<SendBooks::Piece> pieces = books.take_ended();
-    if (pieces.empty()) return;
+    const std::vector<UploadTracker::PendingBrick> filled = uploads.take_filled();
+    if (filled.empty()) return;
     make_current(device);
     const std::byte* const from = buffers.locked(0);
     const bool timed = requests % kTimedOf == 0;
@@ -129,28 +129,28 @@ struct BrickPool::Impl {
       end_timing();
       timed_begin.record(stream);
     }
-    copy_all(pieces, from);
+    copy_all(filled, from);
     if (timed) {
       timed_end.record(stream);
-      timing = pieces.size();
+      timing = filled.size();
     }
     ++requests;
-    overs[requests % kEvents].record(stream);
-    bricks_sent += pieces.size();
-    books.asked(pieces, requests);
+    completions[requests % kEvents].record(stream);
+    bricks_sent += filled.size();
+    uploads.requested(filled, requests);
   }
 
-  void copy_all(const std::vector<SendBooks::Piece>& pieces, const std::byte* from) {
-    CopyPieces some;
-    for (const SendBooks::Piece& piece : pieces) {
-      const std::byte* const buffer = from + piece.buffer * brick_bytes;
+  void copy_all(const std::vector<UploadTracker::PendingBrick>& filled, const std::byte* from) {
+    CopyChunks some;
+    for (const UploadTracker::PendingBrick& brick : filled) {
+      const std::byte* const buffer = from + brick.buffer * brick_bytes;
       if (!by_kernel) {
-        check(cudaMemcpyAsync(piece.to, buffer, brick_bytes, cudaMemcpyHostToDevice, stream.get()));
+        check(cudaMemcpyAsync(brick.to, buffer, brick_bytes, cudaMemcpyHostToDevice, stream.get()));
         continue;
       }
       some.from[some.count] = buffer;
-      some.to[some.count++] = piece.to;
-      if (some.count < CopyPieces::kMost) continue;
+      some.to[some.count++] = brick.to;
+      if (some.count < CopyChunks::kMost) continue;
       launch_copy(some, brick_bytes, stream.get());
       some.count = 0;
     }
@@ -185,8 +185,8 @@ std::byte* BrickPool::begin(int thread) {
 }
 
 void BrickPool::end(int thread, std::byte* place) {
-  if (impl_->books.end(thread, place) < impl_->good_request) return;
-  // Whoever is asking the driver just now leaves it to the next one.
+  if (impl_->uploads.end(thread, place) < impl_->bricks_of_request) return;
+  // A thread that is in the driver now leaves these bricks to the next request.
   const std::unique_lock lock(impl_->requesting, std::try_to_lock);
   if (lock) impl_->request();
 }

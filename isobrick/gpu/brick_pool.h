@@ -10,9 +10,9 @@ namespace isobrick::gpu {
 
 class Stream;
 
-/// Memory of the device for bricks, which some threads fill. Each decodes to page-locked
-/// buffers of its own, few enough to stay in its cache: one is copied while the next is filled.
-/// Whichever thread has ended enough of them has the device copy all.
+/// Device memory for bricks, which several threads fill. Each decodes to pinned buffers of its
+/// own, few enough to stay in its cache: one is copied while the next is filled. The thread that
+/// completes a request's number of bricks makes the device copy all of them.
 class BrickPool {
  public:
   /// Throws OutOfDeviceMemory where the device has no room. The buffers are got meanwhile.

@@ -4,16 +4,16 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr unsigned kThreads = 256, kBlocksOfPiece = 8;
+constexpr unsigned kThreads = 256, kBlocksOfChunk = 8;
 
-static_assert(sizeof(uint4) == CopyPieces::kAlign);
+static_assert(sizeof(uint4) == CopyChunks::kAlign);
 
-/// A row of blocks a piece. Each thread has four words on their way at a time, for the other end
+/// A row of blocks a chunk. Each thread has four words on their way at a time, for the other end
 /// of the bus is far away.
-__global__ void __launch_bounds__(kThreads) copy_pieces(CopyPieces pieces, std::size_t words) {
-  const uint4* from = static_cast<const uint4*>(pieces.from[blockIdx.y]);
-  uint4* to = static_cast<uint4*>(pieces.to[blockIdx.y]);
-  constexpr std::size_t step = kBlocksOfPiece * kThreads;
+__global__ void __launch_bounds__(kThreads) copy_chunks(CopyChunks chunks, std::size_t words) {
+  const uint4* from = static_cast<const uint4*>(chunks.from[blockIdx.y]);
+  uint4* to = static_cast<uint4*>(chunks.to[blockIdx.y]);
+  constexpr std::size_t step = kBlocksOfChunk * kThreads;
   std::size_t i = blockIdx.x * kThreads + threadIdx.x;
   for (; i + 3 * step < words; i += 4 * step) {
     const uint4 a = __ldcs(from + i), b = __ldcs(from + i + step), c = __ldcs(from + i + 2 * step),
@@ -28,11 +28,11 @@ __global__ void __launch_bounds__(kThreads) copy_pieces(CopyPieces pieces, std::
 
 }  // namespace
 
-void launch_copy(const CopyPieces& pieces, std::size_t bytes, cudaStream_t stream) {
-  if (pieces.count == 0) return;
-  copy_pieces<<<dim3(kBlocksOfPiece, pieces.count), kThreads, 0, stream>>>(
-      pieces, bytes / CopyPieces::kAlign);
-  check_launch("copy_pieces");
+void launch_copy(const CopyChunks& chunks, std::size_t bytes, cudaStream_t stream) {
+  if (chunks.count == 0) return;
+  copy_chunks<<<dim3(kBlocksOfChunk, chunks.count), kThreads, 0, stream>>>(
+      chunks, bytes / CopyChunks::kAlign);
+  check_launch("copy_chunks");
 }
 
 }  // namespace isobrick::gpu

@@ -8,7 +8,7 @@ namespace isobrick::gpu {
 
 /// Pieces of memory of the same size to copy, from where the device can read to where it can
 /// write.
-struct CopyPieces {
+struct CopyChunks {
   static constexpr unsigned kMost = 64;
   /// Sizes and addresses are multiples of it.
   static constexpr std::size_t kAlign = 16;
@@ -19,6 +19,6 @@ struct CopyPieces {
 
 /// Copies them by a kernel, which costs the calling thread less than a request to the copy engine
 /// for each.
-void launch_copy(const CopyPieces& pieces, std::size_t bytes, cudaStream_t stream);
+void launch_copy(const CopyChunks& chunks, std::size_t bytes, cudaStream_t stream);
 
 }  // namespace isobrick::gpu

@@ -24,7 +24,7 @@ class OutOfDeviceMemory : public Error {
   using Error::Error;
 };
 
-/// Whether kernels read page-locked host memory under the address that the host knows.
+/// Whether kernels read block-locked host memory under the address that the host knows.
 bool reads_host_memory(int device);
 
 /// 16 bytes by which drivers of all kinds tell devices apart. Throws Error for a device that

@@ -9,7 +9,7 @@
 
 namespace isobrick::gpu {
 
-/// Device memory in one piece, cut from the front.
+/// One range of device memory, handed out from the front.
 class DeviceArena {
  public:
   /// Empty when the device does not have so much.

@@ -9,9 +9,9 @@
 #include "isobrick/core/morton.h"
 #include "isobrick/gpu/device_scalar.h"
 #include "isobrick/gpu/device_volume_impl.h"
-#include "isobrick/gpu/page_gather.h"
 #include "isobrick/gpu/search_kernel.h"
 #include "isobrick/gpu/supported.h"
+#include "isobrick/gpu/tile_block.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -27,21 +27,21 @@ DeviceVolume::Impl::Impl(const Lattice& l, const BrickLookup& bricks, double fil
   if (volume(l.tiles()) >= kNone)
     throw UsageError("the volume has too many tiles to be resident on a device");
   tile_count = static_cast<std::uint32_t>(volume(l.tiles()));
-  upload_pages(bricks, fill_value);
+  upload_tile_blocks(bricks, fill_value);
   list_tiles();
 }
 
-void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_value) {
+void DeviceVolume::Impl::upload_tile_blocks(const BrickLookup& bricks, double fill_value) {
   const Int3 grid = lattice.tiles();
-  const std::size_t page_bytes = kPageSamples * lattice.sample_bytes();
-  pages = DeviceBuffer<std::byte>((std::size_t{tile_count} + 1) * page_bytes, stream);
-  const std::size_t batch = std::max<std::size_t>(1, kStagingBytes / page_bytes);
-  PinnedBuffer<std::byte> staging[2] = {PinnedBuffer<std::byte>(batch * page_bytes),
-                                        PinnedBuffer<std::byte>(batch * page_bytes)};
+  const std::size_t tile_block_bytes = kTileBlockSamples * lattice.sample_bytes();
+  tile_blocks = DeviceBuffer<std::byte>((std::size_t{tile_count} + 1) * tile_block_bytes, stream);
+  const std::size_t batch = std::max<std::size_t>(1, kStagingBytes / tile_block_bytes);
+  PinnedBuffer<std::byte> staging[2] = {PinnedBuffer<std::byte>(batch * tile_block_bytes),
+                                        PinnedBuffer<std::byte>(batch * tile_block_bytes)};
   Event copied[2];
-  fill_page(lattice.type, fill_value, staging[0].data());
-  check(cudaMemcpyAsync(pages.data(), staging[0].data(), page_bytes, cudaMemcpyHostToDevice,
-                        stream.get()));
+  fill_tile_block(lattice.type, fill_value, staging[0].data());
+  check(cudaMemcpyAsync(tile_blocks.data(), staging[0].data(), tile_block_bytes,
+                        cudaMemcpyHostToDevice, stream.get()));
   copied[0].record(stream);
   copied[1].record(stream);
   std::vector<std::uint32_t> table(tile_count);
@@ -52,21 +52,23 @@ void DeviceVolume::Impl::upload_pages(const BrickLookup& bricks, double fill_val
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
       const auto n = static_cast<Index>(first + i);
       const Int3 tile{n % grid.x, n / grid.x % grid.y, n / (grid.x * grid.y)};
-      const bool any = gather_page(lattice, bricks, fill_value, tile, to + i * page_bytes);
+      const bool any =
+          gather_tile_block(lattice, bricks, fill_value, tile, to + i * tile_block_bytes);
       table[first + i] = any ? static_cast<std::uint32_t>(first + i + 1) : kNone;
     });
-    check(cudaMemcpyAsync(pages.data() + (first + 1) * page_bytes, to, count * page_bytes,
-                          cudaMemcpyHostToDevice, stream.get()));
+    check(cudaMemcpyAsync(tile_blocks.data() + (first + 1) * tile_block_bytes, to,
+                          count * tile_block_bytes, cudaMemcpyHostToDevice, stream.get()));
     copied[turn].record(stream);
   }
   if (std::find(table.begin(), table.end(), kNone) != table.end()) {
-    page_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
-    check(cudaMemcpyAsync(page_of_tile.data(), table.data(), page_of_tile.bytes(),
+    block_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
+    check(cudaMemcpyAsync(block_of_tile.data(), table.data(), block_of_tile.bytes(),
                           cudaMemcpyHostToDevice, stream.get()));
   }
   columns = DeviceBuffer<std::byte>(
       (std::size_t{tile_count} + 1) * kColumnSamples * lattice.sample_bytes(), stream);
-  launch_first_columns(lattice.type, pages.data(), tile_count + 1, columns.data(), stream.get());
+  launch_first_columns(lattice.type, tile_blocks.data(), tile_count + 1, columns.data(),
+                       stream.get());
   stream.wait();
 }
 
@@ -86,9 +88,9 @@ void DeviceVolume::Impl::list_tiles() {
 
 TileParams DeviceVolume::Impl::params() const {
   TileParams p{};
-  p.pages = pages.data();
-  p.page_of_tile = page_of_tile.data();
-  p.fill_page = 0;
+  p.tile_blocks = tile_blocks.data();
+  p.block_of_tile = block_of_tile.data();
+  p.fill_tile_block = 0;
   p.columns = columns.data();
   for (int axis = 0; axis < 3; ++axis) {
     p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
@@ -104,7 +106,7 @@ DeviceVolume::~DeviceVolume() = default;
 const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
 
 std::uint64_t DeviceVolume::bytes() const {
-  return impl_->pages.bytes() + impl_->columns.bytes() + impl_->page_of_tile.bytes() +
+  return impl_->tile_blocks.bytes() + impl_->columns.bytes() + impl_->block_of_tile.bytes() +
          impl_->tiles.bytes() + impl_->ranges.bytes();
 }
 

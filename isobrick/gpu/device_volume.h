@@ -9,7 +9,7 @@
 
 namespace isobrick::gpu {
 
-/// A whole volume in device memory, at its own width, as pages of one tile each,
+/// A whole volume in device memory, at its own width, as tile_blocks of one tile each,
 /// with the ranges of all tiles. Not thread-safe.
 class DeviceVolume {
  public:

@@ -82,37 +82,38 @@ struct GpuExtractor::Impl {
     return item;
   }
 
-  void link_all(Lane& lane, std::span<const TileWork> tiles) {
-    auto* items = reinterpret_cast<TileItem*>(lane.at(device.layout().items));
-    auto* links = reinterpret_cast<TileLinks*>(lane.at(device.layout().links));
+  void link_all(InFlightLaunch& launch, std::span<const TileWork> tiles) {
+    auto* items = reinterpret_cast<TileItem*>(launch.at(device.layout().items));
+    auto* links = reinterpret_cast<TileLinks*>(launch.at(device.layout().links));
     for (std::uint32_t i = 0; i < tiles.size(); ++i) items[i] = link(tiles[i], i, links[i]);
-    if (welded()) slots.end_launch(tiles.back().tile, lane.unused_slots);
+    if (welded()) slots.end_launch(tiles.back().tile, launch.unused_slots);
   }
 
   /// Where the launch finds its bricks.
-  BrickUse find_bricks(Lane& lane, std::span<const TileWork> tiles, const BrickLookup& bricks) {
+  BrickUse find_bricks(InFlightLaunch& launch, std::span<const TileWork> tiles,
+                       const BrickLookup& bricks) {
     const StreamSizes& sizes = device.sizes();
     const BrickTable table{
-        {reinterpret_cast<BrickBox*>(lane.at(device.layout().boxes)), sizes.tiles},
-        {reinterpret_cast<std::uint64_t*>(lane.at(device.layout().bricks)),
+        {reinterpret_cast<BrickBox*>(launch.at(device.layout().boxes)), sizes.tiles},
+        {reinterpret_cast<std::uint64_t*>(launch.at(device.layout().bricks)),
          std::size_t{sizes.tiles} * sizes.tile_bricks}};
-    return use_bricks(lattice, sample_reach(options), tiles, bricks, sizes.sent_bricks, lane.bricks,
-                      table);
+    return use_bricks(lattice, sample_reach(options), tiles, bricks, sizes.sent_bricks,
+                      launch.bricks, table);
   }
 
-  void launch(std::span<const TileWork> tiles, const BrickLookup& bricks,
+  void submit(std::span<const TileWork> tiles, const BrickLookup& bricks,
               std::shared_ptr<const void> samples) {
-    Lane& lane = device.lane(launches);
-    slots.recycle(lane.unused_slots);
-    lane.count = static_cast<std::uint32_t>(tiles.size());
-    lane.samples = std::move(samples);
-    *reinterpret_cast<LaunchHeader*>(lane.at(0)) = {.item_count = lane.count};
-    std::fill_n(reinterpret_cast<OrderState*>(lane.at(device.layout().order)), tiles.size(),
+    InFlightLaunch& launch = device.in_flight(launches);
+    slots.recycle(launch.unused_slots);
+    launch.count = static_cast<std::uint32_t>(tiles.size());
+    launch.samples = std::move(samples);
+    *reinterpret_cast<LaunchHeader*>(launch.at(0)) = {.item_count = launch.count};
+    std::fill_n(reinterpret_cast<OrderState*>(launch.at(device.layout().order)), tiles.size(),
                 OrderState{0, 0});
-    lane.use = find_bricks(lane, tiles, bricks);
-    link_all(lane, tiles);
-    device.submit(lane, launches++);
-    collector.submitted(lane);
+    launch.use = find_bricks(launch, tiles, bricks);
+    link_all(launch, tiles);
+    device.submit(launch, launches++);
+    collector.submitted(launch);
   }
 };
 
@@ -128,10 +129,10 @@ void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& b
   make_current(impl_->cuda_device);
   tiles = impl_->all_to_look_at(tiles);
   while (!tiles.empty()) {
-    impl_->collector.wait_for_lane();
-    const std::size_t parts = ceil_div(tiles.size(), impl_->collector.good_tiles());
+    impl_->collector.wait_for_free_launch();
+    const std::size_t parts = ceil_div(tiles.size(), impl_->collector.preferred_tiles());
     const std::size_t n = ceil_div(tiles.size(), parts);
-    impl_->launch(tiles.first(n), bricks, samples);
+    impl_->submit(tiles.first(n), bricks, samples);
     tiles = tiles.subspan(n);
   }
 }

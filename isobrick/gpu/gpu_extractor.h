@@ -14,8 +14,8 @@ namespace isobrick::gpu {
 
 class BrickPool;
 
-/// Takes a piece of the mesh. It stays as it is until `release` is called, once, from any
-/// thread. When it throws, it has not taken the piece.
+/// Takes a chunk of the mesh. It stays valid until `release` is called, once, from any
+/// thread. When it throws, it has not taken the chunk.
 using TakeChunk = std::function<void(const MeshChunk& chunk, std::function<void()> release)>;
 
 /// How long a stage was busy, and with how much.
@@ -32,12 +32,12 @@ struct StreamReport {
   std::uint64_t launches = 0, repeats = 0;  ///< repeats: parts of launches whose mesh was too large
   std::uint32_t tiles_of_launch = 0;        ///< at most
   std::uint64_t device_bytes = 0;           ///< device memory held
-  std::uint64_t pinned_bytes = 0;           ///< page-locked host memory held
+  std::uint64_t pinned_bytes = 0;           ///< block-locked host memory held
 };
 
 /// Marching cubes on a device, for volumes that need not fit it: tiles in, the CPU's mesh
 /// out, byte for byte. Upload, kernels, download and whoever takes the mesh work at the same
-/// time, on some hundred tiles each. docs/design/gpu.md says how.
+/// time, on some hundred tiles each. docs/design/gpu.md describes it.
 class GpuExtractor {
  public:
   /// Buffers of the given sizes on the device, which open_device has made ready; of smaller
@@ -48,7 +48,7 @@ class GpuExtractor {
   GpuExtractor(int device, const Lattice& lattice, const SurfaceOptions& options,
                const StreamSizes& sizes, TakeChunk take,
                const std::shared_ptr<BrickPool>& pool = nullptr);
-  /// Stops; waits for pieces that were taken and not released.
+  /// Stops; waits for chunks that were taken and not released.
   ~GpuExtractor();
 
   /// Sends the tiles off. Over all calls tiles come in Morton order, none twice; `bricks`

@@ -86,7 +86,7 @@ struct SmallGrid {
 struct GridBatch::Impl {
   /// What is known of a grid that was staged.
   struct Slot {
-    std::byte *staging = nullptr, *sent = nullptr;  ///< page-locked, and on the device
+    std::byte *staging = nullptr, *sent = nullptr;  ///< block-locked, and on the device
     std::size_t used = 0;
     GridWork work{};
   };
@@ -200,7 +200,7 @@ struct GridBatch::Impl {
       work.triangles = job.place.triangles;
       work.vertex_room = job.place.vertices;
       work.triangle_room = job.place.triangle_count;
-      batch.most_rows = std::max(batch.most_rows, work.grid.n[1] * work.grid.n[2]);
+      batch.max_rows = std::max(batch.max_rows, work.grid.n[1] * work.grid.n[2]);
       batch.any_meets_coarser |= work.meets_coarser;
       batch.any_stored |= work.grid.stored.samples != nullptr;
       sent_works[static_cast<std::size_t>(batch.count++)] = work;

@@ -33,7 +33,7 @@ struct GridMeshJob {
 
 /// Marching cubes over small grids on a device, several at a time: the meshes of the CPU's
 /// GridExtractor, byte for byte. Slots keep grids; each takes 8 MiB of work space on the device
-/// and 3 MiB of page-locked memory. All but stage() is for one thread at a time.
+/// and 3 MiB of block-locked memory. All but stage() is for one thread at a time.
 class GridBatch {
  public:
   /// On a device that open_device has made ready, whose code is loaded here. Throws Error when

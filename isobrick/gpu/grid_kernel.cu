@@ -12,7 +12,7 @@ namespace {
 /// That make the values of a grid.
 constexpr unsigned kBlocksOfValues = 32;
 constexpr int kThreads = 256, kWarps = kThreads / 32, kScanThreads = 1024;
-constexpr unsigned kAll = 0xffffffffu;
+constexpr unsigned kFullMask = 0xffffffffu;
 
 static_assert(sizeof(GridWork) % 4 == 0 && std::is_trivially_copyable_v<GridWork>);
 
@@ -38,7 +38,7 @@ template <class T>
 __device__ void make_values(const GridView& g) {
   const int count = g.around_n[0] * g.around_n[1] * g.around_n[2];
   const T* from = static_cast<const T*>(g.stored.samples);
-  // Of this grid alone: nothing else reads or writes there meanwhile.
+  // Of this grid unwelded: nothing else reads or writes there meanwhile.
   auto* to = const_cast<float*>(g.around);
   for (int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x); i < count;
        i += static_cast<int>(gridDim.x * blockDim.x))
@@ -74,7 +74,7 @@ __device__ void ballot(const float* values, int count, int lane, F&& pass,
                        std::uint64_t (&bits)[2]) {
   const auto part = [&](int first) {
     const int x = first + lane;
-    return __ballot_sync(kAll, x < count && pass(values[x]));
+    return __ballot_sync(kFullMask, x < count && pass(values[x]));
   };
   const unsigned a = part(0), b = part(32), c = part(64);
   bits[0] = a | static_cast<std::uint64_t>(b) << 32;
@@ -227,7 +227,7 @@ __global__ void __launch_bounds__(kThreads) find_borders(const GridWork* works) 
   unsigned count = 0;
   const auto flag = [&](bool here, unsigned number, unsigned faces) {
     if (here) w.faces[number] = static_cast<std::uint8_t>(faces);
-    count += static_cast<unsigned>(__popc(__ballot_sync(kAll, here && faces != 0)));
+    count += static_cast<unsigned>(__popc(__ballot_sync(kFullMask, here && faces != 0)));
   };
   for_each_edge<0>(row, warp.lane, g.n[0], [&](bool here, int x, unsigned number) {
     flag(here, number, here ? grid::place_on<0>(g, x, y, z).faces(g) : 0u);
@@ -245,10 +245,10 @@ __global__ void __launch_bounds__(kThreads) find_borders(const GridWork* works) 
 __device__ unsigned sum_before(unsigned value, int lane, unsigned& all) {
   unsigned sum = value;
   for (int step = 1; step < 32; step *= 2) {
-    const unsigned other = __shfl_up_sync(kAll, sum, step);
+    const unsigned other = __shfl_up_sync(kFullMask, sum, step);
     if (lane >= step) sum += other;
   }
-  all = __shfl_sync(kAll, sum, 31);
+  all = __shfl_sync(kFullMask, sum, 31);
   return sum - value;
 }
 
@@ -291,7 +291,7 @@ __global__ void __launch_bounds__(kThreads) count_ribbons(const GridWork* works)
   if (warp.lane == 0) w.counts[3 * kGridRows + warp.row] = all;
 }
 
-__global__ void __launch_bounds__(kScanThreads) number_ribbons(const GridWork* works) {
+__global__ void __launch_bounds__(kScanThreads) number_seam_strips(const GridWork* works) {
   __shared__ WorkStorage storage;
   const GridWork& w = load_work(works, storage);
   if (!w.meets_coarser) return;
@@ -329,7 +329,7 @@ __global__ void __launch_bounds__(kThreads) emit_vertices(const GridWork* works)
     }
     if (w.meets_coarser) {
       const bool on = here && vertex.faces != 0;
-      const unsigned mask = __ballot_sync(kAll, on);
+      const unsigned mask = __ballot_sync(kFullMask, on);
       if (on) {
         const auto before = static_cast<unsigned>(__popc(mask & ((1u << warp.lane) - 1)));
         const unsigned beside = w.totals->vertices + 2 * (border + before);
@@ -399,7 +399,7 @@ void launch_grid_values(const GridBatchWork& batch, cudaStream_t stream) {
 
 void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream) {
   const auto grids = static_cast<unsigned>(batch.count);
-  const auto rows = static_cast<unsigned>(batch.most_rows);
+  const auto rows = static_cast<unsigned>(batch.max_rows);
   const dim3 warps((rows + kWarps - 1) / kWarps, grids), threads((rows + 127) / 128, grids);
   find_inside<<<warps, kThreads, 0, stream>>>(batch.works);
   count_rows<<<threads, 128, 0, stream>>>(batch.works);
@@ -407,13 +407,13 @@ void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream) {
   if (batch.any_meets_coarser) {
     find_borders<<<warps, kThreads, 0, stream>>>(batch.works);
     count_ribbons<<<warps, kThreads, 0, stream>>>(batch.works);
-    number_ribbons<<<dim3(1, grids), kScanThreads, 0, stream>>>(batch.works);
+    number_seam_strips<<<dim3(1, grids), kScanThreads, 0, stream>>>(batch.works);
   }
   check_launch("counting the meshes of grids");
 }
 
 void launch_grid_mesh(const GridBatchWork& batch, cudaStream_t stream) {
-  const dim3 warps((static_cast<unsigned>(batch.most_rows) + kWarps - 1) / kWarps,
+  const dim3 warps((static_cast<unsigned>(batch.max_rows) + kWarps - 1) / kWarps,
                    static_cast<unsigned>(batch.count));
   emit_vertices<<<warps, kThreads, 0, stream>>>(batch.works);
   emit_triangles<<<warps, kThreads, 0, stream>>>(batch.works);

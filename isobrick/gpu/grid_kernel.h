@@ -50,7 +50,7 @@ struct GridWork {
 struct GridBatchWork {
   const GridWork* works = nullptr;  ///< on the device
   int count = 0;
-  int most_rows = 0;               ///< rows of points in the largest of them
+  int max_rows = 0;                ///< rows of points in the largest of them
   bool any_meets_coarser = false;  ///< whether any of them does
   bool any_stored = false;         ///< whether any of them is of stored samples
 };

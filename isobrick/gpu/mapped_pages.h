@@ -5,8 +5,8 @@
 
 namespace isobrick::gpu {
 
-/// Memory of whole pages that nobody else has, to be locked by the driver: large ones where it
-/// is as large as one. It is to be touched before: while the driver locks pages, others wait for
+/// Memory of whole pages of its own, for the driver to lock: large pages where it is as large as
+/// one. Touch it before: while the driver locks pages, others wait for
 /// the driver.
 class MappedPages {
  public:
@@ -26,12 +26,12 @@ class MappedPages {
   ~MappedPages();
 
   std::byte* data() const { return data_; }
-  /// A multiple of pages, as all that is locked.
+  /// A multiple of the page size.
   std::size_t bytes() const { return bytes_; }
   static constexpr std::size_t whole_pages(std::size_t bytes) {
     return (bytes + kPage - 1) / kPage * kPage;
   }
-  /// Writes what pages are read as at first.
+  /// Makes the system map the pages, by writing zeros to them.
   static void touch(std::byte* data, std::size_t bytes) {
     for (std::size_t at = 0; at < bytes; at += kPage)
       *static_cast<volatile std::byte*>(data + at) = std::byte{0};

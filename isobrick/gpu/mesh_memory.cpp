@@ -16,7 +16,7 @@
 namespace isobrick::gpu {
 namespace {
 
-constexpr std::uint32_t kMostVertices = 1u << 22, kFewestVertices = 1u << 17;
+constexpr std::uint32_t kMaxVertices = 1u << 22, kFewestVertices = 1u << 17;
 constexpr std::uint64_t kVertexBytes = 4 * sizeof(Vec3f);  // with a normal and two triangles
 
 /// A function of the driver; the program is not linked to it.
@@ -112,7 +112,7 @@ class Block final : public MeshBlock {
 };
 
 std::uint32_t block_vertices(std::uint64_t budget) {
-  std::uint32_t vertices = kMostVertices;
+  std::uint32_t vertices = kMaxVertices;
   while (vertices > kFewestVertices && vertices * kVertexBytes > budget / 4) vertices /= 2;
   return vertices;
 }

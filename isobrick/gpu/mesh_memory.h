@@ -9,7 +9,7 @@
 
 namespace isobrick::gpu {
 
-/// A large piece of device memory that other interfaces (OpenGL) can import: an array of
+/// A large block of device memory that other interfaces (OpenGL) can import: an array of
 /// positions, one of as many normals, one of twice as many triangles.
 struct MeshBlock {
   int file = -1;                              ///< descriptor to import it by; closed with the block
@@ -38,7 +38,7 @@ class MeshMemory {
   std::optional<MeshSpan> take(std::uint32_t vertices, std::uint32_t triangles);
   /// Gives back what is behind the first so many.
   void trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t triangles);
-  /// The place is free for others: nobody reads or writes it any more.
+  /// Frees the place. Nothing may read or write it any more.
   void give_back(const MeshSpan& span);
 
   /// Gives all but the first so many blocks back. Before any of them is used.

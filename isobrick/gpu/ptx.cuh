@@ -7,15 +7,15 @@
 
 namespace isobrick::gpu {
 
-/// The thread's number, read again wherever it is asked for: what follows from it is not
-/// kept in registers throughout a tile.
+/// The thread's number, read anew at each call, so that values derived from it need no registers
+/// throughout a tile.
 __device__ inline unsigned own_thread() {
   unsigned thread;
   asm volatile("mov.u32 %0, %%tid.x;" : "=r"(thread));
   return thread;
 }
 
-/// Adds what the lane `distance` below has, if there is one: the shuffle itself says whether.
+/// Adds what the lane `distance` below has, if there is one; the shuffle reports whether.
 __device__ inline void add_from_below(std::uint32_t& v, int distance) {
   asm volatile(
       "{.reg .pred there; .reg .u32 below;\n"

@@ -32,7 +32,7 @@ struct ResidentExtractor::Impl {
       room.positions = {};
       room.normals = {};
       if (launcher.options().normals) room.normals = DeviceBuffer<Vec3f>(vertices, stream);
-      room.positions = DeviceBuffer<Vec3f>(vertices, stream);  // the last: it says how much fits
+      room.positions = DeviceBuffer<Vec3f>(vertices, stream);  // last: its size is the capacity
     }
     if (triangles > room.triangles.size()) {
       room.triangles = {};
@@ -48,7 +48,7 @@ struct ResidentExtractor::Impl {
   }
 
   DeviceCounts make() {
-    // Tiles that have no room are not begun: the first launch tells how many there are.
+    // Tiles without a row table are not begun: the first launch reports how many there are.
     for (;;) {
       if (!launcher.launch(isovalue, room, last)) return {};
       last = launcher.wait();

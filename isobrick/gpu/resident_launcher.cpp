@@ -132,7 +132,7 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
   p.slot_of_tile = slot_of_tile_.data();
   set_region(p);
   p.isovalue = isovalue;
-  p.crossing = static_cast<float>(isovalue);
+  p.vertex_isovalue = static_cast<float>(isovalue);
   p.world = world_map(options_.transform, options_.inside);
   p.diagonal = is_diagonal(p.world);
   p.row_tables = row_tables_.data();

@@ -42,10 +42,10 @@ std::uint32_t RowSlots::add(Int3 tile) {
   }
   added_cube_->entries[place_of(tile)] = {slot, launch_};
   ++added_cube_->used;
-  const std::uint64_t last_asker = morton_encode(min(tile + Int3{1, 1, 1}, last_tile_));
-  if (added_last_ == expiries_.end() || added_last_->first != group_of(last_asker))
-    added_last_ = expiries_.try_emplace(group_of(last_asker)).first;
-  added_last_->second.push_back({last_asker, morton_encode(tile)});
+  const std::uint64_t last_user = morton_encode(min(tile + Int3{1, 1, 1}, last_tile_));
+  if (added_last_ == expiries_.end() || added_last_->first != group_of(last_user))
+    added_last_ = expiries_.try_emplace(group_of(last_user)).first;
+  added_last_->second.push_back({last_user, morton_encode(tile)});
   return slot;
 }
 
@@ -74,7 +74,7 @@ void RowSlots::end_launch(Int3 last, std::vector<std::uint32_t>& unused) {
   }
   if (expiries_.empty() || expiries_.begin()->first != group_of(now)) return;
   std::erase_if(expiries_.begin()->second, [&](const Expiry& expiry) {
-    const bool over = expiry.last_asker <= now;
+    const bool over = expiry.last_user <= now;
     if (over) drop(morton_decode(expiry.tile), unused);
     return over;
   });

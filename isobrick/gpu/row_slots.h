@@ -13,17 +13,17 @@
 namespace isobrick::gpu {
 
 /// Which row table on the device belongs to which tile, as the BoundaryMap of the CPU:
-/// tiles come in Morton order, and a tile's last asker is its neighbour at (+1, +1, +1).
-/// Host books only; not thread-safe.
+/// tiles come in Morton order, and a tile's last user is its neighbour at (+1, +1, +1).
+/// Host uploads only; not thread-safe.
 class RowSlots {
  public:
-  /// `tiles` is the grid: where a neighbour is beyond it, the last asker is nearer.
+  /// `tiles` is the grid: where a neighbour is beyond it, the last user is nearer.
   RowSlots(std::uint32_t slots, Int3 tiles);
 
   /// A slot for a tile that is about to be extracted, of the launch that is being
   /// put together. Throws Error when none is left.
   std::uint32_t add(Int3 tile);
-  /// What TileLinks says of a tile: its slot, or kNone when it has none.
+  /// A tile's slot as TileLinks holds it, or kNone.
   std::uint32_t find(Int3 tile) const;
   /// Ends a launch whose last tile is `last`. Appends the slots that no later tile will
   /// ask for; they go back with recycle(), when the launch need not be repeated any more.
@@ -40,7 +40,7 @@ class RowSlots {
     int used = 0;
   };
   struct Expiry {
-    std::uint64_t last_asker, tile;  ///< codes
+    std::uint64_t last_user, tile;  ///< codes
   };
   const Cube* cube_of(Int3 tile) const;
   void drop(Int3 tile, std::vector<std::uint32_t>& unused);

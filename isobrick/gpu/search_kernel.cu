@@ -24,11 +24,11 @@ void launch_tile_ranges(ScalarType type, const TileParams& params, const std::in
   check_launch("find_tile_ranges");
 }
 
-void launch_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns,
-                          cudaStream_t stream) {
+void launch_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t count,
+                          void* columns, cudaStream_t stream) {
   visit_device_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    copy_first_columns<<<count, kSearchThreads, 0, stream>>>(static_cast<const T*>(pages),
+    copy_first_columns<<<count, kSearchThreads, 0, stream>>>(static_cast<const T*>(tile_blocks),
                                                              static_cast<T*>(columns));
   });
   check_launch("copy_first_columns");

@@ -2,8 +2,8 @@
 
 #include "isobrick/core/range.h"
 #include "isobrick/gpu/search_params.h"
+#include "isobrick/gpu/tile_block_place.cuh"
 #include "isobrick/gpu/tile_order.cuh"
-#include "isobrick/gpu/tile_page.cuh"
 
 // The kernel that finds active tiles, and those that make what it and the extraction read of a
 // volume: ranges and first columns.
@@ -114,15 +114,15 @@ __global__ void __launch_bounds__(kSearchThreads)
     const std::int64_t place =
         (static_cast<std::int64_t>(t[2] + (z >> 5)) * p.tiles[1] + t[1] + (y >> 5)) * p.tiles[0] +
         t[0] + (x >> 5);
-    const std::size_t page = page_of_place(p, place);
+    const std::size_t block = block_of_place(p, place);
     range.include(static_cast<const T*>(
-        p.pages)[page * kPageSamples + ((z & 31) << 10 | (y & 31) << 5 | (x & 31))]);
+        p.tile_blocks)[block * kTileBlockSamples + ((z & 31) << 10 | (y & 31) << 5 | (x & 31))]);
   }
   const auto merge = [&](T lo, T hi) { range.include(ValueRange<T>{lo, hi}); };
 #pragma unroll
   for (int d = 16; d; d /= 2)
-    merge(static_cast<T>(__shfl_xor_sync(kAll, range.lo, d)),
-          static_cast<T>(__shfl_xor_sync(kAll, range.hi, d)));
+    merge(static_cast<T>(__shfl_xor_sync(kFullMask, range.lo, d)),
+          static_cast<T>(__shfl_xor_sync(kFullMask, range.hi, d)));
   if (lane_id() == 0) {
     least[threadIdx.x >> 5] = range.lo;
     most[threadIdx.x >> 5] = range.hi;
@@ -135,10 +135,11 @@ __global__ void __launch_bounds__(kSearchThreads)
 }
 
 template <class T>
-__global__ void __launch_bounds__(kSearchThreads) copy_first_columns(const T* pages, T* columns) {
-  const std::size_t page = blockIdx.x;
+__global__ void __launch_bounds__(kSearchThreads)
+    copy_first_columns(const T* tile_blocks, T* columns) {
+  const std::size_t block = blockIdx.x;
   for (unsigned i = threadIdx.x; i < kColumnSamples; i += kSearchThreads)
-    columns[page * kColumnSamples + i] = pages[page * kPageSamples + 32 * i];
+    columns[block * kColumnSamples + i] = tile_blocks[block * kTileBlockSamples + 32 * i];
 }
 
 }  // namespace isobrick::gpu

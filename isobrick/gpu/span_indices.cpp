@@ -19,20 +19,20 @@ DeviceBuffer<T> to_device(const std::vector<T>& values, const Stream& stream) {
 }  // namespace
 
 SpanIndices::SpanIndices(IndexBlocks blocks, const Stream& stream) : blocks_(std::move(blocks)) {
-  std::vector<MaskPiece> pieces;
+  std::vector<MaskRange> ranges;
   std::vector<IndexPlace> places;
   std::uint64_t words = 0;
   for (std::size_t i = 0; i < headers().size(); ++i) {
     const std::uint32_t items = headers()[i].items, own = items / 32 + (items % 32 ? 1 : 0);
     places.push_back({blocks_.offsets[i], words});
-    first_pieces_.push_back(static_cast<std::uint32_t>(pieces.size()));
-    for (std::uint32_t at = 0; at < own; at += MaskPiece::kWords)
-      pieces.push_back({words + at, std::min(own - at, MaskPiece::kWords), 32 * at});
+    first_ranges_.push_back(static_cast<std::uint32_t>(ranges.size()));
+    for (std::uint32_t at = 0; at < own; at += MaskRange::kWords)
+      ranges.push_back({words + at, std::min(own - at, MaskRange::kWords), 32 * at});
     words += own;
-    most_items_ = std::max(most_items_, items);
+    max_items_ = std::max(max_items_, items);
   }
-  first_pieces_.push_back(static_cast<std::uint32_t>(pieces.size()));
-  pieces_ = to_device(pieces, stream);
+  first_ranges_.push_back(static_cast<std::uint32_t>(ranges.size()));
+  ranges_ = to_device(ranges, stream);
   places_ = to_device(places, stream);
   mask_ = DeviceBuffer<std::uint32_t>(words + 1, stream);
   if (headers().size() == 1 && headers()[0].kind == IndexKind::quadtree)
@@ -48,12 +48,12 @@ void SpanIndices::search(double isovalue, const Stream& stream) {
     launch_search_one(like, isovalue, mask_.data(), later, stream.get());
   else
     launch_search_many(like, blocks_.bytes.data(), places_.data(),
-                       static_cast<std::uint32_t>(headers().size()), most_items_, isovalue,
+                       static_cast<std::uint32_t>(headers().size()), max_items_, isovalue,
                        mask_.data(), stream.get());
 }
 
 std::uint64_t SpanIndices::bytes() const {
-  return blocks_.bytes.bytes() + pieces_.bytes() + places_.bytes() + mask_.bytes() + runs_.bytes();
+  return blocks_.bytes.bytes() + ranges_.bytes() + places_.bytes() + mask_.bytes() + runs_.bytes();
 }
 
 IndexBlocks upload_indices(const std::vector<IndexView>& indices, const Stream& stream) {

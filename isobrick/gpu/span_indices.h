@@ -22,21 +22,21 @@ class SpanIndices {
   const std::byte* block(std::size_t i) const { return blocks_.bytes.data() + blocks_.offsets[i]; }
   /// Bit i & 31 of word i >> 5: item i. Each index begins a word of its own.
   const std::uint32_t* mask() const { return mask_.data(); }
-  /// The mask in pieces, index by index, and the first piece of each index.
-  const DeviceBuffer<MaskPiece>& pieces() const { return pieces_; }
-  const std::vector<std::uint32_t>& first_pieces() const { return first_pieces_; }
+  /// The mask in ranges, index by index, and the first range of each index.
+  const DeviceBuffer<MaskRange>& ranges() const { return ranges_; }
+  const std::vector<std::uint32_t>& first_ranges() const { return first_ranges_; }
   /// Bytes of the indices, and of all device memory.
   std::uint64_t index_bytes() const { return blocks_.bytes.bytes(); }
   std::uint64_t bytes() const;
 
  private:
   IndexBlocks blocks_;
-  std::vector<std::uint32_t> first_pieces_;
-  DeviceBuffer<MaskPiece> pieces_;
+  std::vector<std::uint32_t> first_ranges_;
+  DeviceBuffer<MaskRange> ranges_;
   DeviceBuffer<IndexPlace> places_;
   DeviceBuffer<std::uint32_t> mask_;  ///< and the number of runs that wait
   DeviceBuffer<Run> runs_;
-  std::uint32_t most_items_ = 0;  ///< of an index
+  std::uint32_t max_items_ = 0;  ///< of an index
 };
 
 /// Uploads indices of one kind and type as they are. Throws UsageError when they

@@ -38,8 +38,8 @@ struct IndexPlace {
   std::uint64_t first_word;  ///< of its mask
 };
 
-/// A piece of the mask that belongs to one index.
-struct MaskPiece {
+/// A range of the mask that belongs to one index.
+struct MaskRange {
   static constexpr std::uint32_t kWords = 1024;  ///< at most
 
   std::uint64_t first_word;
@@ -53,19 +53,19 @@ void launch_search_one(const IndexView& index, double isovalue, std::uint32_t* m
                        const RunQueue& later, cudaStream_t stream);
 
 /// Searches `count` indices of the kind and type of `like`, none of which has more
-/// than `most_items`: blocks of threads for each.
+/// than `max_items`: blocks of threads for each.
 void launch_search_many(const IndexView& like, const std::byte* blocks, const IndexPlace* places,
-                        std::uint32_t count, std::uint32_t most_items, double isovalue,
+                        std::uint32_t count, std::uint32_t max_items, double isovalue,
                         std::uint32_t* mask, cudaStream_t stream);
 
-/// The number of bits that are set in each piece, and the sum of those before it:
+/// The number of bits that are set in each range, and the sum of those before it:
 /// `first` has one more, the sum of all. So has `counts`, a 0.
-void launch_count_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
+void launch_count_bits(const std::uint32_t* mask, const MaskRange* ranges, std::uint32_t count,
                        std::uint32_t* counts, std::uint32_t* first, cudaStream_t stream);
 
-/// Writes the ids of the set bits ascending, those of piece i from first[i] on;
+/// Writes the ids of the set bits ascending, those of range i from first[i] on;
 /// none at `room` or above.
-void launch_list_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
+void launch_list_bits(const std::uint32_t* mask, const MaskRange* ranges, std::uint32_t count,
                       const std::uint32_t* first, std::uint32_t* ids, std::uint64_t room,
                       cudaStream_t stream);
 

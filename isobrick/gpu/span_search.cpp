@@ -69,7 +69,7 @@ struct SpanSearch::Impl {
   Event start, end;
   float build_ms = 0;
   SpanIndices indices;
-  DeviceBuffer<std::uint32_t> counts, first;  ///< of each piece of the mask, one more
+  DeviceBuffer<std::uint32_t> counts, first;  ///< of each range of the mask, one more
   DeviceBuffer<std::uint32_t> ids;
   PinnedBuffer<std::uint32_t> total{1};
   std::uint32_t found = 0;
@@ -102,29 +102,29 @@ struct SpanSearch::Impl {
   }
 
   void prepare() {
-    counts = DeviceBuffer<std::uint32_t>(indices.pieces().size() + 1, stream);
+    counts = DeviceBuffer<std::uint32_t>(indices.ranges().size() + 1, stream);
     first = DeviceBuffer<std::uint32_t>(counts.size(), stream);
     check(cudaMemsetAsync(counts.data(), 0, counts.bytes(), stream.get()));
     check(cudaMemsetAsync(first.data(), 0, first.bytes(), stream.get()));
     stream.wait();
   }
 
-  std::uint32_t pieces() const { return static_cast<std::uint32_t>(indices.pieces().size()); }
+  std::uint32_t mask_ranges() const { return static_cast<std::uint32_t>(indices.ranges().size()); }
 
   void list() {
-    launch_list_bits(indices.mask(), indices.pieces().data(), pieces(), first.data(), ids.data(),
-                     ids.size(), stream.get());
+    launch_list_bits(indices.mask(), indices.ranges().data(), mask_ranges(), first.data(),
+                     ids.data(), ids.size(), stream.get());
   }
 
   std::uint64_t search(double isovalue) {
-    if (pieces() == 0) return 0;
+    if (mask_ranges() == 0) return 0;
     start.record(stream);
     indices.search(isovalue, stream);
-    launch_count_bits(indices.mask(), indices.pieces().data(), pieces(), counts.data(),
+    launch_count_bits(indices.mask(), indices.ranges().data(), mask_ranges(), counts.data(),
                       first.data(), stream.get());
     list();
     end.record(stream);
-    check(cudaMemcpyAsync(total.data(), first.data() + pieces(), sizeof(std::uint32_t),
+    check(cudaMemcpyAsync(total.data(), first.data() + mask_ranges(), sizeof(std::uint32_t),
                           cudaMemcpyDeviceToHost, stream.get()));
     stream.wait();
     found = total[0];
@@ -168,16 +168,16 @@ std::uint64_t SpanSearch::search(double isovalue) { return impl_->search(isovalu
 
 void SpanSearch::answers(std::vector<std::uint32_t>& first, std::vector<std::uint32_t>& ids) const {
   const Impl& i = *impl_;
-  std::vector<std::uint32_t> of_pieces(i.first.size());
+  std::vector<std::uint32_t> of_ranges(i.first.size());
   ids.resize(i.found);
-  check(cudaMemcpyAsync(of_pieces.data(), i.first.data(), i.first.bytes(), cudaMemcpyDeviceToHost,
+  check(cudaMemcpyAsync(of_ranges.data(), i.first.data(), i.first.bytes(), cudaMemcpyDeviceToHost,
                         i.stream.get()));
   if (i.found > 0)
     check(cudaMemcpyAsync(ids.data(), i.ids.data(), i.found * sizeof(std::uint32_t),
                           cudaMemcpyDeviceToHost, i.stream.get()));
   i.stream.wait();
   first.clear();
-  for (const std::uint32_t piece : i.indices.first_pieces()) first.push_back(of_pieces[piece]);
+  for (const std::uint32_t range : i.indices.first_ranges()) first.push_back(of_ranges[range]);
 }
 
 float SpanSearch::search_milliseconds() const { return impl_->end.since(impl_->start); }

@@ -72,9 +72,9 @@ struct BlockSum {
   }
 };
 
-/// The numbers of bits of all pieces to where each one's ids begin, and their sum
+/// The numbers of bits of all ranges to where each one's ids begin, and their sum
 /// behind; one block.
-__device__ void place_pieces(const std::uint32_t* counts, std::uint32_t count, std::uint32_t* first,
+__device__ void place_ranges(const std::uint32_t* counts, std::uint32_t count, std::uint32_t* first,
                              std::uint32_t (&of_warp)[kWarps]) {
   constexpr std::uint32_t kEach = 8;
   std::uint32_t base = 0;
@@ -99,17 +99,17 @@ __device__ void place_pieces(const std::uint32_t* counts, std::uint32_t count, s
   if (threadIdx.x == 0) first[count] = base;
 }
 
-/// The block that is the last to be done places all pieces.
+/// The block that is the last to be done places all ranges.
 __global__ void __launch_bounds__(kSearchThreads)
-    count_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
+    count_bits(const std::uint32_t* mask, const MaskRange* ranges, std::uint32_t count,
                std::uint32_t* counts, std::uint32_t* done, std::uint32_t* first) {
   __shared__ std::uint32_t of_warp[kWarps];
   __shared__ bool last;
   for (std::uint32_t i = blockIdx.x; i < count; i += gridDim.x) {
-    const MaskPiece piece = pieces[i];
+    const MaskRange range = ranges[i];
     std::uint32_t bits = 0;
-    for (std::uint32_t w = threadIdx.x; w < piece.words; w += kSearchThreads)
-      bits += __popc(mask[piece.first_word + w]);
+    for (std::uint32_t w = threadIdx.x; w < range.words; w += kSearchThreads)
+      bits += __popc(mask[range.first_word + w]);
     const BlockSum sum(bits, of_warp);
     if (threadIdx.x == 0) counts[i] = sum.all;
   }
@@ -120,28 +120,28 @@ __global__ void __launch_bounds__(kSearchThreads)
   }
   __syncthreads();
   if (!last) return;
-  place_pieces(counts, count, first, of_warp);
+  place_ranges(counts, count, first, of_warp);
   if (threadIdx.x == 0) *done = 0;
 }
 
 __global__ void __launch_bounds__(kSearchThreads)
-    list_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
+    list_bits(const std::uint32_t* mask, const MaskRange* ranges, std::uint32_t count,
               const std::uint32_t* first, std::uint32_t* ids, std::uint64_t room) {
-  constexpr std::uint32_t kEach = MaskPiece::kWords / kSearchThreads;
+  constexpr std::uint32_t kEach = MaskRange::kWords / kSearchThreads;
   __shared__ std::uint32_t of_warp[kWarps];
   for (std::uint32_t i = blockIdx.x; i < count; i += gridDim.x) {
-    const MaskPiece piece = pieces[i];
+    const MaskRange range = ranges[i];
     std::uint32_t words[kEach], own = 0;
 #pragma unroll
     for (std::uint32_t k = 0; k < kEach; ++k) {
       const std::uint32_t w = kEach * threadIdx.x + k;
-      words[k] = w < piece.words ? mask[piece.first_word + w] : 0;
+      words[k] = w < range.words ? mask[range.first_word + w] : 0;
       own += __popc(words[k]);
     }
     std::uint64_t place = std::uint64_t{first[i]} + BlockSum(own, of_warp).before;
 #pragma unroll
     for (std::uint32_t k = 0; k < kEach; ++k) {
-      const std::uint32_t id = piece.first_id + 32 * (kEach * threadIdx.x + k);
+      const std::uint32_t id = range.first_id + 32 * (kEach * threadIdx.x + k);
       for (std::uint32_t left = words[k]; left; left &= left - 1, ++place)
         if (place < room)
           ids[place] = id + static_cast<std::uint32_t>(__ffs(static_cast<int>(left))) - 1;
@@ -181,16 +181,16 @@ void launch_search_one(const IndexView& index, double isovalue, std::uint32_t* m
 }
 
 void launch_search_many(const IndexView& like, const std::byte* blocks, const IndexPlace* places,
-                        std::uint32_t count, std::uint32_t most_items, double isovalue,
+                        std::uint32_t count, std::uint32_t max_items, double isovalue,
                         std::uint32_t* mask, cudaStream_t stream) {
   visit_index(like, [&]<template <class> class View, class T>(const View<T>&) {
     const Threshold<T> threshold(isovalue);
     if (threshold.none) return;
     // A warp for few items; several blocks where the indices are few and large.
     const unsigned threads =
-        std::clamp<unsigned>(std::bit_ceil(most_items / 64 + 1), 32, kSearchThreads);
+        std::clamp<unsigned>(std::bit_ceil(max_items / 64 + 1), 32, kSearchThreads);
     const unsigned room = blocks_for(~0ull);
-    const unsigned parts = std::clamp(room / count, 1u, most_items / (4 * kSearchThreads) + 1);
+    const unsigned parts = std::clamp(room / count, 1u, max_items / (4 * kSearchThreads) + 1);
     const dim3 grid(std::min(count, room * (kSearchThreads / threads)), parts);
     search_indices<View<T>, T>
         <<<grid, threads, 0, stream>>>(blocks, places, count, threshold.value, mask);
@@ -198,17 +198,17 @@ void launch_search_many(const IndexView& like, const std::byte* blocks, const In
   });
 }
 
-void launch_count_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
+void launch_count_bits(const std::uint32_t* mask, const MaskRange* ranges, std::uint32_t count,
                        std::uint32_t* counts, std::uint32_t* first, cudaStream_t stream) {
-  count_bits<<<blocks_for(count), kSearchThreads, 0, stream>>>(mask, pieces, count, counts,
+  count_bits<<<blocks_for(count), kSearchThreads, 0, stream>>>(mask, ranges, count, counts,
                                                                counts + count, first);
   check_launch("count_bits");
 }
 
-void launch_list_bits(const std::uint32_t* mask, const MaskPiece* pieces, std::uint32_t count,
+void launch_list_bits(const std::uint32_t* mask, const MaskRange* ranges, std::uint32_t count,
                       const std::uint32_t* first, std::uint32_t* ids, std::uint64_t room,
                       cudaStream_t stream) {
-  list_bits<<<blocks_for(count), kSearchThreads, 0, stream>>>(mask, pieces, count, first, ids,
+  list_bits<<<blocks_for(count), kSearchThreads, 0, stream>>>(mask, ranges, count, first, ids,
                                                               room);
   check_launch("list_bits");
 }

@@ -7,7 +7,7 @@
 namespace isobrick::gpu {
 namespace {
 
-/// Calls run(memory, bytes) twice: to ask for temporary memory, and with it.
+/// Calls run(memory, bytes) twice: for the size of temporary memory, and with it.
 template <class F>
 void with_memory(const Stream& stream, F run) {
   std::size_t bytes = 0;

@@ -33,11 +33,11 @@ struct Marker {
   /// The same, but a list that is long for one warp is left to all of them.
   __device__ void shared_list(const Crew& crew, const std::uint32_t* ids, std::uint32_t n) const {
     if (later.room == 0 || n <= RunQueue::kRun) return list(crew, ids, n);
-    const std::uint32_t pieces = (n - 1) / RunQueue::kRun + 1;
+    const std::uint32_t runs = (n - 1) / RunQueue::kRun + 1;
     std::uint32_t place = 0;
-    if (crew.lane == 0) place = atomicAdd(later.count, pieces);
+    if (crew.lane == 0) place = atomicAdd(later.count, runs);
     place = __shfl_sync(0xffffffffu, place, 0);
-    for (std::uint32_t i = crew.lane; i < pieces; i += 32) {
+    for (std::uint32_t i = crew.lane; i < runs; i += 32) {
       const std::uint32_t begin = i * RunQueue::kRun;
       const Run run{ids + begin, ::min(n - begin, RunQueue::kRun)};
       if (place + i < later.room)

@@ -41,7 +41,7 @@ class Stream {
   cudaStream_t stream_ = nullptr;
 };
 
-/// Owns an event that can measure time. With cudaEventBlockingSync whoever waits for it
+/// Owns an event that can measure time. With cudaEventBlockingSync a waiting thread
 /// sleeps instead of keeping a core busy.
 class Event {
  public:
@@ -99,7 +99,7 @@ class DeviceBuffer {
   cudaStream_t stream_ = nullptr;
 };
 
-/// Owns one T of page-locked host memory that kernels write to; zeroed at first.
+/// Owns one T of pinned host memory that kernels write to; zeroed at first.
 template <class T>
 class MappedHost {
  public:
@@ -120,7 +120,7 @@ class MappedHost {
   void* device_ = nullptr;
 };
 
-/// Owns page-locked host memory, for copies that run beside everything else. Mapped in
+/// Owns pinned host memory, for copies that run beside everything else. Mapped in
 /// large pages, which are locked three times as fast as those of cudaMallocHost. Kernels may
 /// read it under the same address.
 class PinnedMemory {

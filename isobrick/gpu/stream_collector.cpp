@@ -27,8 +27,8 @@ StreamCollector::StreamCollector(int cuda_device, StreamDevice& device, bool wel
       welded_(welded),
       normals_(normals),
       take_(std::move(take)),
-      outputs_(cuda_device, output_pieces(device.sizes())),
-      good_tiles_(device.sizes().tiles) {
+      outputs_(cuda_device, output_chunks(device.sizes())),
+      preferred_tiles_(device.sizes().tiles) {
   for (std::size_t i = 0; i < kOutputs; ++i) free_outputs_.push_back(kOutputs - 1 - i);
   thread_ = std::thread([this] { run(); });
 }
@@ -46,24 +46,24 @@ StreamCollector::~StreamCollector() {
   changed_.wait(lock, [&] { return taken_outputs_ == 0; });
 }
 
-void StreamCollector::wait_for_lane() {
+void StreamCollector::wait_for_free_launch() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return error_ || busy_lanes_ < device_.sizes().lanes; });
+  changed_.wait(lock, [&] { return error_ || busy_ < device_.sizes().in_flight; });
   if (error_) std::rethrow_exception(error_);
 }
 
-void StreamCollector::submitted(Lane& lane) {
+void StreamCollector::submitted(InFlightLaunch& launch) {
   {
     const std::lock_guard lock(mutex_);
-    ++busy_lanes_;
-    lanes_.push_back(&lane);
+    ++busy_;
+    in_flight_.push_back(&launch);
   }
   changed_.notify_all();
 }
 
-std::uint32_t StreamCollector::good_tiles() const {
+std::uint32_t StreamCollector::preferred_tiles() const {
   const std::lock_guard lock(mutex_);
-  return good_tiles_;
+  return preferred_tiles_;
 }
 
 void StreamCollector::finish() {
@@ -90,68 +90,68 @@ void StreamCollector::run() {
 void StreamCollector::follow() {
   for (;;) {
     // A mesh is handed on while the next one is downloaded, or nothing else is to do.
-    Lane* lane = next_lane(!pending_);
-    if (!lane && !pending_) return;
+    InFlightLaunch* launch = next_submitted(!pending_);
+    if (!launch && !pending_) return;
     std::optional<Pending> next;
-    if (lane) next = collect(*lane);
+    if (launch) next = collect(*launch);
     if (pending_) deliver(*pending_);
     pending_ = next;
   }
 }
 
 /// Null at the end, or when none is there and `wait` is not set.
-Lane* StreamCollector::next_lane(bool wait) {
+InFlightLaunch* StreamCollector::next_submitted(bool wait) {
   std::unique_lock lock(mutex_);
-  if (wait) changed_.wait(lock, [&] { return closed_ || !lanes_.empty(); });
-  if (stop_ || lanes_.empty()) return nullptr;
-  Lane* lane = lanes_.front();
-  lanes_.pop_front();
-  return lane;
+  if (wait) changed_.wait(lock, [&] { return closed_ || !in_flight_.empty(); });
+  if (stop_ || in_flight_.empty()) return nullptr;
+  InFlightLaunch* launch = in_flight_.front();
+  in_flight_.pop_front();
+  return launch;
 }
 
-std::optional<StreamCollector::Pending> StreamCollector::collect(Lane& lane) {
-  lane.extracted.wait();
+std::optional<StreamCollector::Pending> StreamCollector::collect(InFlightLaunch& launch) {
+  launch.extracted.wait();
   const StreamSizes& sizes = device_.sizes();
-  const SurfaceTotals size = lane.totals[0];
+  const SurfaceTotals size = launch.totals[0];
   ++report_.launches;
-  report_.upload.seconds += seconds_between(lane.upload_begin, lane.uploaded);
-  report_.upload.bytes += device_.sent_bytes(lane);
-  report_.gather.seconds += seconds_between(lane.unpack_begin, lane.unpacked);
-  report_.gather.bytes += lane.use.read_bytes;
-  report_.kernel.seconds += seconds_between(lane.unpacked, lane.extracted);
-  report_.kernel.bytes += lane.count * device_.page_bytes() + mesh_bytes(size, normals_);
+  report_.upload.seconds += seconds_between(launch.upload_begin, launch.uploaded);
+  report_.upload.bytes += device_.sent_bytes(launch);
+  report_.gather.seconds += seconds_between(launch.unpack_begin, launch.unpacked);
+  report_.gather.bytes += launch.use.read_bytes;
+  report_.kernel.seconds += seconds_between(launch.unpacked, launch.extracted);
+  report_.kernel.bytes += launch.count * device_.tile_block_bytes() + mesh_bytes(size, normals_);
   check_numbers(size.vertices);
   std::optional<Pending> next;
   if (size.vertices > sizes.vertices || size.triangles > sizes.triangles) {
     if (pending_) deliver(*pending_);
     pending_.reset();
-    repeat_in_parts(lane);
+    repeat_in_parts(launch);
   } else if (size.vertices + size.triangles > 0) {
-    next = start_download(lane, size);
+    next = start_download(launch, size);
   }
-  lane.samples.reset();
-  free_lane(lane.count, size);
+  launch.samples.reset();
+  release_launch(launch.count, size);
   return next;
 }
 
-/// As many tiles at a time as fit; the sums that they have passed on say how many.
-void StreamCollector::repeat_in_parts(Lane& lane) {
-  const std::vector<OrderState> sums = device_.totals_of_tiles(lane);
+/// As many tiles at a time as fit, going by the sums that they handed on.
+void StreamCollector::repeat_in_parts(InFlightLaunch& launch) {
+  const std::vector<OrderState> sums = device_.totals_of_tiles(launch);
   const StreamSizes& sizes = device_.sizes();
   const std::uint64_t start = report_.vertices;
   OrderState before{0, 0};
-  for (std::uint32_t first = 0; first < lane.count;) {
+  for (std::uint32_t first = 0; first < launch.count;) {
     std::uint32_t end = first + 1;
-    while (end < lane.count && sums[end].vertices - before.vertices <= sizes.vertices &&
+    while (end < launch.count && sums[end].vertices - before.vertices <= sizes.vertices &&
            sums[end].triangles - before.triangles <= sizes.triangles)
       ++end;
-    device_.submit_part(lane, first, end - first, start + before.vertices);
-    lane.extracted.wait();
+    device_.submit_part(launch, first, end - first, start + before.vertices);
+    launch.extracted.wait();
     ++report_.repeats;
-    report_.gather.seconds += seconds_between(lane.unpack_begin, lane.unpacked);
-    report_.kernel.seconds += seconds_between(lane.unpacked, lane.extracted);
-    const SurfaceTotals size = lane.totals[0];
-    if (size.vertices + size.triangles > 0) deliver(start_download(lane, size));
+    report_.gather.seconds += seconds_between(launch.unpack_begin, launch.unpacked);
+    report_.kernel.seconds += seconds_between(launch.unpacked, launch.extracted);
+    const SurfaceTotals size = launch.totals[0];
+    if (size.vertices + size.triangles > 0) deliver(start_download(launch, size));
     before = sums[end - 1];
     first = end;
   }
@@ -164,18 +164,19 @@ void StreamCollector::check_numbers(std::uint64_t more) const {
         "cannot number; extract it in parts with --roi, or as STL");
 }
 
-StreamCollector::Pending StreamCollector::start_download(Lane& lane, SurfaceTotals size) {
-  Pending pending{&lane, take_output(), size, report_.vertices};
-  device_.download(lane, output(pending.output), size);
+StreamCollector::Pending StreamCollector::start_download(InFlightLaunch& launch,
+                                                         SurfaceTotals size) {
+  Pending pending{&launch, take_output(), size, report_.vertices};
+  device_.download(launch, output(pending.output), size);
   report_.vertices += size.vertices;
   report_.triangles += size.triangles;
   return pending;
 }
 
 void StreamCollector::deliver(const Pending& pending) {
-  pending.lane->downloaded.wait();
+  pending.launch->downloaded.wait();
   report_.download.seconds +=
-      seconds_between(pending.lane->download_begin, pending.lane->downloaded);
+      seconds_between(pending.launch->download_begin, pending.launch->downloaded);
   report_.download.bytes += mesh_bytes(pending.size, normals_);
   const HostOutput from = output(pending.output);
   const auto vertices = static_cast<std::size_t>(pending.size.vertices);
@@ -219,19 +220,19 @@ void StreamCollector::give_output(std::size_t output) {
   changed_.notify_all();
 }
 
-void StreamCollector::free_lane(std::uint32_t tiles, SurfaceTotals size) {
+void StreamCollector::release_launch(std::uint32_t tiles, SurfaceTotals size) {
   const StreamSizes& sizes = device_.sizes();
   const auto fitting = [&](std::uint64_t capacity, std::uint64_t made) {
     return kFill * static_cast<double>(capacity) * tiles /
            static_cast<double>(std::max<std::uint64_t>(made, 1));
   };
-  const double good =
+  const double preferred =
       std::min(fitting(sizes.vertices, size.vertices), fitting(sizes.triangles, size.triangles));
   {
     const std::lock_guard lock(mutex_);
-    --busy_lanes_;
-    good_tiles_ =
-        static_cast<std::uint32_t>(std::clamp(good, 1.0, static_cast<double>(sizes.tiles)));
+    --busy_;
+    preferred_tiles_ =
+        static_cast<std::uint32_t>(std::clamp(preferred, 1.0, static_cast<double>(sizes.tiles)));
   }
   changed_.notify_all();
 }

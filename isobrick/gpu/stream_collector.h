@@ -23,12 +23,12 @@ class StreamCollector {
   StreamCollector(int cuda_device, StreamDevice& device, bool welded, bool normals, TakeChunk take);
   ~StreamCollector();
 
-  /// Waits until the lane of the next launch is free. Rethrows what went wrong.
-  void wait_for_lane();
-  /// A launch was submitted on its lane.
-  void submitted(Lane& lane);
+  /// Waits until the buffers of the next launch are free. Rethrows what went wrong.
+  void wait_for_free_launch();
+  /// A launch was submitted.
+  void submitted(InFlightLaunch& launch);
   /// How many tiles a launch may have, going by the meshes so far.
-  std::uint32_t good_tiles() const;
+  std::uint32_t preferred_tiles() const;
   /// Waits until every mesh was taken. Rethrows what went wrong.
   void finish();
   /// All but what the host's side knows; after finish().
@@ -37,7 +37,7 @@ class StreamCollector {
  private:
   /// A mesh on its way to the host.
   struct Pending {
-    Lane* lane = nullptr;
+    InFlightLaunch* launch = nullptr;
     std::size_t output = 0;
     SurfaceTotals size{};
     std::uint64_t first_vertex = 0;
@@ -45,16 +45,16 @@ class StreamCollector {
 
   void run();
   void follow();
-  Lane* next_lane(bool wait);
-  std::optional<Pending> collect(Lane& lane);
-  void repeat_in_parts(Lane& lane);
-  Pending start_download(Lane& lane, SurfaceTotals size);
+  InFlightLaunch* next_submitted(bool wait);
+  std::optional<Pending> collect(InFlightLaunch& launch);
+  void repeat_in_parts(InFlightLaunch& launch);
+  Pending start_download(InFlightLaunch& launch, SurfaceTotals size);
   void deliver(const Pending& pending);
   void check_numbers(std::uint64_t more) const;
   std::size_t take_output();
   HostOutput output(std::size_t index);
   void give_output(std::size_t output);
-  void free_lane(std::uint32_t tiles, SurfaceTotals size);
+  void release_launch(std::uint32_t tiles, SurfaceTotals size);
 
   int cuda_device_;
   StreamDevice& device_;
@@ -64,15 +64,15 @@ class StreamCollector {
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Lane*> lanes_;  ///< submitted, not collected
-  int busy_lanes_ = 0;       ///< submitted, not free
+  std::deque<InFlightLaunch*> in_flight_;  ///< submitted, not collected
+  int busy_ = 0;                           ///< submitted, not free
   bool closed_ = false, stop_ = false;
   std::exception_ptr error_;
-  std::uint32_t good_tiles_;
+  std::uint32_t preferred_tiles_;
   std::vector<std::size_t> free_outputs_;
   int taken_outputs_ = 0;  ///< handed on, not released
 
-  // Of the thread alone, until it ends.
+  // Of the thread unwelded, until it ends.
   std::optional<Pending> pending_;
   StreamReport report_;
 

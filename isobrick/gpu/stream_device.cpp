@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "isobrick/core/error.h"
+#include "isobrick/gpu/block_groups.h"
 #include "isobrick/gpu/device.h"
-#include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/unpack_kernel.h"
 #include "isobrick/surface/cpu_extractor.h"
 #include "isobrick/surface/world_map.h"
@@ -30,8 +30,8 @@ StreamDevice::StreamDevice(const Lattice& lattice, const SurfaceOptions& options
     : lattice_(lattice), options_(options), pool_(pool) {
   if (!pool_) check_reads_host_memory();
   for (StreamSizes s = sizes; !allocate(s);
-       s = stream_sizes(lattice, options, std::max(1u, s.tiles / 2), kLeastLanes, s.pool))
-    if (s.tiles == 1 && s.lanes == kLeastLanes)
+       s = stream_sizes(lattice, options, std::max(1u, s.tiles / 2), kMinInFlight, s.pool))
+    if (s.tiles == 1 && s.in_flight == kMinInFlight)
       throw Error(fmt::format(
           "the GPU has no {} bytes of free memory, which a single tile takes; use --backend cpu",
           s.device_bytes));
@@ -50,24 +50,24 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   arena_ = std::move(arena);
   sizes_ = sizes;
   layout_ = StagingLayout(sizes.tiles, sizes.tile_bricks);
-  lanes_.clear();
-  const std::size_t of_lane =
+  in_flight_.clear();
+  const std::size_t launch_bytes =
       StagingLayout::aligned(sizes.staging_bytes) + StagingLayout::aligned(sizeof(SurfaceTotals));
-  const auto lanes = static_cast<std::size_t>(sizes.lanes);
-  staging_ = PinnedBuffer<std::byte>(lanes * of_lane);
-  for (std::size_t i = 0; i < lanes; ++i) {
-    auto lane = std::make_unique<Lane>();
-    lane->staging = staging_.data() + i * of_lane;
-    lane->totals = reinterpret_cast<SurfaceTotals*>(lane->staging +
-                                                    StagingLayout::aligned(sizes.staging_bytes));
-    lane->device = arena_->take<std::byte>(sizes.staging_bytes);
-    lane->bricks = arena_->take<std::byte>(sizes.sent_bricks * lattice_.brick_bytes());
-    lane->positions = arena_->take<Vec3f>(sizes.vertices);
-    if (options_.normals) lane->normals = arena_->take<Vec3f>(sizes.vertices);
-    lane->triangles = arena_->take<Triangle>(sizes.triangles);
-    lanes_.push_back(std::move(lane));
+  const auto in_flight = static_cast<std::size_t>(sizes.in_flight);
+  staging_ = PinnedBuffer<std::byte>(in_flight * launch_bytes);
+  for (std::size_t i = 0; i < in_flight; ++i) {
+    auto launch = std::make_unique<InFlightLaunch>();
+    launch->staging = staging_.data() + i * launch_bytes;
+    launch->totals = reinterpret_cast<SurfaceTotals*>(launch->staging +
+                                                      StagingLayout::aligned(sizes.staging_bytes));
+    launch->device = arena_->take<std::byte>(sizes.staging_bytes);
+    launch->bricks = arena_->take<std::byte>(sizes.sent_bricks * lattice_.brick_bytes());
+    launch->positions = arena_->take<Vec3f>(sizes.vertices);
+    if (options_.normals) launch->normals = arena_->take<Vec3f>(sizes.vertices);
+    launch->triangles = arena_->take<Triangle>(sizes.triangles);
+    in_flight_.push_back(std::move(launch));
   }
-  pages_ = arena_->take<std::byte>(sizes.page_bytes);
+  tile_blocks_ = arena_->take<std::byte>(sizes.tile_block_bytes);
   cases_ = arena_->take<CaseTable>(1);
   number_ends_ = arena_->take<unsigned long long>(kEnds + 1);
   params_.row_tables = arena_->take<RowTable>(sizes.slots);
@@ -77,7 +77,7 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   const CaseTable cases = make_case_table(world.mirrored);
   check(cudaMemcpyAsync(cases_, &cases, sizeof cases, cudaMemcpyHostToDevice, kernel_.get()));
   kernel_.wait();
-  params_.pages = pages_;
+  params_.tile_blocks = tile_blocks_;
   for (int axis = 0; axis < 3; ++axis) {
     params_.tiles[axis] = static_cast<std::int32_t>(lattice_.tiles()[axis]);
     params_.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
@@ -85,39 +85,39 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
     params_.roi_hi[axis] = static_cast<std::int32_t>(options_.roi.hi[axis]);
   }
   params_.isovalue = options_.isovalue;
-  params_.crossing = static_cast<float>(options_.isovalue);
+  params_.vertex_isovalue = static_cast<float>(options_.isovalue);
   params_.world = world;
   params_.diagonal = is_diagonal(world);
-  params_.alone = options_.indexing == Indexing::chunk_local;
+  params_.unwelded = options_.indexing == Indexing::chunk_local;
   params_.vertex_capacity = sizes.vertices;
   params_.triangle_capacity = sizes.triangles;
   return true;
 }
 
-void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
-                          const unsigned long long* number_start, unsigned long long* number_end,
-                          bool tables_known) {
-  auto* header = reinterpret_cast<LaunchHeader*>(lane.device);
+void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, std::uint32_t count,
+                                  const unsigned long long* number_start,
+                                  unsigned long long* number_end, bool tables_known) {
+  auto* header = reinterpret_cast<LaunchHeader*>(launch.device);
   TileParams p = params_;
-  p.items = reinterpret_cast<const TileItem*>(lane.device + layout_.items) + first;
-  p.links = reinterpret_cast<const TileLinks*>(lane.device + layout_.links) + first;
-  p.order = reinterpret_cast<OrderState*>(lane.device + layout_.order);
+  p.items = reinterpret_cast<const TileItem*>(launch.device + layout_.items) + first;
+  p.links = reinterpret_cast<const TileLinks*>(launch.device + layout_.links) + first;
+  p.order = reinterpret_cast<OrderState*>(launch.device + layout_.order);
   p.item_count = &header->item_count;
   p.ticket = &header->ticket;
   p.totals = &header->totals;
   p.tables_known = tables_known;
   p.epoch = ++epoch_;
-  p.number_start = params_.alone ? number_ends_ + kEnds : number_start;
-  p.number_end = params_.alone ? &header->number_end : number_end;
-  p.positions = lane.positions;
-  p.normals = lane.normals;
-  p.triangles = lane.triangles;
+  p.number_start = params_.unwelded ? number_ends_ + kEnds : number_start;
+  p.number_end = params_.unwelded ? &header->number_end : number_end;
+  p.positions = launch.positions;
+  p.normals = launch.normals;
+  p.triangles = launch.triangles;
   UnpackParams u{};
   u.items = p.items;
   u.links = p.links;
   u.count = count;
-  u.boxes = reinterpret_cast<const BrickBox*>(lane.device + layout_.boxes) + first;
-  u.bricks = reinterpret_cast<const std::uint64_t*>(lane.device + layout_.bricks) +
+  u.boxes = reinterpret_cast<const BrickBox*>(launch.device + layout_.boxes) + first;
+  u.bricks = reinterpret_cast<const std::uint64_t*>(launch.device + layout_.bricks) +
              std::size_t{first} * sizes_.tile_bricks;
   u.tile_bricks = sizes_.tile_bricks;
   u.reach = static_cast<int>(sample_reach(options_));
@@ -127,63 +127,64 @@ void StreamDevice::launch(Lane& lane, std::uint32_t first, std::uint32_t count,
     u.extent[axis] = p.extent[axis];
   }
   u.fill_value = options_.fill_value;
-  u.pages = pages_;
-  lane.unpack_begin.record(kernel_);
+  u.tile_blocks = tile_blocks_;
+  launch.unpack_begin.record(kernel_);
   launch_unpack(lattice_.type, u, kernel_.get());
-  lane.unpacked.record(kernel_);
+  launch.unpacked.record(kernel_);
   LaunchShape shape = shapes_.of(count);
   shape.blocks = std::min(shape.blocks, static_cast<int>(count));
   shape.launch(shape, p, cases_, kernel_.get(), false);
-  check(cudaMemcpyAsync(lane.totals, &header->totals, sizeof(SurfaceTotals), cudaMemcpyDeviceToHost,
-                        kernel_.get()));
-  lane.extracted.record(kernel_);
+  check(cudaMemcpyAsync(launch.totals, &header->totals, sizeof(SurfaceTotals),
+                        cudaMemcpyDeviceToHost, kernel_.get()));
+  launch.extracted.record(kernel_);
 }
 
 /// Neighbours in host memory are sent together.
-void StreamDevice::send(Lane& lane) {
+void StreamDevice::send(InFlightLaunch& launch) {
   const std::size_t bytes = lattice_.brick_bytes();
-  const std::vector<SentBrick>& sent = lane.use.sent;
+  const std::vector<SentBrick>& sent = launch.use.sent;
   for (std::size_t first = 0, end = 0; first < sent.size(); first = end) {
     for (++end; end < sent.size() && sent[end].from == sent[end - 1].from + bytes;) ++end;
-    check(cudaMemcpyAsync(lane.bricks + first * bytes, sent[first].from, (end - first) * bytes,
+    check(cudaMemcpyAsync(launch.bricks + first * bytes, sent[first].from, (end - first) * bytes,
                           cudaMemcpyHostToDevice, upload_.get()));
   }
-  check(cudaMemcpyAsync(lane.device, lane.staging, used_staging(lane), cudaMemcpyHostToDevice,
+  check(cudaMemcpyAsync(launch.device, launch.staging, used_staging(launch), cudaMemcpyHostToDevice,
                         upload_.get()));
 }
 
-void StreamDevice::submit(Lane& lane, std::uint64_t launch_number) {
+void StreamDevice::submit(InFlightLaunch& launch, std::uint64_t number) {
   const std::lock_guard lock(launching_);
-  lane.upload_begin.record(upload_);
-  send(lane);
-  lane.uploaded.record(upload_);
-  check(cudaStreamWaitEvent(kernel_.get(), lane.uploaded.get()));
+  launch.upload_begin.record(upload_);
+  send(launch);
+  launch.uploaded.record(upload_);
+  check(cudaStreamWaitEvent(kernel_.get(), launch.uploaded.get()));
   if (pool_) pool_->wait_on(kernel_);
-  check(cudaStreamWaitEvent(kernel_.get(), lane.downloaded.get()));
-  launch(lane, 0, lane.count, number_ends_ + launch_number % kEnds,
-         number_ends_ + (launch_number + 1) % kEnds, false);
+  check(cudaStreamWaitEvent(kernel_.get(), launch.downloaded.get()));
+  launch_kernels(launch, 0, launch.count, number_ends_ + number % kEnds,
+                 number_ends_ + (number + 1) % kEnds, false);
 }
 
-void StreamDevice::submit_part(Lane& lane, std::uint32_t first, std::uint32_t count,
+void StreamDevice::submit_part(InFlightLaunch& launch, std::uint32_t first, std::uint32_t count,
                                std::uint64_t number_start) {
   const std::lock_guard lock(launching_);
-  auto* header = reinterpret_cast<LaunchHeader*>(lane.device);
-  LaunchHeader& sent = *reinterpret_cast<LaunchHeader*>(lane.at(0));
+  auto* header = reinterpret_cast<LaunchHeader*>(launch.device);
+  LaunchHeader& sent = *reinterpret_cast<LaunchHeader*>(launch.at(0));
   sent = {};
   sent.item_count = count;
   sent.number_start = number_start;
   check(cudaMemcpyAsync(header, &sent, sizeof sent, cudaMemcpyHostToDevice, kernel_.get()));
-  check(cudaMemsetAsync(lane.device + layout_.order, 0, count * sizeof(OrderState), kernel_.get()));
-  launch(lane, first, count, &header->number_start, &header->number_end, true);
+  check(
+      cudaMemsetAsync(launch.device + layout_.order, 0, count * sizeof(OrderState), kernel_.get()));
+  launch_kernels(launch, first, count, &header->number_start, &header->number_end, true);
 }
 
-std::vector<OrderState> StreamDevice::totals_of_tiles(Lane& lane) {
-  std::vector<OrderState> totals(lane.count);
-  check(cudaMemcpyAsync(totals.data(), lane.device + layout_.order,
+std::vector<OrderState> StreamDevice::totals_of_tiles(InFlightLaunch& launch) {
+  std::vector<OrderState> totals(launch.count);
+  check(cudaMemcpyAsync(totals.data(), launch.device + layout_.order,
                         totals.size() * sizeof(OrderState), cudaMemcpyDeviceToHost,
                         download_.get()));
   download_.wait();
-  // Tiles without a mesh have not asked for the sums before them.
+  // Tiles without a mesh never read the sums before them.
   OrderState before{0, 0};
   for (OrderState& t : totals)
     before = t = {std::max(before.vertices, t.vertices & kOrderMask),
@@ -191,16 +192,16 @@ std::vector<OrderState> StreamDevice::totals_of_tiles(Lane& lane) {
   return totals;
 }
 
-void StreamDevice::download(Lane& lane, const HostOutput& to, SurfaceTotals size) {
+void StreamDevice::download(InFlightLaunch& launch, const HostOutput& to, SurfaceTotals size) {
   const auto copy = [&](void* host, const void* device, std::size_t bytes) {
     if (bytes > 0)
       check(cudaMemcpyAsync(host, device, bytes, cudaMemcpyDeviceToHost, download_.get()));
   };
-  lane.download_begin.record(download_);
-  copy(to.positions, lane.positions, size.vertices * sizeof(Vec3f));
-  if (options_.normals) copy(to.normals, lane.normals, size.vertices * sizeof(Vec3f));
-  copy(to.triangles, lane.triangles, size.triangles * sizeof(Triangle));
-  lane.downloaded.record(download_);
+  launch.download_begin.record(download_);
+  copy(to.positions, launch.positions, size.vertices * sizeof(Vec3f));
+  if (options_.normals) copy(to.normals, launch.normals, size.vertices * sizeof(Vec3f));
+  copy(to.triangles, launch.triangles, size.triangles * sizeof(Triangle));
+  launch.downloaded.record(download_);
 }
 
 }  // namespace isobrick::gpu

@@ -15,16 +15,16 @@
 
 namespace isobrick::gpu {
 
-/// A launch under way: what the host sends, and where its mesh goes on the device.
-struct Lane {
-  std::byte* staging = nullptr;  ///< page-locked
+/// The buffers of a launch in flight: what the host sends, and where its mesh goes on the device.
+struct InFlightLaunch {
+  std::byte* staging = nullptr;  ///< block-locked
   std::byte* device = nullptr;   ///< the same, on the device
   std::byte* bricks = nullptr;   ///< those that are sent, likewise
   BrickUse use;
   std::shared_ptr<const void> samples;  ///< owns the bricks in host memory
   Vec3f *positions = nullptr, *normals = nullptr;
   Triangle* triangles = nullptr;
-  SurfaceTotals* totals = nullptr;  ///< page-locked
+  SurfaceTotals* totals = nullptr;  ///< block-locked
   // Each that can be slept for wakes a thread of the driver's when it is over.
   Event extracted{cudaEventBlockingSync}, downloaded{cudaEventBlockingSync};
   Event upload_begin, uploaded, unpack_begin, unpacked, download_begin;
@@ -34,7 +34,7 @@ struct Lane {
   std::byte* at(std::size_t offset) const { return staging + offset; }
 };
 
-/// Page-locked memory for the mesh of a launch.
+/// Pinned memory for the mesh of a launch.
 struct HostOutput {
   Vec3f *positions = nullptr, *normals = nullptr;
   Triangle* triangles = nullptr;
@@ -51,34 +51,37 @@ class StreamDevice {
 
   const StreamSizes& sizes() const { return sizes_; }
   const StagingLayout& layout() const { return layout_; }
-  /// What is uploaded for a lane, and the samples of a tile.
-  std::uint64_t sent_bytes(const Lane& lane) const {
-    return used_staging(lane) + lane.use.sent.size() * lattice_.brick_bytes();
+  /// What is uploaded for a launch, and the samples of a tile.
+  std::uint64_t sent_bytes(const InFlightLaunch& launch) const {
+    return used_staging(launch) + launch.use.sent.size() * lattice_.brick_bytes();
   }
-  std::uint64_t page_bytes() const { return kPageSamples * lattice_.sample_bytes(); }
-  Lane& lane(std::uint64_t launch) { return *lanes_[launch % lanes_.size()]; }
+  std::uint64_t tile_block_bytes() const { return kTileBlockSamples * lattice_.sample_bytes(); }
+  InFlightLaunch& in_flight(std::uint64_t number) {
+    return *in_flight_[number % in_flight_.size()];
+  }
 
-  /// Uploads a lane with its bricks and extracts it, as launch number `launch`; waits for nothing.
-  void submit(Lane& lane, std::uint64_t launch);
-  /// Extracts tiles [first, first + count) of a lane that has been extracted once more, its
+  /// Uploads a launch with its bricks and extracts it, as launch `number`; waits for
+  /// nothing.
+  void submit(InFlightLaunch& launch, std::uint64_t number);
+  /// Extracts tiles [first, first + count) of a launch that has been extracted once more, its
   /// vertices numbered from `number_start`. May be called beside submit().
-  void submit_part(Lane& lane, std::uint32_t first, std::uint32_t count,
+  void submit_part(InFlightLaunch& launch, std::uint32_t first, std::uint32_t count,
                    std::uint64_t number_start);
-  /// The running totals of a lane's tiles; waits for them.
-  std::vector<OrderState> totals_of_tiles(Lane& lane);
-  /// Copies a lane's mesh to the host; waits for nothing.
-  void download(Lane& lane, const HostOutput& to, SurfaceTotals size);
+  /// The running totals of a launch's tiles; waits for them.
+  std::vector<OrderState> totals_of_tiles(InFlightLaunch& launch);
+  /// Copies a launch's mesh to the host; waits for nothing.
+  void download(InFlightLaunch& launch, const HostOutput& to, SurfaceTotals size);
   /// Waits until nothing is copied to the host any more, whatever went wrong.
   void end_downloads() noexcept { (void)cudaStreamSynchronize(download_.get()); }
 
  private:
-  void launch(Lane& lane, std::uint32_t first, std::uint32_t count,
-              const unsigned long long* number_start, unsigned long long* number_end,
-              bool tables_known);
+  void launch_kernels(InFlightLaunch& launch, std::uint32_t first, std::uint32_t count,
+                      const unsigned long long* number_start, unsigned long long* number_end,
+                      bool tables_known);
   bool allocate(const StreamSizes& sizes);
-  void send(Lane& lane);
-  std::size_t used_staging(const Lane& lane) const {
-    return layout_.bricks + lane.count * sizes_.tile_bricks * sizeof(std::uint64_t);
+  void send(InFlightLaunch& launch);
+  std::size_t used_staging(const InFlightLaunch& launch) const {
+    return layout_.bricks + launch.count * sizes_.tile_bricks * sizeof(std::uint64_t);
   }
 
   Lattice lattice_;
@@ -87,13 +90,13 @@ class StreamDevice {
   StreamSizes sizes_;
   StagingLayout layout_{0, 0};
   // Streams end before the memory that they work on.
-  PinnedBuffer<std::byte> staging_;  ///< of all lanes
+  PinnedBuffer<std::byte> staging_;  ///< of all launch
   std::unique_ptr<DeviceArena> arena_;
-  std::vector<std::unique_ptr<Lane>> lanes_;
+  std::vector<std::unique_ptr<InFlightLaunch>> in_flight_;
   Stream upload_, kernel_, download_;
   std::mutex launching_;
   TileParams params_{};
-  std::byte* pages_ = nullptr;
+  std::byte* tile_blocks_ = nullptr;
   CaseTable* cases_ = nullptr;
   static constexpr std::uint64_t kEnds = 4;
   unsigned long long* number_ends_ = nullptr;  ///< of the last launches, in turn; then a zero

@@ -5,7 +5,7 @@
 
 #include "isobrick/gpu/tile_params.h"
 
-// What the host sends for a launch, in one piece: the header, the items, their links,
+// What the host sends for a launch, in one copy: the header, the items, their links,
 // their zeroed running totals, where the bricks of each lie. Bricks that are sent follow.
 
 namespace isobrick::gpu {
@@ -23,7 +23,7 @@ struct BrickBox {
   std::int32_t first[3], count[3];
 };
 
-/// Where the parts of such a piece begin, in bytes.
+/// Where the parts of it begin, in bytes.
 struct StagingLayout {
   std::size_t items, links, order, boxes, bricks, end;
 

@@ -7,8 +7,8 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/tile.h"
+#include "isobrick/gpu/block_groups.h"
 #include "isobrick/gpu/brick_pool.h"
-#include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/stream_layout.h"
 #include "isobrick/surface/cpu_extractor.h"
 
@@ -18,29 +18,29 @@ namespace {
 /// Mesh to expect of a tile before anything is known; launches shrink where there is more.
 constexpr std::uint64_t kVerticesOfTile = 1600, kTrianglesOfTile = 3200;
 /// What a tile can make at most: 3 edges a sample, 5 triangles a cell.
-constexpr std::uint64_t kMostVertices = std::uint64_t{3} * 33 * 33 * 33,
-                        kMostTriangles = std::uint64_t{5} * 32 * 32 * 32;
+constexpr std::uint64_t kMaxVertices = std::uint64_t{3} * 33 * 33 * 33,
+                        kMaxTriangles = std::uint64_t{5} * 32 * 32 * 32;
 /// Case table, ends of the numbering, and the rounding of buffers.
 constexpr std::uint64_t kSmallBuffers = 64 << 10;
 /// Bricks of fewer bytes are not sent: a copy has a price of its own.
-constexpr std::uint64_t kLeastSent = std::uint64_t{128} << 10;
+constexpr std::uint64_t kMinSentBytes = std::uint64_t{128} << 10;
 /// Smaller launches are not worth a pool.
-constexpr std::uint64_t kLeastTilesWithPool = 128;
+constexpr std::uint64_t kMinTilesWithPool = 128;
 /// Bricks a thread that are decoded ahead into a pool, and that are being decoded or belong to
 /// launches.
-constexpr std::uint64_t kLeastAhead = 24, kMostAhead = 40, kUnderWay = 8;
-/// A row table in the host's books: its slot, its tile, its expiry. Tables on the faces of what is
-/// finished fill a quarter of their cubes, those of a launch may be alone in theirs.
+constexpr std::uint64_t kMinAhead = 24, kMaxAhead = 40, kInWork = 8;
+/// A row table in the host's uploads: its slot, its tile, its expiry. Tables on the faces of what
+/// is finished fill a quarter of their cubes, those of a launch may be unwelded in theirs.
 constexpr std::uint64_t kBytesOfSlot = 128, kBytesOfCube = 640;
 
 /// Row tables that are needed at a time: as with the CPU's boundaries those on the upper
-/// faces of what is finished, and those of the launches under way.
-std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles, int lanes) {
+/// faces of what is finished, and those of the launches in flight.
+std::uint64_t slots_for(const Lattice& lattice, bool welded, std::uint64_t tiles, int in_flight) {
   if (!welded) return tiles;
   const Int3 t = lattice.tiles();
   const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
   return std::min(static_cast<std::uint64_t>(volume(t)),
-                  faces + (static_cast<std::uint64_t>(lanes) + 1) * tiles);
+                  faces + (static_cast<std::uint64_t>(in_flight) + 1) * tiles);
 }
 
 /// In Morton order about half of the bricks on the three upper faces of the grid live at a time.
@@ -52,8 +52,8 @@ std::uint64_t living_bricks(const Lattice& lattice) {
 /// Bricks that hold as many samples as the tiles of a launch and a quarter more, for tiles
 /// that do not fill theirs.
 std::uint64_t bricks_to_send(const Lattice& lattice, std::uint64_t tiles) {
-  if (lattice.brick_bytes() < kLeastSent) return 0;
-  return tiles * kPageSamples * lattice.sample_bytes() * 5 / 4 / lattice.brick_bytes();
+  if (lattice.brick_bytes() < kMinSentBytes) return 0;
+  return tiles * kTileBlockSamples * lattice.sample_bytes() * 5 / 4 / lattice.brick_bytes();
 }
 
 std::string too_small(const char* option, std::uint64_t budget, std::uint64_t least) {
@@ -65,50 +65,50 @@ std::string too_small(const char* option, std::uint64_t budget, std::uint64_t le
 }  // namespace
 
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
-                         int lanes, PoolSizes pool) {
+                         int in_flight, PoolSizes pool) {
   StreamSizes s;
   s.pool = pool;
-  const auto of_lanes = static_cast<std::uint64_t>(lanes);
+  const auto in_flight_count = static_cast<std::uint64_t>(in_flight);
   s.tiles = tiles;
-  s.lanes = lanes;
-  s.vertices = std::max(kMostVertices, tiles * kVerticesOfTile);
-  s.triangles = std::max(kMostTriangles, tiles * kTrianglesOfTile);
+  s.in_flight = in_flight;
+  s.vertices = std::max(kMaxVertices, tiles * kVerticesOfTile);
+  s.triangles = std::max(kMaxTriangles, tiles * kTrianglesOfTile);
   s.slots = static_cast<std::uint32_t>(
-      slots_for(lattice, options.indexing == Indexing::welded, tiles, lanes));
+      slots_for(lattice, options.indexing == Indexing::welded, tiles, in_flight));
   s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
   if (pool.bricks == 0) s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
   s.staging_bytes = StagingLayout(tiles, s.tile_bricks).end;
   s.output_bytes =
       s.vertices * sizeof(Vec3f) * (options.normals ? 2 : 1) + s.triangles * sizeof(Triangle);
-  const std::uint64_t groups = (tiles + kTilesOfPageGroup - 1) / kTilesOfPageGroup;
-  s.page_bytes = groups * kPageGroupSamples * lattice.sample_bytes();
+  const std::uint64_t groups = (tiles + kTilesOfBlockGroup - 1) / kTilesOfBlockGroup;
+  s.tile_block_bytes = groups * kBlockGroupSamples * lattice.sample_bytes();
   s.device_bytes =
-      kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.page_bytes +
+      kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.tile_block_bytes +
       pool.bricks * lattice.brick_bytes() +
-      of_lanes * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
-  s.pinned_bytes = kSmallBuffers + of_lanes * s.staging_bytes + kOutputs * s.output_bytes +
+      in_flight_count * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
+  s.pinned_bytes = kSmallBuffers + in_flight_count * s.staging_bytes + kOutputs * s.output_bytes +
                    BrickPool::pinned_bytes(lattice.brick_bytes(), pool.threads);
-  s.host_bytes = kBytesOfSlot * s.slots + (of_lanes + 1) * tiles * kBytesOfCube +
-                 of_lanes * tiles * sizeof(OrderState);
+  s.host_bytes = kBytesOfSlot * s.slots + (in_flight_count + 1) * tiles * kBytesOfCube +
+                 in_flight_count * tiles * sizeof(OrderState);
   return s;
 }
 
-std::vector<std::size_t> output_pieces(const StreamSizes& sizes) {
+std::vector<std::size_t> output_chunks(const StreamSizes& sizes) {
   return std::vector<std::size_t>(kOutputs, sizes.output_bytes);
 }
 
-std::uint64_t good_pool(const Lattice& lattice, int threads) {
+std::uint64_t preferred_pool_bricks(const Lattice& lattice, int threads) {
   return std::min(
       static_cast<std::uint64_t>(volume(lattice.bricks())),
-      living_bricks(lattice) + (kMostAhead + kUnderWay) * static_cast<std::uint64_t>(threads));
+      living_bricks(lattice) + (kMaxAhead + kInWork) * static_cast<std::uint64_t>(threads));
 }
 
 std::size_t bricks_ahead(const Lattice& lattice, const PoolSizes& pool) {
   const std::uint64_t others =
-      living_bricks(lattice) + kUnderWay * static_cast<std::uint64_t>(pool.threads);
+      living_bricks(lattice) + kInWork * static_cast<std::uint64_t>(pool.threads);
   return static_cast<std::size_t>(std::clamp(
       (pool.bricks - std::min(pool.bricks, others)) / static_cast<std::uint64_t>(pool.threads),
-      kLeastAhead, kMostAhead));
+      kMinAhead, kMaxAhead));
 }
 
 namespace {
@@ -117,19 +117,19 @@ namespace {
 std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions& options,
                                     std::uint64_t device_budget, std::uint64_t host_budget,
                                     std::uint64_t other_host_bytes, PoolSizes wanted) {
-  if (wanted.bricks == 0 || lattice.brick_bytes() < kLeastSent) return std::nullopt;
+  if (wanted.bricks == 0 || lattice.brick_bytes() < kMinSentBytes) return std::nullopt;
   const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
-  for (std::uint64_t tiles = std::min<std::uint64_t>(kMostTilesOfLaunch, all);
-       tiles >= std::min<std::uint64_t>(kLeastTilesWithPool, all); tiles /= 2)
-    for (int lanes = kMostLanes; lanes >= kLeastLanes; --lanes) {
+  for (std::uint64_t tiles = std::min<std::uint64_t>(kMaxTilesOfLaunch, all);
+       tiles >= std::min<std::uint64_t>(kMinTilesWithPool, all); tiles /= 2)
+    for (int in_flight = kMaxInFlight; in_flight >= kMinInFlight; --in_flight) {
       PoolSizes pool{1, wanted.threads};
       const auto count = static_cast<std::uint32_t>(tiles);
       const std::uint64_t launches =
-          stream_sizes(lattice, options, count, lanes, pool).device_bytes;
+          stream_sizes(lattice, options, count, in_flight, pool).device_bytes;
       if (launches > device_budget) continue;
       pool.bricks = std::min(wanted.bricks, 1 + (device_budget - launches) / lattice.brick_bytes());
       if (10 * pool.bricks < 6 * wanted.bricks) continue;
-      const StreamSizes s = stream_sizes(lattice, options, count, lanes, pool);
+      const StreamSizes s = stream_sizes(lattice, options, count, in_flight, pool);
       // Any tile's bricks must fit, however few bricks there are.
       if (pool.bricks < s.tile_bricks) continue;
       if (s.pinned_bytes + s.host_bytes + other_host_bytes <= host_budget) return s;
@@ -146,15 +146,15 @@ StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& optio
           fit_pool(lattice, options, device_budget, host_budget, other_host_bytes, wanted))
     return *s;
   const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
-  auto tiles = static_cast<std::uint32_t>(std::min<std::uint64_t>(kMostTilesOfLaunch, all));
-  for (int lanes = kMostLanes;; --lanes) {
-    if (lanes < kLeastLanes) {
-      lanes = kMostLanes;
+  auto tiles = static_cast<std::uint32_t>(std::min<std::uint64_t>(kMaxTilesOfLaunch, all));
+  for (int in_flight = kMaxInFlight;; --in_flight) {
+    if (in_flight < kMinInFlight) {
+      in_flight = kMaxInFlight;
       tiles /= 2;
     }
-    const StreamSizes s = stream_sizes(lattice, options, tiles, lanes);
+    const StreamSizes s = stream_sizes(lattice, options, tiles, in_flight);
     const std::uint64_t own = s.pinned_bytes + s.host_bytes, host = own + other_host_bytes;
-    const bool least = tiles == 1 && lanes == kLeastLanes;
+    const bool least = tiles == 1 && in_flight == kMinInFlight;
     // But for the least they leave half to the bricks.
     const std::uint64_t needed = least ? host : host + own;
     if (s.device_bytes <= device_budget && needed <= host_budget) return s;

@@ -19,38 +19,38 @@ struct PoolSizes {
 struct StreamSizes {
   PoolSizes pool;
   std::uint32_t tiles = 0;                    ///< a launch takes at most
-  int lanes = 0;                              ///< launches under way at a time
+  int in_flight = 0;                          ///< launches at a time
   std::uint64_t vertices = 0, triangles = 0;  ///< that the output of a launch has room for
   std::uint32_t slots = 0;                    ///< row tables
   std::uint32_t tile_bricks = 0;              ///< bricks that a tile's samples can lie in
   std::uint32_t sent_bricks = 0;              ///< that a launch can take along whole
   std::uint64_t staging_bytes = 0;            ///< all else that the host sends for a launch
   std::uint64_t output_bytes = 0;             ///< mesh of a launch
-  std::uint64_t page_bytes = 0;               ///< samples of a launch as the kernel reads them
+  std::uint64_t tile_block_bytes = 0;         ///< samples of a launch as the kernel reads them
   std::uint64_t device_bytes = 0;             ///< device memory, all in all
-  std::uint64_t pinned_bytes = 0;             ///< page-locked host memory, all in all
+  std::uint64_t pinned_bytes = 0;             ///< pinned host memory, all in all
   std::uint64_t host_bytes = 0;               ///< other host memory
 };
 
-/// Launches that are under way at a time: one is uploaded while the one before is
+/// Launches in flight at a time: one is uploaded while the one before is
 /// extracted or downloaded. More hide how long busy cores take to notice that one is over.
-inline constexpr int kLeastLanes = 2, kMostLanes = 4;
+inline constexpr int kMinInFlight = 2, kMaxInFlight = 4;
 /// Meshes in host memory at a time: one is downloaded, one written, one waits.
 inline constexpr int kOutputs = 3;
 /// More tiles a launch gain little, for a device is faster than what feeds it, and cost
-/// page-locked memory, which takes long to get.
-inline constexpr std::uint32_t kMostTilesOfLaunch = 256;
+/// pinned memory, which takes long to get.
+inline constexpr std::uint32_t kMaxTilesOfLaunch = 256;
 
 /// The sizes for launches of `tiles` tiles.
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
-                         int lanes = kLeastLanes, PoolSizes pool = {});
+                         int in_flight = kMinInFlight, PoolSizes pool = {});
 
-/// The pieces of the page-locked memory that meshes come to.
-std::vector<std::size_t> output_pieces(const StreamSizes& sizes);
+/// The chunks of pinned memory that meshes are downloaded to.
+std::vector<std::size_t> output_chunks(const StreamSizes& sizes);
 
 /// Bricks that a pool should have room for when so many threads decode for launches of a
 /// whole volume.
-std::uint64_t good_pool(const Lattice& lattice, int threads);
+std::uint64_t preferred_pool_bricks(const Lattice& lattice, int threads);
 
 /// Bricks a thread that should be decoded ahead into such a pool: what waits for a thread that
 /// was held up takes no host memory here.

@@ -10,9 +10,9 @@ namespace isobrick::gpu {
 
 #if __CUDA_ARCH__ >= 800
 /// Whether the device has such barriers. Without them tiles take turns, with __syncthreads.
-inline constexpr bool kTeamBarriers = true;
+inline constexpr bool kHasWarpBarriers = true;
 #else
-inline constexpr bool kTeamBarriers = false;
+inline constexpr bool kHasWarpBarriers = false;
 #endif
 
 __device__ inline std::uint32_t address_of(const unsigned long long& barrier) {

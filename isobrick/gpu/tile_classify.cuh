@@ -2,7 +2,7 @@
 
 #include <type_traits>
 
-#include "isobrick/gpu/tile_pieces.cuh"
+#include "isobrick/gpu/tile_row_groups.cuh"
 
 // First step: the inside bits of a tile's 33 × 33 rows, from global memory.
 
@@ -64,15 +64,15 @@ struct Classifier {
 /// Where the samples of a row lie, counted from sample (0, 0, 0) of the tile.
 __device__ inline int row_start(int row, int z) { return (row - z) * 32; }
 
-/// The page of a sample, each coordinate in −32 … 63.
-__device__ inline int page_of(int x, int y, int z) {
+/// The block of a sample, each coordinate in −32 … 63.
+__device__ inline int block_at(int x, int y, int z) {
   return 13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5);
 }
 
-/// The sample at `place` = x + 32·y + 1024·z, which lies in `page`.
+/// The sample at `place` = x + 32·y + 1024·z, which lies in `block`.
 template <class T>
-__device__ inline const T* sample_at(const TileShared& s, int page, int place) {
-  return reinterpret_cast<const T*>(s.pages[page]) + place;
+__device__ inline const T* sample_at(const TileShared& s, int block, int place) {
+  return reinterpret_cast<const T*>(s.tile_blocks[block]) + place;
 }
 
 /// The last sample of a row, which is the first of one of the next tile.
@@ -82,7 +82,7 @@ __device__ inline const T* column_at(const TileShared& s, const TileParams& p, i
   return reinterpret_cast<const T*>(s.columns[(y >> 5) + 2 * (z >> 5)]) + (y + 32 * z) * step;
 }
 
-/// What a warp reads of a piece of rows of narrow samples. Such a row is 32 or 64 bytes; two or
+/// What a warp reads of a group of rows of narrow samples. Such a row is 32 or 64 bytes; two or
 /// four lanes read one, 16 bytes each, and give each other the bits.
 template <class T>
 struct SamplesOfRows {
@@ -94,7 +94,7 @@ struct SamplesOfRows {
   __device__ static SamplesOfRows read(const TileShared& s, const TileParams& p, Rows rows) {
     const auto lane = static_cast<int>(lane_id());
     const auto start_of = [&](int y, int z) {
-      return reinterpret_cast<const uint4*>(sample_at<T>(s, page_of(0, y, z), 32 * y + 1024 * z));
+      return reinterpret_cast<const uint4*>(sample_at<T>(s, block_at(0, y, z), 32 * y + 1024 * z));
     };
     SamplesOfRows read;
     const uint4* plane = Rows::kPlane ? start_of(0, rows.z(0)) + lane : nullptr;
@@ -121,7 +121,7 @@ struct SamplesOfRows {
     }
 #pragma unroll
     for (int i = 0; i < kLanes; ++i) {
-      const std::uint32_t part = __shfl_sync(kAll, parts, lane % kAtOnce * kLanes + i);
+      const std::uint32_t part = __shfl_sync(kFullMask, parts, lane % kAtOnce * kLanes + i);
       word |= (part >> lane / kAtOnce * kAtOnce & ((1u << kAtOnce) - 1u)) << i * kAtOnce;
     }
     return {word, classifier.one(last)};
@@ -132,7 +132,7 @@ struct SamplesOfRows {
 template <int N, class T>
 __device__ inline void classify_rows(TileShared& s, const TileParams& p,
                                      const Classifier<T>& classifier) {
-  for_each_piece<N>([&](auto rows) {
+  for_each_row_group<N>([&](auto rows) {
     const OwnRow at(rows);
     const RowBits bits = SamplesOfRows<T>::read(s, p, rows).bits(classifier);
     if (at.exists()) s.rows[at.row()] = bits;
@@ -140,15 +140,15 @@ __device__ inline void classify_rows(TileShared& s, const TileParams& p,
 }
 
 /// A plane a warp and a sample a thread: rows of wide samples, read by one thread
-/// each, would be fetched in pieces again and again.
+/// each, would be fetched sector by sector, again and again.
 template <int N, class T>
 __device__ inline void classify_planes(TileShared& s, const TileParams& p,
                                        const Classifier<T>& classifier) {
   const int lane = static_cast<int>(lane_id());
-  const auto inside = [&](T v) { return __ballot_sync(kAll, v >= classifier.threshold); };
+  const auto inside = [&](T v) { return __ballot_sync(kFullMask, v >= classifier.threshold); };
   for (auto z = static_cast<int>(warp_id()); z < 33; z += BlockConfig<N>::kWarps) {
-    const int page = page_of(0, 0, z), start = 1024 * z;
-    const T* from = sample_at<T>(s, page, start + lane);
+    const int block = block_at(0, 0, z), start = 1024 * z;
+    const T* from = sample_at<T>(s, block, start + lane);
     std::uint32_t word = 0;
 #pragma unroll 16
     for (int y = 0; y < 32; ++y) {
@@ -158,7 +158,7 @@ __device__ inline void classify_planes(TileShared& s, const TileParams& p,
     const T last = __ldg(column_at<T>(s, p, lane, z));
     s.rows[33 * z + lane] = {word, classifier.one(last)};
     // The row at y = 32 lies in the tile above.
-    const std::uint32_t top = inside(__ldg(sample_at<T>(s, page + 3, start + 1024 + lane)));
+    const std::uint32_t top = inside(__ldg(sample_at<T>(s, block + 3, start + 1024 + lane)));
     const T corner = __ldg(column_at<T>(s, p, 32, z));
     if (lane == 0) s.rows[33 * z + 32] = {top, classifier.one(corner)};
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/gpu/tile_pieces.cuh"
+#include "isobrick/gpu/tile_row_groups.cuh"
 
 // Second step: crossing edges and active cells of each row, numbered by prefix
 // sums within planes and over planes. Where the vertices and cells of a row begin is marked, so
@@ -30,7 +30,7 @@ __device__ inline std::uint32_t mixed_cells(const RowBits& a, const RowBits& b, 
   return any & ~all;
 }
 
-/// What of a row is in the region of interest, as far as its y says. All of an inner tile is.
+/// Clips a row to the region of interest by its y coordinate. Inner tiles need no clipping.
 struct RowLimits {
   std::uint32_t edges_x, edges_yz, cells;  ///< bits
   bool up, own;                            ///< there is a row above; it is no lower tile's
@@ -67,7 +67,7 @@ __device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape,
 
 /// What is remembered of a row between counting and marking: where its numbers will be.
 struct RowCount {
-  std::uint32_t before;  ///< of the 32 rows of its piece: vertices | cells << 16
+  std::uint32_t before;  ///< of the 32 rows of its group: vertices | cells << 16
   std::uint32_t packed;
 
   /// Of this row, with `own` for those of later ones.
@@ -92,7 +92,7 @@ template <int N, bool Inner, class LeaveOut>
 __device__ inline void count_rows_of(TileShared& s, LeaveOut&& leave_out) {
   const Shape shape = s.shape;
   const RowLimits of_lane = RowLimits::of(shape, static_cast<int>(lane_id()));
-  for_each_piece<N>([&](auto rows) {
+  for_each_row_group<N>([&](auto rows) {
     const OwnRow at(rows);
     const int row = at.row();
     RowCount count{0, 0};
@@ -104,9 +104,9 @@ __device__ inline void count_rows_of(TileShared& s, LeaveOut&& leave_out) {
       leave_out(y, z, edges);
       if (!Inner && y == 0) s.plane_at_0[0][z] = static_cast<std::uint8_t>(edges.z_at_0);
       if (!Inner && z == 0) s.plane_at_0[1][y] = static_cast<std::uint8_t>(edges.y_at_0);
-      s.crossing[0][row] = edges.x;
-      s.crossing[1][row] = edges.y;
-      s.crossing[2][row] = edges.z;
+      s.edge_bits[0][row] = edges.x;
+      s.edge_bits[1][row] = edges.y;
+      s.edge_bits[2][row] = edges.z;
       s.mixed[row] = edges.cells;
       count = RowCount::of(edges, own);
     }
@@ -159,13 +159,13 @@ struct Before {
   std::uint32_t vertices, cells;
 };
 
-/// What lies before the rows of a piece; in a plane before its first row.
-__device__ inline Before before_piece(const TileShared&, const PlaneBases& b, PlaneRows rows) {
+/// What lies before the rows of a group; in a plane before its first row.
+__device__ inline Before before_row_group(const TileShared&, const PlaneBases& b, PlaneRows rows) {
   if (rows.plane == 32) return {b.vertices, b.cells};
-  const std::uint32_t before = __shfl_sync(kAll, b.before, rows.plane);
+  const std::uint32_t before = __shfl_sync(kFullMask, b.before, rows.plane);
   return {before & 0x1ffffu, before >> 17};
 }
-__device__ inline Before before_piece(const TileShared& s, const PlaneBases& b, LastRows rows) {
+__device__ inline Before before_row_group(const TileShared& s, const PlaneBases& b, LastRows rows) {
   if (rows.first > 0) return {b.vertices + (s.plane_sums[32] & 0xffffu), b.cells};
   return {(b.before & 0x1ffffu) + (b.own & 0xffffu), (b.before >> 17) + (b.own >> 16)};
 }
@@ -206,15 +206,15 @@ __device__ inline void mark_row_from_0(Mark (&marks)[Listed], FirstOfGroup* grou
   const std::uint32_t end = ::min(place + count, Listed);
   mark_groups<Most>(groups, (place + 31) & ~31u, end, place, count, row);
 }
-inline constexpr int kMostVerticesOfRow = 32 + 33 + 33, kMostCellsOfRow = 32;
+inline constexpr int kMaxVerticesOfRow = 32 + 33 + 33, kMaxCellsOfRow = 32;
 
 /// Leaves the row table for later tiles and the numbers within the tile in
 /// shared memory, and marks the first vertices and cells.
 template <int N>
 __device__ inline void publish_rows(TileShared& s, const PlaneBases& bases, RowTable& table) {
   auto& lists = lists_of<N>(s);
-  for_each_piece<N>([&](auto rows) {
-    const Before before = before_piece(s, bases, rows);
+  for_each_row_group<N>([&](auto rows) {
+    const Before before = before_row_group(s, bases, rows);
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();
@@ -227,9 +227,9 @@ __device__ inline void publish_rows(TileShared& s, const PlaneBases& bases, RowT
     s.number[1][row] = base + y + count.y_at_0();
     s.number[2][row] = base + z + count.z_at_0();
     s.cell_base[row] = static_cast<std::uint16_t>(cell);
-    mark_row_from_0<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups, base,
-                                        count.vertices(), row);
-    mark_row_from_0<kMostCellsOfRow>(lists.cells, lists.cell_groups, cell, count.cells(), row);
+    mark_row_from_0<kMaxVerticesOfRow>(lists.vertex_marks, lists.vertex_groups, base,
+                                       count.vertices(), row);
+    mark_row_from_0<kMaxCellsOfRow>(lists.cells, lists.cell_groups, cell, count.cells(), row);
   });
   if (threadIdx.x == 0) {
     table.rows[kRowsOfTile] = bases.all_vertices(s);
@@ -248,9 +248,9 @@ __device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
   for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.number[0][row];
     const std::uint32_t end = row + 1 < kRowsOfTile ? s.number[0][row + 1] : s.all_vertices;
-    mark_row<kMostVerticesOfRow>(lists.vertex_marks, lists.vertex_groups,
-                                 static_cast<int>(begin - first), static_cast<int>(end - begin),
-                                 row);
+    mark_row<kMaxVerticesOfRow>(lists.vertex_marks, lists.vertex_groups,
+                                static_cast<int>(begin - first), static_cast<int>(end - begin),
+                                row);
   }
   __syncthreads();
 }
@@ -263,8 +263,8 @@ __device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
   __syncthreads();
   for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
-    mark_row<kMostCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(begin - first),
-                              static_cast<int>(end - begin), row);
+    mark_row<kMaxCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(begin - first),
+                             static_cast<int>(end - begin), row);
   }
   __syncthreads();
 }

@@ -38,13 +38,13 @@ __device__ inline EdgeOfVertex find_edge(const TileShared& s, At0 at_0, std::uin
     // and what lies before there is one number more than edges.
     const std::uint32_t z = z_of_row(row), y = row - 33 * z;
     const bool own_y = y > 0 || s.shape.first[1], own_z = z > 0 || s.shape.first[2];
-    const std::uint32_t xs = own_y && own_z ? __popc(s.crossing[0][row]) : 0;
-    const std::uint32_t ys = own_z ? __popc(s.crossing[1][row]) : 0;
+    const std::uint32_t xs = own_y && own_z ? __popc(s.edge_bits[0][row]) : 0;
+    const std::uint32_t ys = own_z ? __popc(s.edge_bits[1][row]) : 0;
     if (number + 1 == z_first && number == y_first + ys) return {0, 2};
     if (number + 1 == y_first && number == s.number[0][row] + xs) return {0, 1};
   }
   const std::uint32_t axis = std::uint32_t{number >= y_first} + (number >= z_first);
-  return {nth_bit(s.crossing[axis][row], number - s.number[axis][row]) + (axis > 0), axis};
+  return {nth_bit(s.edge_bits[axis][row], number - s.number[axis][row]) + (axis > 0), axis};
 }
 
 template <class T>
@@ -55,7 +55,7 @@ struct VertexMaker {
   R iso;
 
   __device__ R sample(int x, int y, int z) const {
-    return static_cast<R>(__ldg(sample_at<T>(s, page_of(x, y, z), x + 32 * y + 1024 * z)));
+    return static_cast<R>(__ldg(sample_at<T>(s, block_at(x, y, z), x + 32 * y + 1024 * z)));
   }
 
   __device__ float crossing_of(R a, R b) const {
@@ -89,12 +89,12 @@ struct VertexMaker {
     e.z = static_cast<int>(z_of_row(row));
     e.y = static_cast<int>(row) - 33 * e.z;
     e.axis = static_cast<int>(edge.axis);
-    const int page = page_of(e.x, e.y, e.z);
+    const int block = block_at(e.x, e.y, e.z);
     const int place = row_start(static_cast<int>(row), e.z) + e.x;
-    e.a = static_cast<R>(__ldg(sample_at<T>(s, page, place)));
+    e.a = static_cast<R>(__ldg(sample_at<T>(s, block, place)));
     const int along = e.axis == 0 ? e.x : e.axis == 1 ? e.y : e.z;
-    // 1, 3 or 9 pages on, 1, 32 or 1024 samples.
-    const int next = page + (along == 31 ? 0x931 >> 4 * e.axis & 15 : 0);
+    // 1, 3 or 9 tile_blocks on, 1, 32 or 1024 samples.
+    const int next = block + (along == 31 ? 0x931 >> 4 * e.axis & 15 : 0);
     e.b = static_cast<R>(__ldg(sample_at<T>(s, next, place + (1 << 5 * e.axis))));
     return e;
   }
@@ -125,7 +125,7 @@ template <int N, class T, bool Normals, class At0>
 __device__ inline void emit_vertices_of(TileShared& s, const TileParams& p, std::uint32_t first,
                                         std::uint32_t listed, At0 at_0) {
   using Maker = VertexMaker<T>;
-  const Maker maker{s, p, p.crossing};
+  const Maker maker{s, p, p.vertex_isovalue};
   const auto& lists = lists_of<N>(s);
   Vec3f* const positions = kept(p.positions + s.vertex_base + first);
   Vec3f* const normals = Normals ? kept(p.normals + s.vertex_base + first) : nullptr;
@@ -158,7 +158,7 @@ __device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::ui
 
 /// How far behind a row's word its number lies, in bytes.
 inline constexpr std::uint32_t kNumberOfWord =
-    offsetof(TileShared, number) - offsetof(TileShared, crossing);
+    offsetof(TileShared, number) - offsetof(TileShared, edge_bits);
 
 /// Fills the tables of places and triangles; once a block.
 template <int N>
@@ -174,7 +174,7 @@ __device__ inline void fill_tables(TileShared& s, const CaseTable* cases) {
     s.places[at_0][e].offset = static_cast<std::uint32_t>(
         axis > 0 && at_0 && first == 0
             ? array + 4 * (kRowPitch * (axis - 1) + row)
-            : offsetof(TileShared, crossing) + 4 * (kRowPitch * axis + row));
+            : offsetof(TileShared, edge_bits) + 4 * (kRowPitch * axis + row));
   }
 }
 
@@ -210,10 +210,10 @@ __device__ inline void emit_triangle(const TileShared& s, std::uint32_t places, 
 
 __device__ inline std::uint32_t warp_or(std::uint32_t v) {
 #if __CUDA_ARCH__ >= 800
-  return __reduce_or_sync(kAll, v);
+  return __reduce_or_sync(kFullMask, v);
 #else
 #pragma unroll
-  for (int d = 16; d; d /= 2) v |= __shfl_xor_sync(kAll, v, d);
+  for (int d = 16; d; d /= 2) v |= __shfl_xor_sync(kFullMask, v, d);
   return v;
 #endif
 }

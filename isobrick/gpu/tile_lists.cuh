@@ -15,9 +15,9 @@ struct PlaceInRow {
 /// From the marks of 32 things in a row. `lanes` are the own lane and those below.
 __device__ inline PlaceInRow place_of_lane(std::uint32_t mark, const FirstOfGroup& group,
                                            std::uint32_t lanes) {
-  const unsigned begins = __ballot_sync(kAll, mark != 0) & lanes;
+  const unsigned begins = __ballot_sync(kFullMask, mark != 0) & lanes;
   const auto from = static_cast<unsigned>(31 - __clz(static_cast<int>(begins)));
-  const std::uint32_t found = __shfl_sync(kAll, mark, from);
+  const std::uint32_t found = __shfl_sync(kFullMask, mark, from);
   if (begins) return {found - 1, lane_id() - from};
   return {group.row, group.before + lane_id()};
 }
@@ -46,7 +46,7 @@ __device__ inline WarpPart part_of_warp(std::uint32_t listed) {
   return {begin, ::min(end, all)};
 }
 
-/// The same where the first warp has something else to do: `First` pieces for it when
+/// The same where the first warp has something else to do: `First` shares for it when
 /// each of the others gets `Others`.
 template <int N, int First, int Others>
 __device__ inline WarpPart part_beside_first(std::uint32_t listed) {

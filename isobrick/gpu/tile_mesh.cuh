@@ -10,8 +10,8 @@
 
 namespace isobrick::gpu {
 
-/// A tile without a vertex or a cell tells so and nothing else: whoever asks for its sums adds
-/// nothing, and whoever asks for its rows finds no vertex there.
+/// A tile without a vertex or a cell publishes zero sums and no row table: later tiles add nothing
+/// and find no vertex there.
 __device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
   if (threadIdx.x != 0) return;
   publish_sum(p.order[s.item].vertices, s.item, 0);
@@ -21,16 +21,16 @@ __device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
 }
 
 /// Whether all cells and vertices of a tile are listed at once, and its warps wait for no more
-/// than they need (TeamBarriers). Others take turns, with __syncthreads between them.
+/// than they need (WarpBarriers). Others take turns, with __syncthreads between them.
 template <int N, bool Nan>
 __device__ inline bool listed_at_once(const TileShared& s) {
-  return kTeamBarriers && !Nan && ::max(s.all_cells, s.all_vertices) <= ListsOf<N>::kListed;
+  return kHasWarpBarriers && !Nan && ::max(s.all_cells, s.all_vertices) <= ListsOf<N>::kListed;
 }
 
 /// One thread, before a block's first tile.
 template <int N>
-__device__ inline void init_barriers(TeamBarriers& barriers) {
-  if constexpr (!kTeamBarriers) return;
+__device__ inline void init_barriers(WarpBarriers& barriers) {
+  if constexpr (!kHasWarpBarriers) return;
   init_barrier(barriers.cells, BlockConfig<N>::kWarps);
   init_barrier(barriers.vertex_base, 1);
   init_barrier(barriers.neighbours, 1);
@@ -38,7 +38,7 @@ __device__ inline void init_barriers(TeamBarriers& barriers) {
 }
 
 /// Counts a tile's crossing edges and active cells, and leaves their places. False where there
-/// are none; the last tile, which tells what all have, goes on.
+/// are none; the last tile, which reports the totals, goes on.
 template <int N, bool Nan>
 __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
   count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
@@ -69,7 +69,7 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
 /// The triangles of a tile with more cells than are listed at a time. The last
 /// cells stay listed.
 template <int N>
-__device__ inline std::uint32_t count_in_turns(TileShared& s) {
+__device__ inline std::uint32_t count_in_rounds(TileShared& s) {
   constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
   std::uint32_t triangles = 0;
@@ -84,8 +84,8 @@ __device__ inline std::uint32_t count_in_turns(TileShared& s) {
   return triangles;
 }
 
-/// Finds the tile's cells and where its vertices and triangles go. Two warps ask what other
-/// tiles know; the others wait for no more than the place of the vertices.
+/// Finds the tile's cells and where its vertices and triangles go. Two warps wait for other
+/// tiles; the others wait for no more than the place of the vertices.
 template <int N, bool Nan>
 __device__ inline void find_places(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
@@ -101,10 +101,10 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
     find_cells<N>(s, cells);
     arrive(s.barriers.cells);
   } else {
-    triangles = count_in_turns<N>(s);
+    triangles = count_in_rounds<N>(s);
     // No turn has been between where there is no cell: with NaN vertices may belong to cells of
     // others only.
-    if constexpr (Nan || !kTeamBarriers) __syncthreads();
+    if constexpr (Nan || !kHasWarpBarriers) __syncthreads();
   }
   const bool for_vertices = warp_id() == BlockConfig<N>::kVertices,
              for_triangles = warp_id() == BlockConfig<N>::kTriangles;
@@ -120,7 +120,7 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
     find_triangle_base(s, p, triangles);
   }
   if (for_vertices) {
-    ask_neighbours<N>(s, p, neighbour);
+    wait_for_neighbours<N>(s, p, neighbour);
     if (at_once) arrive(s.barriers.neighbours);
   } else if (at_once) {
     wait(s.barriers.vertex_base, turn);
@@ -174,14 +174,14 @@ template <int N, class T, bool Normals, bool Nan>
 __device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
   find_places<N, Nan>(s, p);
   const bool at_once = listed_at_once<N, Nan>(s);
-  const bool has_asked = at_once && warp_id() == BlockConfig<N>::kVertices;
+  const bool has_waited = at_once && warp_id() == BlockConfig<N>::kVertices;
   // With normals vertices are most of the work, and all warps make them.
-  if (!has_asked || Normals || can_help<N>(s)) emit_all_vertices<N, T, Normals>(s, p);
+  if (!has_waited || Normals || can_help<N>(s)) emit_all_vertices<N, T, Normals>(s, p);
   if (!at_once) {
     __syncthreads();
     number_at_0<N>(s);
   } else {
-    if (!has_asked) wait(s.barriers.neighbours, s.barriers.turn);
+    if (!has_waited) wait(s.barriers.neighbours, s.barriers.turn);
     number_at_0<N, !Normals>(s);
   }
   // Elsewhere the first warp may still make vertices.

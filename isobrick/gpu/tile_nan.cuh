@@ -33,7 +33,7 @@ __device__ inline void find_nan(TileShared& s, const TileParams& p) {
     return global >= p.roi_lo[axis] && global < p.roi_hi[axis];
   };
   const auto is_nan = [&](int x, int y, int z) {
-    const T v = __ldg(sample_at<T>(s, page_of(x, y, z), x + 32 * y + 1024 * z));
+    const T v = __ldg(sample_at<T>(s, block_at(x, y, z), x + 32 * y + 1024 * z));
     return v != v;
   };
   const int beside = lane == 0 ? -1 : 31 + lane;  // lanes 0, 1, 2: the samples beside the 32
@@ -41,8 +41,9 @@ __device__ inline void find_nan(TileShared& s, const TileParams& p) {
   for (auto row = static_cast<int>(warp_id()); row < kEdge * kEdge; row += BlockConfig<N>::kWarps) {
     const int y = row % kEdge - 1, z = row / kEdge - 1;
     const bool here = exists(1, y) && exists(2, z);
-    const unsigned inner = __ballot_sync(kAll, !(here && row_exists) || is_nan(lane, y, z));
-    const unsigned outer = __ballot_sync(kAll, !(here && beside_exists) || is_nan(beside, y, z));
+    const unsigned inner = __ballot_sync(kFullMask, !(here && row_exists) || is_nan(lane, y, z));
+    const unsigned outer =
+        __ballot_sync(kFullMask, !(here && beside_exists) || is_nan(beside, y, z));
     if (lane == 0)
       nan.rows[row] = (outer & 1u) | static_cast<unsigned long long>(inner) << 1 |
                       static_cast<unsigned long long>(outer >> 1 & 3u) << 33;

@@ -3,7 +3,7 @@
 #include <cuda/atomic>
 
 #include "isobrick/gpu/tile_lists.cuh"
-#include "isobrick/gpu/tile_pieces.cuh"
+#include "isobrick/gpu/tile_row_groups.cuh"
 
 // Third step: where the tile's output goes, and the numbers of vertices that
 // belong to tiles before it.
@@ -20,7 +20,7 @@ using BlockWord = cuda::atomic_ref<std::uint32_t, cuda::thread_scope_block>;
 
 __device__ inline unsigned long long warp_sum_64(unsigned long long v) {
 #pragma unroll
-  for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kAll, v, d);
+  for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kFullMask, v, d);
   return v;
 }
 
@@ -59,8 +59,8 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
       while (seen[j] >> 62 == 0)
         seen[j] = DeviceWord(word(static_cast<std::uint32_t>(i))).load(cuda::memory_order_relaxed);
       // Lanes up to the first that knows everything before it.
-      const unsigned full = __ballot_sync(kAll, seen[j] >> 62 == 2);
-      const unsigned used = full ? full ^ (full - 1) : kAll;
+      const unsigned full = __ballot_sync(kFullMask, seen[j] >> 62 == 2);
+      const unsigned used = full ? full ^ (full - 1) : kFullMask;
       sum += used >> lane_id() & 1u ? seen[j] & kSumMask : 0ull;
       found = full != 0;
     }
@@ -140,8 +140,8 @@ __device__ inline void copy_table(RowTable& copy, const RowTable& table) {
 #endif
 }
 
-/// The row table of the lower neighbour that lane 1 … 6 asks, where bits 0, 1, 2 of the lane
-/// say along which axes it is one lower.
+/// The row table of a lower neighbour, one for each of lanes 1 … 6: bits 0, 1, 2 of the lane are
+/// the axes along which the neighbour is one lower.
 struct Neighbour {
   std::uint32_t slot;  ///< or kNone
   bool wait;           ///< the table may not be ready
@@ -171,8 +171,8 @@ struct Neighbour {
 /// from this tile's first vertex, and fetches what this tile needs of their rows.
 /// A neighbour that is not active shares no vertex with this tile.
 template <int N>
-__device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
-                                      const Neighbour& neighbour) {
+__device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p,
+                                           const Neighbour& neighbour) {
   const unsigned n = lane_id();
   const std::uint32_t slot = neighbour.slot;
   if (slot != kNone) {
@@ -187,7 +187,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
     s.neighbour_base[n] = 0;
   }
   __syncwarp();
-  const auto slot_of_neighbour = [&](int n) { return __shfl_sync(kAll, slot, n); };
+  const auto slot_of_neighbour = [&](int n) { return __shfl_sync(kFullMask, slot, n); };
   const std::uint32_t before = slot_of_neighbour(1);
   // Where the cells' rows are needed again, the table is read where it is.
   const bool copied = before != kNone && s.all_cells <= ListsOf<N>::kListed;
@@ -202,7 +202,7 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
   const std::uint32_t y = fetch(2, 33 * n + 32), xy = fetch(3, 33 * n + 33),
                       z = fetch(4, 33 * 32 + n), xz = fetch(5, 33 * 32 + n);
   // The last of each, and the row that three tiles share.
-  const std::uint32_t from = __shfl_sync(kAll, slot, ::min(n + 2, 6u));
+  const std::uint32_t from = __shfl_sync(kFullMask, slot, ::min(n + 2, 6u));
   const std::uint32_t last_row = n == 1 ? kRowsOfTile : kRowsOfTile - 1;
   const std::uint32_t last = n < 5 && from != kNone ? p.row_tables[from].rows[last_row] : 0;
   s.lower.y[n] = y;
@@ -218,13 +218,13 @@ __device__ inline void ask_neighbours(TileShared& s, const TileParams& p,
 
 /// The numbers of vertices that cells at x = 0 have at sample 0: an edge there is
 /// the one before the row's others, or the last of its kind in the row of the
-/// tile before. `BesideFirst` as for pieces.
+/// tile before. `BesideFirst` as for row groups.
 template <int N, bool BesideFirst = false>
 __device__ inline void number_at_0(TileShared& s) {
   const RowTable* before = s.before;
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
-  for_each_piece<N, BesideFirst>([&](auto rows) {
+  for_each_row_group<N, BesideFirst>([&](auto rows) {
     const OwnRow at(rows);
     if (!at.exists()) return;
     const int row = at.row();

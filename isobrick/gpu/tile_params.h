@@ -9,8 +9,8 @@
 
 namespace isobrick::gpu {
 
-/// A page holds the samples of one tile: 32³, C order [z, y, x].
-inline constexpr std::uint32_t kPageSamples = 32 * 32 * 32;
+/// A block holds the samples of one tile: 32³, C order [z, y, x].
+inline constexpr std::uint32_t kTileBlockSamples = 32 * 32 * 32;
 /// Samples of its first column, x = 0.
 inline constexpr std::uint32_t kColumnSamples = 32 * 32;
 /// Rows (y, z) of the 33³ samples that the cells of a tile touch.
@@ -24,10 +24,10 @@ struct TileItem {
 
 inline constexpr std::uint32_t kNone = 0xffffffffu;
 
-/// What later tiles ask of a tile: the number of the first own vertex of each
+/// What later tiles need of a tile: the number of the first own vertex of each
 /// row, counted from the tile's first vertex, and where in the row those on
 /// edges along y and along z begin: base | y << 17 | z << 23. One entry more
-/// ends the last row. That of a tile without vertices and cells has nothing that anyone asks for.
+/// ends the last row. The table of a tile without vertices and cells is never read.
 struct alignas(16) RowTable {
   std::uint32_t rows[kRowsOfTile + 1];
   /// The mesh number of the tile's first vertex, and above it the epoch in which it was
@@ -82,9 +82,9 @@ struct LaunchReport {
   std::uint64_t words[kWords];
 };
 
-/// How a launch tells the host what it has made, and leaves everything as the next one needs it.
+/// How a launch reports what it has made and prepares the counters for the next launch.
 struct LaunchEnd {
-  LaunchReport* report;        ///< or null: totals say it, and nothing is left to be done
+  LaunchReport* report;        ///< or null: the launch writes `totals` instead
   std::uint32_t launch;        ///< goes into the report
   const std::uint32_t* found;  ///< active tiles, as the search has counted them
   std::uint32_t* done;         ///< zeroed
@@ -104,21 +104,21 @@ CaseTable make_case_table(bool mirrored);
 struct TileParams {
   const TileItem* items;  ///< the active tiles in Morton order
   const std::uint32_t* item_count;
-  const void* pages;
-  /// [z, y, x] of `tiles`; kNone: all fill value. Null where page i + 1 is that of tile i.
-  const std::uint32_t* page_of_tile;
+  const void* tile_blocks;
+  /// [z, y, x] of `tiles`; kNone: all fill value. Null where block i + 1 is that of tile i.
+  const std::uint32_t* block_of_tile;
   const std::uint32_t* slot_of_tile;  ///< the same; kNone: not active
   const TileLinks* links;             ///< one an item, instead of the two tables; or null
   bool tables_known;  ///< with links: a launch before has left all row tables as they will be
-  bool alone;         ///< every tile owns all its edges
-  std::uint32_t fill_page;
-  /// The samples at x = 0 of each page once more, [z, y], so that the last column of a tile
-  /// is not read from as many lines as it has rows; null: they are read from the pages.
+  bool unwelded;      ///< every tile owns all its edges
+  std::uint32_t fill_tile_block;
+  /// The samples at x = 0 of each block once more, [z, y], so that the last column of a tile
+  /// is not read from as many lines as it has rows; null: they are read from the tile_blocks.
   const void* columns;
   std::int32_t tiles[3];
   std::int32_t extent[3], roi_lo[3], roi_hi[3];  ///< samples
   double isovalue;
-  float crossing;  ///< the isovalue as vertices are interpolated
+  float vertex_isovalue;  ///< the isovalue in the precision of vertices
   WorldMap world;
   bool diagonal;  ///< the map has no term off the diagonal
   RowTable* row_tables;

@@ -10,14 +10,14 @@
 
 namespace isobrick::gpu {
 
-inline constexpr unsigned kAll = 0xffffffffu;
+inline constexpr unsigned kFullMask = 0xffffffffu;
 /// What lies between the words of a row along x, y and z. The cells of a warp lie in rows
 /// close to each other: like this, the three are in different banks.
 inline constexpr int kRowPitch = kRowsOfTile + 10;
 static_assert(kRowPitch % 32 == 11);
 
-/// Rows are dealt out to warps in pieces of up to 32 (tile_pieces.cuh).
-inline constexpr int kPieces = 33 + 2;
+/// Rows are dealt out to warps in groups of up to 32 (tile_row_groups.cuh).
+inline constexpr int kRowGroups = 33 + 2;
 
 /// A block of N threads that makes the mesh of one tile at a time.
 template <int N>
@@ -50,7 +50,7 @@ struct RowBits {
 };
 
 /// Where the number of the vertex on an edge of a cell is found: in which word of
-/// TileShared::crossing for a cell in row 0, as bytes, and what else is added.
+/// TileShared::edge_bits for a cell in row 0, as bytes, and what else is added.
 struct EdgePlace {
   std::uint32_t offset, addend;
 };
@@ -70,7 +70,7 @@ struct LowerRows {
 };
 
 /// Where warps wait for some of the others (tile_barrier.cuh).
-struct TeamBarriers {
+struct WarpBarriers {
   unsigned long long vertex_base, cells, neighbours;
   std::uint32_t turn;  ///< of the tile that is worked on, if it needs them
 };
@@ -81,7 +81,7 @@ struct alignas(256) TileShared {
   /// The crossing edges of each row along x, y and z, the tile's own and those of
   /// lower tiles, and the number of the first. Bit x stands for the edge between
   /// samples x and x + 1 along x, for the one at sample x + 1 along y and z.
-  std::uint32_t crossing[3][kRowPitch], number[3][kRowPitch];
+  std::uint32_t edge_bits[3][kRowPitch], number[3][kRowPitch];
   union {
     std::uint32_t mixed[kRowsOfTile];  ///< cells with corners on both sides
     alignas(16) RowTable before_copy;
@@ -93,7 +93,7 @@ struct alignas(256) TileShared {
   alignas(256) EdgePlace places[2][16];  ///< of cells with x > 0, of those with x = 0
   /// Of the tiles around, x + 3·y + 9·z, where their sample (0, 0, 0) of this tile's
   /// coordinates would be.
-  std::uintptr_t pages[27];
+  std::uintptr_t tile_blocks[27];
   /// Of the tiles one higher along x, y + 2·z: where their sample (32, 0, 0) of this tile's
   /// coordinates would be in their first column (column_at).
   std::uintptr_t columns[4];
@@ -111,7 +111,7 @@ struct alignas(256) TileShared {
   std::uint32_t items;     ///< how many there are
   std::uint32_t all_triangles;
   std::uint32_t next_cells, next_vertices;  ///< groups of 32 that a warp has taken
-  TeamBarriers barriers;
+  WarpBarriers barriers;
   std::uint32_t done_before;  ///< blocks that were done before this one
   TileItem tile;
   Shape shape;
@@ -146,24 +146,26 @@ __device__ inline unsigned warp_id() { return threadIdx.x >> 5; }
 
 /// What all threads of a warp have alike, so that the compiler knows it too: loops
 /// and branches on it then need no care for threads that part.
-__device__ inline std::uint32_t uniform(std::uint32_t v) { return __shfl_sync(kAll, v, 0); }
+__device__ inline std::uint32_t uniform(std::uint32_t v) { return __shfl_sync(kFullMask, v, 0); }
 __device__ inline unsigned lane_id() { return threadIdx.x & 31u; }
 __device__ inline std::uint32_t lanes_below() { return (1u << lane_id()) - 1u; }
 /// The value of this thread, which the compiler then keeps in a register instead of finding it
 /// again in each turn of a loop. Whole warps.
-__device__ inline std::uint32_t kept(std::uint32_t v) { return __shfl_sync(kAll, v, lane_id()); }
+__device__ inline std::uint32_t kept(std::uint32_t v) {
+  return __shfl_sync(kFullMask, v, lane_id());
+}
 template <class T>
 __device__ inline T* kept(T* p) {
   return reinterpret_cast<T*>(
-      __shfl_sync(kAll, reinterpret_cast<unsigned long long>(p), lane_id()));
+      __shfl_sync(kFullMask, reinterpret_cast<unsigned long long>(p), lane_id()));
 }
 
 __device__ inline std::uint32_t warp_sum(std::uint32_t v) {
 #if __CUDA_ARCH__ >= 800
-  return __reduce_add_sync(kAll, v);
+  return __reduce_add_sync(kFullMask, v);
 #else
 #pragma unroll
-  for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kAll, v, d);
+  for (int d = 16; d; d /= 2) v += __shfl_xor_sync(kFullMask, v, d);
   return v;
 #endif
 }
@@ -188,7 +190,7 @@ __device__ inline Shape shape_of(const TileParams& p, const TileItem& item) {
     s.origin[axis] = tile[axis] * 32;
     s.lo[axis] = ::max(p.roi_lo[axis] - s.origin[axis], 0);
     s.hi[axis] = ::min(p.roi_hi[axis] - 1 - s.origin[axis], 32);
-    s.first[axis] = p.alone || tile[axis] == p.roi_lo[axis] / 32;
+    s.first[axis] = p.unwelded || tile[axis] == p.roi_lo[axis] / 32;
     s.empty = s.empty || s.hi[axis] <= s.lo[axis];
   }
   s.cell_mask = s.empty ? 0 : static_cast<std::uint32_t>(bit_span(s.lo[0], s.hi[0] - 1));

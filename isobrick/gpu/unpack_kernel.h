@@ -7,8 +7,8 @@
 
 namespace isobrick::gpu {
 
-/// Lays the samples of streamed tiles out as pages. Those that no active block
-/// needs become what they are as good as: the sample that all blocks of a tile share.
+/// Lays the samples of streamed tiles out as tile_blocks. Those that no active block
+/// needs are replaced by the sample that all blocks of a tile share, which changes no result.
 void launch_unpack(ScalarType type, const UnpackParams& params, cudaStream_t stream);
 
 }  // namespace isobrick::gpu

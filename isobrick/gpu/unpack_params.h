@@ -21,7 +21,7 @@ struct UnpackParams {
   std::int32_t brick[3];   ///< samples of a brick
   std::int32_t extent[3];  ///< samples of the volume
   double fill_value;       ///< of bricks without an address
-  void* pages;
+  void* tile_blocks;
 };
 
 }  // namespace isobrick::gpu

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "isobrick/gpu/streamed_pages.cuh"
+#include "isobrick/gpu/streamed_blocks.cuh"
 #include "isobrick/gpu/unpack_params.h"
 
-// The kernel that lays the samples of streamed tiles out as pages.
+// The kernel that lays the samples of streamed tiles out as tile_blocks.
 
 namespace isobrick::gpu {
 
@@ -27,7 +27,7 @@ struct AxisPlace {
 /// A tile that is unpacked.
 template <class T>
 struct UnpackedTile {
-  T* pages[27];
+  T* tile_blocks[27];
   AxisPlace places[3][kPlaces];
   const std::uint64_t* bricks;
   unsigned active;
@@ -38,13 +38,13 @@ struct UnpackedTile {
     const std::uint64_t brick = bricks[x.brick + y.brick + z.brick];
     return brick ? reinterpret_cast<const T*>(brick)[x.offset + y.offset + z.offset] : fill;
   }
-  /// Copies sample (x, y, z), or what it is as good as, to its page.
+  /// Copies sample (x, y, z), or what it is as good as, to its block.
   __device__ void copy(int x, int y, int z, T fill) const {
     const AxisPlace &px = at(0, x), &py = at(1, y), &pz = at(2, z);
     const bool needed =
         (active & px.near & py.near & pz.near) != 0 && (px.brick | py.brick | pz.brick) >= 0;
-    pages[13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5)][(x & 31) | (y & 31) << 5 | (z & 31) << 10] =
-        needed ? read(px, py, pz, fill) : side;
+    tile_blocks[13 + (x >> 5) + 3 * (y >> 5) + 9 * (z >> 5)]
+               [(x & 31) | (y & 31) << 5 | (z & 31) << 10] = needed ? read(px, py, pz, fill) : side;
   }
 };
 
@@ -83,8 +83,8 @@ __global__ void __launch_bounds__(kUnpackThreads)
   const T fill = static_cast<T>(p.fill_value);
   find_axis_places(tile, p, item, p.boxes[blockIdx.x]);
   if (threadIdx.x < 27)
-    tile.pages[threadIdx.x] =
-        static_cast<T*>(p.pages) + streamed_page(blockIdx.x, static_cast<int>(threadIdx.x));
+    tile.tile_blocks[threadIdx.x] =
+        static_cast<T*>(p.tile_blocks) + streamed_block(blockIdx.x, static_cast<int>(threadIdx.x));
   if (threadIdx.x == 0) {
     tile.bricks = p.bricks + std::size_t{blockIdx.x} * p.tile_bricks;
     tile.active = p.links[blockIdx.x].active_blocks;

@@ -109,7 +109,7 @@ class CudaSession final : public GpuSession {
       sizes_ = gpu::fit_stream_sizes(lattice, request.surface, device_budget, host_budget,
                                      other_host_bytes, {bricks, request.threads});
     };
-    fit(std::min(most_bricks, gpu::good_pool(lattice, request.threads)));
+    fit(std::min(most_bricks, gpu::preferred_pool_bricks(lattice, request.threads)));
     bricks_ = std::make_unique<HostBricks>(device_);
     if (sizes_.pool.bricks > 0 && !make_pool(lattice)) fit(0);
     return sizes_.pinned_bytes + sizes_.host_bytes;

@@ -84,7 +84,7 @@ TEST_F(GpuBrickPool, WhatSomeThreadsFillLiesInItsPlaces) {
 TEST_F(GpuBrickPool, ARequestMayBeMoreThanALaunchOfTheKernelTakes) {
   constexpr std::size_t kBytes = 4096;
   constexpr int kThreads = 24;
-  static_assert(kThreads * gpu::BrickPool::buffers_of_thread(kBytes) / 2 > gpu::CopyPieces::kMost,
+  static_assert(kThreads * gpu::BrickPool::buffers_of_thread(kBytes) / 2 > gpu::CopyChunks::kMost,
                 "half of all buffers make a request");
   Pool pool{kBytes, 1000, kThreads};
   // By this thread for all of them: none runs out of buffers before, which would make a smaller
@@ -122,7 +122,7 @@ TEST(GpuBrickPoolSizes, BricksAreDecodedAsFarAheadAsThePoolHasRoom) {
   EXPECT_EQ(ahead(384 + 16 * (8 + 30)), 30u);
   EXPECT_EQ(ahead(384 + 16 * (8 + 24)), 24u);
   EXPECT_EQ(ahead(100), 24u) << "never less";
-  EXPECT_EQ(ahead(gpu::good_pool(lattice, 16)), 40u);
+  EXPECT_EQ(ahead(gpu::preferred_pool_bricks(lattice, 16)), 40u);
   EXPECT_EQ(ahead(100'000), 40u) << "never more";
 }
 

@@ -8,7 +8,7 @@
 #include "isobrick/core/dense_bricks.h"
 #include "isobrick/gpu/tile_params.h"
 
-// Host books: whatever a kernel finds through the table is the sample that it needs.
+// Host uploads: whatever a kernel finds through the table is the sample that it needs.
 
 namespace isobrick::testing {
 namespace {

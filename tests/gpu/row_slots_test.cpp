@@ -59,14 +59,14 @@ TEST(RowSlots, ATileIsFoundUntilItsLastAskerIsDone) {
   EXPECT_EQ(slots.find({0, 0, 0}), gpu::kNone);
 }
 
-// Beside books of the simplest kind, over tiles here and there.
+// Beside uploads of the simplest kind, over tiles here and there.
 TEST(RowSlots, EachNeighbourIsFoundWithItsSlot) {
   const Int3 grid{13, 9, 10};
   gpu::RowSlots slots(static_cast<std::uint32_t>(volume(grid)), grid);
   struct Known {
     std::uint32_t slot;
     int launch;
-    std::uint64_t last_asker;
+    std::uint64_t last_user;
   };
   std::map<std::uint64_t, Known> known;  // by code
   std::vector<std::uint32_t> unused;
@@ -92,7 +92,7 @@ TEST(RowSlots, EachNeighbourIsFoundWithItsSlot) {
     slots.end_launch(tile, unused);
     std::multiset<std::uint32_t> expected;
     std::erase_if(known, [&](const auto& entry) {
-      const bool over = entry.second.last_asker <= morton_encode(tile);
+      const bool over = entry.second.last_user <= morton_encode(tile);
       if (over) expected.insert(entry.second.slot);
       return over;
     });

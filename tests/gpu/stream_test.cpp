@@ -144,7 +144,7 @@ Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOpt
         }
     release();
   };
-  const gpu::StreamSizes sizes = gpu::stream_sizes(lattice, options, way.tiles, gpu::kLeastLanes,
+  const gpu::StreamSizes sizes = gpu::stream_sizes(lattice, options, way.tiles, gpu::kMinInFlight,
                                                    pooled ? pooled->sizes() : gpu::PoolSizes{});
   gpu::GpuExtractor extractor(0, lattice, options, sizes, take, pooled ? pooled->pool() : nullptr);
   for (std::size_t i = 0; i < tiles.size(); i += std::min(way.call, tiles.size()))
@@ -307,7 +307,7 @@ TEST(GpuStreamSizes, TheLeastBudgetWorksAndLessIsRefusedByName) {
   constexpr std::uint64_t much = std::uint64_t{1} << 40;
   const gpu::StreamSizes least = gpu::stream_sizes(lattice, options, 1);
   EXPECT_EQ(gpu::fit_stream_sizes(lattice, options, least.device_bytes, much, 0).tiles, 1u);
-  EXPECT_EQ(gpu::fit_stream_sizes(lattice, options, much, much, 0).tiles, gpu::kMostTilesOfLaunch);
+  EXPECT_EQ(gpu::fit_stream_sizes(lattice, options, much, much, 0).tiles, gpu::kMaxTilesOfLaunch);
   const auto refusal = [&](std::uint64_t device, std::uint64_t host) -> std::string {
     try {
       gpu::fit_stream_sizes(lattice, options, device, host, 100);
@@ -330,7 +330,7 @@ TEST(GpuStreamSizes, APoolIsTakenWhereMostOfItFits) {
   const Lattice lattice{{1024, 1024, 1024}, {64, 64, 64}, ScalarType::u16};
   const SurfaceOptions options{.roi = lattice.box()};
   constexpr std::uint64_t mebi = std::uint64_t{1} << 20, much = mebi << 20;
-  const gpu::PoolSizes wanted{gpu::good_pool(lattice, 16), 16};
+  const gpu::PoolSizes wanted{gpu::preferred_pool_bricks(lattice, 16), 16};
   EXPECT_GE(wanted.bricks, 384u);
   EXPECT_LT(wanted.bricks, 2048u);
   const auto fit = [&](std::uint64_t device, std::uint64_t host) {
@@ -342,7 +342,7 @@ TEST(GpuStreamSizes, APoolIsTakenWhereMostOfItFits) {
   const gpu::StreamSizes whole = fit(1024 * mebi, much), most = fit(400 * mebi, much),
                          none = fit(200 * mebi, much), little_host = fit(1024 * mebi, 20 * mebi);
   EXPECT_EQ(whole.pool.bricks, wanted.bricks);
-  EXPECT_EQ(whole.tiles, gpu::kMostTilesOfLaunch);
+  EXPECT_EQ(whole.tiles, gpu::kMaxTilesOfLaunch);
   EXPECT_EQ(whole.sent_bricks, 0u);
   EXPECT_LT(most.pool.bricks, wanted.bricks);
   EXPECT_GT(most.device_bytes + lattice.brick_bytes(), 400 * mebi) << "all of the room is used";

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "isobrick/core/morton.h"
-#include "isobrick/gpu/page_gather.h"
+#include "isobrick/gpu/tile_block.h"
 #include "isobrick/surface/world_map.h"
 #include "tests/gpu/compare.h"
 #include "tests/gpu/kernels/tile_runner.h"
@@ -85,7 +85,7 @@ inline gpu::TileParams params_of(const Lattice& lattice, const SurfaceOptions& o
     p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
   }
   p.isovalue = options.isovalue;
-  p.crossing = static_cast<float>(options.isovalue);
+  p.vertex_isovalue = static_cast<float>(options.isovalue);
   p.world = world_map(options.transform, options.inside);
   p.diagonal = is_diagonal(p.world);
   return p;
@@ -135,9 +135,9 @@ class KernelVolume {
     SurfaceOptions o = options;
     o.isovalue = isovalue;
     gpu::TileParams p = params_of(lattice, o);
-    p.pages = pages_.data();
+    p.tile_blocks = tile_blocks_.data();
     p.columns = columns_.data();
-    p.page_of_tile = page_of_tile_.data();
+    p.block_of_tile = block_of_tile_.data();
     return p;
   }
 
@@ -150,7 +150,7 @@ class KernelVolume {
       EXPECT_EQ(range.hi, ranges_[2 * i + 1]) << "tile " << i;
     }
     for (std::size_t i = 0; i < columns_.size(); ++i)
-      ASSERT_EQ(std::memcmp(&columns_[i], &pages_[32 * i], sizeof(T)), 0) << "row " << i;
+      ASSERT_EQ(std::memcmp(&columns_[i], &tile_blocks_[32 * i], sizeof(T)), 0) << "row " << i;
   }
 
  private:
@@ -160,18 +160,19 @@ class KernelVolume {
   }
   void make_pages() {
     const Int3 grid = lattice.tiles();
-    pages_.resize((tiles_.size() + 1) * gpu::kPageSamples);
-    gpu::fill_page(lattice.type, options.fill_value, page(0));
+    tile_blocks_.resize((tiles_.size() + 1) * gpu::kTileBlockSamples);
+    gpu::fill_tile_block(lattice.type, options.fill_value, block(0));
     for_each_point({{0, 0, 0}, grid}, [&](Int3 tile) {
       const auto place = static_cast<std::uint32_t>(linear_index(tile, grid)) + 1;
-      const bool any = gpu::gather_page(lattice, bricks_, options.fill_value, tile, page(place));
-      page_of_tile_.push_back(any ? place : gpu::kNone);
+      const bool any =
+          gpu::gather_tile_block(lattice, bricks_, options.fill_value, tile, block(place));
+      block_of_tile_.push_back(any ? place : gpu::kNone);
     });
     columns_.resize((tiles_.size() + 1) * gpu::kColumnSamples);
-    emulated::run_first_columns(lattice.type, pages_.data(), tiles() + 1, columns_.data());
+    emulated::run_first_columns(lattice.type, tile_blocks_.data(), tiles() + 1, columns_.data());
   }
-  std::byte* page(std::size_t i) {
-    return reinterpret_cast<std::byte*>(pages_.data() + i * gpu::kPageSamples);
+  std::byte* block(std::size_t i) {
+    return reinterpret_cast<std::byte*>(tile_blocks_.data() + i * gpu::kTileBlockSamples);
   }
   void list_tiles() {
     for (const Int3 tile : tiles_)
@@ -185,8 +186,8 @@ class KernelVolume {
   const Field<T>& field_;
   const BrickLookup& bricks_;
   std::vector<Int3> tiles_;  ///< in Morton order
-  std::vector<T> pages_, columns_, ranges_;
-  std::vector<std::uint32_t> page_of_tile_;
+  std::vector<T> tile_blocks_, columns_, ranges_;
+  std::vector<std::uint32_t> block_of_tile_;
   std::vector<std::int32_t> coordinates_;
   gpu::CaseTable cases_;
 };

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "isobrick/gpu/block_groups.h"
 #include "isobrick/gpu/brick_table.h"
-#include "isobrick/gpu/page_groups.h"
 #include "isobrick/gpu/row_slots.h"
 #include "tests/gpu/kernels/kernel_volume.h"
 
@@ -98,8 +98,8 @@ class Streamed {
   }
 
   void unpack() {
-    const std::size_t groups = (count_ + gpu::kTilesOfPageGroup - 1) / gpu::kTilesOfPageGroup;
-    pages_.assign(groups * gpu::kPageGroupSamples, T{93});  // of launches before
+    const std::size_t groups = (count_ + gpu::kTilesOfBlockGroup - 1) / gpu::kTilesOfBlockGroup;
+    tile_blocks_.assign(groups * gpu::kBlockGroupSamples, T{93});  // of launches before
     gpu::UnpackParams u{};
     u.items = items_.data();
     u.links = links_.data();
@@ -114,7 +114,7 @@ class Streamed {
       u.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
     }
     u.fill_value = options_.fill_value;
-    u.pages = pages_.data();
+    u.tile_blocks = tile_blocks_.data();
     emulated::run_unpack(lattice_.type, u, epoch_);
   }
 
@@ -123,7 +123,7 @@ class Streamed {
     p.items = items_.data();
     p.item_count = &count_;
     p.links = links_.data();
-    p.pages = pages_.data();
+    p.tile_blocks = tile_blocks_.data();
     p.epoch = epoch_ + 1;
     p.row_tables = row_tables_.data();
     return p;
@@ -143,7 +143,7 @@ class Streamed {
   std::vector<gpu::TileItem> items_;
   std::vector<gpu::TileLinks> links_;
   std::vector<std::uint32_t> unused_;
-  std::vector<T> pages_;
+  std::vector<T> tile_blocks_;
 };
 
 /// In launches of so many tiles.

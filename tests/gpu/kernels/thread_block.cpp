@@ -63,7 +63,7 @@ void ThreadBlock::run(const std::function<void()>& kernel) {
   running_ = choose_next();
   release(this);
   caller_->switch_to(*fibers_[running_]);
-  acquire(&ended_);
+  acquire(&filled_);
   current_block = nullptr;
 }
 
@@ -71,9 +71,9 @@ void ThreadBlock::begin_thread() {
   fibers_[running_]->arrive();
   acquire(this);
   (*kernel_)();
-  release(&ended_);
+  release(&filled_);
   Fiber& own = *fibers_[running_];
-  own.end_in(++ended_ < fibers_.size() ? *fibers_[running_ = choose_next()] : *caller_);
+  own.end_in(++filled_ < fibers_.size() ? *fibers_[running_ = choose_next()] : *caller_);
 }
 
 void ThreadBlock::go_on_elsewhere() {

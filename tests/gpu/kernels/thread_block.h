@@ -81,7 +81,7 @@ class ThreadBlock {
   void make_ready(unsigned thread);
   [[noreturn]] void fail(const char* what) const;
 
-  unsigned index_, blocks_, running_ = 0, ended_ = 0;
+  unsigned index_, blocks_, running_ = 0, filled_ = 0;
   unsigned in_barrier_ = 0, barrier_ = 0;  ///< threads that have arrived; at which of two
   std::uint64_t barriers_[2] = {};         ///< for ThreadSanitizer
   std::minstd_rand random_;

@@ -64,11 +64,12 @@ void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::
   });
 }
 
-void run_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns) {
+void run_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t count,
+                       void* columns) {
   gpu::visit_device_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     launch(count, gpu::kSearchThreads, 0, 1, [&] {
-      gpu::copy_first_columns<T>(static_cast<const T*>(pages), static_cast<T*>(columns));
+      gpu::copy_first_columns<T>(static_cast<const T*>(tile_blocks), static_cast<T*>(columns));
     });
   });
 }

@@ -23,7 +23,8 @@ void run_tiles(const TileRun& run, const gpu::TileParams& params, const gpu::Cas
 void run_search(ScalarType type, const gpu::SearchParams& params, unsigned seed);
 void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::int32_t* tiles,
                      std::uint32_t count, void* ranges);
-void run_first_columns(ScalarType type, const void* pages, std::uint32_t count, void* columns);
+void run_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t count,
+                       void* columns);
 void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed);
 
 }  // namespace isobrick::emulated

@@ -3,7 +3,7 @@
 #include "isobrick/gpu/tile_shared.cuh"
 
 // How the 33 × 33 rows of a tile are dealt out to warps: the first 32 rows of each plane are
-// a piece, so that a thread has the same y in all of them; the last rows of all planes are
+// a group, so that a thread has the same y in all of them; the last rows of all planes are
 // two more.
 
 namespace isobrick::gpu {
@@ -14,7 +14,7 @@ struct PlaneRows {
   static constexpr int end = 33;
   int plane;
 
-  /// Of row `i` of the piece, which is that of lane i.
+  /// Of row `i` of the group, which is that of lane i.
   __device__ int y(int i) const { return i; }
   __device__ int z(int) const { return plane; }
 };
@@ -39,20 +39,20 @@ struct OwnRow {
   __device__ int row() const { return 33 * z + y; }
 };
 
-/// Calls f(PlaneRows) or f(LastRows) for the pieces of this warp. Loops, so that the code of each
-/// kind is there once: warps in different steps share the instruction cache. `BesideFirst`: the
-/// first warp of several has something else to do and gets no planes, but the last rows.
+/// Calls f(PlaneRows) or f(LastRows) for the row groups of this warp. Loops, so that the code of
+/// each kind is there once: warps in different steps share the instruction cache. `BesideFirst`:
+/// the first warp of several has something else to do and gets no planes, but the last rows.
 template <int N, bool BesideFirst = false, class F>
-__device__ inline void for_each_piece(F&& f) {
-  auto piece = static_cast<int>(uniform(warp_id()));
+__device__ inline void for_each_row_group(F&& f) {
+  auto group = static_cast<int>(uniform(warp_id()));
   constexpr bool kBeside = BesideFirst && BlockConfig<N>::kWarps > 1;
   constexpr int kStep = BlockConfig<N>::kWarps - (kBeside ? 1 : 0);
-  if (kBeside) piece = piece == 0 ? 33 : piece - 1;
+  if (kBeside) group = group == 0 ? 33 : group - 1;
 #pragma unroll 1
-  for (; piece < 33; piece += kStep) f(PlaneRows{piece});
+  for (; group < 33; group += kStep) f(PlaneRows{group});
   if (kBeside && uniform(warp_id()) != 0) return;
 #pragma unroll 1
-  for (; piece < kPieces; piece += kBeside ? 1 : kStep) f(LastRows{32 * (piece - 33), 33});
+  for (; group < kRowGroups; group += kBeside ? 1 : kStep) f(LastRows{32 * (group - 33), 33});
 }
 
 }  // namespace isobrick::gpu

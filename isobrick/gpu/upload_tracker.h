@@ -9,20 +9,19 @@
 
 namespace isobrick::gpu {
 
-/// Books of the buffers that threads fill with bricks, each its own ones, and of the requests,
-/// numbered from 1, by which these are copied to their places. Thread-safe; knows nothing of a
-/// device.
-class SendBooks {
+/// Tracks the buffers that threads fill with bricks, each its own, and the requests, numbered from
+/// 1, that copy them to their places. Thread-safe; uses no device.
+class UploadTracker {
  public:
   /// A brick that waits to be copied.
-  struct Piece {
+  struct PendingBrick {
     std::size_t buffer;  ///< counted over all threads
     std::byte* to;
   };
-  /// What becomes of a buffer: it may be filled, waits for a request, or is copied by one.
-  enum class State { free, ended, asked };
+  /// A buffer is free to be filled, filled and without a request, or being copied by one.
+  enum class State { free, filled, requested };
 
-  SendBooks(int threads, std::size_t buffers_of_thread);
+  UploadTracker(int threads, std::size_t buffers_of_thread);
 
   std::size_t buffers() const { return requests_.size(); }
   /// A free buffer for `thread` to fill: the one that it filled last, which its cache holds rather
@@ -35,28 +34,28 @@ class SendBooks {
   std::size_t end(int thread, std::byte* place);
 
   State state_of(std::size_t buffer) const;
-  /// The request that copies a buffer that was asked for.
+  /// The request that copies a requested buffer.
   std::uint64_t request_of(std::size_t buffer) const { return requests_[buffer]; }
 
   /// All bricks that wait, for a request.
-  std::vector<Piece> take_ended();
-  /// The request of this number copies these, once it has been made.
-  void asked(const std::vector<Piece>& pieces, std::uint64_t request);
-  /// That request and all before it are over: their buffers are free.
-  void over(std::uint64_t request);
+  std::vector<PendingBrick> take_filled();
+  /// The request of this number, which has been made, copies these.
+  void requested(const std::vector<PendingBrick>& bricks, std::uint64_t request);
+  /// That request and all before it have completed: their buffers are free.
+  void completed(std::uint64_t request);
 
  private:
-  static constexpr std::uint64_t kEnded = ~std::uint64_t{0};
+  static constexpr std::uint64_t kFilled = ~std::uint64_t{0};
 
   using Order = std::vector<std::size_t>;
   const Order& order_of(int thread) const { return orders_[static_cast<std::size_t>(thread)]; }
   Order& order_of(int thread) { return orders_[static_cast<std::size_t>(thread)]; }
 
   std::vector<Order> orders_;  ///< buffers of each thread, the one that was begun last first
-  std::vector<std::atomic<std::uint64_t>> requests_;  ///< of each buffer; kEnded: none yet
-  std::atomic<std::uint64_t> known_over_ = 0;
+  std::vector<std::atomic<std::uint64_t>> requests_;  ///< of each buffer; kFilled: none yet
+  std::atomic<std::uint64_t> completed_ = 0;
   std::mutex mutex_;
-  std::vector<Piece> ended_;
+  std::vector<PendingBrick> filled_;
 };
 
 }  // namespace isobrick::gpu

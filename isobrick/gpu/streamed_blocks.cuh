@@ -2,36 +2,36 @@
 
 #include <cstdint>
 
-#include "isobrick/gpu/page_groups.h"
+#include "isobrick/gpu/block_groups.h"
 
-// Where the samples of a streamed tile lie. A tile is read as if 27 pages of 32³
+// Where the samples of a streamed tile lie. A tile is read as if 27 tile_blocks of 32³
 // samples lay around it, but of the 26 that are not its own only the samples within one
-// step of its 33³ are ever looked at. Eight tiles share the pages for those: each has
+// step of its 33³ are ever looked at. Eight tiles share the tile_blocks for those: each has
 // four columns, rows or planes of them for itself (of the edges and corners, four by four).
 // docs/design/gpu.md has the picture.
 
 namespace isobrick::gpu {
 
-/// Number of a tile's own page among the 27, x + 3·y + 9·z.
-inline constexpr int kOwnPage = 13;
+/// Number of a tile's own block among the 27, x + 3·y + 9·z.
+inline constexpr int kOwnBlock = 13;
 
-/// Where page `n` of the streamed tile `number` begins, in samples from the first
-/// tile's page. It may lie before that: only the places that are looked at do not.
-__device__ inline std::int64_t streamed_page(std::uint32_t number, int n) {
-  constexpr std::int64_t page = kPageSamples, tiles = kTilesOfPageGroup, patch = 4096;
-  constexpr std::int64_t of_axis[3] = {tiles * page, (tiles + 1) * page, (tiles + 2) * page};
-  constexpr std::int64_t of_edge_xy = (tiles + 3) * page, of_edge_xz = of_edge_xy + page,
+/// Where block `n` of the streamed tile `number` begins, in samples from the first
+/// tile's block. It may lie before that: only the places that are looked at do not.
+__device__ inline std::int64_t streamed_block(std::uint32_t number, int n) {
+  constexpr std::int64_t block = kTileBlockSamples, tiles = kTilesOfBlockGroup, patch = 4096;
+  constexpr std::int64_t of_axis[3] = {tiles * block, (tiles + 1) * block, (tiles + 2) * block};
+  constexpr std::int64_t of_edge_xy = (tiles + 3) * block, of_edge_xz = of_edge_xy + block,
                          of_edge_yz = of_edge_xz + patch, of_corner = of_edge_yz + patch;
-  static_assert(of_corner + patch == kPageGroupSamples);
+  static_assert(of_corner + patch == kBlockGroupSamples);
   const std::int64_t group =
-      static_cast<std::int64_t>(number / kTilesOfPageGroup) * kPageGroupSamples;
-  const int tile = static_cast<int>(number % kTilesOfPageGroup);
+      static_cast<std::int64_t>(number / kTilesOfBlockGroup) * kBlockGroupSamples;
+  const int tile = static_cast<int>(number % kTilesOfBlockGroup);
   const int x = n % 3 - 1, y = n / 3 % 3 - 1, z = n / 9 - 1;
   // Of an upper neighbour the samples 0 and 1 are looked at, of a lower one 31: they are
   // three of four places.
   const auto place = [](int direction) { return direction > 0 ? 0 : 2 - 31; };
-  if (x == 0 && y == 0 && z == 0) return group + tile * page;
-  // The first axis on which the page is another than the tile's has the fours of all tiles.
+  if (x == 0 && y == 0 && z == 0) return group + tile * block;
+  // The first axis on which the block is another than the tile's has the fours of all tiles.
   const int first = 4 * tile;
   if (y == 0 && z == 0) return group + of_axis[0] + first + place(x);
   if (x == 0 && z == 0) return group + of_axis[1] + (first + place(y)) * 32;

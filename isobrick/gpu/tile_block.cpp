@@ -1,4 +1,4 @@
-#include "isobrick/gpu/page_gather.h"
+#include "isobrick/gpu/tile_block.h"
 
 #include <algorithm>
 #include <cstring>
@@ -9,7 +9,7 @@ namespace {
 constexpr Int3 kPage{kTileEdge, kTileEdge, kTileEdge};
 
 template <class T>
-bool gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Int3 tile, T* page) {
+bool gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Int3 tile, T* block) {
   const Int3 origin = tile * kTileEdge;
   const Box3 box = intersect({origin, origin + kPage}, lattice.box());
   bool any = false;
@@ -20,7 +20,7 @@ bool gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Int3
     any = any || from;
     for (Index z = part.lo.z; z < part.hi.z; ++z)
       for (Index y = part.lo.y; y < part.hi.y; ++y) {
-        T* to = page + linear_index(Int3{part.lo.x, y, z} - origin, kPage);
+        T* to = block + linear_index(Int3{part.lo.x, y, z} - origin, kPage);
         const auto n = static_cast<std::size_t>(part.extent().x);
         if (from)
           std::memcpy(to, from + linear_index(Int3{part.lo.x, y, z} - corner, lattice.brick),
@@ -34,18 +34,18 @@ bool gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Int3
 
 }  // namespace
 
-bool gather_page(const Lattice& lattice, const BrickLookup& bricks, double fill_value, Int3 tile,
-                 std::byte* page) {
+bool gather_tile_block(const Lattice& lattice, const BrickLookup& bricks, double fill_value,
+                       Int3 tile, std::byte* block) {
   return visit_scalar(lattice.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    return gather<T>(lattice, bricks, fill_value, tile, reinterpret_cast<T*>(page));
+    return gather<T>(lattice, bricks, fill_value, tile, reinterpret_cast<T*>(block));
   });
 }
 
-void fill_page(ScalarType type, double value, std::byte* page) {
+void fill_tile_block(ScalarType type, double value, std::byte* block) {
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    std::fill_n(reinterpret_cast<T*>(page), kTileEdge * kTileEdge * kTileEdge,
+    std::fill_n(reinterpret_cast<T*>(block), kTileEdge * kTileEdge * kTileEdge,
                 static_cast<T>(value));
   });
 }
