@@ -1,14 +1,14 @@
-// A store to a mesh in host memory through the GPU, beside each of its stages unwelded.
+// A store to a mesh in host memory through the GPU, beside each of its stages alone.
 //
 //   isobrick synth gyroid g.zarr --dims 1024,1024,1024 --type u16
 //   bench_stream_extract g.zarr --isovalue 32767.5 --gpu-memory 256M --memory 1G
 //
-// What the stages do unwelded is measured in the same run: reading the encoded bricks (from
+// What the stages do alone is measured in the same run: reading the encoded bricks (from
 // the page cache, where they fit it), reading and decoding them on all cores, copies of
 // the same bytes up and down. After an extraction that sets the device up, extractions take turns
-// with reading and decoding unwelded, so that what the machine does meanwhile meets both alike, and
+// with reading and decoding alone, so that what the machine does meanwhile meets both alike, and
 // medians are compared. --check compares the mesh with the CPU's by a hash. With --cold
-// the store is dropped from the page cache before each extraction, and before the reads unwelded.
+// the store is dropped from the page cache before each extraction, and before the reads alone.
 // Built as bench/README.md says.
 
 #include <fcntl.h>
@@ -111,7 +111,7 @@ void drop_from_cache(const std::string& store) {
   }
 }
 
-/// Reading unwelded, on all cores.
+/// Reading alone, on all cores.
 double read_alone(const StoreReader& store, int level, const std::vector<Int3>& bricks) {
   std::map<std::string, int> files;
   struct Piece {
@@ -152,7 +152,7 @@ double decode_alone(const StoreReader& store, int level, const std::vector<Int3>
   return seconds_since(start);
 }
 
-/// Extractions and stages unwelded, in turns.
+/// Extractions and stages alone, in turns.
 struct Measured {
   double first_seconds = 0;  ///< the device's setting up included
   std::vector<ExtractReport> reports;
@@ -197,17 +197,17 @@ int run(Arguments a) {
 
   const Measured measured = measure(store, a, bricks);
   const ExtractReport& r = measured.report();
-  std::map<std::string, double> unwelded{{"read", median(measured.seconds.at("read"))},
+  std::map<std::string, double> alone{{"read", median(measured.seconds.at("read"))},
                                       {"decode", median(measured.seconds.at("decode"))}};
   const std::uint64_t launches = std::max<std::uint64_t>(r.launches, 1);
-  unwelded["upload"] = copy_seconds(r.upload.bytes, r.upload.bytes / launches, true);
-  unwelded["download"] = copy_seconds(r.download.bytes, r.download.bytes / launches, false);
-  // By events, beside the copies to a pool: unwelded they take no longer.
-  unwelded["kernel"] = r.gather.seconds + r.kernel.seconds;
+  alone["upload"] = copy_seconds(r.upload.bytes, r.upload.bytes / launches, true);
+  alone["download"] = copy_seconds(r.download.bytes, r.download.bytes / launches, false);
+  // By events, beside the copies to a pool: alone they take no longer.
+  alone["kernel"] = r.gather.seconds + r.kernel.seconds;
   const auto slowest = std::max_element(
-      unwelded.begin(), unwelded.end(), [](const auto& l, const auto& n) { return l.second < n.second; });
+      alone.begin(), alone.end(), [](const auto& l, const auto& n) { return l.second < n.second; });
   // What was dropped is decoded again.
-  const double decode = unwelded["decode"] * static_cast<double>(r.brick_reads) /
+  const double decode = alone["decode"] * static_cast<double>(r.brick_reads) /
                         static_cast<double>(std::max<std::uint64_t>(r.bricks_read, 1));
   // As if nothing passed before the first brick and after the last. What the plan takes is not
   // added: decoding begins inside of it.
@@ -221,7 +221,7 @@ int run(Arguments a) {
   out["prediction"] = prediction;
   out["slowest_alone"] = slowest->first;
   out["ratio"] = slowest->second / r.seconds;
-  for (const auto& [name, seconds] : unwelded) out["unwelded"][name] = seconds;
+  for (const auto& [name, seconds] : alone) out["alone"][name] = seconds;
   for (const auto& [name, stage] : stages_of(r))
     out["busy"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
   out["triangles"] = r.triangles;
@@ -245,7 +245,7 @@ int run(Arguments a) {
     fmt::print("{}\n", out.dump());
   } else {
     fmt::print(
-        "{} triangles in {:.3f} s (first {:.3f}), predicted {:.3f}; slowest unwelded: {} {:.3f}, "
+        "{} triangles in {:.3f} s (first {:.3f}), predicted {:.3f}; slowest alone: {} {:.3f}, "
         "ratio {:.2f}\n",
         r.triangles, r.seconds, measured.first_seconds, prediction, slowest->first, slowest->second,
         slowest->second / r.seconds);
@@ -255,14 +255,14 @@ int run(Arguments a) {
         "memory, {:.1f} page-locked{}\n",
         r.plan_seconds, r.decode_seconds, r.surface_seconds, r.bricks_read, r.brick_reads,
         r.launches, mebibytes(r.device_bytes), mebibytes(r.pinned_bytes),
-        a.check ? fmt::format("; the CPU unwelded {:.3f} s, {}", out["cpu_seconds"].get<double>(),
+        a.check ? fmt::format("; the CPU alone {:.3f} s, {}", out["cpu_seconds"].get<double>(),
                               out["same_as_cpu"].get<bool>() ? "same mesh" : "OTHER MESH")
                 : "");
     for (const auto& [name, stage] : stages_of(r))
       fmt::print(
-          "  {:9} busy {:.3f} s, {:8.1f} MiB, unwelded {}\n", name, stage.seconds,
+          "  {:9} busy {:.3f} s, {:8.1f} MiB, alone {}\n", name, stage.seconds,
           mebibytes(stage.bytes),
-          unwelded.count(std::string(name)) ? fmt::format("{:.3f}", unwelded[std::string(name)]) : "-");
+          alone.count(std::string(name)) ? fmt::format("{:.3f}", alone[std::string(name)]) : "-");
   }
   return out.value("same_as_cpu", true) ? 0 : 1;
 }
@@ -272,7 +272,7 @@ int run(Arguments a) {
 
 int main(int argc, char** argv) {
   isobrick::bench::Arguments a;
-  CLI::App app{"A store to a mesh through the GPU, beside its stages unwelded"};
+  CLI::App app{"A store to a mesh through the GPU, beside its stages alone"};
   app.add_option("store", a.store)->required();
   app.add_option("--isovalue", a.options.isovalue)->required();
   app.add_option("--memory", a.options.memory)->transform(CLI::AsSizeValue(false));

@@ -48,17 +48,15 @@ __global__ void __launch_bounds__(N, BlockConfig<N>::kBlocks)
                   const CaseTable* __restrict__ cases) {
   extern __shared__ __align__(256) unsigned char shared_bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(shared_bytes);
-  const std::uint32_t first = next_number(p);
   fill_tables<N>(s, cases);
   const Classifier<T> classifier(threshold);
-  wait_for_launch_before();
   if (threadIdx.x == 0) {
     s.items = *p.item_count;
     s.all_cells = s.all_vertices = ListsOf<N>::kListed;
     init_barriers<N>(s.barriers);
   }
   __syncwarp();
-  take_tile<T>(s, p, first);
+  take_tile<T>(s, p, next_number(p));
   __syncthreads();
   while (s.item < s.items) {
     if constexpr (Nan)

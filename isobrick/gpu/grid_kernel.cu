@@ -38,7 +38,7 @@ template <class T>
 __device__ void make_values(const GridView& g) {
   const int count = g.around_n[0] * g.around_n[1] * g.around_n[2];
   const T* from = static_cast<const T*>(g.stored.samples);
-  // Of this grid unwelded: nothing else reads or writes there meanwhile.
+  // Of this grid only: nothing else reads or writes there meanwhile.
   auto* to = const_cast<float*>(g.around);
   for (int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x); i < count;
        i += static_cast<int>(gridDim.x * blockDim.x))

@@ -56,19 +56,6 @@ __device__ inline std::uint32_t increment_shared(std::uint32_t address) {
   return before;
 }
 
-/// Where a launch may start before the one before it on the stream has ended: the latter says
-/// so, and the former waits for what it writes. Before Hopper launches do not overlap.
-__device__ inline void let_next_launch_start() {
-#if __CUDA_ARCH__ >= 900
-  asm volatile("griddepcontrol.launch_dependents;");
-#endif
-}
-__device__ inline void wait_for_launch_before() {
-#if __CUDA_ARCH__ >= 900
-  asm volatile("griddepcontrol.wait;" ::: "memory");
-#endif
-}
-
 #if __CUDA_ARCH__ >= 800
 /// Copies 16 bytes to an address in shared memory, on the way while this returns. With several, a
 /// thread says when it has begun all and waits until its own are there.

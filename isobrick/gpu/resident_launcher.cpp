@@ -148,7 +148,7 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
   p.triangle_capacity = room.triangles.size();
   p.end = launch_end();
   const LaunchShape shape = shape_for(last);
-  shape.launch(shape, p, cases_.data(), volume_.stream.get(), true);
+  shape.launch(shape, p, cases_.data(), volume_.stream.get());
   ++launches_;  // only now: the sums of one that could not be launched are those of the next
 }
 

@@ -57,7 +57,6 @@ __global__ void __launch_bounds__(kSearchThreads)
   __shared__ std::uint32_t warp_sums[kSearchWarps];
   __shared__ std::uint32_t block;
   __shared__ unsigned long long base;
-  let_next_launch_start();
   if (threadIdx.x == 0) block = atomicAdd(p.ticket, 1u);
   __syncthreads();
   const std::uint32_t first = block * kTilesOfSearchBlock + threadIdx.x * kTilesOfSearchThread;

@@ -72,7 +72,7 @@ class StreamCollector {
   std::vector<std::size_t> free_outputs_;
   int taken_outputs_ = 0;  ///< handed on, not released
 
-  // Of the thread unwelded, until it ends.
+  // Used by the thread only, until it ends.
   std::optional<Pending> pending_;
   StreamReport report_;
 

@@ -133,7 +133,7 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
   launch.unpacked.record(kernel_);
   LaunchShape shape = shapes_.of(count);
   shape.blocks = std::min(shape.blocks, static_cast<int>(count));
-  shape.launch(shape, p, cases_, kernel_.get(), false);
+  shape.launch(shape, p, cases_, kernel_.get());
   check(cudaMemcpyAsync(launch.totals, &header->totals, sizeof(SurfaceTotals),
                         cudaMemcpyDeviceToHost, kernel_.get()));
   launch.extracted.record(kernel_);

@@ -30,7 +30,7 @@ constexpr std::uint64_t kMinTilesWithPool = 128;
 /// launches.
 constexpr std::uint64_t kMinAhead = 24, kMaxAhead = 40, kInWork = 8;
 /// A row table in the host's uploads: its slot, its tile, its expiry. Tables on the faces of what
-/// is finished fill a quarter of their cubes, those of a launch may be unwelded in theirs.
+/// is finished fill a quarter of their cubes, those of a launch may have a cube each.
 constexpr std::uint64_t kBytesOfSlot = 128, kBytesOfCube = 640;
 
 /// Row tables that are needed at a time: as with the CPU's boundaries those on the upper

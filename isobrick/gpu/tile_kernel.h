@@ -24,10 +24,9 @@ struct LaunchShape {
   int threads = 0;               ///< of a block
   std::size_t shared_bytes = 0;  ///< of a block
   std::uint32_t listed = 0;      ///< cells of a tile; fuller tiles are listed in several rounds
-  /// Launches the kernel on a stream. `overlap`: the launch before is a search for its tiles, and
-  /// blocks may start while that runs.
+  /// Launches the kernel on a stream.
   void (*launch)(const LaunchShape& shape, const TileParams& params, const CaseTable* cases,
-                 cudaStream_t stream, bool overlap) = nullptr;
+                 cudaStream_t stream) = nullptr;
 };
 
 /// The shapes of a kernel on the current device: the fewer tiles there are, the more threads share

@@ -40,26 +40,11 @@ struct Launcher {
     check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kKernel, N, shared_bytes));
     return each * device_attribute(cudaDevAttrMultiProcessorCount);
   }
-  /// Code for older devices does not wait for the launch before (wait_for_launch_before).
-  static bool can_overlap() {
-    cudaFuncAttributes attributes{};
-    check(cudaFuncGetAttributes(&attributes, kKernel));
-    return attributes.ptxVersion >= 90;
-  }
   static void launch(const LaunchShape& shape, const TileParams& params, const CaseTable* cases,
-                     cudaStream_t stream, bool overlap) {
-    cudaLaunchAttribute attribute{};
-    attribute.id = cudaLaunchAttributeProgrammaticStreamSerialization;
-    attribute.val.programmaticStreamSerializationAllowed = 1;
-    cudaLaunchConfig_t config{};
-    config.gridDim = static_cast<unsigned>(shape.blocks);
-    config.blockDim = N;
-    config.dynamicSmemBytes = shape.shared_bytes;
-    config.stream = stream;
-    config.attrs = &attribute;
-    config.numAttrs = overlap && can_overlap() ? 1 : 0;
+                     cudaStream_t stream) {
     const T threshold = Threshold<T>(params.isovalue).value;
-    check(cudaLaunchKernelEx(&config, kKernel, params, threshold, cases));
+    kKernel<<<static_cast<unsigned>(shape.blocks), N, shape.shared_bytes, stream>>>(
+        params, threshold, cases);
     check_launch("extract_tiles");
   }
 };

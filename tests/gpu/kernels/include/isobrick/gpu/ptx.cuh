@@ -28,9 +28,6 @@ inline std::uint32_t increment_shared(std::uint32_t address) {
   return atomicAdd(reinterpret_cast<std::uint32_t*>(shared_bytes + address), 1u);
 }
 
-inline void let_next_launch_start() {}
-inline void wait_for_launch_before() {}
-
 /// As late as may be.
 inline void begin_copy(std::uint32_t to, const void* from) {
   emulated::ThreadBlock::current().copies().push_back({shared_bytes + to, from});
