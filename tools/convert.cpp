@@ -96,7 +96,8 @@ int run(const Arguments& arguments, Console& console) {
   const ConvertReport report = arguments.in == "-"
                                    ? convert_stream(*source, arguments.out, options, console)
                                    : convert(*source, arguments.out, options, console.progress());
-  report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report);
+  report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report,
+                    source->notes());
   return 0;
 }
 

@@ -205,7 +205,7 @@ void note_conversion(const std::string& output) {
 
 void report_conversion(Console& console, const std::string& command, const std::string& input,
                        const std::string& output, const VolumeInfo& volume,
-                       const ConvertReport& report) {
+                       const ConvertReport& report, const std::vector<std::string>& notes) {
   const double ratio = report.bytes_out == 0 ? 0
                                              : static_cast<double>(report.bytes_in) /
                                                    static_cast<double>(report.bytes_out);
@@ -226,6 +226,7 @@ void report_conversion(Console& console, const std::string& command, const std::
       {"ratio", ratio},
       {"seconds", report.seconds},
       {"index_seconds", report.index_seconds},
+      {"notes", notes},
       {"peak_resident_bytes", peak_resident_bytes()}};
   std::string text = fmt::format("{}: {} samples of {}", output, human_extent(volume.extent),
                                  zarr_name(volume.type));
@@ -241,6 +242,7 @@ void report_conversion(Console& console, const std::string& command, const std::
     text += fmt::format("of that {} for the index, in {}\n", human_bytes(report.index_bytes),
                         human_seconds(report.index_seconds));
   console.result(object, text);
+  for (const std::string& note : notes) console.note(note);
 }
 
 }  // namespace isobrick::tools

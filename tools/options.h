@@ -108,9 +108,9 @@ void add_store_options(CLI::App* app, ConvertOptions& options);
 /// From now on an interrupt is reported with what it leaves of a conversion to `output`.
 void note_conversion(const std::string& output);
 
-/// Says what a conversion by `command` did.
+/// Says what a conversion by `command` did; `notes` are its source's.
 void report_conversion(Console& console, const std::string& command, const std::string& input,
                        const std::string& output, const VolumeInfo& volume,
-                       const ConvertReport& report);
+                       const ConvertReport& report, const std::vector<std::string>& notes = {});
 
 }  // namespace isobrick::tools

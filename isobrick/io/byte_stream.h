@@ -23,6 +23,9 @@ class ByteStream {
   /// anything is read. Unlimited where nothing is known.
   virtual std::uint64_t most_bytes() const = 0;
 
+  /// Once read() has met the end: bytes of the file behind it that belong to no compressed data.
+  virtual std::uint64_t left_over() const { return 0; }
+
   /// Bytes of memory that the stream holds.
   virtual std::size_t memory() const { return 0; }
 

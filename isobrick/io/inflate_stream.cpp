@@ -47,6 +47,10 @@ class InflateStream final : public ByteStream {
                : packed * kMostRatio;
   }
 
+  std::uint64_t left_over() const override {
+    return ended_ ? packed_->most_bytes() - fetched_ + state_->avail_in : 0;
+  }
+
   std::size_t memory() const override { return packed_->memory() + sizeof(inflate_state) + kInput; }
 
  private:
@@ -60,6 +64,7 @@ class InflateStream final : public ByteStream {
     if (state_->avail_in > 0 || packed_ended_) return;
     const std::size_t got = packed_->read(input_.get(), kInput);
     packed_ended_ = got < kInput;
+    fetched_ += got;
     state_->next_in = reinterpret_cast<std::uint8_t*>(input_.get());
     state_->avail_in = static_cast<std::uint32_t>(got);
   }
@@ -107,7 +112,7 @@ class InflateStream final : public ByteStream {
   Wrapper wrapper_;
   std::unique_ptr<inflate_state> state_;
   std::unique_ptr<std::byte[]> input_;
-  std::uint64_t position_ = 0;
+  std::uint64_t position_ = 0, fetched_ = 0;  ///< bytes unpacked; bytes taken from `packed_`
   bool packed_ended_ = false, between_members_ = false, ended_ = false;
 };
 

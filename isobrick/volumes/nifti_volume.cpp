@@ -80,10 +80,12 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   const std::uint64_t end = header.offset + static_cast<std::uint64_t>(header.view.total) * sample;
   if (is_packed(data_path))
     return scale_source(
-        make_stream_source(std::move(layout), open_stream(data_path, true), end, AfterEnd::ignored),
+        make_stream_source(std::move(layout), open_stream(data_path, true), end, AfterEnd::noted),
         header.scale);
   File file = open_input(data_path);
   check_header_promise(layout, file);
+  if (const std::uint64_t size = file.size(); size > end)
+    layout.notes.push_back(trailing_note(quoted(data_path), size - end));
   return scale_source(make_raw_source(std::move(layout), std::move(file)), header.scale);
 }
 

@@ -22,6 +22,7 @@ class RawSource final : public VolumeSource {
 
   const VolumeInfo& info() const override { return layout_.info; }
   bool random_access() const override { return true; }
+  std::vector<std::string> notes() const override { return layout_.notes; }
 
   void read(Box3 box, std::byte* out) override {
     if (box.empty()) return;

@@ -75,26 +75,40 @@ std::uint64_t after_lines(const File& file, const std::string& path, std::uint64
   return begin + at;
 }
 
-/// What else would make the size right, as " (would fit …)". Behind a header in the same file
-/// another offset would only shift the samples.
-std::string size_hint(const TextHeader& header, const VolumeInfo& info, std::uint64_t samples,
-                      std::uint64_t offset, std::uint64_t size) {
-  const std::uint64_t count = samples / size_of(info.type);
+/// Who says what samples a file has: the header in it or beside it, or its name and options.
+enum class DescribedBy : std::uint8_t { header, caller };
+
+/// The types of which so many samples would make the file's size, as "u16 or i16".
+std::string types_that_fit(std::uint64_t count, std::uint64_t bytes) {
   std::string types;
   for (const ScalarType type : kScalarTypes)
-    if (size > offset && count * size_of(type) == size - offset)
+    if (count * size_of(type) == bytes)
       types += fmt::format("{}{}", types.empty() ? "" : " or ", short_name(type));
-  if (!types.empty()) return fmt::format(" (would fit --type {})", types);
+  return types;
+}
+
+/// What else would make the size right, as " (would fit …)". Where a header says where samples
+/// begin another offset would only shift them.
+std::string size_hint(DescribedBy by, const std::string& types, std::uint64_t samples,
+                      std::uint64_t size) {
+  const bool header = by == DescribedBy::header;
+  if (!types.empty())
+    return fmt::format(" (would fit {} {})", header ? "the type" : "--type", types);
   constexpr std::uint64_t likely_header = 64 * 1024;
-  if (header.data_begin == 0 && size >= samples && size - samples <= likely_header)
+  if (!header && size >= samples && size - samples <= likely_header)
     return fmt::format(" (would fit --offset {})", size - samples);
   return {};
 }
 
-/// The file must hold `samples` bytes from the layout's offset on.
-void check_size(const TextHeader& header, const VolumeInfo& info, std::uint64_t offset,
-                std::uint64_t samples, std::uint64_t size) {
+/// The file must hold `samples` bytes from the layout's offset on. What follows them is left to
+/// trailing_note() where a header describes them, unless samples of another type would fit.
+void check_size(const TextHeader& header, DescribedBy by, const VolumeInfo& info,
+                std::uint64_t offset, std::uint64_t samples, std::uint64_t size) {
   if (offset <= size && size - offset == samples) return;
+  const std::string types =
+      size > offset ? types_that_fit(samples / size_of(info.type), size - offset) : "";
+  if (by == DescribedBy::header && offset <= size && size - offset > samples && types.empty())
+    return;
   const std::string at = offset ? fmt::format(" after offset {}", offset) : "";
   const bool whole =
       samples == static_cast<std::uint64_t>(volume(info.extent)) * size_of(info.type);
@@ -107,14 +121,15 @@ void check_size(const TextHeader& header, const VolumeInfo& info, std::uint64_t 
                                offset > std::numeric_limits<std::uint64_t>::max() - samples
                                    ? std::string("far more")
                                    : fmt::format("{}", offset + samples),
-                               size_hint(header, info, samples, offset, size)));
+                               size_hint(by, types, samples, size)));
 }
 
 /// Opens samples that lie as they are in one file: what is said goes before what
 /// the header says.
 std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const VolumeRequest& said,
-                                             File file) {
+                                             DescribedBy by, File file) {
   const std::string& path = header.data_paths[0];
+  if (said.extent || said.type || said.offset) by = DescribedBy::caller;
   const ScalarType type = said.type.value_or(header.type);
   SampleLayout layout;
   layout.info =
@@ -131,7 +146,9 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
     offset = std::max(offset, size > total ? size - total : 0);
   else
     offset = after_lines(file, path, header.data_begin, header.skip_lines) + header.skip_bytes;
-  check_size(header, layout.info, offset, total, size);
+  check_size(header, by, layout.info, offset, total, size);
+  if (const std::uint64_t extra = size - offset - total; extra > 0)
+    layout.notes.push_back(trailing_note(quoted(path), extra));
   layout.offset = offset;
   if (!said.extent) {
     layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);
@@ -188,7 +205,7 @@ TextHeader parse_text_header(const std::string& path, bool nrrd, const Selection
 std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
                                                const VolumeRequest& said) {
   if (header.encoding == Encoding::raw && header.data_paths.size() == 1)
-    return open_described(header, said, open_input(header.data_paths[0]));
+    return open_described(header, said, DescribedBy::header, open_input(header.data_paths[0]));
   VolumeRequest rest = said;
   rest.order.reset();
   refuse_raw_description(header.path, "a header that describes its samples", rest);
@@ -204,7 +221,11 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   auto stream = open_all_data(header);
   if (header.encoding != Encoding::text)
     layout.swap = must_swap(order_of(header, header.type, said), header.type);
-  return make_stream_source(std::move(layout), std::move(stream), end);
+  // More files than the header's extent needs are a mistake in it.
+  const AfterEnd after_end = header.data_paths.size() > 1        ? AfterEnd::refused
+                             : header.encoding == Encoding::text ? AfterEnd::noted_as_numbers
+                                                                 : AfterEnd::noted;
+  return make_stream_source(std::move(layout), std::move(stream), end, after_end);
 }
 
 namespace {
@@ -247,7 +268,7 @@ TextHeader describe_by_name(const std::string& path, const VolumeRequest& said) 
 std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& said) {
   File file = open_input(path);
   if (const auto header = find_header_beside(path, said)) return open_text_volume(*header, said);
-  return open_described(describe_by_name(path, said), said, std::move(file));
+  return open_described(describe_by_name(path, said), said, DescribedBy::caller, std::move(file));
 }
 
 std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& said) {

@@ -5,7 +5,11 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "isobrick/io/byte_order.h"
 #include "isobrick/volumes/volume_source.h"
@@ -20,6 +24,7 @@ struct SampleLayout {
   /// Samples from one to the next along x, y and z, each at least what the axes
   /// before it take up; nothing: dense, C order [z, y, x].
   std::optional<Int3> stride = {};
+  std::vector<std::string> notes = {};  ///< VolumeSource::notes() as far as they are known
 
   Int3 strides() const {
     return stride.value_or(Int3{1, info.extent.x, info.extent.x * info.extent.y});
@@ -33,6 +38,15 @@ struct SampleLayout {
   /// One after the last byte that belongs to the volume.
   std::uint64_t end() const { return offset_of(info.extent - Int3{1, 1, 1}) + size_of(info.type); }
 };
+
+/// The note that `count` bytes (`what`) after the samples (`after`) of a file are ignored. `name`
+/// has its quotes.
+inline std::string trailing_note(std::string_view name, std::uint64_t count,
+                                 std::string_view what = "byte",
+                                 std::string_view after = "the samples", bool at_least = false) {
+  return fmt::format("{}: {}{} {}{} after {} {} ignored", name, at_least ? "at least " : "", count,
+                     what, count == 1 ? "" : "s", after, count == 1 ? "is" : "are");
+}
 
 /// Gathers `count` samples, `stride` apart, from pieces that fetch(offset,
 /// bytes, size) copies.

@@ -20,6 +20,7 @@ class ScaledSource final : public VolumeSource {
   bool random_access() const override { return stored_->random_access(); }
   bool parallel() const override { return stored_->parallel(); }
   std::size_t memory() const override { return stored_->memory(); }
+  std::vector<std::string> notes() const override { return stored_->notes(); }
   void will_need(Box3 box) override { stored_->will_need(box); }
 
   void read(Box3 box, std::byte* out) override {

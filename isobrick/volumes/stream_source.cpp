@@ -27,6 +27,7 @@ class StreamSource final : public VolumeSource {
   const VolumeInfo& info() const override { return layout_.info; }
   bool random_access() const override { return false; }
   std::size_t memory() const override { return stream_->memory(); }
+  std::vector<std::string> notes() const override { return layout_.notes; }
 
   void read(Box3 box, std::byte* out) override {
     assert(box.lo.z >= next_plane_ && "planes of a stream come in order, each once");
@@ -63,6 +64,18 @@ class StreamSource final : public VolumeSource {
     if (extra > 0 && after_end_ == AfterEnd::refused)
       throw UsageError(fmt::format("{} goes on after the {} bytes expected: {}{} more",
                                    stream_->name(), end_, extra == most ? "at least " : "", extra));
+    note_rest(extra, extra == most);
+  }
+
+  void note_rest(std::size_t extra, bool at_least) {
+    const bool text = after_end_ == AfterEnd::noted_as_numbers;
+    const std::size_t count = text ? extra / size_of(layout_.info.type) : extra;
+    if (count > 0)
+      layout_.notes.push_back(
+          trailing_note(stream_->name(), count, text ? "number" : "byte", "the samples", at_least));
+    if (const std::uint64_t left_over = stream_->left_over(); left_over > 0)
+      layout_.notes.push_back(
+          trailing_note(stream_->name(), left_over, "byte", "the compressed data"));
   }
 
   SampleLayout layout_;

@@ -11,7 +11,8 @@ namespace isobrick {
 /// What becomes of bytes that follow the samples.
 enum class AfterEnd : unsigned char {
   refused,
-  ignored,  ///< they are read (where checksums follow) but not looked at
+  noted,             ///< ignored, and counted in a note
+  noted_as_numbers,  ///< the same of a text: its numbers are counted
   unread,
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/transform.h"
@@ -58,6 +59,10 @@ class VolumeSource {
   /// order. `box` lies inside the extent; `out` has room for it.
   /// Throws Error naming the file and the offset on a short or failed read.
   virtual void read(Box3 box, std::byte* out) = 0;
+
+  /// Remarks about the file for its user, a sentence each: what is ignored of it. A stream has
+  /// them only when its last plane was read.
+  virtual std::vector<std::string> notes() const { return {}; }
 
   /// Hints that `box` is read soon; may start the disk. Does nothing by default.
   virtual void will_need(Box3) {}

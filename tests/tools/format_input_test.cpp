@@ -114,5 +114,20 @@ TEST_F(FormatInput, OptionsThatMakeNoSenseForAFormat) {
   expect_refused(run({"convert", path("v.nii") + ":/v", path("other.zarr")}), 2, {":/v"});
 }
 
+TEST_F(FormatInput, WhatIsIgnoredOfAFileIsNoted) {
+  write_file(
+      path("v.nrrd"),
+      "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 4 4\nencoding: raw\n\n" + noise(64) + "\n");
+  const std::string note = "v.nrrd': 1 byte after the samples is ignored";
+  const Outcome outcome = run({"convert", path("v.nrrd"), path("a.zarr")});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.err.find(note), std::string::npos) << outcome.err;
+  const nlohmann::json report = run_json({"convert", path("v.nrrd"), path("b.zarr")});
+  ASSERT_EQ(report["notes"].size(), 1u);
+  EXPECT_NE(report["notes"][0].get<std::string>().find(note), std::string::npos);
+  write_file(path("w.nii"), nifti(4, 4, 4) + noise(64));
+  EXPECT_TRUE(run_json({"convert", path("w.nii"), path("c.zarr")})["notes"].empty());
+}
+
 }  // namespace
 }  // namespace isobrick::test

@@ -112,6 +112,23 @@ TEST_F(Nifti, BothVersionsAndByteOrdersPlainAndPacked) {
     }
 }
 
+TEST_F(Nifti, BytesAfterTheSamplesAreIgnoredWithANote) {
+  const std::string bytes = Header(1).bytes() + samples();
+  const std::pair<std::string, const char*> cases[] = {
+      {bytes + "padding", ": 7 bytes after the samples are ignored"},
+      {gzip(bytes + "padding"), ": 7 bytes after the samples are ignored"},
+      {gzip(bytes) + std::string(512, '\0'), ": 512 bytes after the compressed data are ignored"}};
+  for (const auto& [file, part] : cases) {
+    const auto source = open(file);
+    EXPECT_EQ(read_box(*source, kWhole), samples());
+    ASSERT_EQ(source->notes().size(), 1u) << part;
+    EXPECT_TRUE(contains(source->notes()[0], part)) << source->notes()[0];
+  }
+  EXPECT_TRUE(open(bytes)->notes().empty());
+  // Of a volume with a scale, too.
+  EXPECT_EQ(open(Header(1).scale(2, 0).bytes() + samples() + "!")->notes().size(), 1u);
+}
+
 TEST_F(Nifti, HeaderAndImageApart) {
   std::string header = Header(1).text(344, {"ni1\0", 4}).put<float>(108, 0).bytes();
   header.resize(348);
