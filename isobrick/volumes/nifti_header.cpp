@@ -219,15 +219,18 @@ std::uint64_t read_offset(const std::string& path, const Numbers& n, const Versi
 
 bool is_nifti(std::span<const std::byte> head) { return find_version(head).number != 0; }
 
+bool is_analyze(std::span<const std::byte> head) {
+  const Version version = find_version(head);
+  return version.number == 0 && version.analyze;
+}
+
 bool is_nifti_pair(std::span<const std::byte> head) { return find_version(head).detached; }
 
 NiftiHeader parse_nifti_header(const std::string& path, std::span<const std::byte> head,
                                const Selection& selection) {
   const Version version = find_version(head);
   if (version.number == 0)
-    header_error(path, version.analyze ? "ANALYZE 7.5, which does not say where its samples are in "
-                                         "space, is not supported; convert it to NIfTI"
-                                       : "not a NIfTI header");
+    header_error(path, version.analyze ? kAnalyzeRefusal : "not a NIfTI header");
   const Fields fields(head, version.swap);
   const Numbers n = version.number == 1 ? read_version_1(fields) : read_version_2(fields);
   NiftiHeader header;

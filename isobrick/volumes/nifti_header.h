@@ -31,6 +31,12 @@ bool is_nifti(std::span<const std::byte> head);
 /// Whether it is the header of a pair, whose samples lie in another file.
 bool is_nifti_pair(std::span<const std::byte> head);
 
+/// Whether it is ANALYZE 7.5, whose headers parse_nifti_header() refuses with this.
+bool is_analyze(std::span<const std::byte> head);
+inline constexpr const char* kAnalyzeRefusal =
+    "ANALYZE 7.5, which does not say where its samples are in space, is not supported; convert it "
+    "to NIfTI";
+
 /// Parses a header and selects one volume where there are several. `path` is for
 /// messages. Throws UsageError.
 NiftiHeader parse_nifti_header(const std::string& path, std::span<const std::byte> head,

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <filesystem>
 #include <utility>
+#include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/io/file_stream.h"
@@ -20,8 +21,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::unique_ptr<ByteStream> open_stream(const std::string& path, bool packed) {
-  auto stream = make_file_stream(open_input(path));
+/// `header` needs the file, which may be itself.
+std::unique_ptr<ByteStream> open_stream(const std::string& path, const std::string& header,
+                                        bool packed) {
+  auto stream = make_file_stream(open_data_file(path, header));
   return packed ? make_inflate_stream(std::move(stream), Wrapper::gzip) : std::move(stream);
 }
 
@@ -43,33 +46,54 @@ std::string path_beside(const fs::path& path, const char* lower, const char* upp
 /// Where the samples of a header's file lie.
 std::string image_path(const std::string& path) { return path_beside(path, ".img", ".IMG"); }
 
-bool is_packed(const std::string& path) { return open_input(path).text_at(0, 2) == "\x1f\x8b"; }
+bool is_packed(const std::string& path, const std::string& header) {
+  return open_data_file(path, header).text_at(0, 2) == "\x1f\x8b";
+}
 
-/// Whether a file has the header of a pair.
-bool is_header_of_pair(const std::string& path) {
-  std::array<std::byte, kNiftiHeaderBytes> head;
+/// What a header's file begins with, unpacked.
+std::vector<std::byte> read_head(const std::string& path) {
+  std::vector<std::byte> head(kNiftiHeaderBytes);
+  head.resize(open_stream(path, path, is_packed(path, path))->read(head.data(), head.size()));
+  return head;
+}
+
+/// The same, or nothing of what cannot be read.
+std::vector<std::byte> try_head(const std::string& path) {
   try {
-    const std::size_t got = open_stream(path, is_packed(path))->read(head.data(), head.size());
-    return is_nifti_pair({head.data(), got});
+    return read_head(path);
   } catch (const Error&) {
-    return false;
+    return {};
   }
+}
+
+bool has_image_name(const std::string& path) {
+  const std::string name = lower(path);
+  return name.ends_with(".img") || name.ends_with(".img.gz");
 }
 
 }  // namespace
 
 std::string nifti_header_beside(const std::string& path) {
-  const std::string name = lower(path);
-  if (!name.ends_with(".img") && !name.ends_with(".img.gz")) return {};
+  if (!has_image_name(path)) return {};
   const std::string header = path_beside(path, ".hdr", ".HDR");
-  return is_header_of_pair(header) ? header : std::string();
+  const std::vector<std::byte> head = try_head(header);
+  if (is_analyze(head))
+    throw UsageError(fmt::format("'{}' has the header '{}': {}", path, header, kAnalyzeRefusal));
+  return is_nifti_pair(head) ? header : std::string();
+}
+
+std::string nifti_pair_hint(const std::string& path) {
+  if (!has_image_name(path)) return {};
+  const std::string header = path_beside(path, ".hdr", ".HDR");
+  std::error_code ignored;
+  return fs::exists(header, ignored)
+             ? fmt::format("; '{}' beside it is not the header of a NIfTI pair", header)
+             : fmt::format("; the image of a NIfTI pair needs its header '{}' beside it", header);
 }
 
 std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& said) {
   refuse_raw_description(path, "a NIfTI file", said);
-  std::array<std::byte, kNiftiHeaderBytes> head;
-  const std::size_t got = open_stream(path, is_packed(path))->read(head.data(), head.size());
-  const NiftiHeader header = parse_nifti_header(path, {head.data(), got}, said.selection);
+  const NiftiHeader header = parse_nifti_header(path, read_head(path), said.selection);
   const std::string data_path = header.detached ? image_path(path) : path;
   const std::size_t sample = size_of(header.type);
   SampleLayout layout;
@@ -77,12 +101,13 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   layout.offset = header.offset + static_cast<std::uint64_t>(header.view.first) * sample;
   layout.swap = header.swap && sample > 1;
   layout.stride = header.view.stride;
+  if (header.detached) layout.header = path;
   const std::uint64_t end = header.offset + static_cast<std::uint64_t>(header.view.total) * sample;
-  if (is_packed(data_path))
-    return scale_source(
-        make_stream_source(std::move(layout), open_stream(data_path, true), end, AfterEnd::noted),
-        header.scale);
-  File file = open_input(data_path);
+  if (is_packed(data_path, path))
+    return scale_source(make_stream_source(std::move(layout), open_stream(data_path, path, true),
+                                           end, AfterEnd::noted),
+                        header.scale);
+  File file = open_data_file(data_path, path);
   check_header_promise(layout, file);
   if (const std::uint64_t size = file.size(); size > end)
     layout.notes.push_back(trailing_note(quoted(data_path), size - end));

@@ -93,8 +93,9 @@ std::unique_ptr<VolumeSource> make_raw_source(SampleLayout layout, File file) {
 void check_header_promise(const SampleLayout& layout, const File& file) {
   const std::uint64_t size = file.size();
   if (size < layout.end())
-    throw UsageError(fmt::format("'{}' has {} bytes, but its header promises samples up to {}",
-                                 file.path().string(), size, layout.end()));
+    throw UsageError(fmt::format("'{}' has {} bytes, but its header{} promises samples up to {}",
+                                 file.path().string(), size, layout.header_in_message(),
+                                 layout.end()));
 }
 
 }  // namespace isobrick

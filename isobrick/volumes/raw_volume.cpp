@@ -15,6 +15,7 @@
 #include "isobrick/io/inflate_stream.h"
 #include "isobrick/io/text_stream.h"
 #include "isobrick/volumes/meta_image_header.h"
+#include "isobrick/volumes/nifti_volume.h"
 #include "isobrick/volumes/nrrd_header.h"
 #include "isobrick/volumes/raw_name.h"
 #include "isobrick/volumes/raw_source.h"
@@ -159,7 +160,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
 
 /// The bytes of one data file, from where its samples begin.
 std::unique_ptr<ByteStream> open_bytes(const TextHeader& header, const std::string& path) {
-  File file = open_input(path);
+  File file = open_data_file(path, header.path);
   const std::uint64_t begin = after_lines(file, path, header.data_begin, header.skip_lines);
   const std::uint64_t end = file.size();
   const bool packed = header.encoding == Encoding::gzip || header.encoding == Encoding::zlib;
@@ -205,7 +206,8 @@ TextHeader parse_text_header(const std::string& path, bool nrrd, const Selection
 std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
                                                const VolumeRequest& said) {
   if (header.encoding == Encoding::raw && header.data_paths.size() == 1)
-    return open_described(header, said, DescribedBy::header, open_input(header.data_paths[0]));
+    return open_described(header, said, DescribedBy::header,
+                          open_data_file(header.data_paths[0], header.path));
   VolumeRequest rest = said;
   rest.order.reset();
   refuse_raw_description(header.path, "a header that describes its samples", rest);
@@ -226,6 +228,7 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
                              : header.encoding == Encoding::text ? AfterEnd::noted_as_numbers
                                                                  : AfterEnd::noted;
   return make_stream_source(std::move(layout), std::move(stream), end, after_end);
+  if (!header.attached()) layout.header = header.path;
 }
 
 namespace {
@@ -242,8 +245,10 @@ constexpr const char* kStdinName = "standard input";
              : "extent and type",
       is_file ? fmt::format("'{}'", path) : path, extent || type ? "is" : "are",
       extent ? "" : "--dims X,Y,Z", extent || type ? "" : " ", type ? "" : "--type TYPE",
-      is_file ? ", name the file like 'scan_256x256x128_uint8.raw', or give a .nhdr or .mhd header"
-              : ""));
+      !is_file
+          ? ""
+          : ", name the file like 'scan_256x256x128_uint8.raw', or give a .nhdr or .mhd header" +
+                nifti_pair_hint(path)));
 }
 
 /// Extent and type that are said, else those in the name.

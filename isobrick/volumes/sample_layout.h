@@ -24,7 +24,11 @@ struct SampleLayout {
   /// Samples from one to the next along x, y and z, each at least what the axes
   /// before it take up; nothing: dense, C order [z, y, x].
   std::optional<Int3> stride = {};
+  std::string header = {};              ///< path of their header, where it is a file of its own
   std::vector<std::string> notes = {};  ///< VolumeSource::notes() as far as they are known
+
+  /// " 'x.hdr'" where there is such a file.
+  std::string header_in_message() const { return header.empty() ? "" : " '" + header + "'"; }
 
   Int3 strides() const {
     return stride.value_or(Int3{1, info.extent.x, info.extent.x * info.extent.y});

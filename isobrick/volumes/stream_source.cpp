@@ -18,10 +18,10 @@ class StreamSource final : public VolumeSource {
                AfterEnd after_end)
       : layout_(std::move(layout)), stream_(std::move(stream)), end_(end), after_end_(after_end) {
     if (stream_->most_bytes() < layout_.end())
-      throw UsageError(
-          fmt::format("{} can hold at most {} bytes of samples, but its header "
-                      "promises {}",
-                      stream_->name(), stream_->most_bytes(), layout_.end()));
+      throw UsageError(fmt::format(
+          "{} can hold at most {} bytes of samples, but its header{} "
+          "promises {}",
+          stream_->name(), stream_->most_bytes(), layout_.header_in_message(), layout_.end()));
   }
 
   const VolumeInfo& info() const override { return layout_.info; }
@@ -48,8 +48,9 @@ class StreamSource final : public VolumeSource {
     const std::size_t got = stream_->read(out, size);
     position_ += got;
     if (got < size)
-      throw UsageError(fmt::format("{} ended after {} bytes, {} were expected", stream_->name(),
-                                   position_, end_));
+      throw UsageError(fmt::format("{} ended after {} bytes, {} were expected{}", stream_->name(),
+                                   position_, end_,
+                                   layout_.header.empty() ? "" : " by '" + layout_.header + "'"));
   }
 
   /// Where the last sample is (nearly) the last byte, the stream must end: that

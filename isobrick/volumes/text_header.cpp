@@ -41,6 +41,20 @@ void header_error(const std::string& path, const std::string& what) {
   throw UsageError(fmt::format("'{}': {}", path, what));
 }
 
+File open_data_file(const std::string& path, const std::string& header) {
+  if (path == header) return open_input(path);
+  const auto told = [&](const Error& error) {
+    return fmt::format("{}; the header '{}' needs it", error.what(), header);
+  };
+  try {
+    return open_input(path);
+  } catch (const UsageError& error) {
+    throw UsageError(told(error));
+  } catch (const Error& error) {
+    throw Error(told(error));
+  }
+}
+
 HeaderLines::HeaderLines(const std::string& path) : path_(path) {
   const File file = open_input(path);
   file_size_ = file.size();

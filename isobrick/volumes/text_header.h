@@ -9,6 +9,7 @@
 #include "isobrick/core/scalar.h"
 #include "isobrick/core/transform.h"
 #include "isobrick/core/vec.h"
+#include "isobrick/io/file.h"
 #include "isobrick/volumes/array_view.h"
 #include "isobrick/volumes/volume_request.h"
 
@@ -40,6 +41,9 @@ struct TextHeader {
 inline constexpr std::uint64_t kMostHeader = std::uint64_t{1} << 20;
 
 [[noreturn]] void header_error(const std::string& path, const std::string& what);
+
+/// Opens the file of samples that a header needs; where that fails, the message names both.
+File open_data_file(const std::string& path, const std::string& header);
 
 /// The lines at the beginning of a file; samples may follow them.
 class HeaderLines {

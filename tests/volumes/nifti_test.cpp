@@ -133,7 +133,16 @@ TEST_F(Nifti, HeaderAndImageApart) {
   std::string header = Header(1).text(344, {"ni1\0", 4}).put<float>(108, 0).bytes();
   header.resize(348);
   dir.write("v.hdr", header);
-  EXPECT_TRUE(contains(message_of<Error>([&] { open_source(dir / "v.hdr", {}); }), "v.img"));
+  const auto refused_of = [&](const char* name) {
+    return message_of<Error>([&] { open_source(dir / name, {}); });
+  };
+  const std::string missing = refused_of("v.hdr");
+  EXPECT_TRUE(contains(missing, "v.img': No such file")) << missing;
+  EXPECT_TRUE(contains(missing, "the header '" + (dir / "v.hdr") + "' needs it")) << missing;
+  dir.write("v.img", samples().substr(1));
+  for (const char* half : {"v.hdr", "v.img"})
+    EXPECT_TRUE(contains(refused_of(half), "its header '" + (dir / "v.hdr") + "' promises"));
+  std::filesystem::remove(dir / "v.img");
   dir.write("v.img", samples());
   EXPECT_EQ(read_box(*open_source(dir / "v.hdr", {}), kWhole), samples());
   dir.write("w.hdr.gz", gzip(header));
@@ -155,7 +164,17 @@ TEST_F(Nifti, ImagesOfNoPairAreRaw) {
   dir.write("other.img", samples());
   dir.write("other.hdr", "ENVI\n");
   EXPECT_EQ(read_box(*open_source(dir / "other.img", raw), kWhole), samples());
-  EXPECT_THROW(open_source(dir / "other.img", {}), UsageError);
+  const auto told = [&](const char* name) {
+    return message_of<UsageError>([&] { open_source(dir / name, {}); });
+  };
+  EXPECT_TRUE(contains(told("alone.img"), "needs its header '" + (dir / "alone.hdr")));
+  EXPECT_TRUE(contains(told("other.img"), "other.hdr' beside it is not the header of a NIfTI"));
+  dir.write("old.img", samples());
+  dir.write("old.hdr", Header(1).text(344, {"\0\0\0\0", 4}).bytes());
+  const std::string analyze = told("old.img");
+  EXPECT_TRUE(contains(analyze, "old.img' has the header '" + (dir / "old.hdr"))) << analyze;
+  EXPECT_TRUE(contains(analyze, "ANALYZE")) << analyze;
+  EXPECT_EQ(read_box(*open_source(dir / "old.img", raw), kWhole), samples());
 }
 
 TEST_F(Nifti, ScaledValuesAreF32) {
