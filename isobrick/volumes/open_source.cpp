@@ -15,13 +15,21 @@
 namespace isobrick {
 namespace {
 
+/// Its header says what the options of raw samples are for, but for a byte order that it may lack.
+std::unique_ptr<VolumeSource> open_with_text_header(VolumeFormat format, const std::string& file,
+                                                    const VolumeRequest& said) {
+  const bool nrrd = format == VolumeFormat::nrrd;
+  VolumeRequest rest = said;
+  rest.order.reset();
+  refuse_raw_description(file, nrrd ? "a NRRD file" : "a MetaImage", rest);
+  return open_text_volume(parse_text_header(file, nrrd, said.selection), said);
+}
+
 std::unique_ptr<VolumeSource> open_file(VolumeFormat format, const std::string& file,
                                         const VolumeRequest& said) {
   switch (format) {
     case VolumeFormat::nrrd:
-    case VolumeFormat::meta_image:
-      return open_text_volume(parse_text_header(file, format == VolumeFormat::nrrd, said.selection),
-                              said);
+    case VolumeFormat::meta_image: return open_with_text_header(format, file, said);
     case VolumeFormat::nifti: return open_nifti(file, said);
     case VolumeFormat::legacy_vtk: return open_legacy_vtk(file, said);
     case VolumeFormat::tiff: return open_tiff_if_built(file, {file}, said);

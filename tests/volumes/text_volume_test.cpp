@@ -265,6 +265,18 @@ TEST_F(TextVolume, WhatTheFileSaysItselfIsNotSaidAgain) {
   said.type = ScalarType::u16;
   EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nrrd", said); }), "--type"));
   said.type.reset();
+  const std::string head = nrrd("encoding: raw\nendian: little\n");
+  dir.write("v.raw", whole(ScalarType::i16) + "!!");
+  dir.write("apart.nhdr", head + "data file: v.raw\n");
+  dir.write("raw.nrrd", head + "\n" + whole(ScalarType::i16) + "!!");
+  dir.write("v.mhd",
+            "NDims = 3\nDimSize = 7 5 4\nElementType = MET_SHORT\nElementDataFile = v.raw\n");
+  said.offset = 2;
+  for (const char* name : {"v.nrrd", "apart.nhdr", "raw.nrrd", "v.mhd"})
+    EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(dir / name, said); }),
+                         "leave --offset out"))
+        << name;
+  said.offset.reset();
   said.spacing = Vec3d{1, 2, 3};
   EXPECT_EQ(open_source(dir / "v.nrrd", said)->info().transform.spacing, (Vec3d{1, 2, 3}));
 }
