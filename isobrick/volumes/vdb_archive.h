@@ -4,6 +4,8 @@
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/io.h>
 
+#include <cstdint>
+#include <functional>
 #include <istream>
 #include <string>
 #include <string_view>
@@ -16,6 +18,12 @@
 
 namespace isobrick {
 
+/// A grid that is in memory, its leaves' values included.
+struct VdbLoadedGrid {
+  VdbGrid description;  ///< without its place and, so far, without its name
+  openvdb::GridBase::Ptr grid;
+};
+
 /// An OpenVDB file whose grids are read step by step. OpenVDB's own File neither notices
 /// that a file ends early nor can be told to; the stream here throws. OpenVDB's delayed
 /// loading is not used.
@@ -27,17 +35,31 @@ class VdbArchive final : private openvdb::io::Archive {
   /// begins: for a grid that shares another one's, at that one's.
   openvdb::GridBase::Ptr read_grid(const std::vector<VdbGrid>& grids, const VdbGrid& chosen);
 
+  /// Reads all grids one after the other, with OpenVDB's own functions and whatever the file says
+  /// of their places. Calls about_to_read(grid, bytes) before each takes so many bytes.
+  std::vector<VdbLoadedGrid> load_grids(
+      const std::function<void(const VdbGrid&, std::uint64_t)>& about_to_read);
+
   /// Throws std::ios_base::failure where the file ends.
   std::istream& stream() { return in_; }
 
  private:
   openvdb::GridBase::Ptr read_description(const VdbGrid& grid);
+  std::uint64_t bytes_of_next(const openvdb::GridBase& grid);
+  void read_header();
 
   std::string path_;
+  std::uint32_t version_ = 0;  ///< as the file says it
   VdbFileBuffer buffer_;
   openvdb::io::StreamMetadata::Ptr metadata_;  // the stream refers to this very pointer
   std::istream in_;
 };
+
+/// VdbArchive::load_grids() of a file whose layout we do not know. Throws Error where OpenVDB
+/// does not know it either.
+std::vector<VdbLoadedGrid> load_vdb_grids(
+    const std::string& path,
+    const std::function<void(const VdbGrid&, std::uint64_t)>& about_to_read);
 
 /// The Error for what went wrong with OpenVDB while a grid was read; call it in a handler.
 /// An Error of our own passes.

@@ -19,7 +19,6 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "OpenVDB's files are little endian");
 
 constexpr std::string_view kMagic{" BDV\0\0\0\0", 8};
-constexpr std::uint32_t kOldest = 222, kNewest = 225;
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
 /// Between a name and the number of its repetition.
 constexpr char kSeparator = '\x1e';
@@ -111,11 +110,9 @@ void read_own_header(Fields& in, VdbGrid& grid) {
   in.seek(grid.begin);
   in.number<std::uint32_t>();  // how it is compressed
   const Metadata metadata = in.metadata();
-  grid.own_name = printable(text_of(metadata, "name"), kMostKept);
-  grid.unit = unit_name(text_of(metadata, "unit"));
-  grid.grid_class = shown(text_of(metadata, "class"));
   grid.transform = in.at();
-  grid.map = shown(in.text());
+  describe_vdb_texts(grid, text_of(metadata, "name"), text_of(metadata, "unit"),
+                     text_of(metadata, "class"), in.text());
   in.seek(next);
 }
 
@@ -136,21 +133,13 @@ VdbGrid read_grid(Fields& in) {
   return grid;
 }
 
-void check_version(Fields& in, const std::string& path) {
+VdbLayout read_layout(Fields& in) {
   if (in.bytes(kMagic.size()) != kMagic) in.damaged("not what such files begin with");
-  const auto version = in.number<std::uint32_t>();
-  if (version < kOldest || version > kNewest)
-    throw Error(
-        fmt::format("'{}' is an OpenVDB file of version {}; {} to {} can be read: let "
-                    "OpenVDB's own programs write it anew",
-                    path, version, kOldest, kNewest));
+  VdbLayout layout;
+  layout.version = in.number<std::uint32_t>();
   in.bytes(2 * sizeof(std::uint32_t));  // the library's own version
-  if (in.number<char>() == 0)
-    throw Error(
-        fmt::format("'{}' is an OpenVDB stream that does not say where its grids are: "
-                    "let OpenVDB write it to a file",
-                    path));
-  in.bytes(kUuidBytes);
+  layout.has_offsets = in.number<char>() != 0;
+  return layout;
 }
 
 std::string list(const std::vector<VdbGrid>& grids) {
@@ -169,21 +158,47 @@ std::string VdbGrid::value_type() const {
   return rest.substr(0, rest.find('_'));
 }
 
+VdbLayout read_vdb_layout(const std::string& path) {
+  Fields in(path);
+  return read_layout(in);
+}
+
 std::vector<VdbGrid> read_vdb_header(const std::string& path) {
   Fields in(path);
-  check_version(in, path);
+  if (!read_layout(in).known()) return {};
+  in.bytes(kUuidBytes);
   in.metadata();
   const auto count = in.number<std::uint32_t>();
   if (count > kMostItems) in.damaged(fmt::format("{} grids", count));
   std::vector<VdbGrid> grids;
+  for (std::uint32_t i = 0; i < count; ++i) grids.push_back(read_grid(in));
+  name_vdb_grids(grids);
+  return grids;
+}
+
+void name_vdb_grids(std::vector<VdbGrid>& grids) {
   std::map<std::string, int> times;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    grids.push_back(read_grid(in));
-    ++times[shown_name(grids.back().unique_name, false)];
-  }
+  for (const VdbGrid& grid : grids) ++times[shown_name(grid.unique_name, false)];
   for (VdbGrid& grid : grids)
     grid.name = shown_name(grid.unique_name, times[shown_name(grid.unique_name, false)] > 1);
-  return grids;
+}
+
+void describe_vdb_texts(VdbGrid& grid, const std::string& name, const std::string& unit,
+                        const std::string& grid_class, const std::string& map) {
+  grid.own_name = printable(name, kMostKept);
+  grid.unit = unit_name(unit);
+  grid.grid_class = shown(grid_class);
+  grid.map = shown(map);
+}
+
+void check_vdb_memory(const std::string& path, const VdbGrid& grid, std::uint64_t needed,
+                      const std::optional<std::uint64_t>& room) {
+  constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+  if (room && needed > *room)
+    throw UsageError(fmt::format(
+        "'{}': grid '{}' takes {} MiB in memory, more than the budget of {} MiB leaves: say "
+        "--memory {}M",
+        path, grid.name, needed / kMiB + 1, *room / kMiB, needed / kMiB * 5 / 4 + 256));
 }
 
 bool is_readable(const VdbGrid& grid) {

@@ -26,10 +26,35 @@ struct VdbGrid {
   std::string value_type() const;
 };
 
-/// The grids of an OpenVDB file, in its order. Every length and position is
-/// checked against the file's size. Throws Error for what is damaged, for files
-/// older than OpenVDB 1.0, and for streams, which do not say where grids are.
+/// The oldest and the newest version of files that are read here: OpenVDB 1.0's and 13's.
+inline constexpr std::uint32_t kVdbOldest = 222, kVdbNewest = 225;
+
+/// How an OpenVDB file is laid out.
+struct VdbLayout {
+  std::uint32_t version = 0;
+  bool has_offsets = false;  ///< it says where its grids are; streams do not
+
+  /// Whether read_vdb_header() knows it. All else is left to OpenVDB's own reader.
+  bool known() const { return version >= kVdbOldest && version <= kVdbNewest && has_offsets; }
+};
+
+/// Throws Error for what is no OpenVDB file.
+VdbLayout read_vdb_layout(const std::string& path);
+
+/// The grids of an OpenVDB file, in its order; none of a file whose layout is not known. Every
+/// length and position is checked against the file's size. Throws Error for what is damaged.
 std::vector<VdbGrid> read_vdb_header(const std::string& path);
+
+/// Gives grids the names by which users know them, from their unique names.
+void name_vdb_grids(std::vector<VdbGrid>& grids);
+
+/// As much as is shown and kept of the texts by which a file describes a grid.
+void describe_vdb_texts(VdbGrid& grid, const std::string& name, const std::string& unit,
+                        const std::string& grid_class, const std::string& map);
+
+/// Throws UsageError when a grid takes more bytes than `room`.
+void check_vdb_memory(const std::string& path, const VdbGrid& grid, std::uint64_t needed,
+                      const std::optional<std::uint64_t>& room);
 
 /// Whether it is of a type and a shape that volumes are made of.
 bool is_readable(const VdbGrid& grid);

@@ -21,8 +21,6 @@
 namespace isobrick {
 namespace {
 
-constexpr std::size_t kMiB = std::size_t{1} << 20;
-
 /// `Leaves` knows the values of the tree's leaves: VdbLeaves or VdbLoadedLeaves.
 template <class Tree, class Leaves, class Out>
 class VdbSource final : public VolumeSource {
@@ -134,21 +132,11 @@ ScalarType type_of_int64(const std::string& path, const VdbGrid& grid,
                   path, grid.name, lo, hi));
 }
 
-void check_memory(const std::string& path, const VdbGrid& grid, std::uint64_t needed,
-                  const std::optional<std::uint64_t>& room) {
-  if (room && needed > *room)
-    throw UsageError(fmt::format(
-        "'{}': grid '{}' takes {} MiB in memory, more than the budget of {} MiB leaves: say "
-        "--memory {}M",
-        path, grid.name, needed / kMiB + 1, *room / kMiB, needed / kMiB * 5 / 4 + 256));
-}
-
 /// A grid that is being opened.
 struct Opening {
   const std::string& path;
   const VolumeRequest& said;
   const VdbGrid& grid;
-  VdbArchive& archive;
   openvdb::GridBase::Ptr read;  ///< without its tree, at first
 };
 
@@ -167,30 +155,23 @@ std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::Cons
       std::move(info), in.grid.name, std::move(tree), std::move(leaves), memory, box.lo);
 }
 
-/// A grid of numbers, the values of whose leaves stay in the file.
-template <class Grid>
-std::unique_ptr<VolumeSource> open_numbers(const Opening& in) {
-  using Tree = typename Grid::TreeType;
-  using Leaves = VdbLeaves<Tree>;
-  const auto grid = openvdb::gridPtrCast<Grid>(in.read);
-  if (!grid) return nullptr;
-  const bool as_half = grid->saveFloatAsHalf();
-  std::istream& stream = in.archive.stream();
-  const VdbNodeCounts nodes = count_vdb_nodes<Tree>(stream, as_half);
-  const std::size_t memory = nodes.bytes + Leaves::memory(nodes.leaves);
-  check_memory(in.path, in.grid, memory, in.said.memory);
-  grid->readTopology(stream);
-  const auto leaves = std::make_shared<const Leaves>(in.path, stream, grid->tree(), as_half);
+/// The same with samples of the type that holds the tree's values.
+template <class Tree, class Leaves>
+std::unique_ptr<VolumeSource> make_source_of_values(const Opening& in, typename Tree::ConstPtr tree,
+                                                    std::shared_ptr<const Leaves> leaves,
+                                                    std::size_t memory) {
   const auto as = [&]<class Out>(Out) {
-    return make_source<Out, Tree, Leaves>(in, grid->constTreePtr(), leaves, memory);
+    return make_source<Out, Tree, Leaves>(in, tree, leaves, memory);
   };
   using Value = typename Tree::ValueType;
-  if constexpr (std::is_same_v<Value, openvdb::math::half>) {
+  if constexpr (std::is_same_v<Value, bool>) {
+    return as(std::uint8_t{});
+  } else if constexpr (std::is_same_v<Value, openvdb::math::half>) {
     return as(float{});
   } else if constexpr (!std::is_same_v<Value, std::int64_t>) {
     return as(Value{});
   } else {
-    const auto range = value_range(grid->constTree(), typename Leaves::Reader(*leaves));
+    const auto range = value_range(*tree, typename Leaves::Reader(*leaves));
     switch (type_of_int64(in.path, in.grid, range)) {
       case ScalarType::i32: return as(std::int32_t{});
       case ScalarType::u32: return as(std::uint32_t{});
@@ -199,20 +180,58 @@ std::unique_ptr<VolumeSource> open_numbers(const Opening& in) {
   }
 }
 
-/// A grid of bits, which is held whole.
+/// A grid of numbers, the values of whose leaves stay in the file, or of bits, which is held
+/// whole. `stream` is where its tree begins.
 template <class Grid>
-std::unique_ptr<VolumeSource> open_bits(const Opening& in) {
+std::unique_ptr<VolumeSource> open_tree(const Opening& in, std::istream& stream) {
+  using Tree = typename Grid::TreeType;
+  const auto grid = openvdb::gridPtrCast<Grid>(in.read);
+  if (!grid) return nullptr;
+  const bool as_half = grid->saveFloatAsHalf();
+  const VdbNodeCounts nodes = count_vdb_nodes<Tree>(stream, as_half);
+  if constexpr (std::is_same_v<typename Tree::ValueType, bool>) {
+    using Leaves = VdbLoadedLeaves<Tree>;
+    check_vdb_memory(in.path, in.grid, nodes.bytes, in.said.memory);
+    grid->readTopology(stream);
+    grid->readBuffers(stream);
+    return make_source_of_values<Tree, Leaves>(in, grid->constTreePtr(),
+                                               std::make_shared<const Leaves>(), nodes.bytes);
+  } else {
+    using Leaves = VdbLeaves<Tree>;
+    const std::size_t memory = nodes.bytes + Leaves::memory(nodes.leaves);
+    check_vdb_memory(in.path, in.grid, memory, in.said.memory);
+    grid->readTopology(stream);
+    const auto leaves = std::make_shared<const Leaves>(in.path, stream, grid->tree(), as_half);
+    return make_source_of_values<Tree, Leaves>(in, grid->constTreePtr(), leaves, memory);
+  }
+}
+
+/// A grid that is in memory as a whole and takes `memory` bytes.
+template <class Grid>
+std::unique_ptr<VolumeSource> open_loaded_tree(const Opening& in, std::size_t memory) {
   using Tree = typename Grid::TreeType;
   using Leaves = VdbLoadedLeaves<Tree>;
   const auto grid = openvdb::gridPtrCast<Grid>(in.read);
   if (!grid) return nullptr;
-  std::istream& stream = in.archive.stream();
-  const std::size_t memory = count_vdb_nodes<Tree>(stream, false).bytes;
-  check_memory(in.path, in.grid, memory, in.said.memory);
-  grid->readTopology(stream);
-  grid->readBuffers(stream);
-  return make_source<std::uint8_t, Tree, Leaves>(in, grid->constTreePtr(),
-                                                 std::make_shared<const Leaves>(), memory);
+  return make_source_of_values<Tree, Leaves>(in, grid->constTreePtr(),
+                                             std::make_shared<const Leaves>(), memory);
+}
+
+/// Calls open(grid type) for each type that volumes are made of until one gives a source.
+template <class Open>
+std::unique_ptr<VolumeSource> open_by_type(const std::string& path, const VdbGrid& grid,
+                                           const Open& open) {
+  std::unique_ptr<VolumeSource> source;
+  const auto attempt = [&]<class... Grids>(std::type_identity<Grids>... types) {
+    ((source ? void() : void(source = open(types))), ...);
+  };
+  attempt(std::type_identity<openvdb::FloatGrid>{}, std::type_identity<VdbHalfGrid>{},
+          std::type_identity<openvdb::DoubleGrid>{}, std::type_identity<openvdb::Int32Grid>{},
+          std::type_identity<openvdb::Int64Grid>{}, std::type_identity<openvdb::BoolGrid>{},
+          std::type_identity<openvdb::MaskGrid>{});
+  if (!source)
+    throw Error(fmt::format("'{}': grid '{}' is not of the type it says", path, grid.name));
+  return source;
 }
 
 void check_transform(const std::string& path, const VdbGrid& grid) {
@@ -223,27 +242,42 @@ void check_transform(const std::string& path, const VdbGrid& grid) {
         path, grid.name, grid.map));
 }
 
+/// A file of a layout that only OpenVDB's own reader may know: it holds the grids whole.
+std::unique_ptr<VolumeSource> open_loaded(const std::string& file, const VolumeRequest& said) {
+  std::uint64_t memory = 0;
+  const std::vector<VdbLoadedGrid> loaded =
+      load_vdb_grids(file, [&](const VdbGrid& grid, std::uint64_t bytes) {
+        memory += bytes;
+        check_vdb_memory(file, grid, memory, said.memory);
+      });
+  std::vector<VdbGrid> grids;
+  for (const VdbLoadedGrid& one : loaded) grids.push_back(one.description);
+  name_vdb_grids(grids);
+  const VdbGrid& grid = choose_vdb_grid(file, grids, said.grid);
+  check_transform(file, grid);
+  const Opening in{file, said, grid, loaded[static_cast<std::size_t>(&grid - grids.data())].grid};
+  return with_vdb_errors(file, grid.name, [&] {
+    return open_by_type(file, grid, [&]<class Grid>(std::type_identity<Grid>) {
+      return open_loaded_tree<Grid>(in, memory);
+    });
+  });
+}
+
 }  // namespace
 
 std::unique_ptr<VolumeSource> open_vdb(const std::string& file, const VolumeRequest& said) {
   refuse_raw_description(file, "an OpenVDB file", said);
   refuse_selection(file, said);
+  if (!read_vdb_layout(file).known()) return open_loaded(file, said);
   const std::vector<VdbGrid> grids = read_vdb_header(file);
   const VdbGrid& grid = choose_vdb_grid(file, grids, said.grid);
   check_transform(file, grid);
   return with_vdb_errors(file, grid.name, [&] {
     VdbArchive archive(file);
-    const Opening in{file, said, grid, archive, archive.read_grid(grids, grid)};
-    std::unique_ptr<VolumeSource> source = open_numbers<openvdb::FloatGrid>(in);
-    if (!source) source = open_numbers<VdbHalfGrid>(in);
-    if (!source) source = open_numbers<openvdb::DoubleGrid>(in);
-    if (!source) source = open_numbers<openvdb::Int32Grid>(in);
-    if (!source) source = open_numbers<openvdb::Int64Grid>(in);
-    if (!source) source = open_bits<openvdb::BoolGrid>(in);
-    if (!source) source = open_bits<openvdb::MaskGrid>(in);
-    if (!source)
-      throw Error(fmt::format("'{}': grid '{}' is not of the type it says", file, grid.name));
-    return source;
+    const Opening in{file, said, grid, archive.read_grid(grids, grid)};
+    return open_by_type(file, grid, [&]<class Grid>(std::type_identity<Grid>) {
+      return open_tree<Grid>(in, archive.stream());
+    });
   });
 }
 
