@@ -101,13 +101,10 @@ struct Piece {
 void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, Workers& workers,
                 OutputFile& output, Progress& progress) {
   const Lattice& lattice = in.lattice();
-  VolumeInfo grid_info = info;
-  grid_info.fill_value = in.store.info().fill_value;
-  grid_info.grid_class = in.store.info().grid_class;
-  const std::string& name = in.store.info().grid_name;
+  const std::string& name = info.grid_name;
   const std::uint64_t others =
       fixed_bytes(in.store.info(), in.level, workers.threads()) + lattice.brick_bytes();
-  const auto grid = make_vdb_writer_if_built(grid_info, name.empty() ? "density" : name,
+  const auto grid = make_vdb_writer_if_built(info, name.empty() ? "density" : name,
                                              memory - std::min(memory, others));
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
   progress.begin("export", static_cast<std::uint64_t>(volume(lattice.bricks_of(in.box).extent())) *
@@ -215,13 +212,16 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
         "name a file, or say --format nrrd");
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
-  const VolumeInfo info = describe(level, box, out.string());
+  VolumeInfo info = describe(level, box, out.string());
   check_replaces_no_input(out, {&store.info().path, 1});
   OutputFile output(out.string(), options.force);
   if (options.isovalue) {
     export_level_set(store, box, info, options, output, progress);
     return output.publish();
   }
+  info.fill_value = store.info().fill_value;
+  info.grid_class = store.info().grid_class;
+  info.grid_name = store.info().grid_name;
   Workers workers(options.threads);
   const Piece samples{store, options.level, box};
   const Int3 piece = piece_within(level.lattice, box.extent(), options.memory,

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <span>
 
@@ -37,6 +39,16 @@ std::optional<ScalarType> parse_type(const std::string& name) {
   return std::nullopt;
 }
 
+/// Whether a sample can have this value; a float may round it.
+bool holds(ScalarType type, double value) {
+  return visit_scalar(type, [&](auto tag) {
+    using Limits = std::numeric_limits<typename decltype(tag)::type>;
+    return !Limits::is_integer ||
+           (value == std::trunc(value) && value >= static_cast<double>(Limits::min()) &&
+            value <= static_cast<double>(Limits::max()));
+  });
+}
+
 /// The fields by name, names in lower case without blanks ("data file" and
 /// "datafile" are one).
 class Fields {
@@ -63,6 +75,12 @@ class Fields {
     return at == fields_.end() ? std::nullopt : std::optional(at->second);
   }
 
+  /// The value of a key/value pair ("key:=value"); empty where it is not there.
+  std::string pair(const std::string& key) const {
+    const auto at = pairs_.find(key);
+    return at == pairs_.end() ? std::string() : unescaped(at->second);
+  }
+
   std::string_view need(const std::string& name) const {
     const auto value = find(name);
     if (!value) header_error(path_, fmt::format("the field '{}' is missing", name));
@@ -76,7 +94,10 @@ class Fields {
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos)
       header_error(path_, "a line is neither a field nor a comment");
-    if (line.substr(colon).starts_with(":=")) return;  // key/value pair
+    if (line.substr(colon).starts_with(":=")) {
+      pairs_[std::string(line.substr(0, colon))] = line.substr(colon + 2);
+      return;
+    }
     std::string name = lower(line.substr(0, colon));
     std::erase(name, ' ');
     const std::string_view value = trim(line.substr(colon + 1));
@@ -90,9 +111,19 @@ class Fields {
       if (const std::string_view name = trim(lines_.next()); !name.empty()) list_.push_back(name);
   }
 
+  /// A value may have line ends and backslashes as \n and \\.
+  static std::string unescaped(std::string_view value) {
+    std::string text;
+    for (std::size_t i = 0; i < value.size(); ++i) {
+      const bool escape = value[i] == '\\' && i + 1 < value.size();
+      text += !escape ? value[i] : value[++i] == 'n' ? '\n' : value[i];
+    }
+    return text;
+  }
+
   std::string path_;
   HeaderLines lines_;
-  std::map<std::string, std::string_view> fields_;
+  std::map<std::string, std::string_view> fields_, pairs_;
   std::vector<std::string_view> list_;
   bool listed_ = false;
 };
@@ -308,6 +339,21 @@ std::string read_unit(const Fields& fields, const std::string& name, std::size_t
   return entries[kept[1]] == first && entries[kept[2]] == first ? unit_name(first) : std::string();
 }
 
+/// What export keeps of a grid in key/value pairs.
+void read_grid(const Fields& fields, TextHeader& header) {
+  constexpr std::size_t kMostClass = 100, kMostName = 1000;
+  header.grid_class = printable(fields.pair(kNrrdGridClass), kMostClass);
+  header.grid_name = printable(fields.pair(kNrrdGridName), kMostName);
+  const std::string fill = fields.pair(kNrrdFillValue);
+  if (fill.empty()) return;
+  double value = 0;
+  const auto [end, error] = std::from_chars(fill.data(), fill.data() + fill.size(), value);
+  if (error != std::errc{} || end != fill.data() + fill.size() || !holds(header.type, value))
+    header_error(fields.path(), fmt::format("'{}': '{}' is no {}", kNrrdFillValue,
+                                            printable(fill, 60), short_name(header.type)));
+  header.fill_value = value;
+}
+
 }  // namespace
 
 TextHeader parse_nrrd_header(const std::string& path, const Selection& selection) {
@@ -322,6 +368,7 @@ TextHeader parse_nrrd_header(const std::string& path, const Selection& selection
   header.transform.unit = read_unit(fields, "spaceunits", 3, {0, 1, 2});
   if (header.transform.unit.empty())
     header.transform.unit = read_unit(fields, "units", dimension, header.view.kept);
+  read_grid(fields, header);
   return header;
 }
 

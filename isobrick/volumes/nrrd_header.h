@@ -6,6 +6,11 @@
 
 namespace isobrick {
 
+/// Keys by which nrrd_header_text() keeps what a NRRD has no fields for.
+inline constexpr const char* kNrrdGridClass = "isobrick grid class";
+inline constexpr const char* kNrrdGridName = "isobrick grid name";
+inline constexpr const char* kNrrdFillValue = "isobrick fill value";
+
 /// Parses a NRRD header (NRRD0001 … NRRD0005), attached to its samples or not,
 /// and selects one volume where there are several. Comments and key/value pairs
 /// are skipped.

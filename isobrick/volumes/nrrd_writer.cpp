@@ -3,11 +3,23 @@
 #include <fmt/format.h>
 
 #include "isobrick/core/length_unit.h"
+#include "isobrick/core/printable.h"
+#include "isobrick/volumes/nrrd_header.h"
 
 namespace isobrick {
 namespace {
 
 std::string vector_text(Vec3d v) { return fmt::format("({},{},{})", v.x, v.y, v.z); }
+
+/// A key/value pair, of which readers of NRRD keep what they do not know.
+std::string pair_text(const char* key, const std::string& value) {
+  std::string escaped;
+  for (const char c : value) {
+    if (c == '\\') escaped += '\\';
+    escaped += c;
+  }
+  return fmt::format("{}:={}\n", key, escaped);
+}
 
 }  // namespace
 
@@ -24,6 +36,12 @@ std::string nrrd_header_text(const VolumeInfo& info, const std::string& data_fil
   if (!t.unit.empty())
     text += fmt::format("space units: \"{0}\" \"{0}\" \"{0}\"\n", ascii_unit_symbol(t.unit));
   text += "endian: little\nencoding: raw\n";
+  if (!info.grid_class.empty())
+    text += pair_text(kNrrdGridClass, printable(info.grid_class, info.grid_class.size()));
+  if (!info.grid_name.empty())
+    text += pair_text(kNrrdGridName, printable(info.grid_name, info.grid_name.size()));
+  if (!info.grid_class.empty() || info.fill_value != 0)
+    text += pair_text(kNrrdFillValue, fmt::format("{}", info.fill_value));
   return text + (data_file.empty() ? "\n" : fmt::format("data file: {}\n", data_file));
 }
 

@@ -125,6 +125,13 @@ void check_size(const TextHeader& header, DescribedBy by, const VolumeInfo& info
                                size_hint(by, types, samples, size)));
 }
 
+/// What a header says of the grid that its samples were.
+void take_grid(const TextHeader& header, VolumeInfo& info) {
+  info.grid_class = header.grid_class;
+  info.grid_name = header.grid_name;
+  if (header.fill_value && info.type == header.type) info.fill_value = *header.fill_value;
+}
+
 /// Opens samples that lie as they are in one file: what is said goes before what
 /// the header says.
 std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const VolumeRequest& said,
@@ -135,6 +142,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
   SampleLayout layout;
   layout.info =
       describe_volume(path, said.extent.value_or(header.view.extent), type, header.transform, said);
+  take_grid(header, layout.info);
   layout.swap = must_swap(order_of(header, type, said), type);
   const auto total =
       static_cast<std::uint64_t>(said.extent ? volume(*said.extent) : header.view.total) *
@@ -216,9 +224,11 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   SampleLayout layout;
   layout.info =
       describe_volume(header.path, header.view.extent, header.type, header.transform, said);
+  take_grid(header, layout.info);
   const std::size_t sample = size_of(header.type);
   layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
   layout.stride = header.view.stride;
+  if (!header.attached()) layout.header = header.path;
   const std::uint64_t end = static_cast<std::uint64_t>(header.view.total) * sample;
   auto stream = open_all_data(header);
   if (header.encoding != Encoding::text)
@@ -228,7 +238,6 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
                              : header.encoding == Encoding::text ? AfterEnd::noted_as_numbers
                                                                  : AfterEnd::noted;
   return make_stream_source(std::move(layout), std::move(stream), end, after_end);
-  if (!header.attached()) layout.header = header.path;
 }
 
 namespace {

@@ -31,6 +31,8 @@ struct TextHeader {
   ScalarType type = ScalarType::u8;
   std::optional<ByteOrder> order;
   Transform transform;
+  std::string grid_class, grid_name;  ///< as VolumeInfo has them
+  std::optional<double> fill_value;
 
   bool attached() const { return data_paths.front() == path; }
 };
