@@ -319,8 +319,9 @@ void add_preview_options(CLI::App* app, Arguments& arguments) {
              picture.width = size.width;
              picture.height = size.height;
            });
-  add_parsed(app, picture.towards_eye, parse_vector,
-             {"--preview-eye", "X,Y,Z", "From the volume's centre towards the eye", "0.55,-1,0.5"});
+  add_parsed(
+      app, picture.towards_eye, parse_vector,
+      {"--preview-eye", "X,Y,Z", "From the surface's centre towards the eye", "0.55,-1,0.5"});
   add_parsed(app, picture.up, parse_vector,
              {"--preview-up", "X,Y,Z", "What is up in the picture", "0,0,1"});
 }

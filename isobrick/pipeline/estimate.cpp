@@ -33,16 +33,22 @@ Box3 block_box(Int3 tile, int i) {
   return {corner, corner + Int3{kBlockEdge, kBlockEdge, kBlockEdge}};
 }
 
-/// Cells between `samples` in the active blocks of a tile.
-std::uint64_t active_cells(const TileWork& work, Box3 samples) {
-  std::uint64_t cells = 0;
+/// The smallest box that has both.
+Box3 unite(Box3 a, Box3 b) {
+  if (a.empty() || b.empty()) return a.empty() ? b : a;
+  return {min(a.lo, b.lo), max(a.hi, b.hi)};
+}
+
+/// Adds the cells between `samples` in the active blocks of a tile.
+void add_cells(const TileWork& work, Box3 samples, ActiveParts& parts) {
   for (int i = 0; i < 8; ++i)
     if (work.active_blocks >> i & 1) {
       const Box3 box = intersect(block_box(work.tile, i),
                                  {samples.lo, max(samples.hi - Int3{1, 1, 1}, samples.lo)});
-      if (!box.empty()) cells += static_cast<std::uint64_t>(volume(box.extent()));
+      if (box.empty()) continue;
+      parts.active_cells += static_cast<std::uint64_t>(volume(box.extent()));
+      parts.bounds = unite(parts.bounds, box);
     }
-  return cells;
 }
 
 /// Adds a tile's active cells and blocks; calls brick(number) for the brick of each.
@@ -50,7 +56,7 @@ template <class F>
 void count_tile(const ExtractRequest& request, const TileWork& work, ActiveParts& parts,
                 F&& brick) {
   const Lattice& lattice = request.level->lattice;
-  parts.active_cells += active_cells(work, request.surface.roi);
+  add_cells(work, request.surface.roi, parts);
   for (int i = 0; i < 8; ++i) {
     if (!(work.active_blocks >> i & 1)) continue;
     ++parts.active_blocks;
@@ -125,6 +131,7 @@ ActiveParts count_in_ranges(const StoreReader& store, const ExtractRequest& requ
       const std::lock_guard lock(adding);
       parts.active_blocks += own.active_blocks;
       parts.active_cells += own.active_cells;
+      parts.bounds = unite(parts.bounds, own.bounds);
       for (const std::size_t brick : own_bricks) bricks.add(brick);
     });
   });
@@ -170,7 +177,9 @@ Sampled look_at(const TileWork& work, const ExtractRequest& request, const Brick
   const Box3 own = own_bricks(lattice, work.tile);
   const Int3 corner = work.tile * kTileEdge;
   const Box3 samples = intersect({corner, own.hi * lattice.brick}, request.surface.roi);
-  const std::uint64_t cells = active_cells(work, samples);
+  ActiveParts parts;
+  add_cells(work, samples, parts);
+  const std::uint64_t cells = parts.active_cells;
   if (cells == 0) return {};
   SurfaceOptions surface = request.surface;
   surface.normals = false;

@@ -12,6 +12,7 @@ struct ActiveParts {
   std::uint64_t active_bricks = 0;  ///< with a block that is stabbed
   std::uint64_t active_blocks = 0;
   std::uint64_t active_cells = 0;  ///< cells of those blocks, in the region
+  Box3 bounds;                     ///< of these cells
 };
 
 /// Throws as extract() does for options that make no sense.

@@ -33,20 +33,29 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// World-space corners of a level's sample box.
-MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface) {
-  MeshHeader header;
-  header.has_normals = surface.normals;
+/// World-space bounds of the samples from `first` to `last`.
+MeshBounds world_bounds(const Transform& transform, Int3 first, Int3 last) {
+  MeshBounds bounds;
   for (int corner = 0; corner < 8; ++corner) {
-    const Int3 last = level.lattice.extent - Int3{1, 1, 1};
-    const Vec3d p = level.transform.apply({corner & 1 ? static_cast<double>(last.x) : 0.0,
-                                           corner & 2 ? static_cast<double>(last.y) : 0.0,
-                                           corner & 4 ? static_cast<double>(last.z) : 0.0});
+    const Vec3d p = transform.apply({static_cast<double>(corner & 1 ? last.x : first.x),
+                                     static_cast<double>(corner & 2 ? last.y : first.y),
+                                     static_cast<double>(corner & 4 ? last.z : first.z)});
     for (int axis = 0; axis < 3; ++axis) {
-      header.world_lo[axis] = corner ? std::fmin(header.world_lo[axis], p[axis]) : p[axis];
-      header.world_hi[axis] = corner ? std::fmax(header.world_hi[axis], p[axis]) : p[axis];
+      bounds.lo[axis] = corner ? std::fmin(bounds.lo[axis], p[axis]) : p[axis];
+      bounds.hi[axis] = corner ? std::fmax(bounds.hi[axis], p[axis]) : p[axis];
     }
   }
+  return bounds;
+}
+
+MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface,
+                     const ActiveParts& active) {
+  const MeshBounds all =
+      world_bounds(level.transform, {0, 0, 0}, level.lattice.extent - Int3{1, 1, 1});
+  MeshHeader header{surface.normals, all.lo, all.hi};
+  // The last cells end at the samples behind them.
+  if (!active.bounds.empty())
+    header.surface = world_bounds(level.transform, active.bounds.lo, active.bounds.hi);
   return header;
 }
 
@@ -250,7 +259,7 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
     report.active_bricks = active.active_bricks;
     report.gpu_refusal = backend.gpu_refusal;
 
-    sink.begin(header_of(*request.level, request.surface));
+    sink.begin(header_of(*request.level, request.surface, active));
     progress.begin("extracting", active.active_bricks * lattice.brick_bytes());
     const double bytes_per_block = static_cast<double>(active.active_bricks) *
                                    static_cast<double>(lattice.brick_bytes()) /

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "isobrick/core/error.h"
 #include "isobrick/io/png_file.h"
 #include "isobrick/render/camera_request.h"
@@ -54,13 +56,30 @@ std::uint64_t PreviewSink::memory(const PreviewOptions& options) {
 }
 
 void PreviewSink::begin(const MeshHeader& header) {
+  largest_ = header.surface.value_or(MeshBounds{header.world_lo, header.world_hi});
+  origin_ = (largest_.lo + largest_.hi) * 0.5;
+}
+
+void PreviewSink::begin_picture(const MeshBounds& frame) {
   const Current current(context_);
   renderer_.emplace();
   const CameraRequest request{.up = options_.up, .from = options_.towards_eye};
   const double aspect = static_cast<double>(options_.width) / options_.height;
-  origin_ = (header.world_lo + header.world_hi) * 0.5;
-  renderer_->begin(make_camera(request, header.world_lo, header.world_hi, aspect), options_.width,
+  renderer_->begin(make_camera(request, frame.lo, frame.hi, aspect), options_.width,
                    options_.height, {});
+}
+
+MeshBounds PreviewSink::bounds_of_batch() const {
+  if (positions_.empty()) return largest_;
+  MeshBounds bounds{largest_.hi, largest_.lo};
+  for (const Vec3f& position : positions_) {
+    const Vec3d p = to_double(position) + origin_;
+    for (int axis = 0; axis < 3; ++axis) {
+      bounds.lo[axis] = std::fmin(bounds.lo[axis], std::fmax(p[axis], largest_.lo[axis]));
+      bounds.hi[axis] = std::fmax(bounds.hi[axis], std::fmin(p[axis], largest_.hi[axis]));
+    }
+  }
+  return bounds;
 }
 
 void PreviewSink::write(const MeshChunk& chunk) {
@@ -76,6 +95,7 @@ void PreviewSink::write(const MeshChunk& chunk) {
 
 void PreviewSink::draw_batch() {
   if (triangles_.empty()) return;
+  if (!renderer_) begin_picture(largest_);
   const Current current(context_);
   renderer_->draw({0, positions_, normals_, triangles_}, {.colour = options_.colour}, origin_);
   positions_.clear();
@@ -84,6 +104,8 @@ void PreviewSink::draw_batch() {
 }
 
 void PreviewSink::finish() {
+  // Nothing was drawn so far: this batch is the mesh.
+  if (!renderer_) begin_picture(bounds_of_batch());
   draw_batch();
   const Current current(context_);
   renderer_->end();

@@ -13,8 +13,10 @@
 
 namespace isobrick {
 
-/// Draws the mesh into a PNG picture, off-screen. Memory: `memory`, from begin to
-/// finish, however large the mesh. Looks best with normals; without them facets show.
+/// Draws the mesh into a PNG picture, off-screen, as large as fits: a mesh of one batch of
+/// triangles by its own bounds, a larger one by those of the blocks that it passes through. Memory:
+/// `memory`, from begin to finish, however large the mesh. Looks best with normals; without them
+/// facets show.
 class PreviewSink final : public MeshSink {
  public:
   /// Throws UsageError for a size that makes no sense, Error where there is no OpenGL;
@@ -32,12 +34,15 @@ class PreviewSink final : public MeshSink {
   std::uint64_t bytes() const override { return out_.writer().size(); }
 
  private:
+  void begin_picture(const MeshBounds& frame);
+  MeshBounds bounds_of_batch() const;
   void draw_batch();
 
   PreviewOptions options_;
   OutputFile out_;
-  GlContext context_;  ///< current only within a call: they may come from any thread
-  std::optional<Renderer> renderer_;
+  GlContext context_;                 ///< current only within a call: they may come from any thread
+  std::optional<Renderer> renderer_;  ///< from the first triangles that are drawn
+  MeshBounds largest_;                ///< that the mesh can have
   Vec3d origin_;
   std::vector<Vec3f> positions_, normals_;
   std::vector<Triangle> triangles_;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "isobrick/core/vec.h"
@@ -35,10 +36,17 @@ struct MeshSize {
   std::uint64_t vertices = 0, triangles = 0;
 };
 
+/// A box in world space.
+struct MeshBounds {
+  Vec3d lo, hi;
+};
+
 /// What is known before the first chunk.
 struct MeshHeader {
   bool has_normals = false;
   Vec3d world_lo, world_hi;  ///< bounds of the volume (not of the mesh) in world space
+  /// Bounds of the blocks that the surface passes through, within the region; nothing: not known.
+  std::optional<MeshBounds> surface = {};
 };
 
 /// Takes a mesh chunk by chunk. Calls come from one thread at a time, in order.

@@ -87,6 +87,38 @@ Field<T> mixed_field(Int3 extent) {
   return field;
 }
 
+/// What a picture frames while the mesh is being made.
+TEST_F(Extract, TheHeaderBoundsTheSurfaceWithinTheRegion) {
+  const Field<float> field({128, 128, 96}, [](Int3 p) {
+    const Int3 d = p - Int3{100, 30, 70};
+    return 10 - std::sqrt(static_cast<double>(d.x * d.x + d.y * d.y + d.z * d.z));
+  });
+  const StoreReader reader = store(field, {.brick = 32, .shard = 64});
+  const Vec3d spacing{0.5, 1, 2};
+  for (const std::optional<Box3> roi :
+       {std::optional<Box3>(), std::optional(Box3{{95, 0, 0}, {128, 31, 70}})}) {
+    MemorySink sink;
+    run(reader, {.roi = roi}, sink);
+    ASSERT_FALSE(sink.mesh.positions.empty());
+    ASSERT_TRUE(sink.header_.surface);
+    const MeshBounds bounds = *sink.header_.surface;
+    for (int axis = 0; axis < 3; ++axis) {
+      double lo = 1e9, hi = -1e9;
+      for (const Vec3f& p : sink.mesh.positions) {
+        lo = std::min(lo, static_cast<double>(p[axis]));
+        hi = std::max(hi, static_cast<double>(p[axis]));
+      }
+      EXPECT_LE(bounds.lo[axis], lo);
+      EXPECT_GE(bounds.hi[axis], hi);
+      EXPECT_GT(bounds.lo[axis], lo - 16 * spacing[axis]);
+      EXPECT_LT(bounds.hi[axis], hi + 16 * spacing[axis]);
+      if (!roi) continue;
+      EXPECT_GE(bounds.lo[axis], static_cast<double>(roi->lo[axis]) * spacing[axis]);
+      EXPECT_LE(bounds.hi[axis], static_cast<double>(roi->hi[axis] - 1) * spacing[axis]);
+    }
+  }
+}
+
 TEST_F(Extract, NothingButVolumeAndIsovalueShowsInTheMesh) {
   const auto field = mixed_field<std::uint8_t>({170, 131, 100});
   const double iso = 60;

@@ -22,11 +22,11 @@ PreviewOptions small() {
 }
 
 Picture draw(const std::vector<MeshChunk>& chunks, const PreviewOptions& options = small(),
-             bool normals = true) {
+             const MeshHeader& header = {true, {-1, -1, -1}, {1, 1, 1}}) {
   const TempDir dir;
   PreviewSink sink(dir / "a.png", false, options);
   EXPECT_EQ(sink.indexing(), Indexing::chunk_local);
-  sink.begin({normals, {-1, -1, -1}, {1, 1, 1}});
+  sink.begin(header);
   for (const MeshChunk& chunk : chunks) sink.write(chunk);
   sink.finish();
   EXPECT_EQ(dir.list(), std::vector<std::string>{"a.png"});
@@ -95,7 +95,7 @@ TEST(PreviewSink, BothSidesAreLitAlike) {
 TEST(PreviewSink, FacetsWithoutNormals) {
   const TestMesh ball = make_ball({0, 0, 0}, 1, 100);
   const Picture smooth = draw({ball.chunk()}),
-                facets = draw({ball.chunk(0, false)}, small(), false);
+                facets = draw({ball.chunk(0, false)}, small(), {false, {-1, -1, -1}, {1, 1, 1}});
   EXPECT_TRUE(facets.surface(100, 80));
   EXPECT_NEAR(smooth.brightness(100, 80), facets.brightness(100, 80), 30);
 }
@@ -113,8 +113,50 @@ TEST(PreviewSink, UpIsUpAndRightIsRight) {
   PreviewOptions options = small();
   options.towards_eye = {0, -1, 0};
   const TestMesh up = make_ball({0, 0, 0.8f}, 0.2f, 20), right = make_ball({0.8f, 0, 0}, 0.2f, 20);
-  EXPECT_TRUE(draw({up.chunk()}, options).surface(100, 80 - 45));
-  EXPECT_TRUE(draw({right.chunk()}, options).surface(100 + 45, 80));
+  const TestMesh down = make_ball({0, 0, -0.98f}, 0.02f, 20),
+                 left = make_ball({-0.98f, 0, 0}, 0.02f, 20);
+  const Picture upright = draw({up.chunk(), down.chunk()}, options),
+                lying = draw({right.chunk(), left.chunk()}, options);
+  EXPECT_TRUE(upright.surface(100, 80 - 45));
+  EXPECT_FALSE(upright.surface(100, 80 + 45));
+  EXPECT_TRUE(lying.surface(100 + 45, 80));
+  EXPECT_FALSE(lying.surface(100 - 45, 80));
+}
+
+/// Pixels from the first to the last column and row that show the surface.
+std::pair<int, int> spot(const Picture& picture) {
+  int left = picture.width, right = -1, top = picture.height, bottom = -1;
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x)
+      if (picture.surface(x, y)) {
+        left = std::min(left, x), right = std::max(right, x);
+        top = std::min(top, y), bottom = std::max(bottom, y);
+      }
+  return {right - left + 1, bottom - top + 1};
+}
+
+TEST(PreviewSink, FramesTheMeshAndNotTheVolume) {
+  const MeshHeader volume{true, {-1, -1, -1}, {1, 1, 1}};
+  const auto [across, down] = spot(draw({make_ball({0, 0, 0}, 1, 100).chunk()}));
+  for (const float radius : {0.1f, 0.01f}) {
+    const TestMesh ball = make_ball({0.7f, -0.5f, 0.2f}, radius, 100);
+    const auto [w, h] = spot(draw({ball.chunk()}, small(), volume));
+    EXPECT_NEAR(w, across, 2);
+    EXPECT_NEAR(h, down, 2);
+  }
+}
+
+/// The first triangles of a large mesh are drawn before the last ones are there.
+TEST(PreviewSink, FramesALargeMeshByWhatItPassesThrough) {
+  MeshHeader header{true, {-1, -1, -1}, {1, 1, 1}};
+  const TestMesh ball = make_ball({0.5f, 0.5f, 0.5f}, 0.1f, 300);
+  ASSERT_GT(ball.triangles.size(), 1u << 17);
+  const auto [small_across, small_down] = spot(draw({ball.chunk(), ball.chunk()}, small(), header));
+  header.surface = MeshBounds{{0.4, 0.4, 0.4}, {0.6, 0.6, 0.6}};
+  const auto [across, down] = spot(draw({ball.chunk(), ball.chunk()}, small(), header));
+  EXPECT_LT(small_down, 20);
+  EXPECT_GT(down, 80);
+  EXPECT_NEAR(across, down, 3);
 }
 
 TEST(PreviewSink, SurvivesBadNumbers) {
