@@ -1,5 +1,8 @@
 #include "tools/info_volumes.h"
 
+#include <algorithm>
+#include <optional>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -32,6 +35,15 @@ std::vector<std::string> options_of(const VolumeAxis& axis) {
   if (axis.by_channel) options.emplace_back("--channel");
   if (axis.by_time) options.emplace_back("--time");
   return options;
+}
+
+/// Throws UsageError for a number that no axis has of those on which the option chooses.
+void check_number(const std::string& path, const char* option, bool VolumeAxis::*by,
+                  const std::vector<VolumeAxis>& axes, std::optional<Index> number) {
+  Index count = 1;
+  for (const VolumeAxis& axis : axes)
+    if (axis.*by) count = std::max(count, axis.count);
+  if (number) choose(path, option, count, number);
 }
 
 ordered_json json_of(const std::filesystem::path& path, const MetadataFiles& files,
@@ -89,6 +101,8 @@ bool list_volumes(const std::filesystem::path& path, const Selection& selection,
   const std::vector<VolumeAxis> axes =
       open_axes(files.image, files.levels.front().array, selection);
   if (axes.empty()) return false;
+  check_number(path.string(), "--channel", &VolumeAxis::by_channel, axes, selection.channel);
+  check_number(path.string(), "--time", &VolumeAxis::by_time, axes, selection.time);
   console.result(json_of(path, files, axes), text_of(path, files, axes));
   return true;
 }

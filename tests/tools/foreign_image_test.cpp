@@ -98,6 +98,34 @@ TEST_F(ForeignImage, InfoListsChannelsInsteadOfRefusing) {
   expect_refused(run({"export", image, path("x.raw")}), 2, {"--channel 0 … 1"});
 }
 
+TEST_F(ForeignImage, InfoRefusesChannelsAndTimesThatAreNotThere) {
+  const std::string image = path("tc.zarr");
+  std::filesystem::create_directories(image + "/0");
+  json axes =
+      json::array({{{"name", "t"}, {"type", "time"}}, {{"name", "c"}, {"type", "channel"}}});
+  for (const char* name : {"z", "y", "x"}) axes.push_back({{"name", name}, {"type", "space"}});
+  const json scale{{"type", "scale"}, {"scale", {1, 1, 1, 1, 1}}};
+  const json level{{"path", "0"}, {"coordinateTransformations", {scale}}};
+  const json attributes{
+      {"multiscales", {{{"version", "0.4"}, {"axes", axes}, {"datasets", {level}}}}}};
+  write_file(image + "/.zgroup", R"({"zarr_format": 2})");
+  write_file(image + "/.zattrs", attributes.dump());
+  const json array{{"zarr_format", 2},          {"shape", {4, 3, 5, 6, 7}},
+                   {"chunks", {1, 1, 5, 6, 7}}, {"dtype", "|u1"},
+                   {"compressor", nullptr},     {"filters", nullptr},
+                   {"fill_value", 0},           {"order", "C"}};
+  write_file(image + "/0/.zarray", array.dump());
+  for (const Arguments& chosen :
+       {Arguments{}, Arguments{"--channel", "2"}, Arguments{"--time", "3"}}) {
+    Arguments info{"info", image};
+    info.insert(info.end(), chosen.begin(), chosen.end());
+    EXPECT_EQ(run_json(info)["axes"].size(), 2u);
+  }
+  expect_refused(run({"info", image, "--channel", "5"}), 2, {"--channel 5 is not there"});
+  expect_refused(run({"info", image, "--time", "4"}), 2, {"--time 4 is not there"});
+  expect_refused(run({"info", image, "--time", "-1"}), 2, {"-1"});
+}
+
 TEST_F(ForeignImage, ATurnedImageBecomesAMeshThatIsTurned) {
   const std::string image = write_image();
   ASSERT_EQ(run({"index", image, "--kind", "octree", "--channel", "1"}).exit_code, 0);
