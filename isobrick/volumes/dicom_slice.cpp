@@ -149,11 +149,12 @@ void read_geometry(const std::string& path, const Attributes& a, DicomSlice& sli
   // First from row to row, then from column to column.
   slice.spacing.y = a.real(tag, 0).value_or(1);
   slice.spacing.x = a.real(tag, 1).value_or(slice.spacing.y);
-  slice.spacing.z =
-      a.real(DCM_SpacingBetweenSlices).value_or(a.real(DCM_SliceThickness).value_or(1));
-  if (slice.spacing.z <= 0) slice.spacing.z = 1;
-  if (const double step = read_frame_step(path, a, slice.extent.z); step != 0)
-    slice.spacing.z = step;
+  const double said =
+      a.real(DCM_SpacingBetweenSlices).value_or(a.real(DCM_SliceThickness).value_or(0));
+  const double step = read_frame_step(path, a, slice.extent.z);
+  const bool is_dose = a.has(DCM_DoseGridScaling) || a.text(DCM_Modality) == "RTDOSE";
+  slice.has_frame_step = step != 0 || (said > 0 && !is_dose);
+  slice.spacing.z = step != 0 ? step : said > 0 ? said : 1;
   slice.position = a.vector(DCM_ImagePositionPatient);
   const auto row = a.vector(DCM_ImageOrientationPatient, 0),
              column = a.vector(DCM_ImageOrientationPatient, 3);

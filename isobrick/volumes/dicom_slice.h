@@ -22,6 +22,9 @@ struct DicomSlice {
   /// Of columns, rows, frames or slices. That of frames is negative where they go against the
   /// normal, row × column.
   Vec3d spacing{1, 1, 1};
+  /// Whether the file says how far apart its frames lie. A dose does so by its
+  /// GridFrameOffsetVector only.
+  bool has_frame_step = false;
   std::optional<Vec3d> position;        ///< of the first sample in space, millimetres
   Vec3d row{1, 0, 0}, column{0, 1, 0};  ///< directions in which x and y grow
   Index time = 0, instance = 0;         ///< TemporalPositionIdentifier, InstanceNumber

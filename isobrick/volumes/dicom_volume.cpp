@@ -185,9 +185,35 @@ std::vector<double> steps_of(const std::vector<DicomSlice>& slices) {
       name, after.path, step, before.path, usual));
 }
 
+/// Frames must say how far apart they lie, unless the caller does.
+void check_frame_step(const DicomSlice& slice, const VolumeRequest& said) {
+  if (slice.extent.z < 2 || slice.has_frame_step || said.spacing) return;
+  throw UsageError(
+      fmt::format("'{}' does not say how far apart its {} frames lie (GridFrameOffsetVector of a "
+                  "dose, else SpacingBetweenSlices or SliceThickness): add --spacing X,Y,Z",
+                  slice.path, slice.extent.z));
+}
+
+/// Of slices without positions only their InstanceNumbers say whether one is missing. Whoever
+/// gives a spacing takes them as they are.
+void check_numbers(const std::string& name, const std::vector<DicomSlice>& slices) {
+  const double usual = usual_step(steps_of(slices));
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    const DicomSlice &before = slices[i - 1], &after = slices[i];
+    if (static_cast<double>(after.instance - before.instance) != usual)
+      throw UsageError(fmt::format(
+          "'{}': slices without positions, of which one seems to be missing between '{}' and '{}', "
+          "whose InstanceNumbers are {} and {}: add it, or --spacing X,Y,Z to take them as evenly "
+          "spaced",
+          name, before.path, after.path, before.instance, after.instance));
+  }
+}
+
 /// From one slice to the next, which must be the same throughout and along the
 /// normal.
-double find_step(const std::string& name, const std::vector<DicomSlice>& slices) {
+double find_step(const std::string& name, const std::vector<DicomSlice>& slices,
+                 const VolumeRequest& said) {
+  if (slices.size() > 1 && !slices[0].position && !said.spacing) check_numbers(name, slices);
   if (slices.size() < 2 || !slices[0].position) return slices[0].spacing.z;
   const Vec3d normal = cross(slices[0].row, slices[0].column);
   const auto last = static_cast<double>(slices.size() - 1);
@@ -233,6 +259,7 @@ std::unique_ptr<VolumeSource> open_dicom(const std::string& name,
   if (slices.size() > 1 && first.extent.z > 1)
     throw UsageError(
         fmt::format("'{}' holds several files of several frames each: give one of them", name));
+  check_frame_step(first, said);
   choose(name, "--channel", 1, said.selection.channel);
   std::sort(slices.begin(), slices.end(),
             [](const DicomSlice& a, const DicomSlice& b) { return height_of(a) < height_of(b); });
@@ -242,7 +269,7 @@ std::unique_ptr<VolumeSource> open_dicom(const std::string& name,
   Transform transform;
   const Vec3d normal = cross(first.row, first.column);
   const Vec3d axes[3] = {first.row * first.spacing.x, first.column * first.spacing.y,
-                         normal * find_step(name, slices)};
+                         normal * find_step(name, slices, said)};
   set_axes(name, transform, axes);
   transform.origin = slices[0].position.value_or(Vec3d{0, 0, 0});
   transform.unit = "millimeter";

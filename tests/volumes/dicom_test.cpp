@@ -146,6 +146,53 @@ TEST_F(Dicom, ADoseHasItsOffsetsAndItsScaling) {
   EXPECT_TRUE(contains(few, "3 numbers for 5 frames")) << few;
 }
 
+TEST_F(Dicom, FramesSayHowFarApartTheyLieOrTheCallerDoes) {
+  const auto refused = [&](const std::string& file) {
+    const std::string text = message_of<UsageError>([&] { open_source(file, {}); });
+    EXPECT_TRUE(contains(text, "does not say how far apart its 5 frames lie")) << text;
+    EXPECT_TRUE(contains(text, "--spacing")) << text;
+    VolumeRequest said;
+    said.spacing = Vec3d{1, 2, 3};
+    EXPECT_EQ(open_source(file, said)->info().transform.spacing, (Vec3d{1, 2, 3}));
+  };
+  const auto bare = [](DcmDataset& data) { delete data.remove(DCM_SliceThickness); };
+  refused(write("plain", 0, kExtent.z, EXS_LittleEndianExplicit, bare));
+  refused(write("dose", 0, kExtent.z, EXS_LittleEndianExplicit, [&](DcmDataset& data) {
+    bare(data);
+    data.putAndInsertString(DCM_DoseGridScaling, "0.25");
+  }));
+  // The thickness of a dose says nothing of its frames.
+  refused(write("thick", 0, kExtent.z, EXS_LittleEndianExplicit,
+                [](DcmDataset& data) { data.putAndInsertString(DCM_Modality, "RTDOSE"); }));
+  const auto between = open_source(write("between", 0, kExtent.z, EXS_LittleEndianExplicit,
+                                         [&](DcmDataset& data) {
+                                           bare(data);
+                                           data.putAndInsertString(DCM_SpacingBetweenSlices, "7");
+                                         }),
+                                   {});
+  EXPECT_EQ(between->info().transform.spacing.z, 7);
+  EXPECT_NO_THROW(open_source(write("one", 0, 1, EXS_LittleEndianExplicit, bare), {}));
+}
+
+TEST_F(Dicom, OfSlicesWithoutPositionsTheNumbersShowWhatIsMissing) {
+  const auto number = [&](const char* name, Index z, const char* instance) {
+    write(name, z, z + 1, EXS_LittleEndianExplicit, [&](DcmDataset& data) {
+      delete data.remove(DCM_ImagePositionPatient);
+      data.putAndInsertString(DCM_InstanceNumber, instance);
+    });
+  };
+  number("s0", 0, "1"), number("s1", 1, "2"), number("s2", 2, "3"), number("s3", 3, "5"),
+      number("s4", 4, "6");
+  const std::string text = message_of<UsageError>([&] { open_source(dir / ".", {}); });
+  EXPECT_TRUE(contains(text, "s2' and '")) << text;
+  EXPECT_TRUE(contains(text, "s3', whose InstanceNumbers are 3 and 5")) << text;
+  VolumeRequest said;
+  said.spacing = Vec3d{1, 2, 3};
+  EXPECT_EQ(open_source(dir / ".", said)->info().extent, kExtent);
+  number("s3", 3, "4"), number("s4", 4, "5");
+  EXPECT_EQ(open_source(dir / ".", {})->info().extent, kExtent);
+}
+
 TEST_F(Dicom, AMissingSliceIsNamed) {
   const char* names[] = {"s0", "s1", "s2", "s3", "s4", "s5", "s6"};
   for (const Index z : {0, 1, 2, 4}) write(names[z], z, z + 1);
