@@ -12,6 +12,13 @@
 namespace isobrick {
 namespace {
 
+/// Of a smaller control byte literals follow, one more than it says.
+constexpr unsigned kFirstReference = 32;
+/// A reference of this length has a byte more for it.
+constexpr unsigned kLongReference = 7;
+/// Of a chunk, and what filters add to it.
+constexpr std::size_t kMostFiltered = kMostHdf5Chunk + (std::size_t{1} << 16);
+
 /// Reads one packed stream and writes its samples.
 class Unpacker {
  public:
@@ -30,10 +37,6 @@ class Unpacker {
   }
 
  private:
-  static constexpr unsigned kFirstReference = 32;
-  /// A reference of this length has a byte more for it.
-  static constexpr unsigned kLongReference = 7;
-
   [[noreturn]] void fail() const {
     throw DamageError(fmt::format("it does not unpack to {} bytes (LZF)", out_.size()));
   }
@@ -65,14 +68,35 @@ class Unpacker {
   std::size_t at_ = 0, done_ = 0;
 };
 
-/// The filter as libhdf5 calls it; 0 is failure. h5py's third value is the chunk's size.
-std::size_t filter(unsigned flags, std::size_t count, const unsigned* values, std::size_t size,
+/// Bytes that a packed stream says it unpacks to.
+std::size_t unpacked_size(std::span<const std::byte> packed) {
+  std::size_t size = 0;
+  for (std::size_t at = 0; at < packed.size();) {
+    const auto control = std::to_integer<unsigned>(packed[at++]);
+    if (control < kFirstReference) {
+      size += control + 1;
+      at += control + 1;
+    } else {
+      size += (control >> 5) + 2;
+      if (control >> 5 == kLongReference && at < packed.size())
+        size += std::to_integer<unsigned>(packed[at++]);
+      ++at;
+    }
+  }
+  return size;
+}
+
+/// The filter as libhdf5 calls it; 0 is failure. h5py's third value is the chunk's size, but
+/// another filter before this one may have made it smaller or larger.
+std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t size,
                    std::size_t* room, void** buffer) {
-  if ((flags & H5Z_FLAG_REVERSE) == 0 || count < 3 || values[2] == 0 || values[2] > kMostHdf5Chunk)
-    return 0;
+  if ((flags & H5Z_FLAG_REVERSE) == 0) return 0;
+  const std::span packed{static_cast<const std::byte*>(*buffer), size};
+  const std::size_t unpacked_bytes = unpacked_size(packed);
+  if (unpacked_bytes == 0 || unpacked_bytes > kMostFiltered) return 0;
   try {
     PodBuffer<std::byte> out;
-    unpack_lzf({static_cast<const std::byte*>(*buffer), size}, values[2], out);
+    unpack_lzf(packed, unpacked_bytes, out);
     void* const unpacked = H5allocate_memory(out.size(), false);
     if (unpacked == nullptr) return 0;
     std::copy_n(out.data(), out.size(), static_cast<std::byte*>(unpacked));

@@ -7,14 +7,12 @@
 #include <vector>
 
 #include "damaged_files.h"
+#include "hdf5_file.h"
 #include "isobrick/core/error.h"
 #include "isobrick/volumes/open_source.h"
 
 namespace isobrick {
 namespace {
-
-constexpr Int3 kExtent{19, 17, 5};
-constexpr Box3 kWhole{{0, 0, 0}, kExtent};
 
 class Hdf5 : public ::testing::Test {
  protected:
@@ -59,24 +57,6 @@ TEST_F(Hdf5, AnyBoxOfPlainAndChunkedData) {
     EXPECT_TRUE(contains(
         message_of<UsageError>([&] { open_source(dir / (std::string("v.data:/") + name), {}); }),
         "it has /v"));
-}
-
-/// One dataset /v of 5 × 17 × 19 samples in chunks of 2 × 5 × 6, made by `set` of its
-/// properties; `write` puts the samples.
-template <class Set, class Write>
-void create(const std::string& path, hid_t stored, Set&& set, Write&& write) {
-  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  const hsize_t sizes[3] = {5, 17, 19}, chunks[3] = {2, 5, 6};
-  const hid_t space = H5Screate_simple(3, sizes, nullptr), how = H5Pcreate(H5P_DATASET_CREATE);
-  H5Pset_chunk(how, 3, chunks);
-  set(how);
-  const hid_t data = H5Dcreate2(file, "v", stored, space, H5P_DEFAULT, how, H5P_DEFAULT);
-  ASSERT_GE(data, 0);
-  write(data);
-  H5Dclose(data);
-  H5Pclose(how);
-  H5Sclose(space);
-  H5Fclose(file);
 }
 
 /// Slabs, as a conversion asks for them, then a box across chunks.
@@ -271,60 +251,6 @@ TEST_F(Hdf5, ChunksThatSkippedAFilter) {
   const auto source = open_source(dir / "v.h5", {});
   const std::string read = read_box(*source, {{6, 5, 2}, {12, 10, 4}});
   EXPECT_EQ(read, std::string(chunk.begin(), chunk.end()));
-}
-
-/// h5py's filter: its own version, LibLZF's, and the bytes of a chunk.
-void set_lzf(hid_t how) {
-  const unsigned values[] = {4, 0x0105, 2 * 5 * 6};
-  // A filter that only reads, as the module's, would keep the dataset from being made.
-  if (H5Zfilter_avail(32000) > 0) H5Zunregister(32000);
-  H5Pset_filter(how, 32000, H5Z_FLAG_OPTIONAL, 3, values);
-}
-
-/// One chunk of 60 bytes as LibLZF packs it: four literals, then references that
-/// overlap what they write, with and without a byte for their length.
-const std::string kLzfChunk{
-    "\x03"
-    "abcd\x20\x03\xe0\x2c\x03",
-    10};
-const std::string kLzfSamples = [] {
-  std::string samples;
-  while (samples.size() < 60) samples += "abcd";
-  return samples;
-}();
-
-TEST_F(Hdf5, LzfOfH5py) {
-  const std::pair<std::uint32_t, std::function<void(hid_t)>> filters[] = {
-      {0, set_lzf},
-      {2,  // compressed twice, which is left to the library; deflate is skipped
-       [](hid_t how) {
-         set_lzf(how);
-         H5Pset_deflate(how, 6);
-       }}};
-  for (const auto& [skipped, set] : filters) {
-    create(dir / "v.h5", H5T_STD_U8LE, set, [&, mask = skipped](hid_t data) {
-      const hsize_t at[3] = {2, 5, 6};
-      ASSERT_GE(H5Dwrite_chunk(data, H5P_DEFAULT, mask, at, kLzfChunk.size(), kLzfChunk.data()), 0);
-    });
-    EXPECT_EQ(read_box(*open_source(dir / "v.h5", {}), {{6, 5, 2}, {12, 10, 4}}), kLzfSamples);
-  }
-}
-
-TEST_F(Hdf5, DamagedLzfIsNamed) {
-  std::vector<std::string> damaged{kLzfChunk + "\x01", kLzfChunk + std::string("\0x", 2),
-                                   std::string("\x20\x03", 2) + kLzfChunk};
-  for (std::size_t size = 1; size < kLzfChunk.size(); ++size)
-    damaged.push_back(kLzfChunk.substr(0, size));
-  for (const std::string& bytes : damaged) {
-    create(dir / "v.h5", H5T_STD_U8LE, set_lzf, [&](hid_t data) {
-      const hsize_t at[3] = {2, 5, 6};
-      ASSERT_GE(H5Dwrite_chunk(data, H5P_DEFAULT, 0, at, bytes.size(), bytes.data()), 0);
-    });
-    const auto source = open_source(dir / "v.h5", {});
-    const std::string message = message_of<DamageError>([&] { read_box(*source, kWhole); });
-    EXPECT_TRUE(contains(message, "the chunk at [2, 5, 6]")) << message;
-    EXPECT_TRUE(contains(message, "LZF")) << message;
-  }
 }
 
 TEST_F(Hdf5, DamagedChunksAreNamed) {
