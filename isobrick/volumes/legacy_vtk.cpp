@@ -126,6 +126,10 @@ class Parser {
       found_ = true;
     } else if (tuples_ && key == "field") {
       take_field();
+    } else if (key == "field") {
+      skip_field(parse_integer(path_, key, word(words, 2)));
+    } else if (key == "metadata") {
+      skip_metadata();
     } else {
       header_error(path_, fmt::format("'{}' is not supported{}", printable(key, 60),
                                       tuples_ ? " before the SCALARS" : ""));
@@ -155,6 +159,74 @@ class Parser {
       header_error(path_, "FIELD: an array is not as long as its data set");
     header_.type = read_type(path_, lower(words[3]));
     found_ = true;
+  }
+
+  /// Field data of the whole data set, in front of its samples: NAME COMPONENTS TUPLES TYPE and
+  /// values, each array with its metadata.
+  void skip_field(Index arrays) {
+    while (arrays > 0) {
+      if (lines_.at_end()) header_error(path_, "FIELD: an array is missing");
+      const auto words = split_words(lines_.next());
+      if (words.empty()) continue;
+      if (lower(words[0]) == "metadata") {
+        skip_metadata();
+        continue;
+      }
+      const Index components = parse_integer(path_, "FIELD", word(words, 1)),
+                  tuples = parse_integer(path_, "FIELD", word(words, 2));
+      constexpr auto most = static_cast<Index>(kMostHeader);
+      if (components < 0 || tuples < 0 || components > most || tuples > most)
+        header_error(path_, "FIELD: the size of an array makes no sense");
+      const std::string type = lower(word(words, 3));
+      const auto values = static_cast<std::uint64_t>(components * tuples);
+      if (type == "string")
+        header_.text ? skip_lines(values) : skip_packed_strings(values);
+      else
+        header_.text ? skip_numbers(values) : lines_.skip(bytes_of_values(type, values));
+      --arrays;
+    }
+  }
+
+  /// A block that ends at an empty line.
+  void skip_metadata() {
+    while (!lines_.at_end() && !trim(lines_.next()).empty()) continue;
+  }
+
+  void skip_lines(std::uint64_t count) {
+    for (; count > 0 && !lines_.at_end(); --count) lines_.next();
+  }
+
+  void skip_numbers(std::uint64_t count) {
+    for (std::uint64_t seen = 0; seen < count && !lines_.at_end();)
+      seen += split_words(lines_.next()).size();
+  }
+
+  /// Each after its length: the highest two bits say how many more bytes that has.
+  void skip_packed_strings(std::uint64_t count) {
+    for (; count > 0; --count) {
+      if (lines_.at_end()) header_error(path_, "FIELD: a text is missing");
+      const auto first = static_cast<unsigned char>(lines_.rest().front());
+      const std::size_t length_bytes = std::size_t{1} << (3 - (first >> 6));
+      std::uint64_t length = first & 0x3F;
+      for (std::size_t i = 1; i < std::min(length_bytes, lines_.rest().size()); ++i)
+        length = length << 8 | static_cast<unsigned char>(lines_.rest()[i]);
+      lines_.skip(length_bytes);
+      lines_.skip(length);
+    }
+  }
+
+  std::uint64_t bytes_of_values(const std::string& type, std::uint64_t count) const {
+    if (type == "bit") return (count + 7) / 8;
+    if (type == "vtkidtype") return count * 4;
+    if (type == "vtktypeint64" || type == "vtktypeuint64") return count * 8;
+    if (type == "long" || type == "unsigned_long") {
+      // 8 or 4 bytes, depending on who wrote it; a line ends behind the values.
+      const std::string_view rest = lines_.rest();
+      const bool wide =
+          count * 8 < rest.size() && rest[static_cast<std::size_t>(count * 8)] == '\n';
+      return count * (wide ? 8 : 4);
+    }
+    return count * size_of(read_type(path_, type));
   }
 
   void finish() {

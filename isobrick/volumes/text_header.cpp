@@ -76,6 +76,13 @@ std::string_view HeaderLines::next() {
   return line;
 }
 
+void HeaderLines::skip(std::uint64_t bytes) {
+  if (bytes > rest_.size())
+    header_error(path_, fmt::format("the header does not end within its first {} bytes (of {})",
+                                    text_.size(), file_size_));
+  rest_.remove_prefix(static_cast<std::size_t>(bytes));
+}
+
 std::string_view trim(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kBlanks);
   if (first == std::string_view::npos) return {};

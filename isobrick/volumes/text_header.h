@@ -42,10 +42,10 @@ struct TextHeader {
 
 inline constexpr std::uint64_t kMostHeader = std::uint64_t{1} << 20;
 
-[[noreturn]] void header_error(const std::string& path, const std::string& what);
-
 /// Opens the file of samples that a header needs; where that fails, the message names both.
 File open_data_file(const std::string& path, const std::string& header);
+
+[[noreturn]] void header_error(const std::string& path, const std::string& what);
 
 /// The lines at the beginning of a file; samples may follow them.
 class HeaderLines {
@@ -56,6 +56,8 @@ class HeaderLines {
   /// The next line without its end (LF or CR LF). Refuses NUL bytes, and headers
   /// longer than kMostHeader.
   std::string_view next();
+  /// Passes over bytes, which may be anything. Refuses more than kMostHeader has.
+  void skip(std::uint64_t bytes);
   /// What comes next, as far as it was read.
   std::string_view rest() const { return rest_; }
   /// Bytes before the line that comes next.

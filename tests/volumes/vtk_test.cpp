@@ -219,6 +219,40 @@ TEST_F(Vtk, Legacy) {
   EXPECT_EQ(read_box(*open(field + samples(true)), kWhole), samples());
 }
 
+/// What VTK 9 writes of an image with field data: numbers, texts, bits, identifiers, metadata.
+TEST_F(Vtk, LegacyFieldDataAreSkipped) {
+  using namespace std::string_literals;
+  const std::string binary =
+      "FIELD FieldData 6\nTimeValue 1 1 float\n\x3f\xc0\0\0\n"
+      "note%20s 1 3 string\n\xcdhello world\nx\x80\x41"s +
+      std::string(65, 'a') + "\xcdPOINT_DATA 60\nd 3 2 double\n"s + std::string(48, '\x0a') +
+      "\nMETADATA\nCOMPONENT_NAMES\nxx\n\n\n\n\nb 1 11 bit\n\x55\x40\nids 1 1 vtkIdType\n"
+      "\0\0\0\x07\nlongs 1 2 long\n"s +
+      std::string(16, '\0') + "\nMETADATA\nINFORMATION 0\n\n";
+  const std::string text =
+      "FIELD FieldData 5\nTimeValue 1 1 float\n1.5 \nnote%20s 1 3 string\nhello%20world%0Ax\n\n"
+      "POINT_DATA%2060\n\nd 3 2 double\n1 2 3 10 2 3 \nMETADATA\nCOMPONENT_NAMES\nxx\n\n\n\n"
+      "b 1 11 bit\n0 1 0 1 0 1 0 1\n0 1 0 \nids 1 0 vtkIdType\n\n";
+  const auto with_field = [](const std::string& header, const std::string& field) {
+    std::string whole = header;
+    return whole.insert(whole.find("DIMENSIONS"), field);
+  };
+  EXPECT_EQ(read_box(*open(with_field(kLegacy, binary) + samples(true)), kWhole), samples());
+  std::string numbers, ascii = kLegacy;
+  ascii.replace(ascii.find("BINARY"), 6, "ASCII");
+  for (std::size_t i = 0; i < samples().size(); i += 2) {
+    std::int16_t sample;
+    std::memcpy(&sample, samples().data() + i, 2);
+    numbers += std::to_string(sample) + "\n";
+  }
+  EXPECT_EQ(read_box(*open(with_field(ascii, text) + numbers), kWhole), samples());
+  for (const char* field :
+       {"FIELD f\n", "FIELD f x\n", "FIELD f 2\na 1 1 float\n1234\n", "FIELD f 1\na -1 1 float\n",
+        "FIELD f 1\na 1 9999999999 float\n", "FIELD f 1\na 1 1 variant\n",
+        "FIELD f 1\na 1 1000 double\n1\n", "FIELD f 1\ns 1 1 string\n\x3f"})
+    refuse(with_field(kLegacy, field) + samples(true));
+}
+
 TEST_F(Vtk, LegacyColoursAsTextAreFractionsOf255) {
   const std::string header =
       "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 8\n"
