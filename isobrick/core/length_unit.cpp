@@ -46,12 +46,15 @@ constexpr LengthUnit kUnits[] = {
     {"pc", "parsec", 3.0856775814913673e28},
 };
 
-/// Other spellings of the same: plurals, British ones, and "micron".
+/// Other spellings of the same: capitals, plurals, British ones, and "micron". Of symbols, whose
+/// case says which unit they are (Mm, mm), none becomes a name so.
 std::string singular(std::string_view unit) {
-  if (unit == "micron" || unit == "microns") return "micrometer";
-  if (unit == "feet") return "foot";
-  if (unit == "inches") return "inch";
   std::string name(unit);
+  for (char& c : name)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  if (name == "micron" || name == "microns") return "micrometer";
+  if (name == "feet") return "foot";
+  if (name == "inches") return "inch";
   if (name.ends_with("s") && name.size() > 3) name.pop_back();
   if (name.ends_with("metre")) name.replace(name.size() - 2, 2, "er");
   return name;

@@ -335,8 +335,9 @@ std::string read_unit(const Fields& fields, const std::string& name, std::size_t
   if (entries.size() != count) return {};
   for (auto& entry : entries)
     if (entry.size() >= 2 && entry.front() == '"') entry = entry.substr(1, entry.size() - 2);
-  const std::string_view first = entries[kept[0]];
-  return entries[kept[1]] == first && entries[kept[2]] == first ? unit_name(first) : std::string();
+  const std::string first = unit_name(entries[kept[0]]);
+  const bool shared = unit_name(entries[kept[1]]) == first && unit_name(entries[kept[2]]) == first;
+  return shared ? first : std::string();
 }
 
 /// What export keeps of a grid in key/value pairs.

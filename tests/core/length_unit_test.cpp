@@ -33,6 +33,17 @@ TEST(LengthUnit, OtherSpellings) {
   EXPECT_EQ(unit_name("feet"), "foot");
 }
 
+/// Only of names: Mm is no mm.
+TEST(LengthUnit, NamesMayHaveCapitals) {
+  for (const char* text : {"Millimeter", "MILLIMETER", "millimeter", "Millimetres"})
+    EXPECT_EQ(unit_name(text), "millimeter") << text;
+  EXPECT_EQ(unit_name("Microns"), "micrometer");
+  EXPECT_EQ(unit_name("Inches"), "inch");
+  EXPECT_EQ(unit_name("Feet"), "foot");
+  EXPECT_EQ(unit_name("Mm"), "megameter");
+  for (const char* text : {"MM", "UM", "Nm", "CM"}) EXPECT_EQ(unit_name(text), "") << text;
+}
+
 TEST(LengthUnit, WhatIsUnknownIsNone) {
   for (const char* text : {"pixel", "kilogrammeter", "MM", "mms", "s", ""})
     EXPECT_EQ(unit_name(text), "") << text;

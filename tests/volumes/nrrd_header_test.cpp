@@ -57,6 +57,10 @@ TEST_F(NrrdHeader, Geometry) {
       parse(std::string(kPlain) + "spacings: 0.5 nan 2e0\nunits: \"um\" \"um\" \"um\"\n");
   EXPECT_EQ(spacings.transform.spacing, (Vec3d{0.5, 1, 2}));
   EXPECT_EQ(spacings.transform.unit, "micrometer");
+  const auto capitals =
+      parse(std::string(kPlain) + "units: \"Millimeter\" \"MILLIMETER\" \"mm\"\n");
+  EXPECT_EQ(capitals.transform.unit, "millimeter");
+  EXPECT_EQ(parse(std::string(kPlain) + "units: \"MM\" \"MM\" \"MM\"\n").transform.unit, "");
 
   const auto turned = parse(std::string(kPlain) +
                             "space: left-posterior-superior\n"
