@@ -1,6 +1,7 @@
 #include "tools/command_line.h"
 
 #include <algorithm>
+#include <cctype>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -18,6 +19,13 @@ const OptionView* find_option(const CommandView& command, const std::string& nam
   return nullptr;
 }
 
+/// Whether a word behind an option that may be bare is its value.
+bool is_value(const OptionView& option, const std::string& word) {
+  const auto is_letter = [](unsigned char c) { return std::isalpha(c) != 0 || c >= 0x80; };
+  return std::find(option.choices.begin(), option.choices.end(), word) != option.choices.end() ||
+         (option.takes_words && !word.empty() && std::all_of(word.begin(), word.end(), is_letter));
+}
+
 /// Puts the values of options that may be bare behind "=".
 std::vector<std::string> with_values(const CommandView& command,
                                      const std::vector<std::string>& words) {
@@ -26,10 +34,8 @@ std::vector<std::string> with_values(const CommandView& command,
     all.push_back(words[i]);
     const OptionView* option = find_option(command, words[i]);
     if (option == nullptr || !option->may_be_bare) continue;
-    const auto& choices = option->choices;
-    const bool has_value = i + 1 < words.size() &&
-                           std::find(choices.begin(), choices.end(), words[i + 1]) != choices.end();
-    all.back() += '=' + (has_value ? words[++i] : choices.front());
+    const bool has_value = i + 1 < words.size() && is_value(*option, words[i + 1]);
+    all.back() += '=' + (has_value ? words[++i] : option->choices.front());
   }
   return all;
 }

@@ -1,5 +1,7 @@
 #include "tools/definitions.h"
 
+#include <algorithm>
+
 #include <CLI/CLI.hpp>
 
 namespace isobrick::tools {
@@ -29,7 +31,10 @@ OptionView view_of(const CLI::Option& option) {
   for (const std::string& name : option.get_lnames()) view.names.push_back("--" + name);
   if (option.get_positional()) view.names = {option.get_name(true)};
   if (option.get_type_size() != 0) view.value = option.get_type_name();
-  view.choices = choices_in(option.get_type_name());
+  const std::string type = option.get_type_name();
+  view.choices = choices_in(type);
+  view.takes_words = static_cast<std::size_t>(std::count(type.begin(), type.end(), '|')) + 1 >
+                     std::max<std::size_t>(view.choices.size(), 1);
   view.help = option.get_description();
   view.fallback = option.get_default_str();
   view.required = option.get_required();

@@ -17,6 +17,7 @@ struct OptionView {
   std::string fallback;  ///< what holds when it is left out
   bool required = false;
   bool may_be_bare = false;  ///< without a value it means the first of its choices
+  bool takes_words = false;  ///< besides its choices it takes other words, of letters
   bool repeated = false;     ///< it may be given several times
   bool path = false;         ///< its value is a file or a folder
 };

@@ -5,6 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/io/output_guard.h"
 #include "isobrick/io/parted_output.h"
 #include "isobrick/io/png_file.h"
@@ -65,6 +67,7 @@ int run(const Arguments& arguments, Console& console) {
                   {"vertices", picture.vertices},
                   {"triangles", picture.triangles},
                   {"bounds", {to_json(picture.lo), to_json(picture.hi)}},
+                  {"unit", picture.unit},
                   {"renderer", picture.renderer},
                   {"peak_resident_bytes", peak_resident_bytes()}},
                  fmt::format("{}: {} triangles, drawn by {}\n", arguments.output,
@@ -80,13 +83,29 @@ void parse_background(const std::string& text, PictureSettings& settings) {
       comma == text.npos ? settings.background_top : parse_colour(text.substr(comma + 1));
 }
 
+/// A unit of length, or the meshes' own.
+std::string parse_bar_unit(const std::string& text) {
+  if (text == "auto") return {};
+  std::string unit = unit_name(text);
+  if (unit.empty())
+    throw UsageError(
+        fmt::format("'{}' is no unit of length; it is one of {}, or a symbol such "
+                    "as mm",
+                    text, unit_names()));
+  return unit;
+}
+
 void add_overlay_options(CLI::App* app, MeshPictureRequest& request) {
   add_flag(app, "--box", request.box, "Draw the box around all meshes");
   add_flag(app, "--axes", request.axes, "Draw the directions of x, y and z");
-  add_text(app, {"--scale-bar", "UNIT", "Draw a bar of a round length in this unit, such as mm"},
+  add_text(app,
+           {.name = "--scale-bar",
+            .value = "auto|m|cm|mm|um|nm|UNIT",
+            .help = "Draw a bar of a round length in this unit; auto: that of the meshes",
+            .may_be_bare = true},
            [&request](const std::string& text) {
              request.scale_bar = true;
-             request.unit = text;
+             request.scale_bar_unit = parse_bar_unit(text);
            });
 }
 

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/core/length_unit.h"
+
 namespace isobrick {
 namespace {
 
@@ -173,17 +175,21 @@ Bounds3f GlbVertices::append(FileWriter& out, std::span<const std::byte> rows) c
 
 std::string glb_json(const GlbVertices& vertices, std::span<const GlbPrimitive> primitives) {
   ordered_json scene{{"asset", {{"version", "2.0"}, {"generator", "Isobrick"}}}};
+  if (!vertices.unit.empty()) scene["asset"]["extras"] = {{"unit", vertices.unit}};
   scene["scene"] = 0;
   scene["scenes"] = ordered_json::array({ordered_json::object()});
   if (primitives.empty()) return scene.dump();
   scene["scenes"][0]["nodes"] = ordered_json::array({0});
   ordered_json node{{"mesh", 0}};
+  const double metres = unit_ratio(vertices.unit, "meter").value_or(1);
   if (vertices.quantized) {
     for (const char* key : {"extensionsUsed", "extensionsRequired"})
       scene[key] = ordered_json::array({"KHR_mesh_quantization"});
-    node["scale"] = {vertices.step, vertices.step, vertices.step};
-    node["translation"] = {vertices.origin.x, vertices.origin.y, vertices.origin.z};
+    const Vec3d origin = vertices.origin * metres;
+    node["translation"] = {origin.x, origin.y, origin.z};
   }
+  if (const double scale = metres * (vertices.quantized ? vertices.step : 1); scale != 1)
+    node["scale"] = {scale, scale, scale};
   Lists lists;
   for (const GlbPrimitive& primitive : primitives) lists.add(vertices, primitive);
   scene["nodes"] = ordered_json::array({std::move(node)});

@@ -21,11 +21,14 @@ struct Bounds3f {
   void include(const Bounds3f& other);
 };
 
-/// How a glTF file holds vertices: rows of float, or of 16 bits on a grid.
+/// How a glTF file holds vertices: rows of float, or of 16 bits on a grid. glTF measures in
+/// metres: where the unit is known, the scene's node scales by what one is in metres, and the
+/// asset's extras name it ("unit": "micrometer"). The vertices stay in the unit.
 struct GlbVertices {
   bool normals = false, quantized = false;
   Vec3d origin;     ///< of the grid, world units
   double step = 1;  ///< of the grid, the same along all axes, so that normals stay right
+  std::string unit = {};
 
   /// The grid that covers `bounds`.
   void set_grid(const Bounds3f& bounds);

@@ -20,6 +20,7 @@ GlbSink::GlbSink(std::string path, bool force, const GlbOptions& options)
 void GlbSink::begin(const MeshHeader& header) {
   PartedMeshSink::begin(header);
   vertices_.normals = header.has_normals;
+  vertices_.unit = header.unit;
 }
 
 void GlbSink::write(const MeshChunk& chunk) {

@@ -88,7 +88,10 @@ std::uint64_t ObjSink::memory_with(int threads) {
          kBatchText;
 }
 
-void ObjSink::begin(const MeshHeader&) { out_.writer().append("# Isobrick\n"); }
+void ObjSink::begin(const MeshHeader& header) {
+  out_.writer().append("# Isobrick\n");
+  if (!header.unit.empty()) out_.writer().append("# unit " + header.unit + "\n");
+}
 
 void ObjSink::write(const MeshChunk& chunk) {
   const bool normals = !chunk.normals.empty();

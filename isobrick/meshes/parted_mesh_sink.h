@@ -20,7 +20,10 @@ class PartedMeshSink : public MeshSink {
   static constexpr std::uint64_t kPartTriangles = std::uint64_t{1} << 20;
 
   Indexing indexing() const override { return Indexing::welded; }
-  void begin(const MeshHeader& header) override { has_normals_ = header.has_normals; }
+  void begin(const MeshHeader& header) override {
+    has_normals_ = header.has_normals;
+    unit_ = header.unit;
+  }
   void write(const MeshChunk& chunk) override;
   std::uint64_t bytes() const override;
   std::uint64_t memory() const override { return part_memory(part_triangles_); }
@@ -30,6 +33,8 @@ class PartedMeshSink : public MeshSink {
   PartedMeshSink(std::string path, bool force, std::uint64_t part_triangles);
 
   bool has_normals() const { return has_normals_; }
+  /// MeshHeader::unit.
+  const std::string& unit() const { return unit_; }
   MeshSize size() const { return size_; }
   PartedOutput& output() { return out_; }
   const PartedOutput& output() const { return out_; }
@@ -52,6 +57,7 @@ class PartedMeshSink : public MeshSink {
   std::uint64_t part_triangles_, part_bytes_ = 0;
   MeshSize size_;
   bool has_normals_ = false;
+  std::string unit_;
 };
 
 }  // namespace isobrick

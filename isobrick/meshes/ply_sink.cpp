@@ -39,15 +39,17 @@ std::string PlySink::header_text() const {
   const std::string counts = fmt::format("{}{}", vertices_, triangles_);
   const std::size_t most = 2 * std::numeric_limits<std::uint64_t>::digits10 + 2;
   return fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment Isobrick {}\n"
+      "ply\nformat binary_little_endian 1.0\ncomment Isobrick {}\n{}"
       "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n{}"
       "element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-      std::string(most - counts.size(), '.'), vertices_,
+      std::string(most - counts.size(), '.'),
+      unit_.empty() ? "" : fmt::format("comment unit {}\n", unit_), vertices_,
       has_normals_ ? "property float nx\nproperty float ny\nproperty float nz\n" : "", triangles_);
 }
 
 void PlySink::begin(const MeshHeader& header) {
   has_normals_ = header.has_normals;
+  unit_ = header.unit;
   out_.writer().append(header_text());
 }
 

@@ -10,7 +10,7 @@ namespace isobrick {
 
 /// Writes a welded mesh as binary little-endian PLY: float x y z [nx ny nz],
 /// faces as `list uchar uint vertex_indices`. The vertex numbers are uint, not
-/// int, because a mesh may have up to 2³² − 1 vertices.
+/// int, because a mesh may have up to 2³² − 1 vertices. A unit is a comment: "unit micrometer".
 class PlySink final : public MeshSink {
  public:
   /// See OutputFile for what `path` and `force` may throw. The faces come behind all vertices:
@@ -32,6 +32,7 @@ class PlySink final : public MeshSink {
   OutputFile out_;    ///< header and vertices; the faces at the end
   FileWriter faces_;  ///< waits until all vertices are known
   bool has_normals_ = false;
+  std::string unit_;
   std::uint64_t vertices_ = 0, triangles_ = 0;
 };
 

@@ -13,8 +13,8 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie");
 
-/// Twenty digits in each place fill some 1150.
-constexpr std::size_t kHeaderBytes = 1280;
+/// Twenty digits in each place and the longest unit fill some 1400.
+constexpr std::size_t kHeaderBytes = 1536;
 
 std::string data_array(std::string_view type, std::string_view name, int components,
                        std::uint64_t offset) {
@@ -22,6 +22,17 @@ std::string data_array(std::string_view type, std::string_view name, int compone
       "        <DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" "
       "offset=\"{}\"/>\n",
       type, name, components, offset);
+}
+
+/// VTK's strings in text: the codes of their characters and a zero.
+std::string unit_field(std::string_view unit) {
+  if (unit.empty()) return {};
+  std::string codes;
+  for (const char c : unit) codes += fmt::format("{} ", static_cast<unsigned>(c));
+  return fmt::format(
+      "    <FieldData>\n      <Array type=\"String\" Name=\"unit\" NumberOfTuples=\"1\" "
+      "format=\"ascii\">{}0</Array>\n    </FieldData>\n",
+      codes);
 }
 
 template <class Number, class F>
@@ -67,13 +78,13 @@ std::string VtpLayout::header() const {
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n"
-      "  <PolyData>\n"
+      "  <PolyData>\n{}"
       "    <Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
       "NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n{}      </PointData>\n"
       "      <Points>\n{}      </Points>\n      <Polys>\n{}{}      </Polys>\n"
       "    </Piece>\n  </PolyData>\n",
-      size.vertices, size.triangles, point_data, data_array("Float32", "Points", 3, 0),
-      data_array(number, "connectivity", 1, offset),
+      unit_field(unit), size.vertices, size.triangles, point_data,
+      data_array("Float32", "Points", 3, 0), data_array(number, "connectivity", 1, offset),
       data_array(number, "offsets", 1, offset + length + connectivity_bytes()));
   constexpr std::string_view data = "\n  <AppendedData encoding=\"raw\">\n   _";
   text.resize(kHeaderBytes - data.size(), ' ');

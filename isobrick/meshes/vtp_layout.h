@@ -11,10 +11,11 @@ namespace isobrick {
 
 /// A VTK PolyData file (.vtp) of one piece: XML, then the arrays appended raw,
 /// little endian, each behind its length in bytes as UInt64: points, normals,
-/// connectivity, offsets.
+/// connectivity, offsets. A unit is a string in the field data, named "unit".
 struct VtpLayout {
   MeshSize size;
   bool normals = false;
+  std::string unit = {};
 
   /// Numbers are Int32 where they fit, as VTK holds them, and Int64 otherwise.
   bool wide() const;

@@ -44,6 +44,7 @@ VtpSink::VtpSink(std::string path, bool force)
 
 void VtpSink::begin(const MeshHeader& header) {
   layout_.normals = header.has_normals;
+  layout_.unit = header.unit;
   out_.writer().append(layout_.header());
   append_length(out_.writer(), 0);
 }
@@ -83,7 +84,7 @@ PvtpSink::PvtpSink(std::string path, bool force, std::uint64_t part_triangles)
     : PartedMeshSink(named_in_xml(std::move(path)), force, part_triangles) {}
 
 void PvtpSink::write_part(FileWriter& out, const MeshPart& part) {
-  const VtpLayout layout{{part.vertices(), part.triangles}, has_normals()};
+  const VtpLayout layout{{part.vertices(), part.triangles}, has_normals(), unit()};
   const std::size_t row = row_bytes(has_normals());
   out.append(layout.header());
   for (std::size_t column = 0; column < row; column += sizeof(Vec3f)) {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "isobrick/core/length_unit.h"
 #include "isobrick/core/morton.h"
 #include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
@@ -53,6 +54,7 @@ MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface,
   const MeshBounds all =
       world_bounds(level.transform, {0, 0, 0}, level.lattice.extent - Int3{1, 1, 1});
   MeshHeader header{surface.normals, all.lo, all.hi};
+  header.unit = unit_name(level.transform.unit);
   // The last cells end at the samples behind them.
   if (!active.bounds.empty())
     header.surface = world_bounds(level.transform, active.bounds.lo, active.bounds.hi);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/render/mesh_parts_reader.h"
 #include "isobrick/render/mesh_readers.h"
 #include "isobrick/render/vectors.h"
@@ -110,15 +111,17 @@ class GlbReader {
         for (const json& name : root_.at("extensionsRequired"))
           if (name != "KHR_mesh_quantization")
             fail(fmt::format("it needs the extension {}, which is not read", name.dump()));
+      const WorldMatrix root = choose_unit();
       if (root_.contains("scenes")) {
         const json& scene = item("scenes", root_.value("scene", std::uint64_t{0}));
         if (scene.contains("nodes"))
-          for (const json& node : scene.at("nodes")) add_node(index(node), {}, 0);
+          for (const json& node : scene.at("nodes")) add_node(index(node), root, 0);
       }
     } catch (const json::exception& error) {
       fail(fmt::format("its scene: {}", error.what()));
     }
-    return std::make_unique<IndexedMeshFile>(path_, std::move(parts_), std::move(keep_));
+    return std::make_unique<IndexedMeshFile>(path_, std::move(parts_), std::move(keep_),
+                                             std::move(unit_));
   }
 
  private:
@@ -158,6 +161,24 @@ class GlbReader {
         fail(fmt::format("its scene is nested more than {} levels deep", kMostDepth));
       return true;
     });
+  }
+
+  /// Finds the unit of the coordinates, and what takes the scene to it. glTF measures in metres;
+  /// scenes of ours also name the unit of the volume, or had none.
+  WorldMatrix choose_unit() {
+    const json asset = root_.value("asset", json::object());
+    const json extras = asset.value("extras", json::object());
+    if (extras.is_object() && extras.contains("unit") && extras.at("unit").is_string())
+      unit_ = unit_name(extras.at("unit").get<std::string>());
+    WorldMatrix to_unit;
+    if (unit_.empty()) {
+      if (asset.value("generator", "") != "Isobrick") unit_ = "meter";
+      return to_unit;
+    }
+    const double metres = *unit_ratio(unit_, "meter");
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      to_unit.columns[axis] = to_unit.columns[axis] * (1 / metres);
+    return to_unit;
   }
 
   /// A whole number that counts or numbers something.
@@ -346,6 +367,7 @@ class GlbReader {
   std::span<const std::byte> bytes_, binary_;
   json root_;
   std::size_t nodes_seen_ = 0;
+  std::string unit_;
   std::map<std::uint64_t, std::shared_ptr<MappedFile>> external_;
   std::vector<IndexedPart> parts_;
   std::vector<std::shared_ptr<const void>> keep_;

@@ -14,6 +14,7 @@ namespace isobrick {
 struct MeshFileInfo {
   /// Faces of PLY may have more than three corners: several triangles each.
   std::uint64_t vertices = 0, faces = 0;
+  std::string unit = {};  ///< of its coordinates, as unit_name() has it; empty: it has none
 };
 
 /// A mesh file that is read in batches. It is mapped, not loaded (OBJ's positions go through

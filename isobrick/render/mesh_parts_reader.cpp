@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/io/byte_order.h"
 #include "isobrick/render/vectors.h"
 
@@ -108,6 +109,13 @@ Vec3d VertexField::at(std::uint64_t vertex) const {
   return v;
 }
 
+std::string unit_of_comment(std::string_view comment) {
+  constexpr std::string_view keyword = "unit ";
+  while (!comment.empty() && (comment.back() == '\r' || comment.back() == ' '))
+    comment.remove_suffix(1);
+  return comment.starts_with(keyword) ? unit_name(comment.substr(keyword.size())) : std::string();
+}
+
 void BoundsOf::include(Vec3d p, std::uint64_t vertex) {
   if (!std::isfinite(p.x + p.y + p.z))
     throw Error(
@@ -125,11 +133,14 @@ void BoundsOf::get(Vec3d& lo, Vec3d& hi) const {
 }
 
 IndexedMeshFile::IndexedMeshFile(std::string path, std::vector<IndexedPart> parts,
-                                 std::vector<std::shared_ptr<const void>> keep)
-    : path_(std::move(path)), parts_(std::move(parts)), keep_(std::move(keep)) {}
+                                 std::vector<std::shared_ptr<const void>> keep, std::string unit)
+    : path_(std::move(path)),
+      parts_(std::move(parts)),
+      keep_(std::move(keep)),
+      unit_(std::move(unit)) {}
 
 MeshFileInfo IndexedMeshFile::info() const {
-  MeshFileInfo info;
+  MeshFileInfo info{.unit = unit_};
   for (const IndexedPart& part : parts_) {
     info.vertices += part.vertices;
     info.faces += part.faces;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "isobrick/core/vec.h"
@@ -71,7 +72,7 @@ class IndexedMeshFile final : public MeshFile {
  public:
   /// `keep`: what the parts point into. `path` is for messages.
   IndexedMeshFile(std::string path, std::vector<IndexedPart> parts,
-                  std::vector<std::shared_ptr<const void>> keep);
+                  std::vector<std::shared_ptr<const void>> keep, std::string unit);
 
   MeshFileInfo info() const override;
   void bounds(Vec3d& lo, Vec3d& hi) const override;
@@ -81,7 +82,12 @@ class IndexedMeshFile final : public MeshFile {
   std::string path_;
   std::vector<IndexedPart> parts_;
   std::vector<std::shared_ptr<const void>> keep_;
+  std::string unit_;
 };
+
+/// The unit that a comment of Isobrick names ("unit micrometer"); empty where it is another
+/// comment.
+std::string unit_of_comment(std::string_view comment);
 
 /// Grows bounds by a position; throws Error for one that is not finite.
 class BoundsOf {

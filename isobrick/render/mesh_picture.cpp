@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/length_unit.h"
 #include "isobrick/render/gl_context.h"
 
 namespace isobrick {
@@ -15,6 +16,44 @@ struct Opened {
   std::string path;
   std::unique_ptr<MeshFile> file;
   MeshStyle style;
+  double scale = 1;  ///< from its unit to that of the picture
+};
+
+/// The unit of the picture, and what scales each mesh to it.
+std::string choose_unit(std::vector<Opened>& meshes) {
+  std::string unit;
+  for (Opened& mesh : meshes) {
+    const std::string own = mesh.file->info().unit;
+    if (own.empty()) continue;
+    if (unit.empty()) unit = own;
+    mesh.scale = unit_ratio(own, unit).value_or(1);
+  }
+  return unit;
+}
+
+/// Draws the bar of a picture in `unit`, in the unit that is asked for.
+void draw_scale_bar(Renderer& renderer, const std::string& unit, const std::string& wanted) {
+  if (wanted.empty()) return renderer.draw_scale_bar(unit_symbol(unit));
+  renderer.draw_scale_bar(unit_symbol(wanted), unit_ratio(wanted, unit).value_or(1));
+}
+
+/// A chunk whose coordinates count from an origin, scaled.
+class ScaledChunk {
+ public:
+  explicit ScaledChunk(double scale) : scale_(static_cast<float>(scale)), scaled_(scale != 1) {}
+
+  MeshChunk operator()(MeshChunk chunk) {
+    if (!scaled_) return chunk;
+    positions_.assign(chunk.positions.begin(), chunk.positions.end());
+    for (Vec3f& p : positions_) p = p * scale_;
+    chunk.positions = positions_;
+    return chunk;
+  }
+
+ private:
+  float scale_;
+  bool scaled_;
+  std::vector<Vec3f> positions_;
 };
 
 /// Bounds of all meshes that have a vertex; two equal corners if none has.
@@ -24,6 +63,8 @@ void find_bounds(const std::vector<Opened>& meshes, Vec3d& lo, Vec3d& hi) {
     if (mesh.file->info().vertices == 0) continue;
     Vec3d mesh_lo, mesh_hi;
     mesh.file->bounds(mesh_lo, mesh_hi);
+    mesh_lo = mesh_lo * mesh.scale;
+    mesh_hi = mesh_hi * mesh.scale;
     if (!std::exchange(any, true)) {
       lo = mesh_lo;
       hi = mesh_hi;
@@ -42,11 +83,17 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
   std::vector<Opened> meshes;
   std::uint64_t faces = 0;
   for (const PicturedMesh& mesh : request.meshes) {
-    meshes.push_back({mesh.path, open_mesh_file(mesh.path), mesh.style});
+    meshes.push_back({.path = mesh.path, .file = open_mesh_file(mesh.path), .style = mesh.style});
     const MeshFileInfo info = meshes.back().file->info();
     picture.vertices += info.vertices;
     faces += info.faces;
   }
+  picture.unit = choose_unit(meshes);
+  if (picture.unit.empty() && !request.scale_bar_unit.empty())
+    throw UsageError(fmt::format(
+        "'{}' has no unit, so that a scale bar cannot be in {}; without a unit it counts in the "
+        "mesh's own",
+        meshes.front().path, request.scale_bar_unit));
   // Those that are seen through come last.
   std::stable_sort(meshes.begin(), meshes.end(), [](const Opened& a, const Opened& b) {
     return a.style.opacity >= 1 && b.style.opacity < 1;
@@ -63,8 +110,9 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
   progress.begin("draw", faces * sizeof(Triangle));
   for (const Opened& mesh : meshes) {
     const std::uint64_t before = picture.triangles;
-    mesh.file->read(origin, [&](const MeshChunk& chunk, Vec3d from) {
-      renderer.draw(chunk, mesh.style, from);
+    ScaledChunk scaled(mesh.scale);
+    mesh.file->read(origin * (1 / mesh.scale), [&](const MeshChunk& chunk, Vec3d from) {
+      renderer.draw(scaled(chunk), mesh.style, from * mesh.scale);
       picture.triangles += chunk.triangles.size();
       progress.advance(chunk.triangles.size_bytes());
     });
@@ -74,7 +122,7 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
   progress.end();
   if (request.box) renderer.draw_box(picture.lo, picture.hi, {0.36f, 0.40f, 0.46f});
   if (request.axes) renderer.draw_axes();
-  if (request.scale_bar) renderer.draw_scale_bar(request.unit);
+  if (request.scale_bar) draw_scale_bar(renderer, picture.unit, request.scale_bar_unit);
   renderer.end();
   picture.rgba = renderer.read_pixels();
   return picture;

@@ -23,18 +23,23 @@ struct MeshPictureRequest {
   CameraRequest camera;
   PictureSettings settings;
   bool box = false, axes = false, scale_bar = false;
-  std::string unit;  ///< of the scale bar
+  /// Of the scale bar, as unit_name() has it. Empty: that of the meshes, or none where they have
+  /// none.
+  std::string scale_bar_unit;
 };
 
 struct MeshPicture {
   std::vector<std::uint8_t> rgba;  ///< rows from the top
   std::uint64_t vertices = 0, triangles = 0;
   Vec3d lo, hi;          ///< bounds of all meshes
+  std::string unit;      ///< of all coordinates: that of the first mesh that has one, or empty
   std::string renderer;  ///< what drew it
 };
 
 /// Draws mesh files off-screen; memory is that of the picture and of a batch of triangles.
-/// Throws Error for a file without triangles, and as open_mesh_file, GlContext and Renderer do.
+/// Meshes of another unit of length than the first one's are scaled to it; those without a unit
+/// are taken to be in it. Throws UsageError for a scale bar in a unit that the meshes lack, Error
+/// for a file without triangles, and as open_mesh_file, GlContext and Renderer do.
 MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progress);
 
 }  // namespace isobrick

@@ -44,6 +44,11 @@ class ObjText {
     return found;
   }
 
+  /// Of the line, without leading blanks.
+  std::string_view rest() const {
+    return line_.substr(std::min(line_.find_first_not_of(" \t"), line_.size()));
+  }
+
   Vec3d vector() {
     Vec3d v;
     for (int axis = 0; axis < 3; ++axis) {
@@ -145,8 +150,10 @@ std::unique_ptr<MeshFile> read_obj(const std::string& path, std::shared_ptr<Mapp
                               file->bytes().size());
   VectorFile positions, normals;
   IndexedPart part;
+  std::string unit;
   for (ObjText lines(path, text); lines.next();) {
     const std::string_view kind = lines.word();
+    if (kind == "#" && unit.empty() && positions.count() == 0) unit = unit_of_comment(lines.rest());
     if (kind == "v") positions.add(lines.vector());
     if (kind == "vn") normals.add(lines.vector());
     if (kind != "f") continue;
@@ -169,7 +176,8 @@ std::unique_ptr<MeshFile> read_obj(const std::string& path, std::shared_ptr<Mapp
   // A normal a vertex, as isosurfaces have it; others are lit by facet.
   if (normals.count() > 0 && normals.count() == positions.count()) part.normals = field(normals);
   part.open_triangles = [path, text] { return std::make_unique<ObjTriangles>(path, text); };
-  return std::make_unique<IndexedMeshFile>(path, std::vector{std::move(part)}, std::move(keep));
+  return std::make_unique<IndexedMeshFile>(path, std::vector{std::move(part)}, std::move(keep),
+                                           std::move(unit));
 }
 
 }  // namespace isobrick

@@ -201,8 +201,9 @@ void OverlayPass::add_axes() {
   }
 }
 
-void OverlayPass::add_scale_bar(const std::string& unit) {
-  const double pixel = camera_.extent_at(camera_.distance()) / std::min(width_, height_);
+void OverlayPass::add_scale_bar(const Overlays::ScaleBar& bar) {
+  const double pixel =
+      camera_.extent_at(camera_.distance()) / std::min(width_, height_) / bar.unit_length;
   const double most = 0.22 * width_ * pixel;
   if (!(most > 0) || !std::isfinite(most)) return;
   const double size = round_length(most), pixels = size / pixel, height = unit_height();
@@ -212,7 +213,7 @@ void OverlayPass::add_scale_bar(const std::string& unit) {
   const auto thick = static_cast<float>(height / 9);
   add_flat_line(left, right, dark, thick);
   for (const Vec3d end : {left, right}) add_flat_line(end - tick, end + tick, dark, thick);
-  const std::string text = label(size, unit);
+  const std::string text = label(size, bar.unit);
   add_text(text, left.x + (pixels - text_width(text, height)) / 2, right.y - 1.5 * height, height,
            dark);
 }

@@ -21,10 +21,14 @@ struct Overlays {
     Vec3f colour;
     float width;  ///< pixels
   };
+  struct ScaleBar {
+    std::string unit;
+    double unit_length = 1;  ///< in the world
+  };
   std::vector<Line> lines;
-  bool axes = false;                     ///< of the world, in the lower left corner
-  std::optional<std::string> scale_bar;  ///< a round length in the lower right corner: its unit
-  float scale = 1;                       ///< PictureSettings::overlay_scale
+  bool axes = false;                  ///< of the world, in the lower left corner
+  std::optional<ScaleBar> scale_bar;  ///< a round length in the lower right corner
+  float scale = 1;                    ///< PictureSettings::overlay_scale
 
   bool empty() const { return lines.empty() && !axes && !scale_bar; }
 };
@@ -47,7 +51,7 @@ class OverlayPass {
   void add_text(const std::string& text, double x, double y, double line_height, Vec3f colour);
   double text_width(const std::string& text, double line_height) const;
   void add_axes();
-  void add_scale_bar(const std::string& unit);
+  void add_scale_bar(const Overlays::ScaleBar& bar);
 
   /// A corner of a rectangle: on the screen, depth, and what its kind needs.
   struct Corner {

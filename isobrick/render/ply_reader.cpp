@@ -43,6 +43,7 @@ struct Header {
   bool swapped = false;
   std::vector<Element> elements;
   std::size_t bytes = 0;
+  std::string unit;
 };
 
 [[noreturn]] void damaged(const std::string& path, const std::string& what) {
@@ -120,8 +121,12 @@ Header parse_header(const std::string& path, std::string_view text) {
   for (std::size_t at = 0;;) {
     const std::size_t end = text.find('\n', at);
     if (end == text.npos) damaged(path, "its header does not end");
-    const std::vector<std::string_view> words = words_of(text.substr(at, end - at));
+    const std::string_view line = text.substr(at, end - at);
+    const std::vector<std::string_view> words = words_of(line);
     at = end + 1;
+    constexpr std::string_view comment = "comment ";
+    if (header.unit.empty() && line.starts_with(comment))
+      header.unit = unit_of_comment(line.substr(comment.size()));
     if (words.empty() || words[0] == "ply" || words[0] == "comment" || words[0] == "obj_info")
       continue;
     if (words[0] == "end_header") {
@@ -253,7 +258,7 @@ std::unique_ptr<MeshFile> read_ply(const std::string& path, std::shared_ptr<Mapp
       };
       return std::make_unique<IndexedMeshFile>(
           path, std::vector{std::move(part)},
-          std::vector<std::shared_ptr<const void>>{std::move(file)});
+          std::vector<std::shared_ptr<const void>>{std::move(file)}, header.unit);
     }
     const std::optional<std::uint64_t> row = element.row_bytes();
     if (!row) damaged(path, fmt::format("its element '{}' has lists", element.name));

@@ -248,7 +248,9 @@ void Renderer::draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float line_width) {
 }
 
 void Renderer::draw_axes() { state_->overlays.axes = true; }
-void Renderer::draw_scale_bar(const std::string& unit) { state_->overlays.scale_bar = unit; }
+void Renderer::draw_scale_bar(const std::string& unit, double unit_length) {
+  state_->overlays.scale_bar = {unit, unit_length};
+}
 
 void Renderer::end() { state_->go_on(std::numeric_limits<std::uint64_t>::max()); }
 bool Renderer::end_piece(std::uint64_t work) { return state_->go_on(work); }

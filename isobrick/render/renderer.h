@@ -120,8 +120,8 @@ class Renderer {
   /// The world's axes x (red), y (green) and z (blue) in the lower left corner.
   void draw_axes();
   /// A bar of a round length at the target's depth in the lower right corner, such as
-  /// "20 mm". `unit` may be empty.
-  void draw_scale_bar(const std::string& unit);
+  /// "20 mm". `unit` may be empty; it is `unit_length` long in the world.
+  void draw_scale_bar(const std::string& unit, double unit_length = 1);
 
   /// Finishes the picture.
   void end();

@@ -20,7 +20,7 @@ class StlFile final : public MeshFile {
   StlFile(std::string path, std::shared_ptr<MappedFile> file, std::uint64_t triangles)
       : path_(std::move(path)), file_(std::move(file)), triangles_(triangles) {}
 
-  MeshFileInfo info() const override { return {3 * triangles_, triangles_}; }
+  MeshFileInfo info() const override { return {.vertices = 3 * triangles_, .faces = triangles_}; }
 
   void bounds(Vec3d& lo, Vec3d& hi) const override {
     BoundsOf bounds(path_);

@@ -40,9 +40,9 @@ Chunks make_chunks(std::size_t triangles, std::uint32_t rings = 40) {
   return chunks;
 }
 
-void write(MeshSink& sink, const Chunks& chunks, bool normals) {
+void write(MeshSink& sink, const Chunks& chunks, bool normals, const std::string& unit = "") {
   EXPECT_EQ(sink.indexing(), Indexing::welded);
-  sink.begin({normals, {0, 0, 0}, {1, 1, 1}});
+  sink.begin({normals, {0, 0, 0}, {1, 1, 1}, unit});
   std::size_t v = 0, t = 0;
   for (const auto& [v_end, t_end] : chunks.ends) {
     MeshChunk chunk{.first_vertex = v};
@@ -110,6 +110,53 @@ TEST(MeshFormats, EachHasWhatPlyHas) {
     expect_equal(parts.mesh, expected);
     EXPECT_EQ(dir.list(), (std::vector<std::string>{"a.glb", "a.obj", "a.pvtp", "a.pvtp.parts",
                                                     "a.vtp", "reference.ply"}));
+  }
+}
+
+TEST(MeshFormats, TheUnitIsKept) {
+  const TempDir dir;
+  const Chunks chunks = make_chunks(777);
+  const auto written = [&](const std::string& name, MeshSink&& sink) {
+    write(sink, chunks, true, "micrometer");
+    return dir.read(name);
+  };
+  const std::string ply = written("a.ply", PlySink(dir / "a.ply", false));
+  EXPECT_TRUE(contains(ply.substr(0, 200), "\ncomment unit micrometer\n"));
+  EXPECT_EQ(read_ply(ply).triangles, chunks.mesh.triangles);
+  EXPECT_TRUE(written("a.obj", ObjSink(dir / "a.obj", false))
+                  .starts_with("# Isobrick\n# unit micrometer\nv "));
+  const std::string field =
+      "<FieldData>\n      <Array type=\"String\" Name=\"unit\" NumberOfTuples=\"1\" "
+      "format=\"ascii\">109 105 99 114 111 109 101 116 101 114 0</Array>";
+  const std::string vtp = written("a.vtp", VtpSink(dir / "a.vtp", false));
+  EXPECT_TRUE(contains(vtp, field));
+  EXPECT_EQ(read_vtp(vtp).positions, chunks.mesh.positions);
+  written("a.pvtp", PvtpSink(dir / "a.pvtp", false));
+  EXPECT_TRUE(contains(dir.read("a.pvtp.parts/part_0.vtp"), field));
+}
+
+TEST(MeshFormats, AGlbIsInMetres) {
+  for (const bool quantize : {false, true}) {
+    const TempDir dir;
+    const Chunks chunks = make_chunks(777);
+    GlbSink plain(dir / "plain.glb", false, {.quantize = quantize}),
+        sink(dir / "a.glb", false, {.quantize = quantize});
+    write(plain, chunks, true);
+    write(sink, chunks, true, "micrometer");
+    const GlbFile expected = read_glb(dir.read("plain.glb"), dir / "."),
+                  file = read_glb(dir.read("a.glb"), dir / ".");
+    EXPECT_TRUE(contains(file.json, R"("extras":{"unit":"micrometer"})"));
+    EXPECT_FALSE(contains(expected.json, "extras"));
+    // Vertices stay as they are; the node says how long their unit is.
+    EXPECT_NEAR(file.step, quantize ? 1e-6 * expected.step : 1e-6, 1e-15);
+    ASSERT_EQ(file.mesh.positions.size(), chunks.mesh.positions.size());
+    for (std::size_t i = 0; i < file.mesh.positions.size(); ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        const double here = double{expected.mesh.positions[i][axis]} * 1e-6;
+        EXPECT_NEAR(file.mesh.positions[i][axis], here, std::abs(here) * 2e-7 + 1e-14);
+      }
+    EXPECT_EQ(dir.read("a.glb").substr(dir.read("a.glb").size() - 1000),
+              dir.read("plain.glb").substr(dir.read("plain.glb").size() - 1000));
   }
 }
 
@@ -254,6 +301,10 @@ TEST(VtpLayout, NumbersGrowOnlyWhereTheyMust) {
   EXPECT_EQ(large.connectivity_bytes(), (std::uint64_t{1} << 33) * 24);
   const VtpLayout largest{{~std::uint64_t{0} / 12, ~std::uint64_t{0} / 24}, true};
   EXPECT_EQ(largest.header().size(), VtpLayout{}.header().size());
+  VtpLayout with_unit = largest;
+  with_unit.unit = "femtometer";  // no name is longer
+  EXPECT_EQ(with_unit.header().size(), VtpLayout{}.header().size());
+  EXPECT_TRUE(contains(with_unit.header(), "</PolyData>"));
 }
 
 TEST(VtpLayout, WideNumbersAreInt64) {

@@ -119,6 +119,21 @@ TEST_F(Extract, TheHeaderBoundsTheSurfaceWithinTheRegion) {
   }
 }
 
+TEST_F(Extract, TheMeshHasTheUnitOfTheStore) {
+  Field<std::uint8_t> field{{9, 9, 9}};
+  field.samples.assign(9 * 9 * 9, 1);
+  for (const auto& [unit, expected] : {std::pair("micrometer", "micrometer"), std::pair("", "")}) {
+    MemorySource source(field.extent, ScalarType::u8, as_bytes(field.samples));
+    source.mutable_info().transform.unit = unit;
+    const fs::path path = dir_ / (std::string("unit") + unit + ".zarr");
+    NoProgress silent;
+    convert(source, path, {}, silent);
+    MemorySink sink;
+    run(StoreReader(path), {.isovalue = 5}, sink);
+    EXPECT_EQ(sink.header_.unit, expected);
+  }
+}
+
 TEST_F(Extract, NothingButVolumeAndIsovalueShowsInTheMesh) {
   const auto field = mixed_field<std::uint8_t>({170, 131, 100});
   const double iso = 60;

@@ -21,9 +21,9 @@ namespace {
 
 constexpr std::uint32_t kRings = 20;
 
-void write(MeshSink& sink, bool normals = true) {
+void write(MeshSink& sink, bool normals = true, const std::string& unit = "") {
   const TestMesh ball = make_ball({1, 2, 3}, 1, kRings);
-  sink.begin({normals, {0, 1, 2}, {2, 3, 4}});
+  sink.begin({normals, {0, 1, 2}, {2, 3, 4}, unit});
   sink.write(ball.chunk(0, normals));
   sink.finish();
 }
@@ -83,6 +83,30 @@ TEST(MeshFile, ReadsWhatTheSinksWrite) {
   expect_ball(dir / "a.glb", true, 1e-6);
   expect_ball(dir / "q.glb", true, 2.1 / 65535);
   expect_ball(dir / "a.obj", true, 1e-6);
+}
+
+TEST(MeshFile, HasTheUnitOfTheStore) {
+  const TempDir dir;
+  const auto unit_of = [&](const std::string& name, MeshSink&& sink, const std::string& unit) {
+    write(sink, true, unit);
+    return open_mesh_file(dir / name)->info().unit;
+  };
+  for (const std::string unit : {"", "micrometer", "inch", "meter"}) {
+    EXPECT_EQ(unit_of("a.ply", PlySink(dir / "a.ply", true), unit), unit);
+    EXPECT_EQ(unit_of("a.obj", ObjSink(dir / "a.obj", true, 1), unit), unit);
+    EXPECT_EQ(unit_of("a.glb", GlbSink(dir / "a.glb", true), unit), unit);
+    EXPECT_EQ(unit_of("q.glb", GlbSink(dir / "q.glb", true, {.quantize = true}), unit), unit);
+    EXPECT_EQ(unit_of("a.stl", StlSink(dir / "a.stl", true), unit), "");
+    // In that unit, whatever the file measures in.
+    expect_ball(dir / "a.ply", true, 1e-6);
+    expect_ball(dir / "a.obj", true, 1e-6);
+    expect_ball(dir / "a.glb", true, 1e-6);
+    expect_ball(dir / "q.glb", true, 2.1 / 65535);
+  }
+  EXPECT_EQ(open_mesh_file(dir.write("b.obj", "# unit banana\nv 0 0 0\n"))->info().unit, "");
+  EXPECT_EQ(open_mesh_file(dir.write("c.obj", "# unit: none\n#unit mm\r\n"))->info().unit, "");
+  EXPECT_EQ(open_mesh_file(dir.write("d.obj", "# unit mm\r\nv 0 0 0\r\n"))->info().unit,
+            "millimeter");
 }
 
 TEST(MeshFile, ReadsStl) {
@@ -248,6 +272,70 @@ TEST(MeshFile, NormalsStayAcrossTheSurfaceWhereAxesAreScaledDifferently) {
       }
     });
   }
+}
+
+TEST(MeshFile, AGlbOfOthersIsInMetres) {
+  const TempDir dir;
+  const auto unit = [&](const std::string& asset) {
+    return open_mesh_file(dir.write("a.glb", glb(R"({"asset":)" + asset + "}", "")))->info().unit;
+  };
+  EXPECT_EQ(unit(R"({"version":"2.0","generator":"Blender"})"), "meter");
+  EXPECT_EQ(unit(R"({"version":"2.0"})"), "meter");
+  EXPECT_EQ(unit(R"({"version":"2.0","generator":"Isobrick"})"), "");
+  EXPECT_EQ(unit(R"({"version":"2.0","extras":{"unit":"banana"}})"), "meter");
+  EXPECT_EQ(unit(R"({"version":"2.0","extras":[1]})"), "meter");
+  message_of<Error>([&] { unit("7"); });
+}
+
+/// A triangle in a picture from above.
+MeshPictureRequest request_of(const std::vector<std::string>& paths) {
+  MeshPictureRequest request{.width = 64, .height = 64};
+  for (const std::string& path : paths) request.meshes.push_back({path, {}});
+  request.scale_bar = true;
+  return request;
+}
+
+TEST(MeshFile, UnitsOfSeveralMeshesBecomeThatOfTheFirst) {
+  if (!GlContext::available()) GTEST_SKIP() << "no OpenGL 4.5 without a window here";
+  const TempDir dir;
+  const auto obj = [&](const std::string& name, const std::string& unit, const std::string& size) {
+    return dir.write(name, (unit.empty() ? "" : "# unit " + unit + "\n") + "v 0 0 0\nv " + size +
+                               " 0 0\nv 0 " + size + " 0\nf 1 2 3\n");
+  };
+  const std::string none = obj("none.obj", "", "3"), mm = obj("mm.obj", "millimeter", "2"),
+                    um = obj("um.obj", "micrometer", "5000");
+  NoProgress progress;
+  const MeshPicture in_mm = draw_mesh_files(request_of({none, mm, um}), progress),
+                    in_um = draw_mesh_files(request_of({um, mm}), progress),
+                    without = draw_mesh_files(request_of({none}), progress);
+  EXPECT_EQ(in_mm.unit, "millimeter");
+  EXPECT_EQ(in_mm.hi, (Vec3d{5, 5, 0}));
+  EXPECT_EQ(in_um.unit, "micrometer");
+  EXPECT_EQ(in_um.hi, (Vec3d{5000, 5000, 0}));
+  EXPECT_EQ(without.unit, "");
+  MeshPictureRequest request = request_of({none});
+  request.scale_bar_unit = "millimeter";
+  const std::string message = message_of<UsageError>([&] { draw_mesh_files(request, progress); });
+  EXPECT_TRUE(contains(message, "none.obj") && contains(message, "has no unit")) << message;
+}
+
+TEST(MeshFile, AScaleBarIsTheSameLengthInAnyUnit) {
+  if (!GlContext::available()) GTEST_SKIP() << "no OpenGL 4.5 without a window here";
+  const TempDir dir;
+  // The same triangle twice: what the bar says must not depend on what the file measures in.
+  const std::string mm = dir.write("mm.obj", "# unit mm\nv 0 0 0\nv 2 0 0\nv 0 2 0\nf 1 2 3\n"),
+                    um = dir.write("um.obj",
+                                   "# unit um\nv 0 0 0\nv 2000 0 0\nv 0 2000 0\nf 1 2 3\n");
+  const auto pixels = [&](const std::string& path, const std::string& unit) {
+    MeshPictureRequest request = request_of({path});
+    request.width = request.height = 256;
+    request.scale_bar_unit = unit;
+    NoProgress progress;
+    return draw_mesh_files(request, progress).rgba;
+  };
+  EXPECT_TRUE(pixels(mm, "") == pixels(um, "millimeter"));
+  EXPECT_TRUE(pixels(um, "") == pixels(mm, "micrometer"));
+  EXPECT_FALSE(pixels(um, "") == pixels(mm, ""));
 }
 
 TEST(MeshFile, DamagedScenesAreSaid) {

@@ -42,6 +42,13 @@ class StoredPictures : public ProgramTest {
     return read_png(path("seen.png"));
   }
 
+  /// A surface in a PLY that has a unit, which made-up volumes lack.
+  static void write_millimetres(const std::string& store, const std::string& mesh) {
+    run_json({"extract", store, "--isovalue", "127.5", "-o", mesh});
+    std::string bytes = read_file(mesh);
+    write_file(mesh, bytes.insert(bytes.find("element vertex"), "comment unit millimeter\n"));
+  }
+
   static std::string stored(const std::string& name) {
     return std::string(ISOBRICK_PICTURES) + "/" + name + ".png";
   }
@@ -90,8 +97,7 @@ TEST_F(StoredPictures, ParallelRaysAndAScaleBar) {
 
 TEST_F(StoredPictures, MeshFiles) {
   for (const char* kind : {"gyroid", "sphere"})
-    run_json(
-        {"extract", volume(kind), "--isovalue", "127.5", "-o", path(kind + std::string(".ply"))});
+    write_millimetres(volume(kind), path(kind + std::string(".ply")));
   expect_stored("meshes",
                 render({path("gyroid.ply"), path("sphere.ply"), "--opacity", "1", "--opacity",
                         "0.4", "--clip", "-1,0.4,0,-60", "--region", "4:90,0:80,0:50", "--axes",

@@ -76,12 +76,20 @@ def same(a, b):
     return a.shape == b.shape and (a == b).all()
 
 
+def unit_of(data):
+    strings = data.GetFieldData().GetAbstractArray("unit")
+    return strings.GetValue(0) if strings else None
+
+
 def compare(base):
     name = base.name
+    vtp = read(base.with_name(name + ".vtp"), vtk.vtkXMLPolyDataReader())
+    unit = None if name in ("gyroid", "flat") else "micrometer"
+    check(unit_of(vtp) == unit, f"{name}.vtp: the unit is {unit_of(vtp)}")
     reference = Mesh(read(base.with_name(name + ".ply"), vtk.vtkPLYReader()))
     whole = {
         "obj": Mesh(read(base.with_name(name + ".obj"), vtk.vtkOBJReader())),
-        "vtp": Mesh(read(base.with_name(name + ".vtp"), vtk.vtkXMLPolyDataReader())),
+        "vtp": Mesh(vtp),
     }
     glb = base.with_name(name + ".glb")
     if len(reference.triangles):

@@ -13,8 +13,8 @@
 namespace isobrick {
 namespace {
 
-void write(MeshSink&& sink, const TestMesh& mesh, bool normals) {
-  sink.begin({.has_normals = normals});
+void write(MeshSink&& sink, const TestMesh& mesh, bool normals, const std::string& unit = "") {
+  sink.begin({.has_normals = normals, .unit = unit});
   if (!mesh.positions.empty()) sink.write(mesh.chunk(0, normals));
   sink.finish();
 }
@@ -22,10 +22,11 @@ void write(MeshSink&& sink, const TestMesh& mesh, bool normals) {
 void write_all(const std::filesystem::path& base, const TestMesh& mesh, bool normals) {
   constexpr std::uint64_t part = 1000, cut = 100'000;
   const auto name = [&](const char* extension) { return base.string() + extension; };
-  write(PlySink(name(".ply"), true), mesh, normals);
-  write(ObjSink(name(".obj"), true), mesh, normals);
-  write(VtpSink(name(".vtp"), true), mesh, normals);
-  write(PvtpSink(name(".pvtp"), true, part), mesh, normals);
+  const std::string unit = "micrometer";
+  write(PlySink(name(".ply"), true), mesh, normals, unit);
+  write(ObjSink(name(".obj"), true), mesh, normals, unit);
+  write(VtpSink(name(".vtp"), true), mesh, normals, unit);
+  write(PvtpSink(name(".pvtp"), true, part), mesh, normals, unit);
   write(GlbSink(name(".glb"), true), mesh, normals);
   write(GlbSink(name(".quantized.glb"), true, {.quantize = true}), mesh, normals);
   for (const bool quantize : {false, true})
