@@ -20,7 +20,7 @@ macro(isobrick_found_option option text found library without)
   endif()
 endmacro()
 
-isobrick_format_library(ISOBRICK_EXPAT EXPAT "VTK images (.vti)")
+isobrick_format_library(ISOBRICK_EXPAT EXPAT "VTK images (.vti) and meshes (.vtp)")
 isobrick_format_library(ISOBRICK_TIFF TIFF "TIFF stacks" 4.5)
 
 # CMake's own module for HDF5 needs a C compiler; Debian calls the library that

@@ -1,7 +1,9 @@
 #include "tools/open_store.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
+#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -52,6 +54,13 @@ std::string raw_options(const fs::path& path) {
   return name.extent && name.type ? "" : " --dims X,Y,Z --type TYPE";
 }
 
+/// Of the formats of pictures that are no slices of volumes.
+bool has_picture_name(const fs::path& path) {
+  constexpr std::array<std::string_view, 6> extensions{".png", ".jpg",  ".jpeg",
+                                                       ".gif", ".webp", ".bmp"};
+  return std::find(extensions.begin(), extensions.end(), extension_of(path)) != extensions.end();
+}
+
 [[noreturn]] void refuse_file(const fs::path& path) {
   const std::string name = path.string();
   if (has_mesh_name(path)) {
@@ -60,6 +69,8 @@ std::string raw_options(const fs::path& path) {
            fmt::format("run: isobrick render {} -o {}", shell_word(name),
                        shell_word(picture.replace_extension(".png").string())));
   }
+  if (has_picture_name(path))
+    refuse(name, "it is a picture", "name the store or the volume that it shows");
   const VolumeFormat format = recognise_format(name);
   refuse(name, fmt::format("it is {}", kFormatNames[static_cast<std::size_t>(format)]),
          convert_command(path, format == VolumeFormat::raw ? raw_options(path) : ""));

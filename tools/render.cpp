@@ -10,6 +10,7 @@
 #include "isobrick/io/output_guard.h"
 #include "isobrick/io/parted_output.h"
 #include "isobrick/io/png_file.h"
+#include "isobrick/meshes/mesh_name.h"
 #include "isobrick/render/mesh_picture.h"
 #include "tools/format.h"
 #include "tools/output_name.h"
@@ -118,7 +119,7 @@ void add_render(Program& program) {
       add_subcommand(program, "render", "Draw mesh files of any size into a picture.",
                      "isobrick render head_500.ply head_1150.ply --opacity 0.3 --camera "
                      "azimuth=40,elevation=15 -o head.png");
-  add_paths(app, "MESH", arguments->meshes, "Meshes to draw: PLY, STL, GLB or OBJ");
+  add_paths(app, "MESH", arguments->meshes, "Meshes to draw: " + mesh_extensions());
   add_text(app, {"-o,--output", "PNG", "Picture to write, - for standard output", "", true},
            [&output = arguments->output](const std::string& text) { output = text; });
   add_picture_options(app, arguments->picture, "mesh");

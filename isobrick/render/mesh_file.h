@@ -17,8 +17,8 @@ struct MeshFileInfo {
   std::string unit = {};  ///< of its coordinates, as unit_name() has it; empty: it has none
 };
 
-/// A mesh file that is read in batches. It is mapped, not loaded (OBJ's positions go through
-/// a nameless file): memory is that of a batch. One thread at a time.
+/// A mesh file that is read in batches. It is mapped, not loaded (what is text, base64 or packed
+/// goes through a nameless file): memory is that of a batch. One thread at a time.
 class MeshFile {
  public:
   virtual ~MeshFile() = default;
@@ -38,7 +38,7 @@ class MeshFile {
   static constexpr std::size_t kBatch = std::size_t{1} << 18;  ///< triangles
 };
 
-/// Opens a PLY (binary), STL (binary), GLB or OBJ file, told apart by their content.
+/// Opens a PLY, STL, OBJ, GLB, glTF or VTK PolyData file (.vtp, .pvtp).
 /// Throws Error for one that is damaged or has what is not read here.
 std::unique_ptr<MeshFile> open_mesh_file(const std::string& path);
 

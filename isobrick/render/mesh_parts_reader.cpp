@@ -81,7 +81,7 @@ class Batch {
 }  // namespace
 
 std::size_t size_of(NumberKind kind) {
-  constexpr std::array<std::size_t, 8> sizes{1, 1, 2, 2, 4, 4, 4, 8};
+  constexpr std::array<std::size_t, 10> sizes{1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
   return sizes[static_cast<std::size_t>(kind)];
 }
 
@@ -93,6 +93,8 @@ double load_number(const std::byte* at, NumberKind kind, bool swapped) {
     case NumberKind::u16: return load<std::uint16_t>(at, swapped);
     case NumberKind::i32: return load<std::int32_t>(at, swapped);
     case NumberKind::u32: return load<std::uint32_t>(at, swapped);
+    case NumberKind::i64: return load<std::int64_t>(at, swapped);
+    case NumberKind::u64: return load<std::uint64_t>(at, swapped);
     case NumberKind::f32: return load<float>(at, swapped);
     case NumberKind::f64: return load<double>(at, swapped);
   }

@@ -16,7 +16,7 @@
 namespace isobrick {
 
 /// How a number lies in a file.
-enum class NumberKind : std::uint8_t { i8, u8, i16, u16, i32, u32, f32, f64 };
+enum class NumberKind : std::uint8_t { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };
 
 std::size_t size_of(NumberKind kind);
 /// The number at `at`; `swapped`: its bytes are in the other order.

@@ -70,9 +70,8 @@ std::unique_ptr<MeshFile> read_stl(const std::string& path, std::shared_ptr<Mapp
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (bytes.size() >= kStart && needed == bytes.size())
     return std::make_unique<StlFile>(path, std::move(file), count);
-  if (text.starts_with("solid"))
-    throw Error(
-        fmt::format("'{}' is STL in text, which is not read; write it as binary STL", path));
+  if (text.starts_with("solid") && text.substr(0, kStart).find('\0') == text.npos)
+    return read_text_stl(path, std::move(file));
   if (bytes.size() < kStart)
     throw Error(fmt::format("'{}' is damaged: {} bytes are no STL file", path, bytes.size()));
   if (bytes.size() < needed)

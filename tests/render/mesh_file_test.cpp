@@ -13,6 +13,7 @@
 #include "isobrick/meshes/stl_sink.h"
 #include "isobrick/render/gl_context.h"
 #include "isobrick/render/mesh_picture.h"
+#include "tests/io/base64_text.h"
 #include "tests/io/temp_dir.h"
 #include "tests/meshes/test_meshes.h"
 
@@ -64,6 +65,14 @@ void expect_ball(const std::string& path, bool normals, double tolerance) {
     EXPECT_NEAR(corners[i].y, p.y, tolerance) << path;
     EXPECT_NEAR(corners[i].z, p.z, tolerance) << path;
   }
+}
+
+/// Everything that reading takes: opening, bounds, triangles.
+void read_all(const std::string& path) {
+  const std::unique_ptr<MeshFile> file = open_mesh_file(path);
+  Vec3d lo, hi;
+  file->bounds(lo, hi);
+  file->read(lo, [](const MeshChunk&, Vec3d) {});
 }
 
 TEST(MeshFile, ReadsWhatTheSinksWrite) {
@@ -118,6 +127,85 @@ TEST(MeshFile, ReadsStl) {
   EXPECT_EQ(corners_of(dir / "a.stl").size(), 3 * ball.triangles.size());
 }
 
+TEST(MeshFile, ReadsTextPly) {
+  const TempDir dir;
+  const std::string path =
+      dir.write("a.ply",
+                "ply\r\nformat ascii 1.0\r\ncomment unit mm\r\n"
+                "element camera 1\nproperty float f\nproperty list uchar int l\n"
+                "element vertex 4\nproperty uchar mark\nproperty double x\n"
+                "property double y\nproperty double z\nproperty float nx\n"
+                "property float ny\nproperty float nz\nelement face 2\n"
+                "property list uchar int vertex_indices\nproperty int n\n"
+                "end_header\n1.5 2 7 8\n"
+                "9 5000000.123456 0 7 0 0 1\n9 1 0 7 0 0 1\n"
+                "9 0 1 7\n0 0 1 9 1 1 7 0 0 1\n"  // rows need no lines
+                "4 0 1 3 2 -1\n3 0 1\n2 -1\n");
+  const std::unique_ptr<MeshFile> file = open_mesh_file(path);
+  EXPECT_EQ(file->info().vertices, 4U);
+  EXPECT_EQ(file->info().faces, 2U);
+  EXPECT_EQ(file->info().unit, "millimeter");
+  for (int again = 0; again < 2; ++again) {
+    const std::vector<Vec3d> corners = corners_of(path, {5e6, 0, 0});
+    ASSERT_EQ(corners.size(), 9U);  // a fan of two, and one
+    EXPECT_NEAR(corners[0].x, 5000000.123456, 1e-7);
+    EXPECT_EQ(corners[2], (Vec3d{1, 1, 7}));
+    EXPECT_EQ(corners[8], (Vec3d{0, 1, 7}));
+  }
+  file->read({}, [](const MeshChunk& chunk, Vec3d) {
+    ASSERT_EQ(chunk.normals.size(), chunk.positions.size());
+    EXPECT_EQ(chunk.normals[0], (Vec3f{0, 0, 1}));
+  });
+}
+
+TEST(MeshFile, ReadsTextStl) {
+  const TempDir dir;
+  const std::string facet =
+      "  facet normal nan -nan(ind) 0\n    outer loop\n      vertex 5000000.123456 0 1e0\n"
+      "      VERTEX 1 0 +1\n      vertex 0 1 1\n    endloop\n  endfacet\n";
+  const std::string path =
+      dir.write("a.stl", "solid two words\r\n" + facet + facet + "endsolid two words\nsolid\n" +
+                             facet + "endsolid");
+  EXPECT_EQ(open_mesh_file(path)->info().faces, 3U);
+  const std::vector<Vec3d> corners = corners_of(path, {5e6, 0, 0});
+  ASSERT_EQ(corners.size(), 9U);
+  EXPECT_NEAR(corners[6].x, 5000000.123456, 1e-7);
+  EXPECT_EQ(corners[7], (Vec3d{1, 0, 1}));
+  Vec3d lo, hi;
+  open_mesh_file(path)->bounds(lo, hi);
+  EXPECT_EQ(lo, (Vec3d{0, 0, 1}));
+  // A binary file may begin with the same word.
+  StlSink stl(dir / "b.stl", false);
+  write(stl);
+  std::string bytes = dir.read("b.stl").replace(0, 5, "solid");
+  EXPECT_EQ(open_mesh_file(dir.write("b.stl", bytes))->info().faces,
+            make_ball({1, 2, 3}, 1, kRings).triangles.size());
+}
+
+TEST(MeshFile, TextSaysTheLineThatIsWrong) {
+  const TempDir dir;
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::vector<std::array<std::string, 3>> files{
+      {"a.ply", head + "0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n", "line 11: 'x' is no number"},
+      {"b.ply", head + "0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "line 13: it ends within an element 'face'"},
+      {"c.ply", head + "0 0 0\n1 0\n", "line 11: it ends within an element 'vertex'"},
+      {"d.ply", head + "0 0 0\n1 0 0\n0 1 0\n1.5 0 1 2\n", "line 13: a list has 1.5 items"},
+      {"e.ply", head + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "names vertex 3 of 3"},
+      {"a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\nvertex 1 2 3\n",
+       "line 5: 'vertex' is no number"},
+      {"b.stl", "solid a\nfacet normal 0 0 1\nouter loop\n", "line 3: it ends where 'vertex'"},
+      {"c.stl", "solid a\nfacets\n", "line 2: 'facets' stands where 'facet'"},
+      {"d.stl", "solid a\n", "line 1: it ends where 'facet'"},
+  };
+  for (const auto& [name, text, expected] : files) {
+    const std::string path = dir.write(name, text);
+    const std::string message = message_of<Error>([&] { read_all(path); });
+    EXPECT_TRUE(contains(message, name) && contains(message, expected)) << message;
+  }
+}
+
 TEST(MeshFile, BigEndianPlyWithOtherProperties) {
   const TempDir dir;
   std::string text =
@@ -143,14 +231,6 @@ TEST(MeshFile, BigEndianPlyWithOtherProperties) {
   ASSERT_EQ(corners.size(), 6u);  // a fan
   EXPECT_EQ(corners[2], (Vec3d{1, 1, 7}));
   EXPECT_EQ(corners[5], (Vec3d{0, 1, 7}));
-}
-
-/// Everything that reading takes: opening, bounds, triangles.
-void read_all(const std::string& path) {
-  const std::unique_ptr<MeshFile> file = open_mesh_file(path);
-  Vec3d lo, hi;
-  file->bounds(lo, hi);
-  file->read(lo, [](const MeshChunk&, Vec3d) {});
 }
 
 TEST(MeshFile, DamageIsSaid) {
@@ -336,6 +416,42 @@ TEST(MeshFile, AScaleBarIsTheSameLengthInAnyUnit) {
   EXPECT_TRUE(pixels(mm, "") == pixels(um, "millimeter"));
   EXPECT_TRUE(pixels(um, "") == pixels(mm, "micrometer"));
   EXPECT_FALSE(pixels(um, "") == pixels(mm, ""));
+}
+
+/// A GLB's scene as a .gltf whose buffer is at `uri`.
+std::string scene_of(const std::string& glb_bytes, const std::string& uri) {
+  std::uint32_t size = 0;
+  std::memcpy(&size, glb_bytes.data() + 12, sizeof(size));
+  std::string scene = glb_bytes.substr(20, size);
+  const std::string buffers = R"("buffers":[{)";
+  return scene.insert(scene.find(buffers) + buffers.size(), R"("uri":")" + uri + R"(",)");
+}
+
+TEST(MeshFile, ReadsScenesInText) {
+  const TempDir dir;
+  GlbSink sink(dir / "a.glb", false);
+  write(sink, true, "micrometer");
+  const std::string bytes = dir.read("a.glb");
+  std::uint32_t size = 0;
+  std::memcpy(&size, bytes.data() + 12, sizeof(size));
+  const std::string buffer = bytes.substr(20 + size + 8);
+  dir.write("a b.bin", buffer);
+  const std::string data = "data:application/octet-stream;base64," + base64(buffer);
+  for (const std::string& uri : {std::string("a%20b.bin"), data}) {
+    const std::string path = dir.write("b.gltf", scene_of(bytes, uri));
+    expect_ball(path, true, 1e-6);
+    EXPECT_EQ(open_mesh_file(path)->info().unit, "micrometer");
+  }
+  for (const std::string& uri :
+       {std::string("gone.bin"), std::string("../a b.bin"), std::string("data:,abc"),
+        data.substr(0, data.size() / 2), "data:;base64,*" + data.substr(40)}) {
+    const std::string path = dir.write("c.gltf", scene_of(bytes, uri));
+    EXPECT_TRUE(contains(message_of<Error>([&] { read_all(path); }),
+                         uri == "gone.bin" ? "gone.bin" : "c.gltf"));
+  }
+  for (const std::string text : {"", "[]", "{", "ply"})
+    EXPECT_TRUE(
+        contains(message_of<Error>([&] { open_mesh_file(dir.write("d.gltf", text)); }), "d.gltf"));
 }
 
 TEST(MeshFile, DamagedScenesAreSaid) {

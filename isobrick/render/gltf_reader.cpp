@@ -3,9 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <limits>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
@@ -13,6 +11,7 @@
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/length_unit.h"
+#include "isobrick/render/gltf_buffers.h"
 #include "isobrick/render/mesh_parts_reader.h"
 #include "isobrick/render/mesh_readers.h"
 #include "isobrick/render/vectors.h"
@@ -23,7 +22,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
-constexpr std::size_t kMostJson = std::size_t{64} << 20;
+constexpr std::size_t kMaxJson = std::size_t{64} << 20;
 constexpr int kMostDepth = 64;
 
 std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
@@ -32,31 +31,10 @@ std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
   return word;
 }
 
-/// "a%20b" → "a b".
-std::string percent_decoded(std::string_view text) {
-  const auto digit = [](char c) {
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-  };
-  std::string decoded;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] == '%' && i + 2 < text.size() && digit(text[i + 1]) >= 0 &&
-        digit(text[i + 2]) >= 0) {
-      decoded += static_cast<char>(16 * digit(text[i + 1]) + digit(text[i + 2]));
-      i += 2;
-    } else {
-      decoded += text[i];
-    }
-  }
-  return decoded;
-}
-
 /// Three indices after the other.
-class GlbTriangles final : public TriangleReader {
+class GltfTriangles final : public TriangleReader {
  public:
-  GlbTriangles(const std::byte* first, NumberKind kind, std::uint64_t triangles)
+  GltfTriangles(const std::byte* first, NumberKind kind, std::uint64_t triangles)
       : at_(first), kind_(kind), left_(triangles) {}
 
   bool next(std::array<std::uint64_t, 3>& triangle) override {
@@ -97,16 +75,21 @@ WorldMatrix product(const WorldMatrix& a, const WorldMatrix& b) {
   return m;
 }
 
-class GlbReader {
+class GltfReader {
  public:
-  GlbReader(const std::string& path, std::shared_ptr<MappedFile> file)
-      : path_(path), bytes_(file->bytes()) {
+  /// `in_chunks`: a GLB, and not the scene alone.
+  GltfReader(const std::string& path, std::shared_ptr<MappedFile> file, bool in_chunks)
+      : path_(path), bytes_(file->bytes()), in_chunks_(in_chunks), buffers_(path) {
     keep_.push_back(std::move(file));
   }
 
   std::unique_ptr<MeshFile> read() {
     try {
-      read_chunks();
+      if (in_chunks_)
+        read_chunks();
+      else
+        read_scene(bytes_);
+      if (!root_.is_object()) fail("its scene is no object");
       if (root_.contains("extensionsRequired"))
         for (const json& name : root_.at("extensionsRequired"))
           if (name != "KHR_mesh_quantization")
@@ -120,19 +103,19 @@ class GlbReader {
     } catch (const json::exception& error) {
       fail(fmt::format("its scene: {}", error.what()));
     }
+    keep_.insert(keep_.end(), buffers_.files().begin(), buffers_.files().end());
     return std::make_unique<IndexedMeshFile>(path_, std::move(parts_), std::move(keep_),
                                              std::move(unit_));
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error(fmt::format("'{}' is no GLB file that can be drawn: {}", path_, what));
-  }
+  [[noreturn]] void fail(const std::string& what) const { fail_gltf(path_, what); }
 
   void read_chunks() {
     constexpr std::size_t start = 12, head = 8;
     if (bytes_.size() < start + head) fail("it ends within its header");
     if (word_at(bytes_, 4) != 2) fail(fmt::format("its version is {}", word_at(bytes_, 4)));
+    bool has_binary = false;
     for (std::size_t at = start; at + head <= bytes_.size();) {
       const std::size_t size = word_at(bytes_, at), kind = word_at(bytes_, at + 4);
       if (size > bytes_.size() - at - head)
@@ -140,19 +123,20 @@ class GlbReader {
       const auto chunk = bytes_.subspan(at + head, size);
       if (at == start) {
         if (kind != kJsonChunk) fail("it does not begin with a scene");
-        if (size > kMostJson) fail(fmt::format("its scene takes {} bytes", size));
         read_scene(chunk);
-      } else if (kind == kBinaryChunk && binary_.empty()) {
-        binary_ = chunk;
+      } else if (kind == kBinaryChunk && !has_binary) {
+        buffers_.set_binary(chunk);
+        has_binary = true;
       }
       at += head + (size + 3) / 4 * 4;
     }
-    if (!root_.is_object()) fail("its scene is no object");
   }
 
   /// Parses the scene. A level of nesting takes some 70 times the memory of its
   /// byte of text, so the parser stops where the levels become too many.
   void read_scene(std::span<const std::byte> chunk) {
+    if (chunk.size() > kMaxJson)
+      fail(fmt::format("its scene takes {} bytes, more than {} MiB", chunk.size(), kMaxJson >> 20));
     const auto* text = reinterpret_cast<const char*>(chunk.data());
     using Event = json::parse_event_t;
     root_ = json::parse(text, text + chunk.size(), [this](int depth, Event event, json&) {
@@ -284,7 +268,7 @@ class GlbReader {
     if (place.stride != size_of(kind)) fail("its triangles do not lie side by side");
     part.faces = place.count / 3;
     part.open_triangles = [first = place.first, kind, count = part.faces] {
-      return std::make_unique<GlbTriangles>(first, kind, count);
+      return std::make_unique<GltfTriangles>(first, kind, count);
     };
   }
 
@@ -327,7 +311,9 @@ class GlbReader {
     if (accessor.contains("sparse")) fail("it has sparse accessors, which are not read");
     const std::uint64_t count = index(accessor.at("count"));
     const json& view = item("bufferViews", index(accessor.at("bufferView")));
-    const std::span<const std::byte> buffer = buffer_of(index(view.at("buffer")));
+    const std::uint64_t buffer_number = index(view.at("buffer"));
+    const std::span<const std::byte> buffer =
+        buffers_.get(item("buffers", buffer_number), buffer_number);
     const std::uint64_t offset = whole(view, "byteOffset", 0),
                         inner = whole(accessor, "byteOffset", 0);
     const std::uint64_t length = index(view.at("byteLength"));
@@ -342,33 +328,13 @@ class GlbReader {
     return {buffer.data() + offset + inner, stride, count};
   }
 
-  std::span<const std::byte> buffer_of(std::uint64_t number) {
-    const json& buffer = item("buffers", number);
-    if (!buffer.contains("uri")) {
-      if (number != 0) fail(fmt::format("buffer {} is nowhere", number));
-      return binary_;
-    }
-    if (const auto known = external_.find(number); known != external_.end())
-      return known->second->bytes();
-    const auto uri = buffer.at("uri").get<std::string>();
-    if (uri.starts_with("data:")) fail("its buffers are text, which is not read");
-    const std::filesystem::path name = percent_decoded(uri);
-    bool leads_away = name.is_absolute() || uri.find("://") != uri.npos;
-    for (const auto& part : name) leads_away |= part == "..";
-    if (leads_away) fail(fmt::format("its buffer '{}' is not below its folder", uri));
-    auto file =
-        std::make_shared<MappedFile>((std::filesystem::path(path_).parent_path() / name).string());
-    keep_.push_back(file);
-    external_.emplace(number, file);
-    return file->bytes();
-  }
-
   const std::string& path_;
-  std::span<const std::byte> bytes_, binary_;
+  std::span<const std::byte> bytes_;
+  bool in_chunks_;
   json root_;
   std::size_t nodes_seen_ = 0;
   std::string unit_;
-  std::map<std::uint64_t, std::shared_ptr<MappedFile>> external_;
+  GltfBuffers buffers_;
   std::vector<IndexedPart> parts_;
   std::vector<std::shared_ptr<const void>> keep_;
 };
@@ -376,7 +342,11 @@ class GlbReader {
 }  // namespace
 
 std::unique_ptr<MeshFile> read_glb(const std::string& path, std::shared_ptr<MappedFile> file) {
-  return GlbReader(path, std::move(file)).read();
+  return GltfReader(path, std::move(file), true).read();
+}
+
+std::unique_ptr<MeshFile> read_gltf(const std::string& path, std::shared_ptr<MappedFile> file) {
+  return GltfReader(path, std::move(file), false).read();
 }
 
 }  // namespace isobrick

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "isobrick/io/byte_stream.h"
+
+namespace isobrick {
+
+/// Bytes in memory, which must live as long; `path` is for messages.
+std::unique_ptr<ByteStream> make_memory_stream(const std::string& path,
+                                               std::span<const std::byte> bytes);
+
+}  // namespace isobrick

@@ -1,0 +1,42 @@
+#include "isobrick/render/scratch_rows.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+namespace {
+
+std::filesystem::path temporary_folder() {
+  std::error_code failure;
+  std::filesystem::path folder = std::filesystem::temp_directory_path(failure);
+  if (failure)
+    throw Error("there is no folder for temporary files; set TMPDIR to one: " + failure.message());
+  return folder;
+}
+
+}  // namespace
+
+ScratchBytes::ScratchBytes()
+    : out_(open_scratch_beside((temporary_folder() / "isobrick").string())) {}
+
+std::shared_ptr<MappedFile> ScratchBytes::map() {
+  out_.flush();
+  const File file = out_.share();
+  return std::make_shared<MappedFile>(fmt::format("/proc/self/fd/{}", file.fd()));
+}
+
+VertexField ScratchRows::field(std::vector<std::shared_ptr<const void>>& keep, double scale) {
+  const std::shared_ptr<MappedFile> mapped = bytes_.map();
+  keep.push_back(mapped);
+  constexpr NumberKind kind = NumberKind::f64;
+  return {.first = mapped->bytes().data(),
+          .stride = sizeof(Vec3d),
+          .offsets = {0, 8, 16},
+          .kinds = {kind, kind, kind},
+          .scale = scale};
+}
+
+}  // namespace isobrick
