@@ -235,12 +235,17 @@ struct Said {
   std::string text;
 };
 
-Said estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
+Said estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
+                  Console& console) {
   Said said;
   for (const ExtractedSurface& surface : surfaces) {
     const ExtractEstimate guess = estimate_one(surface, store);
     said.objects.push_back(estimate_json(surface, guess));
     said.text += estimate_text(surface, guess);
+    const ExtractOptions& options = surface.options;
+    if (const std::string why = why_out_of_range(store, options.level, options.isovalue);
+        guess.mesh.triangles == 0 && !why.empty())
+      console.note(why);
   }
   return said;
 }
@@ -279,7 +284,7 @@ int run(const Arguments& arguments, Console& console) {
   const StoreReader store = open_store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
   for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
-  const Said said = arguments.estimate ? estimate_all(surfaces, store)
+  const Said said = arguments.estimate ? estimate_all(surfaces, store, console)
                                        : make_all(arguments, surfaces, store, console);
   console.result({{"command", "extract"},
                   {"store", arguments.store},
