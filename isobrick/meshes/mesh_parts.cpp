@@ -8,17 +8,23 @@ namespace isobrick {
 namespace {
 
 constexpr std::uint64_t kRun = FileWriter::kBuffer / sizeof(Triangle);
+/// Triangles whose vertices are gathered at a time.
+constexpr std::uint64_t kGatheredRun = std::uint64_t{1} << 14;
 
-/// Calls f(run) for triangles [first, first + count) of the file; f may change them.
+/// Calls f(run) for runs of triangles [first, first + count) of the file, until it returns false;
+/// f may change them.
 template <class F>
-void read_triangles(FileWriter& file, std::uint64_t first, std::uint64_t count, F&& f) {
-  std::vector<Triangle> run(static_cast<std::size_t>(std::min(count, kRun)));
+void read_triangles(FileWriter& file, std::uint64_t first, std::uint64_t count,
+                    std::uint64_t run_triangles, F&& f) {
+  std::vector<Triangle> run(static_cast<std::size_t>(std::min(count, run_triangles)));
   for (const std::uint64_t end = first + count; first < end; first += run.size()) {
-    run.resize(static_cast<std::size_t>(std::min(kRun, end - first)));
+    run.resize(static_cast<std::size_t>(std::min(run_triangles, end - first)));
     file.read_back(first * sizeof(Triangle), std::as_writable_bytes(std::span(run)));
-    f(std::span<Triangle>(run));
+    if (!f(std::span<Triangle>(run))) return;
   }
 }
+
+std::uint64_t max_borrowed(std::uint64_t part_triangles) { return part_triangles / 8; }
 
 void sort_unique(std::vector<std::uint32_t>& numbers) {
   std::sort(numbers.begin(), numbers.end());
@@ -39,11 +45,13 @@ class VertexCollector {
           end_ = std::max(end_, std::uint64_t{vertex} + 1);
       }
     // Each is named some six times.
-    if (borrowed_.size() > 2 * distinct_ + 3 * kRun) {
+    if (borrowed_.size() > 2 * distinct_ + 3 * kGatheredRun) {
       sort_unique(borrowed_);
       distinct_ = borrowed_.size();
     }
   }
+  /// Of the vertices borrowed, those that are known to be distinct.
+  std::size_t distinct() const { return distinct_; }
   const std::vector<std::uint32_t>& borrowed() {
     sort_unique(borrowed_);
     return borrowed_;
@@ -70,8 +78,14 @@ void for_each_part(FileWriter& triangles, MeshSize mesh, std::uint64_t part_tria
   do {
     part.triangles = std::min(part_triangles, mesh.triangles - part.first_triangle);
     VertexCollector collector(part.first_vertex);
-    read_triangles(triangles, part.first_triangle, part.triangles,
-                   [&](std::span<const Triangle> run) { collector.add(run); });
+    std::uint64_t gathered = 0;
+    read_triangles(triangles, part.first_triangle, part.triangles, kGatheredRun,
+                   [&](std::span<const Triangle> run) {
+                     collector.add(run);
+                     gathered += run.size();
+                     return collector.distinct() <= max_borrowed(part_triangles);
+                   });
+    part.triangles = gathered;
     const bool last = part.first_triangle + part.triangles == mesh.triangles;
     // Vertices that no triangle names go with the last one.
     const std::uint64_t end = last ? mesh.vertices : collector.end();
@@ -84,8 +98,10 @@ void for_each_part(FileWriter& triangles, MeshSize mesh, std::uint64_t part_tria
 }
 
 std::uint64_t part_memory(std::uint64_t part_triangles) {
-  // The vector of numbers may have twice the room that it needs.
-  return 2 * sizeof(std::uint32_t) * 3 * (part_triangles + kRun);
+  // Numbers are sorted out when there are twice as many as distinct ones and a run more. The vector
+  // may have twice the room that it needs.
+  const std::uint64_t run = 3 * std::min(part_triangles, kGatheredRun);
+  return 2 * sizeof(std::uint32_t) * (2 * (max_borrowed(part_triangles) + run) + 2 * run);
 }
 
 void for_each_row_run(const VertexRows& rows, const MeshPart& part,
@@ -120,11 +136,13 @@ void for_each_row_run(const VertexRows& rows, const MeshPart& part,
 
 void for_each_triangle_run(FileWriter& triangles, const MeshPart& part,
                            const std::function<void(std::span<const Triangle>)>& take) {
-  read_triangles(triangles, part.first_triangle, part.triangles, [&](std::span<Triangle> run) {
-    for (Triangle& triangle : run)
-      for (std::uint32_t& vertex : triangle) vertex = part.local(vertex);
-    take(run);
-  });
+  read_triangles(triangles, part.first_triangle, part.triangles, kRun,
+                 [&](std::span<Triangle> run) {
+                   for (Triangle& triangle : run)
+                     for (std::uint32_t& vertex : triangle) vertex = part.local(vertex);
+                   take(run);
+                   return true;
+                 });
 }
 
 }  // namespace isobrick

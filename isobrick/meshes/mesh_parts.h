@@ -26,8 +26,8 @@ struct MeshPart {
 
 /// Cuts a welded mesh, whose triangles lie in a scratch file, into parts of
 /// `part_triangles` (the last has fewer; a mesh without triangles is one part)
-/// and calls `take` for each, in order. Where the cuts lie depends on nothing
-/// but the mesh.
+/// and calls `take` for each, in order. A part that borrows more vertices than an eighth of
+/// that ends sooner. Where the cuts lie depends on nothing but the mesh.
 void for_each_part(FileWriter& triangles, MeshSize mesh, std::uint64_t part_triangles,
                    const std::function<void(const MeshPart&)>& take);
 

@@ -208,15 +208,18 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const StoreLayout layout = plan_layout(source.info(), options);
-  if (options.index)
-    check_index_options(index_options(options, false), layout.levels.front().lattice);
+  const Lattice& finest = layout.levels.front().lattice;
+  const std::uint64_t least_of_index =
+      options.index ? least_index_memory(index_options(options, false), finest) : 0;
   const int threads = Workers(options.threads).threads();
   std::optional<ConvertPlan> plan;
   std::optional<SparsePyramid> sparse;
   if (SparsePyramid::possible(source, layout))
-    sparse.emplace(source, layout, options, threads);
+    sparse.emplace(source, layout, options, threads, least_of_index);
   else
-    plan.emplace(layout, options.memory, threads, source.random_access(), source.memory());
+    plan.emplace(layout, options.memory, threads, source.random_access(), source.memory(),
+                 least_of_index);
+  if (options.index) check_index_options(index_options(options, false), finest);
   ConvertStaging staging(out, options.resume, options.force, options.inputs);
   Workers workers(plan ? plan->threads() : sparse->threads());
   ConvertReport report = workers.execute([&] {

@@ -125,7 +125,7 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
 }
 
 ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads,
-                         bool random_access, std::size_t source_bytes)
+                         bool random_access, std::size_t source_bytes, std::uint64_t least_of_index)
     : layout_(layout),
       source_bytes_(source_bytes),
       threads_(threads),
@@ -140,11 +140,12 @@ ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int th
   }
   const std::size_t least = encoding_bytes() + samples;
   if (memory < least)
-    throw UsageError(
-        fmt::format("a memory budget of {:.1f} MiB is too small: bricks of {}³ samples need "
-                    "--memory {}M at least, {} MiB of it for the program and its libraries, the "
-                    "rest for a layer of bricks, its ranges and encoding them",
-                    in_mib(memory), lattice.brick.x, mib_above(least), kProgramBytes / kMiB));
+    throw UsageError(fmt::format(
+        "a memory budget of {:.1f} MiB is too small: bricks of {}³ samples{} need "
+        "--memory {}M at least, {} MiB of it for the program and its libraries, the "
+        "rest for a layer of bricks, its ranges and encoding them",
+        in_mib(memory), lattice.brick.x, least_of_index > least ? " and the index" : "",
+        mib_above(std::max<std::uint64_t>(least, least_of_index)), kProgramBytes / kMiB));
   room_ = static_cast<std::size_t>(memory) - encoding_bytes();
 }
 

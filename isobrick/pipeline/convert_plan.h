@@ -22,10 +22,10 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
 /// smaller pieces and the next one through a temporary file.
 class ConvertPlan {
  public:
-  /// `source_bytes`: what the source takes for itself. Throws UsageError naming
-  /// the least budget when not even one piece fits.
+  /// `source_bytes`: what the source takes for itself. Throws UsageError when not even one piece
+  /// fits, naming the least budget, which is `least_of_index` at least.
   ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads, bool random_access,
-              std::size_t source_bytes);
+              std::size_t source_bytes, std::uint64_t least_of_index = 0);
 
   /// As many as asked for, or fewer where the budget is small for the bricks.
   int threads() const { return threads_; }

@@ -296,7 +296,8 @@ bool SparsePyramid::possible(const VolumeSource& source, const StoreLayout& layo
 }
 
 SparsePyramid::SparsePyramid(VolumeSource& source, const StoreLayout& layout,
-                             const ConvertOptions& options, int threads)
+                             const ConvertOptions& options, int threads,
+                             std::uint64_t least_of_index)
     : source_(source),
       layout_(layout),
       threads_(threads),
@@ -304,22 +305,28 @@ SparsePyramid::SparsePyramid(VolumeSource& source, const StoreLayout& layout,
   const Lattice& finest = layout.levels.front().lattice;
   const std::size_t count = count_sparse_bricks(source, finest);
   const std::size_t fixed = kProgramBytes + source.memory() + count * kBytesPerBrick;
-  fit(fixed, options.memory);
+  const auto refuse = [&](std::size_t all_fixed) {
+    const std::size_t least = all_fixed + working_bytes(layout, in_flight_, threads_);
+    throw UsageError(fmt::format(
+        "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {} MiB of it "
+        "for the program and its libraries, {:.1f} for the grid",
+        in_mib(options.memory), mib_above(std::max<std::uint64_t>(least, least_of_index)),
+        kProgramBytes / kMiB, in_mib(source.memory())));
+  };
+  const bool fits = fit(fixed, options.memory);
+  // The list is short enough to be made for a message that names what is needed.
+  if (!fits && count * kBytesPerBrick > kProgramBytes / 4) refuse(fixed);
   bricks_ = SparseBricks(find_sparse_bricks(source, finest, count), factors_of(layout, 0));
-  fit(fixed + ranges_bytes(layout, bricks_, threads_), options.memory);
+  const std::size_t ranges = ranges_bytes(layout, bricks_, threads_);
+  if (!fits || !fit(fixed + ranges, options.memory)) refuse(fixed + ranges);
 }
 
-void SparsePyramid::fit(std::size_t fixed, std::uint64_t memory) {
+bool SparsePyramid::fit(std::size_t fixed, std::uint64_t memory) {
   while (in_flight_ > 1 && fixed + working_bytes(layout_, in_flight_, threads_) > memory) {
     --in_flight_;
     threads_ = std::min(threads_, static_cast<int>(in_flight_));
   }
-  if (const std::size_t least = fixed + working_bytes(layout_, in_flight_, threads_);
-      memory < least)
-    throw UsageError(fmt::format(
-        "a memory budget of {} MiB is too small: {} MiB are needed at least, {} of them "
-        "for the grid",
-        memory / kMiB, least / kMiB + 1, source_.memory() / kMiB + 1));
+  return fixed + working_bytes(layout_, in_flight_, threads_) <= memory;
 }
 
 SparsePyramid::Counts SparsePyramid::write(StoreWriter& store, ConvertJournal& journal,

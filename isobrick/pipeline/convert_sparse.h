@@ -31,10 +31,10 @@ class SparsePyramid {
   /// Whether a source and a layout can be converted in this way.
   static bool possible(const VolumeSource& source, const StoreLayout& layout);
 
-  /// Looks for the bricks that are there. Throws UsageError, naming the least that does, for
-  /// a budget that is too small.
+  /// Looks for the bricks that are there. Throws UsageError for a budget that is too small, naming
+  /// one that does, which is `least_of_index` at least.
   SparsePyramid(VolumeSource& source, const StoreLayout& layout, const ConvertOptions& options,
-                int threads);
+                int threads, std::uint64_t least_of_index = 0);
 
   int threads() const { return threads_; }
 
@@ -44,8 +44,8 @@ class SparsePyramid {
  private:
   class Level;
 
-  /// Chooses threads and bricks in flight that leave room for `fixed` bytes.
-  void fit(std::size_t fixed, std::uint64_t memory);
+  /// Chooses threads and bricks in flight that leave room for `fixed` bytes; false where none do.
+  bool fit(std::size_t fixed, std::uint64_t memory);
 
   VolumeSource& source_;
   const StoreLayout& layout_;

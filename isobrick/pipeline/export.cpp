@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "isobrick/core/budget_error.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/leftovers.h"
 #include "isobrick/io/output_file.h"
@@ -18,6 +19,7 @@
 #include "isobrick/pipeline/slab_piece.h"
 #include "isobrick/pipeline/slab_reader.h"
 #include "isobrick/pipeline/stored_bricks.h"
+#include "isobrick/pipeline/vdb_budget.h"
 #include "isobrick/pipeline/workers.h"
 #include "isobrick/volumes/nrrd_writer.h"
 #include "isobrick/volumes/vdb_writer.h"
@@ -98,22 +100,47 @@ struct Piece {
   }
 };
 
+/// The most that the grid of a box takes: all that is stored of it.
+std::uint64_t most_of_grid(const Piece& in) {
+  const Lattice& lattice = in.lattice();
+  std::uint64_t leaves = 0;
+  NoProgress silent;
+  for_each_stored_brick(in.store, in.level, in.box, silent, [&](Int3 brick) {
+    const Box3 part = intersect(lattice.brick_box(brick), in.box);
+    const Box3 in_grid{part.lo - in.box.lo, part.hi - in.box.lo};
+    constexpr Int3 leaf{8, 8, 8};
+    leaves += static_cast<std::uint64_t>(
+        volume(ceil_div(in_grid.hi, leaf) - floor_div(in_grid.lo, leaf)));
+  });
+  const bool wide = lattice.type == ScalarType::f64 || lattice.type == ScalarType::u32;
+  return vdb_grid_bytes(in.box.extent(), leaves, wide ? 8 : 4);
+}
+
 void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, Workers& workers,
                 OutputFile& output, Progress& progress) {
   const Lattice& lattice = in.lattice();
   const std::string& name = info.grid_name;
-  const std::uint64_t others =
-      fixed_bytes(in.store.info(), in.level, workers.threads()) + lattice.brick_bytes();
-  const auto grid = make_vdb_writer_if_built(info, name.empty() ? "density" : name,
-                                             memory - std::min(memory, others));
+  const std::uint64_t others = fixed_bytes(in.store.info(), in.level, workers.threads()) +
+                               lattice.brick_bytes() + kVdbLibraryBytes;
+  const auto refuse = [&] {
+    const std::uint64_t most = most_of_grid(in);
+    refuse_vdb_budget(memory, others + most, most);
+  };
+  if (memory < others + vdb_grid_bytes({1, 1, 1}, 1, 8)) refuse();
+  const auto grid =
+      make_vdb_writer_if_built(info, name.empty() ? "density" : name, memory - others);
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(lattice.brick_bytes());
   progress.begin("export", static_cast<std::uint64_t>(volume(lattice.bricks_of(in.box).extent())) *
                                lattice.brick_bytes());
-  for_each_stored_brick(in.store, in.level, in.box, progress, [&](Int3 brick) {
-    const Box3 part = intersect(lattice.brick_box(brick), in.box);
-    workers.execute([&] { read_slab(in.store, in.level, part, buffer.get()); });
-    grid->put({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
-  });
+  try {
+    for_each_stored_brick(in.store, in.level, in.box, progress, [&](Int3 brick) {
+      const Box3 part = intersect(lattice.brick_box(brick), in.box);
+      workers.execute([&] { read_slab(in.store, in.level, part, buffer.get()); });
+      grid->put({part.lo - in.box.lo, part.hi - in.box.lo}, buffer.get());
+    });
+  } catch (const BudgetError&) {
+    refuse();
+  }
   progress.end();
   grid->write(output);
 }
@@ -224,12 +251,12 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   info.grid_name = store.info().grid_name;
   Workers workers(options.threads);
   const Piece samples{store, options.level, box};
-  const Int3 piece = piece_within(level.lattice, box.extent(), options.memory,
-                                  fixed_bytes(store.info(), options.level, workers.threads()));
   if (options.format == ExportFormat::vdb) {
     export_vdb(samples, info, options.memory, workers, output, progress);
     return output.publish();
   }
+  const Int3 piece = piece_within(level.lattice, box.extent(), options.memory,
+                                  fixed_bytes(store.info(), options.level, workers.threads()));
   std::optional<DetachedHeader> header;
   if (options.format == ExportFormat::nrrd)
     output.writer().append(nrrd_header_text(info));

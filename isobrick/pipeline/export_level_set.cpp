@@ -3,16 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
 #include "isobrick/bricks/level_set.h"
-#include "isobrick/core/error.h"
+#include "isobrick/core/budget_error.h"
 #include "isobrick/core/threshold.h"
+#include "isobrick/core/tile.h"
+#include "isobrick/pipeline/estimate.h"
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/pipeline/slab_reader.h"
 #include "isobrick/pipeline/stored_bricks.h"
+#include "isobrick/pipeline/vdb_budget.h"
 #include "isobrick/pipeline/workers.h"
+#include "isobrick/surface/cpu_extractor.h"
 #include "isobrick/volumes/vdb_level_set.h"
 
 namespace isobrick {
@@ -21,6 +26,53 @@ namespace {
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 /// The extraction is not much faster with more.
 constexpr std::uint64_t kExtractBytes = 256 * kMiB;
+
+/// The most that the level set of active parts takes, with what it keeps of the triangles of a tile
+/// or two.
+std::uint64_t most_of_level_set(const ActiveParts& active, const VolumeInfo& info, int half_band) {
+  const Vec3d spacing = info.transform.spacing;
+  const double longest = std::max({spacing.x, spacing.y, spacing.z});
+  std::uint64_t leaves_of_block = 1, leaves_of_triangle = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    // Voxels that a distance reaches on either side, and a leaf more where it begins within one.
+    const double reach = std::ceil(half_band * longest / spacing[axis]) + 1;
+    leaves_of_block *= static_cast<std::uint64_t>((kBlockEdge + 1 + 2 * reach) / 8) + 2;
+    leaves_of_triangle *= static_cast<std::uint64_t>((2 + 2 * reach) / 8) + 2;
+  }
+  const MeshSize mesh = largest_mesh(active);
+  const std::uint64_t tile = CpuExtractor::max_tile_output(false);
+  const std::uint64_t vertices = std::min(mesh.vertices, tile / sizeof(Vec3f)),
+                      triangles = std::min(mesh.triangles, tile / sizeof(Triangle));
+  // Vectors may have twice the room that they need; the list of leaves and triangles that are near
+  // each other is worked off when it is long.
+  constexpr std::uint64_t listed = std::uint64_t{1} << 20, near_bytes = 16, touched_bytes = 48;
+  const std::uint64_t near = std::min(triangles * leaves_of_triangle, listed + leaves_of_triangle);
+  const std::uint64_t leaves = active.active_blocks * leaves_of_block;
+  return vdb_grid_bytes(info.extent, leaves, sizeof(float)) +
+         2 * (vertices * sizeof(Vec3d) + near * near_bytes +
+              std::min(near, leaves) * touched_bytes);
+}
+
+/// How a budget is divided.
+struct Shares {
+  std::uint64_t extraction = 0, grid = 0;
+  std::uint64_t enough = 0, most_of_grid = 0;  ///< the whole and the grid's, so that it surely fits
+};
+
+Shares divide(const StoreReader& store, const VolumeInfo& info, const ExtractOptions& extraction,
+              int half_band, std::uint64_t memory) {
+  const std::uint64_t least = least_extract_memory(store, extraction, Indexing::chunk_local, 0);
+  Shares shares;
+  shares.most_of_grid = most_of_level_set(count_active(store, extraction), info, half_band);
+  shares.enough = least + kVdbLibraryBytes + shares.most_of_grid;
+  if (memory < least + kVdbLibraryBytes + vdb_grid_bytes({1, 1, 1}, 1, sizeof(float)))
+    refuse_vdb_budget(memory, shares.enough, shares.most_of_grid);
+  // Larger pieces of mesh take more of the grid's share.
+  const std::uint64_t spare = memory - std::min(memory, shares.enough);
+  shares.extraction = std::max(least, std::min(least + spare / 2, kExtractBytes));
+  shares.grid = memory - kVdbLibraryBytes - shares.extraction;
+  return shares;
+}
 
 /// Measures distances from the triangles of a mesh.
 class DistanceSink final : public MeshSink {
@@ -95,30 +147,15 @@ class Signs {
   std::vector<std::uint8_t> inside_;
 };
 
-}  // namespace
-
-void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info,
-                      const ExportOptions& options, OutputFile& file, Progress& progress) {
-  if (options.half_band < 1 || options.half_band > kWidestHalfBand)
-    throw UsageError(fmt::format("a band of {} samples on either side: 1 to {} are possible",
-                                 options.half_band, kWidestHalfBand));
-  const std::uint64_t for_extraction = std::min(options.memory / 2, kExtractBytes);
-  const auto set = make_vdb_level_set_if_built(info, "surface", options.half_band, options.threads,
-                                               options.memory - for_extraction);
-  DistanceSink sink(*set);
-  ExtractOptions extraction;
-  extraction.isovalue = *options.isovalue;
-  extraction.level = options.level;
-  extraction.inside = options.inside;
-  extraction.roi = box;
-  extraction.memory = for_extraction;
-  extraction.threads = options.threads;
-  extraction.backend = Backend::cpu;
+/// Takes the surface's distances, then which samples are inside.
+void fill_level_set(const StoreReader& store, Box3 box, const ExportOptions& options,
+                    const ExtractOptions& extraction, VdbLevelSet& set, Progress& progress) {
+  DistanceSink sink(set);
   extract(store, extraction, sink, progress);
 
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(options.level)].lattice;
   Workers workers(options.threads);
-  Signs signs(store, box, options, *set);
+  Signs signs(store, box, options, set);
   const Box3 bricks = lattice.bricks_of(box);
   const auto bytes = [&](Box3 b) {
     return static_cast<std::uint64_t>(volume(b.extent())) * lattice.brick_bytes();
@@ -129,6 +166,32 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
     progress.advance(bytes(part));
   });
   progress.end();
+}
+
+}  // namespace
+
+void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info,
+                      const ExportOptions& options, OutputFile& file, Progress& progress) {
+  if (options.half_band < 1 || options.half_band > kWidestHalfBand)
+    throw UsageError(fmt::format("a band of {} samples on either side: 1 to {} are possible",
+                                 options.half_band, kWidestHalfBand));
+  ExtractOptions extraction;
+  extraction.isovalue = *options.isovalue;
+  extraction.level = options.level;
+  extraction.inside = options.inside;
+  extraction.roi = box;
+  extraction.threads = options.threads;
+  extraction.backend = Backend::cpu;
+  const Shares shares = divide(store, info, extraction, options.half_band, options.memory);
+  extraction.memory = shares.extraction;
+  extraction.memory_of_others = options.memory - shares.extraction;
+  const auto set =
+      make_vdb_level_set_if_built(info, "surface", options.half_band, options.threads, shares.grid);
+  try {
+    fill_level_set(store, box, options, extraction, *set, progress);
+  } catch (const BudgetError&) {
+    refuse_vdb_budget(options.memory, shares.enough, shares.most_of_grid);
+  }
   set->write(file);
 }
 

@@ -240,6 +240,12 @@ std::string_view bound_of(const ExtractReport& report) {
       ->first;
 }
 
+std::uint64_t least_extract_memory(const StoreReader& store, const ExtractOptions& options,
+                                   Indexing indexing, std::uint64_t sink_bytes) {
+  const ExtractRequest request = check_request(store, options, indexing);
+  return least_memory(request, sink_bytes + decode_extra(store.info(), request.threads));
+}
+
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
                       Progress& progress) {
   ExtractReport report;

@@ -31,7 +31,9 @@ struct ExtractOptions {
   bool normals = false;          ///< gradient normals
   bool drop_degenerate = false;  ///< see SurfaceOptions
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
-  int threads = 0;                                ///< 0: all cores
+  /// Of the budget of the whole command what others take; messages name both together.
+  std::uint64_t memory_of_others = 0;
+  int threads = 0;    ///< 0: all cores
   IndexChoice index;  ///< how active blocks are found; never shows in the mesh
   Backend backend = Backend::automatic;
   std::uint64_t gpu_memory = 0;  ///< hard budget of device memory, bytes; 0: what is free less 10 %
@@ -75,6 +77,11 @@ std::vector<std::pair<std::string_view, StageReport>> stages_of(const ExtractRep
 
 /// The stage that was busy longest.
 std::string_view bound_of(const ExtractReport& report);
+
+/// The least `memory` that extract() takes without a GPU, for a sink of this indexing that holds
+/// `sink_bytes` (MeshSink::memory()). Throws as it does for options that make no sense.
+std::uint64_t least_extract_memory(const StoreReader& store, const ExtractOptions& options,
+                                   Indexing indexing, std::uint64_t sink_bytes);
 
 /// Streams the isosurface of one level into `sink` (begin … finish).
 /// Throws UsageError for a level, ROI or isovalue that makes no sense, a budget too small

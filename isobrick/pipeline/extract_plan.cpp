@@ -66,8 +66,9 @@ std::uint64_t fixed_bytes(const ExtractRequest& request) {
       "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {:.1f} MiB of "
       "it for the program and its libraries, {:.1f} for decoding on {} threads, {:.1f} for the "
       "output, the rest for bricks and the triangles of a tile",
-      in_mib(budget), mib_above(least), in_mib(kProgramBytes), in_mib(decoding), request.threads,
-      in_mib(output)));
+      in_mib(budget + request.memory_of_others), mib_above(least + request.memory_of_others),
+      in_mib(kProgramBytes), in_mib(decoding), request.threads,
+      in_mib(output + request.memory_of_others)));
 }
 
 /// Bricks that a cache can use: neighbours come on top of the active ones.
@@ -112,7 +113,17 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
   request.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
   request.search = resolve_index(store, options.level, options.index);
   request.search_memory = block_search_bytes(store, options.level, request.search, request.threads);
+  request.memory_of_others = options.memory_of_others;
   return request;
+}
+
+std::uint64_t least_memory(const ExtractRequest& request, std::uint64_t other_bytes) {
+  const Lattice& lattice = request.level->lattice;
+  const bool drop = request.surface.drop_degenerate;
+  return fixed_bytes(request) + boundary_bytes(lattice, drop) + other_bytes +
+         CpuExtractor::workspace_bytes(lattice.type, drop) +
+         2 * CpuExtractor::max_tile_output(request.surface.normals) +
+         max_bricks_of_tile(lattice, sample_reach(request.surface)) * lattice.brick_bytes();
 }
 
 ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
@@ -125,7 +136,7 @@ ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
   const std::uint64_t fixed = fixed_bytes(request) + boundary_bytes(lattice, drop) + other_bytes;
-  const std::uint64_t least = fixed + workspace + 2 * tile_output + tile_bricks * brick_bytes;
+  const std::uint64_t least = least_memory(request, other_bytes);
   if (budget < least) refuse_budget(request, budget, least, other_bytes);
 
   ExtractPlan plan;

@@ -22,14 +22,18 @@ struct ExtractRequest {
   const LevelInfo* level = nullptr;
   SurfaceOptions surface;
   int threads = 1;
-  SearchBy search;                  ///< for its active blocks
-  std::uint64_t search_memory = 0;  ///< that such a search takes
+  SearchBy search;                     ///< for its active blocks
+  std::uint64_t search_memory = 0;     ///< that such a search takes
+  std::uint64_t memory_of_others = 0;  ///< see ExtractOptions
 };
 
 /// Throws UsageError for a level, region or isovalue that makes no sense, and for
 /// an index that the store lacks.
 ExtractRequest check_request(const StoreReader& store, const ExtractOptions& options,
                              Indexing indexing);
+
+/// The least budget that plan_memory() takes.
+std::uint64_t least_memory(const ExtractRequest& request, std::uint64_t other_bytes);
 
 /// `active_bricks` bounds what a cache can use, `other_bytes` are the sink's (MeshSink::memory())
 /// and those of decoding beyond the usual (decode_extra()). Throws UsageError naming the least

@@ -227,22 +227,25 @@ IndexReport build_all(const fs::path& path, const IndexOptions& given, int threa
 
 }  // namespace
 
-void check_index_options(const IndexOptions& options, const Lattice& lattice,
-                         std::uint64_t others) {
+std::uint64_t least_index_memory(const IndexOptions& options, const Lattice& lattice) {
   if (options.kind == IndexKind::linear)
     throw UsageError("a linear scan needs no index: that is what a store's ranges are for");
   if (!is_leaf(options.leaf))
     throw UsageError(
         fmt::format("a leaf has 1, 2, 4, 8 or 16 cells along an edge, not {}", options.leaf));
-  const int threads = Workers(options.threads).threads();
-  const std::uint64_t least =
-      others + IndexChunkBuilder::least_memory(lattice, options.leaf, threads);
+  return IndexChunkBuilder::least_memory(lattice, options.leaf, Workers(options.threads).threads());
+}
+
+void check_index_options(const IndexOptions& options, const Lattice& lattice,
+                         std::uint64_t others) {
+  const std::uint64_t least = others + least_index_memory(options, lattice);
   if (options.memory < least)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: an index with leaf {} needs --memory {}M at "
         "least, {} MiB of it for the program and its libraries, the rest for {} threads that read "
         "and build",
-        in_mib(options.memory), options.leaf, mib_above(least), kProgramBytes >> 20, threads));
+        in_mib(options.memory), options.leaf, mib_above(least), kProgramBytes >> 20,
+        Workers(options.threads).threads()));
 }
 
 IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& progress) {

@@ -34,6 +34,10 @@ struct IndexReport {
   double seconds = 0, range_seconds = 0;      ///< the former includes the latter
 };
 
+/// The least budget of such an index of `lattice`. Throws UsageError for a kind or leaf that stores
+/// cannot have.
+std::uint64_t least_index_memory(const IndexOptions& options, const Lattice& lattice);
+
 /// Throws UsageError for a kind or leaf that stores cannot have, and for a budget
 /// that is too small for such an index of `lattice`, naming the least that does: that of the
 /// command, of which `others` bytes are in use already.

@@ -7,7 +7,7 @@
 #include <ostream>
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include "isobrick/core/budget_error.h"
 #include "isobrick/io/writer_stream.h"
 #include "isobrick/volumes/vdb_header.h"
 
@@ -42,7 +42,7 @@ void describe_vdb_grid(openvdb::GridBase& grid, const VolumeInfo& info, const st
 }
 
 void throw_vdb_budget(std::uint64_t budget) {
-  throw UsageError(
+  throw BudgetError(
       fmt::format("the grid takes more than the {} MiB that the memory budget leaves for it, and "
                   "OpenVDB holds it whole: give more, or export a region or a coarser level",
                   budget >> 20));

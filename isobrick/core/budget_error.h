@@ -1,0 +1,13 @@
+#pragma once
+
+#include "isobrick/core/error.h"
+
+namespace isobrick {
+
+/// Something would take more memory than its part of the budget.
+class BudgetError : public UsageError {
+ public:
+  using UsageError::UsageError;
+};
+
+}  // namespace isobrick
