@@ -34,7 +34,10 @@ std::vector<MeshStyle> styles_of(const PictureOptions& options, std::size_t coun
   std::vector<MeshStyle> styles;
   for (std::size_t i = 0; i < count; ++i) {
     MeshStyle style{.colour = surface_colour(i)};
-    if (i < options.colours.size()) style.colour = options.colours[i];
+    if (i < options.colours.size()) {
+      style.colour = options.colours[i];
+      style.vertex_colours = false;
+    }
     if (i < options.opacities.size()) style.opacity = options.opacities[i];
     styles.push_back(style);
   }

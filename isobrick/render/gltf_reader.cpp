@@ -248,6 +248,12 @@ class GltfReader {
       if (normals.second != part.vertices) fail("a mesh has more positions than normals, or fewer");
       part.normals = normals.first;
     }
+    if (attributes.contains("COLOR_0")) {
+      const auto colours = vertex_field(index(attributes.at("COLOR_0")), true);
+      if (colours.second != part.vertices) fail("a mesh has more positions than colours, or fewer");
+      part.colours = colours.first;
+      part.linear_colours = true;
+    }
     if (primitive.contains("indices"))
       add_indices(part, index(primitive.at("indices")));
     else {
@@ -284,12 +290,14 @@ class GltfReader {
     }
   }
 
-  std::pair<VertexField, std::uint64_t> vertex_field(std::uint64_t number) {
+  /// `or_four`: the accessor's items may have a fourth component, which is passed over.
+  std::pair<VertexField, std::uint64_t> vertex_field(std::uint64_t number, bool or_four = false) {
     const json& accessor = item("accessors", number);
-    if (accessor.at("type") != "VEC3") fail("its vertices are no triples");
+    const bool four = or_four && accessor.at("type") == "VEC4";
+    if (accessor.at("type") != "VEC3" && !four) fail("its vertices are no triples");
     const NumberKind kind = kind_of(accessor);
     const auto size = static_cast<std::uint32_t>(size_of(kind));
-    const Place place = place_of(accessor, 3 * size);
+    const Place place = place_of(accessor, (four ? 4 : 3) * size);
     VertexField field{.first = place.first,
                       .stride = place.stride,
                       .offsets = {0, size, 2 * size},

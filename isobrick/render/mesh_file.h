@@ -24,7 +24,7 @@ class MeshFile {
   virtual ~MeshFile() = default;
 
   /// A batch; its triangles count from its first vertex, its coordinates from `origin`. Normals
-  /// are of any length.
+  /// are of any length. Colours come where the file has them at its vertices.
   using Take = std::function<void(const MeshChunk&, Vec3d origin)>;
 
   virtual MeshFileInfo info() const = 0;

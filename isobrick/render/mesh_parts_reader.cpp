@@ -25,6 +25,18 @@ double load(const std::byte* at, bool swapped) {
   return static_cast<double>(value);
 }
 
+VertexColour to_colour(Vec3d rgb, bool linear) {
+  VertexColour colour{0, 0, 0, 255};
+  for (int channel = 0; channel < 3; ++channel) {
+    // What is no number is black.
+    double value = rgb[channel] > 0 ? std::min(rgb[channel], 1.0) : 0;
+    if (linear)
+      value = value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055;
+    colour[static_cast<std::size_t>(channel)] = static_cast<std::uint8_t>(std::lround(255 * value));
+  }
+  return colour;
+}
+
 /// Gathers the vertices of a batch of triangles. A vertex that is named again soon is
 /// found again, so that batches are little larger than what they are made from.
 class Batch {
@@ -43,9 +55,10 @@ class Batch {
 
   void flush() {
     if (triangles_.empty()) return;
-    take_({0, positions_, normals_, triangles_}, origin_);
+    take_({0, positions_, normals_, triangles_, colours_}, origin_);
     positions_.clear();
     normals_.clear();
+    colours_.clear();
     triangles_.clear();
     std::fill(recent_.begin(), recent_.end(), Recent{});
   }
@@ -65,6 +78,8 @@ class Batch {
       positions_.push_back(to_float(p - origin_));
       if (part_.normals)
         normals_.push_back(to_float(to_world_of_normals_.turn(part_.normals->at(vertex))));
+      if (part_.colours)
+        colours_.push_back(to_colour(part_.colours->at(vertex), part_.linear_colours));
     }
     return recent.number;
   }
@@ -75,6 +90,7 @@ class Batch {
   const MeshFile::Take& take_;
   std::vector<Recent> recent_;
   std::vector<Vec3f> positions_, normals_;
+  std::vector<VertexColour> colours_;
   std::vector<Triangle> triangles_;
 };
 

@@ -62,7 +62,9 @@ struct WorldMatrix {
 struct IndexedPart {
   std::uint64_t vertices = 0, faces = 0;
   VertexField positions;
-  std::optional<VertexField> normals;
+  std::optional<VertexField> normals = {};
+  std::optional<VertexField> colours = {};  ///< red, green and blue in [0, 1]
+  bool linear_colours = false;              ///< as light adds up, and not sRGB
   WorldMatrix to_world;
   std::function<std::unique_ptr<TriangleReader>()> open_triangles;
 };

@@ -39,6 +39,10 @@ const char* const kVertex = R"(
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in uint number;
+#if COLOURED
+layout(location = 3) in vec3 vertex_colour;
+centroid out vec3 surface_colour;
+#endif
 centroid out vec3 world_normal;
 #if FRONT
 // Within the triangle, also where a pixel's centre is beside it.
@@ -56,6 +60,9 @@ flat out uint look;
 void main() {
   place(position + looks[number].offset.xyz);
   world_normal = normal;
+#if COLOURED
+  surface_colour = vertex_colour;
+#endif
 #if FRONT
   stored_depth = gl_Position.z / gl_Position.w;
 #endif
@@ -81,6 +88,16 @@ flat in uint look;
 #define mesh uvec3(looks[look].id.xy, looks[look].offset.w > 0.5 ? 1 : 0)
 #endif
 
+#if COLOURED
+centroid in vec3 surface_colour;
+vec3 outer() {
+  vec3 c = clamp(surface_colour, 0, 1);
+  return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
+}
+#else
+vec3 outer() { return outer_colour.rgb; }
+#endif
+
 struct Seen { vec3 position, normal, eye, light; float slope; };
 
 Seen see() {
@@ -103,7 +120,7 @@ Seen see() {
   float facing = dot(s.normal, s.eye);
   if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
   bool opened = OPEN != 0 && !gl_FrontFacing;
-  s.light = lit(s.normal, s.eye, opened ? inner_colour.rgb : outer_colour.rgb);
+  s.light = lit(s.normal, s.eye, opened ? inner_colour.rgb : outer());
   return s;
 }
 )";
@@ -167,10 +184,11 @@ Look look_of(const MeshStyle& style) {
 
 }  // namespace
 
-MeshPass::Programs::Programs(bool cut, bool picture_is_cut, bool software) {
-  const std::string frame = fmt::format("#define OPEN {}\n#define SOFTWARE {}\n",
-                                        picture_is_cut ? 1 : 0, software ? 1 : 0) +
-                            kFrameGlsl;
+MeshPass::Programs::Programs(bool cut, bool picture_is_cut, bool software, bool coloured) {
+  const std::string frame =
+      fmt::format("#define OPEN {}\n#define SOFTWARE {}\n#define COLOURED {}\n",
+                  picture_is_cut ? 1 : 0, software ? 1 : 0, coloured ? 1 : 0) +
+      kFrameGlsl;
   const std::string vertex = kPlaceGlsl + std::string(kLooks) + kVertex,
                     fragment = frame + (software ? "" : kLooks) + fragment_glsl(cut) + kLightGlsl +
                                kFragment;
@@ -187,6 +205,7 @@ MeshPass::MeshPass()
       commands_(make_stream_buffer()),
       positions_(make_stream_buffer()),
       normals_(make_stream_buffer()),
+      colours_(make_stream_buffer()),
       triangles_(make_stream_buffer()) {
   const unsigned array = vertices_.get();
   for (unsigned attribute : {0u, 1u}) {
@@ -198,6 +217,8 @@ MeshPass::MeshPass()
   glVertexArrayAttribIFormat(array, 2, 1, GL_UNSIGNED_INT, 0);
   glVertexArrayAttribBinding(array, 2, 2);
   glVertexArrayBindingDivisor(array, 2, 1);
+  glVertexArrayAttribFormat(array, 3, 3, GL_UNSIGNED_BYTE, GL_TRUE, 0);
+  glVertexArrayAttribBinding(array, 3, 3);
   check_gl("the attributes of meshes");
 }
 
@@ -211,10 +232,12 @@ void MeshPass::need_numbers(std::size_t count) {
   glVertexArrayVertexBuffer(vertices_.get(), 2, numbers_.get(), 0, sizeof(std::uint32_t));
 }
 
-void MeshPass::bind(bool cut, bool transparent) {
+void MeshPass::bind(bool cut, bool transparent, bool coloured) {
   cut &= cuts_;
-  std::optional<Programs>& programs = cuts_ ? programs_[cut ? 1 : 0] : whole_programs_;
-  if (!programs) programs.emplace(cut, cuts_, software_);
+  const std::size_t colours = coloured ? 1 : 0;
+  std::optional<Programs>& programs =
+      cuts_ ? programs_[colours][cut ? 1 : 0] : whole_programs_[colours];
+  if (!programs) programs.emplace(cut, cuts_, software_, coloured);
   glUseProgram((transparent ? programs->transparent : programs->opaque).get());
   glBindVertexArray(vertices_.get());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, looks_.get());
@@ -277,9 +300,17 @@ void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin,
   const GlBuffer& normals = mesh.normals.empty() ? positions_ : normals_;
   bind_block(
       {.positions = positions_.get(), .normals = normals.get(), .triangles = triangles_.get()});
-  bind(may_be_cut(style), transparent);
+  const bool coloured = style.vertex_colours && !mesh.colours.empty();
+  const unsigned array = vertices_.get();
+  if (coloured) {
+    fill_buffer(colours_, std::as_bytes(mesh.colours));
+    glVertexArrayVertexBuffer(array, 3, colours_.get(), 0, sizeof(VertexColour));
+    glEnableVertexArrayAttrib(array, 3);
+  }
+  bind(may_be_cut(style), transparent, coloured);
   glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * triangles.size()), GL_UNSIGNED_INT,
                  nullptr);
+  if (coloured) glDisableVertexArrayAttrib(array, 3);
   check_gl("drawing a mesh");
 }
 

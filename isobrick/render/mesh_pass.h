@@ -29,22 +29,24 @@ class MeshPass {
  private:
   /// One source in several forms.
   struct Programs {
-    Programs(bool cut, bool picture_is_cut, bool software);
+    Programs(bool cut, bool picture_is_cut, bool software, bool coloured);
     GlProgram opaque, transparent;
   };
 
-  void bind(bool cut, bool transparent);
+  void bind(bool cut, bool transparent, bool coloured = false);
   void bind_block(const MeshPlace& place);
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
   void need_numbers(std::size_t count);
 
   bool software_;
-  std::optional<Programs> whole_programs_;           ///< where nothing is cut
-  std::array<std::optional<Programs>, 2> programs_;  ///< elsewhere, for what is not cut, and is
+  /// Without and with colours at the vertices: where nothing is cut; elsewhere for what is not
+  /// cut, and what is.
+  std::array<std::optional<Programs>, 2> whole_programs_;
+  std::array<std::array<std::optional<Programs>, 2>, 2> programs_;
   bool cuts_ = false;
   GlVertexArray vertices_;
   GlBuffer looks_, numbers_, commands_;
-  GlBuffer positions_, normals_, triangles_;  ///< of meshes that lie in memory
+  GlBuffer positions_, normals_, colours_, triangles_;  ///< of meshes that lie in memory
   std::size_t number_count_ = 0;
   std::vector<Triangle> kept_;
 };

@@ -15,7 +15,10 @@ constexpr std::size_t kMaxLine = 1 << 16;
 }  // namespace
 
 bool MeshText::next_line() {
-  if (rest_.empty()) return false;
+  if (rest_.empty()) {
+    line_ = {};
+    return false;
+  }
   ++number_;
   const std::size_t end = std::min(rest_.find('\n'), rest_.size());
   if (end > kMaxLine) fail(fmt::format("it is {} bytes long", end));

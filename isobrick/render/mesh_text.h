@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "isobrick/core/vec.h"
 
@@ -32,8 +33,8 @@ class MeshText {
   /// A word as a number.
   double parse(std::string_view word) const;
 
-  /// Bytes behind the current line.
-  std::size_t bytes_left() const { return rest_.size(); }
+  /// Bytes that have not been read.
+  std::size_t bytes_left() const { return line_.size() + rest_.size(); }
 
   [[noreturn]] void fail(const std::string& what) const;
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <charconv>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -55,6 +56,17 @@ class ObjTriangles final : public TriangleReader {
   std::size_t corner_ = 1;
 };
 
+/// Three more numbers of the line; nothing where there are fewer.
+std::optional<Vec3d> colour_of(MeshText& line) {
+  Vec3d colour;
+  for (int channel = 0; channel < 3; ++channel) {
+    const std::string_view word = line.word();
+    if (word.empty()) return std::nullopt;
+    colour[channel] = line.parse(word);
+  }
+  return colour;
+}
+
 }  // namespace
 
 /// Positions and normals go once into nameless files, which are mapped; faces are read from the
@@ -62,14 +74,18 @@ class ObjTriangles final : public TriangleReader {
 std::unique_ptr<MeshFile> read_obj(const std::string& path, std::shared_ptr<MappedFile> file) {
   const std::string_view text(reinterpret_cast<const char*>(file->bytes().data()),
                               file->bytes().size());
-  ScratchRows positions, normals;
+  ScratchRows positions, normals, colours;
   IndexedPart part;
   std::string unit;
   for (MeshText lines(path, "OBJ", text); lines.next_line();) {
     const std::string_view kind = lines.word();
     if (kind == "#" && unit.empty() && positions.count() == 0)
       unit = unit_of_comment(lines.rest_of_line());
-    if (kind == "v") positions.add(lines.vector());
+    if (kind == "v") {
+      positions.add(lines.vector());
+      // Many programs write a colour behind a position; a lone number there is a weight.
+      if (const auto colour = colour_of(lines)) colours.add(*colour);
+    }
     if (kind == "vn") normals.add(lines.vector());
     if (kind != "f") continue;
     std::uint64_t corners = 0;
@@ -82,6 +98,8 @@ std::unique_ptr<MeshFile> read_obj(const std::string& path, std::shared_ptr<Mapp
   // A normal a vertex, as isosurfaces have it; others are lit by facet.
   if (normals.count() > 0 && normals.count() == positions.count())
     part.normals = normals.field(keep);
+  if (colours.count() > 0 && colours.count() == positions.count())
+    part.colours = colours.field(keep);
   part.open_triangles = [path, text] { return std::make_unique<ObjTriangles>(path, text); };
   return std::make_unique<IndexedMeshFile>(path, std::vector{std::move(part)}, std::move(keep),
                                            std::move(unit));

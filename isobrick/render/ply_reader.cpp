@@ -99,6 +99,10 @@ void take_vertices(const std::string& path, const PlyElement& element, const std
   part.positions = field_of(element, *positions, first, swapped);
   if (const auto normals = element.find({"nx", "ny", "nz"}))
     part.normals = field_of(element, *normals, first, swapped);
+  if (const auto colours = element.find_colours()) {
+    part.colours = field_of(element, *colours, first, swapped);
+    part.colours->scale = ply_colour_scale(part.colours->kinds[0]);
+  }
 }
 
 }  // namespace

@@ -99,6 +99,11 @@ class PlyTextVertices {
     if (!positions) fail_ply(path, "its vertices have no x, y, z");
     const auto normals = element.find({"nx", "ny", "nz"});
     if (normals) normals_.emplace();
+    const auto colours = element.find_colours();
+    if (colours) {
+      colours_.emplace();
+      colour_scale_ = ply_colour_scale(element.properties[(*colours)[0]].kind);
+    }
     std::vector<double> numbers;
     std::vector<std::uint64_t> none;
     const auto three = [&](const std::array<std::size_t, 3>& at) {
@@ -108,18 +113,21 @@ class PlyTextVertices {
       rows.next(element, element.properties.size(), numbers, none);
       positions_.add(three(*positions));
       if (normals) normals_->add(three(*normals));
+      if (colours) colours_->add(three(*colours));
     }
   }
 
   IndexedPart part(std::vector<std::shared_ptr<const void>>& keep) {
     IndexedPart part{.vertices = positions_.count(), .positions = positions_.field(keep)};
     if (normals_) part.normals = normals_->field(keep);
+    if (colours_) part.colours = colours_->field(keep, colour_scale_);
     return part;
   }
 
  private:
   ScratchRows positions_;
-  std::optional<ScratchRows> normals_;
+  std::optional<ScratchRows> normals_, colours_;
+  double colour_scale_ = 1;
 };
 
 }  // namespace

@@ -47,6 +47,7 @@ struct MeshStyle {
   Vec3f colour{0.87f, 0.80f, 0.70f};
   float opacity = 1;                 ///< of a piece seen face to face; below 1: transparent
   std::optional<Vec3f> inside = {};  ///< of the back where something is cut off; else a darker tone
+  bool vertex_colours = true;        ///< where the mesh has them they go before `colour`
   /// What pick() tells; 0: nothing. Of transparent ones the lowest 8 bits.
   std::uint32_t id = 0;
   /// Of the picture's half spaces those that may cut it, a bit each: with none it is drawn sooner.

@@ -101,8 +101,10 @@ class Parser {
       add_array(std::move(element));
     } else if (name == "FieldData" || name == "PointData" || name == "Points" || name == "Polys") {
       section_ = name;
-      if (name == "PointData" && !header_.pieces.empty())
+      if (name == "PointData" && !header_.pieces.empty()) {
         header_.pieces.back().normals = element.get("Normals");
+        header_.pieces.back().scalars = element.get("Scalars");
+      }
     }
   }
 

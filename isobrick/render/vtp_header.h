@@ -23,7 +23,7 @@ struct VtkArray {
 struct VtpPiece {
   std::uint64_t points = 0, polygons = 0, strips = 0;
   std::vector<VtkArray> positions, polygon_arrays, point_data;
-  std::string normals;  ///< the name of that array among the point data
+  std::string normals, scalars;  ///< names of these among the point data, or empty
 };
 
 /// What the XML of a VTK PolyData file (.vtp) or its index of parts (.pvtp) says.

@@ -97,6 +97,11 @@ class VtpReader {
     for (const VtkArray& array : piece.point_data)
       if (array.get("Name") == normals && array.get("NumberOfComponents") == "3")
         part.normals = vectors(path, piece, array, arrays);
+    for (const VtkArray& array : piece.point_data)
+      if (is_colour(piece, array)) {
+        part.colours = vectors(path, piece, array, arrays);
+        part.colours->scale = 1.0 / 255;
+      }
     const NumberArray corners = named(path, piece, "connectivity", arrays),
                       ends = named(path, piece, "offsets", arrays);
     if (ends.count < piece.polygons)
@@ -107,15 +112,27 @@ class VtpReader {
     parts_.push_back(std::move(part));
   }
 
+  /// Bytes of red, green, blue and perhaps alpha that are the scalars, which VTK shows as they are.
+  static bool is_colour(const VtpPiece& piece, const VtkArray& array) {
+    return array.get("type") == "UInt8" && components_of(array) >= 3 && !piece.scalars.empty() &&
+           array.get("Name") == piece.scalars;
+  }
+  /// Of an item, 3 or 4; 0 for others.
+  static std::uint32_t components_of(const VtkArray& array) {
+    const std::string number = array.get("NumberOfComponents", "1");
+    return number == "3" ? 3 : number == "4" ? 4 : 0;
+  }
+
   static VertexField vectors(const std::string& path, const VtpPiece& piece, const VtkArray& array,
                              const VtpArrays& arrays) {
     const NumberArray numbers = arrays.numbers(array);
-    if (numbers.count / 3 < piece.points)
+    const std::uint32_t components = std::max(components_of(array), 3u);
+    if (numbers.count / components < piece.points)
       fail_vtp(path, fmt::format("{} points have {} numbers in '{}'", piece.points, numbers.count,
                                  array.get("Name")));
     const auto size = static_cast<std::uint32_t>(size_of(numbers.kind));
     return {.first = numbers.first,
-            .stride = 3 * size,
+            .stride = components * size,
             .offsets = {0, size, 2 * size},
             .kinds = {numbers.kind, numbers.kind, numbers.kind},
             .swapped = numbers.swapped};

@@ -13,6 +13,9 @@ namespace isobrick {
 /// Three vertex numbers, counter-clockwise seen from outside (see Inside).
 using Triangle = std::array<std::uint32_t, 3>;
 
+/// sRGB, a byte each; the fourth is not used.
+using VertexColour = std::array<std::uint8_t, 4>;
+
 /// How triangles name their vertices.
 enum class Indexing : std::uint8_t {
   /// One vertex per crossing lattice edge in the whole mesh; numbers count
@@ -30,6 +33,7 @@ struct MeshChunk {
   std::span<const Vec3f> positions;
   std::span<const Vec3f> normals;  ///< unit length, outward; empty or one a position
   std::span<const Triangle> triangles;
+  std::span<const VertexColour> colours = {};  ///< of meshes of others; empty or one a position
 };
 
 /// Of what a mesh consists.

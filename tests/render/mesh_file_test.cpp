@@ -454,6 +454,107 @@ TEST(MeshFile, ReadsScenesInText) {
         contains(message_of<Error>([&] { open_mesh_file(dir.write("d.gltf", text)); }), "d.gltf"));
 }
 
+/// The colours of the corners of all triangles.
+std::vector<VertexColour> colours_of(const std::string& path) {
+  std::vector<VertexColour> colours;
+  open_mesh_file(path)->read({}, [&](const MeshChunk& chunk, Vec3d) {
+    ASSERT_TRUE(chunk.colours.empty() || chunk.colours.size() == chunk.positions.size());
+    if (chunk.colours.empty()) return;
+    for (const Triangle& t : chunk.triangles)
+      for (const std::uint32_t v : t) colours.push_back(chunk.colours[v]);
+  });
+  return colours;
+}
+
+/// A triangle of a red, a green and a half blue corner.
+const std::vector<VertexColour> kColours{{255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 128, 255}};
+
+std::string coloured_ply(const std::string& kind, const std::string& full,
+                         const std::string& half) {
+  std::string colours;
+  for (const char* name : {"red", "green", "blue"})
+    colours += "property " + kind + " " + name + "\n";
+  return "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+         "property float z\n" +
+         colours + "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 " +
+         full + " 0 0\n1 0 0 0 " + full + " 0\n0 1 0 0 0 " + half + "\n3 0 1 2\n";
+}
+
+TEST(MeshFile, ReadsColoursOfVertices) {
+  const TempDir dir;
+  EXPECT_EQ(colours_of(dir.write("a.ply", coloured_ply("uchar", "255", "128"))), kColours);
+  EXPECT_EQ(colours_of(dir.write("b.ply", coloured_ply("ushort", "65535", "32896"))), kColours);
+  EXPECT_EQ(colours_of(dir.write("c.ply", coloured_ply("float", "1", "0.502"))), kColours);
+  std::string binary =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+      "property float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+      "property uchar blue\nelement face 1\nproperty list uchar uint vertex_indices\n"
+      "end_header\n";
+  for (const VertexColour& colour : kColours) {
+    binary.append(12, '\0');
+    binary.append(reinterpret_cast<const char*>(colour.data()), 3);
+  }
+  binary += std::string("\x03\0\0\0\0\x01\0\0\0\x02\0\0\0", 13);
+  EXPECT_EQ(colours_of(dir.write("d.ply", binary)), kColours);
+  EXPECT_EQ(
+      colours_of(dir.write("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.502\nf 1 2 3\n")),
+      kColours);
+  // A weight behind a position is no colour, nor is one of some vertices only.
+  for (const char* text :
+       {"v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"})
+    EXPECT_TRUE(colours_of(dir.write("b.obj", text)).empty());
+}
+
+TEST(MeshFile, ReadsColoursOfScenes) {
+  const TempDir dir;
+  // Linear: a half of the light is 188 of sRGB's 255.
+  const std::array<float, 9> positions{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::array<std::uint8_t, 12> colours{255, 0, 0, 9, 0, 255, 0, 9, 0, 0, 128, 9};
+  std::string binary(reinterpret_cast<const char*>(positions.data()), sizeof(positions));
+  binary.append(reinterpret_cast<const char*>(colours.data()), sizeof(colours));
+  const std::string json =
+      R"({"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":1}}]}],)"
+      R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)"
+      R"({"bufferView":1,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}],)"
+      R"("bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12}],)"
+      R"("buffers":[{"byteLength":48}]})";
+  EXPECT_EQ(colours_of(dir.write("a.glb", glb(json, binary))),
+            (std::vector<VertexColour>{{255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 188, 255}}));
+}
+
+/// How many pixels are mostly red, green and blue.
+std::array<int, 3> pixels_by_colour(const MeshPicture& picture) {
+  std::array<int, 3> count{};
+  for (std::size_t i = 0; i < picture.rgba.size(); i += 4)
+    for (std::size_t c = 0; c < 3; ++c)
+      count[c] += picture.rgba[i + c] > 90 + picture.rgba[i + (c + 1) % 3] &&
+                  picture.rgba[i + c] > 90 + picture.rgba[i + (c + 2) % 3];
+  return count;
+}
+
+TEST(MeshFile, ColoursOfVerticesAreDrawn) {
+  if (!GlContext::available()) GTEST_SKIP() << "no OpenGL 4.5 without a window here";
+  const TempDir dir;
+  const std::string path = dir.write("a.ply", coloured_ply("uchar", "255", "255"));
+  NoProgress progress;
+  for (const float opacity : {1.0f, 0.8f})
+    for (const bool cut : {false, true}) {
+      MeshPictureRequest request{.width = 64, .height = 64};
+      request.camera.elevation = 80;
+      request.meshes = {{path, {.opacity = opacity}}};
+      if (cut) request.settings.planes = {{{0, 0, 1}, 1}};  // nothing of it goes
+      for (const int count : pixels_by_colour(draw_mesh_files(request, progress)))
+        EXPECT_GT(count, 30) << opacity << cut;
+      // A colour that is asked for goes before.
+      request.meshes[0].style.vertex_colours = false;
+      request.meshes[0].style.colour = {1, 0, 0};
+      const std::array<int, 3> one = pixels_by_colour(draw_mesh_files(request, progress));
+      EXPECT_GT(one[0], 200);
+      EXPECT_EQ(one[1] + one[2], 0);
+    }
+}
+
 TEST(MeshFile, DamagedScenesAreSaid) {
   const TempDir dir;
   const std::string good =

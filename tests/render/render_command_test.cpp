@@ -43,6 +43,18 @@ TEST_F(RenderCommand, AScaleBarInAnUnknownUnitIsRefused) {
                  {"none.obj' has no unit", "cannot be in millimeter"});
 }
 
+TEST_F(RenderCommand, AColourGoesBeforeThoseOfTheVertices) {
+  write_file(path("a.obj"), "v 0 0 0 0 1 0\nv 2 0 0 0 1 0\nv 0 2 0 0 1 0\nf 1 2 3\n");
+  const auto drawn = [&](const Arguments& options) {
+    Arguments arguments{path("a.obj")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    run_json(render(arguments));
+    return read_file(path("a.png"));
+  };
+  EXPECT_NE(drawn({}), drawn({"--colour", "#dec9b0"}));
+  EXPECT_EQ(drawn({}), drawn({"--colour", "#00ff00"}));
+}
+
 TEST_F(RenderCommand, TheUnitComesFromTheStore) {
   write_file(path("a_8x8x8_uint8.raw"), noise(512));
   const std::string store = path("a.zarr");
