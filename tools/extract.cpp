@@ -12,6 +12,7 @@
 #include "isobrick/bricks/level_set.h"
 #include "isobrick/io/output_guard.h"
 #include "isobrick/pipeline/estimate.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "tools/extract_report.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
@@ -73,18 +74,6 @@ MeshForm form_of(const Arguments& arguments) {
   return form;
 }
 
-/// What the picture may take of the memory, so that the extraction keeps most.
-void check_picture(const Arguments& arguments) {
-  if (arguments.preview.empty()) return;
-  const std::uint64_t bytes = preview_memory(arguments.picture), most = arguments.memory / 4;
-  if (bytes > most)
-    throw UsageError(fmt::format(
-        "a picture of {} x {} pixels takes {} while it is drawn, more than a quarter of the memory "
-        "of {}; choose a smaller --preview-size or a larger --memory",
-        arguments.picture.width, arguments.picture.height, human_bytes(bytes),
-        human_bytes(arguments.memory)));
-}
-
 /// Refuses two outputs that would replace each other.
 void check_names(const Arguments& arguments) {
   std::vector<fs::path> names;
@@ -114,7 +103,6 @@ void check(const Arguments& arguments) {
   if (!arguments.preview.empty()) check_picture_name(arguments.preview);
   if (is_standard_output(arguments.output) && arguments.isovalues.size() > 1)
     throw UsageError("standard output takes one mesh; give one --isovalue, or name a file");
-  if (!arguments.estimate) check_picture(arguments);
 }
 
 std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader& store) {
@@ -138,6 +126,33 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
                         named(arguments.preview, arguments, isovalue)});
   }
   return surfaces;
+}
+
+/// Refuses a budget of which the pictures would take more than a quarter, so that the extraction
+/// keeps most, or that leaves too little for it.
+void check_picture_budget(const Arguments& arguments, const std::vector<ExtractedSurface>& surfaces,
+                          const StoreReader& store) {
+  if (arguments.preview.empty() || arguments.estimate) return;
+  const std::uint64_t picture = preview_memory(arguments.picture);
+  std::uint64_t least = 4 * picture;
+  for (const ExtractedSurface& surface : surfaces) {
+    ExtractOptions shaded = surface.options;
+    shaded.normals = true;
+    least =
+        std::max(least, picture + least_extract_memory(store, shaded, Indexing::chunk_local, 0));
+    if (!surface.output.empty())
+      least = std::max(least,
+                       least_extract_memory(
+                           store, surface.options, Indexing::welded,
+                           mesh_memory(surface.form.format, arguments.threads, arguments.memory)));
+  }
+  if (arguments.memory < least)
+    throw UsageError(fmt::format(
+        "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed where a "
+        "picture of {} x {} pixels takes {:.1f} MiB while it is drawn; or choose a smaller "
+        "--preview-size",
+        in_mib(arguments.memory), mib_above(least), arguments.picture.width,
+        arguments.picture.height, in_mib(picture)));
 }
 
 /// The meshes to write, with size_of(ExtractedSurface) as PlannedMesh has it.
@@ -221,7 +236,8 @@ ExtractReport make(const ExtractedSurface& surface, const Sinks& sinks, const Ar
   if (sinks.preview) {
     ExtractOptions shaded = surface.options;
     shaded.normals = true;
-    shaded.memory -= preview_memory(arguments.picture);
+    shaded.memory_of_others = preview_memory(arguments.picture);
+    shaded.memory -= shaded.memory_of_others;
     const ExtractReport drawn = extract(store, shaded, *sinks.preview, console.progress());
     if (!sinks.mesh) report = drawn;
   }
@@ -283,6 +299,7 @@ int run(const Arguments& arguments, Console& console) {
   if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
   const StoreReader store = open_store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
+  check_picture_budget(arguments, surfaces, store);
   for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
   const Said said = arguments.estimate ? estimate_all(surfaces, store, console)
                                        : make_all(arguments, surfaces, store, console);

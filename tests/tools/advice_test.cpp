@@ -44,6 +44,16 @@ TEST_F(Advice, SaysWhatTheFileIs) {
   write_file(path("a.ply"), "ply\n");
   refused("a.ply", {"it is a mesh",
                     fmt::format("isobrick render {} -o {}\n", path("a.ply"), path("a.png"))});
+  // Every format that is drawn, and no other: the advice leads somewhere.
+  for (const std::string extension : {"ply", "stl", "obj", "glb", "gltf", "vtp", "pvtp"}) {
+    const std::string mesh = "mesh." + extension;
+    write_file(path(mesh), "{");
+    refused(mesh, {"it is a mesh", "isobrick render " + path(mesh) + " -o " + path("mesh.png")});
+    const std::string err = run({"render", path(mesh), "-o", path("mesh.png")}).err;
+    EXPECT_EQ(err.find("no mesh that can be drawn"), std::string::npos) << err;
+  }
+  write_file(path("a.png"), "\x89PNG\r\n\x1a\n");
+  refused("a.png", {"it is a picture", "name the store or the volume"});
   fs::create_directory(path("slices"));
   refused("slices", {"a folder without Zarr's metadata",
                      fmt::format("isobrick convert {} {}\n", path("slices"), path("slices.zarr"))});
@@ -95,6 +105,9 @@ TEST_F(Advice, OfAnIsovalueThatNoSampleReaches) {
   const Outcome outcome = run({"extract", store, "--isovalue", "40000", "-o", path("a.ply")});
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_EQ(outcome.err, why);
+  const Outcome estimate = run({"extract", store, "--isovalue", "40000", "--estimate"});
+  EXPECT_EQ(estimate.exit_code, 0);
+  EXPECT_EQ(estimate.err, why);
   const Outcome level_set = run({"export", store, path("a.vdb"), "--isovalue", "40000"});
   if (level_set.exit_code == 0) {  // else there is no OpenVDB
     EXPECT_EQ(level_set.err, why);
