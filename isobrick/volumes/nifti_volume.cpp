@@ -110,7 +110,7 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   File file = open_data_file(data_path, path);
   check_header_promise(layout, file);
   if (const std::uint64_t size = file.size(); size > end)
-    layout.notes.push_back(trailing_note(quoted(data_path), size - end));
+    layout.notes.push_back(trailing_note(quoted(file.path()), size - end));
   return scale_source(make_raw_source(std::move(layout), std::move(file)), header.scale);
 }
 

@@ -157,7 +157,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
     offset = after_lines(file, path, header.data_begin, header.skip_lines) + header.skip_bytes;
   check_size(header, by, layout.info, offset, total, size);
   if (const std::uint64_t extra = size - offset - total; extra > 0)
-    layout.notes.push_back(trailing_note(quoted(path), extra));
+    layout.notes.push_back(trailing_note(quoted(file.path()), extra));
   layout.offset = offset;
   if (!said.extent) {
     layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);
