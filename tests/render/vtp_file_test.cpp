@@ -64,7 +64,7 @@ class VtkWriter {
   template <class T>
   std::string text(const std::vector<T>& values) const {
     std::string words;
-    for (const T value : values) words += " " + std::to_string(value);
+    for (const T value : values) words.append(" ").append(std::to_string(value));
     return words;
   }
 
