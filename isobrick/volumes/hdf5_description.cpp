@@ -66,6 +66,36 @@ std::optional<int> direction_of(const std::string& label) {
                                                                  : std::nullopt;
 }
 
+/// Strings of any length of an attribute.
+std::vector<std::string> read_variable_strings(hid_t attribute, hid_t type, std::size_t count) {
+  std::vector<char*> raw(count, nullptr);
+  const Hdf5Handle space(H5Aget_space(attribute), H5Sclose);
+  const Hdf5Handle memory(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(memory, H5T_VARIABLE);
+  H5Tset_cset(memory, H5Tget_cset(type));
+  if (H5Aread(attribute, memory, raw.data()) < 0) return {};
+  std::vector<std::string> strings;
+  for (const char* text : raw) strings.emplace_back(text ? text : "");
+  H5Dvlen_reclaim(memory, space, H5P_DEFAULT, raw.data());
+  return strings;
+}
+
+/// Strings of one length, which end with zeros or blanks.
+std::vector<std::string> read_fixed_strings(hid_t attribute, hid_t type, std::size_t count) {
+  constexpr std::size_t kMost = 1 << 16;
+  const std::size_t size = H5Tget_size(type);
+  if (size == 0 || size > kMost) return {};
+  std::string raw(size * count, '\0');
+  if (H5Aread(attribute, type, raw.data()) < 0) return {};
+  std::vector<std::string> strings;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::string& text = strings.emplace_back(raw, i * size, size);
+    text.resize(std::min(text.find('\0'), size));
+    text.resize(text.find_last_not_of(' ') + 1);
+  }
+  return strings;
+}
+
 /// The strings of the attribute DIMENSION_LABELS, slowest dimension first; empty
 /// where it is missing or not as it should be.
 std::vector<std::string> read_labels(hid_t dataset, std::size_t dimensions) {
@@ -74,17 +104,13 @@ std::vector<std::string> read_labels(hid_t dataset, std::size_t dimensions) {
   const Hdf5Handle attribute(H5Aopen(dataset, kName, H5P_DEFAULT), H5Aclose);
   const Hdf5Handle space(attribute.valid() ? H5Aget_space(attribute) : -1, H5Sclose);
   const Hdf5Handle type(attribute.valid() ? H5Aget_type(attribute) : -1, H5Tclose);
-  if (!space.valid() || !type.valid() || H5Tis_variable_str(type) <= 0 ||
+  if (!space.valid() || !type.valid() || H5Tget_class(type) != H5T_STRING ||
       H5Sget_simple_extent_npoints(space) != static_cast<hssize_t>(dimensions))
     return {};
-  std::vector<char*> raw(dimensions, nullptr);
-  const Hdf5Handle memory(H5Tcopy(H5T_C_S1), H5Tclose);
-  H5Tset_size(memory, H5T_VARIABLE);
-  H5Tset_cset(memory, H5Tget_cset(type));
-  if (H5Aread(attribute, memory, raw.data()) < 0) return {};
-  std::vector<std::string> labels;
-  for (const char* text : raw) labels.push_back(text ? lower(text) : "");
-  H5Dvlen_reclaim(memory, space, H5P_DEFAULT, raw.data());
+  std::vector<std::string> labels = H5Tis_variable_str(type) > 0
+                                        ? read_variable_strings(attribute, type, dimensions)
+                                        : read_fixed_strings(attribute, type, dimensions);
+  for (std::string& label : labels) label = lower(label);
   return labels;
 }
 
@@ -220,10 +246,9 @@ std::vector<ArrayAxis> read_hdf5_axes(const std::string& path, hid_t dataset, bo
     labelled = labelled && role;
     if (sizes[i] > static_cast<hsize_t>(std::numeric_limits<Index>::max()))
       throw UsageError(fmt::format("'{}': a dimension of {} is too large", path, sizes[i]));
-    axes.push_back({static_cast<Index>(sizes[i]), role.value_or(AxisRole::space)});
+    axes.push_back({static_cast<Index>(sizes[i]), role.value_or(AxisRole::space),
+                    labels.empty() ? std::nullopt : direction_of(labels[i])});
   }
-  for (std::size_t i = 0; labelled && i < axes.size(); ++i)
-    axes[i].direction = direction_of(labels[axes.size() - 1 - i]);
   return axes;
 }
 

@@ -31,8 +31,8 @@ hid_t hdf5_native_type(ScalarType type);
 /// nothing where they differ in more than that.
 std::optional<bool> hdf5_swapped(hid_t dataset, ScalarType type);
 
-/// The sizes, fastest first, with the roles that the attribute DIMENSION_LABELS says;
-/// `labelled` becomes whether it says all: then those of space have their directions.
+/// The sizes, fastest first, with the roles and directions that the attribute DIMENSION_LABELS
+/// says; `labelled` becomes whether it says all roles.
 std::vector<ArrayAxis> read_hdf5_axes(const std::string& path, hid_t dataset, bool& labelled);
 /// The attribute `element_size_um` that Fiji and ilastik write, of the axes of space, fastest
 /// first; or zeros.

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -121,6 +123,22 @@ Vec3d spacing_of(const ArrayView& view, Vec3d in_file) {
   return spacing;
 }
 
+/// Labels of some dimensions do not say what the others are: those must agree with where they are
+/// taken to be.
+void check_directions(const std::string& path, std::span<const ArrayAxis> axes) {
+  int next = 0;
+  for (const ArrayAxis& axis : axes) {
+    const bool is_space = axis.role == AxisRole::space;
+    const int place = is_space ? next++ : -1;
+    if (!axis.direction || *axis.direction == place) continue;
+    const char label = "xyz"[*axis.direction];
+    throw UsageError(fmt::format(
+        "'{}': DIMENSION_LABELS name a dimension {} that is taken for {}, since not all have a "
+        "name: label all of them x, y, z, c or t",
+        path, label, is_space ? std::string(1, "xyz"[std::min(place, 2)]) : "a channel or time"));
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::string& dataset,
@@ -133,6 +151,7 @@ std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::stri
         fmt::format("'{}': a dataset of {} dimensions, without DIMENSION_LABELS that "
                     "say which 3 are space: {}",
                     file, axes.size(), kRolesHint));
+  if (!opened->labelled()) check_directions(file, axes);
   const ArrayView view = select_volume(file, axes, said.selection);
   std::vector<Index> fixed(axes.size(), 0);
   for (std::size_t i = 0; i < axes.size(); ++i) {

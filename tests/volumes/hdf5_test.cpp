@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <array>
 #include <functional>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -141,6 +143,32 @@ void set_labels(hid_t data, const std::vector<const char*>& labels) {
   H5Tclose(text);
 }
 
+/// The same as strings of one length, padded with zeros (h5py's arrays of 'S') or blanks.
+void set_fixed_labels(hid_t data, const std::vector<const char*>& labels, std::size_t size,
+                      char padding) {
+  const hid_t text = H5Tcopy(H5T_C_S1);
+  H5Tset_size(text, size);
+  H5Tset_strpad(text, padding == ' ' ? H5T_STR_SPACEPAD : H5T_STR_NULLPAD);
+  std::string raw;
+  for (const char* label : labels) {
+    raw += label;
+    raw.resize((raw.size() + size - 1) / size * size, padding);
+  }
+  set_attribute(data, "DIMENSION_LABELS", text, labels.size(), raw.data());
+  H5Tclose(text);
+}
+
+/// Replaces the labels of /v.
+template <class Set>
+void replace_labels(const std::string& path, const Set& set) {
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const hid_t data = H5Dopen2(file, "v", H5P_DEFAULT);
+  H5Adelete(data, "DIMENSION_LABELS");
+  set(data);
+  H5Dclose(data);
+  H5Fclose(file);
+}
+
 /// What sample_bytes() has, at the places that labels say, in channel 1 of 2 where there are any;
 /// the sizes of its elements are 1, 2, … in the order x, y, z.
 std::string write_labelled(const std::string& path, const std::vector<const char*>& labels,
@@ -204,15 +232,65 @@ TEST_F(Hdf5, LabelsSayWhichDimensionIsWhich) {
       const Box3 inner{{3, 2, 1}, {17, 16, 4}};
       EXPECT_EQ(read_box(*source, inner), sample_bytes(ScalarType::i16, inner, kExtent));
     }
-  // Labels that say nothing of ours leave the order as it is; two alike are refused.
+  // Two alike are refused.
   const auto twice = write_labelled(dir / "twice.h5", {"z", "y", "x"}, 0);
-  const hid_t file = H5Fopen(twice.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
-  const hid_t data = H5Dopen2(file, "v", H5P_DEFAULT);
-  H5Adelete(data, "DIMENSION_LABELS");
-  set_labels(data, {"x", "y", "x"});
-  H5Dclose(data);
-  H5Fclose(file);
+  replace_labels(twice, [](hid_t data) { set_labels(data, {"x", "y", "x"}); });
   EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(twice, {}); }), "are called x"));
+}
+
+TEST_F(Hdf5, LabelsMayBeStringsOfOneLength) {
+  using Labels = std::vector<const char*>;
+  for (const Labels& labels :
+       {Labels{"z", "y", "x"}, Labels{"x", "y", "z"}, Labels{"x", "y", "z", "channel"}})
+    for (const auto& [size, padding] :
+         {std::pair(1, '\0'), std::pair(8, '\0'), std::pair(8, ' ')}) {
+      if (labels.size() > 3 && size == 1) continue;
+      const auto path = write_labelled(dir / "v.h5", labels, 0);
+      replace_labels(path, [&](hid_t data) {
+        set_fixed_labels(data, labels, static_cast<std::size_t>(size), padding);
+      });
+      VolumeRequest said;
+      if (labels.size() > 3) said.selection.channel = 1;
+      const auto source = open_source(path, said);
+      EXPECT_EQ(source->info().extent, kExtent);
+      EXPECT_EQ(read_box(*source, kWhole), sample_bytes(ScalarType::i16, kWhole, kExtent));
+    }
+}
+
+TEST_F(Hdf5, LabelsOfSomeDimensionsThatContradictTheirPlaceAreRefused) {
+  using Labels = std::vector<const char*>;
+  const auto path = write_labelled(dir / "v.h5", {"z", "y", "x"}, 0);
+  const auto label = [&](const Labels& labels) {
+    replace_labels(path, [&](hid_t data) { set_labels(data, labels); });
+  };
+  for (const Labels& labels :
+       {Labels{"x", "", ""}, Labels{"x", "y", ""}, Labels{"", "", "z"}, Labels{"row", "x", ""}}) {
+    label(labels);
+    const std::string message = message_of<UsageError>([&] { open_source(path, {}); });
+    EXPECT_TRUE(contains(message, "DIMENSION_LABELS name a dimension ")) << message;
+    EXPECT_TRUE(contains(message, "v.h5")) << message;
+  }
+  // Those that agree, or say nothing of ours, leave the order as it is.
+  for (const Labels& labels :
+       {Labels{"z", "", ""}, Labels{"", "y", "x"}, Labels{"", "", ""}, Labels{"row", "y", "x"}}) {
+    label(labels);
+    EXPECT_EQ(read_box(*open_source(path, {}), kWhole),
+              sample_bytes(ScalarType::i16, kWhole, kExtent));
+  }
+  // A dimension of size 1 does not move the others.
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const std::array<hsize_t, 4> sizes{1, 4, 3, 2};
+  const hid_t space = H5Screate_simple(4, sizes.data(), nullptr);
+  const hid_t data =
+      H5Dcreate2(file, "v", H5T_NATIVE_UINT8, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  set_labels(data, {"", "x", "y", "z"});
+  H5Dclose(data);
+  H5Sclose(space);
+  H5Fclose(file);
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, {}); }), "taken for"));
+  label({"x", "", "", ""});
+  EXPECT_TRUE(
+      contains(message_of<UsageError>([&] { open_source(path, {}); }), "for a channel or time"));
 }
 
 TEST_F(Hdf5, ChunksThatWereNeverWritten) {
