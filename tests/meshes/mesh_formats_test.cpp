@@ -42,7 +42,7 @@ Chunks make_chunks(std::size_t triangles, std::uint32_t rings = 40) {
 
 void write(MeshSink& sink, const Chunks& chunks, bool normals, const std::string& unit = "") {
   EXPECT_EQ(sink.indexing(), Indexing::welded);
-  sink.begin({normals, {0, 0, 0}, {1, 1, 1}, unit});
+  sink.begin({normals, {0, 0, 0}, {1, 1, 1}, {}, unit});
   std::size_t v = 0, t = 0;
   for (const auto& [v_end, t_end] : chunks.ends) {
     MeshChunk chunk{.first_vertex = v};

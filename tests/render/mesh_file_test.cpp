@@ -24,7 +24,7 @@ constexpr std::uint32_t kRings = 20;
 
 void write(MeshSink& sink, bool normals = true, const std::string& unit = "") {
   const TestMesh ball = make_ball({1, 2, 3}, 1, kRings);
-  sink.begin({normals, {0, 1, 2}, {2, 3, 4}, unit});
+  sink.begin({normals, {0, 1, 2}, {2, 3, 4}, {}, unit});
   sink.write(ball.chunk(0, normals));
   sink.finish();
 }

@@ -142,7 +142,7 @@ TEST(VtpFile, ReadsWhatVtkWrites) {
 /// Writes a ball, cut into parts where the sink does that.
 void write(MeshSink&& sink, bool normals) {
   const TestMesh ball = make_ball({1, 2, 3}, 1, 20);
-  sink.begin({normals, {0, 1, 2}, {2, 3, 4}, "micrometer"});
+  sink.begin({normals, {0, 1, 2}, {2, 3, 4}, {}, "micrometer"});
   sink.write(ball.chunk(0, normals));
   sink.finish();
 }
