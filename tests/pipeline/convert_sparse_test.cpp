@@ -245,7 +245,7 @@ TEST(ConvertSparse, WhatIsRememberedOfEachBrickIsPartOfTheBudget) {
     convert_quietly(source, folder / "a", {.brick = 16, .memory = 150 * kMiB, .threads = 2});
     FAIL() << "the bricks were not counted";
   } catch (const UsageError& e) {
-    EXPECT_NE(std::string(e.what()).find("150 MiB is too small"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("150.0 MiB is too small"), std::string::npos) << e.what();
   }
   EXPECT_FALSE(std::filesystem::exists(folder / "a.partial"));
 }
