@@ -11,7 +11,7 @@ namespace {
 class MemoryStream final : public ByteStream {
  public:
   MemoryStream(std::string name, std::span<const std::byte> bytes)
-      : name_(std::move(name)), rest_(bytes) {}
+      : name_(std::move(name)), rest_(bytes), all_(bytes.size()) {}
 
   std::size_t read(std::byte* out, std::size_t size) override {
     const std::size_t count = std::min(size, rest_.size());
@@ -20,11 +20,12 @@ class MemoryStream final : public ByteStream {
     return count;
   }
   std::string name() const override { return name_; }
-  std::uint64_t most_bytes() const override { return rest_.size(); }
+  std::uint64_t most_bytes() const override { return all_; }
 
  private:
   std::string name_;
   std::span<const std::byte> rest_;
+  std::uint64_t all_;  ///< bytes, read or not
 };
 
 }  // namespace

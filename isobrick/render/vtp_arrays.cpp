@@ -58,8 +58,14 @@ std::uint64_t VtpArrays::read_size(ByteStream& stream) const {
 
 /// From the array's first byte or character to the end of the file.
 std::span<const std::byte> VtpArrays::encoded(const VtkArray& array) const {
-  if (array.get("format", "ascii") != "appended")
-    return bytes_.subspan(std::min<std::size_t>(array.content, bytes_.size()));
+  if (array.get("format", "ascii") != "appended") {
+    const auto rest = bytes_.subspan(std::min<std::size_t>(array.content, bytes_.size()));
+    // VTK indents the text, and the table of zlib blocks is counted in characters.
+    const auto first = std::ranges::find_if_not(rest, [](std::byte b) {
+      return b == std::byte{' '} || (b >= std::byte{'\t'} && b <= std::byte{'\r'});
+    });
+    return rest.subspan(static_cast<std::size_t>(first - rest.begin()));
+  }
   const std::string text = array.get("offset", "0");
   std::uint64_t offset = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset);

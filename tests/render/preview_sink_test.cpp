@@ -119,8 +119,8 @@ TEST(PreviewSink, UpIsUpAndRightIsRight) {
                 lying = draw({right.chunk(), left.chunk()}, options);
   EXPECT_TRUE(upright.surface(100, 80 - 45));
   EXPECT_FALSE(upright.surface(100, 80 + 45));
-  EXPECT_TRUE(lying.surface(100 + 45, 80));
-  EXPECT_FALSE(lying.surface(100 - 45, 80));
+  EXPECT_TRUE(lying.surface(100 + 70, 80));
+  EXPECT_FALSE(lying.surface(100 - 70, 80));
 }
 
 /// Pixels from the first to the last column and row that show the surface.
