@@ -134,7 +134,7 @@ std::optional<StreamCollector::Pending> StreamCollector::collect(InFlightLaunch&
   return next;
 }
 
-/// As many tiles at a time as fit, going by the sums that they handed on.
+/// As many tiles at a time as fit, going by the sums that they passed on.
 void StreamCollector::repeat_in_parts(InFlightLaunch& launch) {
   const std::vector<OrderState> sums = device_.totals_of_tiles(launch);
   const StreamSizes& sizes = device_.sizes();

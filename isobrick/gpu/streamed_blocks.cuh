@@ -4,10 +4,10 @@
 
 #include "isobrick/gpu/block_groups.h"
 
-// Where the samples of a streamed tile lie. A tile is read as if 27 tile_blocks of 32³
-// samples lay around it, but of the 26 that are not its own only the samples within one
-// step of its 33³ are ever looked at. Eight tiles share the tile_blocks for those: each has
-// four columns, rows or planes of them for itself (of the edges and corners, four by four).
+// Where the samples of a streamed tile lie. A tile is read as if it had 27 tile blocks of 32³
+// samples: its own and 26 around it. Of those 26 the kernel reads only the samples within one step
+// of its 33³. Eight tiles share blocks for them: each tile has four columns, rows or planes of a
+// block (of the edges and corners, four by four).
 // docs/design/gpu.md has the picture.
 
 namespace isobrick::gpu {

@@ -194,8 +194,8 @@ void check_frame_step(const DicomSlice& slice, const VolumeRequest& said) {
                   slice.path, slice.extent.z));
 }
 
-/// Of slices without positions only their InstanceNumbers say whether one is missing. Whoever
-/// gives a spacing takes them as they are.
+/// Of slices without positions only their InstanceNumbers say whether one is missing. With a
+/// spacing that the user gives they are taken as they are.
 void check_numbers(const std::string& name, const std::vector<DicomSlice>& slices) {
   const double usual = usual_step(steps_of(slices));
   for (std::size_t i = 1; i < slices.size(); ++i) {

@@ -92,7 +92,7 @@ TEST_F(DataFile, BytesAfterTheSamplesAreIgnoredWithANote) {
   }
   dir.write("exact.nrrd", head + "\n" + samples);
   EXPECT_TRUE(open_source(dir / "exact.nrrd", {})->notes().empty());
-  // Who describes the samples is told that the file has more.
+  // A note says that the file has more samples than the request describes.
   VolumeRequest said;
   said.extent = kExtent;
   said.type = ScalarType::i16;
