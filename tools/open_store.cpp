@@ -11,6 +11,7 @@
 #include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/shell_word.h"
+#include "isobrick/io/folder_walk.h"
 #include "isobrick/meshes/mesh_name.h"
 #include "isobrick/pipeline/convert_staging.h"
 #include "isobrick/volumes/raw_name.h"
@@ -77,11 +78,13 @@ bool has_picture_name(const fs::path& path) {
 }
 
 [[noreturn]] void refuse_folder(const fs::path& path) {
-  std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path, ignored))
-    if (entry.is_directory(ignored) && is_zarr(entry.path()))
+  for (const FolderEntry& entry : folder_entries(path)) {
+    const fs::path inner = path / entry.name;
+    std::error_code ignored;
+    if (fs::is_directory(inner, ignored) && is_zarr(inner))
       refuse(path.string(), "it is a folder that holds Zarr",
-             fmt::format("name that, such as {}", shell_word(entry.path().string())));
+             fmt::format("name that, such as {}", shell_word(inner.string())));
+  }
   refuse(path.string(), "it is a folder without Zarr's metadata",
          "if it holds the slices of a volume, " + convert_command(path));
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/folder_walk.h"
 #include "isobrick/volumes/optional_formats.h"
 #include "isobrick/volumes/volume_format.h"
 
@@ -51,15 +52,13 @@ bool before(std::string_view a, std::string_view b) {
 
 std::unique_ptr<VolumeSource> open_folder(const std::string& path, const VolumeRequest& said) {
   std::vector<std::string> tiff, dicom;
-  std::error_code failure;
-  fs::directory_iterator entries(path, failure);
-  if (failure) throw system_error("list", path, failure.value());
-  for (const fs::directory_entry& entry : entries) {
-    if (!entry.is_regular_file(failure) || entry.path().filename().string().starts_with('.'))
-      continue;
-    const VolumeFormat format = recognise_format(entry.path().string());
-    if (format == VolumeFormat::tiff) tiff.push_back(entry.path().string());
-    if (format == VolumeFormat::dicom) dicom.push_back(entry.path().string());
+  for (const FolderEntry& entry : folder_entries(path)) {
+    const std::string file = (fs::path(path) / entry.name).string();
+    std::error_code failure;
+    if (entry.name.starts_with('.') || !fs::is_regular_file(file, failure)) continue;
+    const VolumeFormat format = recognise_format(file);
+    if (format == VolumeFormat::tiff) tiff.push_back(file);
+    if (format == VolumeFormat::dicom) dicom.push_back(file);
   }
   if (!tiff.empty() && !dicom.empty())
     throw UsageError(fmt::format("'{}' holds TIFF and DICOM files: which are meant?", path));

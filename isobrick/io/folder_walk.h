@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace isobrick {
+
+// The standard library's iterators over folders end the program where memory is short.
+
+struct FolderEntry {
+  std::string name;
+  std::filesystem::file_type type;  ///< of a link that it is one
+};
+
+/// What a folder holds, in no particular order. Throws Error where it cannot be read.
+std::vector<FolderEntry> folder_entries(const std::filesystem::path& folder);
+
+/// Calls visit(path relative to `root`, type) for everything below a folder, a folder before what
+/// is in it, until it returns false. Follows no links. Throws Error where a folder cannot be read.
+void walk_folder(
+    const std::filesystem::path& root,
+    const std::function<bool(const std::filesystem::path&, std::filesystem::file_type)>& visit);
+
+}  // namespace isobrick
