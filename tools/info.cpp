@@ -8,6 +8,7 @@
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/bricks/stored_index.h"
+#include "isobrick/io/folder_walk.h"
 #include "tools/format.h"
 #include "tools/histogram.h"
 #include "tools/info_volumes.h"
@@ -23,8 +24,10 @@ using nlohmann::ordered_json;
 
 std::uint64_t directory_bytes(const fs::path& path) {
   std::uint64_t bytes = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(path))
-    if (entry.is_regular_file()) bytes += entry.file_size();
+  walk_folder(path, [&](const fs::path& file, fs::file_type type) {
+    if (type == fs::file_type::regular) bytes += fs::file_size(path / file);
+    return true;
+  });
   return bytes;
 }
 

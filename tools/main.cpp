@@ -53,10 +53,14 @@ int die_of(int signal) {
 
 std::terminate_handler g_usual_end = nullptr;
 
-/// Where memory is short even destructors of libraries throw: that ends the program with a line.
+/// Where memory is short even destructors of libraries throw, or give up without an exception: that
+/// ends the program with a line.
 [[noreturn]] void end_at_once() {
+  const std::exception_ptr thrown = std::current_exception();
   try {
-    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+    if (thrown) std::rethrow_exception(thrown);
+    print_error("", "a library ended the program; memory may be short: try a smaller --memory");
+    ::_exit(1);
   } catch (const std::bad_alloc&) {
     print_out_of_memory("");
     ::_exit(1);

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/folder_walk.h"
 #include "isobrick/io/parted_output.h"
 #include "isobrick/meshes/glb_sink.h"
 #include "isobrick/meshes/mesh_parts.h"
@@ -112,8 +113,8 @@ std::uint64_t mesh_memory(MeshFormat format, int threads, std::uint64_t memory) 
 std::uint64_t mesh_bytes(const fs::path& path) {
   std::uint64_t bytes = fs::file_size(path);
   for (const fs::path& folder : part_folders(path))
-    for (const fs::directory_entry& part : fs::directory_iterator(folder))
-      bytes += part.file_size();
+    for (const FolderEntry& part : folder_entries(folder))
+      bytes += fs::file_size(folder / part.name);
   return bytes;
 }
 

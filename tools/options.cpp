@@ -150,11 +150,12 @@ void add_selection(CLI::App* app, Selection& selection) {
 
 void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_parsed(app, options.brick, [](const std::string& text) { return parse_whole(text, 16, 256); },
-             {"--brick", "N", "Samples along each edge of a brick, 16 to 256", "64"});
+             {"--brick", "N", "Samples along each edge of a brick, 16 to 256",
+              "64; in thin volumes as many samples in longer bricks"});
   add_parsed(app, options.shard,
              [](const std::string& text) { return parse_whole(text, 16, 1 << 20); },
              {"--shard", "N", "Samples along each edge of a shard, cut to a multiple of the brick",
-              "512"});
+              "512; in thin volumes as many bricks in longer shards"});
   add_parsed(app, options.zstd_level, parse_codec,
              {"--codec", "zstd:LEVEL|none", "Compression of bricks", "zstd:3"});
   add_parsed(app, options.levels, parse_levels,

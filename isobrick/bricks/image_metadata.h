@@ -55,7 +55,7 @@ struct ImageMetadata {
 };
 
 /// The version of `attributes.isobrick` that we write, and the only one we read.
-inline constexpr int kStoreVersion = 2;
+inline constexpr int kStoreVersion = 3;
 
 std::string to_json(const ImageMetadata& image);
 

@@ -11,12 +11,12 @@ constexpr int kRangeZstdLevel = 3;
 
 /// Calls f(byte offset in the chunk, item in the box, items) for each row of `part`.
 template <class F>
-void for_each_row(Box3 box, Int3 chunk, Box3 part, std::size_t pair_bytes, const F& f) {
+void for_each_row(Box3 box, const ChunkPlace& place, Box3 part, std::size_t bytes_of_item,
+                  const F& f) {
   for (Index z = part.lo.z; z < part.hi.z; ++z)
     for (Index y = part.lo.y; y < part.hi.y; ++y) {
       const Int3 p{part.lo.x, y, z};
-      f(static_cast<std::size_t>(linear_index(p - chunk * kRangeChunkEdge, kRangeChunkExtent)) *
-            pair_bytes,
+      f(static_cast<std::size_t>(linear_index(p - place.box().lo, place.extent)) * bytes_of_item,
         static_cast<std::size_t>(linear_index(p - box.lo, box.extent())),
         static_cast<std::size_t>(part.extent().x));
     }
@@ -24,40 +24,69 @@ void for_each_row(Box3 box, Int3 chunk, Box3 part, std::size_t pair_bytes, const
 
 }  // namespace
 
+Int3 range_chunk_extent(Int3 items) {
+  Int3 chunk = kRangeChunkCube;
+  for (;;) {
+    int thin = 0, large = 0;
+    while (thin < 3 && (chunk[thin] == 1 || 2 * items[thin] > chunk[thin])) ++thin;
+    for (int axis = 1; axis < 3; ++axis)
+      if (items[axis] * chunk[large] > items[large] * chunk[axis]) large = axis;
+    if (thin == 3 || items[large] <= chunk[large]) return chunk;
+    chunk[thin] /= 2;
+    chunk[large] *= 2;
+  }
+}
+
 ArrayMetadata range_array_metadata(Int3 items, ScalarType type) {
-  ArrayMetadata metadata;
-  metadata.shape = {items.z, items.y, items.x, 2};
-  metadata.chunk = {kRangeChunkEdge, kRangeChunkEdge, kRangeChunkEdge, 2};
+  ArrayMetadata metadata = checksum_array_metadata(items);
+  metadata.shape.push_back(2);
+  metadata.chunk.push_back(2);
   metadata.type = type;
-  metadata.codecs = CodecChain::ours(kRangeZstdLevel);
-  metadata.dimension_names = {"z", "y", "x", "bound"};
+  metadata.dimension_names.emplace_back("bound");
   return metadata;
 }
 
-std::size_t range_chunk_bytes(ScalarType type) {
-  return static_cast<std::size_t>(volume(kRangeChunkExtent)) * 2 * size_of(type);
+ArrayMetadata checksum_array_metadata(Int3 items) {
+  ArrayMetadata metadata;
+  metadata.shape = {items.z, items.y, items.x};
+  const Int3 chunk = range_chunk_extent(items);
+  metadata.chunk = {chunk.z, chunk.y, chunk.x};
+  metadata.type = ScalarType::u32;
+  metadata.codecs = CodecChain::ours(kRangeZstdLevel);
+  metadata.dimension_names = {"z", "y", "x"};
+  return metadata;
 }
 
-std::uint32_t range_chunk_checksum(std::span<const std::byte> encoded) {
+std::size_t item_bytes(const ArrayMetadata& array) {
+  const Index values = array.chunk.size() > 3 ? array.chunk[3] : 1;
+  return static_cast<std::size_t>(values) * size_of(array.type);
+}
+
+std::size_t chunk_bytes(const ArrayMetadata& array) {
+  return static_cast<std::size_t>(volume(kRangeChunkCube)) * item_bytes(array);
+}
+
+std::uint32_t last_checksum(std::span<const std::byte> encoded) {
   // The checksum of all bytes, their own checksum among them, would always be the same.
   std::uint32_t crc = 0;
   if (encoded.size() >= sizeof crc) std::memcpy(&crc, encoded.last(sizeof crc).data(), sizeof crc);
   return crc;
 }
 
-void pack_ranges(ScalarType type, Box3 box, std::span<const std::byte> pairs, Int3 chunk, Box3 part,
-                 std::span<std::byte> decoded) {
-  const std::size_t pair = 2 * size_of(type);
-  for_each_row(box, chunk, part, pair, [&](std::size_t to, std::size_t item, std::size_t count) {
-    std::memcpy(decoded.data() + to, pairs.data() + item * pair, count * pair);
-  });
+void pack_items(std::size_t bytes_of_item, Box3 box, std::span<const std::byte> items,
+                const ChunkPlace& place, Box3 part, std::span<std::byte> decoded) {
+  for_each_row(box, place, part, bytes_of_item,
+               [&](std::size_t to, std::size_t item, std::size_t count) {
+                 std::memcpy(decoded.data() + to, items.data() + item * bytes_of_item,
+                             count * bytes_of_item);
+               });
 }
 
-void unpack_ranges(ScalarType type, std::span<const std::byte> decoded, Int3 chunk, Box3 part,
-                   RangeTable& table) {
+void unpack_ranges(ScalarType type, std::span<const std::byte> decoded, const ChunkPlace& place,
+                   Box3 part, RangeTable& table) {
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    for_each_row(table.box, chunk, part, 2 * sizeof(T),
+    for_each_row(table.box, place, part, 2 * sizeof(T),
                  [&](std::size_t from, std::size_t item, std::size_t count) {
                    const std::byte* bytes = decoded.data() + from;
                    ValueRange<double>* to = table.ranges.data() + item;

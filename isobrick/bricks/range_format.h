@@ -10,29 +10,46 @@
 #include "isobrick/bricks/range_table.h"
 #include "isobrick/core/lattice.h"
 
-// The bytes of a range array: pairs (lo, hi) of the level's type in chunks of kRangeChunkEdge³
-// items, C order [z, y, x, 2], and the checksums of all chunks. No files here.
+// The bytes of the arrays below isobrick/: one item for each brick or block, in chunks of as many
+// items as a cube of kRangeChunkEdge has, C order [z, y, x], and the checksums of all chunks. No
+// files here.
 
 namespace isobrick {
 
-inline constexpr Int3 kRangeChunkExtent{kRangeChunkEdge, kRangeChunkEdge, kRangeChunkEdge};
+inline constexpr Int3 kRangeChunkCube{kRangeChunkEdge, kRangeChunkEdge, kRangeChunkEdge};
 
-/// The array [z, y, x, 2] of the ranges of so many items.
+/// Items of a chunk along each axis: a cube, but in thin volumes long along the long axes.
+/// docs/store_format.md has the rule.
+Int3 range_chunk_extent(Int3 items);
+
+/// The array [z, y, x, 2] of the ranges of so many items: pairs (lo, hi) of the level's type.
 ArrayMetadata range_array_metadata(Int3 items, ScalarType type);
 
+/// The array [z, y, x] of the checksums of so many bricks.
+ArrayMetadata checksum_array_metadata(Int3 items);
+
+/// Bytes of an item of such an array.
+std::size_t item_bytes(const ArrayMetadata& array);
+
 /// Bytes of a decoded chunk.
-std::size_t range_chunk_bytes(ScalarType type);
+std::size_t chunk_bytes(const ArrayMetadata& array);
 
-/// The checksum that an encoded chunk ends with; 0 when it has none.
-std::uint32_t range_chunk_checksum(std::span<const std::byte> encoded);
+/// The checksum that encoded bytes end with; 0 when they have none.
+std::uint32_t last_checksum(std::span<const std::byte> encoded);
 
-/// Copies pairs from `box` (C order) to a decoded chunk: those of `part`, which is in both.
-void pack_ranges(ScalarType type, Box3 box, std::span<const std::byte> pairs, Int3 chunk, Box3 part,
-                 std::span<std::byte> decoded);
+/// A chunk's place among those of an array, and its extent.
+struct ChunkPlace {
+  Int3 chunk, extent;
+  Box3 box() const { return {chunk * extent, (chunk + Int3{1, 1, 1}) * extent}; }
+};
+
+/// Copies items from `box` (C order) to a decoded chunk: those of `part`, which is in both.
+void pack_items(std::size_t bytes_of_item, Box3 box, std::span<const std::byte> items,
+                const ChunkPlace& place, Box3 part, std::span<std::byte> decoded);
 
 /// Reads the ranges of `part` from a decoded chunk into the table.
-void unpack_ranges(ScalarType type, std::span<const std::byte> decoded, Int3 chunk, Box3 part,
-                   RangeTable& table);
+void unpack_ranges(ScalarType type, std::span<const std::byte> decoded, const ChunkPlace& place,
+                   Box3 part, RangeTable& table);
 
 /// The file of checksums: one of each chunk, then the checksum of those.
 std::vector<std::uint32_t> with_own_checksum(std::vector<std::uint32_t> checksums);
@@ -44,13 +61,12 @@ struct ChunkChecksums {
 std::optional<ChunkChecksums> parse_range_checksums(std::span<const std::byte> bytes,
                                                     std::size_t chunks);
 
-/// Calls f(chunk coordinates, the part of the box in that chunk).
+/// Calls f(place of a chunk, the part of the box in that chunk) for chunks of `extent` items.
 template <class F>
-void for_each_range_chunk(Box3 box, F&& f) {
-  constexpr Index edge = kRangeChunkEdge;
-  const Int3 first{box.lo.x / edge, box.lo.y / edge, box.lo.z / edge};
-  for_each_point({first, ceil_div(box.hi, kRangeChunkExtent)}, [&](Int3 c) {
-    f(c, intersect(box, {c * edge, (c + Int3{1, 1, 1}) * edge}));
+void for_each_range_chunk(Box3 box, Int3 extent, F&& f) {
+  for_each_point({floor_div(box.lo, extent), ceil_div(box.hi, extent)}, [&](Int3 c) {
+    const ChunkPlace place{c, extent};
+    f(place, intersect(box, place.box()));
   });
 }
 

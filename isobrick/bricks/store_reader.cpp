@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 
 #include "isobrick/bricks/array_metadata.h"
+#include "isobrick/bricks/brick_checksums.h"
 #include "isobrick/bricks/level_description.h"
 #include "isobrick/bricks/lru_cache.h"
 #include "isobrick/bricks/metadata_files.h"
@@ -32,6 +32,15 @@ constexpr std::uint64_t kMaxOpenFiles = 128;
 // and must not make us ask for that much memory.
 std::uint64_t largest_encoded(std::uint64_t decoded) { return decoded + decoded / 8 + (64 << 10); }
 
+/// Of a whole brick that is not the one which belongs to its place, the end of a message.
+std::string why_other_content(const StoreInfo& info) {
+  if (info.ours) return "it belongs to another place or store; see: isobrick verify";
+  return fmt::format(
+      "it belongs to another place, or was changed since the ranges were computed; compute them "
+      "anew with: {} --force",
+      index_command(info));
+}
+
 }  // namespace
 
 std::uint64_t decode_extra(const StoreInfo& info, int threads) {
@@ -47,6 +56,7 @@ struct StoreReader::Impl {
     VolumePlace place;
     ShardGrid grid;
     std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // null: none
+    std::shared_ptr<const BrickChecksums> checksums;                     // null: none
   };
   struct Place {
     std::shared_ptr<const File> file;
@@ -64,8 +74,10 @@ struct StoreReader::Impl {
   std::filesystem::path shard_path(int level, Int3 s) const;
   std::shared_ptr<const File> shard_file(int level, Int3 s);
   std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
-  void check_missing_shard(int level, Int3 s);
+  std::optional<Place> find_unchecked(int level, Int3 b);
   std::optional<Place> find(int level, Int3 b);
+  void check_content(int level, Int3 b, const Place& place, std::uint32_t checksum);
+  std::uint32_t read(int level, Int3 b, const Place& place, std::byte* out);
   RangeTable ranges(int level, Box3 box, bool blocks);
   std::uint64_t key(int level, Int3 s) const {
     return static_cast<std::uint64_t>(linear_index(s, at(level).grid.shards)) * 64 +
@@ -129,14 +141,17 @@ void StoreReader::Impl::open_ranges(int level, const RangeChecksums& checksums) 
   const Lattice& samples = lattice(level);
   const auto open = [&](const std::filesystem::path& folder, Int3 items, std::uint32_t crc32c) {
     using Ranges = std::shared_ptr<const RangeArrayReader>;
-    if (!std::filesystem::exists(folder / "zarr.json")) return Ranges();
-    return Ranges(std::make_shared<const RangeArrayReader>(folder, items, samples.type, crc32c));
+    auto ranges = std::make_shared<const RangeArrayReader>(folder, items, samples.type, crc32c);
+    return ranges->exists() ? Ranges(std::move(ranges)) : Ranges();
   };
   Level& l = levels[static_cast<std::size_t>(level)];
   l.brick_ranges =
       open(brick_range_folder(info.additions, level), samples.bricks(), checksums.bricks);
   l.block_ranges =
       open(block_range_folder(info.additions, level), samples.blocks(), checksums.blocks);
+  // Those that are missing are damage: else nobody would notice bricks of another place.
+  l.checksums = std::make_shared<const BrickChecksums>(brick_checksum_folder(info.additions, level),
+                                                       samples.bricks(), checksums.content);
   info.levels[static_cast<std::size_t>(level)].block_ranges_crc32c = checksums.blocks;
 }
 
@@ -196,36 +211,12 @@ std::shared_ptr<const File> StoreReader::Impl::shard_file(int level, Int3 s) {
   });
 }
 
-// To Zarr a shard without a file holds nothing but fill values, so that a lost
-// file would pass for empty space. The ranges know better: those of its bricks
-// must be the fill value, or hold it where a neighbour's first layer is in them.
-void StoreReader::Impl::check_missing_shard(int level, Int3 s) {
-  if (!at(level).brick_ranges || std::isnan(info.fill_value)) return;
-  const Int3 n = at(level).grid.bricks_per_shard, grid = lattice(level).bricks();
-  const Box3 box = intersect({s * n, (s + Int3{1, 1, 1}) * n}, {{0, 0, 0}, grid});
-  const RangeTable table = ranges(level, box, false);
-  for_each_point(box, [&](Int3 b) {
-    const ValueRange<double>& range = table.at(b);
-    const bool alone = intersect({b, b + Int3{2, 2, 2}}, {{0, 0, 0}, grid}) ==
-                       intersect({b, b + Int3{2, 2, 2}}, box);
-    const bool holds = range.lo <= info.fill_value && info.fill_value <= range.hi;
-    if (!holds || (alone && range.lo != range.hi))
-      throw DamageError(fmt::format(
-          "level {}, shard ({}, {}, {}): '{}' is missing, but brick ({}, {}, {}) has samples from "
-          "{} to {}",
-          level, s.x, s.y, s.z, shard_path(level, s).string(), b.x, b.y, b.z, range.lo, range.hi));
-  });
-}
-
 std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3 s) {
   return indices.get(key(level, s), [&] {
     const std::uint64_t bricks = at(level).grid.shard_bricks() * at(level).place.shard_volumes;
     const auto file = shard_file(level, s);
     // A shard without a file has only absent bricks.
-    if (!*file) {
-      check_missing_shard(level, s);
-      return std::pair(std::make_shared<const ShardIndex>(0), index_weight(0));
-    }
+    if (!*file) return std::pair(std::make_shared<const ShardIndex>(0), index_weight(0));
     const ArrayMetadata::Sharding& sharding = *at(level).metadata.sharding;
     const std::uint64_t size = file->size();
     const std::uint64_t index_size = ShardIndex::encoded_size(bricks, sharding.index_has_crc);
@@ -246,12 +237,11 @@ std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3
   });
 }
 
-std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 b) {
+std::optional<StoreReader::Impl::Place> StoreReader::Impl::find_unchecked(int level, Int3 b) {
   check_brick(level, b);
   if (!at(level).metadata.sharding) {
     const auto file = shard_file(level, b);
     if (*file) return Place{file, 0, file->size()};
-    check_missing_shard(level, b);
     return std::nullopt;
   }
   const ShardGrid& grid = at(level).grid;
@@ -262,6 +252,32 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 
       (*index)[at(level).place.in_shard * grid.shard_bricks() + grid.place_in_shard(b)];
   if (entry.absent()) return std::nullopt;
   return Place{shard_file(level, s), entry.offset, entry.size};
+}
+
+// To Zarr a shard without a file holds nothing but fill values, so that a lost
+// file would pass for empty space. The checksums know better.
+std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 b) {
+  const std::optional<Place> place = find_unchecked(level, b);
+  const auto& checksums = at(level).checksums;
+  if (place || !checksums || checksums->at(b, bytes_read) == kAbsentBrick) return place;
+  const Int3 s = at(level).metadata.sharding ? at(level).grid.shard_of(b) : b;
+  const std::string path = shard_path(level, s).string();
+  if (!*shard_file(level, s))
+    throw DamageError(fmt::format("level {}, shard ({}, {}, {}): '{}' is missing, but has bricks",
+                                  level, s.x, s.y, s.z, path));
+  throw DamageError(fmt::format("level {}, brick ({}, {}, {}): '{}' lacks it: {}", level, b.x, b.y,
+                                b.z, path, why_other_content(info)));
+}
+
+void StoreReader::Impl::check_content(int level, Int3 b, const Place& place,
+                                      std::uint32_t checksum) {
+  const auto& checksums = at(level).checksums;
+  if (!checksums) return;
+  const std::uint32_t stored = checksums->at(b, bytes_read);
+  if (stored != checksum)
+    damaged(level, b, place,
+            fmt::format("its checksum is {:08x}, that of the brick that belongs here {:08x}: {}",
+                        checksum, stored, why_other_content(info)));
 }
 
 RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
@@ -298,43 +314,53 @@ std::optional<BrickLocation> StoreReader::locate(int level, Int3 b) const {
 bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   const auto place = impl_->find(level, b);
   if (!place) return false;
-  const Lattice& lattice = impl_->lattice(level);
-  const VolumePlace& volumes = impl_->at(level).place;
-  const ArrayMetadata& array = impl_->at(level).metadata;
-  const auto samples = static_cast<std::size_t>(volume(lattice.brick));
+  impl_->check_content(level, b, *place, impl_->read(level, b, *place, out));
+  return true;
+}
+
+std::uint32_t StoreReader::read_brick_unchecked(int level, Int3 b, std::byte* out) const {
+  const auto place = impl_->find_unchecked(level, b);
+  return place ? impl_->read(level, b, *place, out) : kAbsentBrick;
+}
+
+/// The checksum of the brick that is read.
+std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, std::byte* out) {
+  const VolumePlace& volumes = at(level).place;
+  const ArrayMetadata& array = at(level).metadata;
+  const auto samples = static_cast<std::size_t>(volume(lattice(level).brick));
   const std::size_t stored = samples * array.stored_bytes(),
                     decoded = stored * volumes.chunk_volumes;
-  if (place->size > largest_encoded(decoded))
-    impl_->damaged(level, b, *place, fmt::format("too long for {} bytes of samples", decoded));
+  if (place.size > largest_encoded(decoded))
+    damaged(level, b, place, fmt::format("too long for {} bytes of samples", decoded));
   thread_local PodBuffer<std::byte> buffer;
   thread_local std::vector<std::byte> several;
   buffer.clear();
-  buffer.resize(static_cast<std::size_t>(place->size));
+  buffer.resize(static_cast<std::size_t>(place.size));
   const std::span encoded(buffer.data(), buffer.size());
   if (volumes.chunk_volumes > 1) several.resize(decoded);
   // What is widened afterwards goes to the end of where its samples will be.
-  std::byte* const at_end = out + (lattice.brick_bytes() - stored);
+  std::byte* const at_end = out + (lattice(level).brick_bytes() - stored);
   const std::span to = volumes.chunk_volumes > 1 ? std::span(several) : std::span(at_end, stored);
   try {
     const auto start = Clock::now();
-    place->file->read_at(place->offset, encoded);
-    const auto read = Clock::now();
-    impl_->bytes_read += place->size;
-    impl_->brick_bytes_read += place->size;
-    impl_->read_ticks += (read - start).count();
+    place.file->read_at(place.offset, encoded);
+    const auto end_of_read = Clock::now();
+    bytes_read += place.size;
+    brick_bytes_read += place.size;
+    read_ticks += (end_of_read - start).count();
     decode_bytes(array.codecs, array.stored_bytes(), encoded, to);
-    impl_->brick_bytes_decoded += decoded;
-    impl_->decode_ticks += (Clock::now() - read).count();
+    brick_bytes_decoded += decoded;
+    decode_ticks += (Clock::now() - end_of_read).count();
   } catch (const DamageError& e) {
-    impl_->damaged(level, b, *place, e.what());
+    damaged(level, b, place, e.what());
   }
   const std::byte* from =
       volumes.chunk_volumes > 1 ? several.data() + volumes.in_chunk * stored : at_end;
   if (array.wide)
-    impl_->widen_brick(level, b, *place, from, out);
+    widen_brick(level, b, place, from, out);
   else if (from != out)
     std::copy_n(from, stored, out);
-  return true;
+  return brick_checksum(array.codecs, encoded);
 }
 
 void StoreReader::will_need(int level, Int3 b) const {
@@ -353,7 +379,7 @@ BrickTimes StoreReader::brick_times() const {
 
 bool StoreReader::has_ranges(int level) const {
   const Impl::Level& l = impl_->levels.at(static_cast<std::size_t>(level));
-  return l.brick_ranges && l.block_ranges;
+  return l.brick_ranges && l.block_ranges && l.checksums->exists();
 }
 
 RangeTable StoreReader::brick_ranges(int level, Box3 box) const {

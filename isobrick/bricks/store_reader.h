@@ -77,8 +77,12 @@ class StoreReader {
 
   /// Reads, checks and decodes brick `b` into `out` (lattice.brick_bytes(),
   /// native byte order). False when the brick is absent; `out` is untouched then.
-  /// Throws DamageError naming level, brick, file and offset.
+  /// Throws DamageError naming level, brick, file and offset, also for a whole brick that is not
+  /// the one that the store's checksums are of: it is that of another place or store.
   bool read_brick(int level, Int3 b, std::byte* out) const;
+  /// The same without comparing it with the store's checksums: for computing them. The brick's
+  /// checksum, kAbsentBrick when it is absent.
+  std::uint32_t read_brick_unchecked(int level, Int3 b, std::byte* out) const;
 
   /// Hints that brick `b` is read soon; may start the disk.
   void will_need(int level, Int3 b) const;
@@ -88,8 +92,8 @@ class StoreReader {
   /// The bricks among it.
   BrickTimes brick_times() const;
 
-  /// Whether the level has both kinds of ranges. Without them no surface can be
-  /// extracted; `isobrick index` adds them.
+  /// Whether the level has both kinds of ranges, and checksums of its bricks. Without them no
+  /// surface can be extracted; `isobrick index` adds them.
   bool has_ranges(int level) const;
 
   /// Edge, in blocks, of the chunks in which block ranges are stored: reading

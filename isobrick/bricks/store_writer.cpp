@@ -8,8 +8,10 @@
 #include <mutex>
 
 #include "isobrick/bricks/array_metadata.h"
+#include "isobrick/bricks/brick_checksums.h"
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/image_metadata.h"
+#include "isobrick/bricks/item_array.h"
 #include "isobrick/bricks/publisher.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/shard_grid.h"
@@ -19,6 +21,7 @@
 #include "isobrick/bricks/zarr_v2.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/file.h"
+#include "isobrick/io/folder_walk.h"
 
 namespace isobrick {
 namespace {
@@ -31,7 +34,7 @@ constexpr int kMaxOpenShards = 256;
 constexpr std::uint64_t kWriteback = std::uint64_t{8} << 20;
 
 struct OpenShard {
-  explicit OpenShard(std::size_t bricks) : index(bricks) {}
+  explicit OpenShard(std::size_t bricks) : index(bricks), checksums(bricks, kAbsentBrick) {}
   std::mutex mutex;
   std::filesystem::path path;
   File file;  // empty when closed between bricks
@@ -40,6 +43,7 @@ struct OpenShard {
   std::uint64_t end = 0;
   std::uint64_t writeback_end = 0;  // the disk was told of what is before
   ShardIndex index;
+  std::vector<std::uint32_t> checksums;  // of its bricks, in the order of the index
 };
 
 }  // namespace
@@ -50,7 +54,7 @@ struct StoreWriter::Impl {
     ShardGrid grid;
     ArrayMetadata metadata;
     std::filesystem::path folder;
-    std::unique_ptr<RangeArrayWriter> brick_ranges, block_ranges;
+    std::unique_ptr<ItemArrayWriter> brick_ranges, block_ranges, brick_checksums;
   };
 
   Impl(const std::filesystem::path& directory, const StoreLayout& store_layout, bool is_resume)
@@ -71,6 +75,9 @@ struct StoreWriter::Impl {
   void write(OpenShard& shard, std::span<const std::byte> bytes);
   void publish_root(const ImageMetadata& image);
   void reopen(OpenShard& shard);
+  std::optional<ShardIndex> whole_index(const Level& l, const File& file) const;
+  void put_checksums(const Level& l, Int3 s, std::span<const std::uint32_t> checksums) const;
+  std::optional<RangeChecksums> finish_items(Level& l) const;
 
   std::filesystem::path dir;
   StoreLayout layout;
@@ -100,9 +107,11 @@ void StoreWriter::Impl::prepare_folder() {
   publisher = std::make_unique<Publisher>(dir);
   if (!empty) {
     check_resume();
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(dir))
-      if (!entry.is_directory() && is_temporary_name(entry.path()))
-        publisher->folder().remove_file(entry.path());
+    walk_folder(dir, [&](const std::filesystem::path& path, std::filesystem::file_type type) {
+      if (type != std::filesystem::file_type::directory && is_temporary_name(path))
+        publisher->folder().remove_file(dir / path);
+      return true;
+    });
   }
   if (empty) {
     // It has its name before any other file is there. That it is durable is not
@@ -123,10 +132,16 @@ void StoreWriter::Impl::open_levels() {
     l.metadata = array_metadata(info, layout);
     l.folder = dir / std::to_string(i);
     const int number = static_cast<int>(i);
-    l.brick_ranges = std::make_unique<RangeArrayWriter>(
-        brick_range_folder(dir, number), l.lattice.bricks(), l.lattice.type, *publisher);
-    l.block_ranges = std::make_unique<RangeArrayWriter>(
-        block_range_folder(dir, number), l.lattice.blocks(), l.lattice.type, *publisher);
+    const auto writer = [&](const std::filesystem::path& folder, Int3 items, ArrayMetadata array) {
+      return std::make_unique<ItemArrayWriter>(folder, items, std::move(array), *publisher);
+    };
+    const Int3 bricks = l.lattice.bricks(), blocks = l.lattice.blocks();
+    l.brick_ranges = writer(brick_range_folder(dir, number), bricks,
+                            range_array_metadata(bricks, l.lattice.type));
+    l.block_ranges = writer(block_range_folder(dir, number), blocks,
+                            range_array_metadata(blocks, l.lattice.type));
+    l.brick_checksums =
+        writer(brick_checksum_folder(dir, number), bricks, checksum_array_metadata(bricks));
   }
 }
 
@@ -179,24 +194,76 @@ StoreWriter::~StoreWriter() {
     if (shard->created) impl_->publisher->discard_temporary(shard->path);
 }
 
-bool StoreWriter::shard_is_whole(int level, Int3 s) const {
-  const Impl::Level& l = impl_->level(level);
-  if (!impl_->resume) return false;
-  const std::filesystem::path path = impl_->shard_path(l, s);
-  const File file = impl_->publisher->folder().open_file(path, O_RDONLY);
-  if (!file) return false;
-  if (!l.metadata.sharding) return true;  // it has its name only when it is whole
+/// The index of a shard's file; nothing if the file is not whole.
+std::optional<ShardIndex> StoreWriter::Impl::whole_index(const Level& l, const File& file) const {
   const std::uint64_t size = file.size();
+  if (!l.metadata.sharding) {  // it has its name only when it is whole
+    ShardIndex index(1);
+    index[0] = {0, size};
+    return index;
+  }
   const std::uint64_t index_size = ShardIndex::encoded_size(l.grid.shard_bricks(), true);
-  if (size < index_size) return false;
+  if (size < index_size) return std::nullopt;
   std::vector<std::byte> bytes(index_size);
   file.read_at(size - index_size, bytes);
   try {
+    ShardIndex index = ShardIndex::decode(bytes, true, size - index_size);
     // The bricks of our shards leave no gaps, so their sizes tell the file's.
-    return ShardIndex::decode(bytes, true, size - index_size).brick_bytes() == size - index_size;
+    if (index.brick_bytes() == size - index_size) return index;
   } catch (const DamageError&) {
-    return false;
+    // As one whose sizes do not add up.
   }
+  return std::nullopt;
+}
+
+bool StoreWriter::shard_is_whole(int level, Int3 s) const {
+  const Impl::Level& l = impl_->level(level);
+  if (!impl_->resume) return false;
+  const File file = impl_->publisher->folder().open_file(impl_->shard_path(l, s), O_RDONLY);
+  return file && impl_->whole_index(l, file);
+}
+
+void StoreWriter::keep_shard(int level, Int3 s) {
+  const Impl::Level& l = impl_->level(level);
+  const std::filesystem::path path = impl_->shard_path(l, s);
+  const File file = impl_->publisher->folder().open_file(path, O_RDONLY);
+  const auto index = file ? impl_->whole_index(l, file) : std::nullopt;
+  if (!index) throw Error(fmt::format("'{}' has changed meanwhile", path.string()));
+  std::vector<std::uint32_t> checksums;
+  const std::vector<ByteCodec>& steps = l.metadata.codecs.steps;
+  const bool ends_with_checksum = !steps.empty() && steps.back() == ByteCodec::crc32c;
+  std::vector<std::byte> bytes;
+  for (const ShardIndex::Entry& brick : index->entries()) {
+    checksums.push_back(kAbsentBrick);
+    if (brick.absent()) continue;
+    const std::uint64_t needed = ends_with_checksum
+                                     ? std::min<std::uint64_t>(brick.size, sizeof(std::uint32_t))
+                                     : brick.size;
+    bytes.resize(needed);
+    file.read_at(brick.offset + brick.size - needed, bytes);
+    checksums.back() = brick_checksum(l.metadata.codecs, bytes);
+  }
+  impl_->put_checksums(l, s, checksums);
+}
+
+/// `checksums` of all bricks of a shard, also of those beyond the volume.
+void StoreWriter::Impl::put_checksums(const Level& l, Int3 s,
+                                      std::span<const std::uint32_t> checksums) const {
+  const Int3 n = l.grid.bricks_per_shard;
+  const Box3 box = intersect({s * n, (s + Int3{1, 1, 1}) * n}, {{0, 0, 0}, l.lattice.bricks()});
+  std::vector<std::uint32_t> inside;
+  inside.reserve(static_cast<std::size_t>(volume(box.extent())));
+  for_each_point(box, [&](Int3 b) { inside.push_back(checksums[l.grid.place_in_shard(b)]); });
+  l.brick_checksums->put(box, std::as_bytes(std::span(inside)));
+}
+
+void StoreWriter::forget_shard(int level, Int3 s) {
+  if (impl_->resume)
+    impl_->publisher->folder().remove_file(impl_->shard_path(impl_->level(level), s));
+}
+
+void StoreWriter::finish_below(int level, Index z) {
+  impl_->level(level).brick_checksums->fill_below(z);
 }
 
 void StoreWriter::put(int level, Int3 brick, std::span<const std::byte> encoded) {
@@ -214,6 +281,7 @@ void StoreWriter::put(int level, Int3 brick, std::span<const std::byte> encoded)
   const std::uint64_t offset = shard->end;
   impl_->write(*shard, encoded);
   shard->index[i] = {offset, encoded.size()};
+  shard->checksums[i] = brick_checksum(l.metadata.codecs, encoded);
 }
 
 void StoreWriter::finish_shard(int level, Int3 s) {
@@ -228,14 +296,17 @@ void StoreWriter::finish_shard(int level, Int3 s) {
   }
   if (!shard || !shard->created) {
     // All absent: no file. An earlier run may have left a damaged one.
-    if (impl_->resume) impl_->publisher->folder().remove_file(impl_->shard_path(l, s));
-    return;
+    forget_shard(level, s);
+    const std::vector<std::uint32_t> absent(static_cast<std::size_t>(l.grid.shard_bricks()),
+                                            kAbsentBrick);
+    return impl_->put_checksums(l, s, absent);
   }
   const std::lock_guard lock(shard->mutex);
   if (l.metadata.sharding) impl_->write(*shard, shard->index.encode());
   if (!shard->file) impl_->reopen(*shard);
   if (shard->counted) --impl_->open_files;
   impl_->publisher->publish(std::move(shard->file), shard->path);
+  impl_->put_checksums(l, s, shard->checksums);
   const std::lock_guard map_lock(impl_->mutex);
   impl_->open_shards.erase({level, linear_index(s, l.grid.shards)});
 }
@@ -256,6 +327,14 @@ void StoreWriter::Impl::publish_root(const ImageMetadata& image) {
   publisher->folder().rename_file(temporary_name(root), root);
 }
 
+/// Nothing of a level without ranges: it has no checksums either.
+std::optional<RangeChecksums> StoreWriter::Impl::finish_items(Level& l) const {
+  const auto bricks = l.brick_ranges->finish(), blocks = l.block_ranges->finish();
+  if (!bricks || !blocks) return std::nullopt;
+  return RangeChecksums{
+      .bricks = *bricks, .blocks = *blocks, .content = l.brick_checksums->finish().value_or(0)};
+}
+
 void StoreWriter::finish(bool may_have_nan,
                          const std::function<std::optional<DisplayWindow>()>& window,
                          const std::function<void()>& more) {
@@ -271,8 +350,7 @@ void StoreWriter::finish(bool may_have_nan,
   StoredRanges ranges{.may_have_nan = may_have_nan, .image_crc32c = 0, .levels = {}};
   for (std::size_t i = 0; i < impl_->levels.size(); ++i) {
     Impl::Level& l = impl_->levels[i];
-    const auto bricks = l.brick_ranges->finish(), blocks = l.block_ranges->finish();
-    if (bricks && blocks) ranges.levels.push_back({*bricks, *blocks});
+    if (const auto checksums = impl_->finish_items(l)) ranges.levels.push_back(*checksums);
     publisher.write(impl_->dir / "isobrick" / std::to_string(i) / "zarr.json", group_json());
     if (layout.ome == OmeVersion::v04)
       publisher.write(l.folder / ".zarray", to_zarray(l.metadata));

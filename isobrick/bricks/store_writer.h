@@ -37,6 +37,13 @@ class StoreWriter {
   /// thread of the writer's own. A failure there comes out of a later call, at
   /// the latest of finish().
   void finish_shard(int level, Int3 s);
+  /// The same of a shard that was whole: takes the checksums of its bricks from its file.
+  void keep_shard(int level, Int3 s);
+  /// Removes what an earlier run may have left of a shard that has no bricks and is not finished.
+  void forget_shard(int level, Int3 s);
+  /// All shards with bricks below `z` (in bricks) are finished or kept; what was not put is
+  /// absent. Not needed where that is done with every shard. From one thread.
+  void finish_below(int level, Index z);
 
   /// Ranges of an aligned box of bricks or of 16³ blocks, as pairs (lo, hi) of
   /// the level's type, C order [z, y, x, 2] over `box`; each item exactly once.

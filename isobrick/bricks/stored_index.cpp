@@ -7,6 +7,7 @@
 #include "isobrick/bricks/checked_json.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/file.h"
+#include "isobrick/io/folder_walk.h"
 
 namespace isobrick {
 
@@ -27,11 +28,13 @@ fs::path index_chunk_path(const fs::path& folder, Int3 chunk) {
 std::vector<std::string> stored_index_kinds(const fs::path& store, int level) {
   std::vector<std::string> kinds;
   std::error_code none;
-  for (const fs::directory_entry& entry :
-       fs::directory_iterator(index_folder(store, level, ""), none)) {
+  const fs::path folder = index_folder(store, level, "").parent_path();
+  if (!fs::is_directory(folder, none)) return kinds;
+  for (const FolderEntry& entry : folder_entries(folder)) {
     // A folder NAME.partial is still being built.
-    if (!entry.path().has_extension() && fs::exists(index_description(entry.path()), none))
-      kinds.push_back(entry.path().filename().string());
+    if (entry.name.find('.') == std::string::npos &&
+        fs::exists(index_description(folder / entry.name), none))
+      kinds.push_back(entry.name);
   }
   std::sort(kinds.begin(), kinds.end());
   return kinds;
@@ -39,19 +42,11 @@ std::vector<std::string> stored_index_kinds(const fs::path& store, int level) {
 
 std::vector<std::string> index_folder_kinds(const fs::path& store, int level) {
   const fs::path folder = index_folder(store, level, "").parent_path();
-  const auto check = [&](const std::error_code& failure) {
-    if (failure) throw system_error("look into the folder", folder.string(), failure.value());
-  };
   std::error_code failure;
-  fs::directory_iterator entry(folder, failure);
-  if (failure == std::errc::no_such_file_or_directory) return {};
-  check(failure);
+  if (fs::status(folder, failure).type() == fs::file_type::not_found) return {};
   std::vector<std::string> kinds;
-  for (; entry != fs::directory_iterator(); entry.increment(failure)) {
-    check(failure);
-    if (!entry->path().has_extension()) kinds.push_back(entry->path().filename().string());
-  }
-  check(failure);
+  for (const FolderEntry& entry : folder_entries(folder))
+    if (entry.name.find('.') == std::string::npos) kinds.push_back(entry.name);
   std::sort(kinds.begin(), kinds.end());
   return kinds;
 }

@@ -7,7 +7,7 @@
 namespace isobrick {
 namespace {
 
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 
 }  // namespace
 
@@ -22,8 +22,9 @@ std::string to_json(const StoredRanges& stored) {
   json["image_crc32c"] = stored.image_crc32c;
   json["levels"] = nlohmann::json::array();
   for (const RangeChecksums& level : stored.levels)
-    json["levels"].push_back(
-        {{"range_crc32c", level.bricks}, {"block_range_crc32c", level.blocks}});
+    json["levels"].push_back({{"range_crc32c", level.bricks},
+                              {"block_range_crc32c", level.blocks},
+                              {"brick_crc32c", level.content}});
   return seal_json(std::move(json));
 }
 
@@ -36,10 +37,14 @@ StoredRanges parse_stored_ranges(std::string_view text, const std::string& where
                       static_cast<std::uint32_t>(json.at("image_crc32c").integer()),
                       {}};
   const CheckedJson levels = json.at("levels");
-  for (std::size_t i = 0; i < levels.array_size(); ++i)
-    stored.levels.push_back(
-        {static_cast<std::uint32_t>(levels.at(i).at("range_crc32c").integer()),
-         static_cast<std::uint32_t>(levels.at(i).at("block_range_crc32c").integer())});
+  for (std::size_t i = 0; i < levels.array_size(); ++i) {
+    const auto checksum = [level = levels.at(i)](const char* key) {
+      return static_cast<std::uint32_t>(level.at(key).integer());
+    };
+    stored.levels.push_back({.bricks = checksum("range_crc32c"),
+                             .blocks = checksum("block_range_crc32c"),
+                             .content = checksum("brick_crc32c")});
+  }
   return stored;
 }
 

@@ -9,9 +9,10 @@
 
 namespace isobrick {
 
-/// The checksums of a level's range arrays, as RangeArrayWriter::finish() gives them.
+/// The checksums of a level's arrays of ranges and of its bricks' checksums, as
+/// ItemArrayWriter::finish() gives them.
 struct RangeChecksums {
-  std::uint32_t bricks = 0, blocks = 0;
+  std::uint32_t bricks = 0, blocks = 0, content = 0;
   friend bool operator==(const RangeChecksums&, const RangeChecksums&) = default;
 };
 

@@ -18,17 +18,21 @@
 #include "isobrick/core/cancel.h"
 #include "isobrick/core/digits.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/folder_walk.h"
 
 namespace isobrick {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// "4711-0": process and counter.
-bool is_process_suffix(std::string_view text) {
-  const std::size_t dash = text.find('-');
-  return dash != std::string_view::npos && is_digits(text.substr(0, dash)) &&
-         is_digits(text.substr(dash + 1));
+/// What a temporary name of an output ends with: ".partial-4711-0-5a9c01ef", process, counter and
+/// FNV-1a of all before, so that nobody else's file has such a name.
+std::string temporary_suffix(std::string_view output, std::string_view process_and_counter) {
+  std::string suffix = fmt::format(".partial-{}", process_and_counter);
+  std::uint32_t hash = 2166136261U;
+  for (const std::string_view text : {output, std::string_view(suffix)})
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+  return suffix + fmt::format("-{:08x}", hash);
 }
 
 std::recursive_timed_mutex& publication_mutex() {
@@ -72,7 +76,8 @@ template <class Create>
 Temporary create_beside(const std::string& path, const Create& create) {
   static std::atomic<unsigned> counter{0};
   for (int attempt = 0;; ++attempt) {
-    std::string name = fmt::format("{}.partial-{}-{}", path, ::getpid(), counter++);
+    std::string name = path + temporary_suffix(fs::path(path).filename().string(),
+                                               fmt::format("{}-{}", ::getpid(), counter++));
     UniqueFd fd(create(name.c_str()));
     if (fd.get() >= 0 && keep(fd)) {
       note_taken(name);
@@ -84,10 +89,9 @@ Temporary create_beside(const std::string& path, const Create& create) {
 }
 
 bool only_parts(const fs::path& folder) {
-  std::error_code failure;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, failure))
-    if (!is_part_name(entry.path().filename().native())) return false;
-  return !failure;
+  const std::vector<FolderEntry> entries = folder_entries(folder);
+  return std::ranges::all_of(entries,
+                             [](const FolderEntry& entry) { return is_part_name(entry.name); });
 }
 
 /// Removes a file or folder that nobody holds; whether it did.
@@ -123,18 +127,26 @@ Temporary create_temporary_folder(const std::string& path) {
 bool remove_leftovers(const std::string& path) {
   const fs::path output(path);
   const fs::path folder = output.has_parent_path() ? output.parent_path() : fs::path(".");
-  const std::string prefix = output.filename().string() + ".partial-";
-  std::vector<fs::path> left;
-  std::error_code failure;
-  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
-       entry.increment(failure)) {
-    const std::string name = entry->path().filename().string();
-    if (name.starts_with(prefix) && is_process_suffix(std::string_view(name).substr(prefix.size())))
-      left.push_back(entry->path());
-  }
+  const std::string name = output.filename().string();
   bool any = false;
-  for (const fs::path& leftover : left) any |= remove_if_left(leftover);
+  try {
+    for (const FolderEntry& entry : folder_entries(folder))
+      if (is_temporary_of(entry.name, name)) any |= remove_if_left(folder / entry.name);
+  } catch (const Error&) {
+    // One may write into a folder that one may not list.
+  }
   return any;
+}
+
+bool is_temporary_of(std::string_view name, std::string_view output) {
+  constexpr std::string_view partial = ".partial-";
+  if (!name.starts_with(output) || !name.substr(output.size()).starts_with(partial)) return false;
+  const std::string_view suffix = name.substr(output.size());
+  const std::string_view numbers = suffix.substr(
+      partial.size(), suffix.rfind('-') - std::min(partial.size(), suffix.rfind('-')));
+  const std::size_t dash = numbers.find('-');
+  return dash != std::string_view::npos && is_digits(numbers.substr(0, dash)) &&
+         is_digits(numbers.substr(dash + 1)) && temporary_suffix(output, numbers) == suffix;
 }
 
 Publication::Publication() {

@@ -5,8 +5,8 @@
 
 #include "isobrick/io/file.h"
 
-// Outputs grow under names such as mesh.ply.partial-4711-0. A process holds a lock on what it
-// writes so, and the lock ends with the process: what is not locked is what a killed one left.
+// Outputs grow under names such as mesh.ply.partial-4711-0-5a9c01ef. A process holds a lock on what
+// it writes so, and the lock ends with the process: what is not locked is what a killed one left.
 
 namespace isobrick {
 
@@ -23,6 +23,9 @@ Temporary create_temporary_folder(const std::string& path);
 /// Removes the temporary files that killed processes left of the output `path`; whether there
 /// were any. Folders are removed if they hold nothing but parts (is_part_name).
 bool remove_leftovers(const std::string& path);
+
+/// Whether a file name is such a name of the output `output`, without folders.
+bool is_temporary_of(std::string_view name, std::string_view output);
 
 /// Held while an output takes its final name. Throws Cancelled when an end was requested
 /// (core/cancel.h). One thread may hold several.

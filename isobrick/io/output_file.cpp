@@ -155,9 +155,10 @@ void check_output(const std::string& path, bool force) {
 
 OutputFile::OutputFile(std::string path, bool force)
     : path_(std::move(path)), force_(force), writer_([this] {
-        check_output(path_, force_);
         if (path_ == kStandardOutput) return open_standard_output();
-        remove_leftovers(path_);
+        // First: what a killed process left goes also where the output stays as it is.
+        if (!path_.empty()) remove_leftovers(path_);
+        check_output(path_, force_);
         Temporary temporary = create_temporary_file(path_);
         temporary_ = std::move(temporary.path);
         return FileWriter({std::move(temporary.fd), path_});

@@ -6,6 +6,7 @@
 #include <cerrno>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/folder_walk.h"
 #include "isobrick/io/output_guard.h"
 #include "isobrick/io/rename.h"
 
@@ -30,11 +31,10 @@ void check_folder(const fs::path& folder, bool replace) {
         fmt::format("'{}' exists already; say --force to replace it", folder.string()));
   if (fs::symlink_status(folder).type() != fs::file_type::directory)
     throw UsageError(fmt::format("'{}' is no folder of parts", folder.string()));
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.symlink_status().type() != fs::file_type::regular ||
-        !is_part_name(entry.path().filename().native()))
+  for (const FolderEntry& entry : folder_entries(folder))
+    if (entry.type != fs::file_type::regular || !is_part_name(entry.name))
       throw UsageError(fmt::format("'{}' holds '{}', which is no part of a mesh; move it away",
-                                   folder.string(), entry.path().filename().string()));
+                                   folder.string(), entry.name));
   check_replaces_no_input(folder, {});
 }
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "isobrick/bricks/brick_checksums.h"
+#include "isobrick/bricks/item_array.h"
 #include "isobrick/bricks/range_array.h"
 #include "isobrick/bricks/store_entries.h"
 #include "isobrick/bricks/stored_ranges.h"
@@ -24,12 +26,13 @@ fs::path partial(fs::path folder) {
   return folder;
 }
 
-/// Calls f(folder, where it lies in a store) for both range arrays of every level.
+/// Calls f(folder, where it lies in a store) for the arrays of ranges and checksums of every level.
 template <class F>
 void for_each_range_folder(const StoreInfo& info, F&& f) {
   for (int level = 0; level < static_cast<int>(info.levels.size()); ++level) {
     f(block_range_folder(info.additions, level), block_range_folder("", level));
     f(brick_range_folder(info.additions, level), brick_range_folder("", level));
+    f(brick_checksum_folder(info.additions, level), brick_checksum_folder("", level));
   }
 }
 
@@ -43,7 +46,7 @@ std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uin
   const std::uint64_t fixed = kProgramBytes + level.index_bytes +
                               static_cast<std::uint64_t>(threads) * brick * 9 / 4 +
                               level_ranges_bytes(lattice, lattice.brick.z) +
-                              level_ranges_bytes(lattice, StoreReader::kRangeChunk * kBlockEdge);
+                              gathered_ranges_bytes(lattice) + brick_checksum_bytes(level);
   if (memory < fixed + brick)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: computing the ranges needs at least --memory "
@@ -54,22 +57,29 @@ std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uin
   return std::min(memory - fixed, kEnoughForAPiece);
 }
 
-/// Writes both range arrays of a level beside their places, and their checksums into `stored`.
+/// Writes the arrays of a level beside their places, and their checksums into `stored`.
 void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
                   Progress& progress, StoredRanges& stored) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const fs::path& root = store.info().additions;
-  RangeArrayWriter blocks(partial(block_range_folder(root, level)), lattice.blocks(), lattice.type,
-                          publisher);
-  RangeArrayWriter bricks(partial(brick_range_folder(root, level)), lattice.bricks(), lattice.type,
-                          publisher);
+  const Int3 block_count = lattice.blocks(), brick_count = lattice.bricks();
+  ItemArrayWriter blocks(partial(block_range_folder(root, level)), block_count,
+                         range_array_metadata(block_count, lattice.type), publisher);
+  ItemArrayWriter bricks(partial(brick_range_folder(root, level)), brick_count,
+                         range_array_metadata(brick_count, lattice.type), publisher);
+  ItemArrayWriter checksums(partial(brick_checksum_folder(root, level)), brick_count,
+                            checksum_array_metadata(brick_count), publisher);
   const auto ranges = make_level_ranges(lattice);
   scan_level(
       store, level, static_cast<std::size_t>(bytes), *ranges, nullptr,
       [&](Box3 items, std::span<const std::byte> pairs) { blocks.put(items, pairs); },
       [&](Box3 items, std::span<const std::byte> pairs) { bricks.put(items, pairs); },
-      [&](std::uint64_t done) { progress.advance(done); });
-  stored.levels.push_back({.bricks = *bricks.finish(), .blocks = *blocks.finish()});
+      [&](std::uint64_t done) { progress.advance(done); },
+      [&](Int3 b, std::uint32_t checksum) {
+        checksums.put({b, b + Int3{1, 1, 1}}, std::as_bytes(std::span(&checksum, 1)));
+      });
+  stored.levels.push_back(
+      {.bricks = *bricks.finish(), .blocks = *blocks.finish(), .content = *checksums.finish()});
   stored.may_have_nan |= ranges->has_nan();
 }
 
@@ -86,9 +96,10 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
         static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
   Publisher publisher(info.path);
+  const StoreEntries entries = StoreEntries::of(info.levels);
   for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
-    check_replaceable(folder, place);
-    check_replaceable(partial(folder), place);
+    check_replaceable(folder, entries, place);
+    check_replaceable(partial(folder), entries, place);
     publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
   });
   progress.begin("ranges", total);
@@ -101,7 +112,7 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
   progress.end();
   for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
     publisher.folder().replace_folder(partial(folder), folder);
-    check_replaceable(set_aside_name(folder), place);
+    check_replaceable(set_aside_name(folder), entries, place);
     publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left
   });
   publisher.write(ranges_file(info.additions), to_json(stored));

@@ -207,7 +207,7 @@ std::unique_ptr<SpooledVolume> Conversion::spool_stream() {
 ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
-  const StoreLayout layout = plan_layout(source.info(), options);
+  const StoreLayout layout = plan_layout(source.info(), options, source.sparse());
   const Lattice& finest = layout.levels.front().lattice;
   const std::uint64_t least_of_index =
       options.index ? least_index_memory(index_options(options, false), finest) : 0;
@@ -220,7 +220,9 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
     plan.emplace(layout, options.memory, threads, source.random_access(), source.memory(),
                  least_of_index);
   if (options.index) check_index_options(index_options(options, false), finest);
-  ConvertStaging staging(out, options.resume, options.force, options.inputs);
+  std::vector<std::filesystem::path> inputs = options.inputs;
+  inputs.insert(inputs.end(), source.info().files.begin(), source.info().files.end());
+  ConvertStaging staging(out, options.resume, options.force, std::move(inputs));
   Workers workers(plan ? plan->threads() : sparse->threads());
   ConvertReport report = workers.execute([&] {
     return Conversion(source, layout, plan ? &*plan : nullptr, sparse ? &*sparse : nullptr, staging,

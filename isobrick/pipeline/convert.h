@@ -15,8 +15,10 @@ namespace isobrick {
 
 /// How a store is written.
 struct ConvertOptions {
-  Index brick = 64;                   ///< samples along each edge of a brick, 16 … 256
-  Index shard = 512;                  ///< samples along each edge of a shard, a multiple of `brick`
+  /// Samples along each edge of a brick, 16 … 256; of a shard, a multiple of `brick`. Nothing: as
+  /// many samples as cubes of 64 and 512 have, in bricks and shards that follow the shape of a thin
+  /// volume. No brick is much longer than the volume.
+  std::optional<Index> brick, shard;
   std::optional<int> zstd_level = 3;  ///< nothing: bricks are stored as they are
   std::optional<int> levels;          ///< nothing: until one brick holds the coarsest
   /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
@@ -28,7 +30,7 @@ struct ConvertOptions {
   int threads = 0;                                ///< 0: all cores
   bool resume = false;  ///< go on with an interrupted conversion of the same input
   bool force = false;   ///< replace a store that exists (only when the new one is whole)
-  std::vector<std::filesystem::path> inputs;  ///< what is read: never replaced
+  std::vector<std::filesystem::path> inputs;  ///< never replaced, beside the source's files
   std::optional<IndexKind> index;             ///< also add one of this kind to all levels
   Index leaf = kDefaultLeaf;                  ///< of that index
 };

@@ -49,7 +49,10 @@ void LevelWriter::finish_shards(Index z1) {
   for (; next_shard_z_ < shards_.z && (all || (next_shard_z_ + 1) * info_.shard.z <= z1);
        ++next_shard_z_)
     for_each_point({{0, 0, next_shard_z_}, {shards_.x, shards_.y, next_shard_z_ + 1}}, [&](Int3 s) {
-      if (!is_kept(s)) store_.finish_shard(level_, s);
+      if (is_kept(s))
+        store_.keep_shard(level_, s);
+      else
+        store_.finish_shard(level_, s);
     });
 }
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "isobrick/bricks/brick_checksums.h"
 #include "isobrick/bricks/codec.h"
 #include "isobrick/bricks/store_reader.h"
+#include "isobrick/bricks/range_format.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/program_memory.h"
@@ -20,46 +22,87 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 /// What a reader takes.
 constexpr int kMaxLevels = 64;
 
-Index longest(Int3 e) { return std::max({e.x, e.y, e.z}); }
+constexpr Index kBrick = 64, kShard = 512;
 
-/// Samples of a shard: no larger than the bricks that the level has.
-Int3 shard_extent(const Lattice& lattice, Index shard) {
-  const Int3 whole = lattice.bricks() * lattice.brick;
-  return min({shard, shard, shard}, whole);
+/// A box of no more than volume(box) items that follows the shape of `whole`: while an axis of the
+/// box is shorter than that of `whole`, the one that lies over most boxes is doubled. None becomes
+/// longer than `longest`.
+Int3 follow_shape(Int3 box, Int3 whole, Index items, Index longest) {
+  for (;;) {
+    int large = -1;
+    for (int axis = 0; axis < 3; ++axis)
+      if (box[axis] < whole[axis] && 2 * box[axis] <= longest &&
+          (large < 0 || ceil_div(whole[axis], box[axis]) > ceil_div(whole[large], box[large])))
+        large = axis;
+    if (large < 0 || 2 * volume(box) > items) return box;
+    box[large] *= 2;
+  }
 }
 
+/// Samples of a brick.
+Int3 brick_extent(Int3 extent, std::optional<Index> edge, bool sparse) {
+  const Index most = edge.value_or(kBrick);
+  Int3 brick;
+  for (int axis = 0; axis < 3; ++axis) {
+    brick[axis] = sparse ? kBlockEdge : 1;
+    while (brick[axis] < extent[axis]) brick[axis] *= 2;
+    brick[axis] = std::min(brick[axis], most);
+  }
+  if (edge) return brick;
+  const Index longest = sparse ? kRangeChunkEdge * kBlockEdge : kMaxAxisSamples;
+  return follow_shape(brick, extent, kBrick * kBrick * kBrick, longest);
+}
+
+/// How many bricks a shard has along each axis; no more than a level has.
+Int3 bricks_of_shard(const Lattice& lattice, const ConvertOptions& options) {
+  if (options.ome == OmeVersion::v04) return {1, 1, 1};
+  const Index edge =
+      std::max<Index>(1, options.shard.value_or(kShard) / options.brick.value_or(kBrick));
+  const Int3 bricks = lattice.bricks();
+  const Int3 cube = min({edge, edge, edge}, bricks);
+  if (options.shard) return cube;
+  return min(follow_shape(cube, bricks, edge * edge * edge, kMaxAxisSamples), bricks);
+}
+
+Int3 shard_extent(const Lattice& lattice, const ConvertOptions& options) {
+  return bricks_of_shard(lattice, options) * lattice.brick;
+}
+
+/// Whether a brick holds the whole level.
+bool is_one_brick(const Lattice& lattice) { return lattice.bricks() == Int3{1, 1, 1}; }
+
 /// Whether an axis is halved that does not fit into a brick.
-bool halves_long_axis(Int3 factors, Int3 extent, Index brick) {
+bool halves_long_axis(Int3 factors, const Lattice& lattice) {
   bool any = false;
-  for (int axis = 0; axis < 3; ++axis) any |= factors[axis] == 2 && extent[axis] > brick;
+  for (int axis = 0; axis < 3; ++axis) any |= factors[axis] == 2 && lattice.bricks()[axis] > 1;
   return any;
 }
 
 /// By spacing, but for volumes that have become thin: of these only the long axes are halved.
-Int3 own_factors(const LevelInfo& level, Index brick) {
-  const Int3 extent = level.lattice.extent;
-  const Int3 factors = factors_by_spacing(level.transform, extent);
-  if (longest(extent) <= brick || halves_long_axis(factors, extent, brick)) return factors;
-  return {extent.x > brick ? 2 : 1, extent.y > brick ? 2 : 1, extent.z > brick ? 2 : 1};
+Int3 own_factors(const LevelInfo& level) {
+  const Lattice& lattice = level.lattice;
+  const Int3 factors = factors_by_spacing(level.transform, lattice.extent);
+  if (is_one_brick(lattice) || halves_long_axis(factors, lattice)) return factors;
+  const Int3 bricks = lattice.bricks();
+  return {bricks.x > 1 ? 2 : 1, bricks.y > 1 ? 2 : 1, bricks.z > 1 ? 2 : 1};
 }
 
 /// From `level`, which is number `step` of the pyramid, to the next one.
 Int3 factors_of(const ConvertOptions& options, const LevelInfo& level, std::size_t step) {
-  if (options.factors.empty()) return own_factors(level, options.brick);
+  if (options.factors.empty()) return own_factors(level);
   return options.factors[std::min(step, options.factors.size() - 1)];
 }
 
 /// Whether no further level gets nearer to one that a brick holds.
 bool is_coarsest(const ConvertOptions& options, const LevelInfo& level, std::size_t step) {
-  const Int3 extent = level.lattice.extent;
-  if (longest(extent) <= options.brick) return true;
+  if (is_one_brick(level.lattice)) return true;
   return step + 1 >= options.factors.size() && !options.factors.empty() &&
-         !halves_long_axis(options.factors.back(), extent, options.brick);
+         !halves_long_axis(options.factors.back(), level.lattice);
 }
 
 /// Adds coarser levels to the finest one, as many as are asked for or until one brick holds the
 /// last. Where the factors leave an axis as it is, they may end before.
-void add_levels(StoreLayout& layout, const ConvertOptions& options, Index shard) {
+void add_levels(StoreLayout& layout, const ConvertOptions& options) {
   const auto wanted = static_cast<std::size_t>(options.levels.value_or(kMaxLevels));
   while (layout.levels.size() < wanted) {
     LevelInfo level = layout.levels.back();
@@ -69,7 +112,7 @@ void add_levels(StoreLayout& layout, const ConvertOptions& options, Index shard)
     level.lattice.extent = coarser_extent(extent, factors);
     if (level.lattice.extent == extent) break;
     level.transform = coarser_transform(level.transform, extent, factors, options.downsampling);
-    level.shard = shard_extent(level.lattice, shard);
+    level.shard = shard_extent(level.lattice, options);
     layout.levels.push_back(level);
     layout.factors.push_back(factors);
   }
@@ -84,11 +127,12 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
   if (!checked_volume(volume.extent))
     throw UsageError(fmt::format("'{}': {} × {} × {} samples are none or too many", volume.name,
                                  volume.extent.x, volume.extent.y, volume.extent.z));
-  if (options.brick < 16 || options.brick > 256)
-    throw UsageError(fmt::format("bricks of {}³ samples: 16 to 256 are possible", options.brick));
-  if (options.shard < options.brick)
-    throw UsageError(fmt::format("shards of {}³ samples are smaller than bricks of {}³",
-                                 options.shard, options.brick));
+  const Index brick = options.brick.value_or(kBrick), shard = options.shard.value_or(kShard);
+  if (brick < 16 || brick > 256)
+    throw UsageError(fmt::format("bricks of {}³ samples: 16 to 256 are possible", brick));
+  if (shard < brick)
+    throw UsageError(
+        fmt::format("shards of {}³ samples are smaller than bricks of {}³", shard, brick));
   if (options.zstd_level && (*options.zstd_level < 1 || *options.zstd_level > 22))
     throw UsageError(fmt::format("zstd level {}: 1 to 22 are possible", *options.zstd_level));
   if (options.threads < 0) throw UsageError(fmt::format("{} threads", options.threads));
@@ -103,7 +147,7 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
 
 }  // namespace
 
-StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options) {
+StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options, bool sparse) {
   check_options(volume, options);
   StoreLayout layout;
   layout.zstd_level = options.zstd_level;
@@ -112,15 +156,13 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options)
   layout.grid_name = volume.grid_name;
   layout.name = std::filesystem::path(volume.name).filename().string();
   layout.ome = options.ome;
-  const Index bricks_per_shard = options.ome == OmeVersion::v04 ? 1 : options.shard / options.brick;
-  const Index shard = bricks_per_shard * options.brick;
   LevelInfo finest;
-  finest.lattice = {volume.extent, {options.brick, options.brick, options.brick}, volume.type};
+  finest.lattice = {volume.extent, brick_extent(volume.extent, options.brick, sparse), volume.type};
   finest.transform = volume.transform;
-  finest.shard = shard_extent(finest.lattice, shard);
+  finest.shard = shard_extent(finest.lattice, options);
   layout.levels.push_back(finest);
   layout.downsampling = options.downsampling;
-  add_levels(layout, options, shard);
+  add_levels(layout, options);
   return layout;
 }
 
@@ -141,10 +183,11 @@ ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int th
   const std::size_t least = encoding_bytes() + samples;
   if (memory < least)
     throw UsageError(fmt::format(
-        "a memory budget of {:.1f} MiB is too small: bricks of {}³ samples{} need "
+        "a memory budget of {:.1f} MiB is too small: bricks of {} × {} × {} samples{} need "
         "--memory {}M at least, {} MiB of it for the program and its libraries, the "
         "rest for a layer of bricks, its ranges and encoding them",
-        in_mib(memory), lattice.brick.x, least_of_index > least ? " and the index" : "",
+        in_mib(memory), lattice.brick.x, lattice.brick.y, lattice.brick.z,
+        least_of_index > least ? " and the index" : "",
         mib_above(std::max<std::uint64_t>(least, least_of_index)), kProgramBytes / kMiB));
   room_ = static_cast<std::size_t>(memory) - encoding_bytes();
 }
@@ -165,9 +208,9 @@ std::size_t ConvertPlan::slab_bytes(int level) const {
 
 std::size_t ConvertPlan::ranges_bytes(int level) const {
   const Lattice& lattice = layout_.levels[static_cast<std::size_t>(level)].lattice;
-  // The scanner's open layers, and the layer of chunks that the writer gathers.
-  return level_ranges_bytes(lattice, slab_planes_) +
-         level_ranges_bytes(lattice, StoreReader::kRangeChunk * kBlockEdge);
+  // The scanner's open layers, and the layers of chunks that the writer gathers.
+  return level_ranges_bytes(lattice, slab_planes_) + gathered_ranges_bytes(lattice) +
+         brick_checksum_bytes(layout_.levels[static_cast<std::size_t>(level)]);
 }
 
 std::size_t ConvertPlan::cascade_bytes(int level) const {
@@ -181,11 +224,18 @@ bool ConvertPlan::second_slab_fits() const { return cascade_bytes(0) + slab_byte
 
 Int3 ConvertPlan::piece(int level) const {
   const Lattice& lattice = layout_.levels[static_cast<std::size_t>(level)].lattice;
-  const Index s = slab_planes_;
   // Beside a piece lies the part of it that goes to the next level.
   const std::size_t parts = coarser_part();
   const std::size_t room = (room_ - ranges_bytes(level)) / (parts + 1) * parts;
-  return largest_piece(lattice.extent, {s, s, s}, room / lattice.sample_bytes());
+  return largest_piece(lattice.extent, least_piece(), room / lattice.sample_bytes());
+}
+
+/// A brick, or two where its samples would not pair up for the next level.
+Int3 ConvertPlan::least_piece() const {
+  Int3 piece = layout_.levels.front().lattice.brick;
+  for (int axis = 0; axis < 3; ++axis)
+    if (piece[axis] % 2 != 0) piece[axis] *= 2;
+  return piece;
 }
 
 std::size_t ConvertPlan::coarser_part() const {
@@ -204,8 +254,7 @@ Index ConvertPlan::spool_planes() const {
 
 std::size_t ConvertPlan::least_room(bool random_access) const {
   const Lattice& lattice = layout_.levels.front().lattice;
-  const std::size_t cube =
-      static_cast<std::size_t>(slab_planes_ * slab_planes_ * slab_planes_) * lattice.sample_bytes();
+  const std::size_t cube = static_cast<std::size_t>(volume(least_piece())) * lattice.sample_bytes();
   const std::size_t parts = coarser_part();
   const std::size_t pieces = ranges_bytes(0) + cube / parts * (parts + 1) + parts + 1;
   const std::size_t plane =

@@ -9,9 +9,10 @@
 
 namespace isobrick {
 
-/// What the store of `volume` will look like. Throws UsageError for options
-/// that make no sense.
-StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options);
+/// What the store of `volume` will look like; `sparse`: its bricks must suit SparsePyramid. Throws
+/// UsageError for options that make no sense.
+StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options,
+                        bool sparse = false);
 
 /// How a conversion keeps to its budget.
 ///
@@ -45,6 +46,7 @@ class ConvertPlan {
  private:
   std::size_t encoding_bytes() const;
   std::size_t slab_bytes(int level) const;
+  Int3 least_piece() const;
   std::size_t cascade_bytes(int level) const;
   std::size_t ranges_bytes(int level) const;
   std::size_t least_room(bool random_access) const;

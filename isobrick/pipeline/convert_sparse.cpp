@@ -88,7 +88,7 @@ std::size_t ranges_bytes(const StoreLayout& layout, const SparseBricks& finest, 
   for (const SparseBrick& b : finest.all()) bricks.push_back(b.brick);
   std::size_t most = 0;
   for (std::size_t i = 0; i < layout.levels.size(); ++i) {
-    most = std::max(most, sparse_ranges_bytes(layout.levels[i].lattice, bricks, threads));
+    most = std::max(most, sparse_ranges_bytes(layout.levels[i], bricks, threads));
     for (Int3& b : bricks) b = floor_div(b, factors_of(layout, i));
     bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
   }
@@ -187,7 +187,7 @@ class SparsePyramid::Level {
   void forget_other_shards() {
     for_each_point({{0, 0, 0}, ceil_div(info_.lattice.extent, info_.shard)}, [&](Int3 place) {
       const auto at = shard_at(place);
-      if (at == shards_.end() || at->place != place) store_.finish_shard(level_, place);
+      if (at == shards_.end() || at->place != place) store_.forget_shard(level_, place);
     });
   }
 
@@ -271,8 +271,13 @@ class SparsePyramid::Level {
     for (; next_shard_ < shards_.size(); ++next_shard_) {
       const Shard& shard = shards_[next_shard_];
       if (!all && (shard.place.z + 1) * info_.shard.z > z1) break;
-      if (!shard.whole) store_.finish_shard(level_, shard.place);
+      if (shard.whole)
+        store_.keep_shard(level_, shard.place);
+      else
+        store_.finish_shard(level_, shard.place);
     }
+    const Index shards = all ? ceil_div(info_.lattice.extent, info_.shard).z : z1 / info_.shard.z;
+    store_.finish_below(level_, shards * bricks_per_shard_.z);
   }
 
   const StoreLayout& layout_;

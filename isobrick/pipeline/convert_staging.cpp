@@ -5,12 +5,14 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 
 #include "isobrick/bricks/store_entries.h"
 #include "isobrick/bricks/store_names.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/exchange.h"
+#include "isobrick/io/folder_walk.h"
 #include "isobrick/io/output_guard.h"
 
 namespace isobrick {
@@ -30,9 +32,10 @@ bool has_marker(const fs::path& folder) {
 
 /// Whether a conversion stopped before its first file, the marker, was whole.
 bool nothing_to_resume(const fs::path& staging) {
-  for (const fs::directory_entry& entry : fs::directory_iterator(staging))
-    if (!is_temporary_name(entry.path()) || entry.path().stem() != kLayoutMarker) return false;
-  return true;
+  const std::string marker = temporary_name(kLayoutMarker).string();
+  return std::ranges::all_of(folder_entries(staging), [&](const FolderEntry& entry) {
+    return entry.name == marker && entry.type == fs::file_type::regular;
+  });
 }
 
 fs::path without_last_slash(fs::path path) {
@@ -102,7 +105,7 @@ void ConvertStaging::end_publication(bool resume) {
 
 /// Removes the rest of a store that a new one has replaced.
 void ConvertStaging::remove_replaced(const fs::path& folder) const {
-  check_replaceable(folder, "", inputs_);
+  check_replaceable(folder, StoreEntries::of(folder), "", inputs_);
   parent_.remove_folder(folder);
 }
 
@@ -142,16 +145,20 @@ void ConvertStaging::prepare(bool resume) {
         fmt::format("an interrupted conversion is in '{}'; --resume goes on with it, "
                     "--force starts anew",
                     staging_.string()));
-  check_replaceable(staging_, "", inputs_);
+  if (begun) {
+    const StoreEntries store = StoreEntries::of(staging_);
+    check_replaceable(staging_, store, "", inputs_);
+    if (!store.why().empty())
+      throw UsageError(
+          fmt::format("'{}' is not replaced: {}; move it away", staging_.string(), store.why()));
+  }
   clear();
 }
 
 /// Empties the staging folder; its marker goes last, so that the next run knows what is left.
 void ConvertStaging::clear() const {
-  std::vector<fs::path> entries;
-  for (const fs::directory_entry& entry : fs::directory_iterator(staging_))
-    if (entry.path().filename() != kLayoutMarker) entries.push_back(entry.path());
-  for (const fs::path& entry : entries) parent_.remove_folder(entry);
+  for (const FolderEntry& entry : folder_entries(staging_))
+    if (entry.name != kLayoutMarker) parent_.remove_folder(staging_ / entry.name);
   parent_.remove_file(staging_ / kLayoutMarker);
 }
 

@@ -10,6 +10,7 @@
 
 #include "isobrick/core/budget_error.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
 #include "isobrick/io/leftovers.h"
 #include "isobrick/io/output_file.h"
 #include "isobrick/io/output_guard.h"
@@ -145,30 +146,63 @@ void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, W
   grid->write(output);
 }
 
+bool is_there(const std::filesystem::path& path) {
+  std::error_code none;
+  return std::filesystem::exists(std::filesystem::symlink_status(path, none));
+}
+
 /// The header beside the samples of a raw file.
 class DetachedHeader {
  public:
-  DetachedHeader(const std::filesystem::path& raw, const VolumeInfo& info, bool force)
-      : file_(name_of(raw), force), replaces_(force) {
-    file_.writer().append(nrrd_header_text(info, raw.filename().string()));
+  /// `left`: a process was killed while it wrote the same output.
+  DetachedHeader(const std::filesystem::path& raw, const VolumeInfo& info, bool force, bool left)
+      : raw_(raw),
+        force_(force),
+        text_(nrrd_header_text(info, raw.filename().string())),
+        file_(name_of(raw), force || is_left(left)) {
+    file_.writer().append(text_);
   }
 
-  /// Removes what is there already, since it describes another file than the one that comes next.
-  /// What may fail comes before.
-  void remove_old() {
+  /// Gives the header and the samples their names; what else may fail comes before. The header goes
+  /// first, so that a killed process leaves no samples without one, unless it would describe older
+  /// samples then.
+  void publish_with(OutputFile& samples) {
     file_.writer().finish();
     std::error_code none;
-    if (replaces_) std::filesystem::remove(file_.path(), none);
+    if (is_there(raw_)) {
+      if (force_) std::filesystem::remove(file_.path(), none);
+      samples.publish();
+      return file_.publish();
+    }
+    file_.publish();
+    try {
+      samples.publish();
+    } catch (...) {
+      std::filesystem::remove(file_.path(), none);
+      throw;
+    }
   }
-  void publish() { file_.publish(); }
 
- private:
   static std::string name_of(std::filesystem::path raw) {
     return raw.replace_extension(".nhdr").string();
   }
 
+ private:
+  /// Whether a header that is there is what a killed process left of this output: it comes before
+  /// its samples.
+  bool is_left(bool left) const {
+    if (is_there(raw_)) return false;
+    try {
+      return left || read_small_file(name_of(raw_), text_.size()) == text_;
+    } catch (const Error&) {
+      return false;  // larger, or no file
+    }
+  }
+
+  std::filesystem::path raw_;
+  bool force_;
+  std::string text_;
   OutputFile file_;
-  bool replaces_;
 };
 
 /// Where dense samples go: pieces of any box into a file, or one after the other into a stream.
@@ -241,6 +275,9 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   VolumeInfo info = describe(level, box, out.string());
   check_replaces_no_input(out, {&store.info().path, 1});
+  bool left = !streamed && remove_leftovers(out.string());
+  if (!streamed && options.format == ExportFormat::raw)
+    left |= remove_leftovers(DetachedHeader::name_of(out));
   OutputFile output(out.string(), options.force);
   if (options.isovalue) {
     export_level_set(store, box, info, options, output, progress);
@@ -261,13 +298,14 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   if (options.format == ExportFormat::nrrd)
     output.writer().append(nrrd_header_text(info));
   else if (!streamed)
-    header.emplace(out, info, options.force);
+    header.emplace(out, info, options.force, left);
   export_dense(samples, piece, workers, output, progress);
   output.writer().finish();
   const Publication turn;
-  if (header) header->remove_old();
-  output.publish();
-  if (header) header->publish();
+  if (header)
+    header->publish_with(output);
+  else
+    output.publish();
 }
 
 }  // namespace isobrick

@@ -57,6 +57,7 @@ class LevelIndex {
       : store_(store),
         level_(level),
         options_(options),
+        entries_(StoreEntries::of(store.info().levels)),
         place_(index_folder(store.info().additions, level, kind_of(options))),
         partial_(place_) {
     partial_ += ".partial";
@@ -91,6 +92,7 @@ class LevelIndex {
   const StoreReader& store_;
   int level_;
   const IndexOptions& options_;
+  StoreEntries entries_;
   fs::path place_, partial_;
   IndexLayout layout_;
   bool finished_ = false;  ///< by an earlier run
@@ -109,12 +111,13 @@ bool LevelIndex::is_wanted(const fs::path& folder) const {
 
 void LevelIndex::remove(const OutputFolder& root, const fs::path& folder) const {
   if (!fs::exists(folder)) return;
-  check_replaceable(folder, place_in_store());
+  check_replaceable(folder, entries_, place_in_store());
   root.remove_folder(folder);
 }
 
 void LevelIndex::check() const {
-  for (const fs::path& folder : {place_, partial_}) check_replaceable(folder, place_in_store());
+  for (const fs::path& folder : {place_, partial_})
+    check_replaceable(folder, entries_, place_in_store());
   if (options_.force) return;
   const bool finished = options_.resume && is_wanted(place_);
   if (fs::exists(place_) && !finished)

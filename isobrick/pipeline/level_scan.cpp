@@ -8,7 +8,7 @@ namespace isobrick {
 
 void scan_level(const StoreReader& store, int level, std::size_t piece_bytes, LevelRanges& ranges,
                 const BrickFailure& failure, const RangeEmit& blocks, const RangeEmit& bricks,
-                const std::function<void(std::uint64_t)>& advance) {
+                const std::function<void(std::uint64_t)>& advance, const BrickChecksum& checksum) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Int3 piece =
       largest_piece(lattice.extent, lattice.brick, piece_bytes / lattice.sample_bytes());
@@ -20,7 +20,7 @@ void scan_level(const StoreReader& store, int level, std::size_t piece_bytes, Le
   const auto buffer = std::make_unique<std::byte[]>(bytes_of(min(piece, lattice.extent)));
   for_each_point({{0, 0, 0}, pieces}, [&](Int3 p) {
     const Box3 box = intersect({p * piece, (p + Int3{1, 1, 1}) * piece}, lattice.box());
-    read_slab(store, level, box, buffer.get(), failure);
+    read_slab(store, level, box, buffer.get(), failure, checksum);
     ranges.add(box, buffer.get());
     if (p.x + 1 == pieces.x && p.y + 1 == pieces.y) ranges.close(box.hi.z, blocks, bricks);
     advance(bytes_of(box.extent()));

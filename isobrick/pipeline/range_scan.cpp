@@ -6,6 +6,8 @@
 #include <atomic>
 #include <limits>
 
+#include "isobrick/bricks/range_format.h"
+
 namespace isobrick {
 namespace {
 
@@ -272,6 +274,13 @@ std::size_t level_ranges_bytes(const Lattice& lattice, Index planes) {
   const Index open_blocks = std::min(blocks.z, planes / kBlockEdge + 2);
   const Index open_bricks = std::min(bricks.z, planes / lattice.brick.z + 2);
   const Index items = blocks.x * blocks.y * open_blocks + bricks.x * bricks.y * open_bricks;
+  return static_cast<std::size_t>(items) * 2 * lattice.sample_bytes();
+}
+
+std::size_t gathered_ranges_bytes(const Lattice& lattice) {
+  Index items = 0;
+  for (const Int3 all : {lattice.blocks(), lattice.bricks()})
+    items += all.x * all.y * std::min(all.z, range_chunk_extent(all).z + 2);
   return static_cast<std::size_t>(items) * 2 * lattice.sample_bytes();
 }
 

@@ -61,5 +61,7 @@ std::unique_ptr<LevelRanges> make_level_ranges(const Lattice& lattice);
 
 /// Bytes that the LevelRanges of a level hold while slabs of `planes` pass.
 std::size_t level_ranges_bytes(const Lattice& lattice, Index planes);
+/// Bytes of the layer of chunks that a writer of ranges gathers of a level.
+std::size_t gathered_ranges_bytes(const Lattice& lattice);
 
 }  // namespace isobrick

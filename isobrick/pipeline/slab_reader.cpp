@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "isobrick/bricks/brick_checksums.h"
 #include "isobrick/bricks/codec.h"
 #include "isobrick/core/copy_box.h"
 #include "isobrick/core/error.h"
@@ -11,13 +12,23 @@
 namespace isobrick {
 namespace {
 
+/// Whether the brick is there.
+bool read_brick(const StoreReader& store, int level, Int3 brick, std::byte* out,
+                const BrickChecksum& checksum) {
+  if (!checksum) return store.read_brick(level, brick, out);
+  const std::uint32_t found = store.read_brick_unchecked(level, brick, out);
+  checksum(brick, found);
+  return found != kAbsentBrick;
+}
+
 /// Decodes a brick and copies what it shares with `box`, whose samples are `out`.
-void copy_brick(const StoreReader& store, int level, Int3 brick, Box3 box, std::byte* out) {
+void copy_brick(const StoreReader& store, int level, Int3 brick, Box3 box, std::byte* out,
+                const BrickChecksum& checksum) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   thread_local std::vector<std::byte> samples;
   samples.resize(lattice.brick_bytes());
   const Box3 shared = intersect(lattice.brick_box(brick), box);
-  if (store.read_brick(level, brick, samples.data()))
+  if (read_brick(store, level, brick, samples.data(), checksum))
     copy_box({samples.data(), lattice.full_brick_box(brick)}, {out, box}, shared,
              lattice.sample_bytes());
   else
@@ -34,16 +45,16 @@ std::uint64_t slab_memory(const StoreInfo& store, int level, int threads) {
 }
 
 void read_slab(const StoreReader& store, int level, Box3 box, std::byte* out,
-               const BrickFailure& failure) {
+               const BrickFailure& failure, const BrickChecksum& checksum) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Box3 bricks = lattice.bricks_of(box);
   const Int3 count = bricks.extent();
   tbb::parallel_for(Index{0}, volume(count), [&](Index i) {
     const Int3 brick =
         bricks.lo + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
-    if (!failure) return copy_brick(store, level, brick, box, out);
+    if (!failure) return copy_brick(store, level, brick, box, out, checksum);
     try {
-      copy_brick(store, level, brick, box, out);
+      copy_brick(store, level, brick, box, out, checksum);
     } catch (const Error& e) {
       failure(brick, e.what());
     }

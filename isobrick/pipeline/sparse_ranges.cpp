@@ -8,7 +8,8 @@
 #include <map>
 #include <utility>
 
-#include "isobrick/bricks/store_reader.h"
+#include "isobrick/bricks/brick_checksums.h"
+#include "isobrick/bricks/range_table.h"
 #include "isobrick/core/range.h"
 #include "isobrick/pipeline/range_scan.h"
 
@@ -17,7 +18,7 @@ namespace {
 
 constexpr Int3 kBlock{kBlockEdge, kBlockEdge, kBlockEdge};
 /// A chunk of ranges, in blocks and in samples.
-constexpr Index kChunkBlocks = StoreReader::kRangeChunk;
+constexpr Index kChunkBlocks = kRangeChunkEdge;
 constexpr Index kChunkSamples = kChunkBlocks * kBlockEdge;
 constexpr Int3 kChunk{kChunkBlocks, kChunkBlocks, kChunkBlocks};
 
@@ -146,11 +147,14 @@ BrickBlocks constant_brick(const Lattice& lattice, Box3 box, std::uint64_t bits)
 }
 
 bool sparse_ranges_possible(const Lattice& lattice) {
-  const Index edge = lattice.brick.x;
-  return edge % kBlockEdge == 0 && kChunkSamples % edge == 0;
+  bool possible = true;
+  for (int axis = 0; axis < 3; ++axis)
+    possible &= lattice.brick[axis] % kBlockEdge == 0 && kChunkSamples % lattice.brick[axis] == 0;
+  return possible;
 }
 
-std::size_t sparse_ranges_bytes(const Lattice& lattice, std::span<const Int3> bricks, int threads) {
+std::size_t sparse_ranges_bytes(const LevelInfo& level, std::span<const Int3> bricks, int threads) {
+  const Lattice& lattice = level.lattice;
   const Int3 chunks = ceil_div(lattice.blocks(), kChunk);
   const Int3 samples = kChunk * kBlock;
   std::vector<bool> touched(static_cast<std::size_t>(volume(chunks)));
@@ -173,8 +177,9 @@ std::size_t sparse_ranges_bytes(const Lattice& lattice, std::span<const Int3> br
   const auto written = 4 * static_cast<std::size_t>(threads);
   const Int3 of_bricks = ceil_div(lattice.bricks(), kChunk);
   const auto gathered = static_cast<std::size_t>(of_bricks.x * of_bricks.y);
-  return (open + written + gathered) * static_cast<std::size_t>(volume(kChunk)) * 2 *
-         lattice.sample_bytes();
+  return brick_checksum_bytes(level) + (open + written + gathered) *
+                                           static_cast<std::size_t>(volume(kChunk)) * 2 *
+                                           lattice.sample_bytes();
 }
 
 std::unique_ptr<SparseRanges> make_sparse_ranges(StoreWriter& store, int level,

@@ -46,9 +46,9 @@ using BrickTest = std::function<bool(Int3 brick)>;
 /// are no sparse ranges.
 bool sparse_ranges_possible(const Lattice& lattice);
 
-/// Bytes that sparse ranges take while `bricks` are added by `threads` threads, and the
-/// store's writer for them.
-std::size_t sparse_ranges_bytes(const Lattice& lattice, std::span<const Int3> bricks, int threads);
+/// Bytes that sparse ranges, and the checksums of bricks, take while `bricks` are added by
+/// `threads` threads, and the store's writer for them.
+std::size_t sparse_ranges_bytes(const LevelInfo& level, std::span<const Int3> bricks, int threads);
 
 /// `store` outlives the ranges.
 std::unique_ptr<SparseRanges> make_sparse_ranges(StoreWriter& store, int level,

@@ -8,9 +8,11 @@
 #include <set>
 #include <unordered_set>
 
+#include "isobrick/bricks/checked_json.h"
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/bricks/stored_index.h"
 #include "isobrick/core/error.h"
+#include "isobrick/io/file.h"
 #include "isobrick/pipeline/level_scan.h"
 #include "isobrick/pipeline/program_memory.h"
 #include "isobrick/pipeline/verify_index.h"
@@ -27,8 +29,8 @@ constexpr std::uint64_t kPieceBytes = 128 * kMiB;
 constexpr std::uint64_t kListBytes = 8 * kMiB;
 /// Beyond so many unreadable bricks, every range counts as one that covers such a brick.
 constexpr std::size_t kMaxUnreadable = std::size_t{1} << 17;
-/// Shards of a level that are looked for, each a file: a minute or two.
-constexpr Index kMaxLookups = Index{1} << 24;
+/// Shards of a level that are looked for, each a file: about half a minute.
+constexpr Index kMaxShards = Index{1} << 21;
 
 /// Collects damages. A broken shard index says the same for each of its
 /// bricks: that is one damage. Thread-safe.
@@ -165,14 +167,37 @@ void verify_level(const StoreReader& store, int level, int threads, std::uint64_
                   DamageList& damages, Progress& progress) {
   const LevelInfo& info = store.info().levels[static_cast<std::size_t>(level)];
   const Index shards = volume(ceil_div(info.lattice.extent, info.shard));
-  if (shards > kMaxLookups)
+  if (shards > kMaxShards)
     return damages.add(
         fmt::format("level {}: not looked at: of its {} chunk files at most {} are looked for",
-                    level, shards, kMaxLookups));
+                    level, shards, kMaxShards));
   const LevelBudget budget = budget_of(store.info(), level, threads, memory);
   Workers(budget.threads).execute([&] {
     LevelCheck(store, level, damages).run(budget.piece_bytes, progress);
   });
+}
+
+/// The groups of a store of ours, which other programs need and ours does not.
+void verify_groups(const StoreInfo& store, DamageList& damages) {
+  if (!store.ours) return;
+  const auto check = [&](const std::filesystem::path& file, bool version2) {
+    try {
+      const auto text = read_small_file(file, kMaxMetadataBytes);
+      if (!text) return damages.add(quoted(file) + " is missing");
+      const nlohmann::json parsed = parse_json(*text, quoted(file));
+      const CheckedJson group(parsed, quoted(file));
+      if (group.at("zarr_format").integer() != (version2 ? 2 : 3) ||
+          (!version2 && group.string_at("node_type") != "group"))
+        damages.add(quoted(file) + " is no group");
+    } catch (const Error& e) {
+      damages.add(e.what());
+    }
+  };
+  const std::filesystem::path additions = store.path / "isobrick";
+  if (std::filesystem::exists(store.path / ".zattrs")) check(store.path / ".zgroup", true);
+  check(additions / "zarr.json", false);
+  for (std::size_t i = 0; i < store.levels.size(); ++i)
+    check(additions / std::to_string(i) / "zarr.json", false);
 }
 
 /// The kinds of index of each level. That a level lacks one which another has is damage, and so is
@@ -219,6 +244,7 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
   }
   progress.begin("verify", bytes);
   threads = Workers(threads).threads();
+  verify_groups(store->info(), damages);
   for (std::size_t level = 0; level < levels.size(); ++level)
     verify_level(*store, static_cast<int>(level), threads, memory, damages, progress);
   progress.end();

@@ -276,6 +276,7 @@ std::unique_ptr<VolumeSource> open_dicom(const std::string& name,
   const Index planes = slices.size() == 1 ? first.extent.z : static_cast<Index>(slices.size());
   VolumeInfo info = describe_volume(name, {first.extent.x, first.extent.y, planes},
                                     scaled ? real_type(slices) : first.type, transform, said);
+  info.files.assign(files.begin(), files.end());
   return std::make_unique<DicomSource>(std::move(info), std::move(slices), scaled);
 }
 

@@ -98,6 +98,7 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   const std::size_t sample = size_of(header.type);
   SampleLayout layout;
   layout.info = describe_volume(data_path, header.view.extent, header.type, header.transform, said);
+  layout.info.files = {path, data_path};
   layout.offset = header.offset + static_cast<std::uint64_t>(header.view.first) * sample;
   layout.swap = header.swap && sample > 1;
   layout.stride = header.view.stride;

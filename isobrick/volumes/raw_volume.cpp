@@ -132,6 +132,12 @@ void take_grid(const TextHeader& header, VolumeInfo& info) {
   if (header.fill_value && info.type == header.type) info.fill_value = *header.fill_value;
 }
 
+std::vector<fs::path> files_of(const TextHeader& header) {
+  std::vector<fs::path> files(header.data_paths.begin(), header.data_paths.end());
+  files.emplace_back(header.path);
+  return files;
+}
+
 /// Opens samples that lie as they are in one file: what is said goes before what
 /// the header says.
 std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const VolumeRequest& said,
@@ -143,6 +149,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
   layout.info =
       describe_volume(path, said.extent.value_or(header.view.extent), type, header.transform, said);
   take_grid(header, layout.info);
+  layout.info.files = files_of(header);
   layout.swap = must_swap(order_of(header, type, said), type);
   const auto total =
       static_cast<std::uint64_t>(said.extent ? volume(*said.extent) : header.view.total) *
@@ -225,6 +232,7 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   layout.info =
       describe_volume(header.path, header.view.extent, header.type, header.transform, said);
   take_grid(header, layout.info);
+  layout.info.files = files_of(header);
   const std::size_t sample = size_of(header.type);
   layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
   layout.stride = header.view.stride;
@@ -293,6 +301,7 @@ std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& said) {
     throw UsageError(fmt::format("an offset of {} bytes is too large", offset));
   SampleLayout layout;
   layout.info = describe_volume(name, header.view.extent, header.type, {}, said);
+  layout.info.files.clear();
   layout.offset = offset;
   layout.swap = must_swap(said.order.value_or(ByteOrder::little), header.type);
   const std::uint64_t end = layout.end();

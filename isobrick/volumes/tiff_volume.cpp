@@ -227,6 +227,7 @@ std::unique_ptr<VolumeSource> open_tiff(const std::string& name,
   const ArrayView view = select_volume(name, axes, said.selection);
   VolumeInfo info =
       describe_volume(name, view.extent, pages.page.type, read_transform(pages), said);
+  info.files.assign(files.begin(), files.end());
   if (behind) return open_behind_first(files[0], pages, view, std::move(info));
   const Index plane = Index{pages.page.width} * pages.page.height * pages.page.samples;
   return std::make_unique<TiffSource>(std::move(info), files, pages.memory, std::move(pages.places),

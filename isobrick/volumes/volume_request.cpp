@@ -44,6 +44,7 @@ VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type
   info.type = type;
   info.transform = std::move(transform);
   info.name = path;
+  info.files = {path};
   if (said.spacing) info.transform.spacing = *said.spacing;
   if (said.origin) info.transform.origin = *said.origin;
   // What is no length ("pixel") is left out: viewers refuse a store with it.

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,9 @@ struct VolumeInfo {
   double fill_value = 0;   ///< what absent bricks hold: the value of empty space
   std::string grid_class;  ///< what OpenVDB calls it: "level set", "fog volume", …; or empty
   std::string grid_name;   ///< of the OpenVDB grid that it is, or empty
+  /// All files that it is read from, headers included; none of a volume that is computed or comes
+  /// from a stream.
+  std::vector<std::filesystem::path> files;
 };
 
 /// A volume that can be read piece by piece. Never holds the whole of it.

@@ -182,7 +182,7 @@ TEST(StoredRangesJson, RoundTripAndChanges) {
   const TemporaryFolder folder;
   EXPECT_FALSE(read_stored_ranges(folder / "a"));
   const StoredRanges ranges{
-      .may_have_nan = false, .image_crc32c = 0xfedcba98, .levels = {{1, 2}, {3, 0xfedcba97}}};
+      .may_have_nan = false, .image_crc32c = 0xfedcba98, .levels = {{1, 2, 3}, {3, 0xfedcba97, 4}}};
   const std::string text = to_json(ranges);
   write_file(ranges_file(folder / "a"), text);
   EXPECT_EQ(read_stored_ranges(folder / "a"), ranges);

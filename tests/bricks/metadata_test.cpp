@@ -183,9 +183,10 @@ TEST(ImageMetadata, HostileValues) {
                           const std::string& to) {
     expect_error(damage, part, [&] { parse_image_metadata(replaced(text, from, to), "file"); });
   };
-  expect(false, "version 3", "\"version\":2", "\"version\":3");
-  expect(false, "convert the volume anew", "\"version\":2", "\"version\":1");
-  expect(true, "version", "\"version\":2", "\"version\":\"2\"");
+  expect(false, "version 4", "\"version\":3", "\"version\":4");
+  for (const char* older : {"\"version\":1", "\"version\":2"})
+    expect(false, "convert the volume anew", "\"version\":3", older);
+  expect(true, "version", "\"version\":3", "\"version\":\"3\"");
   expect(false, "OME-Zarr 0.7", "\"0.5\"", "\"0.7\"");
   expect(false, "ome is missing", "\"ome\"", "\"omo\"");
   expect(false, "array", "\"group\"", "\"array\"");
@@ -230,7 +231,7 @@ TEST(ImageMetadata, UnknownVersionStopsTheReader) {
   const TemporaryFolder folder;
   write_store(folder / "file.zarr", {make_level(ScalarType::u8, {4, 4, 4}, 4, 4, 0, false)}, 3, 0);
   const std::filesystem::path root = folder / "file.zarr/zarr.json";
-  write_file(root, replaced(read_file(root), "\"version\":2", "\"version\":99"));
+  write_file(root, replaced(read_file(root), "\"version\":3", "\"version\":99"));
   expect_error(false, "version 99", [&] { StoreReader store(folder / "file.zarr"); });
 }
 

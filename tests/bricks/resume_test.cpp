@@ -41,10 +41,12 @@ class Resume : public testing::Test {
     StoreWriter writer(path, layout, true);
     int kept = 0;
     for (const auto& [level, s] : shards()) {
-      if (writer.shard_is_whole(level, s))
+      if (writer.shard_is_whole(level, s)) {
+        writer.keep_shard(level, s);
         ++kept;
-      else
+      } else {
         write_shard(writer, levels, level, s, 3, 3);
+      }
     }
     write_ranges(writer, levels);
     writer.finish(false);

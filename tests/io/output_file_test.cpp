@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
+#include "isobrick/io/leftovers.h"
 #include "isobrick/meshes/glb_sink.h"
 #include "isobrick/meshes/obj_sink.h"
 #include "isobrick/meshes/ply_sink.h"
@@ -92,13 +93,18 @@ TEST(OutputFile, KeepsWhatAppearedInTheMeantime) {
 
 TEST(OutputFile, RemovesWhatKilledProcessesLeftAndNothingElse) {
   const TempDir dir;
-  const Names others{"a.partial", "a.partial-1", "a.partial-1-0x", "ab.partial-1-0", "notes"};
+  Names others{"a.partial", "a.partial-1", "a.partial-1-0", "a.partial-1-0-12345678", "notes"};
   for (const std::string& name : others) dir.write(name, "mine");
-  dir.write("a.partial-1-0", "left");
-  std::filesystem::create_symlink("notes", dir / "a.partial-1-1");
+  // Who made them has let go of them.
+  const std::string left = create_temporary_file(dir / "a").path;
+  others.push_back(std::filesystem::path(create_temporary_file(dir / "ab").path).filename());
+  const std::string link = create_temporary_file(dir / "a").path;
+  std::filesystem::remove(link);
+  std::filesystem::create_symlink("notes", link);
+  others.push_back(std::filesystem::path(link).filename());
   {
     OutputFile out(dir / "a", false);
-    EXPECT_FALSE(std::filesystem::exists(dir / "a.partial-1-0"));
+    EXPECT_FALSE(std::filesystem::exists(left));
     // What is being written stays.
     OutputFile second(dir / "a", false);
     second.writer().append("second");
@@ -106,8 +112,7 @@ TEST(OutputFile, RemovesWhatKilledProcessesLeftAndNothingElse) {
     EXPECT_TRUE(contains(message_of([&] { second.publish(); }), "exists"));
   }
   Names expected = others;
-  expected.insert(expected.begin(), "a");
-  expected.insert(expected.begin() + 3, "a.partial-1-1");
+  expected.emplace_back("a");
   std::sort(expected.begin(), expected.end());
   EXPECT_EQ(dir.list(), expected);
   EXPECT_EQ(dir.read("notes"), "mine");

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "isobrick/io/leftovers.h"
 #include "isobrick/io/xml_text.h"
 #include "isobrick/meshes/glb_scene.h"
 #include "isobrick/meshes/vtp_sink.h"
@@ -89,15 +90,16 @@ TEST(PartedOutput, RemovesWhatAKilledProcessLeft) {
   dir.write("a.parts/part_0.x", "left");
   message_of([&] { PartedOutput(dir / "a", false); });
   // The file under its temporary name shows that nobody finished this output.
-  dir.write("a.partial-1-0", "left");
-  fs::create_directory(dir / "a.parts.partial-1-1");
-  dir.write("a.parts.partial-1-1/part_0.x", "left");
-  fs::create_directory(dir / "a.parts.partial-1-2");
-  dir.write("a.parts.partial-1-2/thesis.tex", "mine");
+  const std::string file = create_temporary_file(dir / "a").path;
+  const std::string parts = create_temporary_folder(dir / "a.parts").path;
+  const std::string mine = fs::path(create_temporary_folder(dir / "a.parts").path).filename();
+  dir.write(fs::path(parts).filename().string() + "/part_0.x", "left");
+  dir.write(mine + "/thesis.tex", "mine");
   PartedOutput out(dir / "a", false);
   write_parts(out, 1, "new");
   out.publish();
-  EXPECT_EQ(dir.list(), (Names{"a", "a.parts", "a.parts.partial-1-2"}));
+  EXPECT_EQ(dir.list(), (Names{"a", "a.parts", mine}));
+  EXPECT_FALSE(fs::exists(file) || fs::exists(parts));
 }
 
 TEST(PartedOutput, WhatAppearedInTheMeantimeStays) {

@@ -69,15 +69,16 @@ TEST_F(IndexGolden, Octree) {
 }
 
 TEST_F(IndexGolden, StoredRanges) {
-  EXPECT_EQ(
-      to_json(StoredRanges{.may_have_nan = false, .image_crc32c = 305419896, .levels = {{1, 2}}}),
-      R"({
-  "crc32c": 3894405433,
+  EXPECT_EQ(to_json(StoredRanges{
+                .may_have_nan = false, .image_crc32c = 305419896, .levels = {{1, 2, 3}}}),
+            R"({
+  "crc32c": 3214801016,
   "image_crc32c": 305419896,
-  "isobrick_ranges": 2,
+  "isobrick_ranges": 3,
   "levels": [
     {
       "block_range_crc32c": 2,
+      "brick_crc32c": 3,
       "range_crc32c": 1
     }
   ],

@@ -151,7 +151,8 @@ TEST_F(Indexes, AutoTakesTheFastestWhereLittleIsActive) {
   ExtractReport by_index;
   mesh_of(store_, {.isovalue = 300}, IndexKind::octree, &by_index);
   EXPECT_EQ(empty.search_bytes, by_index.search_bytes);
-  EXPECT_LT(empty.search_bytes, dense.search_bytes);
+  mesh_of(store_, {.isovalue = 77.5}, IndexKind::octree, &by_index);
+  EXPECT_LT(empty.search_bytes, by_index.search_bytes);
 }
 
 TEST_F(Indexes, BytesDependOnTheVolumeAlone) {

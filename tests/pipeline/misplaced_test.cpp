@@ -110,8 +110,9 @@ TEST_F(Misplaced, FilesOfAnotherStore) {
 }
 
 TEST_F(Misplaced, RangesOfAnotherStoreAsAWhole) {
-  for (const char* folder : {"isobrick/0/range", "isobrick/0/block_range",
-                             "isobrick/0/index/octree", "isobrick/0/index/interval"}) {
+  for (const char* folder :
+       {"isobrick/0/range", "isobrick/0/block_range", "isobrick/0/brick_crc32c",
+        "isobrick/0/index/octree", "isobrick/0/index/interval"}) {
     fs::rename(store_ / folder, folder_ / "kept");
     fs::copy(twin_ / folder, store_ / folder, fs::copy_options::recursive);
     expect_told_or_right(folder);
@@ -120,6 +121,155 @@ TEST_F(Misplaced, RangesOfAnotherStoreAsAWhole) {
   }
   EXPECT_GT(refused_, 4);
 }
+
+// Bricks whose ranges are alike: only their checksums tell them apart.
+
+enum class Content : std::uint8_t { noise, mask };
+
+struct Alike {
+  const char* name;
+  Content content;
+  ConvertOptions options;
+};
+
+class MisplacedAlike : public testing::TestWithParam<Alike> {
+ protected:
+  static constexpr Int3 kCube{72, 70, 66};
+
+  void SetUp() override {
+    make(store_, 1);
+    make(twin_, 2);
+    mesh_ = mesh();
+    ASSERT_NE(mesh_, "");
+  }
+
+  static void make(const fs::path& store, unsigned seed) {
+    std::vector<std::uint8_t> samples = make_samples<std::uint8_t>(kCube, seed, false);
+    if (GetParam().content == Content::mask)
+      for_each_point({{0, 0, 0}, kCube}, [&](Int3 p) {
+        const Int3 d = p - Int3{36, 30 + static_cast<Index>(seed), 33};
+        samples[static_cast<std::size_t>(linear_index(p, kCube))] =
+            d.x * d.x + d.y * d.y + d.z * d.z < 900 ? 1 : 0;
+      });
+    MemorySource source(kCube, ScalarType::u8, as_bytes(samples));
+    convert_quietly(source, store, GetParam().options);
+  }
+
+  std::string mesh() const {
+    const double isovalue = GetParam().content == Content::mask ? 0.5 : 127.5;
+    return mesh_of(store_, {.isovalue = isovalue}, std::nullopt);
+  }
+
+  /// The files of bricks of level 0.
+  std::vector<std::string> brick_files() const {
+    std::vector<std::string> files;
+    for (const auto& [file, bytes] : tree_of(store_))
+      if (file.starts_with("0/") && !file.ends_with(".json") && !file.ends_with(".zarray"))
+        files.push_back(file);
+    return files;
+  }
+
+  /// The mesh is refused, naming a file, or right; and verify() sees the damage.
+  void expect_told_or_right(const std::string& what) {
+    try {
+      EXPECT_TRUE(mesh() == mesh_) << what;
+    } catch (const DamageError& error) {
+      ++refused_;
+      EXPECT_NE(std::string(error.what()).find((store_ / "0").string()), std::string::npos)
+          << error.what();
+    }
+    EXPECT_GE(verify_quietly(store_).damage_count, 1u) << what;
+  }
+
+  void put(const std::string& file, const std::string& bytes) const {
+    std::ofstream(store_ / file, std::ios::binary) << bytes;
+  }
+
+  TemporaryFolder folder_;
+  fs::path store_ = folder_ / "a", twin_ = folder_ / "b";
+  std::string mesh_;
+  int refused_ = 0;
+};
+
+TEST_P(MisplacedAlike, FilesThatChangePlaces) {
+  const std::vector<std::string> files = brick_files();
+  const auto tree = tree_of(store_);
+  ASSERT_GT(files.size(), 10u);
+  std::size_t pair = 0;
+  int swaps = 0;
+  for (std::size_t a = 0; a < files.size(); ++a)
+    for (std::size_t b = a + 1; b < files.size(); ++b) {
+      const std::string &first = tree.at(files[a]), &second = tree.at(files[b]);
+      if (++pair % (files.size() * files.size() / 40) != 0 || first == second) continue;
+      put(files[a], second);
+      put(files[b], first);
+      expect_told_or_right(files[a] + " and " + files[b]);
+      put(files[a], first);
+      put(files[b], second);
+      ++swaps;
+    }
+  EXPECT_GT(swaps, 5);
+  if (GetParam().content == Content::noise) {
+    EXPECT_EQ(refused_, swaps);
+  }
+  EXPECT_EQ(verify_quietly(store_).damage_count, 0u);
+}
+
+TEST_P(MisplacedAlike, FilesOfATwin) {
+  const std::vector<std::string> files = brick_files();
+  const auto tree = tree_of(store_), other = tree_of(twin_);
+  for (std::size_t i = 0; i < files.size(); i += files.size() / 10) {
+    const auto found = other.find(files[i]);
+    if (found == other.end() || found->second == tree.at(files[i])) continue;
+    put(files[i], found->second);
+    expect_told_or_right(files[i]);
+    put(files[i], tree.at(files[i]));
+  }
+  EXPECT_GT(refused_, 0);
+}
+
+TEST_P(MisplacedAlike, AWholeLevelOfATwin) {
+  fs::remove_all(store_ / "0");
+  fs::copy(twin_ / "0", store_ / "0", fs::copy_options::recursive);
+  expect_told_or_right("level 0");
+  EXPECT_EQ(refused_, 1);
+}
+
+TEST_P(MisplacedAlike, AFileThatIsGone) {
+  int gone = 0;
+  for (const std::string& file : brick_files()) {
+    if (++gone % 7 != 0) continue;
+    const std::string bytes = content_of(store_ / file);
+    fs::remove(store_ / file);
+    expect_told_or_right(file);
+    put(file, bytes);
+  }
+  EXPECT_GT(refused_, 0);
+}
+
+/// What reads samples for other ends than a surface.
+TEST_P(MisplacedAlike, EveryReaderSeesIt) {
+  fs::remove_all(store_ / "0");
+  fs::copy(twin_ / "0", store_ / "0", fs::copy_options::recursive);
+  EXPECT_THROW(samples_of(StoreReader(store_), 0), DamageError);
+  EXPECT_NO_THROW(samples_of(StoreReader(twin_), 0));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Stores, MisplacedAlike,
+    testing::Values(Alike{"Noise", Content::noise, {.brick = 16, .shard = 32}},
+                    Alike{"NoiseWithoutCodec",
+                          Content::noise,
+                          {.brick = 16, .shard = 16, .zstd_level = std::nullopt}},
+                    Alike{"NoiseOme04", Content::noise, {.brick = 16, .ome = OmeVersion::v04}},
+                    Alike{"NoiseOme04WithoutCodec",
+                          Content::noise,
+                          {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}},
+                    Alike{"Mask", Content::mask, {.brick = 16, .shard = 32}},
+                    Alike{"MaskOme04WithoutCodec",
+                          Content::mask,
+                          {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}}),
+    [](const testing::TestParamInfo<Alike>& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace isobrick::test

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/verify.h"
 #include "tests/pipeline/convert_store.h"
@@ -68,21 +69,46 @@ TEST_F(Verify, NoticesAMissingShardByItsRanges) {
 }
 
 TEST_F(Verify, ComparesRangesWithSamples) {
-  // The same volume but for one sample: its bricks under the old ranges.
+  // The same volume but for one sample: its ranges beside the old bricks and their checksums.
   std::vector<std::byte> samples = make_source<std::uint16_t>({90, 70, 66}, 2).samples();
   std::memset(samples.data() + 2 * linear_index({40, 33, 20}, {90, 70, 66}), 0xff, 2);
   MemorySource changed({90, 70, 66}, ScalarType::u16, samples);
   ConvertOptions options;
   options.brick = 16;
   options.shard = 48;
-  options.levels = 1;
-  options.force = true;
   convert_quietly(changed, folder_ / "b", options);
-  std::filesystem::remove_all(folder_ / "a/0");
-  std::filesystem::rename(folder_ / "b/0", folder_ / "a/0");
+  StoredRanges ranges = *read_stored_ranges(folder_ / "a");
+  const RangeChecksums other = read_stored_ranges(folder_ / "b")->levels[0];
+  ranges.levels[0].bricks = other.bricks;
+  ranges.levels[0].blocks = other.blocks;
+  std::ofstream(ranges_file(folder_ / "a")) << to_json(ranges);
+  for (const char* name : {"isobrick/0/range", "isobrick/0/block_range"}) {
+    std::filesystem::remove_all(folder_ / "a" / name);
+    std::filesystem::rename(folder_ / "b" / name, folder_ / "a" / name);
+  }
   const VerifyReport report = check();
   // The brick and the block that own the sample; it lies on no lower border.
   EXPECT_EQ(report.damage_count, 2u);
+}
+
+TEST_F(Verify, ComparesChecksumsOfBricks) {
+  std::vector<std::byte> samples = make_source<std::uint16_t>({90, 70, 66}, 2).samples();
+  // Two samples in the middle of a brick change places, which no range shows.
+  const auto byte_of = [&](Index x) {
+    return static_cast<std::size_t>(2 * linear_index({x, 40, 24}, {90, 70, 66}));
+  };
+  Index x = 36;
+  while (x < 44 && samples[byte_of(x)] == samples[byte_of(x + 1)]) ++x;
+  ASSERT_LT(x, 44);
+  std::swap(samples[byte_of(x)], samples[byte_of(x + 1)]);
+  std::swap(samples[byte_of(x) + 1], samples[byte_of(x + 1) + 1]);
+  MemorySource changed({90, 70, 66}, ScalarType::u16, samples);
+  convert_quietly(changed, folder_ / "b", {.brick = 16, .shard = 48});
+  std::filesystem::remove_all(folder_ / "a/0");
+  std::filesystem::rename(folder_ / "b/0", folder_ / "a/0");
+  const VerifyReport report = check();
+  ASSERT_EQ(report.damage_count, 1u);
+  EXPECT_NE(report.damages[0].find("(2, 2, 1)"), std::string::npos) << report.damages[0];
 }
 
 TEST_F(Verify, ReportsBrokenMetadataAndThrowsWithoutAStore) {

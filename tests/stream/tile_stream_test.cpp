@@ -10,9 +10,11 @@ namespace isobrick::test {
 namespace {
 
 TEST(TileStream, BeginLooksAtOneRangeChunkAndNextGoesOn) {
-  // Along x three range chunks, of which only the last has active tiles.
-  constexpr Index kEdge = StoreReader::kRangeChunk * kBlockEdge;
-  const Int3 extent{3 * kEdge, 8, 8};
+  // Along x three chunks of ranges, of which only the last has active tiles. The chunks of so thin
+  // a volume lie along x.
+  constexpr Index kEdge =
+      StoreReader::kRangeChunk * StoreReader::kRangeChunk * StoreReader::kRangeChunk * kBlockEdge;
+  const Int3 extent{3 * kEdge, 2, 2};
   auto samples = make_samples<std::uint16_t>(extent, 3);
   for_each_point({{0, 0, 0}, extent}, [&](Int3 p) {
     auto& sample = samples[static_cast<std::size_t>(linear_index(p, extent))];

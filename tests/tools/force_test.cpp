@@ -96,6 +96,34 @@ TEST_F(Force, KeepsTheInputOfAConversion) {
       {"a.zarr"});
 }
 
+/// Samples that a header elsewhere names.
+TEST_F(Force, KeepsTheFilesThatAHeaderNames) {
+  make_store("a");
+  const std::string shard = "a.zarr/0/c/0/0/0";
+  write_file(path("in.nhdr"),
+             "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 10 10 10\nencoding: raw\n"
+             "byte skip: -1\ndata file: " +
+                 shard + "\n");
+  write_file(path("in.mhd"),
+             "ObjectType = Image\nNDims = 3\nDimSize = 10 10 10\nElementType = MET_UCHAR\n"
+             "HeaderSize = -1\nElementDataFile = " +
+                 shard + "\n");
+  for (const char* header : {"in.nhdr", "in.mhd"})
+    expect_kept({"convert", path(header), path("a.zarr"), "--force"}, {"a.zarr", "lies in it"});
+}
+
+/// Names as a store has them, which this one has not.
+TEST_F(Force, KeepsWhatTheStoreDoesNotHave) {
+  for (const char* name :
+       {"spool", "spool.partial-thesis.txt", "0/5.tmp", "7/c/1/1/1", "2024/c/1/1/1", "0/c/9/9/9"}) {
+    make_store("b");
+    fs::create_directories(fs::path(path(std::string("b.zarr/") + name)).parent_path());
+    write_file(path(std::string("b.zarr/") + name), "mine");
+    expect_kept(convert(path("a.raw"), path("b.zarr")), {"b.zarr", "no part of a store"});
+    fs::remove_all(path("b.zarr"));
+  }
+}
+
 TEST_F(Force, KeepsTheCurrentDirectory) {
   const std::string store = make_store("a", {"--index", "octree"});
   for (const char* folder : {".", "0/c", "isobrick/0/index/octree"}) {

@@ -56,6 +56,14 @@ class FullDisk : public ProgramTest {
     return run_process(words);
   }
 
+  /// With every other write and read interrupted by a signal.
+  static Outcome run_interrupted(const Arguments& arguments) {
+    Arguments words{"env", "LD_PRELOAD=" ISOBRICK_WRITE_FAULT, "ISOBRICK_FAULT_INTERRUPTS=1",
+                    "ASAN_OPTIONS=verify_asan_link_order=0", ISOBRICK_PROGRAM};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return run_process(words);
+  }
+
   /// Whether the output can be made at all: a format or OpenGL may be missing.
   bool possible(const Writer& writer) const {
     const Outcome made = run(with_output(writer, path(writer.output)));
@@ -158,6 +166,25 @@ TEST_F(FullDisk, OfASmallFileSystem) {
     const char* said = writer.words[0] == "synth" ? "its disk has" : "No space left";
     EXPECT_NE(outcome.err.find(said), std::string::npos) << outcome.err;
   }
+}
+
+TEST_F(FullDisk, InterruptedCallsAreRepeated) {
+  write_file(path("a.raw"), noise(20 * 20 * 20));
+  const Arguments convert{"convert", path("a.raw"), path("b.zarr"), "--dims", "20,20,20",
+                          "--type",  "u8",          "--brick",      "16",     "--index",
+                          "octree",  "--memory",    "40M",          "--force"};
+  ASSERT_EQ(run(convert).exit_code, 0);
+  const std::string store = path("b.zarr");
+  const Arguments extract{"extract", store, "--isovalue", "128", "--force", "-o", path("m.ply")};
+  const Arguments exported{"export", store, path("x.nrrd"), "--force"};
+  for (const Arguments& words : {extract, exported}) ASSERT_EQ(run(words).exit_code, 0);
+  const std::string mesh = read_file(path("m.ply")), samples = read_file(path("x.nrrd"));
+  for (const Arguments& words : {convert, extract, exported}) {
+    const Outcome outcome = run_interrupted(words);
+    EXPECT_EQ(outcome.exit_code, 0) << words[0] << ": " << outcome.err;
+  }
+  EXPECT_TRUE(read_file(path("m.ply")) == mesh && read_file(path("x.nrrd")) == samples);
+  EXPECT_EQ(run_interrupted({"verify", store}).exit_code, 0);
 }
 
 }  // namespace

@@ -226,6 +226,54 @@ TEST_F(KilledMesh, LeavesNothingForever) {
   }
 }
 
+TEST_F(KilledMesh, RawSamplesAndTheirHeaderComeTogether) {
+  if (skipped_) GTEST_SKIP();
+  const Arguments exported{"export", path("a.zarr"), path("x.raw")};
+  succeeds(exported, -1);
+  const std::string samples = read_file(path("x.raw")), header = read_file(path("x.nhdr"));
+  const std::set<std::string> after{"a.zarr", "new.raw", "old.raw", "x.nhdr", "x.raw"};
+  int at = 0;
+  for (bool killed = true; killed; ++at) {
+    fs::remove(path("x.raw"));
+    fs::remove(path("x.nhdr"));
+    killed = run_until(at, exported);
+    // Samples never lie there without their header.
+    EXPECT_TRUE(!fs::exists(path("x.raw")) || fs::exists(path("x.nhdr"))) << at;
+    if (!fs::exists(path("x.raw"))) succeeds(exported, at);
+    expect_only(after, at);
+    EXPECT_TRUE(read_file(path("x.raw")) == samples && read_file(path("x.nhdr")) == header) << at;
+  }
+  EXPECT_GT(at, 1);
+  at = 0;
+  for (bool killed = true; killed; ++at) {
+    const Arguments part{"export", path("a.zarr"), path("x.raw"), "--roi", "0:9,0:9,:", "--force"};
+    succeeds({"export", path("a.zarr"), path("x.raw"), "--force"}, at);
+    killed = run_until(at, part);
+    // A run that is refused removes what the other one left, too.
+    if (killed && fs::exists(path("x.raw")) && fs::exists(path("x.nhdr"))) {
+      expect_refused(run(exported), 2, {"exists already"});
+      expect_only(after, at);
+    }
+    succeeds(part, at);
+    expect_only(after, at);
+    EXPECT_LT(fs::file_size(path("x.raw")), samples.size());
+  }
+}
+
+TEST_F(KilledMesh, AHeaderOfOtherSamplesStays) {
+  write_file(path("x.nhdr"), "mine");
+  expect_refused(run({"export", path("a.zarr"), path("x.raw")}), 2, {"x.nhdr", "exists already"});
+  EXPECT_EQ(read_file(path("x.nhdr")), "mine");
+}
+
+TEST_F(KilledMesh, AFileOfAUserWithSuchANameStays) {
+  write_file(path("m.ply.partial-2024-11"), "mine");
+  write_file(path("m.ply.partial-2024-11-12345678"), "mine");
+  succeeds(extract("m.ply", "127"), -1);
+  EXPECT_EQ(read_file(path("m.ply.partial-2024-11")), "mine");
+  EXPECT_EQ(read_file(path("m.ply.partial-2024-11-12345678")), "mine");
+}
+
 TEST_F(KilledMesh, PartsAreAlwaysThoseOfTheirFile) {
   if (skipped_) GTEST_SKIP();
   succeeds(extract("m.pvtp", "120"), -1);

@@ -17,15 +17,16 @@ class OutOfMemory : public ProgramTest {
     return run_process(words);
   }
 
-  /// Whichever allocation fails, alone or with all that follow, the program ends with a line.
-  static void expect_lines(const Arguments& arguments, long step) {
+  /// Whichever allocation fails, alone or with all that follow, the program ends with a line. With
+  /// `growth` the steps between those that are tried grow by that part of what lies before.
+  static void expect_lines(const Arguments& arguments, long step, long growth = 0) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     GTEST_SKIP() << "a sanitizer has its own allocations";
 #endif
     int refused = 0;
     for (const long length : {1L, 30L, 1L << 40}) {
       int whole = 0;
-      for (long at = length % 7; whole < 3; at += step) {
+      for (long at = length % 7; whole < 3; at += step + (growth > 0 ? at / growth : 0)) {
         const Outcome outcome = run_without(at, length, arguments);
         // A message of the C library itself, where it starts a thread.
         if (outcome.err.find("glibc") != std::string::npos) continue;
@@ -52,6 +53,30 @@ TEST_F(OutOfMemory, AnExtractionEndsWithALine) {
       {"extract", store, "--isovalue", "128", "-o", path("m.ply"), "--threads", "3", "--force"},
       61);
 }
+
+/// The commands but for extract, each on its own output that is there already.
+class OutOfMemoryCommands : public OutOfMemory, public testing::WithParamInterface<const char*> {};
+
+TEST_P(OutOfMemoryCommands, EndWithALine) {
+  const std::string store = make_store("a", {"--index", "octree"});
+  const std::string command = GetParam();
+  write_file(path("a.raw"), noise(20 * 20 * 20));
+  if (command == "convert")
+    return expect_lines({"convert", path("a.raw"), store, "--dims", "20,20,20", "--type", "u8",
+                         "--brick", "16", "--index", "octree", "--threads", "2", "--force"},
+                        5, 12);
+  if (command == "index")
+    return expect_lines({"index", store, "--kind", "octree", "--threads", "2", "--force"}, 5, 12);
+  if (command == "export")
+    return expect_lines({"export", store, path("x.raw"), "--threads", "2", "--force"}, 5, 12);
+  expect_lines({command, store}, 5, 12);
+}
+
+INSTANTIATE_TEST_SUITE_P(Commands, OutOfMemoryCommands,
+                         testing::Values("convert", "index", "export", "info", "verify"),
+                         [](const testing::TestParamInfo<const char*>& test) {
+                           return std::string(test.param);
+                         });
 
 }  // namespace
 }  // namespace isobrick::test

@@ -67,6 +67,29 @@ TEST_F(VerifyCommand, AFolderThatCannotBeReadIsDamage) {
   fs::permissions(folder, fs::perms::owner_all);
 }
 
+TEST_F(VerifyCommand, AGroupThatIsGoneIsDamage) {
+  for (const Arguments& how : {Arguments{}, Arguments{"--ome", "0.4"}}) {
+    const std::string store = make_store(how.empty() ? "a" : "b", how);
+    ASSERT_EQ(run({"verify", store}).exit_code, 0);
+    for (const std::string file : {"/isobrick/zarr.json", "/isobrick/0/zarr.json", "/.zgroup"}) {
+      const fs::path group = store + file;
+      if (!fs::exists(group)) continue;
+      const std::string text = read_file(group);
+      fs::remove(group);
+      expect_not_whole(store, group.string() + "' is missing");
+      write_file(group, "{}");
+      expect_not_whole(store, group.string());
+      write_file(group, text);
+      if (geteuid() != 0) {
+        fs::permissions(group, fs::perms::none);
+        expect_not_whole(store, group.string());
+        fs::permissions(group, fs::perms::owner_read | fs::perms::owner_write);
+      }
+    }
+    EXPECT_EQ(run({"verify", store}).exit_code, 0);
+  }
+}
+
 // Four bricks of 16 MiB at a time would take twice as much.
 TEST_F(VerifyCommand, StaysWithinItsBudget) {
   const std::string store = path("a.zarr");
@@ -96,6 +119,7 @@ TEST_F(VerifyCommand, AHugeChunkIsNotTakenIntoMemory) {
 TEST_F(VerifyCommand, TooManyChunksAreNotLookedFor) {
   const std::string array = write_array("tiny", 1000, 1);
   expect_not_whole(array, "of its 1000000000 chunk files at most");
+  expect_not_whole(write_array("many", 2064, 16), "of its 2146689 chunk files at most 2097152");
   const json info = run_json({"info", array});
   EXPECT_EQ(info["histogram"], nullptr);
   EXPECT_EQ(info["levels"][0]["bricks_stored"], nullptr);

@@ -1,7 +1,8 @@
 // Preloaded into the program: regular files take ISOBRICK_FAULT_AFTER bytes in all, then every
 // write fails with the error number ISOBRICK_FAULT_ERRNO. A negative number of bytes lets writes
 // succeed, and closing a file that is open for writing fail. With ISOBRICK_FAULT_SIGNAL nothing
-// fails, but the process gets that signal with the write that goes beyond those bytes.
+// fails, but the process gets that signal with the write that goes beyond those bytes. With
+// ISOBRICK_FAULT_INTERRUPTS every other write and read at an offset is interrupted (EINTR).
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -22,8 +23,11 @@ struct Fault {
   int number = 0;  ///< 0: none
   int signal = 0;  ///< 0: none
   bool at_close = false;
+  bool interrupts = false;
+  std::atomic<unsigned> calls{0};
 
   Fault() {
+    interrupts = std::getenv("ISOBRICK_FAULT_INTERRUPTS") != nullptr;
     const char* after = std::getenv("ISOBRICK_FAULT_AFTER");
     const char* text = std::getenv("ISOBRICK_FAULT_ERRNO");
     if (after == nullptr || text == nullptr) return;
@@ -45,8 +49,16 @@ bool is_output(int fd) {
          (::fcntl(fd, F_GETFL) & O_ACCMODE) != O_RDONLY;
 }
 
+/// Whether a call is interrupted: errno says so then.
+bool interrupted() {
+  if (!fault().interrupts || fault().calls++ % 2 != 0) return false;
+  errno = EINTR;
+  return true;
+}
+
 /// How many of `size` bytes the disk takes; -1 and errno when it is full.
 ssize_t granted(int fd, std::size_t size) {
+  if (size > 0 && interrupted()) return -1;
   const auto wanted = static_cast<long long>(size);
   if (size == 0 || fault().at_close || !is_output(fd)) return wanted;
   const long long before = fault().left.fetch_sub(wanted);
@@ -76,6 +88,14 @@ ssize_t write(int fd, const void* bytes, size_t size) {
 ssize_t pwrite(int fd, const void* bytes, size_t size, off_t offset) {
   const ssize_t n = granted(fd, size);
   return n < 0 ? n : next("pwrite", &pwrite)(fd, bytes, static_cast<size_t>(n), offset);
+}
+
+ssize_t pread(int fd, void* bytes, size_t size, off_t offset) {
+  return interrupted() ? -1 : next("pread", &pread)(fd, bytes, size, offset);
+}
+
+ssize_t pread64(int fd, void* bytes, size_t size, off64_t offset) {
+  return pread(fd, bytes, size, offset);
 }
 
 ssize_t pwrite64(int fd, const void* bytes, size_t size, off64_t offset) {
