@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <string_view>
 #include <vector>
 
 #include "isobrick/bricks/checked_json.h"
@@ -53,14 +53,17 @@ std::string with_dimension_names(std::string_view array, std::string_view attrib
 }
 
 void check_axis_order(const ArrayMetadata& array, const std::string& where) {
-  std::string letters, all;  // of each dimension one; '-': none of space
-  for (const std::string& name : array.dimension_names) {
-    const char letter = name.size() == 1 ? static_cast<char>(name[0] | 0x20) : '-';
-    letters += letter >= 'x' && letter <= 'z' ? letter : '-';
-    all += (all.empty() ? "" : ", ") + name;
+  constexpr std::string_view kLast = "zyx";
+  const std::vector<std::string>& names = array.dimension_names;
+  bool misplaced = false;
+  std::string all;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    all += (all.empty() ? "" : ", ") + (names[i].empty() ? "(no name)" : names[i]);
+    if (names[i].size() != 1) continue;
+    const std::size_t last = kLast.find(static_cast<char>(names[i][0] | 0x20));
+    misplaced |= last != kLast.npos && i + kLast.size() != names.size() + last;
   }
-  const bool named = std::ranges::count(letters, '-') + 3 == std::ssize(letters);
-  if (named && !letters.ends_with("zyx"))
+  if (misplaced)
     throw Error(
         fmt::format("{}: its dimensions are {}: only arrays whose last are z, y, x are read; write "
                     "it transposed",

@@ -174,12 +174,22 @@ TEST_F(Foreign, WhatIsNotSupportedIsNamed) {
   expect("4 dimensions");
   metadata.shape = {4, 5, 7};
   metadata.chunk = {2, 2, 3};
-  for (const auto& names : {std::vector<std::string>{"x", "y", "z"}, {"Y", "Z", "X"}}) {
+  using Names = std::vector<std::string>;
+  for (const auto& [names, listed] :
+       std::vector<std::pair<Names, std::string>>{{{"x", "y", "z"}, "x, y, z"},
+                                                  {{"Y", "Z", "X"}, "Y, Z, X"},
+                                                  {{"x", "", ""}, "x, (no name), (no name)"},
+                                                  {{"x", "y", ""}, "x, y, (no name)"},
+                                                  {{"", "y", "z"}, "(no name), y, z"},
+                                                  {{"row", "x", "column"}, "row, x, column"}}) {
     metadata.dimension_names = names;
     write_metadata();
-    expect(metadata.dimension_names[0] + ", ");
+    expect("its dimensions are " + listed + ": ");
     expect("only arrays whose last are z, y, x");
   }
+  metadata.dimension_names = {"z", "", ""};
+  write_metadata();
+  EXPECT_NO_THROW(StoreReader{path});
   metadata.dimension_names = {"row", "y", "x"};  // says nothing of the order
   write_metadata();
   EXPECT_NO_THROW(StoreReader{path});
