@@ -111,7 +111,10 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
   options.roi = store_region(store, arguments.level, arguments.roi);
   options.inside = arguments.inside;
   options.drop_degenerate = arguments.drop_degenerate;
-  options.memory = arguments.memory;
+  // The driver is there from when the picture is opened, before meshes are made.
+  if (!arguments.preview.empty() && !arguments.estimate)
+    options.memory_of_others = preview_driver_memory();
+  options.memory = arguments.memory - std::min(arguments.memory, options.memory_of_others);
   options.threads = arguments.threads;
   options.index = arguments.index;
   options.backend = arguments.backend;
@@ -126,33 +129,6 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
                         named(arguments.preview, arguments, isovalue)});
   }
   return surfaces;
-}
-
-/// Refuses a budget of which the pictures would take more than a quarter, so that the extraction
-/// keeps most, or that leaves too little for it.
-void check_picture_budget(const Arguments& arguments, const std::vector<ExtractedSurface>& surfaces,
-                          const StoreReader& store) {
-  if (arguments.preview.empty() || arguments.estimate) return;
-  const std::uint64_t picture = preview_memory(arguments.picture);
-  std::uint64_t least = 4 * picture;
-  for (const ExtractedSurface& surface : surfaces) {
-    ExtractOptions shaded = surface.options;
-    shaded.normals = true;
-    least =
-        std::max(least, picture + least_extract_memory(store, shaded, Indexing::chunk_local, 0));
-    if (!surface.output.empty())
-      least = std::max(least,
-                       least_extract_memory(
-                           store, surface.options, Indexing::welded,
-                           mesh_memory(surface.form.format, arguments.threads, arguments.memory)));
-  }
-  if (arguments.memory < least)
-    throw UsageError(fmt::format(
-        "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed where a "
-        "picture of {} x {} pixels takes {:.1f} MiB while it is drawn; or choose a smaller "
-        "--preview-size",
-        in_mib(arguments.memory), mib_above(least), arguments.picture.width,
-        arguments.picture.height, in_mib(picture)));
 }
 
 /// The meshes to write, with size_of(ExtractedSurface) as PlannedMesh has it.
@@ -214,7 +190,7 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty())
       of_surface.mesh =
-          open_mesh(surface.output, surface.form, force, arguments.threads, arguments.memory);
+          open_mesh(surface.output, surface.form, force, arguments.threads, surface.options.memory);
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.picture);
   }
@@ -229,16 +205,53 @@ std::string why_empty(const ExtractOptions& options, const ExtractReport& report
   return empty + "; " + range_text(store, options.level);
 }
 
+/// How the surface is extracted once more, for its picture.
+ExtractOptions options_of_picture(const ExtractedSurface& surface, const Arguments& arguments) {
+  ExtractOptions options = surface.options;
+  options.normals = true;
+  options.memory = arguments.memory;
+  options.memory_of_others = preview_memory(arguments.picture);
+  options.memory -= std::min(options.memory, options.memory_of_others);
+  return options;
+}
+
+/// The least budget of the whole command for a surface with a picture.
+std::uint64_t least_with_picture(const ExtractedSurface& surface, const Arguments& arguments,
+                                 const StoreReader& store) {
+  const ExtractOptions picture = options_of_picture(surface, arguments);
+  const std::uint64_t least =
+      picture.memory_of_others + least_extract_memory(store, picture, Indexing::chunk_local, 0);
+  if (surface.output.empty()) return least;
+  const std::uint64_t sink =
+      mesh_memory(surface.form.format, arguments.threads, surface.options.memory);
+  return std::max(least, surface.options.memory_of_others +
+                             least_extract_memory(store, surface.options, Indexing::welded, sink));
+}
+
+/// Refuses a budget in which pictures cannot be drawn, before anything is extracted.
+void check_pictures(const std::vector<ExtractedSurface>& surfaces, const Arguments& arguments,
+                    const StoreReader& store) {
+  for (const ExtractedSurface& surface : surfaces) {
+    if (surface.preview.empty()) continue;
+    const std::uint64_t least = least_with_picture(surface, arguments, store);
+    if (arguments.memory < least)
+      throw UsageError(fmt::format(
+          "a memory budget of {:.1f} MiB is too small: with a picture of {} x {} pixels at least "
+          "--memory {}M is needed, {:.1f} MiB of it for the picture and {} for OpenGL's driver; or "
+          "choose a smaller --preview-size",
+          in_mib(arguments.memory), arguments.picture.width, arguments.picture.height,
+          mib_above(least), in_mib(preview_memory(arguments.picture) - preview_driver_memory()),
+          preview_driver_memory() >> 20));
+  }
+}
+
 ExtractReport make(const ExtractedSurface& surface, const Sinks& sinks, const Arguments& arguments,
                    const StoreReader& store, Console& console) {
   ExtractReport report;
   if (sinks.mesh) report = extract(store, surface.options, *sinks.mesh, console.progress());
   if (sinks.preview) {
-    ExtractOptions shaded = surface.options;
-    shaded.normals = true;
-    shaded.memory_of_others = preview_memory(arguments.picture);
-    shaded.memory -= shaded.memory_of_others;
-    const ExtractReport drawn = extract(store, shaded, *sinks.preview, console.progress());
+    const ExtractReport drawn =
+        extract(store, options_of_picture(surface, arguments), *sinks.preview, console.progress());
     if (!sinks.mesh) report = drawn;
   }
   if (report.triangles == 0) console.note(why_empty(surface.options, report, store));
@@ -268,6 +281,7 @@ Said estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreRead
 
 Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& surfaces,
               const StoreReader& store, Console& console) {
+  check_pictures(surfaces, arguments, store);
   if (!arguments.no_space_check) check_space(surfaces, store);
   std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
   Said said;
@@ -299,7 +313,6 @@ int run(const Arguments& arguments, Console& console) {
   if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
   const StoreReader store = open_store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
-  check_picture_budget(arguments, surfaces, store);
   for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
   const Said said = arguments.estimate ? estimate_all(surfaces, store, console)
                                        : make_all(arguments, surfaces, store, console);

@@ -32,6 +32,7 @@ std::unique_ptr<MeshSink> open_preview(const std::string&, bool, const PreviewOp
 }
 
 std::uint64_t preview_memory(const PreviewOptions&) { refuse("--preview"); }
+std::uint64_t preview_driver_memory() { refuse("--preview"); }
 
 void add_render(Program& program) {
   add_refused(program, "render", "Draw mesh files", "isobrick render head_500.ply -o head.png");

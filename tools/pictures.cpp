@@ -11,4 +11,6 @@ std::unique_ptr<MeshSink> open_preview(const std::string& path, bool force,
 
 std::uint64_t preview_memory(const PreviewOptions& options) { return PreviewSink::memory(options); }
 
+std::uint64_t preview_driver_memory() { return Renderer::driver_memory(); }
+
 }  // namespace isobrick::tools

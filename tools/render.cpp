@@ -11,6 +11,7 @@
 #include "isobrick/io/parted_output.h"
 #include "isobrick/io/png_file.h"
 #include "isobrick/meshes/mesh_name.h"
+#include "isobrick/pipeline/program_memory.h"
 #include "isobrick/render/mesh_picture.h"
 #include "tools/format.h"
 #include "tools/output_name.h"
@@ -24,6 +25,7 @@ struct Arguments {
   std::string output;
   PictureOptions picture{.size = {1280, 960}};
   MeshPictureRequest request;
+  std::uint64_t memory = std::uint64_t{1} << 30;
   bool force = false;
 };
 
@@ -50,12 +52,24 @@ std::vector<std::filesystem::path> input_paths(const std::vector<std::string>& m
   return paths;
 }
 
+void check_memory(const MeshPictureRequest& request, std::uint64_t memory) {
+  const std::uint64_t picture = mesh_picture_memory(request), least = kProgramBytes + picture;
+  if (memory < least)
+    throw UsageError(fmt::format(
+        "a memory budget of {:.1f} MiB is too small: a picture of {} x {} pixels needs --memory "
+        "{}M at least, {} MiB of it for the program and its libraries, {} for OpenGL's driver; or "
+        "choose a smaller --size",
+        in_mib(memory), request.width, request.height, mib_above(least), kProgramBytes >> 20,
+        Renderer::driver_memory() >> 20));
+}
+
 int run(const Arguments& arguments, Console& console) {
   if (is_standard_output(arguments.output))
     console.reserve_output();
   else
     check_picture_name(arguments.output);
   const MeshPictureRequest request = request_of(arguments);
+  check_memory(request, arguments.memory);
   check_replaces_no_input(arguments.output, input_paths(arguments.meshes));
   OutputFile out(arguments.output, arguments.force);
   MeshPicture picture = draw_mesh_files(request, console.progress());
@@ -134,6 +148,7 @@ void add_render(Program& program) {
              },
              {"--region", "X0:X1,Y0:Y1,Z0:Z1", "Draw only what is in this box, world units"});
   add_overlay_options(app, request);
+  add_memory(app, arguments->memory);
   add_force(app, arguments->force);
   add_run(program, app, arguments, run);
 }

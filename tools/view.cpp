@@ -22,6 +22,7 @@
 #include "tools/picture_options.h"
 #include "tools/store_region.h"
 #include "tools/value_range.h"
+#include "tools/view_memory.h"
 
 namespace isobrick::tools {
 namespace {
@@ -128,8 +129,15 @@ Drawn draw_shots(StorePicture& picture, const std::vector<Shot>& shots, PictureS
 int draw(const Arguments& arguments, Console& console) {
   check_store(arguments.store);
   const auto store = std::make_shared<const StoreReader>(arguments.store, arguments.selection);
+  const std::vector<MeshStyle> styles = styles_of(
+      arguments.picture, std::max<std::size_t>(arguments.isovalues.size(), 1), "isovalues");
+  const bool transparent = std::any_of(styles.begin(), styles.end(),
+                                       [](const MeshStyle& style) { return style.opacity < 1; });
   const GlContext context;
-  StorePicture picture(store, arguments.budgets, {});
+  StorePicture picture(store,
+                       divide_view_memory(arguments.budgets, *store, arguments.picture.size,
+                                          transparent, current_gl_device().software),
+                       {});
   const WorldBox box = picture.bounds();
   const auto [width, height] = arguments.picture.size;
   const std::vector<Shot> shots = shots_of(

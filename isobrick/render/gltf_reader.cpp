@@ -23,6 +23,8 @@ using nlohmann::json;
 
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr std::size_t kMaxJson = std::size_t{64} << 20;
+/// Of the values of the scene: enough for some 100,000 meshes and nodes.
+constexpr std::size_t kMaxValueBytes = std::size_t{128} << 20;
 constexpr int kMostDepth = 64;
 
 std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
@@ -132,19 +134,36 @@ class GltfReader {
     }
   }
 
-  /// Parses the scene. A level of nesting takes some 70 times the memory of its
-  /// byte of text, so the parser stops where the levels become too many.
+  /// Parses the scene. Its values may take a hundred times the memory of their text, so the parser
+  /// stops where they become too many, or their levels, each of which takes some of the stack.
   void read_scene(std::span<const std::byte> chunk) {
     if (chunk.size() > kMaxJson)
       fail(fmt::format("its scene takes {} bytes, more than {} MiB", chunk.size(), kMaxJson >> 20));
     const auto* text = reinterpret_cast<const char*>(chunk.data());
     using Event = json::parse_event_t;
-    root_ = json::parse(text, text + chunk.size(), [this](int depth, Event event, json&) {
+    std::size_t bytes = 0;
+    root_ = json::parse(text, text + chunk.size(), [&](int depth, Event event, json&) {
       const bool opens = event == Event::object_start || event == Event::array_start;
       if (opens && depth >= kMostDepth)
         fail(fmt::format("its scene is nested more than {} levels deep", kMostDepth));
+      bytes += bytes_of(event);
+      if (bytes > kMaxValueBytes)
+        fail(fmt::format("its scene has so many values that they take more than {} MiB",
+                         kMaxValueBytes >> 20));
       return true;
     });
+  }
+
+  /// About the memory of a value in a list or an object, text aside.
+  static std::size_t bytes_of(json::parse_event_t event) {
+    using Event = json::parse_event_t;
+    switch (event) {
+      case Event::object_start:
+      case Event::array_start: return 96;
+      case Event::key: return 96;
+      case Event::value: return 32;
+      default: return 0;
+    }
   }
 
   /// Finds the unit of the coordinates, and what takes the scene to it. glTF measures in metres;

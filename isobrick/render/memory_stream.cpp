@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "isobrick/io/mapped_file.h"
+
 namespace isobrick {
 namespace {
 
@@ -17,6 +19,7 @@ class MemoryStream final : public ByteStream {
     const std::size_t count = std::min(size, rest_.size());
     if (count > 0) std::memcpy(out, rest_.data(), count);
     rest_ = rest_.subspan(count);
+    MappedFile::note_read(count);
     return count;
   }
   std::string name() const override { return name_; }

@@ -35,7 +35,7 @@ class MeshFile {
   /// names a vertex that is not there.
   virtual void read(Vec3d origin, const Take& take) const = 0;
 
-  static constexpr std::size_t kBatch = std::size_t{1} << 18;  ///< triangles
+  static constexpr std::size_t kBatch = std::size_t{1} << 16;  ///< triangles
 };
 
 /// Opens a PLY, STL, OBJ, GLB, glTF or VTK PolyData file (.vtp, .pvtp).

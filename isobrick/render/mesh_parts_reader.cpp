@@ -10,6 +10,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/core/length_unit.h"
 #include "isobrick/io/byte_order.h"
+#include "isobrick/io/mapped_file.h"
 #include "isobrick/render/vectors.h"
 
 namespace isobrick {
@@ -36,6 +37,8 @@ VertexColour to_colour(Vec3d rgb, bool linear) {
   }
   return colour;
 }
+/// About what a vertex has in a file.
+constexpr std::size_t kBytesOfVertex = 64;
 
 /// Gathers the vertices of a batch of triangles. A vertex that is named again soon is
 /// found again, so that batches are little larger than what they are made from.
@@ -49,6 +52,7 @@ class Batch {
         recent_(kRecent) {}
 
   void add(const std::array<std::uint64_t, 3>& triangle) {
+    MappedFile::note_read(sizeof(triangle));
     triangles_.push_back({number_of(triangle[0]), number_of(triangle[1]), number_of(triangle[2])});
     if (triangles_.size() == MeshFile::kBatch) flush();
   }
@@ -65,6 +69,9 @@ class Batch {
 
  private:
   static constexpr std::size_t kRecent = 1 << 16;
+  /// Bytes that the system maps with a vertex, where none of the others is near it: up to four
+  /// times as many with each array.
+  static constexpr std::size_t kPagesOfVertex = std::size_t{1} << 14;
   struct Recent {
     std::uint64_t vertex = ~std::uint64_t{0};
     std::uint32_t number = 0;
@@ -73,6 +80,7 @@ class Batch {
   std::uint32_t number_of(std::uint64_t vertex) {
     Recent& recent = recent_[vertex % kRecent];
     if (recent.vertex != vertex) {
+      MappedFile::note_read(kPagesOfVertex);
       recent = {vertex, static_cast<std::uint32_t>(positions_.size())};
       const Vec3d p = part_.to_world.move(part_.positions.at(vertex));
       positions_.push_back(to_float(p - origin_));
@@ -135,6 +143,7 @@ std::string unit_of_comment(std::string_view comment) {
 }
 
 void BoundsOf::include(Vec3d p, std::uint64_t vertex) {
+  MappedFile::note_read(kBytesOfVertex);
   if (!std::isfinite(p.x + p.y + p.z))
     throw Error(
         fmt::format("'{}' is damaged: vertex {} is at ({}, {}, {})", path_, vertex, p.x, p.y, p.z));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <glm/vec4.hpp>
+#include <limits>
 #include <numeric>
 
 #include "isobrick/render/frame.h"
@@ -22,6 +23,9 @@ struct Look {
   glm::vec4 inside;
   glm::uvec4 id;  ///< y: the half spaces that may cut it, as bits
 };
+
+/// See MeshPass::max_triangles().
+constexpr std::uint64_t kSoftwareTriangles = std::uint64_t{1} << 14;
 
 /// What glMultiDrawElementsIndirect reads.
 struct Command {
@@ -249,6 +253,16 @@ void MeshPass::bind_block(const MeshPlace& place) {
   glVertexArrayElementBuffer(vertices_.get(), place.triangles);
 }
 
+std::uint64_t MeshPass::max_triangles() const {
+  return software_ ? kSoftwareTriangles : std::numeric_limits<std::uint64_t>::max();
+}
+
+void MeshPass::wait_for_call_before() {
+  GlFence fence = GlFence::insert();
+  if (last_call_) last_call_->wait();
+  last_call_ = std::move(fence);
+}
+
 void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent) {
   if (meshes.empty()) return;
   std::vector<Look> looks;
@@ -283,6 +297,8 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
   }
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
   check_gl("drawing meshes");
+  // Devices hold these meshes anyway.
+  if (software_) wait_for_call_before();
 }
 
 void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin, Vec3d eye,
@@ -308,8 +324,14 @@ void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin,
     glEnableVertexArrayAttrib(array, 3);
   }
   bind(may_be_cut(style), transparent, coloured);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * triangles.size()), GL_UNSIGNED_INT,
-                 nullptr);
+  const auto at_once =
+      static_cast<std::size_t>(std::min<std::uint64_t>(max_triangles(), triangles.size()));
+  for (std::size_t first = 0; first < triangles.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, triangles.size() - first);
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * count), GL_UNSIGNED_INT,
+                   reinterpret_cast<const void*>(first * sizeof(Triangle)));
+    wait_for_call_before();
+  }
   if (coloured) glDisableVertexArrayAttrib(array, 3);
   check_gl("drawing a mesh");
 }

@@ -26,6 +26,10 @@ class MeshPass {
   void draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin, Vec3d eye,
             bool transparent);
 
+  /// Triangles that should be drawn with one call. A software driver takes some 500 bytes for each
+  /// until it is drawn, and is not waited for within a call.
+  std::uint64_t max_triangles() const;
+
  private:
   /// One source in several forms.
   struct Programs {
@@ -35,6 +39,9 @@ class MeshPass {
 
   void bind(bool cut, bool transparent, bool coloured = false);
   void bind_block(const MeshPlace& place);
+  /// Waits until what came before the last call has been drawn, so that a driver keeps no more than
+  /// two of them, and draws one while it is told the next.
+  void wait_for_call_before();
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
   void need_numbers(std::size_t count);
 
@@ -49,6 +56,7 @@ class MeshPass {
   GlBuffer positions_, normals_, colours_, triangles_;  ///< of meshes that lie in memory
   std::size_t number_count_ = 0;
   std::vector<Triangle> kept_;
+  std::optional<GlFence> last_call_;
 };
 
 }  // namespace isobrick

@@ -1,12 +1,14 @@
 #include "isobrick/render/mesh_picture.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/length_unit.h"
+#include "isobrick/io/mapped_file.h"
 #include "isobrick/render/gl_context.h"
 
 namespace isobrick {
@@ -76,7 +78,34 @@ void find_bounds(const std::vector<Opened>& meshes, Vec3d& lo, Vec3d& hi) {
   }
 }
 
+/// What a batch of triangles takes: with normals and colours of its vertices, in vectors that may
+/// have twice the room that they need, and once more on the way to the device.
+constexpr std::uint64_t kBatchBytes =
+    MeshFile::kBatch * 3 * (sizeof(Triangle) / 3 + 2 * sizeof(Vec3f) + sizeof(VertexColour)) * 3;
+
+/// The most of mapped files that lies in memory, where triangles name vertices that are far apart.
+std::uint64_t mapped_memory(const MeshPictureRequest& request) {
+  std::uint64_t bytes = 0;
+  for (const PicturedMesh& mesh : request.meshes) {
+    std::error_code failure;
+    const std::uintmax_t size = std::filesystem::file_size(mesh.path, failure);
+    if (!failure) bytes += size;
+  }
+  // What is text or packed is also in a file of numbers, which may be larger.
+  return std::min<std::uint64_t>(4 * bytes, 4 * MappedFile::kWindow);
+}
+
 }  // namespace
+
+std::uint64_t mesh_picture_memory(const MeshPictureRequest& request) {
+  const bool transparent = std::any_of(request.meshes.begin(), request.meshes.end(),
+                                       [](const auto& mesh) { return mesh.style.opacity < 1; });
+  const auto pixels =
+      static_cast<std::uint64_t>(request.width) * static_cast<std::uint64_t>(request.height);
+  return Renderer::driver_memory() +
+         Renderer::memory(request.width, request.height, request.settings, transparent) +
+         pixels * (4 + 3 + 4) + kBatchBytes + mapped_memory(request);
+}
 
 MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progress) {
   MeshPicture picture;

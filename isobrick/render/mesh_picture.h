@@ -36,7 +36,11 @@ struct MeshPicture {
   std::string renderer;  ///< what drew it
 };
 
-/// Draws mesh files off-screen; memory is that of the picture and of a batch of triangles.
+/// Bytes that the picture takes while it is drawn, OpenGL's driver among them, until it is written:
+/// those of its pixels and of a batch of triangles, however large the meshes are.
+std::uint64_t mesh_picture_memory(const MeshPictureRequest& request);
+
+/// Draws mesh files off-screen; memory is that of mesh_picture_memory().
 /// Meshes of another unit of length than the first one's are scaled to it; those without a unit
 /// are taken to be in it. Throws UsageError for a scale bar in a unit that the meshes lack, Error
 /// for a file without triangles, and as open_mesh_file, GlContext and Renderer do.

@@ -6,6 +6,7 @@
 #include <charconv>
 
 #include "isobrick/core/error.h"
+#include "isobrick/io/mapped_file.h"
 
 namespace isobrick {
 namespace {
@@ -22,6 +23,7 @@ bool MeshText::next_line() {
   ++number_;
   const std::size_t end = std::min(rest_.find('\n'), rest_.size());
   if (end > kMaxLine) fail(fmt::format("it is {} bytes long", end));
+  MappedFile::note_read(end);
   line_ = rest_.substr(0, end);
   rest_.remove_prefix(std::min(end + 1, rest_.size()));
   return true;

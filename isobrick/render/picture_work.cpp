@@ -57,7 +57,7 @@ bool PictureWork::draw_surfaces(PicturePasses& passes, Vec3d eye, bool transpare
   while (!queue.empty()) {
     if (work == 0) return false;
     const std::uint64_t before = queue.triangles();
-    passes.meshes.draw(queue.take(work), eye, transparent);
+    passes.meshes.draw(queue.take(std::min(work, passes.meshes.max_triangles())), eye, transparent);
     take(work, before - queue.triangles());
   }
   if (!std::exchange(slices_drawn_[transparent ? 1 : 0], true))

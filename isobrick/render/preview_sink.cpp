@@ -52,7 +52,8 @@ std::uint64_t PreviewSink::memory(const PreviewOptions& options) {
   constexpr std::uint64_t batch = 2 * kBatch * (sizeof(Triangle) + 2 * 2 * sizeof(Vec3f));
   const auto pixels =
       static_cast<std::uint64_t>(options.width) * static_cast<std::uint64_t>(options.height);
-  return Renderer::memory(options.width, options.height, {}, false) + pixels * (4 + 3 + 4) + batch;
+  return Renderer::driver_memory() + Renderer::memory(options.width, options.height, {}, false) +
+         pixels * (4 + 3 + 4) + batch;
 }
 
 void PreviewSink::begin(const MeshHeader& header) {

@@ -24,7 +24,7 @@ class PreviewSink final : public MeshSink {
   PreviewSink(std::string path, bool force, const PreviewOptions& options = {});
   ~PreviewSink() override;
 
-  /// Bytes that a picture of this size takes while it is drawn.
+  /// Bytes that a picture of this size takes while it is drawn, OpenGL's driver among them.
   static std::uint64_t memory(const PreviewOptions& options);
 
   Indexing indexing() const override { return Indexing::chunk_local; }

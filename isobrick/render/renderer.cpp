@@ -28,6 +28,10 @@ float depth_of_front(const Camera& camera, std::uint32_t word) {
   return static_cast<float>(camera.orthographic ? far - stored * (far - near) : near / stored);
 }
 
+/// Of Mesa's llvmpipe 66 MiB of libraries, some 12 of shaders and as many of triangles were
+/// measured.
+constexpr std::uint64_t kDriverMemory = std::uint64_t{100} << 20;
+
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
 
 }  // namespace
@@ -207,6 +211,8 @@ std::uint64_t Renderer::memory(int width, int height, const PictureSettings& set
                                bool transparent) {
   return PictureTargets::bytes(width, height, samples_of(settings), settings.picking, transparent);
 }
+
+std::uint64_t Renderer::driver_memory() { return kDriverMemory; }
 
 void Renderer::begin(const Camera& camera, int width, int height, const PictureSettings& settings) {
   state_->start(camera, width, height, settings);

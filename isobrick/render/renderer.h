@@ -96,6 +96,10 @@ class Renderer {
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
 
+  /// What OpenGL takes of the host's memory beside pictures and meshes: the driver's libraries,
+  /// compiled shaders, and what a software driver keeps of the meshes that it is drawing.
+  static std::uint64_t driver_memory();
+
   /// Draws a triangle as pictures of this size and with these settings are drawn, cut or not:
   /// drivers compile shaders, and get memory, when something is first drawn, and no picture waits
   /// for that any more.

@@ -42,6 +42,7 @@ class StlFile final : public MeshFile {
         for (std::size_t k = 0; k < 3; ++k)
           positions.push_back(to_float(to_double(corner(first + i, k)) - origin));
       }
+      MappedFile::note_read(count * kFacet);
       take({0, positions, {}, triangles}, origin);
     }
   }

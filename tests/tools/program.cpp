@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <spawn.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -123,7 +124,9 @@ Outcome run_process(const Arguments& words, const Surroundings& surroundings) {
   }
   const auto signalled = std::chrono::steady_clock::now();
   int status = 0;
-  waitpid(pid, &status, 0);
+  rusage usage{};
+  wait4(pid, &status, 0, &usage);
+  outcome.peak_bytes = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
   outcome.seconds_since_signal =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - signalled).count();
   listener.join();

@@ -20,6 +20,7 @@ struct Outcome {
   int exit_code = -1;  ///< -1: a signal ended it
   int signal = 0;
   std::string out, err;
+  std::uint64_t peak_bytes = 0;     ///< most of its memory that was resident, as the kernel counts
   double seconds_since_signal = 0;  ///< from `interrupt_after` to the end
 };
 
