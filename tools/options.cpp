@@ -104,9 +104,9 @@ void add_roi(CLI::App* app, std::optional<RoiText>& roi) {
               "Only these samples of the level, half-open; parts may be left out"});
 }
 
-void add_memory(CLI::App* app, std::uint64_t& memory) {
+void add_memory(CLI::App* app, std::uint64_t& memory, const char* default_text) {
   add_parsed(app, memory, parse_bytes,
-             {"--memory", "BYTES", "Budget of memory, such as 512M or 1.5G", "1G"});
+             {"--memory", "BYTES", "Budget of memory, such as 512M or 1.5G", default_text});
 }
 
 void add_threads(CLI::App* app, int& threads) {

@@ -92,7 +92,7 @@ void add_dims(CLI::App* app, std::optional<Int3>& dims, bool required = false);
 void add_type(CLI::App* app, std::optional<ScalarType>& type, bool required = false);
 void add_level(CLI::App* app, int& level);
 void add_roi(CLI::App* app, std::optional<RoiText>& roi);
-void add_memory(CLI::App* app, std::uint64_t& memory);
+void add_memory(CLI::App* app, std::uint64_t& memory, const char* default_text = "1G");
 void add_threads(CLI::App* app, int& threads);
 void add_force(CLI::App* app, bool& force);
 /// --clip, up to kMostClipPlanes times.

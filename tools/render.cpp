@@ -25,7 +25,7 @@ struct Arguments {
   std::string output;
   PictureOptions picture{.size = {1280, 960}};
   MeshPictureRequest request;
-  std::uint64_t memory = std::uint64_t{1} << 30;
+  std::uint64_t memory = std::uint64_t{2} << 30;  // pictures of 4096 x 4096 pixels take 1.5 GiB
   bool force = false;
 };
 
@@ -148,7 +148,7 @@ void add_render(Program& program) {
              },
              {"--region", "X0:X1,Y0:Y1,Z0:Z1", "Draw only what is in this box, world units"});
   add_overlay_options(app, request);
-  add_memory(app, arguments->memory);
+  add_memory(app, arguments->memory, "2G");
   add_force(app, arguments->force);
   add_run(program, app, arguments, run);
 }
