@@ -10,6 +10,7 @@
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/gpu_backend.h"
 #include "isobrick/pipeline/program_memory.h"
+#include "isobrick/pipeline/resolve_index.h"
 #include "isobrick/stream/brick_slots.h"
 #include "isobrick/stream/tile_stream.h"
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "isobrick/pipeline/extract.h"
+#include "isobrick/stream/block_search.h"
 #include "isobrick/surface/cpu_extractor.h"
 
 namespace isobrick {

@@ -2,19 +2,14 @@
 
 #include <optional>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/stream/block_search.h"
+#include "isobrick/index/index_kind.h"
 
 namespace isobrick {
 
-/// How an extraction is told to find the active blocks.
+/// How an extraction finds the active blocks. The mesh is the same.
 struct IndexChoice {
   bool automatic = true;          ///< whatever is expected to be fastest
-  std::optional<IndexKind> kind;  ///< otherwise: that index; nothing: the block ranges
+  std::optional<IndexKind> kind;  ///< otherwise: that index; nullopt: the block ranges
 };
-
-/// How a level is searched then. Throws UsageError when the level lacks the index
-/// that was asked for.
-SearchBy resolve_index(const StoreReader& store, int level, const IndexChoice& choice);
 
 }  // namespace isobrick

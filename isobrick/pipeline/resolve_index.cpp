@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/index_choice.h"
+#include "isobrick/pipeline/resolve_index.h"
 
 #include <fmt/format.h>
 
