@@ -149,7 +149,7 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& sur
 ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store) {
   return estimate(
       store, surface.options,
-      mesh_memory(surface.form.format, surface.options.threads, surface.options.memory));
+      mesh_file_memory(surface.form.format, surface.options.threads, surface.options.memory));
 }
 
 /// Refuses meshes that cannot fit their disk, before anything is written.
@@ -189,8 +189,11 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
     check_replaces_no_input(surface.preview, inputs);
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty())
-      of_surface.mesh =
-          open_mesh(surface.output, surface.form, force, arguments.threads, surface.options.memory);
+      of_surface.mesh = create_mesh_file(surface.output, {.format = surface.form.format,
+                                                          .quantize = surface.form.quantize,
+                                                          .force = force,
+                                                          .threads = arguments.threads,
+                                                          .memory = surface.options.memory});
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.picture);
   }
@@ -223,7 +226,7 @@ std::uint64_t least_with_picture(const ExtractedSurface& surface, const Argument
       picture.memory_of_others + least_extract_memory(store, picture, Indexing::chunk_local, 0);
   if (surface.output.empty()) return least;
   const std::uint64_t sink =
-      mesh_memory(surface.form.format, arguments.threads, surface.options.memory);
+      mesh_file_memory(surface.form.format, arguments.threads, surface.options.memory);
   return std::max(least, surface.options.memory_of_others +
                              least_extract_memory(store, surface.options, Indexing::welded, sink));
 }

@@ -109,10 +109,13 @@ TEST(Mesh, ItsMemoryIsKnownBeforeItIsOpened) {
                                   MeshFormat::glb, MeshFormat::vtp, MeshFormat::pvtp})
     for (const int threads : {0, 3})
       for (const std::uint64_t memory : {64 * kMiB, 1024 * kMiB})
-        EXPECT_EQ(mesh_memory(format, threads, memory),
-                  open_mesh(dir / "a", {.format = format}, true, threads, memory)->memory())
+        EXPECT_EQ(
+            mesh_file_memory(format, threads, memory),
+            create_mesh_file(
+                dir / "a", {.format = format, .force = true, .threads = threads, .memory = memory})
+                ->memory())
             << name_of(format);
-  EXPECT_EQ(mesh_memory(MeshFormat::ply, 0, 64 * kMiB), 0U);
+  EXPECT_EQ(mesh_file_memory(MeshFormat::ply, 0, 64 * kMiB), 0U);
 }
 
 TEST(Space, AMeshNeedsItsScratchFileToo) {

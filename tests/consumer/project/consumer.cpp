@@ -1,17 +1,22 @@
-// consumer FOLDER [MODULE...]: makes a volume, converts it, extracts its surface: everything
-// through the installed headers and libraries. Then loads the modules of formats that are named.
+// consumer FOLDER [FORMAT...]: makes a volume, converts it, extracts its surface: everything
+// through the installed headers and libraries. Then makes the library load the modules of the
+// formats that are named.
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 
 #include <isobrick/bricks/store_reader.h>
+#include <isobrick/core/error.h>
 #include <isobrick/core/progress.h>
-#include <isobrick/meshes/ply_sink.h>
+#include <isobrick/meshes/mesh_file_sink.h>
 #include <isobrick/pipeline/convert.h>
+#include <isobrick/pipeline/export.h>
 #include <isobrick/pipeline/extract.h>
-#include <isobrick/volumes/module_loader.h>
+#include <isobrick/volumes/open_source.h>
 #include <isobrick/volumes/synth_source.h>
 
 namespace {
@@ -27,25 +32,42 @@ int run(const std::filesystem::path& folder) {
   const isobrick::StoreReader store(folder / "sphere.zarr");
   isobrick::ExtractOptions options;
   options.isovalue = isobrick::default_isovalue(store.info().type);
-  isobrick::PlySink sink((folder / "sphere.ply").string(), true);
-  const isobrick::ExtractReport report = isobrick::extract(store, options, sink, progress);
+  const auto mesh = isobrick::create_mesh_file(folder / "sphere.ply", {.force = true});
+  const isobrick::ExtractReport report = isobrick::extract(store, options, *mesh, progress);
   std::printf("%llu triangles\n", static_cast<unsigned long long>(report.triangles));
   return report.triangles > 0 ? 0 : 1;
 }
 
-const char* version_of(std::string_view module) {
-  if (module == "hdf5") return isobrick::hdf5_module().version;
-  if (module == "dicom") return isobrick::dicom_module().version;
-  if (module == "openvdb") return isobrick::vdb_module().version;
-  throw std::runtime_error("no such module");
+/// Opens a file that begins as those of a format do, and is none: the format's module says so.
+void load_reader(const std::filesystem::path& file, std::string_view begin) {
+  std::ofstream(file, std::ios::binary) << begin << std::string(4096, '\0');
+  try {
+    (void)isobrick::open_source(file.string(), {});
+  } catch (const isobrick::Error& error) {
+    if (std::string_view(error.what()).find("install isobrick") != std::string_view::npos) throw;
+    return;
+  }
+  throw std::runtime_error("a file of zeros was read as a volume");
+}
+
+void load_module(std::string_view format, const std::filesystem::path& folder) {
+  using namespace std::string_view_literals;
+  if (format == "hdf5") return load_reader(folder / "a.h5", "\x89HDF\r\n\x1a\n"sv);
+  if (format == "dicom") return load_reader(folder / "a.dcm", std::string(128, '\0') + "DICM");
+  if (format != "openvdb") throw std::runtime_error("no such module");
+  isobrick::NoProgress progress;
+  isobrick::export_volume(isobrick::StoreReader(folder / "sphere.zarr"), folder / "sphere.vdb",
+                          {.format = isobrick::ExportFormat::vdb, .force = true}, progress);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
-    for (int i = 2; i < argc; ++i) std::printf("%s %s\n", argv[i], version_of(argv[i]));
-    return run(argc > 1 ? argv[1] : ".");
+    const std::filesystem::path folder = argc > 1 ? argv[1] : ".";
+    const int result = run(folder);
+    for (int i = 2; i < argc; ++i) load_module(argv[i], folder);
+    return result;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -1,0 +1,94 @@
+#include "isobrick/meshes/mesh_file_sink.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "isobrick/core/error.h"
+#include "isobrick/meshes/glb_sink.h"
+#include "isobrick/meshes/mesh_parts.h"
+#include "isobrick/meshes/obj_sink.h"
+#include "isobrick/meshes/ply_sink.h"
+#include "isobrick/meshes/stl_sink.h"
+#include "isobrick/meshes/vtp_sink.h"
+
+namespace isobrick {
+namespace {
+
+struct NamedFormat {
+  MeshFormat format;
+  std::string_view extension, name;
+};
+
+constexpr std::array<NamedFormat, 6> kFormats{{{MeshFormat::ply, ".ply", "PLY"},
+                                               {MeshFormat::stl, ".stl", "STL"},
+                                               {MeshFormat::obj, ".obj", "OBJ"},
+                                               {MeshFormat::glb, ".glb", "GLB"},
+                                               {MeshFormat::vtp, ".vtp", "VTP"},
+                                               {MeshFormat::pvtp, ".pvtp", "PVTP"}}};
+
+/// What a PLY file's faces may take of a budget until they are written: nothing of a small one,
+/// which the extraction needs.
+std::size_t faces_memory(std::uint64_t memory) {
+  constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+  return memory < 512 * mib ? 0 : static_cast<std::size_t>(std::min(memory / 16, 64 * mib));
+}
+
+}  // namespace
+
+std::string_view name_of(MeshFormat format) {
+  return kFormats[static_cast<std::size_t>(format)].name;
+}
+
+std::string_view extension_of(MeshFormat format) {
+  return kFormats[static_cast<std::size_t>(format)].extension;
+}
+
+std::optional<MeshFormat> find_mesh_format(std::string_view extension) {
+  const auto same = [](char a, char b) {
+    return a == (b >= 'A' && b <= 'Z' ? b + ('a' - 'A') : b);
+  };
+  for (const NamedFormat& known : kFormats)
+    if (std::ranges::equal(known.extension, extension, same)) return known.format;
+  return std::nullopt;
+}
+
+bool has_normals(MeshFormat format) { return format != MeshFormat::stl; }
+
+bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
+
+std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
+                                           const MeshFileOptions& options) {
+  const std::string name = path.string();
+  const bool force = options.force;
+  const auto format = options.format ? options.format : find_mesh_format(path.extension().string());
+  if (!format)
+    throw UsageError(fmt::format(
+        "'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp or .pvtp",
+        name));
+  switch (*format) {
+    case MeshFormat::ply:
+      return std::make_unique<PlySink>(name, force, faces_memory(options.memory));
+    case MeshFormat::stl: return std::make_unique<StlSink>(name, force);
+    case MeshFormat::obj: return std::make_unique<ObjSink>(name, force, options.threads);
+    case MeshFormat::glb:
+      return std::make_unique<GlbSink>(name, force, GlbOptions{.quantize = options.quantize});
+    case MeshFormat::vtp: return std::make_unique<VtpSink>(name, force);
+    case MeshFormat::pvtp: return std::make_unique<PvtpSink>(name, force);
+  }
+  throw UsageError("no such format of a mesh");
+}
+
+std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory) {
+  switch (format) {
+    case MeshFormat::ply: return faces_memory(memory);
+    case MeshFormat::obj: return ObjSink::memory_with(threads);
+    case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
+    case MeshFormat::pvtp: return part_memory(PvtpSink::kPartTriangles);
+    default: return 0;
+  }
+}
+
+}  // namespace isobrick

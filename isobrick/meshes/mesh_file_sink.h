@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "isobrick/surface/mesh.h"
+
+namespace isobrick {
+
+/// The files that a mesh can become.
+enum class MeshFormat : std::uint8_t { ply, stl, obj, glb, vtp, pvtp };
+
+/// "PLY".
+std::string_view name_of(MeshFormat format);
+
+/// ".ply".
+std::string_view extension_of(MeshFormat format);
+
+/// The format of files with an extension such as ".ply" (or ".PLY"); nullopt for any other.
+std::optional<MeshFormat> find_mesh_format(std::string_view extension);
+
+/// Whether a mesh of this format has normals at its vertices. An STL has them at facets only.
+bool has_normals(MeshFormat format);
+/// Whether its triangles share vertices, so that it has a number of them.
+bool has_vertices(MeshFormat format);
+
+struct MeshFileOptions {
+  std::optional<MeshFormat> format;  ///< nullopt: by the name's extension
+  bool quantize = false;             ///< GLB: 16 bits a number (KHR_mesh_quantization)
+  bool force = false;                ///< replaces a file that exists
+  int threads = 0;                   ///< that may help to write; 0: all cores
+  /// Bytes of the whole operation's budget, of which the sink takes a small part
+  /// (MeshSink::memory).
+  std::uint64_t memory = std::uint64_t{1} << 30;
+};
+
+/// Opens a mesh file for extract(). It has its name once it is finished; a sink that is destroyed
+/// before leaves nothing. Throws UsageError when the file exists and `force` is not set or its name
+/// tells no format, Error when it cannot be made.
+std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
+                                           const MeshFileOptions& options);
+
+/// What MeshSink::memory() of such a mesh is.
+std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory);
+
+}  // namespace isobrick
