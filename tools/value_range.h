@@ -4,15 +4,13 @@
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/range.h"
+#include "isobrick/pipeline/value_text.h"
 
 namespace isobrick::tools {
 
 /// Range of a level's samples, from the bricks' ranges: one layer of them at a time. Empty where
 /// there are none or only NaN. Throws what StoreReader::brick_ranges() does.
 ValueRange<double> value_range(const StoreReader& store, int level);
-
-/// The fewest digits that read back as this sample of a volume.
-std::string sample_text(double value, ScalarType type);
 
 /// "the samples of level 0 lie within 0 and 255", for an isovalue without a surface.
 std::string range_text(const StoreReader& store, int level);
