@@ -1,8 +1,10 @@
 #include "isobrick/pipeline/add_ranges.h"
 
 #include <fmt/format.h>
+#include <sys/file.h>
 
 #include <algorithm>
+#include <cerrno>
 
 #include "isobrick/bricks/brick_checksums.h"
 #include "isobrick/bricks/item_array.h"
@@ -11,8 +13,10 @@
 #include "isobrick/bricks/stored_ranges.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/exchange.h"
+#include "isobrick/io/output_folder.h"
 #include "isobrick/pipeline/level_scan.h"
 #include "isobrick/pipeline/program_memory.h"
+#include "isobrick/pipeline/workers.h"
 
 namespace isobrick {
 namespace {
@@ -34,6 +38,15 @@ void for_each_range_folder(const StoreInfo& info, F&& f) {
     f(brick_range_folder(info.additions, level), brick_range_folder("", level));
     f(brick_checksum_folder(info.additions, level), brick_checksum_folder("", level));
   }
+}
+
+/// Removes what was written beside the places of ranges.
+void discard_unfinished(const StoreInfo& info) {
+  const OutputFolder root(info.path);
+  for_each_range_folder(info, [&](const fs::path& folder, const fs::path&) {
+    std::error_code none;
+    if (fs::exists(fs::symlink_status(partial(folder), none))) root.remove_folder(partial(folder));
+  });
 }
 
 /// Bytes for the samples of a piece: what the budget leaves.
@@ -117,6 +130,36 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
   });
   publisher.write(ranges_file(info.additions), to_json(stored));
   publisher.wait();
+}
+
+UniqueFd lock_store(const fs::path& store) {
+  UniqueFd lock = OutputFolder(store).make_folder(store / "isobrick");
+  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw Error(fmt::format("another process is adding to '{}'", store.string()));
+  return lock;
+}
+
+bool has_all_ranges(const StoreReader& store) {
+  for (std::size_t level = 0; level < store.info().levels.size(); ++level)
+    if (!store.has_ranges(static_cast<int>(level))) return false;
+  return true;
+}
+
+void add_missing_ranges(const fs::path& path, const Selection& volume, std::uint64_t memory,
+                        int threads, Progress& progress) {
+  Workers workers(threads);
+  workers.execute([&] {
+    const UniqueFd lock = lock_store(path);
+    const StoreReader store(path, volume);
+    if (has_all_ranges(store)) return;
+    const std::uint64_t others = decode_extra(store.info(), workers.threads());
+    try {
+      add_ranges(store, memory - std::min(memory, others), workers.threads(), progress);
+    } catch (...) {
+      discard_unfinished(store.info());
+      throw;
+    }
+  });
 }
 
 }  // namespace isobrick

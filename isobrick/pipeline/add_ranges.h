@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 
 #include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/progress.h"
+#include "isobrick/core/selection.h"
+#include "isobrick/io/file.h"
 
 namespace isobrick {
 
@@ -12,5 +15,18 @@ namespace isobrick {
 /// Runs in the current arena; throws UsageError when `memory` is too small for a
 /// brick, naming the least that does.
 void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Progress& progress);
+
+/// Keeps others from adding to the same store at the same time, while it is held. Throws Error when
+/// another process does.
+UniqueFd lock_store(const std::filesystem::path& store);
+
+/// Whether every level has ranges.
+bool has_all_ranges(const StoreReader& store);
+
+/// Adds the ranges that a volume lacks, in an arena of its own of so many threads (0: all cores).
+/// Leaves nothing of them when it fails or is cancelled. Throws what lock_store() and add_ranges()
+/// do.
+void add_missing_ranges(const std::filesystem::path& store, const Selection& volume,
+                        std::uint64_t memory, int threads, Progress& progress);
 
 }  // namespace isobrick

@@ -1,10 +1,8 @@
 #include "isobrick/pipeline/index_build.h"
 
 #include <fmt/format.h>
-#include <sys/file.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -40,14 +38,6 @@ std::optional<int> zstd_level_of(const StoreInfo& info) {
   if (info.codec == "none") return std::nullopt;
   const int level = std::atoi(info.codec.c_str() + std::string_view("zstd:").size());
   return level >= 1 && level <= 22 ? level : kZstdLevel;
-}
-
-/// Keeps others from adding to the same store at the same time.
-UniqueFd lock_store(const fs::path& store) {
-  UniqueFd lock = OutputFolder(store).make_folder(store / "isobrick");
-  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-    throw Error(fmt::format("another process is adding to '{}'", store.string()));
-  return lock;
 }
 
 /// One level's index on its way into the store.
@@ -185,10 +175,8 @@ void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, 
 /// Adds what is missing of the ranges, and opens the store again to find it.
 void complete_ranges(std::unique_ptr<StoreReader>& store, const IndexOptions& options, int threads,
                      Progress& progress, IndexReport& report) {
-  bool missing = !store->info().ours && options.force;
-  for (std::size_t level = 0; level < store->info().levels.size(); ++level)
-    missing |= !store->has_ranges(static_cast<int>(level));
-  if (!missing) return;
+  const bool anew = !store->info().ours && options.force;
+  if (!anew && has_all_ranges(*store)) return;
   const auto start = std::chrono::steady_clock::now();
   add_ranges(*store, options.memory, threads, progress);
   store = std::make_unique<StoreReader>(store->info().path, options.selection);
