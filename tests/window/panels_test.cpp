@@ -9,6 +9,7 @@
 #include <map>
 #include <thread>
 
+#include "tests/window/imgui_version.h"
 #include "tests/window/picture_test.h"
 
 namespace isobrick {
@@ -70,28 +71,11 @@ class Panels : public Picture {
     frame();
   }
   void press(ImGuiKey key) {
-    hold(key, true);
+    test::hold_key(key, true);
     frame();
-    hold(key, false);
+    test::hold_key(key, false);
     frame();
   }
-#if IMGUI_VERSION_NUM < 18700
-  static void hold(ImGuiKey key, bool down) {
-    ImGuiIO& io = ImGui::GetIO();
-    io.KeyMap[key] = 300 + key;
-    io.KeysDown[300 + key] = down;
-  }
-  static void hold_control(bool down) { ImGui::GetIO().KeyCtrl = down; }
-#else
-  static void hold(ImGuiKey key, bool down) { ImGui::GetIO().AddKeyEvent(key, down); }
-  static void hold_control(bool down) {
-#if IMGUI_VERSION_NUM < 18900
-    hold(ImGuiKey_ModCtrl, down);
-#else
-    hold(ImGuiMod_Ctrl, down);
-#endif
-  }
-#endif
 
   /// Where in a window each widget is under the pointer.
   std::map<ImGuiID, std::vector<ImVec2>> widgets(const char* window = "###panel") {
@@ -180,9 +164,9 @@ TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
   ImGuiIO& io = ImGui::GetIO();
   const ImVec2 field = place_of({"Surfaces", "##isovalue"}, 0);
   const auto type = [&](const char* text) {
-    hold_control(true);
+    test::hold_control(true);
     click(field);  // selects all
-    hold_control(false);
+    test::hold_control(false);
     for (; *text != 0; ++text) {
       io.AddInputCharacter(static_cast<unsigned>(*text));
       frame();
@@ -315,7 +299,7 @@ TEST_F(Panels, GrowWithTheFont) {
   };
   ImGui::GetIO().DisplaySize = {1400, 2800};
   const float one = width_of("##isovalue");
-  ImGui::GetIO().FontGlobalScale = 2;
+  test::scale_font(2);
   frame();
   EXPECT_EQ(scaled(90), 2 * before);
   ImGui::SetWindowSize("###panel", {scaled(kPanelWidth), 2700});
