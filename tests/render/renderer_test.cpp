@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -148,6 +149,55 @@ TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
                     rgba.data());
   EXPECT_EQ(count_blue(rgba), wanted);
+}
+
+/// Width and height of what differs between the columns `from` and `to`.
+std::array<int, 2> extent_of_difference(const Pixels& a, const Pixels& b, int from, int to) {
+  int left = to, right = from - 1, top = a.height, bottom = -1;
+  for (int y = 0; y < a.height; ++y)
+    for (int x = from; x < to; ++x) {
+      if (a.brightness(x, y) == b.brightness(x, y)) continue;
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
+    }
+  return {right - left + 1, bottom - top + 1};
+}
+
+TEST_F(RenderTest, OverlaysAreTwiceAsLargeOnADisplayOfTwiceTheScale) {
+  constexpr int kWidth = 400, kHeight = 320;
+  const auto draw = [&](float scale, bool overlays) {
+    renderer().begin(front_camera(1.25), kWidth, kHeight,
+                     {.occlusion = false, .overlay_scale = scale});
+    if (overlays) {
+      renderer().draw_axes();
+      renderer().draw_scale_bar("mm");
+    }
+    renderer().end();
+    return Pixels(renderer());
+  };
+  const Pixels none = draw(1, false), one = draw(1, true), two = draw(2, true);
+  const auto axes = extent_of_difference(one, none, 0, kWidth / 2),
+             axes_2 = extent_of_difference(two, none, 0, kWidth / 2);
+  EXPECT_GT(axes[0], 25);
+  EXPECT_NEAR(axes_2[0], 2 * axes[0], 3);
+  EXPECT_NEAR(axes_2[1], 2 * axes[1], 3);
+  // The bar is as long as the length that it shows, and twice as high with its text.
+  const auto bar = extent_of_difference(one, none, kWidth / 2, kWidth),
+             bar_2 = extent_of_difference(two, none, kWidth / 2, kWidth);
+  EXPECT_GT(bar[1], 12);
+  EXPECT_NEAR(bar_2[1], 2 * bar[1], 3);
+  EXPECT_NEAR(bar_2[0], bar[0], 6);
+
+  const auto blue = [&](float scale) {
+    renderer().begin(front_camera(1.25), kWidth, kHeight, {.overlay_scale = scale});
+    renderer().draw_box({-1, -1, -1}, {1, 1, 1}, {0.1f, 0.1f, 0.9f}, 3);
+    renderer().end();
+    return count_blue(renderer().read_pixels());
+  };
+  const int thin = blue(1);
+  EXPECT_NEAR(blue(2), 2 * thin, 0.25 * thin);
 }
 
 /// What an opaque mesh hides is not picked through it.
