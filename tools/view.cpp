@@ -8,11 +8,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "isobrick/bricks/image_volumes.h"
 #include "isobrick/core/error.h"
 #include "isobrick/io/output_file.h"
 #include "isobrick/io/output_guard.h"
 #include "isobrick/render/camera_request.h"
 #include "isobrick/render/gl_context.h"
+#include "isobrick/window/framing.h"
 #include "isobrick/window/screenshot.h"
 #include "isobrick/window/viewer_window.h"
 #include "tools/format.h"
@@ -34,23 +36,41 @@ struct Arguments {
   ViewSettings settings;
   int frames = 120;
   bool plain = false, force = false;
+  int level = 0;
   Selection selection;
   std::optional<RoiText> roi;
   PictureBudgets budgets;
   IndexKind index = IndexKind::linear;
 };
 
-/// Shows only --roi, which counts the samples of level 0.
+/// Where a sample of a level lies among those of level 0, along an axis.
+double in_level_0(const StoreInfo& info, int level, int axis, Index sample) {
+  const Transform& finest = info.levels.front().transform;
+  Vec3d index;
+  index[axis] = static_cast<double>(sample);
+  const Vec3d world = info.levels[static_cast<std::size_t>(level)].transform.apply(index);
+  const Vec3d step = finest.step(axis);
+  return dot(world - finest.origin, step) / dot(step, step);
+}
+
+/// Shows only --roi, which counts the samples of --level, and no finer level than that.
 void set_region(const StoreReader& store, const Arguments& arguments, ViewSettings& settings) {
-  if (!arguments.roi) return;
-  const Box3 box = store_region(store, 0, arguments.roi);
+  const Box3 box = store_region(store, arguments.level, arguments.roi);
+  settings.finest_level = arguments.level;
+  settings.region_on = arguments.roi.has_value();
+  if (!settings.region_on) return;
+  const StoreInfo& info = store.info();
+  const Int3 extent = info.levels[static_cast<std::size_t>(arguments.level)].lattice.extent;
   const Vec3d last = last_sample(store);
-  settings.region_on = true;
+  const auto part = [&](int axis, Index sample) {
+    return static_cast<float>(
+        std::clamp(in_level_0(info, arguments.level, axis, sample) / last[axis], 0.0, 1.0));
+  };
   for (int axis = 0; axis < 3; ++axis) {
     if (!(last[axis] > 0)) continue;
-    settings.region_lo[axis] = static_cast<float>(static_cast<double>(box.lo[axis]) / last[axis]);
-    settings.region_hi[axis] =
-        static_cast<float>(static_cast<double>(box.hi[axis] - 1) / last[axis]);
+    // The outermost samples of a coarse level lie within the volume, which is shown up to its end.
+    if (box.lo[axis] > 0) settings.region_lo[axis] = part(axis, box.lo[axis]);
+    if (box.hi[axis] < extent[axis]) settings.region_hi[axis] = part(axis, box.hi[axis] - 1);
   }
 }
 
@@ -82,13 +102,31 @@ void make_folder(const std::string& folder) {
   if (failure) throw system_error("create the folder", folder, failure.value());
 }
 
+/// Moves the cameras of a turn so far back that all of them see the box whole.
+void see_whole(std::vector<Shot>& turn, const WorldBox& box, double aspect) {
+  const auto fitting = [&](Camera camera) {
+    camera.fit(box.lo, box.hi, aspect);
+    return camera.distance();
+  };
+  double most = 0;
+  for (const Shot& shot : turn) most = std::max(most, fitting(shot.camera));
+  const double first = fitting(turn.front().camera);
+  for (Shot& shot : turn) shot.camera.zoom(first / most);
+}
+
 /// The pictures that are asked for, of which none may be there already.
-std::vector<Shot> shots_of(const Arguments& arguments, const Camera& camera) {
+std::vector<Shot> shots_of(const Arguments& arguments, const StorePicture& picture,
+                           const ViewSettings& settings) {
   if (!arguments.screenshot.empty()) check_picture_name(arguments.screenshot);
+  const CameraRequest& request = arguments.picture.camera;
+  const double aspect =
+      static_cast<double>(arguments.picture.size.width) / arguments.picture.size.height;
+  const Camera camera = make_camera(request, picture, settings, aspect);
   std::vector<Shot> shots;
   if (!arguments.turntable.empty()) {
     make_folder(arguments.turntable);
-    shots = turntable(camera, arguments.picture.camera.up, arguments.frames, arguments.turntable);
+    shots = turntable(camera, request.up, arguments.frames, arguments.turntable);
+    if (!request.eye) see_whole(shots, picture.shown_bounds(settings), aspect);
   }
   if (!arguments.screenshot.empty()) shots.insert(shots.begin(), {arguments.screenshot, camera});
   const std::array<std::filesystem::path, 1> inputs{arguments.store};
@@ -133,29 +171,26 @@ int draw(const Arguments& arguments, Console& console) {
       arguments.picture, std::max<std::size_t>(arguments.isovalues.size(), 1), "isovalues");
   const bool transparent = std::any_of(styles.begin(), styles.end(),
                                        [](const MeshStyle& style) { return style.opacity < 1; });
+  ViewSettings settings = settings_of(arguments);
+  set_region(*store, arguments, settings);
   const GlContext context;
   StorePicture picture(store,
                        divide_view_memory(arguments.budgets, *store, arguments.picture.size,
                                           transparent, current_gl_device().software),
                        {});
-  const WorldBox box = picture.bounds();
-  const auto [width, height] = arguments.picture.size;
-  const std::vector<Shot> shots = shots_of(
-      arguments,
-      make_camera(arguments.picture.camera, box.lo, box.hi, static_cast<double>(width) / height));
+  choose_values(settings, picture.scene().tree());
+  const std::vector<Shot> shots = shots_of(arguments, picture, settings);
   NodeSearch& search = picture.scene().search();
   search.use(arguments.index);
   search.wait();
   if (const std::string refused = search.state().refused; !refused.empty())
     console.note(refused + ": a linear scan is used");
-  ViewSettings settings = settings_of(arguments);
-  set_region(*store, arguments, settings);
-  choose_values(settings, picture.scene().tree());
   const Drawn drawn = draw_shots(picture, shots, arguments.picture.size, settings, arguments.force,
                                  console.progress());
   for (const std::string& message : drawn.damage) console.note(message);
   for (const SurfaceSettings& surface : settings.surfaces)
-    if (const std::string why = why_out_of_range(*store, 0, surface.isovalue); !why.empty())
+    if (const std::string why = why_out_of_range(*store, arguments.level, surface.isovalue);
+        !why.empty())
       console.note(why);
   if (drawn.limited_by_budget)
     console.note(
@@ -172,12 +207,13 @@ int draw(const Arguments& arguments, Console& console) {
                            arguments.turntable);
   console.result({{"command", "view"},
                   {"store", arguments.store},
+                  {"level", arguments.level},
                   {"isovalues", isovalues},
                   {"screenshot", arguments.screenshot},
                   {"turntable", arguments.turntable},
                   {"pictures", shots.size()},
-                  {"width", width},
-                  {"height", height},
+                  {"width", arguments.picture.size.width},
+                  {"height", arguments.picture.size.height},
                   {"most_triangles", drawn.most_triangles},
                   {"index", to_json(search.state())},
                   {"damaged_parts", drawn.damage.size()},
@@ -204,8 +240,11 @@ int run(const Arguments& arguments, Console& console) {
   options.settings = settings_of(arguments);
   set_interrupt_note([] { return "the window is closed"; });
   // A store that cannot be opened is reported before anything about windows.
-  if (!arguments.store.empty())
-    set_region(open_store(arguments.store, arguments.selection), arguments, options.settings);
+  if (!arguments.store.empty()) {
+    check_store(arguments.store);
+    const Selection shown = image_volumes(arguments.store, arguments.selection).selection;
+    set_region(StoreReader(arguments.store, shown), arguments, options.settings);
+  }
   {
     ViewerWindow window(options);
     if (!arguments.store.empty()) window.open(arguments.store, arguments.selection);
@@ -269,9 +308,10 @@ void add_view(Program& program) {
                  values.push_back(parse_number(text));
                });
   add_selection(app, arguments->selection);
-  add_parsed(app, arguments->roi, parse_roi,
-             {"--roi", "X0:X1,Y0:Y1,Z0:Z1",
-              "Show only these samples of level 0, half-open; parts may be left out"});
+  add_parsed(
+      app, arguments->level, [](const std::string& text) { return parse_int(text, 0, 64); },
+      {"--level", "L", "Show no finer level of the pyramid than this one, 0 the finest", "0"});
+  add_roi(app, arguments->roi);
   add_picture_options(app, arguments->picture, "surface");
   add_inside(app, arguments->budgets.inside);
   add_what_to_draw(app, *arguments);

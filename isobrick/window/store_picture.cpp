@@ -37,6 +37,14 @@ StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()
   return options;
 }
 
+/// The finest level of nodes that has samples of this stored level, or of the next coarser one that
+/// any has; of those above the stored ones none.
+int finest_node_level(const NodeGrid& grid, int stored) {
+  int v = 0;
+  while (v < grid.coarsest_stored() && grid.level(v).source < stored) ++v;
+  return v;
+}
+
 /// Whether both show the same.
 bool same_meshes(const Drawable* a, const Drawable* b) {
   if (a == nullptr || b == nullptr || a == b) return a == b;
@@ -81,17 +89,6 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
 
 StorePicture::~StorePicture() = default;
 
-WorldBox StorePicture::bounds() const {
-  const auto c = corners(scene_->tree().grid().transform(), {0, 0, 0}, last_sample(*store_));
-  WorldBox box{c[0], c[0]};
-  for (const Vec3d& p : c)
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lo[axis] = std::min(box.lo[axis], p[axis]);
-      box.hi[axis] = std::max(box.hi[axis], p[axis]);
-    }
-  return box;
-}
-
 void StorePicture::update_scene(const Camera& camera, int width, int height,
                                 const ViewSettings& settings, const PictureWay& way) {
   std::vector<double> isovalues;
@@ -102,6 +99,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
       shown_surfaces_.push_back(i);
     }
   View view = view_of(camera, width, height, settings.pixel_error);
+  view.finest_level = finest_node_level(scene_->tree().grid(), settings.finest_level);
   const ShownBox box = shown_box(settings);
   if (!box.whole()) {
     const Vec3d last = last_sample(*store_);

@@ -112,6 +112,10 @@ class StorePicture {
 
   /// The box around the volume, axis by axis of world space.
   WorldBox bounds() const;
+  /// The box around what such settings show of it: the blocks of 16³ cells that shown surfaces pass
+  /// through, and slices, within cuts and region. bounds() where they show nothing. May read
+  /// ranges, and throws what that throws.
+  WorldBox shown_bounds(const ViewSettings& settings) const;
 
   /// Makes the picture in the renderer, of what is there by now, or goes on with it; leaves the one
   /// before until it is whole, and where it would show the same. Throws what Scene, Renderer and

@@ -112,6 +112,7 @@ nlohmann::ordered_json to_json(const ViewSettings& s) {
           {"axes", s.axes},
           {"scale_bar", s.scale_bar},
           {"pixel_error", s.pixel_error},
+          {"finest_level", s.finest_level},
           {"background", {list(s.background_top), list(s.background_bottom)}}};
 }
 
@@ -155,6 +156,9 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   s.axes = in.flag("axes");
   s.scale_bar = in.flag("scale_bar");
   s.pixel_error = in.real("pixel_error", kLeastPixelError, kMostPixelError);
+  // Bookmarks of earlier versions do not have it.
+  if (json.contains("finest_level"))
+    s.finest_level = static_cast<int>(in.real("finest_level", 0, 64));
   return s;
 }
 

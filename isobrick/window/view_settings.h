@@ -58,6 +58,7 @@ struct ViewSettings {
   bool occlusion = true, edges = false, multisample = true;
   bool box = true, axes = true, scale_bar = true;
   float pixel_error = 1.5f;  ///< how long a cell may be on the picture
+  int finest_level = 0;      ///< of the store: no finer one is shown
   Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
   friend bool operator==(const ViewSettings&, const ViewSettings&) = default;
 };

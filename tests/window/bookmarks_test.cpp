@@ -22,6 +22,7 @@ Bookmark jaw() {
   b.settings.region_hi = {0.5f, 1, 0.75f};
   b.settings.edges = true;
   b.settings.pixel_error = 3;
+  b.settings.finest_level = 2;
   return b;
 }
 
@@ -33,6 +34,16 @@ TEST(Bookmarks, ComeBackAsTheyWere) {
   EXPECT_EQ(again.list()[0].name, "jaw");
   EXPECT_EQ(to_json(again.list()[0].settings).dump(), to_json(jaw().settings).dump());
   EXPECT_EQ(to_json(again.list()[0].camera).dump(), to_json(jaw().camera).dump());
+}
+
+/// Those of versions that showed every level.
+TEST(Bookmarks, NeedNoLevel) {
+  nlohmann::ordered_json json = to_json(jaw().settings);
+  EXPECT_EQ(view_settings_from(json).finest_level, 2);
+  json.erase("finest_level");
+  EXPECT_EQ(view_settings_from(json).finest_level, 0);
+  json["finest_level"] = -1;
+  EXPECT_THROW(view_settings_from(json), Error);
 }
 
 TEST(Bookmarks, AreTheirStores) {

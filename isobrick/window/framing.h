@@ -1,0 +1,17 @@
+#pragma once
+
+#include "isobrick/render/camera_request.h"
+#include "isobrick/window/store_picture.h"
+
+namespace isobrick {
+
+/// Moves the camera back or ahead, and its target, so that a box of a store fills a picture of
+/// width / height `aspect` but for a margin.
+void frame(Camera& camera, const StorePicture& picture, const WorldBox& box, double aspect);
+
+/// The camera that is asked for. One without an eye of its own frames what the settings show, not
+/// the volume around it: StorePicture::shown_bounds().
+Camera make_camera(const CameraRequest& request, const StorePicture& picture,
+                   const ViewSettings& settings, double aspect);
+
+}  // namespace isobrick
