@@ -20,7 +20,7 @@ constexpr std::array kLines{
     HelpLine{"click", "position, value and normal of the surface"},
     HelpLine{"[ ] or arrow keys", "isovalue of the selected surface; with shift: finer"},
     HelpLine{"Tab", "select the next surface"},
-    HelpLine{"R", "show the whole volume"},
+    HelpLine{"R", "frame the surface; with shift: the whole volume"},
     HelpLine{"X Y Z", "look along an axis; with shift: from behind"},
     HelpLine{"P", "perspective or orthographic"},
     HelpLine{"F", "orbit, trackball, fly"},

@@ -15,6 +15,7 @@
 #include "isobrick/core/shell_word.h"
 #include "isobrick/io/file.h"
 #include "isobrick/meshes/mesh_name.h"
+#include "isobrick/pipeline/add_ranges.h"
 #include "isobrick/pipeline/convert_staging.h"
 #include "isobrick/pipeline/store_source.h"
 #include "isobrick/volumes/open_source.h"
@@ -56,15 +57,49 @@ ImportJob::ImportJob(fs::path input, fs::path store, ConvertOptions options)
   thread_ = std::thread([this] { run(); });
 }
 
+ImportJob::ImportJob(fs::path image, const Selection& volume, ConvertOptions options)
+    : input_(image), store_(std::move(image)), options_(options), volume_(volume) {
+  thread_ = std::thread([this] { run(); });
+}
+
 ImportJob::~ImportJob() {
   cancel();
   thread_.join();
 }
 
+void ImportJob::add_note(std::string note) {
+  const MutexLock lock(mutex_);
+  state_.notes.push_back(std::move(note));
+}
+
+/// Of a file with several volumes, of which somebody would have to choose, the first.
+std::unique_ptr<VolumeSource> ImportJob::open_first(VolumeRequest request) {
+  const std::string input = input_.string();
+  std::exception_ptr why;
+  for (const Selection& selection :
+       {Selection{}, Selection{.channel = 0, .time = {}}, Selection{.channel = {}, .time = 0},
+        Selection{.channel = 0, .time = 0}}) {
+    request.selection = selection;
+    try {
+      auto source = is_zarr(input) ? open_store_source(input, request, options_.threads)
+                                   : open_source(input, request);
+      if (selection.channel || selection.time)
+        add_note(fmt::format(
+            "'{}' has several volumes; this is the first (others: isobrick convert{}{})",
+            input_.filename().string(), selection.channel ? " --channel" : "",
+            selection.time ? " --time" : ""));
+      return source;
+    } catch (const UsageError&) {
+      if (!why) why = std::current_exception();
+    }
+  }
+  std::rethrow_exception(why);
+}
+
 std::unique_ptr<VolumeSource> ImportJob::open() {
   VolumeRequest request;
   const std::string input = input_.string();
-  if (is_zarr(input)) return open_store_source(input, request, options_.threads);
+  if (is_zarr(input)) return open_first(request);
   if (has_mesh_name(input_)) {
     fs::path picture = input_;
     throw Error(fmt::format("'{}' is a mesh, no volume; draw it: isobrick render {} -o {}", input,
@@ -75,13 +110,22 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
   // A folder of slices has no format of its own.
   if (fs::is_regular_file(input_) && recognise_format(input) == VolumeFormat::vdb)
     request.grid = grid_to_show(read_vdb_header(input));
-  if (request.grid) {
-    const MutexLock lock(mutex_);
-    state_.note =
-        fmt::format("'{}' has several grids; this is '{}' (others: isobrick convert --grid)",
-                    input_.filename().string(), *request.grid);
-  }
-  return open_source(input, request);
+  if (request.grid)
+    add_note(fmt::format("'{}' has several grids; this is '{}' (others: isobrick convert --grid)",
+                         input_.filename().string(), *request.grid));
+  return open_first(request);
+}
+
+void ImportJob::convert_input(Progress& progress) {
+  const auto source = open();
+  convert(*source, store_, options_, progress);
+  for (std::string& note : source->notes()) add_note(std::move(note));
+}
+
+void ImportJob::add_ranges(Progress& progress) {
+  add_missing_ranges(store_, *volume_, options_.memory, options_.threads, progress);
+  add_note(fmt::format("the ranges of the samples were computed; they are in '{}'",
+                       (store_ / "isobrick").string()));
 }
 
 /// A conversion keeps what it has so that it can be resumed; a cancelled drop is not. What another
@@ -99,14 +143,16 @@ void ImportJob::run() {
   bool cancelled = false;
   try {
     Reporter reporter(*this);
-    const auto source = open();
-    convert(*source, store_, options_, reporter);
+    if (volume_)
+      add_ranges(reporter);
+    else
+      convert_input(reporter);
   } catch (const Cancelled&) {
     cancelled = true;
   } catch (const std::exception& e) {
     failure = what_of(e);
   }
-  if (begun_ && (cancelled || !failure.empty())) discard();
+  if (begun_ && !volume_ && (cancelled || !failure.empty())) discard();
   const MutexLock lock(mutex_);
   state_.finished = true;
   state_.cancelled = cancelled;

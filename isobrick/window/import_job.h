@@ -10,18 +10,23 @@
 #include <thread>
 #include <vector>
 
+#include "isobrick/core/selection.h"
 #include "isobrick/core/thread_annotations.h"
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/volumes/vdb_header.h"
+#include "isobrick/volumes/volume_request.h"
 
 namespace isobrick {
 
-/// A conversion in a thread of its own, for a window that goes on meanwhile. The
-/// destructor cancels it and waits until nothing unfinished is left.
+/// A conversion, or what else makes a volume ready to be shown, in a thread of its own, for a
+/// window that goes on meanwhile. The destructor cancels it and waits until nothing unfinished is
+/// left.
 class ImportJob {
  public:
   /// Converts `input` (any format that open_source or a store can be) to `store`.
   ImportJob(std::filesystem::path input, std::filesystem::path store, ConvertOptions options);
+  /// Adds to an image, in its place, the ranges that a volume of it lacks.
+  ImportJob(std::filesystem::path image, const Selection& volume, ConvertOptions options);
   ~ImportJob();
 
   struct State {
@@ -30,22 +35,29 @@ class ImportJob {
     bool finished = false;              ///< well, cancelled or not
     std::string failure;                ///< empty when all went well or was cancelled
     bool cancelled = false;
-    std::string note;  ///< beside what is converted
+    std::vector<std::string> notes;  ///< remarks about the input, as `convert` has them
   };
   State state() const;
   void cancel() { cancel_ = true; }
 
   const std::filesystem::path& input() const { return input_; }
   const std::filesystem::path& store() const { return store_; }
+  /// Whose ranges are added; nothing of a conversion.
+  const std::optional<Selection>& volume() const { return volume_; }
 
  private:
   class Reporter;
   void run();
+  void convert_input(Progress& progress);
+  void add_ranges(Progress& progress);
   void discard() const;
   std::unique_ptr<VolumeSource> open();
+  std::unique_ptr<VolumeSource> open_first(VolumeRequest request);
+  void add_note(std::string note);
 
   std::filesystem::path input_, store_;
   ConvertOptions options_;
+  std::optional<Selection> volume_;
   mutable Mutex mutex_;
   State state_ ISOBRICK_GUARDED_BY(mutex_);
   std::atomic<bool> cancel_ = false;

@@ -107,6 +107,14 @@ void slices_panel(ViewerState& state) {
                          hi, "%.5g");
 }
 
+/// Which stored level is the finest to be shown.
+void finest_level(ViewerState& state) {
+  const int coarsest = static_cast<int>(state.picture->store().info().levels.size()) - 1;
+  if (coarsest > 0)
+    ImGui::SliderInt("Finest level", &state.settings.finest_level, 0, coarsest, "%d",
+                     ImGuiSliderFlags_AlwaysClamp);
+}
+
 void look_panel(ViewerState& state) {
   ViewSettings& s = state.settings;
   Navigator& n = state.navigator;
@@ -119,7 +127,9 @@ void look_panel(ViewerState& state) {
   n.mode = static_cast<NavigationMode>(mode);
   ImGui::Checkbox("Orthographic", &n.camera.orthographic);
   ImGui::SameLine();
-  if (ImGui::SmallButton("Whole volume")) state.requests.fit = true;
+  if (ImGui::SmallButton("Surface")) state.requests.fit = Framed::surface;
+  ImGui::SameLine();
+  if (ImGui::SmallButton("Whole volume")) state.requests.fit = Framed::volume;
   for (int axis = 0; axis < 3; ++axis)
     for (const double sign : {1.0, -1.0}) {
       if (axis + (sign < 0) > 0) ImGui::SameLine();
@@ -133,6 +143,7 @@ void look_panel(ViewerState& state) {
   if (ImGui::SliderFloat("Field of view", &angle, 5, 100, "%.0f\u00b0",
                          ImGuiSliderFlags_AlwaysClamp))
     n.camera.field_of_view = angle;
+  finest_level(state);
   ImGui::SliderFloat("Cell, pixels", &s.pixel_error, 0.5f, 8, "%.1f", ImGuiSliderFlags_AlwaysClamp);
   ImGui::Checkbox("Occlusion", &s.occlusion);
   ImGui::SameLine();
@@ -260,7 +271,9 @@ void status_panel(ViewerState& state) {
 
 void import_progress(ImportJob& import) {
   const ImportJob::State s = import.state();
-  text(fmt::format("{}\nto {}", import.input().string(), import.store().string()));
+  text(import.volume()
+           ? fmt::format("{}\nranges of its samples", import.input().string())
+           : fmt::format("{}\nto {}", import.input().string(), import.store().string()));
   const float part = s.total > 0 ? static_cast<float>(s.done) / static_cast<float>(s.total) : 0;
   ImGui::ProgressBar(std::min(part, 1.f), {scaled(400), 0}, s.stage.c_str());
   if (ImGui::Button("Cancel")) import.cancel();
@@ -330,6 +343,7 @@ void main_panel(ViewerState& state) {
   ImGui::Begin(fmt::format("{}###panel", state.path.filename().string()).c_str(), nullptr,
                ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   state.panel_width = ImGui::GetWindowWidth();
+  draw_volumes_panel(state);
   section("Surfaces", true, surfaces_panel, state);
   section("Camera and look", false, look_panel, state);
   section("Cuts and region", false, draw_cuts_panel, state);

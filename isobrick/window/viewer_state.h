@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "isobrick/bricks/image_volumes.h"
 #include "isobrick/window/bookmarks.h"
 #include "isobrick/window/frame_pacer.h"
 #include "isobrick/window/import_job.h"
@@ -27,9 +28,14 @@ struct PickedPoint {
   std::optional<Vec3d> normal;  ///< of unit length, towards smaller samples
 };
 
+/// What the camera is to frame.
+enum class Framed : std::uint8_t { surface, volume };
+
 /// What panels may ask of the window.
 struct Requests {
-  bool fit = false, close = false;
+  bool close = false;
+  std::optional<Framed> fit;
+  std::optional<Selection> volume;  ///< another one of the image
   std::optional<Vec3d> look_along;  ///< world direction
   std::optional<std::filesystem::path> screenshot;
 };
@@ -56,6 +62,7 @@ struct TypedIsovalue {
 /// What a window shows and how; panels change it. Not thread-safe.
 struct ViewerState {
   std::filesystem::path path;             ///< of the store; empty: none is open
+  ImageVolumes volumes;                   ///< of the store, and the one that is shown
   std::unique_ptr<StorePicture> picture;  ///< of the store; null: none is open
   std::unique_ptr<IsovalueFacts> facts;   ///< of the store
   IndexKind index = IndexKind::linear;    ///< what finds active nodes, of the next store too

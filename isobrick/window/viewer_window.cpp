@@ -15,12 +15,11 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/metadata_files.h"
 #include "isobrick/core/error.h"
 #include "isobrick/core/file_error.h"
 #include "isobrick/render/font_atlas.h"
-#include "isobrick/render/gl_context.h"
 #include "isobrick/render/vectors.h"
+#include "isobrick/window/framing.h"
 #include "isobrick/window/panels.h"
 #include "isobrick/window/pick.h"
 #include "isobrick/window/screenshot.h"
@@ -134,74 +133,16 @@ double ViewerWindow::aspect() const {
   return static_cast<double>(area.width) / area.height;
 }
 
-void ViewerWindow::open(const std::filesystem::path& path, const Selection& selection) {
-  if (state_.picture == nullptr)
-    show_notice(fmt::format("Opening '{}' …", path.filename().string()));
-  auto store = std::make_shared<const StoreReader>(path, selection);
-  auto facts = std::make_unique<IsovalueFacts>(store);
-  // Last: once it is made, that of the store before has gone from the renderer.
-  auto picture =
-      std::make_unique<StorePicture>(store, options_.budgets, glfwPostEmptyEvent, setup_);
-  picture->scene().search().use(state_.index);
-  state_.facts = std::move(facts);
-  state_.picture = std::move(picture);
-  state_.path = path;
-  state_.selected = 0;
-  state_.settings = options_.settings;
-  // In software four samples a pixel take longer than anything else.
-  const bool software = current_gl_device().software;
-  if (software) state_.settings.multisample = false;
-  state_.pacer = FramePacer::for_device(software);
-  opened_ = glfwGetTime();
-  covered_ = false;
-  choose_values(state_.settings, state_.picture->scene().tree());
-  state_.picked.reset();
-  state_.measured.clear();
-  clicks_.clear();
-  state_.typed.reset();
-  told_damage_.clear();
-  const WorldBox box = state_.picture->bounds();
+void ViewerWindow::frame_again(Framed framed) {
+  const StorePicture& picture = *state_.picture;
+  WorldBox box = picture.bounds();
+  try {
+    if (framed == Framed::surface) box = picture.shown_bounds(state_.settings);
+  } catch (const std::exception& e) {
+    state_.say(what_of(e));
+  }
+  frame(state_.navigator.camera, picture, box, aspect());
   state_.navigator.stop();
-  state_.navigator.vertical = options_.camera.up;
-  state_.navigator.camera = make_camera(options_.camera, box.lo, box.hi, aspect());
-  state_.bookmarks.reset();
-  try {
-    state_.bookmarks = std::make_unique<Bookmarks>(
-        options_.bookmarks.empty() ? Bookmarks::default_file() : options_.bookmarks, path);
-  } catch (const std::exception& e) {
-    state_.say(what_of(e));
-  }
-  glfwSetWindowTitle(window_, fmt::format("{} - Isobrick", path.filename().string()).c_str());
-  // The next store is seen whole and with its own isovalue.
-  options_.camera = {};
-  options_.settings.surfaces.clear();
-  options_.settings.region_on = false;
-  changed_ = true;
-}
-
-void ViewerWindow::drop(const std::filesystem::path& path) {
-  try {
-    if (is_zarr(path)) return open(path);
-    if (state_.import != nullptr) throw Error("another file is being converted");
-    ConvertOptions options;
-    options.memory = options_.budgets.memory;
-    options.threads = options_.budgets.threads;
-    state_.import = std::make_unique<ImportJob>(path, store_for(path), options);
-  } catch (const std::exception& e) {
-    state_.say(what_of(e));
-  }
-}
-
-void ViewerWindow::handle_import() {
-  if (state_.import == nullptr) return;
-  const ImportJob::State now = state_.import->state();
-  if (!now.finished) return;
-  const std::filesystem::path store = state_.import->store();
-  state_.import.reset();
-  if (now.cancelled) return;
-  if (!now.failure.empty()) return state_.say(now.failure);
-  drop(store);
-  if (!now.note.empty()) state_.say(now.note);
 }
 
 void ViewerWindow::look_along(Vec3d direction) {
@@ -222,11 +163,8 @@ void ViewerWindow::handle_requests() {
   if (asked.close) glfwSetWindowShouldClose(window_, GLFW_TRUE);
   if (state_.picture == nullptr) return;
   if (asked.look_along) look_along(*asked.look_along);
-  if (asked.fit) {
-    const WorldBox box = state_.picture->bounds();
-    state_.navigator.camera.fit(box.lo, box.hi, aspect());
-    state_.navigator.stop();
-  }
+  if (asked.volume) show_volume(*asked.volume);
+  if (asked.fit) frame_again(*asked.fit);
   if (!asked.screenshot) return;
   // One that moves may be smaller, and without box and axes: that at rest is worth keeping.
   if (rests())

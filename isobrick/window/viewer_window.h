@@ -35,10 +35,14 @@ class ViewerWindow {
   ViewerWindow(const ViewerWindow&) = delete;
   ViewerWindow& operator=(const ViewerWindow&) = delete;
 
-  /// Shows a store, or the chosen volume of an image with channels or times. Throws what opening it
-  /// throws; what was shown before stays then.
+  /// Shows a store, or the chosen volume of an image with channels or times: the first one where
+  /// nothing is chosen. Throws what opening it throws; what was shown before stays then.
   void open(const std::filesystem::path& store, const Selection& selection = {});
-  /// Shows a store, or converts another format and shows that; failures are shown.
+  /// Shows another volume of the same image; camera and settings stay, but for isovalues that it
+  /// does not have. Failures are shown.
+  void show_volume(const Selection& selection);
+  /// Shows a store, or converts another format and shows that. An image without ranges gets them
+  /// first. Failures are shown.
   void drop(const std::filesystem::path& path);
 
   /// Waits for something to happen, at most so long and not at all while anything moves (some
@@ -78,6 +82,11 @@ class ViewerWindow {
   void begin_frame();
   void end_frame();
   void show_notice(const std::string& text);
+  void load(const std::filesystem::path& path, const Selection& selection);
+  bool begin_ranges(const std::filesystem::path& path, const Selection& selection);
+  ConvertOptions import_options() const;
+  void frame_again(Framed framed);
+  void tell_empty_surfaces();
   FrameKey frame_key() const;
   bool is_due() const;
   PictureArea picture_area() const;
@@ -118,6 +127,7 @@ class ViewerWindow {
   /// again once the picture rests, if it is still of the same.
   std::vector<Click> clicks_;
   std::set<std::string> told_damage_;  ///< of this store
+  std::set<double> told_empty_;        ///< isovalues without a surface, of this store
 };
 
 }  // namespace isobrick

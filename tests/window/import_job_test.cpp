@@ -38,6 +38,37 @@ TEST(ImportJob, ConvertsWhatItIsGiven) {
   EXPECT_EQ(StoreReader(dir / "ramp.zarr").info().levels[0].lattice.extent, (Int3{40, 30, 20}));
 }
 
+TEST(ImportJob, HasTheRemarksOfTheReader) {
+  const TempDir dir;
+  dir.write("ramp.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 40 30 20\nencoding: raw\n\n" +
+                             ramp(40 * 30 * 20 + 9));
+  const ImportJob job(dir / "ramp.nrrd", dir / "ramp.zarr", {});
+  const ImportJob::State state = finished(job);
+  EXPECT_EQ(state.failure, "");
+  ASSERT_EQ(state.notes.size(), 1u);
+  EXPECT_EQ(state.notes, open_source(dir / "ramp.nrrd", VolumeRequest{})->notes());
+  EXPECT_TRUE(contains(state.notes[0], "9 bytes")) << state.notes[0];
+}
+
+/// Of several volumes the first is taken, whether they are channels or times.
+TEST(ImportJob, TakesTheFirstOfSeveralVolumes) {
+  const TempDir dir;
+  const std::string head = "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\n";
+  const std::string samples = ramp(2 * 40 * 30 * 20);
+  dir.write("time.nrrd", head + "sizes: 40 30 20 2\nkinds: space space space time\n\n" + samples);
+  dir.write("channel.nrrd",
+            head + "sizes: 2 40 30 20\nkinds: vector space space space\n\n" + samples);
+  for (const std::string name : {"time", "channel"}) {
+    const ImportJob job(dir / (name + ".nrrd"), dir / (name + ".zarr"), {});
+    const ImportJob::State state = finished(job);
+    EXPECT_EQ(state.failure, "");
+    ASSERT_EQ(state.notes.size(), 1u);
+    EXPECT_TRUE(contains(state.notes[0], "isobrick convert --" + name + ")")) << state.notes[0];
+    EXPECT_EQ(StoreReader(dir / (name + ".zarr")).info().levels[0].lattice.extent,
+              (Int3{40, 30, 20}));
+  }
+}
+
 TEST(ImportJob, SaysWhatIsWrong) {
   const TempDir dir;
   dir.write("ramp_40x30x20_uint8.raw", ramp(100));

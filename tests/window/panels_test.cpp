@@ -250,6 +250,39 @@ TEST_F(Panels, MessagesAreNotBehindThePanel) {
   EXPECT_GT(messages->FocusOrder, panel->FocusOrder);
 }
 
+TEST_F(Panels, ListsOfChannelsAndTimesChooseAnotherVolume) {
+  EXPECT_EQ(state_.volumes.axes.size(), 0u);
+  const std::size_t widgets_before = widgets().size();
+  state_.volumes = {.axes = {{.name = "t", .count = 1'000'000'000, .by_time = true},
+                             {.name = "c", .count = 3, .by_channel = true}},
+                    .channel_names = {"nuclei", "walls", "a \x01 name"},
+                    .selection = {.channel = 0, .time = 4}};
+  frame();
+  EXPECT_EQ(widgets().size(), widgets_before + 2);
+  const auto choose = [&](const char* list, int item) {
+    state_.requests = {};
+    click(place_of({list}));
+    ASSERT_EQ(GImGui->OpenPopupStack.Size, 1);
+    const ImGuiWindow* popup = GImGui->OpenPopupStack[0].Window;
+    ASSERT_NE(popup, nullptr);
+    const float line = ImGui::GetFontSize() + ImGui::GetStyle().ItemSpacing.y;
+    click({popup->Pos.x + 30,
+           popup->Pos.y + popup->WindowPadding.y + line * (static_cast<float>(item) + 0.4f)});
+    EXPECT_EQ(GImGui->OpenPopupStack.Size, 0);
+  };
+  choose("Channel", 1);
+  ASSERT_TRUE(state_.requests.volume);
+  EXPECT_EQ(state_.requests.volume->channel, 1);
+  EXPECT_EQ(state_.requests.volume->time, 4);
+  choose("Channel", 0);
+  EXPECT_FALSE(state_.requests.volume) << "it is shown";
+  // The list of times begins with the one that is shown.
+  choose("Time", 2);
+  ASSERT_TRUE(state_.requests.volume);
+  EXPECT_EQ(state_.requests.volume->time, 6);
+  EXPECT_EQ(state_.requests.volume->channel, 0);
+}
+
 TEST_F(Panels, AConversionCanBeCancelled) {
   const auto file = dir_ / "a_2048x2048x2048_uint8.raw";
   dir_.write("a_2048x2048x2048_uint8.raw", "");

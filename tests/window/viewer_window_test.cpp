@@ -185,13 +185,26 @@ TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   const Vec3d across = window.state().picked->world - middle;
   EXPECT_LT(std::abs(dot(across, camera.right)), 2);
   EXPECT_LT(std::abs(dot(across, camera.up)), 2);
-  // `R` fits the whole volume into it.
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p =
-        camera.project({corner & 1 ? 95.0 : 0, corner & 2 ? 95.0 : 0, corner & 4 ? 95.0 : 0},
-                       kWidth - 250, kHeight);
-    EXPECT_TRUE(p.x >= 0 && p.x <= kWidth - 250 && p.y >= 0 && p.y <= kHeight) << corner;
-  }
+  // `R` fits the surface into it, and with shift the whole volume.
+  const auto is_seen = [&](double lo, double hi) {
+    bool all = true;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3d p =
+          camera.project({corner & 1 ? hi : lo, corner & 2 ? hi : lo, corner & 4 ? hi : lo},
+                         kWidth - 250, kHeight);
+      all &= p.x >= 0 && p.x <= kWidth - 250 && p.y >= 0 && p.y <= kHeight;
+    }
+    return all;
+  };
+  const double radius = length(across), surface = camera.distance();
+  EXPECT_TRUE(is_seen(47.5 - radius, 47.5 + radius));
+  display_->key(XK_Shift_L, true);
+  display_->tap(XK_r);
+  display_->key(XK_Shift_L, false);
+  steps(3);
+  until([&] { return rests(); });
+  EXPECT_TRUE(is_seen(0, 95));
+  EXPECT_GT(camera.distance(), surface) << "the surface fills more of it";
   display_->tap(XK_h);
   until([&] { return rests() && window.state().picture->renderer().width() == kWidth; });
 }

@@ -1,0 +1,142 @@
+#include "isobrick/window/viewer_window.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "isobrick/bricks/metadata_files.h"
+#include "isobrick/core/error.h"
+#include "isobrick/core/file_error.h"
+#include "isobrick/pipeline/add_ranges.h"
+#include "isobrick/render/gl_context.h"
+#include "isobrick/window/framing.h"
+
+// Which volume a window shows: opened, dropped, converted, chosen from an image.
+
+namespace isobrick {
+
+/// Shows a volume in place of the one before; the settings stay as they are.
+void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection) {
+  ImageVolumes volumes = image_volumes(path, selection);
+  auto store = std::make_shared<const StoreReader>(path, volumes.selection);
+  auto facts = std::make_unique<IsovalueFacts>(store);
+  // Last: once it is made, that of the store before has gone from the renderer.
+  auto picture =
+      std::make_unique<StorePicture>(store, options_.budgets, glfwPostEmptyEvent, setup_);
+  picture->scene().search().use(state_.index);
+  state_.facts = std::move(facts);
+  state_.picture = std::move(picture);
+  state_.path = path;
+  state_.volumes = std::move(volumes);
+  state_.pacer = FramePacer::for_device(current_gl_device().software);
+  opened_ = glfwGetTime();
+  covered_ = false;
+  state_.picked.reset();
+  state_.measured.clear();
+  clicks_.clear();
+  state_.typed.reset();
+  told_damage_.clear();
+  told_empty_.clear();
+  const std::string volume = text_of(state_.volumes);
+  glfwSetWindowTitle(window_, fmt::format("{}{}{} - Isobrick", path.filename().string(),
+                                          volume.empty() ? "" : ", ", volume)
+                                  .c_str());
+  changed_ = true;
+}
+
+void ViewerWindow::open(const std::filesystem::path& path, const Selection& selection) {
+  if (state_.picture == nullptr)
+    show_notice(fmt::format("Opening '{}' …", path.filename().string()));
+  load(path, selection);
+  state_.selected = 0;
+  state_.settings = options_.settings;
+  // In software four samples a pixel take longer than anything else.
+  if (current_gl_device().software) state_.settings.multisample = false;
+  choose_values(state_.settings, state_.picture->scene().tree());
+  state_.navigator.stop();
+  state_.navigator.vertical = options_.camera.up;
+  state_.navigator.camera =
+      make_camera(options_.camera, *state_.picture, state_.settings, aspect());
+  state_.bookmarks.reset();
+  try {
+    state_.bookmarks = std::make_unique<Bookmarks>(
+        options_.bookmarks.empty() ? Bookmarks::default_file() : options_.bookmarks, path);
+  } catch (const std::exception& e) {
+    state_.say(what_of(e));
+  }
+  // The next store is seen whole and with its own isovalue.
+  options_.camera = {};
+  options_.settings.surfaces.clear();
+  options_.settings.region_on = false;
+  options_.settings.finest_level = 0;
+}
+
+void ViewerWindow::show_volume(const Selection& selection) {
+  try {
+    if (begin_ranges(state_.path, selection)) return;
+    load(state_.path, selection);
+    ViewSettings& settings = state_.settings;
+    const ValueRange<double> range = state_.facts->counts().range();
+    for (SurfaceSettings& surface : settings.surfaces)
+      if (!range.stabbed_by(surface.isovalue))
+        surface.isovalue = std::numeric_limits<double>::quiet_NaN();
+    if (settings.window_hi <= range.lo || settings.window_lo >= range.hi)
+      settings.window_lo = settings.window_hi = 0;
+    choose_values(settings, state_.picture->scene().tree());
+  } catch (const std::exception& e) {
+    state_.say(what_of(e));
+  }
+}
+
+ConvertOptions ViewerWindow::import_options() const {
+  if (state_.import != nullptr) throw Error("another file is being converted");
+  ConvertOptions options;
+  options.memory = options_.budgets.memory;
+  options.threads = options_.budgets.threads;
+  return options;
+}
+
+/// Begins to compute the ranges that a volume lacks; false where it has them.
+bool ViewerWindow::begin_ranges(const std::filesystem::path& path, const Selection& selection) {
+  const Selection shown = image_volumes(path, selection).selection;
+  if (has_all_ranges(StoreReader(path, shown))) return false;
+  state_.import = std::make_unique<ImportJob>(path, shown, import_options());
+  return true;
+}
+
+void ViewerWindow::drop(const std::filesystem::path& path) {
+  try {
+    if (!is_zarr(path))
+      state_.import = std::make_unique<ImportJob>(path, store_for(path), import_options());
+    else if (!begin_ranges(path, {}))
+      open(path);
+  } catch (const std::exception& e) {
+    state_.say(what_of(e));
+  }
+}
+
+void ViewerWindow::handle_import() {
+  if (state_.import == nullptr) return;
+  const ImportJob::State now = state_.import->state();
+  if (!now.finished) return;
+  const std::filesystem::path store = state_.import->store();
+  const std::optional<Selection> volume = state_.import->volume();
+  state_.import.reset();
+  if (now.cancelled) return;
+  if (!now.failure.empty()) return state_.say(now.failure);
+  try {
+    if (volume && store == state_.path)
+      show_volume(*volume);
+    else
+      open(store, volume.value_or(Selection()));
+  } catch (const std::exception& e) {
+    state_.say(what_of(e));
+  }
+  for (const std::string& note : now.notes) state_.say(note);
+}
+
+}  // namespace isobrick
