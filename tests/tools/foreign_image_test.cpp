@@ -67,6 +67,10 @@ TEST_F(ForeignImage, ViewShowsTheChannelAndTheRegionThatAreChosen) {
     GTEST_SKIP() << "built without pictures";
   const std::string image = write_image();
   expect_refused(run({"view", image, "--screenshot", path("a.png")}), 2, {"--channel"});
+  // A window lists the channels and begins with the first; here there is none.
+  expect_refused(run_process({"env", "-u", "DISPLAY", "-u", "WAYLAND_DISPLAY", ISOBRICK_PROGRAM,
+                              "view", image}),
+                 1, {"cannot open a window"});
   ASSERT_EQ(run({"index", image, "--channel", "1"}).exit_code, 0);
   const auto triangles = [&](const std::string& name, const Arguments& more) {
     Arguments arguments{"view",   image,     "--channel",    "1",       "--isovalue", "5",
