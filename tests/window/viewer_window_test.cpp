@@ -17,7 +17,6 @@
 #include "isobrick/pipeline/convert.h"
 #include "isobrick/render/vectors.h"
 #include "isobrick/volumes/synth_source.h"
-#include "isobrick/window/panels.h"
 #include "tests/window/imgui_version.h"
 #include "tests/window/window_test.h"
 
@@ -250,59 +249,6 @@ TEST_F(Window, HasTheCharactersThatItWrites) {
   for (const ImWchar character :
        std::initializer_list<ImWchar>{0x2026, 0xb5, 0xb0, 0x2212, 0x3b1, 0x416})
     EXPECT_TRUE(test::has_glyph(character)) << character;
-}
-
-/// How many pixels of the picture of a window, as large on every display, axes and scale bar take.
-int pixels_of_overlays(const std::string& store, int dots_per_inch) {
-  const VirtualDisplay display(1000, 700, dots_per_inch);
-  WindowOptions options;
-  options.width = 800 * 96 / dots_per_inch;
-  options.height = 600 * 96 / dots_per_inch;
-  options.settings.box = options.settings.occlusion = options.settings.multisample = false;
-  ViewerWindow window(options);
-  window.open(store);
-  window.state().panels = false;
-  window.state().settings.surfaces[0].shown = false;
-  const auto picture = [&](bool overlays) {
-    window.state().settings.axes = window.state().settings.scale_bar = overlays;
-    for (int i = 0; i < 500; ++i) {
-      window.step(0.02);
-      const PictureState& state = window.state().picture->state();
-      if (i > 20 && state.complete && !state.moving && !state.plain) break;
-    }
-    EXPECT_EQ(window.state().picture->renderer().width(), 800);
-    return window.state().picture->renderer().read_pixels();
-  };
-  const auto with = picture(true), without = picture(false);
-  int pixels = 0;
-  for (std::size_t i = 0; i < std::min(with.size(), without.size()); i += 4)
-    pixels += !std::equal(&with[i], &with[i] + 3, &without[i]);
-  return pixels;
-}
-
-TEST_F(Window, AxesAndScaleBarGrowWithTheDisplay) {
-  display_.reset();
-  const int one = pixels_of_overlays(dir_ / "sphere.zarr", 96),
-            two = pixels_of_overlays(dir_ / "sphere.zarr", 192);
-  EXPECT_GT(one, 400);
-  // As high as a 45th of the picture, which is 13 pixels, or twice 11 of them: lines and text
-  // are 1.65 times as large in both directions, but for the bar's length.
-  EXPECT_GT(two, 1.8 * one);
-}
-
-TEST(ScaledWindow, DoublesEverything) {
-  if (!VirtualDisplay::available()) GTEST_SKIP() << "there is no Xvfb";
-  const VirtualDisplay display(1000, 700, 192);
-  WindowOptions options;
-  options.width = 400;
-  options.height = 300;
-  ViewerWindow window(options);
-  int width = 0, height = 0;
-  glfwGetFramebufferSize(window.handle(), &width, &height);
-  EXPECT_EQ(width, 800);
-  EXPECT_EQ(window.state().panel_width, 2 * kPanelWidth);
-  EXPECT_EQ(test::font_pixels(), 2 * kFontPixels);
-  EXPECT_GT(ImGui::GetStyle().FramePadding.x, 1.9f * ImGuiStyle().FramePadding.x);
 }
 
 TEST_F(Window, SurvivesOtherSizesAndNone) {
