@@ -19,7 +19,7 @@ namespace isobrick {
 inline constexpr Int3 kRangeChunkCube{kRangeChunkEdge, kRangeChunkEdge, kRangeChunkEdge};
 
 /// Items of a chunk along each axis: a cube, but in thin volumes long along the long axes.
-/// docs/store_format.md has the rule.
+/// docs/reference/store_format.md has the rule.
 Int3 range_chunk_extent(Int3 items);
 
 /// The array [z, y, x, 2] of the ranges of so many items: pairs (lo, hi) of the level's type.
