@@ -43,7 +43,8 @@ Box3 blocks_of(Box3 samples, Int3 all) {
 
 }  // namespace
 
-NodeTree::NodeTree(const BrickSource& source) : grid_(source.info()) {
+NodeTree::NodeTree(const BrickSource& source)
+    : grid_(source.info()), thin_structure_(std::make_unique<ThinStructure>(grid_, source.info())) {
   // Of all levels at once: the next one may be a single group.
   std::vector<std::pair<int, Box3>> groups;
   for (int v = 0; v < grid_.levels(); ++v) {
@@ -73,6 +74,10 @@ void NodeTree::read_nodes(const BrickSource& source, int v, Box3 nodes) {
         summary(table, blocks_of(grid_.samples({v, p}), blocks), blocks_in({v, p}));
     if (v > 0) read_parts(table, {v, p}, blocks);
   });
+  constexpr Index per_node = kNodeEdge / kBlockEdge;
+  if (v == 0)
+    thin_structure_->include(table,
+                             intersect({nodes.lo * per_node, nodes.hi * per_node}, table.box));
 }
 
 double NodeTree::part(const Node& node, double value) {
@@ -173,7 +178,7 @@ std::uint64_t NodeTree::bytes() const {
   std::uint64_t bytes = 0;
   for (const auto& level : nodes_) bytes += level.capacity() * sizeof(Node);
   for (const auto& level : parts_) bytes += level.capacity() * sizeof(ValueRange<float>);
-  return bytes;
+  return bytes + thin_structure_->bytes();
 }
 
 }  // namespace isobrick

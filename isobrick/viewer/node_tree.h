@@ -10,6 +10,7 @@
 #include "isobrick/core/range.h"
 #include "isobrick/stream/brick_source.h"
 #include "isobrick/viewer/node_grid.h"
+#include "isobrick/viewer/thin_structure.h"
 
 namespace isobrick {
 
@@ -34,6 +35,8 @@ class NodeTree {
   /// Whether a finer level crosses the isovalue within a part of the node, a 64th (of level 1: an
   /// eighth), where the node's own field does not: thin structure that averaging has removed.
   bool loses(const NodeKey& n, double isovalue) const;
+  /// The same within smaller parts, once somebody has read the samples that it takes.
+  ThinStructure& thin_structure() const { return *thin_structure_; }
 
   /// About how many of the node's blocks of 16³ cells are active (never fewer
   /// than there are).
@@ -72,6 +75,7 @@ class NodeTree {
   std::vector<std::vector<Node>> nodes_;  ///< by level, x fastest
   /// By level, from 1 on: the range of its field within each node of parts_level().
   std::vector<std::vector<ValueRange<float>>> parts_;
+  const std::unique_ptr<ThinStructure> thin_structure_;
 };
 
 }  // namespace isobrick

@@ -131,6 +131,11 @@ void RequestQueue::close() {
   change_.notify_all();
 }
 
+bool RequestQueue::closed() const {
+  const MutexLock lock(mutex_);
+  return closed_;
+}
+
 bool RequestQueue::wait_until_unused(Time deadline) const {
   const MutexLock lock(mutex_);
   while (!running_.empty())

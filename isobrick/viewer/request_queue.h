@@ -48,6 +48,7 @@ class RequestQueue {
 
   /// Cancels everything. From now on the queue takes and gives nothing.
   void close();
+  bool closed() const;
   /// Waits until nothing is being made.
   bool wait_until_unused(Time deadline) const;
 

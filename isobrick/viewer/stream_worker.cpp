@@ -18,6 +18,18 @@ NodeMesh empty_mesh(const MeshJob& job) {
   return mesh;
 }
 
+/// For what no request stands for.
+class UntilClosed final : public Wanted {
+ public:
+  explicit UntilClosed(const RequestQueue& queue) : queue_(queue) {}
+  void check() const override {
+    if (queue_.closed()) throw Abandoned();
+  }
+
+ private:
+  const RequestQueue& queue_;
+};
+
 /// Gets what a device has made, on the device's thread.
 void receive(StreamState& state, const RequestQueue::RequestPtr& request, NodeMesh&& mesh,
              const std::string& failure, std::shared_ptr<DeviceMesher> by) {
@@ -47,6 +59,16 @@ void StreamWorker::run() {
       make_slice(request);
     else
       make_mesh(request);
+    find_thin_structure();
+  }
+}
+
+/// Once there is something to see: most of the bricks are there then.
+void StreamWorker::find_thin_structure() {
+  try {
+    if (state_->tree->thin_structure().read(state_->bricks, UntilClosed(state_->queue)))
+      state_->notify_change();
+  } catch (const Abandoned&) {
   }
 }
 

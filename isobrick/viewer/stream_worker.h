@@ -21,6 +21,7 @@ class StreamWorker {
   void make_mesh(const RequestPtr& request);
   void make_slice(const RequestPtr& request);
   void prefetch_bricks();
+  void find_thin_structure();
   std::optional<NodeMesh> mesh_of(const RequestPtr& request);
   bool send(const GridView& grid, const RequestPtr& request);
   void plan_if_late();

@@ -297,7 +297,7 @@ class LargeBall final : public BrickSource {
 TEST(LargeCut, TakesMilliseconds) {
   const LargeBall source;
   const NodeTree tree(source);
-  EXPECT_LT(tree.bytes(), 2u << 20);
+  EXPECT_LT(tree.bytes(), 3u << 20);
   CutSelector selector(tree);
   const ActiveNodes active = active_of(tree, std::vector<double>{0});
   double best = 1e9;
