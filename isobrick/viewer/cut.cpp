@@ -33,18 +33,55 @@ class Candidates {
  public:
   void push(const Candidate& candidate, bool loses) { (loses ? losing_ : others_).push(candidate); }
   bool empty() const { return losing_.empty() && others_.empty(); }
+  struct Next {
+    NodeKey key;
+    bool thin;  ///< loses thin structure
+  };
   /// `thin_first`: one that loses thin structure, if there is any.
-  NodeKey pop(bool thin_first) {
+  Next pop(bool thin_first) {
     const bool thin =
         !losing_.empty() && (thin_first || others_.empty() || others_.top() < losing_.top());
     auto& queue = thin ? losing_ : others_;
     const NodeKey key = queue.top().key;
     queue.pop();
-    return key;
+    return {key, thin};
   }
 
  private:
   std::priority_queue<Candidate> losing_, others_;
+};
+
+/// How many triangles a cut may have, and has so far. What thin structure takes beyond the budget
+/// leaves a part of the budget to all else.
+class Allowance {
+ public:
+  explicit Allowance(const CutBudget& budget)
+      : most_(bounded(budget.triangles, budget)),
+        hard_(std::max(most_, bounded(budget.thin_triangles, budget))) {}
+
+  double used() const { return used_; }
+  /// Whether thin structure may take more than the budget.
+  bool stretches() const { return hard_ > most_; }
+  /// Whether nodes that lose thin structure come before all others.
+  bool thin_first() const { return used_ < hard_ - kOtherPart * most_; }
+  bool fits(double more, bool thin) const {
+    const double after = used_ + more, rest = kOtherPart * most_ - std::max(others_, 0.0);
+    if (after <= most_) return true;
+    return thin ? after <= hard_ - std::max(rest, 0.0) : after <= hard_ && more <= rest;
+  }
+  void take(double more, bool thin) {
+    used_ += more;
+    if (!thin) others_ += more;
+  }
+
+ private:
+  static constexpr double kOtherPart = 1 - kThinPart;
+  static double bounded(std::uint64_t triangles, const CutBudget& budget) {
+    return static_cast<double>(std::min(triangles, budget.mesh_bytes / kBytesPerTriangle));
+  }
+
+  double most_, hard_;
+  double used_ = 0, others_ = 0;  ///< the latter for what loses nothing
 };
 
 constexpr int kAround = 27;  ///< a node and its neighbours; bit (z + 1) · 9 + (y + 1) · 3 + x + 1
@@ -91,10 +128,13 @@ double CutSelector::urgency(const NodeKey& n, const NodeSight& sight, const Acti
   return sight.pixels * (before ? kHysteresis : 1);
 }
 
-bool CutSelector::loses(const NodeKey& n, const ActiveNodes& active) const {
+bool CutSelector::loses(const NodeKey& n, const ActiveNodes& active,
+                        const CutBudget& budget) const {
   const std::vector<double>& isovalues = active.isovalues();
-  return std::any_of(isovalues.begin(), isovalues.end(),
-                     [&](double iso) { return tree_.loses(n, iso); });
+  return std::any_of(isovalues.begin(), isovalues.end(), [&](double iso) {
+    return tree_.loses(n, iso) ||
+           (budget.thin_triangles > 0 && tree_.thin_structure().lost(n, iso));
+  });
 }
 
 double CutSelector::triangles(const NodeKey& n, const NodeView& view,
@@ -146,43 +186,49 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   std::swap(refined_, before_);
   refined_.clear();
   Candidates queue;
-  const double most =
-      static_cast<double>(std::min(budget.triangles, budget.mesh_bytes / kBytesPerTriangle));
-  double used = 0;
+  Allowance allowance(budget);
+  const double least_error = budget.thin_triangles > 0
+                                 ? std::min(view.pixel_error, view.thin_pixel_error)
+                                 : view.pixel_error;
   const auto enter = [&](const NodeKey& n) {
     if (n.level <= view.finest_level) return;
     const double pixels = urgency(n, node_view.see(n), active);
-    if (pixels > view.pixel_error) queue.push({pixels, n}, loses(n, active));
+    if (pixels <= least_error) return;
+    const bool thin = loses(n, active, budget);
+    if (pixels > (thin ? least_error : view.pixel_error)) queue.push({pixels, n}, thin);
   };
   const int top = grid.levels() - 1;
   const Box3 top_nodes{{0, 0, 0}, grid.level(top).nodes};
   for_each_point(top_nodes, [&](Int3 p) {
-    used += triangles({top, p}, node_view, isovalues, budget.triangles_per_block);
+    allowance.take(triangles({top, p}, node_view, isovalues, budget.triangles_per_block), true);
     enter({top, p});
   });
 
   Cut cut;
   cut.isovalues = isovalues;
   std::vector<NodeKey> needed;
+  bool thin_first = true;
   for (int misfits = 0; misfits < kMaxMisfits && !queue.empty();) {
-    const NodeKey n = queue.pop(used < kThinPart * most);
+    const auto [n, thin] = queue.pop(thin_first && allowance.thin_first());
     if (refined_(n)) continue;
     needed.clear();
     collect(n, needed);
     for (const NodeKey& r : needed) wanted_(r) = 0;
     const double more = added_triangles(needed, node_view, isovalues, budget.triangles_per_block);
-    if (used + more > most) {
+    if (!allowance.fits(more, thin)) {
       cut.limited_by_budget = true;
+      // Those that do not fit must not keep all else from being refined.
+      if (thin && allowance.stretches()) thin_first = false;
       ++misfits;
       continue;
     }
-    used += more;
+    allowance.take(more, thin);
     for (const NodeKey& r : needed) {
       refined_(r) = 1;
       for_each_point(grid.children(r), [&](Int3 c) { enter({r.level - 1, c}); });
     }
   }
-  cut.triangles = static_cast<std::uint64_t>(std::max(used, 0.0));
+  cut.triangles = static_cast<std::uint64_t>(std::max(allowance.used(), 0.0));
   for_each_point(top_nodes, [&](Int3 p) { append({top, p}, 0, node_view, active, cut); });
   return cut;
 }

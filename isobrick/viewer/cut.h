@@ -15,6 +15,9 @@ namespace isobrick {
 /// times `triangles_per_block`; none where all of it is cut away.
 struct CutBudget {
   std::uint64_t triangles = 20'000'000;
+  /// A cut of more than `triangles` may have up to so many, where nodes need them that lose thin
+  /// structure: a coarse node may take less than its one surface of the next level.
+  std::uint64_t thin_triangles = 0;
   std::uint64_t mesh_bytes = std::uint64_t{2} << 30;
   double triangles_per_block = 600;
 
@@ -54,12 +57,13 @@ class CutSelector {
   /// The cut for a view: nodes are refined, the longest cells on the picture first,
   /// while these are longer than the view's pixel error, visible, and not without
   /// any surface (of active.isovalues()) below, and while the budget lasts. Up to half of the
-  /// budget goes first to nodes that lose thin structure (NodeTree::loses). A function of its
-  /// arguments and of the cut before.
+  /// budget goes first to nodes that lose thin structure (NodeTree::loses), and all of
+  /// `thin_triangles` but for the other half; then ThinStructure counts as well. A function of its
+  /// arguments, of the cut before, and of whether that is known.
   Cut select(const ActiveNodes& active, const View& view, const CutBudget& budget);
 
  private:
-  bool loses(const NodeKey& n, const ActiveNodes& active) const;
+  bool loses(const NodeKey& n, const ActiveNodes& active, const CutBudget& budget) const;
   double urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active);
   double triangles(const NodeKey& n, const NodeView& view, std::span<const double> isovalues,
                    double per_block) const;

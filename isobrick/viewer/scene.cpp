@@ -44,7 +44,7 @@ void Scene::update(const std::vector<double>& isovalues, const View& view,
   const double measured = stream_->counters().triangles_per_block;
   if (measured > 0 && std::abs(measured - triangles_per_block_) > 0.2 * triangles_per_block_)
     triangles_per_block_ = measured;
-  CutRequest request{isovalues, view, budget};
+  CutRequest request{isovalues, view, budget, tree_->thin_structure().known()};
   if (triangles_per_block_ > 0) request.budget.triangles_per_block = triangles_per_block_;
   const bool same = chosen_ == request;
   if (same && search_->found(isovalues)) return;

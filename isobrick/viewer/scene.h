@@ -60,6 +60,7 @@ class Scene {
     std::vector<double> isovalues;
     View view;
     CutBudget budget;
+    bool thin_known;  ///< ThinStructure::known()
     friend bool operator==(const CutRequest&, const CutRequest&) = default;
   };
 

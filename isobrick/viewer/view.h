@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -18,7 +19,9 @@ struct View {
   std::array<double, 16> view_projection{};
   int width = 1, height = 1;  ///< of the picture, pixels
   double pixel_error = 1.5;   ///< how long a cell's edge may be on the picture, pixels
-  int finest_level = 0;       ///< of a NodeGrid; no node of a finer one is shown
+  /// Where a preview loses thin structure, if that is shorter: for a picture that is shown larger.
+  double thin_pixel_error = std::numeric_limits<double>::infinity();
+  int finest_level = 0;  ///< of a NodeGrid; no node of a finer one is shown
   /// What is shown of the volume, in level-0 index space; nothing: all.
   std::optional<IndexBox> clip;
   std::vector<HalfSpace> planes;  ///< what lies within all of them is shown
