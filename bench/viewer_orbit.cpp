@@ -78,13 +78,15 @@ class Flight {
       Stopwatch watch;
       const double submitted =
           draw({.max_triangles = pacer_.max_triangles(),
-                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no},
+                .thin_triangles = pacer_.thin_triangles(),
+                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no,
+                .smaller = pacer_.smaller()},
                pacer_.smaller());
       const double seconds = watch.lap();
       const PictureState& state = picture_->state();
       pictures.push_back({seconds * 1e3, pacer_.max_triangles(), pacer_.smaller(), pacer_.plain(),
                           state.nodes, state.triangles, state.covers});
-      pacer_.drawn(seconds, state.triangles, state.limited);
+      pacer_.drawn(seconds, state.triangles, state.limited, state.thin);
       times.add(seconds, picture_->times(), seconds - submitted);
       spent += seconds;
     }

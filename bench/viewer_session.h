@@ -116,7 +116,7 @@ class Session {
     const double whole = std::max(seconds, picture_->picture_seconds());
     (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
     if (moving)
-      pacer_.drawn(whole, state.triangles, state.limited);
+      pacer_.drawn(whole, state.triangles, state.limited, state.thin);
     else if (!state.plain)
       pacer_.drawn_still(whole, state.triangles);
   }

@@ -10,10 +10,17 @@ namespace isobrick {
 /// preview that took longer makes the next one a step simpler, one that left a quarter of the
 /// limit makes it a step finer. The steps down are: no occlusion and multisampling, half the
 /// triangles, a smaller picture, and at last half the triangles again. Occlusion and multisampling
-/// come back with the next picture at rest that leaves time for them. Not thread-safe.
+/// come back with the next picture at rest that leaves time for them.
+///
+/// Thin structure that coarse levels have lost may take kThinTimes the limit: a preview in which it
+/// took longer makes the next one as small as can be, and if that does not help it gets fewer
+/// triangles, as many as the time lasts for. Not thread-safe.
 class FramePacer {
  public:
   static constexpr std::uint64_t kAllTriangles = std::numeric_limits<std::uint64_t>::max();
+  /// The most that previews may have for thin structure, and in how many times the limit.
+  static constexpr std::uint64_t kThinTriangles = 600'000;
+  static constexpr double kThinTimes = 4;
 
   /// `limit`: how long a picture may take while something moves, seconds.
   explicit FramePacer(double limit = kSoftwareLimit) : limit_(limit) {}
@@ -38,8 +45,10 @@ class FramePacer {
   }
 
   /// A preview that took `seconds` to draw as plain(), max_triangles() and smaller() returned.
-  /// `limited`: with more triangles it would be finer.
-  void drawn(double seconds, std::uint64_t triangles, bool limited) {
+  /// `limited`: with more triangles it would be finer. `thin`: it had more than max_triangles(),
+  /// for thin structure.
+  void drawn(double seconds, std::uint64_t triangles, bool limited, bool thin = false) {
+    pace_thin(seconds, static_cast<double>(triangles), limited, thin);
     if (seconds > limit_)
       simplify(std::min(triangles_, static_cast<double>(triangles)));
     else if (seconds < kFull * limit_)
@@ -52,6 +61,8 @@ class FramePacer {
   std::uint64_t max_triangles() const {
     return triangles_ < kUnlimited ? static_cast<std::uint64_t>(triangles_) : kAllTriangles;
   }
+  /// Of a preview that needs more than max_triangles() for thin structure.
+  std::uint64_t thin_triangles() const { return static_cast<std::uint64_t>(thin_triangles_); }
   /// Divisor of the picture's width and height while something moves. At rest: 1.
   int smaller() const { return smaller_; }
 
@@ -85,8 +96,22 @@ class FramePacer {
       triangles_ *= kGrowth;
   }
 
+  void pace_thin(double seconds, double triangles, bool limited, bool thin) {
+    const double most = kThinTimes * limit_;
+    const double fitting = triangles * kFull * most / seconds;
+    if (thin && seconds > most) {
+      if (smaller_ == kMaxSmaller) thin_triangles_ = std::max(fitting, kMinTriangles);
+      plain_ = true;
+      smaller_ = kMaxSmaller;
+    } else if (limited && fitting > thin_triangles_) {
+      thin_triangles_ =
+          std::min({fitting, kGrowth * thin_triangles_, static_cast<double>(kThinTriangles)});
+    }
+  }
+
   double limit_;
   double triangles_ = kUnlimited;
+  double thin_triangles_ = kThinTriangles;
   int smaller_ = 1;
   bool plain_ = false;
 };

@@ -59,9 +59,10 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
 PictureWay PictureWay::in_window(const FramePacer& pacer, bool software, bool moving) {
   PictureWay way{
       .max_triangles = moving ? pacer.max_triangles() : FramePacer::kAllTriangles,
+      .thin_triangles = moving ? pacer.thin_triangles() : 0,
       .piece_seconds = software ? kPieceSeconds : std::numeric_limits<double>::infinity(),
       .moving = moving,
-      .smaller = moving && pacer.smaller() > 1};
+      .smaller = moving ? pacer.smaller() : 1};
   // Nor should pictures that follow while meshes come in wait for a good one.
   if (pacer.plain()) way.plain = moving ? Plain::yes : Plain::until_complete;
   return way;
@@ -100,6 +101,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
     }
   View view = view_of(camera, width, height, settings.pixel_error);
   view.finest_level = finest_node_level(scene_->tree().grid(), settings.finest_level);
+  view.thin_pixel_error = view.pixel_error / way.smaller;
   const ShownBox box = shown_box(settings);
   if (!box.whole()) {
     const Vec3d last = last_sample(*store_);
@@ -108,6 +110,7 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
   view.planes = shown_half_spaces(settings);
   CutBudget budget;
   budget.triangles = std::min(budget.triangles, way.max_triangles);
+  budget.thin_triangles = way.thin_triangles;
   // What stands in until the cut is there takes room beside it.
   const std::uint64_t there =
       device_->turns() != nullptr ? DeviceMeshes::cache_bytes(device_->held()) : upload_memory();
@@ -280,6 +283,7 @@ void StorePicture::update_state(const Asked& asked) {
   // One that is no simpler than those at rest is not drawn again.
   if (!work_ && !asked.way.moving && !state_.plain) state_.moving = false;
   state_.limited = scene_->cut().limited_by_budget;
+  state_.thin = scene_->cut().triangles > asked.way.max_triangles;
   state_.limited_by_budget = state_.limited && asked.way.max_triangles == FramePacer::kAllTriangles;
   state_.covers = shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
   state_.more = imported_ || device_->more();

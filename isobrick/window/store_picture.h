@@ -42,6 +42,7 @@ struct PictureState {
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
   bool more = false;                ///< the next draw() has something to do, whatever comes
   bool limited = false;             ///< by PictureWay::max_triangles, or by memory
+  bool thin = false;                ///< more than PictureWay::max_triangles, for thin structure
   bool limited_by_budget = false;   ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
 };
@@ -49,6 +50,8 @@ struct PictureState {
 /// How a picture may be simpler than its settings say.
 struct PictureWay {
   std::uint64_t max_triangles = FramePacer::kAllTriangles;
+  /// So many where coarse levels have lost thin structure; see CutBudget.
+  std::uint64_t thin_triangles = 0;
   /// Without occlusion and multisampling; `until_complete`: unless nothing finer is to come. In
   /// software, which draws slowly, that is one picture later: first a plain one of all.
   enum class Plain : std::uint8_t { no, until_complete, yes } plain = Plain::no;
@@ -59,9 +62,9 @@ struct PictureWay {
   /// The view changes all the time: a picture that has been begun is finished all the same, unless
   /// there are much fewer triangles to draw by now.
   bool moving = false;
-  /// It is shown in something larger: box, axes and scale bar are drawn there, and as large as
-  /// always.
-  bool smaller = false;
+  /// Divisor of the width and height that it is shown with. Where it is more than 1, box, axes and
+  /// scale bar are drawn there, and as large as always.
+  int smaller = 1;
   /// Of the display: text, axes and lines are so much larger at least.
   float overlay_scale = 1;
   /// The same picture every time, whichever mesh came first. A device takes longer for it; in

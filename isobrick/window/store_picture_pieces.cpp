@@ -67,7 +67,7 @@ void StorePicture::begin_picture(const Asked& asked) {
   PictureSettings picture =
       picture_settings(settings, scene_->tree().grid().transform(), last_sample(*store_));
   picture.in_order = asked.way.in_order || setup_->software();
-  picture.overlays_later = asked.way.smaller;
+  picture.overlays_later = asked.way.smaller > 1;
   picture.overlay_scale = asked.way.overlay_scale;
   renderer().begin(asked.camera, asked.width, asked.height, picture);
   draw_surfaces(settings, picture, work_->state);

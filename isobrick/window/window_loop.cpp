@@ -195,7 +195,8 @@ void ViewerWindow::pace(double seconds) {
   if (!picture.drew()) return;
   state_.draw_seconds = std::max(seconds, picture.picture_seconds());
   if (picture.state().moving)
-    state_.pacer.drawn(state_.draw_seconds, picture.state().triangles, picture.state().limited);
+    state_.pacer.drawn(state_.draw_seconds, picture.state().triangles, picture.state().limited,
+                       picture.state().thin);
   else if (!picture.state().plain)
     state_.pacer.drawn_still(state_.draw_seconds, picture.state().triangles);
 }

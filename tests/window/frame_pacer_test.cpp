@@ -124,5 +124,65 @@ TEST(FramePacer, RefinesAgainWhereThereIsTime) {
   EXPECT_EQ(pacer.smaller(), 1);
 }
 
+/// Previews of a surface with thin structure that needs 200,000 triangles, and has as many where it
+/// may; a million take `seconds_per_million`.
+struct ThinPreviews {
+  FramePacer& pacer;
+  double pixels, seconds_per_million;
+  double seconds = 0;
+  bool thin = false;
+
+  void draw() {
+    constexpr std::uint64_t kNeeded = 200'000;
+    const double s = pacer.smaller();
+    thin = pacer.thin_triangles() >= kNeeded && pacer.max_triangles() < kNeeded;
+    const std::uint64_t most = std::max(pacer.max_triangles(), pacer.thin_triangles());
+    const std::uint64_t triangles = std::min(thin ? kNeeded : pacer.max_triangles(), most);
+    seconds = pixels / (s * s) + static_cast<double>(triangles) / 1e6 * seconds_per_million;
+    pacer.drawn(seconds, triangles, true, thin);
+  }
+};
+
+TEST(FramePacer, ThePictureGivesWayBeforeThinStructure) {
+  FramePacer pacer = FramePacer::for_device(true);
+  ThinPreviews previews{pacer, 0.4, 0.6};
+  previews.draw();
+  EXPECT_GT(previews.seconds, 0.18);
+  for (int i = 0; i < 30; ++i) {
+    previews.draw();
+    EXPECT_TRUE(previews.thin) << i;
+    EXPECT_LE(previews.seconds, 0.18);
+  }
+  EXPECT_EQ(pacer.smaller(), 4);
+  EXPECT_EQ(pacer.thin_triangles(), FramePacer::kThinTriangles);
+}
+
+TEST(FramePacer, ThinStructureTakesFourTimesTheLimitAtMost) {
+  for (const double seconds_per_million : {0.5, 3.0, 10.0, 1000.0}) {
+    FramePacer pacer(0.045);
+    pacer.drawn_still(1, 20'000);
+    ThinPreviews previews{pacer, 0.1, seconds_per_million};
+    int long_ones = 0;
+    for (int i = 0; i < 100; ++i) {
+      previews.draw();
+      long_ones += previews.thin && previews.seconds > 4 * 0.045;
+    }
+    EXPECT_LE(long_ones, 2) << seconds_per_million;
+    EXPECT_EQ(previews.thin, seconds_per_million == 0.5) << "that much may be had in time";
+    EXPECT_LT(previews.seconds, 0.18 + 2e-3 * seconds_per_million);  // of the least triangles
+  }
+}
+
+TEST(FramePacer, ThinStructureComesBackWhereThereIsTime) {
+  FramePacer pacer = FramePacer::for_device(true);
+  ThinPreviews slow{pacer, 0.1, 5};
+  for (int i = 0; i < 10; ++i) slow.draw();
+  EXPECT_LT(pacer.thin_triangles(), 200'000u);
+  ThinPreviews quick{pacer, 0.01, 0.02};
+  for (int i = 0; i < 100; ++i) quick.draw();
+  EXPECT_GE(std::max(pacer.thin_triangles(), pacer.max_triangles()), 200'000u);
+  EXPECT_EQ(pacer.smaller(), 1);
+}
+
 }  // namespace
 }  // namespace isobrick
