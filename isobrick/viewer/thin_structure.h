@@ -14,12 +14,12 @@ namespace isobrick {
 class NodeSamples;
 
 /// Where coarse levels have lost what finer ones hold: thin structure that averaging, or leaving
-/// samples out, has removed. Known to within two cells of a level, for the levels of few samples,
-/// which are read for that: the ranges of their blocks span far too much.
+/// samples out, has removed. Known to within a few cells of a level, for the levels of few
+/// samples, which are read for that: the ranges of their blocks span far too much.
 ///
-/// A patch of a level is a box of two of its cells along each axis, of four where the level has
-/// more than kNodeEdge, or of a block of level 0 where that is larger. It is lost where level 0
-/// crosses the isovalue in it and the level itself does not even within a cell of it.
+/// A patch is two cells of a level along each axis, four where the level has more than kNodeEdge,
+/// and never less than a block of level 0. It is lost where level 0 crosses the isovalue in it and
+/// the level itself does not, even within a cell of it. Thread-safe.
 class ThinStructure {
  public:
   ThinStructure(const NodeGrid& grid, const StoreInfo& info);

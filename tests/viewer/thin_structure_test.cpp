@@ -132,13 +132,18 @@ TEST(ThinStructure, LeavesAPartOfTheBudgetToAllElse) {
   };
   Volume volume(+field);
   volume.tree.thin_structure().read(volume.bricks, Always());
-  const auto plane = [&](std::uint64_t thin_triangles) {
-    int fine = 0;
-    for (const CutNode& node : preview(volume.tree, 800'000, thin_triangles).nodes)
-      fine += node.key.level == 0 && node.key.node.z == 0;
-    return fine;
+  // Blocks of the cut that the plane crosses.
+  const auto plane = [&](std::uint64_t triangles, std::uint64_t thin_triangles) {
+    int blocks = 0;
+    for (const CutNode& node : preview(volume.tree, triangles, thin_triangles).nodes)
+      if (volume.tree.grid().box(node.key).lo.z < 40)
+        blocks += volume.tree.active_blocks(node.key, kIsovalue);
+    return blocks;
   };
-  EXPECT_GT(plane(1'000'000), 0);
+  const int finest = plane(10'000'000, 0);
+  EXPECT_GT(finest, plane(10'000, 0));
+  for (const std::uint64_t budget : {400'000, 600'000, 800'000})  // half of it is enough
+    EXPECT_EQ(plane(budget, 1'000'000), finest) << budget;
 }
 
 TEST(ThinStructure, WhatCannotBeReadCountsAsThere) {
