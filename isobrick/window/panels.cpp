@@ -251,7 +251,7 @@ void status_panel(ViewerState& state) {
                    state.frame_seconds > 0 ? 1 / state.frame_seconds : 0,
                    state.draw_seconds * 1e3));
   if (p.moving && p.limited)
-    text(fmt::format("preview: {} triangles at most, 1/{} of the size", state.pacer.max_triangles(),
+    text(fmt::format("preview: about {} triangles, 1/{} of the size", state.pacer.max_triangles(),
                      state.pacer.smaller()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
