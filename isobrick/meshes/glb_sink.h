@@ -21,9 +21,9 @@ struct GlbOptions {
 };
 
 /// Writes a welded mesh as binary glTF 2.0, coordinates in world units as they
-/// are; see GlbVertices for their unit. One primitive in one file; beyond GlbOptions::file_bytes one primitive a
-/// part, with a buffer each in the folder `path`.parts, vertices that several
-/// parts name repeated in each. A mesh without triangles is an empty scene.
+/// are; see GlbVertices for their unit. One primitive in one file; beyond GlbOptions::file_bytes
+/// one primitive a part, with a buffer each in the folder `path`.parts, vertices that several parts
+/// name repeated in each. A mesh without triangles is an empty scene.
 class GlbSink final : public PartedMeshSink {
  public:
   /// See PartedOutput for what `path` and `force` may throw.

@@ -7,8 +7,8 @@
 
 #include "isobrick/bricks/brick_checksums.h"
 #include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/store_reader.h"
 #include "isobrick/bricks/range_format.h"
+#include "isobrick/bricks/store_reader.h"
 #include "isobrick/core/error.h"
 #include "isobrick/pipeline/downsample.h"
 #include "isobrick/pipeline/program_memory.h"

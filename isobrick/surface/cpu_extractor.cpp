@@ -48,8 +48,9 @@ struct CpuExtractor::Impl {
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
     options.may_have_nan = o.may_have_nan && is_floating(l.type);
     options.drop_degenerate = o.drop_degenerate && has_ties(l.type, o.isovalue);
-    context = {o.isovalue, world_map(o.transform, o.inside), o.normals, options.may_have_nan, l.extent,
-               options.roi};
+    context = {o.isovalue, world_map(o.transform, o.inside),
+               o.normals,  options.may_have_nan,
+               l.extent,   options.roi};
     first_tile = tile_of(options.roi.lo);
   }
 

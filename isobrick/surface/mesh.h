@@ -52,7 +52,7 @@ struct MeshHeader {
   Vec3d world_lo, world_hi;  ///< bounds of the volume (not of the mesh) in world space
   /// Bounds of the blocks that the surface passes through, within the region; nothing: not known.
   std::optional<MeshBounds> surface = {};
-  std::string unit = {};     ///< of all coordinates, as unit_name() has it; empty: unknown
+  std::string unit = {};  ///< of all coordinates, as unit_name() has it; empty: unknown
 };
 
 /// Takes a mesh chunk by chunk. Calls come from one thread at a time, in order.
