@@ -1,0 +1,18 @@
+# cmake -D CLANG_FORMAT=… -D ROOT=… -P check_format.cmake
+# Names every place in our sources that clang-format would lay out differently.
+set(files)
+foreach(folder isobrick tools tests bench)
+  foreach(extension h cpp cu cuh inc)
+    file(GLOB_RECURSE found ${ROOT}/${folder}/*.${extension})
+    list(FILTER found EXCLUDE REGEX /node_modules/)
+    list(APPEND files ${found})
+  endforeach()
+endforeach()
+list(LENGTH files count)
+if(count LESS 500)
+  message(FATAL_ERROR "only ${count} sources below ${ROOT}")
+endif()
+execute_process(COMMAND ${CLANG_FORMAT} --dry-run --Werror ${files} RESULT_VARIABLE result)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "run: clang-format-14 -i FILE")
+endif()
