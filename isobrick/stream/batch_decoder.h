@@ -34,7 +34,12 @@ class DecodedBatch final : public BrickLookup {
   DecodedBatch& operator=(const DecodedBatch&) = delete;
   ~DecodedBatch() override;
 
+  /// That any isovalue touches.
   std::span<const TileWork> tiles() const { return batch_.tiles; }
+  /// Those that an isovalue of the planner's stream touches.
+  std::span<const TileWork> tiles_of(std::size_t isovalue) const {
+    return batch_.tiles_of[isovalue];
+  }
   const std::byte* find(Int3 brick) const override;
 
  private:

@@ -11,18 +11,30 @@ class RangeSearch final : public BlockSearch {
  public:
   RangeSearch(const StoreReader& store, int level) : store_(store), level_(level) {}
 
-  void append_tiles(Int3 chunk, Box3 box, double isovalue, std::vector<TileWork>& tiles) override {
+  void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
+                    std::span<std::vector<TileWork>> tiles) override {
+    const RangeTable table = read(chunk);
+    for (std::size_t i = 0; i < isovalues.size(); ++i)
+      append_tiles(table, box, isovalues[i], tiles[i]);
+  }
+  std::uint64_t range_bytes() const override { return bytes_read_; }
+
+  /// The ranges of a chunk's blocks.
+  RangeTable read(Int3 chunk) {
     const Lattice& lattice = store_.info().levels[static_cast<std::size_t>(level_)].lattice;
     constexpr Int3 edge{StoreReader::kRangeChunk, StoreReader::kRangeChunk,
                         StoreReader::kRangeChunk};
-    const RangeTable table = store_.block_ranges(
+    RangeTable table = store_.block_ranges(
         level_,
         intersect({chunk * edge, (chunk + Int3{1, 1, 1}) * edge}, {{0, 0, 0}, lattice.blocks()}));
     bytes_read_ += table.bytes_read;
+    return table;
+  }
+  static void append_tiles(const RangeTable& table, Box3 box, double isovalue,
+                           std::vector<TileWork>& tiles) {
     append_active_tiles<double>(table.box, table.ranges, isovalue, tiles);
     std::erase_if(tiles, [&](const TileWork& work) { return !box.contains(work.tile); });
   }
-  std::uint64_t range_bytes() const override { return bytes_read_; }
 
  private:
   const StoreReader& store_;
@@ -37,9 +49,14 @@ class FewSearch final : public BlockSearch {
   FewSearch(const StoreReader& store, int level, IndexKind kind)
       : ranges_(store, level), index_(store, level, kind) {}
 
-  void append_tiles(Int3 chunk, Box3 box, double isovalue, std::vector<TileWork>& tiles) override {
-    if (!index_.append_tiles_if_few(chunk, box, isovalue, kFew, tiles))
-      ranges_.append_tiles(chunk, box, isovalue, tiles);
+  void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
+                    std::span<std::vector<TileWork>> tiles) override {
+    std::optional<RangeTable> table;  // read once, for all isovalues that need it
+    for (std::size_t i = 0; i < isovalues.size(); ++i) {
+      if (index_.append_tiles_if_few(chunk, box, isovalues[i], kFew, tiles[i])) continue;
+      if (!table) table = ranges_.read(chunk);
+      RangeSearch::append_tiles(*table, box, isovalues[i], tiles[i]);
+    }
   }
   std::uint64_t range_bytes() const override { return ranges_.range_bytes(); }
   std::uint64_t index_bytes() const override { return index_.index_bytes(); }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
@@ -25,8 +26,9 @@ class BlockSearch {
 
   /// Appends the tiles of a range chunk that lie in `box` (in tiles) and have an
   /// active block, in Morton order. Blocks without an active cell may be among them.
-  virtual void append_tiles(Int3 chunk, Box3 box, double isovalue,
-                            std::vector<TileWork>& tiles) = 0;
+  /// `tiles` has a list for each isovalue.
+  virtual void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
+                            std::span<std::vector<TileWork>> tiles) = 0;
 
   /// Bytes read from disk so far: of ranges, which StoreReader::bytes_read()
   /// counts as well, and of an index.

@@ -156,8 +156,10 @@ std::uint64_t IndexSearch::with_cell_less_blocks(std::uint64_t blocks, Int3 bric
   return blocks;
 }
 
-void IndexSearch::append_tiles(Int3 c, Box3 box, double isovalue, std::vector<TileWork>& tiles) {
-  append_tiles_if_few(c, box, isovalue, 1, tiles);
+void IndexSearch::append_tiles(Int3 c, Box3 box, std::span<const double> isovalues,
+                               std::span<std::vector<TileWork>> tiles) {
+  for (std::size_t i = 0; i < isovalues.size(); ++i)
+    append_tiles_if_few(c, box, isovalues[i], 1, tiles[i]);
 }
 
 bool IndexSearch::append_tiles_if_few(Int3 c, Box3 box, double isovalue, double few,

@@ -31,10 +31,11 @@ class IndexSearch final : public BlockSearch {
  public:
   IndexSearch(const StoreReader& store, int level, IndexKind kind);
 
-  void append_tiles(Int3 chunk, Box3 box, double isovalue, std::vector<TileWork>& tiles) override;
+  void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
+                    std::span<std::vector<TileWork>> tiles) override;
   std::uint64_t index_bytes() const override { return bytes_read_; }
 
-  /// The same, unless more than `few` of the chunk's index bricks are active, as a
+  /// The same for one isovalue, unless more than `few` of the chunk's index bricks are active, as a
   /// fraction: then nothing is appended and it returns false.
   bool append_tiles_if_few(Int3 chunk, Box3 box, double isovalue, double few,
                            std::vector<TileWork>& tiles);

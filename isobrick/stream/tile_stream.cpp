@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "isobrick/core/flat_map.h"
 #include "isobrick/core/morton.h"
@@ -23,8 +24,11 @@ void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index re
 
 }  // namespace
 
-TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by)
-    : search_(make_block_search(store, level, by)), isovalue_(isovalue) {
+TileStream::TileStream(const StoreReader& store, int level, std::vector<double> isovalues, Box3 roi,
+                       SearchBy by)
+    : search_(make_block_search(store, level, by)),
+      isovalues_(std::move(isovalues)),
+      tiles_of_(isovalues_.size()) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Box3 samples = intersect(roi, lattice.box());
   // The last sample along an axis begins no cell.
@@ -41,11 +45,39 @@ TileStream::TileStream(const StoreReader& store, int level, double isovalue, Box
 bool TileStream::load_next_chunk() {
   if (next_chunk_ == chunks_.size()) return false;
   const auto start = std::chrono::steady_clock::now();
-  tiles_.clear();
-  next_tile_ = 0;
-  search_->append_tiles(chunks_[next_chunk_++], roi_tiles_, isovalue_, tiles_);
+  for (std::vector<TileWork>& tiles : tiles_of_) tiles.clear();
+  search_->append_tiles(chunks_[next_chunk_++], roi_tiles_, isovalues_, tiles_of_);
+  merge();
   seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return true;
+}
+
+/// Of the tiles that come next in the lists, the Morton-first is always the next one.
+void TileStream::merge() {
+  tiles_.clear();
+  blocks_.clear();
+  next_tile_ = 0;
+  std::vector<std::size_t> next(tiles_of_.size(), 0);
+  for (;;) {
+    std::uint64_t first = ~std::uint64_t{0};
+    TileWork tile;
+    for (std::size_t i = 0; i < tiles_of_.size(); ++i) {
+      if (next[i] == tiles_of_[i].size()) continue;
+      const Int3 candidate = tiles_of_[i][next[i]].tile;
+      if (const std::uint64_t code = morton_encode(candidate); code < first) {
+        first = code;
+        tile.tile = candidate;
+      }
+    }
+    if (first == ~std::uint64_t{0}) return;
+    for (std::size_t i = 0; i < tiles_of_.size(); ++i) {
+      const bool is_active =
+          next[i] < tiles_of_[i].size() && tiles_of_[i][next[i]].tile == tile.tile;
+      blocks_.push_back(is_active ? tiles_of_[i][next[i]++].active_blocks : std::uint8_t{0});
+      tile.active_blocks |= blocks_.back();
+    }
+    tiles_.push_back(tile);
+  }
 }
 
 void TileStream::begin() {
@@ -61,6 +93,7 @@ std::optional<TileWork> TileStream::next() {
 
 bool BatchPlanner::next(TileBatch& batch) {
   batch.tiles.clear();
+  batch.tiles_of.assign(stream_.isovalues(), {});
   batch.bricks.clear();
   FlatMap<char> needed(max_tiles_);
   std::vector<Int3> of_tile;
@@ -80,6 +113,9 @@ bool BatchPlanner::next(TileBatch& batch) {
       batch.bricks.push_back(b);
     }
     batch.tiles.push_back(*held_);
+    for (std::size_t i = 0; i < batch.tiles_of.size(); ++i)
+      if (const std::uint8_t blocks = stream_.blocks_of_each()[i])
+        batch.tiles_of[i].push_back({held_->tile, blocks});
     held_.reset();
   }
   return !batch.tiles.empty();

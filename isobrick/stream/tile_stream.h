@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "isobrick/bricks/store_reader.h"
@@ -10,19 +12,27 @@
 
 namespace isobrick {
 
-/// The active tiles of a level in Morton order, found range chunk by range
-/// chunk: memory does not grow with the volume.
+/// The tiles of a level that are active at an isovalue, or at any of several, in Morton order.
+/// They are found range chunk by range chunk: memory does not grow with the volume.
 class TileStream {
  public:
   /// Tiles without a cell in `roi` (samples) are left out. `by` says how
   /// they are found.
-  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by = {});
+  TileStream(const StoreReader& store, int level, std::vector<double> isovalues, Box3 roi,
+             SearchBy by = {});
+  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by = {})
+      : TileStream(store, level, std::vector<double>{isovalue}, roi, by) {}
 
   /// Looks for the first tiles in one range chunk, so that next() need not; where it has none,
   /// next() goes on.
   void begin();
-  /// The next tile, or nothing at the end.
+  /// The next tile with the blocks that any isovalue touches, or nothing at the end.
   std::optional<TileWork> next();
+  /// Of the last tile: TileWork::active_blocks for each isovalue.
+  std::span<const std::uint8_t> blocks_of_each() const {
+    return std::span(blocks_).subspan((next_tile_ - 1) * isovalues_.size(), isovalues_.size());
+  }
+  std::size_t isovalues() const { return isovalues_.size(); }
 
   /// What searching has cost so far.
   std::uint64_t range_bytes() const { return search_->range_bytes(); }
@@ -31,20 +41,24 @@ class TileStream {
 
  private:
   bool load_next_chunk();
+  void merge();
 
   std::unique_ptr<BlockSearch> search_;
-  double isovalue_;
+  std::vector<double> isovalues_;
   double seconds_ = 0;
   Box3 roi_tiles_;
   std::vector<Int3> chunks_;  ///< range chunks in Morton order
   std::size_t next_chunk_ = 0;
-  std::vector<TileWork> tiles_;
+  std::vector<std::vector<TileWork>> tiles_of_;  ///< of the chunk at hand, for each isovalue
+  std::vector<TileWork> tiles_;                  ///< of any of them
+  std::vector<std::uint8_t> blocks_;             ///< blocks_of_each() of every tile
   std::size_t next_tile_ = 0;
 };
 
 /// Tiles that are extracted together, and the bricks that must be resident for it.
 struct TileBatch {
-  std::vector<TileWork> tiles;
+  std::vector<TileWork> tiles;                  ///< that any isovalue touches
+  std::vector<std::vector<TileWork>> tiles_of;  ///< those that each isovalue touches
   std::vector<Int3> bricks;
 };
 
@@ -73,7 +87,7 @@ class BatchPlanner {
   Index reach_;
   bool whole_tiles_;
   std::size_t max_tiles_, max_bricks_;
-  std::optional<TileWork> held_;  ///< did not fit the batch before
+  std::optional<TileWork> held_;  ///< did not fit the batch before; the stream's last
 };
 
 }  // namespace isobrick
