@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "isobrick/core/error.h"
@@ -31,6 +32,9 @@ Index sample_reach(const SurfaceOptions& options) {
   return options.normals || options.may_have_nan || options.drop_degenerate ? 1 : 0;
 }
 
+TileWorkSpaces::TileWorkSpaces() = default;
+TileWorkSpaces::~TileWorkSpaces() = default;
+
 struct CpuExtractor::Impl {
   Lattice lattice;
   SurfaceOptions options;
@@ -38,11 +42,18 @@ struct CpuExtractor::Impl {
   KernelContext context;
   Int3 first_tile;
   BoundaryMap boundaries;
-  std::vector<std::unique_ptr<TileState>> states;
+  std::shared_ptr<TileWorkSpaces> spaces;
+  std::vector<std::unique_ptr<TileState>>& states;
   std::uint64_t vertices = 0, triangles = 0, degenerate = 0;
 
-  Impl(const Lattice& l, const SurfaceOptions& o, ExtractorLimits bounds)
-      : lattice(l), options(o), limits(bounds), boundaries(l.tiles()) {
+  Impl(const Lattice& l, const SurfaceOptions& o, ExtractorLimits bounds,
+       std::shared_ptr<TileWorkSpaces> work_spaces)
+      : lattice(l),
+        options(o),
+        limits(bounds),
+        boundaries(l.tiles()),
+        spaces(work_spaces ? std::move(work_spaces) : std::make_shared<TileWorkSpaces>()),
+        states(spaces->states_) {
     options.roi = intersect(o.roi, l.box());
     if (std::isnan(o.isovalue)) throw UsageError("the isovalue is not a number");
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
@@ -76,7 +87,9 @@ struct CpuExtractor::Impl {
     state.work = work;
     state.vertices = state.triangles = 0;
     state.cells.clear();
-    if (options.drop_degenerate && !state.ties) state.ties = std::make_unique<TileTies>();
+    // Another extractor may have left its own, or none.
+    if (options.drop_degenerate != (state.ties != nullptr))
+      state.ties = options.drop_degenerate ? std::make_unique<TileTies>() : nullptr;
     if (!shape_tile(state.shape, work.tile)) {
       state.clear_rows();
       if (state.ties) state.ties->clear();
@@ -171,14 +184,16 @@ struct CpuExtractor::Impl {
 };
 
 CpuExtractor::CpuExtractor(const Lattice& lattice, const SurfaceOptions& options,
-                           ExtractorLimits limits)
-    : impl_(std::make_unique<Impl>(lattice, options, limits)) {}
+                           ExtractorLimits limits, std::shared_ptr<TileWorkSpaces> spaces)
+    : impl_(std::make_unique<Impl>(lattice, options, limits, std::move(spaces))) {}
 CpuExtractor::~CpuExtractor() = default;
 
 void CpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                            MeshBuffer& out, const TakeMesh& take) {
   while (!tiles.empty()) {
-    const std::size_t batch = std::min(tiles.size(), impl_->limits.tiles);
+    // Parts of one size: a small last one would keep few threads busy.
+    const std::size_t parts = (tiles.size() + impl_->limits.tiles - 1) / impl_->limits.tiles;
+    const std::size_t batch = (tiles.size() + parts - 1) / parts;
     impl_->extract_batch(tiles.first(batch), bricks, out, take);
     tiles = tiles.subspan(batch);
   }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "isobrick/core/tile.h"
 #include "isobrick/surface/surface_options.h"
@@ -27,6 +28,22 @@ struct ExtractorLimits {
 /// empty one in its place). The chunk's first vertex comes along.
 using TakeMesh = std::function<void(MeshBuffer& mesh, std::uint64_t first_vertex)>;
 
+struct TileState;
+
+/// Work spaces for the tiles between two hand-offs. Extractors of one lattice may share them when
+/// no two work at the same time.
+class TileWorkSpaces {
+ public:
+  TileWorkSpaces();
+  ~TileWorkSpaces();
+  TileWorkSpaces(const TileWorkSpaces&) = delete;
+  TileWorkSpaces& operator=(const TileWorkSpaces&) = delete;
+
+ private:
+  friend class CpuExtractor;
+  std::vector<std::unique_ptr<TileState>> states_;
+};
+
 /// Marching cubes on the CPU: tiles in, indexed welded mesh out.
 ///
 /// Two passes over a batch of tiles, each in parallel over its tiles: the first
@@ -36,8 +53,10 @@ using TakeMesh = std::function<void(MeshBuffer& mesh, std::uint64_t first_vertex
 /// options, in Morton order of tiles.
 class CpuExtractor {
  public:
-  /// Throws UsageError when the isovalue is not a number or the roi is empty.
-  CpuExtractor(const Lattice& lattice, const SurfaceOptions& options, ExtractorLimits limits);
+  /// Has work spaces of its own where none are given. Throws UsageError when the isovalue is not
+  /// a number or the roi is empty.
+  CpuExtractor(const Lattice& lattice, const SurfaceOptions& options, ExtractorLimits limits,
+               std::shared_ptr<TileWorkSpaces> spaces = nullptr);
   ~CpuExtractor();
 
   /// Appends the surface in `tiles` to `out`, or hands it to `take` whenever the
