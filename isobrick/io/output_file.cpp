@@ -72,6 +72,14 @@ void FileWriter::finish() {
   // A network's file system may store only now, and say only to who closes that it could not.
   const int copy = duplicate(file_.fd()).release();
   if (copy < 0 || ::close(copy) != 0) fail(errno);
+  buffer_.reset();
+  capacity_ = 0;
+}
+
+void FileWriter::release() {
+  buffer_.reset();
+  capacity_ = used_ = 0;
+  written_ = 0;
 }
 
 void FileWriter::write_all(const std::byte* bytes, std::size_t size) {

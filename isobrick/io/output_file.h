@@ -37,8 +37,11 @@ class FileWriter {
   /// Forgets everything: the next byte is the first.
   void restart();
   void flush();
-  /// Flushes, and throws what file systems report only when a file is closed. Nothing follows.
+  /// Flushes, and throws what file systems report only when a file is closed. Nothing follows: the
+  /// buffer is freed.
   void finish();
+  /// Forgets a file that is not needed any more, and frees the buffer. Nothing follows.
+  void release();
 
   /// The same file once more, to be read or written at offsets. What is still in the buffer is not
   /// in it: flush() first. Appending and writing at offsets do not mix.

@@ -70,6 +70,7 @@ void GlbSink::finish() {
     finish_whole(whole);
   else
     finish_parts();
+  release_scratch();
   output().publish();
 }
 

@@ -105,6 +105,7 @@ void ObjSink::write(const MeshChunk& chunk) {
 
 void ObjSink::finish() {
   out_.writer().append_file(faces_);
+  faces_.release();
   out_.publish();
 }
 

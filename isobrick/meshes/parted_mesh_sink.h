@@ -51,6 +51,12 @@ class PartedMeshSink : public MeshSink {
   void for_each_triangle_run(const MeshPart& part,
                              const std::function<void(std::span<const Triangle>)>& take);
 
+  /// Frees what scratch files take of the memory. They are not needed any more.
+  void release_scratch() {
+    rows_.release();
+    triangles_.release();
+  }
+
  private:
   PartedOutput out_;
   FileWriter rows_, triangles_;  ///< scratch files of the whole mesh

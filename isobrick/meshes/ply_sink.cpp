@@ -67,6 +67,7 @@ void PlySink::write(const MeshChunk& chunk) {
 
 void PlySink::finish() {
   out_.writer().append_file(faces_);
+  faces_.release();
   out_.writer().patch(0, header_text());
   out_.publish();
 }

@@ -77,6 +77,8 @@ void VtpSink::finish() {
     out.append_file(triangles_);
   }
   append_vtp_end(out, layout_);
+  normals_.release();
+  triangles_.release();
   out_.publish();
 }
 
@@ -102,6 +104,7 @@ void PvtpSink::finish() {
   write_parts(kPartExtension,
               [this](FileWriter& out, const MeshPart& part) { write_part(out, part); });
   output().index().writer().append(index_text());
+  release_scratch();
   output().publish();
 }
 

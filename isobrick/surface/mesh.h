@@ -66,9 +66,10 @@ class MeshSink {
   /// The mesh is whole: only now may it appear under its final name.
   /// Not called after a failure; the destructor then removes what was written.
   virtual void finish() = 0;
-  /// Bytes written so far.
+  /// Bytes written so far, to scratch files as well; those of the mesh when it is finished.
   virtual std::uint64_t bytes() const = 0;
-  /// Bytes that it holds at most, beyond a few buffers of FileWriter::kBuffer.
+  /// Bytes that it holds at most from begin to finish, beyond a few buffers of FileWriter::kBuffer;
+  /// afterwards it holds none.
   virtual std::uint64_t memory() const { return 0; }
 };
 

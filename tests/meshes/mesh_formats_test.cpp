@@ -274,6 +274,21 @@ TEST(MeshFormats, AnEmptyMeshIsAFile) {
   }
 }
 
+TEST(MeshFormats, AFinishedSinkSaysHowLongTheMeshIs) {
+  const TempDir dir;
+  const Chunks chunks = make_chunks(700);
+  const auto expect_length = [&](MeshSink& sink, const std::string& name) {
+    write(sink, chunks, true);
+    EXPECT_EQ(sink.bytes(), dir.read(name).size()) << name;
+  };
+  ObjSink obj(dir / "a.obj", false);
+  expect_length(obj, "a.obj");
+  VtpSink vtp(dir / "a.vtp", false);
+  expect_length(vtp, "a.vtp");
+  GlbSink glb(dir / "a.glb", false);
+  expect_length(glb, "a.glb");
+}
+
 TEST(MeshFormats, ObjNumbersReadBackAsTheSameFloat) {
   const TempDir dir;
   Chunks chunks;

@@ -44,7 +44,7 @@ TEST(PlySink, ByteByByte) {
       sink.write(ball.chunk(static_cast<std::uint64_t>(i) * ball.positions.size(), normals));
     sink.finish();
     const std::string file = dir.read(name), header = header_of(file);
-    EXPECT_EQ(sink.bytes(), file.size() + copies * ball.triangles.size() * 13);
+    EXPECT_EQ(sink.bytes(), file.size()) << "scratch files are forgotten";
     EXPECT_TRUE(file.substr(header.size()) == expected_body(ball, normals, copies));
     EXPECT_TRUE(contains(
         header, "\nelement vertex " + std::to_string(copies * ball.positions.size()) + "\n"));
