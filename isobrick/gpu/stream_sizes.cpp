@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <optional>
 
 #include "isobrick/core/error.h"
 #include "isobrick/core/tile.h"
@@ -111,13 +110,37 @@ std::size_t bricks_ahead(const Lattice& lattice, const PoolSizes& pool) {
       kMinAhead, kMaxAhead));
 }
 
+std::uint64_t device_bytes_of(const Lattice& lattice, std::span<const StreamSizes> sizes) {
+  const std::uint64_t pool = sizes.front().pool.bricks * lattice.brick_bytes();
+  std::uint64_t bytes = pool;
+  for (const StreamSizes& s : sizes) bytes += s.device_bytes - pool;
+  return bytes;
+}
+
+std::uint64_t host_bytes_of(const Lattice& lattice, std::span<const StreamSizes> sizes) {
+  const std::uint64_t pool =
+      BrickPool::pinned_bytes(lattice.brick_bytes(), sizes.front().pool.threads);
+  std::uint64_t bytes = pool;
+  for (const StreamSizes& s : sizes) bytes += s.pinned_bytes - pool + s.host_bytes;
+  return bytes;
+}
+
 namespace {
 
-/// Launches beside a pool of at least 60 % of what is wanted.
-std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions& options,
-                                    std::uint64_t device_budget, std::uint64_t host_budget,
-                                    std::uint64_t other_host_bytes, PoolSizes wanted) {
-  if (wanted.bricks == 0 || lattice.brick_bytes() < kMinSentBytes) return std::nullopt;
+std::vector<StreamSizes> sizes_of_each(const Lattice& lattice,
+                                       std::span<const SurfaceOptions> surfaces,
+                                       std::uint32_t tiles, int in_flight, PoolSizes pool = {}) {
+  std::vector<StreamSizes> sizes;
+  for (const SurfaceOptions& options : surfaces)
+    sizes.push_back(stream_sizes(lattice, options, tiles, in_flight, pool));
+  return sizes;
+}
+
+/// Launches beside a pool of at least 60 % of what is wanted; none where they don't fit.
+std::vector<StreamSizes> fit_pool(const Lattice& lattice, std::span<const SurfaceOptions> surfaces,
+                                  std::uint64_t device_budget, std::uint64_t host_budget,
+                                  std::uint64_t other_host_bytes, PoolSizes wanted) {
+  if (wanted.bricks == 0 || lattice.brick_bytes() < kMinSentBytes) return {};
   const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
   for (std::uint64_t tiles = std::min<std::uint64_t>(kMaxTilesOfLaunch, all);
        tiles >= std::min<std::uint64_t>(kMinTilesWithPool, all); tiles /= 2)
@@ -125,26 +148,30 @@ std::optional<StreamSizes> fit_pool(const Lattice& lattice, const SurfaceOptions
       PoolSizes pool{1, wanted.threads};
       const auto count = static_cast<std::uint32_t>(tiles);
       const std::uint64_t launches =
-          stream_sizes(lattice, options, count, in_flight, pool).device_bytes;
+          device_bytes_of(lattice, sizes_of_each(lattice, surfaces, count, in_flight, pool));
       if (launches > device_budget) continue;
       pool.bricks = std::min(wanted.bricks, 1 + (device_budget - launches) / lattice.brick_bytes());
       if (10 * pool.bricks < 6 * wanted.bricks) continue;
-      const StreamSizes s = stream_sizes(lattice, options, count, in_flight, pool);
+      const auto sizes = sizes_of_each(lattice, surfaces, count, in_flight, pool);
       // Any tile's bricks must fit, however few bricks there are.
-      if (pool.bricks < s.tile_bricks) continue;
-      if (s.pinned_bytes + s.host_bytes + other_host_bytes <= host_budget) return s;
+      if (std::any_of(sizes.begin(), sizes.end(),
+                      [&](const StreamSizes& s) { return pool.bricks < s.tile_bricks; }))
+        continue;
+      if (host_bytes_of(lattice, sizes) + other_host_bytes <= host_budget) return sizes;
     }
-  return std::nullopt;
+  return {};
 }
 
 }  // namespace
 
-StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
-                             std::uint64_t device_budget, std::uint64_t host_budget,
-                             std::uint64_t other_host_bytes, PoolSizes wanted) {
-  if (const auto s =
-          fit_pool(lattice, options, device_budget, host_budget, other_host_bytes, wanted))
-    return *s;
+std::vector<StreamSizes> fit_stream_sizes(const Lattice& lattice,
+                                          std::span<const SurfaceOptions> surfaces,
+                                          std::uint64_t device_budget, std::uint64_t host_budget,
+                                          std::uint64_t other_host_bytes, PoolSizes wanted) {
+  if (auto sizes =
+          fit_pool(lattice, surfaces, device_budget, host_budget, other_host_bytes, wanted);
+      !sizes.empty())
+    return sizes;
   const auto all = static_cast<std::uint64_t>(volume(lattice.tiles()));
   auto tiles = static_cast<std::uint32_t>(std::min<std::uint64_t>(kMaxTilesOfLaunch, all));
   for (int in_flight = kMaxInFlight;; --in_flight) {
@@ -152,17 +179,25 @@ StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& optio
       in_flight = kMaxInFlight;
       tiles /= 2;
     }
-    const StreamSizes s = stream_sizes(lattice, options, tiles, in_flight);
-    const std::uint64_t own = s.pinned_bytes + s.host_bytes, host = own + other_host_bytes;
+    auto sizes = sizes_of_each(lattice, surfaces, tiles, in_flight);
+    const std::uint64_t device = device_bytes_of(lattice, sizes),
+                        own = host_bytes_of(lattice, sizes), host = own + other_host_bytes;
     const bool least = tiles == 1 && in_flight == kMinInFlight;
     // But for the least they leave half to the bricks.
     const std::uint64_t needed = least ? host : host + own;
-    if (s.device_bytes <= device_budget && needed <= host_budget) return s;
+    if (device <= device_budget && needed <= host_budget) return sizes;
     if (!least) continue;
-    if (s.device_bytes > device_budget)
-      throw UsageError(too_small("--gpu-memory", device_budget, s.device_bytes));
+    if (device > device_budget) throw UsageError(too_small("--gpu-memory", device_budget, device));
     throw UsageError(too_small("--memory", host_budget, host));
   }
+}
+
+StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
+                             std::uint64_t device_budget, std::uint64_t host_budget,
+                             std::uint64_t other_host_bytes, PoolSizes wanted) {
+  return fit_stream_sizes(lattice, std::span(&options, 1), device_budget, host_budget,
+                          other_host_bytes, wanted)
+      .front();
 }
 
 }  // namespace isobrick::gpu

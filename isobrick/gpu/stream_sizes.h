@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "isobrick/core/lattice.h"
@@ -63,5 +64,17 @@ std::size_t bricks_ahead(const Lattice& lattice, const PoolSizes& pool);
 StreamSizes fit_stream_sizes(const Lattice& lattice, const SurfaceOptions& options,
                              std::uint64_t device_budget, std::uint64_t host_budget,
                              std::uint64_t other_host_bytes, PoolSizes wanted = {});
+
+/// The same for extractions of several surfaces beside each other, which share the pool: the sizes
+/// of each, with launches of as many tiles.
+std::vector<StreamSizes> fit_stream_sizes(const Lattice& lattice,
+                                          std::span<const SurfaceOptions> surfaces,
+                                          std::uint64_t device_budget, std::uint64_t host_budget,
+                                          std::uint64_t other_host_bytes, PoolSizes wanted = {});
+
+/// Device memory of such extractions, their pool counted once.
+std::uint64_t device_bytes_of(const Lattice& lattice, std::span<const StreamSizes> sizes);
+/// Their host memory, pinned and other.
+std::uint64_t host_bytes_of(const Lattice& lattice, std::span<const StreamSizes> sizes);
 
 }  // namespace isobrick::gpu

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <functional>
+#include <memory>
 #include <numeric>
+#include <optional>
 
 #include "isobrick/core/error.h"
+#include "isobrick/core/morton.h"
 #include "isobrick/gpu/brick_pool.h"
 #include "isobrick/gpu/gpu_extractor.h"
 #include "isobrick/gpu/host_memory.h"
@@ -119,6 +122,23 @@ struct Streamed {
   gpu::StreamReport report;
 };
 
+/// Appends a chunk to a mesh whose vertices are numbered from its first, and lets it go.
+void take_chunk(MeshBuffer& mesh, Indexing indexing, const MeshChunk& chunk,
+                const std::function<void()>& release) {
+  EXPECT_EQ(chunk.first_vertex, mesh.positions.size());
+  append(mesh.positions, chunk.positions);
+  append(mesh.normals, chunk.normals);
+  const std::size_t before = mesh.triangles.size();
+  append(mesh.triangles, chunk.triangles);
+  if (indexing == Indexing::chunk_local)
+    for (std::size_t i = before; i < mesh.triangles.size(); ++i)
+      for (std::uint32_t& v : mesh.triangles[i]) {
+        EXPECT_LT(v, chunk.positions.size());
+        v += static_cast<std::uint32_t>(chunk.first_vertex);
+      }
+  release();
+}
+
 Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOptions& options,
                 std::span<const TileWork> tiles, const Way& way) {
   Streamed result;
@@ -131,18 +151,7 @@ Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOpt
     for (TileWork& tile : looked_at) tile.active_blocks = 0xff;
   const NeededBricks bricks(on_device, lattice, looked_at, sample_reach(options));
   const auto take = [&](const MeshChunk& chunk, const std::function<void()>& release) {
-    EXPECT_EQ(chunk.first_vertex, result.mesh.positions.size());
-    append(result.mesh.positions, chunk.positions);
-    append(result.mesh.normals, chunk.normals);
-    const std::size_t before = result.mesh.triangles.size();
-    append(result.mesh.triangles, chunk.triangles);
-    if (options.indexing == Indexing::chunk_local)
-      for (std::size_t i = before; i < result.mesh.triangles.size(); ++i)
-        for (std::uint32_t& v : result.mesh.triangles[i]) {
-          EXPECT_LT(v, chunk.positions.size());
-          v += static_cast<std::uint32_t>(chunk.first_vertex);
-        }
-    release();
+    take_chunk(result.mesh, options.indexing, chunk, release);
   };
   const gpu::StreamSizes sizes = gpu::stream_sizes(lattice, options, way.tiles, gpu::kMinInFlight,
                                                    pooled ? pooled->sizes() : gpu::PoolSizes{});
@@ -197,6 +206,72 @@ TYPED_TEST_SUITE(GpuStream, DeviceTypes);
 TYPED_TEST(GpuStream, SmoothFieldHoweverItIsCut) {
   compare(this->waves(kOdd), this->lowest() + 100.5, {}, kManyWays);
   compare(this->waves(kOdd), this->lowest() + 140, {}, {{5, 3, 64}});
+}
+
+/// One surface of several.
+struct Beside {
+  SurfaceOptions options;
+  std::vector<TileWork> tiles;
+  MeshBuffer mesh;
+  std::unique_ptr<gpu::GpuExtractor> extractor;
+};
+
+/// The next tiles of a surface whose codes are below `end`.
+std::span<const TileWork> take_tiles(std::span<const TileWork>& left, std::uint64_t end) {
+  std::size_t count = 0;
+  while (count < left.size() && morton_encode(left[count].tile) < end) ++count;
+  const auto taken = left.first(count);
+  left = left.subspan(count);
+  return taken;
+}
+
+/// As in a pass over a store: batch after batch, each surface's tiles of it in turn, from bricks
+/// that all of them read.
+TYPED_TEST(GpuStream, SeveralSurfacesReadTheSameBricks) {
+  const auto field = this->waves(kOdd);
+  const Lattice lattice{field.extent, {32, 32, 32}, scalar_type_of<TypeParam>};
+  const DenseBricks all(lattice, field.samples.data());
+  const double middle = this->lowest() + 100.5;
+  for (const bool pool : {false, true}) {
+    SCOPED_TRACE(pool ? "pool" : "host memory");
+    const DeviceBricks in_host_memory(all, lattice);
+    std::optional<PooledBricks> pooled;
+    if (pool) pooled.emplace(all, lattice);
+    const BrickLookup& bricks = pooled ? static_cast<const BrickLookup&>(*pooled) : in_host_memory;
+    std::vector<Beside> surfaces(3);
+    surfaces[0].options = {.isovalue = middle, .normals = true};
+    surfaces[1].options = surfaces[0].options;
+    surfaces[1].options.indexing = Indexing::chunk_local;
+    surfaces[2].options = {.isovalue = middle + 20};
+    for (Beside& s : surfaces) {
+      s.options.roi = lattice.box();
+      s.tiles = active_tiles(field, s.options.isovalue);
+      s.extractor = std::make_unique<gpu::GpuExtractor>(
+          0, lattice, s.options,
+          gpu::stream_sizes(lattice, s.options, 4, gpu::kMinInFlight,
+                            pooled ? pooled->sizes() : gpu::PoolSizes{}),
+          [&s](const MeshChunk& chunk, const std::function<void()>& release) {
+            take_chunk(s.mesh, s.options.indexing, chunk, release);
+          },
+          pooled ? pooled->pool() : nullptr);
+    }
+    std::vector<std::span<const TileWork>> left;
+    for (const Beside& s : surfaces) left.emplace_back(s.tiles);
+    for (std::uint64_t end = 6; left[0].size() + left[2].size() > 0; end += 6)
+      for (std::size_t i = 0; i < surfaces.size(); ++i)
+        surfaces[i].extractor->extract(take_tiles(left[i], end), bricks, in_host_memory.memory());
+    for (Beside& s : surfaces) s.extractor->finish();
+    EXPECT_EQ(in_host_memory.memory().use_count(), 1) << "samples are let go";
+    for (const std::size_t i : {0u, 2u})
+      expect_same(on_cpu(field, lattice, all, surfaces[i].options), surfaces[i].mesh);
+    EXPECT_EQ(surfaces[1].mesh.triangles.size(), surfaces[0].mesh.triangles.size());
+    const auto corner = [](const MeshBuffer& mesh, std::size_t triangle, std::size_t n) {
+      return mesh.positions[mesh.triangles[triangle][n]];
+    };
+    for (std::size_t i = 0; i < surfaces[0].mesh.triangles.size(); ++i)
+      for (std::size_t n = 0; n < 3; ++n)
+        ASSERT_EQ(corner(surfaces[1].mesh, i, n), corner(surfaces[0].mesh, i, n));
+  }
 }
 
 // The mesh of eight tiles of noise is larger than the output of such a launch.
