@@ -9,8 +9,10 @@ std::unique_ptr<MeshSink> open_preview(const std::string& path, bool force,
   return std::make_unique<PreviewSink>(path, force, options);
 }
 
-std::uint64_t preview_memory(const PreviewOptions& options) { return PreviewSink::memory(options); }
+std::uint64_t preview_memory(const PreviewOptions& options) {
+  return PreviewSink::memory_with(options);
+}
 
-std::uint64_t preview_driver_memory() { return Renderer::driver_memory(); }
+std::uint64_t preview_driver_memory() { return Renderer::driver_memory(0); }
 
 }  // namespace isobrick::tools

@@ -14,8 +14,8 @@ namespace isobrick::tools {
 std::unique_ptr<MeshSink> open_preview(const std::string& path, bool force,
                                        const PreviewOptions& options);
 
-/// What the sink takes of the memory while it draws, and of that what OpenGL's driver takes from
-/// when it is opened. Throw as open_preview does.
+/// MeshSink::memory() of such a sink, and what OpenGL's driver takes besides for all of them, from
+/// when the first is opened. Throw as open_preview does.
 std::uint64_t preview_memory(const PreviewOptions& options);
 std::uint64_t preview_driver_memory();
 

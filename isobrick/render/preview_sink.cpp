@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "isobrick/core/error.h"
@@ -39,21 +40,22 @@ class Current {
 
 PreviewSink::PreviewSink(std::string path, bool force, const PreviewOptions& options)
     : options_(checked(options)), out_(std::move(path), force) {
-  context_.release_current();
+  context_->release_current();
 }
 
 PreviewSink::~PreviewSink() {
-  const Current current(context_);
+  if (!context_) return;
+  const Current current(*context_);
   renderer_.reset();
 }
 
-std::uint64_t PreviewSink::memory(const PreviewOptions& options) {
+std::uint64_t PreviewSink::memory_with(const PreviewOptions& options) {
   // The batch, also on the way to the device, and the pixels on the way to the file.
   constexpr std::uint64_t batch = 2 * kBatch * (sizeof(Triangle) + 2 * 2 * sizeof(Vec3f));
   const auto pixels =
       static_cast<std::uint64_t>(options.width) * static_cast<std::uint64_t>(options.height);
-  return Renderer::driver_memory() + Renderer::memory(options.width, options.height, {}, false) +
-         pixels * (4 + 3 + 4) + batch;
+  return Renderer::driver_memory(1) - Renderer::driver_memory(0) +
+         Renderer::memory(options.width, options.height, {}, false) + pixels * (4 + 3 + 4) + batch;
 }
 
 void PreviewSink::begin(const MeshHeader& header) {
@@ -62,7 +64,7 @@ void PreviewSink::begin(const MeshHeader& header) {
 }
 
 void PreviewSink::begin_picture(const MeshBounds& frame) {
-  const Current current(context_);
+  const Current current(*context_);
   renderer_.emplace();
   const CameraRequest request{.up = options_.up, .from = options_.towards_eye};
   const double aspect = static_cast<double>(options_.width) / options_.height;
@@ -85,19 +87,38 @@ MeshBounds PreviewSink::bounds_of_batch() const {
 
 void PreviewSink::write(const MeshChunk& chunk) {
   // A batch has normals or has none.
-  const bool other_kind = !positions_.empty() && normals_.empty() != chunk.normals.empty();
-  if (other_kind || triangles_.size() + chunk.triangles.size() > kBatch) draw_batch();
+  if (!positions_.empty() && normals_.empty() != chunk.normals.empty()) draw_batch();
+  for (std::span<const Triangle> left = chunk.triangles; !left.empty();) {
+    if (triangles_.size() == kBatch) draw_batch();
+    const std::size_t count = std::min(left.size(), kBatch - triangles_.size());
+    add(chunk, left.first(count));
+    left = left.subspan(count);
+  }
+}
+
+/// Adds triangles of a chunk to the batch with the vertices between their first and their last.
+void PreviewSink::add(const MeshChunk& chunk, std::span<const Triangle> triangles) {
+  std::uint32_t lo = triangles.front()[0], hi = lo;
+  for (const Triangle& t : triangles) {
+    lo = std::min({lo, t[0], t[1], t[2]});
+    hi = std::max({hi, t[0], t[1], t[2]});
+  }
   const auto first = static_cast<std::uint32_t>(positions_.size());
-  for (const Vec3f& p : chunk.positions) positions_.push_back(to_float(to_double(p) - origin_));
-  normals_.insert(normals_.end(), chunk.normals.begin(), chunk.normals.end());
-  for (const Triangle& t : chunk.triangles)
-    triangles_.push_back({t[0] + first, t[1] + first, t[2] + first});
+  const std::size_t count = std::size_t{hi} - lo + 1;
+  for (const Vec3f& p : chunk.positions.subspan(lo, count))
+    positions_.push_back(to_float(to_double(p) - origin_));
+  if (!chunk.normals.empty()) {
+    const auto normals = chunk.normals.subspan(lo, count);
+    normals_.insert(normals_.end(), normals.begin(), normals.end());
+  }
+  for (const Triangle& t : triangles)
+    triangles_.push_back({t[0] - lo + first, t[1] - lo + first, t[2] - lo + first});
 }
 
 void PreviewSink::draw_batch() {
   if (triangles_.empty()) return;
   if (!renderer_) begin_picture(largest_);
-  const Current current(context_);
+  const Current current(*context_);
   renderer_->draw({0, positions_, normals_, triangles_}, {.colour = options_.colour}, origin_);
   positions_.clear();
   normals_.clear();
@@ -108,10 +129,16 @@ void PreviewSink::finish() {
   // Nothing was drawn so far: this batch is the mesh.
   if (!renderer_) begin_picture(bounds_of_batch());
   draw_batch();
-  const Current current(context_);
-  renderer_->end();
-  write_png(out_, options_.width, options_.height, without_alpha(renderer_->read_pixels()));
-  renderer_.reset();
+  {
+    const Current current(*context_);
+    renderer_->end();
+    write_png(out_, options_.width, options_.height, without_alpha(renderer_->read_pixels()));
+    renderer_.reset();
+  }
+  context_.reset();
+  positions_ = {};
+  normals_ = {};
+  triangles_ = {};
 }
 
 }  // namespace isobrick

@@ -30,7 +30,7 @@ float depth_of_front(const Camera& camera, std::uint32_t word) {
 
 /// Of Mesa's llvmpipe 66 MiB of libraries, some 12 of shaders and as many of triangles were
 /// measured.
-constexpr std::uint64_t kDriverMemory = std::uint64_t{100} << 20;
+constexpr std::uint64_t kLibraries = std::uint64_t{70} << 20, kOfRenderer = std::uint64_t{30} << 20;
 
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
 
@@ -212,7 +212,9 @@ std::uint64_t Renderer::memory(int width, int height, const PictureSettings& set
   return PictureTargets::bytes(width, height, samples_of(settings), settings.picking, transparent);
 }
 
-std::uint64_t Renderer::driver_memory() { return kDriverMemory; }
+std::uint64_t Renderer::driver_memory(int renderers) {
+  return kLibraries + static_cast<std::uint64_t>(renderers) * kOfRenderer;
+}
 
 void Renderer::begin(const Camera& camera, int width, int height, const PictureSettings& settings) {
   state_->start(camera, width, height, settings);

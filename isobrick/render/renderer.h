@@ -96,9 +96,10 @@ class Renderer {
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
 
-  /// What OpenGL takes of the host's memory beside pictures and meshes: the driver's libraries,
-  /// compiled shaders, and what a software driver keeps of the meshes that it is drawing.
-  static std::uint64_t driver_memory();
+  /// What OpenGL takes of the host's memory beside pictures and meshes, with so many renderers at a
+  /// time: the driver's libraries once, and for each renderer its compiled shaders and what a
+  /// software driver keeps of the meshes that it is drawing.
+  static std::uint64_t driver_memory(int renderers = 1);
 
   /// Draws a triangle as pictures of this size and with these settings are drawn, cut or not:
   /// drivers compile shaders, and get memory, when something is first drawn, and no picture waits

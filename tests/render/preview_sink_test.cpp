@@ -81,6 +81,28 @@ TEST(PreviewSink, TheNearestIsSeenWhateverTheOrder) {
   EXPECT_NE(one.rgb, draw({ball.chunk()}).rgb);
 }
 
+/// Also of a mesh of more triangles than are drawn at once, which is framed by the header's bounds.
+TEST(PreviewSink, HowAMeshIsDividedNeverShows) {
+  const MeshHeader header{.has_normals = true,
+                          .world_lo = {-1, -1, -1},
+                          .world_hi = {1, 1, 1},
+                          .surface = MeshBounds{{-0.9, -0.8, -0.7}, {0.6, 0.7, 0.8}}};
+  for (const std::uint32_t rings : {100u, 200u}) {  // 40,000 and 160,000 triangles
+    const TestMesh ball = make_ball({0.1f, 0.2f, 0}, 0.3f, rings);
+    const Picture whole = draw({ball.chunk()}, small(), header);
+    for (const std::size_t piece : {std::size_t{30011}, std::size_t{140000}}) {
+      std::vector<MeshChunk> pieces;
+      for (std::size_t first = 0; first < ball.triangles.size(); first += piece) {
+        MeshChunk chunk = ball.chunk();
+        chunk.triangles =
+            chunk.triangles.subspan(first, std::min(piece, ball.triangles.size() - first));
+        pieces.push_back(chunk);
+      }
+      EXPECT_EQ(draw(pieces, small(), header).rgb, whole.rgb) << rings << " rings, " << piece;
+    }
+  }
+}
+
 TEST(PreviewSink, BothSidesAreLitAlike) {
   TestMesh ball = make_ball({0, 0, 0}, 1, 60);
   const Picture outside = draw({ball.chunk()});
