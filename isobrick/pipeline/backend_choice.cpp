@@ -17,6 +17,17 @@ bool is_worth_it(const ExtractRequest& request, std::uint64_t active_blocks) {
          2 * kSecondsToSetUp;
 }
 
+/// Plans for as many of the first surfaces as the GPU has room for together; how many.
+std::size_t plan_gpu_pass(PassRequests requests, const ExtractOptions& options,
+                          std::uint64_t other_bytes, GpuSession& gpu, ExtractPlan& plan) {
+  for (std::size_t count = requests.size();; --count) try {
+      plan = plan_gpu_memory(requests.first(count), options, other_bytes, gpu);
+      return count;
+    } catch (const UsageError&) {
+      if (count == 1) throw;
+    }
+}
+
 }  // namespace
 
 bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
@@ -39,26 +50,32 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
   return wanted && devices > 0;
 }
 
-ChosenBackend set_up_backend(const ExtractRequest& request, const ExtractOptions& options,
-                             std::uint64_t active_bricks, std::uint64_t other_bytes, MeshSink& sink,
+ChosenBackend set_up_backend(PassRequests requests, const ExtractOptions& options,
+                             std::uint64_t other_bytes, std::span<MeshSink* const> sinks,
                              const OpenGpu& open, const BeginDecoding& begin) {
   ChosenBackend chosen;
   try {
     chosen.gpu = open();
     if (chosen.gpu) {
-      chosen.plan = plan_gpu_memory(request, options, active_bricks, other_bytes, *chosen.gpu);
-      chosen.decoded = begin(chosen.plan, *chosen.gpu);
-      chosen.surface = chosen.gpu->make_surface(request, sink);
+      const std::size_t count =
+          plan_gpu_pass(requests, options, other_bytes, *chosen.gpu, chosen.plan);
+      chosen.decoded = begin(requests.first(count), chosen.plan, *chosen.gpu);
+      for (std::size_t i = 0; i < count; ++i)
+        chosen.surfaces.push_back(chosen.gpu->make_surface(requests[i], i, *sinks[i]));
       return chosen;
     }
   } catch (const Error& e) {
     if (options.backend == Backend::cuda) throw;
     chosen.gpu_refusal = e.what();
+    chosen.surfaces.clear();
     chosen.decoded.reset();
     chosen.gpu.reset();
   }
-  chosen.plan = plan_memory(request, options.memory, active_bricks, other_bytes);
-  chosen.surface = make_cpu_surface(request, chosen.plan.limits, sink);
+  const std::size_t count = surfaces_of_pass(requests, options.memory, other_bytes);
+  chosen.plan = plan_memory(requests.first(count), options.memory, other_bytes);
+  const auto spaces = std::make_shared<TileWorkSpaces>();
+  for (std::size_t i = 0; i < count; ++i)
+    chosen.surfaces.push_back(make_cpu_surface(requests[i], chosen.plan.limits, spaces, *sinks[i]));
   return chosen;
 }
 

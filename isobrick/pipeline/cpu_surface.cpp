@@ -1,4 +1,5 @@
 #include <chrono>
+#include <utility>
 
 #include "isobrick/pipeline/chunk_writer.h"
 #include "isobrick/pipeline/surface_extractor.h"
@@ -9,8 +10,10 @@ namespace {
 
 class CpuSurface final : public SurfaceExtractor {
  public:
-  CpuSurface(const ExtractRequest& request, const ExtractorLimits& limits, MeshSink& sink)
-      : extractor_(request.level->lattice, request.surface, limits), writer_(sink) {}
+  CpuSurface(const ExtractRequest& request, const ExtractorLimits& limits,
+             std::shared_ptr<TileWorkSpaces> spaces, MeshSink& sink)
+      : extractor_(request.level->lattice, request.surface, limits, std::move(spaces)),
+        writer_(sink) {}
 
   void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                const std::shared_ptr<const void>&) override {
@@ -45,8 +48,10 @@ class CpuSurface final : public SurfaceExtractor {
 }  // namespace
 
 std::unique_ptr<SurfaceExtractor> make_cpu_surface(const ExtractRequest& request,
-                                                   const ExtractorLimits& limits, MeshSink& sink) {
-  return std::make_unique<CpuSurface>(request, limits, sink);
+                                                   const ExtractorLimits& limits,
+                                                   std::shared_ptr<TileWorkSpaces> spaces,
+                                                   MeshSink& sink) {
+  return std::make_unique<CpuSurface>(request, limits, std::move(spaces), sink);
 }
 
 }  // namespace isobrick

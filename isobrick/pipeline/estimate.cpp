@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "isobrick/pipeline/extract_plan.h"
@@ -83,21 +84,44 @@ class BrickSet {
   std::uint64_t size_ = 0;
 };
 
-/// Counts what is active and calls visit(TileWork) for every active tile, in order.
+/// What is active at each of several isovalues.
+class ActiveCounts {
+ public:
+  ActiveCounts(const ExtractRequest& request, std::size_t isovalues)
+      : parts_(isovalues), bricks_(isovalues, BrickSet(request.level->lattice)) {}
+
+  std::size_t isovalues() const { return parts_.size(); }
+  ActiveParts& parts(std::size_t i) { return parts_[i]; }
+  BrickSet& bricks(std::size_t i) { return bricks_[i]; }
+  std::vector<ActiveParts> counted() {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      parts_[i].bricks = bricks_[i].of();
+      parts_[i].active_bricks = bricks_[i].size();
+    }
+    return std::move(parts_);
+  }
+
+ private:
+  std::vector<ActiveParts> parts_;
+  std::vector<BrickSet> bricks_;
+};
+
+/// Counts what is active and calls visit(TileWork) for every tile that is active at any of the
+/// isovalues, in order.
 template <class F>
-ActiveParts visit_active(const StoreReader& store, const ExtractRequest& request,
-                         const ExtractOptions& options, F&& visit) {
-  ActiveParts parts;
-  BrickSet bricks(request.level->lattice);
-  TileStream tiles(store, options.level, options.isovalue, request.surface.roi, request.search);
+std::vector<ActiveParts> visit_active(const StoreReader& store, const ExtractRequest& request,
+                                      int level, std::span<const double> isovalues, F&& visit) {
+  ActiveCounts counts(request, isovalues.size());
+  TileStream tiles(store, level, {isovalues.begin(), isovalues.end()}, request.surface.roi,
+                   request.search);
   Workers workers(request.threads);  // an index is searched in parallel
   while (const auto work = workers.execute([&] { return tiles.next(); })) {
     visit(*work);
-    count_tile(request, *work, parts, [&](std::size_t brick) { bricks.add(brick); });
+    for (std::size_t i = 0; i < isovalues.size(); ++i)
+      count_tile(request, {work->tile, tiles.blocks_of_each()[i]}, counts.parts(i),
+                 [&](std::size_t brick) { counts.bricks(i).add(brick); });
   }
-  parts.bricks = bricks.of();
-  parts.active_bricks = bricks.size();
-  return parts;
+  return counts.counted();
 }
 
 /// The region's parts of the range chunks, each with the samples where its last cells end.
@@ -112,32 +136,49 @@ std::vector<Box3> range_chunks(const ExtractRequest& request) {
   return chunks;
 }
 
-/// Counts what is active by the ranges alone, several range chunks at a time.
-ActiveParts count_in_ranges(const StoreReader& store, const ExtractRequest& request,
-                            const ExtractOptions& options) {
+/// What is active in one range chunk.
+struct ChunkCount {
   ActiveParts parts;
-  BrickSet bricks(request.level->lattice);
+  std::vector<std::size_t> bricks;  ///< any of them more than once
+};
+
+std::vector<ChunkCount> count_in_chunk(const StoreReader& store, const ExtractRequest& request,
+                                       int level, std::span<const double> isovalues,
+                                       const Box3& chunk) {
+  std::vector<ChunkCount> counts(isovalues.size());
+  TileStream tiles(store, level, {isovalues.begin(), isovalues.end()}, chunk);
+  while (const auto work = tiles.next())
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      std::vector<std::size_t>& bricks = counts[i].bricks;
+      count_tile(request, {work->tile, tiles.blocks_of_each()[i]}, counts[i].parts,
+                 [&](std::size_t brick) {
+                   if (bricks.empty() || bricks.back() != brick) bricks.push_back(brick);
+                 });
+    }
+  return counts;
+}
+
+/// Counts what is active by the ranges alone, several range chunks at a time.
+std::vector<ActiveParts> count_in_ranges(const StoreReader& store, const ExtractRequest& request,
+                                         int level, std::span<const double> isovalues) {
+  ActiveCounts counts(request, isovalues.size());
   std::mutex adding;
   Workers workers(request.threads);
   workers.execute([&] {
     tbb::parallel_for_each(range_chunks(request), [&](const Box3& chunk) {
-      TileStream tiles(store, options.level, options.isovalue, chunk);
-      ActiveParts own;
-      std::vector<std::size_t> own_bricks;
-      while (const auto work = tiles.next())
-        count_tile(request, *work, own, [&](std::size_t brick) {
-          if (own_bricks.empty() || own_bricks.back() != brick) own_bricks.push_back(brick);
-        });
+      const auto of_chunk = count_in_chunk(store, request, level, isovalues, chunk);
       const std::lock_guard lock(adding);
-      parts.active_blocks += own.active_blocks;
-      parts.active_cells += own.active_cells;
-      parts.bounds = unite(parts.bounds, own.bounds);
-      for (const std::size_t brick : own_bricks) bricks.add(brick);
+      for (std::size_t i = 0; i < of_chunk.size(); ++i) {
+        const ActiveParts& own = of_chunk[i].parts;
+        ActiveParts& parts = counts.parts(i);
+        parts.active_blocks += own.active_blocks;
+        parts.active_cells += own.active_cells;
+        parts.bounds = unite(parts.bounds, own.bounds);
+        for (const std::size_t brick : of_chunk[i].bricks) counts.bricks(i).add(brick);
+      }
     });
   });
-  parts.bricks = bricks.of();
-  parts.active_bricks = bricks.size();
-  return parts;
+  return counts.counted();
 }
 
 /// The bricks in which a tile's 32³ samples lie. Its last layer of cells may
@@ -252,9 +293,14 @@ void scale(std::span<const Sampled> sampled, std::uint64_t cells, ExtractEstimat
 }  // namespace
 
 ActiveParts count_active(const StoreReader& store, const ExtractOptions& options) {
+  return count_active(store, options, std::span(&options.isovalue, 1)).front();
+}
+
+std::vector<ActiveParts> count_active(const StoreReader& store, const ExtractOptions& options,
+                                      std::span<const double> isovalues) {
   const ExtractRequest request = check_request(store, options, Indexing::welded);
-  if (!request.search.kind) return count_in_ranges(store, request, options);
-  return visit_active(store, request, options, [](const TileWork&) {});
+  if (!request.search.kind) return count_in_ranges(store, request, options.level, isovalues);
+  return visit_active(store, request, options.level, isovalues, [](const TileWork&) {});
 }
 
 MeshSize largest_mesh(const ActiveParts& active) {
@@ -265,12 +311,16 @@ MeshSize largest_mesh(const ActiveParts& active) {
 
 ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options,
                          std::uint64_t sink_bytes) {
-  const ExtractRequest request = check_request(store, options, Indexing::welded);
+  ExtractRequest request = check_request(store, options, Indexing::welded);
   TileSample sample(groups_to_sample(request.level->lattice));
   const ActiveParts parts =
-      visit_active(store, request, options, [&](const TileWork& work) { sample.add(work); });
-  const ExtractPlan plan = plan_memory(request, options.memory, parts.active_bricks,
-                                       sink_bytes + decode_extra(store.info(), request.threads));
+      visit_active(store, request, options.level, std::span(&options.isovalue, 1),
+                   [&](const TileWork& work) { sample.add(work); })
+          .front();
+  request.active_bricks = parts.active_bricks;
+  request.sink_bytes = sink_bytes;
+  const ExtractPlan plan =
+      plan_memory({&request, 1}, options.memory, decode_extra(store.info(), request.threads));
   ExtractEstimate result{.active = parts, .memory = plan.bytes};
   const std::vector<TileGroup> groups = sample.chosen();
   std::vector<TileWork> tiles;

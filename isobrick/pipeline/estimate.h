@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "isobrick/pipeline/extract.h"
 
@@ -17,6 +19,9 @@ struct ActiveParts {
 
 /// Throws as extract() does for options that make no sense.
 ActiveParts count_active(const StoreReader& store, const ExtractOptions& options);
+/// The same of each of several isovalues, instead of that of the options. Reads the ranges once.
+std::vector<ActiveParts> count_active(const StoreReader& store, const ExtractOptions& options,
+                                      std::span<const double> isovalues);
 
 /// What no mesh in these parts exceeds; real ones are mostly some ten times smaller.
 MeshSize largest_mesh(const ActiveParts& active);

@@ -2,37 +2,22 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <future>
 #include <utility>
 #include <vector>
 
 #include "isobrick/core/length_unit.h"
-#include "isobrick/core/morton.h"
 #include "isobrick/pipeline/backend_choice.h"
 #include "isobrick/pipeline/estimate.h"
+#include "isobrick/pipeline/extract_pass.h"
 #include "isobrick/pipeline/extract_plan.h"
 #include "isobrick/pipeline/extract_tiles.h"
+#include "isobrick/pipeline/seconds_sum.h"
 #include "isobrick/pipeline/workers.h"
-#include "isobrick/stream/brick_cache.h"
 
 namespace isobrick {
 namespace {
-
-/// Adds the time it lives to a sum of seconds.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& sum) : sum_(sum) {}
-  ~Stopwatch() {
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start_;
-    sum_ += took.count();
-  }
-
- private:
-  double& sum_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 /// World-space bounds of the samples from `first` to `last`.
 MeshBounds world_bounds(const Transform& transform, Int3 first, Int3 last) {
@@ -61,166 +46,179 @@ MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface,
   return header;
 }
 
-/// Called with the tiles that are done.
-using Done = std::function<void(std::span<const TileWork>)>;
-
-/// An extraction that is under way.
-struct Work {
-  const StoreReader& store;
-  const ExtractOptions& options;
-  const ExtractRequest& request;
-  const ExtractPlan& plan;
-  ExtractReport& report;
-  Done done;
+/// What becomes of a device and of the search for tiles while the active parts are counted.
+struct EarlyWork {
+  std::future<std::unique_ptr<GpuSession>> gpu;
+  std::future<TileStream> tiles;
 };
 
-/// Tiles whose bricks are there or on their way; none at the end.
-struct CpuBatch {
-  TileBatch batch;
-  std::unique_ptr<CachedBricks> bricks;
-};
+/// A device takes some tenths of a second to open: when it is known that there will be one, that
+/// goes on while the active parts are counted, and the first tiles are found.
+EarlyWork begin_early(const StoreReader& store, const ExtractOptions& options,
+                      PassRequests requests) {
+  EarlyWork early;
+  if (options.backend != Backend::cuda || !use_cuda(requests.front(), options, 0)) return early;
+  early.gpu = std::async(std::launch::async, open_gpu, options.device);
+  early.tiles = std::async(std::launch::async, [&store, level = options.level, requests] {
+    TileStream tiles = tiles_of(store, level, requests);
+    Workers(requests.front().threads).execute([&] { tiles.begin(); });
+    return tiles;
+  });
+  return early;
+}
 
-/// Hands the batches of an extraction out, and their bricks.
-class CpuBatches {
+/// The surfaces that extract() is asked for.
+class Extraction {
  public:
-  CpuBatches(const Work& work, BatchPlanner& planner)
-      : planner_(planner),
-        cache_(work.store, work.options.level, sample_reach(work.request.surface),
-               work.plan.cache_bricks) {
-    planner_.next(planned_);
+  Extraction(const StoreReader& store, const ExtractOptions& options,
+             std::span<const SurfaceOutput> outputs)
+      : store_(store), options_(options), reports_(outputs.size()) {
+    for (const SurfaceOutput& output : outputs) {
+      options_.isovalue = output.isovalue;
+      options_.normals = output.normals;
+      requests_.push_back(check_request(store, options_, output.sink->indexing()));
+      requests_.back().sink_bytes = output.sink->memory();
+      sinks_.push_back(output.sink);
+    }
+    other_bytes_ = decode_extra(store.info(), requests_.front().threads);
   }
 
-  CpuBatch next() {
-    CpuBatch next{.batch = std::exchange(planned_, {})};
-    if (!next.batch.tiles.empty()) planner_.next(planned_);
-    return next;
+  std::vector<ExtractReport> run(Progress& progress) {
+    double count_seconds = 0;
+    {
+      const SecondsSum watch(count_seconds);
+      begin();
+    }
+    std::uint64_t bytes = 0;
+    for (const ExtractRequest& request : requests_) bytes += active_bytes(request);
+    progress.begin("extracting", bytes);
+    std::size_t made = 0;
+    for (std::size_t pass = 0; made < requests_.size(); ++pass) {
+      const std::size_t first = made;
+      made += run_next(first, pass, progress);
+      for (std::size_t i = first; i < made && pass == 0; ++i) {
+        reports_[i].plan_seconds += count_seconds;
+        reports_[i].seconds += count_seconds;
+      }
+    }
+    progress.end();
+    return std::move(reports_);
   }
-
-  /// Begins to decode a batch's bricks; the disk works on those of the batch after it.
-  void begin(CpuBatch& batch) {
-    if (batch.batch.tiles.empty()) return;
-    batch.bricks = cache_.begin(batch.batch.bricks, batch.batch.tiles.back().tile);
-    cache_.will_need(*batch.bricks, planned_.bricks);
-  }
-
-  const BrickCache& cache() const { return cache_; }
 
  private:
-  BatchPlanner& planner_;
-  BrickCache cache_;
-  TileBatch planned_;
+  static std::uint64_t active_bytes(const ExtractRequest& request) {
+    return request.active_bricks * request.level->lattice.brick_bytes();
+  }
+
+  /// Counts what is active, and refuses a budget that is too small for any of the surfaces.
+  void begin() {
+    bytes_before_ = store_.bytes_read();
+    early_ = begin_early(store_, options_, requests_);
+    const std::vector<double> isovalues = isovalues_of(requests_);
+    const std::vector<ActiveParts> counted = count_active(store_, options_, isovalues);
+    std::uint64_t blocks = 0;
+    for (ExtractRequest& request : requests_) {
+      const auto at = std::find(isovalues.begin(), isovalues.end(), request.surface.isovalue);
+      active_.push_back(counted[static_cast<std::size_t>(at - isovalues.begin())]);
+      request.active_bricks = active_.back().active_bricks;
+      blocks += active_.back().active_blocks;
+      if (options_.backend != Backend::cuda)
+        plan_memory({&request, 1}, options_.memory, other_bytes_);
+    }
+    use_gpu_ = early_.gpu.valid() || use_cuda(requests_.front(), options_, blocks);
+  }
+
+  ChosenBackend set_up(const PassSurfaces& left) {
+    return set_up_backend(
+        left.requests, options_, other_bytes_, left.sinks,
+        [&]() -> std::unique_ptr<GpuSession> {
+          if (early_.gpu.valid()) return early_.gpu.get();
+          return use_gpu_ ? open_gpu(options_.device) : nullptr;
+        },
+        [&](PassRequests requests, const ExtractPlan& plan, GpuSession& gpu) {
+          // What was begun early is for all surfaces.
+          const bool is_begun = early_.tiles.valid() && requests.size() == requests_.size();
+          return std::make_unique<DecodedTiles>(
+              store_, options_.level,
+              is_begun ? early_.tiles.get() : tiles_of(store_, options_.level, requests), requests,
+              plan, gpu.bricks());
+        });
+  }
+
+  /// Makes as many of the surfaces from `first` on as one pass has room for; how many.
+  std::size_t run_next(std::size_t first, std::size_t pass, Progress& progress) {
+    const PassSurfaces left = PassSurfaces{requests_, sinks_, reports_}.after(first);
+    const BrickTimes times_before = store_.brick_times();
+    if (first > 0) bytes_before_ = store_.bytes_read();
+    double seconds = 0, plan_seconds = 0;
+    PassSurfaces made;
+    {
+      const SecondsSum whole(seconds);
+      ChosenBackend backend;
+      {
+        const SecondsSum watch(plan_seconds);
+        backend = set_up(left);
+      }
+      made = left.first(backend.surfaces.size());
+      for (std::size_t i = 0; i < made.sinks.size(); ++i) {
+        const ExtractRequest& request = made.requests[i];
+        made.sinks[i]->begin(header_of(*request.level, request.surface, active_[first + i]));
+      }
+      run_pass(store_, options_, backend, made,
+               [&](std::size_t i, std::span<const TileWork> tiles) {
+                 progress.advance(bytes_of(tiles, first + i));
+               });
+      for (ExtractReport& report : made.reports) report.gpu_refusal = backend.gpu_refusal;
+      // Their buffers are freed before the sinks end their files.
+      backend.surfaces.clear();
+      for (MeshSink* sink : made.sinks) sink->finish();
+    }
+    complete(made, first, times_before);
+    for (ExtractReport& report : made.reports) {
+      report.pass = pass;
+      report.seconds = seconds;
+      report.plan_seconds = plan_seconds;
+    }
+    return made.requests.size();
+  }
+
+  /// Of a surface's active bricks, the part that lies in these tiles.
+  std::uint64_t bytes_of(std::span<const TileWork> tiles, std::size_t surface) const {
+    double blocks = 0;
+    for (const TileWork& tile : tiles)
+      blocks += static_cast<double>(std::popcount(tile.active_blocks));
+    const double all = std::max(1.0, static_cast<double>(active_[surface].active_blocks));
+    return static_cast<std::uint64_t>(blocks / all *
+                                      static_cast<double>(active_bytes(requests_[surface])));
+  }
+
+  /// Adds to the reports of a pass what is known of its surfaces and what the store counted.
+  void complete(const PassSurfaces& made, std::size_t first, const BrickTimes& before) const {
+    const BrickTimes times = store_.brick_times();
+    for (std::size_t i = 0; i < made.reports.size(); ++i) {
+      ExtractReport& report = made.reports[i];
+      report.bricks = active_[first + i].bricks;
+      report.active_bricks = active_[first + i].active_bricks;
+      report.index = made.requests[i].search.kind;
+      const int threads = made.requests[i].threads;
+      report.read = {(times.read_seconds - before.read_seconds) / threads,
+                     times.bytes_read - before.bytes_read};
+      report.decode = {(times.decode_seconds - before.decode_seconds) / threads,
+                       times.bytes_decoded - before.bytes_decoded};
+      report.bytes_read += store_.bytes_read() - bytes_before_;
+    }
+  }
+
+  const StoreReader& store_;
+  ExtractOptions options_;
+  std::vector<ExtractRequest> requests_;
+  std::vector<MeshSink*> sinks_;
+  std::vector<ActiveParts> active_;
+  std::vector<ExtractReport> reports_;
+  std::uint64_t other_bytes_ = 0, bytes_before_ = 0;
+  bool use_gpu_ = false;
+  EarlyWork early_;
 };
-
-void report_search(const TileStream& tiles, ExtractReport& report) {
-  report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
-  // Once for the plan and once for the surface; the index has files of its own.
-  report.bytes_read = 2 * tiles.index_bytes();
-  report.search_seconds = tiles.seconds();
-}
-
-/// Threads' time of reading and decoding so far.
-double bricks_seconds(const StoreReader& store) {
-  const BrickTimes times = store.brick_times();
-  return times.read_seconds + times.decode_seconds;
-}
-
-/// While the surface of one batch is made the bricks of the next are decoded, by the same
-/// threads: where the one has nothing to do for them just then, the other has.
-void extract_on_cpu(const Work& work, SurfaceExtractor& surface) {
-  PlannedTiles planned(tiles_of(work.store, work.options, work.request), work.request, work.plan);
-  double decoded_beside = 0;  // of threads
-  const bool room_for_two = work.plan.cache_bricks >= 2 * work.plan.batch_bricks;
-  Workers workers(work.request.threads);
-  workers.execute([&] {
-    CpuBatches batches(work, planned.batches);
-    CpuBatch now = batches.next();
-    batches.begin(now);
-    while (now.bricks) {
-      CpuBatch next = batches.next();
-      if (room_for_two) batches.begin(next);
-      {
-        Stopwatch watch(work.report.decode_seconds);
-        now.bricks->wait();
-      }
-      const double decoded_before = bricks_seconds(work.store);
-      {
-        Stopwatch watch(work.report.surface_seconds);
-        surface.extract(now.batch.tiles, *now.bricks, nullptr);
-      }
-      decoded_beside += bricks_seconds(work.store) - decoded_before;
-      work.done(now.batch.tiles);
-      now.bricks.reset();
-      if (!room_for_two) batches.begin(next);
-      now = std::move(next);
-    }
-    work.report.bricks_read = batches.cache().bricks_read();
-    work.report.brick_reads = batches.cache().reads();
-  });
-  surface.finish();
-  surface.report(work.report);
-  double& seconds = work.report.surface.seconds;
-  seconds = std::max(0.0, seconds - decoded_beside / work.request.threads);
-  report_search(planned.tiles, work.report);
-}
-
-/// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.
-void extract_on_gpu(const Work& work, ChosenBackend& backend) {
-  BatchDecoder& decoder = backend.decoded->decoder;
-  SurfaceExtractor* const surface = backend.surface.get();
-  for (;;) {
-    std::shared_ptr<const DecodedBatch> batch;
-    {
-      Stopwatch watch(work.report.decode_seconds);
-      batch = decoder.next();
-    }
-    if (!batch) break;
-    {
-      Stopwatch watch(work.report.surface_seconds);
-      surface->extract(batch->tiles(), *batch, batch);
-    }
-    work.done(batch->tiles());
-  }
-  surface->finish();
-  surface->report(work.report);
-  if (backend.gpu->pool_bricks() == 0) work.report.pinned_bytes += decoder.memory_bytes();
-  work.report.bricks_read = decoder.bricks_read();
-  work.report.brick_reads = decoder.reads();
-  report_search(backend.decoded->planned.tiles, work.report);
-  // Their memory is freed before the sink ends its file.
-  backend.surface.reset();
-  backend.decoded.reset();
-}
-
-/// Counts what is active and sets up who makes the surface. A device takes some tenths of a
-/// second to open: when it is known that there will be one, that goes on meanwhile, and the first
-/// tiles are found.
-ChosenBackend choose_backend(const ExtractRequest& request, const ExtractOptions& options,
-                             const StoreReader& store, MeshSink& sink, ActiveParts& active) {
-  std::future<std::unique_ptr<GpuSession>> early;
-  std::future<TileStream> first;
-  if (options.backend == Backend::cuda && use_cuda(request, options, 0)) {
-    early = std::async(std::launch::async, open_gpu, options.device);
-    first = std::async(std::launch::async, [&] {
-      TileStream tiles = tiles_of(store, options, request);
-      Workers(request.threads).execute([&] { tiles.begin(); });
-      return tiles;
-    });
-  }
-  active = count_active(store, options);
-  const bool wanted = early.valid() || use_cuda(request, options, active.active_blocks);
-  const std::uint64_t other = sink.memory() + decode_extra(store.info(), request.threads);
-  return set_up_backend(
-      request, options, active.active_bricks, other, sink,
-      [&]() -> std::unique_ptr<GpuSession> {
-        if (early.valid()) return early.get();
-        return wanted ? open_gpu(options.device) : nullptr;
-      },
-      [&](const ExtractPlan& plan, GpuSession& gpu) {
-        return std::make_unique<DecodedTiles>(
-            store, options.level, first.valid() ? first.get() : tiles_of(store, options, request),
-            request, plan, gpu.bricks());
-      });
-}
 
 }  // namespace
 
@@ -242,58 +240,21 @@ std::string_view bound_of(const ExtractReport& report) {
 
 std::uint64_t least_extract_memory(const StoreReader& store, const ExtractOptions& options,
                                    Indexing indexing, std::uint64_t sink_bytes) {
-  const ExtractRequest request = check_request(store, options, indexing);
-  return least_memory(request, sink_bytes + decode_extra(store.info(), request.threads));
+  ExtractRequest request = check_request(store, options, indexing);
+  request.sink_bytes = sink_bytes;
+  return least_memory({&request, 1}, decode_extra(store.info(), request.threads));
 }
 
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
                       Progress& progress) {
-  ExtractReport report;
-  const std::uint64_t bytes_before = store.bytes_read();
-  const BrickTimes times_before = store.brick_times();
-  {
-    Stopwatch whole(report.seconds);
-    const ExtractRequest request = check_request(store, options, sink.indexing());
-    const Lattice& lattice = request.level->lattice;
+  const SurfaceOutput output{options.isovalue, options.normals, &sink};
+  return extract(store, options, {&output, 1}, progress).front();
+}
 
-    ActiveParts active;
-    ChosenBackend backend;
-    {
-      Stopwatch watch(report.plan_seconds);
-      backend = choose_backend(request, options, store, sink, active);
-    }
-    const ExtractPlan& plan = backend.plan;
-    report.bricks = active.bricks;
-    report.active_bricks = active.active_bricks;
-    report.gpu_refusal = backend.gpu_refusal;
-
-    sink.begin(header_of(*request.level, request.surface, active));
-    progress.begin("extracting", active.active_bricks * lattice.brick_bytes());
-    const double bytes_per_block = static_cast<double>(active.active_bricks) *
-                                   static_cast<double>(lattice.brick_bytes()) /
-                                   std::max(1.0, static_cast<double>(active.active_blocks));
-    const auto done = [&](std::span<const TileWork> of_batch) {
-      double blocks = 0;
-      for (const TileWork& tile : of_batch)
-        blocks += static_cast<double>(std::popcount(tile.active_blocks));
-      progress.advance(static_cast<std::uint64_t>(blocks * bytes_per_block));
-    };
-    const Work work{store, options, request, plan, report, done};
-    if (backend.gpu)
-      extract_on_gpu(work, backend);
-    else
-      extract_on_cpu(work, *backend.surface);
-    sink.finish();
-    progress.end();
-    report.index = request.search.kind;
-    const BrickTimes times = store.brick_times();
-    report.read = {(times.read_seconds - times_before.read_seconds) / request.threads,
-                   times.bytes_read - times_before.bytes_read};
-    report.decode = {(times.decode_seconds - times_before.decode_seconds) / request.threads,
-                     times.bytes_decoded - times_before.bytes_decoded};
-  }
-  report.bytes_read += store.bytes_read() - bytes_before;
-  return report;
+std::vector<ExtractReport> extract(const StoreReader& store, const ExtractOptions& options,
+                                   std::span<const SurfaceOutput> outputs, Progress& progress) {
+  if (outputs.empty()) return {};
+  return Extraction(store, options, outputs).run(progress);
 }
 
 }  // namespace isobrick

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -47,8 +48,17 @@ struct StageReport {
   std::uint64_t bytes = 0;
 };
 
-/// What an extraction did.
+/// One of several surfaces that are extracted together, and the sink that takes it.
+struct SurfaceOutput {
+  double isovalue = 0;
+  bool normals = false;      ///< gradient normals
+  MeshSink* sink = nullptr;  ///< one for each surface
+};
+
+/// What an extraction did. Of surfaces that were made in one pass over the store, what the pass
+/// read, decoded, searched for and waited for is in each one's report.
 struct ExtractReport {
+  std::size_t pass = 0;  ///< which pass made the surface, the first is 0
   std::uint64_t triangles = 0, vertices = 0;
   std::uint64_t degenerate_triangles = 0;  ///< left out, with drop_degenerate
   std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
@@ -89,5 +99,18 @@ std::uint64_t least_extract_memory(const StoreReader& store, const ExtractOption
 /// there is no CUDA device for it. Backend::automatic takes the CPU where the GPU cannot.
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
                       Progress& progress);
+
+/// Streams several surfaces of one level, each into its sink, and reads and decodes every brick
+/// once for all of them: bricks that any isovalue touches are visited once, in the order of a
+/// single extraction. Isovalues may repeat, for a mesh and its picture. Every sink gets what it
+/// would get alone. `isovalue` and `normals` of the options do not matter.
+///
+/// The budgets hold for all surfaces together. Where they have no room for all, the surfaces are
+/// made in several passes over the store, in their order, each of as many as fit; the budget of
+/// the one that needs most is enough. Begins the sinks of a pass before it and finishes them after
+/// it. Throws as above: for options that make no sense, and for a `memory` too small for one of the
+/// surfaces on the CPU, before any sink begins. A report for each surface.
+std::vector<ExtractReport> extract(const StoreReader& store, const ExtractOptions& options,
+                                   std::span<const SurfaceOutput> outputs, Progress& progress);
 
 }  // namespace isobrick

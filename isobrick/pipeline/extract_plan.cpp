@@ -23,12 +23,26 @@ constexpr std::uint64_t kRanges = std::uint64_t{6} << 20;
 /// the decoded ones, and the codec's own window, once a thread.
 constexpr std::uint64_t kDecoder = std::uint64_t{2} << 20;
 
+/// What the options of a pass's surfaces have in common.
+const ExtractRequest& common(PassRequests requests) { return requests.front(); }
+
+bool any_drops(PassRequests requests) {
+  return std::any_of(requests.begin(), requests.end(),
+                     [](const ExtractRequest& r) { return r.surface.drop_degenerate; });
+}
+
+/// The mesh that one tile can make, of the surface that takes most.
+std::uint64_t tile_output(PassRequests requests) {
+  return CpuExtractor::max_tile_output(std::any_of(
+      requests.begin(), requests.end(), [](const ExtractRequest& r) { return r.surface.normals; }));
+}
+
 /// The boundaries that wait between finished and unfinished tiles: in Morton order at
 /// most about those on the three upper faces of the tile grid.
-std::uint64_t boundary_bytes(const Lattice& lattice, bool drop_degenerate) {
-  const Int3 t = lattice.tiles();
+std::uint64_t boundary_bytes(PassRequests requests) {
+  const Int3 t = common(requests).level->lattice.tiles();
   const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
-  return faces * CpuExtractor::boundary_bytes(drop_degenerate);
+  return requests.size() * faces * CpuExtractor::boundary_bytes(any_drops(requests));
 }
 
 /// Mesh coordinates are float, and so are the factors of positions and normals.
@@ -72,15 +86,26 @@ std::uint64_t fixed_bytes(const ExtractRequest& request) {
       in_mib(output + request.memory_of_others)));
 }
 
+/// Buffers of the files that a sink writes; those of one sink are the program's.
+constexpr std::uint64_t kSinkBuffers = std::uint64_t{3} << 20;
+
+std::uint64_t sink_bytes(PassRequests requests) {
+  std::uint64_t bytes = (requests.size() - 1) * kSinkBuffers;
+  for (const ExtractRequest& request : requests) bytes += request.sink_bytes;
+  return bytes;
+}
+
 /// Bricks that a cache can use: neighbours come on top of the active ones.
-std::uint64_t most_useful(std::size_t tile_bricks, std::uint64_t active_bricks) {
+std::uint64_t most_useful(std::size_t tile_bricks, PassRequests requests) {
+  std::uint64_t active_bricks = 0;
+  for (const ExtractRequest& request : requests) active_bricks += request.active_bricks;
   return std::max<std::uint64_t>(tile_bricks, 8 * active_bricks);
 }
 
-std::size_t fit_cache(const Lattice& lattice, std::uint64_t bytes, std::size_t tile_bricks,
-                      std::uint64_t active_bricks) {
-  return static_cast<std::size_t>(std::clamp<std::uint64_t>(
-      bytes / lattice.brick_bytes(), tile_bricks, most_useful(tile_bricks, active_bricks)));
+std::size_t fit_cache(PassRequests requests, std::uint64_t bytes, std::size_t tile_bricks) {
+  return static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(bytes / common(requests).level->lattice.brick_bytes(), tile_bricks,
+                                most_useful(tile_bricks, requests)));
 }
 
 }  // namespace
@@ -118,53 +143,76 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
   return request;
 }
 
-std::uint64_t least_memory(const ExtractRequest& request, std::uint64_t other_bytes) {
-  const Lattice& lattice = request.level->lattice;
-  const bool drop = request.surface.drop_degenerate;
-  return fixed_bytes(request) + boundary_bytes(lattice, drop) + other_bytes +
-         CpuExtractor::workspace_bytes(lattice.type, drop) +
-         2 * CpuExtractor::max_tile_output(request.surface.normals) +
-         max_bricks_of_tile(lattice, sample_reach(request.surface)) * lattice.brick_bytes();
+std::vector<double> isovalues_of(PassRequests requests) {
+  std::vector<double> isovalues;
+  for (const ExtractRequest& request : requests)
+    if (std::find(isovalues.begin(), isovalues.end(), request.surface.isovalue) == isovalues.end())
+      isovalues.push_back(request.surface.isovalue);
+  return isovalues;
 }
 
-ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
-                        std::uint64_t active_bricks, std::uint64_t other_bytes) {
-  const Lattice& lattice = request.level->lattice;
-  const bool drop = request.surface.drop_degenerate;
-  const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type, drop);
-  const std::uint64_t tile_output = CpuExtractor::max_tile_output(request.surface.normals);
-  const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
+Index reach_of(PassRequests requests) {
+  Index reach = 0;
+  for (const ExtractRequest& request : requests)
+    reach = std::max(reach, sample_reach(request.surface));
+  return reach;
+}
+
+std::uint64_t least_memory(PassRequests requests, std::uint64_t other_bytes) {
+  const Lattice& lattice = common(requests).level->lattice;
+  return fixed_bytes(common(requests)) + boundary_bytes(requests) + sink_bytes(requests) +
+         other_bytes + CpuExtractor::workspace_bytes(lattice.type, any_drops(requests)) +
+         2 * requests.size() * tile_output(requests) +
+         max_bricks_of_tile(lattice, reach_of(requests)) * lattice.brick_bytes();
+}
+
+std::size_t surfaces_of_pass(PassRequests requests, std::uint64_t budget,
+                             std::uint64_t other_bytes) {
+  std::size_t count = 1;
+  while (count < requests.size() && least_memory(requests.first(count + 1), other_bytes) <= budget)
+    ++count;
+  return count;
+}
+
+ExtractPlan plan_memory(PassRequests requests, std::uint64_t budget, std::uint64_t other_bytes) {
+  const Lattice& lattice = common(requests).level->lattice;
+  const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type, any_drops(requests));
+  const std::size_t tile_bricks = max_bricks_of_tile(lattice, reach_of(requests));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 
-  const std::uint64_t fixed = fixed_bytes(request) + boundary_bytes(lattice, drop) + other_bytes;
-  const std::uint64_t least = least_memory(request, other_bytes);
-  if (budget < least) refuse_budget(request, budget, least, other_bytes);
+  const std::uint64_t output = sink_bytes(requests) + other_bytes;
+  const std::uint64_t fixed = fixed_bytes(common(requests)) + boundary_bytes(requests) + output;
+  const std::uint64_t least = least_memory(requests, other_bytes);
+  if (budget < least) refuse_budget(common(requests), budget, least, output);
 
   ExtractPlan plan;
   const std::uint64_t spare = budget - least;
   plan.limits.tiles = std::clamp<std::size_t>(1 + spare / 6 / workspace, 1,
-                                              CpuExtractor::good_batch(request.threads));
-  // One piece of mesh is written while the next is made.
-  plan.limits.output_bytes = std::clamp<std::uint64_t>(
-      tile_output + spare / 12, tile_output, std::max(tile_output, std::uint64_t{32} << 20));
-  const std::uint64_t used = fixed + plan.limits.tiles * workspace + 2 * plan.limits.output_bytes;
-  plan.cache_bricks = fit_cache(lattice, budget - used, tile_bricks, active_bricks);
+                                              CpuExtractor::good_batch(common(requests).threads));
+  // One piece of each mesh is written while the next is made.
+  const std::uint64_t least_output = tile_output(requests);
+  plan.limits.output_bytes =
+      std::clamp<std::uint64_t>(least_output + spare / 12 / requests.size(), least_output,
+                                std::max(least_output, std::uint64_t{32} << 20));
+  const std::uint64_t used =
+      fixed + plan.limits.tiles * workspace + 2 * requests.size() * plan.limits.output_bytes;
+  plan.cache_bricks = fit_cache(requests, budget - used, tile_bricks);
   // The next batch is decoded beside the one that is worked on.
   plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 2);
   plan.bytes = used + plan.cache_bricks * brick_bytes;
   return plan;
 }
 
-ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions& options,
-                            std::uint64_t active_bricks, std::uint64_t other_bytes,
-                            GpuSession& gpu) {
-  const Lattice& lattice = request.level->lattice;
-  const std::size_t tile_bricks = max_bricks_of_tile(lattice, sample_reach(request.surface));
+ExtractPlan plan_gpu_memory(PassRequests requests, const ExtractOptions& options,
+                            std::uint64_t other_bytes, GpuSession& gpu) {
+  const Lattice& lattice = common(requests).level->lattice;
+  const std::size_t tile_bricks = max_bricks_of_tile(lattice, reach_of(requests));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
-  const std::uint64_t fixed = fixed_bytes(request) + kCudaDriver + other_bytes;
+  const std::uint64_t fixed =
+      fixed_bytes(common(requests)) + kCudaDriver + sink_bytes(requests) + other_bytes;
   const std::uint64_t used =
-      fixed + gpu.plan(request, options.gpu_memory, options.memory,
-                       fixed + tile_bricks * brick_bytes, most_useful(tile_bricks, active_bricks));
+      fixed + gpu.plan(requests, options.gpu_memory, options.memory,
+                       fixed + tile_bricks * brick_bytes, most_useful(tile_bricks, requests));
   ExtractPlan plan;
   plan.limits.tiles = gpu.good_batch();
   if (const std::size_t pool = gpu.pool_bricks()) {
@@ -173,7 +221,7 @@ ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions&
     plan.bytes = used;
     return plan;
   }
-  plan.cache_bricks = fit_cache(lattice, options.memory - used, tile_bricks, active_bricks);
+  plan.cache_bricks = fit_cache(requests, options.memory - used, tile_bricks);
   // Two batches are on their way through the GPU while others are decoded.
   plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 4);
   plan.bytes = used + plan.cache_bricks * brick_bytes;

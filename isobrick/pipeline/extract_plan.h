@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
+#include <vector>
 
 #include "isobrick/pipeline/extract.h"
 #include "isobrick/stream/block_search.h"
@@ -12,7 +14,7 @@ class GpuSession;
 
 /// How an extraction divides its memory budget.
 struct ExtractPlan {
-  ExtractorLimits limits;  ///< of the CPU's extractor; tiles: of a batch on any
+  ExtractorLimits limits;  ///< of each extractor on the CPU; tiles: of a batch on any
   std::size_t cache_bricks = 0;
   std::size_t batch_bricks = 0;  ///< that a batch may need
   std::uint64_t bytes = 0;       ///< all of it, the program itself included
@@ -26,6 +28,8 @@ struct ExtractRequest {
   SearchBy search;                     ///< for its active blocks
   std::uint64_t search_memory = 0;     ///< that such a search takes
   std::uint64_t memory_of_others = 0;  ///< see ExtractOptions
+  std::uint64_t sink_bytes = 0;        ///< MeshSink::memory() of its sink
+  std::uint64_t active_bricks = 0;     ///< bounds what a cache can use
 };
 
 /// Throws UsageError for a level, region or isovalue that makes no sense, and for
@@ -33,19 +37,29 @@ struct ExtractRequest {
 ExtractRequest check_request(const StoreReader& store, const ExtractOptions& options,
                              Indexing indexing);
 
+/// Surfaces that are made in one pass over the bricks. They differ in their SurfaceOptions only,
+/// and not in the region.
+using PassRequests = std::span<const ExtractRequest>;
+
+/// The isovalues of a pass, each once.
+std::vector<double> isovalues_of(PassRequests requests);
+/// Layers of samples around a tile that any of the surfaces needs.
+Index reach_of(PassRequests requests);
+
 /// The least budget that plan_memory() takes.
-std::uint64_t least_memory(const ExtractRequest& request, std::uint64_t other_bytes);
+std::uint64_t least_memory(PassRequests requests, std::uint64_t other_bytes);
 
-/// `active_bricks` bounds what a cache can use, `other_bytes` are the sink's (MeshSink::memory())
-/// and those of decoding beyond the usual (decode_extra()). Throws UsageError naming the least
-/// budget that works when this one does not.
-ExtractPlan plan_memory(const ExtractRequest& request, std::uint64_t budget,
-                        std::uint64_t active_bricks, std::uint64_t other_bytes);
+/// How many of the first surfaces one pass makes within the budget; one at least.
+std::size_t surfaces_of_pass(PassRequests requests, std::uint64_t budget,
+                             std::uint64_t other_bytes);
 
-/// The same where a GPU makes the surface, whose buffers `gpu` plans: page-locked memory
+/// `other_bytes` are those of decoding beyond the usual (decode_extra()) and of sinks that wait.
+/// Throws UsageError naming the least budget that works when this one does not.
+ExtractPlan plan_memory(PassRequests requests, std::uint64_t budget, std::uint64_t other_bytes);
+
+/// The same where a GPU makes the surfaces, whose buffers `gpu` plans: page-locked memory
 /// and what its driver takes are within the budget.
-ExtractPlan plan_gpu_memory(const ExtractRequest& request, const ExtractOptions& options,
-                            std::uint64_t active_bricks, std::uint64_t other_bytes,
-                            GpuSession& gpu);
+ExtractPlan plan_gpu_memory(PassRequests requests, const ExtractOptions& options,
+                            std::uint64_t other_bytes, GpuSession& gpu);
 
 }  // namespace isobrick

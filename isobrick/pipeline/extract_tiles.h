@@ -8,10 +8,10 @@
 
 namespace isobrick {
 
-/// The active tiles of an extraction. `store` must outlive them.
-inline TileStream tiles_of(const StoreReader& store, const ExtractOptions& options,
-                           const ExtractRequest& request) {
-  return {store, options.level, options.isovalue, request.surface.roi, request.search};
+/// The tiles that are active at any of a pass's isovalues_of(). `store` must outlive them.
+inline TileStream tiles_of(const StoreReader& store, int level, PassRequests requests) {
+  const ExtractRequest& common = requests.front();
+  return {store, level, isovalues_of(requests), common.surface.roi, common.search};
 }
 
 /// The same in batches as planned.
@@ -19,10 +19,12 @@ struct PlannedTiles {
   TileStream tiles;
   BatchPlanner batches;
 
-  PlannedTiles(TileStream all, const ExtractRequest& request, const ExtractPlan& plan)
+  /// Isovalues may share no tile: so that each has enough for all threads, a batch has as many more.
+  PlannedTiles(TileStream all, PassRequests requests, const ExtractPlan& plan)
       : tiles(std::move(all)),
-        batches(tiles, request.level->lattice, sample_reach(request.surface),
-                request.surface.may_have_nan, plan.limits.tiles, plan.batch_bricks) {}
+        batches(tiles, requests.front().level->lattice, reach_of(requests),
+                requests.front().surface.may_have_nan, plan.limits.tiles * tiles.isovalues(),
+                plan.batch_bricks) {}
 };
 
 /// The same with a decoder that has begun: for a GPU, to whose memory the bricks go.
@@ -31,11 +33,11 @@ struct DecodedTiles {
   BatchDecoder decoder;
 
   /// `tiles` are of this level of `store`, which must outlive it, as `memory` must.
-  DecodedTiles(const StoreReader& store, int level, TileStream tiles, const ExtractRequest& request,
+  DecodedTiles(const StoreReader& store, int level, TileStream tiles, PassRequests requests,
                const ExtractPlan& plan, BrickMemory& memory)
-      : planned(std::move(tiles), request, plan),
-        decoder(store, level, planned.batches, sample_reach(request.surface), plan.cache_bricks,
-                request.threads, memory) {}
+      : planned(std::move(tiles), requests, plan),
+        decoder(store, level, planned.batches, reach_of(requests), plan.cache_bricks,
+                requests.front().threads, memory) {}
 };
 
 }  // namespace isobrick

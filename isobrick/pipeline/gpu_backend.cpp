@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "isobrick/core/error.h"
 #include "isobrick/gpu/brick_pool.h"
@@ -100,46 +101,49 @@ class CudaSession final : public GpuSession {
  public:
   explicit CudaSession(int device) : device_(device), info_(gpu::open_device(device)) {}
 
-  std::uint64_t plan(const ExtractRequest& request, std::uint64_t device_budget,
-                     std::uint64_t host_budget, std::uint64_t other_host_bytes,
-                     std::uint64_t most_bricks) override {
-    const Lattice& lattice = request.level->lattice;
+  std::uint64_t plan(PassRequests requests, std::uint64_t device_budget, std::uint64_t host_budget,
+                     std::uint64_t other_host_bytes, std::uint64_t most_bricks) override {
+    const Lattice& lattice = requests.front().level->lattice;
+    const int threads = requests.front().threads;
     if (device_budget == 0) device_budget = info_.free_bytes - info_.free_bytes / 10;
+    std::vector<SurfaceOptions> surfaces;
+    for (const ExtractRequest& request : requests) surfaces.push_back(request.surface);
     const auto fit = [&](std::uint64_t bricks) {
-      sizes_ = gpu::fit_stream_sizes(lattice, request.surface, device_budget, host_budget,
-                                     other_host_bytes, {bricks, request.threads});
+      sizes_ = gpu::fit_stream_sizes(lattice, surfaces, device_budget, host_budget,
+                                     other_host_bytes, {bricks, threads});
     };
-    fit(std::min(most_bricks, gpu::preferred_pool_bricks(lattice, request.threads)));
+    fit(std::min(most_bricks, gpu::preferred_pool_bricks(lattice, threads)));
     bricks_ = std::make_unique<HostBricks>(device_);
-    if (sizes_.pool.bricks > 0 && !make_pool(lattice)) fit(0);
-    return sizes_.pinned_bytes + sizes_.host_bytes;
+    if (pool_bricks() > 0 && !make_pool(lattice)) fit(0);
+    return gpu::host_bytes_of(lattice, sizes_);
   }
 
-  std::size_t good_batch() const override { return sizes_.tiles; }
-  std::size_t pool_bricks() const override { return sizes_.pool.bricks; }
+  std::size_t good_batch() const override { return sizes_.front().tiles; }
+  std::size_t pool_bricks() const override { return sizes_.front().pool.bricks; }
   BrickMemory& bricks() override { return *bricks_; }
 
-  std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
+  std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request, std::size_t number,
                                                  MeshSink& sink) override {
-    return std::make_unique<CudaSurface>(device_, info_, request, sizes_, pool_, sink);
+    return std::make_unique<CudaSurface>(device_, info_, request, sizes_[number], pool_, sink);
   }
 
  private:
   /// False when the device has less room than it said.
   bool make_pool(const Lattice& lattice) {
+    const gpu::PoolSizes& pool = sizes_.front().pool;
     try {
-      pool_ = std::make_shared<gpu::BrickPool>(device_, lattice.brick_bytes(), sizes_.pool.bricks,
-                                               sizes_.pool.threads);
+      pool_ = std::make_shared<gpu::BrickPool>(device_, lattice.brick_bytes(), pool.bricks,
+                                               pool.threads);
     } catch (const gpu::OutOfDeviceMemory&) {
       return false;
     }
-    bricks_ = std::make_unique<DeviceBricks>(pool_, gpu::bricks_ahead(lattice, sizes_.pool));
+    bricks_ = std::make_unique<DeviceBricks>(pool_, gpu::bricks_ahead(lattice, pool));
     return true;
   }
 
   int device_;
   gpu::DeviceInfo info_;
-  gpu::StreamSizes sizes_;
+  std::vector<gpu::StreamSizes> sizes_;  ///< of each surface
   std::shared_ptr<gpu::BrickPool> pool_;
   std::unique_ptr<BrickMemory> bricks_;
 };

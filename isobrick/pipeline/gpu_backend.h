@@ -23,21 +23,22 @@ class GpuSession {
  public:
   virtual ~GpuSession() = default;
 
-  /// Chooses buffers within `device_budget` (0: what is free less 10 %) and within
-  /// `host_budget`, of which `other_host_bytes` are taken, for at most `most_bricks` bricks.
-  /// The host memory that they take. Throws UsageError naming the least that works.
-  virtual std::uint64_t plan(const ExtractRequest& request, std::uint64_t device_budget,
+  /// Chooses buffers for these surfaces together, within `device_budget` (0: what is free less
+  /// 10 %) and within `host_budget`, of which `other_host_bytes` are taken, for at most
+  /// `most_bricks` bricks. The host memory that they take. Throws UsageError naming the least that
+  /// works.
+  virtual std::uint64_t plan(PassRequests requests, std::uint64_t device_budget,
                              std::uint64_t host_budget, std::uint64_t other_host_bytes,
                              std::uint64_t most_bricks) = 0;
-  /// Tiles to hand to its surface at a time, as planned.
+  /// Tiles to hand to its surfaces at a time, as planned.
   virtual std::size_t good_batch() const = 0;
   /// Bricks that the device has room for, as planned; 0: they lie in host memory.
   virtual std::size_t pool_bricks() const = 0;
-  /// Where the bricks that its surface is given lie.
+  /// Where the bricks that its surfaces are given lie.
   virtual BrickMemory& bricks() = 0;
-  /// As planned. Session and sink must outlive it.
+  /// The surface of a request, by its number, as planned. Session and sink must outlive it.
   virtual std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
-                                                         MeshSink& sink) = 0;
+                                                         std::size_t number, MeshSink& sink) = 0;
 };
 
 /// Throws Error when the device cannot be made ready, or without the backend.

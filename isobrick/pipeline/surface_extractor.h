@@ -27,8 +27,10 @@ class SurfaceExtractor {
   virtual void report(ExtractReport& report) const = 0;
 };
 
-/// The CPU. The sink must outlive it.
+/// The CPU. The sink must outlive it. For TileWorkSpaces see CpuExtractor.
 std::unique_ptr<SurfaceExtractor> make_cpu_surface(const ExtractRequest& request,
-                                                   const ExtractorLimits& limits, MeshSink& sink);
+                                                   const ExtractorLimits& limits,
+                                                   std::shared_ptr<TileWorkSpaces> spaces,
+                                                   MeshSink& sink);
 
 }  // namespace isobrick

@@ -20,20 +20,22 @@ class NoSurface final : public SurfaceExtractor {
   void report(ExtractReport&) const override {}
 };
 
-/// A GPU that is busy or small, or neither.
+/// A GPU that is busy or small, or neither; `pinned` is what a surface takes of the host's memory.
 class FakeGpu final : public GpuSession {
  public:
   FakeGpu(std::uint64_t pinned, bool full) : pinned_(pinned), full_(full) {}
 
-  std::uint64_t plan(const ExtractRequest&, std::uint64_t, std::uint64_t host_budget,
+  std::uint64_t plan(PassRequests requests, std::uint64_t, std::uint64_t host_budget,
                      std::uint64_t other, std::uint64_t) override {
-    if (host_budget < other + pinned_) throw UsageError("--memory is too small for the GPU");
-    return pinned_;
+    const std::uint64_t pinned = requests.size() * pinned_;
+    if (host_budget < other + pinned) throw UsageError("--memory is too small for the GPU");
+    return pinned;
   }
   std::size_t good_batch() const override { return 8; }
   std::size_t pool_bricks() const override { return 0; }
   BrickMemory& bricks() override { return bricks_; }
-  std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, MeshSink&) override {
+  std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, std::size_t,
+                                                 MeshSink&) override {
     if (full_) {
       // Decoding is to be stopped in the middle, not before it has begun.
       bricks_.wait_for_demand();
@@ -56,15 +58,23 @@ class BackendChoice : public ::testing::Test {
     store_ = std::make_unique<StoreReader>(folder_ / "a");
   }
 
-  ChosenBackend choose(Backend backend, std::uint64_t memory, const OpenGpu& open) {
+  ChosenBackend choose(Backend backend, std::uint64_t memory, const OpenGpu& open,
+                       std::size_t surfaces = 1) {
     const ExtractOptions options{
         .isovalue = 100, .memory = memory, .threads = 2, .backend = backend};
-    const ExtractRequest request = check_request(*store_, options, Indexing::welded);
-    return set_up_backend(
-        request, options, 64, 0, sink_, open, [&](const ExtractPlan& plan, GpuSession& gpu) {
-          return std::make_unique<DecodedTiles>(*store_, 0, tiles_of(*store_, options, request),
-                                                request, plan, gpu.bricks());
-        });
+    std::vector<ExtractRequest> requests(surfaces,
+                                         check_request(*store_, options, Indexing::welded));
+    for (std::size_t i = 0; i < surfaces; ++i) {
+      requests[i].surface.isovalue += static_cast<double>(i);
+      requests[i].active_bricks = 64;
+    }
+    const std::vector<MeshSink*> sinks(surfaces, &sink_);
+    return set_up_backend(requests, options, 0, sinks, open,
+                          [&](PassRequests of_pass, const ExtractPlan& plan, GpuSession& gpu) {
+                            return std::make_unique<DecodedTiles>(*store_, 0,
+                                                                  tiles_of(*store_, 0, of_pass),
+                                                                  of_pass, plan, gpu.bricks());
+                          });
   }
 
   TemporaryFolder folder_;
@@ -80,7 +90,7 @@ TEST_F(BackendChoice, AGpuThatWorksIsTaken) {
   for (const Backend backend : {Backend::automatic, Backend::cuda}) {
     const ChosenBackend chosen = choose(backend, 400 * kMiB, gpu(100 * kMiB));
     EXPECT_TRUE(chosen.gpu);
-    EXPECT_TRUE(chosen.surface);
+    EXPECT_EQ(chosen.surfaces.size(), 1u);
     EXPECT_EQ(chosen.gpu_refusal, "");
     ASSERT_TRUE(chosen.decoded);
     const auto batch = chosen.decoded->decoder.next();
@@ -90,7 +100,7 @@ TEST_F(BackendChoice, AGpuThatWorksIsTaken) {
   const ChosenBackend cpu = choose(Backend::automatic, 400 * kMiB, [] { return nullptr; });
   EXPECT_FALSE(cpu.gpu);
   EXPECT_FALSE(cpu.decoded);
-  EXPECT_TRUE(cpu.surface);
+  EXPECT_EQ(cpu.surfaces.size(), 1u);
   EXPECT_EQ(cpu.gpu_refusal, "");
 }
 
@@ -100,7 +110,7 @@ TEST_F(BackendChoice, TheCpuStepsInForAnAutomaticGpuAndSaysWhy) {
     const ChosenBackend chosen = choose(Backend::automatic, memory, open);
     EXPECT_FALSE(chosen.gpu);
     EXPECT_FALSE(chosen.decoded);
-    EXPECT_TRUE(chosen.surface);
+    EXPECT_EQ(chosen.surfaces.size(), 1u);
     EXPECT_LE(chosen.plan.bytes, memory);
     EXPECT_EQ(chosen.gpu_refusal, why);
   };
@@ -108,6 +118,28 @@ TEST_F(BackendChoice, TheCpuStepsInForAnAutomaticGpuAndSaysWhy) {
   expect_cpu(100 * kMiB, gpu(100 * kMiB), "--memory is too small for the GPU");
   expect_cpu(400 * kMiB, gpu(kMiB, true), "no device memory is left");
   EXPECT_THROW(choose(Backend::automatic, kMiB, gpu(kMiB)), UsageError);
+}
+
+TEST_F(BackendChoice, AsManySurfacesAsFitAreSetUpTogether) {
+  // The driver and decoding take some 160 MiB, each surface 100.
+  for (const auto& [memory, expected] :
+       {std::pair(600 * kMiB, 4u), std::pair(400 * kMiB, 2u), std::pair(300 * kMiB, 1u)}) {
+    const ChosenBackend chosen = choose(Backend::cuda, memory, gpu(100 * kMiB), 4);
+    EXPECT_EQ(chosen.surfaces.size(), expected) << memory;
+    const auto batch = chosen.decoded->decoder.next();
+    ASSERT_TRUE(batch);
+    EXPECT_FALSE(batch->tiles_of(expected - 1).empty());
+  }
+  EXPECT_THROW(choose(Backend::cuda, 200 * kMiB, gpu(100 * kMiB), 4), UsageError);
+  EXPECT_EQ(choose(
+                Backend::cpu, 400 * kMiB, [] { return nullptr; }, 4)
+                .surfaces.size(),
+            4u);
+  const ChosenBackend tight = choose(
+      Backend::cpu, 48 * kMiB, [] { return nullptr; }, 4);
+  EXPECT_GE(tight.surfaces.size(), 1u);
+  EXPECT_LT(tight.surfaces.size(), 4u);
+  EXPECT_LE(tight.plan.bytes, 48 * kMiB);
 }
 
 TEST_F(BackendChoice, AGpuThatIsDemandedFailsAloud) {
