@@ -111,7 +111,7 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
   options.roi = store_region(store, arguments.level, arguments.roi);
   options.inside = arguments.inside;
   options.drop_degenerate = arguments.drop_degenerate;
-  // The driver is there from when the picture is opened, before meshes are made.
+  // The driver is there from when a picture is opened, before anything is extracted.
   if (!arguments.preview.empty() && !arguments.estimate)
     options.memory_of_others = preview_driver_memory();
   options.memory = arguments.memory - std::min(arguments.memory, options.memory_of_others);
@@ -129,6 +129,11 @@ std::vector<ExtractedSurface> plan(const Arguments& arguments, const StoreReader
                         named(arguments.preview, arguments, isovalue)});
   }
   return surfaces;
+}
+
+/// Of the budget, what the mesh of a surface may use to hold what it writes later.
+std::uint64_t memory_of_mesh(const ExtractedSurface& surface, const Arguments& arguments) {
+  return surface.options.memory / arguments.isovalues.size();
 }
 
 /// The meshes to write, with size_of(ExtractedSurface) as PlannedMesh has it.
@@ -155,8 +160,12 @@ ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader&
 /// Refuses meshes that cannot fit their disk, before anything is written.
 void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
   // Mostly all that the active cells could hold fits, which is known without a sample.
+  std::vector<double> isovalues;
+  for (const ExtractedSurface& surface : surfaces) isovalues.push_back(surface.options.isovalue);
+  const std::vector<ActiveParts> active = count_active(store, surfaces.front().options, isovalues);
   const auto largest = planned_meshes(surfaces, [&](const ExtractedSurface& surface) {
-    return PlannedMesh{.size = largest_mesh(count_active(store, surface.options))};
+    return PlannedMesh{
+        .size = largest_mesh(active[static_cast<std::size_t>(&surface - surfaces.data())])};
   });
   if (!find_shortage(largest, free_space)) return;
   const auto likely = planned_meshes(surfaces, [&](const ExtractedSurface& surface) {
@@ -189,11 +198,12 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
     check_replaces_no_input(surface.preview, inputs);
     Sinks& of_surface = sinks.emplace_back();
     if (!surface.output.empty())
-      of_surface.mesh = create_mesh_file(surface.output, {.format = surface.form.format,
-                                                          .quantize = surface.form.quantize,
-                                                          .force = force,
-                                                          .threads = arguments.threads,
-                                                          .memory = surface.options.memory});
+      of_surface.mesh =
+          create_mesh_file(surface.output, {.format = surface.form.format,
+                                            .quantize = surface.form.quantize,
+                                            .force = force,
+                                            .threads = arguments.threads,
+                                            .memory = memory_of_mesh(surface, arguments)});
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.picture);
   }
@@ -208,27 +218,19 @@ std::string why_empty(const ExtractOptions& options, const ExtractReport& report
   return empty + "; " + range_text(store, options.level);
 }
 
-/// How the surface is extracted once more, for its picture.
-ExtractOptions options_of_picture(const ExtractedSurface& surface, const Arguments& arguments) {
-  ExtractOptions options = surface.options;
-  options.normals = true;
-  options.memory = arguments.memory;
-  options.memory_of_others = preview_memory(arguments.picture);
-  options.memory -= std::min(options.memory, options.memory_of_others);
-  return options;
-}
-
 /// The least budget of the whole command for a surface with a picture.
 std::uint64_t least_with_picture(const ExtractedSurface& surface, const Arguments& arguments,
                                  const StoreReader& store) {
-  const ExtractOptions picture = options_of_picture(surface, arguments);
-  const std::uint64_t least =
-      picture.memory_of_others + least_extract_memory(store, picture, Indexing::chunk_local, 0);
-  if (surface.output.empty()) return least;
-  const std::uint64_t sink =
-      mesh_file_memory(surface.form.format, arguments.threads, surface.options.memory);
-  return std::max(least, surface.options.memory_of_others +
-                             least_extract_memory(store, surface.options, Indexing::welded, sink));
+  ExtractOptions picture = surface.options;
+  picture.normals = true;
+  std::uint64_t least = least_extract_memory(store, picture, Indexing::chunk_local,
+                                             preview_memory(arguments.picture));
+  if (!surface.output.empty())
+    least = std::max(least,
+                     least_extract_memory(store, surface.options, Indexing::welded,
+                                          mesh_file_memory(surface.form.format, arguments.threads,
+                                                           memory_of_mesh(surface, arguments))));
+  return surface.options.memory_of_others + least;
 }
 
 /// Refuses a budget in which pictures cannot be drawn, before anything is extracted.
@@ -240,30 +242,47 @@ void check_pictures(const std::vector<ExtractedSurface>& surfaces, const Argumen
     if (arguments.memory < least)
       throw UsageError(fmt::format(
           "a memory budget of {:.1f} MiB is too small: with a picture of {} x {} pixels at least "
-          "--memory {}M is needed, {:.1f} MiB of it for the picture and {} for OpenGL's driver; or "
+          "--memory {}M is needed, {:.1f} MiB of it for the picture and OpenGL's driver; or "
           "choose a smaller --preview-size",
           in_mib(arguments.memory), arguments.picture.width, arguments.picture.height,
-          mib_above(least), in_mib(preview_memory(arguments.picture) - preview_driver_memory()),
-          preview_driver_memory() >> 20));
+          mib_above(least), in_mib(preview_memory(arguments.picture) + preview_driver_memory())));
   }
 }
 
-ExtractReport make(const ExtractedSurface& surface, const Sinks& sinks, const Arguments& arguments,
-                   const StoreReader& store, Console& console) {
-  ExtractReport report;
-  if (sinks.mesh) report = extract(store, surface.options, *sinks.mesh, console.progress());
-  if (sinks.preview) {
-    const ExtractReport drawn =
-        extract(store, options_of_picture(surface, arguments), *sinks.preview, console.progress());
-    if (!sinks.mesh) report = drawn;
+struct MadeSurfaces {
+  std::vector<ExtractReport> reports;  ///< of each mesh, or of the picture where there is no mesh
+  std::vector<MadePass> passes;
+};
+
+/// Makes all meshes and pictures.
+MadeSurfaces make(const std::vector<ExtractedSurface>& surfaces, const std::vector<Sinks>& sinks,
+                  const StoreReader& store, Console& console) {
+  std::vector<SurfaceOutput> outputs;
+  std::vector<std::string> names;
+  std::vector<std::size_t> reported;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const ExtractOptions& options = surfaces[i].options;
+    reported.push_back(outputs.size());
+    if (sinks[i].mesh) {
+      outputs.push_back({options.isovalue, options.normals, sinks[i].mesh.get()});
+      names.push_back(surfaces[i].output.string());
+    }
+    if (sinks[i].preview) {
+      outputs.push_back({options.isovalue, true, sinks[i].preview.get()});
+      names.push_back(surfaces[i].preview.string());
+    }
   }
-  if (report.triangles == 0) console.note(why_empty(surface.options, report, store));
-  return report;
+  const std::vector<ExtractReport> reports =
+      extract(store, surfaces.front().options, outputs, console.progress());
+  MadeSurfaces made;
+  for (const std::size_t i : reported) made.reports.push_back(reports[i]);
+  made.passes = passes_of(reports, names);
+  return made;
 }
 
 /// What there is to say of each surface.
 struct Said {
-  ordered_json objects = ordered_json::array();
+  ordered_json objects = ordered_json::array(), passes;  ///< no passes of an estimate
   std::string text;
 };
 
@@ -286,18 +305,21 @@ Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& s
               const StoreReader& store, Console& console) {
   check_pictures(surfaces, arguments, store);
   if (!arguments.no_space_check) check_space(surfaces, store);
-  std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
+  const std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
+  const MadeSurfaces made = make(surfaces, sinks, store, console);
   Said said;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    const ExtractReport report = make(surfaces[i], sinks[i], arguments, store, console);
+    const ExtractReport& report = made.reports[i];
+    if (report.triangles == 0) console.note(why_empty(surfaces[i].options, report, store));
     const std::uint64_t bytes = !sinks[i].mesh ? 0
                                 : is_standard_output(arguments.output)
                                     ? sinks[i].mesh->bytes()
                                     : mesh_bytes(surfaces[i].output);
     said.objects.push_back(report_json(surfaces[i], report, bytes));
-    said.text += report_text(surfaces[i], report, bytes);
-    sinks[i] = {};
+    said.text += report_text(surfaces[i], report, bytes, surfaces.size() == 1);
   }
+  said.passes = passes_json(made.passes);
+  if (surfaces.size() > 1 || made.passes.size() > 1) said.text += passes_text(made.passes);
   return said;
 }
 
@@ -319,13 +341,14 @@ int run(const Arguments& arguments, Console& console) {
   for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
   const Said said = arguments.estimate ? estimate_all(surfaces, store, console)
                                        : make_all(arguments, surfaces, store, console);
-  console.result({{"command", "extract"},
-                  {"store", arguments.store},
-                  {"level", arguments.level},
-                  {"estimate", arguments.estimate},
-                  {"surfaces", said.objects},
-                  {"peak_resident_bytes", peak_resident_bytes()}},
-                 said.text);
+  ordered_json result{{"command", "extract"},
+                      {"store", arguments.store},
+                      {"level", arguments.level},
+                      {"estimate", arguments.estimate},
+                      {"surfaces", said.objects}};
+  if (!arguments.estimate) result["passes"] = said.passes;
+  result["peak_resident_bytes"] = peak_resident_bytes();
+  console.result(result, said.text);
   return 0;
 }
 

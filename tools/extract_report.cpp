@@ -36,6 +36,11 @@ void add_backend(ordered_json& object, const ExtractReport& r) {
   object["pool_bricks"] = r.pool_bricks;
 }
 
+std::string what_was_read(const ExtractReport& r) {
+  return fmt::format("from {} of {} bricks in {}", human_count(r.bricks_read),
+                     human_count(r.bricks), human_seconds(r.seconds));
+}
+
 }  // namespace
 
 ordered_json estimate_json(const ExtractedSurface& surface, const ExtractEstimate& e) {
@@ -92,12 +97,11 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
 }
 
 std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
-                        std::uint64_t bytes) {
-  std::string text =
-      fmt::format("isovalue {}: {} triangles{} from {} of {} bricks in {}\n",
-                  surface.options.isovalue, human_count(r.triangles),
-                  is_welded(surface) ? fmt::format(", {} vertices", human_count(r.vertices)) : "",
-                  human_count(r.bricks_read), human_count(r.bricks), human_seconds(r.seconds));
+                        std::uint64_t bytes, bool only) {
+  std::string text = fmt::format(
+      "isovalue {}: {} triangles{}{}\n", surface.options.isovalue, human_count(r.triangles),
+      is_welded(surface) ? fmt::format(", {} vertices", human_count(r.vertices)) : "",
+      only ? fmt::format(" {}", what_was_read(r)) : "");
   if (!r.gpu_refusal.empty())
     text += fmt::format("  on the CPU, for the GPU cannot: {}\n", r.gpu_refusal);
   if (r.backend == "cuda")
@@ -109,6 +113,39 @@ std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
   if (!surface.output.empty())
     text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
   if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());
+  return text;
+}
+
+std::vector<MadePass> passes_of(std::span<const ExtractReport> reports,
+                                std::span<const std::string> names) {
+  std::vector<MadePass> passes;
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    if (reports[i].pass == passes.size()) passes.push_back({{}, reports[i]});
+    passes[reports[i].pass].outputs.push_back(names[i]);
+  }
+  return passes;
+}
+
+ordered_json passes_json(std::span<const MadePass> passes) {
+  ordered_json list = ordered_json::array();
+  for (const MadePass& pass : passes)
+    list.push_back({{"outputs", pass.outputs},
+                    {"bricks_read", pass.report.bricks_read},
+                    {"brick_reads", pass.report.brick_reads},
+                    {"bytes_read", pass.report.bytes_read},
+                    {"seconds", pass.report.seconds}});
+  return list;
+}
+
+std::string passes_text(std::span<const MadePass> passes) {
+  std::string text;
+  for (const MadePass& pass : passes)
+    text += fmt::format("{} {} {}\n", human_count(pass.outputs.size()),
+                        pass.outputs.size() == 1 ? "file" : "files", what_was_read(pass.report));
+  if (passes.size() > 1)
+    text += fmt::format(
+        "{} passes over the store, because the memory budget has no room for all at once\n",
+        human_count(passes.size()));
   return text;
 }
 

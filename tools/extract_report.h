@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -28,7 +30,21 @@ std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate
 /// What was made; its file has `bytes`.
 nlohmann::ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r,
                                    std::uint64_t bytes);
+/// What its pass took is in the text where it is the `only` surface.
 std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
-                        std::uint64_t bytes);
+                        std::uint64_t bytes, bool only);
+
+/// What was made in one pass over the store.
+struct MadePass {
+  std::vector<std::string> outputs;
+  ExtractReport report;  ///< of any of them
+};
+
+/// The passes that made the outputs of these names, which have a report each.
+std::vector<MadePass> passes_of(std::span<const ExtractReport> reports,
+                                std::span<const std::string> names);
+
+nlohmann::ordered_json passes_json(std::span<const MadePass> passes);
+std::string passes_text(std::span<const MadePass> passes);
 
 }  // namespace isobrick::tools

@@ -160,6 +160,66 @@ TEST_F(Cuda, FilesAreThoseOfTheCpu) {
   compare(store, ".stl", {"--roi", "11:99,40:,:77", "--normals", "gradient"});
 }
 
+/// Also where a budget has no room for all surfaces beside each other.
+TEST_F(Cuda, SeveralSurfacesInOnePassAreThoseOfTheCpu) {
+  const std::string store = waves("u16", {"--brick", "32"});
+  const Arguments isovalues{"20000", "32767.5", "45000"};
+  for (const std::string extension : {".ply", ".stl"}) {
+    Arguments cpu{"extract", store, "--force", "-o", path("cpu" + extension), "--backend", "cpu"};
+    for (const std::string& isovalue : isovalues) cpu.insert(cpu.end(), {"--isovalue", isovalue});
+    run_json(cpu);
+    for (const char* budget : {"1G", "24M"}) {
+      SCOPED_TRACE(extension + ", " + budget);
+      Arguments cuda = cpu;
+      cuda[4] = path("cuda" + extension);
+      cuda[6] = "cuda";
+      cuda.insert(cuda.end(), {"--gpu-memory", budget});
+      const nlohmann::json made = run_json(cuda);
+      std::uint64_t outputs = 0;
+      for (const nlohmann::json& pass : made["passes"]) outputs += pass["outputs"].size();
+      EXPECT_EQ(outputs, 3u);
+      if (budget == std::string("1G")) {
+        ASSERT_EQ(made["passes"].size(), 1u);
+        EXPECT_EQ(made["passes"][0]["brick_reads"], made["passes"][0]["bricks_read"]);
+      }
+      for (const nlohmann::json& surface : made["surfaces"]) {
+        EXPECT_EQ(surface["backend"], "cuda");
+        EXPECT_LE(surface["device_bytes"].get<std::uint64_t>(), std::uint64_t{1} << 30);
+      }
+      for (const std::string& isovalue : isovalues)
+        EXPECT_TRUE(read_file(path("cpu_" + isovalue + extension)) ==
+                    read_file(path("cuda_" + isovalue + extension)));
+    }
+  }
+}
+
+/// A mesh and its picture are two surfaces of one isovalue.
+TEST_F(Cuda, AMeshAndItsPictureReadTheStoreOnce) {
+  const std::string store = waves("u8", {"--brick", "32"});
+  const auto extract = [&](const std::string& backend) {
+    return Arguments{"extract",
+                     store,
+                     "--force",
+                     "--isovalue",
+                     "127.5",
+                     "-o",
+                     path(backend + ".ply"),
+                     "--preview",
+                     path(backend + ".png"),
+                     "--backend",
+                     backend};
+  };
+  const Outcome drawn = run(extract("cpu"));
+  if (drawn.exit_code != 0) GTEST_SKIP() << drawn.err;  // nothing can draw here
+  const nlohmann::json made = run_json(extract("cuda"));
+  ASSERT_EQ(made["passes"].size(), 1u);
+  EXPECT_EQ(made["passes"][0]["brick_reads"], made["passes"][0]["bricks_read"]);
+  for (const char* extension : {".ply", ".png"})
+    EXPECT_TRUE(read_file(path(std::string("cpu") + extension)) ==
+                read_file(path(std::string("cuda") + extension)))
+        << extension;
+}
+
 TEST_F(Cuda, VolumesWithSamplesThatAreNoNumbers) {
   std::vector<float> samples;
   for (int i = 0; i < 70 * 65 * 90; ++i)
