@@ -19,12 +19,10 @@ struct PlannedTiles {
   TileStream tiles;
   BatchPlanner batches;
 
-  /// Isovalues may share no tile: so that each has enough for all threads, a batch has as many more.
   PlannedTiles(TileStream all, PassRequests requests, const ExtractPlan& plan)
       : tiles(std::move(all)),
         batches(tiles, requests.front().level->lattice, reach_of(requests),
-                requests.front().surface.may_have_nan, plan.limits.tiles * tiles.isovalues(),
-                plan.batch_bricks) {}
+                requests.front().surface.may_have_nan, plan.limits.tiles, plan.batch_bricks) {}
 };
 
 /// The same with a decoder that has begun: for a GPU, to whose memory the bricks go.
