@@ -12,8 +12,8 @@ namespace isobrick {
 /// Reads all samples of a level, in pieces of at most `piece_bytes` (or of one
 /// brick), and feeds them to `ranges`, whose finished layers go to `blocks` and
 /// `bricks`. Without `failure` the first brick that cannot be read ends it.
-/// `advance` is told of each piece's bytes, `checksum`, if there is one, of each brick (see
-/// read_slab).
+/// `advance` receives each piece's bytes; `checksum`, if there is one, receives that of each brick
+/// (see read_slab).
 void scan_level(const StoreReader& store, int level, std::size_t piece_bytes, LevelRanges& ranges,
                 const BrickFailure& failure, const RangeEmit& blocks, const RangeEmit& bricks,
                 const std::function<void(std::uint64_t)>& advance,

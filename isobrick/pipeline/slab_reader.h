@@ -9,9 +9,9 @@
 
 namespace isobrick {
 
-/// Told of a brick that cannot be read and why; called from any thread.
+/// Receives a brick that cannot be read, and why; called from any thread.
 using BrickFailure = std::function<void(Int3 brick, const std::string& what)>;
-/// Told of a brick's checksum, kAbsentBrick for an absent one; called from any thread.
+/// Receives a brick's checksum, kAbsentBrick for an absent one; called from any thread.
 using BrickChecksum = std::function<void(Int3 brick, std::uint32_t checksum)>;
 
 /// Bytes that read_slab() takes on so many threads, and the reader for its shard indices.

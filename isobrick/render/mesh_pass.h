@@ -39,8 +39,8 @@ class MeshPass {
 
   void bind(bool cut, bool transparent, bool coloured = false);
   void bind_block(const MeshPlace& place);
-  /// Waits until what came before the last call has been drawn, so that a driver keeps no more than
-  /// two of them, and draws one while it is told the next.
+  /// Waits until everything before the last call has been drawn. So a driver keeps two calls at
+  /// most, and draws one while it receives the next.
   void wait_for_call_before();
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
   void need_numbers(std::size_t count);

@@ -122,7 +122,7 @@ TEST_F(Misplaced, RangesOfAnotherStoreAsAWhole) {
   EXPECT_GT(refused_, 4);
 }
 
-// Bricks whose ranges are alike: only their checksums tell them apart.
+// Bricks whose ranges are alike: only their checksums differ.
 
 enum class Content : std::uint8_t { noise, mask };
 
