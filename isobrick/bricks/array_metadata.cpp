@@ -275,7 +275,7 @@ std::string to_json(const ArrayMetadata& array) {
     sharding["index_location"] = array.sharding->index_at_end ? "end" : "start";
     codecs = Json::array({named("sharding_indexed", std::move(sharding))});
   }
-  Json json;
+  Json json = Json::object();
   json["zarr_format"] = 3;
   json["node_type"] = "array";
   json["shape"] = array.shape;
@@ -336,7 +336,7 @@ ArrayMetadata parse_array_metadata(std::string_view text, const std::string& whe
 }
 
 std::string group_json() {
-  Json json;
+  Json json = Json::object();
   json["zarr_format"] = 3;
   json["node_type"] = "group";
   json["attributes"] = Json::object();

@@ -233,7 +233,7 @@ std::string to_json(const ImageMetadata& image) {
   }
   Json datasets = Json::array();
   for (const ImageMetadata::Level& level : image.levels) {
-    Json dataset;
+    Json dataset = Json::object();
     dataset["path"] = level.path;
     dataset["coordinateTransformations"] = Json::array();
     dataset["coordinateTransformations"].push_back(
@@ -242,13 +242,13 @@ std::string to_json(const ImageMetadata& image) {
         {{"type", "translation"}, {"translation", zyx(level.transform.origin)}});
     datasets.push_back(std::move(dataset));
   }
-  Json multiscale;
+  Json multiscale = Json::object();
   multiscale["name"] = image.name;
   if (!image.downsampling.empty()) multiscale["type"] = image.downsampling;
   multiscale["axes"] = std::move(axes);
   multiscale["datasets"] = std::move(datasets);
 
-  Json ours;
+  Json ours = Json::object();
   ours["version"] = kStoreVersion;
   if (!finest.axis_aligned()) ours["direction"] = finest.direction;
   if (!image.grid_class.empty()) ours["grid_class"] = image.grid_class;
@@ -256,12 +256,13 @@ std::string to_json(const ImageMetadata& image) {
   if (image.may_have_nan) ours["may_have_nan"] = *image.may_have_nan;
   if (image.checksum) ours[kChecksumKey] = *image.checksum;
 
-  Json attributes;
+  Json attributes = Json::object();
+  attributes["ome"] = Json::object();
   attributes["ome"]["version"] = "0.5";
   attributes["ome"]["multiscales"] = Json::array({std::move(multiscale)});
   if (image.window) attributes["ome"]["omero"] = omero(image);
   if (image.ours) attributes["isobrick"] = std::move(ours);
-  Json json;
+  Json json = Json::object();
   json["zarr_format"] = 3;
   json["node_type"] = "group";
   json["attributes"] = std::move(attributes);
@@ -297,7 +298,7 @@ std::uint32_t metadata_checksum(std::string_view root, std::span<const std::stri
                                 const std::string& where) {
   const nlohmann::json parsed = parse_json(root, where);
   const CheckedJson attributes = CheckedJson(parsed, where).at("attributes");
-  nlohmann::json covered;
+  nlohmann::json covered = nlohmann::json::object();
   // Other programs may add to the rest of `ome` how they show the image.
   covered["multiscales"] = attributes.at("ome").at("multiscales").raw();
   if (attributes.has("isobrick")) covered["isobrick"] = attributes.at("isobrick").raw();

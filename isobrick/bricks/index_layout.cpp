@@ -25,7 +25,7 @@ Int3 parse_extent(const CheckedJson& json) {
 }  // namespace
 
 std::string to_json(const IndexLayout& layout) {
-  nlohmann::json json;
+  nlohmann::json json = nlohmann::json::object();
   json["isobrick_index"] = kVersion;
   json["kind"] = layout.kind;
   json["leaf"] = layout.leaf;

@@ -38,8 +38,8 @@ std::string group_of(const ArrayMetadata& array, const std::string& where) {
   dataset["coordinateTransformations"] = Json::array({Json{{"type", "scale"}, {"scale", ones}}});
   Json multiscale{{"axes", std::move(axes)}, {"datasets", Json::array({std::move(dataset)})}};
   Json group{{"zarr_format", 3}, {"node_type", "group"}};
-  group["attributes"]["ome"] = {{"version", "0.5"},
-                                {"multiscales", Json::array({std::move(multiscale)})}};
+  group["attributes"] = {
+      {"ome", {{"version", "0.5"}, {"multiscales", Json::array({std::move(multiscale)})}}}};
   return group.dump();
 }
 

@@ -14,9 +14,10 @@ namespace isobrick {
 namespace {
 
 nlohmann::json marker_json(const StoreLayout& layout) {
-  nlohmann::json marker;
+  nlohmann::json marker = nlohmann::json::object();
   marker["isobrick_layout"] = kStoreVersion;
   marker["image"] = nlohmann::json::parse(to_json(image_metadata(layout)));
+  marker["arrays"] = nlohmann::json::array();
   for (const LevelInfo& level : layout.levels)
     marker["arrays"].push_back(nlohmann::json::parse(to_json(array_metadata(level, layout))));
   return marker;

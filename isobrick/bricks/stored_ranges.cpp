@@ -16,7 +16,7 @@ std::filesystem::path ranges_file(const std::filesystem::path& store) {
 }
 
 std::string to_json(const StoredRanges& stored) {
-  nlohmann::json json;
+  nlohmann::json json = nlohmann::json::object();
   json["isobrick_ranges"] = kVersion;
   json["may_have_nan"] = stored.may_have_nan;
   json["image_crc32c"] = stored.image_crc32c;

@@ -67,7 +67,7 @@ std::string v3_from_zarray(std::string_view text, const std::string& where) {
   const NumpyType type = parse_dtype(json.at("dtype"));
   const std::string separator =
       json.has("dimension_separator") ? json.string_at("dimension_separator") : ".";
-  Json array;
+  Json array = Json::object();
   array["zarr_format"] = 3;
   array["node_type"] = "array";
   array["shape"] = json.at("shape").raw();
@@ -92,10 +92,10 @@ std::string v3_from_zattrs(std::string_view text, const std::string& where) {
   const std::string version = first.has("version") ? first.string_at("version") : "unknown";
   if (version != "0.4")
     first.unsupported(fmt::format("OME-NGFF {} is not supported, only 0.4 to 0.6", version));
-  Json group;
+  Json group = Json::object();
   group["zarr_format"] = 3;
   group["node_type"] = "group";
-  group["attributes"]["ome"] = {{"version", "0.5"}, {"multiscales", multiscales.raw()}};
+  group["attributes"] = {{"ome", {{"version", "0.5"}, {"multiscales", multiscales.raw()}}}};
   if (json.has("isobrick")) group["attributes"]["isobrick"] = json.at("isobrick").raw();
   if (json.has("omero")) group["attributes"]["ome"]["omero"] = json.at("omero").raw();
   return group.dump();
@@ -104,7 +104,7 @@ std::string v3_from_zattrs(std::string_view text, const std::string& where) {
 std::string to_zarray(const ArrayMetadata& array) {
   // The fill value and the names of codecs are those of version 3.
   const Json v3 = Json::parse(to_json(array));
-  Json json;
+  Json json = Json::object();
   json["zarr_format"] = 2;
   json["shape"] = v3["shape"];
   json["chunks"] = v3["chunk_grid"]["configuration"]["chunk_shape"];
@@ -122,7 +122,8 @@ std::string to_zarray(const ArrayMetadata& array) {
 
 std::string to_zattrs(const ImageMetadata& image) {
   Json attributes = Json::parse(to_json(image))["attributes"];
-  Json json;
+  Json json = Json::object();
+  json["multiscales"] = Json::array();
   for (const Json& multiscale : attributes["ome"]["multiscales"]) {
     Json item{{"version", "0.4"}};
     item.update(multiscale);
