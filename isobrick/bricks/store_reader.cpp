@@ -318,9 +318,11 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   return true;
 }
 
-std::uint32_t StoreReader::read_brick_unchecked(int level, Int3 b, std::byte* out) const {
+std::optional<std::uint32_t> StoreReader::read_brick_unchecked(int level, Int3 b,
+                                                               std::byte* out) const {
   const auto place = impl_->find_unchecked(level, b);
-  return place ? impl_->read(level, b, *place, out) : kAbsentBrick;
+  if (!place) return std::nullopt;
+  return impl_->read(level, b, *place, out);
 }
 
 /// The checksum of the brick that is read.

@@ -81,8 +81,8 @@ class StoreReader {
   /// the one that the store's checksums are of: it is that of another place or store.
   bool read_brick(int level, Int3 b, std::byte* out) const;
   /// The same without comparing it with the store's checksums: for computing them. The brick's
-  /// checksum, kAbsentBrick when it is absent.
-  std::uint32_t read_brick_unchecked(int level, Int3 b, std::byte* out) const;
+  /// checksum; nullopt when it is absent.
+  std::optional<std::uint32_t> read_brick_unchecked(int level, Int3 b, std::byte* out) const;
 
   /// Hints that brick `b` is read soon; may start the disk.
   void will_need(int level, Int3 b) const;

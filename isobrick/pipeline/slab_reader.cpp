@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <optional>
 #include <vector>
 
 #include "isobrick/bricks/brick_checksums.h"
@@ -16,9 +17,10 @@ namespace {
 bool read_brick(const StoreReader& store, int level, Int3 brick, std::byte* out,
                 const BrickChecksum& checksum) {
   if (!checksum) return store.read_brick(level, brick, out);
-  const std::uint32_t found = store.read_brick_unchecked(level, brick, out);
-  checksum(brick, found);
-  return found != kAbsentBrick;
+  // A brick that is there may have the checksum of an absent one.
+  const std::optional<std::uint32_t> found = store.read_brick_unchecked(level, brick, out);
+  checksum(brick, found.value_or(kAbsentBrick));
+  return found.has_value();
 }
 
 /// Decodes a brick and copies what it shares with `box`, whose samples are `out`.

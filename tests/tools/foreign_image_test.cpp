@@ -147,5 +147,19 @@ TEST_F(ForeignImage, ATurnedImageBecomesAMeshThatIsTurned) {
   EXPECT_TRUE(read_file(path("a.ply")) == read_file(path("b.ply")));
 }
 
+/// A chunk whose CRC-32C is 0, which stands for an absent brick.
+TEST_F(ForeignImage, AChunkWithTheChecksumOfNoneIsRead) {
+  const std::string image = path("zero.zarr");
+  std::filesystem::create_directories(image + "/c/0/0");
+  write_file(image + "/zarr.json",
+             R"({"zarr_format":3,"node_type":"array","shape":[2,2,2],"data_type":"uint8",
+                 "chunk_grid":{"name":"regular","configuration":{"chunk_shape":[2,2,2]}},
+                 "chunk_key_encoding":{"name":"default"},"fill_value":0,
+                 "codecs":[{"name":"bytes"}]})");
+  write_file(image + "/c/0/0/0", "\x09\xc8\x1e\x4d\x09\xe2\xd8\xb9");
+  ASSERT_EQ(run({"index", image, "--kind", "octree"}).exit_code, 0);
+  EXPECT_EQ(run_json({"info", image})["value_range"], (json{9, 226}));
+}
+
 }  // namespace
 }  // namespace isobrick::test
