@@ -156,9 +156,7 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   s.axes = in.flag("axes");
   s.scale_bar = in.flag("scale_bar");
   s.pixel_error = in.real("pixel_error", kLeastPixelError, kMostPixelError);
-  // Bookmarks of earlier versions do not have it.
-  if (json.contains("finest_level"))
-    s.finest_level = static_cast<int>(in.real("finest_level", 0, 64));
+  s.finest_level = static_cast<int>(in.real("finest_level", 0, 64));
   return s;
 }
 
