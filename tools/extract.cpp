@@ -136,14 +136,15 @@ std::uint64_t memory_of_mesh(const ExtractedSurface& surface, const Arguments& a
   return surface.options.memory / arguments.isovalues.size();
 }
 
-/// The meshes to write, with size_of(ExtractedSurface) as PlannedMesh has it.
+/// The meshes to write, with the size_of(number of a surface) that PlannedMesh has.
 template <class F>
 std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& surfaces,
                                         const F& size_of) {
   std::vector<PlannedMesh> meshes;
-  for (const ExtractedSurface& surface : surfaces) {
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const ExtractedSurface& surface = surfaces[i];
     if (surface.output.empty() || is_standard_output(surface.output.native())) continue;
-    PlannedMesh mesh = size_of(surface);
+    PlannedMesh mesh = size_of(i);
     mesh.path = surface.output;
     mesh.form = surface.form;
     meshes.push_back(std::move(mesh));
@@ -163,13 +164,11 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
   std::vector<double> isovalues;
   for (const ExtractedSurface& surface : surfaces) isovalues.push_back(surface.options.isovalue);
   const std::vector<ActiveParts> active = count_active(store, surfaces.front().options, isovalues);
-  const auto largest = planned_meshes(surfaces, [&](const ExtractedSurface& surface) {
-    return PlannedMesh{
-        .size = largest_mesh(active[static_cast<std::size_t>(&surface - surfaces.data())])};
-  });
+  const auto largest = planned_meshes(
+      surfaces, [&](std::size_t i) { return PlannedMesh{.size = largest_mesh(active[i])}; });
   if (!find_shortage(largest, free_space)) return;
-  const auto likely = planned_meshes(surfaces, [&](const ExtractedSurface& surface) {
-    const ExtractEstimate guess = estimate_one(surface, store);
+  const auto likely = planned_meshes(surfaces, [&](std::size_t i) {
+    const ExtractEstimate guess = estimate_one(surfaces[i], store);
     return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
   });
   if (const auto shortage = find_shortage(likely, free_space))
