@@ -2,11 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <vector>
 
 #include "isobrick/core/error.h"
 
-// Sizes of streaming extractions beside each other, which needs no device.
+// Sizes of streaming extractions, alone and beside each other, which need no device.
 
 namespace isobrick {
 namespace {
@@ -20,6 +21,66 @@ std::vector<SurfaceOptions> surfaces() {
       {.isovalue = 1, .normals = true, .roi = kLattice.box()},
       {.isovalue = 1, .normals = true, .indexing = Indexing::chunk_local, .roi = kLattice.box()},
       {.isovalue = 2, .roi = kLattice.box()}};
+}
+
+TEST(StreamSizes, TheLeastBudgetWorksAndLessIsRefusedByName) {
+  const SurfaceOptions options{.roi = kLattice.box()};
+  const gpu::StreamSizes least = gpu::stream_sizes(kLattice, options, 1);
+  EXPECT_EQ(gpu::fit_stream_sizes(kLattice, options, least.device_bytes, kMuch, 0).tiles, 1u);
+  EXPECT_EQ(gpu::fit_stream_sizes(kLattice, options, kMuch, kMuch, 0).tiles,
+            gpu::kMaxTilesOfLaunch);
+  const auto refusal = [&](std::uint64_t device, std::uint64_t host) -> std::string {
+    try {
+      gpu::fit_stream_sizes(kLattice, options, device, host, 100);
+    } catch (const UsageError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(refusal(least.device_bytes - 1, kMuch)
+                .find("at least " + std::to_string(least.device_bytes) + " bytes (--gpu-memory "),
+            std::string::npos);
+  const std::uint64_t host = least.pinned_bytes + least.host_bytes + 100;
+  EXPECT_EQ(refusal(kMuch, host), "");
+  EXPECT_NE(refusal(kMuch, host - 1).find("at least " + std::to_string(host) + " bytes (--memory "),
+            std::string::npos);
+  EXPECT_LT(least.device_bytes, 32 * kMiB);
+}
+
+TEST(StreamSizes, APoolIsTakenWhereMostOfItFits) {
+  const SurfaceOptions options{.roi = kLattice.box()};
+  const gpu::PoolSizes wanted{gpu::preferred_pool_bricks(kLattice, 16), 16};
+  EXPECT_GE(wanted.bricks, 384u);
+  EXPECT_LT(wanted.bricks, 2048u);
+  const auto fit = [&](std::uint64_t device, std::uint64_t host) {
+    const gpu::StreamSizes s = gpu::fit_stream_sizes(kLattice, options, device, host, 0, wanted);
+    EXPECT_LE(s.device_bytes, device);
+    EXPECT_LE(s.pinned_bytes + s.host_bytes, host);
+    return s;
+  };
+  const gpu::StreamSizes whole = fit(1024 * kMiB, kMuch), most = fit(400 * kMiB, kMuch),
+                         none = fit(200 * kMiB, kMuch), little_host = fit(1024 * kMiB, 20 * kMiB);
+  EXPECT_EQ(whole.pool.bricks, wanted.bricks);
+  EXPECT_EQ(whole.tiles, gpu::kMaxTilesOfLaunch);
+  EXPECT_EQ(whole.sent_bricks, 0u);
+  EXPECT_LT(most.pool.bricks, wanted.bricks);
+  EXPECT_GT(most.device_bytes + kLattice.brick_bytes(), 400 * kMiB) << "all of the room is used";
+  EXPECT_GE(10 * most.pool.bricks, 6 * wanted.bricks);
+  EXPECT_EQ(none.pool.bricks, 0u);
+  EXPECT_GT(none.sent_bricks, 0u);
+  EXPECT_EQ(little_host.pool.bricks, 0u);
+  // Eight bricks, all of which one tile needs.
+  const Lattice small{{128, 128, 128}, {64, 64, 64}, ScalarType::u16};
+  for (std::uint64_t device = 24 * kMiB; device <= 128 * kMiB; device += kMiB / 4) {
+    const gpu::StreamSizes s =
+        gpu::fit_stream_sizes(small, {.roi = small.box()}, device, kMuch, 0, {8, 4});
+    EXPECT_TRUE(s.pool.bricks == 0 || s.pool.bricks >= s.tile_bricks) << device;
+  }
+  // Small bricks would be many copies.
+  EXPECT_EQ(gpu::fit_stream_sizes({{256, 256, 256}, {32, 32, 32}, ScalarType::u8}, options, kMuch,
+                                  kMuch, 0, {100, 4})
+                .pool.bricks,
+            0u);
 }
 
 TEST(StreamSizes, SeveralSurfacesShareThePoolAndTheBudgets) {

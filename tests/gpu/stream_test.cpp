@@ -376,70 +376,7 @@ TYPED_TEST(GpuStream, WhoTakesTheMeshMayFail) {
   EXPECT_EQ(taken, 3);
 }
 
-TEST(GpuStreamSizes, TheLeastBudgetWorksAndLessIsRefusedByName) {
-  const Lattice lattice{{1024, 1024, 1024}, {64, 64, 64}, ScalarType::u16};
-  const SurfaceOptions options{.roi = lattice.box()};
-  constexpr std::uint64_t much = std::uint64_t{1} << 40;
-  const gpu::StreamSizes least = gpu::stream_sizes(lattice, options, 1);
-  EXPECT_EQ(gpu::fit_stream_sizes(lattice, options, least.device_bytes, much, 0).tiles, 1u);
-  EXPECT_EQ(gpu::fit_stream_sizes(lattice, options, much, much, 0).tiles, gpu::kMaxTilesOfLaunch);
-  const auto refusal = [&](std::uint64_t device, std::uint64_t host) -> std::string {
-    try {
-      gpu::fit_stream_sizes(lattice, options, device, host, 100);
-    } catch (const UsageError& e) {
-      return e.what();
-    }
-    return "";
-  };
-  EXPECT_NE(refusal(least.device_bytes - 1, much)
-                .find("at least " + std::to_string(least.device_bytes) + " bytes (--gpu-memory "),
-            std::string::npos);
-  const std::uint64_t host = least.pinned_bytes + least.host_bytes + 100;
-  EXPECT_EQ(refusal(much, host), "");
-  EXPECT_NE(refusal(much, host - 1).find("at least " + std::to_string(host) + " bytes (--memory "),
-            std::string::npos);
-  EXPECT_LT(least.device_bytes, std::uint64_t{32} << 20);
-}
-
-TEST(GpuStreamSizes, APoolIsTakenWhereMostOfItFits) {
-  const Lattice lattice{{1024, 1024, 1024}, {64, 64, 64}, ScalarType::u16};
-  const SurfaceOptions options{.roi = lattice.box()};
-  constexpr std::uint64_t mebi = std::uint64_t{1} << 20, much = mebi << 20;
-  const gpu::PoolSizes wanted{gpu::preferred_pool_bricks(lattice, 16), 16};
-  EXPECT_GE(wanted.bricks, 384u);
-  EXPECT_LT(wanted.bricks, 2048u);
-  const auto fit = [&](std::uint64_t device, std::uint64_t host) {
-    const gpu::StreamSizes s = gpu::fit_stream_sizes(lattice, options, device, host, 0, wanted);
-    EXPECT_LE(s.device_bytes, device);
-    EXPECT_LE(s.pinned_bytes + s.host_bytes, host);
-    return s;
-  };
-  const gpu::StreamSizes whole = fit(1024 * mebi, much), most = fit(400 * mebi, much),
-                         none = fit(200 * mebi, much), little_host = fit(1024 * mebi, 20 * mebi);
-  EXPECT_EQ(whole.pool.bricks, wanted.bricks);
-  EXPECT_EQ(whole.tiles, gpu::kMaxTilesOfLaunch);
-  EXPECT_EQ(whole.sent_bricks, 0u);
-  EXPECT_LT(most.pool.bricks, wanted.bricks);
-  EXPECT_GT(most.device_bytes + lattice.brick_bytes(), 400 * mebi) << "all of the room is used";
-  EXPECT_GE(10 * most.pool.bricks, 6 * wanted.bricks);
-  EXPECT_EQ(none.pool.bricks, 0u);
-  EXPECT_GT(none.sent_bricks, 0u);
-  EXPECT_EQ(little_host.pool.bricks, 0u);
-  // Eight bricks, all of which one tile needs.
-  const Lattice small{{128, 128, 128}, {64, 64, 64}, ScalarType::u16};
-  for (std::uint64_t device = 24 * mebi; device <= 128 * mebi; device += mebi / 4) {
-    const gpu::StreamSizes s =
-        gpu::fit_stream_sizes(small, {.roi = small.box()}, device, much, 0, {8, 4});
-    EXPECT_TRUE(s.pool.bricks == 0 || s.pool.bricks >= s.tile_bricks) << device;
-  }
-  // Small bricks would be many copies.
-  EXPECT_EQ(gpu::fit_stream_sizes({{256, 256, 256}, {32, 32, 32}, ScalarType::u8}, options, much,
-                                  much, 0, {100, 4})
-                .pool.bricks,
-            0u);
-}
-
-TEST(GpuStreamSizes, WhatHasNoKernelsIsRefused) {
+TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
   if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
   const auto refused = [](ScalarType type, auto change) {
     const Lattice lattice{{64, 64, 64}, {64, 64, 64}, type};

@@ -42,13 +42,20 @@ TEST(TileStream, BeginLooksAtOneRangeChunkAndNextGoesOn) {
   EXPECT_EQ(tiles, kEdge / kTileEdge);
 }
 
+struct NoiseStore {
+  explicit NoiseStore(Int3 extent) {
+    MemorySource source = make_source<std::uint16_t>(extent, 3, true);
+    convert_quietly(source, path, {.brick = 32, .shard = 64});
+  }
+
+  TemporaryFolder folder;
+  std::filesystem::path path = folder / "a";
+};
+
 /// Of several isovalues the stream has every tile once, in Morton order, and what each touches.
 TEST(TileStream, SeveralIsovaluesShareOneOrder) {
-  const Int3 extent{150, 90, 530};
-  MemorySource source = make_source<std::uint16_t>(extent, 3, true);
-  const TemporaryFolder folder;
-  convert_quietly(source, folder / "a", {.brick = 32, .shard = 64});
-  const StoreReader store(folder / "a");
+  const NoiseStore noise({150, 90, 530});
+  const StoreReader store(noise.path);
   const Box3 roi{{3, 40, 5}, {140, 90, 530}};
   const std::vector<double> isovalues{40000, -1, 20000, 65000};
   TileStream together(store, 0, isovalues, roi);
@@ -71,7 +78,7 @@ TEST(TileStream, SeveralIsovaluesShareOneOrder) {
   std::uint64_t range_bytes = 0;
   for (std::size_t i = 0; i < isovalues.size(); ++i) {
     SCOPED_TRACE(isovalues[i]);
-    const StoreReader fresh(folder / "a");  // one that has kept no ranges
+    const StoreReader fresh(noise.path);  // one that has kept no ranges
     TileStream alone(fresh, 0, isovalues[i], roi);
     std::size_t count = 0;
     while (const auto work = alone.next()) {
@@ -89,11 +96,8 @@ TEST(TileStream, SeveralIsovaluesShareOneOrder) {
 
 /// A batch has the tiles of each isovalue and the bricks of all.
 TEST(TileStream, BatchesOfSeveralIsovalues) {
-  const Int3 extent{150, 90, 100};
-  MemorySource source = make_source<std::uint16_t>(extent, 3, true);
-  const TemporaryFolder folder;
-  convert_quietly(source, folder / "a", {.brick = 32, .shard = 64});
-  const StoreReader store(folder / "a");
+  const NoiseStore noise({150, 90, 100});
+  const StoreReader store(noise.path);
   const Lattice& lattice = store.info().levels[0].lattice;
   TileStream stream(store, 0, std::vector<double>{40000, 20000}, lattice.box());
   BatchPlanner planner(stream, lattice, 1, false, 3, 40);
