@@ -11,7 +11,7 @@ namespace isobrick::tools {
 namespace {
 
 /// The least for bricks and meshes: with less a picture is too coarse to be of use.
-constexpr std::uint64_t kLeastScene = std::uint64_t{48} << 20;
+constexpr std::uint64_t kMinScene = std::uint64_t{48} << 20;
 
 /// Of a picture, the one before it, and its way to the file.
 std::uint64_t picture_memory(PictureSize size, bool transparent) {
@@ -28,7 +28,7 @@ std::uint64_t least_scene(const StoreReader& store) {
   std::uint64_t brick = 0;
   for (const LevelInfo& level : store.info().levels)
     brick = std::max<std::uint64_t>(brick, level.lattice.brick_bytes());
-  return kLeastScene + 2 * brick;
+  return kMinScene + 2 * brick;
 }
 
 }  // namespace

@@ -56,18 +56,18 @@ class Candidates {
 class Allowance {
  public:
   explicit Allowance(const CutBudget& budget)
-      : most_(bounded(budget.triangles, budget)),
-        hard_(std::max(most_, bounded(budget.thin_triangles, budget))) {}
+      : limit_(bounded(budget.triangles, budget)),
+        thin_limit_(std::max(limit_, bounded(budget.thin_triangles, budget))) {}
 
   double used() const { return used_; }
   /// Whether thin structure may take more than the budget.
-  bool stretches() const { return hard_ > most_; }
+  bool stretches() const { return thin_limit_ > limit_; }
   /// Whether nodes that lose thin structure come before all others.
-  bool thin_first() const { return used_ < hard_ - kOtherPart * most_; }
+  bool thin_first() const { return used_ < thin_limit_ - kOtherPart * limit_; }
   bool fits(double more, bool thin) const {
-    const double after = used_ + more, rest = kOtherPart * most_ - std::max(others_, 0.0);
-    if (after <= most_) return true;
-    return thin ? after <= hard_ - std::max(rest, 0.0) : after <= hard_ && more <= rest;
+    const double after = used_ + more, rest = kOtherPart * limit_ - std::max(others_, 0.0);
+    if (after <= limit_) return true;
+    return thin ? after <= thin_limit_ - std::max(rest, 0.0) : after <= thin_limit_ && more <= rest;
   }
   void take(double more, bool thin) {
     used_ += more;
@@ -80,7 +80,7 @@ class Allowance {
     return static_cast<double>(std::min(triangles, budget.mesh_bytes / kBytesPerTriangle));
   }
 
-  double most_, hard_;
+  double limit_, thin_limit_;
   double used_ = 0, others_ = 0;  ///< the latter for what loses nothing
 };
 

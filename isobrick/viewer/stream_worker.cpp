@@ -18,10 +18,10 @@ NodeMesh empty_mesh(const MeshJob& job) {
   return mesh;
 }
 
-/// For what no request stands for.
-class UntilClosed final : public Wanted {
+/// For work that belongs to no request: it ends when the queue is closed.
+class CloseCheck final : public Wanted {
  public:
-  explicit UntilClosed(const RequestQueue& queue) : queue_(queue) {}
+  explicit CloseCheck(const RequestQueue& queue) : queue_(queue) {}
   void check() const override {
     if (queue_.closed()) throw Abandoned();
   }
@@ -66,7 +66,7 @@ void StreamWorker::run() {
 /// Once there is something to see: most of the bricks are there then.
 void StreamWorker::find_thin_structure() {
   try {
-    if (state_->tree->thin_structure().read(state_->bricks, UntilClosed(state_->queue)))
+    if (state_->tree->thin_structure().read(state_->bricks, CloseCheck(state_->queue)))
       state_->notify_change();
   } catch (const Abandoned&) {
   }

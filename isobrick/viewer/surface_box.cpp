@@ -16,8 +16,8 @@ constexpr Index kNodeBlocks = kNodeEdge / kBlockEdge;
 constexpr Index kChunkNodes = StoreReader::kRangeChunk / kNodeBlocks;
 static_assert(kChunkNodes * kNodeBlocks == StoreReader::kRangeChunk);
 
-/// A box that grows; nothing at first.
-class Growing {
+/// The box around all that were included; nothing at first.
+class BoxUnion {
  public:
   void include(const IndexBox& box) {
     if (!box_) box_ = box;
@@ -54,12 +54,12 @@ std::optional<IndexBox> within(const IndexBox& part, const IndexBox& box) {
 constexpr Index kFewBlocks = 1024;
 
 /// How many of the isovalues each sample of a box reaches.
-class Reached {
+class ReachCounts {
  public:
-  static constexpr std::size_t kMostIsovalues = 254;
+  static constexpr std::size_t kMaxIsovalues = 254;
 
   /// Reads the bricks, one at a time. Throws what that throws.
-  Reached(const BrickSource& source, std::span<const double> isovalues, Box3 samples)
+  ReachCounts(const BrickSource& source, std::span<const double> isovalues, Box3 samples)
       : samples_(samples), reached_(static_cast<std::size_t>(volume(samples.extent())), kNaN) {
     const StoreInfo& info = source.info();
     const Lattice& lattice = info.levels.front().lattice;
@@ -75,7 +75,7 @@ class Reached {
 
   /// Around the edges between samples that one of the isovalues crosses.
   std::optional<IndexBox> crossed() const {
-    Growing box;
+    BoxUnion box;
     for_each_point(samples_, [&](Int3 p) {
       for (int axis = 0; axis < 3; ++axis) {
         Int3 next = p;
@@ -125,7 +125,7 @@ class Search {
   std::optional<IndexBox> run() {
     std::vector<IndexBox> chunks = active_chunks();
     // Those at the ends of the volume make the box so large that most others are within.
-    Growing all;
+    BoxUnion all;
     for (const IndexBox& chunk : chunks) all.include(chunk);
     if (!all.box()) return std::nullopt;
     const Vec3d middle = (all.box()->lo + all.box()->hi) * 0.5;
@@ -155,7 +155,7 @@ class Search {
     const Int3 nodes = tree_.grid().level(0).nodes, edge{kChunkNodes, kChunkNodes, kChunkNodes};
     std::vector<IndexBox> chunks;
     for_each_point({{0, 0, 0}, ceil_div(nodes, edge)}, [&](Int3 chunk) {
-      Growing active;
+      BoxUnion active;
       for_each_point(intersect({chunk * edge, (chunk + Int3{1, 1, 1}) * edge}, {{0, 0, 0}, nodes}),
                      [&](Int3 node) {
                        const ValueRange<float> range = tree_.range({0, node});
@@ -195,10 +195,11 @@ class Search {
       samples.hi[axis] = static_cast<Index>(std::ceil(blocks.hi[axis])) + 1;
     }
     const Int3 cells = samples.extent() - Int3{1, 1, 1}, edge{kBlockEdge, kBlockEdge, kBlockEdge};
-    if (volume(ceil_div(cells, edge)) > kFewBlocks || isovalues_.size() > Reached::kMostIsovalues)
+    if (volume(ceil_div(cells, edge)) > kFewBlocks ||
+        isovalues_.size() > ReachCounts::kMaxIsovalues)
       return blocks;
     try {
-      const auto crossed = Reached(source_, isovalues_, samples).crossed();
+      const auto crossed = ReachCounts(source_, isovalues_, samples).crossed();
       return (crossed ? within(blocks, *crossed) : crossed).value_or(blocks);
     } catch (const DamageError&) {  // which is shown where the brick is
       return blocks;
@@ -219,7 +220,7 @@ class Search {
   const NodeTree& tree_;
   std::span<const double> isovalues_;
   const IndexBox& part_;
-  Growing found_;
+  BoxUnion found_;
 };
 
 }  // namespace

@@ -127,9 +127,9 @@ void look_panel(ViewerState& state) {
   n.mode = static_cast<NavigationMode>(mode);
   ImGui::Checkbox("Orthographic", &n.camera.orthographic);
   ImGui::SameLine();
-  if (ImGui::SmallButton("Fit surface")) state.requests.fit = Framed::surface;
+  if (ImGui::SmallButton("Fit surface")) state.requests.fit = FrameTarget::surface;
   ImGui::SameLine();
-  if (ImGui::SmallButton("Fit volume")) state.requests.fit = Framed::volume;
+  if (ImGui::SmallButton("Fit volume")) state.requests.fit = FrameTarget::volume;
   for (int axis = 0; axis < 3; ++axis)
     for (const double sign : {1.0, -1.0}) {
       if (axis + (sign < 0) > 0) ImGui::SameLine();

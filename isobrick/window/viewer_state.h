@@ -29,12 +29,12 @@ struct PickedPoint {
 };
 
 /// What the camera is to frame.
-enum class Framed : std::uint8_t { surface, volume };
+enum class FrameTarget : std::uint8_t { surface, volume };
 
 /// What panels may ask of the window.
 struct Requests {
   bool close = false;
-  std::optional<Framed> fit;
+  std::optional<FrameTarget> fit;
   std::optional<Selection> volume;  ///< another one of the image
   std::optional<Vec3d> look_along;  ///< world direction
   std::optional<std::filesystem::path> screenshot;

@@ -133,11 +133,11 @@ double ViewerWindow::aspect() const {
   return static_cast<double>(area.width) / area.height;
 }
 
-void ViewerWindow::frame_again(Framed framed) {
+void ViewerWindow::frame_again(FrameTarget framed) {
   const StorePicture& picture = *state_.picture;
   WorldBox box = picture.bounds();
   try {
-    if (framed == Framed::surface) box = picture.shown_bounds(state_.settings);
+    if (framed == FrameTarget::surface) box = picture.shown_bounds(state_.settings);
   } catch (const std::exception& e) {
     state_.say(what_of(e));
   }

@@ -85,8 +85,8 @@ class ViewerWindow {
   void load(const std::filesystem::path& path, const Selection& selection);
   bool begin_ranges(const std::filesystem::path& path, const Selection& selection);
   ConvertOptions import_options() const;
-  void frame_again(Framed framed);
-  void tell_empty_surfaces();
+  void frame_again(FrameTarget framed);
+  void report_empty_surfaces();
   FrameKey frame_key() const;
   bool is_due() const;
   PictureArea picture_area() const;
@@ -127,7 +127,7 @@ class ViewerWindow {
   /// again once the picture rests, if it is still of the same.
   std::vector<Click> clicks_;
   std::set<std::string> told_damage_;  ///< of this store
-  std::set<double> told_empty_;        ///< isovalues without a surface, of this store
+  std::set<double> reported_empty_;    ///< isovalues without a surface, of this store
 };
 
 }  // namespace isobrick

@@ -9,14 +9,14 @@
 namespace isobrick {
 namespace {
 
-constexpr std::size_t kMostName = 60;  ///< characters of a channel's name
-constexpr Index kMostItems = 1'000'000;
+constexpr std::size_t kMaxNameLength = 60;  ///< characters of a channel's name
+constexpr Index kMaxItems = 1'000'000;
 
 /// The number on the axis, and the name of a channel that has one.
 std::string item_text(const ImageVolumes& volumes, bool channel, Index number) {
   const auto i = static_cast<std::size_t>(number);
   if (!channel || i >= volumes.channel_names.size()) return fmt::format("{}", number);
-  return fmt::format("{}: {}", number, printable(volumes.channel_names[i], kMostName));
+  return fmt::format("{}: {}", number, printable(volumes.channel_names[i], kMaxNameLength));
 }
 
 /// The items of an open list; the one that was clicked.
@@ -27,7 +27,7 @@ std::optional<Index> choose_item(const ImageVolumes& volumes, bool channel, Inde
   if (ImGui::IsWindowAppearing())
     ImGui::SetScrollY(static_cast<float>(chosen) * ImGui::GetTextLineHeightWithSpacing());
   ImGuiListClipper clipper;
-  clipper.Begin(static_cast<int>(std::min(count, kMostItems)));
+  clipper.Begin(static_cast<int>(std::min(count, kMaxItems)));
   while (clipper.Step())
     for (Index i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i) {
       ImGui::PushID(static_cast<int>(i));

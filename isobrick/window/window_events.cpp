@@ -190,7 +190,7 @@ void ViewerWindow::Events::on_press(int key, int mods, bool again) {
         state.requests.close = true;
       return;
     case GLFW_KEY_H: state.panels = !state.panels; return;
-    case GLFW_KEY_R: state.requests.fit = fine ? Framed::volume : Framed::surface; return;
+    case GLFW_KEY_R: state.requests.fit = fine ? FrameTarget::volume : FrameTarget::surface; return;
     case GLFW_KEY_F: next_mode(); return;
     case GLFW_KEY_P:
       state.navigator.camera.orthographic = !state.navigator.camera.orthographic;

@@ -62,15 +62,15 @@ void ViewerWindow::tell_damage() {
 }
 
 /// Says once, of each isovalue that no sample reaches, why nothing of it is seen.
-void ViewerWindow::tell_empty_surfaces() {
+void ViewerWindow::report_empty_surfaces() {
   if (moving()) return;  // one that is dragged goes by
   const ValueRange<double> range = state_.facts->counts().range();
   for (const SurfaceSettings& surface : state_.settings.surfaces) {
-    if (!surface.shown || told_empty_.contains(surface.isovalue)) continue;
+    if (!surface.shown || reported_empty_.contains(surface.isovalue)) continue;
     const std::string why =
         why_out_of_range(range, state_.picture->store().info().type, 0, surface.isovalue);
     if (why.empty()) continue;
-    told_empty_.insert(surface.isovalue);
+    reported_empty_.insert(surface.isovalue);
     state_.say(why);
   }
 }
@@ -104,7 +104,7 @@ void ViewerWindow::draw_picture(int width, int height) {
   failed_ = false;
   pace(glfwGetTime() - begin);
   tell_damage();
-  tell_empty_surfaces();
+  report_empty_surfaces();
   settle_clicks();
 }
 

@@ -40,7 +40,7 @@ void ViewerWindow::load(const std::filesystem::path& path, const Selection& sele
   clicks_.clear();
   state_.typed.reset();
   told_damage_.clear();
-  told_empty_.clear();
+  reported_empty_.clear();
   const std::string volume = text_of(state_.volumes);
   glfwSetWindowTitle(window_, fmt::format("{}{}{} - Isobrick", path.filename().string(),
                                           volume.empty() ? "" : ", ", volume)
