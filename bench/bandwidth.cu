@@ -2,7 +2,7 @@
 #include <limits>
 
 #include "bench/bandwidth.h"
-#include "isobrick/gpu/stream.h"
+#include "gpu/memory/cuda_objects.h"
 
 namespace isobrick::bench {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "isobrick/gpu/stream.h"
+#include "gpu/memory/cuda_objects.h"
 
 namespace isobrick::bench {
 

@@ -19,17 +19,17 @@
 #include <optional>
 #include <vector>
 
+#include <isobrick/device_volume.h>
+#include <isobrick/error.h>
+#include <isobrick/synth_source.h>
 #include "bench/bandwidth.h"
 #include "bench/median.h"
 #include "bench/resident_times.h"
 #include "bench/volume.h"
-#include "isobrick/core/dense_bricks.h"
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/device_volume.h"
-#include "isobrick/gpu/tile_kernel.h"
-#include "isobrick/index/active_tiles.h"
-#include "isobrick/surface/cpu_extractor.h"
-#include "isobrick/volumes/synth_source.h"
+#include "core/dense_bricks.h"
+#include "gpu/tile/tile_kernel.h"
+#include "index/active_tiles.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick::bench {
 namespace {

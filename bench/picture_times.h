@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/store_picture.h"
 
 namespace isobrick::bench {
 

@@ -4,8 +4,8 @@
 #include <chrono>
 #include <vector>
 
+#include <isobrick/device_volume.h>
 #include "bench/median.h"
-#include "isobrick/gpu/device_volume.h"
 
 // How long a volume on the device takes to a mesh, as all benches of it measure.
 

@@ -17,9 +17,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/core/error.h"
-#include "isobrick/stream/tile_stream.h"
+#include <isobrick/error.h>
+#include "bricks/stored_index.h"
+#include "stream/tile_stream.h"
 
 namespace isobrick {
 namespace {

@@ -25,13 +25,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include <isobrick/error.h>
+#include <isobrick/extract.h>
 #include "bench/copies.h"
 #include "bench/median.h"
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/pipeline/workers.h"
-#include "isobrick/stream/tile_stream.h"
+#include "pipeline/extract/extract_plan.h"
+#include "pipeline/workers.h"
+#include "stream/tile_stream.h"
 
 namespace isobrick::bench {
 namespace {

@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "bench/volume.h"
-#include "isobrick/core/dense_bricks.h"
-#include "isobrick/index/active_tiles.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include "core/dense_bricks.h"
+#include "index/active_tiles.h"
+#include "surface/cpu_extractor.h"
 #ifdef ISOBRICK_WITH_VTK
 #include "bench/vtk_peer.h"
 #endif

@@ -22,10 +22,10 @@
 
 #include "bench/guarded_main.h"
 #include "bench/picture_times.h"
-#include "isobrick/core/stopwatch.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/window/frame_pacer.h"
-#include "isobrick/window/store_picture.h"
+#include "core/stopwatch.h"
+#include "viewer/app/frame_pacer.h"
+#include "viewer/app/store_picture.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::bench {
 namespace {

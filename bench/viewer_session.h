@@ -11,11 +11,11 @@
 #include <thread>
 #include <utility>
 
+#include <isobrick/error.h>
 #include "bench/picture_times.h"
-#include "isobrick/core/error.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/window/frame_pacer.h"
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/frame_pacer.h"
+#include "viewer/app/store_picture.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::bench {
 

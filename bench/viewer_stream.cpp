@@ -28,12 +28,12 @@
 #include <utility>
 #include <vector>
 
+#include <isobrick/extract.h>
 #include "bench/guarded_main.h"
 #include "bench/median.h"
 #include "bench/viewer_session.h"
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/render/gl_context.h"
+#include "pipeline/extract/gpu_backend.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::bench {
 namespace {

@@ -1,6 +1,6 @@
 #include "bench/volume.h"
 
-#include "isobrick/volumes/open_source.h"
+#include <isobrick/open_source.h>
 
 namespace isobrick::bench {
 

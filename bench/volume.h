@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/range.h"
-#include "isobrick/index/leaf_ranges.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/lattice.h>
+#include <isobrick/range.h>
+#include <isobrick/volume_source.h>
+#include "index/leaf_ranges.h"
 
 namespace isobrick::bench {
 

@@ -1,8 +1,8 @@
-#include "isobrick/bricks/image_volumes.h"
+#include "bricks/image_volumes.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/metadata_files.h"
+#include "bricks/zarr/metadata_files.h"
 
 namespace isobrick {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/volume_choice.h"
+#include "bricks/zarr/volume_choice.h"
 
 namespace isobrick {
 

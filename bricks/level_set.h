@@ -3,8 +3,8 @@
 #include <cmath>
 #include <optional>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/inside.h"
+#include <isobrick/inside.h>
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

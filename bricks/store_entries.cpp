@@ -1,4 +1,4 @@
-#include "isobrick/bricks/store_entries.h"
+#include "bricks/store_entries.h"
 
 #include <fmt/format.h>
 
@@ -7,17 +7,17 @@
 #include <limits>
 #include <string_view>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/index_layout.h"
-#include "isobrick/bricks/range_format.h"
-#include "isobrick/bricks/store_names.h"
-#include "isobrick/bricks/zarr_v2.h"
-#include "isobrick/core/digits.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/folder_walk.h"
-#include "isobrick/io/leftovers.h"
-#include "isobrick/io/output_guard.h"
+#include <isobrick/error.h>
+#include "bricks/ranges/index_layout.h"
+#include "bricks/ranges/range_format.h"
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/store_names.h"
+#include "bricks/zarr/zarr_v2.h"
+#include "core/digits.h"
+#include "io/bytes/file.h"
+#include "io/bytes/folder_walk.h"
+#include "io/bytes/leftovers.h"
+#include "io/bytes/output_guard.h"
 
 namespace isobrick {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/level_info.h"
+#include <isobrick/level_info.h>
+#include "bricks/zarr/array_metadata.h"
 
 namespace isobrick {
 

@@ -1,14 +1,14 @@
-#include "isobrick/bricks/store_layout.h"
+#include "bricks/store_layout.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/ome_transformations.h"
-#include "isobrick/bricks/zarr_v2.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/ome_transformations.h"
+#include "bricks/zarr/zarr_v2.h"
 
 namespace isobrick {
 namespace {

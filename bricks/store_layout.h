@@ -6,11 +6,11 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/level_info.h"
-#include "isobrick/core/downsampling.h"
+#include <isobrick/downsampling.h>
+#include <isobrick/image_metadata.h>
+#include <isobrick/level_info.h>
+#include "bricks/zarr/array_metadata.h"
+#include "bricks/zarr/codec.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
 
 #include <fmt/format.h>
 
@@ -6,20 +6,20 @@
 #include <atomic>
 #include <chrono>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/brick_checksums.h"
-#include "isobrick/bricks/level_description.h"
-#include "isobrick/bricks/lru_cache.h"
-#include "isobrick/bricks/metadata_files.h"
-#include "isobrick/bricks/range_array.h"
-#include "isobrick/bricks/shard_grid.h"
-#include "isobrick/bricks/shard_index.h"
-#include "isobrick/bricks/stored_ranges.h"
-#include "isobrick/bricks/volume_choice.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/pod_buffer.h"
-#include "isobrick/core/shell_word.h"
-#include "isobrick/io/file.h"
+#include <isobrick/error.h>
+#include <isobrick/pod_buffer.h>
+#include "bricks/ranges/brick_checksums.h"
+#include "bricks/ranges/lru_cache.h"
+#include "bricks/ranges/range_array.h"
+#include "bricks/ranges/stored_ranges.h"
+#include "bricks/zarr/array_metadata.h"
+#include "bricks/zarr/level_description.h"
+#include "bricks/zarr/metadata_files.h"
+#include "bricks/zarr/shard_grid.h"
+#include "bricks/zarr/shard_index.h"
+#include "bricks/zarr/volume_choice.h"
+#include "core/shell_word.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {

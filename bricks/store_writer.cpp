@@ -1,4 +1,4 @@
-#include "isobrick/bricks/store_writer.h"
+#include "bricks/store_writer.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -7,21 +7,21 @@
 #include <map>
 #include <mutex>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/brick_checksums.h"
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/item_array.h"
-#include "isobrick/bricks/publisher.h"
-#include "isobrick/bricks/range_array.h"
-#include "isobrick/bricks/shard_grid.h"
-#include "isobrick/bricks/shard_index.h"
-#include "isobrick/bricks/store_names.h"
-#include "isobrick/bricks/stored_ranges.h"
-#include "isobrick/bricks/zarr_v2.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/folder_walk.h"
+#include <isobrick/error.h>
+#include <isobrick/image_metadata.h>
+#include "bricks/ranges/brick_checksums.h"
+#include "bricks/ranges/item_array.h"
+#include "bricks/ranges/range_array.h"
+#include "bricks/ranges/stored_ranges.h"
+#include "bricks/zarr/array_metadata.h"
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/publisher.h"
+#include "bricks/zarr/shard_grid.h"
+#include "bricks/zarr/shard_index.h"
+#include "bricks/zarr/store_names.h"
+#include "bricks/zarr/zarr_v2.h"
+#include "io/bytes/file.h"
+#include "io/bytes/folder_walk.h"
 
 namespace isobrick {
 namespace {

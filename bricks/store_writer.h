@@ -8,9 +8,9 @@
 #include <optional>
 #include <span>
 
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/store_layout.h"
-#include "isobrick/core/lattice.h"
+#include <isobrick/image_metadata.h>
+#include <isobrick/lattice.h>
+#include "bricks/store_layout.h"
 
 namespace isobrick {
 

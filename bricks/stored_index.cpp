@@ -1,13 +1,13 @@
-#include "isobrick/bricks/stored_index.h"
+#include "bricks/stored_index.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/folder_walk.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/checked_json.h"
+#include "io/bytes/file.h"
+#include "io/bytes/folder_walk.h"
 
 namespace isobrick {
 

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/index_chunk.h"
-#include "isobrick/bricks/index_layout.h"
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
+#include "bricks/ranges/index_chunk.h"
+#include "bricks/ranges/index_layout.h"
 
 namespace isobrick {
 

@@ -4,22 +4,9 @@ include(CMakePackageConfigHelpers)
 
 set(isobrick_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/isobrick)
 
-# The libraries are those that the folders below isobrick/ define.
-get_property(folders DIRECTORY isobrick PROPERTY SUBDIRECTORIES)
-set(libraries)
-foreach(folder IN LISTS folders)
-  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
-  foreach(target IN LISTS targets)
-    get_target_property(type ${target} TYPE)
-    if(type STREQUAL STATIC_LIBRARY)
-      list(APPEND libraries ${target})
-    endif()
-  endforeach()
-endforeach()
-
+get_property(libraries GLOBAL PROPERTY isobrick_libraries)
 install(TARGETS ${libraries} EXPORT isobrick_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY isobrick/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/isobrick
-  FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY include/isobrick DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(EXPORT isobrick_targets NAMESPACE isobrick:: DESTINATION ${isobrick_package_dir})
 
 # The CUDA runtime that the libraries were built with, so that programs of others need no toolkit.

@@ -22,6 +22,8 @@ add_link_options(LINKER:--as-needed)
 # Every library and program of ours: warnings, and floating point exactly as
 # written (no contraction into fma), so that every machine makes the same mesh.
 add_library(isobrick_flags INTERFACE)
+# Private headers are named from here: "core/cancel.h".
+target_include_directories(isobrick_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(isobrick_flags INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wconversion -Wshadow
   -Wno-missing-field-initializers  # designated initialisers leave out what keeps its default
@@ -39,8 +41,9 @@ function(isobrick_library name)
   add_library(isobrick::${name} ALIAS isobrick_${name})
   set_target_properties(isobrick_${name} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(isobrick_${name} PUBLIC
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(isobrick_${name} PUBLIC cxx_std_20)
   target_link_libraries(isobrick_${name} PUBLIC ${arg_LINK}
     PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:isobrick_flags>)
+  set_property(GLOBAL APPEND PROPERTY isobrick_libraries isobrick_${name})
 endfunction()

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstring>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "isobrick/core/copy_box.h"
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
+#include "core/copy_box.h"
 
 namespace isobrick {
 

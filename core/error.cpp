@@ -1,4 +1,4 @@
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 #include <system_error>
 

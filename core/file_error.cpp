@@ -1,8 +1,8 @@
-#include "isobrick/core/file_error.h"
+#include "core/file_error.h"
 
 #include <filesystem>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 

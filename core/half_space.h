@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

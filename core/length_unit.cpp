@@ -1,4 +1,4 @@
-#include "isobrick/core/length_unit.h"
+#include "core/length_unit.h"
 
 #include <algorithm>
 #include <iterator>

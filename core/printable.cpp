@@ -1,4 +1,4 @@
-#include "isobrick/core/printable.h"
+#include "core/printable.h"
 
 #include <algorithm>
 

@@ -1,8 +1,8 @@
-#include "isobrick/core/selection.h"
+#include <isobrick/selection.h>
 
 #include <string_view>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 

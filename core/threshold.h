@@ -4,7 +4,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "isobrick/core/host_device.h"
+#include "core/host_device.h"
 
 namespace isobrick {
 

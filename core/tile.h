@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
 
 namespace isobrick {
 

@@ -1,6 +1,6 @@
-#include "isobrick/index/active_tiles.h"
+#include "index/active_tiles.h"
 
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 
 namespace isobrick {
 

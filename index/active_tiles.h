@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/tile.h"
+#include <isobrick/range.h>
+#include "core/tile.h"
 
 namespace isobrick {
 

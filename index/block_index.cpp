@@ -1,11 +1,11 @@
-#include "isobrick/index/block_index.h"
+#include "index/block_index.h"
 
 #include <bit>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/index/instantiate.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/lattice.h>
+#include "core/morton.h"
+#include "index/instantiate.h"
+#include "index/span_index.h"
 
 namespace isobrick {
 namespace {

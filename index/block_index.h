@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/tile.h"
-#include "isobrick/index/index_kind.h"
+#include <isobrick/index_kind.h>
+#include <isobrick/range.h>
+#include "core/tile.h"
 
 namespace isobrick {
 

@@ -1,11 +1,11 @@
-#include "isobrick/index/index_format.h"
+#include "index/index_format.h"
 
 #include <cstring>
 #include <limits>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/error.h>
+#include "index/span_index.h"
 
 namespace isobrick {
 

@@ -7,10 +7,10 @@
 #include <type_traits>
 #include <vector>
 
-#include "isobrick/core/host_device.h"
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/index/index_kind.h"
+#include <isobrick/index_kind.h>
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
+#include "core/host_device.h"
 
 // An index is one block of bytes: a header, then the arrays of its kind, each at
 // a multiple of 8. Where an array lies follows from the counts in the header, so

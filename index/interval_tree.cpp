@@ -1,9 +1,9 @@
-#include "isobrick/index/interval_tree.h"
+#include "index/interval_tree.h"
 
 #include <algorithm>
 
-#include "isobrick/index/instantiate.h"
-#include "isobrick/index/span_items.h"
+#include "index/instantiate.h"
+#include "index/span_items.h"
 
 namespace isobrick {
 

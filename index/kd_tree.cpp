@@ -1,10 +1,10 @@
-#include "isobrick/index/kd_tree.h"
+#include "index/kd_tree.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "isobrick/index/instantiate.h"
-#include "isobrick/index/span_items.h"
+#include "index/instantiate.h"
+#include "index/span_items.h"
 
 namespace isobrick {
 

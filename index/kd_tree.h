@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/host_device.h"
-#include "isobrick/core/range.h"
-#include "isobrick/index/index_format.h"
+#include <isobrick/range.h>
+#include "core/host_device.h"
+#include "index/index_format.h"
 
 namespace isobrick {
 

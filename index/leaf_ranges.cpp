@@ -1,10 +1,10 @@
-#include "isobrick/index/leaf_ranges.h"
+#include "index/leaf_ranges.h"
 
 #include <algorithm>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/index/instantiate.h"
+#include <isobrick/error.h>
+#include "index/instantiate.h"
 
 namespace isobrick {
 namespace {

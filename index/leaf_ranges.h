@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/range.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -1,7 +1,7 @@
-#include "isobrick/index/linear_scan.h"
+#include "index/linear_scan.h"
 
-#include "isobrick/index/instantiate.h"
-#include "isobrick/index/span_items.h"
+#include "index/instantiate.h"
+#include "index/span_items.h"
 
 namespace isobrick {
 

@@ -1,9 +1,9 @@
-#include "isobrick/index/octree.h"
+#include "index/octree.h"
 
 #include <algorithm>
 
-#include "isobrick/index/instantiate.h"
-#include "isobrick/index/span_items.h"
+#include "index/instantiate.h"
+#include "index/span_items.h"
 
 namespace isobrick {
 

@@ -1,10 +1,10 @@
-#include "isobrick/index/quadtree.h"
+#include "index/quadtree.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "isobrick/index/instantiate.h"
-#include "isobrick/index/span_items.h"
+#include "index/instantiate.h"
+#include "index/span_items.h"
 
 namespace isobrick {
 

@@ -1,11 +1,11 @@
-#include "isobrick/index/span_index.h"
+#include "index/span_index.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/threshold.h"
-#include "isobrick/index/instantiate.h"
+#include <isobrick/error.h>
+#include "core/threshold.h"
+#include "index/instantiate.h"
 
 namespace isobrick {
 namespace {

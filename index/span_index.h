@@ -6,15 +6,15 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/index/index_format.h"
-#include "isobrick/index/interval_tree.h"
-#include "isobrick/index/kd_tree.h"
-#include "isobrick/index/linear_scan.h"
-#include "isobrick/index/octree.h"
-#include "isobrick/index/quadtree.h"
-#include "isobrick/index/stab_sinks.h"
+#include <isobrick/range.h>
+#include <isobrick/vec.h>
+#include "index/index_format.h"
+#include "index/interval_tree.h"
+#include "index/kd_tree.h"
+#include "index/linear_scan.h"
+#include "index/octree.h"
+#include "index/quadtree.h"
+#include "index/stab_sinks.h"
 
 // Span-space search: which of many ranges does an isovalue stab, min < iso <= max?
 // All structures answer every query alike, each in an order of its own:

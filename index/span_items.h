@@ -7,8 +7,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "isobrick/core/pod_buffer.h"
-#include "isobrick/core/range.h"
+#include <isobrick/pod_buffer.h>
+#include <isobrick/range.h>
 
 // What the builders share: the points of span space and their sorting.
 

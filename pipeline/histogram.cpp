@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/histogram.h"
+#include <isobrick/histogram.h>
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <cstring>
 #include <limits>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/slab_reader.h"
+#include <isobrick/error.h>
+#include "pipeline/program_memory.h"
+#include "pipeline/slab_reader.h"
 
 namespace isobrick {
 namespace {

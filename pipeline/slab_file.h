@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/io/file.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/vec.h>
+#include <isobrick/volume_source.h>
+#include "io/bytes/file.h"
 
 namespace isobrick {
 

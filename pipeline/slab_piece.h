@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

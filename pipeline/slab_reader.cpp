@@ -1,14 +1,14 @@
-#include "isobrick/pipeline/slab_reader.h"
+#include "pipeline/slab_reader.h"
 
 #include <tbb/parallel_for.h>
 
 #include <optional>
 #include <vector>
 
-#include "isobrick/bricks/brick_checksums.h"
-#include "isobrick/bricks/codec.h"
-#include "isobrick/core/copy_box.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/ranges/brick_checksums.h"
+#include "bricks/zarr/codec.h"
+#include "core/copy_box.h"
 
 namespace isobrick {
 namespace {

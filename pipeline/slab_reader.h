@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

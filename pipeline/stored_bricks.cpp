@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/stored_bricks.h"
+#include "pipeline/stored_bricks.h"
 
 namespace isobrick {
 

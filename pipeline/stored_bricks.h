@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/progress.h"
+#include <isobrick/progress.h>
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

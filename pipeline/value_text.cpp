@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/value_text.h"
+#include "pipeline/value_text.h"
 
 #include <fmt/format.h>
 

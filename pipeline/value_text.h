@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/scalar.h"
+#include <isobrick/range.h>
+#include <isobrick/scalar.h>
 
 namespace isobrick {
 

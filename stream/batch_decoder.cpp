@@ -1,4 +1,4 @@
-#include "isobrick/stream/batch_decoder.h"
+#include "stream/batch_decoder.h"
 
 #include <tbb/task_arena.h>
 
@@ -6,7 +6,7 @@
 #include <cassert>
 #include <utility>
 
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 
 namespace isobrick {
 namespace {

@@ -12,13 +12,13 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/flat_map.h"
-#include "isobrick/stream/brick_check.h"
-#include "isobrick/stream/brick_memory.h"
-#include "isobrick/stream/brick_slots.h"
-#include "isobrick/stream/job_queue.h"
-#include "isobrick/stream/tile_stream.h"
+#include <isobrick/store_reader.h>
+#include "core/flat_map.h"
+#include "stream/brick_check.h"
+#include "stream/brick_memory.h"
+#include "stream/brick_slots.h"
+#include "stream/job_queue.h"
+#include "stream/tile_stream.h"
 
 namespace isobrick {
 

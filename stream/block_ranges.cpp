@@ -1,4 +1,4 @@
-#include "isobrick/stream/block_ranges.h"
+#include "stream/block_ranges.h"
 
 #include <utility>
 

@@ -6,8 +6,8 @@
 #include <mutex>
 #include <utility>
 
-#include "isobrick/bricks/lru_cache.h"
-#include "isobrick/stream/brick_source.h"
+#include "bricks/ranges/lru_cache.h"
+#include "stream/brick_source.h"
 
 namespace isobrick {
 

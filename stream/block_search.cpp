@@ -1,7 +1,7 @@
-#include "isobrick/stream/block_search.h"
+#include "stream/block_search.h"
 
-#include "isobrick/index/active_tiles.h"
-#include "isobrick/stream/index_search.h"
+#include "index/active_tiles.h"
+#include "stream/index_search.h"
 
 namespace isobrick {
 namespace {

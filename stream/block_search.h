@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/tile.h"
-#include "isobrick/index/index_kind.h"
+#include <isobrick/index_kind.h>
+#include <isobrick/store_reader.h>
+#include "core/tile.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/stream/brick_cache.h"
+#include "stream/brick_cache.h"
 
 #include <sys/mman.h>
 
@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 
 namespace isobrick {
 

@@ -10,10 +10,10 @@
 #include <unordered_map>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/tile.h"
-#include "isobrick/stream/brick_check.h"
-#include "isobrick/stream/brick_slots.h"
+#include <isobrick/store_reader.h>
+#include "core/tile.h"
+#include "stream/brick_check.h"
+#include "stream/brick_slots.h"
 
 namespace isobrick {
 

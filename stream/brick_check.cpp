@@ -1,10 +1,10 @@
-#include "isobrick/stream/brick_check.h"
+#include "stream/brick_check.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

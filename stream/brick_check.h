@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <memory>
 
-#include "isobrick/bricks/lru_cache.h"
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
+#include "bricks/ranges/lru_cache.h"
 
 namespace isobrick {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

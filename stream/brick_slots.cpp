@@ -1,9 +1,9 @@
-#include "isobrick/stream/brick_slots.h"
+#include "stream/brick_slots.h"
 
 #include <algorithm>
 #include <iterator>
 
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 
 namespace isobrick {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
 
 namespace isobrick {
 

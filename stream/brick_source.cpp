@@ -1,10 +1,10 @@
-#include "isobrick/stream/brick_source.h"
+#include "stream/brick_source.h"
 
 #include <fmt/format.h>
 
 #include <utility>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

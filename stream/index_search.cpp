@@ -1,4 +1,4 @@
-#include "isobrick/stream/index_search.h"
+#include "stream/index_search.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -6,9 +6,9 @@
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/error.h>
+#include "core/morton.h"
+#include "index/span_index.h"
 
 namespace isobrick {
 namespace {

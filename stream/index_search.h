@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/index/index_format.h"
-#include "isobrick/stream/block_search.h"
+#include "bricks/stored_index.h"
+#include "index/index_format.h"
+#include "stream/block_search.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/stream/job_queue.h"
+#include "stream/job_queue.h"
 
 #include <utility>
 

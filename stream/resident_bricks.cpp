@@ -1,10 +1,10 @@
-#include "isobrick/stream/resident_bricks.h"
+#include "stream/resident_bricks.h"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

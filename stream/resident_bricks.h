@@ -11,9 +11,9 @@
 #include <span>
 #include <unordered_map>
 
-#include "isobrick/stream/block_ranges.h"
-#include "isobrick/stream/brick_set.h"
-#include "isobrick/stream/brick_source.h"
+#include "stream/block_ranges.h"
+#include "stream/brick_set.h"
+#include "stream/brick_source.h"
 
 namespace isobrick {
 

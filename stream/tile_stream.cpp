@@ -1,11 +1,11 @@
-#include "isobrick/stream/tile_stream.h"
+#include "stream/tile_stream.h"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include "isobrick/core/flat_map.h"
-#include "isobrick/core/morton.h"
+#include "core/flat_map.h"
+#include "core/morton.h"
 
 namespace isobrick {
 namespace {

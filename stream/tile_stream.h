@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/tile.h"
-#include "isobrick/stream/block_search.h"
+#include <isobrick/store_reader.h>
+#include "core/tile.h"
+#include "stream/block_search.h"
 
 namespace isobrick {
 

@@ -1,8 +1,8 @@
-#include "isobrick/surface/boundary_map.h"
+#include "surface/boundary_map.h"
 
 #include <bit>
 
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 
 namespace isobrick {
 namespace {

@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "isobrick/surface/tile_state.h"
+#include "surface/tile_state.h"
 
 namespace isobrick {
 

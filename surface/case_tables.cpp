@@ -1,4 +1,4 @@
-#include "isobrick/surface/case_tables.h"
+#include "surface/case_tables.h"
 
 namespace isobrick {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/surface/case_rule.h"
+#include "surface/case_rule.h"
 
 namespace isobrick {
 

@@ -4,8 +4,8 @@
 #include <limits>
 #include <type_traits>
 
-#include "isobrick/core/host_device.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
+#include "core/host_device.h"
 
 // The arithmetic of a vertex, shared verbatim by both backends. Every operation
 // is one IEEE operation in the order written; the build forbids contraction.

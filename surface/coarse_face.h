@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "isobrick/surface/grid_view.h"
+#include "surface/grid_view.h"
 
 // Where a vertex on a face belongs on the other, coarser side: arithmetic that both
 // backends share verbatim.

@@ -1,4 +1,4 @@
-#include "isobrick/surface/cpu_extractor.h"
+#include "surface/cpu_extractor.h"
 
 #include <tbb/parallel_for.h>
 
@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/surface/boundary_map.h"
-#include "isobrick/surface/case_rule.h"
-#include "isobrick/surface/tile_gather.h"
-#include "isobrick/surface/tile_kernels.h"
-#include "isobrick/surface/tile_ties.h"
-#include "isobrick/surface/world_map.h"
+#include <isobrick/error.h>
+#include "surface/boundary_map.h"
+#include "surface/case_rule.h"
+#include "surface/tile_gather.h"
+#include "surface/tile_kernels.h"
+#include "surface/tile_ties.h"
+#include "surface/world_map.h"
 
 namespace isobrick {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/tile.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/surface_options.h>
+#include "core/tile.h"
 
 namespace isobrick {
 

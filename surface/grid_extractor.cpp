@@ -1,10 +1,10 @@
-#include "isobrick/surface/grid_extractor.h"
+#include "surface/grid_extractor.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "isobrick/surface/case_tables.h"
-#include "isobrick/surface/grid_math.h"
+#include "surface/case_tables.h"
+#include "surface/grid_math.h"
 
 namespace isobrick {
 namespace {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/surface/grid_view.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/surface_options.h>
+#include "surface/grid_view.h"
 
 namespace isobrick {
 

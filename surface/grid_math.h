@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/surface/coarse_face.h"
+#include "surface/coarse_face.h"
 
 // A vertex of a grid's surface: arithmetic that both backends share verbatim.
 

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/surface/cell_math.h"
+#include <isobrick/scalar.h>
+#include "surface/cell_math.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/surface/tile_gather.h"
+#include "surface/tile_gather.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/surface/tile_state.h"
+#include "surface/tile_state.h"
 
 namespace isobrick {
 

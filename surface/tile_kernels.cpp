@@ -1,19 +1,19 @@
-#include "isobrick/surface/tile_kernels.h"
+#include "surface/tile_kernels.h"
 
 // Highway compiles what lies in HWY_NAMESPACE once for every target below.
 #define HWY_WANT_AVX3_DL  // vpopcntd
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "isobrick/surface/tile_kernels.cpp"
+#define HWY_TARGET_INCLUDE "surface/tile_kernels.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 //
 #include <hwy/highway.h>
 
-#include "isobrick/surface/case_tables.h"
-#include "isobrick/surface/tile_scan-inl.h"
-#include "isobrick/surface/tile_ties-inl.h"
-#include "isobrick/surface/tile_triangles-inl.h"
-#include "isobrick/surface/tile_vertices-inl.h"
+#include "surface/case_tables.h"
+#include "surface/tile_scan-inl.h"
+#include "surface/tile_ties-inl.h"
+#include "surface/tile_triangles-inl.h"
+#include "surface/tile_vertices-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "isobrick/surface/surface_options.h"
-#include "isobrick/surface/tile_state.h"
+#include <isobrick/surface_options.h>
+#include "surface/tile_state.h"
 
 namespace isobrick {
 

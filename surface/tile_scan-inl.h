@@ -12,10 +12,10 @@
 #include <bit>
 #include <cstring>
 
-#include "isobrick/core/threshold.h"
-#include "isobrick/surface/case_tables.h"
-#include "isobrick/surface/tile_kernels.h"
-#include "isobrick/surface/tile_ties.h"
+#include "core/threshold.h"
+#include "surface/case_tables.h"
+#include "surface/tile_kernels.h"
+#include "surface/tile_ties.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {

@@ -8,9 +8,9 @@
 #include <iterator>
 #include <memory>
 
-#include "isobrick/core/pod_buffer.h"
-#include "isobrick/core/tile.h"
-#include "isobrick/surface/cell_math.h"
+#include <isobrick/pod_buffer.h>
+#include "core/tile.h"
+#include "surface/cell_math.h"
 
 namespace isobrick {
 

@@ -9,8 +9,8 @@
 
 #include <bit>
 
-#include "isobrick/surface/tile_ties.h"
-#include "isobrick/surface/tile_vertices-inl.h"
+#include "surface/tile_ties.h"
+#include "surface/tile_vertices-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {

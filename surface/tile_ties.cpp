@@ -1,11 +1,11 @@
-#include "isobrick/surface/tile_ties.h"
+#include "surface/tile_ties.h"
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
 
-#include "isobrick/core/morton.h"
-#include "isobrick/core/threshold.h"
+#include "core/morton.h"
+#include "core/threshold.h"
 
 namespace isobrick {
 namespace {

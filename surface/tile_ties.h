@@ -3,10 +3,10 @@
 #include <array>
 #include <optional>
 
-#include "isobrick/surface/boundary_map.h"
-#include "isobrick/surface/case_tables.h"
-#include "isobrick/surface/cell_math.h"
-#include "isobrick/surface/tile_kernels.h"
+#include "surface/boundary_map.h"
+#include "surface/case_tables.h"
+#include "surface/cell_math.h"
+#include "surface/tile_kernels.h"
 
 // Leaving degenerate triangles out. A sample that equals the isovalue, a *tie*,
 // draws the vertices of all crossing edges around it to itself. Here they become

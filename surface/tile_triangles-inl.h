@@ -11,8 +11,8 @@
 
 #include <cstring>
 
-#include "isobrick/surface/case_tables.h"
-#include "isobrick/surface/tile_kernels.h"
+#include "surface/case_tables.h"
+#include "surface/tile_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {

@@ -12,8 +12,8 @@
 #include <bit>
 #include <cstring>
 
-#include "isobrick/core/threshold.h"
-#include "isobrick/surface/tile_kernels.h"
+#include "core/threshold.h"
+#include "surface/tile_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {

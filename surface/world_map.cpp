@@ -1,4 +1,4 @@
-#include "isobrick/surface/world_map.h"
+#include "surface/world_map.h"
 
 #include <cmath>
 

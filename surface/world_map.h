@@ -1,8 +1,8 @@
 #pragma once
 
-#include "isobrick/core/inside.h"
-#include "isobrick/core/transform.h"
-#include "isobrick/surface/cell_math.h"
+#include <isobrick/inside.h>
+#include <isobrick/transform.h>
+#include "surface/cell_math.h"
 
 namespace isobrick {
 

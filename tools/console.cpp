@@ -13,7 +13,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 #include "tools/format.h"
 #include "tools/interrupt.h"
 

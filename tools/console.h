@@ -7,8 +7,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "isobrick/core/progress.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/progress.h>
+#include <isobrick/vec.h>
 
 namespace isobrick::tools {
 

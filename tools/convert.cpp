@@ -1,16 +1,16 @@
-#include "isobrick/pipeline/convert.h"
+#include <isobrick/convert.h>
 
 #include <filesystem>
 #include <memory>
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/metadata_files.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/output_folder.h"
-#include "isobrick/pipeline/convert_staging.h"
-#include "isobrick/pipeline/store_source.h"
-#include "isobrick/volumes/open_source.h"
+#include <isobrick/error.h>
+#include <isobrick/open_source.h>
+#include "bricks/zarr/metadata_files.h"
+#include "io/bytes/output_folder.h"
+#include "pipeline/convert/convert_staging.h"
+#include "pipeline/convert/store_source.h"
 #include "tools/options.h"
 #include "tools/output_name.h"
 

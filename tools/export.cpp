@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/export.h"
+#include <isobrick/export.h>
 
 #include <filesystem>
 #include <memory>

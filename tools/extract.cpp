@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/extract.h"
+#include <isobrick/extract.h>
 
 #include <algorithm>
 #include <array>
@@ -9,10 +9,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/level_set.h"
-#include "isobrick/io/output_guard.h"
-#include "isobrick/pipeline/estimate.h"
-#include "isobrick/pipeline/program_memory.h"
+#include <isobrick/estimate.h>
+#include "bricks/level_set.h"
+#include "io/bytes/output_guard.h"
+#include "pipeline/program_memory.h"
 #include "tools/extract_report.h"
 #include "tools/format.h"
 #include "tools/index_options.h"

@@ -8,8 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "isobrick/pipeline/estimate.h"
-#include "isobrick/pipeline/extract.h"
+#include <isobrick/estimate.h>
+#include <isobrick/extract.h>
 #include "tools/mesh_output.h"
 
 // What `isobrick extract` says of each surface.

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 // Figures and names as people read and write them.
 namespace isobrick::tools {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "isobrick/pipeline/histogram.h"
+#include <isobrick/histogram.h>
 
 namespace isobrick::tools {
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/pipeline/index_build.h"
+#include <isobrick/index_build.h>
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/interrupt.h"

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/index/leaf_ranges.h"
+#include "index/leaf_ranges.h"
 
 namespace isobrick::tools {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "isobrick/pipeline/index_build.h"
-#include "isobrick/pipeline/index_choice.h"
+#include <isobrick/index_build.h>
+#include <isobrick/index_choice.h>
 #include "tools/options.h"
 
 namespace isobrick::tools {

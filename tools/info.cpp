@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/io/folder_walk.h"
+#include <isobrick/store_reader.h>
+#include "bricks/stored_index.h"
+#include "io/bytes/folder_walk.h"
 #include "tools/format.h"
 #include "tools/histogram.h"
 #include "tools/info_volumes.h"

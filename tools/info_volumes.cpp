@@ -8,9 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/metadata_files.h"
-#include "isobrick/bricks/volume_choice.h"
-#include "isobrick/core/printable.h"
+#include "bricks/zarr/metadata_files.h"
+#include "bricks/zarr/volume_choice.h"
+#include "core/printable.h"
 #include "tools/format.h"
 #include "tools/options.h"
 

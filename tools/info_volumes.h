@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "isobrick/core/selection.h"
+#include <isobrick/selection.h>
 #include "tools/console.h"
 
 namespace isobrick::tools {

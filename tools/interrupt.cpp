@@ -11,8 +11,8 @@
 #include <system_error>
 #include <thread>
 
-#include "isobrick/core/cancel.h"
-#include "isobrick/io/leftovers.h"
+#include "core/cancel.h"
+#include "io/bytes/leftovers.h"
 #include "tools/console.h"
 
 namespace isobrick::tools {

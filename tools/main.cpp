@@ -7,8 +7,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/file_error.h"
+#include <isobrick/error.h>
+#include "core/file_error.h"
 #include "tools/command_line.h"
 #include "tools/console.h"
 #include "tools/help.h"

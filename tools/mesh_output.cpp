@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/folder_walk.h"
-#include "isobrick/io/parted_output.h"
-#include "isobrick/meshes/mesh_parts.h"
+#include <isobrick/error.h>
+#include "io/bytes/folder_walk.h"
+#include "io/bytes/parted_output.h"
+#include "io/meshes/mesh_parts.h"
 #include "tools/format.h"
 #include "tools/output_name.h"
 

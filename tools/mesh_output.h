@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "isobrick/meshes/mesh_file_sink.h"
+#include <isobrick/mesh_file_sink.h>
 
 namespace isobrick::tools {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick::tools {
 

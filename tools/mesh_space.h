@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
 #include "tools/mesh_output.h"
 
 namespace isobrick::tools {

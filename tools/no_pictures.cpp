@@ -1,6 +1,6 @@
 #include <CLI/CLI.hpp>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 #include "tools/options.h"
 #include "tools/pictures.h"
 

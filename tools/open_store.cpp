@@ -8,14 +8,14 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/metadata_files.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/shell_word.h"
-#include "isobrick/io/folder_walk.h"
-#include "isobrick/meshes/mesh_name.h"
-#include "isobrick/pipeline/convert_staging.h"
-#include "isobrick/volumes/raw_name.h"
-#include "isobrick/volumes/volume_format.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/metadata_files.h"
+#include "core/shell_word.h"
+#include "io/bytes/folder_walk.h"
+#include "io/meshes/mesh_name.h"
+#include "io/volumes/open/volume_format.h"
+#include "io/volumes/raw/raw_name.h"
+#include "pipeline/convert/convert_staging.h"
 #include "tools/format.h"
 #include "tools/mesh_output.h"
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
 
 namespace isobrick::tools {
 

@@ -8,8 +8,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/store_names.h"
-#include "isobrick/pipeline/convert_staging.h"
+#include "bricks/zarr/store_names.h"
+#include "pipeline/convert/convert_staging.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/interrupt.h"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/convert.h"
+#include <isobrick/convert.h>
+#include <isobrick/error.h>
 #include "tools/console.h"
 #include "tools/parse.h"
 

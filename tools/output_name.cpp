@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 #include "tools/format.h"
 
 namespace isobrick::tools {

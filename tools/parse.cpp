@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/lattice.h"
-#include "isobrick/render/preview_options.h"
+#include <isobrick/error.h>
+#include <isobrick/lattice.h>
+#include "viewer/render/preview_options.h"
 
 namespace isobrick::tools {
 namespace {

@@ -6,12 +6,12 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/core/downsampling.h"
-#include "isobrick/core/half_space.h"
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/volumes/open_source.h"
+#include <isobrick/downsampling.h>
+#include <isobrick/extract.h>
+#include <isobrick/open_source.h>
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
+#include "core/half_space.h"
 
 // The values of the command line: text to meaning. Every function throws
 // UsageError with a line that says what was given and what would do.

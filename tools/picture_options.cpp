@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/window/view_settings.h"
+#include "viewer/app/view_settings.h"
 
 namespace isobrick::tools {
 

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/half_space.h"
-#include "isobrick/render/camera_request.h"
-#include "isobrick/render/renderer.h"
+#include "core/half_space.h"
 #include "tools/options.h"
+#include "viewer/render/camera_request.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick::tools {
 

@@ -1,6 +1,6 @@
 #include "tools/pictures.h"
 
-#include "isobrick/render/preview_sink.h"
+#include "viewer/render/preview_sink.h"
 
 namespace isobrick::tools {
 

@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/render/preview_options.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "viewer/render/preview_options.h"
 
 // Pictures, or their refusal in a program that was built without OpenGL.
 namespace isobrick::tools {

@@ -5,17 +5,17 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/io/output_guard.h"
-#include "isobrick/io/parted_output.h"
-#include "isobrick/io/png_file.h"
-#include "isobrick/meshes/mesh_name.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/render/mesh_picture.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "io/bytes/output_guard.h"
+#include "io/bytes/parted_output.h"
+#include "io/bytes/png_file.h"
+#include "io/meshes/mesh_name.h"
+#include "pipeline/program_memory.h"
 #include "tools/format.h"
 #include "tools/output_name.h"
 #include "tools/picture_options.h"
+#include "viewer/render/mesh_picture.h"
 
 namespace isobrick::tools {
 namespace {

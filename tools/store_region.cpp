@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick::tools {
 

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/store_reader.h>
 #include "tools/parse.h"
 
 namespace isobrick::tools {

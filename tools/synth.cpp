@@ -1,4 +1,4 @@
-#include "isobrick/volumes/synth_source.h"
+#include <isobrick/synth_source.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,8 +9,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/output_file.h"
+#include <isobrick/error.h>
+#include "io/bytes/output_file.h"
 #include "tools/format.h"
 #include "tools/mesh_space.h"
 #include "tools/options.h"

@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/range.h"
-#include "isobrick/pipeline/value_text.h"
+#include <isobrick/range.h>
+#include <isobrick/store_reader.h>
+#include "pipeline/value_text.h"
 
 namespace isobrick::tools {
 

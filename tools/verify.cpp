@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/verify.h>
 
 #include <memory>
 #include <set>

@@ -8,15 +8,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/image_volumes.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/output_file.h"
-#include "isobrick/io/output_guard.h"
-#include "isobrick/render/camera_request.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/window/framing.h"
-#include "isobrick/window/screenshot.h"
-#include "isobrick/window/viewer_window.h"
+#include <isobrick/error.h>
+#include "bricks/image_volumes.h"
+#include "io/bytes/output_file.h"
+#include "io/bytes/output_guard.h"
 #include "tools/format.h"
 #include "tools/interrupt.h"
 #include "tools/open_store.h"
@@ -25,6 +20,11 @@
 #include "tools/store_region.h"
 #include "tools/value_range.h"
 #include "tools/view_memory.h"
+#include "viewer/app/framing.h"
+#include "viewer/app/screenshot.h"
+#include "viewer/app/viewer_window.h"
+#include "viewer/render/camera_request.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::tools {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/program_memory.h"
+#include <isobrick/error.h>
+#include "pipeline/program_memory.h"
 
 namespace isobrick::tools {
 namespace {

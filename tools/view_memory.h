@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/window/picture_setup.h"
+#include <isobrick/store_reader.h>
 #include "tools/parse.h"
+#include "viewer/app/picture_setup.h"
 
 namespace isobrick::tools {
 

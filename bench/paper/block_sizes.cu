@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/gpu/tile_launcher.cuh"
+#include "gpu/tile/tile_launcher.cuh"
 
 namespace isobrick::bench {
 

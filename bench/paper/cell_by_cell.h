@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/surface/case_tables.h"
-#include "isobrick/surface/cell_math.h"
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
+#include "surface/case_tables.h"
+#include "surface/cell_math.h"
 
 namespace isobrick::bench {
 

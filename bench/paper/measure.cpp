@@ -13,13 +13,13 @@
 
 #include "bench/median.h"
 #include "bench/paper/cell_by_cell.h"
-#include "isobrick/core/dense_bricks.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/index/active_tiles.h"
-#include "isobrick/index/block_index.h"
-#include "isobrick/index/leaf_ranges.h"
-#include "isobrick/index/span_index.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include "core/dense_bricks.h"
+#include "core/morton.h"
+#include "index/active_tiles.h"
+#include "index/block_index.h"
+#include "index/leaf_ranges.h"
+#include "index/span_index.h"
+#include "surface/cpu_extractor.h"
 #ifdef ISOBRICK_WITH_VTK
 #include "bench/vtk_tree_peer.h"
 #endif

@@ -7,18 +7,18 @@
 #include <cstring>
 #include <functional>
 
+#include <isobrick/error.h>
 #include "bench/median.h"
 #include "bench/paper/block_sizes.h"
 #include "bench/resident_times.h"
-#include "isobrick/core/dense_bricks.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/gpu/span_search.h"
-#include "isobrick/gpu/tile_kernel.h"
-#include "isobrick/index/active_tiles.h"
-#include "isobrick/index/leaf_ranges.h"
-#include "isobrick/index/span_index.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include "core/dense_bricks.h"
+#include "core/morton.h"
+#include "gpu/search/span_search.h"
+#include "gpu/tile/tile_kernel.h"
+#include "index/active_tiles.h"
+#include "index/leaf_ranges.h"
+#include "index/span_index.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick::bench {
 namespace {

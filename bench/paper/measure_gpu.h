@@ -2,9 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include <isobrick/device_volume.h>
 #include "bench/paper/measure.h"
 #include "bench/paper/volumes.h"
-#include "isobrick/gpu/device_volume.h"
 
 namespace isobrick::bench {
 

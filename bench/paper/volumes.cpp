@@ -3,8 +3,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include <isobrick/synth_source.h>
 #include "bench/paper/measure.h"
-#include "isobrick/volumes/synth_source.h"
 
 namespace isobrick::bench {
 LoadedVolume gyroid(Int3 extent, double frequency) {

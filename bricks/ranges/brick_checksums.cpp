@@ -1,4 +1,4 @@
-#include "isobrick/bricks/brick_checksums.h"
+#include "bricks/ranges/brick_checksums.h"
 
 #include <algorithm>
 #include <cstring>

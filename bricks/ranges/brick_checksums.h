@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/item_array.h"
-#include "isobrick/bricks/level_info.h"
-#include "isobrick/bricks/lru_cache.h"
+#include <isobrick/level_info.h>
+#include "bricks/ranges/item_array.h"
+#include "bricks/ranges/lru_cache.h"
+#include "bricks/zarr/codec.h"
 
 // The checksums of a level's bricks as they are encoded: what a whole brick at the place of
 // another, or of another store, is recognised by.

@@ -1,11 +1,11 @@
-#include "isobrick/bricks/index_chunk.h"
+#include "bricks/ranges/index_chunk.h"
 
 #include <fmt/format.h>
 
 #include <cstring>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/codec.h"
 
 namespace isobrick {
 namespace {

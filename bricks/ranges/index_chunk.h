@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/bricks/publisher.h"
-#include "isobrick/bricks/shard_index.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/io/file.h"
+#include <isobrick/vec.h>
+#include "bricks/zarr/publisher.h"
+#include "bricks/zarr/shard_index.h"
+#include "io/bytes/file.h"
 
 // The file of an index chunk: parts, each encoded like a brick, and where they
 // are. What a part holds is not known here. docs/reference/store_format.md has the bytes.

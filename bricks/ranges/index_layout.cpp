@@ -1,9 +1,9 @@
-#include "isobrick/bricks/index_layout.h"
+#include "bricks/ranges/index_layout.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/sealed_json.h"
+#include "bricks/ranges/sealed_json.h"
+#include "bricks/zarr/checked_json.h"
 
 namespace isobrick {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
 
 namespace isobrick {
 

@@ -1,14 +1,14 @@
-#include "isobrick/bricks/item_array.h"
+#include "bricks/ranges/item_array.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/codec.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/codec.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {

@@ -12,9 +12,9 @@
 #include <tuple>
 #include <vector>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/publisher.h"
-#include "isobrick/bricks/range_format.h"
+#include "bricks/ranges/range_format.h"
+#include "bricks/zarr/array_metadata.h"
+#include "bricks/zarr/publisher.h"
 
 namespace isobrick {
 

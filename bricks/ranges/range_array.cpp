@@ -1,11 +1,11 @@
-#include "isobrick/bricks/range_array.h"
+#include "bricks/ranges/range_array.h"
 
 #include <fmt/format.h>
 
 #include <utility>
 
-#include "isobrick/bricks/range_format.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/ranges/range_format.h"
 
 namespace isobrick {
 namespace {

@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/bricks/item_array.h"
-#include "isobrick/bricks/lru_cache.h"
-#include "isobrick/bricks/range_table.h"
+#include <isobrick/range_table.h>
+#include "bricks/ranges/item_array.h"
+#include "bricks/ranges/lru_cache.h"
 
 namespace isobrick {
 

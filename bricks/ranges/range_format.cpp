@@ -1,8 +1,8 @@
-#include "isobrick/bricks/range_format.h"
+#include "bricks/ranges/range_format.h"
 
 #include <cstring>
 
-#include "isobrick/bricks/codec.h"
+#include "bricks/zarr/codec.h"
 
 namespace isobrick {
 namespace {

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/range_table.h"
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
+#include <isobrick/range_table.h>
+#include "bricks/zarr/array_metadata.h"
 
 // The bytes of the arrays below isobrick/: one item for each brick or block, in chunks of as many
 // items as a cube of kRangeChunkEdge has, C order [z, y, x], and the checksums of all chunks. No

@@ -1,9 +1,9 @@
-#include "isobrick/bricks/sealed_json.h"
+#include "bricks/ranges/sealed_json.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/codec.h"
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/codec.h"
 
 namespace isobrick {
 namespace {

@@ -1,8 +1,8 @@
-#include "isobrick/bricks/stored_ranges.h"
+#include "bricks/ranges/stored_ranges.h"
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/sealed_json.h"
-#include "isobrick/io/file.h"
+#include "bricks/ranges/sealed_json.h"
+#include "bricks/zarr/checked_json.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {

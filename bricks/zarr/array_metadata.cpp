@@ -1,4 +1,4 @@
-#include "isobrick/bricks/array_metadata.h"
+#include "bricks/zarr/array_metadata.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <limits>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/shard_index.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/shard_index.h"
 
 namespace isobrick {
 namespace {

@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/stored_type.h"
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
+#include "bricks/zarr/codec.h"
+#include "bricks/zarr/stored_type.h"
 
 namespace isobrick {
 

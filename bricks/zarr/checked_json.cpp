@@ -1,8 +1,8 @@
-#include "isobrick/bricks/checked_json.h"
+#include "bricks/zarr/checked_json.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/bricks/codec.h"
+#include "bricks/zarr/codec.h"
 
 #include <fmt/format.h>
 #include <isa-l/crc.h>
@@ -13,9 +13,9 @@
 #include <limits>
 #include <memory>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/pod_buffer.h"
-#include "isobrick/io/byte_order.h"
+#include <isobrick/error.h>
+#include <isobrick/pod_buffer.h>
+#include "io/bytes/byte_order.h"
 
 namespace isobrick {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/decompress.h"
-#include "isobrick/core/copy_box.h"
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
+#include "bricks/zarr/decompress.h"
+#include "core/copy_box.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/bricks/decompress.h"
+#include "bricks/zarr/decompress.h"
 
 #include <fmt/format.h>
 #include <zstd.h>
@@ -14,8 +14,8 @@
 #include <limits>
 #include <memory>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/inflate.h"
+#include <isobrick/error.h>
+#include "io/bytes/inflate.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/bricks/image_metadata.h"
+#include <isobrick/image_metadata.h>
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <bit>
 #include <set>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/ome_transformations.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/codec.h"
+#include "bricks/zarr/ome_transformations.h"
 
 namespace isobrick {
 namespace {

@@ -1,13 +1,13 @@
-#include "isobrick/bricks/level_description.h"
+#include "bricks/zarr/level_description.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <span>
 
-#include "isobrick/bricks/shard_grid.h"
-#include "isobrick/bricks/shard_index.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/shard_grid.h"
+#include "bricks/zarr/shard_index.h"
 
 namespace isobrick {
 namespace {

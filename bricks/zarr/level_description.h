@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <string>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/level_info.h"
-#include "isobrick/bricks/volume_choice.h"
+#include <isobrick/level_info.h>
+#include "bricks/zarr/array_metadata.h"
+#include "bricks/zarr/volume_choice.h"
 
 namespace isobrick {
 

@@ -1,12 +1,12 @@
-#include "isobrick/bricks/lone_array.h"
+#include "bricks/zarr/lone_array.h"
 
 #include <fmt/format.h>
 
 #include <string_view>
 #include <vector>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/checked_json.h"
 
 namespace isobrick {
 namespace {

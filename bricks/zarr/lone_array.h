@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/bricks/array_metadata.h"
+#include "bricks/zarr/array_metadata.h"
 
 // Zarr arrays that other programs have written: what their metadata leave to a reader to find out.
 // `where` names the file.

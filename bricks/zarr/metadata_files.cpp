@@ -1,15 +1,15 @@
-#include "isobrick/bricks/metadata_files.h"
+#include "bricks/zarr/metadata_files.h"
 
 #include <fmt/format.h>
 
 #include <optional>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/lone_array.h"
-#include "isobrick/bricks/store_names.h"
-#include "isobrick/bricks/zarr_v2.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/lone_array.h"
+#include "bricks/zarr/store_names.h"
+#include "bricks/zarr/zarr_v2.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/image_metadata.h"
+#include <isobrick/image_metadata.h>
+#include "bricks/zarr/array_metadata.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/bricks/ome_transformations.h"
+#include "bricks/zarr/ome_transformations.h"
 
 #include <fmt/format.h>
 

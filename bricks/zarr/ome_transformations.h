@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <string>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/core/transform.h"
+#include <isobrick/transform.h>
+#include "bricks/zarr/checked_json.h"
 
 namespace isobrick {
 

@@ -1,8 +1,8 @@
-#include "isobrick/bricks/publisher.h"
+#include "bricks/zarr/publisher.h"
 
 #include <utility>
 
-#include "isobrick/bricks/store_names.h"
+#include "bricks/zarr/store_names.h"
 
 namespace isobrick {
 namespace {

@@ -13,8 +13,8 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/io/file.h"
-#include "isobrick/io/output_folder.h"
+#include "io/bytes/file.h"
+#include "io/bytes/output_folder.h"
 
 namespace isobrick {
 

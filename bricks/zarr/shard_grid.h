@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isobrick/bricks/level_info.h"
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
+#include <isobrick/level_info.h>
 
 namespace isobrick {
 

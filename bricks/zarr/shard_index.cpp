@@ -1,11 +1,11 @@
-#include "isobrick/bricks/shard_index.h"
+#include "bricks/zarr/shard_index.h"
 
 #include <fmt/format.h>
 
 #include <cstring>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/codec.h"
 
 namespace isobrick {
 

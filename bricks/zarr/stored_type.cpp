@@ -1,4 +1,4 @@
-#include "isobrick/bricks/stored_type.h"
+#include "bricks/zarr/stored_type.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-#include "isobrick/core/scalar.h"
+#include <isobrick/scalar.h>
 
 namespace isobrick {
 

@@ -1,8 +1,8 @@
-#include "isobrick/bricks/volume_choice.h"
+#include "bricks/zarr/volume_choice.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

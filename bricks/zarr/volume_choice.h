@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/core/selection.h"
+#include <isobrick/image_metadata.h>
+#include <isobrick/selection.h>
+#include "bricks/zarr/array_metadata.h"
 
 namespace isobrick {
 

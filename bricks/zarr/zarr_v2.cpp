@@ -1,10 +1,10 @@
-#include "isobrick/bricks/zarr_v2.h"
+#include "bricks/zarr/zarr_v2.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/stored_type.h"
-#include "isobrick/core/scalar.h"
+#include <isobrick/scalar.h>
+#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/stored_type.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/gpu/grid_batch.h"
+#include "gpu/grid/grid_batch.h"
 
 #include <algorithm>
 #include <array>
@@ -6,10 +6,10 @@
 #include <cstring>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/grid_kernel.h"
-#include "isobrick/gpu/stream.h"
-#include "isobrick/surface/case_tables.h"
+#include <isobrick/error.h>
+#include "gpu/grid/grid_kernel.h"
+#include "gpu/memory/cuda_objects.h"
+#include "surface/case_tables.h"
 
 namespace isobrick::gpu {
 namespace {

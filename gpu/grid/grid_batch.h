@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
-#include "isobrick/surface/grid_view.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/surface_options.h>
+#include "surface/grid_view.h"
 
 namespace isobrick::gpu {
 

@@ -1,10 +1,10 @@
-#include "isobrick/gpu/grid_kernel.h"
+#include "gpu/grid/grid_kernel.h"
 
 #include <cub/block/block_scan.cuh>
 #include <type_traits>
 
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/surface/grid_math.h"
+#include "gpu/memory/cuda_check.h"
+#include "surface/grid_math.h"
 
 namespace isobrick::gpu {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "isobrick/surface/case_rule.h"
-#include "isobrick/surface/grid_view.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "surface/case_rule.h"
+#include "surface/grid_view.h"
 
 namespace isobrick::gpu {
 

@@ -1,4 +1,4 @@
-#include "isobrick/gpu/mesh_memory.h"
+#include "gpu/grid/mesh_memory.h"
 
 #include <cuda.h>
 #include <fmt/format.h>
@@ -8,10 +8,10 @@
 #include <mutex>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/free_list.h"
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/device.h"
+#include <isobrick/device.h>
+#include <isobrick/error.h>
+#include "core/free_list.h"
+#include "gpu/memory/cuda_check.h"
 
 namespace isobrick::gpu {
 namespace {

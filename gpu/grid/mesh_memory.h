@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/gpu/grid_batch.h"
+#include "gpu/grid/grid_batch.h"
 
 namespace isobrick::gpu {
 

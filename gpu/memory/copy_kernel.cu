@@ -1,5 +1,5 @@
-#include "isobrick/gpu/copy_kernel.h"
-#include "isobrick/gpu/cuda_check.h"
+#include "gpu/memory/copy_kernel.h"
+#include "gpu/memory/cuda_check.h"
 
 namespace isobrick::gpu {
 namespace {

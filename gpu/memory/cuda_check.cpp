@@ -1,8 +1,8 @@
-#include "isobrick/gpu/cuda_check.h"
+#include "gpu/memory/cuda_check.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/gpu/device.h"
+#include <isobrick/device.h>
 
 namespace isobrick::gpu {
 namespace {

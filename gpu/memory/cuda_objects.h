@@ -6,8 +6,8 @@
 #include <cstring>
 #include <utility>
 
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/mapped_pages.h"
+#include "gpu/memory/cuda_check.h"
+#include "gpu/memory/mapped_pages.h"
 
 // Owners of CUDA objects. Destructors wait for nothing and never throw, also
 // when the driver has already been shut down at exit.

@@ -1,10 +1,10 @@
-#include "isobrick/gpu/device.h"
+#include <isobrick/device.h>
 
 #include <cuda_runtime_api.h>
 
 #include <cstring>
 
-#include "isobrick/gpu/cuda_check.h"
+#include "gpu/memory/cuda_check.h"
 
 namespace isobrick::gpu {
 

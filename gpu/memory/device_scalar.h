@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/core/scalar.h"
+#include <isobrick/scalar.h>
 
 namespace isobrick::gpu {
 

@@ -1,11 +1,11 @@
-#include "isobrick/gpu/mapped_pages.h"
+#include "gpu/memory/mapped_pages.h"
 
 #include <sys/mman.h>
 
 #include <cerrno>
 #include <cstdint>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick::gpu {
 

@@ -1,5 +1,5 @@
-#include "isobrick/gpu/host_memory.h"
-#include "isobrick/gpu/stream.h"
+#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/host_memory.h"
 
 namespace isobrick::gpu {
 

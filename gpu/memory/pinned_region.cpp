@@ -1,11 +1,11 @@
-#include "isobrick/gpu/pinned_region.h"
+#include "gpu/memory/pinned_region.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 
-#include "isobrick/gpu/cuda_check.h"
+#include "gpu/memory/cuda_check.h"
 
 namespace isobrick::gpu {
 namespace {

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/gpu/mapped_pages.h"
+#include "gpu/memory/mapped_pages.h"
 
 namespace isobrick::gpu {
 

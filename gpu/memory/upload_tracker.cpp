@@ -1,4 +1,4 @@
-#include "isobrick/gpu/upload_tracker.h"
+#include "gpu/memory/upload_tracker.h"
 
 #include <algorithm>
 #include <utility>

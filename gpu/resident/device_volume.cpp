@@ -1,17 +1,17 @@
-#include "isobrick/gpu/device_volume.h"
+#include <isobrick/device_volume.h>
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/device_volume_impl.h"
-#include "isobrick/gpu/search_kernel.h"
-#include "isobrick/gpu/supported.h"
-#include "isobrick/gpu/tile_block.h"
+#include <isobrick/error.h>
+#include "core/morton.h"
+#include "gpu/memory/device_scalar.h"
+#include "gpu/resident/device_volume_impl.h"
+#include "gpu/search/search_kernel.h"
+#include "gpu/tile/supported.h"
+#include "gpu/tile/tile_block.h"
 
 namespace isobrick::gpu {
 namespace {

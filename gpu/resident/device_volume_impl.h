@@ -1,8 +1,8 @@
 #pragma once
 
-#include "isobrick/gpu/device_volume.h"
-#include "isobrick/gpu/stream.h"
-#include "isobrick/gpu/tile_params.h"
+#include <isobrick/device_volume.h>
+#include "gpu/memory/cuda_objects.h"
+#include "gpu/tile/tile_params.h"
 
 namespace isobrick::gpu {
 

@@ -1,9 +1,9 @@
 #include <cmath>
 #include <limits>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/device_volume_impl.h"
-#include "isobrick/gpu/resident_launcher.h"
+#include <isobrick/error.h>
+#include "gpu/resident/device_volume_impl.h"
+#include "gpu/resident/resident_launcher.h"
 
 namespace isobrick::gpu {
 namespace {

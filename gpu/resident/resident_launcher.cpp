@@ -1,16 +1,16 @@
-#include "isobrick/gpu/resident_launcher.h"
+#include "gpu/resident/resident_launcher.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstring>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/threshold.h"
-#include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/search_kernel.h"
-#include "isobrick/gpu/supported.h"
-#include "isobrick/surface/world_map.h"
+#include <isobrick/error.h>
+#include "core/threshold.h"
+#include "gpu/memory/device_scalar.h"
+#include "gpu/search/search_kernel.h"
+#include "gpu/tile/supported.h"
+#include "surface/world_map.h"
 
 namespace isobrick::gpu {
 namespace {

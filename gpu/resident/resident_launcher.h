@@ -1,8 +1,8 @@
 #pragma once
 
-#include "isobrick/gpu/device_volume_impl.h"
-#include "isobrick/gpu/tile_kernel.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/surface_options.h>
+#include "gpu/resident/device_volume_impl.h"
+#include "gpu/tile/tile_kernel.h"
 
 namespace isobrick::gpu {
 

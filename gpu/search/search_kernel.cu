@@ -1,8 +1,8 @@
-#include "isobrick/gpu/search_kernel.h"
+#include "gpu/search/search_kernel.h"
 
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/search_tiles.cuh"
+#include "gpu/memory/cuda_check.h"
+#include "gpu/memory/device_scalar.h"
+#include "gpu/search/search_tiles.cuh"
 
 namespace isobrick::gpu {
 

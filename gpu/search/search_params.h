@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/gpu/tile_params.h"
+#include "gpu/tile/tile_params.h"
 
 // What the host hands to the search for active tiles. Plain data, no CUDA header.
 

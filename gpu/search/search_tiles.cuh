@@ -1,9 +1,9 @@
 #pragma once
 
-#include "isobrick/core/range.h"
-#include "isobrick/gpu/search_params.h"
-#include "isobrick/gpu/tile_block_place.cuh"
-#include "isobrick/gpu/tile_order.cuh"
+#include <isobrick/range.h>
+#include "gpu/search/search_params.h"
+#include "gpu/tile/tile_block_place.cuh"
+#include "gpu/tile/tile_order.cuh"
 
 // The kernel that finds active tiles, and those that make what it and the extraction read of a
 // volume: ranges and first columns.

@@ -1,6 +1,6 @@
-#include "isobrick/gpu/span_build.h"
+#include "gpu/search/span_build.h"
 
-#include "isobrick/gpu/span_items.cuh"
+#include "gpu/search/span_items.cuh"
 
 namespace isobrick::gpu {
 namespace {

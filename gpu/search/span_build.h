@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/gpu/stream.h"
-#include "isobrick/index/index_format.h"
+#include "gpu/memory/cuda_objects.h"
+#include "index/index_format.h"
 
 namespace isobrick::gpu {
 

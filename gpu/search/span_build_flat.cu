@@ -1,5 +1,5 @@
-#include "isobrick/gpu/span_items.cuh"
-#include "isobrick/index/instantiate.h"
+#include "gpu/search/span_items.cuh"
+#include "index/instantiate.h"
 
 // The structures whose items keep their places: linear scan and octree.
 

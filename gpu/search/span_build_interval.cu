@@ -1,5 +1,5 @@
-#include "isobrick/gpu/span_items.cuh"
-#include "isobrick/index/instantiate.h"
+#include "gpu/search/span_items.cuh"
+#include "index/instantiate.h"
 
 // The interval tree. Its split values follow from one another, each the least max
 // of the items whose min is not below the one before: a path through the items by

@@ -1,5 +1,5 @@
-#include "isobrick/gpu/span_items.cuh"
-#include "isobrick/index/instantiate.h"
+#include "gpu/search/span_items.cuh"
+#include "index/instantiate.h"
 
 // The k-d tree, level by level: all parts of a level are divided at once. As on
 // the CPU both orders are sorted once; the one that divides a part has its median

@@ -1,5 +1,5 @@
-#include "isobrick/gpu/span_items.cuh"
-#include "isobrick/index/instantiate.h"
+#include "gpu/search/span_items.cuh"
+#include "index/instantiate.h"
 
 // The quadtree: items sorted along the Z-curve, then squares cut in four level by
 // level, each by one thread; bounds and sizes from the last level upwards, and with

@@ -1,8 +1,8 @@
-#include "isobrick/gpu/span_indices.h"
+#include "gpu/search/span_indices.h"
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick::gpu {
 namespace {

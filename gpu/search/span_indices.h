@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/gpu/span_build.h"
-#include "isobrick/gpu/span_kernels.h"
+#include "gpu/search/span_build.h"
+#include "gpu/search/span_kernels.h"
 
 namespace isobrick::gpu {
 

@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/gpu/span_build.h"
-#include "isobrick/gpu/span_sort.h"
-#include "isobrick/index/span_index.h"
-#include "isobrick/index/span_items.h"
+#include <isobrick/range.h>
+#include "gpu/search/span_build.h"
+#include "gpu/search/span_sort.h"
+#include "index/span_index.h"
+#include "index/span_items.h"
 
 // What the builders on the device share. All of them make several indices at
 // once: their items lie index by index, and "owner" is the number of an index.

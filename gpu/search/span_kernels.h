@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isobrick/index/index_format.h"
+#include "index/index_format.h"
 
 // The launches of a search in indices that lie in device memory. Answers are bits
 // of a mask of 32-bit words: item i is bit i & 31 of word i >> 5.

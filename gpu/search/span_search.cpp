@@ -1,12 +1,12 @@
-#include "isobrick/gpu/span_search.h"
+#include "gpu/search/span_search.h"
 
 #include <algorithm>
 #include <limits>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/span_indices.h"
-#include "isobrick/index/instantiate.h"
+#include <isobrick/error.h>
+#include "gpu/search/span_indices.h"
+#include "index/instantiate.h"
 
 namespace isobrick::gpu {
 namespace {

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <bit>
 
-#include "isobrick/core/threshold.h"
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/span_kernels.h"
-#include "isobrick/gpu/span_walk.cuh"
+#include "core/threshold.h"
+#include "gpu/memory/cuda_check.h"
+#include "gpu/search/span_kernels.h"
+#include "gpu/search/span_walk.cuh"
 
 namespace isobrick::gpu {
 namespace {

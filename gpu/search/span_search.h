@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/index/index_format.h"
+#include <isobrick/range.h>
+#include <isobrick/vec.h>
+#include "index/index_format.h"
 
 namespace isobrick::gpu {
 

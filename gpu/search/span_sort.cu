@@ -1,4 +1,4 @@
-#include "isobrick/gpu/span_sort.h"
+#include "gpu/search/span_sort.h"
 
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/gpu/stream.h"
+#include "gpu/memory/cuda_objects.h"
 
 // Sorting and scanning in device memory, in the order of a stream. Temporary
 // memory comes from the stream's pool and goes back to it.

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <cstring>
 
-#include "isobrick/gpu/span_kernels.h"
-#include "isobrick/index/span_index.h"
+#include "gpu/search/span_kernels.h"
+#include "index/span_index.h"
 
 // How warps search the arrays of an index together. Each structure is cut into
 // as many parts as there are warps, so that no warp waits for another one and

@@ -1,4 +1,4 @@
-#include "isobrick/gpu/brick_pool.h"
+#include "gpu/stream/brick_pool.h"
 
 #include <array>
 #include <chrono>
@@ -7,13 +7,13 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/copy_kernel.h"
-#include "isobrick/gpu/device.h"
-#include "isobrick/gpu/device_arena.h"
-#include "isobrick/gpu/pinned_region.h"
-#include "isobrick/gpu/stream.h"
-#include "isobrick/gpu/upload_tracker.h"
+#include <isobrick/device.h>
+#include <isobrick/error.h>
+#include "gpu/memory/copy_kernel.h"
+#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/pinned_region.h"
+#include "gpu/memory/upload_tracker.h"
+#include "gpu/stream/device_arena.h"
 
 namespace isobrick::gpu {
 namespace {

@@ -1,8 +1,8 @@
-#include "isobrick/gpu/brick_table.h"
+#include "gpu/stream/brick_table.h"
 
 #include <algorithm>
 
-#include "isobrick/core/flat_map.h"
+#include "core/flat_map.h"
 
 namespace isobrick::gpu {
 namespace {

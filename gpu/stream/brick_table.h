@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/tile.h"
-#include "isobrick/gpu/stream_layout.h"
+#include "core/tile.h"
+#include "gpu/stream/stream_layout.h"
 
 namespace isobrick::gpu {
 

@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/stream_layout.h"
+#include "gpu/memory/cuda_check.h"
+#include "gpu/stream/stream_layout.h"
 
 namespace isobrick::gpu {
 

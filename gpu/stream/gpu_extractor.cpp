@@ -1,17 +1,17 @@
-#include "isobrick/gpu/gpu_extractor.h"
+#include "gpu/stream/gpu_extractor.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/brick_table.h"
-#include "isobrick/gpu/row_slots.h"
-#include "isobrick/gpu/stream_collector.h"
-#include "isobrick/gpu/stream_device.h"
-#include "isobrick/gpu/supported.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include <isobrick/error.h>
+#include "gpu/stream/brick_table.h"
+#include "gpu/stream/row_slots.h"
+#include "gpu/stream/stream_collector.h"
+#include "gpu/stream/stream_device.h"
+#include "gpu/tile/supported.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick::gpu {
 namespace {

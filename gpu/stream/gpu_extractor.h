@@ -6,9 +6,9 @@
 #include <span>
 #include <string>
 
-#include "isobrick/core/tile.h"
-#include "isobrick/gpu/stream_sizes.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/surface_options.h>
+#include "core/tile.h"
+#include "gpu/stream/stream_sizes.h"
 
 namespace isobrick::gpu {
 

@@ -1,10 +1,10 @@
-#include "isobrick/gpu/row_slots.h"
+#include "gpu/stream/row_slots.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
+#include <isobrick/error.h>
+#include "core/morton.h"
 
 namespace isobrick::gpu {
 namespace {

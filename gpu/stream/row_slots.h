@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/core/flat_map.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/gpu/tile_params.h"
+#include <isobrick/vec.h>
+#include "core/flat_map.h"
+#include "gpu/tile/tile_params.h"
 
 namespace isobrick::gpu {
 

@@ -1,10 +1,10 @@
-#include "isobrick/gpu/stream_collector.h"
+#include "gpu/stream/stream_collector.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick::gpu {
 namespace {

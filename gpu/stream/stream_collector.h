@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/gpu/gpu_extractor.h"
-#include "isobrick/gpu/pinned_region.h"
-#include "isobrick/gpu/stream_device.h"
+#include "gpu/memory/pinned_region.h"
+#include "gpu/stream/gpu_extractor.h"
+#include "gpu/stream/stream_device.h"
 
 namespace isobrick::gpu {
 

@@ -1,15 +1,15 @@
-#include "isobrick/gpu/stream_device.h"
+#include "gpu/stream/stream_device.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/block_groups.h"
-#include "isobrick/gpu/device.h"
-#include "isobrick/gpu/unpack_kernel.h"
-#include "isobrick/surface/cpu_extractor.h"
-#include "isobrick/surface/world_map.h"
+#include <isobrick/device.h>
+#include <isobrick/error.h>
+#include "gpu/stream/unpack_kernel.h"
+#include "gpu/tile/block_groups.h"
+#include "surface/cpu_extractor.h"
+#include "surface/world_map.h"
 
 namespace isobrick::gpu {
 

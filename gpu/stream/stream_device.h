@@ -5,13 +5,13 @@
 #include <mutex>
 #include <vector>
 
-#include "isobrick/gpu/brick_pool.h"
-#include "isobrick/gpu/brick_table.h"
-#include "isobrick/gpu/device_arena.h"
-#include "isobrick/gpu/stream.h"
-#include "isobrick/gpu/stream_layout.h"
-#include "isobrick/gpu/stream_sizes.h"
-#include "isobrick/gpu/tile_kernel.h"
+#include "gpu/memory/cuda_objects.h"
+#include "gpu/stream/brick_pool.h"
+#include "gpu/stream/brick_table.h"
+#include "gpu/stream/device_arena.h"
+#include "gpu/stream/stream_layout.h"
+#include "gpu/stream/stream_sizes.h"
+#include "gpu/tile/tile_kernel.h"
 
 namespace isobrick::gpu {
 

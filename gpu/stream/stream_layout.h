@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isobrick/gpu/tile_params.h"
+#include "gpu/tile/tile_params.h"
 
 // What the host sends for a launch, in one copy: the header, the items, their links,
 // their zeroed running totals, where the bricks of each lie. Bricks that are sent follow.

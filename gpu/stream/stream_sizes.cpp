@@ -1,15 +1,15 @@
-#include "isobrick/gpu/stream_sizes.h"
+#include "gpu/stream/stream_sizes.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/tile.h"
-#include "isobrick/gpu/block_groups.h"
-#include "isobrick/gpu/brick_pool.h"
-#include "isobrick/gpu/stream_layout.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include <isobrick/error.h>
+#include "core/tile.h"
+#include "gpu/stream/brick_pool.h"
+#include "gpu/stream/stream_layout.h"
+#include "gpu/tile/block_groups.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick::gpu {
 namespace {

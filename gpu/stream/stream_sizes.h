@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/lattice.h>
+#include <isobrick/surface_options.h>
 
 namespace isobrick::gpu {
 

@@ -1,8 +1,8 @@
-#include "isobrick/gpu/unpack_kernel.h"
+#include "gpu/stream/unpack_kernel.h"
 
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/unpack_tiles.cuh"
+#include "gpu/memory/cuda_check.h"
+#include "gpu/memory/device_scalar.h"
+#include "gpu/stream/unpack_tiles.cuh"
 
 namespace isobrick::gpu {
 

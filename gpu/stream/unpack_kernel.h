@@ -2,8 +2,8 @@
 
 #include <cuda_runtime_api.h>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/gpu/unpack_params.h"
+#include <isobrick/scalar.h>
+#include "gpu/stream/unpack_params.h"
 
 namespace isobrick::gpu {
 

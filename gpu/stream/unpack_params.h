@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/gpu/stream_layout.h"
+#include "gpu/stream/stream_layout.h"
 
 // What the host hands to the kernel that unpacks tiles. Plain data, no CUDA header.
 

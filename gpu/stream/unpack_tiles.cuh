@@ -1,7 +1,7 @@
 #pragma once
 
-#include "isobrick/gpu/streamed_blocks.cuh"
-#include "isobrick/gpu/unpack_params.h"
+#include "gpu/stream/unpack_params.h"
+#include "gpu/tile/streamed_blocks.cuh"
 
 // The kernel that lays the samples of streamed tiles out as tile_blocks.
 

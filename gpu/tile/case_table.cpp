@@ -1,5 +1,5 @@
-#include "isobrick/gpu/tile_params.h"
-#include "isobrick/surface/case_tables.h"
+#include "gpu/tile/tile_params.h"
+#include "surface/case_tables.h"
 
 namespace isobrick::gpu {
 

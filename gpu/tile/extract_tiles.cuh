@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "isobrick/gpu/tile_mesh.cuh"
-#include "isobrick/gpu/tile_take.cuh"
+#include "gpu/tile/tile_mesh.cuh"
+#include "gpu/tile/tile_take.cuh"
 
 // The extraction kernel: each thread block makes the meshes of one tile after the other.
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/gpu/block_groups.h"
+#include "gpu/tile/block_groups.h"
 
 // Where the samples of a streamed tile lie. A tile is read as if it had 27 tile blocks of 32³
 // samples: its own and 26 around it. Of those 26 the kernel reads only the samples within one step

@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/device_scalar.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/error.h>
+#include <isobrick/surface_options.h>
+#include "gpu/memory/device_scalar.h"
 
 namespace isobrick::gpu {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/gpu/tile_shared.cuh"
+#include "gpu/tile/tile_shared.cuh"
 
 // Where warps of a tile wait for some of the others, not for all as at __syncthreads: barriers in
 // shared memory (PTX ISA, mbarrier), at which who arrives goes on at once and who waits need not

@@ -1,4 +1,4 @@
-#include "isobrick/gpu/tile_block.h"
+#include "gpu/tile/tile_block.h"
 
 #include <algorithm>
 #include <cstring>

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
 
 namespace isobrick::gpu {
 

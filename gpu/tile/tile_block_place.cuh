@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/gpu/tile_params.h"
+#include "gpu/tile/tile_params.h"
 
 namespace isobrick::gpu {
 

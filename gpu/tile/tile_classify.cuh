@@ -2,7 +2,7 @@
 
 #include <type_traits>
 
-#include "isobrick/gpu/tile_row_groups.cuh"
+#include "gpu/tile/tile_row_groups.cuh"
 
 // First step: the inside bits of a tile's 33 × 33 rows, from global memory.
 

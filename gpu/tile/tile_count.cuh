@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/gpu/tile_row_groups.cuh"
+#include "gpu/tile/tile_row_groups.cuh"
 
 // Second step: crossing edges and active cells of each row, numbered by prefix
 // sums within planes and over planes. Where the vertices and cells of a row begin is marked, so

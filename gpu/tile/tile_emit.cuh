@@ -1,7 +1,7 @@
 #pragma once
 
-#include "isobrick/gpu/tile_classify.cuh"
-#include "isobrick/gpu/tile_lists.cuh"
+#include "gpu/tile/tile_classify.cuh"
+#include "gpu/tile/tile_lists.cuh"
 
 // Last step: vertices and triangles, written where they belong.
 

@@ -1,8 +1,8 @@
-#include "isobrick/gpu/tile_kernel.h"
+#include "gpu/tile/tile_kernel.h"
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/tile_launcher.cuh"
+#include <isobrick/error.h>
+#include "gpu/memory/device_scalar.h"
+#include "gpu/tile/tile_launcher.cuh"
 
 namespace isobrick::gpu {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <cuda_runtime_api.h>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/gpu/tile_params.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/scalar.h>
+#include <isobrick/surface_options.h>
+#include "gpu/tile/tile_params.h"
 
 namespace isobrick::gpu {
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "isobrick/core/threshold.h"
-#include "isobrick/gpu/cuda_check.h"
-#include "isobrick/gpu/extract_tiles.cuh"
-#include "isobrick/gpu/tile_kernel.h"
+#include "core/threshold.h"
+#include "gpu/memory/cuda_check.h"
+#include "gpu/tile/extract_tiles.cuh"
+#include "gpu/tile/tile_kernel.h"
 
 namespace isobrick::gpu {
 

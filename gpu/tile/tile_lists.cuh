@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/gpu/tile_shared.cuh"
+#include "gpu/tile/tile_shared.cuh"
 
 // How warps take what is listed of a tile: 32 things at a time, whose rows 32 threads find by a
 // vote over the marks that counting has left (tile_count.cuh).

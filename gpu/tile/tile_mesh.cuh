@@ -1,10 +1,10 @@
 #pragma once
 
-#include "isobrick/gpu/tile_barrier.cuh"
-#include "isobrick/gpu/tile_count.cuh"
-#include "isobrick/gpu/tile_emit.cuh"
-#include "isobrick/gpu/tile_nan.cuh"
-#include "isobrick/gpu/tile_order.cuh"
+#include "gpu/tile/tile_barrier.cuh"
+#include "gpu/tile/tile_count.cuh"
+#include "gpu/tile/tile_emit.cuh"
+#include "gpu/tile/tile_nan.cuh"
+#include "gpu/tile/tile_order.cuh"
 
 // From the inside bits of a tile to its mesh: the steps, and where its warps wait for each other.
 

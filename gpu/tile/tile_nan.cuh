@@ -1,7 +1,7 @@
 #pragma once
 
-#include "isobrick/gpu/tile_classify.cuh"
-#include "isobrick/gpu/tile_count.cuh"
+#include "gpu/tile/tile_classify.cuh"
+#include "gpu/tile/tile_count.cuh"
 
 // Volumes that may hold NaN: cells with such a corner are left out, and edges with no
 // other cell around them.

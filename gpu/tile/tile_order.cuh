@@ -2,8 +2,8 @@
 
 #include <cuda/atomic>
 
-#include "isobrick/gpu/tile_lists.cuh"
-#include "isobrick/gpu/tile_row_groups.cuh"
+#include "gpu/tile/tile_lists.cuh"
+#include "gpu/tile/tile_row_groups.cuh"
 
 // Third step: where the tile's output goes, and the numbers of vertices that
 // belong to tiles before it.

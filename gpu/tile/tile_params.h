@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "isobrick/surface/cell_math.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "surface/cell_math.h"
 
 // What the host hands to the extraction kernel. Plain data, no CUDA header.
 

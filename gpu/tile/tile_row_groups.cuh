@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/gpu/tile_shared.cuh"
+#include "gpu/tile/tile_shared.cuh"
 
 // How the 33 × 33 rows of a tile are dealt out to warps: the first 32 rows of each plane are
 // a group, so that a thread has the same y in all of them; the last rows of all planes are

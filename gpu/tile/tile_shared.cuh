@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isobrick/gpu/ptx.cuh"
-#include "isobrick/gpu/tile_params.h"
+#include "gpu/tile/ptx.cuh"
+#include "gpu/tile/tile_params.h"
 
 // How a block of threads works on one tile; docs/design/gpu.md has the whole picture.
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "isobrick/gpu/streamed_blocks.cuh"
-#include "isobrick/gpu/tile_block_place.cuh"
-#include "isobrick/gpu/tile_classify.cuh"
+#include "gpu/tile/streamed_blocks.cuh"
+#include "gpu/tile/tile_block_place.cuh"
+#include "gpu/tile/tile_classify.cuh"
 
 // Before the first step: which tile is the next, and where its samples lie.
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/selection.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/selection.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

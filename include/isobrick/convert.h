@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/core/downsampling.h"
-#include "isobrick/core/progress.h"
-#include "isobrick/pipeline/index_build.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/downsampling.h>
+#include <isobrick/image_metadata.h>
+#include <isobrick/index_build.h>
+#include <isobrick/progress.h>
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick::gpu {
 

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/gpu/device.h"
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/device.h>
+#include <isobrick/lattice.h>
+#include <isobrick/surface_options.h>
 
 namespace isobrick::gpu {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/pipeline/extract.h"
+#include <isobrick/extract.h>
 
 namespace isobrick {
 

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <optional>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/inside.h"
-#include "isobrick/core/progress.h"
+#include <isobrick/inside.h>
+#include <isobrick/progress.h>
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

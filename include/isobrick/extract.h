@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/inside.h"
-#include "isobrick/core/progress.h"
-#include "isobrick/pipeline/index_choice.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/index_choice.h>
+#include <isobrick/inside.h>
+#include <isobrick/mesh.h>
+#include <isobrick/progress.h>
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/progress.h"
+#include <isobrick/progress.h>
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/transform.h"
+#include <isobrick/transform.h>
 
 namespace isobrick {
 

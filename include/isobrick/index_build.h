@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/progress.h"
-#include "isobrick/core/selection.h"
-#include "isobrick/index/index_kind.h"
+#include <isobrick/index_kind.h>
+#include <isobrick/lattice.h>
+#include <isobrick/progress.h>
+#include <isobrick/selection.h>
 
 namespace isobrick {
 

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "isobrick/index/index_kind.h"
+#include <isobrick/index_kind.h>
 
 namespace isobrick {
 

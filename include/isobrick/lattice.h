@@ -4,8 +4,8 @@
 #include <limits>
 #include <optional>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/transform.h"
+#include <isobrick/lattice.h>
+#include <isobrick/transform.h>
 
 namespace isobrick {
 

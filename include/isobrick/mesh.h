@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string_view>
 
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
 
 namespace isobrick {
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/range.h"
+#include <isobrick/lattice.h>
+#include <isobrick/range.h>
 
 namespace isobrick {
 

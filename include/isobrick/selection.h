@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/level_info.h"
-#include "isobrick/bricks/range_table.h"
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/selection.h"
+#include <isobrick/lattice.h>
+#include <isobrick/level_info.h>
+#include <isobrick/range_table.h>
+#include <isobrick/selection.h>
 
 namespace isobrick {
 

@@ -2,11 +2,11 @@
 
 #include <span>
 
-#include "isobrick/core/inside.h"
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/pod_buffer.h"
-#include "isobrick/core/transform.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/inside.h>
+#include <isobrick/lattice.h>
+#include <isobrick/mesh.h>
+#include <isobrick/pod_buffer.h>
+#include <isobrick/transform.h>
 
 namespace isobrick {
 

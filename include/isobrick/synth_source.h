@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/progress.h"
-#include "isobrick/core/selection.h"
+#include <isobrick/progress.h>
+#include <isobrick/selection.h>
 
 namespace isobrick {
 

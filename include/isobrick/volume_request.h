@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/volumes/array_view.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/array_view.h>
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

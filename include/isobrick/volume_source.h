@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/transform.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/scalar.h>
+#include <isobrick/transform.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

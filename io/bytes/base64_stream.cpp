@@ -1,4 +1,4 @@
-#include "isobrick/io/base64_stream.h"
+#include "io/bytes/base64_stream.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cstring>
 #include <utility>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

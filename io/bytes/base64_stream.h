@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "isobrick/io/byte_stream.h"
+#include "io/bytes/byte_stream.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/io/byte_stream.h"
+#include "io/bytes/byte_stream.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <array>
 #include <cstring>
 
-#include "isobrick/core/cancel.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/byte_order.h"
+#include <isobrick/error.h>
+#include "core/cancel.h"
+#include "io/bytes/byte_order.h"
 
 namespace isobrick {
 

@@ -1,11 +1,11 @@
-#include "isobrick/io/concat_stream.h"
+#include "io/bytes/concat_stream.h"
 
 #include <fmt/format.h>
 
 #include <limits>
 #include <utility>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/io/byte_stream.h"
+#include "io/bytes/byte_stream.h"
 
 namespace isobrick {
 

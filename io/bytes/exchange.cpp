@@ -1,4 +1,4 @@
-#include "isobrick/io/exchange.h"
+#include "io/bytes/exchange.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <cstdio>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/io/file_stream.h"
+#include "io/bytes/file_stream.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -10,8 +10,8 @@
 #include <limits>
 #include <utility>
 
-#include "isobrick/core/cancel.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "core/cancel.h"
 
 namespace isobrick {
 namespace {

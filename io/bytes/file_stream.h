@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "isobrick/io/byte_stream.h"
-#include "isobrick/io/file.h"
+#include "io/bytes/byte_stream.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/io/folder_walk.h"
+#include "io/bytes/folder_walk.h"
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -8,7 +8,7 @@
 #include <memory>
 #include <string_view>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/io/inflate_stream.h"
+#include "io/bytes/inflate_stream.h"
 
 #include <fmt/format.h>
 #include <isa-l/igzip_lib.h>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

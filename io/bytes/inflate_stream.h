@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "isobrick/io/byte_stream.h"
-#include "isobrick/io/inflate.h"
+#include "io/bytes/byte_stream.h"
+#include "io/bytes/inflate.h"
 
 namespace isobrick {
 

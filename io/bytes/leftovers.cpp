@@ -1,4 +1,4 @@
-#include "isobrick/io/leftovers.h"
+#include "io/bytes/leftovers.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -15,10 +15,10 @@
 #include <new>
 #include <vector>
 
-#include "isobrick/core/cancel.h"
-#include "isobrick/core/digits.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/folder_walk.h"
+#include <isobrick/error.h>
+#include "core/cancel.h"
+#include "core/digits.h"
+#include "io/bytes/folder_walk.h"
 
 namespace isobrick {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/io/file.h"
+#include "io/bytes/file.h"
 
 // Outputs grow under names such as mesh.ply.partial-4711-0-5a9c01ef. A process holds a lock on what
 // it writes so, and the lock ends with the process: what is not locked is what a killed one left.

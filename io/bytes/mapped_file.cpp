@@ -1,4 +1,4 @@
-#include "isobrick/io/mapped_file.h"
+#include "io/bytes/mapped_file.h"
 
 #include <sys/mman.h>
 
@@ -7,8 +7,8 @@
 #include <mutex>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
+#include <isobrick/error.h>
+#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {

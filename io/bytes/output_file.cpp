@@ -1,4 +1,4 @@
-#include "isobrick/io/output_file.h"
+#include "io/bytes/output_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,9 +13,9 @@
 #include <filesystem>
 #include <new>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/leftovers.h"
-#include "isobrick/io/rename.h"
+#include <isobrick/error.h>
+#include "io/bytes/leftovers.h"
+#include "io/bytes/rename.h"
 
 namespace isobrick {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/io/file.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/io/output_folder.h"
+#include "io/bytes/output_folder.h"
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/exchange.h"
+#include <isobrick/error.h>
+#include "io/bytes/exchange.h"
 
 namespace isobrick {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "isobrick/io/file.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 

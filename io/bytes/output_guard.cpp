@@ -1,10 +1,10 @@
-#include "isobrick/io/output_guard.h"
+#include "io/bytes/output_guard.h"
 
 #include <fmt/format.h>
 
 #include <string_view>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -1,14 +1,14 @@
-#include "isobrick/io/parted_output.h"
+#include "io/bytes/parted_output.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
 
 #include <cerrno>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/folder_walk.h"
-#include "isobrick/io/output_guard.h"
-#include "isobrick/io/rename.h"
+#include <isobrick/error.h>
+#include "io/bytes/folder_walk.h"
+#include "io/bytes/output_guard.h"
+#include "io/bytes/rename.h"
 
 namespace isobrick {
 namespace {

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/io/leftovers.h"
-#include "isobrick/io/output_file.h"
+#include "io/bytes/leftovers.h"
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

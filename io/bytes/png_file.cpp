@@ -1,11 +1,11 @@
-#include "isobrick/io/png_file.h"
+#include "io/bytes/png_file.h"
 
 #include <fmt/format.h>
 #include <png.h>
 
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "isobrick/io/output_file.h"
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

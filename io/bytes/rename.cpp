@@ -1,4 +1,4 @@
-#include "isobrick/io/rename.h"
+#include "io/bytes/rename.h"
 
 #include <fcntl.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "isobrick/io/text_stream.h"
+#include "io/bytes/text_stream.h"
 
 #include <fmt/format.h>
 #include <locale.h>
@@ -12,8 +12,8 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/printable.h"
+#include <isobrick/error.h>
+#include "core/printable.h"
 
 namespace isobrick {
 namespace {

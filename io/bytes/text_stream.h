@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/io/byte_stream.h"
+#include <isobrick/scalar.h>
+#include "io/bytes/byte_stream.h"
 
 namespace isobrick {
 

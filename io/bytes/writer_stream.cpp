@@ -1,4 +1,4 @@
-#include "isobrick/io/writer_stream.h"
+#include "io/bytes/writer_stream.h"
 
 #include <algorithm>
 #include <string_view>

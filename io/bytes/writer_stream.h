@@ -4,7 +4,7 @@
 #include <ostream>
 #include <streambuf>
 
-#include "isobrick/io/output_file.h"
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/io/xml_text.h"
+#include "io/bytes/xml_text.h"
 
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-#include "isobrick/io/zlib_block_stream.h"
+#include "io/bytes/zlib_block_stream.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/inflate.h"
+#include <isobrick/error.h>
+#include "io/bytes/inflate.h"
 
 namespace isobrick {
 namespace {

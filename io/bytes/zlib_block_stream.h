@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "isobrick/io/byte_stream.h"
+#include "io/bytes/byte_stream.h"
 
 namespace isobrick {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isobrick/io/output_file.h"
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/meshes/glb_scene.h"
+#include "io/meshes/glb_scene.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/length_unit.h"
+#include "core/length_unit.h"
 
 namespace isobrick {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/io/output_file.h"
+#include <isobrick/vec.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

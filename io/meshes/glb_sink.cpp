@@ -1,4 +1,4 @@
-#include "isobrick/meshes/glb_sink.h"
+#include "io/meshes/glb_sink.h"
 
 #include <utility>
 #include <vector>

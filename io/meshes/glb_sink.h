@@ -4,8 +4,8 @@
 #include <limits>
 #include <string>
 
-#include "isobrick/meshes/glb_scene.h"
-#include "isobrick/meshes/parted_mesh_sink.h"
+#include "io/meshes/glb_scene.h"
+#include "io/meshes/parted_mesh_sink.h"
 
 namespace isobrick {
 

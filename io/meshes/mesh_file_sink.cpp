@@ -1,4 +1,4 @@
-#include "isobrick/meshes/mesh_file_sink.h"
+#include <isobrick/mesh_file_sink.h>
 
 #include <fmt/format.h>
 
@@ -6,13 +6,13 @@
 #include <array>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/meshes/glb_sink.h"
-#include "isobrick/meshes/mesh_parts.h"
-#include "isobrick/meshes/obj_sink.h"
-#include "isobrick/meshes/ply_sink.h"
-#include "isobrick/meshes/stl_sink.h"
-#include "isobrick/meshes/vtp_sink.h"
+#include <isobrick/error.h>
+#include "io/meshes/glb_sink.h"
+#include "io/meshes/mesh_parts.h"
+#include "io/meshes/obj_sink.h"
+#include "io/meshes/ply_sink.h"
+#include "io/meshes/stl_sink.h"
+#include "io/meshes/vtp_sink.h"
 
 namespace isobrick {
 namespace {

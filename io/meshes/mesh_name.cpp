@@ -1,4 +1,4 @@
-#include "isobrick/meshes/mesh_name.h"
+#include "io/meshes/mesh_name.h"
 
 #include <algorithm>
 #include <cctype>

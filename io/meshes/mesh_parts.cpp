@@ -1,4 +1,4 @@
-#include "isobrick/meshes/mesh_parts.h"
+#include "io/meshes/mesh_parts.h"
 
 #include <algorithm>
 #include <memory>

@@ -1,4 +1,4 @@
-#include "isobrick/meshes/obj_sink.h"
+#include "io/meshes/obj_sink.h"
 
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>

@@ -5,8 +5,8 @@
 
 #include <tbb/task_arena.h>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

@@ -1,8 +1,8 @@
-#include "isobrick/meshes/parted_mesh_sink.h"
+#include "io/meshes/parted_mesh_sink.h"
 
 #include <utility>
 
-#include "isobrick/meshes/vertex_rows.h"
+#include "io/meshes/vertex_rows.h"
 
 namespace isobrick {
 

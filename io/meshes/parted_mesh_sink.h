@@ -6,10 +6,10 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/io/parted_output.h"
-#include "isobrick/meshes/mesh_parts.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "io/bytes/output_file.h"
+#include "io/bytes/parted_output.h"
+#include "io/meshes/mesh_parts.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/meshes/ply_sink.h"
+#include "io/meshes/ply_sink.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <cstring>
 #include <limits>
 
-#include "isobrick/core/error.h"
-#include "isobrick/meshes/append_items.h"
-#include "isobrick/meshes/vertex_rows.h"
+#include <isobrick/error.h>
+#include "io/meshes/append_items.h"
+#include "io/meshes/vertex_rows.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/meshes/stl_sink.h"
+#include "io/meshes/stl_sink.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <cstring>
 #include <limits>
 
-#include "isobrick/core/error.h"
-#include "isobrick/meshes/append_items.h"
+#include <isobrick/error.h>
+#include "io/meshes/append_items.h"
 
 namespace isobrick {
 namespace {

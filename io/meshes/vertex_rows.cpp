@@ -1,9 +1,9 @@
-#include "isobrick/meshes/vertex_rows.h"
+#include "io/meshes/vertex_rows.h"
 
 #include <bit>
 #include <cstring>
 
-#include "isobrick/meshes/append_items.h"
+#include "io/meshes/append_items.h"
 
 namespace isobrick {
 

@@ -2,8 +2,8 @@
 
 #include <cstddef>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/meshes/vtp_layout.h"
+#include "io/meshes/vtp_layout.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "isobrick/meshes/append_items.h"
+#include "io/meshes/append_items.h"
 
 namespace isobrick {
 namespace {

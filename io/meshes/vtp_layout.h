@@ -4,8 +4,8 @@
 #include <span>
 #include <string>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

@@ -1,15 +1,15 @@
-#include "isobrick/meshes/vtp_sink.h"
+#include "io/meshes/vtp_sink.h"
 
 #include <fmt/format.h>
 
 #include <cstring>
 #include <filesystem>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/xml_text.h"
-#include "isobrick/meshes/append_items.h"
-#include "isobrick/meshes/mesh_parts.h"
-#include "isobrick/meshes/vertex_rows.h"
+#include <isobrick/error.h>
+#include "io/bytes/xml_text.h"
+#include "io/meshes/append_items.h"
+#include "io/meshes/mesh_parts.h"
+#include "io/meshes/vertex_rows.h"
 
 namespace isobrick {
 namespace {

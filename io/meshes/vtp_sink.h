@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <string>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/meshes/parted_mesh_sink.h"
-#include "isobrick/meshes/vtp_layout.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "io/bytes/output_file.h"
+#include "io/meshes/parted_mesh_sink.h"
+#include "io/meshes/vtp_layout.h"
 
 namespace isobrick {
 

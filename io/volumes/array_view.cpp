@@ -1,10 +1,10 @@
-#include "isobrick/volumes/array_view.h"
+#include <isobrick/array_view.h>
 
 #include <fmt/format.h>
 
 #include <limits>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -11,8 +11,8 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/io/byte_order.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_source.h>
+#include "io/bytes/byte_order.h"
 
 namespace isobrick {
 

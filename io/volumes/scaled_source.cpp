@@ -1,4 +1,4 @@
-#include "isobrick/volumes/scaled_source.h"
+#include "io/volumes/scaled_source.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

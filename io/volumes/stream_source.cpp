@@ -1,4 +1,4 @@
-#include "isobrick/volumes/stream_source.h"
+#include "io/volumes/stream_source.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "isobrick/io/byte_stream.h"
-#include "isobrick/volumes/sample_layout.h"
+#include "io/bytes/byte_stream.h"
+#include "io/volumes/sample_layout.h"
 
 namespace isobrick {
 

@@ -1,13 +1,13 @@
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/volume_request.h>
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/length_unit.h"
+#include <isobrick/error.h>
+#include <isobrick/lattice.h>
+#include "core/length_unit.h"
 
 namespace isobrick {
 namespace {

@@ -1,10 +1,10 @@
-#include "isobrick/pipeline/brick_output.h"
+#include "pipeline/convert/brick_output.h"
 
 #include <utility>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/core/copy_box.h"
-#include "isobrick/core/pod_buffer.h"
+#include <isobrick/pod_buffer.h>
+#include "bricks/zarr/codec.h"
+#include "core/copy_box.h"
 
 namespace isobrick {
 

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/bricks/store_writer.h"
-#include "isobrick/core/progress.h"
-#include "isobrick/pipeline/convert_journal.h"
+#include <isobrick/progress.h>
+#include "bricks/store_writer.h"
+#include "pipeline/convert/convert_journal.h"
 
 namespace isobrick {
 

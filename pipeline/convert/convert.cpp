@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/convert.h"
+#include <isobrick/convert.h>
 
 #include <algorithm>
 #include <chrono>
@@ -6,17 +6,17 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/bricks/store_writer.h"
-#include "isobrick/pipeline/convert_cascade.h"
-#include "isobrick/pipeline/convert_journal.h"
-#include "isobrick/pipeline/convert_level.h"
-#include "isobrick/pipeline/convert_plan.h"
-#include "isobrick/pipeline/convert_sparse.h"
-#include "isobrick/pipeline/convert_staging.h"
-#include "isobrick/pipeline/display_window.h"
-#include "isobrick/pipeline/downsample.h"
-#include "isobrick/pipeline/slab_file.h"
-#include "isobrick/pipeline/workers.h"
+#include "bricks/store_writer.h"
+#include "pipeline/convert/convert_cascade.h"
+#include "pipeline/convert/convert_journal.h"
+#include "pipeline/convert/convert_level.h"
+#include "pipeline/convert/convert_plan.h"
+#include "pipeline/convert/convert_sparse.h"
+#include "pipeline/convert/convert_staging.h"
+#include "pipeline/convert/display_window.h"
+#include "pipeline/convert/downsample.h"
+#include "pipeline/slab_file.h"
+#include "pipeline/workers.h"
 
 namespace isobrick {
 namespace {

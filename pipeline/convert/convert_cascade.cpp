@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/convert_cascade.h"
+#include "pipeline/convert/convert_cascade.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <future>
 
-#include "isobrick/pipeline/downsample.h"
+#include "pipeline/convert/downsample.h"
 
 namespace isobrick {
 

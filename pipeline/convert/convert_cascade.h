@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/pipeline/convert_level.h"
-#include "isobrick/pipeline/convert_plan.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_source.h>
+#include "pipeline/convert/convert_level.h"
+#include "pipeline/convert/convert_plan.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/convert_journal.h"
+#include "pipeline/convert/convert_journal.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <span>
 
-#include "isobrick/bricks/store_names.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/store_names.h"
 
 namespace isobrick {
 namespace {

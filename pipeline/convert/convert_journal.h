@@ -5,9 +5,9 @@
 #include <map>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/output_folder.h"
+#include <isobrick/lattice.h>
+#include "io/bytes/file.h"
+#include "io/bytes/output_folder.h"
 
 namespace isobrick {
 

@@ -1,8 +1,8 @@
-#include "isobrick/pipeline/convert_level.h"
+#include "pipeline/convert/convert_level.h"
 
 #include <tbb/parallel_invoke.h>
 
-#include "isobrick/pipeline/in_order.h"
+#include "pipeline/convert/in_order.h"
 
 namespace isobrick {
 LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int level,

@@ -5,11 +5,11 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/bricks/store_writer.h"
-#include "isobrick/core/progress.h"
-#include "isobrick/pipeline/brick_output.h"
-#include "isobrick/pipeline/convert_journal.h"
-#include "isobrick/pipeline/range_scan.h"
+#include <isobrick/progress.h>
+#include "bricks/store_writer.h"
+#include "pipeline/convert/brick_output.h"
+#include "pipeline/convert/convert_journal.h"
+#include "pipeline/index/range_scan.h"
 
 namespace isobrick {
 

@@ -1,19 +1,19 @@
-#include "isobrick/pipeline/convert_plan.h"
+#include "pipeline/convert/convert_plan.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 
-#include "isobrick/bricks/brick_checksums.h"
-#include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/range_format.h"
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/downsample.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/range_scan.h"
-#include "isobrick/pipeline/slab_piece.h"
+#include <isobrick/error.h>
+#include <isobrick/store_reader.h>
+#include "bricks/ranges/brick_checksums.h"
+#include "bricks/ranges/range_format.h"
+#include "bricks/zarr/codec.h"
+#include "pipeline/convert/downsample.h"
+#include "pipeline/index/range_scan.h"
+#include "pipeline/program_memory.h"
+#include "pipeline/slab_piece.h"
 
 namespace isobrick {
 namespace {

@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isobrick/bricks/store_writer.h"
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/convert.h>
+#include <isobrick/volume_source.h>
+#include "bricks/store_writer.h"
 
 namespace isobrick {
 

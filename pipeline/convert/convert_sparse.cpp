@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/convert_sparse.h"
+#include "pipeline/convert/convert_sparse.h"
 
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
@@ -8,16 +8,16 @@
 #include <tuple>
 #include <utility>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/core/copy_box.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/pod_buffer.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/output_file.h"
-#include "isobrick/pipeline/brick_output.h"
-#include "isobrick/pipeline/downsample.h"
-#include "isobrick/pipeline/in_order.h"
-#include "isobrick/pipeline/program_memory.h"
+#include <isobrick/error.h>
+#include <isobrick/pod_buffer.h>
+#include "bricks/zarr/codec.h"
+#include "core/copy_box.h"
+#include "io/bytes/file.h"
+#include "io/bytes/output_file.h"
+#include "pipeline/convert/brick_output.h"
+#include "pipeline/convert/downsample.h"
+#include "pipeline/convert/in_order.h"
+#include "pipeline/program_memory.h"
 
 namespace isobrick {
 namespace {

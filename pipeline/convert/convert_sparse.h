@@ -3,14 +3,14 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "isobrick/bricks/store_writer.h"
-#include "isobrick/core/progress.h"
-#include "isobrick/pipeline/brick_output.h"
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/pipeline/convert_journal.h"
-#include "isobrick/pipeline/sparse_bricks.h"
-#include "isobrick/pipeline/sparse_ranges.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/convert.h>
+#include <isobrick/progress.h>
+#include <isobrick/volume_source.h>
+#include "bricks/store_writer.h"
+#include "pipeline/convert/brick_output.h"
+#include "pipeline/convert/convert_journal.h"
+#include "pipeline/convert/sparse_bricks.h"
+#include "pipeline/convert/sparse_ranges.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/convert_staging.h"
+#include "pipeline/convert/convert_staging.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -8,12 +8,12 @@
 #include <algorithm>
 #include <cerrno>
 
-#include "isobrick/bricks/store_entries.h"
-#include "isobrick/bricks/store_names.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/exchange.h"
-#include "isobrick/io/folder_walk.h"
-#include "isobrick/io/output_guard.h"
+#include <isobrick/error.h>
+#include "bricks/store_entries.h"
+#include "bricks/zarr/store_names.h"
+#include "io/bytes/exchange.h"
+#include "io/bytes/folder_walk.h"
+#include "io/bytes/output_guard.h"
 
 namespace isobrick {
 namespace {

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/io/file.h"
-#include "isobrick/io/output_folder.h"
+#include "io/bytes/file.h"
+#include "io/bytes/output_folder.h"
 
 namespace isobrick {
 

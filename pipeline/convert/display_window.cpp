@@ -1,11 +1,11 @@
-#include "isobrick/pipeline/display_window.h"
+#include "pipeline/convert/display_window.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>
 
-#include "isobrick/bricks/codec.h"
+#include "bricks/zarr/codec.h"
 
 namespace isobrick {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/store_reader.h"
+#include <isobrick/image_metadata.h>
+#include <isobrick/store_reader.h>
 
 namespace isobrick {
 

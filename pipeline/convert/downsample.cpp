@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/downsample.h"
+#include "pipeline/convert/downsample.h"
 
 #include <tbb/parallel_for.h>
 

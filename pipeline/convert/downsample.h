@@ -2,10 +2,10 @@
 
 #include <cstddef>
 
-#include "isobrick/core/downsampling.h"
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/transform.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/downsampling.h>
+#include <isobrick/scalar.h>
+#include <isobrick/transform.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

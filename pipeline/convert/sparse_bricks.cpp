@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/sparse_bricks.h"
+#include "pipeline/convert/sparse_bricks.h"
 
 #include <algorithm>
 #include <utility>

@@ -5,8 +5,8 @@
 #include <tuple>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/lattice.h>
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

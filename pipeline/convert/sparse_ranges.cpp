@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/sparse_ranges.h"
+#include "pipeline/convert/sparse_ranges.h"
 
 #include <tbb/parallel_for.h>
 
@@ -8,10 +8,10 @@
 #include <map>
 #include <utility>
 
-#include "isobrick/bricks/brick_checksums.h"
-#include "isobrick/bricks/range_table.h"
-#include "isobrick/core/range.h"
-#include "isobrick/pipeline/range_scan.h"
+#include <isobrick/range.h>
+#include <isobrick/range_table.h>
+#include "bricks/ranges/brick_checksums.h"
+#include "pipeline/index/range_scan.h"
 
 namespace isobrick {
 namespace {

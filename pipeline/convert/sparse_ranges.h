@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/bricks/store_writer.h"
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
+#include "bricks/store_writer.h"
 
 namespace isobrick {
 

@@ -1,12 +1,12 @@
-#include "isobrick/pipeline/store_source.h"
+#include "pipeline/convert/store_source.h"
 
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
 
 #include <utility>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/pipeline/slab_reader.h"
+#include <isobrick/store_reader.h>
+#include "pipeline/slab_reader.h"
 
 namespace isobrick {
 namespace {

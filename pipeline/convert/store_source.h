@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/volumes/volume_request.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_request.h>
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/export.h"
+#include <isobrick/export.h>
 
 #include <fmt/format.h>
 
@@ -8,22 +8,22 @@
 #include <optional>
 #include <span>
 
-#include "isobrick/core/budget_error.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/leftovers.h"
-#include "isobrick/io/output_file.h"
-#include "isobrick/io/output_guard.h"
-#include "isobrick/pipeline/export_level_set.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/slab_file.h"
-#include "isobrick/pipeline/slab_piece.h"
-#include "isobrick/pipeline/slab_reader.h"
-#include "isobrick/pipeline/stored_bricks.h"
-#include "isobrick/pipeline/vdb_budget.h"
-#include "isobrick/pipeline/workers.h"
-#include "isobrick/volumes/nrrd_writer.h"
-#include "isobrick/volumes/vdb_writer.h"
+#include <isobrick/error.h>
+#include "core/budget_error.h"
+#include "io/bytes/file.h"
+#include "io/bytes/leftovers.h"
+#include "io/bytes/output_file.h"
+#include "io/bytes/output_guard.h"
+#include "io/volumes/raw/nrrd_writer.h"
+#include "io/volumes/vdb/vdb_writer.h"
+#include "pipeline/export/export_level_set.h"
+#include "pipeline/export/vdb_budget.h"
+#include "pipeline/program_memory.h"
+#include "pipeline/slab_file.h"
+#include "pipeline/slab_piece.h"
+#include "pipeline/slab_reader.h"
+#include "pipeline/stored_bricks.h"
+#include "pipeline/workers.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/export_level_set.h"
+#include "pipeline/export/export_level_set.h"
 
 #include <fmt/format.h>
 
@@ -7,18 +7,18 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/bricks/level_set.h"
-#include "isobrick/core/budget_error.h"
-#include "isobrick/core/threshold.h"
-#include "isobrick/core/tile.h"
-#include "isobrick/pipeline/estimate.h"
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/pipeline/slab_reader.h"
-#include "isobrick/pipeline/stored_bricks.h"
-#include "isobrick/pipeline/vdb_budget.h"
-#include "isobrick/pipeline/workers.h"
-#include "isobrick/surface/cpu_extractor.h"
-#include "isobrick/volumes/vdb_level_set.h"
+#include <isobrick/estimate.h>
+#include <isobrick/extract.h>
+#include "bricks/level_set.h"
+#include "core/budget_error.h"
+#include "core/threshold.h"
+#include "core/tile.h"
+#include "io/volumes/vdb/vdb_level_set.h"
+#include "pipeline/export/vdb_budget.h"
+#include "pipeline/slab_reader.h"
+#include "pipeline/stored_bricks.h"
+#include "pipeline/workers.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick {
 namespace {

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "isobrick/core/progress.h"
-#include "isobrick/io/output_file.h"
-#include "isobrick/pipeline/export.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/export.h>
+#include <isobrick/progress.h>
+#include <isobrick/volume_source.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

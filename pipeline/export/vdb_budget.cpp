@@ -1,11 +1,11 @@
-#include "isobrick/pipeline/vdb_budget.h"
+#include "pipeline/export/vdb_budget.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/program_memory.h"
+#include <isobrick/error.h>
+#include "pipeline/program_memory.h"
 
 namespace isobrick {
 namespace {

@@ -1,9 +1,9 @@
-#include "isobrick/pipeline/backend_choice.h"
+#include "pipeline/extract/backend_choice.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/supported.h"
+#include <isobrick/error.h>
+#include "gpu/tile/supported.h"
 
 namespace isobrick {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/pipeline/extract_tiles.h"
-#include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/pipeline/surface_extractor.h"
+#include "pipeline/extract/extract_plan.h"
+#include "pipeline/extract/extract_tiles.h"
+#include "pipeline/extract/gpu_backend.h"
+#include "pipeline/extract/surface_extractor.h"
 
 namespace isobrick {
 

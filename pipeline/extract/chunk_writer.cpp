@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/chunk_writer.h"
+#include "pipeline/extract/chunk_writer.h"
 
 #include <chrono>
 

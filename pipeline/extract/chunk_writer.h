@@ -8,7 +8,7 @@
 #include <memory>
 #include <thread>
 
-#include "isobrick/surface/surface_options.h"
+#include <isobrick/surface_options.h>
 
 namespace isobrick {
 

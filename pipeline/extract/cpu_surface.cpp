@@ -1,9 +1,9 @@
 #include <chrono>
 #include <utility>
 
-#include "isobrick/pipeline/chunk_writer.h"
-#include "isobrick/pipeline/surface_extractor.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include "pipeline/extract/chunk_writer.h"
+#include "pipeline/extract/surface_extractor.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/estimate.h"
+#include <isobrick/estimate.h>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_for_each.h>
@@ -12,12 +12,12 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/pipeline/tile_sample.h"
-#include "isobrick/pipeline/workers.h"
-#include "isobrick/stream/brick_cache.h"
-#include "isobrick/stream/tile_stream.h"
-#include "isobrick/surface/case_rule.h"
+#include "pipeline/extract/extract_plan.h"
+#include "pipeline/extract/tile_sample.h"
+#include "pipeline/workers.h"
+#include "stream/brick_cache.h"
+#include "stream/tile_stream.h"
+#include "surface/case_rule.h"
 
 namespace isobrick {
 namespace {

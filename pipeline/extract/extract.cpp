@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/extract.h"
+#include <isobrick/extract.h>
 
 #include <algorithm>
 #include <bit>
@@ -7,14 +7,14 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/length_unit.h"
-#include "isobrick/pipeline/backend_choice.h"
-#include "isobrick/pipeline/estimate.h"
-#include "isobrick/pipeline/extract_pass.h"
-#include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/pipeline/extract_tiles.h"
-#include "isobrick/pipeline/seconds_sum.h"
-#include "isobrick/pipeline/workers.h"
+#include <isobrick/estimate.h>
+#include "core/length_unit.h"
+#include "pipeline/extract/backend_choice.h"
+#include "pipeline/extract/extract_pass.h"
+#include "pipeline/extract/extract_plan.h"
+#include "pipeline/extract/extract_tiles.h"
+#include "pipeline/seconds_sum.h"
+#include "pipeline/workers.h"
 
 namespace isobrick {
 namespace {

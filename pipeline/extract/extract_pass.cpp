@@ -1,14 +1,14 @@
-#include "isobrick/pipeline/extract_pass.h"
+#include "pipeline/extract/extract_pass.h"
 
 #include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
 
-#include "isobrick/pipeline/extract_tiles.h"
-#include "isobrick/pipeline/seconds_sum.h"
-#include "isobrick/pipeline/workers.h"
-#include "isobrick/stream/brick_cache.h"
+#include "pipeline/extract/extract_tiles.h"
+#include "pipeline/seconds_sum.h"
+#include "pipeline/workers.h"
+#include "stream/brick_cache.h"
 
 namespace isobrick {
 namespace {

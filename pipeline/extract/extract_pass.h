@@ -4,7 +4,7 @@
 #include <functional>
 #include <span>
 
-#include "isobrick/pipeline/backend_choice.h"
+#include "pipeline/extract/backend_choice.h"
 
 namespace isobrick {
 

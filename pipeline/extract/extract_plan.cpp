@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/extract_plan.h"
+#include "pipeline/extract/extract_plan.h"
 
 #include <fmt/format.h>
 #include <tbb/info.h>
@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isobrick/bricks/level_set.h"
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/resolve_index.h"
-#include "isobrick/stream/brick_slots.h"
-#include "isobrick/stream/tile_stream.h"
+#include <isobrick/error.h>
+#include "bricks/level_set.h"
+#include "pipeline/extract/gpu_backend.h"
+#include "pipeline/extract/resolve_index.h"
+#include "pipeline/program_memory.h"
+#include "stream/brick_slots.h"
+#include "stream/tile_stream.h"
 
 namespace isobrick {
 namespace {

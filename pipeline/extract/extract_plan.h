@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/stream/block_search.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include <isobrick/extract.h>
+#include "stream/block_search.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick {
 

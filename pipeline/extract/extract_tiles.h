@@ -2,9 +2,9 @@
 
 #include <utility>
 
-#include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/stream/batch_decoder.h"
-#include "isobrick/stream/tile_stream.h"
+#include "pipeline/extract/extract_plan.h"
+#include "stream/batch_decoder.h"
+#include "stream/tile_stream.h"
 
 namespace isobrick {
 

@@ -1,15 +1,15 @@
-#include "isobrick/pipeline/gpu_backend.h"
+#include "pipeline/extract/gpu_backend.h"
 
 #include <algorithm>
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/brick_pool.h"
-#include "isobrick/gpu/device.h"
-#include "isobrick/gpu/gpu_extractor.h"
-#include "isobrick/gpu/host_memory.h"
-#include "isobrick/pipeline/chunk_writer.h"
+#include <isobrick/device.h>
+#include <isobrick/error.h>
+#include "gpu/memory/host_memory.h"
+#include "gpu/stream/brick_pool.h"
+#include "gpu/stream/gpu_extractor.h"
+#include "pipeline/extract/chunk_writer.h"
 
 namespace isobrick {
 namespace {

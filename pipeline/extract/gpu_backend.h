@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "isobrick/pipeline/surface_extractor.h"
-#include "isobrick/stream/brick_memory.h"
+#include "pipeline/extract/surface_extractor.h"
+#include "stream/brick_memory.h"
 
 // The CUDA backend as the pipeline sees it: gpu_backend.cpp where it is built, else
 // no_gpu_backend.cpp.

@@ -1,5 +1,5 @@
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/gpu_backend.h"
+#include <isobrick/error.h>
+#include "pipeline/extract/gpu_backend.h"
 
 namespace isobrick {
 

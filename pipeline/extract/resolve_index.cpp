@@ -1,9 +1,9 @@
-#include "isobrick/pipeline/resolve_index.h"
+#include "pipeline/extract/resolve_index.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include "bricks/stored_index.h"
 
 namespace isobrick {
 

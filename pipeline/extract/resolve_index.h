@@ -1,8 +1,8 @@
 #pragma once
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/pipeline/index_choice.h"
-#include "isobrick/stream/block_search.h"
+#include <isobrick/index_choice.h>
+#include <isobrick/store_reader.h>
+#include "stream/block_search.h"
 
 namespace isobrick {
 

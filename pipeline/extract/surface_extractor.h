@@ -3,9 +3,9 @@
 #include <memory>
 #include <span>
 
-#include "isobrick/core/tile.h"
-#include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "core/tile.h"
+#include "pipeline/extract/extract_plan.h"
 
 namespace isobrick {
 

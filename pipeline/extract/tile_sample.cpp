@@ -1,8 +1,8 @@
-#include "isobrick/pipeline/tile_sample.h"
+#include "pipeline/extract/tile_sample.h"
 
 #include <algorithm>
 
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 
 namespace isobrick {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/core/tile.h"
+#include "core/tile.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/add_ranges.h"
+#include "pipeline/index/add_ranges.h"
 
 #include <fmt/format.h>
 #include <sys/file.h>
@@ -6,17 +6,17 @@
 #include <algorithm>
 #include <cerrno>
 
-#include "isobrick/bricks/brick_checksums.h"
-#include "isobrick/bricks/item_array.h"
-#include "isobrick/bricks/range_array.h"
-#include "isobrick/bricks/store_entries.h"
-#include "isobrick/bricks/stored_ranges.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/exchange.h"
-#include "isobrick/io/output_folder.h"
-#include "isobrick/pipeline/level_scan.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/workers.h"
+#include <isobrick/error.h>
+#include "bricks/ranges/brick_checksums.h"
+#include "bricks/ranges/item_array.h"
+#include "bricks/ranges/range_array.h"
+#include "bricks/ranges/stored_ranges.h"
+#include "bricks/store_entries.h"
+#include "io/bytes/exchange.h"
+#include "io/bytes/output_folder.h"
+#include "pipeline/index/level_scan.h"
+#include "pipeline/program_memory.h"
+#include "pipeline/workers.h"
 
 namespace isobrick {
 namespace {

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/progress.h"
-#include "isobrick/core/selection.h"
-#include "isobrick/io/file.h"
+#include <isobrick/progress.h>
+#include <isobrick/selection.h>
+#include <isobrick/store_reader.h>
+#include "io/bytes/file.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/index_build.h"
+#include <isobrick/index_build.h>
 
 #include <fmt/format.h>
 
@@ -7,18 +7,18 @@
 #include <memory>
 #include <optional>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/store_entries.h"
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/index/leaf_ranges.h"
-#include "isobrick/io/exchange.h"
-#include "isobrick/io/output_folder.h"
-#include "isobrick/pipeline/add_ranges.h"
-#include "isobrick/pipeline/index_chunk_builder.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/workers.h"
+#include <isobrick/error.h>
+#include "bricks/store_entries.h"
+#include "bricks/stored_index.h"
+#include "bricks/zarr/checked_json.h"
+#include "core/morton.h"
+#include "index/leaf_ranges.h"
+#include "io/bytes/exchange.h"
+#include "io/bytes/output_folder.h"
+#include "pipeline/index/add_ranges.h"
+#include "pipeline/index/index_chunk_builder.h"
+#include "pipeline/program_memory.h"
+#include "pipeline/workers.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/index_chunk_builder.h"
+#include "pipeline/index/index_chunk_builder.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <memory>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/index/leaf_ranges.h"
-#include "isobrick/index/span_index.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/slab_reader.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/codec.h"
+#include "core/morton.h"
+#include "index/leaf_ranges.h"
+#include "index/span_index.h"
+#include "pipeline/program_memory.h"
+#include "pipeline/slab_reader.h"
 
 namespace isobrick {
 namespace {

@@ -5,9 +5,9 @@
 #include <functional>
 #include <vector>
 
-#include "isobrick/bricks/index_layout.h"
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/index/index_kind.h"
+#include <isobrick/index_kind.h>
+#include <isobrick/store_reader.h>
+#include "bricks/ranges/index_layout.h"
 
 namespace isobrick {
 

@@ -1,8 +1,8 @@
-#include "isobrick/pipeline/level_scan.h"
+#include "pipeline/index/level_scan.h"
 
 #include <memory>
 
-#include "isobrick/pipeline/slab_piece.h"
+#include "pipeline/slab_piece.h"
 
 namespace isobrick {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "isobrick/pipeline/range_scan.h"
-#include "isobrick/pipeline/slab_reader.h"
+#include "pipeline/index/range_scan.h"
+#include "pipeline/slab_reader.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/range_scan.h"
+#include "pipeline/index/range_scan.h"
 
 #include <tbb/parallel_for.h>
 
@@ -6,7 +6,7 @@
 #include <atomic>
 #include <limits>
 
-#include "isobrick/bricks/range_format.h"
+#include "bricks/ranges/range_format.h"
 
 namespace isobrick {
 namespace {

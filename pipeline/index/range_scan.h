@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/lattice.h"
-#include "isobrick/core/range.h"
+#include <isobrick/lattice.h>
+#include <isobrick/range.h>
 
 namespace isobrick {
 

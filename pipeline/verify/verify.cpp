@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/verify.h>
 
 #include <fmt/format.h>
 
@@ -8,15 +8,15 @@
 #include <set>
 #include <unordered_set>
 
-#include "isobrick/bricks/checked_json.h"
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/pipeline/level_scan.h"
-#include "isobrick/pipeline/program_memory.h"
-#include "isobrick/pipeline/verify_index.h"
-#include "isobrick/pipeline/workers.h"
+#include <isobrick/error.h>
+#include <isobrick/store_reader.h>
+#include "bricks/stored_index.h"
+#include "bricks/zarr/checked_json.h"
+#include "io/bytes/file.h"
+#include "pipeline/index/level_scan.h"
+#include "pipeline/program_memory.h"
+#include "pipeline/verify/verify_index.h"
+#include "pipeline/workers.h"
 
 namespace isobrick {
 namespace {

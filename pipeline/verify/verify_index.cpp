@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/verify_index.h"
+#include "pipeline/verify/verify_index.h"
 
 #include <fmt/format.h>
 
@@ -6,11 +6,11 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/pipeline/index_chunk_builder.h"
-#include "isobrick/pipeline/workers.h"
-#include "isobrick/stream/index_search.h"
+#include <isobrick/error.h>
+#include "core/morton.h"
+#include "pipeline/index/index_chunk_builder.h"
+#include "pipeline/workers.h"
+#include "stream/index_search.h"
 
 namespace isobrick {
 namespace {

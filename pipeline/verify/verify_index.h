@@ -4,9 +4,9 @@
 #include <functional>
 #include <string>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/core/progress.h"
+#include <isobrick/progress.h>
+#include <isobrick/store_reader.h>
+#include "bricks/stored_index.h"
 
 namespace isobrick {
 

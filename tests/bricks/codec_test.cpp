@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "isobrick/bricks/shard_index.h"
+#include "bricks/zarr/shard_index.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace isobrick::test {

@@ -4,8 +4,8 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/stored_ranges.h"
+#include <isobrick/image_metadata.h>
+#include "bricks/ranges/stored_ranges.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace isobrick::test {

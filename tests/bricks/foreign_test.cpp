@@ -2,9 +2,9 @@
 
 #include <bit>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/shard_index.h"
+#include <isobrick/image_metadata.h>
+#include "bricks/zarr/array_metadata.h"
+#include "bricks/zarr/shard_index.h"
 #include "tests/bricks/store_fixture.h"
 
 // Stores as others write them: plain chunks, other codecs, other byte orders.

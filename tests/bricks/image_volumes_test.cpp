@@ -1,11 +1,11 @@
-#include "isobrick/bricks/image_volumes.h"
+#include "bricks/image_volumes.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "isobrick/bricks/store_reader.h"
-#include "tests/io/temp_dir.h"
+#include <isobrick/store_reader.h>
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -1,12 +1,12 @@
-#include "isobrick/bricks/index_chunk.h"
+#include "bricks/ranges/index_chunk.h"
 
 #include <gtest/gtest.h>
 
-#include "isobrick/bricks/index_layout.h"
-#include "isobrick/bricks/sealed_json.h"
-#include "isobrick/bricks/stored_ranges.h"
+#include "bricks/ranges/index_layout.h"
+#include "bricks/ranges/sealed_json.h"
+#include "bricks/ranges/stored_ranges.h"
 #include "tests/bricks/store_fixture.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick::test {
 namespace {

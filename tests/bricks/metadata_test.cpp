@@ -3,8 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/image_metadata.h"
+#include <isobrick/image_metadata.h>
+#include "bricks/zarr/array_metadata.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace isobrick::test {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/image_metadata.h"
+#include <isobrick/image_metadata.h>
 #include "tests/bricks/store_fixture.h"
 
 // OME-Zarr 0.6 as its specification has it, and what 0.5 forbids.

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "isobrick/bricks/store_writer.h"
+#include "bricks/store_writer.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace {

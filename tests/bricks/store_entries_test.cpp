@@ -1,11 +1,11 @@
-#include "isobrick/bricks/store_entries.h"
+#include "bricks/store_entries.h"
 
 #include <gtest/gtest.h>
 
-#include "isobrick/bricks/store_layout.h"
-#include "isobrick/bricks/store_names.h"
-#include "isobrick/core/error.h"
-#include "isobrick/io/leftovers.h"
+#include <isobrick/error.h>
+#include "bricks/store_layout.h"
+#include "bricks/zarr/store_names.h"
+#include "io/bytes/leftovers.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace isobrick::test {

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/bricks/store_writer.h"
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
+#include <isobrick/store_reader.h>
+#include "bricks/store_writer.h"
+#include "bricks/zarr/codec.h"
 
 namespace isobrick::test {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/array_metadata.h"
+#include "bricks/zarr/array_metadata.h"
 #include "tests/bricks/store_fixture.h"
 
 // Types of Zarr that none of ours is, read without loss or not at all.

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "isobrick/bricks/codec.h"
-#include "isobrick/bricks/decompress.h"
-#include "isobrick/bricks/metadata_files.h"
+#include "bricks/zarr/codec.h"
+#include "bricks/zarr/decompress.h"
+#include "bricks/zarr/metadata_files.h"
 #include "tests/bricks/store_fixture.h"
 
 // Zarr version 2 as the specification has it; what real writers write is

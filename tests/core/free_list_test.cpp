@@ -1,4 +1,4 @@
-#include "isobrick/core/free_list.h"
+#include "core/free_list.h"
 
 #include <gtest/gtest.h>
 

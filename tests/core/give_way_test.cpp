@@ -1,4 +1,4 @@
-#include "isobrick/core/give_way.h"
+#include "core/give_way.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -1,12 +1,12 @@
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "isobrick/core/copy_box.h"
-#include "isobrick/core/printable.h"
-#include "isobrick/core/transform.h"
+#include <isobrick/transform.h>
+#include "core/copy_box.h"
+#include "core/printable.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 
 #include <gtest/gtest.h>
 

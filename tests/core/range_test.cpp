@@ -1,11 +1,11 @@
-#include "isobrick/core/range.h"
+#include <isobrick/range.h>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdint>
 
-#include "isobrick/core/lattice.h"
+#include <isobrick/lattice.h>
 
 namespace isobrick {
 namespace {

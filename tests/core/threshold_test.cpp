@@ -1,4 +1,4 @@
-#include "isobrick/core/threshold.h"
+#include "core/threshold.h"
 
 #include <gtest/gtest.h>
 

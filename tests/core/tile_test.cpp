@@ -1,4 +1,4 @@
-#include "isobrick/core/tile.h"
+#include "core/tile.h"
 
 #include <gtest/gtest.h>
 

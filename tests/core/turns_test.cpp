@@ -1,4 +1,4 @@
-#include "isobrick/core/turns.h"
+#include "core/turns.h"
 
 #include <gtest/gtest.h>
 

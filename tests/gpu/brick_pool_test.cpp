@@ -1,4 +1,4 @@
-#include "isobrick/gpu/brick_pool.h"
+#include "gpu/stream/brick_pool.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/copy_kernel.h"
-#include "isobrick/gpu/device.h"
-#include "isobrick/gpu/stream.h"
-#include "isobrick/gpu/stream_sizes.h"
+#include <isobrick/device.h>
+#include <isobrick/error.h>
+#include "gpu/memory/copy_kernel.h"
+#include "gpu/memory/cuda_objects.h"
+#include "gpu/stream/stream_sizes.h"
 
 namespace isobrick::test {
 namespace {

@@ -1,12 +1,12 @@
-#include "isobrick/gpu/brick_table.h"
+#include "gpu/stream/brick_table.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <optional>
 
-#include "isobrick/core/dense_bricks.h"
-#include "isobrick/gpu/tile_params.h"
+#include "core/dense_bricks.h"
+#include "gpu/tile/tile_params.h"
 
 // Host uploads: whatever a kernel finds through the table is the sample that it needs.
 

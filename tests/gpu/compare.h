@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/gpu/device.h"
+#include <isobrick/device.h>
 #include "tests/surface/field.h"
 
 namespace isobrick::testing {

@@ -1,4 +1,4 @@
-#include "isobrick/gpu/mapped_pages.h"
+#include "gpu/memory/mapped_pages.h"
 
 #include <gtest/gtest.h>
 

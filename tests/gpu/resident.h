@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-#include "isobrick/gpu/device_volume.h"
+#include <isobrick/device_volume.h>
 #include "tests/gpu/compare.h"
 
 namespace isobrick::testing {

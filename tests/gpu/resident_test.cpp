@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/tile_kernel.h"
+#include <isobrick/error.h>
+#include "gpu/tile/tile_kernel.h"
 #include "tests/gpu/resident.h"
 
 // The mesh from the device is the CPU's, byte for byte.

@@ -1,4 +1,4 @@
-#include "isobrick/gpu/row_slots.h"
+#include "gpu/stream/row_slots.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/morton.h"
-#include "isobrick/gpu/stream_sizes.h"
+#include "core/morton.h"
+#include "gpu/stream/stream_sizes.h"
 
 namespace isobrick::testing {
 namespace {

@@ -1,13 +1,13 @@
-#include "isobrick/gpu/span_search.h"
+#include "gpu/search/span_search.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "isobrick/core/error.h"
-#include "isobrick/gpu/device_volume.h"
-#include "isobrick/index/leaf_ranges.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/device_volume.h>
+#include <isobrick/error.h>
+#include "index/leaf_ranges.h"
+#include "index/span_index.h"
 #include "tests/index/range_sets.h"
 
 // Searches and builds on the device give what the definition and the CPU give.

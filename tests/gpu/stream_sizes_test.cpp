@@ -1,11 +1,11 @@
-#include "isobrick/gpu/stream_sizes.h"
+#include "gpu/stream/stream_sizes.h"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 // Sizes of streaming extractions, alone and beside each other, which need no device.
 

@@ -6,11 +6,11 @@
 #include <numeric>
 #include <optional>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/gpu/brick_pool.h"
-#include "isobrick/gpu/gpu_extractor.h"
-#include "isobrick/gpu/host_memory.h"
+#include <isobrick/error.h>
+#include "core/morton.h"
+#include "gpu/memory/host_memory.h"
+#include "gpu/stream/brick_pool.h"
+#include "gpu/stream/gpu_extractor.h"
 #include "tests/gpu/compare.h"
 
 // The streamed mesh is the CPU's, byte for byte, however it is cut into launches.

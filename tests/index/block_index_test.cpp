@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/index/active_tiles.h"
-#include "isobrick/index/block_index.h"
+#include "index/active_tiles.h"
+#include "index/block_index.h"
 #include "tests/index/range_sets.h"
 
 // Whatever the structure, the tiles are those of the linear scan, in its order.

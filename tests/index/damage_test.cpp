@@ -2,8 +2,8 @@
 
 #include <cstring>
 
-#include "isobrick/core/error.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/error.h>
+#include "index/span_index.h"
 #include "range_sets.h"
 
 namespace isobrick {

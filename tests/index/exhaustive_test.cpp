@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/index/span_index.h"
+#include "index/span_index.h"
 #include "range_sets.h"
 
 namespace isobrick {

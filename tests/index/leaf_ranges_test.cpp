@@ -1,11 +1,11 @@
-#include "isobrick/index/leaf_ranges.h"
+#include "index/leaf_ranges.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/error.h>
+#include "index/span_index.h"
 #include "range_sets.h"
 
 namespace isobrick {

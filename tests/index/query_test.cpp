@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/error.h>
+#include "core/morton.h"
+#include "index/span_index.h"
 #include "range_sets.h"
 
 namespace isobrick {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/range.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

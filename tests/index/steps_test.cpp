@@ -4,8 +4,8 @@
 #include <cmath>
 #include <functional>
 
-#include "isobrick/index/leaf_ranges.h"
-#include "isobrick/index/span_index.h"
+#include "index/leaf_ranges.h"
+#include "index/span_index.h"
 #include "range_sets.h"
 
 // The work of queries, counted, against the theory's bounds, as the number of

@@ -1,8 +1,8 @@
-#include "isobrick/pipeline/backend_choice.h"
+#include "pipeline/extract/backend_choice.h"
 
 #include <gtest/gtest.h>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/no_sink.h"
 #include "tests/stream/heap_memory.h"

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/range.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/error.h>
+#include <isobrick/range.h>
+#include <isobrick/volume_source.h>
 
 namespace isobrick::test {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isobrick/pipeline/downsample.h"
+#include "pipeline/convert/downsample.h"
 #include "tests/pipeline/convert_doubles.h"
 
 namespace isobrick {

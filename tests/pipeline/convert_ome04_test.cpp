@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/verify.h>
 #include "tests/pipeline/convert_store.h"
 
 // Stores of OME-Zarr 0.4, which are Zarr version 2: each brick is a file. That others read them

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/pipeline/downsample.h"
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/verify.h>
+#include "pipeline/convert/downsample.h"
 #include "tests/pipeline/convert_store.h"
 
 // Pyramids whose levels halve some axes only, or are made otherwise than by the mean.

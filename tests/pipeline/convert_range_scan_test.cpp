@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/pipeline/range_scan.h"
+#include "pipeline/index/range_scan.h"
 #include "tests/pipeline/convert_doubles.h"
 
 namespace isobrick {

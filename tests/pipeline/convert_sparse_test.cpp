@@ -1,9 +1,9 @@
-#include "isobrick/pipeline/convert_sparse.h"
+#include "pipeline/convert/convert_sparse.h"
 
 #include <gtest/gtest.h>
 
-#include "isobrick/pipeline/stored_bricks.h"
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/verify.h>
+#include "pipeline/stored_bricks.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick::test {

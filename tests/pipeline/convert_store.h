@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/pipeline/slab_reader.h"
+#include <isobrick/convert.h>
+#include <isobrick/store_reader.h>
+#include "pipeline/slab_reader.h"
 #include "tests/pipeline/convert_doubles.h"
 
 namespace isobrick::test {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/downsample.h"
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/error.h>
+#include <isobrick/verify.h>
+#include "pipeline/convert/downsample.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/least_budget.h"
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/bricks/range_format.h"
-#include "isobrick/pipeline/convert_plan.h"
+#include "bricks/ranges/range_format.h"
+#include "pipeline/convert/convert_plan.h"
 #include "tests/pipeline/index_fixture.h"
 
 // Bricks, shards and chunks of ranges follow the shape of thin volumes.

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/display_window.h"
+#include "pipeline/convert/display_window.h"
 
 #include <gtest/gtest.h>
 

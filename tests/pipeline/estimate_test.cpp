@@ -1,12 +1,12 @@
-#include "isobrick/pipeline/estimate.h"
+#include <isobrick/estimate.h>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/morton.h"
-#include "isobrick/pipeline/tile_sample.h"
+#include <isobrick/error.h>
+#include "core/morton.h"
+#include "pipeline/extract/tile_sample.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/least_budget.h"
 #include "tests/pipeline/no_sink.h"

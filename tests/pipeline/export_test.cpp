@@ -7,8 +7,8 @@
 #include <csignal>
 #include <thread>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/export.h"
+#include <isobrick/error.h>
+#include <isobrick/export.h>
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick {

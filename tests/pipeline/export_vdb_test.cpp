@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstring>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/export.h"
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/volumes/open_source.h"
-#include "isobrick/volumes/vdb_level_set.h"
+#include <isobrick/error.h>
+#include <isobrick/export.h>
+#include <isobrick/extract.h>
+#include <isobrick/open_source.h>
+#include "io/volumes/vdb/vdb_level_set.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick {

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/extract.h"
+#include <isobrick/extract.h>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/convert.h"
+#include <isobrick/convert.h>
+#include <isobrick/error.h>
 #include "tests/pipeline/convert_doubles.h"
 #include "tests/pipeline/least_budget.h"
 #include "tests/surface/field.h"

@@ -6,11 +6,11 @@
 #include <tuple>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/pipeline/extract_plan.h"
-#include "isobrick/pipeline/extract_tiles.h"
-#include "isobrick/pipeline/index_build.h"
+#include <isobrick/error.h>
+#include <isobrick/extract.h>
+#include <isobrick/index_build.h>
+#include "pipeline/extract/extract_plan.h"
+#include "pipeline/extract/extract_tiles.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/least_budget.h"
 #include "tests/surface/field.h"

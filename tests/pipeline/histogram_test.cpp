@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/histogram.h"
+#include <isobrick/histogram.h>
 
 #include <gtest/gtest.h>
 

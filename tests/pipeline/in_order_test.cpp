@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/in_order.h"
+#include "pipeline/convert/in_order.h"
 
 #include <gtest/gtest.h>
 

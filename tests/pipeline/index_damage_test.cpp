@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/index/span_index.h"
+#include "bricks/stored_index.h"
+#include "index/span_index.h"
 #include "tests/pipeline/index_fixture.h"
 
 namespace isobrick::test {

@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/pipeline/index_build.h"
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/error.h>
+#include <isobrick/extract.h>
+#include <isobrick/index_build.h>
+#include <isobrick/verify.h>
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick::test {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "isobrick/bricks/array_metadata.h"
-#include "isobrick/bricks/image_metadata.h"
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/bricks/stored_ranges.h"
+#include <isobrick/image_metadata.h>
+#include "bricks/ranges/stored_ranges.h"
+#include "bricks/stored_index.h"
+#include "bricks/zarr/array_metadata.h"
 #include "tests/pipeline/index_fixture.h"
 
 namespace isobrick::test {

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/bricks/stored_ranges.h"
+#include "bricks/ranges/stored_ranges.h"
+#include "bricks/stored_index.h"
 #include "tests/bricks/hex.h"
 #include "tests/pipeline/index_fixture.h"
 

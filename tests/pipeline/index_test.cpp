@@ -2,8 +2,8 @@
 
 #include <tuple>
 
-#include "isobrick/bricks/stored_index.h"
-#include "isobrick/index/span_index.h"
+#include "bricks/stored_index.h"
+#include "index/span_index.h"
 #include "tests/pipeline/index_fixture.h"
 #include "tests/pipeline/least_budget.h"
 

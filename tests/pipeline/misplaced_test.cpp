@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/bricks/stored_index.h"
+#include "bricks/stored_index.h"
 #include "tests/pipeline/index_fixture.h"
 
 // Files of a store whose checksums are right, at the place of others.

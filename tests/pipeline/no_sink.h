@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
 
 namespace isobrick::test {
 

@@ -1,4 +1,4 @@
-#include "isobrick/pipeline/store_source.h"
+#include "pipeline/convert/store_source.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/bricks/stored_ranges.h"
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/verify.h"
+#include <isobrick/error.h>
+#include <isobrick/verify.h>
+#include "bricks/ranges/stored_ranges.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick {

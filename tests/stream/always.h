@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/stream/resident_bricks.h"
+#include "stream/resident_bricks.h"
 
 namespace isobrick::test {
 

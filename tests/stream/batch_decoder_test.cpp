@@ -1,11 +1,11 @@
-#include "isobrick/stream/batch_decoder.h"
+#include "stream/batch_decoder.h"
 
 #include <gtest/gtest.h>
 
 #include <deque>
 #include <fstream>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 #include "tests/stream/heap_memory.h"
 #include "tests/stream/stored_volume.h"
 

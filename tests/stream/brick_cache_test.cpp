@@ -1,4 +1,4 @@
-#include "isobrick/stream/brick_cache.h"
+#include "stream/brick_cache.h"
 
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
@@ -7,8 +7,8 @@
 #include <fstream>
 #include <set>
 
-#include "isobrick/core/error.h"
-#include "isobrick/stream/tile_stream.h"
+#include <isobrick/error.h>
+#include "stream/tile_stream.h"
 #include "tests/stream/stored_volume.h"
 
 namespace isobrick::test {

@@ -1,9 +1,9 @@
-#include "isobrick/stream/brick_slots.h"
+#include "stream/brick_slots.h"
 
 #include <gtest/gtest.h>
 
-#include "isobrick/core/morton.h"
-#include "isobrick/core/tile.h"
+#include "core/morton.h"
+#include "core/tile.h"
 
 namespace isobrick::test {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "isobrick/stream/brick_memory.h"
+#include "stream/brick_memory.h"
 
 namespace isobrick::test {
 

@@ -1,11 +1,11 @@
-#include "isobrick/stream/index_search.h"
+#include "stream/index_search.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "isobrick/core/error.h"
-#include "isobrick/index/span_index.h"
+#include <isobrick/error.h>
+#include "index/span_index.h"
 
 namespace isobrick::test {
 namespace {

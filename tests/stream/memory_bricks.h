@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/downsample.h"
-#include "isobrick/stream/brick_source.h"
+#include <isobrick/error.h>
+#include "pipeline/convert/downsample.h"
+#include "stream/brick_source.h"
 
 namespace isobrick::test {
 

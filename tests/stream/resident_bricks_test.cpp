@@ -1,4 +1,4 @@
-#include "isobrick/stream/resident_bricks.h"
+#include "stream/resident_bricks.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/stream/tile_stream.h"
+#include <isobrick/convert.h>
+#include "stream/tile_stream.h"
 #include "tests/pipeline/convert_doubles.h"
 
 namespace isobrick::test {

@@ -1,4 +1,4 @@
-#include "isobrick/stream/tile_stream.h"
+#include "stream/tile_stream.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/core/morton.h"
+#include "core/morton.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick::test {

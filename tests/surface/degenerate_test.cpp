@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
-#include "isobrick/surface/tile_ties.h"
+#include "surface/tile_ties.h"
 #include "tests/surface/kept_triangles.h"
 
 // SurfaceOptions::drop_degenerate.

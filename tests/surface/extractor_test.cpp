@@ -3,8 +3,8 @@
 
 #include <numbers>
 
-#include "isobrick/core/error.h"
-#include "isobrick/surface/case_tables.h"
+#include <isobrick/error.h>
+#include "surface/case_tables.h"
 #include "tests/surface/field.h"
 
 namespace isobrick::testing {

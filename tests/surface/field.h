@@ -10,10 +10,10 @@
 #include <set>
 #include <vector>
 
-#include "isobrick/core/dense_bricks.h"
-#include "isobrick/index/active_tiles.h"
-#include "isobrick/surface/case_tables.h"
-#include "isobrick/surface/cpu_extractor.h"
+#include "core/dense_bricks.h"
+#include "index/active_tiles.h"
+#include "surface/case_tables.h"
+#include "surface/cpu_extractor.h"
 
 namespace isobrick::testing {
 

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "isobrick/surface/cell_math.h"
+#include "surface/cell_math.h"
 #include "tests/surface/field.h"
 
 // What remains of a mesh when degenerate triangles are left out, straight from

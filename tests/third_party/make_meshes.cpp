@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <limits>
 
-#include "isobrick/meshes/glb_sink.h"
-#include "isobrick/meshes/obj_sink.h"
-#include "isobrick/meshes/ply_sink.h"
-#include "isobrick/meshes/vtp_sink.h"
-#include "tests/meshes/test_meshes.h"
+#include "io/meshes/glb_sink.h"
+#include "io/meshes/obj_sink.h"
+#include "io/meshes/ply_sink.h"
+#include "io/meshes/vtp_sink.h"
+#include "tests/io/meshes/test_meshes.h"
 
 namespace isobrick {
 namespace {

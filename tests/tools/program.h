@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
 
 namespace isobrick::test {
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/core/error.h"
-#include "tests/io/temp_dir.h"
+#include <isobrick/error.h>
+#include "tests/io/bytes/temp_dir.h"
 #include "tools/console.h"
 #include "tools/format.h"
 #include "tools/mesh_output.h"

@@ -1,7 +1,7 @@
 #include <imgui.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/window/panels.h"
+#include <isobrick/error.h>
+#include "viewer/app/panels.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/bookmarks.h"
+#include "viewer/app/bookmarks.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/output_file.h"
+#include <isobrick/error.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/window/view_settings.h"
+#include "viewer/app/view_settings.h"
 
 namespace isobrick {
 

@@ -4,8 +4,8 @@
 
 #include <imgui.h>
 
-#include "isobrick/render/vectors.h"
-#include "isobrick/window/panels.h"
+#include "core/vectors.h"
+#include "viewer/app/panels.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/window/device_meshes.h"
+#include "viewer/app/device_meshes.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/gpu_backend.h"
+#include <isobrick/error.h>
+#include "pipeline/extract/gpu_backend.h"
 
 namespace isobrick {
 

@@ -9,9 +9,9 @@
 #include <unordered_map>
 #include <utility>
 
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/render/imported_buffers.h"
-#include "isobrick/viewer/scene_stream.h"
+#include <isobrick/extract.h>
+#include "viewer/render/imported_buffers.h"
+#include "viewer/scene/scene_stream.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/framing.h"
+#include "viewer/app/framing.h"
 
 namespace isobrick {
 namespace {

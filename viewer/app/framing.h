@@ -1,7 +1,7 @@
 #pragma once
 
-#include "isobrick/render/camera_request.h"
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/store_picture.h"
+#include "viewer/render/camera_request.h"
 
 namespace isobrick {
 

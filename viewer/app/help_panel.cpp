@@ -2,7 +2,7 @@
 
 #include <imgui.h>
 
-#include "isobrick/window/panels.h"
+#include "viewer/app/panels.h"
 
 namespace isobrick {
 namespace {

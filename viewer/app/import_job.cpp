@@ -1,4 +1,4 @@
-#include "isobrick/window/import_job.h"
+#include "viewer/app/import_job.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -9,17 +9,17 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/metadata_files.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/file_error.h"
-#include "isobrick/core/shell_word.h"
-#include "isobrick/io/file.h"
-#include "isobrick/meshes/mesh_name.h"
-#include "isobrick/pipeline/add_ranges.h"
-#include "isobrick/pipeline/convert_staging.h"
-#include "isobrick/pipeline/store_source.h"
-#include "isobrick/volumes/open_source.h"
-#include "isobrick/volumes/volume_format.h"
+#include <isobrick/error.h>
+#include <isobrick/open_source.h>
+#include "bricks/zarr/metadata_files.h"
+#include "core/file_error.h"
+#include "core/shell_word.h"
+#include "io/bytes/file.h"
+#include "io/meshes/mesh_name.h"
+#include "io/volumes/open/volume_format.h"
+#include "pipeline/convert/convert_staging.h"
+#include "pipeline/convert/store_source.h"
+#include "pipeline/index/add_ranges.h"
 
 namespace isobrick {
 

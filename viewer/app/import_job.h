@@ -10,11 +10,11 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/core/selection.h"
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/volumes/vdb_header.h"
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/convert.h>
+#include <isobrick/selection.h>
+#include <isobrick/volume_request.h>
+#include "core/thread_annotations.h"
+#include "io/volumes/vdb/vdb_header.h"
 
 namespace isobrick {
 

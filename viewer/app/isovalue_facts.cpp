@@ -1,12 +1,12 @@
-#include "isobrick/window/isovalue_facts.h"
+#include "viewer/app/isovalue_facts.h"
 
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/file_error.h"
-#include "isobrick/core/progress.h"
+#include <isobrick/error.h>
+#include <isobrick/progress.h>
+#include "core/file_error.h"
 
 namespace isobrick {
 namespace {

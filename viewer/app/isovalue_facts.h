@@ -6,10 +6,10 @@
 #include <string>
 #include <thread>
 
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/pipeline/histogram.h"
-#include "isobrick/viewer/isovalue_counts.h"
-#include "isobrick/viewer/scene_stream.h"
+#include <isobrick/histogram.h>
+#include "core/thread_annotations.h"
+#include "viewer/scene/isovalue_counts.h"
+#include "viewer/scene/scene_stream.h"
 
 namespace isobrick {
 

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
-#include "isobrick/window/panels.h"
+#include "viewer/app/panels.h"
 
 namespace isobrick {
 namespace {

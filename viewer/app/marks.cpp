@@ -1,9 +1,9 @@
-#include "isobrick/window/marks.h"
+#include "viewer/app/marks.h"
 
 #include <vector>
 
-#include "isobrick/core/length_unit.h"
-#include "isobrick/window/shown_part.h"
+#include "core/length_unit.h"
+#include "viewer/app/shown_part.h"
 
 namespace isobrick {
 namespace {

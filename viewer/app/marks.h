@@ -1,9 +1,9 @@
 #pragma once
 
-#include "isobrick/render/renderer.h"
-#include "isobrick/viewer/drawable.h"
-#include "isobrick/viewer/node_grid.h"
-#include "isobrick/window/view_settings.h"
+#include "viewer/app/view_settings.h"
+#include "viewer/render/renderer.h"
+#include "viewer/scene/drawable.h"
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/mesh_uploads.h"
+#include "viewer/app/mesh_uploads.h"
 
 #include <algorithm>
 #include <utility>

@@ -6,8 +6,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "isobrick/render/mesh_pool.h"
-#include "isobrick/viewer/drawable.h"
+#include "viewer/render/mesh_pool.h"
+#include "viewer/scene/drawable.h"
 
 namespace isobrick {
 

@@ -1,10 +1,10 @@
-#include "isobrick/window/navigation.h"
+#include "viewer/app/navigation.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "isobrick/render/vectors.h"
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {

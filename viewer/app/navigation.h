@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "isobrick/render/camera.h"
+#include "viewer/render/camera.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/panels.h"
+#include "viewer/app/panels.h"
 
 #include <algorithm>
 #include <charconv>
@@ -13,11 +13,11 @@
 #include <misc/cpp/imgui_stdlib.h>
 #endif
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/file_error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/core/stopwatch.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/file_error.h"
+#include "core/length_unit.h"
+#include "core/stopwatch.h"
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {

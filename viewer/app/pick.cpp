@@ -1,12 +1,12 @@
-#include "isobrick/window/pick.h"
+#include "viewer/app/pick.h"
 
 #include <fmt/format.h>
 #include <imgui.h>
 
-#include "isobrick/core/length_unit.h"
-#include "isobrick/render/vectors.h"
-#include "isobrick/viewer/probe.h"
-#include "isobrick/window/panels.h"
+#include "core/length_unit.h"
+#include "core/vectors.h"
+#include "viewer/app/panels.h"
+#include "viewer/scene/probe.h"
 
 namespace isobrick {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "isobrick/window/viewer_state.h"
+#include "viewer/app/viewer_state.h"
 
 namespace isobrick {
 

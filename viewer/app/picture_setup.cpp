@@ -1,4 +1,4 @@
-#include "isobrick/window/picture_setup.h"
+#include "viewer/app/picture_setup.h"
 
 #include <epoxy/gl.h>
 
@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/render/gl_context.h"
+#include <isobrick/error.h>
+#include "pipeline/extract/gpu_backend.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick {
 namespace {

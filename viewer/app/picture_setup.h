@@ -5,10 +5,10 @@
 #include <memory>
 #include <optional>
 
-#include "isobrick/pipeline/extract.h"
-#include "isobrick/render/mesh_pool.h"
-#include "isobrick/render/renderer.h"
-#include "isobrick/window/device_meshes.h"
+#include <isobrick/extract.h>
+#include "viewer/app/device_meshes.h"
+#include "viewer/render/mesh_pool.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -1,11 +1,11 @@
-#include "isobrick/window/screenshot.h"
+#include "viewer/app/screenshot.h"
 
 #include <numbers>
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/png_file.h"
+#include <isobrick/error.h>
+#include "io/bytes/png_file.h"
 
 namespace isobrick {
 

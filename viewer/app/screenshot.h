@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/store_picture.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/shown_part.h"
+#include "viewer/app/shown_part.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
-#include "isobrick/render/vectors.h"
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {

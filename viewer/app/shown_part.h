@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/render/camera.h"
-#include "isobrick/render/renderer.h"
-#include "isobrick/viewer/node_tree.h"
-#include "isobrick/viewer/view.h"
-#include "isobrick/window/view_settings.h"
+#include <isobrick/store_reader.h>
+#include "viewer/app/view_settings.h"
+#include "viewer/render/camera.h"
+#include "viewer/render/renderer.h"
+#include "viewer/scene/node_tree.h"
+#include "viewer/scene/view.h"
 
 // What settings and a camera mean for a volume.
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/shown_slices.h"
+#include "viewer/app/shown_slices.h"
 
 #include <algorithm>
 #include <cstring>

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/render/renderer.h"
-#include "isobrick/viewer/scene_stream.h"
-#include "isobrick/window/picture_setup.h"
-#include "isobrick/window/view_settings.h"
+#include "viewer/app/picture_setup.h"
+#include "viewer/app/view_settings.h"
+#include "viewer/render/renderer.h"
+#include "viewer/scene/scene_stream.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/store_picture.h"
 
 #include <algorithm>
 #include <chrono>
@@ -7,8 +7,8 @@
 
 #include <epoxy/gl.h>
 
-#include "isobrick/core/stopwatch.h"
-#include "isobrick/render/gl_context.h"
+#include "core/stopwatch.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick {
 namespace {

@@ -10,16 +10,16 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/render/renderer.h"
-#include "isobrick/viewer/scene.h"
-#include "isobrick/window/device_meshes.h"
-#include "isobrick/window/frame_pacer.h"
-#include "isobrick/window/mesh_uploads.h"
-#include "isobrick/window/picture_setup.h"
-#include "isobrick/window/piece_pacer.h"
-#include "isobrick/window/shown_part.h"
-#include "isobrick/window/shown_slices.h"
-#include "isobrick/window/view_settings.h"
+#include "viewer/app/device_meshes.h"
+#include "viewer/app/frame_pacer.h"
+#include "viewer/app/mesh_uploads.h"
+#include "viewer/app/picture_setup.h"
+#include "viewer/app/piece_pacer.h"
+#include "viewer/app/shown_part.h"
+#include "viewer/app/shown_slices.h"
+#include "viewer/app/view_settings.h"
+#include "viewer/render/renderer.h"
+#include "viewer/scene/scene.h"
 
 namespace isobrick {
 

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "isobrick/viewer/surface_box.h"
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/store_picture.h"
+#include "viewer/scene/surface_box.h"
 
 // Where in the world a store, and what is shown of it, lies.
 

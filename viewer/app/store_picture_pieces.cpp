@@ -1,4 +1,4 @@
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/store_picture.h"
 
 #include <epoxy/gl.h>
 
@@ -7,8 +7,8 @@
 #include <limits>
 #include <utility>
 
-#include "isobrick/core/stopwatch.h"
-#include "isobrick/window/marks.h"
+#include "core/stopwatch.h"
+#include "viewer/app/marks.h"
 
 // How a picture that has been chosen is made, in pieces; store_picture.cpp chooses it.
 

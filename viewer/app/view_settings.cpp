@@ -1,11 +1,11 @@
-#include "isobrick/window/view_settings.h"
+#include "viewer/app/view_settings.h"
 
 #include <string>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

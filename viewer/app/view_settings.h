@@ -7,9 +7,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "isobrick/render/camera.h"
-#include "isobrick/render/renderer.h"
-#include "isobrick/window/navigation.h"
+#include "viewer/app/navigation.h"
+#include "viewer/render/camera.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -9,14 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/bricks/image_volumes.h"
-#include "isobrick/window/bookmarks.h"
-#include "isobrick/window/frame_pacer.h"
-#include "isobrick/window/import_job.h"
-#include "isobrick/window/isovalue_facts.h"
-#include "isobrick/window/navigation.h"
-#include "isobrick/window/store_picture.h"
-#include "isobrick/window/view_settings.h"
+#include "bricks/image_volumes.h"
+#include "viewer/app/bookmarks.h"
+#include "viewer/app/frame_pacer.h"
+#include "viewer/app/import_job.h"
+#include "viewer/app/isovalue_facts.h"
+#include "viewer/app/navigation.h"
+#include "viewer/app/store_picture.h"
+#include "viewer/app/view_settings.h"
 
 namespace isobrick {
 

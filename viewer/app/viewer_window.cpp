@@ -1,4 +1,4 @@
-#include "isobrick/window/viewer_window.h"
+#include "viewer/app/viewer_window.h"
 
 #include <epoxy/gl.h>
 // After OpenGL's.
@@ -15,15 +15,15 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/file_error.h"
-#include "isobrick/render/font_atlas.h"
-#include "isobrick/render/vectors.h"
-#include "isobrick/window/framing.h"
-#include "isobrick/window/panels.h"
-#include "isobrick/window/pick.h"
-#include "isobrick/window/screenshot.h"
-#include "isobrick/window/window_events.h"
+#include <isobrick/error.h>
+#include "core/file_error.h"
+#include "core/vectors.h"
+#include "viewer/app/framing.h"
+#include "viewer/app/panels.h"
+#include "viewer/app/pick.h"
+#include "viewer/app/screenshot.h"
+#include "viewer/app/window_events.h"
+#include "viewer/render/font_atlas.h"
 
 namespace isobrick {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/render/camera_request.h"
-#include "isobrick/window/viewer_state.h"
+#include "viewer/app/viewer_state.h"
+#include "viewer/render/camera_request.h"
 
 struct GLFWwindow;
 

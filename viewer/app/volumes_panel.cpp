@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
-#include "isobrick/core/printable.h"
-#include "isobrick/window/panels.h"
+#include "core/printable.h"
+#include "viewer/app/panels.h"
 
 namespace isobrick {
 namespace {

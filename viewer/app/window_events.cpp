@@ -1,4 +1,4 @@
-#include "isobrick/window/window_events.h"
+#include "viewer/app/window_events.h"
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>

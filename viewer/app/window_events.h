@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "isobrick/window/viewer_window.h"
+#include "viewer/app/viewer_window.h"
 
 namespace isobrick {
 

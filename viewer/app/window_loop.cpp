@@ -1,4 +1,4 @@
-#include "isobrick/window/viewer_window.h"
+#include "viewer/app/viewer_window.h"
 
 #include <epoxy/gl.h>
 // After OpenGL's.
@@ -11,11 +11,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "isobrick/core/cancel.h"
-#include "isobrick/pipeline/value_text.h"
-#include "isobrick/window/panels.h"
-#include "isobrick/window/pick.h"
-#include "isobrick/window/window_events.h"
+#include "core/cancel.h"
+#include "pipeline/value_text.h"
+#include "viewer/app/panels.h"
+#include "viewer/app/pick.h"
+#include "viewer/app/window_events.h"
 
 // What a window does again and again: wait for input, draw, show.
 

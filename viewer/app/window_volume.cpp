@@ -1,4 +1,4 @@
-#include "isobrick/window/viewer_window.h"
+#include "viewer/app/viewer_window.h"
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
@@ -8,12 +8,12 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/bricks/metadata_files.h"
-#include "isobrick/core/error.h"
-#include "isobrick/core/file_error.h"
-#include "isobrick/pipeline/add_ranges.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/window/framing.h"
+#include <isobrick/error.h>
+#include "bricks/zarr/metadata_files.h"
+#include "core/file_error.h"
+#include "pipeline/index/add_ranges.h"
+#include "viewer/app/framing.h"
+#include "viewer/render/gl_context.h"
 
 // Which volume a window shows: opened, dropped, converted, chosen from an image.
 

@@ -1,10 +1,10 @@
-#include "isobrick/render/camera.h"
+#include "viewer/render/camera.h"
 
 #include <algorithm>
 #include <cmath>
 #include <glm/trigonometric.hpp>
 
-#include "isobrick/render/vectors.h"
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {

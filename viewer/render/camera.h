@@ -4,7 +4,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/camera_request.h"
+#include "viewer/render/camera_request.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <glm/trigonometric.hpp>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {

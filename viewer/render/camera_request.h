@@ -3,8 +3,8 @@
 #include <optional>
 #include <string_view>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/render/camera.h"
+#include <isobrick/vec.h>
+#include "viewer/render/camera.h"
 
 namespace isobrick {
 

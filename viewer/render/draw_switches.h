@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "isobrick/render/frame.h"
+#include "viewer/render/frame.h"
 
 namespace isobrick {
 

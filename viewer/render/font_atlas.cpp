@@ -1,6 +1,6 @@
-#include "isobrick/render/font_atlas.h"
+#include "viewer/render/font_atlas.h"
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 #define STB_TRUETYPE_IMPLEMENTATION
 #define STBTT_STATIC

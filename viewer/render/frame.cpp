@@ -1,4 +1,4 @@
-#include "isobrick/render/frame.h"
+#include "viewer/render/frame.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <glm/trigonometric.hpp>
 
-#include "isobrick/render/vectors.h"
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {

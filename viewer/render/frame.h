@@ -5,9 +5,9 @@
 #include <glm/vec4.hpp>
 #include <string>
 
-#include "isobrick/render/camera.h"
-#include "isobrick/render/gl_objects.h"
-#include "isobrick/render/renderer.h"
+#include "viewer/render/camera.h"
+#include "viewer/render/gl_objects.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

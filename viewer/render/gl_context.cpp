@@ -1,4 +1,4 @@
-#include "isobrick/render/gl_context.h"
+#include "viewer/render/gl_context.h"
 
 #include <dlfcn.h>
 #include <epoxy/egl.h>
@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/render/gl_objects.h"
+#include "viewer/render/gl_objects.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

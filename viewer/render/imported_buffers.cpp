@@ -1,4 +1,4 @@
-#include "isobrick/render/imported_buffers.h"
+#include "viewer/render/imported_buffers.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 

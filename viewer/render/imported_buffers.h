@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "isobrick/render/gl_objects.h"
-#include "isobrick/render/mesh_pool.h"
+#include "viewer/render/gl_objects.h"
+#include "viewer/render/mesh_pool.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_pass.h"
+#include "viewer/render/mesh_pass.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -9,9 +9,9 @@
 #include <limits>
 #include <numeric>
 
-#include "isobrick/render/frame.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/render/vectors.h"
+#include "core/vectors.h"
+#include "viewer/render/frame.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick {
 namespace {

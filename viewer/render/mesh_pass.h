@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/render/gl_objects.h"
-#include "isobrick/render/mesh_queue.h"
-#include "isobrick/render/renderer.h"
+#include <isobrick/vec.h>
+#include "viewer/render/gl_objects.h"
+#include "viewer/render/mesh_queue.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

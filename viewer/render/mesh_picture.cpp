@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_picture.h"
+#include "viewer/render/mesh_picture.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/io/mapped_file.h"
-#include "isobrick/render/gl_context.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "io/bytes/mapped_file.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick {
 namespace {

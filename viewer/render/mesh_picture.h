@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/progress.h"
-#include "isobrick/render/camera_request.h"
-#include "isobrick/render/mesh_file.h"
-#include "isobrick/render/renderer.h"
+#include <isobrick/progress.h>
+#include "io/meshes/readers/mesh_file.h"
+#include "viewer/render/camera_request.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_pool.h"
+#include "viewer/render/mesh_pool.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/free_list.h"
+#include <isobrick/error.h>
+#include "core/free_list.h"
 
 namespace isobrick {
 namespace {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/render/gl_objects.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include <isobrick/vec.h>
+#include "viewer/render/gl_objects.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_queue.h"
+#include "viewer/render/mesh_queue.h"
 
 #include <algorithm>
 #include <utility>

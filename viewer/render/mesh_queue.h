@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/render/mesh_pool.h"
-#include "isobrick/render/renderer.h"
+#include "viewer/render/mesh_pool.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/overlay_pass.h"
+#include "viewer/render/overlay_pass.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "isobrick/render/frame.h"
-#include "isobrick/render/vectors.h"
+#include "core/vectors.h"
+#include "viewer/render/frame.h"
 
 namespace isobrick {
 namespace {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/render/camera.h"
-#include "isobrick/render/font_atlas.h"
-#include "isobrick/render/gl_objects.h"
-#include "isobrick/render/picture_targets.h"
-#include "isobrick/render/renderer.h"
+#include "viewer/render/camera.h"
+#include "viewer/render/font_atlas.h"
+#include "viewer/render/gl_objects.h"
+#include "viewer/render/picture_targets.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/picture_targets.h"
+#include "viewer/render/picture_targets.h"
 
 #include <epoxy/gl.h>
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <glm/vec4.hpp>
 
-#include "isobrick/render/gl_objects.h"
+#include "viewer/render/gl_objects.h"
 
 namespace isobrick {
 

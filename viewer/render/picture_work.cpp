@@ -1,4 +1,4 @@
-#include "isobrick/render/picture_work.h"
+#include "viewer/render/picture_work.h"
 
 #include <algorithm>
 #include <array>

@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/render/draw_switches.h"
-#include "isobrick/render/mesh_pass.h"
-#include "isobrick/render/mesh_queue.h"
-#include "isobrick/render/overlay_pass.h"
-#include "isobrick/render/screen_pass.h"
-#include "isobrick/render/slice_pass.h"
+#include "viewer/render/draw_switches.h"
+#include "viewer/render/mesh_pass.h"
+#include "viewer/render/mesh_queue.h"
+#include "viewer/render/overlay_pass.h"
+#include "viewer/render/screen_pass.h"
+#include "viewer/render/slice_pass.h"
 
 namespace isobrick {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

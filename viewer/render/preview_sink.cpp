@@ -1,14 +1,14 @@
-#include "isobrick/render/preview_sink.h"
+#include "viewer/render/preview_sink.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/png_file.h"
-#include "isobrick/render/camera_request.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/vectors.h"
+#include "io/bytes/png_file.h"
+#include "viewer/render/camera_request.h"
 
 namespace isobrick {
 namespace {

@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/render/preview_options.h"
-#include "isobrick/render/renderer.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include "io/bytes/output_file.h"
+#include "viewer/render/gl_context.h"
+#include "viewer/render/preview_options.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/renderer.h"
+#include "viewer/render/renderer.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -10,12 +10,12 @@
 #include <limits>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/frame.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/render/picture_targets.h"
-#include "isobrick/render/picture_work.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/vectors.h"
+#include "viewer/render/frame.h"
+#include "viewer/render/gl_context.h"
+#include "viewer/render/picture_targets.h"
+#include "viewer/render/picture_work.h"
 
 namespace isobrick {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/half_space.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/render/camera.h"
-#include "isobrick/render/mesh_pool.h"
+#include <isobrick/vec.h>
+#include "core/half_space.h"
+#include "viewer/render/camera.h"
+#include "viewer/render/mesh_pool.h"
 
 namespace isobrick {
 

@@ -1,11 +1,11 @@
-#include "isobrick/render/screen_pass.h"
+#include "viewer/render/screen_pass.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
 
 #include <array>
 
-#include "isobrick/render/frame.h"
+#include "viewer/render/frame.h"
 
 namespace isobrick {
 namespace {

@@ -3,9 +3,9 @@
 #include <array>
 #include <vector>
 
-#include "isobrick/render/gl_objects.h"
-#include "isobrick/render/picture_targets.h"
-#include "isobrick/render/renderer.h"
+#include "viewer/render/gl_objects.h"
+#include "viewer/render/picture_targets.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/slice_pass.h"
+#include "viewer/render/slice_pass.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <array>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/frame.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/vectors.h"
+#include "viewer/render/frame.h"
 
 namespace isobrick {
 namespace {

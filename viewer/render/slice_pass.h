@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/render/gl_objects.h"
-#include "isobrick/render/renderer.h"
+#include <isobrick/vec.h>
+#include "viewer/render/gl_objects.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

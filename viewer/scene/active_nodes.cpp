@@ -1,4 +1,4 @@
-#include "isobrick/viewer/active_nodes.h"
+#include "viewer/scene/active_nodes.h"
 
 #include <algorithm>
 #include <bit>

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/viewer/node_flags.h"
-#include "isobrick/viewer/node_tree.h"
+#include "viewer/scene/node_flags.h"
+#include "viewer/scene/node_tree.h"
 
 namespace isobrick {
 

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-#include "isobrick/core/thread_annotations.h"
+#include "core/thread_annotations.h"
 
 namespace isobrick {
 

@@ -6,13 +6,13 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/stopwatch.h"
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/gpu/device.h"
-#include "isobrick/gpu/grid_batch.h"
-#include "isobrick/gpu/mesh_memory.h"
-#include "isobrick/viewer/device_mesher.h"
+#include <isobrick/device.h>
+#include <isobrick/error.h>
+#include "core/stopwatch.h"
+#include "core/thread_annotations.h"
+#include "gpu/grid/grid_batch.h"
+#include "gpu/grid/mesh_memory.h"
+#include "viewer/scene/device_mesher.h"
 
 namespace isobrick {
 namespace {

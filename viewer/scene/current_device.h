@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/viewer/device_mesher.h"
+#include "core/thread_annotations.h"
+#include "viewer/scene/device_mesher.h"
 
 namespace isobrick {
 

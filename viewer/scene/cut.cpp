@@ -1,4 +1,4 @@
-#include "isobrick/viewer/cut.h"
+#include "viewer/scene/cut.h"
 
 #include <algorithm>
 #include <array>

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/viewer/active_nodes.h"
-#include "isobrick/viewer/node_flags.h"
-#include "isobrick/viewer/node_tree.h"
-#include "isobrick/viewer/view.h"
+#include "viewer/scene/active_nodes.h"
+#include "viewer/scene/node_flags.h"
+#include "viewer/scene/node_tree.h"
+#include "viewer/scene/view.h"
 
 namespace isobrick {
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/turns.h"
-#include "isobrick/surface/grid_view.h"
-#include "isobrick/viewer/node_mesh.h"
+#include "core/turns.h"
+#include "surface/grid_view.h"
+#include "viewer/scene/node_mesh.h"
 
 // Node meshes made on a device, and their places in memory that OpenGL draws from:
 // cuda_mesher.cpp where the CUDA backend is built, else no_cuda_mesher.cpp.

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/drawable.h"
+#include "viewer/scene/drawable.h"
 
 namespace isobrick {
 namespace {

@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/core/flat_map.h"
-#include "isobrick/viewer/cut.h"
-#include "isobrick/viewer/mesh_cache.h"
+#include "core/flat_map.h"
+#include "viewer/scene/cut.h"
+#include "viewer/scene/mesh_cache.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/isovalue_counts.h"
+#include "viewer/scene/isovalue_counts.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/stream/brick_source.h"
+#include "stream/brick_source.h"
 
 namespace isobrick {
 

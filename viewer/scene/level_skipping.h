@@ -3,7 +3,7 @@
 #include <chrono>
 #include <optional>
 
-#include "isobrick/core/thread_annotations.h"
+#include "core/thread_annotations.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/mesh_cache.h"
+#include "viewer/scene/mesh_cache.h"
 
 #include <algorithm>
 #include <limits>

@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "isobrick/viewer/node_mesh.h"
+#include "viewer/scene/node_mesh.h"
 
 namespace isobrick {
 

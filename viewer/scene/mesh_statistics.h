@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/viewer/node_mesh.h"
+#include "core/thread_annotations.h"
+#include "viewer/scene/node_mesh.h"
 
 namespace isobrick {
 

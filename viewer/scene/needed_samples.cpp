@@ -1,6 +1,6 @@
-#include "isobrick/viewer/needed_samples.h"
+#include "viewer/scene/needed_samples.h"
 
-#include "isobrick/viewer/node_grid.h"
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/device_mesher.h"
+#include "viewer/scene/device_mesher.h"
 
 namespace isobrick {
 

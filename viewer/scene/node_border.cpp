@@ -1,8 +1,8 @@
-#include "isobrick/viewer/node_border.h"
+#include "viewer/scene/node_border.h"
 
 #include <algorithm>
 
-#include "isobrick/surface/coarse_face.h"
+#include "surface/coarse_face.h"
 
 namespace isobrick {
 namespace {

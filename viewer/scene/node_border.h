@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/surface/grid_view.h"
-#include "isobrick/viewer/node_samples.h"
+#include "surface/grid_view.h"
+#include "viewer/scene/node_samples.h"
 
 namespace isobrick {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/viewer/node_grid.h"
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 

@@ -1,9 +1,9 @@
-#include "isobrick/viewer/node_grid.h"
+#include "viewer/scene/node_grid.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

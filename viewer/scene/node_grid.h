@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/core/flat_map.h"
+#include <isobrick/store_reader.h>
+#include "core/flat_map.h"
 
 namespace isobrick {
 

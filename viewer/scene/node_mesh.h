@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/surface/surface_options.h"
-#include "isobrick/viewer/node_grid.h"
+#include <isobrick/surface_options.h>
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 

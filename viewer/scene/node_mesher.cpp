@@ -1,4 +1,4 @@
-#include "isobrick/viewer/node_mesher.h"
+#include "viewer/scene/node_mesher.h"
 
 #include <algorithm>
 #include <chrono>
@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/bricks/level_set.h"
-#include "isobrick/surface/grid_extractor.h"
-#include "isobrick/surface/world_map.h"
-#include "isobrick/viewer/node_border.h"
+#include "bricks/level_set.h"
+#include "surface/grid_extractor.h"
+#include "surface/world_map.h"
+#include "viewer/scene/node_border.h"
 
 namespace isobrick {
 namespace {

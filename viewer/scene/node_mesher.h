@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/surface/grid_view.h"
-#include "isobrick/viewer/node_mesh.h"
-#include "isobrick/viewer/node_samples.h"
+#include "surface/grid_view.h"
+#include "viewer/scene/node_mesh.h"
+#include "viewer/scene/node_samples.h"
 
 namespace isobrick {
 

@@ -1,12 +1,12 @@
-#include "isobrick/viewer/node_samples.h"
+#include "viewer/scene/node_samples.h"
 
 #include <algorithm>
 #include <cstring>
 #include <limits>
 #include <span>
 
-#include "isobrick/core/copy_box.h"
-#include "isobrick/surface/grid_view.h"
+#include "core/copy_box.h"
+#include "surface/grid_view.h"
 
 namespace isobrick {
 namespace {

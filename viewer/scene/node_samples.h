@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/stream/resident_bricks.h"
-#include "isobrick/viewer/needed_samples.h"
-#include "isobrick/viewer/node_grid.h"
+#include "stream/resident_bricks.h"
+#include "viewer/scene/needed_samples.h"
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 

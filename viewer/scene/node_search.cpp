@@ -1,4 +1,4 @@
-#include "isobrick/viewer/node_search.h"
+#include "viewer/scene/node_search.h"
 
 #include <algorithm>
 #include <chrono>
@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "isobrick/index/span_index.h"
+#include "index/span_index.h"
 
 namespace isobrick {
 namespace {

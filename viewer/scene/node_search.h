@@ -10,11 +10,11 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/index/index_kind.h"
-#include "isobrick/viewer/active_nodes.h"
-#include "isobrick/viewer/node_tree.h"
+#include <isobrick/index_kind.h>
+#include <isobrick/scalar.h>
+#include "core/thread_annotations.h"
+#include "viewer/scene/active_nodes.h"
+#include "viewer/scene/node_tree.h"
 
 namespace isobrick {
 

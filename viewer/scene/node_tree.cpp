@@ -1,4 +1,4 @@
-#include "isobrick/viewer/node_tree.h"
+#include "viewer/scene/node_tree.h"
 
 #include <tbb/parallel_for.h>
 

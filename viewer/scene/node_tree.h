@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/stream/brick_source.h"
-#include "isobrick/viewer/node_grid.h"
-#include "isobrick/viewer/thin_structure.h"
+#include <isobrick/range.h>
+#include "stream/brick_source.h"
+#include "viewer/scene/node_grid.h"
+#include "viewer/scene/thin_structure.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/probe.h"
+#include "viewer/scene/probe.h"
 
 #include <algorithm>
 #include <cmath>

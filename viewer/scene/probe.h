@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "isobrick/stream/resident_bricks.h"
-#include "isobrick/viewer/node_grid.h"
+#include "stream/resident_bricks.h"
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 

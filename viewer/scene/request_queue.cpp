@@ -1,4 +1,4 @@
-#include "isobrick/viewer/request_queue.h"
+#include "viewer/scene/request_queue.h"
 
 #include <algorithm>
 #include <utility>

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/viewer/stream_request.h"
+#include "core/thread_annotations.h"
+#include "viewer/scene/stream_request.h"
 
 namespace isobrick {
 

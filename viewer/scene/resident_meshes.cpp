@@ -1,4 +1,4 @@
-#include "isobrick/viewer/resident_meshes.h"
+#include "viewer/scene/resident_meshes.h"
 
 #include <cstddef>
 #include <utility>

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/viewer/drawable.h"
-#include "isobrick/viewer/stream_plan.h"
+#include "viewer/scene/drawable.h"
+#include "viewer/scene/stream_plan.h"
 
 namespace isobrick {
 

@@ -1,10 +1,10 @@
-#include "isobrick/viewer/scene.h"
+#include "viewer/scene/scene.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "isobrick/core/stopwatch.h"
+#include "core/stopwatch.h"
 
 namespace isobrick {
 namespace {

@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/viewer/node_search.h"
-#include "isobrick/viewer/scene_stream.h"
+#include "viewer/scene/node_search.h"
+#include "viewer/scene/scene_stream.h"
 
 namespace isobrick {
 

@@ -1,12 +1,12 @@
-#include "isobrick/viewer/scene_stream.h"
+#include "viewer/scene/scene_stream.h"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include "isobrick/core/give_way.h"
-#include "isobrick/viewer/stream_state.h"
-#include "isobrick/viewer/stream_worker.h"
+#include "core/give_way.h"
+#include "viewer/scene/stream_state.h"
+#include "viewer/scene/stream_worker.h"
 
 namespace isobrick {
 namespace {

@@ -8,11 +8,11 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/stream/resident_bricks.h"
-#include "isobrick/viewer/cut.h"
-#include "isobrick/viewer/device_mesher.h"
-#include "isobrick/viewer/drawable.h"
-#include "isobrick/viewer/slice_image.h"
+#include "stream/resident_bricks.h"
+#include "viewer/scene/cut.h"
+#include "viewer/scene/device_mesher.h"
+#include "viewer/scene/drawable.h"
+#include "viewer/scene/slice_image.h"
 
 namespace isobrick {
 

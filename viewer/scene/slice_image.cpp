@@ -1,10 +1,10 @@
-#include "isobrick/viewer/slice_image.h"
+#include "viewer/scene/slice_image.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/slice_slots.h"
+#include "viewer/scene/slice_slots.h"
 
 #include <utility>
 

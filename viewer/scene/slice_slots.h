@@ -4,8 +4,8 @@
 #include <memory>
 #include <optional>
 
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/viewer/request_queue.h"
+#include "core/thread_annotations.h"
+#include "viewer/scene/request_queue.h"
 
 namespace isobrick {
 

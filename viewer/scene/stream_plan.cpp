@@ -1,4 +1,4 @@
-#include "isobrick/viewer/stream_plan.h"
+#include "viewer/scene/stream_plan.h"
 
 #include <algorithm>
 #include <tuple>

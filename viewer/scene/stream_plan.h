@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/viewer/drawable.h"
-#include "isobrick/viewer/node_mesher.h"
+#include "viewer/scene/drawable.h"
+#include "viewer/scene/node_mesher.h"
 
 namespace isobrick {
 

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
-#include "isobrick/viewer/slice_image.h"
-#include "isobrick/viewer/stream_plan.h"
+#include "viewer/scene/slice_image.h"
+#include "viewer/scene/stream_plan.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/stream_state.h"
+#include "viewer/scene/stream_state.h"
 
 #include <algorithm>
 #include <thread>

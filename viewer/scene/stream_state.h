@@ -2,15 +2,15 @@
 
 #include <memory>
 
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/viewer/activity_count.h"
-#include "isobrick/viewer/current_device.h"
-#include "isobrick/viewer/level_skipping.h"
-#include "isobrick/viewer/mesh_statistics.h"
-#include "isobrick/viewer/request_queue.h"
-#include "isobrick/viewer/resident_meshes.h"
-#include "isobrick/viewer/scene_stream.h"
-#include "isobrick/viewer/slice_slots.h"
+#include "core/thread_annotations.h"
+#include "viewer/scene/activity_count.h"
+#include "viewer/scene/current_device.h"
+#include "viewer/scene/level_skipping.h"
+#include "viewer/scene/mesh_statistics.h"
+#include "viewer/scene/request_queue.h"
+#include "viewer/scene/resident_meshes.h"
+#include "viewer/scene/scene_stream.h"
+#include "viewer/scene/slice_slots.h"
 
 namespace isobrick {
 

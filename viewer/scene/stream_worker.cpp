@@ -1,11 +1,11 @@
-#include "isobrick/viewer/stream_worker.h"
+#include "viewer/scene/stream_worker.h"
 
 #include <cstddef>
 #include <string>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/stopwatch.h"
+#include <isobrick/error.h>
+#include "core/stopwatch.h"
 
 namespace isobrick {
 namespace {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "isobrick/viewer/stream_state.h"
+#include "viewer/scene/stream_state.h"
 
 namespace isobrick {
 

@@ -1,12 +1,12 @@
-#include "isobrick/viewer/surface_box.h"
+#include "viewer/scene/surface_box.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/lattice.h"
+#include <isobrick/error.h>
+#include <isobrick/lattice.h>
 
 namespace isobrick {
 namespace {

@@ -3,8 +3,8 @@
 #include <optional>
 #include <span>
 
-#include "isobrick/stream/brick_source.h"
-#include "isobrick/viewer/node_tree.h"
+#include "stream/brick_source.h"
+#include "viewer/scene/node_tree.h"
 
 namespace isobrick {
 

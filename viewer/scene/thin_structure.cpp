@@ -1,11 +1,11 @@
-#include "isobrick/viewer/thin_structure.h"
+#include "viewer/scene/thin_structure.h"
 
 #include <algorithm>
 #include <cmath>
 #include <exception>
 #include <limits>
 
-#include "isobrick/viewer/node_samples.h"
+#include "viewer/scene/node_samples.h"
 
 namespace isobrick {
 namespace {

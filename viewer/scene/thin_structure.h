@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/core/range.h"
-#include "isobrick/core/thread_annotations.h"
-#include "isobrick/stream/resident_bricks.h"
-#include "isobrick/viewer/node_grid.h"
+#include <isobrick/range.h>
+#include "core/thread_annotations.h"
+#include "stream/resident_bricks.h"
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/view.h"
+#include "viewer/scene/view.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/core/half_space.h"
-#include "isobrick/viewer/node_grid.h"
+#include "core/half_space.h"
+#include "viewer/scene/node_grid.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/gltf_buffers.h"
+#include "io/meshes/readers/gltf_buffers.h"
 
 #include <fmt/format.h>
 
@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/base64_stream.h"
-#include "isobrick/io/mapped_file.h"
-#include "isobrick/render/memory_stream.h"
-#include "isobrick/render/scratch_rows.h"
+#include <isobrick/error.h>
+#include "io/bytes/base64_stream.h"
+#include "io/bytes/mapped_file.h"
+#include "io/meshes/readers/memory_stream.h"
+#include "io/meshes/readers/scratch_rows.h"
 
 namespace isobrick {
 namespace {

@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/render/gltf_buffers.h"
-#include "isobrick/render/mesh_parts_reader.h"
-#include "isobrick/render/mesh_readers.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "core/vectors.h"
+#include "io/meshes/readers/gltf_buffers.h"
+#include "io/meshes/readers/mesh_parts_reader.h"
+#include "io/meshes/readers/mesh_readers.h"
 
 namespace isobrick {
 namespace {

@@ -1,11 +1,11 @@
-#include "isobrick/render/memory_stream.h"
+#include "io/meshes/readers/memory_stream.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstring>
 
-#include "isobrick/io/mapped_file.h"
+#include "io/bytes/mapped_file.h"
 
 namespace isobrick {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "isobrick/io/byte_stream.h"
+#include "io/bytes/byte_stream.h"
 
 namespace isobrick {
 

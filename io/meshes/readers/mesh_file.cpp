@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_file.h"
+#include "io/meshes/readers/mesh_file.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <string_view>
 
-#include "isobrick/core/error.h"
-#include "isobrick/meshes/mesh_name.h"
-#include "isobrick/render/mesh_readers.h"
+#include <isobrick/error.h>
+#include "io/meshes/mesh_name.h"
+#include "io/meshes/readers/mesh_readers.h"
 
 namespace isobrick {
 

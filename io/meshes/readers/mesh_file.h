@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

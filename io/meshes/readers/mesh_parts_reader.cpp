@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_parts_reader.h"
+#include "io/meshes/readers/mesh_parts_reader.h"
 
 #include <fmt/format.h>
 
@@ -7,11 +7,11 @@
 #include <cstring>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/io/byte_order.h"
-#include "isobrick/io/mapped_file.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "core/vectors.h"
+#include "io/bytes/byte_order.h"
+#include "io/bytes/mapped_file.h"
 
 namespace isobrick {
 namespace {

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/render/mesh_file.h"
+#include <isobrick/vec.h>
+#include "io/meshes/readers/mesh_file.h"
 
 namespace isobrick {
 

@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/io/mapped_file.h"
-#include "isobrick/render/mesh_file.h"
+#include "io/bytes/mapped_file.h"
+#include "io/meshes/readers/mesh_file.h"
 
 namespace isobrick {
 

@@ -1,12 +1,12 @@
-#include "isobrick/render/mesh_text.h"
+#include "io/meshes/readers/mesh_text.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/mapped_file.h"
+#include <isobrick/error.h>
+#include "io/bytes/mapped_file.h"
 
 namespace isobrick {
 namespace {

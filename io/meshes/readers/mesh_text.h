@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

@@ -6,11 +6,11 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/mesh_parts_reader.h"
-#include "isobrick/render/mesh_readers.h"
-#include "isobrick/render/mesh_text.h"
-#include "isobrick/render/scratch_rows.h"
+#include <isobrick/error.h>
+#include "io/meshes/readers/mesh_parts_reader.h"
+#include "io/meshes/readers/mesh_readers.h"
+#include "io/meshes/readers/mesh_text.h"
+#include "io/meshes/readers/scratch_rows.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/render/ply_header.h"
+#include "io/meshes/readers/ply_header.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <charconv>
 #include <utility>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

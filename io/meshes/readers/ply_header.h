@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/io/mapped_file.h"
-#include "isobrick/render/mesh_parts_reader.h"
+#include "io/bytes/mapped_file.h"
+#include "io/meshes/readers/mesh_parts_reader.h"
 
 namespace isobrick {
 

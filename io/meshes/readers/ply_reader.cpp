@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/mesh_parts_reader.h"
-#include "isobrick/render/mesh_readers.h"
-#include "isobrick/render/ply_header.h"
+#include <isobrick/error.h>
+#include "io/meshes/readers/mesh_parts_reader.h"
+#include "io/meshes/readers/mesh_readers.h"
+#include "io/meshes/readers/ply_header.h"
 
 namespace isobrick {
 namespace {

@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/mesh_parts_reader.h"
-#include "isobrick/render/mesh_text.h"
-#include "isobrick/render/ply_header.h"
-#include "isobrick/render/scratch_rows.h"
+#include <isobrick/error.h>
+#include "io/meshes/readers/mesh_parts_reader.h"
+#include "io/meshes/readers/mesh_text.h"
+#include "io/meshes/readers/ply_header.h"
+#include "io/meshes/readers/scratch_rows.h"
 
 namespace isobrick {
 namespace {

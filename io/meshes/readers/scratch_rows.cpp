@@ -1,10 +1,10 @@
-#include "isobrick/render/scratch_rows.h"
+#include "io/meshes/readers/scratch_rows.h"
 
 #include <fmt/format.h>
 
 #include <filesystem>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -5,9 +5,9 @@
 #include <memory>
 #include <span>
 
-#include "isobrick/io/mapped_file.h"
-#include "isobrick/io/output_file.h"
-#include "isobrick/render/mesh_parts_reader.h"
+#include "io/bytes/mapped_file.h"
+#include "io/bytes/output_file.h"
+#include "io/meshes/readers/mesh_parts_reader.h"
 
 namespace isobrick {
 

@@ -5,11 +5,11 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/mesh_parts_reader.h"
-#include "isobrick/render/mesh_readers.h"
-#include "isobrick/render/mesh_text.h"
-#include "isobrick/render/vectors.h"
+#include <isobrick/error.h>
+#include "core/vectors.h"
+#include "io/meshes/readers/mesh_parts_reader.h"
+#include "io/meshes/readers/mesh_readers.h"
+#include "io/meshes/readers/mesh_text.h"
 
 namespace isobrick {
 namespace {

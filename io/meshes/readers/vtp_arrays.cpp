@@ -1,4 +1,4 @@
-#include "isobrick/render/vtp_arrays.h"
+#include "io/meshes/readers/vtp_arrays.h"
 
 #include <fmt/format.h>
 
@@ -8,13 +8,13 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/io/base64_stream.h"
-#include "isobrick/io/byte_order.h"
-#include "isobrick/io/text_stream.h"
-#include "isobrick/io/zlib_block_stream.h"
-#include "isobrick/render/memory_stream.h"
-#include "isobrick/render/scratch_rows.h"
+#include <isobrick/scalar.h>
+#include "io/bytes/base64_stream.h"
+#include "io/bytes/byte_order.h"
+#include "io/bytes/text_stream.h"
+#include "io/bytes/zlib_block_stream.h"
+#include "io/meshes/readers/memory_stream.h"
+#include "io/meshes/readers/scratch_rows.h"
 
 namespace isobrick {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/io/byte_stream.h"
-#include "isobrick/render/mesh_parts_reader.h"
-#include "isobrick/render/vtp_header.h"
+#include <isobrick/scalar.h>
+#include "io/bytes/byte_stream.h"
+#include "io/meshes/readers/mesh_parts_reader.h"
+#include "io/meshes/readers/vtp_header.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/render/vtp_header.h"
+#include "io/meshes/readers/vtp_header.h"
 
 #include <expat.h>
 #include <fmt/format.h>
@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/render/mesh_parts_reader.h"
-#include "isobrick/render/mesh_readers.h"
-#include "isobrick/render/vtp_arrays.h"
-#include "isobrick/render/vtp_header.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "io/meshes/readers/mesh_parts_reader.h"
+#include "io/meshes/readers/mesh_readers.h"
+#include "io/meshes/readers/vtp_arrays.h"
+#include "io/meshes/readers/vtp_header.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/dicom_slice.h"
+#include "io/volumes/dicom/dicom_slice.h"
 
 #include <fmt/format.h>
 
@@ -18,8 +18,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/printable.h"
+#include <isobrick/error.h>
+#include "core/printable.h"
 
 namespace isobrick {
 namespace {

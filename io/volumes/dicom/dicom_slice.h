@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/volumes/scaled_source.h"
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
+#include "io/volumes/scaled_source.h"
 
 namespace isobrick {
 

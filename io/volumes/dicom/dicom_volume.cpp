@@ -1,4 +1,4 @@
-#include "isobrick/volumes/dicom_volume.h"
+#include "io/volumes/dicom/dicom_volume.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 #include <thread>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/dicom_slice.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/error.h>
+#include "io/volumes/dicom/dicom_slice.h"
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/volume_request.h>
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/hdf5_chunks.h"
+#include "io/volumes/hdf5/hdf5_chunks.h"
 
 #include <fmt/format.h>
 #include <tbb/info.h>
@@ -8,8 +8,8 @@
 #include <cstring>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/byte_order.h"
+#include <isobrick/error.h>
+#include "io/bytes/byte_order.h"
 
 namespace isobrick {
 namespace {

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/vec.h"
-#include "isobrick/volumes/hdf5_filters.h"
+#include <isobrick/vec.h>
+#include "io/volumes/hdf5/hdf5_filters.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/hdf5_dataset.h"
+#include "io/volumes/hdf5/hdf5_dataset.h"
 
 #include <fmt/format.h>
 
@@ -8,12 +8,12 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/volumes/hdf5_chunks.h"
-#include "isobrick/volumes/hdf5_description.h"
-#include "isobrick/volumes/hdf5_library.h"
-#include "isobrick/volumes/hdf5_lzf.h"
+#include <isobrick/error.h>
+#include "io/bytes/file.h"
+#include "io/volumes/hdf5/hdf5_chunks.h"
+#include "io/volumes/hdf5/hdf5_description.h"
+#include "io/volumes/hdf5/hdf5_library.h"
+#include "io/volumes/hdf5/hdf5_lzf.h"
 
 namespace isobrick {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/volumes/array_view.h"
+#include <isobrick/array_view.h>
+#include <isobrick/scalar.h>
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/hdf5_description.h"
+#include "io/volumes/hdf5/hdf5_description.h"
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <limits>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/printable.h"
-#include "isobrick/volumes/hdf5_lzf.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/error.h>
+#include "core/printable.h"
+#include "io/volumes/hdf5/hdf5_lzf.h"
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/volumes/array_view.h"
-#include "isobrick/volumes/hdf5_filters.h"
-#include "isobrick/volumes/hdf5_library.h"
+#include <isobrick/array_view.h>
+#include <isobrick/scalar.h>
+#include "io/volumes/hdf5/hdf5_filters.h"
+#include "io/volumes/hdf5/hdf5_library.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/hdf5_filters.h"
+#include "io/volumes/hdf5/hdf5_filters.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <cstring>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/inflate.h"
-#include "isobrick/volumes/hdf5_lzf.h"
+#include <isobrick/error.h>
+#include "io/bytes/inflate.h"
+#include "io/volumes/hdf5/hdf5_lzf.h"
 
 namespace isobrick {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/core/pod_buffer.h"
+#include <isobrick/pod_buffer.h>
 
 namespace isobrick {
 

@@ -1,9 +1,9 @@
-#include "isobrick/volumes/hdf5_library.h"
+#include "io/volumes/hdf5/hdf5_library.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/printable.h"
+#include <isobrick/error.h>
+#include "core/printable.h"
 
 namespace isobrick {
 

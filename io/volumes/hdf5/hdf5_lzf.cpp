@@ -1,4 +1,4 @@
-#include "isobrick/volumes/hdf5_lzf.h"
+#include "io/volumes/hdf5/hdf5_lzf.h"
 
 #include <fmt/format.h>
 #include <hdf5.h>
@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <new>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/hdf5_filters.h"
+#include <isobrick/error.h>
+#include "io/volumes/hdf5/hdf5_filters.h"
 
 namespace isobrick {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include "isobrick/core/pod_buffer.h"
+#include <isobrick/pod_buffer.h>
 
 namespace isobrick {
 

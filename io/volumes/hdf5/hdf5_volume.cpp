@@ -1,4 +1,4 @@
-#include "isobrick/volumes/hdf5_volume.h"
+#include "io/volumes/hdf5/hdf5_volume.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/pod_buffer.h"
-#include "isobrick/volumes/hdf5_dataset.h"
+#include <isobrick/error.h>
+#include <isobrick/pod_buffer.h>
+#include "io/volumes/hdf5/hdf5_dataset.h"
 
 namespace isobrick {
 namespace {

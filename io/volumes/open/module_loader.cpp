@@ -1,4 +1,4 @@
-#include "isobrick/volumes/module_loader.h"
+#include "io/volumes/open/module_loader.h"
 
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 namespace {

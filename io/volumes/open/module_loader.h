@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/volumes/vdb_level_set.h"
-#include "isobrick/volumes/vdb_writer.h"
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/volume_request.h>
+#include "io/volumes/vdb/vdb_level_set.h"
+#include "io/volumes/vdb/vdb_writer.h"
 
 namespace isobrick {
 

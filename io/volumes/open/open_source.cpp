@@ -1,16 +1,16 @@
-#include "isobrick/volumes/open_source.h"
+#include <isobrick/open_source.h>
 
 #include <fmt/format.h>
 
 #include <filesystem>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/legacy_vtk.h"
-#include "isobrick/volumes/nifti_volume.h"
-#include "isobrick/volumes/optional_formats.h"
-#include "isobrick/volumes/raw_volume.h"
-#include "isobrick/volumes/volume_folder.h"
-#include "isobrick/volumes/volume_format.h"
+#include <isobrick/error.h>
+#include "io/volumes/open/optional_formats.h"
+#include "io/volumes/open/volume_folder.h"
+#include "io/volumes/open/volume_format.h"
+#include "io/volumes/raw/nifti_volume.h"
+#include "io/volumes/raw/raw_volume.h"
+#include "io/volumes/vtk/legacy_vtk.h"
 
 namespace isobrick {
 namespace {

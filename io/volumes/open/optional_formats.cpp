@@ -1,16 +1,16 @@
-#include "isobrick/volumes/optional_formats.h"
+#include "io/volumes/open/optional_formats.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/module_loader.h"
-#include "isobrick/volumes/vdb_level_set.h"
-#include "isobrick/volumes/vdb_writer.h"
+#include <isobrick/error.h>
+#include "io/volumes/open/module_loader.h"
+#include "io/volumes/vdb/vdb_level_set.h"
+#include "io/volumes/vdb/vdb_writer.h"
 #ifdef ISOBRICK_WITH_EXPAT
-#include "isobrick/volumes/vti_volume.h"
+#include "io/volumes/vtk/vti_volume.h"
 #endif
 #ifdef ISOBRICK_WITH_TIFF
-#include "isobrick/volumes/tiff_volume.h"
+#include "io/volumes/tiff/tiff_volume.h"
 #endif
 
 namespace isobrick {

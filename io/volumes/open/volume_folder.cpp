@@ -1,4 +1,4 @@
-#include "isobrick/volumes/volume_folder.h"
+#include "io/volumes/open/volume_folder.h"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 #include <system_error>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/folder_walk.h"
-#include "isobrick/volumes/optional_formats.h"
-#include "isobrick/volumes/volume_format.h"
+#include <isobrick/error.h>
+#include "io/bytes/folder_walk.h"
+#include "io/volumes/open/optional_formats.h"
+#include "io/volumes/open/volume_format.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/volume_format.h"
+#include "io/volumes/open/volume_format.h"
 
 #include <filesystem>
 #include <optional>
@@ -6,12 +6,12 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/file_stream.h"
-#include "isobrick/io/inflate_stream.h"
-#include "isobrick/volumes/nifti_header.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/error.h>
+#include "io/bytes/file.h"
+#include "io/bytes/file_stream.h"
+#include "io/bytes/inflate_stream.h"
+#include "io/volumes/raw/nifti_header.h"
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 namespace {

@@ -1,13 +1,13 @@
-#include "isobrick/volumes/meta_image_header.h"
+#include "io/volumes/raw/meta_image_header.h"
 
 #include <fmt/format.h>
 
 #include <map>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/core/printable.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "core/printable.h"
 
 namespace isobrick {
 namespace {

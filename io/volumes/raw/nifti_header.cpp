@@ -1,4 +1,4 @@
-#include "isobrick/volumes/nifti_header.h"
+#include "io/volumes/raw/nifti_header.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/byte_order.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/error.h>
+#include "io/bytes/byte_order.h"
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 namespace {

@@ -4,10 +4,10 @@
 #include <span>
 #include <string>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/transform.h"
-#include "isobrick/volumes/array_view.h"
-#include "isobrick/volumes/scaled_source.h"
+#include <isobrick/array_view.h>
+#include <isobrick/scalar.h>
+#include <isobrick/transform.h>
+#include "io/volumes/scaled_source.h"
 
 namespace isobrick {
 

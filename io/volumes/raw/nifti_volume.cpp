@@ -1,4 +1,4 @@
-#include "isobrick/volumes/nifti_volume.h"
+#include "io/volumes/raw/nifti_volume.h"
 
 #include <fmt/format.h>
 
@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/file_stream.h"
-#include "isobrick/io/inflate_stream.h"
-#include "isobrick/volumes/nifti_header.h"
-#include "isobrick/volumes/raw_source.h"
-#include "isobrick/volumes/stream_source.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/error.h>
+#include "io/bytes/file_stream.h"
+#include "io/bytes/inflate_stream.h"
+#include "io/volumes/raw/nifti_header.h"
+#include "io/volumes/raw/raw_source.h"
+#include "io/volumes/raw/text_header.h"
+#include "io/volumes/stream_source.h"
 
 namespace isobrick {
 namespace {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/volume_request.h>
 
 namespace isobrick {
 

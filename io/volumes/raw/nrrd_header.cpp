@@ -1,4 +1,4 @@
-#include "isobrick/volumes/nrrd_header.h"
+#include "io/volumes/raw/nrrd_header.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 #include <map>
 #include <span>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/core/printable.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "core/printable.h"
 
 namespace isobrick {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "isobrick/volumes/text_header.h"
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 

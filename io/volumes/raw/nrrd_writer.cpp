@@ -1,10 +1,10 @@
-#include "isobrick/volumes/nrrd_writer.h"
+#include "io/volumes/raw/nrrd_writer.h"
 
 #include <fmt/format.h>
 
-#include "isobrick/core/length_unit.h"
-#include "isobrick/core/printable.h"
-#include "isobrick/volumes/nrrd_header.h"
+#include "core/length_unit.h"
+#include "core/printable.h"
+#include "io/volumes/raw/nrrd_header.h"
 
 namespace isobrick {
 namespace {

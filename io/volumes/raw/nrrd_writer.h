@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

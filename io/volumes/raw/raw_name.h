@@ -3,8 +3,8 @@
 #include <optional>
 #include <string_view>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

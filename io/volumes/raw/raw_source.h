@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "isobrick/io/file.h"
-#include "isobrick/volumes/sample_layout.h"
+#include "io/bytes/file.h"
+#include "io/volumes/sample_layout.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/raw_volume.h"
+#include "io/volumes/raw/raw_volume.h"
 
 #include <fmt/format.h>
 
@@ -8,18 +8,18 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/concat_stream.h"
-#include "isobrick/io/file.h"
-#include "isobrick/io/file_stream.h"
-#include "isobrick/io/inflate_stream.h"
-#include "isobrick/io/text_stream.h"
-#include "isobrick/volumes/meta_image_header.h"
-#include "isobrick/volumes/nifti_volume.h"
-#include "isobrick/volumes/nrrd_header.h"
-#include "isobrick/volumes/raw_name.h"
-#include "isobrick/volumes/raw_source.h"
-#include "isobrick/volumes/stream_source.h"
+#include <isobrick/error.h>
+#include "io/bytes/concat_stream.h"
+#include "io/bytes/file.h"
+#include "io/bytes/file_stream.h"
+#include "io/bytes/inflate_stream.h"
+#include "io/bytes/text_stream.h"
+#include "io/volumes/raw/meta_image_header.h"
+#include "io/volumes/raw/nifti_volume.h"
+#include "io/volumes/raw/nrrd_header.h"
+#include "io/volumes/raw/raw_name.h"
+#include "io/volumes/raw/raw_source.h"
+#include "io/volumes/stream_source.h"
 
 namespace isobrick {
 namespace {

@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/volumes/text_header.h"
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/volume_request.h>
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/text_header.h"
+#include "io/volumes/raw/text_header.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/printable.h"
-#include "isobrick/io/file.h"
+#include <isobrick/error.h>
+#include "core/printable.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {

@@ -6,12 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/transform.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/io/file.h"
-#include "isobrick/volumes/array_view.h"
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/array_view.h>
+#include <isobrick/scalar.h>
+#include <isobrick/transform.h>
+#include <isobrick/vec.h>
+#include <isobrick/volume_request.h>
+#include "io/bytes/file.h"
 
 namespace isobrick {
 

@@ -1,10 +1,10 @@
-#include "isobrick/volumes/synth_field.h"
+#include "io/volumes/synth/synth_field.h"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "isobrick/volumes/synth_math.h"
+#include "io/volumes/synth/synth_math.h"
 
 namespace isobrick {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "isobrick/volumes/synth_source.h"
+#include <isobrick/synth_source.h>
 
 namespace isobrick {
 

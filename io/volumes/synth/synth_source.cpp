@@ -1,4 +1,4 @@
-#include "isobrick/volumes/synth_source.h"
+#include <isobrick/synth_source.h>
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <type_traits>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/lattice.h"
-#include "isobrick/volumes/synth_field.h"
+#include <isobrick/error.h>
+#include <isobrick/lattice.h>
+#include "io/volumes/synth/synth_field.h"
 
 namespace isobrick {
 namespace {

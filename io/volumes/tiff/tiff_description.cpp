@@ -1,13 +1,13 @@
-#include "isobrick/volumes/tiff_description.h"
+#include "io/volumes/tiff/tiff_description.h"
 
 #include <fmt/format.h>
 
 #include <optional>
 #include <string_view>
 
-#include "isobrick/core/length_unit.h"
-#include "isobrick/core/printable.h"
-#include "isobrick/volumes/text_header.h"
+#include "core/length_unit.h"
+#include "core/printable.h"
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/tiff_page.h"
+#include "io/volumes/tiff/tiff_page.h"
 
 #include <fmt/format.h>
 #include <tiffio.h>
@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <cstring>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/printable.h"
+#include <isobrick/error.h>
+#include "core/printable.h"
 
 namespace isobrick {
 namespace {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/core/scalar.h"
+#include <isobrick/scalar.h>
 
 struct tiff;
 

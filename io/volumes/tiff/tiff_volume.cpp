@@ -1,4 +1,4 @@
-#include "isobrick/volumes/tiff_volume.h"
+#include "io/volumes/tiff/tiff_volume.h"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 #include <thread>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/raw_source.h"
-#include "isobrick/volumes/tiff_description.h"
-#include "isobrick/volumes/tiff_page.h"
+#include <isobrick/error.h>
+#include "io/volumes/raw/raw_source.h"
+#include "io/volumes/tiff/tiff_description.h"
+#include "io/volumes/tiff/tiff_page.h"
 
 namespace isobrick {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick {
 

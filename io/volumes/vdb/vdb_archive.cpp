@@ -1,4 +1,4 @@
-#include "isobrick/volumes/vdb_archive.h"
+#include "io/volumes/vdb/vdb_archive.h"
 
 #include <fmt/format.h>
 #include <openvdb/io/GridDescriptor.h>
@@ -14,9 +14,9 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "isobrick/core/printable.h"
-#include "isobrick/volumes/vdb_half_grid.h"
-#include "isobrick/volumes/vdb_leaves.h"
+#include "core/printable.h"
+#include "io/volumes/vdb/vdb_half_grid.h"
+#include "io/volumes/vdb/vdb_leaves.h"
 
 namespace isobrick {
 

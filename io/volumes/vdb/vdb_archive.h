@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/vdb_header.h"
-#include "isobrick/volumes/vdb_stream.h"
+#include <isobrick/error.h>
+#include "io/volumes/vdb/vdb_header.h"
+#include "io/volumes/vdb/vdb_stream.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/vdb_grid.h"
+#include "io/volumes/vdb/vdb_grid.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <ostream>
 #include <vector>
 
-#include "isobrick/core/budget_error.h"
-#include "isobrick/io/writer_stream.h"
-#include "isobrick/volumes/vdb_header.h"
+#include "core/budget_error.h"
+#include "io/bytes/writer_stream.h"
+#include "io/volumes/vdb/vdb_header.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/vdb_header.h"
+#include "io/volumes/vdb/vdb_header.h"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 #include <cstring>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/length_unit.h"
-#include "isobrick/core/printable.h"
-#include "isobrick/io/file.h"
+#include <isobrick/error.h>
+#include "core/length_unit.h"
+#include "core/printable.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {

@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/io/file.h"
-#include "isobrick/volumes/vdb_stream.h"
+#include "io/bytes/file.h"
+#include "io/volumes/vdb/vdb_stream.h"
 
 namespace isobrick {
 

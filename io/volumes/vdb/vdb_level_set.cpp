@@ -1,4 +1,4 @@
-#include "isobrick/volumes/vdb_level_set.h"
+#include "io/volumes/vdb/vdb_level_set.h"
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Prune.h>
@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/volumes/triangle_distance.h"
-#include "isobrick/volumes/vdb_grid.h"
-#include "isobrick/volumes/vdb_tree.h"
+#include "io/volumes/vdb/triangle_distance.h"
+#include "io/volumes/vdb/vdb_grid.h"
+#include "io/volumes/vdb/vdb_tree.h"
 
 namespace isobrick {
 namespace {

@@ -7,8 +7,8 @@
 #include <span>
 #include <string>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_source.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

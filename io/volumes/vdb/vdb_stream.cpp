@@ -1,4 +1,4 @@
-#include "isobrick/volumes/vdb_stream.h"
+#include "io/volumes/vdb/vdb_stream.h"
 
 #include <algorithm>
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/io/file.h"
+#include "io/bytes/file.h"
 
 namespace isobrick {
 

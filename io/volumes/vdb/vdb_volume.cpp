@@ -1,4 +1,4 @@
-#include "isobrick/volumes/vdb_volume.h"
+#include "io/volumes/vdb/vdb_volume.h"
 
 #include <fmt/format.h>
 #include <openvdb/openvdb.h>
@@ -9,14 +9,14 @@
 #include <type_traits>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/text_header.h"
-#include "isobrick/volumes/vdb_archive.h"
-#include "isobrick/volumes/vdb_grid.h"
-#include "isobrick/volumes/vdb_half_grid.h"
-#include "isobrick/volumes/vdb_header.h"
-#include "isobrick/volumes/vdb_leaves.h"
-#include "isobrick/volumes/vdb_tree.h"
+#include <isobrick/error.h>
+#include "io/volumes/raw/text_header.h"
+#include "io/volumes/vdb/vdb_archive.h"
+#include "io/volumes/vdb/vdb_grid.h"
+#include "io/volumes/vdb/vdb_half_grid.h"
+#include "io/volumes/vdb/vdb_header.h"
+#include "io/volumes/vdb/vdb_leaves.h"
+#include "io/volumes/vdb/vdb_tree.h"
 
 namespace isobrick {
 namespace {

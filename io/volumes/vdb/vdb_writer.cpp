@@ -1,12 +1,12 @@
-#include "isobrick/volumes/vdb_writer.h"
+#include "io/volumes/vdb/vdb_writer.h"
 
 #include <openvdb/openvdb.h>
 
 #include <cstdint>
 #include <type_traits>
 
-#include "isobrick/volumes/vdb_grid.h"
-#include "isobrick/volumes/vdb_tree.h"
+#include "io/volumes/vdb/vdb_grid.h"
+#include "io/volumes/vdb/vdb_tree.h"
 
 namespace isobrick {
 namespace {

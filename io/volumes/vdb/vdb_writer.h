@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/io/output_file.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/volume_source.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/legacy_vtk.h"
+#include "io/volumes/vtk/legacy_vtk.h"
 
 #include <fmt/format.h>
 
@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/core/printable.h"
-#include "isobrick/io/file_stream.h"
-#include "isobrick/io/text_stream.h"
-#include "isobrick/volumes/raw_source.h"
-#include "isobrick/volumes/stream_source.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/error.h>
+#include "core/printable.h"
+#include "io/bytes/file_stream.h"
+#include "io/bytes/text_stream.h"
+#include "io/volumes/raw/raw_source.h"
+#include "io/volumes/raw/text_header.h"
+#include "io/volumes/stream_source.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/vti_header.h"
+#include "io/volumes/vtk/vti_header.h"
 
 #include <expat.h>
 #include <fmt/format.h>
@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/file.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/error.h>
+#include "io/bytes/file.h"
+#include "io/volumes/raw/text_header.h"
 
 namespace isobrick {
 namespace {

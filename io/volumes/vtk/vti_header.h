@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <string>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/transform.h"
-#include "isobrick/volumes/array_view.h"
-#include "isobrick/volumes/volume_request.h"
+#include <isobrick/array_view.h>
+#include <isobrick/scalar.h>
+#include <isobrick/transform.h>
+#include <isobrick/volume_request.h>
 
 namespace isobrick {
 

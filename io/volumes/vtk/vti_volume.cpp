@@ -1,18 +1,18 @@
-#include "isobrick/volumes/vti_volume.h"
+#include "io/volumes/vtk/vti_volume.h"
 
 #include <fmt/format.h>
 
 #include <limits>
 #include <utility>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/base64_stream.h"
-#include "isobrick/io/file_stream.h"
-#include "isobrick/io/text_stream.h"
-#include "isobrick/io/zlib_block_stream.h"
-#include "isobrick/volumes/raw_source.h"
-#include "isobrick/volumes/stream_source.h"
-#include "isobrick/volumes/vti_header.h"
+#include <isobrick/error.h>
+#include "io/bytes/base64_stream.h"
+#include "io/bytes/file_stream.h"
+#include "io/bytes/text_stream.h"
+#include "io/bytes/zlib_block_stream.h"
+#include "io/volumes/raw/raw_source.h"
+#include "io/volumes/stream_source.h"
+#include "io/volumes/vtk/vti_header.h"
 
 namespace isobrick {
 namespace {

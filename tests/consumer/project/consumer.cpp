@@ -9,15 +9,15 @@
 #include <string>
 #include <string_view>
 
-#include <isobrick/bricks/store_reader.h>
-#include <isobrick/core/error.h>
-#include <isobrick/core/progress.h>
-#include <isobrick/meshes/mesh_file_sink.h>
-#include <isobrick/pipeline/convert.h>
-#include <isobrick/pipeline/export.h>
-#include <isobrick/pipeline/extract.h>
-#include <isobrick/volumes/open_source.h>
-#include <isobrick/volumes/synth_source.h>
+#include <isobrick/convert.h>
+#include <isobrick/error.h>
+#include <isobrick/export.h>
+#include <isobrick/extract.h>
+#include <isobrick/mesh_file_sink.h>
+#include <isobrick/open_source.h>
+#include <isobrick/progress.h>
+#include <isobrick/store_reader.h>
+#include <isobrick/synth_source.h>
 
 namespace {
 

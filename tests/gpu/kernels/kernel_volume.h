@@ -8,9 +8,9 @@
 #include <cstring>
 #include <vector>
 
-#include "isobrick/core/morton.h"
-#include "isobrick/gpu/tile_block.h"
-#include "isobrick/surface/world_map.h"
+#include "core/morton.h"
+#include "gpu/tile/tile_block.h"
+#include "surface/world_map.h"
 #include "tests/gpu/compare.h"
 #include "tests/gpu/kernels/tile_runner.h"
 

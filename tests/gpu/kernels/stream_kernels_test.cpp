@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "isobrick/gpu/block_groups.h"
-#include "isobrick/gpu/brick_table.h"
-#include "isobrick/gpu/row_slots.h"
+#include "gpu/stream/brick_table.h"
+#include "gpu/stream/row_slots.h"
+#include "gpu/tile/block_groups.h"
 #include "tests/gpu/kernels/kernel_volume.h"
 
 // Tiles that stream through a device, launch after launch: unpacked from their bricks, extracted,

@@ -4,11 +4,11 @@
 
 #include <stdexcept>
 
-#include "isobrick/core/threshold.h"
-#include "isobrick/gpu/device_scalar.h"
-#include "isobrick/gpu/extract_tiles.cuh"
-#include "isobrick/gpu/search_tiles.cuh"
-#include "isobrick/gpu/unpack_tiles.cuh"
+#include "core/threshold.h"
+#include "gpu/memory/device_scalar.h"
+#include "gpu/search/search_tiles.cuh"
+#include "gpu/stream/unpack_tiles.cuh"
+#include "gpu/tile/extract_tiles.cuh"
 
 namespace isobrick::emulated {
 namespace {

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/gpu/search_params.h"
-#include "isobrick/gpu/tile_params.h"
-#include "isobrick/gpu/unpack_params.h"
+#include <isobrick/scalar.h>
+#include "gpu/search/search_params.h"
+#include "gpu/stream/unpack_params.h"
+#include "gpu/tile/tile_params.h"
 
 namespace isobrick::emulated {
 

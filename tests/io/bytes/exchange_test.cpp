@@ -1,4 +1,4 @@
-#include "isobrick/io/exchange.h"
+#include "io/bytes/exchange.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "isobrick/io/file.h"
+#include "io/bytes/file.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "isobrick/io/inflate.h"
+#include "io/bytes/inflate.h"
 
 #include <gtest/gtest.h>
 

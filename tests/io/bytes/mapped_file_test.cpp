@@ -1,6 +1,6 @@
-#include "isobrick/io/mapped_file.h"
+#include "io/bytes/mapped_file.h"
 
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/io/output_file.h"
+#include "io/bytes/output_file.h"
 
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -7,14 +7,14 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
-#include "isobrick/io/leftovers.h"
-#include "isobrick/meshes/glb_sink.h"
-#include "isobrick/meshes/obj_sink.h"
-#include "isobrick/meshes/ply_sink.h"
-#include "isobrick/meshes/stl_sink.h"
-#include "isobrick/meshes/vtp_sink.h"
+#include "io/bytes/leftovers.h"
+#include "io/meshes/glb_sink.h"
+#include "io/meshes/obj_sink.h"
+#include "io/meshes/ply_sink.h"
+#include "io/meshes/stl_sink.h"
+#include "io/meshes/vtp_sink.h"
 #include "temp_dir.h"
-#include "tests/meshes/test_meshes.h"
+#include "tests/io/meshes/test_meshes.h"
 
 namespace isobrick {
 namespace {

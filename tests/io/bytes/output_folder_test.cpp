@@ -1,10 +1,10 @@
-#include "isobrick/io/output_folder.h"
+#include "io/bytes/output_folder.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "isobrick/io/output_guard.h"
+#include "io/bytes/output_guard.h"
 #include "temp_dir.h"
 
 namespace isobrick {

@@ -1,15 +1,15 @@
-#include "isobrick/io/parted_output.h"
+#include "io/bytes/parted_output.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "isobrick/io/leftovers.h"
-#include "isobrick/io/xml_text.h"
-#include "isobrick/meshes/glb_scene.h"
-#include "isobrick/meshes/vtp_sink.h"
+#include "io/bytes/leftovers.h"
+#include "io/bytes/xml_text.h"
+#include "io/meshes/glb_scene.h"
+#include "io/meshes/vtp_sink.h"
 #include "temp_dir.h"
-#include "tests/meshes/test_meshes.h"
+#include "tests/io/meshes/test_meshes.h"
 
 namespace isobrick {
 namespace {

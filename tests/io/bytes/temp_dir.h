@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "isobrick/core/error.h"
+#include <isobrick/error.h>
 
 namespace isobrick {
 

@@ -7,9 +7,9 @@
 #include <iterator>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/io/writer_stream.h"
-#include "tests/io/temp_dir.h"
+#include <isobrick/error.h>
+#include "io/bytes/writer_stream.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

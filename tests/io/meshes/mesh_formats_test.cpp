@@ -5,12 +5,12 @@
 #include <map>
 #include <memory>
 
-#include "isobrick/meshes/glb_sink.h"
-#include "isobrick/meshes/mesh_parts.h"
-#include "isobrick/meshes/obj_sink.h"
-#include "isobrick/meshes/ply_sink.h"
-#include "isobrick/meshes/vtp_layout.h"
-#include "isobrick/meshes/vtp_sink.h"
+#include "io/meshes/glb_sink.h"
+#include "io/meshes/mesh_parts.h"
+#include "io/meshes/obj_sink.h"
+#include "io/meshes/ply_sink.h"
+#include "io/meshes/vtp_layout.h"
+#include "io/meshes/vtp_sink.h"
 #include "mesh_reader.h"
 
 // Every format against the same mesh as PLY has it.

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "test_meshes.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 

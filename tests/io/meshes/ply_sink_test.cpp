@@ -1,4 +1,4 @@
-#include "isobrick/meshes/ply_sink.h"
+#include "io/meshes/ply_sink.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "test_meshes.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

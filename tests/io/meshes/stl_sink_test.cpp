@@ -1,11 +1,11 @@
-#include "isobrick/meshes/stl_sink.h"
+#include "io/meshes/stl_sink.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 
 #include "test_meshes.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

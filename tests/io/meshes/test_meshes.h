@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "isobrick/surface/mesh.h"
+#include <isobrick/mesh.h>
 
 namespace isobrick {
 

@@ -10,10 +10,10 @@
 #include <random>
 #include <string>
 
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/open_source.h"
+#include <isobrick/error.h>
+#include <isobrick/open_source.h>
 #include "test_samples.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "damaged_files.h"
-#include "tests/io/packed.h"
+#include "tests/io/bytes/packed.h"
 #include "text_volume.h"
 
 // Files of samples that are missing, too short or too long for the header that describes them.

@@ -11,8 +11,8 @@
 #include <filesystem>
 #include <functional>
 
+#include <isobrick/open_source.h>
 #include "damaged_files.h"
-#include "isobrick/volumes/open_source.h"
 
 namespace isobrick {
 namespace {

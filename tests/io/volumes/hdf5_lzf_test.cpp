@@ -2,12 +2,12 @@
 #include <utility>
 #include <vector>
 
+#include <isobrick/error.h>
+#include <isobrick/open_source.h>
 #include "damaged_files.h"
 #include "hdf5_file.h"
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/open_source.h"
 #include "test_samples.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

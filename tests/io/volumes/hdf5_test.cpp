@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include <isobrick/error.h>
+#include <isobrick/open_source.h>
 #include "damaged_files.h"
 #include "hdf5_file.h"
-#include "isobrick/core/error.h"
-#include "isobrick/volumes/open_source.h"
 
 namespace isobrick {
 namespace {

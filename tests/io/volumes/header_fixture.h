@@ -6,10 +6,10 @@
 #include <string_view>
 #include <utility>
 
-#include "isobrick/volumes/open_source.h"
-#include "isobrick/volumes/text_header.h"
+#include <isobrick/open_source.h>
+#include "io/volumes/raw/text_header.h"
 #include "test_samples.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/meta_image_header.h"
+#include "io/volumes/raw/meta_image_header.h"
 
 #include <gtest/gtest.h>
 

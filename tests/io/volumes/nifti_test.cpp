@@ -3,12 +3,12 @@
 #include <array>
 #include <cmath>
 
+#include <isobrick/open_source.h>
 #include "damaged_files.h"
-#include "isobrick/io/byte_order.h"
-#include "isobrick/volumes/open_source.h"
+#include "io/bytes/byte_order.h"
 #include "test_samples.h"
-#include "tests/io/packed.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/packed.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

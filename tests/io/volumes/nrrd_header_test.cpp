@@ -1,4 +1,4 @@
-#include "isobrick/volumes/nrrd_header.h"
+#include "io/volumes/raw/nrrd_header.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/open_source.h"
+#include <isobrick/open_source.h>
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "test_samples.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/volumes/raw_name.h"
+#include "io/volumes/raw/raw_name.h"
 
 #include <gtest/gtest.h>
 

@@ -4,9 +4,9 @@
 
 #include <thread>
 
-#include "isobrick/volumes/open_source.h"
+#include <isobrick/open_source.h>
 #include "test_samples.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

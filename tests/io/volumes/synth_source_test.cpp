@@ -1,13 +1,13 @@
-#include "isobrick/volumes/synth_source.h"
+#include <isobrick/synth_source.h>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <map>
 
-#include "isobrick/volumes/synth_math.h"
+#include "io/volumes/synth/synth_math.h"
 #include "test_samples.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/core/scalar.h"
-#include "isobrick/core/vec.h"
-#include "isobrick/volumes/volume_source.h"
+#include <isobrick/scalar.h>
+#include <isobrick/vec.h>
+#include <isobrick/volume_source.h>
 
 namespace isobrick {
 

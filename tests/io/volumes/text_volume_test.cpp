@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "damaged_files.h"
-#include "tests/io/packed.h"
+#include "tests/io/bytes/packed.h"
 #include "text_volume.h"
 
 // NRRD and MetaImage files with everything that their headers may say of samples.

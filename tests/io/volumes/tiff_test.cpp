@@ -5,8 +5,8 @@
 #include <memory>
 #include <thread>
 
+#include <isobrick/open_source.h>
 #include "damaged_files.h"
-#include "isobrick/volumes/open_source.h"
 
 namespace isobrick {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/volumes/open_source.h"
-#include "tests/io/temp_dir.h"
-#include "tests/volumes/test_samples.h"
+#include <isobrick/open_source.h>
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/io/volumes/test_samples.h"
 
 namespace isobrick {
 

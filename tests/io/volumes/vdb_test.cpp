@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "damaged_files.h"
-#include "isobrick/volumes/vdb_half_grid.h"
-#include "isobrick/volumes/vdb_writer.h"
+#include "io/volumes/vdb/vdb_half_grid.h"
+#include "io/volumes/vdb/vdb_writer.h"
 #include "vdb_grids.h"
 
 namespace isobrick {

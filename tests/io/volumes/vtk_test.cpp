@@ -3,11 +3,11 @@
 #include <array>
 #include <cstdio>
 
+#include <isobrick/open_source.h>
 #include "damaged_files.h"
-#include "isobrick/volumes/open_source.h"
 #include "test_samples.h"
-#include "tests/io/packed.h"
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/packed.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

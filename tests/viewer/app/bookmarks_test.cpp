@@ -1,11 +1,11 @@
-#include "isobrick/window/bookmarks.h"
+#include "viewer/app/bookmarks.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "isobrick/core/error.h"
-#include "tests/io/temp_dir.h"
+#include <isobrick/error.h>
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

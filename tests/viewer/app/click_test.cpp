@@ -1,5 +1,5 @@
-#include "isobrick/render/vectors.h"
-#include "tests/window/window_test.h"
+#include "core/vectors.h"
+#include "tests/viewer/app/window_test.h"
 
 namespace isobrick {
 namespace {

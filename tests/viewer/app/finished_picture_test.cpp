@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/volumes/synth_source.h"
-#include "isobrick/window/viewer_window.h"
-#include "tests/window/window_test.h"
+#include <isobrick/convert.h>
+#include <isobrick/synth_source.h>
+#include "tests/viewer/app/window_test.h"
+#include "viewer/app/viewer_window.h"
 
 namespace isobrick {
 namespace {

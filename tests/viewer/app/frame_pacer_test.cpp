@@ -1,4 +1,4 @@
-#include "isobrick/window/frame_pacer.h"
+#include "viewer/app/frame_pacer.h"
 
 #include <gtest/gtest.h>
 

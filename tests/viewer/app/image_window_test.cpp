@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "isobrick/bricks/image_volumes.h"
-#include "isobrick/render/vectors.h"
-#include "tests/window/window_test.h"
+#include "bricks/image_volumes.h"
+#include "core/vectors.h"
+#include "tests/viewer/app/window_test.h"
 
 // Images with channels and times, and isovalues and remarks that a window tells about.
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/import_job.h"
+#include "viewer/app/import_job.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,10 @@
 #include <filesystem>
 #include <thread>
 
-#include "isobrick/bricks/store_reader.h"
-#include "isobrick/io/file.h"
-#include "isobrick/volumes/open_source.h"
-#include "tests/io/temp_dir.h"
+#include <isobrick/open_source.h>
+#include <isobrick/store_reader.h>
+#include "io/bytes/file.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

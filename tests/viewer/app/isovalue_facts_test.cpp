@@ -1,4 +1,4 @@
-#include "isobrick/window/isovalue_facts.h"
+#include "viewer/app/isovalue_facts.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numeric>
 #include <thread>
 
-#include "tests/window/picture_test.h"
+#include "tests/viewer/app/picture_test.h"
 
 namespace isobrick {
 namespace {

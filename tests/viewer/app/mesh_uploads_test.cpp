@@ -1,4 +1,4 @@
-#include "isobrick/window/mesh_uploads.h"
+#include "viewer/app/mesh_uploads.h"
 
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/render/gl_context.h"
-#include "tests/meshes/test_meshes.h"
+#include "tests/io/meshes/test_meshes.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick {
 namespace {

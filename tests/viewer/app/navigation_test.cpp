@@ -1,10 +1,10 @@
-#include "isobrick/window/navigation.h"
+#include "viewer/app/navigation.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "isobrick/render/vectors.h"
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/window/panels.h"
+#include "viewer/app/panels.h"
 
 // ImVec2 can be added up with this.
 #define IMGUI_DEFINE_MATH_OPERATORS
@@ -9,8 +9,8 @@
 #include <map>
 #include <thread>
 
-#include "tests/window/imgui_version.h"
-#include "tests/window/picture_test.h"
+#include "tests/viewer/app/imgui_version.h"
+#include "tests/viewer/app/picture_test.h"
 
 namespace isobrick {
 namespace {

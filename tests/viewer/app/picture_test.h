@@ -8,11 +8,11 @@
 #include <memory>
 #include <vector>
 
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/render/gl_context.h"
-#include "isobrick/volumes/synth_source.h"
-#include "isobrick/window/store_picture.h"
-#include "tests/io/temp_dir.h"
+#include <isobrick/convert.h>
+#include <isobrick/synth_source.h>
+#include "tests/io/bytes/temp_dir.h"
+#include "viewer/app/store_picture.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick {
 

@@ -1,4 +1,4 @@
-#include "isobrick/window/piece_pacer.h"
+#include "viewer/app/piece_pacer.h"
 
 #include <gtest/gtest.h>
 

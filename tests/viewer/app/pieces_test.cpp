@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "isobrick/core/error.h"
-#include "tests/window/picture_test.h"
+#include <isobrick/error.h>
+#include "tests/viewer/app/picture_test.h"
 
 namespace isobrick {
 namespace {

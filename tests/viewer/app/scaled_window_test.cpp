@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <string>
 
-#include "isobrick/window/panels.h"
-#include "tests/window/imgui_version.h"
-#include "tests/window/window_test.h"
+#include "tests/viewer/app/imgui_version.h"
+#include "tests/viewer/app/window_test.h"
+#include "viewer/app/panels.h"
 
 // Displays on which everything is to be larger.
 

@@ -1,8 +1,8 @@
-#include "isobrick/window/screenshot.h"
+#include "viewer/app/screenshot.h"
 
 #include <gtest/gtest.h>
 
-#include "tests/io/temp_dir.h"
+#include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "tests/window/picture_test.h"
+#include "tests/viewer/app/picture_test.h"
 
 // How fine a picture is at most, and what it frames.
 

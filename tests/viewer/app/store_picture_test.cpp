@@ -1,4 +1,4 @@
-#include "isobrick/window/store_picture.h"
+#include "viewer/app/store_picture.h"
 
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
@@ -7,13 +7,13 @@
 #include <cmath>
 #include <map>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/gpu_backend.h"
-#include "isobrick/render/vectors.h"
-#include "isobrick/window/pick.h"
-#include "isobrick/window/screenshot.h"
-#include "isobrick/window/shown_part.h"
-#include "tests/window/picture_test.h"
+#include <isobrick/error.h>
+#include "core/vectors.h"
+#include "pipeline/extract/gpu_backend.h"
+#include "tests/viewer/app/picture_test.h"
+#include "viewer/app/pick.h"
+#include "viewer/app/screenshot.h"
+#include "viewer/app/shown_part.h"
 
 namespace isobrick {
 namespace {

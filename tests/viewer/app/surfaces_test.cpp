@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "isobrick/window/pick.h"
-#include "tests/window/picture_test.h"
+#include "tests/viewer/app/picture_test.h"
+#include "viewer/app/pick.h"
 
 // Pictures of several surfaces.
 

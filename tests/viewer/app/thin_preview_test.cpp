@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "isobrick/volumes/volume_source.h"
-#include "tests/window/picture_test.h"
+#include <isobrick/volume_source.h>
+#include "tests/viewer/app/picture_test.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/window/viewer_window.h"
+#include "viewer/app/viewer_window.h"
 
 #include <gtest/gtest.h>
 
@@ -13,12 +13,12 @@
 #include <fstream>
 #include <functional>
 
-#include "isobrick/core/error.h"
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/render/vectors.h"
-#include "isobrick/volumes/synth_source.h"
-#include "tests/window/imgui_version.h"
-#include "tests/window/window_test.h"
+#include <isobrick/convert.h>
+#include <isobrick/error.h>
+#include <isobrick/synth_source.h>
+#include "core/vectors.h"
+#include "tests/viewer/app/imgui_version.h"
+#include "tests/viewer/app/window_test.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/window/virtual_display.h"
+#include "tests/viewer/app/virtual_display.h"
 
 #include <X11/Xatom.h>
 #include <X11/Xlib.h>

@@ -3,9 +3,9 @@
 #include <chrono>
 #include <filesystem>
 
-#include "isobrick/core/cancel.h"
+#include "core/cancel.h"
 #include "tests/tools/program.h"
-#include "tests/window/window_test.h"
+#include "tests/viewer/app/window_test.h"
 
 namespace isobrick {
 namespace {

@@ -11,11 +11,11 @@
 #include <memory>
 #include <string>
 
-#include "isobrick/pipeline/convert.h"
-#include "isobrick/volumes/synth_source.h"
-#include "isobrick/window/viewer_window.h"
-#include "tests/io/temp_dir.h"
-#include "tests/window/virtual_display.h"
+#include <isobrick/convert.h>
+#include <isobrick/synth_source.h>
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/viewer/app/virtual_display.h"
+#include "viewer/app/viewer_window.h"
 
 namespace isobrick::test {
 

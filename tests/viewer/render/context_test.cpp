@@ -3,11 +3,11 @@
 #include <filesystem>
 #include <thread>
 
-#include "isobrick/core/error.h"
-#include "isobrick/render/camera_request.h"
-#include "tests/io/temp_dir.h"
-#include "tests/meshes/test_meshes.h"
-#include "tests/render/pictures.h"
+#include <isobrick/error.h>
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/io/meshes/test_meshes.h"
+#include "tests/viewer/render/pictures.h"
+#include "viewer/render/camera_request.h"
 
 namespace isobrick {
 namespace {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "tests/meshes/test_meshes.h"
-#include "tests/render/pictures.h"
+#include "tests/io/meshes/test_meshes.h"
+#include "tests/viewer/render/pictures.h"
 
 namespace isobrick {
 namespace {

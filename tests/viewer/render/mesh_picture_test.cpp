@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_picture.h"
+#include "viewer/render/mesh_picture.h"
 
 #include <gtest/gtest.h>
 
@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/meshes/glb_sink.h"
-#include "isobrick/meshes/ply_sink.h"
-#include "isobrick/meshes/stl_sink.h"
-#include "isobrick/render/gl_context.h"
-#include "tests/io/temp_dir.h"
-#include "tests/render/mesh_files.h"
+#include "io/meshes/glb_sink.h"
+#include "io/meshes/ply_sink.h"
+#include "io/meshes/stl_sink.h"
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/io/meshes/mesh_files.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/render/picture_difference.h"
+#include "tests/viewer/render/picture_difference.h"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "tests/render/png_picture.h"
+#include "tests/viewer/render/png_picture.h"
 
 namespace isobrick::test {
 

@@ -1,7 +1,7 @@
 #include <regex>
 
-#include "isobrick/render/gl_context.h"
 #include "tests/tools/program.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::test {
 namespace {

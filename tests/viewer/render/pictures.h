@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "isobrick/render/gl_context.h"
-#include "isobrick/render/renderer.h"
+#include "viewer/render/gl_context.h"
+#include "viewer/render/renderer.h"
 
 namespace isobrick {
 

@@ -7,8 +7,8 @@
 #include <set>
 #include <vector>
 
-#include "tests/meshes/test_meshes.h"
-#include "tests/render/pictures.h"
+#include "tests/io/meshes/test_meshes.h"
+#include "tests/viewer/render/pictures.h"
 
 namespace isobrick {
 namespace {

@@ -1,13 +1,13 @@
-#include "isobrick/render/preview_sink.h"
+#include "viewer/render/preview_sink.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "isobrick/io/png_file.h"
-#include "tests/io/temp_dir.h"
-#include "tests/meshes/test_meshes.h"
-#include "tests/render/png_picture.h"
+#include "io/bytes/png_file.h"
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/io/meshes/test_meshes.h"
+#include "tests/viewer/render/png_picture.h"
 
 namespace isobrick {
 namespace {

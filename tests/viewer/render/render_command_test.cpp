@@ -1,5 +1,5 @@
-#include "isobrick/render/gl_context.h"
 #include "tests/tools/program.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::test {
 namespace {

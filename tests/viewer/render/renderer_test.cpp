@@ -1,4 +1,4 @@
-#include "isobrick/render/renderer.h"
+#include "viewer/render/renderer.h"
 
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <cmath>
 #include <vector>
 
-#include "isobrick/render/gl_objects.h"
-#include "tests/meshes/test_meshes.h"
-#include "tests/render/pictures.h"
+#include "tests/io/meshes/test_meshes.h"
+#include "tests/viewer/render/pictures.h"
+#include "viewer/render/gl_objects.h"
 
 namespace isobrick {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <random>
 
-#include "isobrick/core/error.h"
-#include "tests/meshes/test_meshes.h"
-#include "tests/render/pictures.h"
+#include <isobrick/error.h>
+#include "tests/io/meshes/test_meshes.h"
+#include "tests/viewer/render/pictures.h"
 
 namespace isobrick {
 namespace {

@@ -2,9 +2,9 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "isobrick/render/gl_context.h"
-#include "tests/render/picture_difference.h"
 #include "tests/tools/program.h"
+#include "tests/viewer/render/picture_difference.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::test {
 namespace {

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isobrick/render/gl_context.h"
-#include "tests/render/png_picture.h"
 #include "tests/tools/program.h"
+#include "tests/viewer/render/png_picture.h"
+#include "viewer/render/gl_context.h"
 
 namespace isobrick::test {
 namespace {

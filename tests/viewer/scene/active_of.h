@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "isobrick/viewer/active_nodes.h"
+#include "viewer/scene/active_nodes.h"
 
 namespace isobrick::test {
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isobrick/viewer/node_mesher.h"
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/active_of.h"
-#include "tests/viewer/random_cut.h"
-#include "tests/viewer/rasteriser.h"
+#include "tests/viewer/scene/active_of.h"
+#include "tests/viewer/scene/random_cut.h"
+#include "tests/viewer/scene/rasteriser.h"
+#include "viewer/scene/node_mesher.h"
 
 namespace isobrick::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/cut.h"
+#include "viewer/scene/cut.h"
 
 #include <gtest/gtest.h>
 
@@ -8,11 +8,11 @@
 #include <set>
 #include <tuple>
 
-#include "isobrick/pipeline/downsample.h"
+#include "pipeline/convert/downsample.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/active_of.h"
-#include "tests/viewer/perspective.h"
-#include "tests/viewer/random_cut.h"
+#include "tests/viewer/scene/active_of.h"
+#include "tests/viewer/scene/perspective.h"
+#include "tests/viewer/scene/random_cut.h"
 
 namespace isobrick::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/device_mesher.h"
+#include "viewer/scene/device_mesher.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <limits>
 #include <vector>
 
-#include "isobrick/viewer/node_mesher.h"
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/random_cut.h"
+#include "tests/viewer/scene/random_cut.h"
+#include "viewer/scene/node_mesher.h"
 
 namespace isobrick::test {
 namespace {

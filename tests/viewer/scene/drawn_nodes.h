@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "isobrick/viewer/drawable.h"
-#include "isobrick/viewer/node_tree.h"
+#include "viewer/scene/drawable.h"
+#include "viewer/scene/node_tree.h"
 
 namespace isobrick::test {
 

@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include "isobrick/stream/brick_source.h"
+#include "stream/brick_source.h"
 
 namespace isobrick::test {
 

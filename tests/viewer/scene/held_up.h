@@ -3,7 +3,7 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "tests/viewer/forwarding.h"
+#include "tests/viewer/scene/forwarding.h"
 
 namespace isobrick::test {
 

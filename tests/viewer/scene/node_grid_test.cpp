@@ -1,12 +1,12 @@
-#include "isobrick/viewer/node_grid.h"
+#include "viewer/scene/node_grid.h"
 
 #include <gtest/gtest.h>
 
-#include "isobrick/pipeline/downsample.h"
-#include "isobrick/viewer/node_samples.h"
-#include "isobrick/viewer/node_tree.h"
+#include "pipeline/convert/downsample.h"
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
+#include "viewer/scene/node_samples.h"
+#include "viewer/scene/node_tree.h"
 
 namespace isobrick::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/node_mesher.h"
+#include "viewer/scene/node_mesher.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
 #include "tests/surface/field.h"
-#include "tests/viewer/random_cut.h"
+#include "tests/viewer/scene/random_cut.h"
 
 namespace isobrick::test {
 namespace {

@@ -1,13 +1,13 @@
-#include "isobrick/viewer/node_search.h"
+#include "viewer/scene/node_search.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "isobrick/viewer/scene.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/perspective.h"
+#include "tests/viewer/scene/perspective.h"
+#include "viewer/scene/scene.h"
 
 namespace isobrick::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "isobrick/core/vec.h"
+#include <isobrick/vec.h>
 
 namespace isobrick::test {
 

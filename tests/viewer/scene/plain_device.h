@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/viewer/device_mesher.h"
+#include "viewer/scene/device_mesher.h"
 
 namespace isobrick::test {
 

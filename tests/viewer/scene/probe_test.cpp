@@ -1,15 +1,15 @@
-#include "isobrick/viewer/probe.h"
+#include "viewer/scene/probe.h"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 
-#include "isobrick/viewer/device_mesher.h"
-#include "isobrick/viewer/isovalue_counts.h"
-#include "isobrick/viewer/scene.h"
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/random_cut.h"
+#include "tests/viewer/scene/random_cut.h"
+#include "viewer/scene/device_mesher.h"
+#include "viewer/scene/isovalue_counts.h"
+#include "viewer/scene/scene.h"
 
 namespace isobrick::test {
 namespace {

@@ -5,8 +5,8 @@
 #include <tuple>
 #include <vector>
 
-#include "isobrick/viewer/active_nodes.h"
-#include "isobrick/viewer/cut.h"
+#include "viewer/scene/active_nodes.h"
+#include "viewer/scene/cut.h"
 
 namespace isobrick::test {
 

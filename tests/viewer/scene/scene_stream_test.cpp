@@ -1,4 +1,4 @@
-#include "isobrick/viewer/scene_stream.h"
+#include "viewer/scene/scene_stream.h"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/drawn_nodes.h"
-#include "tests/viewer/perspective.h"
-#include "tests/viewer/plain_device.h"
-#include "tests/viewer/random_cut.h"
+#include "tests/viewer/scene/drawn_nodes.h"
+#include "tests/viewer/scene/perspective.h"
+#include "tests/viewer/scene/plain_device.h"
+#include "tests/viewer/scene/random_cut.h"
 
 namespace isobrick::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "isobrick/viewer/scene.h"
+#include "viewer/scene/scene.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/drawn_nodes.h"
-#include "tests/viewer/perspective.h"
+#include "tests/viewer/scene/drawn_nodes.h"
+#include "tests/viewer/scene/perspective.h"
 
 namespace isobrick::test {
 namespace {

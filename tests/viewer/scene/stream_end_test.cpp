@@ -10,11 +10,11 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/viewer/scene_stream.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/held_up.h"
-#include "tests/viewer/plain_device.h"
-#include "tests/viewer/random_cut.h"
+#include "tests/viewer/scene/held_up.h"
+#include "tests/viewer/scene/plain_device.h"
+#include "tests/viewer/scene/random_cut.h"
+#include "viewer/scene/scene_stream.h"
 
 namespace isobrick::test {
 namespace {

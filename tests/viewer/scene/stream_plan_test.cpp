@@ -1,4 +1,4 @@
-#include "isobrick/viewer/stream_plan.h"
+#include "viewer/scene/stream_plan.h"
 
 #include <gtest/gtest.h>
 
@@ -13,9 +13,9 @@
 
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/forwarding.h"
-#include "tests/viewer/held_up.h"
-#include "tests/viewer/random_cut.h"
+#include "tests/viewer/scene/forwarding.h"
+#include "tests/viewer/scene/held_up.h"
+#include "tests/viewer/scene/random_cut.h"
 
 namespace isobrick::test {
 namespace {

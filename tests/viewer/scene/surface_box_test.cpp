@@ -1,4 +1,4 @@
-#include "isobrick/viewer/surface_box.h"
+#include "viewer/scene/surface_box.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/forwarding.h"
+#include "tests/viewer/scene/forwarding.h"
 
 namespace isobrick::test {
 namespace {

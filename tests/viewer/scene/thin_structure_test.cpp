@@ -1,4 +1,4 @@
-#include "isobrick/viewer/thin_structure.h"
+#include "viewer/scene/thin_structure.h"
 
 #include <gtest/gtest.h>
 
@@ -10,13 +10,13 @@
 #include <thread>
 #include <vector>
 
-#include "isobrick/viewer/cut.h"
-#include "isobrick/viewer/node_mesher.h"
-#include "isobrick/viewer/scene.h"
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/active_of.h"
-#include "tests/viewer/perspective.h"
+#include "tests/viewer/scene/active_of.h"
+#include "tests/viewer/scene/perspective.h"
+#include "viewer/scene/cut.h"
+#include "viewer/scene/node_mesher.h"
+#include "viewer/scene/scene.h"
 
 namespace isobrick::test {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "tests/gpu/kernels/cuda_language.h"
 
-// What isobrick/gpu/ptx.cuh has, on a CPU. Shared memory is addressed from its first byte on.
+// What gpu/tile/ptx.cuh has, on a CPU. Shared memory is addressed from its first byte on.
 
 namespace isobrick::gpu {
 

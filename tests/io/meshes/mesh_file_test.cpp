@@ -1,4 +1,4 @@
-#include "isobrick/render/mesh_file.h"
+#include "io/meshes/readers/mesh_file.h"
 
 #include <gtest/gtest.h>
 
@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <functional>
 
-#include "isobrick/meshes/glb_sink.h"
-#include "isobrick/meshes/obj_sink.h"
-#include "isobrick/meshes/ply_sink.h"
-#include "isobrick/meshes/stl_sink.h"
-#include "tests/io/temp_dir.h"
-#include "tests/render/mesh_files.h"
+#include "io/meshes/glb_sink.h"
+#include "io/meshes/obj_sink.h"
+#include "io/meshes/ply_sink.h"
+#include "io/meshes/stl_sink.h"
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/io/meshes/mesh_files.h"
 
 namespace isobrick {
 namespace {

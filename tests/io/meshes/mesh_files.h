@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "isobrick/render/mesh_file.h"
-#include "tests/meshes/test_meshes.h"
+#include "io/meshes/readers/mesh_file.h"
+#include "tests/io/meshes/test_meshes.h"
 
 // Mesh files that the tests write, and what is read from them.
 

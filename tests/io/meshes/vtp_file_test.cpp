@@ -3,12 +3,12 @@
 #include <cstring>
 #include <filesystem>
 
-#include "isobrick/meshes/vtp_sink.h"
-#include "isobrick/render/mesh_file.h"
-#include "tests/io/base64_text.h"
-#include "tests/io/packed.h"
-#include "tests/io/temp_dir.h"
-#include "tests/meshes/test_meshes.h"
+#include "io/meshes/readers/mesh_file.h"
+#include "io/meshes/vtp_sink.h"
+#include "tests/io/bytes/base64_text.h"
+#include "tests/io/bytes/packed.h"
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/io/meshes/test_meshes.h"
 
 namespace isobrick {
 namespace {

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <string>
 
-#include "isobrick/meshes/glb_sink.h"
-#include "tests/io/base64_text.h"
-#include "tests/io/temp_dir.h"
-#include "tests/render/mesh_files.h"
+#include "io/meshes/glb_sink.h"
+#include "tests/io/bytes/base64_text.h"
+#include "tests/io/bytes/temp_dir.h"
+#include "tests/io/meshes/mesh_files.h"
 
 namespace isobrick {
 namespace {
