@@ -70,7 +70,7 @@ double run_cpu(const Volume& v, const Lattice& lattice, const DenseBricks& brick
     find_block_ranges(v, ranges);
     CpuExtractor extractor(
         lattice, options,
-        {.tiles = CpuExtractor::good_batch(tbb::this_task_arena::max_concurrency())});
+        {.tiles = CpuExtractor::preferred_batch(tbb::this_task_arena::max_concurrency())});
     std::vector<TileWork> tiles;
     for (int i = 0; i < runs; ++i) {
       const auto start = Clock::now();

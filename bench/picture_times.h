@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 
 namespace isobrick::bench {
 

@@ -43,7 +43,7 @@ struct Search {
   double seconds = 0;
 };
 
-Search search(const StoreReader& store, double isovalue, SearchBy by) {
+Search search(const StoreReader& store, double isovalue, SearchMethod by) {
   const auto start = std::chrono::steady_clock::now();
   TileStream stream(store, 0, isovalue, store.info().levels[0].lattice.box(), by);
   Search result;
@@ -53,7 +53,7 @@ Search search(const StoreReader& store, double isovalue, SearchBy by) {
   return result;
 }
 
-void measure(const fs::path& path, const StoreReader& store, double isovalue, SearchBy by) {
+void measure(const fs::path& path, const StoreReader& store, double isovalue, SearchMethod by) {
   Search result = search(store, isovalue, by);
   double warm = result.seconds;
   const auto begin = std::chrono::steady_clock::now();

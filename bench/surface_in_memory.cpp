@@ -70,7 +70,7 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_
         options.normals = normals;
         options.roi = lattice.box();
         options.drop_degenerate = drop_degenerate;
-        CpuExtractor extractor(lattice, options, {.tiles = CpuExtractor::good_batch(threads)});
+        CpuExtractor extractor(lattice, options, {.tiles = CpuExtractor::preferred_batch(threads)});
         MeshBuffer out;
         std::vector<TileWork> tiles;
         tbb::task_arena arena(threads);

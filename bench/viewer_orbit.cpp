@@ -24,7 +24,7 @@
 #include "bench/picture_times.h"
 #include "core/stopwatch.h"
 #include "viewer/app/frame_pacer.h"
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 #include "viewer/render/gl_context.h"
 
 namespace isobrick::bench {
@@ -52,7 +52,7 @@ class Flight {
     budgets.device_memory = budgets.memory;
     setup_ = std::make_shared<PictureSetup>(
         budgets, [] {}, PictureSize{arguments.width, arguments.height});
-    picture_ = std::make_unique<StorePicture>(
+    picture_ = std::make_unique<SceneRenderer>(
         std::make_shared<const StoreReader>(arguments.store), budgets, [] {}, setup_);
     settings_.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
     settings_.multisample = !current_gl_device().software;
@@ -79,7 +79,7 @@ class Flight {
       const double submitted =
           draw({.max_triangles = pacer_.max_triangles(),
                 .thin_triangles = pacer_.thin_triangles(),
-                .plain = pacer_.plain() ? PictureWay::Plain::yes : PictureWay::Plain::no,
+                .plain = pacer_.plain() ? FrameOptions::Plain::yes : FrameOptions::Plain::no,
                 .smaller = pacer_.smaller()},
                pacer_.smaller());
       const double seconds = watch.lap();
@@ -103,10 +103,10 @@ class Flight {
     const std::uint64_t before = picture_->counters().finished;
     double all = 0, until_there = 0;
     do {
-      PictureWay way = PictureWay::in_window(pacer_, current_gl_device().software, false);
-      way.piece_seconds = arguments_.piece_seconds.value_or(way.piece_seconds);
+      FrameOptions options = FrameOptions::in_window(pacer_, current_gl_device().software, false);
+      options.piece_seconds = arguments_.piece_seconds.value_or(options.piece_seconds);
       Stopwatch watch;
-      picture_->draw(camera_, arguments_.width, arguments_.height, settings_, way);
+      picture_->draw(camera_, arguments_.width, arguments_.height, settings_, options);
       const double step = watch.lap();
       if (picture_->drew() || picture_->state().drawing) steps.add(step, picture_->times(), 0);
       all += step;
@@ -124,10 +124,10 @@ class Flight {
 
  private:
   /// Seconds until OpenGL was told.
-  double draw(const PictureWay& way, int smaller) {
+  double draw(const FrameOptions& options, int smaller) {
     Stopwatch watch;
     picture_->draw(camera_, arguments_.width / smaller, arguments_.height / smaller, settings_,
-                   way);
+                   options);
     const double submitted = watch.lap();
     glFinish();
     return submitted;
@@ -135,7 +135,7 @@ class Flight {
 
   const Arguments& arguments_;
   std::shared_ptr<PictureSetup> setup_;
-  std::unique_ptr<StorePicture> picture_;
+  std::unique_ptr<SceneRenderer> picture_;
   ViewSettings settings_;
   Camera camera_{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   Camera start_;

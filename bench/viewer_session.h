@@ -14,7 +14,7 @@
 #include <isobrick/error.h>
 #include "bench/picture_times.h"
 #include "viewer/app/frame_pacer.h"
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 #include "viewer/render/gl_context.h"
 
 namespace isobrick::bench {
@@ -46,7 +46,7 @@ class Session {
         opened_(Clock::now()),
         store_(std::make_shared<const StoreReader>(arguments.store)) {
     read_seconds = seconds_since(opened_);
-    picture_ = std::make_unique<StorePicture>(
+    picture_ = std::make_unique<SceneRenderer>(
         store_, budgets, [this] { changed_ = Clock::now(); }, setup);
     set_up_seconds = seconds_since(opened_);
     settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
@@ -56,7 +56,7 @@ class Session {
     camera.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
   }
 
-  StorePicture& picture() { return *picture_; }
+  SceneRenderer& picture() { return *picture_; }
   double since_opened() const { return seconds_since(opened_); }
   /// Seconds from `start` until the last mesh came.
   double changed_after(Clock::time_point start) const {
@@ -98,18 +98,19 @@ class Session {
 
  private:
   static constexpr auto kPeriod = std::chrono::microseconds(16'667);
-  static constexpr double kLeast = 1e-3;  ///< seconds of a frame that counts
+  static constexpr double kMin = 1e-3;  ///< seconds of a frame that counts
 
   void make_frame(bool moving) {
     const auto start = Clock::now();
-    const PictureWay way = PictureWay::in_window(pacer_, software_, moving);
+    const FrameOptions options = FrameOptions::in_window(pacer_, software_, moving);
     const int smaller = moving ? pacer_.smaller() : 1;
-    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, settings, way);
+    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, settings,
+                   options);
     const double submitted = seconds_since(start);
     glFinish();
     const double seconds = seconds_since(start);
     const PictureState& state = picture_->state();
-    if (seconds >= kLeast) frames_.add(seconds, picture_->times(), seconds - submitted);
+    if (seconds >= kMin) frames_.add(seconds, picture_->times(), seconds - submitted);
     device_peak = std::max(device_peak, state.device_bytes);
     if (picture_->drew() || state.more) began_before_ = std::exchange(began_, start);
     if (!picture_->drew()) return;  // nothing is drawn that would look the same
@@ -126,7 +127,7 @@ class Session {
   Clock::time_point began_, began_before_;  ///< the last frames that may have been shown
   std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
-  std::unique_ptr<StorePicture> picture_;
+  std::unique_ptr<SceneRenderer> picture_;
   PicturesTimes frames_;
   Times pictures_;
   const bool software_ = current_gl_device().software;

@@ -10,7 +10,7 @@
 #include <isobrick/error.h>
 #include "bricks/ranges/index_layout.h"
 #include "bricks/ranges/range_format.h"
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/store_names.h"
 #include "bricks/zarr/zarr_v2.h"
 #include "core/digits.h"
@@ -84,7 +84,7 @@ nlohmann::json read_attributes(const fs::path& folder) {
 
 /// How many levels attributes name; Error when they do not.
 std::size_t count_levels(const nlohmann::json& attributes, const std::string& where) {
-  CheckedJson image(attributes, where);
+  JsonReader image(attributes, where);
   if (image.has("ome")) image = image.at("ome");
   return image.at("multiscales").at(std::size_t{0}).at("datasets").array_size();
 }
@@ -105,7 +105,7 @@ std::vector<ArrayMetadata> read_arrays(const fs::path& folder, bool unfinished) 
   if (unfinished) {
     const std::string where = quoted(folder / kLayoutMarker);
     const nlohmann::json marker = read_json(folder / kLayoutMarker).value_or(nlohmann::json());
-    const CheckedJson levels = CheckedJson(marker, where).at("arrays");
+    const JsonReader levels = JsonReader(marker, where).at("arrays");
     for (std::size_t i = 0; i < levels.array_size(); ++i)
       arrays.push_back(parse_array_metadata(levels.at(i).raw().dump(), where));
     return arrays;

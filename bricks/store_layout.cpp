@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/ome_transformations.h"
 #include "bricks/zarr/zarr_v2.h"
 

@@ -14,7 +14,7 @@
 #include "bricks/ranges/range_array.h"
 #include "bricks/ranges/stored_ranges.h"
 #include "bricks/zarr/array_metadata.h"
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/publisher.h"
 #include "bricks/zarr/shard_grid.h"
 #include "bricks/zarr/shard_index.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "io/bytes/file.h"
 #include "io/bytes/folder_walk.h"
 

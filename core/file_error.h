@@ -6,6 +6,6 @@
 namespace isobrick {
 
 /// The message of an exception. The standard library's of files are put as ours are.
-std::string what_of(const std::exception& error);
+std::string error_message(const std::exception& error);
 
 }  // namespace isobrick

@@ -22,6 +22,6 @@ constexpr HalfSpace half_space_at(Vec3d point, Vec3d normal) {
 }
 
 /// So many may cut what is shown, besides a box.
-inline constexpr std::size_t kMostClipPlanes = 6;
+inline constexpr std::size_t kMaxClipPlanes = 6;
 
 }  // namespace isobrick

@@ -14,11 +14,11 @@
 namespace isobrick {
 namespace {
 
-constexpr Index kMostSamples = Index{1} << 24;
+constexpr Index kMaxSamples = Index{1} << 24;
 
 int choose_level(const StoreInfo& info) {
   const auto small = [](const LevelInfo& level) {
-    return volume(level.lattice.extent) <= kMostSamples;
+    return volume(level.lattice.extent) <= kMaxSamples;
   };
   const auto found = std::find_if(info.levels.begin(), info.levels.end(), small);
   return static_cast<int>(std::min<std::ptrdiff_t>(

@@ -44,9 +44,9 @@ class RangeSearch final : public BlockSearch {
 
 /// Asks the index first how much of a chunk is active. Where that is more than
 /// kFew, looking at all ranges is faster: docs/experiments/2026-11-index.md has the figures.
-class FewSearch final : public BlockSearch {
+class SparseSearch final : public BlockSearch {
  public:
-  FewSearch(const StoreReader& store, int level, IndexKind kind)
+  SparseSearch(const StoreReader& store, int level, IndexKind kind)
       : ranges_(store, level), index_(store, level, kind) {}
 
   void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
@@ -69,13 +69,15 @@ class FewSearch final : public BlockSearch {
 
 }  // namespace
 
-std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level, SearchBy by) {
+std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level,
+                                               SearchMethod by) {
   if (!by.kind) return std::make_unique<RangeSearch>(store, level);
-  if (by.only_if_few) return std::make_unique<FewSearch>(store, level, *by.kind);
+  if (by.only_if_few) return std::make_unique<SparseSearch>(store, level, *by.kind);
   return std::make_unique<IndexSearch>(store, level, *by.kind);
 }
 
-std::uint64_t block_search_bytes(const StoreReader& store, int level, SearchBy by, int threads) {
+std::uint64_t block_search_bytes(const StoreReader& store, int level, SearchMethod by,
+                                 int threads) {
   if (!by.kind) return 0;
   const StoredIndex index(store, level, std::string(name_of(*by.kind)));
   return IndexSearch::wave(index.layout(), threads) * IndexSearch::part_bytes(index.layout());

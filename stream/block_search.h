@@ -13,7 +13,7 @@
 namespace isobrick {
 
 /// How the active blocks of a level are searched for.
-struct SearchBy {
+struct SearchMethod {
   std::optional<IndexKind> kind;  ///< a stored index; nothing: the block ranges
   bool only_if_few = false;       ///< the index only for range chunks where little is active
 };
@@ -38,9 +38,10 @@ class BlockSearch {
 
 /// All of them give the same surface. An index works in parallel in the caller's
 /// TBB arena, in no more than block_search_bytes().
-std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level, SearchBy by);
+std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level,
+                                               SearchMethod by);
 
 /// Memory that such a search takes with so many threads, beyond a range chunk.
-std::uint64_t block_search_bytes(const StoreReader& store, int level, SearchBy by, int threads);
+std::uint64_t block_search_bytes(const StoreReader& store, int level, SearchMethod by, int threads);
 
 }  // namespace isobrick

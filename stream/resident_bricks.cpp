@@ -38,7 +38,7 @@ ResidentBricks::ResidentBricks(std::shared_ptr<const BrickSource> source, std::u
     : source_(std::move(source)),
       ranges_(source_, range_bytes(budget)),
       budget_(budget - range_bytes(budget)),
-      there_(source_->info()) {}
+      resident_(source_->info()) {}
 
 /// Drops what nobody uses until so many bytes fit, as far as that goes.
 void ResidentBricks::make_room(std::uint64_t bytes) {
@@ -50,7 +50,7 @@ void ResidentBricks::make_room(std::uint64_t bytes) {
       counters_.bytes -= found->second.samples->size();
       --counters_.bricks;
     }
-    there_.erase(at->level, at->brick);
+    resident_.erase(at->level, at->brick);
     entries_.erase(found);
     at = order_.erase(at);
   }
@@ -66,20 +66,21 @@ std::shared_ptr<const BrickSamples> ResidentBricks::load(const Key& key) {
 }
 
 std::shared_ptr<const BrickSamples> ResidentBricks::get(int level, Int3 brick,
-                                                        const Wanted& wanted) {
-  return get({level, brick}, wanted, true);
+                                                        const CancellationToken& token) {
+  return get({level, brick}, token, true);
 }
 
-std::shared_ptr<const BrickSamples> ResidentBricks::get_unless_busy(int level, Int3 brick,
-                                                                    const Wanted& wanted) {
-  return get({level, brick}, wanted, false);
+std::shared_ptr<const BrickSamples> ResidentBricks::get_unless_busy(
+    int level, Int3 brick, const CancellationToken& token) {
+  return get({level, brick}, token, false);
 }
 
-std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key, const Wanted& wanted,
+std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key,
+                                                        const CancellationToken& token,
                                                         bool may_wait) {
   std::unique_lock lock(mutex_);
   for (;;) {
-    wanted.check();
+    token.check();
     const auto found = entries_.find(key);
     if (found == entries_.end()) break;
     Entry& entry = found->second;
@@ -91,7 +92,7 @@ std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key, const Wa
     if (!may_wait) return nullptr;
     loaded_.wait_for(lock, kPatience);
   }
-  Read made = read(key, lock);
+  LoadResult made = read(key, lock);
   if (made.failure) std::rethrow_exception(made.failure);
   return std::move(made.samples);
 }
@@ -108,19 +109,19 @@ std::optional<ResidentBricks::Key> ResidentBricks::next_wanted() {
       const Key key{request.level, request.bricks[request.next++]};
       if (!entries_.contains(key)) return key;
     }
-  if (soon_.empty()) return std::nullopt;
+  if (prefetch_queue_.empty()) return std::nullopt;
   // What is in use fills the budget at times: then it would be read to be dropped at once.
-  const std::uint64_t bytes = brick_bytes(soon_.front().level);
+  const std::uint64_t bytes = brick_bytes(prefetch_queue_.front().level);
   make_room(bytes);
   if (counters_.bytes + bytes > budget_) return std::nullopt;
-  return soon_.front();
+  return prefetch_queue_.front();
 }
 
 /// Takes a brick off those that are wanted soon.
 void ResidentBricks::forget_need(const Key& key) {
   const auto found = soon_places_.find(key);
   if (found == soon_places_.end()) return;
-  soon_.erase(found->second);
+  prefetch_queue_.erase(found->second);
   soon_places_.erase(found);
   soon_bytes_ -= brick_bytes(key.level);
 }
@@ -133,18 +134,19 @@ bool ResidentBricks::over(const Request& request) const {
          });
 }
 
-void ResidentBricks::read_together(int level, std::span<const Int3> bricks, const Wanted& wanted) {
+void ResidentBricks::read_together(int level, std::span<const Int3> bricks,
+                                   const CancellationToken& token) {
   const std::uint64_t bytes = brick_bytes(level);
   std::unique_lock lock(mutex_);
   const auto missing =
       static_cast<std::uint64_t>(std::count_if(bricks.begin(), bricks.end(), [&](Int3 b) {
-        return !there({level, b});
+        return !is_resident({level, b});
       }));
   if (missing < 2 || missing * bytes > budget_ / kPartTogether) return;
   const auto own = requests_.insert(requests_.end(), {level, bricks});
   try {
     while (!over(*own)) {
-      wanted.check();
+      token.check();
       if (const auto key = next_wanted())
         (void)read(*key, lock);
       else
@@ -158,7 +160,8 @@ void ResidentBricks::read_together(int level, std::span<const Int3> bricks, cons
 }
 
 /// Reads what is not there, and nobody else reads; gives the lock up meanwhile.
-ResidentBricks::Read ResidentBricks::read(const Key& key, std::unique_lock<std::mutex>& lock) {
+ResidentBricks::LoadResult ResidentBricks::read(const Key& key,
+                                                std::unique_lock<std::mutex>& lock) {
   entries_[key];
   forget_need(key);
   const std::uint64_t bytes = brick_bytes(key.level);
@@ -167,7 +170,7 @@ ResidentBricks::Read ResidentBricks::read(const Key& key, std::unique_lock<std::
   counters_.bytes += bytes;
   counters_.peak_bytes = std::max(counters_.peak_bytes, counters_.bytes);
   lock.unlock();
-  Read made;
+  LoadResult made;
   const auto start = Clock::now();
   try {
     made.samples = load(key);
@@ -184,7 +187,7 @@ ResidentBricks::Read ResidentBricks::read(const Key& key, std::unique_lock<std::
   }
   Entry& entry = entries_[key];
   entry.loading = false;
-  there_.insert(key.level, key.brick);
+  resident_.insert(key.level, key.brick);
   entry.samples = made.samples;
   entry.failure = made.failure;
   order_.push_front(key);
@@ -205,7 +208,7 @@ bool ResidentBricks::resident(int level, Box3 box) const {
   for (Index z = box.lo.z; z < box.hi.z; ++z)
     for (Index y = box.lo.y; y < box.hi.y; ++y)
       for (Index x = box.lo.x; x < box.hi.x; ++x)
-        if (!there({level, {x, y, z}})) return false;
+        if (!is_resident({level, {x, y, z}})) return false;
   return true;
 }
 
@@ -215,7 +218,7 @@ bool ResidentBricks::half_resident(int level, Box3 bricks) const {
   for (Index z = bricks.lo.z; z < bricks.hi.z; ++z)
     for (Index y = bricks.lo.y; y < bricks.hi.y; ++y)
       for (Index x = bricks.lo.x; x < bricks.hi.x; ++x) {
-        ++(there({level, {x, y, z}}) ? found : missing);
+        ++(is_resident({level, {x, y, z}}) ? found : missing);
         if (2 * found >= all) return true;
         if (2 * missing > all) return false;
       }
@@ -232,7 +235,7 @@ void ResidentBricks::close() {
 
 bool ResidentBricks::half_resident(int level, std::span<const Int3> bricks) const {
   std::size_t found = 0;
-  for (const Int3 b : bricks) found += there({level, b});
+  for (const Int3 b : bricks) found += is_resident({level, b});
   return 2 * found >= bricks.size();
 }
 
@@ -243,8 +246,8 @@ void ResidentBricks::will_need(int level, Int3 brick) {
     if (entries_.contains(key) || soon_places_.contains(key)) return;
     const std::uint64_t bytes = brick_bytes(level), most = budget_ / kPartTogether;
     if (bytes <= most) {
-      while (soon_bytes_ + bytes > most) forget_need(Key(soon_.front()));
-      soon_places_.emplace(key, soon_.insert(soon_.end(), key));
+      while (soon_bytes_ + bytes > most) forget_need(Key(prefetch_queue_.front()));
+      soon_places_.emplace(key, prefetch_queue_.insert(prefetch_queue_.end(), key));
       soon_bytes_ += bytes;
     }
   }
@@ -253,7 +256,7 @@ void ResidentBricks::will_need(int level, Int3 brick) {
 
 void ResidentBricks::forget_needs() {
   const std::lock_guard lock(mutex_);
-  soon_.clear();
+  prefetch_queue_.clear();
   soon_places_.clear();
   soon_bytes_ = 0;
 }

@@ -18,13 +18,13 @@
 namespace isobrick {
 
 /// Thrown out of work that nobody wants any more. Says nothing to a user.
-class Abandoned final : public std::exception {};
+class OperationCancelled final : public std::exception {};
 
 /// Whether somebody still wants the work that a thread is at; asked between bricks.
-class Wanted {
+class CancellationToken {
  public:
-  virtual ~Wanted() = default;
-  /// Throws Abandoned when nobody does.
+  virtual ~CancellationToken() = default;
+  /// Throws OperationCancelled when nobody does.
   virtual void check() const = 0;
 };
 
@@ -59,17 +59,18 @@ class ResidentBricks {
   ResidentBricks(std::shared_ptr<const BrickSource> source, std::uint64_t budget);
 
   /// The brick, read and decoded by the caller's thread if need be. Throws
-  /// Abandoned, or what reading throws: a brick that is damaged is not read twice.
-  std::shared_ptr<const BrickSamples> get(int level, Int3 brick, const Wanted& wanted);
+  /// OperationCancelled, or what reading throws: a brick that is damaged is not read twice.
+  std::shared_ptr<const BrickSamples> get(int level, Int3 brick, const CancellationToken& token);
   /// The same, but null at once where another thread is reading it.
-  std::shared_ptr<const BrickSamples> get_unless_busy(int level, Int3 brick, const Wanted& wanted);
+  std::shared_ptr<const BrickSamples> get_unless_busy(int level, Int3 brick,
+                                                      const CancellationToken& token);
   /// Reads those of these bricks that are missing. Threads that are in here at the same time read
   /// one another's, whoever came first first, then those that will_need() named while there is room
   /// for them, rather than wait for what others are reading. Does nothing where fewer than two
   /// bricks are missing, which get() reads or waits for, nor where they would take much of the
-  /// budget: then they would displace one another. Throws Abandoned; what cannot be read says so
-  /// when it is got.
-  void read_together(int level, std::span<const Int3> bricks, const Wanted& wanted);
+  /// budget: then they would displace one another. Throws OperationCancelled; what cannot be read
+  /// says so when it is got.
+  void read_together(int level, std::span<const Int3> bricks, const CancellationToken& token);
   /// The brick if it is there.
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
   /// Whether all bricks of `box` (in bricks, within the lattice) are there. Waits for nobody, like
@@ -128,20 +129,21 @@ class ResidentBricks {
     std::size_t next = 0;  ///< the first so many are there, or being read
   };
   /// One of both.
-  struct Read {
+  struct LoadResult {
     std::shared_ptr<const BrickSamples> samples;
     std::exception_ptr failure;
   };
 
-  std::shared_ptr<const BrickSamples> get(const Key& key, const Wanted& wanted, bool may_wait);
-  Read read(const Key& key, std::unique_lock<std::mutex>& lock);
+  std::shared_ptr<const BrickSamples> get(const Key& key, const CancellationToken& token,
+                                          bool may_wait);
+  LoadResult read(const Key& key, std::unique_lock<std::mutex>& lock);
   std::optional<Key> next_wanted();
   void forget_need(const Key& key);
   std::uint64_t brick_bytes(int level) const;
   bool over(const Request& request) const;
   std::shared_ptr<const BrickSamples> load(const Key& key);
   void make_room(std::uint64_t bytes);
-  bool there(const Key& key) const { return there_.has(key.level, key.brick); }
+  bool is_resident(const Key& key) const { return resident_.has(key.level, key.brick); }
 
   std::shared_ptr<const BrickSource> source_;
   BlockRanges ranges_;
@@ -149,11 +151,11 @@ class ResidentBricks {
   mutable std::mutex mutex_;
   std::condition_variable loaded_;
   std::unordered_map<Key, Entry, KeyHash> entries_;
-  BrickSet there_;        ///< those of entries_ that are loaded; may be asked without the lock
+  BrickSet resident_;     ///< those of entries_ that are loaded; may be asked without the lock
   std::list<Key> order_;  ///< most recently used first; only what is loaded
   std::list<Request> requests_;
   /// That will_need() named and nobody has begun to read, those first that were named first.
-  std::list<Key> soon_;
+  std::list<Key> prefetch_queue_;
   std::unordered_map<Key, std::list<Key>::iterator, KeyHash> soon_places_;  ///< in `soon_`
   std::uint64_t soon_bytes_ = 0;                                            ///< of those
   Counters counters_;

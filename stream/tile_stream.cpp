@@ -25,7 +25,7 @@ void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index re
 }  // namespace
 
 TileStream::TileStream(const StoreReader& store, int level, std::vector<double> isovalues, Box3 roi,
-                       SearchBy by)
+                       SearchMethod by)
     : search_(make_block_search(store, level, by)),
       isovalues_(std::move(isovalues)),
       tiles_of_(isovalues_.size()) {

@@ -19,8 +19,8 @@ class TileStream {
   /// Tiles without a cell in `roi` (samples) are left out. `by` says how
   /// they are found.
   TileStream(const StoreReader& store, int level, std::vector<double> isovalues, Box3 roi,
-             SearchBy by = {});
-  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchBy by = {})
+             SearchMethod by = {});
+  TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchMethod by = {})
       : TileStream(store, level, std::vector<double>{isovalue}, roi, by) {}
 
   /// Looks for the first tiles in one range chunk, so that next() need not; where it has none,

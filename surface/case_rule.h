@@ -62,7 +62,7 @@ constexpr std::array<std::uint8_t, 12> faces_of_edges() {
   return faces;
 }
 
-/// For each crossing edge of a case, the edge that follows it around its loop; −1 elsewhere.
+/// For each active edge of a case, the edge that follows it around its loop; −1 elsewhere.
 constexpr std::array<int, 12> successors(int index) {
   const auto inside = [index](int corner) { return (index >> corner & 1) != 0; };
   std::array<int, 12> next{};

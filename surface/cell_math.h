@@ -21,7 +21,7 @@ using Real = std::conditional_t<(sizeof(T) <= 2 || std::is_same_v<T, float>), fl
 /// lies: 0 at a, 1 at b. Defined for infinite samples and for differences that
 /// overflow, too.
 template <class R>
-ISOBRICK_HD inline R crossing(R a, R b, R iso) {
+ISOBRICK_HD inline R edge_parameter(R a, R b, R iso) {
   const R d = b - a;
   if (d >= -std::numeric_limits<R>::max() && d <= std::numeric_limits<R>::max())
     return (iso - a) / d;

@@ -11,9 +11,9 @@
 #include <isobrick/error.h>
 #include "surface/boundary_map.h"
 #include "surface/case_rule.h"
+#include "surface/coincident_vertices.h"
 #include "surface/tile_gather.h"
 #include "surface/tile_kernels.h"
-#include "surface/tile_ties.h"
 #include "surface/world_map.h"
 
 namespace isobrick {
@@ -58,7 +58,7 @@ struct CpuExtractor::Impl {
     if (std::isnan(o.isovalue)) throw UsageError("the isovalue is not a number");
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
     options.may_have_nan = o.may_have_nan && is_floating(l.type);
-    options.drop_degenerate = o.drop_degenerate && has_ties(l.type, o.isovalue);
+    options.drop_degenerate = o.drop_degenerate && has_coincident(l.type, o.isovalue);
     context = {o.isovalue, world_map(o.transform, o.inside),
                o.normals,  options.may_have_nan,
                l.extent,   options.roi};
@@ -88,20 +88,20 @@ struct CpuExtractor::Impl {
     state.vertices = state.triangles = 0;
     state.cells.clear();
     // Another extractor may have left its own, or none.
-    if (options.drop_degenerate != (state.ties != nullptr))
-      state.ties = options.drop_degenerate ? std::make_unique<TileTies>() : nullptr;
+    if (options.drop_degenerate != (state.coincident != nullptr))
+      state.coincident = options.drop_degenerate ? std::make_unique<CoincidentVertices>() : nullptr;
     if (!shape_tile(state.shape, work.tile)) {
       state.clear_rows();
-      if (state.ties) state.ties->clear();
+      if (state.coincident) state.coincident->clear();
     } else {
       if (options.may_have_nan) state.work.active_blocks = 0xff;
       gather_tile(lattice, bricks, options.fill_value, sample_reach(options), state);
       scan_tile(lattice.type, context, state);
-      if (state.ties) count_ties(lattice.type, context, !welded(), state);
+      if (state.coincident) count_coincident(lattice.type, context, !welded(), state);
     }
     if (!state.boundary) return;
     publish_boundary(state);
-    if (state.ties) publish_ties(state);
+    if (state.coincident) publish_coincident(state);
   }
 
   template <class F>
@@ -134,7 +134,7 @@ struct CpuExtractor::Impl {
       t += state.triangles;
       vertices += state.vertices;
       triangles += state.triangles;
-      if (state.ties) degenerate += state.ties->left_out;
+      if (state.coincident) degenerate += state.coincident->left_out;
     }
     if (welded() && vertices > std::numeric_limits<std::uint32_t>::max())
       throw Error(
@@ -146,7 +146,7 @@ struct CpuExtractor::Impl {
   void emit(TileState& state, MeshBuffer& out) const {
     if (state.vertices == 0 && state.triangles == 0) return;
     adopt_boundaries(state, boundaries);
-    if (state.ties) adopt_ties(state, boundaries);
+    if (state.coincident) adopt_coincident(state, boundaries);
     emit_tile(lattice.type, context, state, out.positions.data() + state.vertex_base,
               options.normals ? out.normals.data() + state.vertex_base : nullptr,
               out.triangles.data() + state.triangle_base);
@@ -215,21 +215,23 @@ std::uint64_t CpuExtractor::vertices() const { return impl_->vertices; }
 std::uint64_t CpuExtractor::triangles() const { return impl_->triangles; }
 std::uint64_t CpuExtractor::degenerate_triangles() const { return impl_->degenerate; }
 
-std::size_t CpuExtractor::good_batch(int threads) {
+std::size_t CpuExtractor::preferred_batch(int threads) {
   return kTilesPerThread * static_cast<std::size_t>(threads);
 }
 
 std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate) {
-  const std::uint64_t ties = sizeof(TileTies) + kTileRows * kTileSamples * sizeof(TieVertex);
+  const std::uint64_t coincident =
+      sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(CoincidentVertex);
   return sizeof(TileState) + TileLayout::kSize * size_of(type) +
-         kTileEdge * kTileEdge * kTileEdge * sizeof(ActiveCell) + (drop_degenerate ? ties : 0);
+         kTileEdge * kTileEdge * kTileEdge * sizeof(ActiveCell) +
+         (drop_degenerate ? coincident : 0);
 }
 
 std::uint64_t CpuExtractor::boundary_bytes(bool drop_degenerate) {
-  // Any sample on a tile's six planes may be a tie.
+  // Any sample on a tile's six planes may be a coincident vertex.
   constexpr std::uint64_t inner = kTileSamples - 2;
   constexpr std::uint64_t planes = kTileSamples * kTileRows - inner * inner * inner;
-  return 3072 + (drop_degenerate ? planes * sizeof(FaceTie) : 0);
+  return 3072 + (drop_degenerate ? planes * sizeof(CoincidentFace) : 0);
 }
 
 std::uint64_t CpuExtractor::max_tile_output(bool normals) {

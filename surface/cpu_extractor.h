@@ -80,7 +80,7 @@ class CpuExtractor {
   std::uint64_t degenerate_triangles() const;
 
   /// Tiles between two hand-offs that keep `threads` busy and their caches warm.
-  static std::size_t good_batch(int threads);
+  static std::size_t preferred_batch(int threads);
   /// Bytes of work space for one tile.
   static std::uint64_t workspace_bytes(ScalarType type, bool drop_degenerate);
   /// Bytes of a finished tile that wait for later tiles, mostly.

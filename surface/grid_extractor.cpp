@@ -48,11 +48,12 @@ void GridExtractor::find_inside(const GridView& g) {
 }
 
 template <int axis>
-void GridExtractor::add_vertices(const GridView& g, int y, int z, Bits crossing, MeshBuffer& out) {
+void GridExtractor::add_vertices(const GridView& g, int y, int z, Bits active_edges,
+                                 MeshBuffer& out) {
   Plane& plane = planes_[static_cast<std::size_t>(z & 1)];
   std::uint32_t* numbers = plane.data() + (axis * kGridPoints + y) * kGridPoints;
   auto next = static_cast<std::uint32_t>(out.positions.size());
-  const auto count = static_cast<std::size_t>(std::popcount(crossing.low)) + crossing.last;
+  const auto count = static_cast<std::size_t>(std::popcount(active_edges.low)) + active_edges.last;
   out.positions.resize(next + count);
   out.normals.resize(next + count);
   if (meets_coarser_) faces_.resize(next + count);
@@ -63,8 +64,8 @@ void GridExtractor::add_vertices(const GridView& g, int y, int z, Bits crossing,
     if (meets_coarser_) faces_[next] = static_cast<std::uint8_t>(vertex.faces);
     numbers[x] = next++;
   };
-  for_each_bit(crossing.low, add);
-  if (crossing.last) add(64);
+  for_each_bit(active_edges.low, add);
+  if (active_edges.last) add(64);
 }
 
 /// The vertices on the edges from the points of a row.
@@ -117,29 +118,29 @@ void GridExtractor::add_cells(const GridView& g, int y, int z, MeshBuffer& out) 
   });
 }
 
-std::uint32_t GridExtractor::add_ribbons(const GridView& g, MeshBuffer& out) {
+std::uint32_t GridExtractor::add_seam_strips(const GridView& g, MeshBuffer& out) {
   const std::size_t vertices = out.positions.size(), triangles = out.triangles.size();
-  ribbon_of_.resize(vertices);
+  seam_of_.resize(vertices);
   auto next = static_cast<std::uint32_t>(vertices);
   for (std::size_t i = 0; i < vertices; ++i)
     if (faces_[i]) {
-      ribbon_of_[i] = next;
+      seam_of_[i] = next;
       next += 2;
     }
   out.positions.resize(next);
   out.normals.resize(next);
   for (std::size_t i = 0; i < vertices; ++i)
     if (faces_[i]) {
-      const std::size_t beside = ribbon_of_[i];
-      out.positions[beside] = grid::beside(out.positions[i], out.normals[i], g.ribbon);
-      out.positions[beside + 1] = grid::beside(out.positions[i], out.normals[i], -g.ribbon);
+      const std::size_t beside = seam_of_[i];
+      out.positions[beside] = grid::beside(out.positions[i], out.normals[i], g.seam_strip);
+      out.positions[beside + 1] = grid::beside(out.positions[i], out.normals[i], -g.seam_strip);
       out.normals[beside] = out.normals[beside + 1] = out.normals[i];
     }
   for (std::size_t t = 0; t < triangles; ++t)
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = out.triangles[t][k], b = out.triangles[t][(k + 1) % 3];
       if (!(faces_[a] & faces_[b])) continue;
-      const std::uint32_t ra = ribbon_of_[a], rb = ribbon_of_[b];
+      const std::uint32_t ra = seam_of_[a], rb = seam_of_[b];
       const std::size_t n = out.triangles.size();
       out.triangles.resize(n + 2);
       out.triangles[n] = {ra, rb, rb + 1};
@@ -158,7 +159,7 @@ std::uint32_t GridExtractor::extract(const GridView& g, MeshBuffer& out) {
     if (z > 0)
       for (int y = 0; y + 1 < g.n[1]; ++y) add_cells(g, y, z - 1, out);
   }
-  return meets_coarser_ ? add_ribbons(g, out) : 0;
+  return meets_coarser_ ? add_seam_strips(g, out) : 0;
 }
 
 }  // namespace isobrick

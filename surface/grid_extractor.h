@@ -14,13 +14,13 @@ namespace isobrick {
 ///
 /// Vertices, with normals: by row of points (z, then y), then by the axis of their edge, then
 /// by x; then two for each vertex on a face where the grid meets a coarser one, to either
-/// side of the surface. Triangles: by cell, x fastest, then by case; then the ribbons, two
+/// side of the surface. Triangles: by cell, x fastest, then by case; then the seam strips, two
 /// triangles for each side that lies on such a face. Cells with a corner that is no number
 /// are left out; edges between two numbers have their vertices all the same. One for each
 /// thread: keeps its work space.
 class GridExtractor {
  public:
-  /// Replaces what `out` held. How many of the triangles, the last ones, are ribbons.
+  /// Replaces what `out` held. How many of the triangles, the last ones, are seam strips.
   std::uint32_t extract(const GridView& grid, MeshBuffer& out);
 
  private:
@@ -36,15 +36,15 @@ class GridExtractor {
 
   void find_inside(const GridView& grid);
   template <int axis>
-  void add_vertices(const GridView& grid, int y, int z, Bits crossing, MeshBuffer& out);
+  void add_vertices(const GridView& grid, int y, int z, Bits active_edges, MeshBuffer& out);
   void add_row(const GridView& grid, int y, int z, MeshBuffer& out);
   void add_cells(const GridView& grid, int y, int z, MeshBuffer& out);
-  std::uint32_t add_ribbons(const GridView& grid, MeshBuffer& out);
+  std::uint32_t add_seam_strips(const GridView& grid, MeshBuffer& out);
 
   std::vector<Row> rows_;
   std::array<Plane, 2> planes_;
-  std::vector<std::uint8_t> faces_;       ///< of each vertex, where the grid meets coarser ones
-  std::vector<std::uint32_t> ribbon_of_;  ///< of each vertex: its first one beside it
+  std::vector<std::uint8_t> faces_;     ///< of each vertex, where the grid meets coarser ones
+  std::vector<std::uint32_t> seam_of_;  ///< of each vertex: its first one beside it
   bool meets_coarser_ = false;
 };
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "surface/coarse_face.h"
+#include "surface/lod_seam.h"
 
 // A vertex of a grid's surface: arithmetic that both backends share verbatim.
 
@@ -50,7 +50,11 @@ template <int axis>
 ISOBRICK_HD inline EdgePlace place_on(const GridView& g, int x, int y, int z) {
   EdgePlace at{{x, y, z}, {0, 0, 0}, false};
   const float* value = g.at(x, y, z);
-  const float t = crossing(value[0], value[axis == 0 ? 1 : axis == 1 ? g.row : g.plane], 0.0f);
+  const float t = edge_parameter(value[0],
+                                 value[axis == 0   ? 1
+                                       : axis == 1 ? g.row
+                                                   : g.plane],
+                                 0.0f);
   // Rounded so that vertices that float may put into one place are one place.
   at.part[axis] = static_cast<float>(static_cast<int>(t * 1048576.0f + 0.5f)) * (1.0f / 1048576.0f);
   if (at.part[axis] >= 1) {
@@ -97,7 +101,7 @@ ISOBRICK_HD inline Vertex vertex_on(const GridView& g, int x, int y, int z) {
   return vertex;
 }
 
-/// A ribbon's vertex beside a vertex of the border, to either side of the surface.
+/// A seam strip's vertex beside a vertex of the border, to either side of the surface.
 ISOBRICK_HD inline Vec3f beside(Vec3f position, Vec3f normal, float width) {
   return {position.x + normal.x * width, position.y + normal.y * width,
           position.z + normal.z * width};

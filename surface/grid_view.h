@@ -12,7 +12,7 @@ inline constexpr int kGridPoints = 65;
 
 /// The values of a coarser grid on a face, whose contours the finer grid's vertices
 /// there are moved onto.
-struct CoarseFace {
+struct LodSeam {
   const float* values = nullptr;  ///< the face's first axis fastest; null: no coarser grid
   int n[2] = {0, 0};              ///< points along the face's two axes
 };
@@ -55,12 +55,12 @@ struct GridView {
   double offset[3] = {0, 0, 0};
   WorldMap map;  ///< only what it says of normals and of mirroring
   /// Coarser grids: on faces 2 · axis + side, points between two of theirs along each axis
-  /// (1 or 2), their places, and half the width of a ribbon.
-  CoarseFace faces[6];
+  /// (1 or 2), their places, and half the width of a seam strip.
+  LodSeam faces[6];
   int ratio[3] = {1, 1, 1};
   const double* coarse_place[3] = {nullptr, nullptr, nullptr};
   int coarse_n[3] = {0, 0, 0};  ///< how many places
-  float ribbon = 0;
+  float seam_strip = 0;
 
   ISOBRICK_HD const float* at(int x, int y, int z) const {
     return values + (z * plane + y * row + x);

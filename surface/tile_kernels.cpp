@@ -10,8 +10,8 @@
 #include <hwy/highway.h>
 
 #include "surface/case_tables.h"
+#include "surface/coincident_vertices-inl.h"
 #include "surface/tile_scan-inl.h"
-#include "surface/tile_ties-inl.h"
 #include "surface/tile_triangles-inl.h"
 #include "surface/tile_vertices-inl.h"
 
@@ -29,12 +29,12 @@ void Emit(ScalarType type, const KernelContext& context, TileState& tile, Vec3f*
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     emit_vertices<T>(context, tile, positions, normals);
-    if (tile.ties)
+    if (tile.coincident)
       emit_tie_vertices<T>(context, tile, positions + tile.edge_vertices,
                            normals ? normals + tile.edge_vertices : nullptr);
   });
   const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;
-  if (tile.ties && tile.ties->matter())
+  if (tile.coincident && tile.coincident->matter())
     emit_kept_triangles(tables, tile, triangles);
   else
     emit_triangles(tables, tile, triangles);

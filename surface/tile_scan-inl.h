@@ -14,8 +14,8 @@
 
 #include "core/threshold.h"
 #include "surface/case_tables.h"
+#include "surface/coincident_vertices.h"
 #include "surface/tile_kernels.h"
-#include "surface/tile_ties.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {
@@ -77,7 +77,7 @@ inline std::uint64_t nan_bits(const T* samples) {
 template <class T>
 void classify(const KernelContext& context, TileState& tile) {
   const T threshold = Threshold<T>(context.isovalue).value;
-  const std::optional<T> tie = tie_value<T>(context.isovalue);
+  const std::optional<T> coincident = coincident_value<T>(context.isovalue);
   const T* samples = reinterpret_cast<const T*>(tile.samples.data());
   const Int3 common = common_sample(context.extent, tile.work.tile);
   const T known = samples[TileLayout::offset(static_cast<int>(common.x), static_cast<int>(common.y),
@@ -97,8 +97,9 @@ void classify(const KernelContext& context, TileState& tile) {
       const T* row = samples + TileLayout::offset(0, y, z);
       if (gathered) bits |= gathered & inside_bits(row, threshold);
       tile.inside[row_index(y, z)] = bits;
-      if (tile.ties)
-        tile.ties->at[row_index(y, z)] = gathered ? gathered & equal_bits(row, *tie) : 0;
+      if (tile.coincident)
+        tile.coincident->at[row_index(y, z)] =
+            gathered ? gathered & equal_bits(row, *coincident) : 0;
     }
   }
 }
@@ -137,7 +138,7 @@ void find_good_cells(const KernelContext& context, const TileState& tile, GoodCe
     }
 }
 
-/// The crossing edges that start in a row, and the cells that do.
+/// The active edges that start in a row, and the cells that do.
 struct RowBits {
   std::uint64_t x, y, z, cells;
 };
@@ -193,9 +194,11 @@ inline void leave_out_nan(const GoodCells& good, int y, int z, RowBits& bits) {
   bits.cells &= g11 >> 1;
 }
 
-/// Leaves out the edges with a tie at an end, whose vertices are not numbered with the rest.
-inline void leave_out_ties(const TileTies& ties, int y, int z, RowBits& bits) {
-  const std::uint64_t* at = ties.at + row_index(y, z);
+/// Leaves out the edges with a coincident vertex at an end, whose vertices are not numbered with
+/// the rest.
+inline void leave_out_coincident(const CoincidentVertices& coincident, int y, int z,
+                                 RowBits& bits) {
+  const std::uint64_t* at = coincident.at + row_index(y, z);
   bits.x &= ~(at[0] | at[0] >> 1);
   bits.y &= ~(at[0] | at[1]);
   bits.z &= ~(at[0] | at[kTileSamples]);
@@ -274,7 +277,7 @@ void scan_samples(const KernelContext& context, TileState& tile) {
       RowBits bits = row_bits(tile, y, z);
       if (!(bits.x | bits.y | bits.z | bits.cells)) continue;
       if (look_for_nan) leave_out_nan(good, y, z, bits);
-      if (tile.ties) leave_out_ties(*tile.ties, y, z, bits);
+      if (tile.coincident) leave_out_coincident(*tile.coincident, y, z, bits);
       number = number_row(tile, y, z, bits, number);
       if (bits.cells) list_cells(tile, y, z, bits.cells);
     }

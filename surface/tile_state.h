@@ -61,46 +61,46 @@ struct FaceVertex {
   std::uint32_t number;
 };
 
-/// A vertex on a tie (see tile_ties.h) on a tile's planes: place as in TieVertex
-/// and number within the tile.
-struct FaceTie {
+/// A vertex on a coincident vertex (see coincident_vertices.h) on a tile's planes: place as in
+/// CoincidentVertex and number within the tile.
+struct CoincidentFace {
   std::uint32_t place, number;
 };
 
 /// What later tiles need of a finished one: the vertices on its upper planes,
-/// and those on ties on all its planes.
+/// and those on coincident vertices on all its planes.
 struct TileBoundary {
   std::uint32_t base = 0;  ///< number of the tile's first vertex in the mesh
   bool empty = true;       ///< no vertex: what follows holds anything
   /// Rows with y = 32 (by z) and rows with z = 32 (by y); numbers count from `base`.
   std::array<EdgeRow, kTileSamples> y_face, z_face;
   PodBuffer<FaceVertex> x_face_y, x_face_z;  ///< edges along y and along z at x = 32
-  PodBuffer<FaceTie> ties;                   ///< by place
+  PodBuffer<CoincidentFace> coincident;      ///< by place
 };
 
-/// The vertex on a tie that triangles of a tile have corners on.
-struct TieVertex {
+/// The vertex on a coincident vertex that triangles of a tile have corners on.
+struct CoincidentVertex {
   static constexpr std::uint8_t kOwn = 13;
   std::uint32_t place;  ///< x | y << 6 | z << 12
   std::uint32_t number;
   std::uint8_t owner;  ///< which of the 27 tiles around this one makes it; kOwn: this one
 };
 
-/// The ties of a tile, where degenerate triangles are left out.
-struct TileTies {
-  /// Bit x: sample x is a tie. A row and a sample more than there are, always 0.
+/// The coincident vertices of a tile, where degenerate triangles are left out.
+struct CoincidentVertices {
+  /// Bit x: sample x is a coincident vertex. A row and a sample more than there are, always 0.
   std::uint64_t at[kTileRows + kTileSamples + 1] = {};
   std::uint64_t used[kTileRows];   ///< bit x: a triangle of this tile has a corner on sample x
   std::uint32_t first[kTileRows];  ///< which of `vertices` is the row's first
-  PodBuffer<TieVertex> vertices;   ///< the used ones, by place
-  std::uint32_t own = 0;           ///< of them made by this tile
-  std::uint32_t left_out = 0;      ///< triangles
+  PodBuffer<CoincidentVertex> vertices;  ///< the used ones, by place
+  std::uint32_t own = 0;                 ///< of them made by this tile
+  std::uint32_t left_out = 0;            ///< triangles
 
   void clear() {
     vertices.clear();
     own = left_out = 0;
   }
-  /// Whether a triangle has a corner on a tie, or had before it was left out.
+  /// Whether a triangle has a corner on a coincident vertex, or had before it was left out.
   bool matter() const { return vertices.size() > 0 || left_out > 0; }
 };
 
@@ -121,8 +121,8 @@ struct TileState {
   PodBuffer<std::uint32_t>
       edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
   std::uint32_t vertices = 0, triangles = 0;
-  std::uint32_t edge_vertices = 0;  ///< vertices on edges; those on ties follow them
-  std::unique_ptr<TileTies> ties;   ///< where degenerate triangles are left out
+  std::uint32_t edge_vertices = 0;  ///< vertices on edges; those on coincident vertices follow them
+  std::unique_ptr<CoincidentVertices> coincident;    ///< where degenerate triangles are left out
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
   std::uint32_t number_base = 0;                     ///< what its vertices are numbered from
   TileBoundary* boundary = nullptr;                  ///< of this tile, when later tiles need it

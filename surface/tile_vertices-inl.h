@@ -78,8 +78,8 @@ struct ScalarVertices {
     const T* p = samples + TileLayout::offset(x, y, z);
     const R a = static_cast<R>(p[0]), b = static_cast<R>(p[kStep[axis]]);
     const R iso = static_cast<R>(context.isovalue);
-    const float t =
-        static_cast<float>(std::is_floating_point_v<T> ? crossing(a, b, iso) : (iso - a) / (b - a));
+    const float t = static_cast<float>(std::is_floating_point_v<T> ? edge_parameter(a, b, iso)
+                                                                   : (iso - a) / (b - a));
     const Int3 at = tile.shape.origin + Int3{x, y, z};
     Vec3f where{static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)};
     where[axis] += t;
@@ -95,17 +95,17 @@ struct ScalarVertices {
   }
 
   /// A vertex on the sample at place x | y << 6 | z << 12. Where its gradient
-  /// vanishes, the normal is along its first crossing edge: −x, +x, −y …
+  /// vanishes, the normal is along its first active edge: −x, +x, −y …
   void write_sample(std::uint32_t place, Vec3f* position, Vec3f* normal) const {
     const int x = place & 63, y = place >> 6 & 63, z = place >> 12 & 63;
     const T* p = samples + TileLayout::offset(x, y, z);
     const Int3 at = tile.shape.origin + Int3{x, y, z};
     *position = context.world.position(
         {static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)});
-    if (normal) *normal = context.world.unit_normal(gradient(p, at), first_crossing_edge(p, at));
+    if (normal) *normal = context.world.unit_normal(gradient(p, at), first_active_edge(p, at));
   }
 
-  Vec3f first_crossing_edge(const T* p, Int3 at) const {
+  Vec3f first_active_edge(const T* p, Int3 at) const {
     const T threshold = Threshold<T>(context.isovalue).value;
     Vec3f along{0, 0, 0};
     for (int axis = 0; axis < 3; ++axis)

@@ -100,11 +100,11 @@ void TerminalProgress::erase() {
   drawn_ = false;
 }
 
-Console::Console(Speech speech)
-    : speech_(speech), progress_(!speech.quiet && isatty(STDERR_FILENO) == 1) {}
+Console::Console(OutputMode mode)
+    : mode_(mode), progress_(!mode.quiet && isatty(STDERR_FILENO) == 1) {}
 
 void Console::reserve_output() {
-  if (speech_.json)
+  if (mode_.json)
     throw UsageError("--json and the output '-' would both be on standard output; name a file");
   if (isatty(STDOUT_FILENO) == 1)
     throw UsageError("standard output is a terminal; redirect it, or name a file");
@@ -114,9 +114,9 @@ void Console::reserve_output() {
 void Console::result(const nlohmann::ordered_json& object, std::string_view text) const {
   using nlohmann::ordered_json;
   if (reserved_) return note(text);
-  if (speech_.json)
+  if (mode_.json)
     put(stdout, object.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + '\n');
-  else if (!speech_.quiet)
+  else if (!mode_.quiet)
     put(stdout, text);
 }
 
@@ -125,7 +125,7 @@ void Console::result_text(std::string_view command, std::string_view text) const
 }
 
 void Console::note(std::string_view text) const {
-  if (!speech_.quiet) say(fmt::format("{}{}", text, text.ends_with('\n') ? "" : "\n"));
+  if (!mode_.quiet) say(fmt::format("{}{}", text, text.ends_with('\n') ? "" : "\n"));
 }
 
 void print_error(std::string_view command, std::string_view what) {

@@ -13,7 +13,7 @@
 namespace isobrick::tools {
 
 /// How the program was told to speak.
-struct Speech {
+struct OutputMode {
   bool json = false;
   bool quiet = false;
 };
@@ -52,7 +52,7 @@ std::string progress_line(std::string_view stage, std::uint64_t done, std::uint6
 /// one JSON object; everything else to standard error.
 class Console {
  public:
-  explicit Console(Speech speech);
+  explicit Console(OutputMode mode);
 
   /// From now on standard output carries the command's output, and results go to standard error.
   /// Throws UsageError with --json, and where standard output is a terminal.
@@ -66,7 +66,7 @@ class Console {
   Progress& progress() { return progress_; }
 
  private:
-  Speech speech_;
+  OutputMode mode_;
   bool reserved_ = false;  ///< standard output is the command's output
   TerminalProgress progress_;
 };

@@ -248,14 +248,14 @@ void check_pictures(const std::vector<ExtractedSurface>& surfaces, const Argumen
   }
 }
 
-struct MadeSurfaces {
+struct SurfaceReports {
   std::vector<ExtractReport> reports;  ///< of each mesh, or of the picture where there is no mesh
-  std::vector<MadePass> passes;
+  std::vector<PassReport> passes;
 };
 
 /// Makes all meshes and pictures.
-MadeSurfaces make(const std::vector<ExtractedSurface>& surfaces, const std::vector<Sinks>& sinks,
-                  const StoreReader& store, Console& console) {
+SurfaceReports make(const std::vector<ExtractedSurface>& surfaces, const std::vector<Sinks>& sinks,
+                    const StoreReader& store, Console& console) {
   std::vector<SurfaceOutput> outputs;
   std::vector<std::string> names;
   std::vector<std::size_t> reported;
@@ -273,40 +273,40 @@ MadeSurfaces make(const std::vector<ExtractedSurface>& surfaces, const std::vect
   }
   const std::vector<ExtractReport> reports =
       extract(store, surfaces.front().options, outputs, console.progress());
-  MadeSurfaces made;
+  SurfaceReports made;
   for (const std::size_t i : reported) made.reports.push_back(reports[i]);
   made.passes = passes_of(reports, names);
   return made;
 }
 
 /// What there is to say of each surface.
-struct Said {
+struct CommandOutput {
   ordered_json objects = ordered_json::array(), passes;  ///< no passes of an estimate
   std::string text;
 };
 
-Said estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
-                  Console& console) {
-  Said said;
+CommandOutput estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
+                           Console& console) {
+  CommandOutput result;
   for (const ExtractedSurface& surface : surfaces) {
     const ExtractEstimate guess = estimate_one(surface, store);
-    said.objects.push_back(estimate_json(surface, guess));
-    said.text += estimate_text(surface, guess);
+    result.objects.push_back(estimate_json(surface, guess));
+    result.text += estimate_text(surface, guess);
     const ExtractOptions& options = surface.options;
     if (const std::string why = why_out_of_range(store, options.level, options.isovalue);
         guess.mesh.triangles == 0 && !why.empty())
       console.note(why);
   }
-  return said;
+  return result;
 }
 
-Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& surfaces,
-              const StoreReader& store, Console& console) {
+CommandOutput make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& surfaces,
+                       const StoreReader& store, Console& console) {
   check_pictures(surfaces, arguments, store);
   if (!arguments.no_space_check) check_space(surfaces, store);
   const std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
-  const MadeSurfaces made = make(surfaces, sinks, store, console);
-  Said said;
+  const SurfaceReports made = make(surfaces, sinks, store, console);
+  CommandOutput result;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ExtractReport& report = made.reports[i];
     if (report.triangles == 0) console.note(why_empty(surfaces[i].options, report, store));
@@ -314,12 +314,12 @@ Said make_all(const Arguments& arguments, const std::vector<ExtractedSurface>& s
                                 : is_standard_output(arguments.output)
                                     ? sinks[i].mesh->bytes()
                                     : mesh_bytes(surfaces[i].output);
-    said.objects.push_back(report_json(surfaces[i], report, bytes));
-    said.text += report_text(surfaces[i], report, bytes, surfaces.size() == 1);
+    result.objects.push_back(report_json(surfaces[i], report, bytes));
+    result.text += report_text(surfaces[i], report, bytes, surfaces.size() == 1);
   }
-  said.passes = passes_json(made.passes);
-  if (surfaces.size() > 1 || made.passes.size() > 1) said.text += passes_text(made.passes);
-  return said;
+  result.passes = passes_json(made.passes);
+  if (surfaces.size() > 1 || made.passes.size() > 1) result.text += passes_text(made.passes);
+  return result;
 }
 
 /// Beyond its narrow band a level set does not change: what there is of a surface is no contour.
@@ -338,16 +338,16 @@ int run(const Arguments& arguments, Console& console) {
   const StoreReader store = open_store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
   for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
-  const Said said = arguments.estimate ? estimate_all(surfaces, store, console)
-                                       : make_all(arguments, surfaces, store, console);
+  const CommandOutput result = arguments.estimate ? estimate_all(surfaces, store, console)
+                                                  : make_all(arguments, surfaces, store, console);
   ordered_json result{{"command", "extract"},
                       {"store", arguments.store},
                       {"level", arguments.level},
                       {"estimate", arguments.estimate},
-                      {"surfaces", said.objects}};
-  if (!arguments.estimate) result["passes"] = said.passes;
+                      {"surfaces", result.objects}};
+  if (!arguments.estimate) result["passes"] = result.passes;
   result["peak_resident_bytes"] = peak_resident_bytes();
-  console.result(result, said.text);
+  console.result(result, result.text);
   return 0;
 }
 

@@ -116,9 +116,9 @@ std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
   return text;
 }
 
-std::vector<MadePass> passes_of(std::span<const ExtractReport> reports,
-                                std::span<const std::string> names) {
-  std::vector<MadePass> passes;
+std::vector<PassReport> passes_of(std::span<const ExtractReport> reports,
+                                  std::span<const std::string> names) {
+  std::vector<PassReport> passes;
   for (std::size_t i = 0; i < reports.size(); ++i) {
     if (reports[i].pass == passes.size()) passes.push_back({{}, reports[i]});
     passes[reports[i].pass].outputs.push_back(names[i]);
@@ -126,9 +126,9 @@ std::vector<MadePass> passes_of(std::span<const ExtractReport> reports,
   return passes;
 }
 
-ordered_json passes_json(std::span<const MadePass> passes) {
+ordered_json passes_json(std::span<const PassReport> passes) {
   ordered_json list = ordered_json::array();
-  for (const MadePass& pass : passes)
+  for (const PassReport& pass : passes)
     list.push_back({{"outputs", pass.outputs},
                     {"bricks_read", pass.report.bricks_read},
                     {"brick_reads", pass.report.brick_reads},
@@ -137,9 +137,9 @@ ordered_json passes_json(std::span<const MadePass> passes) {
   return list;
 }
 
-std::string passes_text(std::span<const MadePass> passes) {
+std::string passes_text(std::span<const PassReport> passes) {
   std::string text;
-  for (const MadePass& pass : passes)
+  for (const PassReport& pass : passes)
     text += fmt::format("{} {} {}\n", human_count(pass.outputs.size()),
                         pass.outputs.size() == 1 ? "file" : "files", what_was_read(pass.report));
   if (passes.size() > 1)

@@ -35,16 +35,16 @@ std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
                         std::uint64_t bytes, bool only);
 
 /// What was made in one pass over the store.
-struct MadePass {
+struct PassReport {
   std::vector<std::string> outputs;
   ExtractReport report;  ///< of any of them
 };
 
 /// The passes that made the outputs of these names, which have a report each.
-std::vector<MadePass> passes_of(std::span<const ExtractReport> reports,
-                                std::span<const std::string> names);
+std::vector<PassReport> passes_of(std::span<const ExtractReport> reports,
+                                  std::span<const std::string> names);
 
-nlohmann::ordered_json passes_json(std::span<const MadePass> passes);
-std::string passes_text(std::span<const MadePass> passes);
+nlohmann::ordered_json passes_json(std::span<const PassReport> passes);
+std::string passes_text(std::span<const PassReport> passes);
 
 }  // namespace isobrick::tools

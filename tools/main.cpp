@@ -74,7 +74,7 @@ int run(Program& program, int argc, char** argv) {
   try {
     program.app.parse(words_to_parse(program.app, argc, argv));
     set_up_signals(name_of(parsed(program)));
-    Console console(program.speech);
+    Console console(program.mode);
     const int status = parsed(program)->run(console);
     end_interrupts();
     return status;
@@ -94,7 +94,7 @@ int run(Program& program, int argc, char** argv) {
     print_out_of_memory(name_of(parsed(program)));
     return 1;
   } catch (const std::exception& error) {
-    print_error(name_of(parsed(program)), what_of(error));
+    print_error(name_of(parsed(program)), error_message(error));
     return 1;
   }
 }

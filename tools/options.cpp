@@ -122,11 +122,11 @@ void add_clip(CLI::App* app, std::vector<HalfSpace>& planes) {
   add_repeated(app,
                {"--clip", "NX,NY,NZ,D",
                 fmt::format("Show only where NX*x + NY*y + NZ*z >= D, world units; up to {} times",
-                            kMostClipPlanes)},
+                            kMaxClipPlanes)},
                [&planes](const std::string& text) {
                  planes.push_back(parse_half_space(text));
-                 if (planes.size() > kMostClipPlanes)
-                   throw UsageError(fmt::format("{} planes at most", kMostClipPlanes));
+                 if (planes.size() > kMaxClipPlanes)
+                   throw UsageError(fmt::format("{} planes at most", kMaxClipPlanes));
                });
 }
 

@@ -27,7 +27,7 @@ struct Command {
 /// man page.
 struct Program {
   CLI::App& app;
-  Speech speech;
+  OutputMode speech;
   std::vector<Command> commands;
 };
 
@@ -95,7 +95,7 @@ void add_roi(CLI::App* app, std::optional<RoiText>& roi);
 void add_memory(CLI::App* app, std::uint64_t& memory, const char* default_text = "1G");
 void add_threads(CLI::App* app, int& threads);
 void add_force(CLI::App* app, bool& force);
-/// --clip, up to kMostClipPlanes times.
+/// --clip, up to kMaxClipPlanes times.
 void add_clip(CLI::App* app, std::vector<HalfSpace>& planes);
 /// --inside.
 void add_inside(CLI::App* app, std::optional<Inside>& inside);

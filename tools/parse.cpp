@@ -130,8 +130,8 @@ PictureSize parse_picture_size(std::string_view text) {
   const auto by = text.find('x');
   if (by == std::string_view::npos)
     throw UsageError(fmt::format("'{}' is not of the form WIDTHxHEIGHT", text));
-  return {parse_int(text.substr(0, by), kLeastPictureEdge, kMostPictureEdge),
-          parse_int(text.substr(by + 1), kLeastPictureEdge, kMostPictureEdge)};
+  return {parse_int(text.substr(0, by), kMinPictureEdge, kMaxPictureEdge),
+          parse_int(text.substr(by + 1), kMinPictureEdge, kMaxPictureEdge)};
 }
 
 Vec3f parse_colour(std::string_view text) {

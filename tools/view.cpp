@@ -115,7 +115,7 @@ void see_whole(std::vector<Shot>& turn, const WorldBox& box, double aspect) {
 }
 
 /// The pictures that are asked for, of which none may be there already.
-std::vector<Shot> shots_of(const Arguments& arguments, const StorePicture& picture,
+std::vector<Shot> shots_of(const Arguments& arguments, const SceneRenderer& picture,
                            const ViewSettings& settings) {
   if (!arguments.screenshot.empty()) check_picture_name(arguments.screenshot);
   const CameraRequest& request = arguments.picture.camera;
@@ -140,15 +140,16 @@ std::vector<Shot> shots_of(const Arguments& arguments, const StorePicture& pictu
 }
 
 /// What all pictures have come to.
-struct Drawn {
+struct ScreenshotReport {
   std::set<std::string> damage;
   std::uint64_t most_triangles = 0;
   bool limited_by_budget = false;
 };
 
-Drawn draw_shots(StorePicture& picture, const std::vector<Shot>& shots, PictureSize size,
-                 const ViewSettings& settings, bool force, Progress& progress) {
-  Drawn drawn;
+ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Shot>& shots,
+                            PictureSize size, const ViewSettings& settings, bool force,
+                            Progress& progress) {
+  ScreenshotReport drawn;
   progress.begin("draw", 0);
   for (const Shot& shot : shots) {
     picture.draw_complete(shot.camera, size.width, size.height, settings,
@@ -174,10 +175,10 @@ int draw(const Arguments& arguments, Console& console) {
   ViewSettings settings = settings_of(arguments);
   set_region(*store, arguments, settings);
   const GlContext context;
-  StorePicture picture(store,
-                       divide_view_memory(arguments.budgets, *store, arguments.picture.size,
-                                          transparent, current_gl_device().software),
-                       {});
+  SceneRenderer picture(store,
+                        divide_view_memory(arguments.budgets, *store, arguments.picture.size,
+                                           transparent, current_gl_device().software),
+                        {});
   choose_values(settings, picture.scene().tree());
   const std::vector<Shot> shots = shots_of(arguments, picture, settings);
   NodeSearch& search = picture.scene().search();
@@ -185,8 +186,8 @@ int draw(const Arguments& arguments, Console& console) {
   search.wait();
   if (const std::string refused = search.state().refused; !refused.empty())
     console.note(refused + ": a linear scan is used");
-  const Drawn drawn = draw_shots(picture, shots, arguments.picture.size, settings, arguments.force,
-                                 console.progress());
+  const ScreenshotReport drawn = draw_shots(picture, shots, arguments.picture.size, settings,
+                                            arguments.force, console.progress());
   for (const std::string& message : drawn.damage) console.note(message);
   for (const SurfaceSettings& surface : settings.surfaces)
     if (const std::string why = why_out_of_range(*store, arguments.level, surface.isovalue);
@@ -257,9 +258,9 @@ int run(const Arguments& arguments, Console& console) {
 
 float parse_pixel_error(const std::string& text) {
   const auto pixels = static_cast<float>(parse_number(text));
-  if (!(pixels >= kLeastPixelError && pixels <= kMostPixelError))
+  if (!(pixels >= kMinPixelError && pixels <= kMaxPixelError))
     throw UsageError(fmt::format("'{}' is no pixel error; it lies within {} and {}", text,
-                                 kLeastPixelError, kMostPixelError));
+                                 kMinPixelError, kMaxPixelError));
   return pixels;
 }
 

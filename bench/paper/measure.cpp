@@ -56,7 +56,7 @@ class Measurement {
         bricks_(lattice_, v.samples.data()),
         surface_(make_surface()),
         extractor_(lattice_, surface_,
-                   {.tiles = CpuExtractor::good_batch(arena_.max_concurrency())}) {}
+                   {.tiles = CpuExtractor::preferred_batch(arena_.max_concurrency())}) {}
 
   nlohmann::json run() {
     nlohmann::json out;

@@ -2,21 +2,21 @@
 
 #include <fmt/format.h>
 
-#include "bricks/ranges/sealed_json.h"
-#include "bricks/zarr/checked_json.h"
+#include "bricks/ranges/checksummed_json.h"
+#include "bricks/zarr/json_reader.h"
 
 namespace isobrick {
 namespace {
 
 constexpr int kVersion = 2;
 
-ScalarType parse_type(const CheckedJson& json) {
+ScalarType parse_type(const JsonReader& json) {
   const auto type = parse_scalar_type(json.string());
   if (!type || json.string() != zarr_name(*type)) json.damaged("is no data type");
   return *type;
 }
 
-Int3 parse_extent(const CheckedJson& json) {
+Int3 parse_extent(const JsonReader& json) {
   if (json.array_size() != 3) json.damaged("must have 3 numbers");
   return {json.at(std::size_t{2}).positive(), json.at(std::size_t{1}).positive(),
           json.at(std::size_t{0}).positive()};
@@ -36,14 +36,14 @@ std::string to_json(const IndexLayout& layout) {
   json["zstd_level"] = nullptr;
   if (layout.zstd_level) json["zstd_level"] = *layout.zstd_level;
   json["ranges_crc32c"] = layout.ranges_crc32c;
-  return seal_json(std::move(json));
+  return checksum_json(std::move(json));
 }
 
-std::uint32_t checksum_of(const IndexLayout& layout) { return seal_of(to_json(layout)); }
+std::uint32_t checksum_of(const IndexLayout& layout) { return json_checksum(to_json(layout)); }
 
 IndexLayout parse_index_layout(std::string_view text, const std::string& where) {
-  const nlohmann::json object = unseal_json(text, where);
-  const CheckedJson json(object, where);
+  const nlohmann::json object = read_checksummed_json(text, where);
+  const JsonReader json(object, where);
   json.at("isobrick_index")
       .check_version("index", kVersion, "isobrick index --force makes it anew");
   if (json.at("brick").integer() != IndexLayout::kBrick ||

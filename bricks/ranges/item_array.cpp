@@ -6,8 +6,8 @@
 #include <utility>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/checked_json.h"
 #include "bricks/zarr/codec.h"
+#include "bricks/zarr/json_reader.h"
 #include "io/bytes/file.h"
 
 namespace isobrick {

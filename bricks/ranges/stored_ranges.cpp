@@ -1,7 +1,7 @@
 #include "bricks/ranges/stored_ranges.h"
 
-#include "bricks/ranges/sealed_json.h"
-#include "bricks/zarr/checked_json.h"
+#include "bricks/ranges/checksummed_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "io/bytes/file.h"
 
 namespace isobrick {
@@ -25,18 +25,18 @@ std::string to_json(const StoredRanges& stored) {
     json["levels"].push_back({{"range_crc32c", level.bricks},
                               {"block_range_crc32c", level.blocks},
                               {"brick_crc32c", level.content}});
-  return seal_json(std::move(json));
+  return checksum_json(std::move(json));
 }
 
 StoredRanges parse_stored_ranges(std::string_view text, const std::string& where) {
-  const nlohmann::json object = unseal_json(text, where);
-  const CheckedJson json(object, where);
+  const nlohmann::json object = read_checksummed_json(text, where);
+  const JsonReader json(object, where);
   json.at("isobrick_ranges")
       .check_version("ranges", kVersion, "remove the file and run isobrick index");
   StoredRanges stored{json.at("may_have_nan").boolean(),
                       static_cast<std::uint32_t>(json.at("image_crc32c").integer()),
                       {}};
-  const CheckedJson levels = json.at("levels");
+  const JsonReader levels = json.at("levels");
   for (std::size_t i = 0; i < levels.array_size(); ++i) {
     const auto checksum = [level = levels.at(i)](const char* key) {
       return static_cast<std::uint32_t>(level.at(key).integer());

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/shard_index.h"
 
 namespace isobrick {
@@ -41,7 +41,7 @@ Json fill_value_json(ScalarType type, double value) {
   return value;
 }
 
-double bits_to_double(const CheckedJson& json, ScalarType type, const std::string& text) {
+double bits_to_double(const JsonReader& json, ScalarType type, const std::string& text) {
   const std::size_t digits = 2 * size_of(type);
   if (text.size() != digits + 2 ||
       text.find_first_not_of("0123456789abcdefABCDEF", 2) != std::string::npos)
@@ -52,7 +52,7 @@ double bits_to_double(const CheckedJson& json, ScalarType type, const std::strin
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
 }
 
-double parse_fill_value(const CheckedJson& json, ScalarType type) {
+double parse_fill_value(const JsonReader& json, ScalarType type) {
   double value = 0;
   if (is_floating(type) && json.raw().is_string()) {
     const std::string text = json.string();
@@ -82,7 +82,7 @@ double parse_fill_value(const CheckedJson& json, ScalarType type) {
 }
 
 // Integers that no double is are refused, as samples are.
-double parse_integer(const CheckedJson& json) {
+double parse_integer(const JsonReader& json) {
   const nlohmann::json& raw = json.raw();
   std::uint64_t bits = 0;
   double value = 0;
@@ -107,7 +107,7 @@ double parse_integer(const CheckedJson& json) {
   return value;
 }
 
-double parse_wide_fill_value(const CheckedJson& json, WideType type) {
+double parse_wide_fill_value(const JsonReader& json, WideType type) {
   if (type == WideType::boolean)
     return (json.raw().is_boolean() ? json.boolean() : parse_integer(json) != 0) ? 1 : 0;
   if (type != WideType::f16) {
@@ -127,7 +127,7 @@ std::optional<ScalarType> parse_own_type(std::string_view name) {
   return std::nullopt;
 }
 
-std::vector<Index> parse_extents(const CheckedJson& json, std::size_t dimensions) {
+std::vector<Index> parse_extents(const JsonReader& json, std::size_t dimensions) {
   if (json.array_size() != dimensions)
     json.damaged(fmt::format("has {} numbers, must have {}", json.array_size(), dimensions));
   std::vector<Index> extents(dimensions);
@@ -136,7 +136,7 @@ std::vector<Index> parse_extents(const CheckedJson& json, std::size_t dimensions
 }
 
 // The product of extents and `unit`, refused when above the limit.
-void check_bytes(const CheckedJson& json, std::span<const Index> extents, std::uint64_t unit) {
+void check_bytes(const JsonReader& json, std::span<const Index> extents, std::uint64_t unit) {
   std::uint64_t bytes = unit;
   for (const Index extent : extents) {
     if (static_cast<std::uint64_t>(extent) > kMaxBrickBytes / bytes)
@@ -147,7 +147,7 @@ void check_bytes(const CheckedJson& json, std::span<const Index> extents, std::u
 }
 
 // A codec is an object with a name or, without configuration, the name alone.
-std::string codec_name(const CheckedJson& codec) {
+std::string codec_name(const JsonReader& codec) {
   return codec.raw().is_string() ? codec.string() : codec.string_at("name");
 }
 
@@ -161,12 +161,12 @@ std::optional<ByteCodec> byte_codec(std::string_view name) {
   return std::nullopt;
 }
 
-CodecChain parse_chain(const CheckedJson& codecs, ScalarType type) {
+CodecChain parse_chain(const JsonReader& codecs, ScalarType type) {
   CodecChain chain;
   const std::size_t count = codecs.array_size();
   if (count == 0 || count > kMaxCodecs) codecs.damaged(fmt::format("{} codecs", count));
   for (std::size_t i = 0; i < count; ++i) {
-    const CheckedJson codec = codecs.at(i);
+    const JsonReader codec = codecs.at(i);
     const std::string name = codec_name(codec);
     if (i == 0) {
       if (name != "bytes") codec.unsupported(fmt::format("codec '{}' is not supported here", name));
@@ -194,8 +194,8 @@ CodecChain parse_chain(const CheckedJson& codecs, ScalarType type) {
   return chain;
 }
 
-void parse_sharding(const CheckedJson& codec, ArrayMetadata& array) {
-  const CheckedJson configuration = codec.at("configuration");
+void parse_sharding(const JsonReader& codec, ArrayMetadata& array) {
+  const JsonReader configuration = codec.at("configuration");
   ArrayMetadata::Sharding sharding;
   sharding.brick = parse_extents(configuration.at("chunk_shape"), array.shape.size());
   std::vector<Index> counts(sharding.brick.size());
@@ -207,7 +207,7 @@ void parse_sharding(const CheckedJson& codec, ArrayMetadata& array) {
   }
   check_bytes(configuration, counts, ShardIndex::kEntryBytes);
   array.codecs = parse_chain(configuration.at("codecs"), array.type);
-  const CheckedJson index = configuration.at("index_codecs");
+  const JsonReader index = configuration.at("index_codecs");
   const CodecChain chain = parse_chain(index, ScalarType::f64);
   if (chain.big_endian || chain.steps.size() > 1 ||
       (chain.steps.size() == 1 && chain.steps[0] != ByteCodec::crc32c))
@@ -222,7 +222,7 @@ void parse_sharding(const CheckedJson& codec, ArrayMetadata& array) {
   array.sharding = std::move(sharding);
 }
 
-void parse_key_encoding(const CheckedJson& json, ArrayMetadata& array) {
+void parse_key_encoding(const JsonReader& json, ArrayMetadata& array) {
   const std::string name = json.string_at("name");
   if (name != "default" && name != "v2")
     json.unsupported(fmt::format("chunk key encoding '{}' is not supported", name));
@@ -237,7 +237,7 @@ void parse_key_encoding(const CheckedJson& json, ArrayMetadata& array) {
 }
 
 // Members that we do not know must not be ignored unless they say that they may be.
-void check_members(const CheckedJson& json) {
+void check_members(const JsonReader& json) {
   static constexpr std::string_view known[] = {
       "zarr_format",         "node_type",  "shape",  "data_type",       "chunk_grid",
       "attributes",          "fill_value", "codecs", "dimension_names", "chunk_key_encoding",
@@ -292,26 +292,26 @@ std::string to_json(const ArrayMetadata& array) {
 
 ArrayMetadata parse_array_metadata(std::string_view text, const std::string& where) {
   const nlohmann::json parsed = parse_json(text, where);
-  const CheckedJson json(parsed, where);
+  const JsonReader json(parsed, where);
   if (json.at("zarr_format").integer() != 3) json.unsupported("only Zarr version 3 is supported");
   if (json.string_at("node_type") != "array") json.damaged("must be an array");
   check_members(json);
 
   ArrayMetadata array;
-  const CheckedJson shape = json.at("shape");
+  const JsonReader shape = json.at("shape");
   const std::size_t dimensions = shape.array_size();
   if (dimensions == 0 || dimensions > kMaxDimensions)
     shape.unsupported(fmt::format("{} dimensions are not supported", dimensions));
   array.shape = parse_extents(shape, dimensions);
 
-  const CheckedJson type = json.at("data_type");
+  const JsonReader type = json.at("data_type");
   const std::string type_name = type.raw().is_string() ? type.string() : type.string_at("name");
   array.wide = parse_wide_type(type_name);
   const auto own = array.wide ? widened(*array.wide) : parse_own_type(type_name);
   if (!own) type.unsupported(fmt::format("data type '{}' is not supported", type_name));
   array.type = *own;
 
-  const CheckedJson grid = json.at("chunk_grid");
+  const JsonReader grid = json.at("chunk_grid");
   if (const std::string name = grid.string_at("name"); name != "regular")
     grid.unsupported(fmt::format("chunk grid '{}' is not supported", name));
   array.chunk = parse_extents(grid.at("configuration").at("chunk_shape"), dimensions);
@@ -319,7 +319,7 @@ ArrayMetadata parse_array_metadata(std::string_view text, const std::string& whe
   array.fill_value = array.wide ? parse_wide_fill_value(json.at("fill_value"), *array.wide)
                                 : parse_fill_value(json.at("fill_value"), array.type);
 
-  const CheckedJson codecs = json.at("codecs");
+  const JsonReader codecs = json.at("codecs");
   if (codecs.array_size() == 1 && codec_name(codecs.at(std::size_t{0})) == "sharding_indexed") {
     parse_sharding(codecs.at(std::size_t{0}), array);
     check_bytes(codecs, array.sharding->brick, size_of(array.type));
@@ -328,7 +328,7 @@ ArrayMetadata parse_array_metadata(std::string_view text, const std::string& whe
     check_bytes(codecs, array.chunk, size_of(array.type));
   }
   if (json.has("dimension_names") && json.raw()["dimension_names"].is_array()) {
-    const CheckedJson names = json.at("dimension_names");
+    const JsonReader names = json.at("dimension_names");
     for (std::size_t i = 0; i < names.array_size(); ++i)
       array.dimension_names.push_back(names.raw()[i].is_string() ? names.at(i).string() : "");
   }

@@ -7,8 +7,8 @@
 #include <set>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/checked_json.h"
 #include "bricks/zarr/codec.h"
+#include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/ome_transformations.h"
 
 namespace isobrick {
@@ -21,7 +21,7 @@ constexpr const char* kChecksumKey = "metadata_crc32c";
 
 Json zyx(Vec3d v) { return {v.z, v.y, v.x}; }
 
-ImageMetadata::Axis parse_leading_axis(const CheckedJson& axis) {
+ImageMetadata::Axis parse_leading_axis(const JsonReader& axis) {
   using enum ImageMetadata::Axis::Role;
   ImageMetadata::Axis result{axis.string_at("name"), unknown};
   const std::string type =
@@ -35,7 +35,7 @@ ImageMetadata::Axis parse_leading_axis(const CheckedJson& axis) {
 }
 
 // Returns the unit of z, y, x, which must be the last.
-std::string parse_axes(const CheckedJson& axes, ImageMetadata& image) {
+std::string parse_axes(const JsonReader& axes, ImageMetadata& image) {
   const std::size_t count = axes.array_size();
   if (count < 3 || count > kMaxAxes)
     axes.unsupported(
@@ -44,7 +44,7 @@ std::string parse_axes(const CheckedJson& axes, ImageMetadata& image) {
     image.leading.push_back(parse_leading_axis(axes.at(i)));
   std::string unit;
   for (std::size_t i = 0; i < 3; ++i) {
-    const CheckedJson axis = axes.at(count - 3 + i);
+    const JsonReader axis = axes.at(count - 3 + i);
     const std::string name = axis.string_at("name");
     if (name != std::string(1, "zyx"[i]) || (axis.has("type") && axis.string_at("type") != "space"))
       axis.unsupported(fmt::format("axis '{}' is not supported, only z, y, x in this order", name));
@@ -57,7 +57,7 @@ std::string parse_axes(const CheckedJson& axes, ImageMetadata& image) {
   return unit;
 }
 
-void check_path(const CheckedJson& json, const std::string& path) {
+void check_path(const JsonReader& json, const std::string& path) {
   // Array paths come from a file: they must not lead out of the store.
   bool bad = path.empty() || path.front() == '/' || path.find('\0') != std::string::npos;
   for (std::size_t begin = 0; begin <= path.size();) {
@@ -68,7 +68,7 @@ void check_path(const CheckedJson& json, const std::string& path) {
   if (bad) json.damaged(fmt::format("'{}' is no path inside the store", path));
 }
 
-void add_level(const CheckedJson& dataset, const AffineMap& map, const std::string& unit,
+void add_level(const JsonReader& dataset, const AffineMap& map, const std::string& unit,
                ImageMetadata& image) {
   ImageMetadata::Level level;
   level.path = dataset.string_at("path");
@@ -78,23 +78,23 @@ void add_level(const CheckedJson& dataset, const AffineMap& map, const std::stri
   image.levels.push_back(std::move(level));
 }
 
-CheckedJson datasets_of(const CheckedJson& multiscale) {
-  const CheckedJson datasets = multiscale.at("datasets");
+JsonReader datasets_of(const JsonReader& multiscale) {
+  const JsonReader datasets = multiscale.at("datasets");
   const std::size_t count = datasets.array_size();
   if (count == 0 || count > kMaxLevels) datasets.damaged(fmt::format("{} levels", count));
   return datasets;
 }
 
 // OME-Zarr 0.4 and 0.5: one coordinate system, transformations in lists.
-void parse_levels(const CheckedJson& multiscale, ImageMetadata& image) {
+void parse_levels(const JsonReader& multiscale, ImageMetadata& image) {
   const std::string unit = parse_axes(multiscale.at("axes"), image);
   const std::size_t axes = image.leading.size() + 3;
   AffineMap common;
   if (multiscale.has("coordinateTransformations"))
     common = parse_scale_and_translation(multiscale.at("coordinateTransformations"), axes);
-  const CheckedJson datasets = datasets_of(multiscale);
+  const JsonReader datasets = datasets_of(multiscale);
   for (std::size_t i = 0; i < datasets.array_size(); ++i) {
-    const CheckedJson dataset = datasets.at(i);
+    const JsonReader dataset = datasets.at(i);
     const AffineMap own =
         parse_scale_and_translation(dataset.at("coordinateTransformations"), axes);
     add_level(dataset, then(own, common), unit, image);
@@ -102,18 +102,18 @@ void parse_levels(const CheckedJson& multiscale, ImageMetadata& image) {
 }
 
 // The axes of the coordinate system of this name.
-CheckedJson axes_of(const CheckedJson& multiscale, const std::string& name) {
-  const CheckedJson systems = multiscale.at("coordinateSystems");
+JsonReader axes_of(const JsonReader& multiscale, const std::string& name) {
+  const JsonReader systems = multiscale.at("coordinateSystems");
   for (std::size_t i = 0; i < systems.array_size(); ++i)
     if (systems.at(i).string_at("name") == name) return systems.at(i).at("axes");
   systems.damaged(fmt::format("has no '{}'", name));
 }
 
 // The only transformation of a whole image that begins at the system; several leave open which.
-std::optional<CheckedJson> only_one_from(const CheckedJson& multiscale, const std::string& system) {
-  std::optional<CheckedJson> found;
+std::optional<JsonReader> only_one_from(const JsonReader& multiscale, const std::string& system) {
+  std::optional<JsonReader> found;
   if (!multiscale.has("coordinateTransformations")) return found;
-  const CheckedJson list = multiscale.at("coordinateTransformations");
+  const JsonReader list = multiscale.at("coordinateTransformations");
   for (std::size_t i = 0; i < list.array_size(); ++i) {
     if (coordinate_system(list.at(i).at("input")) != system) continue;
     if (found) return std::nullopt;
@@ -124,10 +124,10 @@ std::optional<CheckedJson> only_one_from(const CheckedJson& multiscale, const st
 
 // OME-Zarr 0.6: levels are placed in the intrinsic system; what leads on from there to one
 // other system is followed.
-void parse_levels_06(const CheckedJson& multiscale, ImageMetadata& image) {
-  const CheckedJson datasets = datasets_of(multiscale);
+void parse_levels_06(const JsonReader& multiscale, ImageMetadata& image) {
+  const JsonReader datasets = datasets_of(multiscale);
   const auto own_of = [&](std::size_t i) {
-    const CheckedJson list = datasets.at(i).at("coordinateTransformations");
+    const JsonReader list = datasets.at(i).at("coordinateTransformations");
     if (list.array_size() != 1)
       list.damaged(fmt::format("must have one transformation, has {}", list.array_size()));
     return list.at(std::size_t{0});
@@ -148,7 +148,7 @@ void parse_levels_06(const CheckedJson& multiscale, ImageMetadata& image) {
       next->unsupported("a transformation to other axes is not supported");
   }
   for (std::size_t i = 0; i < datasets.array_size(); ++i) {
-    const CheckedJson own = own_of(i);
+    const JsonReader own = own_of(i);
     if (coordinate_system(own.at("output")) != intrinsic)
       own.damaged(fmt::format("must lead to '{}', as that of the first level", intrinsic));
     add_level(datasets.at(i), then(parse_transformation(own, axes), common), unit, image);
@@ -161,9 +161,9 @@ bool is_06(std::string_view version) {
          (version.size() == 3 || version[3] < '0' || version[3] > '9');
 }
 
-void parse_multiscales(const CheckedJson& multiscales, bool version_06, ImageMetadata& image) {
+void parse_multiscales(const JsonReader& multiscales, bool version_06, ImageMetadata& image) {
   if (multiscales.array_size() == 0) multiscales.damaged("is empty");
-  const CheckedJson first = multiscales.at(std::size_t{0});
+  const JsonReader first = multiscales.at(std::size_t{0});
   if (first.has("name") && first.raw()["name"].is_string()) image.name = first.string_at("name");
   if (first.has("type") && first.raw()["type"].is_string())
     image.downsampling = first.string_at("type");
@@ -181,13 +181,13 @@ void parse_channel_names(const nlohmann::json& ome, ImageMetadata& image) {
   }
 }
 
-void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
+void parse_ours(const JsonReader& ours, ImageMetadata& image) {
   ours.at("version").check_version("store", kStoreVersion, "convert the volume anew");
   if (ours.has("may_have_nan")) image.may_have_nan = ours.at("may_have_nan").boolean();
   if (ours.has("grid_class")) image.grid_class = ours.string_at("grid_class");
   if (ours.has("grid_name")) image.grid_name = ours.string_at("grid_name");
   if (ours.has("direction")) {
-    const CheckedJson direction = ours.at("direction");
+    const JsonReader direction = ours.at("direction");
     if (direction.array_size() != 9) direction.damaged("must have 9 numbers");
     std::array<double, 9> values{};
     for (std::size_t i = 0; i < 9; ++i) values[i] = direction.at(i).number();
@@ -195,7 +195,7 @@ void parse_ours(const CheckedJson& ours, ImageMetadata& image) {
     for (ImageMetadata::Level& level : image.levels) level.transform.direction = values;
   }
   if (!ours.has(kChecksumKey)) return;
-  const CheckedJson checksum = ours.at(kChecksumKey);
+  const JsonReader checksum = ours.at(kChecksumKey);
   const Index value = checksum.integer();
   if (value < 0 || value > Index{0xffffffff}) checksum.damaged("is no checksum");
   image.checksum = static_cast<std::uint32_t>(value);
@@ -271,16 +271,16 @@ std::string to_json(const ImageMetadata& image) {
 
 ImageMetadata parse_image_metadata(std::string_view text, const std::string& where) {
   const nlohmann::json parsed = parse_json(text, where);
-  const CheckedJson json(parsed, where);
+  const JsonReader json(parsed, where);
   if (json.at("zarr_format").integer() != 3) json.unsupported("only Zarr version 3 is supported");
   if (json.string_at("node_type") != "group")
     json.unsupported("is an array; only OME-Zarr images (groups) are supported");
-  const CheckedJson attributes = json.at("attributes");
+  const JsonReader attributes = json.at("attributes");
   if (!attributes.has("ome"))
     json.unsupported(
         "is no OME-Zarr image: attributes.ome is missing; an image or an array in it can be "
         "named");
-  const CheckedJson ome = attributes.at("ome");
+  const JsonReader ome = attributes.at("ome");
   const std::string version = ome.string_at("version");
   if (version != "0.5" && !is_06(version))
     ome.unsupported(fmt::format("OME-Zarr {} is not supported, only 0.4 to 0.6", version));
@@ -297,7 +297,7 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
 std::uint32_t metadata_checksum(std::string_view root, std::span<const std::string> levels,
                                 const std::string& where) {
   const nlohmann::json parsed = parse_json(root, where);
-  const CheckedJson attributes = CheckedJson(parsed, where).at("attributes");
+  const JsonReader attributes = JsonReader(parsed, where).at("attributes");
   nlohmann::json covered = nlohmann::json::object();
   // Other programs may add to the rest of `ome` how they show the image.
   covered["multiscales"] = attributes.at("ome").at("multiscales").raw();

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 
 namespace isobrick {
 namespace {

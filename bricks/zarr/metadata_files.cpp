@@ -5,7 +5,7 @@
 #include <optional>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/lone_array.h"
 #include "bricks/zarr/store_names.h"
 #include "bricks/zarr/zarr_v2.h"

@@ -12,14 +12,14 @@ std::size_t place_of(int axis, std::size_t axes) {
   return axes - 1 - static_cast<std::size_t>(axis);
 }
 
-Vec3d parse_vector(const CheckedJson& json, std::size_t axes) {
+Vec3d parse_vector(const JsonReader& json, std::size_t axes) {
   if (json.array_size() != axes) json.damaged(fmt::format("must have {} numbers", axes));
   Vec3d result;
   for (int axis = 0; axis < 3; ++axis) result[axis] = json.at(place_of(axis, axes)).number();
   return result;
 }
 
-AffineMap parse_scale(const CheckedJson& json, std::size_t axes) {
+AffineMap parse_scale(const JsonReader& json, std::size_t axes) {
   const Vec3d scale = parse_vector(json.at("scale"), axes);
   AffineMap map;
   for (int axis = 0; axis < 3; ++axis) {
@@ -29,19 +29,19 @@ AffineMap parse_scale(const CheckedJson& json, std::size_t axes) {
   return map;
 }
 
-AffineMap parse_translation(const CheckedJson& json, std::size_t axes) {
+AffineMap parse_translation(const JsonReader& json, std::size_t axes) {
   AffineMap map;
   map.offset = parse_vector(json.at("translation"), axes);
   return map;
 }
 
 // Rows of as many numbers as there are axes and, if it has an offset, one more.
-AffineMap parse_matrix(const CheckedJson& rows, std::size_t axes, bool has_offset) {
+AffineMap parse_matrix(const JsonReader& rows, std::size_t axes, bool has_offset) {
   const std::size_t columns = axes + (has_offset ? 1 : 0), leading = axes - 3;
   if (rows.array_size() != axes) rows.damaged(fmt::format("must have {} rows", axes));
   AffineMap map;
   for (std::size_t i = 0; i < axes; ++i) {
-    const CheckedJson row = rows.at(i);
+    const JsonReader row = rows.at(i);
     if (row.array_size() != columns) row.damaged(fmt::format("must have {} numbers", columns));
     for (std::size_t j = 0; j < columns; ++j) {
       const double value = row.at(j).number();
@@ -74,7 +74,7 @@ AffineMap then(const AffineMap& first, const AffineMap& second) {
   return both;
 }
 
-AffineMap parse_transformation(const CheckedJson& json, std::size_t axes) {
+AffineMap parse_transformation(const JsonReader& json, std::size_t axes) {
   const std::string type = json.string_at("type");
   if (type == "identity") return {};
   const bool known = type == "scale" || type == "translation" || type == "rotation" ||
@@ -82,7 +82,7 @@ AffineMap parse_transformation(const CheckedJson& json, std::size_t axes) {
   if (!known) json.unsupported(fmt::format("transformation '{}' is not supported", type));
   if (type == "sequence") {
     AffineMap map;
-    const CheckedJson list = json.at("transformations");
+    const JsonReader list = json.at("transformations");
     for (std::size_t i = 0; i < list.array_size(); ++i)
       map = then(map, parse_transformation(list.at(i), axes));
     return map;
@@ -95,11 +95,11 @@ AffineMap parse_transformation(const CheckedJson& json, std::size_t axes) {
   return parse_matrix(json.at(type.c_str()), axes, type == "affine");
 }
 
-AffineMap parse_scale_and_translation(const CheckedJson& list, std::size_t axes) {
+AffineMap parse_scale_and_translation(const JsonReader& list, std::size_t axes) {
   AffineMap map;
   bool scaled = false, translated = false;
   for (std::size_t i = 0; i < list.array_size(); ++i) {
-    const CheckedJson item = list.at(i);
+    const JsonReader item = list.at(i);
     const std::string type = item.string_at("type");
     if (type == "scale") {
       if (scaled) list.damaged("has two scales: OME-Zarr allows one");
@@ -118,7 +118,7 @@ AffineMap parse_scale_and_translation(const CheckedJson& list, std::size_t axes)
   return map;
 }
 
-Transform to_transform(const CheckedJson& json, const AffineMap& map) {
+Transform to_transform(const JsonReader& json, const AffineMap& map) {
   Transform transform;
   transform.origin = map.offset;
   for (int axis = 0; axis < 3; ++axis) {
@@ -138,7 +138,7 @@ Transform to_transform(const CheckedJson& json, const AffineMap& map) {
   return transform;
 }
 
-std::string coordinate_system(const CheckedJson& reference) {
+std::string coordinate_system(const JsonReader& reference) {
   if (reference.raw().is_string()) return reference.string();
   return reference.string_at(reference.has("name") ? "name" : "path");
 }

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/scalar.h>
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/stored_type.h"
 
 namespace isobrick {
@@ -17,7 +17,7 @@ struct NumpyType {
 };
 
 /// "<u2", "|i1", ">f4".
-NumpyType parse_dtype(const CheckedJson& json) {
+NumpyType parse_dtype(const JsonReader& json) {
   if (!json.raw().is_string()) json.unsupported("structured data types are not supported");
   const std::string text = json.string();
   const auto refuse = [&]() {
@@ -39,7 +39,7 @@ NumpyType parse_dtype(const CheckedJson& json) {
   return {};
 }
 
-Json codecs_of(const CheckedJson& json, bool big_endian) {
+Json codecs_of(const JsonReader& json, bool big_endian) {
   Json codecs = Json::array();
   codecs.push_back(
       {{"name", "bytes"}, {"configuration", {{"endian", big_endian ? "big" : "little"}}}});
@@ -48,7 +48,7 @@ Json codecs_of(const CheckedJson& json, bool big_endian) {
     json.at("filters").unsupported(fmt::format(
         "filter '{}' is not supported", json.at("filters").at(std::size_t{0}).string_at("id")));
   if (!json.has("compressor") || json.raw()["compressor"].is_null()) return codecs;
-  const CheckedJson compressor = json.at("compressor");
+  const JsonReader compressor = json.at("compressor");
   Json codec{{"name", compressor.string_at("id")}};
   if (compressor.has("level"))
     codec["configuration"] = {{"level", compressor.at("level").integer()}};
@@ -60,7 +60,7 @@ Json codecs_of(const CheckedJson& json, bool big_endian) {
 
 std::string v3_from_zarray(std::string_view text, const std::string& where) {
   const nlohmann::json parsed = parse_json(text, where);
-  const CheckedJson json(parsed, where);
+  const JsonReader json(parsed, where);
   if (json.at("zarr_format").integer() != 2) json.damaged("zarr_format must be 2");
   if (const std::string order = json.string_at("order"); order != "C")
     json.unsupported(fmt::format("order '{}' is not supported, only C", order));
@@ -75,7 +75,7 @@ std::string v3_from_zarray(std::string_view text, const std::string& where) {
   array["chunk_grid"] = {{"name", "regular"},
                          {"configuration", {{"chunk_shape", json.at("chunks").raw()}}}};
   array["chunk_key_encoding"] = {{"name", "v2"}, {"configuration", {{"separator", separator}}}};
-  const CheckedJson fill = json.at("fill_value");
+  const JsonReader fill = json.at("fill_value");
   // Null leaves open what an absent chunk holds; zero is what others show.
   array["fill_value"] = fill.raw().is_null() ? nlohmann::json(0) : fill.raw();
   array["codecs"] = codecs_of(json, type.big_endian);
@@ -84,11 +84,11 @@ std::string v3_from_zarray(std::string_view text, const std::string& where) {
 
 std::string v3_from_zattrs(std::string_view text, const std::string& where) {
   const nlohmann::json parsed = parse_json(text, where);
-  const CheckedJson json(parsed, where);
+  const JsonReader json(parsed, where);
   if (!json.has("multiscales")) return {};
-  const CheckedJson multiscales = json.at("multiscales");
+  const JsonReader multiscales = json.at("multiscales");
   if (multiscales.array_size() == 0) multiscales.damaged("is empty");
-  const CheckedJson first = multiscales.at(std::size_t{0});
+  const JsonReader first = multiscales.at(std::size_t{0});
   const std::string version = first.has("version") ? first.string_at("version") : "unknown";
   if (version != "0.4")
     first.unsupported(fmt::format("OME-NGFF {} is not supported, only 0.4 to 0.6", version));

@@ -57,7 +57,7 @@ constexpr std::size_t kSlotBytes =
     aligned(kVertices * sizeof(std::uint32_t)) + aligned(kSent);
 
 GridMeshSize size_of(const GridTotals& t) {
-  return {t.vertices + 2 * t.border_vertices, t.triangles + 2 * t.ribbon_sides, 2 * t.ribbon_sides};
+  return {t.vertices + 2 * t.border_vertices, t.triangles + 2 * t.seam_sides, 2 * t.seam_sides};
 }
 
 /// A cell with a triangle that meets a coarser grid, of stored samples: all kernels have work.
@@ -114,7 +114,7 @@ struct GridBatch::Impl {
       slot.work.rows = cut.take<GridRow>(kGridRows);
       slot.work.counts = cut.take<std::uint32_t>(4 * kGridRows);
       slot.work.faces = cut.take<std::uint8_t>(kVertices);
-      slot.work.ribbon_of = cut.take<std::uint32_t>(kVertices);
+      slot.work.seam_of = cut.take<std::uint32_t>(kVertices);
       slot.work.totals = cut.take<GridTotals>(1);
       slot.sent = cut.take<std::byte>(kSent);
       slot.work.host_totals = &totals[i];
@@ -182,7 +182,7 @@ struct GridBatch::Impl {
         there.coarse_place[axis] =
             stage(slot, g.coarse_place[axis], static_cast<std::size_t>(g.coarse_n[axis]));
     }
-    for (CoarseFace& face : there.faces)
+    for (LodSeam& face : there.faces)
       if (face.values)
         face.values = stage(slot, face.values, static_cast<std::size_t>(face.n[0] * face.n[1]));
     if (g.stored.samples == nullptr) return;

@@ -20,9 +20,9 @@ struct GridMeshPlace {
   }
 };
 
-/// How large a grid's mesh is, ribbons included.
+/// How large a grid's mesh is, seam strips included.
 struct GridMeshSize {
-  std::uint32_t vertices = 0, triangles = 0, ribbon_triangles = 0;
+  std::uint32_t vertices = 0, triangles = 0, seam_triangles = 0;
 };
 
 /// A grid in a slot, and where its mesh goes.

@@ -134,7 +134,7 @@ struct Cells {
   }
 };
 
-/// Crossing edges, and how many vertices and triangles that makes.
+/// Active edges, and how many vertices and triangles that makes.
 __global__ void __launch_bounds__(kThreads) count_rows(const GridWork* works) {
   __shared__ WorkStorage storage;
   const GridWork& w = load_work(works, storage);
@@ -148,16 +148,16 @@ __global__ void __launch_bounds__(kThreads) count_rows(const GridWork* works) {
   };
   const std::uint64_t next = row.inside[0] >> 1 | row.inside[1] << 63;
   const std::uint64_t next_number = row.number[0] >> 1 | row.number[1] << 63;
-  row.crossing[0][0] = (row.inside[0] ^ next) & row.number[0] & next_number & below(g.n[0] - 1);
-  row.crossing[0][1] = 0;
+  row.active_edges[0][0] = (row.inside[0] ^ next) & row.number[0] & next_number & below(g.n[0] - 1);
+  row.active_edges[0][1] = 0;
   unsigned vertices = 0, triangles = 0;
   for (int i = 0; i < 2; ++i) {
-    row.crossing[1][i] = y + 1 < g.n[1] ? across(w.rows[at + 1], i) : 0;
-    row.crossing[2][i] = z + 1 < g.n[2] ? across(w.rows[at + g.n[1]], i) : 0;
+    row.active_edges[1][i] = y + 1 < g.n[1] ? across(w.rows[at + 1], i) : 0;
+    row.active_edges[2][i] = z + 1 < g.n[2] ? across(w.rows[at + g.n[1]], i) : 0;
   }
   for (int axis = 0; axis < 3; ++axis)
-    vertices += static_cast<unsigned>(__popcll(row.crossing[axis][0])) +
-                static_cast<unsigned>(row.crossing[axis][1]);
+    vertices += static_cast<unsigned>(__popcll(row.active_edges[axis][0])) +
+                static_cast<unsigned>(row.active_edges[axis][1]);
   const Cells cells(w, at);
   for (std::uint64_t left = cells.active; left != 0; left &= left - 1)
     triangles += w.tables->triangles[cells.index(__ffsll(static_cast<long long>(left)) - 1)];
@@ -194,8 +194,8 @@ __global__ void __launch_bounds__(kScanThreads) number_rows(const GridWork* work
                                 for (int axis = 0; axis < 3; ++axis) {
                                   row.first_vertex[axis] = vertices;
                                   vertices +=
-                                      static_cast<unsigned>(__popcll(row.crossing[axis][0])) +
-                                      static_cast<unsigned>(row.crossing[axis][1]);
+                                      static_cast<unsigned>(__popcll(row.active_edges[axis][0])) +
+                                      static_cast<unsigned>(row.active_edges[axis][1]);
                                 }
                                 row.first_triangle = triangles;
                               });
@@ -208,9 +208,9 @@ template <int axis, class F>
 __device__ void for_each_edge(const GridRow& row, int lane, int points, F&& f) {
   for (int first = 0; first < points; first += 32) {
     const int x = first + lane;
-    const bool here =
-        x < 64 ? (row.crossing[axis][0] >> x & 1) != 0 : x == 64 && row.crossing[axis][1] != 0;
-    const int rank = __popcll(row.crossing[axis][0] & below(x));
+    const bool here = x < 64 ? (row.active_edges[axis][0] >> x & 1) != 0
+                             : x == 64 && row.active_edges[axis][1] != 0;
+    const int rank = __popcll(row.active_edges[axis][0] & below(x));
     f(here, x, row.first_vertex[axis] + static_cast<unsigned>(rank));
   }
 }
@@ -258,7 +258,8 @@ __device__ unsigned vertex_number(const GridWork& w, int row, int x, int edge) {
   const int at = row + (axis == 0 ? low + high * plane : axis == 1 ? high * plane : high);
   const int from = axis == 0 ? x : x + low;
   const GridRow& r = w.rows[at];
-  return r.first_vertex[axis] + static_cast<unsigned>(__popcll(r.crossing[axis][0] & below(from)));
+  return r.first_vertex[axis] +
+         static_cast<unsigned>(__popcll(r.active_edges[axis][0] & below(from)));
 }
 
 __device__ Triangle triangle_of(const GridWork& w, int row, int x, unsigned index, int t) {
@@ -277,7 +278,7 @@ __device__ unsigned sides_of(const GridWork& w, int row, int x, unsigned index) 
   return sides;
 }
 
-__global__ void __launch_bounds__(kThreads) count_ribbons(const GridWork* works) {
+__global__ void __launch_bounds__(kThreads) count_seams(const GridWork* works) {
   __shared__ WorkStorage storage;
   const GridWork& w = load_work(works, storage);
   const Warp warp;
@@ -298,11 +299,11 @@ __global__ void __launch_bounds__(kScanThreads) number_seam_strips(const GridWor
   const uint2 all = scan_rows(rows_of(w.grid), w.counts + 2 * kGridRows, w.counts + 3 * kGridRows,
                               [&](int at, unsigned vertices, unsigned sides) {
                                 w.rows[at].border_vertices = vertices;
-                                w.rows[at].ribbon_sides = sides;
+                                w.rows[at].seam_sides = sides;
                               });
   if (threadIdx.x == 0) {
     w.totals->border_vertices = all.x;
-    w.totals->ribbon_sides = all.y;
+    w.totals->seam_sides = all.y;
     *w.host_totals = *w.totals;
   }
 }
@@ -310,7 +311,7 @@ __global__ void __launch_bounds__(kScanThreads) number_seam_strips(const GridWor
 __device__ bool fits(const GridWork& w) {
   const GridTotals& t = *w.totals;
   return t.vertices + 2 * t.border_vertices <= w.vertex_room &&
-         t.triangles + 2 * t.ribbon_sides <= w.triangle_room;
+         t.triangles + 2 * t.seam_sides <= w.triangle_room;
 }
 
 __global__ void __launch_bounds__(kThreads) emit_vertices(const GridWork* works) {
@@ -333,9 +334,9 @@ __global__ void __launch_bounds__(kThreads) emit_vertices(const GridWork* works)
       if (on) {
         const auto before = static_cast<unsigned>(__popc(mask & ((1u << warp.lane) - 1)));
         const unsigned beside = w.totals->vertices + 2 * (border + before);
-        w.ribbon_of[number] = beside;
-        w.positions[beside] = grid::beside(vertex.position, vertex.normal, g.ribbon);
-        w.positions[beside + 1] = grid::beside(vertex.position, vertex.normal, -g.ribbon);
+        w.seam_of[number] = beside;
+        w.positions[beside] = grid::beside(vertex.position, vertex.normal, g.seam_strip);
+        w.positions[beside + 1] = grid::beside(vertex.position, vertex.normal, -g.seam_strip);
         w.normals[beside] = w.normals[beside + 1] = vertex.normal;
       }
       border += static_cast<unsigned>(__popc(mask));
@@ -360,17 +361,17 @@ __global__ void __launch_bounds__(kThreads) emit_triangles(const GridWork* works
   const Cells cells(w, warp.row);
   if (cells.active == 0) return;
   const GridRow& row = w.rows[warp.row];
-  unsigned next = row.first_triangle, side = w.meets_coarser ? row.ribbon_sides : 0, all = 0;
+  unsigned next = row.first_triangle, side = w.meets_coarser ? row.seam_sides : 0, all = 0;
   for (int x = warp.lane; x < 64; x += 32) {
     const bool here = (cells.active >> x & 1) != 0;
     const unsigned index = here ? cells.index(x) : 0;
     const unsigned count = w.tables->triangles[index];
     unsigned at = next + sum_before(count, warp.lane, all);
     next += all;
-    unsigned ribbon = 0;
+    unsigned seam_strip = 0;
     if (w.meets_coarser) {
       const unsigned sides = here ? sides_of(w, warp.row, x, index) : 0;
-      ribbon = w.totals->triangles + 2 * (side + sum_before(sides, warp.lane, all));
+      seam_strip = w.totals->triangles + 2 * (side + sum_before(sides, warp.lane, all));
       side += all;
     }
     for (int t = 0; t < static_cast<int>(count); ++t) {
@@ -380,9 +381,9 @@ __global__ void __launch_bounds__(kThreads) emit_triangles(const GridWork* works
         for (int k = 0; k < 3; ++k) {
           const unsigned a = v[k], b = v[(k + 1) % 3];
           if ((w.faces[a] & w.faces[b]) == 0) continue;
-          const unsigned ra = w.ribbon_of[a], rb = w.ribbon_of[b];
-          w.triangles[ribbon++] = {ra, rb, rb + 1};
-          w.triangles[ribbon++] = {ra, rb + 1, ra + 1};
+          const unsigned ra = w.seam_of[a], rb = w.seam_of[b];
+          w.triangles[seam_strip++] = {ra, rb, rb + 1};
+          w.triangles[seam_strip++] = {ra, rb + 1, ra + 1};
         }
     }
   }
@@ -406,7 +407,7 @@ void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream) {
   number_rows<<<dim3(1, grids), kScanThreads, 0, stream>>>(batch.works);
   if (batch.any_meets_coarser) {
     find_borders<<<warps, kThreads, 0, stream>>>(batch.works);
-    count_ribbons<<<warps, kThreads, 0, stream>>>(batch.works);
+    count_seams<<<warps, kThreads, 0, stream>>>(batch.works);
     number_seam_strips<<<dim3(1, grids), kScanThreads, 0, stream>>>(batch.works);
   }
   check_launch("counting the meshes of grids");

@@ -18,27 +18,27 @@ inline constexpr int kGridRows = kGridPoints * kGridPoints;
 /// above it.
 struct GridRow {
   std::uint64_t inside[2], number[2];
-  std::uint64_t crossing[3][2];
+  std::uint64_t active_edges[3][2];
   std::uint32_t first_vertex[3], first_triangle;
-  std::uint32_t border_vertices, ribbon_sides;  ///< in rows before
+  std::uint32_t border_vertices, seam_sides;  ///< in rows before
 };
 
-/// How large a grid's mesh is, ribbons apart.
+/// How large a grid's mesh is, seam strips apart.
 struct GridTotals {
   std::uint32_t vertices, triangles;
-  std::uint32_t border_vertices, ribbon_sides;  ///< two vertices, two triangles each
+  std::uint32_t border_vertices, seam_sides;  ///< two vertices, two triangles each
 };
 
 /// A grid on the device, and the work space of its mesh there.
 struct GridWork {
   GridView grid;
   const CaseTables* tables;
-  GridRow* rows;             ///< kGridRows
-  std::uint32_t* counts;     ///< 4 · kGridRows
-  std::uint8_t* faces;       ///< of each vertex; only where coarser grids meet this one
-  std::uint32_t* ribbon_of;  ///< of each vertex, likewise
-  GridTotals* totals;        ///< on the device
-  GridTotals* host_totals;   ///< the same, where the host reads it
+  GridRow* rows;            ///< kGridRows
+  std::uint32_t* counts;    ///< 4 · kGridRows
+  std::uint8_t* faces;      ///< of each vertex; only where coarser grids meet this one
+  std::uint32_t* seam_of;   ///< of each vertex, likewise
+  GridTotals* totals;       ///< on the device
+  GridTotals* host_totals;  ///< the same, where the host reads it
   /// The mesh, and the room there is; a mesh that does not fit is not written.
   Vec3f *positions, *normals;
   Triangle* triangles;

@@ -9,11 +9,11 @@ namespace isobrick::gpu {
 /// Pieces of memory of the same size to copy, from where the device can read to where it can
 /// write.
 struct CopyChunks {
-  static constexpr unsigned kMost = 64;
+  static constexpr unsigned kMax = 64;
   /// Sizes and addresses are multiples of it.
   static constexpr std::size_t kAlign = 16;
-  const void* from[kMost];
-  void* to[kMost];
+  const void* from[kMax];
+  void* to[kMax];
   unsigned count = 0;
 };
 

@@ -150,7 +150,7 @@ struct BrickPool::Impl {
       }
       some.from[some.count] = buffer;
       some.to[some.count++] = brick.to;
-      if (some.count < CopyChunks::kMost) continue;
+      if (some.count < CopyChunks::kMax) continue;
       launch_copy(some, brick_bytes, stream.get());
       some.count = 0;
     }

@@ -11,7 +11,7 @@
 namespace isobrick::gpu {
 
 /// A brick that a launch takes along as a whole.
-struct SentBrick {
+struct UploadedBrick {
   const std::byte* from;
 };
 
@@ -23,8 +23,8 @@ struct BrickTable {
 
 /// How a launch reads its bricks.
 struct BrickUse {
-  std::vector<SentBrick> sent;   ///< in the order of their places on the device
-  std::uint64_t read_bytes = 0;  ///< of samples that the device reads where they lie
+  std::vector<UploadedBrick> sent;  ///< in the order of their places on the device
+  std::uint64_t read_bytes = 0;     ///< of samples that the device reads where they lie
 };
 
 /// Fills the table for these tiles. A brick of which they need a good part is sent, as long

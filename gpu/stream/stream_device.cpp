@@ -142,7 +142,7 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
 /// Neighbours in host memory are sent together.
 void StreamDevice::send(InFlightLaunch& launch) {
   const std::size_t bytes = lattice_.brick_bytes();
-  const std::vector<SentBrick>& sent = launch.use.sent;
+  const std::vector<UploadedBrick>& sent = launch.use.sent;
   for (std::size_t first = 0, end = 0; first < sent.size(); first = end) {
     for (++end; end < sent.size() && sent[end].from == sent[end - 1].from + bytes;) ++end;
     check(cudaMemcpyAsync(launch.bricks + first * bytes, sent[first].from, (end - first) * bytes,

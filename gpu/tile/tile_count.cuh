@@ -2,13 +2,13 @@
 
 #include "gpu/tile/tile_row_groups.cuh"
 
-// Second step: crossing edges and active cells of each row, numbered by prefix
+// Second step: active edges and active cells of each row, numbered by prefix
 // sums within planes and over planes. Where the vertices and cells of a row begin is marked, so
 // that 32 threads that take 32 of them find their rows with a vote.
 
 namespace isobrick::gpu {
 
-/// The crossing edges that start in a row, as words of EdgeRow, and those at sample
+/// The active edges that start in a row, as words of EdgeRow, and those at sample
 /// 0, where only the first tiles look. Not all belong to the tile.
 struct RowEdges {
   std::uint32_t x, y, z, y_at_0, z_at_0;

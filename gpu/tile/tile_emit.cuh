@@ -58,8 +58,8 @@ struct VertexMaker {
     return static_cast<R>(__ldg(sample_at<T>(s, block_at(x, y, z), x + 32 * y + 1024 * z)));
   }
 
-  __device__ float crossing_of(R a, R b) const {
-    if constexpr (std::is_floating_point_v<T>) return crossing(a, b, iso);
+  __device__ float edge_parameter_of(R a, R b) const {
+    if constexpr (std::is_floating_point_v<T>) return edge_parameter(a, b, iso);
     return (iso - a) / (b - a);
   }
 
@@ -102,7 +102,7 @@ struct VertexMaker {
   template <bool Normals>
   __device__ void make(const Edge& e, Vec3f& position, Vec3f& normal) const {
     const int dx = e.axis == 0, dy = e.axis == 1, dz = e.axis == 2;
-    const float t = crossing_of(e.a, e.b);
+    const float t = edge_parameter_of(e.a, e.b);
     Vec3f at{static_cast<float>(s.shape.origin[0] + e.x),
              static_cast<float>(s.shape.origin[1] + e.y),
              static_cast<float>(s.shape.origin[2] + e.z)};

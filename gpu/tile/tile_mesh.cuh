@@ -37,7 +37,7 @@ __device__ inline void init_barriers(WarpBarriers& barriers) {
   barriers.turn = 1;
 }
 
-/// Counts a tile's crossing edges and active cells, and leaves their places. False where there
+/// Counts a tile's active edges and active cells, and leaves their places. False where there
 /// are none; the last tile, which reports the totals, goes on.
 template <int N, bool Nan>
 __device__ inline bool count_tile(TileShared& s, const TileParams& p) {

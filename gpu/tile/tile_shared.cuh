@@ -78,7 +78,7 @@ struct WarpBarriers {
 /// Numbers of vertices count from the tile's first one.
 struct alignas(256) TileShared {
   RowBits rows[kRowsOfTile];
-  /// The crossing edges of each row along x, y and z, the tile's own and those of
+  /// The active edges of each row along x, y and z, the tile's own and those of
   /// lower tiles, and the number of the first. Bit x stands for the edge between
   /// samples x and x + 1 along x, for the one at sample x + 1 along y and z.
   std::uint32_t edge_bits[3][kRowPitch], number[3][kRowPitch];
@@ -104,7 +104,7 @@ struct alignas(256) TileShared {
   std::uint32_t number_base;        ///< mesh number of the tile's first vertex
   std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis
   LowerRows lower;
-  /// Crossing edges at sample 0 of the lower planes: along z at y = 0, along y at z = 0.
+  /// Active edges at sample 0 of the lower planes: along z at y = 0, along y at z = 0.
   std::uint8_t plane_at_0[2][33];
   const RowTable* before;  ///< of the tile one lower along x, or null
   std::uint32_t item;      ///< the number of the tile that is worked on

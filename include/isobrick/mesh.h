@@ -18,7 +18,7 @@ using VertexColour = std::array<std::uint8_t, 4>;
 
 /// How triangles name their vertices.
 enum class Indexing : std::uint8_t {
-  /// One vertex per crossing lattice edge in the whole mesh; numbers count
+  /// One vertex per active lattice edge in the whole mesh; numbers count
   /// from the mesh's first vertex and may point into earlier chunks.
   welded,
   /// Every chunk stands alone: numbers count from the chunk's first vertex,

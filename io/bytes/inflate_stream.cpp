@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kInput = 256 * 1024;
 /// No deflate stream unpacks to more than this many times its bytes.
-constexpr std::uint64_t kMostRatio = 1032;
+constexpr std::uint64_t kMaxRatio = 1032;
 
 class InflateStream final : public ByteStream {
  public:
@@ -42,9 +42,9 @@ class InflateStream final : public ByteStream {
 
   std::uint64_t most_bytes() const override {
     const std::uint64_t packed = packed_->most_bytes();
-    return packed > std::numeric_limits<std::uint64_t>::max() / kMostRatio
+    return packed > std::numeric_limits<std::uint64_t>::max() / kMaxRatio
                ? std::numeric_limits<std::uint64_t>::max()
-               : packed * kMostRatio;
+               : packed * kMaxRatio;
   }
 
   std::uint64_t left_over() const override {

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kBuffer = 65536;
 /// No number that anybody writes is longer.
-constexpr std::size_t kMostWord = 400;
+constexpr std::size_t kMaxWord = 400;
 
 /// A comma counts as one: teem reads "1, 2, 3" too.
 bool is_blank(char c) { return c == ' ' || c == ',' || (c >= '\t' && c <= '\r') || c == '\0'; }
@@ -100,7 +100,7 @@ class TextStream final : public ByteStream {
         return word;
       }
       if (ended_) return {};
-      if (at - begin_ > kMostWord) refuse({&buffer_[begin_], at - begin_});
+      if (at - begin_ > kMaxWord) refuse({&buffer_[begin_], at - begin_});
       refill();
     }
   }

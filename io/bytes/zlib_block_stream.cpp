@@ -14,19 +14,19 @@
 namespace isobrick {
 namespace {
 
-constexpr std::uint64_t kMostBlock = std::uint64_t{64} << 20;
+constexpr std::uint64_t kMaxBlock = std::uint64_t{64} << 20;
 
 class ZlibBlockStream final : public ByteStream {
  public:
   ZlibBlockStream(const BlockTable& table, std::unique_ptr<ByteStream> sizes,
                   std::unique_ptr<ByteStream> packed)
       : table_(table), sizes_(std::move(sizes)), packed_(std::move(packed)) {
-    if (table_.block_bytes == 0 || table_.block_bytes > kMostBlock ||
+    if (table_.block_bytes == 0 || table_.block_bytes > kMaxBlock ||
         table_.last_bytes > table_.block_bytes)
       throw UsageError(
           fmt::format("{}: compressed blocks of {} bytes, the last one of {}, make no "
                       "sense (at most {} are supported)",
-                      packed_->name(), table_.block_bytes, table_.last_bytes, kMostBlock));
+                      packed_->name(), table_.block_bytes, table_.last_bytes, kMaxBlock));
     if (table_.blocks > sizes_->most_bytes() / static_cast<std::uint64_t>(table_.entry_bytes))
       throw UsageError(fmt::format("{}: the file has no room for the sizes of {} compressed blocks",
                                    packed_->name(), table_.blocks));

@@ -9,7 +9,7 @@
 namespace isobrick {
 namespace {
 
-constexpr Index kMostSamples = std::numeric_limits<Index>::max() / 8;
+constexpr Index kMaxSamples = std::numeric_limits<Index>::max() / 8;
 
 /// The size of the only axis of a role that has more than one entry, else 1.
 Index count_of(const std::string& path, std::span<const ArrayAxis> axes, AxisRole role,
@@ -35,7 +35,7 @@ void check_sizes(const std::string& path, std::span<const ArrayAxis> axes) {
   for (const ArrayAxis& axis : axes) {
     if (axis.size <= 0)
       throw UsageError(fmt::format("'{}': the extent {} is not positive", path, sizes));
-    if (axis.size > kMostSamples / total)
+    if (axis.size > kMaxSamples / total)
       throw UsageError(
           fmt::format("'{}': an array of {} samples is too large to address", path, sizes));
     total *= axis.size;

@@ -24,10 +24,10 @@ namespace {
 
 /// Groups of tiles that are looked at: enough for 10 % where groups differ by
 /// half of their mean.
-constexpr std::size_t kMostGroups = 64;
+constexpr std::size_t kMaxGroups = 64;
 /// Fewer where samples or bricks are big, so that decoding stays at some 10 ms a core.
-constexpr std::uint64_t kMostBytes = std::uint64_t{32} << 20;
-constexpr std::size_t kLeastGroups = 4;
+constexpr std::uint64_t kMaxBytes = std::uint64_t{32} << 20;
+constexpr std::size_t kMinGroups = 4;
 
 Box3 block_box(Int3 tile, int i) {
   const Int3 corner = tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
@@ -268,7 +268,7 @@ std::size_t groups_to_sample(const Lattice& lattice) {
     const Index latest = brick - std::gcd(brick, edge);  // where in its first brick one begins
     bytes *= static_cast<std::uint64_t>(((latest + edge - 1) / brick + 1) * brick);
   }
-  return std::clamp<std::size_t>(kMostBytes / bytes & ~std::uint64_t{1}, kLeastGroups, kMostGroups);
+  return std::clamp<std::size_t>(kMaxBytes / bytes & ~std::uint64_t{1}, kMinGroups, kMaxGroups);
 }
 
 /// Scales what was seen in some groups to all active cells, and says how sure

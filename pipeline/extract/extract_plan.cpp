@@ -187,8 +187,8 @@ ExtractPlan plan_memory(PassRequests requests, std::uint64_t budget, std::uint64
 
   ExtractPlan plan;
   const std::uint64_t spare = budget - least;
-  plan.limits.tiles = std::clamp<std::size_t>(1 + spare / 6 / workspace, 1,
-                                              CpuExtractor::good_batch(common(requests).threads));
+  plan.limits.tiles = std::clamp<std::size_t>(
+      1 + spare / 6 / workspace, 1, CpuExtractor::preferred_batch(common(requests).threads));
   // One piece of each mesh is written while the next is made.
   const std::uint64_t least_output = tile_output(requests);
   plan.limits.output_bytes =
@@ -214,7 +214,7 @@ ExtractPlan plan_gpu_memory(PassRequests requests, const ExtractOptions& options
       fixed + gpu.plan(requests, options.gpu_memory, options.memory,
                        fixed + tile_bricks * brick_bytes, most_useful(tile_bricks, requests));
   ExtractPlan plan;
-  plan.limits.tiles = gpu.good_batch();
+  plan.limits.tiles = gpu.preferred_batch();
   if (const std::size_t pool = gpu.pool_bricks()) {
     plan.cache_bricks = pool;
     plan.batch_bricks = std::max(tile_bricks, pool / 4);

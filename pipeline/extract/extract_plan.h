@@ -25,7 +25,7 @@ struct ExtractRequest {
   const LevelInfo* level = nullptr;
   SurfaceOptions surface;
   int threads = 1;
-  SearchBy search;                     ///< for its active blocks
+  SearchMethod search;                 ///< for its active blocks
   std::uint64_t search_memory = 0;     ///< that such a search takes
   std::uint64_t memory_of_others = 0;  ///< see ExtractOptions
   std::uint64_t sink_bytes = 0;        ///< MeshSink::memory() of its sink

@@ -118,7 +118,7 @@ class CudaSession final : public GpuSession {
     return gpu::host_bytes_of(lattice, sizes_);
   }
 
-  std::size_t good_batch() const override { return sizes_.front().tiles; }
+  std::size_t preferred_batch() const override { return sizes_.front().tiles; }
   std::size_t pool_bricks() const override { return sizes_.front().pool.bricks; }
   BrickMemory& bricks() override { return *bricks_; }
 

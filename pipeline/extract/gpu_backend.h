@@ -31,7 +31,7 @@ class GpuSession {
                              std::uint64_t host_budget, std::uint64_t other_host_bytes,
                              std::uint64_t most_bricks) = 0;
   /// Tiles to hand to its surfaces at a time, as planned.
-  virtual std::size_t good_batch() const = 0;
+  virtual std::size_t preferred_batch() const = 0;
   /// Bricks that the device has room for, as planned; 0: they lie in host memory.
   virtual std::size_t pool_bricks() const = 0;
   /// Where the bricks that its surfaces are given lie.

@@ -12,7 +12,7 @@ namespace {
 /// The stored index that finds blocks fastest, if one does at all: finer leaves
 /// than the blocks themselves only add to what is read. The order is that of the
 /// figures in docs/experiments/2026-11-index.md.
-SearchBy fastest(const StoreReader& store, int level) {
+SearchMethod fastest(const StoreReader& store, int level) {
   for (const IndexKind kind :
        {IndexKind::octree, IndexKind::kdtree, IndexKind::interval, IndexKind::quadtree}) {
     const std::string name(name_of(kind));
@@ -25,7 +25,7 @@ SearchBy fastest(const StoreReader& store, int level) {
 
 }  // namespace
 
-SearchBy resolve_index(const StoreReader& store, int level, const IndexChoice& choice) {
+SearchMethod resolve_index(const StoreReader& store, int level, const IndexChoice& choice) {
   if (choice.automatic) return fastest(store, level);
   if (!choice.kind) return {};
   const std::string kind(name_of(*choice.kind));

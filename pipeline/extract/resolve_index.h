@@ -7,6 +7,6 @@
 namespace isobrick {
 
 /// How a level is searched. Throws UsageError when the level lacks the index that was asked for.
-SearchBy resolve_index(const StoreReader& store, int level, const IndexChoice& choice);
+SearchMethod resolve_index(const StoreReader& store, int level, const IndexChoice& choice);
 
 }  // namespace isobrick

@@ -10,7 +10,7 @@
 #include <isobrick/error.h>
 #include "bricks/store_entries.h"
 #include "bricks/stored_index.h"
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "core/morton.h"
 #include "index/leaf_ranges.h"
 #include "io/bytes/exchange.h"

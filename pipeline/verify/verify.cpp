@@ -11,7 +11,7 @@
 #include <isobrick/error.h>
 #include <isobrick/store_reader.h>
 #include "bricks/stored_index.h"
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 #include "io/bytes/file.h"
 #include "pipeline/index/level_scan.h"
 #include "pipeline/program_memory.h"
@@ -185,7 +185,7 @@ void verify_groups(const StoreInfo& store, DamageList& damages) {
       const auto text = read_small_file(file, kMaxMetadataBytes);
       if (!text) return damages.add(quoted(file) + " is missing");
       const nlohmann::json parsed = parse_json(*text, quoted(file));
-      const CheckedJson group(parsed, quoted(file));
+      const JsonReader group(parsed, quoted(file));
       if (group.at("zarr_format").integer() != (version2 ? 2 : 3) ||
           (!version2 && group.string_at("node_type") != "group"))
         damages.add(quoted(file) + " is no group");

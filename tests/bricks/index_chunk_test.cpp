@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "bricks/ranges/checksummed_json.h"
 #include "bricks/ranges/index_layout.h"
-#include "bricks/ranges/sealed_json.h"
 #include "bricks/ranges/stored_ranges.h"
 #include "tests/bricks/store_fixture.h"
 #include "tests/io/bytes/temp_dir.h"
@@ -156,9 +156,10 @@ TEST(IndexLayoutJson, EveryChangeIsNoticed) {
 
 TEST(IndexLayoutJson, UnknownVersionsAndOtherGeometryAreRefused) {
   const auto with = [](const char* key, const nlohmann::json& value) {
-    auto json = unseal_json(to_json(IndexLayout{"octree", 4, ScalarType::u8, {9, 9, 9}, {}}), "");
+    auto json =
+        read_checksummed_json(to_json(IndexLayout{"octree", 4, ScalarType::u8, {9, 9, 9}, {}}), "");
     json[key] = value;
-    return seal_json(json);
+    return checksum_json(json);
   };
   EXPECT_THROW(parse_index_layout(with("isobrick_index", 3), "here"), Error);
   for (const auto& [key, value] : std::vector<std::pair<const char*, nlohmann::json>>{
@@ -199,9 +200,9 @@ TEST(StoredRangesJson, ANewerVersionWantsANewerProgram) {
   const TemporaryFolder folder;
   const std::string text = to_json(StoredRanges{});
   const auto message_for = [&](int version) {
-    nlohmann::json json = unseal_json(text, "");
+    nlohmann::json json = read_checksummed_json(text, "");
     json["isobrick_ranges"] = version;
-    write_file(ranges_file(folder / "a"), seal_json(json));
+    write_file(ranges_file(folder / "a"), checksum_json(json));
     return message_of<Error>([&] { read_stored_ranges(folder / "a"); });
   };
   EXPECT_TRUE(message_for(1).ends_with("remove the file and run isobrick index")) << message_for(1);

@@ -84,7 +84,7 @@ TEST_F(GpuBrickPool, WhatSomeThreadsFillLiesInItsPlaces) {
 TEST_F(GpuBrickPool, ARequestMayBeMoreThanALaunchOfTheKernelTakes) {
   constexpr std::size_t kBytes = 4096;
   constexpr int kThreads = 24;
-  static_assert(kThreads * gpu::BrickPool::buffers_of_thread(kBytes) / 2 > gpu::CopyChunks::kMost,
+  static_assert(kThreads * gpu::BrickPool::buffers_of_thread(kBytes) / 2 > gpu::CopyChunks::kMax,
                 "half of all buffers make a request");
   Pool pool{kBytes, 1000, kThreads};
   // By this thread for all of them: none runs out of buffers before, which would make a smaller

@@ -31,7 +31,7 @@ class FakeGpu final : public GpuSession {
     if (host_budget < other + pinned) throw UsageError("--memory is too small for the GPU");
     return pinned;
   }
-  std::size_t good_batch() const override { return 8; }
+  std::size_t preferred_batch() const override { return 8; }
   std::size_t pool_bricks() const override { return 0; }
   BrickMemory& bricks() override { return bricks_; }
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest&, std::size_t,

@@ -68,7 +68,7 @@ class KeptMesh final : public MeshSink {
 };
 
 /// A surface that is asked for.
-struct Wanted {
+struct CancellationToken {
   double isovalue;
   bool normals;
   Indexing indexing = Indexing::welded;
@@ -80,12 +80,12 @@ struct Made {
 };
 
 Made make_together(const StoreReader& store, const ExtractOptions& options,
-                   const std::vector<Wanted>& wanted) {
+                   const std::vector<CancellationToken>& token) {
   std::vector<KeptMesh> sinks;
-  for (const Wanted& w : wanted) sinks.emplace_back(w.indexing);
+  for (const CancellationToken& w : token) sinks.emplace_back(w.indexing);
   std::vector<SurfaceOutput> outputs;
-  for (std::size_t i = 0; i < wanted.size(); ++i)
-    outputs.push_back({wanted[i].isovalue, wanted[i].normals, &sinks[i]});
+  for (std::size_t i = 0; i < token.size(); ++i)
+    outputs.push_back({token[i].isovalue, token[i].normals, &sinks[i]});
   NoProgress silent;
   Made made{.meshes = {}, .reports = extract(store, options, outputs, silent)};
   for (const KeptMesh& sink : sinks) {
@@ -96,9 +96,9 @@ Made make_together(const StoreReader& store, const ExtractOptions& options,
 }
 
 Made make_alone(const StoreReader& store, ExtractOptions options,
-                const std::vector<Wanted>& wanted) {
+                const std::vector<CancellationToken>& token) {
   Made made;
-  for (const Wanted& w : wanted) {
+  for (const CancellationToken& w : token) {
     KeptMesh sink(w.indexing);
     options.isovalue = w.isovalue;
     options.normals = w.normals;
@@ -123,11 +123,11 @@ void expect_same(const Made& together, const Made& alone) {
 }
 
 /// A mesh with its picture, and other isovalues, one of which no sample reaches.
-const std::vector<Wanted> kWanted{{60, true},
-                                  {60, true, Indexing::chunk_local},
-                                  {30.5, false},
-                                  {300, true},
-                                  {90, false, Indexing::chunk_local}};
+const std::vector<CancellationToken> kWanted{{60, true},
+                                             {60, true, Indexing::chunk_local},
+                                             {30.5, false},
+                                             {300, true},
+                                             {90, false, Indexing::chunk_local}};
 
 /// Noise in one half, waves in the other.
 template <class T>
@@ -193,14 +193,15 @@ TEST_F(ExtractTogether, WhateverFindsTheActiveBlocks) {
 
 /// Extractors share work spaces whether their isovalue equals samples or not.
 TEST_F(ExtractTogether, DegenerateTrianglesAreLeftOutOfEach) {
-  const std::vector<Wanted> wanted{{60, true}, {60.5, false}, {50, false, Indexing::chunk_local}};
+  const std::vector<CancellationToken> token{
+      {60, true}, {60.5, false}, {50, false, Indexing::chunk_local}};
   const auto field = noise_and_waves<std::uint8_t>({100, 81, 70});
   const StoreReader reader = store(field, {.brick = 32, .shard = 64});
   const ExtractOptions options{.drop_degenerate = true, .threads = 2};
-  const Made alone = make_alone(reader, options, wanted);
+  const Made alone = make_alone(reader, options, token);
   EXPECT_GT(alone.reports[0].degenerate_triangles, 0u);
   EXPECT_EQ(alone.reports[1].degenerate_triangles, 0u);
-  expect_same(make_together(reader, options, wanted), alone);
+  expect_same(make_together(reader, options, token), alone);
 }
 
 TEST_F(ExtractTogether, RegionsLevelsAndNaN) {
@@ -218,10 +219,10 @@ TEST_F(ExtractTogether, RegionsLevelsAndNaN) {
 }
 
 /// The stored bricks that surfaces need.
-std::set<std::tuple<Index, Index, Index>> needed_bricks(const StoreReader& store,
-                                                        const std::vector<Wanted>& wanted) {
+std::set<std::tuple<Index, Index, Index>> needed_bricks(
+    const StoreReader& store, const std::vector<CancellationToken>& token) {
   std::set<std::tuple<Index, Index, Index>> needed;
-  for (const Wanted& w : wanted) {
+  for (const CancellationToken& w : token) {
     const ExtractRequest request = check_request(
         store, {.isovalue = w.isovalue, .normals = w.normals, .threads = 1}, w.indexing);
     TileStream tiles = tiles_of(store, 0, {&request, 1});

@@ -5,7 +5,7 @@
 namespace isobrick::test {
 
 /// Work that is never abandoned.
-class Always final : public Wanted {
+class Always final : public CancellationToken {
  public:
   void check() const override {}
 };

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
-#include "surface/tile_ties.h"
+#include "surface/coincident_vertices.h"
 #include "tests/surface/kept_triangles.h"
 
 // SurfaceOptions::drop_degenerate.
@@ -84,16 +84,16 @@ TEST(DropDegenerateAt, BoundariesAreNoLargerThanTheirBound) {
   TileBoundary boundary;
   TileState tile;
   tile.boundary = &boundary;
-  tile.ties = std::make_unique<TileTies>();
-  PodBuffer<TieVertex>& vertices = tile.ties->vertices;
+  tile.coincident = std::make_unique<CoincidentVertices>();
+  PodBuffer<CoincidentVertex>& vertices = tile.coincident->vertices;
   for_each_point({{0, 0, 0}, {kTileSamples, kTileSamples, kTileSamples}}, [&](Int3 p) {
     vertices.resize(vertices.size() + 1);
     vertices[vertices.size() - 1] = {static_cast<std::uint32_t>(p.x | p.y << 6 | p.z << 12), 0,
-                                     TieVertex::kOwn};
+                                     CoincidentVertex::kOwn};
   });
-  publish_ties(tile);
-  EXPECT_EQ(boundary.ties.size(), 33u * 33 * 33 - 31 * 31 * 31);
-  EXPECT_LE(boundary.ties.capacity() * sizeof(FaceTie),
+  publish_coincident(tile);
+  EXPECT_EQ(boundary.coincident.size(), 33u * 33 * 33 - 31 * 31 * 31);
+  EXPECT_LE(boundary.coincident.capacity() * sizeof(CoincidentFace),
             CpuExtractor::boundary_bytes(true) - CpuExtractor::boundary_bytes(false));
 }
 
@@ -194,7 +194,7 @@ TEST(DropDegenerateAt, InfiniteNeighboursAndAnInfiniteIsovalue) {
   EXPECT_EQ(extract(field, {.isovalue = HUGE_VAL, .drop_degenerate = true}), all);
 }
 
-// The edges around a tie had normals of their own that differed by rounding, or
+// The edges around a coincident vertex had normals of their own that differed by rounding, or
 // by direction where the gradient vanishes; the one vertex has the sample's.
 TEST(DropDegenerateAt, NormalsAreThoseOfTheSamples) {
   const auto field = coarse_noise<std::uint8_t>({66, 35, 40}, 8);

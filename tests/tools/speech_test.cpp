@@ -6,18 +6,18 @@
 namespace isobrick::test {
 namespace {
 
-using Speech = ProgramTest;
+using OutputMode = ProgramTest;
 
 constexpr std::array kCommands{"convert", "info",  "index",      "verify", "extract",
                                "export",  "synth", "completion", "man",    "help"};
 
-TEST_F(Speech, Version) {
+TEST_F(OutputMode, Version) {
   const Outcome outcome = run({"--version"});
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_EQ(outcome.out, "isobrick " ISOBRICK_VERSION "\n");
 }
 
-TEST_F(Speech, EverySubcommandHasHelpWithAnExample) {
+TEST_F(OutputMode, EverySubcommandHasHelpWithAnExample) {
   const Outcome all = run({"--help"});
   EXPECT_EQ(all.exit_code, 0);
   for (const std::string command : kCommands) {
@@ -30,7 +30,7 @@ TEST_F(Speech, EverySubcommandHasHelpWithAnExample) {
   }
 }
 
-TEST_F(Speech, InfoShowsTheStore) {
+TEST_F(OutputMode, InfoShowsTheStore) {
   const std::string store = make_store("a");
   const Outcome outcome = run({"info", store});
   EXPECT_EQ(outcome.err, "");
@@ -48,7 +48,7 @@ TEST_F(Speech, InfoShowsTheStore) {
   EXPECT_EQ(json["levels"][0]["bricks"], 27);
 }
 
-TEST_F(Speech, InfoOfOddVolumes) {
+TEST_F(OutputMode, InfoOfOddVolumes) {
   const float special[] = {std::numeric_limits<float>::quiet_NaN(),
                            std::numeric_limits<float>::infinity(), 1, 2};
   write_file(path("a_2x2x1_float32.raw"),
@@ -65,7 +65,7 @@ TEST_F(Speech, InfoOfOddVolumes) {
 }
 
 // Rounded to six digits the largest sample would be 0.1, which no sample reaches.
-TEST_F(Speech, InfoPrintsValuesThatReadBackExactly) {
+TEST_F(OutputMode, InfoPrintsValuesThatReadBackExactly) {
   const float samples[] = {-1.00000012f, 0.100000001f, 0.0999999866f, 16777215.0f};
   write_file(path("a_4x1x1_float32.raw"),
              std::string(reinterpret_cast<const char*>(samples), sizeof samples));
@@ -81,7 +81,7 @@ TEST_F(Speech, InfoPrintsValuesThatReadBackExactly) {
     EXPECT_NE(info.find(line), std::string::npos) << line << "is not in\n" << info;
 }
 
-TEST_F(Speech, JsonOfConversions) {
+TEST_F(OutputMode, JsonOfConversions) {
   write_file(path("in_20x20x20_uint8.raw"), noise(8000));
   for (const Arguments& arguments :
        {Arguments{"convert", path("in_20x20x20_uint8.raw"), path("a.zarr")},
@@ -96,7 +96,7 @@ TEST_F(Speech, JsonOfConversions) {
   }
 }
 
-TEST_F(Speech, ExtensionsInCapitals) {
+TEST_F(OutputMode, ExtensionsInCapitals) {
   const Outcome synth =
       run({"synth", "sphere", path("S.RAW"), "--dims", "20,20,20", "--type", "u8"});
   EXPECT_EQ(synth.exit_code, 0) << synth.err;
@@ -107,7 +107,7 @@ TEST_F(Speech, ExtensionsInCapitals) {
     EXPECT_EQ(run({"extract", store, "--isovalue", "127.5", "-o", path(name)}).exit_code, 0);
 }
 
-TEST_F(Speech, QuietSaysNothing) {
+TEST_F(OutputMode, QuietSaysNothing) {
   if (!has_terminals()) GTEST_SKIP() << "no pseudo terminals here";
   const std::string store = make_store("a");
   for (const Arguments& arguments :
@@ -123,7 +123,7 @@ TEST_F(Speech, QuietSaysNothing) {
   }
 }
 
-TEST_F(Speech, ABarOnATerminalAndNoneInAPipe) {
+TEST_F(OutputMode, ABarOnATerminalAndNoneInAPipe) {
   if (!has_terminals()) GTEST_SKIP() << "no pseudo terminals here";
   const Arguments arguments{"synth",  "mixing", path("a.raw"), "--dims", "512,512,256",
                             "--type", "f32",    "--threads",   "1",      "--force"};

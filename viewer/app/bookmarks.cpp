@@ -17,14 +17,14 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr std::uintmax_t kMostBytes = 16u << 20;
+constexpr std::uintmax_t kMaxBytes = 16u << 20;
 
 /// All bookmarks of the user: an object of lists by the stores' absolute paths.
 Json read(const fs::path& file) {
   std::error_code missing;
   const std::uintmax_t size = fs::file_size(file, missing);
   if (missing) return Json::object();
-  if (size > kMostBytes)
+  if (size > kMaxBytes)
     throw Error(fmt::format("'{}' is larger than bookmarks can be", file.string()));
   std::ifstream in(file, std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(in), {});

@@ -11,7 +11,7 @@
 
 namespace isobrick {
 
-void DeviceOpening::begin() {
+void DeviceOpener::begin() {
   if (begun()) return;
   const auto id = current_gl_device_id();  // may throw
   std::promise<std::shared_ptr<DeviceMesher>> opened;
@@ -27,7 +27,7 @@ void DeviceOpening::begin() {
 }
 
 /// Whether there was anything to import.
-bool DeviceOpening::import_one(DeviceMesher& mesher) {
+bool DeviceOpener::import_one(DeviceMesher& mesher) {
   const std::vector<DeviceBlock> blocks = mesher.shared_blocks();
   const std::size_t done = imported_.size();
   if (done == blocks.size()) return false;
@@ -43,12 +43,12 @@ bool DeviceOpening::import_one(DeviceMesher& mesher) {
   return true;
 }
 
-bool DeviceOpening::opened() const {
+bool DeviceOpener::opened() const {
   return begun() && mesher_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
 /// Once it is open; null where there is none.
-DeviceMesher* DeviceOpening::mesher() const {
+DeviceMesher* DeviceOpener::mesher() const {
   try {
     return mesher_.get().get();
   } catch (const Error&) {
@@ -56,33 +56,33 @@ DeviceMesher* DeviceOpening::mesher() const {
   }
 }
 
-bool DeviceOpening::over() const {
+bool DeviceOpener::over() const {
   if (!opened()) return false;
   const DeviceMesher* const device = mesher();
   return device == nullptr || imported_.size() == device->shared_blocks().size();
 }
 
-bool DeviceOpening::import_next() {
+bool DeviceOpener::import_next() {
   if (!opened()) return false;
   DeviceMesher* const device = mesher();
   return device != nullptr && import_one(*device);
 }
 
-std::shared_ptr<DeviceMesher> DeviceOpening::get() {
+std::shared_ptr<DeviceMesher> DeviceOpener::get() {
   const std::shared_ptr<DeviceMesher> device = mesher_.get();
   while (device && import_one(*device)) {
   }
   return device;
 }
 
-std::uint64_t DeviceOpening::held() const {
+std::uint64_t DeviceOpener::held() const {
   const DeviceMesher* const device = opened() ? mesher() : nullptr;
   return device == nullptr ? 0 : device->bytes();
 }
 
-std::uint64_t DeviceOpening::reserved() const { return begun() && !opened() ? budget_ : held(); }
+std::uint64_t DeviceOpener::reserved() const { return begun() && !opened() ? budget_ : held(); }
 
-DeviceMeshes::DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpening> opening)
+DeviceMeshes::DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opening)
     : stream_(stream), opening_(std::move(opening)) {}
 
 void DeviceMeshes::use(Backend backend) {
@@ -122,9 +122,9 @@ void DeviceMeshes::take_over() {
   if (backend_ != Backend::cpu) stream_.set_device(mesher_);
 }
 
-Turns* DeviceMeshes::turns() const {
+TicketLock* DeviceMeshes::kernel_lock() const {
   const bool makes = backend_ != Backend::cpu && shares_memory() && mesher_->failure().empty();
-  return makes ? &mesher_->turns() : nullptr;
+  return makes ? &mesher_->kernel_lock() : nullptr;
 }
 
 bool DeviceMeshes::shares_memory() const { return mesher_ && !mesher_->shared_blocks().empty(); }

@@ -18,11 +18,11 @@ namespace isobrick {
 /// The device that makes meshes, opened once and beside everything else, and its memory as OpenGL
 /// sees it. All of that memory is taken and imported before the device makes any mesh, one piece at
 /// a time: an import takes as long as half a picture may. For the thread of the context.
-class DeviceOpening {
+class DeviceOpener {
  public:
   /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
   /// the device is there, or is known not to come.
-  DeviceOpening(std::uint64_t budget, std::function<void()> on_change)
+  DeviceOpener(std::uint64_t budget, std::function<void()> on_change)
       : budget_(budget), on_change_(std::move(on_change)) {}
 
   /// Unless it has begun: that of the current OpenGL context, if possible. Throws Error, and has
@@ -66,7 +66,7 @@ class DeviceOpening {
 /// of the picture's context.
 class DeviceMeshes {
  public:
-  DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpening> opening);
+  DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opening);
 
   /// From now on: Backend::automatic takes a CUDA device where there is one, as soon as it is
   /// open, without waiting for it. Backend::cuda waits, and throws Error where there is none.
@@ -86,8 +86,8 @@ class DeviceMeshes {
 
   /// What the device has done; nothing where there is none.
   DeviceMesher::Times times() const { return mesher_ ? mesher_->times() : DeviceMesher::Times{}; }
-  /// The device's turns, where it makes meshes and draws; else null.
-  Turns* turns() const;
+  /// DeviceMesher::kernel_lock(), where the device makes meshes and draws; else null.
+  TicketLock* kernel_lock() const;
 
   /// A mesh on the device, to be drawn until the next forget(). Where memory is shared, whoever
   /// draws waits for the end of each picture: only then may meshes go, and their places be given
@@ -106,7 +106,7 @@ class DeviceMeshes {
   void take_over();
 
   SceneStream& stream_;
-  std::shared_ptr<DeviceOpening> opening_;
+  std::shared_ptr<DeviceOpener> opening_;
   Backend backend_ = Backend::cpu;
   std::shared_ptr<DeviceMesher> mesher_;
   bool opened_ = false;  ///< or tried in vain

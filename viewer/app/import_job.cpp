@@ -150,7 +150,7 @@ void ImportJob::run() {
   } catch (const Cancelled&) {
     cancelled = true;
   } catch (const std::exception& e) {
-    failure = what_of(e);
+    failure = error_message(e);
   }
   if (begun_ && !volume_ && (cancelled || !failure.empty())) discard();
   const MutexLock lock(mutex_);

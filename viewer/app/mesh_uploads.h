@@ -23,10 +23,10 @@ class MeshUploads {
     std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
 
     bool spent() const {
-      return bytes > kMostBytes || std::chrono::steady_clock::now() - begin > kMost;
+      return bytes > kMaxBytes || std::chrono::steady_clock::now() - begin > kMax;
     }
-    static constexpr std::uint64_t kMostBytes = 16u << 20;
-    static constexpr std::chrono::milliseconds kMost{6};
+    static constexpr std::uint64_t kMaxBytes = 16u << 20;
+    static constexpr std::chrono::milliseconds kMax{6};
   };
 
   /// Before the pool grows: meshes that are not used may go, or stay. Where OpenGL is software they

@@ -81,7 +81,7 @@ void surfaces_panel(ViewerState& state) {
     surfaces.erase(surfaces.begin() + static_cast<std::ptrdiff_t>(*removed));
     state.selected = std::min(state.selected, surfaces.size() - 1);
   }
-  if (surfaces.size() < kMostSurfaces && ImGui::SmallButton("Add a surface")) {
+  if (surfaces.size() < kMaxSurfaces && ImGui::SmallButton("Add a surface")) {
     SurfaceSettings added = surfaces[state.selected];
     added.colour = surface_colour(surfaces.size());
     surfaces.push_back(added);
@@ -186,7 +186,7 @@ void attempt(ViewerState& state, F&& f) {
   try {
     f();
   } catch (const std::exception& e) {
-    state.say(what_of(e));
+    state.say(error_message(e));
   }
 }
 
@@ -346,7 +346,7 @@ void main_panel(ViewerState& state) {
   draw_volumes_panel(state);
   section("Surfaces", true, surfaces_panel, state);
   section("Camera and look", false, look_panel, state);
-  section("Cuts and region", false, draw_cuts_panel, state);
+  section("ClipTest and region", false, draw_clip_panel, state);
   section("Slices", false, slices_panel, state);
   section("Point and measure", false, picking_panel, state);
   section("Bookmarks", false, bookmarks_panel, state);

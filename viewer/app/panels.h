@@ -27,7 +27,7 @@ void draw_notice(const std::string& text);
 void draw_isovalue_slider(ViewerState& state, float width, float height);
 
 /// What is cut away: across axes, by planes at any angle, outside of a region.
-void draw_cuts_panel(ViewerState& state);
+void draw_clip_panel(ViewerState& state);
 
 /// Which volume of an image with channels or times is shown; nothing of one without.
 void draw_volumes_panel(ViewerState& state);

@@ -15,7 +15,7 @@ constexpr ImU32 kInk = IM_COL32(20, 20, 20, 255), kPaper = IM_COL32(255, 230, 90
 
 }  // namespace
 
-std::optional<PickedPoint> pick_point(StorePicture& picture, int x, int y) {
+std::optional<PickedPoint> pick_point(SceneRenderer& picture, int x, int y) {
   const auto hit = picture.renderer().pick(x, y);
   if (!hit) return std::nullopt;
   PickedPoint point;

@@ -25,7 +25,7 @@ bool cuda_may_hold_up(Backend backend) {
 /// Full pictures, and those while something moves.
 std::array<PictureSettings, 2> usual_settings() {
   PictureSettings full, plain;
-  full.picking = plain.picking = true;  // as StorePicture's pictures
+  full.picking = plain.picking = true;  // as SceneRenderer's pictures
   plain.occlusion = plain.multisample = false;
   return {full, plain};
 }
@@ -61,7 +61,7 @@ PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> 
     : block_vertices_(block_vertices(budgets.device_memory)),
       pool_(block_vertices_),
       software_(software.value_or(current_gl_device().software)),
-      device_(std::make_shared<DeviceOpening>(budgets.device_mesh_memory(), std::move(on_change))) {
+      device_(std::make_shared<DeviceOpener>(budgets.device_mesh_memory(), std::move(on_change))) {
   // Software compiles quickly and draws slowly.
   if (!software_)
     for (const PictureSettings& settings : usual_settings())

@@ -36,9 +36,9 @@ struct PictureSize {
 class PictureSetup {
  public:
   /// Begins to open the device that budgets.backend may use, and does not wait for it; see
-  /// DeviceOpening. `likely`: of the first pictures, for warm_up() where they would wait for CUDA.
+  /// DeviceOpener. `likely`: of the first pictures, for warm_up() where they would wait for CUDA.
   /// `software`: whether to take OpenGL for software; nothing: what it is. Throws what Renderer and
-  /// DeviceOpening::begin() do.
+  /// DeviceOpener::begin() do.
   PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change,
                std::optional<PictureSize> likely = std::nullopt,
                std::optional<bool> software = std::nullopt);
@@ -50,7 +50,7 @@ class PictureSetup {
   Renderer& renderer() { return renderer_; }
   /// For meshes that are uploaded.
   MeshPool& pool() { return pool_; }
-  const std::shared_ptr<DeviceOpening>& device() const { return device_; }
+  const std::shared_ptr<DeviceOpener>& device() const { return device_; }
   /// Whether OpenGL is software.
   bool software() const { return software_; }
 
@@ -61,7 +61,7 @@ class PictureSetup {
   std::uint32_t block_vertices_;
   MeshPool pool_;
   bool software_;
-  std::shared_ptr<DeviceOpening> device_;
+  std::shared_ptr<DeviceOpener> device_;
 };
 
 }  // namespace isobrick

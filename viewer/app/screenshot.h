@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 
 namespace isobrick {
 

@@ -119,7 +119,7 @@ nlohmann::ordered_json to_json(const ViewSettings& s) {
 ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   const Fields in(json);
   ViewSettings s;
-  for (const Json& item : in.array("surfaces", 0, kMostSurfaces)) {
+  for (const Json& item : in.array("surfaces", 0, kMaxSurfaces)) {
     const Fields f(item);
     s.surfaces.push_back(
         {f.number("isovalue"), f.parts("colour"), f.real("opacity", 0, 1), f.flag("shown")});
@@ -131,7 +131,7 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
     s.cuts[axis] = {cut.flag("on"), cut.real("place", 0, 1), cut.flag("beyond")};
     s.slices[axis] = {slice.flag("shown"), slice.real("place", 0, 1)};
   }
-  for (const Json& item : in.array("planes", 0, kMostClipPlanes)) {
+  for (const Json& item : in.array("planes", 0, kMaxClipPlanes)) {
     const Fields plane(item);
     s.planes.push_back({plane.flag("on"), {plane.vector("normal"), plane.number("least")}});
     if (s.planes.back().kept.normal == Vec3d{})
@@ -155,7 +155,7 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   s.box = in.flag("box");
   s.axes = in.flag("axes");
   s.scale_bar = in.flag("scale_bar");
-  s.pixel_error = in.real("pixel_error", kLeastPixelError, kMostPixelError);
+  s.pixel_error = in.real("pixel_error", kMinPixelError, kMaxPixelError);
   s.finest_level = static_cast<int>(in.real("finest_level", 0, 64));
   return s;
 }

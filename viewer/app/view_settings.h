@@ -49,7 +49,7 @@ struct SliceSettings {
 struct ViewSettings {
   std::vector<SurfaceSettings> surfaces;
   std::array<CutSettings, 3> cuts;      ///< across x, y, z
-  std::vector<PlaneSettings> planes;    ///< kMostClipPlanes at most
+  std::vector<PlaneSettings> planes;    ///< kMaxClipPlanes at most
   std::array<SliceSettings, 3> slices;  ///< across x, y, z
   float window_lo = 0,
         window_hi = 0;  ///< samples that slices show black and white; equal: for choose_values()
@@ -63,8 +63,8 @@ struct ViewSettings {
   friend bool operator==(const ViewSettings&, const ViewSettings&) = default;
 };
 
-inline constexpr std::size_t kMostSurfaces = 16;
-inline constexpr float kLeastPixelError = 0.1f, kMostPixelError = 1000;
+inline constexpr std::size_t kMaxSurfaces = 16;
+inline constexpr float kMinPixelError = 0.1f, kMaxPixelError = 1000;
 
 /// Colours for the first surfaces of a scene, told apart in any order.
 Vec3f surface_colour(std::size_t number);

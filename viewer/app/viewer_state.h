@@ -13,9 +13,9 @@
 #include "viewer/app/bookmarks.h"
 #include "viewer/app/frame_pacer.h"
 #include "viewer/app/import_job.h"
-#include "viewer/app/isovalue_facts.h"
+#include "viewer/app/isovalue_stats.h"
 #include "viewer/app/navigation.h"
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 #include "viewer/app/view_settings.h"
 
 namespace isobrick {
@@ -61,11 +61,11 @@ struct TypedIsovalue {
 
 /// What a window shows and how; panels change it. Not thread-safe.
 struct ViewerState {
-  std::filesystem::path path;             ///< of the store; empty: none is open
-  ImageVolumes volumes;                   ///< of the store, and the one that is shown
-  std::unique_ptr<StorePicture> picture;  ///< of the store; null: none is open
-  std::unique_ptr<IsovalueFacts> facts;   ///< of the store
-  IndexKind index = IndexKind::linear;    ///< what finds active nodes, of the next store too
+  std::filesystem::path path;              ///< of the store; empty: none is open
+  ImageVolumes volumes;                    ///< of the store, and the one that is shown
+  std::unique_ptr<SceneRenderer> picture;  ///< of the store; null: none is open
+  std::unique_ptr<IsovalueStats> facts;    ///< of the store
+  IndexKind index = IndexKind::linear;     ///< what finds active nodes, of the next store too
   ViewSettings settings;
   std::size_t selected = 0;  ///< the surface that slider and keys move
   Navigator navigator;

@@ -134,12 +134,12 @@ double ViewerWindow::aspect() const {
 }
 
 void ViewerWindow::frame_again(FrameTarget framed) {
-  const StorePicture& picture = *state_.picture;
+  const SceneRenderer& picture = *state_.picture;
   WorldBox box = picture.bounds();
   try {
     if (framed == FrameTarget::surface) box = picture.shown_bounds(state_.settings);
   } catch (const std::exception& e) {
-    state_.say(what_of(e));
+    state_.say(error_message(e));
   }
   frame(state_.navigator.camera, picture, box, aspect());
   state_.navigator.stop();
@@ -179,7 +179,7 @@ void ViewerWindow::save_picture(const std::filesystem::path& file) {
     write_picture(state_.picture->renderer(), free.string(), false);
     state_.say(fmt::format("wrote '{}'", std::filesystem::absolute(free).string()));
   } catch (const std::exception& e) {
-    state_.say(what_of(e));
+    state_.say(error_message(e));
   }
 }
 

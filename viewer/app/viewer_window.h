@@ -22,7 +22,7 @@ struct WindowOptions {
   CameraRequest camera;                 ///< for the first store
   ViewSettings settings;                ///< for the first store
   std::filesystem::path bookmarks;      ///< file; empty: the user's own
-  std::optional<double> piece_seconds;  ///< nothing: PictureWay::in_window()
+  std::optional<double> piece_seconds;  ///< nothing: FrameOptions::in_window()
 };
 
 /// A window that shows a store: mouse, keys, panels, files dropped on it. All functions
@@ -68,11 +68,11 @@ class ViewerWindow {
   };
 
   /// What is seen beside the picture; another one is a reason for another frame.
-  struct FrameKey {
+  struct WindowKey {
     std::uint64_t pictures = 0;  ///< finished so far
     std::size_t messages = 0;
     bool rests = false, histogram = false, converting = false, panels = false, help = false;
-    friend bool operator==(const FrameKey&, const FrameKey&) = default;
+    friend bool operator==(const WindowKey&, const WindowKey&) = default;
   };
 
   void wait(double most_seconds);
@@ -87,11 +87,11 @@ class ViewerWindow {
   ConvertOptions import_options() const;
   void frame_again(FrameTarget framed);
   void report_empty_surfaces();
-  FrameKey frame_key() const;
+  WindowKey window_key() const;
   bool is_due() const;
   PictureArea picture_area() const;
   void pace(double seconds);
-  void tell_damage();
+  void report_damage();
   bool rests() const;
   void settle_clicks();
   void handle_requests();
@@ -117,7 +117,7 @@ class ViewerWindow {
   double opened_ = 0;     ///< when the store was
   bool covered_ = false;  ///< the store's surface has been shown
   double shown_ = 0;      ///< when the last frame was
-  FrameKey shown_key_;    ///< of that frame
+  WindowKey shown_key_;   ///< of that frame
   bool changed_ = true;   ///< something has happened: the next frame may differ from the last
   bool told_ = false;     ///< something had happened before the last step
   bool more_ = false;     ///< the picture would go on by itself

@@ -34,7 +34,7 @@ constexpr double kLongestUnseen = 0.25;
 /// Where nothing happens, from one look at what others have done (a signal, a count) to the next.
 constexpr double kIdleStep = 0.25;
 /// Messages about damage that are shown one by one.
-constexpr std::size_t kMostTold = 3;
+constexpr std::size_t kMaxReported = 3;
 /// Moving pictures may be coarser for so long after the last motion.
 constexpr double kSettleSeconds = 0.25;
 
@@ -50,12 +50,12 @@ bool values_differ(ViewSettings a, const ViewSettings& b) {
 }  // namespace
 
 /// Says once what cannot be shown.
-void ViewerWindow::tell_damage() {
+void ViewerWindow::report_damage() {
   if (const std::string why = state_.facts->take_failure(); !why.empty()) state_.say(why);
   for (const std::string& message : state_.picture->state().damage) {
-    if (told_damage_.size() > kMostTold) return;
+    if (told_damage_.size() > kMaxReported) return;
     if (!told_damage_.insert(message).second) continue;
-    state_.say(told_damage_.size() <= kMostTold
+    state_.say(told_damage_.size() <= kMaxReported
                    ? message
                    : "more is damaged: 'isobrick verify' names all bricks that cannot be read");
   }
@@ -85,25 +85,25 @@ bool ViewerWindow::moving() const {
 
 /// Makes the picture, or goes on with it.
 void ViewerWindow::draw_picture(int width, int height) {
-  StorePicture& picture = *state_.picture;
+  SceneRenderer& picture = *state_.picture;
   const double begin = glfwGetTime();
   // The first picture of a store should not wait for a good one.
   covered_ |= picture.state().covers;
   const bool fluent = moving() || !covered_;
-  PictureWay way = PictureWay::in_window(state_.pacer, setup_->software(), fluent);
-  way.overlay_scale = scale_;
-  way.piece_seconds = options_.piece_seconds.value_or(way.piece_seconds);
+  FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), fluent);
+  options.overlay_scale = scale_;
+  options.piece_seconds = options_.piece_seconds.value_or(options.piece_seconds);
   const int smaller = fluent ? state_.pacer.smaller() : 1;
   try {
     picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
-                 std::max(height / smaller, 1), state_.settings, way);
+                 std::max(height / smaller, 1), state_.settings, options);
   } catch (const std::exception& e) {
     if (!std::exchange(failed_, true)) state_.say(e.what());
     return;
   }
   failed_ = false;
   pace(glfwGetTime() - begin);
-  tell_damage();
+  report_damage();
   report_empty_surfaces();
   settle_clicks();
 }
@@ -114,11 +114,11 @@ bool ViewerWindow::minimised() const {
   return width == 0 || height == 0 || glfwGetWindowAttrib(window_, GLFW_ICONIFIED) == GLFW_TRUE;
 }
 
-ViewerWindow::FrameKey ViewerWindow::frame_key() const {
-  FrameKey key{.messages = state_.messages.size(),
-               .converting = state_.import != nullptr,
-               .panels = state_.panels,
-               .help = state_.help};
+ViewerWindow::WindowKey ViewerWindow::window_key() const {
+  WindowKey key{.messages = state_.messages.size(),
+                .converting = state_.import != nullptr,
+                .panels = state_.panels,
+                .help = state_.help};
   if (state_.picture == nullptr) return key;
   key.pictures = state_.picture->counters().finished;
   key.rests = rests();
@@ -166,7 +166,7 @@ void ViewerWindow::draw_frame(bool asked) {
   if (minimised()) return;
   const PictureArea area = picture_area();
   if (state_.picture != nullptr) draw_picture(area.width, area.height);
-  const FrameKey key = frame_key();
+  const WindowKey key = window_key();
   if (!asked && key == shown_key_ && !is_due()) return;
   shown_key_ = key;
   const double now = glfwGetTime();
@@ -189,7 +189,7 @@ void ViewerWindow::draw_frame(bool asked) {
 
 /// What a picture, or a piece of one, that took this thread so long says of the next one.
 void ViewerWindow::pace(double seconds) {
-  const StorePicture& picture = *state_.picture;
+  const SceneRenderer& picture = *state_.picture;
   // There is more to draw; or a better one to come; or something else to do.
   more_ = picture.state().drawing || picture.state().plain || picture.state().more;
   if (!picture.drew()) return;

@@ -23,10 +23,10 @@ namespace isobrick {
 void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection) {
   ImageVolumes volumes = image_volumes(path, selection);
   auto store = std::make_shared<const StoreReader>(path, volumes.selection);
-  auto facts = std::make_unique<IsovalueFacts>(store);
+  auto facts = std::make_unique<IsovalueStats>(store);
   // Last: once it is made, that of the store before has gone from the renderer.
   auto picture =
-      std::make_unique<StorePicture>(store, options_.budgets, glfwPostEmptyEvent, setup_);
+      std::make_unique<SceneRenderer>(store, options_.budgets, glfwPostEmptyEvent, setup_);
   picture->scene().search().use(state_.index);
   state_.facts = std::move(facts);
   state_.picture = std::move(picture);
@@ -66,7 +66,7 @@ void ViewerWindow::open(const std::filesystem::path& path, const Selection& sele
     state_.bookmarks = std::make_unique<Bookmarks>(
         options_.bookmarks.empty() ? Bookmarks::default_file() : options_.bookmarks, path);
   } catch (const std::exception& e) {
-    state_.say(what_of(e));
+    state_.say(error_message(e));
   }
   // The next store is seen whole and with its own isovalue.
   options_.camera = {};
@@ -88,7 +88,7 @@ void ViewerWindow::show_volume(const Selection& selection) {
       settings.window_lo = settings.window_hi = 0;
     choose_values(settings, state_.picture->scene().tree());
   } catch (const std::exception& e) {
-    state_.say(what_of(e));
+    state_.say(error_message(e));
   }
 }
 
@@ -115,7 +115,7 @@ void ViewerWindow::drop(const std::filesystem::path& path) {
     else if (!begin_ranges(path, {}))
       open(path);
   } catch (const std::exception& e) {
-    state_.say(what_of(e));
+    state_.say(error_message(e));
   }
 }
 
@@ -134,7 +134,7 @@ void ViewerWindow::handle_import() {
     else
       open(store, volume.value_or(Selection()));
   } catch (const std::exception& e) {
-    state_.say(what_of(e));
+    state_.say(error_message(e));
   }
   for (const std::string& note : now.notes) state_.say(note);
 }

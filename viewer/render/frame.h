@@ -12,7 +12,7 @@
 namespace isobrick {
 
 /// Planes and box faces that cut.
-inline constexpr int kMostHalfSpaces = 12;
+inline constexpr int kMaxHalfSpaces = 12;
 /// Of a pixel, with multisampling.
 inline constexpr int kSamples = 4;
 
@@ -20,7 +20,7 @@ inline constexpr int kSamples = 4;
 struct FrameBlock {
   glm::mat4 projection, rotation;
   /// dot(xyz, position relative to the eye) + w >= 0 is kept.
-  std::array<glm::vec4, kMostHalfSpaces> half_spaces;
+  std::array<glm::vec4, kMaxHalfSpaces> half_spaces;
   glm::vec4 depth;        ///< near, far, orthographic, 1 / depth of the scene
   glm::vec4 viewport;     ///< width, height, half width and half height at depth 1 (or everywhere)
   glm::vec4 pixel;        ///< length of a pixel at depth 1 (or everywhere)

@@ -8,7 +8,7 @@ namespace isobrick {
 namespace {
 
 /// Fewer rows at a time are not worth a call: software works on tiles of so many.
-constexpr int kLeastRows = 64;
+constexpr int kMinRows = 64;
 
 /// What a pixel takes, in hundredths of what a triangle takes in software (Mesa, 0.2 us).
 std::uint64_t hundredths_of(ScreenPass::Step step) {
@@ -71,7 +71,7 @@ bool PictureWork::run_steps(ScreenPass& screen, const ScreenPicture& picture, st
     const std::uint64_t each = row_work(step_);
     const auto fit = static_cast<int>(std::min<std::uint64_t>(
         work / each, static_cast<std::uint64_t>(std::numeric_limits<int>::max())));
-    const int rows = std::min(std::max(fit, kLeastRows), height_ - row_);
+    const int rows = std::min(std::max(fit, kMinRows), height_ - row_);
     screen.run(steps_[step_], picture, {row_, rows});
     take(work, each * static_cast<std::uint64_t>(rows));
     row_ += rows;

@@ -5,11 +5,11 @@
 namespace isobrick {
 
 /// Pictures have edges of so many pixels.
-inline constexpr int kLeastPictureEdge = 16, kMostPictureEdge = 16384;
+inline constexpr int kMinPictureEdge = 16, kMaxPictureEdge = 16384;
 
 /// How PreviewSink draws.
 struct PreviewOptions {
-  int width = 1280, height = 960;      ///< pixels, kLeastPictureEdge … kMostPictureEdge
+  int width = 1280, height = 960;      ///< pixels, kMinPictureEdge … kMaxPictureEdge
   Vec3f colour{0.87f, 0.80f, 0.70f};   ///< of the surface, sRGB in [0, 1]
   Vec3d towards_eye{0.55, -1.0, 0.5};  ///< from the volume's centre, world space
   Vec3d up{0, 0, 1};

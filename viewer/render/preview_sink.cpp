@@ -17,10 +17,10 @@ constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that are dr
 
 const PreviewOptions& checked(const PreviewOptions& options) {
   for (const int edge : {options.width, options.height})
-    if (edge < kLeastPictureEdge || edge > kMostPictureEdge)
+    if (edge < kMinPictureEdge || edge > kMaxPictureEdge)
       throw UsageError(fmt::format("a picture of {}x{} pixels: each edge must be {} to {}",
-                                   options.width, options.height, kLeastPictureEdge,
-                                   kMostPictureEdge));
+                                   options.width, options.height, kMinPictureEdge,
+                                   kMaxPictureEdge));
   return options;
 }
 

@@ -85,10 +85,10 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
     throw UsageError(fmt::format("a picture of {} x {} pixels: {} draws 1 to {} along an edge",
                                  width, height, device.renderer, largest_edge));
   const std::size_t planes = new_settings.planes.size() + (new_settings.region ? 6 : 0);
-  if (planes > kMostHalfSpaces)
+  if (planes > kMaxHalfSpaces)
     throw UsageError(
         fmt::format("{} clipping planes, of which a region is 6: a picture can have {}", planes,
-                    kMostHalfSpaces));
+                    kMaxHalfSpaces));
   camera = new_camera;
   settings = new_settings;
   frame = make_frame(camera, width, height, settings);

@@ -96,7 +96,7 @@ class Work {
   const int device;
   const std::string name;
   const std::shared_ptr<gpu::MeshMemory> memory;  ///< null: meshes go through host memory
-  Turns turns;
+  TicketLock kernel_lock;
 
  private:
   std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
@@ -234,14 +234,14 @@ void Work::make(std::vector<Job>& jobs, DeviceMesher::Times& now) {
     all.push_back(job.on_device());
   }
   now.memory = watch.lap();
-  const Turn turn(&turns);
+  const TicketGuard guard(&kernel_lock);
   now.turn = watch.lap();
   batch_.make(all);
   std::vector<Job*> again;
   for (Job& job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job.slot);
     learn(size);
-    job.mesh.ribbon_triangles = size.ribbon_triangles;
+    job.mesh.seam_triangles = size.seam_triangles;
     if (size.triangles == 0)
       job.place.reset();
     else if (job.place && job.place->span().place.holds(size.vertices, size.triangles))
@@ -303,7 +303,7 @@ class CudaMesher final : public DeviceMesher {
     if (work_->memory) work_->memory->keep(blocks);
   }
   std::uint64_t bytes() const override { return work_->memory ? work_->memory->bytes() : 0; }
-  Turns& turns() override { return work_->turns; }
+  TicketLock& kernel_lock() override { return work_->kernel_lock; }
 
  private:
   std::shared_ptr<Work> work_;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/turns.h"
+#include "core/ticket_lock.h"
 #include "surface/grid_view.h"
 #include "viewer/scene/node_mesh.h"
 
@@ -62,9 +62,9 @@ class DeviceMesher {
   virtual void share_only(std::size_t blocks) = 0;
   /// Device memory of those blocks, whatever lies in them.
   virtual std::uint64_t bytes() const = 0;
-  /// The device's turns: it makes meshes in its own. A device that draws as well changes between
-  /// both slowly, so whoever draws with it takes turns.
-  virtual Turns& turns() = 0;
+  /// Held while the device makes meshes. A device switches slowly between compute and drawing, so
+  /// the thread that draws with it takes this lock as well.
+  virtual TicketLock& kernel_lock() = 0;
 
   /// What the device's thread has done so far.
   struct Times {

@@ -7,7 +7,7 @@ namespace isobrick {
 namespace {
 
 /// Values between which the counts of blocks are interpolated.
-constexpr std::size_t kMostEdges = 1 << 16;
+constexpr std::size_t kMaxEdges = 1 << 16;
 
 /// Calls f(RangeTable) for all items, some range chunks at a time.
 template <class Read, class F>
@@ -61,7 +61,7 @@ void IsovalueCounts::read_blocks(const BrickSource& source, int level) {
   }
   std::sort(bounds.begin(), bounds.end());
   bounds.erase(std::unique(bounds.begin(), bounds.end()), bounds.end());
-  const std::size_t step = bounds.size() / kMostEdges + 1;
+  const std::size_t step = bounds.size() / kMaxEdges + 1;
   for (std::size_t i = 0; i < bounds.size(); i += step) edges_.push_back(bounds[i]);
   if (!bounds.empty() && edges_.back() != bounds.back()) edges_.push_back(bounds.back());
   // First how many bounds lie in each place, then sums of them. Place 2 i is edge i

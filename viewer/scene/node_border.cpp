@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "surface/coarse_face.h"
+#include "surface/lod_seam.h"
 
 namespace isobrick {
 namespace {
@@ -26,7 +26,7 @@ bool on_larger(std::uint32_t mask, int i) {
 
 }  // namespace
 
-NodeBorder::Between NodeBorder::between(int axis, Index point) const {
+NodeBorder::Interpolation NodeBorder::interpolation(int axis, Index point) const {
   const Index r = ratio_[axis], first = point / r;
   if (point % r == 0) return {first, 0};
   const auto at = [&](int level, Index p) {
@@ -34,12 +34,12 @@ NodeBorder::Between NodeBorder::between(int axis, Index point) const {
   };
   const double a = at(key_.level + 1, first), b = at(key_.level + 1, first + 1);
   const double weight = (at(key_.level, point) - a) / (b - a);
-  return weight < 1 ? Between{first, weight} : Between{first + 1, 0};
+  return weight < 1 ? Interpolation{first, weight} : Interpolation{first + 1, 0};
 }
 
 float NodeBorder::interpolated(const GridValues& coarse, Int3 point) const {
-  Between b[3];
-  for (int axis = 0; axis < 3; ++axis) b[axis] = between(axis, point[axis]);
+  Interpolation b[3];
+  for (int axis = 0; axis < 3; ++axis) b[axis] = interpolation(axis, point[axis]);
   const auto mix = [](float u, float v, double w) { return u + static_cast<float>(w) * (v - u); };
   const auto along_x = [&](Index y, Index z) {
     const float u = coarse.at({b[0].first, y, z});
@@ -54,25 +54,26 @@ float NodeBorder::interpolated(const GridValues& coarse, Int3 point) const {
 }
 
 void NodeBorder::apply(const NodeKey& key, std::uint32_t coarser, double isovalue,
-                       const Wanted& wanted, GridValues& field) {
+                       const CancellationToken& token, GridValues& field) {
   key_ = key;
   ratio_ = grid_.ratio(key.level);
   lo_ = field.points.lo;
   hi_ = field.points.hi - Int3{1, 1, 1};
   for (auto& face : faces_) face.reset();
   for (int i = 0; i < kDirections; ++i)
-    if (coarser >> i & 1 && !on_larger(coarser, i)) take_values(i, isovalue, wanted, field);
+    if (coarser >> i & 1 && !on_larger(coarser, i)) take_values(i, isovalue, token, field);
 }
 
-void NodeBorder::take_values(int i, double isovalue, const Wanted& wanted, GridValues& field) {
+void NodeBorder::take_values(int i, double isovalue, const CancellationToken& token,
+                             GridValues& field) {
   const Int3 d = direction(i);
   Box3 points, coarse;
   int normal = 0, fixed = 0;
   for (int axis = 0; axis < 3; ++axis) {
     points.lo[axis] = d[axis] > 0 ? hi_[axis] : lo_[axis];
     points.hi[axis] = (d[axis] < 0 ? lo_[axis] : hi_[axis]) + 1;
-    const Between first = between(axis, points.lo[axis]);
-    const Between last = between(axis, points.hi[axis] - 1);
+    const Interpolation first = interpolation(axis, points.lo[axis]);
+    const Interpolation last = interpolation(axis, points.hi[axis] - 1);
     coarse.lo[axis] = first.first;
     coarse.hi[axis] = last.first + (last.weight > 0 ? 2 : 1);
     if (d[axis] != 0) {
@@ -80,7 +81,7 @@ void NodeBorder::take_values(int i, double isovalue, const Wanted& wanted, GridV
       ++fixed;
     }
   }
-  samples_.read(key_.level + 1, coarse, isovalue, wanted, scratch_);
+  samples_.read(key_.level + 1, coarse, isovalue, token, scratch_);
   for_each_point(points, [&](Int3 p) { field.at(p) = interpolated(scratch_, p); });
   if (fixed != 1) return;
   const int face = 2 * normal + (d[normal] > 0);
@@ -148,7 +149,7 @@ void NodeBorder::describe(GridView& view) {
   for (int axis = 0; axis < 3; ++axis) {
     auto& places = places_[static_cast<std::size_t>(axis)];
     places.clear();
-    const Between last = between(axis, hi_[axis]);
+    const Interpolation last = interpolation(axis, hi_[axis]);
     const Index end = last.first + (last.weight > 0 ? 2 : 1);
     for (Index p = lo_[axis] / ratio_[axis]; p < end; ++p)
       places.push_back(static_cast<double>(grid_.position(key_.level + 1, axis, p)));

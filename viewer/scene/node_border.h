@@ -17,24 +17,24 @@ class NodeBorder {
 
   /// Reads the neighbours' values and writes them over `field`: the grid points of
   /// the node, C order.
-  void apply(const NodeKey& key, std::uint32_t coarser, double isovalue, const Wanted& wanted,
-             GridValues& field);
+  void apply(const NodeKey& key, std::uint32_t coarser, double isovalue,
+             const CancellationToken& token, GridValues& field);
 
   /// After apply(): what a mesh of the node has to know of the coarser side. Valid until
   /// the next apply().
   void describe(GridView& view);
 
  private:
-  void take_values(int i, double isovalue, const Wanted& wanted, GridValues& field);
+  void take_values(int i, double isovalue, const CancellationToken& token, GridValues& field);
   void connect_inside(int face, GridValues& field) const;
   void connect_through(Int3 middle, int u, int v, float inside, GridValues& field) const;
   float interpolated(const GridValues& coarse, Int3 point) const;
   /// The two coarse grid points around a grid point, and how far it is from the first.
-  struct Between {
+  struct Interpolation {
     Index first;
     double weight;
   };
-  Between between(int axis, Index point) const;
+  Interpolation interpolation(int axis, Index point) const;
 
   const NodeGrid& grid_;
   NodeSamples& samples_;

@@ -120,7 +120,7 @@ Box3 NodeGrid::children(const NodeKey& n) const {
                    {{0, 0, 0}, level(n.level - 1).nodes});
 }
 
-NodeGrid::Between NodeGrid::between(int v, int axis, Index point) const {
+NodeGrid::Interpolation NodeGrid::interpolation(int v, int axis, Index point) const {
   const Level& l = level(v);
   const auto last =
       static_cast<double>(stored_extents_[static_cast<std::size_t>(l.source)][axis] - 1);
@@ -137,8 +137,8 @@ Box3 NodeGrid::samples(const NodeKey& n) const {
   Box3 box;
   const Int3 cells = node_cells(n);
   for (int axis = 0; axis < 3; ++axis) {
-    const Between lo = between(n.level, axis, n.node[axis] * kNodeEdge);
-    const Between hi = between(n.level, axis, n.node[axis] * kNodeEdge + cells[axis]);
+    const Interpolation lo = interpolation(n.level, axis, n.node[axis] * kNodeEdge);
+    const Interpolation hi = interpolation(n.level, axis, n.node[axis] * kNodeEdge + cells[axis]);
     box.lo[axis] = lo.first;
     box.hi[axis] = hi.first + (hi.weight > 0 ? 2 : 1);
   }
@@ -151,8 +151,8 @@ Box3 NodeGrid::samples_within(const NodeKey& n, int v) const {
     const Index step = level(v).step[axis], first = n.node[axis] * kNodeEdge;
     const Index begin = position(n.level, axis, first);
     const Index end = position(n.level, axis, first + kNodeEdge);
-    const Between lo = between(v, axis, begin / step);
-    const Between hi = between(v, axis, (end + step - 1) / step);
+    const Interpolation lo = interpolation(v, axis, begin / step);
+    const Interpolation hi = interpolation(v, axis, (end + step - 1) / step);
     box.lo[axis] = lo.first + (lo.weight > 0 ? 1 : 0);
     box.hi[axis] = std::max(hi.first, box.lo[axis]) + 1;
   }

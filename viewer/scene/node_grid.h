@@ -114,11 +114,11 @@ class NodeGrid {
 
   /// Between which stored samples the value at a grid point lies: `first` and
   /// the next one, the part `weight` of the way. weight is 0 where it is a sample.
-  struct Between {
+  struct Interpolation {
     Index first = 0;
     double weight = 0;
   };
-  Between between(int v, int axis, Index point) const;
+  Interpolation interpolation(int v, int axis, Index point) const;
 
  private:
   void add_levels(const StoreInfo& info, int source, Int3& exponents);

@@ -38,9 +38,9 @@ struct NodeMesh {
   /// The same on a device, instead; see device_mesher.h.
   std::shared_ptr<const DeviceMesh> device;
   std::uint64_t device_triangles = 0, device_bytes = 0;  ///< of that
-  /// How many of the triangles, the last ones, are the ribbons along the borders to coarser
+  /// How many of the triangles, the last ones, are the seam strips along the borders to coarser
   /// neighbours: a small part of a cell wide, across the surface, seen from both sides.
-  std::uint32_t ribbon_triangles = 0;
+  std::uint32_t seam_triangles = 0;
   /// What is wrong with the samples; empty when all is well. The mesh is empty otherwise.
   std::string damage;
 

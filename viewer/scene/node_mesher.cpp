@@ -16,9 +16,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Half the width of a ribbon, in cells: enough for what a rasteriser rounds, too
+/// Half the width of a seam strip, in cells: enough for what a rasteriser rounds, too
 /// little to be seen.
-constexpr double kRibbon = 0.02;
+constexpr double kSeam = 0.02;
 
 }  // namespace
 
@@ -106,7 +106,7 @@ struct NodeMesher::Impl {
       v.place[axis] = places[axis].data();
       v.inverse[axis] = inverse[axis].data();
     }
-    v.ribbon = static_cast<float>(kRibbon * grid.level(key.level).spacing);
+    v.seam_strip = static_cast<float>(kSeam * grid.level(key.level).spacing);
     if (coarser) border.describe(v);
     return v;
   }
@@ -147,22 +147,23 @@ struct NodeMesher::Impl {
     return key.level == 0 && coarser == 0 && size_of(type) < sizeof(float);
   }
 
-  GridView read_stored(const NodeKey& key, double isovalue, const Wanted& wanted) {
+  GridView read_stored(const NodeKey& key, double isovalue, const CancellationToken& token) {
     const std::optional<NeededSamples> needed = needed_of(key, isovalue, 0);
     around.points = points_around(key);
-    samples.read_stored(around.points, wanted, stored_samples, needed ? &*needed : nullptr);
+    samples.read_stored(around.points, token, stored_samples, needed ? &*needed : nullptr);
     GridView v = view_of(key, false, false);
     v.stored = {stored_samples.data(), bricks.source().info().type, isovalue};
     return v;
   }
 
-  GridView read(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted) {
+  GridView read(const NodeKey& key, double isovalue, std::uint32_t coarser,
+                const CancellationToken& token) {
     const std::optional<NeededSamples> needed = needed_of(key, isovalue, coarser);
-    samples.read(key.level, points_around(key), isovalue, wanted, around,
+    samples.read(key.level, points_around(key), isovalue, token, around,
                  needed ? &*needed : nullptr);
     if (coarser) {
       copy_field(points(key));
-      border.apply(key, coarser, isovalue, wanted, field);
+      border.apply(key, coarser, isovalue, token, field);
     }
     return view_of(key, coarser != 0);
   }
@@ -186,27 +187,27 @@ NodeMesher::NodeMesher(const NodeGrid& grid, ResidentBricks& bricks, Vec3d origi
 NodeMesher::~NodeMesher() = default;
 
 NodeMesh NodeMesher::mesh(const NodeKey& key, double isovalue, std::uint32_t coarser,
-                          const Wanted& wanted) {
+                          const CancellationToken& token) {
   NodeMesh out;
   out.key = key;
   out.isovalue = isovalue;
   out.coarser = coarser;
-  return extract(grid(key, isovalue, coarser, wanted), std::move(out));
+  return extract(grid(key, isovalue, coarser, token), std::move(out));
 }
 
 NodeMesh NodeMesher::extract(const GridView& grid, NodeMesh mesh) {
   const auto start = Clock::now();
-  mesh.ribbon_triangles = impl_->extractor.extract(grid, impl_->work);
+  mesh.seam_triangles = impl_->extractor.extract(grid, impl_->work);
   Impl::shrink(impl_->work, mesh.mesh);
   impl_->busy += Clock::now() - start;
   return mesh;
 }
 
 GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coarser,
-                          const Wanted& wanted, Form form) {
+                          const CancellationToken& token, Form form) {
   if (form == Form::stored_if_possible && impl_->may_be_stored(key, coarser))
-    return impl_->read_stored(key, isovalue, wanted);
-  return impl_->read(key, isovalue, coarser, wanted);
+    return impl_->read_stored(key, isovalue, token);
+  return impl_->read(key, isovalue, coarser, token);
 }
 
 bool NodeMesher::half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const {

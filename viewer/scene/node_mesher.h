@@ -34,15 +34,16 @@ class NodeMesher {
   ~NodeMesher();
 
   /// The mesh of a node whose neighbours in `coarser` (directions) lie one level
-  /// above. Throws Abandoned, DamageError and what else reading bricks throws.
-  NodeMesh mesh(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted);
+  /// above. Throws OperationCancelled, DamageError and what else reading bricks throws.
+  NodeMesh mesh(const NodeKey& key, double isovalue, std::uint32_t coarser,
+                const CancellationToken& token);
 
   /// Whether a grid may hold samples as they are stored instead of values, which takes less time
   /// and memory: for a device.
   enum class Form : std::uint8_t { values, stored_if_possible };
   /// What that mesh is made of. Valid until the next call; throws the same.
-  GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser, const Wanted& wanted,
-                Form form = Form::values);
+  GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser,
+                const CancellationToken& token, Form form = Form::values);
 
   /// The mesh of the values that grid() gave last. `mesh` says which it is.
   NodeMesh extract(const GridView& grid, NodeMesh mesh);

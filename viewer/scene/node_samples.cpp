@@ -97,7 +97,7 @@ Box3 NodeSamples::box() const {
 /// Of the bricks that lie in `box`: calls take(brick, samples) for those that are needed, skip(part
 /// of the box) for the others.
 template <class Take, class Skip>
-void NodeSamples::for_each_brick(int stored, Box3 box, const Wanted& wanted,
+void NodeSamples::for_each_brick(int stored, Box3 box, const CancellationToken& token,
                                  const NeededSamples* needed, Take&& take, Skip&& skip) {
   const Lattice& lattice = bricks_.source().info().levels[static_cast<std::size_t>(stored)].lattice;
   wanted_.clear();
@@ -108,19 +108,19 @@ void NodeSamples::for_each_brick(int stored, Box3 box, const Wanted& wanted,
     else
       skip(part);
   });
-  bricks_.read_together(stored, wanted_, wanted);
+  bricks_.read_together(stored, wanted_, token);
   // Threads at nodes beside each other want the same bricks: were each to wait for what another
   // one is reading, all would read one brick after the other.
   std::vector<Int3> busy;
   for (const Int3 b : wanted_)
-    if (const auto brick = bricks_.get_unless_busy(stored, b, wanted))
+    if (const auto brick = bricks_.get_unless_busy(stored, b, token))
       take(b, *brick);
     else
       busy.push_back(b);
-  for (const Int3 b : busy) take(b, *bricks_.get(stored, b, wanted));
+  for (const Int3 b : busy) take(b, *bricks_.get(stored, b, token));
 }
 
-void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted,
+void NodeSamples::gather(int stored, double isovalue, const CancellationToken& token,
                          const NeededSamples* needed) {
   const StoreInfo& info = bricks_.source().info();
   const Lattice& lattice = info.levels[static_cast<std::size_t>(stored)].lattice;
@@ -143,11 +143,11 @@ void NodeSamples::gather(int stored, double isovalue, const Wanted& wanted,
     const Index first = linear_index(part.lo - box.lo, box.extent());
     needed->fill(part, -1.0f, 1.0f, gathered_.data() + first, box.extent());
   };
-  for_each_brick(stored, box, wanted, needed, take, skip);
+  for_each_brick(stored, box, token, needed, take, skip);
 }
 
-void NodeSamples::read_stored(Box3 points, const Wanted& wanted, std::vector<std::byte>& out,
-                              const NeededSamples* needed) {
+void NodeSamples::read_stored(Box3 points, const CancellationToken& token,
+                              std::vector<std::byte>& out, const NeededSamples* needed) {
   const int stored = grid_.level(0).source;
   const StoreInfo& info = bricks_.source().info();
   const Lattice& lattice = info.levels[static_cast<std::size_t>(stored)].lattice;
@@ -169,14 +169,14 @@ void NodeSamples::read_stored(Box3 points, const Wanted& wanted, std::vector<std
       using Limits = std::numeric_limits<T>;
       needed->fill(part, Limits::lowest(), Limits::max(), row_at(part.lo), points.extent());
     };
-    for_each_brick(stored, points, wanted, needed, take, skip);
+    for_each_brick(stored, points, token, needed, take, skip);
   });
 }
 
-void NodeSamples::read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out,
-                       const NeededSamples* needed) {
+void NodeSamples::read(int v, Box3 points, double isovalue, const CancellationToken& token,
+                       GridValues& out, const NeededSamples* needed) {
   for (int axis = 0; axis < 3; ++axis) find_axis(v, axis, points.lo[axis], points.hi[axis]);
-  gather(grid_.level(v).source, isovalue, wanted, v == 0 ? needed : nullptr);
+  gather(grid_.level(v).source, isovalue, token, v == 0 ? needed : nullptr);
   out.points = points;
   if (v == 0) {  // grid points are samples
     out.values.swap(gathered_);

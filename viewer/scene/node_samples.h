@@ -34,12 +34,12 @@ class NodeSamples {
   /// volume), in float: the isosurface is where these cross 0. The subtraction is
   /// exact enough in double that no sample changes sides.
   /// Of level 0, bricks that `needed` has no need of are not read, unless it is null.
-  void read(int v, Box3 points, double isovalue, const Wanted& wanted, GridValues& out,
+  void read(int v, Box3 points, double isovalue, const CancellationToken& token, GridValues& out,
             const NeededSamples* needed = nullptr);
 
   /// The samples themselves at the points `points` of level 0, in the store's type; those that
   /// `needed` has no need of are the least or the largest there is, unless it is null.
-  void read_stored(Box3 points, const Wanted& wanted, std::vector<std::byte>& out,
+  void read_stored(Box3 points, const CancellationToken& token, std::vector<std::byte>& out,
                    const NeededSamples* needed);
 
   /// Bricks of the stored level that read() looks at.
@@ -62,10 +62,11 @@ class NodeSamples {
 
   void find_axis(int v, int axis, Index lo, Index hi);
   Box3 box() const;
-  void gather(int stored, double isovalue, const Wanted& wanted, const NeededSamples* needed);
+  void gather(int stored, double isovalue, const CancellationToken& token,
+              const NeededSamples* needed);
   template <class Take, class Skip>
-  void for_each_brick(int stored, Box3 box, const Wanted& wanted, const NeededSamples* needed,
-                      Take&& take, Skip&& skip);
+  void for_each_brick(int stored, Box3 box, const CancellationToken& token,
+                      const NeededSamples* needed, Take&& take, Skip&& skip);
   template <class T>
   void copy_part(const std::byte* brick, Int3 corner, Int3 edge, double isovalue);
   template <class F>

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <utility>
 
-#include "core/give_way.h"
+#include "core/thread_priority.h"
 #include "viewer/scene/stream_state.h"
 #include "viewer/scene/stream_worker.h"
 
@@ -15,7 +15,7 @@ namespace {
 constexpr std::chrono::milliseconds kClosing{50};
 
 void work(const std::shared_ptr<StreamState>& state) {
-  if (state->options.give_way) give_way();
+  if (state->options.lower_thread_priority) lower_thread_priority();
   StreamWorker(state).run();
   state->workers.end();
 }

@@ -26,7 +26,7 @@ struct StreamOptions {
   Vec3d origin;                  ///< world space; subtracted from all positions
   std::optional<Inside> inside;  ///< nothing: as inside_of() the store
   /// Whether the threads give way to others of the process where cores are short.
-  bool give_way = false;
+  bool lower_thread_priority = false;
   /// Called from a worker's thread whenever drawable() may give something new. Must
   /// not call the stream.
   std::function<void()> on_change;

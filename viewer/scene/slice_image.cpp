@@ -70,7 +70,8 @@ void lay_out(const LevelInfo& level, const Plane& plane, SliceSamples& image) {
 
 }  // namespace
 
-SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request, const Wanted& wanted) {
+SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request,
+                        const CancellationToken& token) {
   const StoreInfo& info = bricks.source().info();
   const auto levels = static_cast<int>(info.levels.size());
   if (request.axis < 0 || request.axis > 2 || request.stored < 0 || request.stored >= levels)
@@ -109,7 +110,7 @@ SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request, con
   for_each_point(cover, [&](Int3 b) {
     std::shared_ptr<const BrickSamples> brick;
     try {
-      brick = bricks.get(image.stored, b, wanted);
+      brick = bricks.get(image.stored, b, token);
     } catch (const Error& e) {
       if (image.damage.empty()) image.damage = e.what();
     }

@@ -36,8 +36,9 @@ struct SliceSamples {
   std::string damage;  ///< of bricks that could not be read: their pixels are the fill value
 };
 
-/// Reads it through resident bricks. Throws Abandoned, and UsageError for an axis
+/// Reads it through resident bricks. Throws OperationCancelled, and UsageError for an axis
 /// or level that there is not; a damaged brick does not stop it.
-SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request, const Wanted& wanted);
+SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request,
+                        const CancellationToken& token);
 
 }  // namespace isobrick

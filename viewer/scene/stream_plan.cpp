@@ -23,17 +23,18 @@ class Planner {
   void run(double soon) {
     for (const double isovalue : cut_.isovalues)
       for (const CutNode& node : cut_.nodes) add(node, isovalue);
-    plan_.skips_levels = 2 * bare_.size() > held_ && static_cast<double>(plan_.jobs.size()) <= soon;
-    for (const Bare& bare : bare_) {
-      if (bare.isovalue != ancestors_of_) ancestors_.clear();
-      ancestors_of_ = bare.isovalue;
-      add_ancestors(*bare.node, bare.isovalue);
+    plan_.skips_levels =
+        2 * missing_.size() > held_ && static_cast<double>(plan_.jobs.size()) <= soon;
+    for (const MissingNode& missing : missing_) {
+      if (missing.isovalue != ancestors_of_) ancestors_.clear();
+      ancestors_of_ = missing.isovalue;
+      add_ancestors(*missing.node, missing.isovalue);
     }
   }
 
  private:
   /// A node without any mesh.
-  struct Bare {
+  struct MissingNode {
     const CutNode* node;
     double isovalue;
   };
@@ -42,7 +43,7 @@ class Planner {
     if (node.cut_away || !tree_.may_hold_surface(node.key, isovalue, node.coarser)) return;
     ++held_;
     if (meshes_.find(node.key, isovalue, node.coarser)) return;
-    if (!meshes_.has_any(node.key, isovalue)) bare_.push_back({&node, isovalue});
+    if (!meshes_.has_any(node.key, isovalue)) missing_.push_back({&node, isovalue});
     plan_.jobs.push_back(
         {node.key, isovalue, node.coarser, node.visible, false, node.pixels, node.distance});
   }
@@ -86,7 +87,7 @@ class Planner {
   MeshCache& meshes_;
   MeshPlan& plan_;
   std::size_t held_ = 0;  ///< nodes of the cut with a surface, for each isovalue
-  std::vector<Bare> bare_;
+  std::vector<MissingNode> missing_;
   std::unordered_map<NodeKey, Ancestor, NodeKeyHash> ancestors_;
   double ancestors_of_ = 0;  ///< isovalue
 };

@@ -11,13 +11,13 @@ namespace isobrick {
 
 /// A mesh, or the slice of a slot, that a thread is to make; and the cancellation token that the
 /// thread checks. Thread-safe.
-class StreamRequest final : public Wanted {
+class StreamRequest final : public CancellationToken {
  public:
   explicit StreamRequest(MeshJob mesh) : mesh_(std::move(mesh)) {}
   StreamRequest(int slot, const SliceRequest& slice) : slot_(slot), slice_(slice) {}
 
   void check() const override {
-    if (cancelled()) throw Abandoned();
+    if (cancelled()) throw OperationCancelled();
   }
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
   void set_cancelled(bool cancelled) { cancelled_ = cancelled; }

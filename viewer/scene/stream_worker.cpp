@@ -19,11 +19,11 @@ NodeMesh empty_mesh(const MeshJob& job) {
 }
 
 /// For work that belongs to no request: it ends when the queue is closed.
-class CloseCheck final : public Wanted {
+class CloseCheck final : public CancellationToken {
  public:
   explicit CloseCheck(const RequestQueue& queue) : queue_(queue) {}
   void check() const override {
-    if (queue_.closed()) throw Abandoned();
+    if (queue_.closed()) throw OperationCancelled();
   }
 
  private:
@@ -68,7 +68,7 @@ void StreamWorker::find_thin_structure() {
   try {
     if (state_->tree->thin_structure().read(state_->bricks, CloseCheck(state_->queue)))
       state_->notify_change();
-  } catch (const Abandoned&) {
+  } catch (const OperationCancelled&) {
   }
 }
 
@@ -114,7 +114,7 @@ std::optional<NodeMesh> StreamWorker::mesh_of(const RequestPtr& request) {
     if (send(grid, request)) return std::nullopt;
     if (grid.stored.samples != nullptr) grid = read(NodeMesher::Form::values);
     return mesher_.extract(grid, empty_mesh(job));
-  } catch (const Abandoned&) {
+  } catch (const OperationCancelled&) {
     return std::nullopt;
   } catch (const std::exception& e) {
     NodeMesh damaged = empty_mesh(job);
@@ -149,15 +149,15 @@ void StreamWorker::make_slice(const RequestPtr& request) {
   std::shared_ptr<SliceSamples> image;
   try {
     image = std::make_shared<SliceSamples>(read_slice(state_->bricks, request->slice(), *request));
-  } catch (const Abandoned&) {
+  } catch (const OperationCancelled&) {
   } catch (const std::exception& e) {
     image = std::make_shared<SliceSamples>();
     image->request = request->slice();
     image->damage = e.what();
   }
-  const bool wanted = state_->slices.put(*request, std::move(image));
+  const bool token = state_->slices.put(*request, std::move(image));
   state_->queue.finish(request);
-  if (wanted) state_->notify_change();
+  if (token) state_->notify_change();
 }
 
 }  // namespace isobrick

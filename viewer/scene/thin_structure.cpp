@@ -79,7 +79,7 @@ void ThinStructure::merge_below() {
 
 /// One layer of patches after the other: a whole level would take room that a budget may not have.
 ThinStructure::Ranges ThinStructure::own_ranges(const Level& level, NodeSamples& samples,
-                                                const Wanted& wanted) const {
+                                                const CancellationToken& token) const {
   const NodeGrid::Level& grid = grid_.level(level.level);
   const Box3 all{{0, 0, 0}, grid.cells + Int3{1, 1, 1}};
   const Int3 cells = floor_div(level.edge, grid.step);
@@ -91,7 +91,7 @@ ThinStructure::Ranges ThinStructure::own_ranges(const Level& level, NodeSamples&
   GridValues values;
   for (Index z = 0; z < level.patches.z; ++z) {
     const Box3 layer{{0, 0, z}, {level.patches.x, level.patches.y, z + 1}};
-    samples.read(level.level, around(layer.lo, layer.hi), 0, wanted, values);
+    samples.read(level.level, around(layer.lo, layer.hi), 0, token, values);
     for_each_point(layer, [&](Int3 patch) {
       ValueRange<float> range;
       for_each_point(around(patch, patch + Int3{1, 1, 1}),
@@ -102,21 +102,21 @@ ThinStructure::Ranges ThinStructure::own_ranges(const Level& level, NodeSamples&
   return own;
 }
 
-void ThinStructure::read_levels(ResidentBricks& bricks, const Wanted& wanted) {
+void ThinStructure::read_levels(ResidentBricks& bricks, const CancellationToken& token) {
   merge_below();
   NodeSamples samples(grid_, bricks);
   for (Level& level : levels_) try {
-      level.own = own_ranges(level, samples, wanted);
-    } catch (const Abandoned&) {
+      level.own = own_ranges(level, samples, token);
+    } catch (const OperationCancelled&) {
       throw;
     } catch (const std::exception&) {  // meshes of the level report it
     }
 }
 
-bool ThinStructure::read(ResidentBricks& bricks, const Wanted& wanted) {
+bool ThinStructure::read(ResidentBricks& bricks, const CancellationToken& token) {
   if (levels_.empty() || taken_.exchange(true)) return false;
   try {
-    read_levels(bricks, wanted);
+    read_levels(bricks, token);
   } catch (...) {
     taken_ = false;
     throw;

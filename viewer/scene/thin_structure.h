@@ -28,8 +28,8 @@ class ThinStructure {
   void include(const RangeTable& table, Box3 blocks);
   /// After the ranges of all blocks: reads the samples of the levels, unless somebody does or has.
   /// Of a level that cannot be read nothing counts as lost. False when it did nothing. Throws
-  /// Abandoned; then another call begins again.
-  bool read(ResidentBricks& bricks, const Wanted& wanted);
+  /// OperationCancelled; then another call begins again.
+  bool read(ResidentBricks& bricks, const CancellationToken& token);
   /// Whether read() has ended.
   bool known() const { return known_.load(std::memory_order_acquire); }
 
@@ -51,8 +51,8 @@ class ThinStructure {
   };
 
   void merge_below();
-  void read_levels(ResidentBricks& bricks, const Wanted& wanted);
-  Ranges own_ranges(const Level& level, NodeSamples& samples, const Wanted& wanted) const;
+  void read_levels(ResidentBricks& bricks, const CancellationToken& token);
+  Ranges own_ranges(const Level& level, NodeSamples& samples, const CancellationToken& token) const;
 
   const NodeGrid& grid_;
   Mutex mutex_;                      ///< of include()

@@ -25,7 +25,7 @@ constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr std::size_t kMaxJson = std::size_t{64} << 20;
 /// Of the values of the scene: enough for some 100,000 meshes and nodes.
 constexpr std::size_t kMaxValueBytes = std::size_t{128} << 20;
-constexpr int kMostDepth = 64;
+constexpr int kMaxDepth = 64;
 
 std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
   std::uint32_t word = 0;
@@ -144,8 +144,8 @@ class GltfReader {
     std::size_t bytes = 0;
     root_ = json::parse(text, text + chunk.size(), [&](int depth, Event event, json&) {
       const bool opens = event == Event::object_start || event == Event::array_start;
-      if (opens && depth >= kMostDepth)
-        fail(fmt::format("its scene is nested more than {} levels deep", kMostDepth));
+      if (opens && depth >= kMaxDepth)
+        fail(fmt::format("its scene is nested more than {} levels deep", kMaxDepth));
       bytes += bytes_of(event);
       if (bytes > kMaxValueBytes)
         fail(fmt::format("its scene has so many values that they take more than {} MiB",
@@ -240,7 +240,7 @@ class GltfReader {
 
   void add_node(std::uint64_t number, const WorldMatrix& parent, int depth) {
     // A tree cannot be deeper than it has nodes; a ring would have no end.
-    if (depth > kMostDepth || ++nodes_seen_ > root_.at("nodes").size())
+    if (depth > kMaxDepth || ++nodes_seen_ > root_.at("nodes").size())
       fail("its nodes are no tree");
     const json& node = item("nodes", number);
     const WorldMatrix here = product(parent, matrix_of(node));

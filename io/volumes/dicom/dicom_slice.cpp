@@ -25,7 +25,7 @@ namespace isobrick {
 namespace {
 
 /// Longer elements stay in the file until they are asked for.
-constexpr Uint32 kMostElement = 4096;
+constexpr Uint32 kMaxElement = 4096;
 
 void prepare_library() {
   static std::once_flag once;
@@ -100,11 +100,11 @@ void check_syntax(const std::string& path, DcmFileFormat& file) {
 void load(const std::string& path, DcmFileFormat& file, bool samples) {
   prepare_library();
   OFCondition status =
-      file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, kMostElement, ERM_metaOnly);
+      file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, kMaxElement, ERM_metaOnly);
   if (status.bad()) fail(path, "cannot be read as a DICOM file", status);
   check_syntax(path, file);
-  status = samples ? file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, kMostElement)
-                   : file.loadFileUntilTag(path.c_str(), EXS_Unknown, EGL_noChange, kMostElement,
+  status = samples ? file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, kMaxElement)
+                   : file.loadFileUntilTag(path.c_str(), EXS_Unknown, EGL_noChange, kMaxElement,
                                            ERM_autoDetect, DCM_PixelData);
   if (status.bad()) fail(path, "cannot be read as a DICOM file", status);
 }

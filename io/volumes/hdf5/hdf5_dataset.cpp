@@ -79,10 +79,10 @@ std::vector<Index> Hdf5Dataset::Handles::chunk_edges(hid_t creation) const {
   if (H5Pget_chunk(creation, static_cast<int>(chunk.size()), chunk.data()) !=
       static_cast<int>(chunk.size()))
     hdf5_fail(path, "the chunks have no size");
-  constexpr double kMost = 0x1p40;
+  constexpr double kMax = 0x1p40;
   double bytes = static_cast<double>(size_of(type));
   for (const hsize_t edge : chunk) bytes *= static_cast<double>(edge);
-  if (!(bytes >= 1 && bytes < kMost))
+  if (!(bytes >= 1 && bytes < kMax))
     throw UsageError(fmt::format("'{}': chunks of {} bytes are too large", path, bytes));
   return {chunk.rbegin(), chunk.rend()};
 }
@@ -95,7 +95,7 @@ bool Hdf5Dataset::Handles::decode_chunks(hid_t creation, const std::vector<Index
   if (!swap || !encoding) return false;
   encoding->chunk_bytes = size_of(type);
   for (const Index edge : edges) encoding->chunk_bytes *= static_cast<std::size_t>(edge);
-  if (encoding->chunk_bytes > kMostHdf5Chunk) return false;
+  if (encoding->chunk_bytes > kMaxHdf5Chunk) return false;
   Hdf5ChunkLayout layout{
       path, {}, edges, *encoding, size_of(type), *swap, read_hdf5_fill(creation, type)};
   for (const ArrayAxis& axis : axes) layout.extent.push_back(axis.size);

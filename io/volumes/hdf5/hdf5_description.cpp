@@ -16,7 +16,7 @@ namespace {
 
 /// Names of datasets with three or more dimensions.
 std::vector<std::string> find_volumes(hid_t file) {
-  constexpr std::size_t kMost = 1000;
+  constexpr std::size_t kMax = 1000;
   std::vector<std::string> names;
   const auto visit = [](hid_t root, const char* name, const H5O_info_t* info, void* to) -> herr_t {
     auto& found = *static_cast<std::vector<std::string>*>(to);
@@ -25,7 +25,7 @@ std::vector<std::string> find_volumes(hid_t file) {
     const Hdf5Handle space(dataset.valid() ? H5Dget_space(dataset) : -1, H5Sclose);
     if (!space.valid() || H5Sget_simple_extent_ndims(space) < 3) return 0;
     found.emplace_back(name);
-    return found.size() >= kMost ? 1 : 0;
+    return found.size() >= kMax ? 1 : 0;
   };
   H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &names, H5O_INFO_BASIC);
   return names;
@@ -33,21 +33,21 @@ std::vector<std::string> find_volumes(hid_t file) {
 
 /// "/a, /b, …", as far as that is fit for a message.
 std::string list_of(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 10;
+  constexpr std::size_t kMax = 10;
   std::string list;
-  for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i)
+  for (std::size_t i = 0; i < std::min(names.size(), kMax); ++i)
     list += (i ? ", /" : "/") + printable(names[i], 60);
-  return names.size() > kMost ? list + ", …" : list;
+  return names.size() > kMax ? list + ", …" : list;
 }
 
 /// Numbers of an attribute, or none.
 std::vector<double> read_numbers(hid_t dataset, const char* name) {
-  constexpr hssize_t kMost = 16;
+  constexpr hssize_t kMax = 16;
   if (H5Aexists(dataset, name) <= 0) return {};
   const Hdf5Handle attribute(H5Aopen(dataset, name, H5P_DEFAULT), H5Aclose);
   const Hdf5Handle space(attribute.valid() ? H5Aget_space(attribute) : -1, H5Sclose);
   const hssize_t count = space.valid() ? H5Sget_simple_extent_npoints(space) : 0;
-  if (count < 1 || count > kMost) return {};
+  if (count < 1 || count > kMax) return {};
   std::vector<double> numbers(static_cast<std::size_t>(count));
   if (H5Aread(attribute, H5T_NATIVE_DOUBLE, numbers.data()) < 0) return {};
   return numbers;
@@ -82,9 +82,9 @@ std::vector<std::string> read_variable_strings(hid_t attribute, hid_t type, std:
 
 /// Strings of one length, which end with zeros or blanks.
 std::vector<std::string> read_fixed_strings(hid_t attribute, hid_t type, std::size_t count) {
-  constexpr std::size_t kMost = 1 << 16;
+  constexpr std::size_t kMax = 1 << 16;
   const std::size_t size = H5Tget_size(type);
-  if (size == 0 || size > kMost) return {};
+  if (size == 0 || size > kMax) return {};
   std::string raw(size * count, '\0');
   if (H5Aread(attribute, type, raw.data()) < 0) return {};
   std::vector<std::string> strings;

@@ -15,13 +15,13 @@ enum class Hdf5Filter : std::uint8_t { deflate, lzf, shuffle, fletcher32 };
 struct Hdf5Encoding {
   std::vector<Hdf5Filter> filters;  ///< in the order of writing; one at most compresses
   std::size_t element = 1;          ///< bytes of what shuffle takes apart
-  std::size_t chunk_bytes = 0;      ///< of a chunk's samples, at most kMostHdf5Chunk
+  std::size_t chunk_bytes = 0;      ///< of a chunk's samples, at most kMaxHdf5Chunk
 
   /// No chunk has more bytes in a file.
   std::size_t most_packed() const;
 };
 
-inline constexpr std::size_t kMostHdf5Chunk = std::size_t{1} << 31;
+inline constexpr std::size_t kMaxHdf5Chunk = std::size_t{1} << 31;
 
 /// A chunk's bytes, and room for another form of them.
 struct Hdf5ChunkBuffers {

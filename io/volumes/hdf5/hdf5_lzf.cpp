@@ -17,7 +17,7 @@ constexpr unsigned kFirstReference = 32;
 /// A reference of this length has a byte more for it.
 constexpr unsigned kLongReference = 7;
 /// Of a chunk, and what filters add to it.
-constexpr std::size_t kMostFiltered = kMostHdf5Chunk + (std::size_t{1} << 16);
+constexpr std::size_t kMaxFiltered = kMaxHdf5Chunk + (std::size_t{1} << 16);
 
 /// Reads one packed stream and writes its samples.
 class Unpacker {
@@ -93,7 +93,7 @@ std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t siz
   if ((flags & H5Z_FLAG_REVERSE) == 0) return 0;
   const std::span packed{static_cast<const std::byte*>(*buffer), size};
   const std::size_t unpacked_bytes = unpacked_size(packed);
-  if (unpacked_bytes == 0 || unpacked_bytes > kMostFiltered) return 0;
+  if (unpacked_bytes == 0 || unpacked_bytes > kMaxFiltered) return 0;
   try {
     PodBuffer<std::byte> out;
     unpack_lzf(packed, unpacked_bytes, out);

@@ -206,9 +206,9 @@ bool find_roles(const Fields& fields, std::vector<ArrayAxis>& axes) {
 
 /// Returns how many axes the array has.
 std::size_t read_view(const Fields& fields, const Selection& selection, TextHeader& header) {
-  constexpr Index kMostDimensions = 16;
+  constexpr Index kMaxDimensions = 16;
   const Index dimension = parse_integer(fields.path(), "dimension", fields.need("dimension"));
-  if (dimension < 3 || dimension > kMostDimensions)
+  if (dimension < 3 || dimension > kMaxDimensions)
     header_error(
         fields.path(),
         fmt::format("dimension {}: volumes have 3, or more with channels and times", dimension));
@@ -342,9 +342,9 @@ std::string read_unit(const Fields& fields, const std::string& name, std::size_t
 
 /// What export keeps of a grid in key/value pairs.
 void read_grid(const Fields& fields, TextHeader& header) {
-  constexpr std::size_t kMostClass = 100, kMostName = 1000;
-  header.grid_class = printable(fields.pair(kNrrdGridClass), kMostClass);
-  header.grid_name = printable(fields.pair(kNrrdGridName), kMostName);
+  constexpr std::size_t kMaxClass = 100, kMaxName = 1000;
+  header.grid_class = printable(fields.pair(kNrrdGridClass), kMaxClass);
+  header.grid_name = printable(fields.pair(kNrrdGridName), kMaxName);
   const std::string fill = fields.pair(kNrrdFillValue);
   if (fill.empty()) return;
   double value = 0;

@@ -64,7 +64,7 @@ std::optional<ByteOrder> order_of(const TextHeader& header, ScalarType type,
 std::uint64_t after_lines(const File& file, const std::string& path, std::uint64_t begin,
                           std::uint64_t lines) {
   if (lines == 0) return begin;
-  const std::string text = file.text_at(begin, kMostHeader);
+  const std::string text = file.text_at(begin, kMaxHeader);
   std::size_t at = 0;
   for (std::uint64_t i = 0; i < lines; ++i) {
     at = text.find('\n', at);

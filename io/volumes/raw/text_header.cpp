@@ -58,7 +58,7 @@ File open_data_file(const std::string& path, const std::string& header) {
 HeaderLines::HeaderLines(const std::string& path) : path_(path) {
   const File file = open_input(path);
   file_size_ = file.size();
-  text_ = file.text_at(0, kMostHeader);
+  text_ = file.text_at(0, kMaxHeader);
   rest_ = text_;
 }
 
@@ -66,7 +66,7 @@ std::string_view HeaderLines::next() {
   const std::size_t end = std::min(rest_.find('\n'), rest_.size());
   if (end == rest_.size() && text_.size() < file_size_)
     header_error(path_, fmt::format("the header does not end within its first {} bytes (of {})",
-                                    kMostHeader, file_size_));
+                                    kMaxHeader, file_size_));
   std::string_view line = rest_.substr(0, end);
   if (const std::size_t at = line.find('\0'); at != std::string_view::npos)
     header_error(path_,
@@ -137,9 +137,9 @@ std::string resolve_data_file(const std::string& path, std::string_view name) {
 }
 
 std::vector<std::string> resolve_data_pattern(const std::string& path, std::string_view text) {
-  constexpr Index kMostFiles = 1'000'000;
-  constexpr std::size_t kMostText = std::size_t{64} << 20;
-  constexpr Index kMostDigits = 20;
+  constexpr Index kMaxFiles = 1'000'000;
+  constexpr std::size_t kMaxText = std::size_t{64} << 20;
+  constexpr Index kMaxDigits = 20;
   const auto words = split_words(text);
   if (words.size() != 3 && words.size() != 4)
     header_error(path, fmt::format("{} is not 'PATTERN FIRST LAST [STEP]'", excerpt(text)));
@@ -147,10 +147,10 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
   const Index first = number(1), last = number(2), step = words.size() == 4 ? number(3) : 1;
   const bool ordered =
       first >= 0 && last >= 0 && (step > 0 ? last >= first : step < 0 && last <= first);
-  const Index count = ordered ? std::min((last - first) / step, kMostFiles) + 1 : 0;
+  const Index count = ordered ? std::min((last - first) / step, kMaxFiles) + 1 : 0;
   // A number in a name takes no more characters than the largest one or the widest pattern.
-  const std::size_t name = path.size() + words[0].size() + static_cast<std::size_t>(kMostDigits);
-  if (count < 1 || count > kMostFiles || static_cast<std::size_t>(count) * name > kMostText)
+  const std::size_t name = path.size() + words[0].size() + static_cast<std::size_t>(kMaxDigits);
+  if (count < 1 || count > kMaxFiles || static_cast<std::size_t>(count) * name > kMaxText)
     header_error(path, fmt::format("the numbers of {} make no sense", excerpt(text)));
   const std::string_view pattern = words[0];
   const std::size_t percent = pattern.find('%');
@@ -161,7 +161,7 @@ std::vector<std::string> resolve_data_pattern(const std::string& path, std::stri
     header_error(path,
                  fmt::format("{} is no pattern with one number such as %03d", excerpt(pattern)));
   const Index digits = width.empty() ? 0 : parse_integer(path, "data file", width);
-  if (digits > kMostDigits)
+  if (digits > kMaxDigits)
     header_error(path,
                  fmt::format("{}: numbers of {} digits make no sense", excerpt(pattern), digits));
   std::vector<std::string> names;

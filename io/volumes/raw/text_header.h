@@ -38,9 +38,9 @@ struct TextHeader {
 };
 
 // What the parsers of such headers share. All throw UsageError that begins
-// with the header's path; nothing in a header may cost more than kMostHeader.
+// with the header's path; nothing in a header may cost more than kMaxHeader.
 
-inline constexpr std::uint64_t kMostHeader = std::uint64_t{1} << 20;
+inline constexpr std::uint64_t kMaxHeader = std::uint64_t{1} << 20;
 
 /// Opens the file of samples that a header needs; where that fails, the message names both.
 File open_data_file(const std::string& path, const std::string& header);
@@ -54,9 +54,9 @@ class HeaderLines {
 
   bool at_end() const { return rest_.empty(); }
   /// The next line without its end (LF or CR LF). Refuses NUL bytes, and headers
-  /// longer than kMostHeader.
+  /// longer than kMaxHeader.
   std::string_view next();
-  /// Passes over bytes, which may be anything. Refuses more than kMostHeader has.
+  /// Passes over bytes, which may be anything. Refuses more than kMaxHeader has.
   void skip(std::uint64_t bytes);
   /// What comes next, as far as it was read.
   std::string_view rest() const { return rest_; }

@@ -13,9 +13,9 @@ namespace isobrick {
 namespace {
 
 Index read_count(const std::string& path, const char* name, std::string_view text) {
-  constexpr Index kMost = Index{1} << 20;  // so that three of them can be multiplied
+  constexpr Index kMax = Index{1} << 20;  // so that three of them can be multiplied
   const Index count = parse_integer(path, name, text);
-  if (count < 1 || count > kMost)
+  if (count < 1 || count > kMax)
     header_error(path, fmt::format("{} = {} makes no sense", name, count));
   return count;
 }

@@ -15,7 +15,7 @@ namespace isobrick {
 namespace {
 
 /// No strip, tile or table of a page may take more.
-constexpr std::size_t kMostBlock = std::size_t{512} << 20;
+constexpr std::size_t kMaxBlock = std::size_t{512} << 20;
 
 /// libtiff's words into a string, made fit for one line.
 int keep_complaint(TIFF*, void* to, const char*, const char* format, va_list words) {
@@ -30,7 +30,7 @@ int ignore_warning(TIFF*, void*, const char*, const char*, va_list) { return 1; 
 TIFF* open_quietly(const std::string& path, std::string* complaint) {
   TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
   if (options == nullptr) throw Error("out of memory");
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options, static_cast<tmsize_t>(kMostBlock));
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options, static_cast<tmsize_t>(kMaxBlock));
   TIFFOpenOptionsSetErrorHandlerExtR(options, keep_complaint, complaint);
   TIFFOpenOptionsSetWarningHandlerExtR(options, ignore_warning, nullptr);
   TIFF* file = TIFFOpenExt(path.c_str(), "rm", options);  // m: no memory map
@@ -147,9 +147,9 @@ TiffPage TiffFile::page() const {
   TIFFGetFieldDefaulted(file, TIFFTAG_COMPRESSION, &compression);
   get(file, TIFFTAG_PHOTOMETRIC, photometric);
   page.type = read_type(path_, bits, format);
-  constexpr std::uint32_t kMost = std::uint32_t{1} << 30;
-  if (page.width == 0 || page.height == 0 || page.samples == 0 || page.width > kMost ||
-      page.height > kMost)
+  constexpr std::uint32_t kMax = std::uint32_t{1} << 30;
+  if (page.width == 0 || page.height == 0 || page.samples == 0 || page.width > kMax ||
+      page.height > kMax)
     throw UsageError(fmt::format("'{}': a page of {} x {} pixels with {} samples makes no sense",
                                  path_, page.width, page.height, page.samples));
   if (photometric == PHOTOMETRIC_YCBCR)
@@ -160,9 +160,9 @@ TiffPage TiffFile::page() const {
   if (number(TIFFTAG_IMAGEDEPTH, 1) > 1)
     throw UsageError(
         fmt::format("'{}': pages that are volumes (ImageDepth) are not supported", path_));
-  if (block_bytes() > kMostBlock)
+  if (block_bytes() > kMaxBlock)
     throw UsageError(fmt::format("'{}': strips or tiles of {} bytes are too large (at most {})",
-                                 path_, block_bytes(), kMostBlock));
+                                 path_, block_bytes(), kMaxBlock));
   return page;
 }
 

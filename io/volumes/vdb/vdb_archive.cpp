@@ -24,7 +24,7 @@ namespace {
 
 /// Where a file has its version, and the bytes up to its metadata since version 222.
 constexpr std::size_t kVersion = 8;
-constexpr std::size_t kMostNameShown = 100;
+constexpr std::size_t kMaxNameShown = 100;
 constexpr std::size_t kPrologue = kVersion + 3 * sizeof(std::uint32_t) + 1 + 36;
 
 /// Bytes of a grid's tree in memory with all values, if it is of this type. `in` is where the
@@ -147,7 +147,7 @@ std::vector<VdbLoadedGrid> VdbArchive::load_grids(
     VdbGrid description;
     description.unique_name = descriptor.uniqueName();
     description.name = printable(openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName()),
-                                 kMostNameShown);
+                                 kMaxNameShown);
     description.type = grid->type();
     if (!descriptor.isInstance()) about_to_read(description, bytes_of_next(*grid));
     readGrid(grid, descriptor, in_);
@@ -168,7 +168,7 @@ std::vector<VdbLoadedGrid> VdbArchive::load_grids(
 std::vector<VdbLoadedGrid> load_vdb_grids(
     const std::string& path,
     const std::function<void(const VdbGrid&, std::uint64_t)>& about_to_read) {
-  constexpr std::size_t kMostShown = 200;
+  constexpr std::size_t kMaxShown = 200;
   const VdbLayout layout = read_vdb_layout(path);
   const auto refused = [&](std::string_view what) {
     return Error(fmt::format(
@@ -185,7 +185,7 @@ std::vector<VdbLoadedGrid> load_vdb_grids(
   } catch (const std::bad_alloc&) {
     throw refused("it asks for more memory than there is");
   } catch (const std::exception& error) {
-    throw refused(printable(error.what(), kMostShown));
+    throw refused(printable(error.what(), kMaxShown));
   }
 }
 
@@ -194,7 +194,7 @@ void rethrow_vdb_damage(const std::string& path, std::string_view grid) {
     return Error(fmt::format("'{}': grid '{}' is damaged: {}", path, grid, what));
   };
   // OpenVDB's messages may have several lines, and what the file has for a name.
-  constexpr std::size_t kMostShown = 200;
+  constexpr std::size_t kMaxShown = 200;
   try {
     throw;
   } catch (const Error&) {
@@ -204,7 +204,7 @@ void rethrow_vdb_damage(const std::string& path, std::string_view grid) {
   } catch (const std::bad_alloc&) {
     throw damaged("it asks for more memory than there is");
   } catch (const std::exception& error) {
-    throw damaged(printable(error.what(), kMostShown));
+    throw damaged(printable(error.what(), kMaxShown));
   }
 }
 

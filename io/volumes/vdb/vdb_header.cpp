@@ -24,8 +24,8 @@ constexpr std::string_view kHalfSuffix = "_HalfFloat";
 constexpr char kSeparator = '\x1e';
 constexpr std::size_t kUuidBytes = 36;
 /// A name, a type or a piece of metadata that is longer is damage.
-constexpr std::uint32_t kMostText = 1 << 20;
-constexpr std::uint32_t kMostItems = 1 << 16;
+constexpr std::uint32_t kMaxText = 1 << 20;
+constexpr std::uint32_t kMaxItems = 1 << 16;
 
 /// A type and the bytes of a value, by name.
 using Metadata = std::map<std::string, std::pair<std::string, std::string>>;
@@ -65,7 +65,7 @@ class Fields {
   }
   std::string text() {
     const auto length = number<std::uint32_t>();
-    if (length > kMostText) damaged(fmt::format("a text of {} bytes", length));
+    if (length > kMaxText) damaged(fmt::format("a text of {} bytes", length));
     return bytes(length);
   }
   std::uint64_t position() {
@@ -76,7 +76,7 @@ class Fields {
   }
   Metadata metadata() {
     const auto count = number<std::uint32_t>();
-    if (count > kMostItems) damaged(fmt::format("{} items of metadata", count));
+    if (count > kMaxItems) damaged(fmt::format("{} items of metadata", count));
     Metadata items;
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::string name = text(), type = text();
@@ -93,10 +93,10 @@ class Fields {
 };
 
 /// As much of what a file says of itself as is shown.
-constexpr std::size_t kMostShown = 100;
+constexpr std::size_t kMaxShown = 100;
 /// Of the name that a store keeps.
-constexpr std::size_t kMostKept = 1000;
-std::string shown(std::string_view text) { return printable(text, kMostShown); }
+constexpr std::size_t kMaxKept = 1000;
+std::string shown(std::string_view text) { return printable(text, kMaxShown); }
 
 std::string shown_name(const std::string& unique, bool repeated) {
   const std::size_t separator = unique.find(kSeparator);
@@ -169,7 +169,7 @@ std::vector<VdbGrid> read_vdb_header(const std::string& path) {
   in.bytes(kUuidBytes);
   in.metadata();
   const auto count = in.number<std::uint32_t>();
-  if (count > kMostItems) in.damaged(fmt::format("{} grids", count));
+  if (count > kMaxItems) in.damaged(fmt::format("{} grids", count));
   std::vector<VdbGrid> grids;
   for (std::uint32_t i = 0; i < count; ++i) grids.push_back(read_grid(in));
   name_vdb_grids(grids);
@@ -185,7 +185,7 @@ void name_vdb_grids(std::vector<VdbGrid>& grids) {
 
 void describe_vdb_texts(VdbGrid& grid, const std::string& name, const std::string& unit,
                         const std::string& grid_class, const std::string& map) {
-  grid.own_name = printable(name, kMostKept);
+  grid.own_name = printable(name, kMaxKept);
   grid.unit = unit_name(unit);
   grid.grid_class = shown(grid_class);
   grid.map = shown(map);

@@ -114,7 +114,7 @@ class VdbLeaves {
 
  private:
   /// More than any leaf has, however it was written.
-  static constexpr std::uint64_t kMostBytes = 1 << 16;
+  static constexpr std::uint64_t kMaxBytes = 1 << 16;
 
   File file_;
   bool as_half_;
@@ -136,7 +136,7 @@ VdbLeaves<Tree>::VdbLeaves(const std::string& path, std::istream& in, Tree& tree
     in.seekg(sizeof(typename Leaf::NodeMaskType), std::ios_base::cur);
     openvdb::io::readCompressedValues<Value>(in, nullptr, Leaf::SIZE, leaf->valueMask(), as_half);
     const auto end = static_cast<std::uint64_t>(in.tellg());
-    if (end <= begin_.back() || end - begin_.back() > kMostBytes)
+    if (end <= begin_.back() || end - begin_.back() > kMaxBytes)
       throw std::runtime_error(fmt::format("no leaf takes the bytes {} to {}", begin_.back(), end));
     begin_.push_back(end);
   }

@@ -174,7 +174,7 @@ class Parser {
       }
       const Index components = parse_integer(path_, "FIELD", word(words, 1)),
                   tuples = parse_integer(path_, "FIELD", word(words, 2));
-      constexpr auto most = static_cast<Index>(kMostHeader);
+      constexpr auto most = static_cast<Index>(kMaxHeader);
       if (components < 0 || tuples < 0 || components > most || tuples > most)
         header_error(path_, "FIELD: the size of an array makes no sense");
       const std::string type = lower(word(words, 3));

@@ -39,7 +39,7 @@ class Reader {
   void read() {
     const File file = open_input(path_);
     const std::uint64_t end = file.size();
-    constexpr std::uint64_t kPiece = 1 << 16, kMostToken = 1 << 20;
+    constexpr std::uint64_t kPiece = 1 << 16, kMaxToken = 1 << 20;
     std::vector<char> buffer(kPiece);
     for (std::uint64_t at = 0; at < end && !done_; at += kPiece) {
       const auto size = static_cast<std::size_t>(std::min(kPiece, end - at));
@@ -50,10 +50,10 @@ class Reader {
       if (status != XML_STATUS_OK)
         header_error(path_, fmt::format("not XML at byte {}: {}", position(),
                                         XML_ErrorString(XML_GetErrorCode(parser_.get()))));
-      if (at + size > position() + kMostToken)
+      if (at + size > position() + kMaxToken)
         header_error(path_, fmt::format("the XML has no end of an element or a name for {} bytes "
                                         "from byte {} on",
-                                        kMostToken, position()));
+                                        kMaxToken, position()));
     }
     if (!done_) header_error(path_, "the XML ends before the array of samples is found");
   }
@@ -128,8 +128,8 @@ class Reader {
   }
 
   void start_array(Attributes attributes) {
-    constexpr std::size_t kMostArrays = 10000;
-    if (arrays_.size() == kMostArrays) header_error(path_, "there are too many arrays");
+    constexpr std::size_t kMaxArrays = 10000;
+    if (arrays_.size() == kMaxArrays) header_error(path_, "there are too many arrays");
     arrays_.push_back({std::move(attributes), section_ == "CellData", after_tag()});
   }
 
@@ -215,12 +215,12 @@ Box3 read_extent(const std::string& path, const char* name, const std::string& t
   const auto words = split_words(text);
   if (words.size() != 6) header_error(path, fmt::format("{} does not have 6 numbers", name));
   Box3 box;
-  constexpr Index kMost = Index{1} << 31;
+  constexpr Index kMax = Index{1} << 31;
   for (int axis = 0; axis < 3; ++axis) {
     const auto at = static_cast<std::size_t>(2 * axis);
     box.lo[axis] = parse_integer(path, name, words[at]);
     box.hi[axis] = parse_integer(path, name, words[at + 1]);
-    if (box.lo[axis] < -kMost || box.hi[axis] > kMost || box.hi[axis] < box.lo[axis])
+    if (box.lo[axis] < -kMax || box.hi[axis] > kMax || box.hi[axis] < box.lo[axis])
       header_error(path, fmt::format("{}: {} {} makes no sense", name, box.lo[axis], box.hi[axis]));
     ++box.hi[axis];
   }
@@ -257,8 +257,8 @@ Transform read_transform(const std::string& path, const Attributes& image, Int3 
 
 /// Where the first character is that is no blank.
 std::uint64_t after_blanks(const std::string& path, std::uint64_t at) {
-  constexpr std::uint64_t kMostBlanks = 4096;
-  const std::string text = open_input(path).text_at(at, kMostBlanks);
+  constexpr std::uint64_t kMaxBlanks = 4096;
+  const std::string text = open_input(path).text_at(at, kMaxBlanks);
   return at + std::min(text.find_first_not_of(" \t\r\n"), text.size());
 }
 

@@ -16,7 +16,7 @@ extern thread_local unsigned char shared_bytes[] __attribute__((aligned(256)));
 
 namespace isobrick::emulated {
 
-inline constexpr std::size_t kMostSharedBytes = std::size_t{227} << 10;  ///< Hopper's
+inline constexpr std::size_t kMaxSharedBytes = std::size_t{227} << 10;  ///< Hopper's
 
 /// So many bytes of it are a block's; they hold anything at first. AddressSanitizer tells where
 /// others are touched.
@@ -25,12 +25,12 @@ class SharedBytes {
   explicit SharedBytes(std::size_t count) : count_(count) {
     std::memset(gpu::shared_bytes, 0xa5, count);
 #if defined(ISOBRICK_ASAN)
-    __asan_poison_memory_region(gpu::shared_bytes + count_, kMostSharedBytes - count_);
+    __asan_poison_memory_region(gpu::shared_bytes + count_, kMaxSharedBytes - count_);
 #endif
   }
   ~SharedBytes() {
 #if defined(ISOBRICK_ASAN)
-    __asan_unpoison_memory_region(gpu::shared_bytes + count_, kMostSharedBytes - count_);
+    __asan_unpoison_memory_region(gpu::shared_bytes + count_, kMaxSharedBytes - count_);
 #endif
   }
   SharedBytes(const SharedBytes&) = delete;

@@ -12,7 +12,7 @@
 
 namespace isobrick::gpu {
 
-thread_local unsigned char shared_bytes[emulated::kMostSharedBytes] __attribute__((aligned(256)));
+thread_local unsigned char shared_bytes[emulated::kMaxSharedBytes] __attribute__((aligned(256)));
 
 }  // namespace isobrick::gpu
 
@@ -20,7 +20,7 @@ namespace isobrick::emulated {
 namespace {
 
 /// As many as ThreadSanitizer can tell apart.
-constexpr unsigned kMostThreads = 7000;
+constexpr unsigned kMaxThreads = 7000;
 
 thread_local ThreadBlock* current_block = nullptr;
 
@@ -178,7 +178,7 @@ void acquire([[maybe_unused]] const void* what) {
 void launch(unsigned blocks, unsigned threads, std::size_t shared_bytes, unsigned seed,
             const std::function<void()>& kernel) {
   // As a device of so many multiprocessors: a block begins when those before it have.
-  const unsigned most = std::max(1u, kMostThreads / threads);
+  const unsigned most = std::max(1u, kMaxThreads / threads);
   std::atomic<unsigned> next{0};
   std::vector<std::jthread> running;
   for (unsigned i = 0; i < std::min(blocks, most); ++i)

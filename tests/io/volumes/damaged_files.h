@@ -25,8 +25,8 @@ inline void expect_read_or_refused(const std::string& path, const std::string& n
   try {
     const auto source = open_source(path, said);
     const Int3 e = source->info().extent;
-    constexpr Index kMost = 1 << 22;
-    if (e.x > kMost / e.y || e.x * e.y > kMost / e.z) return;  // a promise that takes long to break
+    constexpr Index kMax = 1 << 22;
+    if (e.x > kMax / e.y || e.x * e.y > kMax / e.z) return;  // a promise that takes long to break
     read_box(*source, {{0, 0, 0}, e});
   } catch (const Error& error) {
     const std::string message = error.what();

@@ -118,7 +118,7 @@ TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
   for (bool there = false; !there; ++pictures) {
     ASSERT_LT(pictures, 10);
     MeshUploads::Share share;
-    share.bytes = MeshUploads::Share::kMostBytes;  // little is left
+    share.bytes = MeshUploads::Share::kMaxBytes;  // little is left
     const std::uint64_t before = share.bytes;
     uploads_->begin_use();
     there = uploads_->add(large, {}, &share);

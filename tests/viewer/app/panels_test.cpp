@@ -32,7 +32,7 @@ class Panels : public Picture {
     open(SynthKind::sphere, {64, 64, 64});
     state_.path = dir_ / "store.zarr";
     state_.facts =
-        std::make_unique<IsovalueFacts>(std::make_shared<const StoreReader>(dir_ / "store.zarr"));
+        std::make_unique<IsovalueStats>(std::make_shared<const StoreReader>(dir_ / "store.zarr"));
     state_.settings = settings_;
     state_.navigator.camera = camera_;
     state_.bookmarks = std::make_unique<Bookmarks>(dir_ / "bookmarks.json", dir_ / "store.zarr");
@@ -43,7 +43,7 @@ class Panels : public Picture {
     ASSERT_NE(panel, nullptr);
     ImGui::SetWindowSize(panel, {390, 1300});
     for (const char* section :
-         {"Camera and look", "Cuts and region", "Slices", "Point and measure", "Bookmarks"})
+         {"Camera and look", "ClipTest and region", "Slices", "Point and measure", "Bookmarks"})
       panel->StateStorage.SetInt(panel->GetID(section), 1);
     frame();
   }
@@ -140,7 +140,7 @@ TEST_F(Panels, PlanesBookmarksAndSurfacesAreRemovedOneByOne) {
   state_.settings.planes.push_back({true, {{0, 0, 1}, 10}});
   state_.bookmarks->add({"one", camera_, settings_});
   frame();
-  click(place_of({"Cuts and region", "x"}, 0));
+  click(place_of({"ClipTest and region", "x"}, 0));
   EXPECT_TRUE(state_.settings.planes.empty());
   click(place_of({"Bookmarks", "x"}, 0));
   EXPECT_TRUE(state_.bookmarks->list().empty());
@@ -153,10 +153,10 @@ TEST_F(Panels, SlicesAndCutsHaveTheirOwnBoxes) {
   click(place_of({"Slices", "x", "x"}));
   EXPECT_TRUE(state_.settings.slices[0].shown);
   EXPECT_FALSE(state_.settings.cuts[0].on);
-  click(place_of({"Cuts and region", "y", "y"}));
+  click(place_of({"ClipTest and region", "y", "y"}));
   EXPECT_TRUE(state_.settings.cuts[1].on);
   EXPECT_FALSE(state_.settings.slices[1].shown);
-  click(place_of({"Cuts and region", "Region"}));
+  click(place_of({"ClipTest and region", "Region"}));
   EXPECT_TRUE(state_.settings.region_on);
 }
 

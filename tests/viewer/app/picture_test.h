@@ -11,7 +11,7 @@
 #include <isobrick/convert.h>
 #include <isobrick/synth_source.h>
 #include "tests/io/bytes/temp_dir.h"
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 #include "viewer/render/gl_context.h"
 
 namespace isobrick {
@@ -37,7 +37,7 @@ class Picture : public testing::Test {
   }
   void show(PictureBudgets budgets = {}) {
     picture_.reset();
-    picture_ = std::make_unique<StorePicture>(
+    picture_ = std::make_unique<SceneRenderer>(
         std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {});
     const WorldBox box = picture_->bounds();
     camera_.fit(box.lo, box.hi, static_cast<double>(kWidth) / kHeight);
@@ -63,7 +63,7 @@ class Picture : public testing::Test {
 
   TempDir dir_;
   std::unique_ptr<GlContext> context_;
-  std::unique_ptr<StorePicture> picture_;
+  std::unique_ptr<SceneRenderer> picture_;
   Camera camera_{{0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1}};
   ViewSettings settings_;
 };

@@ -24,11 +24,11 @@ TEST_F(Pieces, GiveTheSamePicture) {
   settings_.edges = settings_.box = settings_.axes = settings_.scale_bar = true;
   settings_.pixel_error = 3;
   choose_values(settings_, picture_->scene().tree());
-  const PictureWay whole, pieces{.piece_seconds = kShort};
-  const auto pixels_of = [&](const PictureWay& way) {
+  const FrameOptions whole, pieces{.piece_seconds = kShort};
+  const auto pixels_of = [&](const FrameOptions& options) {
     picture_->renderer().discard();
     for (int i = 0; i < 2 || !picture_->state().complete; ++i) {
-      picture_->draw(camera_, kWidth, kHeight, settings_, way);
+      picture_->draw(camera_, kWidth, kHeight, settings_, options);
       if (!picture_->state().drawing) picture_->scene().stream().wait_idle(1);
     }
     EXPECT_FALSE(picture_->state().damage.empty());
@@ -50,10 +50,10 @@ TEST_F(Pieces, GiveTheSamePicture) {
 TEST_F(Pieces, AreDroppedWhenTheViewChangesUnlessItKeepsChanging) {
   open(SynthKind::gyroid, {96, 96, 96});
   const auto first = pixels();
-  PictureWay way{.piece_seconds = kShort};
+  FrameOptions options{.piece_seconds = kShort};
   const auto draw_one = [&](double turn) {
     if (turn != 0) camera_.orbit(turn, 0, {0, 0, 1});
-    picture_->draw(camera_, kWidth, kHeight, settings_, way);
+    picture_->draw(camera_, kWidth, kHeight, settings_, options);
   };
   const PictureCounters& counters = picture_->counters();
   const PictureCounters before = counters;
@@ -71,7 +71,7 @@ TEST_F(Pieces, AreDroppedWhenTheViewChangesUnlessItKeepsChanging) {
   EXPECT_EQ(counters.finished, before.finished);
   EXPECT_EQ(picture_->renderer().read_pixels(), first) << "what is not whole is not shown";
   // While something moves there would never be any picture.
-  way.moving = true;
+  options.moving = true;
   draw_one(0.1);
   EXPECT_EQ(counters.dropped, 3u);
   for (int i = 0; counters.finished == before.finished; ++i) {
@@ -83,7 +83,7 @@ TEST_F(Pieces, AreDroppedWhenTheViewChangesUnlessItKeepsChanging) {
   // What moves no more is seen as it stands.
   draw_one(0);
   ASSERT_TRUE(picture_->state().drawing);
-  way.moving = false;
+  options.moving = false;
   draw_one(1e-3);
   const std::uint64_t dropped = counters.dropped;
   EXPECT_GE(dropped, 4u);
@@ -98,11 +98,11 @@ TEST_F(Pieces, OfPicturesWithoutTrianglesAreFinishedWhileTheViewKeepsChanging) {
   choose_values(settings_, picture_->scene().tree());
   draw();
   const PictureCounters before = picture_->counters();
-  const PictureWay way{.piece_seconds = kShort, .moving = true};
+  const FrameOptions options{.piece_seconds = kShort, .moving = true};
   for (int i = 0; picture_->counters().finished < before.finished + 3; ++i) {
     ASSERT_LT(i, 10000);
     camera_.orbit(1e-3, 0, {0, 0, 1});
-    picture_->draw(camera_, kWidth, kHeight, settings_, way);
+    picture_->draw(camera_, kWidth, kHeight, settings_, options);
   }
   EXPECT_GT(picture_->counters().pieces, before.pieces) << "there is nothing to be finished";
   EXPECT_EQ(picture_->counters().dropped, before.dropped);
@@ -123,10 +123,10 @@ TEST_F(Pieces, NothingIsBeingDrawnAfterAFailure) {
   };
   fail();
   // One that has been begun goes with it.
-  const PictureWay way{.piece_seconds = kShort};
+  const FrameOptions options{.piece_seconds = kShort};
   const Camera front = camera_;
   camera_.orbit(0.3, 0, {0, 0, 1});
-  for (int i = 0; i < 3; ++i) picture_->draw(camera_, kWidth, kHeight, settings_, way);
+  for (int i = 0; i < 3; ++i) picture_->draw(camera_, kWidth, kHeight, settings_, options);
   ASSERT_TRUE(picture_->state().drawing);
   ASSERT_GT(picture_->state().drawn_part, 0);
   fail();

@@ -47,12 +47,12 @@ class ThinPreview : public Picture {
   }
   /// What is drawn for 2,000 triangles while the view moves, when all of it is there.
   std::vector<std::uint8_t> preview(std::uint64_t thin_triangles) {
-    const PictureWay way{.max_triangles = 2'000,
-                         .thin_triangles = thin_triangles,
-                         .plain = PictureWay::Plain::yes,
-                         .moving = true};
+    const FrameOptions options{.max_triangles = 2'000,
+                               .thin_triangles = thin_triangles,
+                               .plain = FrameOptions::Plain::yes,
+                               .moving = true};
     for (int i = 0; i < 20; ++i) {  // each finer cut is one of meshes of the one before
-      picture_->draw(camera_, kWidth, kHeight, settings_, way);
+      picture_->draw(camera_, kWidth, kHeight, settings_, options);
       picture_->scene().stream().wait_idle(10);
     }
     EXPECT_TRUE(picture_->state().moving);
@@ -89,19 +89,19 @@ TEST_F(ThinPreview, HasWhatCoarseLevelsHaveLost) {
 
 /// Previews are shown larger: what is thin is looked for as in the picture that they are shown as.
 TEST_F(ThinPreview, HasItInASmallerPictureAsWell) {
-  PictureWay way{.max_triangles = 2'000,
-                 .thin_triangles = FramePacer::kThinTriangles,
-                 .plain = PictureWay::Plain::yes,
-                 .moving = true};
+  FrameOptions options{.max_triangles = 2'000,
+                       .thin_triangles = FramePacer::kThinTriangles,
+                       .plain = FrameOptions::Plain::yes,
+                       .moving = true};
   const auto finest = [&] {
     for (int i = 0; i < 20; ++i) {
-      picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, way);
+      picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, options);
       picture_->scene().stream().wait_idle(10);
     }
     return picture_->state().triangles;
   };
   const std::uint64_t as_it_is = finest();
-  way.smaller = 4;
+  options.smaller = 4;
   EXPECT_GT(finest(), as_it_is + 10'000);
 }
 

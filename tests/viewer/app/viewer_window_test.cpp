@@ -307,7 +307,7 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
   ViewerWindow& window = open({.piece_seconds = 0.01});
   window.open(dir_ / "many.zarr");
   window.state().settings.pixel_error = 0.2f;
-  const StorePicture& picture = *window.state().picture;
+  const SceneRenderer& picture = *window.state().picture;
   const auto rests = [&] { return picture.state().complete && !picture.state().plain; };
   until(rests);
   steps(15);  // nothing moves any more
@@ -342,7 +342,7 @@ TEST_F(Window, ClosesWithinAPieceOfAPicture) {
   ViewerWindow& window = open({.piece_seconds = 0.01});
   window.open(dir_ / "many.zarr");
   window.state().settings.pixel_error = 0.2f;
-  const StorePicture& picture = *window.state().picture;
+  const SceneRenderer& picture = *window.state().picture;
   until([&] { return picture.state().complete && !picture.state().plain; });
   steps(15);
   window.state().settings.edges = !window.state().settings.edges;
@@ -361,7 +361,7 @@ TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
   ViewerWindow& window = open(options);
   window.open(dir_ / "big.zarr");
   window.state().settings.pixel_error = 0.5f;
-  const StorePicture& picture = *window.state().picture;
+  const SceneRenderer& picture = *window.state().picture;
   const SceneStream& stream = window.state().picture->scene().stream();
   const auto opened = std::chrono::steady_clock::now();
   until([&] {

@@ -14,8 +14,8 @@ struct PictureDifference {
   static constexpr double kNoticed = 4;
   /// What drivers may differ by: how edges are smoothed and where the last bit of a
   /// colour falls. Not whether a surface, a colour or a light is another.
-  static constexpr double kMostMean = 0.25, kMostShare = 0.004;
-  bool tolerable() const { return mean <= kMostMean && share <= kMostShare; }
+  static constexpr double kMaxMean = 0.25, kMaxShare = 0.004;
+  bool tolerable() const { return mean <= kMaxMean && share <= kMaxShare; }
 };
 
 /// Of two pictures of the same size.

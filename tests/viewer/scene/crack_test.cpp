@@ -63,11 +63,11 @@ class Cracks : public ::testing::TestWithParam<Shape> {
 /// Along every ray through a closed surface as many sheets face the eye as face
 /// away, and the first one faces it: whatever the cut and from wherever it is seen.
 TEST_P(Cracks, AreNotBetweenLevels) {
-  std::size_t covered = 0, unbalanced = 0, inside_seen = 0, ribbons = 0;
+  std::size_t covered = 0, unbalanced = 0, inside_seen = 0, seam_strips = 0;
   for (unsigned seed = 1; seed <= 6; ++seed) {
     const std::vector<NodeMesh> meshes =
         meshes_of(RandomCut(grid_, seed, 2 + static_cast<int>(seed) * 2).cut({0}));
-    for (const NodeMesh& mesh : meshes) ribbons += mesh.ribbon_triangles;
+    for (const NodeMesh& mesh : meshes) seam_strips += mesh.seam_triangles;
     for (int view = 0; view < kViews; ++view) {
       Rasteriser raster = picture(view + static_cast<int>(seed) * 100);
       for (const NodeMesh& mesh : meshes) raster.draw(mesh);
@@ -79,7 +79,7 @@ TEST_P(Cracks, AreNotBetweenLevels) {
     }
   }
   EXPECT_GT(covered, 500000u);
-  EXPECT_GT(ribbons, 1000u) << "there are borders between levels";
+  EXPECT_GT(seam_strips, 1000u) << "there are borders between levels";
   // A vertex on a chord is on it to within float's rounding.
   EXPECT_LE(unbalanced, covered / 100000);
   EXPECT_EQ(inside_seen, 0u);

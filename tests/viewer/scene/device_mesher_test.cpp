@@ -56,14 +56,14 @@ class Device : public testing::Test {
           << "node " << node.key.node.x << ' ' << node.key.node.y << ' ' << node.key.node.z
           << " of level " << node.key.level << ", " << a.mesh.triangles.size() << " and "
           << b.mesh.triangles.size() << " triangles";
-      EXPECT_EQ(a.ribbon_triangles, b.ribbon_triangles);
+      EXPECT_EQ(a.seam_triangles, b.seam_triangles);
       triangles_ += a.triangles();
-      ribbons_ += a.ribbon_triangles;
+      seam_strips_ += a.seam_triangles;
     }
   }
 
   std::shared_ptr<DeviceMesher> device_;
-  std::uint64_t triangles_ = 0, ribbons_ = 0;
+  std::uint64_t triangles_ = 0, seam_strips_ = 0;
   int stored_ = 0;  ///< grids of stored samples
 };
 
@@ -83,7 +83,7 @@ TEST_F(Device, MakesTheSameMeshesInCutsOfManyLevels) {
       expect_same(source, RandomCut(grid, seed, 8).cut({0.013}));
   }
   EXPECT_GT(triangles_, 100'000u);
-  EXPECT_GT(ribbons_, 1'000u);
+  EXPECT_GT(seam_strips_, 1'000u);
 }
 
 TEST_F(Device, MakesTheSameMeshesWhereTheVolumeEndsAndAxesDiffer) {

@@ -238,15 +238,15 @@ TEST(NodeMesher, ValuesAreGivenWhereStoredSamplesWouldNotDo) {
 }
 
 TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
-  class Never final : public Wanted {
+  class Never final : public CancellationToken {
    public:
-    void check() const override { throw Abandoned(); }
+    void check() const override { throw OperationCancelled(); }
   };
   const auto source = cube_of(ball, 70);
   const NodeGrid grid(source->info());
   ResidentBricks bricks(source, 1 << 20);
   NodeMesher mesher(grid, bricks, {});
-  EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, Never()), Abandoned);
+  EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, Never()), OperationCancelled);
 }
 
 template <class T>

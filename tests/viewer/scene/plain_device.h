@@ -15,12 +15,12 @@ class PlainDevice : public DeviceMesher {
   std::vector<DeviceBlock> shared_blocks() const override { return {}; }
   void share_only(std::size_t) override {}
   std::uint64_t bytes() const override { return 0; }
-  Turns& turns() override { return turns_; }
+  TicketLock& kernel_lock() override { return kernel_lock_; }
   Times times() const override { return {}; }
 
  private:
   std::string name_ = "of a test";
-  Turns turns_;
+  TicketLock kernel_lock_;
 };
 
 }  // namespace isobrick::test

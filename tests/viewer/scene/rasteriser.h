@@ -30,21 +30,21 @@ class Rasteriser {
               {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}}};
   }
 
-  /// The ribbons are counted apart: they lie across the surface.
+  /// The seam strips are counted apart: they lie across the surface.
   void draw(const NodeMesh& mesh) {
-    const std::size_t ribbons = mesh.mesh.triangles.size() - mesh.ribbon_triangles;
+    const std::size_t seam_strips = mesh.mesh.triangles.size() - mesh.seam_triangles;
     for (std::size_t t = 0; t < mesh.mesh.triangles.size(); ++t) {
       std::array<Vec3d, 3> corners;
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec3f p = mesh.mesh.positions[mesh.mesh.triangles[t][k]];
         corners[k] = project({p.x, p.y, p.z});
       }
-      draw(corners, t >= ribbons);
+      draw(corners, t >= seam_strips);
     }
   }
 
   struct Pixel {
-    int front = 0, back = 0;  ///< surfaces crossed, without ribbons
+    int front = 0, back = 0;  ///< surfaces crossed, without seam strips
     double nearest = std::numeric_limits<double>::infinity();
     bool nearest_is_back = false;
   };
@@ -66,7 +66,7 @@ class Rasteriser {
     if (b.x < a.x || (b.x == a.x && b.y < a.y)) return -side(b, a, x, y);
     return (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
   }
-  void draw(std::array<Vec3d, 3> c, bool ribbon) {
+  void draw(std::array<Vec3d, 3> c, bool seam_strip) {
     const double area = side(c[0], c[1], c[2].x, c[2].y);
     if (area == 0) return;
     // Towards the viewer are small z; counter-clockwise there is clockwise in (x, y).
@@ -85,10 +85,10 @@ class Rasteriser {
         if (!inside) continue;
         Pixel& pixel = pixels_[size_t(j * size_ + i)];
         const double z = (a * c[0].z + b * c[1].z + d * c[2].z) / (a + b + d);
-        if (!ribbon) ++(front ? pixel.front : pixel.back);
+        if (!seam_strip) ++(front ? pixel.front : pixel.back);
         if (z < pixel.nearest) {
           pixel.nearest = z;
-          pixel.nearest_is_back = !front && !ribbon;
+          pixel.nearest_is_back = !front && !seam_strip;
         }
       }
   }

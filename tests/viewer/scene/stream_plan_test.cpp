@@ -198,12 +198,12 @@ TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
       EXPECT_NE(bricks.find(0, b), nullptr);
     }
   }
-  class Never final : public Wanted {
+  class Never final : public CancellationToken {
    public:
-    void check() const override { throw Abandoned(); }
+    void check() const override { throw OperationCancelled(); }
   };
   const std::vector<Int3> others{{0, 1, 3}, {1, 1, 3}};
-  EXPECT_THROW(bricks.read_together(0, others, Never()), Abandoned);
+  EXPECT_THROW(bricks.read_together(0, others, Never()), OperationCancelled);
   bricks.read_together(0, one, Always());
   EXPECT_EQ(bricks.find(0, others[0]), nullptr) << "nobody wants it any more";
 }

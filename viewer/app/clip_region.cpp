@@ -1,4 +1,4 @@
-#include "viewer/app/shown_part.h"
+#include "viewer/app/clip_region.h"
 
 #include <algorithm>
 #include <cmath>
@@ -62,8 +62,8 @@ void choose_values(ViewSettings& settings, const NodeTree& tree) {
   settings.window_hi = known ? all.hi : 1;
 }
 
-ShownBox shown_box(const ViewSettings& settings) {
-  ShownBox box;
+ClipRegion clip_region(const ViewSettings& settings) {
+  ClipRegion box;
   for (int axis = 0; axis < 3; ++axis) {
     if (settings.region_on) {
       box.lo[axis] = std::clamp<double>(settings.region_lo[axis], 0, 1);
@@ -79,7 +79,7 @@ ShownBox shown_box(const ViewSettings& settings) {
   return box;
 }
 
-std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings) {
+std::vector<HalfSpace> clip_half_spaces(const ViewSettings& settings) {
   std::vector<HalfSpace> kept;
   for (const PlaneSettings& plane : settings.planes)
     if (plane.on) kept.push_back(plane.kept);
@@ -95,8 +95,8 @@ PictureSettings picture_settings(const ViewSettings& settings, const Transform& 
   picture.edges = settings.edges;
   picture.multisample = settings.multisample;
   picture.picking = true;
-  picture.planes = shown_half_spaces(settings);
-  const ShownBox box = shown_box(settings);
+  picture.planes = clip_half_spaces(settings);
+  const ClipRegion box = clip_region(settings);
   const Vec3d zero = transform.apply({0, 0, 0});
   for (int axis = 0; axis < 3; ++axis) {
     Vec3d step;
@@ -112,22 +112,22 @@ PictureSettings picture_settings(const ViewSettings& settings, const Transform& 
   return picture;
 }
 
-Cuts::Cuts(const PictureSettings& picture) : half_spaces_(picture.half_spaces()) {
+ClipTest::ClipTest(const PictureSettings& picture) : half_spaces_(picture.half_spaces()) {
   for (HalfSpace& half : half_spaces_) {
     const double scale = 1 / length(half.normal);
     half = {half.normal * scale, half.least * scale};
   }
 }
 
-std::uint16_t Cuts::of(Vec3d middle, double radius) const {
+std::uint16_t ClipTest::of(Vec3d middle, double radius) const {
   unsigned bits = 0;
   for (std::size_t i = 0; i < half_spaces_.size(); ++i)
     if (dot(half_spaces_[i].normal, middle) - radius < half_spaces_[i].least) bits |= 1u << i;
   return static_cast<std::uint16_t>(bits);
 }
 
-/// Ribbons go a little beyond the node, less than a cell.
-std::uint16_t Cuts::of(const NodeGrid& grid, const NodeKey& node) const {
+/// Seam strips go a little beyond the node, less than a cell.
+std::uint16_t ClipTest::of(const NodeGrid& grid, const NodeKey& node) const {
   const IndexBox box = grid.box(node);
   const Transform& t = grid.transform();
   const Vec3d middle = t.apply((box.lo + box.hi) * 0.5);

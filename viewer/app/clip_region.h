@@ -21,23 +21,23 @@ namespace isobrick {
 void choose_values(ViewSettings& settings, const NodeTree& tree);
 
 /// The part of a volume that cuts and region leave, in parts of the volume (0 … 1).
-struct ShownBox {
+struct ClipRegion {
   Vec3d lo{0, 0, 0}, hi{1, 1, 1};
   bool whole() const { return lo == Vec3d{0, 0, 0} && hi == Vec3d{1, 1, 1}; }
 };
-ShownBox shown_box(const ViewSettings& settings);
+ClipRegion clip_region(const ViewSettings& settings);
 
 /// What planes that are on leave.
-std::vector<HalfSpace> shown_half_spaces(const ViewSettings& settings);
+std::vector<HalfSpace> clip_half_spaces(const ViewSettings& settings);
 
 /// How a renderer draws what settings say, of a volume whose last sample is `last`.
 PictureSettings picture_settings(const ViewSettings& settings, const Transform& transform,
                                  Vec3d last);
 
 /// What cuts a picture.
-class Cuts {
+class ClipTest {
  public:
-  explicit Cuts(const PictureSettings& picture);
+  explicit ClipTest(const PictureSettings& picture);
   /// MeshStyle::cut_by of what lies around `middle`.
   std::uint16_t of(Vec3d middle, double radius) const;
   /// Of a node's mesh.

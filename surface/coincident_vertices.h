@@ -8,17 +8,16 @@
 #include "surface/cell_math.h"
 #include "surface/tile_kernels.h"
 
-// Leaving degenerate triangles out. A sample that equals the isovalue, a *tie*,
-// draws the vertices of all crossing edges around it to itself. Here they become
-// one vertex, and triangles with two corners in one vertex are left out. See
-// docs/design/surface.md.
+// Leaving degenerate triangles out. Where a sample equals the isovalue, the vertices
+// of all active edges around it coincide. Here they become one vertex, a *coincident vertex*, and
+// triangles with two corners in one vertex are left out. See docs/design/surface.md.
 
 namespace isobrick {
 
-/// The sample of type T at which vertices meet: it equals the isovalue in the
+/// The sample of type T at which vertices coincide: it equals the isovalue in the
 /// type in which samples are interpolated. Nothing when no finite T does.
 template <class T>
-constexpr std::optional<T> tie_value(double isovalue) {
+constexpr std::optional<T> coincident_value(double isovalue) {
   using Limits = std::numeric_limits<T>;
   if (!(isovalue >= static_cast<double>(Limits::lowest()) &&
         isovalue <= static_cast<double>(Limits::max())))
@@ -28,10 +27,10 @@ constexpr std::optional<T> tie_value(double isovalue) {
   return value;
 }
 
-/// Whether any sample of the type can be a tie.
-bool has_ties(ScalarType type, double isovalue);
+/// Whether vertices can coincide at any sample of the type.
+bool has_coincident(ScalarType type, double isovalue);
 
-namespace ties {
+namespace coincident {
 
 /// The two corners of each edge of a cell.
 inline constexpr auto kEdgeCorners = [] {
@@ -44,8 +43,8 @@ inline constexpr auto kEdgeCorners = [] {
   return corners;
 }();
 
-/// The vertex on a crossing edge of a cell whose ties are the bits `at`: the
-/// corner that is a tie, or 8 + edge. Only one end of a crossing edge can be one.
+/// The vertex on an active edge of a cell whose coincident vertices are the bits `at`: the
+/// corner that is a coincident vertex, or 8 + edge. Only one end of an active edge can be one.
 constexpr int vertex_on(int edge, std::uint32_t at) {
   const auto [a, b] = kEdgeCorners[static_cast<std::size_t>(edge)];
   return at >> a & 1 ? a : at >> b & 1 ? b : 8 + edge;
@@ -76,18 +75,18 @@ constexpr std::uint32_t corner_bits(const std::uint64_t* rows, int x, int y, int
                                     (row[kTileSamples + 1] >> x & 3) << 6);
 }
 
-}  // namespace ties
+}  // namespace coincident
 
-/// After scan_tile: leaves triangles out, finds the ties that the rest has
+/// After scan_tile: leaves triangles out, finds the coincident vertices that the rest has
 /// corners on and the tile that makes each one's vertex, and completes the counts.
 /// With `alone` no other tile exists.
-void count_ties(ScalarType type, const KernelContext& context, bool alone, TileState& tile);
+void count_coincident(ScalarType type, const KernelContext& context, bool alone, TileState& tile);
 
-/// Copies the tile's own vertices on ties on its planes to its boundary.
-void publish_ties(TileState& tile);
+/// Copies the tile's own vertices on coincident vertices on its planes to its boundary.
+void publish_coincident(TileState& tile);
 
-/// Turns the numbers of vertices on ties into those of the mesh; vertices of tiles
+/// Turns the numbers of vertices on coincident vertices into those of the mesh; vertices of tiles
 /// before are asked for.
-void adopt_ties(TileState& tile, const BoundaryMap& map);
+void adopt_coincident(TileState& tile, const BoundaryMap& map);
 
 }  // namespace isobrick

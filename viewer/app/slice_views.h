@@ -15,12 +15,12 @@
 namespace isobrick {
 
 /// Slices of a store, as a renderer takes them. Not thread-safe.
-class ShownSlices {
+class SliceViews {
  public:
   using Samples = std::array<std::shared_ptr<const SliceSamples>, 3>;
 
   /// `last`: the last sample of level 0; `type`: of the samples.
-  ShownSlices(const PictureBudgets& budgets, Vec3d last, ScalarType type);
+  SliceViews(const PictureBudgets& budgets, Vec3d last, ScalarType type);
 
   /// Of host memory: what slices take, with what renderers are given of them.
   static std::uint64_t memory(const PictureBudgets& budgets) { return budgets.memory / 8; }

@@ -9,26 +9,26 @@
 
 #include <bit>
 
-#include "surface/tile_ties.h"
+#include "surface/coincident_vertices.h"
 #include "surface/tile_vertices-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick {
 namespace HWY_NAMESPACE {
 
-/// Writes the tile's own vertices on ties. Their normals are those of the samples.
+/// Writes the tile's own vertices on coincident vertices. Their normals are those of the samples.
 template <class T>
 void emit_tie_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
                        Vec3f* normals) {
   const ScalarVertices<T> scalar{context, tile};
-  for (const TieVertex& vertex : tile.ties->vertices) {
-    if (vertex.owner != TieVertex::kOwn) continue;
+  for (const CoincidentVertex& vertex : tile.coincident->vertices) {
+    if (vertex.owner != CoincidentVertex::kOwn) continue;
     scalar.write_sample(vertex.place, positions++, normals);
     if (normals) ++normals;
   }
 }
 
-/// The number of the vertex on a crossing edge of the cell at (x, y, z).
+/// The number of the vertex on an active edge of the cell at (x, y, z).
 inline std::uint32_t edge_number(const TileState& tile, int x, int y, int z, int edge) {
   const int axis = edge / 4, i = edge & 1, j = edge >> 1 & 1;
   const auto count = [](std::uint32_t word, int bits) {
@@ -44,29 +44,30 @@ inline std::uint32_t edge_number(const TileState& tile, int x, int y, int z, int
   return axis == 1 ? row.y_base + count(row.y, sample - 1) : row.z_base + count(row.z, sample - 1);
 }
 
-/// The number of the vertex on corner `corner` of the cell at (x, y, z), a used tie.
-inline std::uint32_t tie_number(const TileTies& ties, int x, int y, int z, int corner) {
+/// The number of the vertex on corner `corner` of the cell at (x, y, z), a used coincident vertex.
+inline std::uint32_t coincident_number(const CoincidentVertices& coincident, int x, int y, int z,
+                                       int corner) {
   const int row = row_index(y + (corner >> 1 & 1), z + (corner >> 2));
   const std::uint64_t before = (std::uint64_t{1} << (x + (corner & 1))) - 1;
-  return ties
-      .vertices[ties.first[row] +
-                static_cast<std::uint32_t>(std::popcount(ties.used[row] & before))]
+  return coincident
+      .vertices[coincident.first[row] +
+                static_cast<std::uint32_t>(std::popcount(coincident.used[row] & before))]
       .number;
 }
 
 inline void emit_kept_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
-  const TileTies& ties = *tile.ties;
+  const CoincidentVertices& coincident = *tile.coincident;
   for (const ActiveCell cell : tile.cells) {
     const int x = static_cast<int>(cell & 31), y = static_cast<int>(cell >> 5 & 31),
               z = static_cast<int>(cell >> 10 & 31);
     const auto number = [&](int vertex) {
-      return vertex < 8 ? tie_number(ties, x, y, z, vertex)
+      return vertex < 8 ? coincident_number(coincident, x, y, z, vertex)
                         : edge_number(tile, x, y, z, vertex - 8);
     };
-    ties::for_each_kept(tables, cell >> 16, ties::corner_bits(ties.at, x, y, z),
-                        [&](int a, int b, int c) {
-                          *out++ = {number(a), number(b), number(c)};
-                        });
+    coincident::for_each_kept(tables, cell >> 16, coincident::corner_bits(coincident.at, x, y, z),
+                              [&](int a, int b, int c) {
+                                *out++ = {number(a), number(b), number(c)};
+                              });
   }
 }
 

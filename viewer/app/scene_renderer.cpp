@@ -1,4 +1,4 @@
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 
 #include <algorithm>
 #include <chrono>
@@ -30,10 +30,10 @@ StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()
   options.inside = budgets.inside;
   options.threads = budgets.threads;
   options.mesh_bytes = budgets.memory / 2;
-  options.brick_bytes = budgets.memory - options.mesh_bytes - ShownSlices::memory(budgets);
+  options.brick_bytes = budgets.memory - options.mesh_bytes - SliceViews::memory(budgets);
   options.device_bytes = DeviceMeshes::cache_bytes(budgets.device_mesh_memory());
   options.on_change = std::move(on_change);
-  options.give_way = !software;
+  options.lower_thread_priority = !software;
   return options;
 }
 
@@ -56,8 +56,8 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
 
 }  // namespace
 
-PictureWay PictureWay::in_window(const FramePacer& pacer, bool software, bool moving) {
-  PictureWay way{
+FrameOptions FrameOptions::in_window(const FramePacer& pacer, bool software, bool moving) {
+  FrameOptions way{
       .max_triangles = moving ? pacer.max_triangles() : FramePacer::kAllTriangles,
       .thin_triangles = moving ? pacer.thin_triangles() : 0,
       .piece_seconds = software ? kPieceSeconds : std::numeric_limits<double>::infinity(),
@@ -68,8 +68,9 @@ PictureWay PictureWay::in_window(const FramePacer& pacer, bool software, bool mo
   return way;
 }
 
-StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
-                           std::function<void()> on_change, std::shared_ptr<PictureSetup> setup)
+SceneRenderer::SceneRenderer(std::shared_ptr<const StoreReader> store,
+                             const PictureBudgets& budgets, std::function<void()> on_change,
+                             std::shared_ptr<PictureSetup> setup)
     : store_(std::move(store)),
       budgets_(budgets),
       reading_(std::async(std::launch::async,
@@ -88,10 +89,10 @@ StorePicture::StorePicture(std::shared_ptr<const StoreReader> store, const Pictu
   renderer().discard();  // that of another store
 }
 
-StorePicture::~StorePicture() = default;
+SceneRenderer::~SceneRenderer() = default;
 
-void StorePicture::update_scene(const Camera& camera, int width, int height,
-                                const ViewSettings& settings, const PictureWay& way) {
+void SceneRenderer::update_scene(const Camera& camera, int width, int height,
+                                 const ViewSettings& settings, const FrameOptions& way) {
   std::vector<double> isovalues;
   shown_surfaces_.clear();
   for (std::size_t i = 0; i < settings.surfaces.size(); ++i)
@@ -102,23 +103,24 @@ void StorePicture::update_scene(const Camera& camera, int width, int height,
   View view = view_of(camera, width, height, settings.pixel_error);
   view.finest_level = finest_node_level(scene_->tree().grid(), settings.finest_level);
   view.thin_pixel_error = view.pixel_error / way.smaller;
-  const ShownBox box = shown_box(settings);
+  const ClipRegion box = clip_region(settings);
   if (!box.whole()) {
     const Vec3d last = last_sample(*store_);
     view.clip = IndexBox{box.lo * last, box.hi * last};
   }
-  view.planes = shown_half_spaces(settings);
+  view.planes = clip_half_spaces(settings);
   CutBudget budget;
   budget.triangles = std::min(budget.triangles, way.max_triangles);
   budget.thin_triangles = way.thin_triangles;
   // What stands in until the cut is there takes room beside it.
-  const std::uint64_t there =
-      device_->turns() != nullptr ? DeviceMeshes::cache_bytes(device_->held()) : upload_memory();
+  const std::uint64_t there = device_->kernel_lock() != nullptr
+                                  ? DeviceMeshes::cache_bytes(device_->held())
+                                  : upload_memory();
   budget.mesh_bytes = std::min(there, budgets_.memory / 2) / 2;
   scene_->update(isovalues, view, budget);
 }
 
-void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
+void SceneRenderer::upload(const std::shared_ptr<const Drawable>& newest) {
   MeshUploads::Share share;
   // The first picture takes what it needs.
   const auto add = [&](const Drawable& drawable) {
@@ -137,37 +139,37 @@ void StorePicture::upload(const std::shared_ptr<const Drawable>& newest) {
 }
 
 /// Whether what is new can be shown a little later, since more is to come.
-bool StorePicture::can_wait(const Drawable& newest) const {
+bool SceneRenderer::can_wait(const Drawable& newest) const {
   if (shown_ == nullptr || !shown_->covers || newest.complete ||
       shown_->isovalues != newest.isovalues)
     return false;
   const double pause = kRefiningPause * picture_seconds_;
   return std::chrono::duration<double>(Clock::now() - drawn_).count() <
-         (device_->turns() != nullptr ? std::max(pause, kRefiningSeconds) : pause);
+         (device_->kernel_lock() != nullptr ? std::max(pause, kRefiningSeconds) : pause);
 }
 
-bool StorePicture::may_be_plain(const Asked& asked) const {
-  if (asked.way.plain != PictureWay::Plain::until_complete)
-    return asked.way.plain == PictureWay::Plain::yes;
+bool SceneRenderer::may_be_plain(const Asked& asked) const {
+  if (asked.way.plain != FrameOptions::Plain::until_complete)
+    return asked.way.plain == FrameOptions::Plain::yes;
   if (setup_->software()) return !state_.complete;
   // A full budget may leave the newest incomplete.
   return shown_ != asked.newest || !(asked.idle || asked.newest->complete);
 }
 
-void StorePicture::drop_unused() {
+void SceneRenderer::drop_unused() {
   if (shown_ != nullptr) uploads_.keep(*shown_);
   uploads_.drop(upload_memory());
   state_.device_bytes = uploads_.bytes() + device_->held() + slices_.bytes();
 }
 
 /// What is uploaded, slices and the device's own meshes share its memory.
-std::uint64_t StorePicture::upload_memory() const {
+std::uint64_t SceneRenderer::upload_memory() const {
   const std::uint64_t others = device_->reserved() + slices_.bytes();
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
 }
 
 /// Whether a picture that has been begun is still worth finishing.
-bool StorePicture::still_wanted(const Work& work, const Asked& asked) const {
+bool SceneRenderer::still_wanted(const Work& work, const Asked& asked) const {
   const Shows& shows = work.becomes.shows;
   // A picture in full serves as a plain one, and a plain one comes first.
   const bool same_view = shows == asked.shows || shows == asked.shows_plain;
@@ -177,7 +179,7 @@ bool StorePicture::still_wanted(const Work& work, const Asked& asked) const {
 }
 
 /// Whether the next picture would show no more than the last one.
-bool StorePicture::shows_all_there_is(const Pictured& next, const Asked& asked) const {
+bool SceneRenderer::shows_all_there_is(const Pictured& next, const Asked& asked) const {
   if (pictured_.shows != next.shows && pictured_.shows != asked.shows) return false;
   if (!pictured_.stale && pictured_.slices == next.slices &&
       same_meshes(pictured_.meshes.get(), next.meshes.get()))
@@ -188,10 +190,10 @@ bool StorePicture::shows_all_there_is(const Pictured& next, const Asked& asked) 
 }
 
 /// Unless it would show nothing new.
-void StorePicture::choose_picture(const Asked& asked) {
+void SceneRenderer::choose_picture(const Asked& asked) {
   Stopwatch watch;
   const bool plain_serves =
-      asked.way.plain != PictureWay::Plain::no && pictured_.shows == asked.shows_plain;
+      asked.way.plain != FrameOptions::Plain::no && pictured_.shows == asked.shows_plain;
   const bool other_view = pictured_.shows != asked.shows && !plain_serves;
   const bool enough = imported_ && shown_ != nullptr;
   if (!enough && (other_view || asked.idle || !can_wait(*asked.newest))) upload(asked.newest);
@@ -216,8 +218,8 @@ void StorePicture::choose_picture(const Asked& asked) {
   work_->state.plain = plain;
 }
 
-void StorePicture::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
-                        const PictureWay& way) {
+void SceneRenderer::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
+                         const FrameOptions& way) {
   try {
     draw_next(camera, width, height, settings, way);
   } catch (...) {
@@ -231,8 +233,8 @@ void StorePicture::draw(const Camera& camera, int width, int height, const ViewS
   }
 }
 
-void StorePicture::draw_next(const Camera& camera, int width, int height,
-                             const ViewSettings& settings, const PictureWay& way) {
+void SceneRenderer::draw_next(const Camera& camera, int width, int height,
+                              const ViewSettings& settings, const FrameOptions& way) {
   uploads_.begin_use();
   drew_ = false;
   Stopwatch watch;
@@ -263,7 +265,7 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
     watch.lap();
     // Two contexts of one device are changed slowly and to and fro: one after the other is
     // sooner done, for both.
-    const Turn turn(device_->turns());
+    const TicketGuard guard(device_->kernel_lock());
     times_.turn = watch.lap();
     if (!goes_on) begin_picture(asked);
     draw_piece(asked.way.piece_seconds);
@@ -274,7 +276,7 @@ void StorePicture::draw_next(const Camera& camera, int width, int height,
   times_.tidy = watch.lap();
 }
 
-void StorePicture::update_state(const Asked& asked) {
+void SceneRenderer::update_state(const Asked& asked) {
   state_.drawing = work_.has_value();
   state_.drawn_part = work_ && work_->all > 0 ? 1 - static_cast<double>(renderer().work_left()) /
                                                         static_cast<double>(work_->all)
@@ -291,9 +293,9 @@ void StorePicture::update_state(const Asked& asked) {
                     scene_->is_newest(*shown_) && (shown_->complete || scene_->idle());
 }
 
-void StorePicture::draw_complete(const Camera& camera, int width, int height,
-                                 const ViewSettings& settings, const std::function<void()>& wait) {
-  const PictureWay way{.piece_seconds = kPieceSeconds, .in_order = true};
+void SceneRenderer::draw_complete(const Camera& camera, int width, int height,
+                                  const ViewSettings& settings, const std::function<void()>& wait) {
+  const FrameOptions way{.piece_seconds = kPieceSeconds, .in_order = true};
   for (;;) {
     draw(camera, width, height, settings, way);
     // The cut depends on what meshes were like; once more, it may be another.

@@ -1,4 +1,4 @@
-#include "viewer/app/shown_slices.h"
+#include "viewer/app/slice_views.h"
 
 #include <algorithm>
 #include <cstring>
@@ -9,9 +9,8 @@ namespace {
 /// Most that the samples of one slice may take: beside them are as many floats, and on the device.
 std::uint64_t slice_bytes(const PictureBudgets& budgets, ScalarType type) {
   const std::uint64_t sample = std::min<std::uint64_t>(size_of(type), sizeof(float));
-  const std::uint64_t samples =
-      std::min(ShownSlices::memory(budgets) / 3 / (sample + sizeof(float)),
-               budgets.device_memory / 8 / 3 / sizeof(float));
+  const std::uint64_t samples = std::min(SliceViews::memory(budgets) / 3 / (sample + sizeof(float)),
+                                         budgets.device_memory / 8 / 3 / sizeof(float));
   return std::min(SliceRequest{}.bytes, samples * sample);
 }
 
@@ -38,10 +37,10 @@ std::vector<float> floats_of(const SliceSamples& slice) {
 
 }  // namespace
 
-ShownSlices::ShownSlices(const PictureBudgets& budgets, Vec3d last, ScalarType type)
+SliceViews::SliceViews(const PictureBudgets& budgets, Vec3d last, ScalarType type)
     : last_(last), most_bytes_(slice_bytes(budgets, type)) {}
 
-void ShownSlices::update(SceneStream& stream, const ViewSettings& settings) {
+void SliceViews::update(SceneStream& stream, const ViewSettings& settings) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto slot = static_cast<std::size_t>(axis);
     Slice& shown = slices_[slot];
@@ -61,12 +60,12 @@ void ShownSlices::update(SceneStream& stream, const ViewSettings& settings) {
   }
 }
 
-ShownSlices::Samples ShownSlices::samples() const {
+SliceViews::Samples SliceViews::samples() const {
   return {slices_[0].from, slices_[1].from, slices_[2].from};
 }
 
-void ShownSlices::draw(Renderer& renderer, const ViewSettings& settings,
-                       std::vector<std::string>& damage) const {
+void SliceViews::draw(Renderer& renderer, const ViewSettings& settings,
+                      std::vector<std::string>& damage) const {
   for (const Slice& shown : slices_) {
     if (shown.from == nullptr) continue;
     const SliceSamples& from = *shown.from;
@@ -84,7 +83,7 @@ void ShownSlices::draw(Renderer& renderer, const ViewSettings& settings,
   }
 }
 
-std::uint64_t ShownSlices::bytes() const {
+std::uint64_t SliceViews::bytes() const {
   std::uint64_t bytes = 0;
   for (const Slice& slice : slices_) bytes += slice.samples.size() * sizeof(float);
   return bytes;

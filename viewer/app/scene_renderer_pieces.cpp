@@ -1,4 +1,4 @@
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 
 #include <epoxy/gl.h>
 
@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "core/stopwatch.h"
-#include "viewer/app/marks.h"
+#include "viewer/app/damage_markers.h"
 
-// How a picture that has been chosen is made, in pieces; store_picture.cpp chooses it.
+// How a picture that has been chosen is made, in pieces; scene_renderer.cpp chooses it.
 
 namespace isobrick {
 namespace {
@@ -21,8 +21,8 @@ constexpr std::uint64_t kWholePicture = std::numeric_limits<std::uint64_t>::max(
 
 /// Which of the settings' surfaces a mesh of `shown_` belongs to. That may have been made when
 /// others were asked for: where there were as many, one has another isovalue by now.
-std::optional<std::size_t> StorePicture::surface_of(const DrawnNode& node,
-                                                    const ViewSettings& settings) const {
+std::optional<std::size_t> SceneRenderer::surface_of(const DrawnNode& node,
+                                                     const ViewSettings& settings) const {
   const auto number = static_cast<std::size_t>(node.isovalue);
   if (shown_->isovalues.size() == shown_surfaces_.size()) return shown_surfaces_[number];
   for (const std::size_t i : shown_surfaces_)
@@ -30,11 +30,11 @@ std::optional<std::size_t> StorePicture::surface_of(const DrawnNode& node,
   return std::nullopt;
 }
 
-void StorePicture::draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
-                                 PictureState& state) {
+void SceneRenderer::draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
+                                  PictureState& state) {
   state.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
   if (shown_ == nullptr) return;
-  const Cuts cuts(picture);
+  const ClipTest cuts(picture);
   for (const DrawnNode& node : shown_->nodes) {
     if (!node.mesh->damage.empty()) {
       state.damage.push_back(node.mesh->damage);
@@ -60,7 +60,7 @@ void StorePicture::draw_surfaces(const ViewSettings& settings, const PictureSett
   }
 }
 
-void StorePicture::begin_picture(const Asked& asked) {
+void SceneRenderer::begin_picture(const Asked& asked) {
   Stopwatch watch;
   ViewSettings settings = asked.settings;
   if (work_->state.plain) settings.occlusion = settings.multisample = false;
@@ -72,7 +72,7 @@ void StorePicture::begin_picture(const Asked& asked) {
   renderer().begin(asked.camera, asked.width, asked.height, picture);
   draw_surfaces(settings, picture, work_->state);
   slices_.draw(renderer(), settings, work_->state.damage);
-  draw_marks(renderer(), settings, scene_->tree().grid(), last_sample(*store_), shown_.get());
+  draw_markers(renderer(), settings, scene_->tree().grid(), last_sample(*store_), shown_.get());
   work_->all = renderer().work_left();
   times_.draw = watch.lap();
 }
@@ -80,7 +80,7 @@ void StorePicture::begin_picture(const Asked& asked) {
 /// Waits until OpenGL has drawn the piece before the one that was just submitted, or everything.
 /// llvmpipe draws in part on this thread and in part beside it: the rest of a piece is drawn
 /// beside the next one.
-void StorePicture::wait_drawn(bool everything) {
+void SceneRenderer::wait_drawn(bool everything) {
   if (everything) {
     glFinish();  // see DeviceMeshes::drawn(); and drawing counts for the pause after it
     return piece_fence_.reset();
@@ -91,7 +91,7 @@ void StorePicture::wait_drawn(bool everything) {
 }
 
 /// Draws the rest of the picture, or a piece of it where `limit` is finite.
-void StorePicture::draw_piece(double limit) {
+void SceneRenderer::draw_piece(double limit) {
   const bool in_pieces = std::isfinite(limit);
   Stopwatch watch;
   const bool finished = renderer().end_piece(in_pieces ? pieces_.work() : kWholePicture);
@@ -111,7 +111,7 @@ void StorePicture::draw_piece(double limit) {
   work_->seconds += times_.draw + times_.finish;
 }
 
-void StorePicture::finish_picture() {
+void SceneRenderer::finish_picture() {
   picture_seconds_ = work_->seconds + times_.draw + times_.finish;
   drawn_ = std::chrono::steady_clock::now();
   drew_ = true;
@@ -127,7 +127,7 @@ void StorePicture::finish_picture() {
 }
 
 /// Waits for the piece that is still being drawn, if any: then its meshes may go.
-void StorePicture::drop_picture() {
+void SceneRenderer::drop_picture() {
   ++counters_.dropped;
   if (piece_fence_) wait_drawn(true);
   work_.reset();

@@ -1,4 +1,4 @@
-#include "core/give_way.h"
+#include "core/thread_priority.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -13,7 +13,7 @@ TEST(GiveWay, IsOfTheCallingThreadAlone) {
   const int before = getpriority(PRIO_PROCESS, 0);
   int after = before;
   std::thread([&] {
-    give_way();
+    lower_thread_priority();
     after = getpriority(PRIO_PROCESS, 0);
   }).join();
   EXPECT_EQ(after, std::min(before + 10, 19));

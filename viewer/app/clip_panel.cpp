@@ -82,13 +82,13 @@ void planes(ViewerState& state) {
     else
       list.erase(list.begin() + static_cast<std::ptrdiff_t>(i));
   }
-  if (list.size() < kMostClipPlanes && ImGui::SmallButton("Add a plane"))
+  if (list.size() < kMaxClipPlanes && ImGui::SmallButton("Add a plane"))
     list.push_back({true, half_space_at((box.lo + box.hi) * 0.5, ahead)});
 }
 
 }  // namespace
 
-void draw_cuts_panel(ViewerState& state) {
+void draw_clip_panel(ViewerState& state) {
   ViewSettings& settings = state.settings;
   across_axes(settings);
   planes(state);

@@ -1,4 +1,4 @@
-#include "bricks/zarr/checked_json.h"
+#include "bricks/zarr/json_reader.h"
 
 #include <fmt/format.h>
 
@@ -45,60 +45,60 @@ nlohmann::json parse_json(std::string_view text, const std::string& where) {
   }
 }
 
-void CheckedJson::damaged(const std::string& what) const {
+void JsonReader::damaged(const std::string& what) const {
   throw DamageError(fmt::format("{}: {}", where_, what));
 }
 
-void CheckedJson::unsupported(const std::string& what) const {
+void JsonReader::unsupported(const std::string& what) const {
   throw Error(fmt::format("{}: {}", where_, what));
 }
 
-CheckedJson CheckedJson::at(const char* key) const {
+JsonReader JsonReader::at(const char* key) const {
   if (!value_->is_object()) damaged("must be an object");
   const auto found = value_->find(key);
   if (found == value_->end()) damaged(fmt::format("has no '{}'", key));
   return {*found, fmt::format("{}{}{}", where_, where_.ends_with('\'') ? ": " : ".", key)};
 }
 
-CheckedJson CheckedJson::at(std::size_t i) const {
+JsonReader JsonReader::at(std::size_t i) const {
   if (i >= array_size()) damaged(fmt::format("has no element {}", i));
   return {(*value_)[i], fmt::format("{}[{}]", where_, i)};
 }
 
-std::size_t CheckedJson::array_size() const {
+std::size_t JsonReader::array_size() const {
   if (!value_->is_array()) damaged("must be an array");
   return value_->size();
 }
 
-std::string CheckedJson::string() const {
+std::string JsonReader::string() const {
   if (!value_->is_string()) damaged("must be a string");
   return value_->get<std::string>();
 }
 
-bool CheckedJson::boolean() const {
+bool JsonReader::boolean() const {
   if (!value_->is_boolean()) damaged("must be true or false");
   return value_->get<bool>();
 }
 
-double CheckedJson::number() const {
+double JsonReader::number() const {
   if (!value_->is_number()) damaged("must be a number");
   return value_->get<double>();
 }
 
-Index CheckedJson::integer() const {
+Index JsonReader::integer() const {
   if (!value_->is_number_integer()) damaged("must be an integer");
   if (value_->is_number_unsigned() && value_->get<std::uint64_t>() >> 63 != 0)
     damaged("is too large");
   return value_->get<Index>();
 }
 
-Index CheckedJson::positive() const {
+Index JsonReader::positive() const {
   const Index value = integer();
   if (value < 1 || value > Index{1} << 62) damaged(fmt::format("{} is out of bounds", value));
   return value;
 }
 
-void CheckedJson::check_version(const char* what, Index known, const char* renewal) const {
+void JsonReader::check_version(const char* what, Index known, const char* renewal) const {
   const Index version = integer();
   if (version != known)
     unsupported(fmt::format("{} version {} is not known to this program, which knows {}; {}", what,

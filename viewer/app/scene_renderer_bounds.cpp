@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 #include "viewer/scene/surface_box.h"
 
 // Where in the world a store, and what is shown of it, lies.
@@ -30,13 +30,13 @@ void include(std::optional<IndexBox>& box, const IndexBox& more) {
 
 }  // namespace
 
-WorldBox StorePicture::bounds() const {
+WorldBox SceneRenderer::bounds() const {
   return world_box(scene_->tree().grid().transform(), {{0, 0, 0}, last_sample(*store_)});
 }
 
-WorldBox StorePicture::shown_bounds(const ViewSettings& settings) const {
+WorldBox SceneRenderer::shown_bounds(const ViewSettings& settings) const {
   const Vec3d last = last_sample(*store_);
-  const ShownBox shown = shown_box(settings);
+  const ClipRegion shown = clip_region(settings);
   const IndexBox part{shown.lo * last, shown.hi * last};
   std::vector<double> isovalues;
   for (const SurfaceSettings& surface : settings.surfaces)

@@ -1,9 +1,9 @@
-#include "bricks/ranges/sealed_json.h"
+#include "bricks/ranges/checksummed_json.h"
 
 #include <fmt/format.h>
 
-#include "bricks/zarr/checked_json.h"
 #include "bricks/zarr/codec.h"
+#include "bricks/zarr/json_reader.h"
 
 namespace isobrick {
 namespace {
@@ -17,23 +17,23 @@ std::uint32_t checksum_of(const nlohmann::json& object) {
 
 }  // namespace
 
-std::string seal_json(nlohmann::json object) {
+std::string checksum_json(nlohmann::json object) {
   object[kKey] = checksum_of(object);
   return object.dump(2) + "\n";
 }
 
-nlohmann::json unseal_json(std::string_view text, const std::string& where) {
+nlohmann::json read_checksummed_json(std::string_view text, const std::string& where) {
   nlohmann::json object = parse_json(text, where);
-  const CheckedJson checked(object, where);
+  const JsonReader checked(object, where);
   const Index stored = checked.at(kKey).integer();
   object.erase(kKey);
   if (const std::uint32_t crc = checksum_of(object); Index{crc} != stored)
-    CheckedJson(object, where)
+    JsonReader(object, where)
         .damaged(fmt::format("was changed: its checksum is {}, not crc32c {}", crc, stored));
   return object;
 }
 
-std::uint32_t seal_of(std::string_view text) {
+std::uint32_t json_checksum(std::string_view text) {
   return parse_json(text, "").at(kKey).get<std::uint32_t>();
 }
 

@@ -1,9 +1,9 @@
-#include "viewer/app/marks.h"
+#include "viewer/app/damage_markers.h"
 
 #include <vector>
 
 #include "core/length_unit.h"
-#include "viewer/app/shown_part.h"
+#include "viewer/app/clip_region.h"
 
 namespace isobrick {
 namespace {
@@ -12,8 +12,8 @@ constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};
 
 }  // namespace
 
-void draw_marks(Renderer& renderer, const ViewSettings& settings, const NodeGrid& grid, Vec3d last,
-                const Drawable* shown) {
+void draw_markers(Renderer& renderer, const ViewSettings& settings, const NodeGrid& grid,
+                  Vec3d last, const Drawable* shown) {
   const Transform& transform = grid.transform();
   if (shown != nullptr)
     for (const DrawnNode& node : shown->nodes) {

@@ -31,7 +31,7 @@ struct Cell {
     return inside(0) == inside(3) && inside(1) == inside(2) && inside(0) != inside(1);
   }
   /// Where the contour crosses an edge.
-  ISOBRICK_HD Point crossing(int edge) const {
+  ISOBRICK_HD Point edge_point(int edge) const {
     const double a = static_cast<double>(v[low(edge)]), b = static_cast<double>(v[high(edge)]);
     const double d = a - b, most = std::numeric_limits<double>::max();
     const double t = d >= -most && d <= most ? a / d : 0.5;
@@ -99,14 +99,14 @@ ISOBRICK_HD inline int near_edge(const GridView& g, int u, int v, const int (&be
 /// it: where the coarser side has it.
 ISOBRICK_HD inline void move_on_edge(const GridView& g, int face, int u, int v,
                                      const int (&below)[3], double (&place)[3]) {
-  const CoarseFace& coarse = g.faces[face];
+  const LodSeam& coarse = g.faces[face];
   const bool first = (face / 2 == 0 ? 1 : 0) == u;  // whether u is the face's first axis
   const int i = below[u] / g.ratio[u];
   const int j = (below[v] + g.ratio[v] - 1) / g.ratio[v];  // the last row may be cut short
   const float* at = coarse.values + (first ? j * coarse.n[0] + i : i * coarse.n[0] + j);
   const float a = at[0], b = at[first ? 1 : coarse.n[0]];
   if ((a >= 0) == (b >= 0)) return;
-  const float t = crossing(a, b, 0.0f);
+  const float t = edge_parameter(a, b, 0.0f);
   const float part =
       static_cast<float>(static_cast<int>(t * 1048576.0f + 0.5f)) * (1.0f / 1048576.0f);
   const double* ends = g.coarse_place[u] + i;
@@ -124,7 +124,7 @@ ISOBRICK_HD inline void move_to_contour(const GridView& g, int face, const int (
   if (between_u && !between_v && g.ratio[u] == 2) return move_on_edge(g, face, u, v, below, place);
   if (between_v && !between_u && g.ratio[v] == 2) return move_on_edge(g, face, v, u, below, place);
   if (!between_u || !between_v) return;
-  const CoarseFace& coarse = g.faces[face];
+  const LodSeam& coarse = g.faces[face];
   const int i = below[u] / g.ratio[u], j = below[v] / g.ratio[v];
   const double from_u = g.coarse_place[u][i], from_v = g.coarse_place[v][j];
   const double length_u = g.coarse_place[u][i + 1] - from_u;
@@ -136,7 +136,8 @@ ISOBRICK_HD inline void move_to_contour(const GridView& g, int face, const int (
   Nearest best{at, std::numeric_limits<double>::infinity()};
   for (int edge = 0; edge < 4; ++edge) {
     if (!cell.crosses(edge) || (near >= 0 && edge != near)) continue;
-    const Nearest found = nearest_on(cell.crossing(edge), cell.crossing(cell.partner(edge)), at);
+    const Nearest found =
+        nearest_on(cell.edge_point(edge), cell.edge_point(cell.partner(edge)), at);
     if (found.distance2 < best.distance2) best = found;
   }
   place[u] = from_u + best.point.u * length_u;

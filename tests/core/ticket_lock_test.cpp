@@ -1,4 +1,4 @@
-#include "core/turns.h"
+#include "core/ticket_lock.h"
 
 #include <gtest/gtest.h>
 
@@ -8,13 +8,13 @@
 namespace isobrick {
 namespace {
 
-TEST(Turns, NobodyHasOneBesideAnotherOrComesTwiceWhileAnotherWaits) {
-  Turns turns;
+TEST(TicketLock, GoesToThreadsInTurn) {
+  TicketLock lock;
   constexpr int kRounds = 200;
-  std::vector<int> order;  // guarded by the turns themselves
+  std::vector<int> order;  // guarded by the lock
   const auto work = [&](int number) {
     for (int i = 0; i < kRounds; ++i) {
-      const Turn turn(&turns);
+      const TicketGuard guard(&lock);
       order.push_back(number);
       // Long enough for the other one to ask for the next.
       std::this_thread::sleep_for(std::chrono::microseconds(200));
@@ -29,11 +29,11 @@ TEST(Turns, NobodyHasOneBesideAnotherOrComesTwiceWhileAnotherWaits) {
   EXPECT_GT(changes, kRounds) << "they take turns, but for when one was not there in time";
 }
 
-TEST(Turns, OfNothingAreNoTurns) {
-  const Turn one(nullptr), another(nullptr);
-  Turns turns;
-  { const Turn turn(&turns); }
-  const Turn again(&turns);
+TEST(TicketLock, IsOptional) {
+  const TicketGuard one(nullptr), another(nullptr);
+  TicketLock lock;
+  { const TicketGuard guard(&lock); }
+  const TicketGuard again(&lock);
 }
 
 }  // namespace

@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "viewer/app/clip_region.h"
 #include "viewer/app/device_meshes.h"
 #include "viewer/app/frame_pacer.h"
 #include "viewer/app/mesh_uploads.h"
 #include "viewer/app/picture_setup.h"
 #include "viewer/app/piece_pacer.h"
-#include "viewer/app/shown_part.h"
-#include "viewer/app/shown_slices.h"
+#include "viewer/app/slice_views.h"
 #include "viewer/app/view_settings.h"
 #include "viewer/render/renderer.h"
 #include "viewer/scene/scene.h"
@@ -38,17 +38,17 @@ struct PictureState {
   bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
   std::uint64_t triangles = 0, nodes = 0;
   bool plain = false;               ///< drawn without occlusion and multisampling to be quick
-  bool moving = false;              ///< a preview: drawn as PictureWay::moving
+  bool moving = false;              ///< a preview: drawn as FrameOptions::moving
   std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
   bool more = false;                ///< the next draw() has something to do, whatever comes
-  bool limited = false;             ///< by PictureWay::max_triangles, or by memory
-  bool thin = false;                ///< more than PictureWay::max_triangles, for thin structure
+  bool limited = false;             ///< by FrameOptions::max_triangles, or by memory
+  bool thin = false;                ///< more than FrameOptions::max_triangles, for thin structure
   bool limited_by_budget = false;   ///< with more memory it would be finer
   std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
 };
 
 /// How a picture may be simpler than its settings say.
-struct PictureWay {
+struct FrameOptions {
   std::uint64_t max_triangles = FramePacer::kAllTriangles;
   /// So many where coarse levels have lost thin structure; see CutBudget.
   std::uint64_t thin_triangles = 0;
@@ -73,7 +73,7 @@ struct PictureWay {
 
   /// As windows draw, whose pictures become simpler as `pacer` says while something moves.
   /// `software`: whether OpenGL is.
-  static PictureWay in_window(const FramePacer& pacer, bool software, bool moving);
+  static FrameOptions in_window(const FramePacer& pacer, bool software, bool moving);
 };
 
 /// What has become of pictures so far.
@@ -99,14 +99,14 @@ struct PictureTimes {
 /// Draws a store: chooses nodes for a view, takes their meshes from the scene to the
 /// device, and makes the picture. The same for windows and off-screen. One thread, with
 /// the context current that it was made in.
-class StorePicture {
+class SceneRenderer {
  public:
   /// Reads the ranges. `on_change` is called from worker threads when a new
   /// picture would show more. `setup`: of the current context, for as long as this picture is
   /// drawn; null: one of its own. Throws what Scene, PictureSetup and DeviceMeshes::use() do.
-  StorePicture(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
-               std::function<void()> on_change, std::shared_ptr<PictureSetup> setup = nullptr);
-  ~StorePicture();
+  SceneRenderer(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
+                std::function<void()> on_change, std::shared_ptr<PictureSetup> setup = nullptr);
+  ~SceneRenderer();
 
   const StoreReader& store() const { return *store_; }
   Scene& scene() { return *scene_; }
@@ -124,7 +124,7 @@ class StorePicture {
   /// before until it is whole, and where it would show the same. Throws what Scene, Renderer and
   /// DeviceMeshes do; what had been begun is dropped then.
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
-            const PictureWay& way = {});
+            const FrameOptions& way = {});
   const PictureState& state() const { return state_; }
   /// Whether the last draw() finished a picture, rather than to leave the one before.
   bool drew() const { return drew_; }
@@ -152,7 +152,7 @@ class StorePicture {
     const Camera& camera;
     int width, height;
     const ViewSettings& settings;
-    const PictureWay& way;
+    const FrameOptions& way;
     Shows shows, shows_plain;
     bool idle;  ///< nothing finer than `newest` is to come
     std::shared_ptr<const Drawable> newest;
@@ -161,7 +161,7 @@ class StorePicture {
   struct Pictured {
     Shows shows;
     std::shared_ptr<const Drawable> meshes;
-    ShownSlices::Samples slices;
+    SliceViews::Samples slices;
     std::vector<double> isovalues;  ///< of the meshes
     bool stale = false;  ///< meshes or slices are others by now; these are not kept for that
   };
@@ -175,9 +175,9 @@ class StorePicture {
   };
 
   void draw_next(const Camera& camera, int width, int height, const ViewSettings& settings,
-                 const PictureWay& way);
+                 const FrameOptions& way);
   void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
-                    const PictureWay& way);
+                    const FrameOptions& way);
   /// Takes meshes of the newest drawable to the device; shows it once all are there.
   void upload(const std::shared_ptr<const Drawable>& newest);
   bool can_wait(const Drawable& newest) const;
@@ -202,7 +202,7 @@ class StorePicture {
   std::future<std::unique_ptr<Scene>> reading_;  ///< beside the set-up
   std::shared_ptr<PictureSetup> setup_;
   MeshUploads uploads_;
-  ShownSlices slices_;
+  SliceViews slices_;
   std::unique_ptr<Scene> scene_;
   std::unique_ptr<DeviceMeshes> device_;
   std::shared_ptr<const Drawable> shown_, next_;

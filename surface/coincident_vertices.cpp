@@ -1,4 +1,4 @@
-#include "surface/tile_ties.h"
+#include "surface/coincident_vertices.h"
 
 #include <algorithm>
 #include <bit>
@@ -25,50 +25,51 @@ constexpr bool on_planes(std::uint32_t place) {
   return outer(place & 63) || outer(place >> 6 & 63) || outer(place >> 12);
 }
 
-/// Goes through the cells: marks the ties that kept triangles have corners on.
+/// Goes through the cells: marks the coincident vertices that kept triangles have corners on.
 void mark_used(TileState& tile) {
-  TileTies& ties = *tile.ties;
-  std::memset(ties.used, 0, sizeof ties.used);
-  ties.left_out = 0;
+  CoincidentVertices& coincident = *tile.coincident;
+  std::memset(coincident.used, 0, sizeof coincident.used);
+  coincident.left_out = 0;
   for (const ActiveCell cell : tile.cells) {
     const int x = static_cast<int>(cell & 31), y = static_cast<int>(cell >> 5 & 31),
               z = static_cast<int>(cell >> 10 & 31);
-    const std::uint32_t at = ties::corner_bits(ties.at, x, y, z);
+    const std::uint32_t at = coincident::corner_bits(coincident.at, x, y, z);
     if (at == 0) continue;
     const auto use = [&](int vertex) {
       if (vertex >= 8) return;
       const int row = row_index(y + (vertex >> 1 & 1), z + (vertex >> 2));
-      ties.used[row] |= std::uint64_t{1} << (x + (vertex & 1));
+      coincident.used[row] |= std::uint64_t{1} << (x + (vertex & 1));
     };
-    ties.left_out += ties::for_each_kept(kCaseTables, cell >> 16, at, [&](int a, int b, int c) {
-      use(a);
-      use(b);
-      use(c);
-    });
+    coincident.left_out +=
+        coincident::for_each_kept(kCaseTables, cell >> 16, at, [&](int a, int b, int c) {
+          use(a);
+          use(b);
+          use(c);
+        });
   }
 }
 
-/// Finds out which tile makes the vertex on a tie: the first in Morton order that
+/// Finds out which tile makes the vertex on a coincident vertex: the first in Morton order that
 /// has a kept triangle there. That follows from the samples around it alone, so
 /// all tiles find the same.
 template <class T>
-class TieOwner {
+class CoincidentOwner {
  public:
-  TieOwner(const KernelContext& context, const TileState& tile)
+  CoincidentOwner(const KernelContext& context, const TileState& tile)
       : context_(context),
         tile_(tile),
         samples_(reinterpret_cast<const T*>(tile.samples.data())),
         threshold_(Threshold<T>(context.isovalue).value),
-        tie_(*tie_value<T>(context.isovalue)) {}
+        coincident_(*coincident_value<T>(context.isovalue)) {}
 
-  /// The neighbour, for a tie that this tile has a kept triangle at.
+  /// The neighbour, for a coincident vertex that this tile has a kept triangle at.
   std::uint8_t find(Int3 p) const {
-    std::uint8_t owner = TieVertex::kOwn;
+    std::uint8_t owner = CoincidentVertex::kOwn;
     std::uint64_t first = morton_encode(tile_.work.tile);
     for (int corner = 0; corner < 8; ++corner) {
       const Int3 cell = p - Int3{corner & 1, corner >> 1 & 1, corner >> 2};
       const std::uint8_t of = neighbour({side(cell.x), side(cell.y), side(cell.z)});
-      if (of == TieVertex::kOwn || of == owner || !exists(cell)) continue;
+      if (of == CoincidentVertex::kOwn || of == owner || !exists(cell)) continue;
       const std::uint64_t code = morton_encode(tile_.work.tile + offset_of(of));
       if (code < first && has_triangle(cell, corner)) {
         first = code;
@@ -94,10 +95,10 @@ class TieOwner {
                                               static_cast<int>(cell.z) + (c >> 2))];
       if (v != v) return false;
       index |= static_cast<std::uint32_t>(v >= threshold_) << c;
-      at |= static_cast<std::uint32_t>(v == tie_) << c;
+      at |= static_cast<std::uint32_t>(v == coincident_) << c;
     }
     bool found = false;
-    ties::for_each_kept(kCaseTables, index, at, [&](int a, int b, int c) {
+    coincident::for_each_kept(kCaseTables, index, at, [&](int a, int b, int c) {
       found = found || a == corner || b == corner || c == corner;
     });
     return found;
@@ -106,64 +107,66 @@ class TieOwner {
   const KernelContext& context_;
   const TileState& tile_;
   const T* samples_;
-  T threshold_, tie_;
+  T threshold_, coincident_;
 };
 
-/// Lists the used ties in the order of their places and numbers the tile's own.
+/// Lists the used coincident vertices in the order of their places and numbers the tile's own.
 template <class T>
 void list_used(const KernelContext& context, bool alone, TileState& tile) {
-  TileTies& ties = *tile.ties;
-  const TieOwner<T> owner(context, tile);
-  ties.vertices.clear();
-  ties.own = 0;
+  CoincidentVertices& coincident = *tile.coincident;
+  const CoincidentOwner<T> owner(context, tile);
+  coincident.vertices.clear();
+  coincident.own = 0;
   for (int row = 0; row < kTileRows; ++row) {
-    ties.first[row] = static_cast<std::uint32_t>(ties.vertices.size());
-    for (std::uint64_t word = ties.used[row]; word; word &= word - 1) {
+    coincident.first[row] = static_cast<std::uint32_t>(coincident.vertices.size());
+    for (std::uint64_t word = coincident.used[row]; word; word &= word - 1) {
       const int x = std::countr_zero(word), y = row % kTileSamples, z = row / kTileSamples;
-      TieVertex vertex{static_cast<std::uint32_t>(x | y << 6 | z << 12), 0, TieVertex::kOwn};
+      CoincidentVertex vertex{static_cast<std::uint32_t>(x | y << 6 | z << 12), 0,
+                              CoincidentVertex::kOwn};
       if (!alone && on_planes(vertex.place)) vertex.owner = owner.find({x, y, z});
-      if (vertex.owner == TieVertex::kOwn) vertex.number = tile.edge_vertices + ties.own++;
-      ties.vertices.resize(ties.vertices.size() + 1);
-      ties.vertices[ties.vertices.size() - 1] = vertex;
+      if (vertex.owner == CoincidentVertex::kOwn)
+        vertex.number = tile.edge_vertices + coincident.own++;
+      coincident.vertices.resize(coincident.vertices.size() + 1);
+      coincident.vertices[coincident.vertices.size() - 1] = vertex;
     }
   }
 }
 
 }  // namespace
 
-bool has_ties(ScalarType type, double isovalue) {
+bool has_coincident(ScalarType type, double isovalue) {
   return visit_scalar(type, [&](auto tag) {
-    return tie_value<typename decltype(tag)::type>(isovalue).has_value();
+    return coincident_value<typename decltype(tag)::type>(isovalue).has_value();
   });
 }
 
-void count_ties(ScalarType type, const KernelContext& context, bool alone, TileState& tile) {
+void count_coincident(ScalarType type, const KernelContext& context, bool alone, TileState& tile) {
   mark_used(tile);
   visit_scalar(type,
                [&](auto tag) { list_used<typename decltype(tag)::type>(context, alone, tile); });
-  tile.vertices = tile.edge_vertices + tile.ties->own;
-  tile.triangles -= tile.ties->left_out;
+  tile.vertices = tile.edge_vertices + tile.coincident->own;
+  tile.triangles -= tile.coincident->left_out;
 }
 
-void publish_ties(TileState& tile) {
-  PodBuffer<FaceTie>& published = tile.boundary->ties;
+void publish_coincident(TileState& tile) {
+  PodBuffer<CoincidentFace>& published = tile.boundary->coincident;
   const auto for_each_shared = [&](auto&& f) {
-    for (const TieVertex& vertex : tile.ties->vertices)
-      if (vertex.owner == TieVertex::kOwn && on_planes(vertex.place)) f(vertex);
+    for (const CoincidentVertex& vertex : tile.coincident->vertices)
+      if (vertex.owner == CoincidentVertex::kOwn && on_planes(vertex.place)) f(vertex);
   };
   std::size_t count = 0;
-  for_each_shared([&](const TieVertex&) { ++count; });
+  for_each_shared([&](const CoincidentVertex&) { ++count; });
   published.clear();
   published.reserve(count);  // no more than that: boundaries are what a budget counts
-  for_each_shared([&](const TieVertex& vertex) {
+  for_each_shared([&](const CoincidentVertex& vertex) {
     published.resize(published.size() + 1);
     published[published.size() - 1] = {vertex.place, vertex.number};
   });
 }
 
-void adopt_ties(TileState& tile, const BoundaryMap& map) {
-  for (TieVertex& vertex : tile.ties->vertices) {
-    if (vertex.owner == TieVertex::kOwn) {
+void adopt_coincident(TileState& tile, const BoundaryMap& map) {
+  for (CoincidentVertex& vertex : tile.coincident->vertices) {
+    if (vertex.owner == CoincidentVertex::kOwn) {
       vertex.number += tile.number_base;
       continue;
     }
@@ -173,9 +176,9 @@ void adopt_ties(TileState& tile, const BoundaryMap& map) {
       return static_cast<std::uint32_t>((vertex.place >> 6 * axis & 63) - kTileEdge * offset[axis]);
     };
     const std::uint32_t place = along(0) | along(1) << 6 | along(2) << 12;
-    const FaceTie* found =
-        std::lower_bound(from.ties.begin(), from.ties.end(), place,
-                         [](const FaceTie& tie, std::uint32_t p) { return tie.place < p; });
+    const CoincidentFace* found = std::lower_bound(
+        from.coincident.begin(), from.coincident.end(), place,
+        [](const CoincidentFace& coincident, std::uint32_t p) { return coincident.place < p; });
     vertex.number = from.base + found->number;
   }
 }

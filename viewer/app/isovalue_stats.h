@@ -15,11 +15,11 @@ namespace isobrick {
 
 /// What is known about the isovalues of a store: how its samples spread, counted in a
 /// thread of its own, and how much surface there is, from the ranges.
-class IsovalueFacts {
+class IsovalueStats {
  public:
-  explicit IsovalueFacts(std::shared_ptr<const StoreReader> store);
+  explicit IsovalueStats(std::shared_ptr<const StoreReader> store);
   /// Ends the count.
-  ~IsovalueFacts();
+  ~IsovalueStats();
 
   /// The histogram, once it is counted. Null before and when it failed.
   std::shared_ptr<const Histogram> histogram() const;

@@ -1,4 +1,4 @@
-#include "viewer/app/store_picture.h"
+#include "viewer/app/scene_renderer.h"
 
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
@@ -11,9 +11,9 @@
 #include "core/vectors.h"
 #include "pipeline/extract/gpu_backend.h"
 #include "tests/viewer/app/picture_test.h"
+#include "viewer/app/clip_region.h"
 #include "viewer/app/pick.h"
 #include "viewer/app/screenshot.h"
-#include "viewer/app/shown_part.h"
 
 namespace isobrick {
 namespace {
@@ -137,17 +137,17 @@ TEST_F(Picture, PlanesCutAtAnyAngleAndHideWhatIsBehindThem) {
   EXPECT_EQ(picture_->state().triangles, triangles);
 }
 
-TEST(Cuts, AreThoseThatComeNearEnough) {
+TEST(ClipTest, AreThoseThatComeNearEnough) {
   PictureSettings settings;
   settings.planes = {{{0, 0, 10}, 50}};  // z >= 5
   settings.region = WorldBox{{0, -100, -100}, {20, 100, 100}};
-  const Cuts cuts(settings);
+  const ClipTest cuts(settings);
   EXPECT_EQ(cuts.of({10, 0, 20}, 9), 0u);
   EXPECT_EQ(cuts.of({10, 0, 10}, 5.1), 0b1u);
   EXPECT_EQ(cuts.of({4, 0, 20}, 5), 0b10u);
   EXPECT_EQ(cuts.of({16, 0, 8}, 5), 0b101u);
   EXPECT_EQ(cuts.of({10, 0, 20}, 1000), 0b1111111u);
-  EXPECT_EQ(Cuts(PictureSettings{}).of({0, 0, 0}, 1e9), 0u);
+  EXPECT_EQ(ClipTest(PictureSettings{}).of({0, 0, 0}, 1e9), 0u);
 }
 
 TEST_F(Picture, KeepsItsBudgets) {
@@ -170,13 +170,13 @@ TEST_F(Picture, IsDrawnInFullWhenTheMeshBudgetIsFull) {
   }
   const auto store = std::make_shared<const StoreReader>(dir_ / "store.zarr");
   for (const bool software : {true, false}) {
-    picture_ = std::make_unique<StorePicture>(
+    picture_ = std::make_unique<SceneRenderer>(
         store, budgets, [] {},
         std::make_shared<PictureSetup>(
             budgets, [] {}, std::nullopt, software));
-    const PictureWay way{.plain = PictureWay::Plain::until_complete};
+    const FrameOptions options{.plain = FrameOptions::Plain::until_complete};
     const auto draw = [&] {
-      picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, way);
+      picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, options);
       picture_->scene().stream().wait_idle(1);
     };
     for (int i = 0; i < 60 && (i < 3 || picture_->state().plain); ++i) draw();
@@ -287,7 +287,7 @@ TEST_F(Picture, WhatIsSetUpBeforeChangesNothingAndIsKept) {
   EXPECT_GT(block, 0u);
   EXPECT_EQ(setup->pool().bytes(), 0u);
   for (int opened = 0; opened < 2; ++opened) {
-    picture_ = std::make_unique<StorePicture>(
+    picture_ = std::make_unique<SceneRenderer>(
         store, budgets, [] {}, setup);
     EXPECT_FALSE(picture_->renderer().has_picture());
     EXPECT_EQ(pixels(), expected);
@@ -306,14 +306,14 @@ TEST_F(Picture, CanBeHadWhereItCannotBeSetUpBefore) {
   EXPECT_NO_THROW(setup->warm_up({1 << 24, kHeight}));
   EXPECT_FALSE(setup->renderer().has_picture());
   EXPECT_EQ(setup->pool().bytes(), 0u);
-  picture_ = std::make_unique<StorePicture>(
+  picture_ = std::make_unique<SceneRenderer>(
       std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {}, setup);
   EXPECT_EQ(pixels(), expected);
 }
 
 TEST_F(Picture, ADeviceThatCouldNotBeAskedForHasNotBegunToOpen) {
   if (!current_gl_device_id()) GTEST_SKIP() << "OpenGL imports no memory here";
-  DeviceOpening opening(1 << 20, [] {});
+  DeviceOpener opening(1 << 20, [] {});
   glEnable(GL_RGBA8);  // no switch: an error that somebody finds
   EXPECT_THROW(opening.begin(), Error);
   EXPECT_FALSE(opening.begun());
@@ -331,7 +331,7 @@ TEST_F(Picture, KeepsTheBudgetWhoeverMakesMeshesAndForEveryStore) {
   picture_.reset();
   const auto store = std::make_shared<const StoreReader>(dir_ / "store.zarr");
   for (int opened = 0; opened < 2; ++opened) {
-    picture_ = std::make_unique<StorePicture>(
+    picture_ = std::make_unique<SceneRenderer>(
         store, budgets, [] {}, setup);
     for (int i = 0; i < 6; ++i) {
       picture_->device().use(i < 3 ? Backend::automatic : Backend::cpu);

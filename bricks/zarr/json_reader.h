@@ -10,21 +10,21 @@ namespace isobrick {
 
 /// Metadata of others and of broken disks: every access says where and what is
 /// wrong instead of trusting that a member is there and of the right type.
-class CheckedJson {
+class JsonReader {
  public:
   using Json = nlohmann::json;
 
   /// A value and how messages call it ("'scan.zarr/0/zarr.json': codecs[0]").
-  CheckedJson(const Json& value, std::string where) : value_(&value), where_(std::move(where)) {}
+  JsonReader(const Json& value, std::string where) : value_(&value), where_(std::move(where)) {}
 
   const std::string& where() const { return where_; }
   [[noreturn]] void damaged(const std::string& what) const;      ///< throws DamageError
   [[noreturn]] void unsupported(const std::string& what) const;  ///< throws Error
 
   bool has(const char* key) const { return value_->is_object() && value_->contains(key); }
-  CheckedJson at(const char* key) const;  ///< a member that must be there
-  CheckedJson at(std::size_t i) const;    ///< an element that must be there
-  std::size_t array_size() const;         ///< of what must be an array
+  JsonReader at(const char* key) const;  ///< a member that must be there
+  JsonReader at(std::size_t i) const;    ///< an element that must be there
+  std::size_t array_size() const;        ///< of what must be an array
   const Json& raw() const { return *value_; }
 
   std::string string() const;

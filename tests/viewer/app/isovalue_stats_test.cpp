@@ -1,4 +1,4 @@
-#include "viewer/app/isovalue_facts.h"
+#include "viewer/app/isovalue_stats.h"
 
 #include <gtest/gtest.h>
 
@@ -34,17 +34,17 @@ class Facts : public Picture {
 
 TEST_F(Facts, LeaveOutBricksThatCannotBeRead) {
   make_store({96, 96, 96});
-  IsovalueFacts whole(store());
+  IsovalueStats whole(store());
   EXPECT_TRUE(comes([&] { return whole.histogram() != nullptr; }));
   EXPECT_EQ(whole.take_failure(), "");
   damage_bricks();
-  IsovalueFacts damaged(store());
+  IsovalueStats damaged(store());
   std::string why;
   EXPECT_TRUE(comes([&] { return !(why = damaged.take_failure()).empty(); }));
   EXPECT_TRUE(contains(why, "store.zarr")) << why;
   EXPECT_TRUE(contains(why, "1 of level 0")) << why;
   ASSERT_NE(damaged.histogram(), nullptr);
-  const auto count = [](const IsovalueFacts& facts) {
+  const auto count = [](const IsovalueStats& facts) {
     const auto& counts = facts.histogram()->counts;
     return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
   };
@@ -56,7 +56,7 @@ TEST_F(Facts, LeaveOutBricksThatCannotBeRead) {
 
 TEST_F(Facts, ThereIsAlwaysAnEstimateOfTriangles) {
   make_store({48, 48, 48});  // of 27 blocks
-  const IsovalueFacts facts(store());
+  const IsovalueStats facts(store());
   const double iso = default_isovalue(ScalarType::u8);
   const auto blocks = static_cast<double>(facts.counts().active_blocks(iso));
   ASSERT_GT(blocks, 0);
@@ -77,7 +77,7 @@ TEST_F(Facts, AFewBlocksAreMeasured) {
   open(SynthKind::sphere, {48, 48, 48});
   settings_.pixel_error = 0.5f;  // the finest level
   draw();
-  const IsovalueFacts facts(store());
+  const IsovalueStats facts(store());
   const double iso = settings_.surfaces[0].isovalue;
   const double told = facts.triangles(iso, picture_->scene().stream().counters());
   const auto there = static_cast<double>(picture_->state().triangles);

@@ -1,4 +1,4 @@
-#include "viewer/app/isovalue_facts.h"
+#include "viewer/app/isovalue_stats.h"
 
 #include <utility>
 
@@ -30,7 +30,7 @@ class Stoppable final : public Progress {
 
 }  // namespace
 
-IsovalueFacts::IsovalueFacts(std::shared_ptr<const StoreReader> store)
+IsovalueStats::IsovalueStats(std::shared_ptr<const StoreReader> store)
     : counts_(*store_bricks(store)) {
   thread_ = std::thread([this, store = std::move(store)] {
     try {
@@ -46,27 +46,27 @@ IsovalueFacts::IsovalueFacts(std::shared_ptr<const StoreReader> store)
       // Nobody waits for it any more.
     } catch (const std::exception& error) {
       const MutexLock lock(mutex_);
-      failure_ = "the histogram cannot be counted: " + what_of(error);
+      failure_ = "the histogram cannot be counted: " + error_message(error);
     }
   });
 }
 
-IsovalueFacts::~IsovalueFacts() {
+IsovalueStats::~IsovalueStats() {
   stop_ = true;
   thread_.join();
 }
 
-std::shared_ptr<const Histogram> IsovalueFacts::histogram() const {
+std::shared_ptr<const Histogram> IsovalueStats::histogram() const {
   const MutexLock lock(mutex_);
   return histogram_;
 }
 
-std::string IsovalueFacts::take_failure() {
+std::string IsovalueStats::take_failure() {
   const MutexLock lock(mutex_);
   return std::exchange(failure_, {});
 }
 
-double IsovalueFacts::triangles(double isovalue, const StreamCounters& made) const {
+double IsovalueStats::triangles(double isovalue, const StreamCounters& made) const {
   const std::uint64_t blocks = counts_.active_blocks(isovalue);
   double each = made.triangles_per_block;
   // A small surface is measured once as much as all of it was made; until then as cuts guess.
