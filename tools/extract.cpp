@@ -338,16 +338,16 @@ int run(const Arguments& arguments, Console& console) {
   const StoreReader store = open_store(arguments.store, arguments.selection);
   const std::vector<ExtractedSurface> surfaces = plan(arguments, store);
   for (const double isovalue : arguments.isovalues) note_band(isovalue, store.info(), console);
-  const CommandOutput result = arguments.estimate ? estimate_all(surfaces, store, console)
+  const CommandOutput output = arguments.estimate ? estimate_all(surfaces, store, console)
                                                   : make_all(arguments, surfaces, store, console);
   ordered_json result{{"command", "extract"},
                       {"store", arguments.store},
                       {"level", arguments.level},
                       {"estimate", arguments.estimate},
-                      {"surfaces", result.objects}};
-  if (!arguments.estimate) result["passes"] = result.passes;
+                      {"surfaces", output.objects}};
+  if (!arguments.estimate) result["passes"] = output.passes;
   result["peak_resident_bytes"] = peak_resident_bytes();
-  console.result(result, result.text);
+  console.result(result, output.text);
   return 0;
 }
 

@@ -27,7 +27,7 @@ struct Command {
 /// man page.
 struct Program {
   CLI::App& app;
-  OutputMode speech;
+  OutputMode mode;
   std::vector<Command> commands;
 };
 

@@ -16,7 +16,7 @@ float mix(float a, float b, float weight) { return a + weight * (b - a); }
 
 }  // namespace
 
-std::pair<Index, Index> NodeSamples::Axis::between(Index lo, Index hi) const {
+std::pair<Index, Index> NodeSamples::Axis::interpolation(Index lo, Index hi) const {
   const auto first = std::lower_bound(samples.begin(), samples.end(), lo);
   return {first - samples.begin(), std::lower_bound(first, samples.end(), hi) - samples.begin()};
 }
@@ -26,8 +26,8 @@ Box3 NodeSamples::bricks(int v, Box3 points) const {
       bricks_.source().info().levels[static_cast<std::size_t>(grid_.level(v).source)].lattice;
   Box3 bricks;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto lo = grid_.between(v, axis, points.lo[axis]);
-    const auto hi = grid_.between(v, axis, points.hi[axis] - 1);
+    const auto lo = grid_.interpolation(v, axis, points.lo[axis]);
+    const auto hi = grid_.interpolation(v, axis, points.hi[axis] - 1);
     bricks.lo[axis] = lo.first / lattice.brick[axis];
     bricks.hi[axis] = (hi.first + (hi.weight > 0)) / lattice.brick[axis] + 1;
   }
@@ -43,7 +43,7 @@ void NodeSamples::find_axis(int v, int axis, Index lo, Index hi) {
     if (a.samples.empty() || a.samples.back() < sample) a.samples.push_back(sample);
   };
   for (Index p = lo; p < hi; ++p) {
-    const auto between = grid_.between(v, axis, p);
+    const auto between = grid_.interpolation(v, axis, p);
     add(between.first);
     a.points.push_back(
         {a.count() - 1 - (a.samples.back() - between.first), static_cast<float>(between.weight)});
@@ -55,9 +55,9 @@ void NodeSamples::find_axis(int v, int axis, Index lo, Index hi) {
 /// samples of a row).
 template <class F>
 void NodeSamples::for_each_row(Int3 corner, Int3 edge, F&& f) {
-  const auto [x0, x1] = axes_[0].between(corner.x, corner.x + edge.x);
-  const auto [y0, y1] = axes_[1].between(corner.y, corner.y + edge.y);
-  const auto [z0, z1] = axes_[2].between(corner.z, corner.z + edge.z);
+  const auto [x0, x1] = axes_[0].interpolation(corner.x, corner.x + edge.x);
+  const auto [y0, y1] = axes_[1].interpolation(corner.y, corner.y + edge.y);
+  const auto [z0, z1] = axes_[2].interpolation(corner.z, corner.z + edge.z);
   if (x0 == x1) return;
   const std::span places(axes_[0].samples.data() + x0, static_cast<std::size_t>(x1 - x0));
   for (Index z = z0; z < z1; ++z)

@@ -66,7 +66,7 @@ TEST(NodeGrid, StoredSamplesLieWhereTheirTransformsSay) {
     for (const Index p : {Index{3}, Index{17}, Index{20}}) {
       Vec3d stored;
       for (int axis = 0; axis < 3; ++axis) {
-        const auto between = grid.between(v, axis, p);
+        const auto between = grid.interpolation(v, axis, p);
         stored[axis] = static_cast<double>(between.first) + between.weight;
         EXPECT_EQ(between.weight > 0, v > 0);
       }
