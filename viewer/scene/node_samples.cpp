@@ -16,7 +16,7 @@ float mix(float a, float b, float weight) { return a + weight * (b - a); }
 
 }  // namespace
 
-std::pair<Index, Index> NodeSamples::Axis::interpolation(Index lo, Index hi) const {
+std::pair<Index, Index> NodeSamples::Axis::range(Index lo, Index hi) const {
   const auto first = std::lower_bound(samples.begin(), samples.end(), lo);
   return {first - samples.begin(), std::lower_bound(first, samples.end(), hi) - samples.begin()};
 }
@@ -55,9 +55,9 @@ void NodeSamples::find_axis(int v, int axis, Index lo, Index hi) {
 /// samples of a row).
 template <class F>
 void NodeSamples::for_each_row(Int3 corner, Int3 edge, F&& f) {
-  const auto [x0, x1] = axes_[0].interpolation(corner.x, corner.x + edge.x);
-  const auto [y0, y1] = axes_[1].interpolation(corner.y, corner.y + edge.y);
-  const auto [z0, z1] = axes_[2].interpolation(corner.z, corner.z + edge.z);
+  const auto [x0, x1] = axes_[0].range(corner.x, corner.x + edge.x);
+  const auto [y0, y1] = axes_[1].range(corner.y, corner.y + edge.y);
+  const auto [z0, z1] = axes_[2].range(corner.z, corner.z + edge.z);
   if (x0 == x1) return;
   const std::span places(axes_[0].samples.data() + x0, static_cast<std::size_t>(x1 - x0));
   for (Index z = z0; z < z1; ++z)

@@ -57,7 +57,7 @@ class NodeSamples {
 
     Index count() const { return static_cast<Index>(samples.size()); }
     /// Which of the samples lie from `lo` on and before `hi`.
-    std::pair<Index, Index> between(Index lo, Index hi) const;
+    std::pair<Index, Index> range(Index lo, Index hi) const;
   };
 
   void find_axis(int v, int axis, Index lo, Index hi);
