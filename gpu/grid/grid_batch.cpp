@@ -8,6 +8,7 @@
 
 #include <isobrick/error.h>
 #include "gpu/grid/grid_kernel.h"
+#include "gpu/memory/arena.h"
 #include "gpu/memory/cuda_objects.h"
 #include "surface/case_tables.h"
 
@@ -22,39 +23,33 @@ constexpr std::chrono::milliseconds kAwake{1};
 /// With a layer of points on every side.
 constexpr std::size_t kAround = kGridPoints + 2,
                       kVertices = 3 * kGridRows * std::size_t{kGridPoints};
-/// Of a grid that is sent: both kinds of values, faces, places of all kinds, and what
-/// aligning takes. Stored samples and the values that are made of them take less.
-constexpr std::size_t kSent = 4 * (kAround * kAround * kAround + kGridRows * kGridPoints) +
-                              4 * 6 * kGridRows + 3 * 20 * kAround + 32 * 64;
-
-constexpr std::size_t aligned(std::size_t bytes) { return (bytes + 63) / 64 * 64; }
-
-/// Memory that is cut from the front.
-class Cutter {
- public:
-  explicit Cutter(std::byte* data) : data_(data) {}
-  template <class T>
-  T* take(std::size_t count) {
-    std::byte* at = data_ + used_;
-    used_ += aligned(count * sizeof(T));
-    return reinterpret_cast<T*>(at);
-  }
-
- private:
-  std::byte* data_;
-  std::size_t used_ = 0;
-};
-
+/// What aligning takes of all arrays that are sent.
+constexpr std::size_t kGaps = 32 * Arena::kAlign;
+/// Of a grid that is sent: both kinds of values, faces, places of all kinds, and gaps. Stored
+/// samples and the values that are made of them take less.
+constexpr std::size_t kSent =
+    Arena::aligned(4 * (kAround * kAround * kAround + kGridRows * kGridPoints) + 4 * 6 * kGridRows +
+                   3 * 20 * kAround + kGaps);
 /// The largest stored samples.
 constexpr std::size_t kLargestStored = 2;
-static_assert((4 + kLargestStored) * kAround * kAround * kAround + 3 * 12 * kAround + 32 * 64 <=
+static_assert((4 + kLargestStored) * kAround * kAround * kAround + 3 * 12 * kAround + kGaps <=
               kSent);
 
-/// What the work on one grid takes on the device.
-constexpr std::size_t kSlotBytes =
-    aligned(sizeof(GridTotals)) + aligned(kGridRows * sizeof(GridRow)) +
-    aligned(4 * kGridRows * sizeof(std::uint32_t)) + aligned(kVertices) +
-    aligned(kVertices * sizeof(std::uint32_t)) + aligned(kSent);
+/// Takes what the work on one grid needs on the device. The grid itself comes last.
+std::byte* take_slot(Arena& memory, GridWork& work) {
+  work.rows = memory.take<GridRow>(kGridRows);
+  work.counts = memory.take<std::uint32_t>(4 * kGridRows);
+  work.faces = memory.take<std::uint8_t>(kVertices);
+  work.seam_of = memory.take<std::uint32_t>(kVertices);
+  work.totals = memory.take<GridTotals>(1);
+  return memory.take<std::byte>(kSent);
+}
+std::size_t slot_bytes() {
+  Arena measure;
+  GridWork work;
+  take_slot(measure, work);
+  return Arena::aligned(measure.used());
+}
 
 GridMeshSize size_of(const GridTotals& t) {
   return {t.vertices + 2 * t.border_vertices, t.triangles + 2 * t.seam_sides, 2 * t.seam_sides};
@@ -86,8 +81,8 @@ struct SmallGrid {
 struct GridBatch::Impl {
   /// What is known of a grid that was staged.
   struct Slot {
-    std::byte *staging = nullptr, *sent = nullptr;  ///< block-locked, and on the device
-    std::size_t used = 0;
+    std::byte *staging = nullptr, *sent = nullptr;  ///< the grid in pinned memory, on the device
+    std::size_t sent_bytes = 0;
     GridWork work{};
   };
 
@@ -103,22 +98,17 @@ struct GridBatch::Impl {
 
   explicit Impl(std::size_t count)
       : works(count, stream),
-        memory(count * kSlotBytes, stream),
-        staging(count * aligned(kSent)),
+        memory(count * slot_bytes(), stream),
+        staging(count * kSent),
         sent_works(count),
         totals(count),
         slots(count) {
+    Arena arena(memory.data(), memory.size());
     for (std::size_t i = 0; i < count; ++i) {
       Slot& slot = slots[i];
-      Cutter cut(memory.data() + i * kSlotBytes);
-      slot.work.rows = cut.take<GridRow>(kGridRows);
-      slot.work.counts = cut.take<std::uint32_t>(4 * kGridRows);
-      slot.work.faces = cut.take<std::uint8_t>(kVertices);
-      slot.work.seam_of = cut.take<std::uint32_t>(kVertices);
-      slot.work.totals = cut.take<GridTotals>(1);
-      slot.sent = cut.take<std::byte>(kSent);
+      slot.sent = take_slot(arena, slot.work);
       slot.work.host_totals = &totals[i];
-      slot.staging = staging.data() + i * aligned(kSent);
+      slot.staging = staging.data() + i * kSent;
     }
     const auto send_tables = [&](const CaseTables& from, std::size_t at) {
       check(cudaMemcpyAsync(tables.data() + at, &from, sizeof(CaseTables), cudaMemcpyHostToDevice,
@@ -143,17 +133,13 @@ struct GridBatch::Impl {
     done.wait();
   }
 
-  /// Copies an array to the staging; where it will be on the device.
-  template <class T>
-  static const T* stage(Slot& slot, const T* from, std::size_t count) {
-    std::memcpy(slot.staging + slot.used, from, count * sizeof(T));
-    const auto* at = reinterpret_cast<const T*>(slot.sent + slot.used);
-    slot.used += aligned(count * sizeof(T));
-    return at;
-  }
-
   void stage(Slot& slot, const GridView& g) const {
-    slot.used = 0;
+    Arena staged(slot.staging, kSent), sent(slot.sent, kSent);
+    // Stages an array; where it will be on the device.
+    const auto send = [&]<class T>(const T* from, std::size_t count) -> const T* {
+      std::memcpy(staged.take<T>(count), from, count * sizeof(T));
+      return sent.take<T>(count);
+    };
     slot.work.meets_coarser = g.meets_coarser();
     slot.work.tables = tables.data() + (g.map.mirrored ? 1 : 0);
     GridView& there = slot.work.grid;
@@ -167,27 +153,26 @@ struct GridBatch::Impl {
       if (size_of(g.stored.type) > kLargestStored)
         throw Error("a device's grids are made of stored samples of one or two bytes");
       const auto* samples = static_cast<const std::byte*>(g.stored.samples);
-      there.stored.samples = stage(slot, samples, around * size_of(g.stored.type));
+      there.stored.samples = send(samples, around * size_of(g.stored.type));
     } else {
-      there.around = stage(slot, g.around, around);
+      there.around = send(g.around, around);
       const bool within = g.values >= g.around && g.values < g.around + around;
-      there.values =
-          within ? there.around + (g.values - g.around) : stage(slot, g.values, points(g.n));
+      there.values = within ? there.around + (g.values - g.around) : send(g.values, points(g.n));
     }
     for (int axis = 0; axis < 3; ++axis) {
       const auto n = static_cast<std::size_t>(g.around_n[axis]);
-      there.place[axis] = stage(slot, g.place[axis], n);
-      there.inverse[axis] = stage(slot, g.inverse[axis], n);
+      there.place[axis] = send(g.place[axis], n);
+      there.inverse[axis] = send(g.inverse[axis], n);
       if (slot.work.meets_coarser)
         there.coarse_place[axis] =
-            stage(slot, g.coarse_place[axis], static_cast<std::size_t>(g.coarse_n[axis]));
+            send(g.coarse_place[axis], static_cast<std::size_t>(g.coarse_n[axis]));
     }
     for (LodSeam& face : there.faces)
       if (face.values)
-        face.values = stage(slot, face.values, static_cast<std::size_t>(face.n[0] * face.n[1]));
+        face.values = send(face.values, static_cast<std::size_t>(face.n[0] * face.n[1]));
+    slot.sent_bytes = sent.used();
     if (g.stored.samples == nullptr) return;
-    // Behind what is sent.
-    there.around = reinterpret_cast<const float*>(slot.sent + slot.used);
+    there.around = sent.take<float>(around);
     there.values = there.around + (g.shift[2] * g.plane + g.shift[1] * g.row + g.shift[0]);
   }
 
@@ -229,7 +214,7 @@ void GridBatch::make(std::span<const GridMeshJob> jobs) {
   Impl& i = *impl_;
   for (const GridMeshJob& job : jobs) {
     const Impl::Slot& slot = i.at(job.slot);
-    check(cudaMemcpyAsync(slot.sent, slot.staging, slot.used, cudaMemcpyHostToDevice,
+    check(cudaMemcpyAsync(slot.sent, slot.staging, slot.sent_bytes, cudaMemcpyHostToDevice,
                           i.stream.get()));
   }
   const GridBatchWork batch = i.send_works(jobs);

@@ -66,12 +66,17 @@ class Event {
   cudaEvent_t event_ = nullptr;
 };
 
-/// Owns `size` elements of device memory, uninitialised, allocated and freed in
-/// the order of a stream, which must outlive it.
+/// Owns `size` elements of device memory, uninitialised. Throws OutOfDeviceMemory where the device
+/// has less.
 template <class T>
 class DeviceBuffer {
  public:
   DeviceBuffer() = default;
+  /// For all streams; freeing it waits for the device.
+  explicit DeviceBuffer(std::size_t size) : size_(size) {
+    if (size_ > 0) check(cudaMalloc(&data_, size_ * sizeof(T)));
+  }
+  /// Allocated and freed in the order of a stream, which must outlive it.
   DeviceBuffer(std::size_t size, const Stream& stream) : size_(size), stream_(stream.get()) {
     if (size_ > 0) check(cudaMallocAsync(&data_, size_ * sizeof(T), stream_));
   }
@@ -86,7 +91,7 @@ class DeviceBuffer {
     return *this;
   }
   ~DeviceBuffer() {
-    if (data_) (void)cudaFreeAsync(data_, stream_);
+    if (data_) (void)(stream_ ? cudaFreeAsync(data_, stream_) : cudaFree(data_));
   }
 
   T* data() const { return static_cast<T*>(data_); }
@@ -96,7 +101,7 @@ class DeviceBuffer {
  private:
   void* data_ = nullptr;
   std::size_t size_ = 0;
-  cudaStream_t stream_ = nullptr;
+  cudaStream_t stream_ = nullptr;  ///< null: of no stream
 };
 
 /// Owns one T of pinned host memory that kernels write to; zeroed at first.

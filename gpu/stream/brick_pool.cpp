@@ -8,12 +8,11 @@
 #include <vector>
 
 #include <isobrick/device.h>
-#include <isobrick/error.h>
+#include "gpu/memory/arena.h"
 #include "gpu/memory/copy_kernel.h"
 #include "gpu/memory/cuda_objects.h"
 #include "gpu/memory/pinned_region.h"
 #include "gpu/memory/upload_tracker.h"
-#include "gpu/stream/device_arena.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -35,16 +34,16 @@ constexpr int kPoison = 0xff;
 
 struct BrickPool::Impl {
   int device;
-  std::size_t brick_bytes, size, used = 0;
+  std::size_t brick_bytes;
   PinnedRegion buffers;  ///< of all threads
-  DeviceArena memory;
-  std::byte* bricks;
+  DeviceBuffer<std::byte> memory;
   Stream stream;
   std::size_t bricks_of_request;  ///< bricks
   bool by_kernel;                 ///< are bricks copied
   UploadTracker uploads;
 
-  std::mutex taking;      ///< of `used`
+  std::mutex taking;      ///< of `bricks`
+  Arena bricks;           ///< `memory`, which they fill without gaps
   std::mutex requesting;  ///< of all below; `completions` may be polled without it
   std::uint64_t requests = 0, bricks_sent = 0;
   struct Completion : Event {
@@ -60,13 +59,11 @@ struct BrickPool::Impl {
   Impl(int id, std::size_t of_brick, std::size_t count, int threads)
       : device(make_current(id)),
         brick_bytes(of_brick),
-        size(count * of_brick),
         buffers(id, {static_cast<std::size_t>(pinned_bytes(of_brick, threads))}),
-        memory(size),
-        uploads(threads, buffers_of_thread(of_brick)) {
-    if (!memory) throw OutOfDeviceMemory("the GPU has no room for a pool of bricks");
-    bricks = memory.take<std::byte>(size);
-    check(cudaMemsetAsync(bricks, kPoison, size, stream.get()));
+        memory(count * of_brick),
+        uploads(threads, buffers_of_thread(of_brick)),
+        bricks(memory.data(), memory.size(), 1) {
+    check(cudaMemsetAsync(memory.data(), kPoison, memory.size(), stream.get()));
     by_kernel = brick_bytes % CopyChunks::kAlign == 0 && reads_host_memory(device);
     bricks_of_request = std::clamp<std::size_t>(kRequestBytes / of_brick, 1,
                                                 std::max<std::size_t>(1, uploads.buffers() / 2));
@@ -173,10 +170,7 @@ BrickPool::~BrickPool() = default;
 
 std::byte* BrickPool::take(std::size_t bytes) {
   const std::lock_guard lock(impl_->taking);
-  if (bytes > impl_->size - impl_->used) throw Error("the pool of bricks on the device is used up");
-  std::byte* at = impl_->bricks + impl_->used;
-  impl_->used += bytes;
-  return at;
+  return impl_->bricks.take<std::byte>(bytes);
 }
 
 std::byte* BrickPool::begin(int thread) {

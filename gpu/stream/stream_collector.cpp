@@ -178,7 +178,7 @@ void StreamCollector::deliver(const Pending& pending) {
   report_.download.seconds +=
       seconds_between(pending.launch->download_begin, pending.launch->downloaded);
   report_.download.bytes += mesh_bytes(pending.size, normals_);
-  const HostOutput from = output(pending.output);
+  const MeshArrays from = output(pending.output);
   const auto vertices = static_cast<std::size_t>(pending.size.vertices);
   const MeshChunk chunk{pending.first_vertex,
                         {from.positions, vertices},
@@ -204,12 +204,10 @@ std::size_t StreamCollector::take_output() {
   return index;
 }
 
-HostOutput StreamCollector::output(std::size_t index) {
+MeshArrays StreamCollector::output(std::size_t index) {
   const StreamSizes& sizes = device_.sizes();
-  auto* positions = reinterpret_cast<Vec3f*>(outputs_.locked(index));
-  Vec3f* const normals = positions + sizes.vertices;
-  return {positions, normals,
-          reinterpret_cast<Triangle*>(normals_ ? normals + sizes.vertices : normals)};
+  Arena chunk(outputs_.locked(index), sizes.output_bytes);
+  return MeshArrays::take(chunk, sizes.vertices, sizes.triangles, normals_);
 }
 
 void StreamCollector::give_output(std::size_t output) {

@@ -52,7 +52,7 @@ class StreamCollector {
   void deliver(const Pending& pending);
   void check_numbers(std::uint64_t more) const;
   std::size_t take_output();
-  HostOutput output(std::size_t index);
+  MeshArrays output(std::size_t index);
   void give_output(std::size_t output);
   void release_launch(std::uint32_t tiles, SurfaceTotals size);
 

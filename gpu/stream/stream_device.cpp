@@ -44,33 +44,32 @@ StreamDevice::~StreamDevice() {
 }
 
 bool StreamDevice::allocate(const StreamSizes& sizes) {
-  auto arena = std::make_unique<DeviceArena>(sizes.device_bytes -
-                                             sizes.pool.bricks * lattice_.brick_bytes());
-  if (!*arena) return false;
-  arena_ = std::move(arena);
+  try {
+    memory_ =
+        DeviceBuffer<std::byte>(sizes.device_bytes - sizes.pool.bricks * lattice_.brick_bytes());
+  } catch (const OutOfDeviceMemory&) {
+    return false;
+  }
+  Arena arena(memory_.data(), memory_.size());
   sizes_ = sizes;
   layout_ = StagingLayout(sizes.tiles, sizes.tile_bricks);
   in_flight_.clear();
-  const std::size_t launch_bytes =
-      StagingLayout::aligned(sizes.staging_bytes) + StagingLayout::aligned(sizeof(SurfaceTotals));
   const auto in_flight = static_cast<std::size_t>(sizes.in_flight);
-  staging_ = PinnedBuffer<std::byte>(in_flight * launch_bytes);
+  staging_ = PinnedBuffer<std::byte>(in_flight * sizes.staging_bytes);
+  totals_ = PinnedBuffer<SurfaceTotals>(in_flight);
   for (std::size_t i = 0; i < in_flight; ++i) {
     auto launch = std::make_unique<InFlightLaunch>();
-    launch->staging = staging_.data() + i * launch_bytes;
-    launch->totals = reinterpret_cast<SurfaceTotals*>(launch->staging +
-                                                      StagingLayout::aligned(sizes.staging_bytes));
-    launch->device = arena_->take<std::byte>(sizes.staging_bytes);
-    launch->bricks = arena_->take<std::byte>(sizes.sent_bricks * lattice_.brick_bytes());
-    launch->positions = arena_->take<Vec3f>(sizes.vertices);
-    if (options_.normals) launch->normals = arena_->take<Vec3f>(sizes.vertices);
-    launch->triangles = arena_->take<Triangle>(sizes.triangles);
+    launch->staging = staging_.data() + i * sizes.staging_bytes;
+    launch->totals = &totals_[i];
+    launch->device = arena.take<std::byte>(sizes.staging_bytes);
+    launch->bricks = arena.take<std::byte>(sizes.sent_bricks * lattice_.brick_bytes());
+    launch->mesh = MeshArrays::take(arena, sizes.vertices, sizes.triangles, options_.normals);
     in_flight_.push_back(std::move(launch));
   }
-  tile_blocks_ = arena_->take<std::byte>(sizes.tile_block_bytes);
-  cases_ = arena_->take<CaseTable>(1);
-  number_ends_ = arena_->take<unsigned long long>(kEnds + 1);
-  params_.row_tables = arena_->take<RowTable>(sizes.slots);
+  tile_blocks_ = arena.take<std::byte>(sizes.tile_block_bytes);
+  cases_ = arena.take<CaseTable>(1);
+  number_ends_ = arena.take<unsigned long long>(kEnds + 1);
+  params_.row_tables = arena.take<RowTable>(sizes.slots);
   check(cudaMemsetAsync(number_ends_, 0, (kEnds + 1) * sizeof(unsigned long long), kernel_.get()));
   check(cudaMemsetAsync(params_.row_tables, 0, sizes.slots * sizeof(RowTable), kernel_.get()));
   const WorldMap world = world_map(options_.transform, options_.inside);
@@ -109,9 +108,9 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
   p.epoch = ++epoch_;
   p.number_start = params_.unwelded ? number_ends_ + kEnds : number_start;
   p.number_end = params_.unwelded ? &header->number_end : number_end;
-  p.positions = launch.positions;
-  p.normals = launch.normals;
-  p.triangles = launch.triangles;
+  p.positions = launch.mesh.positions;
+  p.normals = launch.mesh.normals;
+  p.triangles = launch.mesh.triangles;
   UnpackParams u{};
   u.items = p.items;
   u.links = p.links;
@@ -192,15 +191,15 @@ std::vector<OrderState> StreamDevice::totals_of_tiles(InFlightLaunch& launch) {
   return totals;
 }
 
-void StreamDevice::download(InFlightLaunch& launch, const HostOutput& to, SurfaceTotals size) {
+void StreamDevice::download(InFlightLaunch& launch, const MeshArrays& to, SurfaceTotals size) {
   const auto copy = [&](void* host, const void* device, std::size_t bytes) {
     if (bytes > 0)
       check(cudaMemcpyAsync(host, device, bytes, cudaMemcpyDeviceToHost, download_.get()));
   };
   launch.download_begin.record(download_);
-  copy(to.positions, launch.positions, size.vertices * sizeof(Vec3f));
-  if (options_.normals) copy(to.normals, launch.normals, size.vertices * sizeof(Vec3f));
-  copy(to.triangles, launch.triangles, size.triangles * sizeof(Triangle));
+  copy(to.positions, launch.mesh.positions, size.vertices * sizeof(Vec3f));
+  if (options_.normals) copy(to.normals, launch.mesh.normals, size.vertices * sizeof(Vec3f));
+  copy(to.triangles, launch.mesh.triangles, size.triangles * sizeof(Triangle));
   launch.downloaded.record(download_);
 }
 

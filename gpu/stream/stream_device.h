@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/mesh_arrays.h"
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/brick_table.h"
-#include "gpu/stream/device_arena.h"
 #include "gpu/stream/stream_layout.h"
 #include "gpu/stream/stream_sizes.h"
 #include "gpu/tile/tile_kernel.h"
@@ -17,14 +17,13 @@ namespace isobrick::gpu {
 
 /// The buffers of a launch in flight: what the host sends, and where its mesh goes on the device.
 struct InFlightLaunch {
-  std::byte* staging = nullptr;  ///< block-locked
+  std::byte* staging = nullptr;  ///< pinned
   std::byte* device = nullptr;   ///< the same, on the device
   std::byte* bricks = nullptr;   ///< those that are sent, likewise
   BrickUse use;
   std::shared_ptr<const void> samples;  ///< owns the bricks in host memory
-  Vec3f *positions = nullptr, *normals = nullptr;
-  Triangle* triangles = nullptr;
-  SurfaceTotals* totals = nullptr;  ///< block-locked
+  MeshArrays mesh;
+  SurfaceTotals* totals = nullptr;  ///< pinned
   // Each that can be slept for wakes a thread of the driver's when it is over.
   Event extracted{cudaEventBlockingSync}, downloaded{cudaEventBlockingSync};
   Event upload_begin, uploaded, unpack_begin, unpacked, download_begin;
@@ -32,12 +31,6 @@ struct InFlightLaunch {
   std::vector<std::uint32_t> unused_slots;  ///< once this launch is not repeated any more
 
   std::byte* at(std::size_t offset) const { return staging + offset; }
-};
-
-/// Pinned memory for the mesh of a launch.
-struct HostOutput {
-  Vec3f *positions = nullptr, *normals = nullptr;
-  Triangle* triangles = nullptr;
 };
 
 /// The device's side of a streaming extraction: its memory, its streams, its launches.
@@ -69,8 +62,8 @@ class StreamDevice {
                    std::uint64_t number_start);
   /// The running totals of a launch's tiles; waits for them.
   std::vector<OrderState> totals_of_tiles(InFlightLaunch& launch);
-  /// Copies a launch's mesh to the host; waits for nothing.
-  void download(InFlightLaunch& launch, const HostOutput& to, SurfaceTotals size);
+  /// Copies a launch's mesh to pinned memory; waits for nothing.
+  void download(InFlightLaunch& launch, const MeshArrays& to, SurfaceTotals size);
   /// Waits until nothing is copied to the host any more, whatever went wrong.
   void end_downloads() noexcept { (void)cudaStreamSynchronize(download_.get()); }
 
@@ -90,8 +83,9 @@ class StreamDevice {
   StreamSizes sizes_;
   StagingLayout layout_{0, 0};
   // Streams end before the memory that they work on.
-  PinnedBuffer<std::byte> staging_;  ///< of all launch
-  std::unique_ptr<DeviceArena> arena_;
+  PinnedBuffer<std::byte> staging_;     ///< of all launches
+  PinnedBuffer<SurfaceTotals> totals_;  ///< likewise
+  DeviceBuffer<std::byte> memory_;
   std::vector<std::unique_ptr<InFlightLaunch>> in_flight_;
   Stream upload_, kernel_, download_;
   std::mutex launching_;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "gpu/memory/arena.h"
 #include "gpu/tile/tile_params.h"
 
 // What the host sends for a launch, in one copy: the header, the items, their links,
@@ -29,16 +30,12 @@ struct StagingLayout {
 
   /// A tile has at most `tile_bricks` bricks.
   constexpr StagingLayout(std::size_t tiles, std::size_t tile_bricks)
-      : items(aligned(sizeof(LaunchHeader))),
-        links(items + aligned(tiles * sizeof(TileItem))),
-        order(links + aligned(tiles * sizeof(TileLinks))),
-        boxes(order + aligned(tiles * sizeof(OrderState))),
-        bricks(boxes + aligned(tiles * sizeof(BrickBox))),
-        end(bricks + aligned(tiles * tile_bricks * sizeof(std::uint64_t))) {}
-
-  static constexpr std::size_t aligned(std::size_t bytes) {
-    return (bytes + 255) & ~std::size_t{255};
-  }
+      : items(Arena::aligned(sizeof(LaunchHeader))),
+        links(items + Arena::aligned(tiles * sizeof(TileItem))),
+        order(links + Arena::aligned(tiles * sizeof(TileLinks))),
+        boxes(order + Arena::aligned(tiles * sizeof(OrderState))),
+        bricks(boxes + Arena::aligned(tiles * sizeof(BrickBox))),
+        end(bricks + Arena::aligned(tiles * tile_bricks * sizeof(std::uint64_t))) {}
 };
 
 }  // namespace isobrick::gpu

@@ -6,6 +6,7 @@
 
 #include <isobrick/error.h>
 #include "core/tile.h"
+#include "gpu/memory/mesh_arrays.h"
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/stream_layout.h"
 #include "gpu/tile/block_groups.h"
@@ -77,8 +78,7 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
   s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
   if (pool.bricks == 0) s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
   s.staging_bytes = StagingLayout(tiles, s.tile_bricks).end;
-  s.output_bytes =
-      s.vertices * sizeof(Vec3f) * (options.normals ? 2 : 1) + s.triangles * sizeof(Triangle);
+  s.output_bytes = MeshArrays::bytes(s.vertices, s.triangles, options.normals);
   const std::uint64_t groups = (tiles + kTilesOfBlockGroup - 1) / kTilesOfBlockGroup;
   s.tile_block_bytes = groups * kBlockGroupSamples * lattice.sample_bytes();
   s.device_bytes =
