@@ -2,7 +2,7 @@
 #include <limits>
 
 #include "bench/bandwidth.h"
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
 
 namespace isobrick::bench {
 namespace {

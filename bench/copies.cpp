@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
+#include "gpu/memory/pinned_buffer.h"
 
 namespace isobrick::bench {
 

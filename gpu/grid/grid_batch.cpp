@@ -9,7 +9,8 @@
 #include <isobrick/error.h>
 #include "gpu/grid/grid_kernel.h"
 #include "gpu/memory/arena.h"
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
+#include "gpu/memory/pinned_buffer.h"
 #include "surface/case_tables.h"
 
 namespace isobrick::gpu {
@@ -107,7 +108,7 @@ struct GridBatch::Impl {
     for (std::size_t i = 0; i < count; ++i) {
       Slot& slot = slots[i];
       slot.sent = take_slot(arena, slot.work);
-      slot.work.host_totals = &totals[i];
+      slot.work.host_totals = totals.on_device() + i;
       slot.staging = staging.data() + i * kSent;
     }
     const auto send_tables = [&](const CaseTables& from, std::size_t at) {
@@ -224,7 +225,9 @@ void GridBatch::make(std::span<const GridMeshJob> jobs) {
   i.wait();
 }
 
-GridMeshSize GridBatch::size(int slot) const { return size_of(*impl_->at(slot).work.host_totals); }
+GridMeshSize GridBatch::size(int slot) const {
+  return size_of(impl_->totals[static_cast<std::size_t>(slot)]);
+}
 
 void GridBatch::write(std::span<const GridMeshJob> jobs) {
   if (jobs.empty()) return;

@@ -38,7 +38,7 @@ struct GridWork {
   std::uint8_t* faces;      ///< of each vertex; only where coarser grids meet this one
   std::uint32_t* seam_of;   ///< of each vertex, likewise
   GridTotals* totals;       ///< on the device
-  GridTotals* host_totals;  ///< the same, where the host reads it
+  GridTotals* host_totals;  ///< the same, in pinned memory
   /// The mesh, and the room there is; a mesh that does not fit is not written.
   Vec3f *positions, *normals;
   Triangle* triangles;

@@ -5,8 +5,8 @@
 
 namespace isobrick::gpu {
 
-/// Page-locked host memory, which the device may read as well. From any thread; throws Error
-/// when there is none.
+/// A PinnedBuffer of bytes, without a CUDA header. From any thread; throws Error where the host has
+/// no room.
 std::shared_ptr<std::byte> host_memory(int device, std::size_t bytes);
 
 }  // namespace isobrick::gpu

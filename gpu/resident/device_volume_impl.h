@@ -1,7 +1,8 @@
 #pragma once
 
 #include <isobrick/device_volume.h>
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
+#include "gpu/memory/pinned_buffer.h"
 #include "gpu/tile/tile_params.h"
 
 namespace isobrick::gpu {

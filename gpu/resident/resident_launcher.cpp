@@ -171,7 +171,7 @@ bool ResidentLauncher::launch(double isovalue, const MeshRoom& room, const Devic
 bool ResidentLauncher::read_report(DeviceCounts& counts) const {
   std::uint64_t words[LaunchReport::kWords];
   for (int i = 0; i < LaunchReport::kWords; ++i) {
-    words[i] = std::atomic_ref((*report_).words[i]).load(std::memory_order_relaxed);
+    words[i] = std::atomic_ref(report_[0].words[i]).load(std::memory_order_relaxed);
     if (!LaunchWord::is_about(words[i], launches_)) return false;
     words[i] = LaunchWord::value_of(words[i]);
   }

@@ -61,7 +61,7 @@ class ResidentLauncher {
   DeviceBuffer<OrderState> order_;
   DeviceBuffer<std::byte> words_;  ///< Counters, then the sums of the search
   DeviceBuffer<RowTable> row_tables_;
-  MappedHost<LaunchReport> report_;
+  PinnedBuffer<LaunchReport> report_{1};
 };
 
 }  // namespace isobrick::gpu

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
 #include "index/index_format.h"
 
 namespace isobrick::gpu {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include <isobrick/error.h>
+#include "gpu/memory/pinned_buffer.h"
 #include "gpu/search/span_indices.h"
 #include "index/instantiate.h"
 

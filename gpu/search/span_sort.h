@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
 
 // Sorting and scanning in device memory, in the order of a stream. Temporary
 // memory comes from the stream's pool and goes back to it.

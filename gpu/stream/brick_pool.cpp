@@ -10,7 +10,7 @@
 #include <isobrick/device.h>
 #include "gpu/memory/arena.h"
 #include "gpu/memory/copy_kernel.h"
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
 #include "gpu/memory/pinned_region.h"
 #include "gpu/memory/upload_tracker.h"
 

@@ -5,8 +5,9 @@
 #include <mutex>
 #include <vector>
 
-#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
 #include "gpu/memory/mesh_arrays.h"
+#include "gpu/memory/pinned_buffer.h"
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/brick_table.h"
 #include "gpu/stream/stream_layout.h"
