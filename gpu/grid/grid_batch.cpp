@@ -181,11 +181,11 @@ struct GridBatch::Impl {
     GridBatchWork batch{works.data()};
     for (const GridMeshJob& job : jobs) {
       GridWork& work = at(job.slot).work;
-      work.positions = job.place.positions;
-      work.normals = job.place.normals;
-      work.triangles = job.place.triangles;
+      work.positions = job.place.arrays.positions;
+      work.normals = job.place.arrays.normals;
+      work.triangles = job.place.arrays.triangles;
       work.vertex_room = job.place.vertices;
-      work.triangle_room = job.place.triangle_count;
+      work.triangle_room = job.place.triangles;
       batch.max_rows = std::max(batch.max_rows, work.grid.n[1] * work.grid.n[2]);
       batch.any_meets_coarser |= work.meets_coarser;
       batch.any_stored |= work.grid.stored.samples != nullptr;
@@ -245,7 +245,7 @@ void GridBatch::download(int slot, MeshBuffer& out) {
   const DeviceBuffer<Vec3f> positions(size.vertices, i.stream), normals(size.vertices, i.stream);
   const DeviceBuffer<Triangle> faces(size.triangles, i.stream);
   write(std::array{GridMeshJob{
-      slot, {positions.data(), normals.data(), faces.data(), size.vertices, size.triangles}}});
+      slot, {{positions.data(), normals.data(), faces.data()}, size.vertices, size.triangles}}});
   const auto copy = [&](void* to, const auto& from) {
     check(cudaMemcpyAsync(to, from.data(), from.bytes(), cudaMemcpyDeviceToHost, i.stream.get()));
   };

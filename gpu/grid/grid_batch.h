@@ -5,19 +5,17 @@
 #include <span>
 
 #include <isobrick/surface_options.h>
+#include "gpu/memory/mesh_arrays.h"
 #include "surface/grid_view.h"
 
 namespace isobrick::gpu {
 
 /// Device memory for a grid's mesh, and how much there is.
 struct GridMeshPlace {
-  Vec3f *positions = nullptr, *normals = nullptr;
-  Triangle* triangles = nullptr;
-  std::uint32_t vertices = 0, triangle_count = 0;
+  MeshArrays arrays;
+  std::uint32_t vertices = 0, triangles = 0;
 
-  bool holds(std::uint32_t v, std::uint32_t t) const {
-    return v <= vertices && t <= triangle_count;
-  }
+  bool holds(std::uint32_t v, std::uint32_t t) const { return v <= vertices && t <= triangles; }
 };
 
 /// How large a grid's mesh is, seam strips included.
@@ -33,7 +31,7 @@ struct GridMeshJob {
 
 /// Marching cubes over small grids on a device, several at a time: the meshes of the CPU's
 /// GridExtractor, byte for byte. Slots keep grids; each takes 8 MiB of work space on the device
-/// and 3 MiB of block-locked memory. All but stage() is for one thread at a time.
+/// and 3 MiB of pinned memory. All but stage() is for one thread at a time.
 class GridBatch {
  public:
   /// On a device that open_device has made ready, whose code is loaded here. Throws Error when

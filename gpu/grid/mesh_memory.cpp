@@ -10,8 +10,8 @@
 
 #include <isobrick/device.h>
 #include <isobrick/error.h>
-#include "core/free_list.h"
 #include "gpu/memory/cuda_check.h"
+#include "gpu/memory/mesh_arrays.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -53,11 +53,19 @@ void check_driver(CUresult result, const char* what) {
   throw Error(message);
 }
 
+std::uint32_t block_vertices(std::uint64_t budget) {
+  std::uint32_t vertices = kMaxVertices;
+  while (vertices > kFewestVertices && vertices * kVertexBytes > budget / 4) vertices /= 2;
+  return vertices;
+}
+
+}  // namespace
+
 /// A block with its bookkeeping.
-class Block final : public MeshBlock {
+class OwnedMeshBlock final : public MeshBlock {
  public:
-  Block(const Driver& driver, int device, std::uint32_t vertex_room)
-      : free_vertices(vertex_room), free_triangles(2 * vertex_room), driver_(driver) {
+  OwnedMeshBlock(const Driver& driver, int device, std::uint32_t vertex_room)
+      : driver_(driver), free_(vertex_room, 2 * vertex_room) {
     vertices = vertex_room;
     triangles = 2 * vertex_room;
     bytes = kVertexBytes * vertex_room;
@@ -77,25 +85,31 @@ class Block final : public MeshBlock {
       check_driver(
           driver_.export_handle(&file, memory_, CU_MEM_HANDLE_TYPE_POSIX_FILE_DESCRIPTOR, 0),
           "cuMemExportToShareableHandle");
+      Arena arena(reinterpret_cast<std::byte*>(address_), bytes);
+      arrays_ = MeshArrays::take(arena, vertices, triangles, true);
     } catch (...) {
       end();
       throw;
     }
   }
-  ~Block() { end(); }
-  Block(const Block&) = delete;
-  Block& operator=(const Block&) = delete;
+  ~OwnedMeshBlock() { end(); }
+  OwnedMeshBlock(const OwnedMeshBlock&) = delete;
+  OwnedMeshBlock& operator=(const OwnedMeshBlock&) = delete;
 
-  GridMeshPlace place(std::uint32_t first_vertex, std::uint32_t vertex_count,
-                      std::uint32_t first_triangle, std::uint32_t triangle_count) const {
-    auto* positions = reinterpret_cast<Vec3f*>(address_);
-    Vec3f* normals = positions + vertices;
-    auto* first = reinterpret_cast<Triangle*>(normals + vertices);
-    return {positions + first_vertex, normals + first_vertex, first + first_triangle, vertex_count,
-            triangle_count};
+  std::optional<MeshRange> take(std::uint32_t vertex_count, std::uint32_t triangle_count) {
+    const std::lock_guard lock(mutex_);
+    return free_.take(vertex_count, triangle_count);
   }
-
-  FreeList free_vertices, free_triangles;
+  MeshRange trim(const MeshRange& range, std::uint32_t vertex_count, std::uint32_t triangle_count) {
+    const std::lock_guard lock(mutex_);
+    return free_.trim(range, vertex_count, triangle_count);
+  }
+  GridMeshPlace place(const MeshRange& range) const {
+    return {{arrays_.positions + range.first_vertex, arrays_.normals + range.first_vertex,
+             arrays_.triangles + range.first_triangle},
+            range.vertices,
+            range.triangles};
+  }
 
  private:
   void end() {
@@ -109,19 +123,23 @@ class Block final : public MeshBlock {
   CUmemGenericAllocationHandle memory_ = 0;
   CUdeviceptr address_ = 0;
   bool mapped_ = false;
+  MeshArrays arrays_;
+  std::mutex mutex_;
+  MeshFreeList free_;
 };
 
-std::uint32_t block_vertices(std::uint64_t budget) {
-  std::uint32_t vertices = kMaxVertices;
-  while (vertices > kFewestVertices && vertices * kVertexBytes > budget / 4) vertices /= 2;
-  return vertices;
+MeshSlice::~MeshSlice() {
+  if (block_) block_->trim(range_, 0, 0);
 }
-
-}  // namespace
+std::shared_ptr<const MeshBlock> MeshSlice::block() const { return block_; }
+GridMeshPlace MeshSlice::place() const { return block_->place(range_); }
+void MeshSlice::trim(std::uint32_t vertices, std::uint32_t triangles) {
+  range_ = block_->trim(range_, vertices, triangles);
+}
 
 struct MeshMemory::Impl {
   mutable std::mutex mutex;
-  std::vector<std::shared_ptr<Block>> blocks;
+  std::vector<std::shared_ptr<OwnedMeshBlock>> blocks;
 
   Impl(int device, std::uint64_t budget) {
     const std::uint32_t room = block_vertices(budget);
@@ -133,30 +151,11 @@ struct MeshMemory::Impl {
                       budget, room * kVertexBytes));
     const Driver driver;
     try {
-      while (blocks.size() < count) blocks.push_back(std::make_shared<Block>(driver, device, room));
+      while (blocks.size() < count)
+        blocks.push_back(std::make_shared<OwnedMeshBlock>(driver, device, room));
     } catch (const OutOfDeviceMemory&) {
       if (blocks.empty()) throw;  // others have the rest: what is there must do
     }
-  }
-
-  void give_back(const MeshSpan& span) {
-    for (const std::shared_ptr<Block>& block : blocks)
-      if (block == span.block) {
-        block->free_vertices.give_back(span.first_vertex, span.vertices);
-        block->free_triangles.give_back(span.first_triangle, span.triangles);
-      }
-  }
-
-  std::optional<MeshSpan> take_from(const std::shared_ptr<Block>& block, std::uint32_t vertices,
-                                    std::uint32_t triangles) {
-    const auto vertex = block->free_vertices.take(vertices);
-    if (!vertex) return std::nullopt;
-    const auto triangle = block->free_triangles.take(triangles);
-    if (triangle)
-      return MeshSpan{block,     *vertex,   vertices,
-                      *triangle, triangles, block->place(*vertex, vertices, *triangle, triangles)};
-    block->free_vertices.give_back(*vertex, vertices);
-    return std::nullopt;
   }
 };
 
@@ -164,27 +163,11 @@ MeshMemory::MeshMemory(int device, std::uint64_t budget)
     : impl_(std::make_unique<Impl>(device, budget)) {}
 MeshMemory::~MeshMemory() = default;
 
-std::optional<MeshSpan> MeshMemory::take(std::uint32_t vertices, std::uint32_t triangles) {
+std::optional<MeshSlice> MeshMemory::take(std::uint32_t vertices, std::uint32_t triangles) {
   const std::lock_guard lock(impl_->mutex);
-  for (const std::shared_ptr<Block>& block : impl_->blocks)
-    if (auto span = impl_->take_from(block, vertices, triangles)) return span;
+  for (const std::shared_ptr<OwnedMeshBlock>& block : impl_->blocks)
+    if (const auto range = block->take(vertices, triangles)) return MeshSlice(block, *range);
   return std::nullopt;
-}
-
-void MeshMemory::trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t triangles) {
-  MeshSpan rest = span;
-  rest.first_vertex += vertices;
-  rest.vertices -= vertices;
-  rest.first_triangle += triangles;
-  rest.triangles -= triangles;
-  give_back(rest);
-  span.vertices = span.place.vertices = vertices;
-  span.triangles = span.place.triangle_count = triangles;
-}
-
-void MeshMemory::give_back(const MeshSpan& span) {
-  const std::lock_guard lock(impl_->mutex);
-  impl_->give_back(span);
 }
 
 void MeshMemory::keep(std::size_t count) {

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "core/mesh_free_list.h"
 #include "gpu/grid/grid_batch.h"
 
 namespace isobrick::gpu {
@@ -17,12 +19,31 @@ struct MeshBlock {
   std::uint32_t vertices = 0, triangles = 0;  ///< room
 };
 
-/// A mesh's place in a block.
-struct MeshSpan {
-  std::shared_ptr<const MeshBlock> block;
-  std::uint32_t first_vertex = 0, vertices = 0;
-  std::uint32_t first_triangle = 0, triangles = 0;
-  GridMeshPlace place;  ///< on the device
+class OwnedMeshBlock;
+
+/// The room of a mesh in a block. It is free again once this is destroyed: nothing may read or
+/// write it any more then.
+class MeshSlice {
+ public:
+  MeshSlice(std::shared_ptr<OwnedMeshBlock> block, const MeshRange& range)
+      : block_(std::move(block)), range_(range) {}
+  MeshSlice(MeshSlice&& other) noexcept = default;
+  MeshSlice& operator=(MeshSlice&& other) noexcept {
+    std::swap(block_, other.block_);
+    std::swap(range_, other.range_);
+    return *this;
+  }
+  ~MeshSlice();
+
+  std::shared_ptr<const MeshBlock> block() const;
+  const MeshRange& range() const { return range_; }
+  GridMeshPlace place() const;
+  /// Frees what is behind the first so many.
+  void trim(std::uint32_t vertices, std::uint32_t triangles);
+
+ private:
+  std::shared_ptr<OwnedMeshBlock> block_;
+  MeshRange range_;
 };
 
 /// Device memory for many meshes, in blocks that stay until the end. Thread-safe.
@@ -35,11 +56,7 @@ class MeshMemory {
   ~MeshMemory();
 
   /// Room for a mesh; nothing where there is none.
-  std::optional<MeshSpan> take(std::uint32_t vertices, std::uint32_t triangles);
-  /// Gives back what is behind the first so many.
-  void trim(MeshSpan& span, std::uint32_t vertices, std::uint32_t triangles);
-  /// Frees the place. Nothing may read or write it any more.
-  void give_back(const MeshSpan& span);
+  std::optional<MeshSlice> take(std::uint32_t vertices, std::uint32_t triangles);
 
   /// Gives all but the first so many blocks back. Before any of them is used.
   void keep(std::size_t count);

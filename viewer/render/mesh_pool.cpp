@@ -10,7 +10,7 @@
 #include <utility>
 
 #include <isobrick/error.h>
-#include "core/free_list.h"
+#include "core/mesh_free_list.h"
 
 namespace isobrick {
 namespace {
@@ -29,39 +29,25 @@ struct MeshBlock {
   MeshBlock(std::uint32_t vertex_count, std::uint32_t triangle_count)
       : vertex_room(vertex_count),
         triangle_room(triangle_count),
-        free_vertices(vertex_count),
-        free_triangles(triangle_count),
+        free(vertex_count, triangle_count),
         positions(make_buffer(vertex_count * sizeof(Vec3f), "memory for positions")),
         normals(make_buffer(vertex_count * sizeof(Vec3f), "memory for normals")),
         triangles(make_buffer(triangle_count * sizeof(Triangle), "memory for triangles")) {}
 
-  /// The places of both kinds, or nothing of either.
-  std::optional<std::pair<std::uint32_t, std::uint32_t>> take(std::uint32_t vertex_count,
-                                                              std::uint32_t triangle_count) {
-    const auto vertex = free_vertices.take(vertex_count);
-    if (!vertex) return std::nullopt;
-    const auto triangle = free_triangles.take(triangle_count);
-    if (triangle) {
-      used += bytes_of(vertex_count, triangle_count);
-      return std::pair(*vertex, *triangle);
-    }
-    free_vertices.give_back(*vertex, vertex_count);
-    return std::nullopt;
+  std::optional<MeshRange> take(std::uint32_t vertex_count, std::uint32_t triangle_count) {
+    const auto range = free.take(vertex_count, triangle_count);
+    if (range) used += bytes_of(vertex_count, triangle_count);
+    return range;
   }
-
-  bool has_room(std::uint32_t vertex_count, std::uint32_t triangle_count) const {
-    return free_vertices.has(vertex_count) && free_triangles.has(triangle_count);
-  }
-
   void give_back(const MeshPlace& place) {
-    free_vertices.give_back(place.first_vertex, place.vertices);
-    free_triangles.give_back(place.first_triangle, place.triangle_count);
+    free.give_back(
+        {place.first_vertex, place.vertices, place.first_triangle, place.triangle_count});
     used -= bytes_of(place.vertices, place.triangle_count);
   }
 
   std::uint32_t vertex_room, triangle_room;
   std::uint64_t used = 0;
-  FreeList free_vertices, free_triangles;
+  MeshFreeList free;
   GlBuffer positions, normals, triangles;
 };
 
@@ -107,26 +93,26 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
   mesh.origin_ = origin;
   mesh.has_normals_ = normals;
   if (vertices == 0 || triangles == 0) return mesh;
-  std::optional<std::pair<std::uint32_t, std::uint32_t>> at;
+  std::optional<MeshRange> range;
   for (const std::shared_ptr<MeshBlock>& block : state_->blocks)
-    if ((at = block->take(vertices, triangles))) {
+    if ((range = block->take(vertices, triangles))) {
       mesh.block_ = block;
       break;
     }
-  if (!at) {
+  if (!range) {
     state_->tidy();
     const std::uint32_t room = state_->block_vertices;
     mesh.block_ =
         std::make_shared<MeshBlock>(std::max(room, vertices), std::max(2 * room, triangles));
     state_->blocks.push_back(mesh.block_);
-    at = mesh.block_->take(vertices, triangles);
+    range = mesh.block_->take(vertices, triangles);
   }
   mesh.place_ = {mesh.block_->positions.get(),
                  mesh.block_->normals.get(),
                  mesh.block_->triangles.get(),
-                 at->first,
+                 range->first_vertex,
                  vertices,
-                 at->second,
+                 range->first_triangle,
                  triangles};
   return mesh;
 }
@@ -186,7 +172,7 @@ bool MeshPool::shares_block(const MeshChunk& mesh) const {
 bool MeshPool::has_room(const MeshChunk& mesh) const {
   return std::any_of(state_->blocks.begin(), state_->blocks.end(),
                      [&](const std::shared_ptr<MeshBlock>& block) {
-                       return block->has_room(static_cast<std::uint32_t>(mesh.positions.size()),
+                       return block->free.has(static_cast<std::uint32_t>(mesh.positions.size()),
                                               static_cast<std::uint32_t>(mesh.triangles.size()));
                      });
 }

@@ -25,42 +25,19 @@ DeviceBlock block_of(std::shared_ptr<const gpu::MeshBlock> block) {
   return {block->file, block->bytes, block->vertices, block->triangles, block};
 }
 
-/// A place for a mesh; gives it back when it is destroyed.
-class Place {
- public:
-  Place(std::shared_ptr<gpu::MeshMemory> memory, gpu::MeshSpan span)
-      : memory_(std::move(memory)), span_(std::move(span)) {}
-  Place(Place&& other) noexcept = default;
-  Place& operator=(Place&& other) noexcept {
-    std::swap(memory_, other.memory_);
-    std::swap(span_, other.span_);
-    return *this;
-  }
-  ~Place() {
-    if (memory_) memory_->give_back(span_);
-  }
-
-  void trim(const gpu::GridMeshSize& size) { memory_->trim(span_, size.vertices, size.triangles); }
-  const gpu::MeshSpan& span() const { return span_; }
-
- private:
-  std::shared_ptr<gpu::MeshMemory> memory_;
-  gpu::MeshSpan span_;
-};
-
 class SharedMesh final : public DeviceMesh {
  public:
-  explicit SharedMesh(Place&& place) : place_(std::move(place)) {
-    const gpu::MeshSpan& span = place_.span();
-    block = block_of(span.block);
-    first_vertex = span.first_vertex;
-    vertices = span.vertices;
-    first_triangle = span.first_triangle;
-    triangles = span.triangles;
+  explicit SharedMesh(gpu::MeshSlice&& slice) : slice_(std::move(slice)) {
+    const MeshRange& range = slice_.range();
+    block = block_of(slice_.block());
+    first_vertex = range.first_vertex;
+    vertices = range.vertices;
+    first_triangle = range.first_triangle;
+    triangles = range.triangles;
   }
 
  private:
-  Place place_;
+  gpu::MeshSlice slice_;
 };
 
 /// A grid that was taken.
@@ -68,11 +45,9 @@ struct Job {
   int slot;
   NodeMesh mesh;
   DeviceMesher::Done done;
-  std::optional<Place> place;
+  std::optional<gpu::MeshSlice> room;
 
-  gpu::GridMeshJob on_device() const {
-    return {slot, place ? place->span().place : gpu::GridMeshPlace{}};
-  }
+  gpu::GridMeshJob on_device() const { return {slot, room ? room->place() : gpu::GridMeshPlace{}}; }
 };
 
 /// What the device's thread works with. It outlives the mesher while that thread does.
@@ -99,7 +74,7 @@ class Work {
   TicketLock kernel_lock;
 
  private:
-  std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
+  std::optional<gpu::MeshSlice> room_for(std::uint32_t vertices, std::uint32_t triangles) const;
   void make(std::vector<Job>& jobs, DeviceMesher::Times& now);
   void add(const DeviceMesher::Times& now);
   std::optional<int> free_slot();
@@ -212,11 +187,10 @@ void Work::add(const DeviceMesher::Times& now) {
   times_.hand_out += now.hand_out;
 }
 
-std::optional<Place> Work::place_for(std::uint32_t vertices, std::uint32_t triangles) const {
+std::optional<gpu::MeshSlice> Work::room_for(std::uint32_t vertices,
+                                             std::uint32_t triangles) const {
   if (memory == nullptr) return std::nullopt;
-  auto span = memory->take(vertices, triangles);
-  if (!span) return std::nullopt;
-  return Place(memory, *std::move(span));
+  return memory->take(vertices, triangles);
 }
 
 void Work::learn(const gpu::GridMeshSize& size) {
@@ -230,7 +204,7 @@ void Work::make(std::vector<Job>& jobs, DeviceMesher::Times& now) {
   Stopwatch watch;
   std::vector<gpu::GridMeshJob> all;
   for (Job& job : jobs) {
-    job.place = place_for(likely_vertices_, likely_triangles_);
+    job.room = room_for(likely_vertices_, likely_triangles_);
     all.push_back(job.on_device());
   }
   now.memory = watch.lap();
@@ -243,35 +217,35 @@ void Work::make(std::vector<Job>& jobs, DeviceMesher::Times& now) {
     learn(size);
     job.mesh.seam_triangles = size.seam_triangles;
     if (size.triangles == 0)
-      job.place.reset();
-    else if (job.place && job.place->span().place.holds(size.vertices, size.triangles))
-      job.place->trim(size);
+      job.room.reset();
+    else if (job.room && job.room->place().holds(size.vertices, size.triangles))
+      job.room->trim(size.vertices, size.triangles);
     else
       again.push_back(&job);
   }
   write_again(again);
   now.device = watch.lap();
   for (Job& job : jobs) {
-    if (!job.place) continue;
-    const gpu::MeshSpan& span = job.place->span();
-    job.mesh.device_triangles = span.triangles;
-    job.mesh.device_bytes = span.vertices * 2 * sizeof(Vec3f) + span.triangles * sizeof(Triangle);
-    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.place, std::nullopt));
+    if (!job.room) continue;
+    const MeshRange& range = job.room->range();
+    job.mesh.device_triangles = range.triangles;
+    job.mesh.device_bytes = range.vertices * 2 * sizeof(Vec3f) + range.triangles * sizeof(Triangle);
+    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.room, std::nullopt));
   }
 }
 
 /// Those that did not fit: now their sizes are known.
 void Work::write_again(std::vector<Job*>& jobs) {
   std::vector<gpu::GridMeshJob> placed;
-  for (Job* job : jobs) job->place.reset();
+  for (Job* job : jobs) job->room.reset();
   for (Job* job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job->slot);
-    job->place = place_for(size.vertices, size.triangles);
-    if (job->place) placed.push_back(job->on_device());
+    job->room = room_for(size.vertices, size.triangles);
+    if (job->room) placed.push_back(job->on_device());
   }
   batch_.write(placed);
   for (Job* job : jobs)
-    if (!job->place) batch_.download(job->slot, job->mesh.mesh);
+    if (!job->room) batch_.download(job->slot, job->mesh.mesh);
 }
 
 class CudaMesher final : public DeviceMesher {
