@@ -125,19 +125,13 @@ struct Quarters {
     const std::uint64_t differ = (lo[begin] ^ lo[last - 1]) | (hi[begin] ^ hi[last - 1]);
     const int bit = 63 - __clzll(static_cast<long long>(differ));
     for (unsigned quarter = 0; quarter < 4; ++quarter) {
-      std::uint32_t from = begin, to = last;
-      while (from < to) {
-        const std::uint32_t middle = from + (to - from) / 2;
-        const auto at =
-            static_cast<unsigned>((lo[middle] >> bit & 1u) | (hi[middle] >> bit & 1u) << 1);
-        if (at <= quarter)
-          from = middle + 1;
-        else
-          to = middle;
-      }
-      end[quarter] = from;
-      count += from > begin;
-      begin = from;
+      const std::uint32_t points = partition_point(last - begin, [&](std::uint32_t i) {
+        const Key x = lo[begin + i] >> bit & 1u, y = hi[begin + i] >> bit & 1u;
+        return static_cast<unsigned>(x | y << 1) <= quarter;
+      });
+      begin += points;
+      end[quarter] = begin;
+      count += points > 0;
     }
   }
 };

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <isobrick/range.h>
+#include "core/partition_point.h"
 #include "gpu/search/span_build.h"
 #include "gpu/search/span_sort.h"
 #include "index/span_index.h"
@@ -53,44 +54,20 @@ std::vector<T> download(const DeviceBuffer<T>& buffer, const Stream& stream) {
   return values;
 }
 
-/// The last i below `count` with first[i] <= at.
-__device__ inline std::uint32_t owner_of(const std::uint32_t* first, std::uint32_t count,
-                                         std::uint32_t at) {
-  std::uint32_t low = 0, high = count;
-  while (high - low > 1) {
-    const std::uint32_t middle = low + (high - low) / 2;
-    if (first[middle] <= at)
-      low = middle;
-    else
-      high = middle;
-  }
-  return low;
-}
-
 /// How many of n values, ascending, are below v, and below or equal.
 template <class Key>
 __device__ std::uint32_t count_below(const Key* values, std::uint32_t n, Key v) {
-  std::uint32_t low = 0, high = n;
-  while (low < high) {
-    const std::uint32_t middle = low + (high - low) / 2;
-    if (values[middle] < v)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
+  return partition_point(n, [&](std::uint32_t i) { return values[i] < v; });
 }
 template <class Key>
 __device__ std::uint32_t count_up_to(const Key* values, std::uint32_t n, Key v) {
-  std::uint32_t low = 0, high = n;
-  while (low < high) {
-    const std::uint32_t middle = low + (high - low) / 2;
-    if (values[middle] <= v)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low;
+  return partition_point(n, [&](std::uint32_t i) { return values[i] <= v; });
+}
+
+/// The last i below `count` with first[i] <= at; there is one.
+__device__ inline std::uint32_t owner_of(const std::uint32_t* first, std::uint32_t count,
+                                         std::uint32_t at) {
+  return count_up_to(first, count, at) - 1;
 }
 
 /// Bits that numbers below n take.

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "core/partition_point.h"
 #include "gpu/search/span_kernels.h"
 #include "index/span_index.h"
 
@@ -114,15 +115,11 @@ __device__ Run prefix_of(const IntervalView<T>& view, std::uint32_t node, T valu
   const T split = view.splits[node];
   const std::uint32_t first = view.first[node], n = view.first[node + 1] - first;
   const bool below = value < split, above = split < value;
-  std::uint32_t low = 0, high = n;
-  while ((below || above) && low < high) {
-    const std::uint32_t middle = low + (high - low) / 2;
-    if (below ? view.mins[first + middle] < value : value <= view.maxs[first + middle])
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return {(above ? view.by_max : view.by_min) + first, below || above ? low : n};
+  if (!below && !above) return {view.by_min + first, n};
+  const std::uint32_t stabbed = partition_point(n, [&](std::uint32_t i) {
+    return below ? view.mins[first + i] < value : value <= view.maxs[first + i];
+  });
+  return {(above ? view.by_max : view.by_min) + first, stabbed};
 }
 
 /// One path from the root. Each thread of a block's first warp keeps a node of
