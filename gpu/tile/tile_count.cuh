@@ -237,36 +237,36 @@ __device__ inline void publish_rows(TileShared& s, const PlaneBases& bases, RowT
   }
 }
 
-/// Marks the vertices from `first` on, for tiles that have more than are listed
-/// at a time. Between barriers.
-template <int N>
-__device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
-  auto& lists = lists_of<N>(s);
-  for (unsigned i = own_thread(); i < lists.kListed; i += N) lists.vertex_marks[i] = 0;
-  if (threadIdx.x == 0) s.next_vertices = 0;
+/// Marks the rows of a list anew, from thing `first` of the tile on, for tiles that have more
+/// than are listed at a time. `first_of(row)` is a row's first thing, also of the row behind the
+/// last; `next` is the list's word in TileShared. Between barriers.
+template <int N, int Most, std::uint32_t Listed, class Mark, class FirstOf>
+__device__ inline void mark_list(Mark (&marks)[Listed], FirstOfGroup* groups, std::uint32_t& next,
+                                 std::uint32_t first, const FirstOf& first_of) {
+  for (unsigned i = own_thread(); i < Listed; i += N) marks[i] = 0;
+  if (threadIdx.x == 0) next = 0;
   __syncthreads();
   for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
-    const std::uint32_t begin = s.number[0][row];
-    const std::uint32_t end = row + 1 < kRowsOfTile ? s.number[0][row + 1] : s.all_vertices;
-    mark_row<kMaxVerticesOfRow>(lists.vertex_marks, lists.vertex_groups,
-                                static_cast<int>(begin - first), static_cast<int>(end - begin),
-                                row);
+    const std::uint32_t begin = first_of(row), end = first_of(row + 1);
+    mark_row<Most>(marks, groups, static_cast<int>(begin - first), static_cast<int>(end - begin),
+                   row);
   }
   __syncthreads();
 }
 
 template <int N>
+__device__ inline void mark_vertices(TileShared& s, std::uint32_t first) {
+  auto& lists = lists_of<N>(s);
+  mark_list<N, kMaxVerticesOfRow>(
+      lists.vertex_marks, lists.vertex_groups, s.next_vertices, first,
+      [&](int row) { return row < kRowsOfTile ? s.number[0][row] : s.all_vertices; });
+}
+template <int N>
 __device__ inline void mark_cells(TileShared& s, std::uint32_t first) {
   auto& lists = lists_of<N>(s);
-  for (unsigned i = own_thread(); i < lists.kListed; i += N) lists.cells[i] = 0;
-  if (threadIdx.x == 0) s.next_cells = 0;
-  __syncthreads();
-  for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
-    const std::uint32_t begin = s.cell_base[row], end = s.cell_base[row + 1];
-    mark_row<kMaxCellsOfRow>(lists.cells, lists.cell_groups, static_cast<int>(begin - first),
-                             static_cast<int>(end - begin), row);
-  }
-  __syncthreads();
+  mark_list<N, kMaxCellsOfRow>(lists.cells, lists.cell_groups, s.next_cells, first, [&](int row) {
+    return static_cast<std::uint32_t>(s.cell_base[row]);
+  });
 }
 
 }  // namespace isobrick::gpu
