@@ -10,6 +10,7 @@
 #include "gpu/grid/grid_kernel.h"
 #include "gpu/memory/arena.h"
 #include "gpu/memory/device_buffer.h"
+#include "gpu/memory/nvtx_range.h"
 #include "gpu/memory/pinned_buffer.h"
 #include "surface/case_tables.h"
 
@@ -212,6 +213,7 @@ void GridBatch::stage(int slot, const GridView& grid) { impl_->stage(impl_->at(s
 
 void GridBatch::make(std::span<const GridMeshJob> jobs) {
   if (jobs.empty()) return;
+  const NvtxRange range("make grid meshes");
   Impl& i = *impl_;
   for (const GridMeshJob& job : jobs) {
     const Impl::Slot& slot = i.at(job.slot);
@@ -231,11 +233,13 @@ GridMeshSize GridBatch::size(int slot) const {
 
 void GridBatch::write(std::span<const GridMeshJob> jobs) {
   if (jobs.empty()) return;
+  const NvtxRange range("write grid meshes");
   launch_grid_mesh(impl_->send_works(jobs), impl_->stream.get());
   impl_->wait();
 }
 
 void GridBatch::download(int slot, MeshBuffer& out) {
+  const NvtxRange range("download");
   Impl& i = *impl_;
   const GridMeshSize size = this->size(slot);
   out.positions.resize(size.vertices);

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "gpu/memory/cuda_check.h"
+#include "gpu/memory/nvtx_range.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -59,6 +60,7 @@ void PinnedRegion::run() {
       touch(arena, at(chunk), bytes(chunk));
       advance(touched_);
       if (stopped()) return;
+      const NvtxRange range("pin memory");
       check(cudaHostRegister(at(chunk), bytes(chunk), cudaHostRegisterMapped));
       advance(locked_);
     }

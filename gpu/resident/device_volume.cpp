@@ -8,6 +8,7 @@
 #include <isobrick/error.h>
 #include "core/morton.h"
 #include "gpu/memory/device_scalar.h"
+#include "gpu/memory/nvtx_range.h"
 #include "gpu/resident/device_volume_impl.h"
 #include "gpu/search/search_kernel.h"
 #include "gpu/tile/supported.h"
@@ -32,6 +33,7 @@ DeviceVolume::Impl::Impl(const Lattice& l, const BrickLookup& bricks, double fil
 }
 
 void DeviceVolume::Impl::upload_tile_blocks(const BrickLookup& bricks, double fill_value) {
+  const NvtxRange range("upload tile blocks");
   const Int3 grid = lattice.tiles();
   const std::size_t tile_block_bytes = kTileBlockSamples * lattice.sample_bytes();
   tile_blocks = DeviceBuffer<std::byte>((std::size_t{tile_count} + 1) * tile_block_bytes, stream);
@@ -73,6 +75,7 @@ void DeviceVolume::Impl::upload_tile_blocks(const BrickLookup& bricks, double fi
 }
 
 void DeviceVolume::Impl::list_tiles() {
+  const NvtxRange range("find tile ranges");
   std::vector<std::int32_t> order;
   order.reserve(3 * std::size_t{tile_count});
   for_each_morton(lattice.tiles(), [&](Int3 t) {

@@ -2,6 +2,7 @@
 #include <limits>
 
 #include <isobrick/error.h>
+#include "gpu/memory/nvtx_range.h"
 #include "gpu/resident/device_volume_impl.h"
 #include "gpu/resident/resident_launcher.h"
 
@@ -76,6 +77,7 @@ struct ResidentExtractor::Impl {
   }
 
   void download(MeshBuffer& mesh) {
+    const NvtxRange range("download");
     launcher.stream().wait();
     mesh.clear();
     mesh.positions.resize(made.vertices);

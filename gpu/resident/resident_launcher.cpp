@@ -8,6 +8,7 @@
 #include <isobrick/error.h>
 #include "core/threshold.h"
 #include "gpu/memory/device_scalar.h"
+#include "gpu/memory/nvtx_range.h"
 #include "gpu/search/search_kernel.h"
 #include "gpu/tile/supported.h"
 #include "surface/world_map.h"
@@ -93,6 +94,7 @@ void ResidentLauncher::set_region(Params& p) const {
 }
 
 void ResidentLauncher::launch_search(double isovalue) {
+  const NvtxRange range("search");
   SearchParams p{};
   p.all = tuning_.brute_force;
   p.uncut = options_.roi == volume_.lattice.box();
@@ -126,6 +128,7 @@ LaunchEnd ResidentLauncher::launch_end() const {
 
 void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
                                     const DeviceCounts& last) {
+  const NvtxRange range("extract tiles");
   TileParams p = volume_.params();
   p.items = items_.data();
   p.item_count = &counters()->item_count;
@@ -182,6 +185,7 @@ bool ResidentLauncher::read_report(DeviceCounts& counts) const {
 
 /// The report comes some microseconds before an event would.
 DeviceCounts ResidentLauncher::wait() {
+  const NvtxRange range("wait for the report");
   for (std::uint32_t reads = 1;; ++reads) {
     // Before the report is read: afterwards nobody writes it any more.
     const bool over = reads % kReadsBetweenQueries == 0 && volume_.stream.is_over();

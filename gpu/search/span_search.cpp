@@ -5,6 +5,7 @@
 #include <string>
 
 #include <isobrick/error.h>
+#include "gpu/memory/nvtx_range.h"
 #include "gpu/memory/pinned_buffer.h"
 #include "gpu/search/span_indices.h"
 #include "index/instantiate.h"
@@ -88,6 +89,7 @@ struct SpanSearch::Impl {
 
   template <class T>
   IndexBlocks build(RangesOfIndices input, std::span<const ValueRange<T>> ranges) {
+    const NvtxRange range("build indices");
     const DeviceBuffer<ValueRange<T>> on_device(ranges.size(), stream);
     if (!ranges.empty())
       check(cudaMemcpyAsync(on_device.data(), ranges.data(), on_device.bytes(),
@@ -119,6 +121,7 @@ struct SpanSearch::Impl {
 
   std::uint64_t search(double isovalue) {
     if (mask_ranges() == 0) return 0;
+    const NvtxRange range("search indices");
     start.record(stream);
     indices.search(isovalue, stream);
     launch_count_bits(indices.mask(), indices.ranges().data(), mask_ranges(), counts.data(),

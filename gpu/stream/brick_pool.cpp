@@ -11,6 +11,7 @@
 #include "gpu/memory/arena.h"
 #include "gpu/memory/copy_kernel.h"
 #include "gpu/memory/device_buffer.h"
+#include "gpu/memory/nvtx_range.h"
 #include "gpu/memory/pinned_region.h"
 #include "gpu/memory/upload_tracker.h"
 
@@ -119,6 +120,7 @@ struct BrickPool::Impl {
   void request_all() {
     const std::vector<UploadTracker::PendingBrick> filled = uploads.take_filled();
     if (filled.empty()) return;
+    const NvtxRange range("upload bricks");
     make_current(device);
     const std::byte* const from = buffers.locked(0);
     const bool timed = requests % kTimedOf == 0;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include <isobrick/error.h>
+#include "gpu/memory/nvtx_range.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -110,6 +111,7 @@ InFlightLaunch* StreamCollector::next_submitted(bool wait) {
 }
 
 std::optional<StreamCollector::Pending> StreamCollector::collect(InFlightLaunch& launch) {
+  const NvtxRange range("collect");
   launch.extracted.wait();
   const StreamSizes& sizes = device_.sizes();
   const SurfaceTotals size = launch.totals[0];
@@ -174,6 +176,7 @@ StreamCollector::Pending StreamCollector::start_download(InFlightLaunch& launch,
 }
 
 void StreamCollector::deliver(const Pending& pending) {
+  const NvtxRange range("deliver");
   pending.launch->downloaded.wait();
   report_.download.seconds +=
       seconds_between(pending.launch->download_begin, pending.launch->downloaded);

@@ -6,6 +6,7 @@
 
 #include <isobrick/device.h>
 #include <isobrick/error.h>
+#include "gpu/memory/nvtx_range.h"
 #include "gpu/stream/unpack_kernel.h"
 #include "gpu/tile/block_groups.h"
 #include "surface/cpu_extractor.h"
@@ -128,8 +129,12 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
   u.fill_value = options_.fill_value;
   u.tile_blocks = tile_blocks_;
   launch.unpack_begin.record(kernel_);
-  launch_unpack(lattice_.type, u, kernel_.get());
+  {
+    const NvtxRange range("unpack tiles");
+    launch_unpack(lattice_.type, u, kernel_.get());
+  }
   launch.unpacked.record(kernel_);
+  const NvtxRange range("extract tiles");
   LaunchShape shape = shapes_.of(count);
   shape.blocks = std::min(shape.blocks, static_cast<int>(count));
   shape.launch(shape, p, cases_, kernel_.get());
@@ -140,6 +145,7 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
 
 /// Neighbours in host memory are sent together.
 void StreamDevice::send(InFlightLaunch& launch) {
+  const NvtxRange range("upload");
   const std::size_t bytes = lattice_.brick_bytes();
   const std::vector<UploadedBrick>& sent = launch.use.sent;
   for (std::size_t first = 0, end = 0; first < sent.size(); first = end) {
@@ -152,6 +158,7 @@ void StreamDevice::send(InFlightLaunch& launch) {
 }
 
 void StreamDevice::submit(InFlightLaunch& launch, std::uint64_t number) {
+  const NvtxRange range("submit launch");
   const std::lock_guard lock(launching_);
   launch.upload_begin.record(upload_);
   send(launch);
@@ -165,6 +172,7 @@ void StreamDevice::submit(InFlightLaunch& launch, std::uint64_t number) {
 
 void StreamDevice::submit_part(InFlightLaunch& launch, std::uint32_t first, std::uint32_t count,
                                std::uint64_t number_start) {
+  const NvtxRange range("submit part of a launch");
   const std::lock_guard lock(launching_);
   auto* header = reinterpret_cast<LaunchHeader*>(launch.device);
   LaunchHeader& sent = *reinterpret_cast<LaunchHeader*>(launch.at(0));
@@ -192,6 +200,7 @@ std::vector<OrderState> StreamDevice::totals_of_tiles(InFlightLaunch& launch) {
 }
 
 void StreamDevice::download(InFlightLaunch& launch, const MeshArrays& to, SurfaceTotals size) {
+  const NvtxRange range("download");
   const auto copy = [&](void* host, const void* device, std::size_t bytes) {
     if (bytes > 0)
       check(cudaMemcpyAsync(host, device, bytes, cudaMemcpyDeviceToHost, download_.get()));
