@@ -11,7 +11,7 @@
 
 #include "surface/case_tables.h"
 #include "surface/coincident_vertices-inl.h"
-#include "surface/tile_scan-inl.h"
+#include "surface/tile_count-inl.h"
 #include "surface/tile_triangles-inl.h"
 #include "surface/tile_vertices-inl.h"
 

@@ -3,7 +3,7 @@
 #include <isobrick/range.h>
 #include "gpu/search/search_params.h"
 #include "gpu/tile/tile_block_place.cuh"
-#include "gpu/tile/tile_order.cuh"
+#include "gpu/tile/tile_place.cuh"
 
 // The kernel that finds active tiles, and those that make what it and the extraction read of a
 // volume: ranges and first columns.

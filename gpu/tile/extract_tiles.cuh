@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "gpu/tile/tile_mesh.cuh"
+#include "gpu/tile/tile_steps.cuh"
 #include "gpu/tile/tile_take.cuh"
 
 // The extraction kernel: each thread block makes the meshes of one tile after the other.

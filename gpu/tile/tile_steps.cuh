@@ -1,10 +1,11 @@
 #pragma once
 
 #include "gpu/tile/tile_barrier.cuh"
+#include "gpu/tile/tile_boundary.cuh"
 #include "gpu/tile/tile_count.cuh"
-#include "gpu/tile/tile_emit.cuh"
 #include "gpu/tile/tile_nan.cuh"
-#include "gpu/tile/tile_order.cuh"
+#include "gpu/tile/tile_triangles.cuh"
+#include "gpu/tile/tile_vertices.cuh"
 
 // From the inside bits of a tile to its mesh: the steps, and where its warps wait for each other.
 
