@@ -1,10 +1,10 @@
 // Ties, where degenerate triangles are left out; included once for every SIMD target.
 
-#if defined(ISOBRICK_TILE_TIES_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef ISOBRICK_TILE_TIES_INL_H_
-#undef ISOBRICK_TILE_TIES_INL_H_
+#if defined(ISOBRICK_COINCIDENT_VERTICES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef ISOBRICK_COINCIDENT_VERTICES_INL_H_
+#undef ISOBRICK_COINCIDENT_VERTICES_INL_H_
 #else
-#define ISOBRICK_TILE_TIES_INL_H_
+#define ISOBRICK_COINCIDENT_VERTICES_INL_H_
 #endif
 
 #include <bit>
@@ -18,8 +18,8 @@ namespace HWY_NAMESPACE {
 
 /// Writes the tile's own vertices on coincident vertices. Their normals are those of the samples.
 template <class T>
-void emit_tie_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
-                       Vec3f* normals) {
+void write_coincident_vertices(const KernelContext& context, const TileState& tile,
+                               Vec3f* positions, Vec3f* normals) {
   const ScalarVertices<T> scalar{context, tile};
   for (const CoincidentVertex& vertex : tile.coincident->vertices) {
     if (vertex.owner != CoincidentVertex::kOwn) continue;
@@ -55,7 +55,7 @@ inline std::uint32_t coincident_number(const CoincidentVertices& coincident, int
       .number;
 }
 
-inline void emit_kept_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
+inline void write_kept_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   const CoincidentVertices& coincident = *tile.coincident;
   for (const ActiveCell cell : tile.cells) {
     const int x = static_cast<int>(cell & 31), y = static_cast<int>(cell >> 5 & 31),

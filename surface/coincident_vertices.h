@@ -77,7 +77,7 @@ constexpr std::uint32_t corner_bits(const std::uint64_t* rows, int x, int y, int
 
 }  // namespace coincident
 
-/// After scan_tile: leaves triangles out, finds the coincident vertices that the rest has
+/// After count_tile: leaves triangles out, finds the coincident vertices that the rest has
 /// corners on and the tile that makes each one's vertex, and completes the counts.
 /// With `alone` no other tile exists.
 void count_coincident(ScalarType type, const KernelContext& context, bool alone, TileState& tile);

@@ -95,8 +95,8 @@ struct CpuExtractor::Impl {
       if (state.coincident) state.coincident->clear();
     } else {
       if (options.may_have_nan) state.work.active_blocks = 0xff;
-      gather_tile(lattice, bricks, options.fill_value, sample_reach(options), state);
-      scan_tile(lattice.type, context, state);
+      gather_samples(lattice, bricks, options.fill_value, sample_reach(options), state);
+      count_tile(lattice.type, context, state);
       if (state.coincident) count_coincident(lattice.type, context, !welded(), state);
     }
     if (!state.boundary) return;
@@ -147,9 +147,9 @@ struct CpuExtractor::Impl {
     if (state.vertices == 0 && state.triangles == 0) return;
     adopt_boundaries(state, boundaries);
     if (state.coincident) adopt_coincident(state, boundaries);
-    emit_tile(lattice.type, context, state, out.positions.data() + state.vertex_base,
-              options.normals ? out.normals.data() + state.vertex_base : nullptr,
-              out.triangles.data() + state.triangle_base);
+    write_tile(lattice.type, context, state, out.positions.data() + state.vertex_base,
+               options.normals ? out.normals.data() + state.vertex_base : nullptr,
+               out.triangles.data() + state.triangle_base);
   }
 
   void resize_for(MeshBuffer& out, const TileState& last) const {

@@ -74,7 +74,7 @@ inline std::uint64_t nan_bits(const T* samples) {
 /// Inside bits of all rows. Blocks that are not active were not gathered; all
 /// their samples lie on the side of the sample that the tile's blocks share.
 template <class T>
-void classify(const KernelContext& context, TileState& tile) {
+void classify_samples(const KernelContext& context, TileState& tile) {
   const T threshold = Threshold<T>(context.isovalue).value;
   const std::optional<T> coincident = coincident_value<T>(context.isovalue);
   const T* samples = reinterpret_cast<const T*>(tile.samples.data());
@@ -113,7 +113,7 @@ struct GoodCells {
 };
 
 template <class T>
-void find_good_cells(const KernelContext& context, const TileState& tile, GoodCells& good) {
+void find_nan(const KernelContext& context, const TileState& tile, GoodCells& good) {
   constexpr int edge = kTileSamples + 2;  // samples −1 … 33
   const T* samples = reinterpret_cast<const T*>(tile.samples.data());
   std::uint64_t nan[edge * edge];

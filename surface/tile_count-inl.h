@@ -20,11 +20,11 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// The active edges that start in a row, and the cells that do.
-struct RowBits {
+struct RowEdges {
   std::uint64_t x, y, z, cells;
 };
 
-inline RowBits row_bits(const TileState& tile, int y, int z) {
+inline RowEdges edges_of_row(const TileState& tile, int y, int z) {
   const TileShape& s = tile.shape;
   const std::uint64_t cell_mask = bit_span(s.lo[0], s.hi[0] - 1);
   const std::uint64_t sample_mask = bit_span(s.lo[0], s.hi[0]);
@@ -36,9 +36,9 @@ inline RowBits row_bits(const TileState& tile, int y, int z) {
   const std::uint64_t both = up_y && up_z ? inside[kTileSamples + 1] : here;
   const std::uint64_t any = here | above | behind | both;
   const std::uint64_t all = here & above & behind & both;
-  const std::uint64_t mixed = (any | any >> 1) & ~(all & all >> 1) & cell_mask;
+  const std::uint64_t active = (any | any >> 1) & ~(all & all >> 1) & cell_mask;
   return {(here ^ here >> 1) & cell_mask, (here ^ above) & sample_mask,
-          (here ^ behind) & sample_mask, up_y && up_z ? mixed : 0};
+          (here ^ behind) & sample_mask, up_y && up_z ? active : 0};
 }
 
 /// Bit y: in row (y, z) an edge or a cell may begin that the surface passes; in
@@ -66,23 +66,23 @@ inline std::uint64_t rows_with_surface(const TileState& tile, int z) {
 
 /// Leaves out what touches NaN: cells with such a corner, and edges with no
 /// other cell around them.
-inline void leave_out_nan(const GoodCells& good, int y, int z, RowBits& bits) {
+inline void leave_out_nan(const GoodCells& good, int y, int z, RowEdges& edges) {
   const std::uint64_t g00 = good.at(y - 1, z - 1), g10 = good.at(y, z - 1);
   const std::uint64_t g01 = good.at(y - 1, z), g11 = good.at(y, z);
-  bits.x &= (g00 | g10 | g01 | g11) >> 1;
-  bits.y &= (g10 | g11) >> 1 | (g10 | g11);
-  bits.z &= (g01 | g11) >> 1 | (g01 | g11);
-  bits.cells &= g11 >> 1;
+  edges.x &= (g00 | g10 | g01 | g11) >> 1;
+  edges.y &= (g10 | g11) >> 1 | (g10 | g11);
+  edges.z &= (g01 | g11) >> 1 | (g01 | g11);
+  edges.cells &= g11 >> 1;
 }
 
 /// Leaves out the edges with a coincident vertex at an end, whose vertices are not numbered with
 /// the rest.
 inline void leave_out_coincident(const CoincidentVertices& coincident, int y, int z,
-                                 RowBits& bits) {
+                                 RowEdges& edges) {
   const std::uint64_t* at = coincident.at + row_index(y, z);
-  bits.x &= ~(at[0] | at[0] >> 1);
-  bits.y &= ~(at[0] | at[1]);
-  bits.z &= ~(at[0] | at[kTileSamples]);
+  edges.x &= ~(at[0] | at[0] >> 1);
+  edges.y &= ~(at[0] | at[1]);
+  edges.z &= ~(at[0] | at[kTileSamples]);
 }
 
 /// Lists the active cells of a row with their cases.
@@ -105,7 +105,7 @@ inline void list_cells(TileState& tile, int y, int z, std::uint64_t cells) {
 }
 
 /// Numbers the tile's own vertices of a row, counting on from `number`.
-inline std::uint32_t number_row(TileState& tile, int y, int z, const RowBits& bits,
+inline std::uint32_t number_row(TileState& tile, int y, int z, const RowEdges& edges,
                                 std::uint32_t number) {
   const TileShape& s = tile.shape;
   const bool own_y = y > 0 || s.first[1], own_z = z > 0 || s.first[2];
@@ -114,36 +114,33 @@ inline std::uint32_t number_row(TileState& tile, int y, int z, const RowBits& bi
     return static_cast<std::uint32_t>(std::popcount(word));
   };
   // Edges along y or z: the one at sample 0, if it is ours, then the word.
-  const auto number_word = [&](std::uint64_t edges, std::uint32_t& word, std::uint32_t& at_0,
+  const auto number_word = [&](std::uint64_t bits, std::uint32_t& word, std::uint32_t& at_0,
                                std::uint32_t& base) {
-    const auto own = static_cast<std::uint8_t>(edges & s.first[0]);
-    word = static_cast<std::uint32_t>(edges >> 1);
+    const auto own = static_cast<std::uint8_t>(bits & s.first[0]);
+    word = static_cast<std::uint32_t>(bits >> 1);
     at_0 = number;
     base = number + own;
     number = base + count(word);
     return own;
   };
   if (own_y && own_z) {
-    row.x = static_cast<std::uint32_t>(bits.x);
+    row.x = static_cast<std::uint32_t>(edges.x);
     row.x_base = number;
     number += count(row.x);
   }
   std::uint8_t own_at_0 = 0;
-  if (own_z) own_at_0 = number_word(bits.y, row.y, row.y_at_0, row.y_base);
+  if (own_z) own_at_0 = number_word(edges.y, row.y, row.y_at_0, row.y_base);
   if (own_y)
     own_at_0 = static_cast<std::uint8_t>(own_at_0 |
-                                         number_word(bits.z, row.z, row.z_at_0, row.z_base) << 1);
+                                         number_word(edges.z, row.z, row.z_at_0, row.z_base) << 1);
   tile.own_at_0[row_index(y, z)] = own_at_0;
   return number;
 }
 
-template <class T>
-void scan_samples(const KernelContext& context, TileState& tile) {
-  classify<T>(context, tile);
-  GoodCells good;
-  const bool look_for_nan = std::is_floating_point_v<T> && context.may_have_nan;
-  if (look_for_nan) find_good_cells<T>(context, tile, good);
-
+/// Numbers the vertices and lists the active cells, row by row. `leave_out(y, z, edges)` first
+/// takes out what has none.
+template <class LeaveOut>
+HWY_INLINE void count_rows(TileState& tile, const LeaveOut& leave_out) {
   tile.clear_rows();
   tile.cells.clear();
   tile.cells.reserve(static_cast<std::size_t>(kTileEdge * kTileEdge * kTileEdge));
@@ -155,15 +152,26 @@ void scan_samples(const KernelContext& context, TileState& tile) {
     tile.written[z] = rows;
     for (; rows; rows &= rows - 1) {
       const int y = std::countr_zero(rows);
-      RowBits bits = row_bits(tile, y, z);
-      if (!(bits.x | bits.y | bits.z | bits.cells)) continue;
-      if (look_for_nan) leave_out_nan(good, y, z, bits);
-      if (tile.coincident) leave_out_coincident(*tile.coincident, y, z, bits);
-      number = number_row(tile, y, z, bits, number);
-      if (bits.cells) list_cells(tile, y, z, bits.cells);
+      RowEdges edges = edges_of_row(tile, y, z);
+      if (!(edges.x | edges.y | edges.z | edges.cells)) continue;
+      leave_out(y, z, edges);
+      number = number_row(tile, y, z, edges, number);
+      if (edges.cells) list_cells(tile, y, z, edges.cells);
     }
   }
   tile.edge_vertices = tile.vertices = number;
+}
+
+template <class T>
+void count_tile(const KernelContext& context, TileState& tile) {
+  classify_samples<T>(context, tile);
+  GoodCells good;
+  const bool look_for_nan = std::is_floating_point_v<T> && context.may_have_nan;
+  if (look_for_nan) find_nan<T>(context, tile, good);
+  count_rows(tile, [&](int y, int z, RowEdges& edges) HWY_ATTR {
+    if (look_for_nan) leave_out_nan(good, y, z, edges);
+    if (tile.coincident) leave_out_coincident(*tile.coincident, y, z, edges);
+  });
 }
 
 }  // namespace HWY_NAMESPACE

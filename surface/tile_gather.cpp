@@ -59,18 +59,18 @@ void gather(const Lattice& lattice, const BrickLookup& bricks, double fill, Inde
 
 }  // namespace
 
-void gather_tile(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
-                 const TileWork& work, const TileBlock& block) {
+void gather_samples(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
+                    const TileWork& work, const TileBlock& block) {
   visit_scalar(lattice.type, [&](auto tag) {
     gather<typename decltype(tag)::type>(lattice, bricks, fill, reach, work, block);
   });
 }
 
-void gather_tile(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
-                 TileState& tile) {
+void gather_samples(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
+                    TileState& tile) {
   tile.samples.resize(TileLayout::kSize * lattice.sample_bytes());
-  gather_tile(lattice, bricks, fill, reach, tile.work,
-              {tile.samples.data(), TileLayout::kOrigin, TileLayout::kRow, TileLayout::kPlane});
+  gather_samples(lattice, bricks, fill, reach, tile.work,
+                 {tile.samples.data(), TileLayout::kOrigin, TileLayout::kRow, TileLayout::kPlane});
 }
 
 }  // namespace isobrick

@@ -13,10 +13,10 @@ struct TileBlock {
 
 /// Copies the samples that the tile's active blocks need, `reach` layers around
 /// them included, from the bricks that hold them. Absent bricks give `fill`.
-void gather_tile(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
-                 const TileWork& work, const TileBlock& block);
+void gather_samples(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
+                    const TileWork& work, const TileBlock& block);
 /// The same for a tile's work space.
-void gather_tile(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
-                 TileState& tile);
+void gather_samples(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
+                    TileState& tile);
 
 }  // namespace isobrick

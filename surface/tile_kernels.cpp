@@ -19,25 +19,25 @@ HWY_BEFORE_NAMESPACE();
 namespace isobrick {
 namespace HWY_NAMESPACE {
 
-void Scan(ScalarType type, const KernelContext& context, TileState& tile) {
-  visit_scalar(type, [&](auto tag) { scan_samples<typename decltype(tag)::type>(context, tile); });
+void Count(ScalarType type, const KernelContext& context, TileState& tile) {
+  visit_scalar(type, [&](auto tag) { count_tile<typename decltype(tag)::type>(context, tile); });
 }
 
-void Emit(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
-          Vec3f* normals, Triangle* triangles) {
+void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
+           Vec3f* normals, Triangle* triangles) {
   list_edges(tile);
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    emit_vertices<T>(context, tile, positions, normals);
+    write_vertices<T>(context, tile, positions, normals);
     if (tile.coincident)
-      emit_tie_vertices<T>(context, tile, positions + tile.edge_vertices,
-                           normals ? normals + tile.edge_vertices : nullptr);
+      write_coincident_vertices<T>(context, tile, positions + tile.edge_vertices,
+                                   normals ? normals + tile.edge_vertices : nullptr);
   });
   const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;
   if (tile.coincident && tile.coincident->matter())
-    emit_kept_triangles(tables, tile, triangles);
+    write_kept_triangles(tables, tile, triangles);
   else
-    emit_triangles(tables, tile, triangles);
+    write_triangles(tables, tile, triangles);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -50,13 +50,13 @@ namespace isobrick {
 namespace {
 
 struct Kernels {
-  decltype(&HWY_STATIC_DISPATCH(Scan)) scan = nullptr;
-  decltype(&HWY_STATIC_DISPATCH(Emit)) emit = nullptr;
+  decltype(&HWY_STATIC_DISPATCH(Count)) count = nullptr;
+  decltype(&HWY_STATIC_DISPATCH(Write)) write = nullptr;
 };
 
 // Empty for a target that was not compiled.
 #define ISOBRICK_KERNELS(TARGET) \
-  Kernels { HWY_CHOOSE_##TARGET(Scan), HWY_CHOOSE_##TARGET(Emit) }
+  Kernels { HWY_CHOOSE_##TARGET(Count), HWY_CHOOSE_##TARGET(Write) }
 
 /// Those that this processor runs best. Highway's own dispatch would do the
 /// same, but it links libhwy, which times its clock for 5 ms whenever a program
@@ -77,12 +77,12 @@ Kernels best_kernels() {
       __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") &&
       __builtin_cpu_supports("avx512bitalg") && __builtin_cpu_supports("avx512vpopcntdq");
   if (avx3_dl) best = ISOBRICK_KERNELS(AVX3_DL);
-  if (avx3 && !best.scan) best = ISOBRICK_KERNELS(AVX3);
-  if (avx2 && !best.scan) best = ISOBRICK_KERNELS(AVX2);
-  if (sse4 && !best.scan) best = ISOBRICK_KERNELS(SSE4);
+  if (avx3 && !best.count) best = ISOBRICK_KERNELS(AVX3);
+  if (avx2 && !best.count) best = ISOBRICK_KERNELS(AVX2);
+  if (sse4 && !best.count) best = ISOBRICK_KERNELS(SSE4);
 #endif
   // What the compiler's options allow: all that other processors need.
-  if (!best.scan) best = {&HWY_STATIC_DISPATCH(Scan), &HWY_STATIC_DISPATCH(Emit)};
+  if (!best.count) best = {&HWY_STATIC_DISPATCH(Count), &HWY_STATIC_DISPATCH(Write)};
   return best;
 }
 
@@ -93,13 +93,13 @@ const Kernels& kernels() {
 
 }  // namespace
 
-void scan_tile(ScalarType type, const KernelContext& context, TileState& tile) {
-  kernels().scan(type, context, tile);
+void count_tile(ScalarType type, const KernelContext& context, TileState& tile) {
+  kernels().count(type, context, tile);
 }
 
-void emit_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
-               Vec3f* normals, Triangle* triangles) {
-  kernels().emit(type, context, tile, positions, normals, triangles);
+void write_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
+                Vec3f* normals, Triangle* triangles) {
+  kernels().write(type, context, tile, positions, normals, triangles);
 }
 
 }  // namespace isobrick

@@ -20,11 +20,11 @@ struct KernelContext {
 
 /// From gathered samples of `type`: inside bits, own edge rows with numbers
 /// that count from the tile's first vertex, active cells, and the counts.
-void scan_tile(ScalarType type, const KernelContext& context, TileState& tile);
+void count_tile(ScalarType type, const KernelContext& context, TileState& tile);
 
 /// With all edge rows complete, foreign ones included: writes the tile's
 /// vertices to `positions` (and `normals`, unless null) and its triangles.
-void emit_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
-               Vec3f* normals, Triangle* triangles);
+void write_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
+                Vec3f* normals, Triangle* triangles);
 
 }  // namespace isobrick

@@ -69,7 +69,7 @@ struct WideRow {
   }
 };
 
-inline void emit_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
+inline void write_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   const Wide d;
   WideRow row;
   row.load(tile.rows, 0, 0);
@@ -138,7 +138,7 @@ HWY_INLINE void cell_vertices(const CellRow& row, std::uint32_t x, std::uint32_t
   }
 }
 
-inline void emit_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
+inline void write_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   CellRow row;
   ActiveCell place = ~ActiveCell{0};
   alignas(64) std::uint32_t ids[16];

@@ -20,7 +20,7 @@ namespace isobrick {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Lists the tile's own edges in the order in which scan numbered them.
+/// Lists the tile's own edges in the order in which count_tile() numbered them.
 inline void list_edges(TileState& tile) {
   const TileShape& s = tile.shape;
   tile.edges.resize(tile.edge_vertices);
@@ -260,8 +260,8 @@ class VectorVertices {
 };
 
 template <class T>
-void emit_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
-                   Vec3f* normals) {
+void write_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
+                    Vec3f* normals) {
   const ScalarVertices<T> scalar{context, tile};
   const std::uint32_t* edges = tile.edges.data();
   const std::size_t n = tile.edges.size();

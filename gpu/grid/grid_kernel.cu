@@ -314,7 +314,7 @@ __device__ bool fits(const GridWork& w) {
          t.triangles + 2 * t.seam_sides <= w.triangle_room;
 }
 
-__global__ void __launch_bounds__(kThreads) emit_vertices(const GridWork* works) {
+__global__ void __launch_bounds__(kThreads) write_vertices(const GridWork* works) {
   __shared__ WorkStorage storage;
   const GridWork& w = load_work(works, storage);
   const Warp warp;
@@ -353,7 +353,7 @@ __global__ void __launch_bounds__(kThreads) emit_vertices(const GridWork* works)
   });
 }
 
-__global__ void __launch_bounds__(kThreads) emit_triangles(const GridWork* works) {
+__global__ void __launch_bounds__(kThreads) write_triangles(const GridWork* works) {
   __shared__ WorkStorage storage;
   const GridWork& w = load_work(works, storage);
   const Warp warp;
@@ -416,8 +416,8 @@ void launch_grid_count(const GridBatchWork& batch, cudaStream_t stream) {
 void launch_grid_mesh(const GridBatchWork& batch, cudaStream_t stream) {
   const dim3 warps((static_cast<unsigned>(batch.max_rows) + kWarps - 1) / kWarps,
                    static_cast<unsigned>(batch.count));
-  emit_vertices<<<warps, kThreads, 0, stream>>>(batch.works);
-  emit_triangles<<<warps, kThreads, 0, stream>>>(batch.works);
+  write_vertices<<<warps, kThreads, 0, stream>>>(batch.works);
+  write_triangles<<<warps, kThreads, 0, stream>>>(batch.works);
   check_launch("the meshes of grids");
 }
 

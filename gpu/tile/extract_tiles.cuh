@@ -5,7 +5,8 @@
 #include "gpu/tile/tile_steps.cuh"
 #include "gpu/tile/tile_take.cuh"
 
-// The extraction kernel: each thread block makes the meshes of one tile after the other.
+// The extraction kernel: each thread block makes the meshes of one tile after the other. Its steps
+// are those of the CPU (docs/design/surface.md).
 
 namespace isobrick::gpu {
 
@@ -59,13 +60,11 @@ __global__ void __launch_bounds__(N, BlockConfig<N>::kBlocks)
   take_tile<T>(s, p, next_number(p));
   __syncthreads();
   while (s.item < s.items) {
-    if constexpr (Nan)
-      find_nan<N, T>(s, p);
-    else
-      clear_lists<N>(s, s.all_cells, s.all_vertices);
-    classify<N>(s, p, classifier);
-    __syncthreads();
-    if (count_tile<N, Nan>(s, p)) make_mesh_of_tile<N, T, Normals, Nan>(s, p);
+    classify_tile<N, T, Nan>(s, p, classifier);
+    if (count_tile<N, Nan>(s, p)) {
+      place_tile<N, Nan>(s, p);
+      write_tile<N, T, Normals, Nan>(s, p);
+    }
     if (s.items <= gridDim.x) {  // each block has one at most
       __syncthreads();
       break;

@@ -10,7 +10,7 @@ namespace isobrick::gpu {
 
 /// Gives the tile's row table to later tiles, once it is known where its vertices go. One
 /// thread.
-__device__ inline void release_rows(const TileShared& s, const TileParams& p) {
+__device__ inline void publish_boundary(const TileShared& s, const TileParams& p) {
   DeviceWord(p.row_tables[s.tile.slot].base_and_epoch)
       .store(s.number_base | static_cast<unsigned long long>(p.epoch) << 32,
              cuda::memory_order_release);
@@ -68,8 +68,8 @@ struct Neighbour {
 /// from this tile's first vertex, and fetches what this tile needs of their rows.
 /// A neighbour that is not active shares no vertex with this tile.
 template <int N>
-__device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p,
-                                           const Neighbour& neighbour) {
+__device__ inline void fetch_boundaries(TileShared& s, const TileParams& p,
+                                        const Neighbour& neighbour) {
   const unsigned n = lane_id();
   const std::uint32_t slot = neighbour.slot;
   if (slot != kNone) {
@@ -117,7 +117,7 @@ __device__ inline void wait_for_neighbours(TileShared& s, const TileParams& p,
 /// the one before the row's others, or the last of its kind in the row of the
 /// tile before. `BesideFirst` as for row groups.
 template <int N, bool BesideFirst = false>
-__device__ inline void number_at_0(TileShared& s) {
+__device__ inline void adopt_at_0(TileShared& s) {
   const RowTable* before = s.before;
   const std::uint32_t base = s.neighbour_base[1] - 1;
   const bool own_y = s.shape.first[1], own_z = s.shape.first[2];
@@ -143,7 +143,7 @@ __device__ inline void number_at_0(TileShared& s) {
 
 /// The rows on the lower planes: their vertices belong to tiles before this one.
 template <int N>
-__device__ inline void borrow_rows(TileShared& s) {
+__device__ inline void adopt_rows(TileShared& s) {
   const Shape& shape = s.shape;
   const bool fx = shape.first[0], fy = shape.first[1], fz = shape.first[2];
   const auto base_of = [&](int neighbour, std::uint32_t e) {

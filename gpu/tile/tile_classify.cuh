@@ -165,8 +165,8 @@ __device__ inline void classify_planes(TileShared& s, const TileParams& p,
 }
 
 template <int N, class T>
-__device__ inline void classify(TileShared& s, const TileParams& p,
-                                const Classifier<T>& classifier) {
+__device__ inline void classify_samples(TileShared& s, const TileParams& p,
+                                        const Classifier<T>& classifier) {
   if constexpr (sizeof(T) <= 2)
     classify_rows<N>(s, p, classifier);
   else

@@ -22,8 +22,8 @@ struct RowEdges {
   __device__ std::uint32_t zs_at_0() const { return own_y ? z_at_0 : 0; }
 };
 
-__device__ inline std::uint32_t mixed_cells(const RowBits& a, const RowBits& b, const RowBits& c,
-                                            const RowBits& d) {
+__device__ inline std::uint32_t active_cells_of(const RowBits& a, const RowBits& b,
+                                                const RowBits& c, const RowBits& d) {
   const std::uint32_t an = a.next(), bn = b.next(), cn = c.next(), dn = d.next();
   const std::uint32_t any = a.at | an | b.at | bn | c.at | cn | d.at | dn;
   const std::uint32_t all = a.at & an & b.at & bn & c.at & cn & d.at & dn;
@@ -56,7 +56,7 @@ __device__ inline RowEdges edges_of_row(const TileShared& s, const Shape& shape,
   e.x = (here.at ^ here.next()) & (in ? limits.edges_x : 0);
   e.y = (here.next() ^ above.next()) & (in ? limits.edges_yz : 0);
   e.z = (here.next() ^ behind.next()) & (in ? limits.edges_yz : 0);
-  e.cells = mixed_cells(here, above, behind, opposite) & (in && up ? limits.cells : 0);
+  e.cells = active_cells_of(here, above, behind, opposite) & (in && up ? limits.cells : 0);
   if (!Inner && shape.at_0) {
     const std::uint32_t first = in && limits.edges_yz ? 1 : 0;
     e.y_at_0 = (here.at ^ above.at) & first;
@@ -107,7 +107,7 @@ __device__ inline void count_rows_of(TileShared& s, LeaveOut&& leave_out) {
       s.edge_bits[0][row] = edges.x;
       s.edge_bits[1][row] = edges.y;
       s.edge_bits[2][row] = edges.z;
-      s.mixed[row] = edges.cells;
+      s.active_cells[row] = edges.cells;
       count = RowCount::of(edges, own);
     }
     if constexpr (rows.kPlane) {
@@ -211,7 +211,7 @@ inline constexpr int kMaxVerticesOfRow = 32 + 33 + 33, kMaxCellsOfRow = 32;
 /// Leaves the row table for later tiles and the numbers within the tile in
 /// shared memory, and marks the first vertices and cells.
 template <int N>
-__device__ inline void publish_rows(TileShared& s, const PlaneBases& bases, RowTable& table) {
+__device__ inline void number_rows(TileShared& s, const PlaneBases& bases, RowTable& table) {
   auto& lists = lists_of<N>(s);
   for_each_row_group<N>([&](auto rows) {
     const Before before = before_row_group(s, bases, rows);

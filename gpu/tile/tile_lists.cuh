@@ -81,13 +81,13 @@ __device__ inline void for_each_group(std::uint32_t& next, std::uint32_t listed,
 
 /// Finds the marked cells and their cases, and how many triangles each 32 have.
 template <int N>
-__device__ inline void find_cells(TileShared& s, std::uint32_t listed) {
+__device__ inline void list_cells(TileShared& s, std::uint32_t listed) {
   auto& lists = lists_of<N>(s);
   const std::uint32_t lanes = kept(lanes_below() << 1 | 1u);
   for_each_group(s.next_cells, listed, [&](std::uint32_t group) {
     const std::uint32_t i = 32 * group + lane_id();
     const PlaceInRow place = place_of_lane(lists.cells[i], lists.cell_groups[group], lanes);
-    const std::uint32_t x = nth_bit(s.mixed[place.row], place.rank);
+    const std::uint32_t x = nth_bit(s.active_cells[place.row], place.rank);
     const auto pair = [&](int step) {
       const RowBits bits = s.rows[place.row + step];
       return __funnelshift_r(bits.at, bits.last, x) & 3u;

@@ -22,7 +22,7 @@ __device__ inline NanRows& nan_rows_of(TileShared& s) {
   return *reinterpret_cast<NanRows*>(&s + 1);
 }
 
-/// Beside classify(): a row a warp.
+/// Beside classify_samples(): a row a warp.
 template <int N, class T>
 __device__ inline void find_nan(TileShared& s, const TileParams& p) {
   constexpr int kEdge = NanRows::kEdge;

@@ -76,7 +76,7 @@ __device__ inline void report(const TileParams& p, LaunchReport::Word word, std:
 }
 
 /// Where the tile's vertices go. One warp.
-__device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
+__device__ inline void place_vertices(TileShared& s, const TileParams& p) {
   const std::uint32_t item = s.item;
   const unsigned long long start = *p.number_start;
   const auto base =
@@ -94,8 +94,8 @@ __device__ inline void find_vertex_base(TileShared& s, const TileParams& p) {
 }
 
 /// Where the tile's triangles go. One warp.
-__device__ inline void find_triangle_base(TileShared& s, const TileParams& p,
-                                          std::uint64_t triangles) {
+__device__ inline void place_triangles(TileShared& s, const TileParams& p,
+                                       std::uint64_t triangles) {
   const std::uint32_t item = s.item;
   const auto base =
       sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].triangles; }, item,

@@ -83,7 +83,7 @@ struct alignas(256) TileShared {
   /// samples x and x + 1 along x, for the one at sample x + 1 along y and z.
   std::uint32_t edge_bits[3][kRowPitch], number[3][kRowPitch];
   union {
-    std::uint32_t mixed[kRowsOfTile];  ///< cells with corners on both sides
+    std::uint32_t active_cells[kRowsOfTile];  ///< cells with corners on both sides
     alignas(16) RowTable before_copy;
   };
   std::uint16_t cell_base[kRowsOfTile + 1];

@@ -7,7 +7,7 @@
 #include "gpu/tile/tile_triangles.cuh"
 #include "gpu/tile/tile_vertices.cuh"
 
-// From the inside bits of a tile to its mesh: the steps, and where its warps wait for each other.
+// The steps from the samples of a tile to its mesh, and where its warps wait for each other.
 
 namespace isobrick::gpu {
 
@@ -18,7 +18,7 @@ __device__ inline void pass_empty_tile(TileShared& s, const TileParams& p) {
   publish_sum(p.order[s.item].vertices, s.item, 0);
   publish_sum(p.order[s.item].triangles, s.item, 0);
   s.number_base = 0;
-  release_rows(s, p);
+  publish_boundary(s, p);
 }
 
 /// Whether all cells and vertices of a tile are listed at once, and its warps wait for no more
@@ -38,7 +38,20 @@ __device__ inline void init_barriers(WarpBarriers& barriers) {
   barriers.turn = 1;
 }
 
-/// Counts a tile's active edges and active cells, and leaves their places. False where there
+/// The inside bits of a tile's samples, and in volumes that may hold NaN the samples that are none.
+/// Other tiles need the room of those for their lists, which are emptied beside it.
+template <int N, class T, bool Nan>
+__device__ inline void classify_tile(TileShared& s, const TileParams& p,
+                                     const Classifier<T>& classifier) {
+  if constexpr (Nan)
+    find_nan<N, T>(s, p);
+  else
+    clear_lists<N>(s, s.all_cells, s.all_vertices);
+  classify_samples<N>(s, p, classifier);
+  __syncthreads();
+}
+
+/// Counts a tile's active edges and active cells, and numbers its vertices. False where there
 /// are none; the last tile, which reports the totals, goes on.
 template <int N, bool Nan>
 __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
@@ -62,7 +75,7 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
-  publish_rows<N>(s, bases, p.row_tables[s.tile.slot]);
+  number_rows<N>(s, bases, p.row_tables[s.tile.slot]);
   __syncthreads();
   return true;
 }
@@ -70,14 +83,14 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
 /// The triangles of a tile with more cells than are listed at a time. The last
 /// cells stay listed.
 template <int N>
-__device__ inline std::uint32_t count_in_rounds(TileShared& s) {
+__device__ inline std::uint32_t list_cells_in_rounds(TileShared& s) {
   constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
   std::uint32_t triangles = 0;
   for (std::uint32_t first = 0; first < cells; first += kListed) {
     if (first > 0) mark_cells<N>(s, first);
     const std::uint32_t listed = ::min(cells - first, kListed);
-    find_cells<N>(s, listed);
+    list_cells<N>(s, listed);
     __syncthreads();
     triangles += triangles_before<N>(s, (listed + 31) / 32);
     __syncthreads();
@@ -85,24 +98,24 @@ __device__ inline std::uint32_t count_in_rounds(TileShared& s) {
   return triangles;
 }
 
-/// Finds the tile's cells and where its vertices and triangles go. Two warps wait for other
+/// Lists the tile's cells and finds where its vertices and triangles go. Two warps wait for other
 /// tiles; the others wait for no more than the place of the vertices.
 template <int N, bool Nan>
-__device__ inline void find_places(TileShared& s, const TileParams& p) {
+__device__ inline void place_tile(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
   const bool at_once = listed_at_once<N, Nan>(s);
   const std::uint32_t turn = s.barriers.turn;
   if (warp_id() == BlockConfig<N>::kVertices) {
-    find_vertex_base(s, p);
+    place_vertices(s, p);
     if (at_once) arrive(s.barriers.vertex_base);
-    if (lane_id() == 0) release_rows(s, p);
+    if (lane_id() == 0) publish_boundary(s, p);
   }
   std::uint32_t triangles = 0;
   if (at_once) {
-    find_cells<N>(s, cells);
+    list_cells<N>(s, cells);
     arrive(s.barriers.cells);
   } else {
-    triangles = count_in_rounds<N>(s);
+    triangles = list_cells_in_rounds<N>(s);
     // No turn has been between where there is no cell: with NaN vertices may belong to cells of
     // others only.
     if constexpr (Nan || !kHasWarpBarriers) __syncthreads();
@@ -118,10 +131,10 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
       s.all_triangles = triangles;
       publish_sum(p.order[s.item].triangles, s.item, triangles);
     }
-    find_triangle_base(s, p, triangles);
+    place_triangles(s, p, triangles);
   }
   if (for_vertices) {
-    wait_for_neighbours<N>(s, p, neighbour);
+    fetch_boundaries<N>(s, p, neighbour);
     if (at_once) arrive(s.barriers.neighbours);
   } else if (at_once) {
     wait(s.barriers.vertex_base, turn);
@@ -129,19 +142,19 @@ __device__ inline void find_places(TileShared& s, const TileParams& p) {
 }
 
 template <int N, class T, bool Normals>
-__device__ inline void emit_all_vertices(TileShared& s, const TileParams& p) {
+__device__ inline void write_vertices(TileShared& s, const TileParams& p) {
   constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t vertices = s.all_vertices;
   if (s.vertex_base + vertices > p.vertex_capacity) return;
   for (std::uint32_t first = 0; first < vertices; first += kListed) {
     if (first > 0) mark_vertices<N>(s, first);
-    emit_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
+    write_listed_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
     if (vertices > kListed) __syncthreads();
   }
 }
 
 template <int N>
-__device__ inline void emit_all_triangles(TileShared& s, const TileParams& p) {
+__device__ inline void write_triangles(TileShared& s, const TileParams& p) {
   constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t cells = s.all_cells;
   std::uint64_t base = s.triangle_base;
@@ -150,10 +163,10 @@ __device__ inline void emit_all_triangles(TileShared& s, const TileParams& p) {
     const std::uint32_t listed = ::min(cells - first, kListed);
     if (cells > kListed) {
       mark_cells<N>(s, first);
-      find_cells<N>(s, listed);
+      list_cells<N>(s, listed);
       __syncthreads();
     }
-    emit_triangles<N>(s, p, listed, base);
+    write_listed_triangles<N>(s, p, listed, base);
     if (cells > kListed) {
       base += triangles_before<N>(s, (listed + 31) / 32);
       __syncthreads();
@@ -170,27 +183,27 @@ __device__ inline bool can_help(TileShared& s) {
          uniform(taken) + BlockConfig<N>::kWarps <= (s.all_vertices + 31) / 32;
 }
 
-/// Of a counted tile.
+/// Writes the mesh of a tile that has its place.
 template <int N, class T, bool Normals, bool Nan>
-__device__ inline void make_mesh_of_tile(TileShared& s, const TileParams& p) {
-  find_places<N, Nan>(s, p);
+__device__ inline void write_tile(TileShared& s, const TileParams& p) {
   const bool at_once = listed_at_once<N, Nan>(s);
   const bool has_waited = at_once && warp_id() == BlockConfig<N>::kVertices;
-  // With normals vertices are most of the work, and all warps make them.
-  if (!has_waited || Normals || can_help<N>(s)) emit_all_vertices<N, T, Normals>(s, p);
+  // With normals vertices are most of the work, and all warps write them.
+  if (!has_waited || Normals || can_help<N>(s)) write_vertices<N, T, Normals>(s, p);
+  // Numbers of vertices that tiles before this one own.
   if (!at_once) {
     __syncthreads();
-    number_at_0<N>(s);
+    adopt_at_0<N>(s);
   } else {
     if (!has_waited) wait(s.barriers.neighbours, s.barriers.turn);
-    number_at_0<N, !Normals>(s);
+    adopt_at_0<N, !Normals>(s);
   }
-  // Elsewhere the first warp may still make vertices.
+  // Elsewhere the first warp may still write vertices.
   __syncthreads();
-  borrow_rows<N>(s);
-  place_numbers<N>(s);
+  adopt_rows<N>(s);
+  number_edges<N>(s);
   __syncthreads();
-  emit_all_triangles<N>(s, p);
+  write_triangles<N>(s, p);
 }
 
 }  // namespace isobrick::gpu

@@ -32,7 +32,7 @@ __device__ inline void fill_tables(TileShared& s, const CaseTable* cases) {
 /// y and z are counted by the mask of its upper ones, so one too many. The last warp: the first
 /// ones have other rows to see to.
 template <int N>
-__device__ inline void place_numbers(TileShared& s) {
+__device__ inline void number_edges(TileShared& s) {
   const unsigned t = own_thread() - (N - 32);
   if (t >= 24) return;
   const unsigned e = t % 12, at_0 = t / 12;
@@ -49,8 +49,8 @@ __device__ inline EdgePlace place_at(std::uint32_t address) {
 }
 
 /// Writes triangle `number` of a listed cell. `places` is the address of the table.
-__device__ inline void emit_triangle(const TileShared& s, std::uint32_t places, std::uint32_t cell,
-                                     std::uint32_t number, Triangle& to) {
+__device__ inline void write_triangle(const TileShared& s, std::uint32_t places, std::uint32_t cell,
+                                      std::uint32_t number, Triangle& to) {
   const char* base = reinterpret_cast<const char*>(&s);
   const auto word = [base](std::uint32_t at) {
     return *reinterpret_cast<const std::uint32_t*>(base + at);
@@ -88,12 +88,12 @@ struct PendingTriangles {
   std::uint32_t starts;  ///< bit i: with triangle i a cell begins
 
   /// One a lane. `lanes` are the own lane and those below.
-  __device__ void emit(const TileShared& s, std::uint32_t places, const std::uint32_t* cells,
-                       std::uint32_t lanes, Triangle& to) const {
+  __device__ void write(const TileShared& s, std::uint32_t places, const std::uint32_t* cells,
+                        std::uint32_t lanes, Triangle& to) const {
     const std::uint32_t begun = starts & lanes;
     const auto from = static_cast<std::uint32_t>(31 - __clz(static_cast<int>(begun)));
-    emit_triangle(s, places, cells[cell + __popc(begun) - 1],
-                  begun ? lane_id() - from : lane_id() + into, to);
+    write_triangle(s, places, cells[cell + __popc(begun) - 1],
+                   begun ? lane_id() - from : lane_id() + into, to);
   }
   __device__ void pass_32() {
     into = starts ? 1 + static_cast<std::uint32_t>(__clz(static_cast<int>(starts))) : into + 32;
@@ -104,8 +104,8 @@ struct PendingTriangles {
 /// Writes the triangles of the listed cells; `base` is the number of the first of
 /// them in the mesh.
 template <int N>
-__device__ inline void emit_triangles(TileShared& s, const TileParams& p, std::uint32_t listed,
-                                      std::uint64_t base) {
+__device__ inline void write_listed_triangles(TileShared& s, const TileParams& p,
+                                              std::uint32_t listed, std::uint64_t base) {
   const WarpPart part = part_beside_first<N, 3, 4>(listed);  // it takes the next tile
   const std::uint32_t* cells = lists_of<N>(s).cells;
   const std::uint16_t* group_triangles = lists_of<N>(s).group_triangles;
@@ -123,13 +123,13 @@ __device__ inline void emit_triangles(TileShared& s, const TileParams& p, std::u
     pending.starts |= warp_or(bit_at(place));
 #pragma unroll 1
     for (; waiting >= 32; waiting -= 32, number += 32) {
-      pending.emit(s, places, cells, lanes, to[number]);
+      pending.write(s, places, cells, lanes, to[number]);
       pending.pass_32();
       place -= 32;
       pending.starts = warp_or(bit_at(place));
     }
   }
-  if (lane_id() < waiting) pending.emit(s, places, cells, lanes, to[number]);
+  if (lane_id() < waiting) pending.write(s, places, cells, lanes, to[number]);
 }
 
 }  // namespace isobrick::gpu

@@ -122,8 +122,9 @@ struct VertexMaker {
 
 /// Writes the marked vertices, the first of which has number `first` in the tile.
 template <int N, class T, bool Normals, class At0>
-__device__ inline void emit_vertices_of(TileShared& s, const TileParams& p, std::uint32_t first,
-                                        std::uint32_t listed, At0 at_0) {
+__device__ inline void write_listed_vertices_of(TileShared& s, const TileParams& p,
+                                                std::uint32_t first, std::uint32_t listed,
+                                                At0 at_0) {
   using Maker = VertexMaker<T>;
   const Maker maker{s, p, p.vertex_isovalue};
   const auto& lists = lists_of<N>(s);
@@ -145,15 +146,15 @@ __device__ inline void emit_vertices_of(TileShared& s, const TileParams& p, std:
 
 /// The same for any tile.
 template <int N, class T, bool Normals>
-__device__ inline void emit_vertices(TileShared& s, const TileParams& p, std::uint32_t first,
-                                     std::uint32_t listed) {
+__device__ inline void write_listed_vertices(TileShared& s, const TileParams& p,
+                                             std::uint32_t first, std::uint32_t listed) {
   const bool at_0 = s.shape.at_0 != 0;
   if (Normals)  // which leave no registers for what else would be kept
-    emit_vertices_of<N, T, Normals>(s, p, first, listed, at_0);
+    write_listed_vertices_of<N, T, Normals>(s, p, first, listed, at_0);
   else if (at_0)
-    emit_vertices_of<N, T, Normals>(s, p, first, listed, std::true_type());
+    write_listed_vertices_of<N, T, Normals>(s, p, first, listed, std::true_type());
   else
-    emit_vertices_of<N, T, Normals>(s, p, first, listed, std::false_type());
+    write_listed_vertices_of<N, T, Normals>(s, p, first, listed, std::false_type());
 }
 
 }  // namespace isobrick::gpu
