@@ -8,6 +8,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "core/box_union.h"
 #include "core/length_unit.h"
 
 namespace isobrick {
@@ -115,11 +116,7 @@ void Lists::add(const GlbVertices& form, const GlbPrimitive& primitive) {
 void Bounds3f::include(std::span<const Vec3f> positions) {
   if (positions.empty()) return;
   if (std::exchange(empty, false)) lo = hi = positions.front();
-  for (const Vec3f& p : positions)
-    for (int axis = 0; axis < 3; ++axis) {
-      lo[axis] = std::min(lo[axis], p[axis]);
-      hi[axis] = std::max(hi[axis], p[axis]);
-    }
+  for (const Vec3f& p : positions) widen(lo, hi, p, p);
 }
 
 void GlbVertices::set_grid(const Bounds3f& bounds) {

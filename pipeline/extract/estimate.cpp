@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/box_union.h"
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/tile_sample.h"
 #include "pipeline/workers.h"
@@ -32,12 +33,6 @@ constexpr std::size_t kMinGroups = 4;
 Box3 block_box(Int3 tile, int i) {
   const Int3 corner = tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
   return {corner, corner + Int3{kBlockEdge, kBlockEdge, kBlockEdge}};
-}
-
-/// The smallest box that has both.
-Box3 unite(Box3 a, Box3 b) {
-  if (a.empty() || b.empty()) return a.empty() ? b : a;
-  return {min(a.lo, b.lo), max(a.hi, b.hi)};
 }
 
 /// Adds the cells between `samples` in the active blocks of a tile.

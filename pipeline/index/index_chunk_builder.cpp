@@ -8,6 +8,7 @@
 
 #include <isobrick/error.h>
 #include "bricks/zarr/codec.h"
+#include "core/box_union.h"
 #include "core/morton.h"
 #include "index/leaf_ranges.h"
 #include "index/span_index.h"
@@ -165,10 +166,10 @@ void IndexChunkBuilder::Chunk<T>::build_from_samples(const std::vector<Int3>& br
   };
   for (std::size_t first = 0, end = 0; first < bricks.size(); first = end) {
     // In Morton order the bricks of a piece, a cube of a power of two, follow each other.
-    Box3 box{bricks[first], bricks[first]};
+    Box3 box;
     for (end = first; end < bricks.size() && piece_of(bricks[end]) == piece_of(bricks[first]);
          ++end)
-      box = {min(box.lo, bricks[end]), max(box.hi, bricks[end] + Int3{1, 1, 1})};
+      box = unite(box, {bricks[end], bricks[end] + Int3{1, 1, 1}});
     const Box3 seen = intersect({box.lo * kEdge, box.hi * kEdge + Int3{1, 1, 1}}, volume_box);
     const Int3 extent = seen.extent();
     const auto bytes = static_cast<std::size_t>(volume(extent)) * sizeof(T);

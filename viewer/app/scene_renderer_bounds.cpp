@@ -1,6 +1,6 @@
-#include <algorithm>
 #include <vector>
 
+#include "core/box_union.h"
 #include "viewer/app/scene_renderer.h"
 #include "viewer/scene/surface_box.h"
 
@@ -10,22 +10,9 @@ namespace isobrick {
 namespace {
 
 WorldBox world_box(const Transform& transform, const IndexBox& box) {
-  const auto c = corners(transform, box.lo, box.hi);
-  WorldBox world{c[0], c[0]};
-  for (const Vec3d& p : c)
-    for (int axis = 0; axis < 3; ++axis) {
-      world.lo[axis] = std::min(world.lo[axis], p[axis]);
-      world.hi[axis] = std::max(world.hi[axis], p[axis]);
-    }
-  return world;
-}
-
-void include(std::optional<IndexBox>& box, const IndexBox& more) {
-  if (!box) box = more;
-  for (int axis = 0; axis < 3; ++axis) {
-    box->lo[axis] = std::min(box->lo[axis], more.lo[axis]);
-    box->hi[axis] = std::max(box->hi[axis], more.hi[axis]);
-  }
+  BoxUnion<WorldBox> world;
+  for (const Vec3d& p : corners(transform, box.lo, box.hi)) world.include({p, p});
+  return *world.box();
 }
 
 }  // namespace
@@ -41,15 +28,16 @@ WorldBox SceneRenderer::shown_bounds(const ViewSettings& settings) const {
   std::vector<double> isovalues;
   for (const SurfaceSettings& surface : settings.surfaces)
     if (surface.shown) isovalues.push_back(surface.isovalue);
-  std::optional<IndexBox> box = surface_box(*store_bricks(store_), scene_->tree(), isovalues, part);
+  BoxUnion<IndexBox> shown_box(surface_box(*store_bricks(store_), scene_->tree(), isovalues, part));
   for (int axis = 0; axis < 3; ++axis) {
     const SliceSettings& slice = settings.slices[static_cast<std::size_t>(axis)];
     IndexBox plane = part;
     plane.lo[axis] = plane.hi[axis] = static_cast<double>(slice.place) * last[axis];
     if (slice.shown && part.lo[axis] <= plane.lo[axis] && plane.hi[axis] <= part.hi[axis])
-      include(box, plane);
+      shown_box.include(plane);
   }
-  return world_box(scene_->tree().grid().transform(), box.value_or(IndexBox{{0, 0, 0}, last}));
+  return world_box(scene_->tree().grid().transform(),
+                   shown_box.box().value_or(IndexBox{{0, 0, 0}, last}));
 }
 
 }  // namespace isobrick

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "core/box_union.h"
 #include "core/length_unit.h"
 #include "io/bytes/mapped_file.h"
 #include "viewer/render/gl_context.h"
@@ -71,10 +72,7 @@ void find_bounds(const std::vector<Opened>& meshes, Vec3d& lo, Vec3d& hi) {
       lo = mesh_lo;
       hi = mesh_hi;
     }
-    for (int axis = 0; axis < 3; ++axis) {
-      lo[axis] = std::min(lo[axis], mesh_lo[axis]);
-      hi[axis] = std::max(hi[axis], mesh_hi[axis]);
-    }
+    widen(lo, hi, mesh_lo, mesh_hi);
   }
 }
 

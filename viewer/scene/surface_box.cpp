@@ -7,6 +7,7 @@
 
 #include <isobrick/error.h>
 #include <isobrick/lattice.h>
+#include "core/box_union.h"
 
 namespace isobrick {
 namespace {
@@ -15,28 +16,6 @@ namespace {
 constexpr Index kNodeBlocks = kNodeEdge / kBlockEdge;
 constexpr Index kChunkNodes = StoreReader::kRangeChunk / kNodeBlocks;
 static_assert(kChunkNodes * kNodeBlocks == StoreReader::kRangeChunk);
-
-/// The box around all that were included; nothing at first.
-class BoxUnion {
- public:
-  void include(const IndexBox& box) {
-    if (!box_) box_ = box;
-    for (int axis = 0; axis < 3; ++axis) {
-      box_->lo[axis] = std::min(box_->lo[axis], box.lo[axis]);
-      box_->hi[axis] = std::max(box_->hi[axis], box.hi[axis]);
-    }
-  }
-  bool has(const IndexBox& box) const {
-    if (!box_) return false;
-    for (int axis = 0; axis < 3; ++axis)
-      if (box.lo[axis] < box_->lo[axis] || box.hi[axis] > box_->hi[axis]) return false;
-    return true;
-  }
-  const std::optional<IndexBox>& box() const { return box_; }
-
- private:
-  std::optional<IndexBox> box_;
-};
 
 /// What is within both; nothing where they only touch. `part` may be flat.
 std::optional<IndexBox> within(const IndexBox& part, const IndexBox& box) {
@@ -75,7 +54,7 @@ class ReachCounts {
 
   /// Around the edges between samples that one of the isovalues crosses.
   std::optional<IndexBox> crossed() const {
-    BoxUnion box;
+    BoxUnion<IndexBox> box;
     for_each_point(samples_, [&](Int3 p) {
       for (int axis = 0; axis < 3; ++axis) {
         Int3 next = p;
@@ -125,7 +104,7 @@ class Search {
   std::optional<IndexBox> run() {
     std::vector<IndexBox> chunks = active_chunks();
     // Those at the ends of the volume make the box so large that most others are within.
-    BoxUnion all;
+    BoxUnion<IndexBox> all;
     for (const IndexBox& chunk : chunks) all.include(chunk);
     if (!all.box()) return std::nullopt;
     const Vec3d middle = (all.box()->lo + all.box()->hi) * 0.5;
@@ -139,7 +118,7 @@ class Search {
       return outwards(a) > outwards(b);
     });
     for (const IndexBox& chunk : chunks)
-      if (!found_.has(chunk)) read_blocks(chunk);
+      if (!found_.covers(chunk)) read_blocks(chunk);
     if (!found_.box()) return std::nullopt;
     return cells_of(*found_.box());
   }
@@ -155,7 +134,7 @@ class Search {
     const Int3 nodes = tree_.grid().level(0).nodes, edge{kChunkNodes, kChunkNodes, kChunkNodes};
     std::vector<IndexBox> chunks;
     for_each_point({{0, 0, 0}, ceil_div(nodes, edge)}, [&](Int3 chunk) {
-      BoxUnion active;
+      BoxUnion<IndexBox> active;
       for_each_point(intersect({chunk * edge, (chunk + Int3{1, 1, 1}) * edge}, {{0, 0, 0}, nodes}),
                      [&](Int3 node) {
                        const ValueRange<float> range = tree_.range({0, node});
@@ -220,7 +199,7 @@ class Search {
   const NodeTree& tree_;
   std::span<const double> isovalues_;
   const IndexBox& part_;
-  BoxUnion found_;
+  BoxUnion<IndexBox> found_;
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <isobrick/error.h>
+#include "core/box_union.h"
 #include "core/length_unit.h"
 #include "core/vectors.h"
 #include "io/bytes/byte_order.h"
@@ -148,10 +149,7 @@ void BoundsOf::include(Vec3d p, std::uint64_t vertex) {
     throw Error(
         fmt::format("'{}' is damaged: vertex {} is at ({}, {}, {})", path_, vertex, p.x, p.y, p.z));
   if (!std::exchange(any_, true)) lo_ = hi_ = p;
-  for (int axis = 0; axis < 3; ++axis) {
-    lo_[axis] = std::min(lo_[axis], p[axis]);
-    hi_[axis] = std::max(hi_[axis], p[axis]);
-  }
+  widen(lo_, hi_, p, p);
 }
 
 void BoundsOf::get(Vec3d& lo, Vec3d& hi) const {

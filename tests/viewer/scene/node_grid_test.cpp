@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/box_union.h"
 #include "pipeline/convert/downsample.h"
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
@@ -42,18 +43,13 @@ TEST(NodeGrid, ChildrenCoverTheirParentExactly) {
     Index children = 0;
     for_each_point({{0, 0, 0}, grid.level(v).nodes}, [&](Int3 p) {
       const IndexBox box = grid.box({v, p});
-      Vec3d lo = box.hi, hi = box.lo;
+      BoxUnion<IndexBox> all;
       for_each_point(grid.children({v, p}), [&](Int3 c) {
         ++children;
         EXPECT_EQ(grid.parent({v - 1, c}), (NodeKey{v, p}));
-        const IndexBox part = grid.box({v - 1, c});
-        for (int axis = 0; axis < 3; ++axis) {
-          lo[axis] = std::min(lo[axis], part.lo[axis]);
-          hi[axis] = std::max(hi[axis], part.hi[axis]);
-        }
+        all.include(grid.box({v - 1, c}));
       });
-      EXPECT_EQ(lo, box.lo);
-      EXPECT_EQ(hi, box.hi);
+      EXPECT_EQ(all.box(), box);
     });
     EXPECT_EQ(children, volume(grid.level(v - 1).nodes));
   }
