@@ -62,7 +62,7 @@ std::uint32_t block_vertices(std::uint64_t budget) {
 }  // namespace
 
 /// A block with its bookkeeping.
-class OwnedMeshBlock final : public MeshBlock {
+class OwnedMeshBlock final : public SharedMeshBlock {
  public:
   OwnedMeshBlock(const Driver& driver, int device, std::uint32_t vertex_room)
       : driver_(driver), free_(vertex_room, 2 * vertex_room) {
@@ -131,7 +131,7 @@ class OwnedMeshBlock final : public MeshBlock {
 MeshSlice::~MeshSlice() {
   if (block_) block_->trim(range_, 0, 0);
 }
-std::shared_ptr<const MeshBlock> MeshSlice::block() const { return block_; }
+std::shared_ptr<const SharedMeshBlock> MeshSlice::block() const { return block_; }
 GridMeshPlace MeshSlice::place() const { return block_->place(range_); }
 void MeshSlice::trim(std::uint32_t vertices, std::uint32_t triangles) {
   range_ = block_->trim(range_, vertices, triangles);
@@ -175,7 +175,7 @@ void MeshMemory::keep(std::size_t count) {
   if (count < impl_->blocks.size()) impl_->blocks.resize(count);
 }
 
-std::vector<std::shared_ptr<const MeshBlock>> MeshMemory::blocks() const {
+std::vector<std::shared_ptr<const SharedMeshBlock>> MeshMemory::blocks() const {
   const std::lock_guard lock(impl_->mutex);
   return {impl_->blocks.begin(), impl_->blocks.end()};
 }

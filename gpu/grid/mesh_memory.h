@@ -13,7 +13,7 @@ namespace isobrick::gpu {
 
 /// A large block of device memory that other interfaces (OpenGL) can import: an array of
 /// positions, one of as many normals, one of twice as many triangles.
-struct MeshBlock {
+struct SharedMeshBlock {
   int file = -1;                              ///< descriptor to import it by; closed with the block
   std::uint64_t bytes = 0;                    ///< all arrays, one behind the other without gaps
   std::uint32_t vertices = 0, triangles = 0;  ///< room
@@ -35,7 +35,7 @@ class MeshSlice {
   }
   ~MeshSlice();
 
-  std::shared_ptr<const MeshBlock> block() const;
+  std::shared_ptr<const SharedMeshBlock> block() const;
   const MeshRange& range() const { return range_; }
   GridMeshPlace place() const;
   /// Frees what is behind the first so many.
@@ -61,7 +61,7 @@ class MeshMemory {
   /// Gives all but the first so many blocks back. Before any of them is used.
   void keep(std::size_t count);
 
-  std::vector<std::shared_ptr<const MeshBlock>> blocks() const;
+  std::vector<std::shared_ptr<const SharedMeshBlock>> blocks() const;
   /// Of blocks.
   std::uint64_t bytes() const;
 

@@ -21,7 +21,7 @@ namespace {
 /// other one.
 constexpr int kSlots = 16;
 
-DeviceBlock block_of(std::shared_ptr<const gpu::MeshBlock> block) {
+DeviceBlock block_of(std::shared_ptr<const gpu::SharedMeshBlock> block) {
   return {block->file, block->bytes, block->vertices, block->triangles, block};
 }
 
