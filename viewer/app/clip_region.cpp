@@ -18,9 +18,7 @@ ValueRange<float> range_of_all(const NodeTree& tree, RangeOf&& range_of) {
   ValueRange<float> all;
   for_each_point({{0, 0, 0}, tree.grid().level(top).nodes}, [&](Int3 p) {
     const ValueRange<float> r = range_of(NodeKey{top, p});
-    if (r.empty()) return;
-    all.lo = std::min(all.lo, r.lo);
-    all.hi = std::max(all.hi, r.hi);
+    if (!r.empty()) all.include(r);
   });
   return all;
 }
