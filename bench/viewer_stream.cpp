@@ -90,7 +90,7 @@ Json slide(Session& session, const Arguments& arguments) {
 Json device_json(const DeviceMesher::Times& t) {
   return {{"launches", t.launches},     {"meshes", t.grids},
           {"turn_seconds", t.turn},     {"memory_seconds", t.memory},
-          {"device_seconds", t.device}, {"hand_out_seconds", t.hand_out}};
+          {"device_seconds", t.device}, {"hand_out_seconds", t.deliver}};
 }
 
 /// Whether the picture shows all that there is, as well as it can.

@@ -16,7 +16,7 @@ void draw_markers(Renderer& renderer, const ViewSettings& settings, const NodeGr
                   Vec3d last, const Drawable* shown) {
   const Transform& transform = grid.transform();
   if (shown != nullptr)
-    for (const DrawnNode& node : shown->nodes) {
+    for (const NodeDraw& node : shown->nodes) {
       if (node.mesh->damage.empty()) continue;
       const IndexBox box = grid.box(node.mesh->key);
       const auto c = corners(transform, box.lo, box.hi);

@@ -21,7 +21,7 @@ MeshUploads::~MeshUploads() {
 bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
   keep(drawable);  // what comes further on is used, too
   std::optional<std::vector<MeshId>> left;
-  for (const DrawnNode& node : drawable.nodes) {
+  for (const NodeDraw& node : drawable.nodes) {
     if (node.mesh->device) continue;
     Upload& upload = uploads_[node.mesh->id()];
     upload.used = now_;
@@ -53,7 +53,7 @@ bool MeshUploads::go_on(Upload& upload, Share* share) {
 }
 
 void MeshUploads::keep(const Drawable& drawable) {
-  for (const DrawnNode& node : drawable.nodes) {
+  for (const NodeDraw& node : drawable.nodes) {
     if (node.mesh->device) continue;
     if (const auto upload = uploads_.find(node.mesh->id()); upload != uploads_.end())
       upload->second.used = now_;

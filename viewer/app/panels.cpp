@@ -222,17 +222,17 @@ void bookmarks_panel(ViewerState& state) {
 }
 
 /// Counted some times a second: it takes as long as to plan.
-std::uint64_t bricks_wanted(ViewerState& state) {
+std::uint64_t missing_bricks(ViewerState& state) {
   constexpr double kSeconds = 0.25;
   // Of many a fiftieth of the time at most.
   constexpr double kPart = 50;
   const double now = ImGui::GetTime();
-  if (now >= state.count_wanted_at) {
+  if (now >= state.next_brick_count) {
     Stopwatch watch;
-    state.bricks_wanted = state.picture->scene().stream().bricks_wanted();
-    state.count_wanted_at = now + std::max(kSeconds, kPart * watch.lap());
+    state.missing_bricks = state.picture->scene().stream().missing_bricks();
+    state.next_brick_count = now + std::max(kSeconds, kPart * watch.lap());
   }
-  return state.bricks_wanted;
+  return state.missing_bricks;
 }
 
 /// What a picture is, or becomes.
@@ -256,7 +256,7 @@ void status_panel(ViewerState& state) {
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
   text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
-                   mebibytes(c.brick_bytes), bricks_wanted(state)));
+                   mebibytes(c.brick_bytes), missing_bricks(state)));
   text(fmt::format("read {} in {:.2f} s, decode {:.2f} s, mesh {:.2f} s", mebibytes(c.bytes_read),
                    c.read_seconds, c.decode_seconds, c.mesh_seconds));
   text(fmt::format("{} meshes ({}), {} wait, {} in work", c.meshes, mebibytes(c.mesh_bytes),

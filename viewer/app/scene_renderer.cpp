@@ -49,7 +49,7 @@ int finest_node_level(const NodeGrid& grid, int stored) {
 bool same_meshes(const Drawable* a, const Drawable* b) {
   if (a == nullptr || b == nullptr || a == b) return a == b;
   return std::equal(a->nodes.begin(), a->nodes.end(), b->nodes.begin(), b->nodes.end(),
-                    [](const DrawnNode& p, const DrawnNode& q) {
+                    [](const NodeDraw& p, const NodeDraw& q) {
                       return p.mesh == q.mesh && p.isovalue == q.isovalue;
                     });
 }

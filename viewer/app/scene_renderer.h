@@ -192,7 +192,7 @@ class SceneRenderer {
   void wait_drawn(bool everything);
   void finish_picture();
   void drop_picture();
-  std::optional<std::size_t> surface_of(const DrawnNode& node, const ViewSettings& settings) const;
+  std::optional<std::size_t> surface_of(const NodeDraw& node, const ViewSettings& settings) const;
   void draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
                      PictureState& state);
   void update_state(const Asked& asked);

@@ -21,7 +21,7 @@ constexpr std::uint64_t kWholePicture = std::numeric_limits<std::uint64_t>::max(
 
 /// Which of the settings' surfaces a mesh of `shown_` belongs to. That may have been made when
 /// others were asked for: where there were as many, one has another isovalue by now.
-std::optional<std::size_t> SceneRenderer::surface_of(const DrawnNode& node,
+std::optional<std::size_t> SceneRenderer::surface_of(const NodeDraw& node,
                                                      const ViewSettings& settings) const {
   const auto number = static_cast<std::size_t>(node.isovalue);
   if (shown_->isovalues.size() == shown_surfaces_.size()) return shown_surfaces_[number];
@@ -35,7 +35,7 @@ void SceneRenderer::draw_surfaces(const ViewSettings& settings, const PictureSet
   state.isovalues.assign(settings.surfaces.size(), std::numeric_limits<double>::quiet_NaN());
   if (shown_ == nullptr) return;
   const ClipTest cuts(picture);
-  for (const DrawnNode& node : shown_->nodes) {
+  for (const NodeDraw& node : shown_->nodes) {
     if (!node.mesh->damage.empty()) {
       state.damage.push_back(node.mesh->damage);
       continue;

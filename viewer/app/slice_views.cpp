@@ -38,7 +38,7 @@ std::vector<float> floats_of(const SliceSamples& slice) {
 }  // namespace
 
 SliceViews::SliceViews(const PictureBudgets& budgets, Vec3d last, ScalarType type)
-    : last_(last), most_bytes_(slice_bytes(budgets, type)) {}
+    : last_(last), max_bytes_(slice_bytes(budgets, type)) {}
 
 void SliceViews::update(SceneStream& stream, const ViewSettings& settings) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -51,7 +51,7 @@ void SliceViews::update(SceneStream& stream, const ViewSettings& settings) {
     }
     SliceRequest request;
     request.axis = axis;
-    request.bytes = most_bytes_;
+    request.bytes = max_bytes_;
     request.position = settings.slices[slot].place * last_[axis];
     shown.requested = true;
     stream.set_slice(axis, request);

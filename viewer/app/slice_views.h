@@ -44,7 +44,7 @@ class SliceViews {
   };
 
   Vec3d last_;
-  std::uint64_t most_bytes_;  ///< of the samples of one
+  std::uint64_t max_bytes_;  ///< of the samples of one
   std::array<Slice, 3> slices_;
 };
 

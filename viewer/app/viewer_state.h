@@ -77,8 +77,8 @@ struct ViewerState {
   std::chrono::milliseconds message_time{15'000};  ///< for which a message is shown
   std::size_t messages_shown = 0;                  ///< so many of them the panel has shown
   std::optional<TypedIsovalue> typed;
-  std::uint64_t bricks_wanted = 0;  ///< as counted last
-  double count_wanted_at = 0;       ///< when next: time of Dear ImGui
+  std::uint64_t missing_bricks = 0;  ///< as counted last
+  double next_brick_count = 0;       ///< when next: time of Dear ImGui
   std::optional<PickedPoint> picked;
   bool measuring = false;
   std::vector<Vec3d> measured;  ///< world positions, two at most

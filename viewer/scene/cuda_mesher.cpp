@@ -26,22 +26,22 @@ DeviceBlock block_of(std::shared_ptr<const gpu::MeshBlock> block) {
 }
 
 /// A place for a mesh; gives it back when it is destroyed.
-class Place {
+class MeshSpanOwner {
  public:
-  Place(std::shared_ptr<gpu::MeshMemory> memory, gpu::MeshSpan span)
+  MeshSpanOwner(std::shared_ptr<gpu::MeshMemory> memory, gpu::MeshSpan span)
       : memory_(std::move(memory)), span_(std::move(span)) {}
-  Place(Place&& other) noexcept = default;
-  Place& operator=(Place&& other) noexcept {
+  MeshSpanOwner(MeshSpanOwner&& other) noexcept = default;
+  MeshSpanOwner& operator=(MeshSpanOwner&& other) noexcept {
     std::swap(memory_, other.memory_);
     std::swap(span_, other.span_);
     return *this;
   }
-  ~Place() {
+  ~MeshSpanOwner() {
     if (memory_) memory_->give_back(span_);
   }
 
   void trim(const gpu::GridMeshSize& size) { memory_->trim(span_, size.vertices, size.triangles); }
-  const gpu::MeshSpan& span() const { return span_; }
+  const gpu::MeshSpan& get() const { return span_; }
 
  private:
   std::shared_ptr<gpu::MeshMemory> memory_;
@@ -50,8 +50,8 @@ class Place {
 
 class SharedMesh final : public DeviceMesh {
  public:
-  explicit SharedMesh(Place&& place) : place_(std::move(place)) {
-    const gpu::MeshSpan& span = place_.span();
+  explicit SharedMesh(MeshSpanOwner&& span_owner) : owner_(std::move(span_owner)) {
+    const gpu::MeshSpan& span = owner_.get();
     block = block_of(span.block);
     first_vertex = span.first_vertex;
     vertices = span.vertices;
@@ -60,25 +60,25 @@ class SharedMesh final : public DeviceMesh {
   }
 
  private:
-  Place place_;
+  MeshSpanOwner owner_;
 };
 
 /// A grid that was taken.
-struct Job {
+struct GridJob {
   int slot;
   NodeMesh mesh;
-  DeviceMesher::Done done;
-  std::optional<Place> place;
+  DeviceMesher::Callback done;
+  std::optional<MeshSpanOwner> span;
 
   gpu::GridMeshJob on_device() const {
-    return {slot, place ? place->span().place : gpu::GridMeshPlace{}};
+    return {slot, span ? span->get().place : gpu::GridMeshPlace{}};
   }
 };
 
 /// What the device's thread works with. It outlives the mesher while that thread does.
-class Work {
+class DeviceWorker {
  public:
-  Work(int index, std::string device_name, std::shared_ptr<gpu::MeshMemory> shared)
+  DeviceWorker(int index, std::string device_name, std::shared_ptr<gpu::MeshMemory> shared)
       : device(index),
         name(std::move(device_name)),
         memory(std::move(shared)),
@@ -86,7 +86,7 @@ class Work {
     for (int i = 0; i < kSlots; ++i) free_.push_back(i);
   }
 
-  bool take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done);
+  bool take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Callback&& done);
   /// Until end(), and until all that was taken is done.
   void run();
   void end();
@@ -99,40 +99,40 @@ class Work {
   TicketLock kernel_lock;
 
  private:
-  std::optional<Place> place_for(std::uint32_t vertices, std::uint32_t triangles) const;
-  void make(std::vector<Job>& jobs, DeviceMesher::Times& now);
+  std::optional<MeshSpanOwner> reserve_span(std::uint32_t vertices, std::uint32_t triangles) const;
+  void make(std::vector<GridJob>& jobs, DeviceMesher::Times& now);
   void add(const DeviceMesher::Times& now);
   std::optional<int> free_slot();
-  std::vector<Job> next_jobs();
-  void free_slots(const std::vector<Job>& jobs, const std::string& failure);
-  void write_again(std::vector<Job*>& jobs);
+  std::vector<GridJob> next_jobs();
+  void free_slots(const std::vector<GridJob>& jobs, const std::string& failure);
+  void write_again(std::vector<GridJob*>& jobs);
   void learn(const gpu::GridMeshSize& size);
 
   gpu::GridBatch batch_;
   /// Room that is taken for a mesh whose size is not known yet.
-  std::uint32_t likely_vertices_ = 1u << 14, likely_triangles_ = 1u << 15;
+  std::uint32_t expected_vertices_ = 1u << 14, expected_triangles_ = 1u << 15;
 
   Mutex mutex_;
   CondVar freed_, taken_;
   std::vector<int> free_ ISOBRICK_GUARDED_BY(mutex_);  ///< slots
-  std::vector<Job> jobs_ ISOBRICK_GUARDED_BY(mutex_);
+  std::vector<GridJob> jobs_ ISOBRICK_GUARDED_BY(mutex_);
   std::string failure_ ISOBRICK_GUARDED_BY(mutex_);  ///< empty: none
   bool end_ ISOBRICK_GUARDED_BY(mutex_) = false;
   DeviceMesher::Times times_ ISOBRICK_GUARDED_BY(mutex_);
 };
 
-DeviceMesher::Times Work::times() {
+DeviceMesher::Times DeviceWorker::times() {
   const MutexLock lock(mutex_);
   return times_;
 }
 
-std::string Work::failure() {
+std::string DeviceWorker::failure() {
   const MutexLock lock(mutex_);
   return failure_;
 }
 
 /// Waits for it; nothing once the device has failed.
-std::optional<int> Work::free_slot() {
+std::optional<int> DeviceWorker::free_slot() {
   const MutexLock lock(mutex_);
   while (failure_.empty() && free_.empty()) freed_.wait(mutex_);
   if (!failure_.empty()) return std::nullopt;
@@ -141,7 +141,7 @@ std::optional<int> Work::free_slot() {
   return slot;
 }
 
-bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done) {
+bool DeviceWorker::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Callback&& done) {
   const std::optional<int> slot = free_slot();
   if (!slot) return false;
   batch_.stage(*slot, grid);
@@ -153,7 +153,7 @@ bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done
   return true;
 }
 
-void Work::end() {
+void DeviceWorker::end() {
   {
     const MutexLock lock(mutex_);
     end_ = true;
@@ -162,22 +162,22 @@ void Work::end() {
 }
 
 /// Waits for them; none once all is done and the end has come.
-std::vector<Job> Work::next_jobs() {
+std::vector<GridJob> DeviceWorker::next_jobs() {
   const MutexLock lock(mutex_);
   while (!end_ && jobs_.empty()) taken_.wait(mutex_);
   return std::exchange(jobs_, {});
 }
 
-void Work::free_slots(const std::vector<Job>& jobs, const std::string& failure) {
+void DeviceWorker::free_slots(const std::vector<GridJob>& jobs, const std::string& failure) {
   {
     const MutexLock lock(mutex_);
     failure_ = failure;
-    for (const Job& job : jobs) free_.push_back(job.slot);
+    for (const GridJob& job : jobs) free_.push_back(job.slot);
   }
   freed_.notify_all();
 }
 
-void Work::run() {
+void DeviceWorker::run() {
   std::string failure;
   try {
     gpu::open_device(device);
@@ -185,7 +185,7 @@ void Work::run() {
     failure = e.what();
   }
   for (;;) {
-    std::vector<Job> jobs = next_jobs();
+    std::vector<GridJob> jobs = next_jobs();
     if (jobs.empty()) return;
     DeviceMesher::Times now{.launches = 1, .grids = jobs.size()};
     try {
@@ -195,91 +195,92 @@ void Work::run() {
     }
     free_slots(jobs, failure);
     Stopwatch watch;
-    for (Job& job : jobs) job.done(std::move(job.mesh), failure);
+    for (GridJob& job : jobs) job.done(std::move(job.mesh), failure);
     jobs.clear();
-    now.hand_out = watch.lap();
+    now.deliver = watch.lap();
     add(now);
   }
 }
 
-void Work::add(const DeviceMesher::Times& now) {
+void DeviceWorker::add(const DeviceMesher::Times& now) {
   const MutexLock lock(mutex_);
   times_.launches += now.launches;
   times_.grids += now.grids;
-  times_.turn += now.turn;
+  times_.lock += now.lock;
   times_.memory += now.memory;
   times_.device += now.device;
-  times_.hand_out += now.hand_out;
+  times_.deliver += now.deliver;
 }
 
-std::optional<Place> Work::place_for(std::uint32_t vertices, std::uint32_t triangles) const {
+std::optional<MeshSpanOwner> DeviceWorker::reserve_span(std::uint32_t vertices,
+                                                        std::uint32_t triangles) const {
   if (memory == nullptr) return std::nullopt;
   auto span = memory->take(vertices, triangles);
   if (!span) return std::nullopt;
-  return Place(memory, *std::move(span));
+  return MeshSpanOwner(memory, *std::move(span));
 }
 
-void Work::learn(const gpu::GridMeshSize& size) {
+void DeviceWorker::learn(const gpu::GridMeshSize& size) {
   if (size.triangles == 0) return;
-  likely_vertices_ = std::max(size.vertices + size.vertices / 4, likely_vertices_ / 8 * 7);
-  likely_triangles_ = std::max(size.triangles + size.triangles / 4, likely_triangles_ / 8 * 7);
+  expected_vertices_ = std::max(size.vertices + size.vertices / 4, expected_vertices_ / 8 * 7);
+  expected_triangles_ = std::max(size.triangles + size.triangles / 4, expected_triangles_ / 8 * 7);
 }
 
 /// Room is taken for what meshes were like before, so that the device is waited for once.
-void Work::make(std::vector<Job>& jobs, DeviceMesher::Times& now) {
+void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
   Stopwatch watch;
   std::vector<gpu::GridMeshJob> all;
-  for (Job& job : jobs) {
-    job.place = place_for(likely_vertices_, likely_triangles_);
+  for (GridJob& job : jobs) {
+    job.span = reserve_span(expected_vertices_, expected_triangles_);
     all.push_back(job.on_device());
   }
   now.memory = watch.lap();
   const TicketGuard guard(&kernel_lock);
-  now.turn = watch.lap();
+  now.lock = watch.lap();
   batch_.make(all);
-  std::vector<Job*> again;
-  for (Job& job : jobs) {
+  std::vector<GridJob*> again;
+  for (GridJob& job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job.slot);
     learn(size);
     job.mesh.seam_triangles = size.seam_triangles;
     if (size.triangles == 0)
-      job.place.reset();
-    else if (job.place && job.place->span().place.holds(size.vertices, size.triangles))
-      job.place->trim(size);
+      job.span.reset();
+    else if (job.span && job.span->get().place.holds(size.vertices, size.triangles))
+      job.span->trim(size);
     else
       again.push_back(&job);
   }
   write_again(again);
   now.device = watch.lap();
-  for (Job& job : jobs) {
-    if (!job.place) continue;
-    const gpu::MeshSpan& span = job.place->span();
+  for (GridJob& job : jobs) {
+    if (!job.span) continue;
+    const gpu::MeshSpan& span = job.span->get();
     job.mesh.device_triangles = span.triangles;
     job.mesh.device_bytes = span.vertices * 2 * sizeof(Vec3f) + span.triangles * sizeof(Triangle);
-    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.place, std::nullopt));
+    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.span, std::nullopt));
   }
 }
 
 /// Those that did not fit: now their sizes are known.
-void Work::write_again(std::vector<Job*>& jobs) {
+void DeviceWorker::write_again(std::vector<GridJob*>& jobs) {
   std::vector<gpu::GridMeshJob> placed;
-  for (Job* job : jobs) job->place.reset();
-  for (Job* job : jobs) {
+  for (GridJob* job : jobs) job->span.reset();
+  for (GridJob* job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job->slot);
-    job->place = place_for(size.vertices, size.triangles);
-    if (job->place) placed.push_back(job->on_device());
+    job->span = reserve_span(size.vertices, size.triangles);
+    if (job->span) placed.push_back(job->on_device());
   }
   batch_.write(placed);
-  for (Job* job : jobs)
-    if (!job->place) batch_.download(job->slot, job->mesh.mesh);
+  for (GridJob* job : jobs)
+    if (!job->span) batch_.download(job->slot, job->mesh.mesh);
 }
 
 class CudaMesher final : public DeviceMesher {
  public:
-  explicit CudaMesher(std::shared_ptr<Work> work)
-      : work_(std::move(work)), thread_([w = work_] { w->run(); }) {}
+  explicit CudaMesher(std::shared_ptr<DeviceWorker> worker)
+      : worker_(std::move(worker)), thread_([w = worker_] { w->run(); }) {}
   ~CudaMesher() override {
-    work_->end();
+    worker_->end();
     // The last one to hold it may be a mesh's receiver, in that thread.
     if (thread_.get_id() == std::this_thread::get_id())
       thread_.detach();
@@ -287,26 +288,26 @@ class CudaMesher final : public DeviceMesher {
       thread_.join();
   }
 
-  bool make(const GridView& grid, NodeMesh mesh, Done done) override {
-    return work_->take(grid, std::move(mesh), std::move(done));
+  bool make(const GridView& grid, NodeMesh mesh, Callback done) override {
+    return worker_->take(grid, std::move(mesh), std::move(done));
   }
-  std::string failure() const override { return work_->failure(); }
-  const std::string& name() const override { return work_->name; }
+  std::string failure() const override { return worker_->failure(); }
+  const std::string& name() const override { return worker_->name; }
   std::vector<DeviceBlock> shared_blocks() const override {
     std::vector<DeviceBlock> blocks;
-    if (work_->memory)
-      for (auto& block : work_->memory->blocks()) blocks.push_back(block_of(std::move(block)));
+    if (worker_->memory)
+      for (auto& block : worker_->memory->blocks()) blocks.push_back(block_of(std::move(block)));
     return blocks;
   }
-  Times times() const override { return work_->times(); }
+  Times times() const override { return worker_->times(); }
   void share_only(std::size_t blocks) override {
-    if (work_->memory) work_->memory->keep(blocks);
+    if (worker_->memory) worker_->memory->keep(blocks);
   }
-  std::uint64_t bytes() const override { return work_->memory ? work_->memory->bytes() : 0; }
-  TicketLock& kernel_lock() override { return work_->kernel_lock; }
+  std::uint64_t bytes() const override { return worker_->memory ? worker_->memory->bytes() : 0; }
+  TicketLock& kernel_lock() override { return worker_->kernel_lock; }
 
  private:
-  std::shared_ptr<Work> work_;
+  std::shared_ptr<DeviceWorker> worker_;
   std::thread thread_;
 };
 
@@ -332,7 +333,8 @@ std::shared_ptr<DeviceMesher> open_device_mesher(const std::optional<DeviceId>& 
     } catch (const Error&) {  // through host memory, then
     }
   }
-  return std::make_shared<CudaMesher>(std::make_shared<Work>(device, info.name, std::move(memory)));
+  return std::make_shared<CudaMesher>(
+      std::make_shared<DeviceWorker>(device, info.name, std::move(memory)));
 }
 
 }  // namespace isobrick

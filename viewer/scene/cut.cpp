@@ -28,34 +28,36 @@ struct Candidate {
   }
 };
 
-/// Candidates, those that lose thin structure apart.
-class Candidates {
+/// CandidateQueue, those that lose thin structure apart.
+class CandidateQueue {
  public:
-  void push(const Candidate& candidate, bool loses) { (loses ? losing_ : others_).push(candidate); }
-  bool empty() const { return losing_.empty() && others_.empty(); }
-  struct Next {
+  void push(const Candidate& candidate, bool loses) {
+    (loses ? losing_ : regular_).push(candidate);
+  }
+  bool empty() const { return losing_.empty() && regular_.empty(); }
+  struct Choice {
     NodeKey key;
     bool thin;  ///< loses thin structure
   };
   /// `thin_first`: one that loses thin structure, if there is any.
-  Next pop(bool thin_first) {
+  Choice pop(bool thin_first) {
     const bool thin =
-        !losing_.empty() && (thin_first || others_.empty() || others_.top() < losing_.top());
-    auto& queue = thin ? losing_ : others_;
+        !losing_.empty() && (thin_first || regular_.empty() || regular_.top() < losing_.top());
+    auto& queue = thin ? losing_ : regular_;
     const NodeKey key = queue.top().key;
     queue.pop();
     return {key, thin};
   }
 
  private:
-  std::priority_queue<Candidate> losing_, others_;
+  std::priority_queue<Candidate> losing_, regular_;
 };
 
 /// How many triangles a cut may have, and has so far. What thin structure takes beyond the budget
 /// leaves a part of the budget to all else.
-class Allowance {
+class TriangleBudget {
  public:
-  explicit Allowance(const CutBudget& budget)
+  explicit TriangleBudget(const CutBudget& budget)
       : limit_(bounded(budget.triangles, budget)),
         thin_limit_(std::max(limit_, bounded(budget.thin_triangles, budget))) {}
 
@@ -63,38 +65,39 @@ class Allowance {
   /// Whether thin structure may take more than the budget.
   bool stretches() const { return thin_limit_ > limit_; }
   /// Whether nodes that lose thin structure come before all others.
-  bool thin_first() const { return used_ < thin_limit_ - kOtherPart * limit_; }
+  bool thin_first() const { return used_ < thin_limit_ - kRegularPart * limit_; }
   bool fits(double more, bool thin) const {
-    const double after = used_ + more, rest = kOtherPart * limit_ - std::max(others_, 0.0);
+    const double after = used_ + more, rest = kRegularPart * limit_ - std::max(regular_, 0.0);
     if (after <= limit_) return true;
     return thin ? after <= thin_limit_ - std::max(rest, 0.0) : after <= thin_limit_ && more <= rest;
   }
   void take(double more, bool thin) {
     used_ += more;
-    if (!thin) others_ += more;
+    if (!thin) regular_ += more;
   }
 
  private:
-  static constexpr double kOtherPart = 1 - kThinPart;
+  static constexpr double kRegularPart = 1 - kThinPart;
   static double bounded(std::uint64_t triangles, const CutBudget& budget) {
     return static_cast<double>(std::min(triangles, budget.mesh_bytes / kBytesPerTriangle));
   }
 
   double limit_, thin_limit_;
-  double used_ = 0, others_ = 0;  ///< the latter for what loses nothing
+  double used_ = 0, regular_ = 0;  ///< the latter for what loses nothing
 };
 
-constexpr int kAround = 27;  ///< a node and its neighbours; bit (z + 1) · 9 + (y + 1) · 3 + x + 1
+constexpr int kNeighbourhood =
+    27;  ///< a node and its neighbours; bit (z + 1) · 9 + (y + 1) · 3 + x + 1
 
 /// For a child at each place of its parent, and each direction from the child: the bit of the
 /// parent's neighbour (or of the parent itself) that lies there. A place on an axis: the first of
 /// two children, the second, or the only one.
-using BitTable = std::array<std::array<std::uint8_t, kDirections>, kAround>;
+using BitTable = std::array<std::array<std::uint8_t, kDirections>, kNeighbourhood>;
 
 constexpr BitTable make_bits() {
   constexpr int steps[3][3] = {{-1, 0, 0}, {0, 0, 1}, {-1, 0, 1}};  // by place, then direction
   BitTable table{};
-  for (std::size_t place = 0; place < kAround; ++place)
+  for (std::size_t place = 0; place < kNeighbourhood; ++place)
     for (int i = 0; i < kDirections; ++i) {
       const Int3 d = direction(i);
       const int x = steps[place % 3][d.x + 1], y = steps[place / 3 % 3][d.y + 1],
@@ -120,10 +123,10 @@ std::size_t place_of(Int3 child, Int3 ratio, Int3 nodes) {
 }  // namespace
 
 CutSelector::CutSelector(const NodeTree& tree)
-    : tree_(tree), refined_(tree.grid(), 1), before_(tree.grid(), 1), wanted_(tree.grid(), 1) {}
+    : tree_(tree), refined_(tree.grid(), 1), previous_(tree.grid(), 1), queued_(tree.grid(), 1) {}
 
 double CutSelector::urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active) {
-  const bool before = before_(n) != 0;
+  const bool before = previous_(n) != 0;
   if (!(before ? sight.nearly_visible : sight.visible) || !active.below(n)) return 0;
   return sight.pixels * (before ? kHysteresis : 1);
 }
@@ -139,7 +142,7 @@ bool CutSelector::loses(const NodeKey& n, const ActiveNodes& active,
 
 double CutSelector::triangles(const NodeKey& n, const NodeView& view,
                               std::span<const double> isovalues, double per_block) const {
-  if (view.cuts_away(n)) return 0;
+  if (view.clips(n)) return 0;
   int blocks = 0;
   for (const double iso : isovalues) blocks += tree_.active_blocks(n, iso);
   return blocks * per_block;
@@ -161,8 +164,8 @@ double CutSelector::added_triangles(std::span<const NodeKey> refined, const Node
 /// `n` after all nodes that must be refined before it, so that no two neighbours
 /// are more than a level apart: those that lie around it a level above.
 void CutSelector::collect(const NodeKey& n, std::vector<NodeKey>& needed) {
-  if (refined_(n) || wanted_(n)) return;
-  wanted_(n) = 1;
+  if (refined_(n) || queued_(n)) return;
+  queued_(n) = 1;
   const NodeGrid& grid = tree_.grid();
   if (grid.has_parent(n)) {
     const Int3 ratio = grid.ratio(n.level);
@@ -183,10 +186,10 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   const std::vector<double>& isovalues = active.isovalues();
   const NodeGrid& grid = tree_.grid();
   const NodeView node_view(view, grid);
-  std::swap(refined_, before_);
+  std::swap(refined_, previous_);
   refined_.clear();
-  Candidates queue;
-  Allowance allowance(budget);
+  CandidateQueue queue;
+  TriangleBudget allowance(budget);
   const double least_error = budget.thin_triangles > 0
                                  ? std::min(view.pixel_error, view.thin_pixel_error)
                                  : view.pixel_error;
@@ -213,7 +216,7 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
     if (refined_(n)) continue;
     needed.clear();
     collect(n, needed);
-    for (const NodeKey& r : needed) wanted_(r) = 0;
+    for (const NodeKey& r : needed) queued_(r) = 0;
     const double more = added_triangles(needed, node_view, isovalues, budget.triangles_per_block);
     if (!allowance.fits(more, thin)) {
       cut.limited_by_budget = true;
@@ -244,7 +247,7 @@ std::uint32_t CutSelector::coarse_around(const NodeKey& n, const NodeView& view,
   std::uint32_t bit = 1;
   for_each_point({n.node - Int3{1, 1, 1}, n.node + Int3{2, 2, 2}}, [&](Int3 p) {
     const NodeKey k{n.level, p};
-    if (!refined_(k) && !view.cuts_away(k) && may_meet(k)) coarse |= bit;
+    if (!refined_(k) && !view.clips(k) && may_meet(k)) coarse |= bit;
     bit <<= 1;
   });
   return coarse;
@@ -255,7 +258,7 @@ void CutSelector::append(const NodeKey& n, std::uint32_t coarser, const NodeView
   if (n.level == 0 || !refined_(n)) {
     const NodeSight sight = view.see(n);
     cut.nodes.push_back({n, coarser, static_cast<float>(sight.pixels),
-                         static_cast<float>(sight.distance), sight.visible, sight.cut_away});
+                         static_cast<float>(sight.distance), sight.visible, sight.clipped});
     return;
   }
   const std::uint32_t coarse = coarse_around(n, view, active);

@@ -36,7 +36,7 @@ struct CutNode {
   float pixels = 0;    ///< a cell's length on the picture
   float distance = 0;  ///< from the eye, world length
   bool visible = false;
-  bool cut_away = false;  ///< nothing of it is shown: it needs no mesh
+  bool clipped = false;  ///< nothing of it is shown: it needs no mesh
 };
 
 /// A set of nodes that covers the volume once. Face, edge and corner neighbours
@@ -76,7 +76,7 @@ class CutSelector {
 
   const NodeTree& tree_;
   // Nodes beside the volume count as refined: nothing is to be done there.
-  NodeFlags refined_, before_, wanted_;
+  NodeFlags refined_, previous_, queued_;
 };
 
 }  // namespace isobrick

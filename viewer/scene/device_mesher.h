@@ -44,13 +44,13 @@ class DeviceMesher {
 
   /// Gets the mesh that was asked for, or why there is none: the device failed, and makes no more.
   /// Called once for each grid, by the device's thread. Must not throw.
-  using Done = std::function<void(NodeMesh&& mesh, const std::string& failure)>;
+  using Callback = std::function<void(NodeMesh&& mesh, const std::string& failure)>;
 
   /// Has the mesh of GridExtractor made, byte for byte: in mesh.device, or in mesh.mesh where
   /// memory is not shared or there is no room. `mesh` says which it is. The grid is not
   /// looked at any more afterwards; waits only while as many as there is room for are being
   /// made. False when the device has failed: nothing was taken.
-  virtual bool make(const GridView& grid, NodeMesh mesh, Done done) = 0;
+  virtual bool make(const GridView& grid, NodeMesh mesh, Callback done) = 0;
   /// Why the device makes no more; empty while it does.
   virtual std::string failure() const = 0;
 
@@ -69,10 +69,10 @@ class DeviceMesher {
   /// What the device's thread has done so far.
   struct Times {
     std::uint64_t launches = 0, grids = 0;
-    double turn = 0;    ///< seconds of waiting for its turn
+    double lock = 0;    ///< seconds of waiting for its turn
     double memory = 0;  ///< of finding places for meshes
     double device = 0;  ///< until the device was done
-    double hand_out = 0;
+    double deliver = 0;
   };
   virtual Times times() const = 0;
 };

@@ -3,10 +3,10 @@
 namespace isobrick {
 namespace {
 
-class Cover {
+class CoverBuilder {
  public:
-  Cover(const NodeTree& tree, const CutIndex& cut, double isovalue, int number, MeshCache& meshes,
-        std::vector<DrawnNode>& nodes, bool& complete)
+  CoverBuilder(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
+               MeshCache& meshes, std::vector<NodeDraw>& nodes, bool& complete)
       : tree_(tree),
         cut_(cut),
         isovalue_(isovalue),
@@ -18,7 +18,7 @@ class Cover {
 
   bool cover(const NodeKey& n) {
     if (const CutNode* in_cut = cut_.find(n))
-      return in_cut->cut_away || cover_cut(n, in_cut->coarser);
+      return in_cut->clipped || cover_cut(n, in_cut->coarser);
     if (!tree_.active_below(n, isovalue_)) return cover_border(n);
     const std::size_t mark = nodes_.size();
     bool all = true;
@@ -87,7 +87,7 @@ class Cover {
   int number_;
   MeshCache& meshes_;
   int finest_;  ///< level with any mesh of the isovalue: nothing finer is looked for
-  std::vector<DrawnNode>& nodes_;
+  std::vector<NodeDraw>& nodes_;
   bool& complete_;
 };
 
@@ -106,8 +106,8 @@ const CutNode* CutIndex::find(const NodeKey& key) const {
 }
 
 bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
-                     MeshCache& meshes, std::vector<DrawnNode>& nodes, bool& complete) {
-  Cover cover(tree, cut, isovalue, number, meshes, nodes, complete);
+                     MeshCache& meshes, std::vector<NodeDraw>& nodes, bool& complete) {
+  CoverBuilder cover(tree, cut, isovalue, number, meshes, nodes, complete);
   const int top = tree.grid().levels() - 1;
   bool all = true;
   for_each_point({{0, 0, 0}, tree.grid().level(top).nodes}, [&](Int3 p) {

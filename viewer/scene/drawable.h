@@ -11,7 +11,7 @@
 namespace isobrick {
 
 /// A mesh to be drawn.
-struct DrawnNode {
+struct NodeDraw {
   MeshPtr mesh;
   int isovalue = 0;  ///< which of the cut's, for its colour
 };
@@ -19,7 +19,7 @@ struct DrawnNode {
 /// What shows the scene now: for each isovalue meshes of nodes no two of which lie
 /// over the same place. Meshes without triangles are left out unless they are damaged.
 struct Drawable {
-  std::vector<DrawnNode> nodes;
+  std::vector<NodeDraw> nodes;
   std::uint64_t version = 0;      ///< differs when the nodes do
   bool complete = false;          ///< the whole cut, nothing stands in
   std::vector<double> isovalues;  ///< that the cut asks for
@@ -44,6 +44,6 @@ class CutIndex {
 /// instead. False when some part can not be shown; then its surroundings are.
 /// `complete` becomes false where anything stands in.
 bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
-                     MeshCache& meshes, std::vector<DrawnNode>& nodes, bool& complete);
+                     MeshCache& meshes, std::vector<NodeDraw>& nodes, bool& complete);
 
 }  // namespace isobrick

@@ -24,35 +24,35 @@ class LevelSkipping {
     skipping_until_.reset();
   }
   /// A mesh took a thread so long.
-  void mesh_took(double seconds) {
+  void add_mesh_seconds(double seconds) {
     const MutexLock lock(mutex_);
     seconds_per_mesh_ += (seconds - seconds_per_mesh_) * kWeight;
   }
 
   /// How many meshes come soon enough for a plan that skips; see plan_jobs().
-  double soon() const {
+  double max_meshes() const {
     const MutexLock lock(mutex_);
     if (changed_twice_ && Clock::now() - *last_isovalue_ < kSliding) return 0;
-    return kSoon.count() / seconds_per_mesh_ * threads_;
+    return kMaxDelay.count() / seconds_per_mesh_ * threads_;
   }
   /// Whether the plan that is worked on now skips levels.
-  void planned(bool skips) {
+  void set_plan(bool skips) {
     const MutexLock lock(mutex_);
     if (!skips)
       skipping_until_.reset();
     else if (!skipping_until_)
-      skipping_until_ = Clock::now() + kLate;
+      skipping_until_ = Clock::now() + kDeadline;
   }
   /// Whether meshes of a plan that skips have not come soon enough: the levels between are needed.
-  bool late() const {
+  bool is_overdue() const {
     const MutexLock lock(mutex_);
     return skipping_until_ && Clock::now() > *skipping_until_;
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::duration<double> kSoon{0.1};
-  static constexpr std::chrono::milliseconds kLate{300};
+  static constexpr std::chrono::duration<double> kMaxDelay{0.1};
+  static constexpr std::chrono::milliseconds kDeadline{300};
   /// An isovalue that changes again within this time is being slid.
   static constexpr std::chrono::milliseconds kSliding{300};
   /// Of one mesh in the mean of those before.

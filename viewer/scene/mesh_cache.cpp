@@ -58,10 +58,10 @@ void MeshCache::put(MeshPtr mesh) {
 }
 
 bool MeshCache::shrink() {
-  if (keeps_budgets()) return true;
+  if (is_within_budgets()) return true;
   // Not for each mesh that is made anew.
   drop_until(budget_ - budget_ / 8, device_budget_ - device_budget_ / 8);
-  return keeps_budgets();
+  return is_within_budgets();
 }
 
 void MeshCache::shrink_device(std::uint64_t bytes) {

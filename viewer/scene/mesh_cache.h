@@ -33,7 +33,7 @@ class MeshCache {
 
   /// What is found from now on is kept by the next shrink().
   void begin_use() { ++now_; }
-  bool keeps_budgets() const { return bytes_ <= budget_ && device_bytes_ <= device_budget_; }
+  bool is_within_budgets() const { return bytes_ <= budget_ && device_bytes_ <= device_budget_; }
   /// When a budget is exceeded, drops what was not used since begin_use() until there is
   /// some room again. False when the budgets are exceeded all the same.
   bool shrink();

@@ -210,7 +210,7 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
   return impl_->read(key, isovalue, coarser, token);
 }
 
-bool NodeMesher::half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
+bool NodeMesher::half_resident(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
   const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
   const int stored = impl_->grid.level(key.level).source;
   const Box3 points = impl_->points(key);

@@ -50,7 +50,7 @@ class NodeMesher {
 
   /// Whether at least half of the bricks are there that hold a node's points and that the mesh
   /// needs. Reads nothing: where ranges have not been read, it seems to need all of them.
-  bool half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
+  bool half_resident(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
 
   /// Adds those of these bricks that are not there.
   void add_missing(const NodeKey& key, double isovalue, std::uint32_t coarser,

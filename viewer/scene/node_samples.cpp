@@ -100,19 +100,19 @@ template <class Take, class Skip>
 void NodeSamples::for_each_brick(int stored, Box3 box, const CancellationToken& token,
                                  const NeededSamples* needed, Take&& take, Skip&& skip) {
   const Lattice& lattice = bricks_.source().info().levels[static_cast<std::size_t>(stored)].lattice;
-  wanted_.clear();
+  needed_.clear();
   for_each_point(lattice.bricks_of(box), [&](Int3 b) {
     const Box3 part = intersect(box, lattice.full_brick_box(b));
     if (needed == nullptr || needed->any(part))
-      wanted_.push_back(b);
+      needed_.push_back(b);
     else
       skip(part);
   });
-  bricks_.read_together(stored, wanted_, token);
+  bricks_.read_together(stored, needed_, token);
   // Threads at nodes beside each other want the same bricks: were each to wait for what another
   // one is reading, all would read one brick after the other.
   std::vector<Int3> busy;
-  for (const Int3 b : wanted_)
+  for (const Int3 b : needed_)
     if (const auto brick = bricks_.get_unless_busy(stored, b, token))
       take(b, *brick);
     else

@@ -75,7 +75,7 @@ class NodeSamples {
   const NodeGrid& grid_;
   ResidentBricks& bricks_;
   std::array<Axis, 3> axes_;
-  std::vector<Int3> wanted_;  ///< bricks
+  std::vector<Int3> needed_;  ///< bricks
   std::vector<float> gathered_, along_x_, along_y_;
 };
 

@@ -42,10 +42,10 @@ std::string size_text(std::uint64_t bytes) {
 }
 
 NodeSearch::NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type,
-                       std::uint64_t most_bytes, std::function<void()> on_change)
+                       std::uint64_t max_bytes, std::function<void()> on_change)
     : tree_(std::move(tree)),
       type_(type),
-      most_bytes_(most_bytes),
+      max_bytes_(max_bytes),
       on_change_(std::move(on_change)),
       active_(*tree_) {
   state_.nodes = static_cast<std::uint64_t>(volume(tree_->grid().level(0).nodes));
@@ -144,9 +144,9 @@ void NodeSearch::build_requested() {
     std::string refused;
     std::optional<Bytes> built;
     const auto start = Clock::now();
-    if (need > most_bytes_)
+    if (need > max_bytes_)
       refused = fmt::format("the {} index of {} nodes takes {} to build, of {}", name_of(*kind),
-                            now.nodes, size_text(need), size_text(most_bytes_));
+                            now.nodes, size_text(need), size_text(max_bytes_));
     else
       built = build(*kind);
     const double seconds = seconds_since(start);

@@ -28,9 +28,9 @@ std::string size_text(std::uint64_t bytes);
 class NodeSearch {
  public:
   /// Begins with a linear scan. `type` is that of the samples. Indices that need more
-  /// than `most_bytes`, what stays and what building takes, are refused. `on_change` is
+  /// than `max_bytes`, what stays and what building takes, are refused. `on_change` is
   /// called from the building thread when there is another index, or it was refused.
-  NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type, std::uint64_t most_bytes,
+  NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type, std::uint64_t max_bytes,
              std::function<void()> on_change);
   /// Waits for an index that is being built.
   ~NodeSearch();
@@ -73,7 +73,7 @@ class NodeSearch {
 
   std::shared_ptr<const NodeTree> tree_;
   ScalarType type_;
-  std::uint64_t most_bytes_;
+  std::uint64_t max_bytes_;
   std::function<void()> on_change_;
 
   mutable Mutex mutex_;

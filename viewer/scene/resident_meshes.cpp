@@ -20,9 +20,9 @@ void ResidentMeshes::set_cut(const Cut& cut, CutIndex index) {
   ++version_;
 }
 
-MeshPlan ResidentMeshes::plan(const NodeMesher& mesher, double soon) {
+MeshPlan ResidentMeshes::plan(const NodeMesher& mesher, double max_meshes) {
   cache_.begin_use();
-  MeshPlan plan = plan_jobs(*tree_, cut_, cache_, mesher, soon);
+  MeshPlan plan = plan_jobs(*tree_, cut_, cache_, mesher, max_meshes);
   make_room();
   return plan;
 }
@@ -37,7 +37,7 @@ void ResidentMeshes::put(std::shared_ptr<const NodeMesh> mesh) {
 void ResidentMeshes::make_device_room() {
   const std::uint64_t budget = cache_.device_budget(), part = budget / kPartForNew;
   if (cache_.device_bytes() + part <= budget) return;
-  keep_shown();
+  mark_shown_used();
   cache_.shrink_device(part);
 }
 
@@ -47,16 +47,16 @@ void ResidentMeshes::set_device_budget(std::uint64_t bytes) {
 }
 
 /// What is shown takes room, too, whatever is wanted now.
-void ResidentMeshes::keep_shown() {
+void ResidentMeshes::mark_shown_used() {
   for (const auto& place : shown_)
-    for (const DrawnNode& node : place)
+    for (const NodeDraw& node : place)
       cache_.find(node.mesh->key, node.mesh->isovalue, node.mesh->coarser);
 }
 
 void ResidentMeshes::make_room() {
   full_ = false;
-  if (cache_.keeps_budgets()) return;
-  keep_shown();
+  if (cache_.is_within_budgets()) return;
+  mark_shown_used();
   full_ = !cache_.shrink();
 }
 
@@ -66,8 +66,8 @@ std::shared_ptr<const Drawable> ResidentMeshes::drawable() {
 }
 
 /// Shows the isovalue that a place shows already, as this cut wants it.
-void ResidentMeshes::show_before(std::size_t place) {
-  std::vector<DrawnNode> nodes;
+void ResidentMeshes::update_previous(std::size_t place) {
+  std::vector<NodeDraw> nodes;
   bool complete = true;
   if (append_drawable(*tree_, *index_, shown_[place].front().mesh->isovalue,
                       static_cast<int>(place), cache_, nodes, complete))
@@ -82,7 +82,7 @@ void ResidentMeshes::rebuild_drawable() {
   cache_.begin_use();
   shown_.resize(cut_.isovalues.size());
   for (std::size_t i = 0; index_ && i < cut_.isovalues.size(); ++i) {
-    std::vector<DrawnNode> nodes;
+    std::vector<NodeDraw> nodes;
     const bool covers = append_drawable(*tree_, *index_, cut_.isovalues[i], static_cast<int>(i),
                                         cache_, nodes, next->complete);
     next->complete &= covers;
@@ -92,10 +92,10 @@ void ResidentMeshes::rebuild_drawable() {
     if (covers || !old)
       shown_[i] = std::move(nodes);
     else
-      show_before(i);
+      update_previous(i);
     next->nodes.insert(next->nodes.end(), shown_[i].begin(), shown_[i].end());
   }
-  for (const DrawnNode& node : next->nodes) next->triangles += node.mesh->triangles();
+  for (const NodeDraw& node : next->nodes) next->triangles += node.mesh->triangles();
   drawn_ = std::move(next);
   make_room();
 }

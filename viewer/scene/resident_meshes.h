@@ -25,7 +25,7 @@ class ResidentMeshes {
   const Cut& cut() const { return cut_; }
 
   /// The meshes that the cut lacks; see plan_jobs(). What the cut uses is kept from now on.
-  MeshPlan plan(const NodeMesher& mesher, double soon);
+  MeshPlan plan(const NodeMesher& mesher, double max_meshes);
   void put(std::shared_ptr<const NodeMesh> mesh);
   /// For meshes that do not fit on the device beside those that are there: older ones give back a
   /// part of the budget. The budget itself may never be reached, since places fall between.
@@ -47,16 +47,16 @@ class ResidentMeshes {
   void close();
 
  private:
-  void keep_shown();
+  void mark_shown_used();
   void make_room();
   void rebuild_drawable();
-  void show_before(std::size_t place);
+  void update_previous(std::size_t place);
 
   std::shared_ptr<const NodeTree> tree_;
   MeshCache cache_;
   Cut cut_;
   std::optional<CutIndex> index_;
-  std::vector<std::vector<DrawnNode>> shown_;  ///< what each isovalue's place shows
+  std::vector<std::vector<NodeDraw>> shown_;  ///< what each isovalue's place shows
   bool full_ = false, closed_ = false;
   std::uint64_t version_ = 0;  ///< of what could be drawn
   std::shared_ptr<const Drawable> drawn_;

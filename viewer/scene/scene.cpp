@@ -15,7 +15,7 @@ bool same_cut(const Cut& a, const Cut& b) {
          std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
                     [](const CutNode& p, const CutNode& q) {
                       return p.key == q.key && p.coarser == q.coarser && p.visible == q.visible &&
-                             p.cut_away == q.cut_away;
+                             p.clipped == q.clipped;
                     });
 }
 

@@ -14,7 +14,7 @@ namespace {
 /// How long the destructor waits for threads that are held up and for a device.
 constexpr std::chrono::milliseconds kClosing{50};
 
-void work(const std::shared_ptr<StreamState>& state) {
+void run_worker(const std::shared_ptr<StreamState>& state) {
   if (state->options.lower_thread_priority) lower_thread_priority();
   StreamWorker(state).run();
   state->workers.end();
@@ -28,7 +28,7 @@ SceneStream::SceneStream(std::shared_ptr<const BrickSource> source,
           std::make_shared<StreamState>(std::move(source), std::move(tree), std::move(options))) {
   for (int i = 0; i < state_->threads; ++i) {
     state_->workers.begin();
-    threads_.emplace_back([state = state_] { work(state); });
+    threads_.emplace_back([state = state_] { run_worker(state); });
   }
 }
 
@@ -127,7 +127,7 @@ StreamCounters SceneStream::counters() const {
   return c;
 }
 
-std::uint64_t SceneStream::bricks_wanted() const {
+std::uint64_t SceneStream::missing_bricks() const {
   std::vector<StoredBrick> missing;
   for (const MeshJob& job : state_->queue.waiting_meshes())
     state_->planner.add_missing(job.key, job.isovalue, job.coarser, missing);

@@ -97,7 +97,7 @@ class SceneStream {
   StreamCounters counters() const;
   /// Bricks that meshes need which wait to be made, and that are not there. Takes about as long as
   /// to plan them.
-  std::uint64_t bricks_wanted() const;
+  std::uint64_t missing_bricks() const;
   /// The decoded bricks; thread-safe by itself.
   ResidentBricks& bricks() const;
 

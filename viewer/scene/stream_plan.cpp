@@ -15,19 +15,19 @@ bool more_urgent(const MeshJob& a, const MeshJob& b) {
   return key(a) < key(b);
 }
 
-class Planner {
+class JobPlanner {
  public:
-  Planner(const NodeTree& tree, const Cut& cut, MeshCache& meshes, MeshPlan& plan)
+  JobPlanner(const NodeTree& tree, const Cut& cut, MeshCache& meshes, MeshPlan& plan)
       : tree_(tree), cut_(cut), meshes_(meshes), plan_(plan) {}
 
-  void run(double soon) {
+  void run(double max_meshes) {
     for (const double isovalue : cut_.isovalues)
       for (const CutNode& node : cut_.nodes) add(node, isovalue);
     plan_.skips_levels =
-        2 * missing_.size() > held_ && static_cast<double>(plan_.jobs.size()) <= soon;
+        2 * missing_.size() > with_surface_ && static_cast<double>(plan_.jobs.size()) <= max_meshes;
     for (const MissingNode& missing : missing_) {
-      if (missing.isovalue != ancestors_of_) ancestors_.clear();
-      ancestors_of_ = missing.isovalue;
+      if (missing.isovalue != ancestors_isovalue_) ancestors_.clear();
+      ancestors_isovalue_ = missing.isovalue;
       add_ancestors(*missing.node, missing.isovalue);
     }
   }
@@ -40,8 +40,8 @@ class Planner {
   };
 
   void add(const CutNode& node, double isovalue) {
-    if (node.cut_away || !tree_.may_hold_surface(node.key, isovalue, node.coarser)) return;
-    ++held_;
+    if (node.clipped || !tree_.may_hold_surface(node.key, isovalue, node.coarser)) return;
+    ++with_surface_;
     if (meshes_.find(node.key, isovalue, node.coarser)) return;
     if (!meshes_.has_any(node.key, isovalue)) missing_.push_back({&node, isovalue});
     plan_.jobs.push_back(
@@ -86,20 +86,20 @@ class Planner {
   const Cut& cut_;
   MeshCache& meshes_;
   MeshPlan& plan_;
-  std::size_t held_ = 0;  ///< nodes of the cut with a surface, for each isovalue
+  std::size_t with_surface_ = 0;  ///< nodes of the cut with a surface, for each isovalue
   std::vector<MissingNode> missing_;
   std::unordered_map<NodeKey, Ancestor, NodeKeyHash> ancestors_;
-  double ancestors_of_ = 0;  ///< isovalue
+  double ancestors_isovalue_ = 0;  ///< isovalue
 };
 
 }  // namespace
 
 MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
-                   const NodeMesher& mesher, double soon) {
+                   const NodeMesher& mesher, double max_meshes) {
   MeshPlan plan;
-  Planner(tree, cut, meshes, plan).run(soon);
+  JobPlanner(tree, cut, meshes, plan).run(max_meshes);
   for (MeshJob& job : plan.jobs)
-    job.resident = mesher.half_there(job.key, job.isovalue, job.coarser);
+    job.resident = mesher.half_resident(job.key, job.isovalue, job.coarser);
   std::sort(plan.jobs.begin(), plan.jobs.end(), more_urgent);
   return plan;
 }

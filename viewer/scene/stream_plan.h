@@ -24,7 +24,7 @@ struct MeshJob {
 /// The meshes that a cut lacks.
 struct MeshPlan {
   /// Most urgent first: visible ones, of them those of whose bricks at least half are there (see
-  /// NodeMesher::half_there(): planning reads nothing), of them coarse ones, then those with the
+  /// NodeMesher::half_resident(): planning reads nothing), of them coarse ones, then those with the
   /// longest cells on the picture, then near ones. Nodes without any mesh bring the ancestors along
   /// that will stand in for them, of levels that are stored.
   std::vector<MeshJob> jobs;
@@ -36,6 +36,6 @@ struct MeshPlan {
 /// `soon`: how many meshes are made so quickly that nothing needs to stand in for them but the
 /// coarsest level; that is done where most of a cut is new.
 MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
-                   const NodeMesher& mesher, double soon);
+                   const NodeMesher& mesher, double max_meshes);
 
 }  // namespace isobrick

@@ -24,10 +24,10 @@ StreamState::StreamState(std::shared_ptr<const BrickSource> s, std::shared_ptr<c
       planner(tree->grid(), bricks, options.origin, options.inside),
       meshes(tree, options.mesh_bytes, options.device_bytes) {}
 
-void StreamState::plan(bool late) {
+void StreamState::plan(bool overdue) {
   bricks.forget_needs();
-  MeshPlan next = meshes.plan(planner, late ? 0 : skipping.soon());
-  skipping.planned(next.skips_levels && !next.jobs.empty());
+  MeshPlan next = meshes.plan(planner, overdue ? 0 : skipping.max_meshes());
+  skipping.set_plan(next.skips_levels && !next.jobs.empty());
   pause_if_full();
   queue.replace_meshes(std::move(next.jobs));
 }

@@ -44,7 +44,7 @@ struct StreamState {
 
   /// Queues the meshes that the cut lacks and cancels all others. `late`: meshes of a plan that
   /// skips levels have not come soon enough.
-  void plan(bool late) ISOBRICK_REQUIRES(meshes_mutex);
+  void plan(bool overdue) ISOBRICK_REQUIRES(meshes_mutex);
   /// Meshes are made while there is room for them.
   void pause_if_full() ISOBRICK_REQUIRES(meshes_mutex) { queue.pause_meshes(meshes.full()); }
   /// Takes over a mesh; `by`: the device that made it, or null.

@@ -80,8 +80,8 @@ void StreamWorker::make_mesh(const RequestPtr& request) {
   const double seconds = watch.lap();
   const bool sent = request->sent_to_device();
   state_->statistics.add_seconds(mesher_.seconds() - before);
-  if (mesh || sent) state_->skipping.mesh_took(seconds);
-  plan_if_late();
+  if (mesh || sent) state_->skipping.add_mesh_seconds(seconds);
+  plan_if_overdue();
   if (sent) return;  // receive() ends it, perhaps has already
   const bool made = mesh.has_value();
   if (made) state_->add_mesh(std::move(*mesh), nullptr);
@@ -139,10 +139,10 @@ bool StreamWorker::send(const GridView& grid, const RequestPtr& request) {
   return false;
 }
 
-void StreamWorker::plan_if_late() {
-  if (!state_->skipping.late() || state_->queue.counters().waiting_meshes == 0) return;
+void StreamWorker::plan_if_overdue() {
+  if (!state_->skipping.is_overdue() || state_->queue.counters().waiting_meshes == 0) return;
   const MutexLock lock(state_->meshes_mutex);
-  if (state_->skipping.late()) state_->plan(true);  // no other thread was first
+  if (state_->skipping.is_overdue()) state_->plan(true);  // no other thread was first
 }
 
 void StreamWorker::make_slice(const RequestPtr& request) {
@@ -155,9 +155,9 @@ void StreamWorker::make_slice(const RequestPtr& request) {
     image->request = request->slice();
     image->damage = e.what();
   }
-  const bool token = state_->slices.put(*request, std::move(image));
+  const bool accepted = state_->slices.put(*request, std::move(image));
   state_->queue.finish(request);
-  if (token) state_->notify_change();
+  if (accepted) state_->notify_change();
 }
 
 }  // namespace isobrick

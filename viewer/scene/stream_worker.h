@@ -24,7 +24,7 @@ class StreamWorker {
   void find_thin_structure();
   std::optional<NodeMesh> mesh_of(const RequestPtr& request);
   bool send(const GridView& grid, const RequestPtr& request);
-  void plan_if_late();
+  void plan_if_overdue();
 
   const std::shared_ptr<StreamState> state_;
   NodeMesher mesher_;

@@ -114,11 +114,11 @@ void ThinStructure::read_levels(ResidentBricks& bricks, const CancellationToken&
 }
 
 bool ThinStructure::read(ResidentBricks& bricks, const CancellationToken& token) {
-  if (levels_.empty() || taken_.exchange(true)) return false;
+  if (levels_.empty() || claimed_.exchange(true)) return false;
   try {
     read_levels(bricks, token);
   } catch (...) {
-    taken_ = false;
+    claimed_ = false;
     throw;
   }
   known_.store(true, std::memory_order_release);

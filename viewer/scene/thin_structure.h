@@ -55,10 +55,10 @@ class ThinStructure {
   Ranges own_ranges(const Level& level, NodeSamples& samples, const CancellationToken& token) const;
 
   const NodeGrid& grid_;
-  Mutex mutex_;                      ///< of include()
-  std::vector<Level> levels_;        ///< the finest first
-  std::atomic<bool> taken_ = false;  ///< somebody reads, or has read
-  std::atomic<bool> known_ = false;  ///< from now on nothing changes
+  Mutex mutex_;                        ///< of include()
+  std::vector<Level> levels_;          ///< the finest first
+  std::atomic<bool> claimed_ = false;  ///< somebody reads, or has read
+  std::atomic<bool> known_ = false;    ///< from now on nothing changes
 };
 
 }  // namespace isobrick

@@ -58,7 +58,7 @@ bool NodeView::Plane::meets(const IndexBox& box) const {
   return most >= 0;
 }
 
-bool NodeView::cut_away(const IndexBox& box) const {
+bool NodeView::clipped(const IndexBox& box) const {
   return (clip_ && !touch(box, *clip_)) ||
          !std::all_of(planes_.begin(), planes_.end(),
                       [&](const Plane& plane) { return plane.meets(box); });
@@ -69,8 +69,8 @@ NodeSight NodeView::see(const NodeKey& n) const {
   NodeSight sight;
   sight.distance = distance(box);
   sight.pixels = pixels(n.level, sight.distance);
-  sight.cut_away = cut_away(box);
-  if (sight.cut_away) return sight;
+  sight.clipped = clipped(box);
+  if (sight.clipped) return sight;
   const auto inside = [&](const Plane& plane) { return plane.meets(box); };
   sight.nearly_visible = std::all_of(wider_.begin(), wider_.end(), inside);
   // The wider picture holds the other one.

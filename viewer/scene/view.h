@@ -35,7 +35,7 @@ struct NodeSight {
   /// nearest. The direction of the view does not enter it.
   double pixels = 0;
   double distance = 0;          ///< from the eye to the node, world length
-  bool cut_away = false;        ///< nothing of the node lies within the clip box and all planes
+  bool clipped = false;         ///< nothing of the node lies within the clip box and all planes
   bool visible = false;         ///< false: cut away or outside of the picture for certain
   bool nearly_visible = false;  ///< the same for a picture that is a little larger
 };
@@ -46,9 +46,9 @@ class NodeView {
   NodeView(const View& view, const NodeGrid& grid);
 
   NodeSight see(const NodeKey& n) const;
-  /// NodeSight::cut_away alone.
-  bool cuts_away(const NodeKey& n) const {
-    return (clip_ || !planes_.empty()) && cut_away(grid_.box(n));
+  /// NodeSight::clipped alone.
+  bool clips(const NodeKey& n) const {
+    return (clip_ || !planes_.empty()) && clipped(grid_.box(n));
   }
 
  private:
@@ -62,7 +62,7 @@ class NodeView {
   using Planes = std::array<Plane, 6>;
 
   Plane to_index_space(Vec3d normal, double offset) const;
-  bool cut_away(const IndexBox& box) const;
+  bool clipped(const IndexBox& box) const;
   double pixels(int level, double distance) const;
   double distance(const IndexBox& box) const;
 

@@ -53,7 +53,7 @@ class Uploads : public testing::Test {
     EXPECT_TRUE(uploads_->add(drawable, {}, nullptr));
   }
   void expect_there(const Drawable& drawable) const {
-    for (const DrawnNode& node : drawable.nodes) EXPECT_NE(uploads_->find(*node.mesh), nullptr);
+    for (const NodeDraw& node : drawable.nodes) EXPECT_NE(uploads_->find(*node.mesh), nullptr);
   }
 
   static constexpr std::uint32_t kVertices = 5000;  ///< room for eleven balls

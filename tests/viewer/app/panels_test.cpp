@@ -376,20 +376,20 @@ TEST_F(Panels, HelpShowsKeysAndCloses) {
 }
 
 TEST_F(Panels, TheStatusNamesBricks) {
-  EXPECT_EQ(state_.picture->scene().stream().bricks_wanted(), 0u) << "all are there";
+  EXPECT_EQ(state_.picture->scene().stream().missing_bricks(), 0u) << "all are there";
   // One thread, and a cut of many bricks.
   open(SynthKind::gyroid, {200, 200, 200}, {.threads = 1});
   const SceneStream& stream = picture_->scene().stream();
   const auto all = static_cast<std::uint64_t>(7 * 7 * 7);
   picture_->scene().update({settings_.surfaces[0].isovalue},
                            view_of(camera_, kWidth, kHeight, settings_.pixel_error), {});
-  const std::uint64_t most = stream.bricks_wanted();
+  const std::uint64_t most = stream.missing_bricks();
   EXPECT_GT(most, all / 4);
   EXPECT_LE(most, 2 * all) << "each counts once";
   do {
     picture_->draw(camera_, kWidth, kHeight, settings_);
   } while (!picture_->state().complete);
-  EXPECT_EQ(stream.bricks_wanted(), 0u);
+  EXPECT_EQ(stream.missing_bricks(), 0u);
 }
 
 }  // namespace

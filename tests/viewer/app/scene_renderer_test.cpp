@@ -215,7 +215,7 @@ TEST_F(Picture, MeshesOnTheDeviceKeepNoneInHostMemory) {
     settings_.surfaces[0].isovalue = 90.5 + 5 * i;
     draw();
     shown = 0;
-    for (const DrawnNode& node : picture_->scene().drawable()->nodes) {
+    for (const NodeDraw& node : picture_->scene().drawable()->nodes) {
       shown += node.mesh->bytes();
       all += node.mesh->bytes();
       seen[node.mesh] = node.mesh->bytes();

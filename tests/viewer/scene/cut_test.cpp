@@ -65,7 +65,7 @@ void expect_sound(const NodeGrid& grid, const Cut& cut, const ActiveNodes& activ
   for (const CutNode& node : cut.nodes) {
     const std::tuple key(node.key.level, node.key.node.x, node.key.node.y, node.key.node.z);
     masks[key] = node.coarser;
-    if (!node.cut_away) shown.insert(key);
+    if (!node.clipped) shown.insert(key);
   }
   std::map<std::tuple<int, Index, Index, Index>, std::uint32_t> expected;
   for_each_point(finest, [&](Int3 p) {
@@ -183,14 +183,14 @@ TEST_F(CutTest, WhatPlanesCutAwayIsNotWanted) {
     const IndexBox box = tree().grid().box(node.key);
     bool any = box.hi.z >= 20;
     any &= kept.contains({box.hi.x, box.hi.y, 0});
-    EXPECT_EQ(node.cut_away, !any);
-    EXPECT_FALSE(node.cut_away && node.visible);
-    away += node.cut_away;
+    EXPECT_EQ(node.clipped, !any);
+    EXPECT_FALSE(node.clipped && node.visible);
+    away += node.clipped;
   }
   EXPECT_GT(away, cut.nodes.size() / 4);
   double triangles = 0;  // takes no part of the budget either
   for (const CutNode& node : cut.nodes)
-    if (!node.cut_away)
+    if (!node.clipped)
       triangles += tree().active_blocks(node.key, 128) * CutBudget{}.triangles_per_block;
   EXPECT_NEAR(static_cast<double>(cut.triangles), triangles, 1);
 }

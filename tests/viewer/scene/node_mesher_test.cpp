@@ -238,7 +238,7 @@ TEST(NodeMesher, ValuesAreGivenWhereStoredSamplesWouldNotDo) {
 }
 
 TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
-  class Never final : public CancellationToken {
+  class AlwaysCancelled final : public CancellationToken {
    public:
     void check() const override { throw OperationCancelled(); }
   };
@@ -246,7 +246,7 @@ TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
   const NodeGrid grid(source->info());
   ResidentBricks bricks(source, 1 << 20);
   NodeMesher mesher(grid, bricks, {});
-  EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, Never()), OperationCancelled);
+  EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, AlwaysCancelled()), OperationCancelled);
 }
 
 template <class T>

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/drawn_nodes.h"
+#include "tests/viewer/scene/drawable_checks.h"
 #include "tests/viewer/scene/perspective.h"
-#include "tests/viewer/scene/plain_device.h"
 #include "tests/viewer/scene/random_cut.h"
+#include "tests/viewer/scene/test_device.h"
 
 namespace isobrick::test {
 namespace {
@@ -62,7 +62,7 @@ TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {
     const auto last = stream.drawable();
     EXPECT_TRUE(last->complete);
     versions_seen += versions.size();
-    for (const DrawnNode& drawn : last->nodes) {
+    for (const NodeDraw& drawn : last->nodes) {
       const auto in_cut = std::find_if(cut.nodes.begin(), cut.nodes.end(), [&](const CutNode& n) {
         return n.key == drawn.mesh->key && n.coarser == drawn.mesh->coarser;
       });
@@ -83,7 +83,7 @@ TEST(SceneStream, CoarseNodesComeFirst) {
   int finest_seen = tree->grid().levels();
   while (!stream.idle()) {
     const auto drawable = stream.drawable();
-    for (const DrawnNode& node : drawable->nodes)
+    for (const NodeDraw& node : drawable->nodes)
       finest_seen = std::min(finest_seen, node.mesh->key.level);
     if (finest_seen == 0) break;
     const auto made = stream.counters().meshes_made;
@@ -101,15 +101,15 @@ TEST(SceneStream, WhatIsCutAwayIsNeitherReadNorMeshed) {
   SceneStream stream(source, tree, {.threads = 2});
   Cut cut = RandomCut(tree->grid(), 2, 3).cut({0.0});
   for (CutNode& node : cut.nodes) {
-    node.cut_away = tree->grid().box(node.key).lo.x > 0;
-    node.visible = !node.cut_away;
+    node.clipped = tree->grid().box(node.key).lo.x > 0;
+    node.visible = !node.clipped;
   }
   stream.set_cut(cut);
   ASSERT_TRUE(stream.wait_idle(60));
   const auto drawn = stream.drawable();
   EXPECT_TRUE(drawn->complete);
   EXPECT_FALSE(drawn->nodes.empty());
-  for (const DrawnNode& node : drawn->nodes) EXPECT_EQ(node.mesh->key.node.x, 0);
+  for (const NodeDraw& node : drawn->nodes) EXPECT_EQ(node.mesh->key.node.x, 0);
 }
 
 TEST(SceneStream, AnotherIsovalueNeedsNoBrickAgain) {
@@ -126,7 +126,7 @@ TEST(SceneStream, AnotherIsovalueNeedsNoBrickAgain) {
   EXPECT_FALSE(stream.drawable()->nodes.empty()) << "the isovalue before stays until then";
   ASSERT_TRUE(stream.wait_idle(60));
   EXPECT_LE(source->reads(), reads + reads / 2);
-  for (const DrawnNode& node : stream.drawable()->nodes) EXPECT_EQ(node.mesh->isovalue, -0.5);
+  for (const NodeDraw& node : stream.drawable()->nodes) EXPECT_EQ(node.mesh->isovalue, -0.5);
   // And back without any work at all.
   const auto made = stream.counters().meshes_made;
   cut.isovalues = {0.0};
@@ -145,7 +145,7 @@ TEST(SceneStream, ShowsSeveralIsovaluesAtOnce) {
   const auto drawable = stream.drawable();
   EXPECT_TRUE(drawable->complete);
   std::set<int> numbers;
-  for (const DrawnNode& node : drawable->nodes) {
+  for (const NodeDraw& node : drawable->nodes) {
     numbers.insert(node.isovalue);
     EXPECT_EQ(node.mesh->isovalue, node.isovalue - 1.0);
   }
@@ -162,7 +162,7 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
   ASSERT_TRUE(stream.wait_idle(60));
   const auto drawable = stream.drawable();
   int damaged = 0, whole = 0;
-  for (const DrawnNode& node : drawable->nodes) {
+  for (const NodeDraw& node : drawable->nodes) {
     damaged += !node.mesh->damage.empty();
     whole += node.mesh->damage.empty();
     if (!node.mesh->damage.empty()) {
@@ -176,13 +176,13 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
 }
 
 /// Takes some grids and then says of all of them that it has failed.
-class FailingDevice final : public PlainDevice {
+class FailingDevice final : public TestDevice {
  public:
   explicit FailingDevice(std::size_t taken = kTaken) : most_(taken) {}
   ~FailingDevice() override {
     for (std::thread& thread : threads_) thread.join();
   }
-  bool make(const GridView& grid, NodeMesh mesh, Done done) override {
+  bool make(const GridView& grid, NodeMesh mesh, Callback done) override {
     const std::lock_guard lock(mutex_);
     ++asked;
     stored += grid.stored.samples != nullptr;
@@ -207,7 +207,7 @@ class FailingDevice final : public PlainDevice {
   std::size_t most_;
   mutable std::mutex mutex_;
   bool failed_ = false;
-  std::vector<std::pair<NodeMesh, Done>> taken_;
+  std::vector<std::pair<NodeMesh, Callback>> taken_;
   std::vector<std::thread> threads_;
 };
 
@@ -273,7 +273,7 @@ TEST(SceneStream, WhatAStraightPlanIsLateWithBringsTheLevelsBetween) {
   std::set<int> levels;
   for (bool idle = false; !idle;) {
     idle = stream.wait_idle(0.002);
-    for (const DrawnNode& node : stream.drawable()->nodes) levels.insert(node.mesh->key.level);
+    for (const NodeDraw& node : stream.drawable()->nodes) levels.insert(node.mesh->key.level);
   }
   EXPECT_TRUE(stream.drawable()->complete);
   EXPECT_GT(stream.counters().meshes_made, planned);

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/drawn_nodes.h"
+#include "tests/viewer/scene/drawable_checks.h"
 #include "tests/viewer/scene/perspective.h"
 
 namespace isobrick::test {
@@ -55,7 +55,7 @@ TEST(Scene, AWindowsLoopEndsWithTheWholeCut) {
   expect_no_overlap(scene.tree().grid(), *drawable);
   EXPECT_TRUE(scene.is_newest(*drawable));
   EXPECT_GT(drawable->triangles, 10000u);
-  for (const DrawnNode& node : drawable->nodes)
+  for (const NodeDraw& node : drawable->nodes)
     for (const Vec3f p : node.mesh->mesh.positions)
       EXPECT_LT(std::abs(p.x) + std::abs(p.y) + std::abs(p.z), 200.0f) << "around the origin";
 }
@@ -94,7 +94,7 @@ TEST(Scene, KeepsNoMeshesOfCutsBefore) {
       const auto drawable = scene.drawable();
       return drawable->complete && scene.idle() && drawable->isovalues[0] == isovalue;
     }));
-    for (const DrawnNode& node : scene.drawable()->nodes) shown.push_back(node.mesh);
+    for (const NodeDraw& node : scene.drawable()->nodes) shown.push_back(node.mesh);
   }
   std::uint64_t bytes = 0;
   for (const auto& mesh : shown)

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/held_up.h"
-#include "tests/viewer/scene/plain_device.h"
+#include "tests/viewer/scene/blocking_source.h"
 #include "tests/viewer/scene/random_cut.h"
+#include "tests/viewer/scene/test_device.h"
 #include "viewer/scene/scene_stream.h"
 
 namespace isobrick::test {
@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 /// Makes empty meshes on a thread of its own, some time after they are asked for.
-class SlowDevice final : public PlainDevice {
+class SlowDevice final : public TestDevice {
  public:
   explicit SlowDevice(milliseconds time) : time_(time), thread_([this] { run(); }) {}
   ~SlowDevice() override {
@@ -34,7 +34,7 @@ class SlowDevice final : public PlainDevice {
     change_.notify_all();
     thread_.join();
   }
-  bool make(const GridView&, NodeMesh mesh, Done done) override {
+  bool make(const GridView&, NodeMesh mesh, Callback done) override {
     {
       const std::lock_guard lock(mutex_);
       taken_.emplace_back(std::move(mesh), std::move(done));
@@ -58,9 +58,9 @@ class SlowDevice final : public PlainDevice {
   std::shared_ptr<const std::atomic<int>> held_count() const { return held_; }
 
  private:
-  struct Counted final : DeviceMesh {
-    explicit Counted(std::shared_ptr<std::atomic<int>> c) : count(std::move(c)) { ++*count; }
-    ~Counted() override { --*count; }
+  struct CountedMesh final : DeviceMesh {
+    explicit CountedMesh(std::shared_ptr<std::atomic<int>> c) : count(std::move(c)) { ++*count; }
+    ~CountedMesh() override { --*count; }
     std::shared_ptr<std::atomic<int>> count;
   };
 
@@ -72,10 +72,10 @@ class SlowDevice final : public PlainDevice {
       lock.unlock();
       std::this_thread::sleep_for(time_);
       lock.lock();
-      std::vector<std::pair<NodeMesh, Done>> made = std::exchange(taken_, {});
+      std::vector<std::pair<NodeMesh, Callback>> made = std::exchange(taken_, {});
       lock.unlock();
       for (auto& [mesh, done] : made) {
-        mesh.device = std::make_shared<const Counted>(held_);
+        mesh.device = std::make_shared<const CountedMesh>(held_);
         mesh.device_triangles = 1;
         done(std::move(mesh), "");
       }
@@ -88,7 +88,7 @@ class SlowDevice final : public PlainDevice {
   std::shared_ptr<std::atomic<int>> held_ = std::make_shared<std::atomic<int>>(0);
   mutable std::mutex mutex_;
   std::condition_variable change_;
-  std::vector<std::pair<NodeMesh, Done>> taken_;
+  std::vector<std::pair<NodeMesh, Callback>> taken_;
   int asked_ = 0;
   bool end_ = false;
   std::thread thread_;
@@ -122,10 +122,11 @@ class StreamEnd : public testing::Test {
     return source_.use_count() == 1;
   }
 
-  std::shared_ptr<HeldUp> source_ = std::make_shared<HeldUp>(std::make_shared<MemoryBricks>(
-      Int3{150, 150, 150},
-      std::function<float(Int3)>([](Int3 p) { return static_cast<float>(ball(p, 150)); }),
-      MemoryBricks::Options{.brick = 16}));
+  std::shared_ptr<BlockingSource> source_ =
+      std::make_shared<BlockingSource>(std::make_shared<MemoryBricks>(
+          Int3{150, 150, 150},
+          std::function<float(Int3)>([](Int3 p) { return static_cast<float>(ball(p, 150)); }),
+          MemoryBricks::Options{.brick = 16}));
   std::shared_ptr<const NodeTree> tree_ = std::make_shared<const NodeTree>(*source_);
   std::unique_ptr<SceneStream> stream_;
 };

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/forwarding.h"
+#include "tests/viewer/scene/forwarding_source.h"
 
 namespace isobrick::test {
 namespace {
@@ -106,9 +106,9 @@ TEST(SurfaceBox, IsThatOfAllIsovaluesOrNone) {
 }
 
 /// Counts what is read of block ranges.
-class Counting final : public Forwarding {
+class CountingSource final : public ForwardingSource {
  public:
-  using Forwarding::Forwarding;
+  using ForwardingSource::ForwardingSource;
   bool read_brick(int level, Int3 brick, std::byte* out) const override {
     return from_->read_brick(level, brick, out);
   }
@@ -123,7 +123,7 @@ class Counting final : public Forwarding {
 
 TEST(SurfaceBox, ReadsOnlyWhatMayBeAtItsEnds) {
   // Active everywhere, over five range chunks.
-  const Counting source(
+  const CountingSource source(
       bricks({2500, 64, 40}, [](Int3 p) { return static_cast<std::uint8_t>(p.x % 2 * 200); }));
   const NodeTree tree(source);
   source.tables = 0;

@@ -157,12 +157,12 @@ TEST(ThinStructure, WhatCannotBeReadCountsAsThere) {
 }
 
 TEST(ThinStructure, IsReadAgainAfterItWasAbandoned) {
-  class Never final : public CancellationToken {
+  class AlwaysCancelled final : public CancellationToken {
     void check() const override { throw OperationCancelled(); }
   };
   Volume volume(ball_and_rods);
   ThinStructure& thin = volume.tree.thin_structure();
-  EXPECT_THROW(thin.read(volume.bricks, Never()), OperationCancelled);
+  EXPECT_THROW(thin.read(volume.bricks, AlwaysCancelled()), OperationCancelled);
   EXPECT_FALSE(thin.known());
   EXPECT_TRUE(thin.read(volume.bricks, Always()));
   EXPECT_TRUE(thin.lost({2, {0, 0, 0}}, kIsovalue));

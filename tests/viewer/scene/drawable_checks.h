@@ -31,7 +31,7 @@ inline bool covers(const NodeTree& tree, const Drawable& drawable, double isoval
   bool all = true;
   for_each_point({{0, 0, 0}, tree.grid().level(0).nodes}, [&](Int3 p) {
     bool found = false, shown = true;
-    for (const DrawnNode& node : drawable.nodes)
+    for (const NodeDraw& node : drawable.nodes)
       found |= overlap(tree.grid(), node.mesh->key, {0, p});
     for (NodeKey n{0, p};;) {
       shown &= tree.active(n, isovalue);
