@@ -38,7 +38,7 @@ PictureSettings picture_settings(const ViewSettings& settings, const Transform& 
 class ClipTest {
  public:
   explicit ClipTest(const PictureSettings& picture);
-  /// MeshStyle::cut_by of what lies around `middle`.
+  /// MeshStyle::clip_mask of what lies around `middle`.
   std::uint16_t of(Vec3d middle, double radius) const;
   /// Of a node's mesh.
   std::uint16_t of(const NodeGrid& grid, const NodeKey& node) const;

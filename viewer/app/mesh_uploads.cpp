@@ -9,7 +9,7 @@ namespace {
 
 /// Bytes that are copied at a time: where a driver gets memory for copies while something else
 /// holds it up, a megabyte takes it some milliseconds.
-constexpr std::uint64_t kPiece = 256 << 10;
+constexpr std::uint64_t kCopyBytes = 256 << 10;
 
 }  // namespace
 
@@ -32,17 +32,17 @@ bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Share* share) {
       upload.copy = pool_.begin(node.mesh->mesh.chunk(0), origin);
       upload.from = node.mesh;
     }
-    if (!go_on(upload, share)) return false;
+    if (!advance(upload, share)) return false;
   }
   return true;
 }
 
 /// False when `share` was spent before it was there.
-bool MeshUploads::go_on(Upload& upload, Share* share) {
+bool MeshUploads::advance(Upload& upload, Share* share) {
   while (upload.copy && !upload.copy->done()) {
     if (share != nullptr && share->spent()) return false;
     const std::uint64_t before = upload.copy->bytes_left();
-    upload.copy->go_on(kPiece);
+    upload.copy->advance(kCopyBytes);
     if (share != nullptr) share->bytes += before - upload.copy->bytes_left();
   }
   if (upload.copy) upload.place = upload.copy->take();

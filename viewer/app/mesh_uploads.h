@@ -63,7 +63,7 @@ class MeshUploads {
     MeshPtr from;
   };
 
-  bool go_on(Upload& upload, Share* share);
+  bool advance(Upload& upload, Share* share);
 
   /// Those that are not used, the oldest last.
   std::vector<MeshId> unused() const;

@@ -15,7 +15,7 @@ namespace isobrick {
 namespace {
 
 /// Pixels enough to have everything compiled.
-constexpr PictureSize kFew{16, 16};
+constexpr PictureSize kCompileSize{16, 16};
 
 /// While CUDA is set up, OpenGL by the same driver waits for it.
 bool cuda_may_hold_up(Backend backend) {
@@ -65,7 +65,7 @@ PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> 
   // Software compiles quickly and draws slowly.
   if (!software_)
     for (const PictureSettings& settings : usual_settings())
-      renderer_.prepare(settings, kFew.width, kFew.height);
+      renderer_.prepare(settings, kCompileSize.width, kCompileSize.height);
   if (likely && !software_ && cuda_may_hold_up(budgets.backend)) warm_up(*likely);
   // Only now: while CUDA is set up, whoever makes OpenGL ask for memory waits for it, tens of
   // milliseconds at a time.

@@ -5,7 +5,7 @@
 
 namespace isobrick {
 
-/// How much of a picture one piece holds where OpenGL is software; see Renderer::end_piece().
+/// How much of a picture one piece holds where OpenGL is software; see Renderer::advance().
 /// The first piece is small. A piece that took longer than its limit halves the next ones, one that
 /// left a quarter of it makes them a quarter larger. Not thread-safe.
 class PiecePacer {

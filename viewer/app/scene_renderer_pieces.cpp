@@ -53,7 +53,7 @@ void SceneRenderer::draw_surfaces(const ViewSettings& settings, const PictureSet
     style.colour = surface.colour;
     style.opacity = surface.opacity;
     style.id = static_cast<std::uint32_t>(*number + 1);
-    style.cut_by = cuts.of(scene_->tree().grid(), node.mesh->key);
+    style.clip_mask = cuts.of(scene_->tree().grid(), node.mesh->key);
     renderer().draw(*mesh, style);
     state.triangles += node.mesh->triangles();
     ++state.nodes;
@@ -67,7 +67,7 @@ void SceneRenderer::begin_picture(const Asked& asked) {
   PictureSettings picture =
       picture_settings(settings, scene_->tree().grid().transform(), last_sample(*store_));
   picture.in_order = asked.way.in_order || setup_->software();
-  picture.overlays_later = asked.way.smaller > 1;
+  picture.defer_overlays = asked.way.smaller > 1;
   picture.overlay_scale = asked.way.overlay_scale;
   renderer().begin(asked.camera, asked.width, asked.height, picture);
   draw_surfaces(settings, picture, work_->state);
@@ -94,7 +94,7 @@ void SceneRenderer::wait_drawn(bool everything) {
 void SceneRenderer::draw_piece(double limit) {
   const bool in_pieces = std::isfinite(limit);
   Stopwatch watch;
-  const bool finished = renderer().end_piece(in_pieces ? pieces_.work() : kWholePicture);
+  const bool finished = renderer().advance(in_pieces ? pieces_.work() : kWholePicture);
   const double submitted = watch.lap();
   const int pieces = (piece_fence_ ? 1 : 0) + (finished ? 1 : 0);  // that are waited for
   wait_drawn(finished);

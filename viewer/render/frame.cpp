@@ -120,10 +120,10 @@ vec3 here() {
 }
 )";
 
-const char* const kCutGlsl = R"(
+const char* const kClipGlsl = R"(
 // A sample lies where a half space ends by what is linear on the picture: its distance, times the
 // stored depth with perspective, and never divided by that.
-void cut(uint bits) {
+void clip(uint bits) {
   vec2 across = (gl_FragCoord.xy / viewport.xy * 2 - 1) * viewport.zw;
   bool parallel = depth_range.z > 0.5;
   vec3 at = parallel ? vec3(across, -depth_of(gl_FragCoord.z)) : vec3(across, -1) * depth_range.x;
@@ -143,8 +143,8 @@ void cut(uint bits) {
 
 }  // namespace
 
-std::string fragment_glsl(bool cut) {
-  return kHereGlsl + std::string(cut ? kCutGlsl : "void cut(uint bits) {}\n");
+std::string fragment_glsl(bool clips) {
+  return kHereGlsl + std::string(clips ? kClipGlsl : "void clip(uint bits) {}\n");
 }
 
 const char* const kLightGlsl = R"(

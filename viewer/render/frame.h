@@ -39,7 +39,7 @@ extern const char* const kPlaceGlsl;
 /// GLSL for fragment shaders, after kFrameGlsl: here(), where the fragment is; and if `cut`
 /// cut(bits), which drops the samples that lie outside of any of these half spaces. What has
 /// nothing to drop can be hidden before it is shaded.
-std::string fragment_glsl(bool cut);
+std::string fragment_glsl(bool clips);
 /// GLSL: light on a surface, after kFrameGlsl.
 extern const char* const kLightGlsl;
 

@@ -19,7 +19,7 @@ class MeshPass {
   MeshPass();
 
   /// From now on half spaces cut what is drawn, or none does.
-  void start(bool cuts) { cuts_ = cuts; }
+  void start(bool clips) { clips_ = clips; }
   /// Those that follow each other in one block of a pool with one call.
   void draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent);
   /// One that lies in memory.
@@ -33,29 +33,29 @@ class MeshPass {
  private:
   /// One source in several forms.
   struct Programs {
-    Programs(bool cut, bool picture_is_cut, bool software, bool coloured);
+    Programs(bool clips, bool picture_clips, bool software, bool coloured);
     GlProgram opaque, transparent;
   };
 
-  void bind(bool cut, bool transparent, bool coloured = false);
+  void bind(bool clips, bool transparent, bool coloured = false);
   void bind_block(const MeshPlace& place);
   /// Waits until everything before the last call has been drawn. So a driver keeps two calls at
   /// most, and draws one while it receives the next.
-  void wait_for_call_before();
+  void wait_for_previous_call();
   /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
-  void need_numbers(std::size_t count);
+  void fill_numbers(std::size_t count);
 
   bool software_;
   /// Without and with colours at the vertices: where nothing is cut; elsewhere for what is not
   /// cut, and what is.
   std::array<std::optional<Programs>, 2> whole_programs_;
   std::array<std::array<std::optional<Programs>, 2>, 2> programs_;
-  bool cuts_ = false;
+  bool clips_ = false;
   GlVertexArray vertices_;
-  GlBuffer looks_, numbers_, commands_;
+  GlBuffer parameters_, numbers_, commands_;
   GlBuffer positions_, normals_, colours_, triangles_;  ///< of meshes that lie in memory
   std::size_t number_count_ = 0;
-  std::vector<Triangle> kept_;
+  std::vector<Triangle> finite_triangles_;
   std::optional<GlFence> last_call_;
 };
 

@@ -14,7 +14,7 @@
 namespace isobrick {
 namespace {
 
-struct Opened {
+struct OpenMesh {
   std::string path;
   std::unique_ptr<MeshFile> file;
   MeshStyle style;
@@ -22,9 +22,9 @@ struct Opened {
 };
 
 /// The unit of the picture, and what scales each mesh to it.
-std::string choose_unit(std::vector<Opened>& meshes) {
+std::string choose_unit(std::vector<OpenMesh>& meshes) {
   std::string unit;
-  for (Opened& mesh : meshes) {
+  for (OpenMesh& mesh : meshes) {
     const std::string own = mesh.file->info().unit;
     if (own.empty()) continue;
     if (unit.empty()) unit = own;
@@ -34,9 +34,9 @@ std::string choose_unit(std::vector<Opened>& meshes) {
 }
 
 /// Draws the bar of a picture in `unit`, in the unit that is asked for.
-void draw_scale_bar(Renderer& renderer, const std::string& unit, const std::string& wanted) {
-  if (wanted.empty()) return renderer.draw_scale_bar(unit_symbol(unit));
-  renderer.draw_scale_bar(unit_symbol(wanted), unit_ratio(wanted, unit).value_or(1));
+void draw_scale_bar(Renderer& renderer, const std::string& unit, const std::string& requested) {
+  if (requested.empty()) return renderer.draw_scale_bar(unit_symbol(unit));
+  renderer.draw_scale_bar(unit_symbol(requested), unit_ratio(requested, unit).value_or(1));
 }
 
 /// A chunk whose coordinates count from an origin, scaled.
@@ -59,9 +59,9 @@ class ScaledChunk {
 };
 
 /// Bounds of all meshes that have a vertex; two equal corners if none has.
-void find_bounds(const std::vector<Opened>& meshes, Vec3d& lo, Vec3d& hi) {
+void find_bounds(const std::vector<OpenMesh>& meshes, Vec3d& lo, Vec3d& hi) {
   bool any = false;
-  for (const Opened& mesh : meshes) {
+  for (const OpenMesh& mesh : meshes) {
     if (mesh.file->info().vertices == 0) continue;
     Vec3d mesh_lo, mesh_hi;
     mesh.file->bounds(mesh_lo, mesh_hi);
@@ -86,7 +86,7 @@ constexpr std::uint64_t kBatchBytes =
 /// The most of mapped files that lies in memory, where triangles name vertices that are far apart.
 std::uint64_t mapped_memory(const MeshPictureRequest& request) {
   std::uint64_t bytes = 0;
-  for (const PicturedMesh& mesh : request.meshes) {
+  for (const MeshInput& mesh : request.meshes) {
     std::error_code failure;
     const std::uintmax_t size = std::filesystem::file_size(mesh.path, failure);
     if (!failure) bytes += size;
@@ -109,9 +109,9 @@ std::uint64_t mesh_picture_memory(const MeshPictureRequest& request) {
 
 MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progress) {
   MeshPicture picture;
-  std::vector<Opened> meshes;
+  std::vector<OpenMesh> meshes;
   std::uint64_t faces = 0;
-  for (const PicturedMesh& mesh : request.meshes) {
+  for (const MeshInput& mesh : request.meshes) {
     meshes.push_back({.path = mesh.path, .file = open_mesh_file(mesh.path), .style = mesh.style});
     const MeshFileInfo info = meshes.back().file->info();
     picture.vertices += info.vertices;
@@ -124,7 +124,7 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
         "mesh's own",
         meshes.front().path, request.scale_bar_unit));
   // Those that are seen through come last.
-  std::stable_sort(meshes.begin(), meshes.end(), [](const Opened& a, const Opened& b) {
+  std::stable_sort(meshes.begin(), meshes.end(), [](const OpenMesh& a, const OpenMesh& b) {
     return a.style.opacity >= 1 && b.style.opacity < 1;
   });
   find_bounds(meshes, picture.lo, picture.hi);
@@ -137,7 +137,7 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
                  request.height, request.settings);
   const Vec3d origin = (picture.lo + picture.hi) * 0.5;
   progress.begin("draw", faces * sizeof(Triangle));
-  for (const Opened& mesh : meshes) {
+  for (const OpenMesh& mesh : meshes) {
     const std::uint64_t before = picture.triangles;
     ScaledChunk scaled(mesh.scale);
     mesh.file->read(origin * (1 / mesh.scale), [&](const MeshChunk& chunk, Vec3d from) {

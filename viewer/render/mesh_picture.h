@@ -11,14 +11,14 @@
 namespace isobrick {
 
 /// A mesh file in a picture.
-struct PicturedMesh {
+struct MeshInput {
   std::string path;
   MeshStyle style;
 };
 
 /// A picture of mesh files.
 struct MeshPictureRequest {
-  std::vector<PicturedMesh> meshes;
+  std::vector<MeshInput> meshes;
   int width = 1280, height = 960;
   CameraRequest camera;
   PictureSettings settings;

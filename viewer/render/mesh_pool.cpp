@@ -133,7 +133,7 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
 
 MeshCopy MeshPool::begin(const MeshChunk& chunk, Vec3d origin) {
   MeshCopy copy;
-  const std::span<const Triangle> triangles = drawable_triangles(chunk, copy.kept_);
+  const std::span<const Triangle> triangles = drawable_triangles(chunk, copy.finite_triangles_);
   constexpr std::size_t most = std::numeric_limits<std::int32_t>::max() / 3;
   if (chunk.positions.size() > most || triangles.size() > most)
     throw Error(
@@ -159,7 +159,7 @@ std::uint64_t MeshCopy::bytes_left() const {
   return sum;
 }
 
-void MeshCopy::go_on(std::uint64_t bytes) {
+void MeshCopy::advance(std::uint64_t bytes) {
   if (done()) return;
   Part& part = parts_.back();
   const std::size_t now = static_cast<std::size_t>(
@@ -174,7 +174,7 @@ void MeshCopy::go_on(std::uint64_t bytes) {
 
 PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
   MeshCopy copy = begin(chunk, origin);
-  while (!copy.done()) copy.go_on(std::numeric_limits<std::uint64_t>::max());
+  while (!copy.done()) copy.advance(std::numeric_limits<std::uint64_t>::max());
   return copy.take();
 }
 

@@ -55,7 +55,7 @@ class MeshCopy {
   /// Of what is copied.
   std::uint64_t bytes_left() const;
   /// Copies about so many bytes more, at least one.
-  void go_on(std::uint64_t bytes);
+  void advance(std::uint64_t bytes);
   /// Once it is done.
   PooledMesh take() { return std::move(mesh_); }
 
@@ -68,8 +68,8 @@ class MeshCopy {
   };
 
   PooledMesh mesh_;
-  std::vector<Triangle> kept_;  ///< triangles, where not all are
-  std::vector<Part> parts_;     ///< the next one last
+  std::vector<Triangle> finite_triangles_;  ///< triangles, where not all are
+  std::vector<Part> parts_;                 ///< the next one last
 };
 
 /// Meshes of any size in a few large buffers, so that thousands are drawn with one

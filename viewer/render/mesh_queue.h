@@ -21,7 +21,7 @@ struct MeshDraw {
 };
 
 /// Whether any half space of the picture may cut a mesh of this style.
-inline bool may_be_cut(const MeshStyle& style) { return style.cut_by != 0; }
+inline bool may_be_clipped(const MeshStyle& style) { return style.clip_mask != 0; }
 
 /// Meshes that are to be drawn, in pieces of any size. However large the pieces are, the triangles
 /// have one order.
@@ -40,12 +40,12 @@ class MeshQueue {
   /// That have not been taken.
   std::uint64_t triangles() const { return left_; }
 
-  /// The next ones, `most` triangles at most and one at least; valid until the next call. The queue
-  /// must not be empty.
-  std::span<const MeshDraw> take(std::uint64_t most);
+  /// The next ones, `max_triangles` triangles at max_triangles and one at least; valid until the
+  /// next call. The queue must not be empty.
+  std::span<const MeshDraw> take(std::uint64_t max_triangles);
 
  private:
-  std::vector<MeshDraw> draws_, piece_;
+  std::vector<MeshDraw> draws_, batch_;
   std::size_t next_ = 0;
   std::uint64_t left_ = 0;
   bool sorted_;

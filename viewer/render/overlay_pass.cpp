@@ -147,8 +147,8 @@ void OverlayPass::add_line(const WorldLine& line, Vec3f colour, float width) {
   const double d0 = depth(ends[0]), d1 = depth(ends[1]);
   if (d0 < near && d1 < near) return;
   if (d0 < near || d1 < near) {
-    const Vec3d cut = ends[0] + (ends[1] - ends[0]) * ((near - d0) / (d1 - d0));
-    ends[d0 < near ? 0 : 1] = cut;
+    const Vec3d clipped = ends[0] + (ends[1] - ends[0]) * ((near - d0) / (d1 - d0));
+    ends[d0 < near ? 0 : 1] = clipped;
   }
   for (Vec3d& end : ends) {
     end = camera_.project(end, width_, height_);

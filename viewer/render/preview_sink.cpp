@@ -25,12 +25,12 @@ const PreviewOptions& checked(const PreviewOptions& options) {
 }
 
 /// The context belongs to the thread of the call at hand.
-class Current {
+class ContextGuard {
  public:
-  explicit Current(GlContext& context) : context_(context) { context_.make_current(); }
-  ~Current() { context_.release_current(); }
-  Current(const Current&) = delete;
-  Current& operator=(const Current&) = delete;
+  explicit ContextGuard(GlContext& context) : context_(context) { context_.make_current(); }
+  ~ContextGuard() { context_.release_current(); }
+  ContextGuard(const ContextGuard&) = delete;
+  ContextGuard& operator=(const ContextGuard&) = delete;
 
  private:
   GlContext& context_;
@@ -45,7 +45,7 @@ PreviewSink::PreviewSink(std::string path, bool force, const PreviewOptions& opt
 
 PreviewSink::~PreviewSink() {
   if (!context_) return;
-  const Current current(*context_);
+  const ContextGuard guard(*context_);
   renderer_.reset();
 }
 
@@ -59,12 +59,12 @@ std::uint64_t PreviewSink::memory_with(const PreviewOptions& options) {
 }
 
 void PreviewSink::begin(const MeshHeader& header) {
-  largest_ = header.surface.value_or(MeshBounds{header.world_lo, header.world_hi});
-  origin_ = (largest_.lo + largest_.hi) * 0.5;
+  max_bounds_ = header.surface.value_or(MeshBounds{header.world_lo, header.world_hi});
+  origin_ = (max_bounds_.lo + max_bounds_.hi) * 0.5;
 }
 
 void PreviewSink::begin_picture(const MeshBounds& frame) {
-  const Current current(*context_);
+  const ContextGuard guard(*context_);
   renderer_.emplace();
   const CameraRequest request{.up = options_.up, .from = options_.towards_eye};
   const double aspect = static_cast<double>(options_.width) / options_.height;
@@ -73,13 +73,13 @@ void PreviewSink::begin_picture(const MeshBounds& frame) {
 }
 
 MeshBounds PreviewSink::bounds_of_batch() const {
-  if (positions_.empty()) return largest_;
-  MeshBounds bounds{largest_.hi, largest_.lo};
+  if (positions_.empty()) return max_bounds_;
+  MeshBounds bounds{max_bounds_.hi, max_bounds_.lo};
   for (const Vec3f& position : positions_) {
     const Vec3d p = to_double(position) + origin_;
     for (int axis = 0; axis < 3; ++axis) {
-      bounds.lo[axis] = std::fmin(bounds.lo[axis], std::fmax(p[axis], largest_.lo[axis]));
-      bounds.hi[axis] = std::fmax(bounds.hi[axis], std::fmin(p[axis], largest_.hi[axis]));
+      bounds.lo[axis] = std::fmin(bounds.lo[axis], std::fmax(p[axis], max_bounds_.lo[axis]));
+      bounds.hi[axis] = std::fmax(bounds.hi[axis], std::fmin(p[axis], max_bounds_.hi[axis]));
     }
   }
   return bounds;
@@ -117,8 +117,8 @@ void PreviewSink::add(const MeshChunk& chunk, std::span<const Triangle> triangle
 
 void PreviewSink::draw_batch() {
   if (triangles_.empty()) return;
-  if (!renderer_) begin_picture(largest_);
-  const Current current(*context_);
+  if (!renderer_) begin_picture(max_bounds_);
+  const ContextGuard guard(*context_);
   renderer_->draw({0, positions_, normals_, triangles_}, {.colour = options_.colour}, origin_);
   positions_.clear();
   normals_.clear();
@@ -130,7 +130,7 @@ void PreviewSink::finish() {
   if (!renderer_) begin_picture(bounds_of_batch());
   draw_batch();
   {
-    const Current current(*context_);
+    const ContextGuard guard(*context_);
     renderer_->end();
     write_png(out_, options_.width, options_.height, without_alpha(renderer_->read_pixels()));
     renderer_.reset();

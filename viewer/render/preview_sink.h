@@ -44,10 +44,10 @@ class PreviewSink final : public MeshSink {
 
   PreviewOptions options_;
   OutputFile out_;
-  /// Current only within a call: they may come from any thread. Until the picture is finished.
+  /// ContextGuard only within a call: they may come from any thread. Until the picture is finished.
   std::optional<GlContext> context_{std::in_place};
   std::optional<Renderer> renderer_;  ///< from the first triangles that are drawn
-  MeshBounds largest_;                ///< that the mesh can have
+  MeshBounds max_bounds_;             ///< that the mesh can have
   Vec3d origin_;
   std::vector<Vec3f> positions_, normals_;
   std::vector<Triangle> triangles_;

@@ -28,7 +28,7 @@ struct PictureSettings {
   bool picking = false;     ///< keep which mesh each pixel shows
   /// Lines, axes and the scale bar are drawn where the picture is copied to, and at that size: it
   /// is smaller than what it is shown in. The picture itself has none then.
-  bool overlays_later = false;
+  bool defer_overlays = false;
   /// Of a display that is scaled: lines are so many times as thick, text and axes at least so many
   /// times the smallest that can be read.
   float overlay_scale = 1;
@@ -51,7 +51,7 @@ struct MeshStyle {
   /// What pick() tells; 0: nothing. Of transparent ones the lowest 8 bits.
   std::uint32_t id = 0;
   /// Of the picture's half spaces those that may cut it, a bit each: with none it is drawn sooner.
-  std::uint16_t cut_by = 0xffff;
+  std::uint16_t clip_mask = 0xffff;
   friend bool operator==(const MeshStyle&, const MeshStyle&) = default;
 };
 
@@ -71,7 +71,7 @@ struct WorldLine {
 };
 
 /// What is under a pixel.
-struct Picked {
+struct PickResult {
   Vec3d position;        ///< world space, of the nearest surface, transparent meshes among them
   std::uint32_t id = 0;  ///< of its MeshStyle; 0 for others, and without PictureSettings::picking
 };
@@ -135,7 +135,7 @@ class Renderer {
   /// which then is the same bytes; until then the one before stays whole, for all functions below.
   /// Other drawing in the context may come in between. Work is counted in triangles; a step over
   /// the whole picture counts as many as take as long in software.
-  bool end_piece(std::uint64_t work);
+  bool advance(std::uint64_t work);
   /// What end() would have to do.
   std::uint64_t work_left() const;
 
@@ -151,11 +151,11 @@ class Renderer {
   /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for ImGui::Image say.
   unsigned texture() const;
   /// Copies it into a framebuffer (0: the window's), lower left corner at (left, 0), enlarged or
-  /// reduced to this size; see PictureSettings::overlays_later.
+  /// reduced to this size; see PictureSettings::defer_overlays.
   void copy_to(unsigned framebuffer, int to_width, int to_height, int left = 0) const;
 
   /// What the picture shows at pixel (x, y), rows from the top; nothing on the background.
-  std::optional<Picked> pick(int x, int y) const;
+  std::optional<PickResult> pick(int x, int y) const;
 
  private:
   struct State;

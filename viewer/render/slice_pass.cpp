@@ -34,7 +34,7 @@ in vec2 uv;
 // After all that is looked at across pixels.
 vec3 shown() {
   float value = texture(samples, uv).r;
-  cut(~0u);
+  clip(~0u);
   if (isnan(value)) discard;
   float part = clamp((value - window_opacity.x) * window_opacity.y, 0.0, 1.0);
   int last = textureSize(colours, 0).x - 1;

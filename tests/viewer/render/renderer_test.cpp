@@ -43,7 +43,7 @@ TEST_F(RenderTest, PickingTellsPlaceAndMesh) {
   renderer().begin(front_camera(1.25), 200, 160, {.picking = true});
   renderer().draw(ball.chunk(), {.id = 7});
   renderer().end();
-  const std::optional<Picked> picked = renderer().pick(110, 60);
+  const std::optional<PickResult> picked = renderer().pick(110, 60);
   ASSERT_TRUE(picked);
   EXPECT_EQ(picked->id, 7u);
   const Vec3d p = picked->position;
@@ -54,7 +54,7 @@ TEST_F(RenderTest, PickingTellsPlaceAndMesh) {
   EXPECT_FALSE(renderer().pick(-1, 80));
 }
 
-double distance_from_middle(const Picked& picked) {
+double distance_from_middle(const PickResult& picked) {
   const Vec3d p = picked.position;
   return std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
 }
@@ -77,7 +77,7 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
         renderer().draw(large.chunk(), {.opacity = 0.2f, .id = 5});
         renderer().draw(middle.chunk(), {.opacity = 0.2f, .id = 4});
         renderer().end();
-        const std::optional<Picked> picked = renderer().pick(100, 80);
+        const std::optional<PickResult> picked = renderer().pick(100, 80);
         ASSERT_TRUE(picked);
         EXPECT_EQ(picked->id, cut ? 3u : 5u);
         EXPECT_NEAR(distance_from_middle(*picked), cut ? 0.3 : 1, 2e-3);
@@ -134,7 +134,7 @@ TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   draw(1, {});
   const int wanted = count_blue(renderer().read_pixels());
   EXPECT_GT(wanted, 500);
-  draw(4, {.overlays_later = true});
+  draw(4, {.defer_overlays = true});
   EXPECT_EQ(count_blue(renderer().read_pixels()), 0);
   const GlTexture shown = make_texture(GL_RGBA8, kWidth, kHeight, 1, "a window");
   const GlFramebuffer window = make_framebuffer(std::array{shown.get()}, 0, "a window");
@@ -144,7 +144,7 @@ TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
                     rgba.data());
   EXPECT_NEAR(count_blue(rgba), wanted, 0.03 * wanted);
   // What hides them hides them, too, where the picture has fewer pixels.
-  draw(1, {.overlays_later = true});
+  draw(1, {.defer_overlays = true});
   renderer().copy_to(window.get(), kWidth, kHeight);
   glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
                     rgba.data());
