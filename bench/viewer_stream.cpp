@@ -71,7 +71,7 @@ Json slide(Session& session, const Arguments& arguments) {
   std::map<double, Clock::time_point> asked;
   const auto start = Clock::now();
   session.draw_until(true, [&] {
-    const std::vector<double>& shown = session.picture().state().isovalues;
+    const std::vector<double>& shown = session.renderer().state().isovalues;
     const auto found = shown.empty() ? asked.end() : asked.find(shown[0]);
     if (found != asked.end()) behind.add(seconds_since(found->second));
     const double turn = seconds_since(start) / arguments.seconds;
@@ -89,28 +89,28 @@ Json slide(Session& session, const Arguments& arguments) {
 
 Json device_json(const DeviceMesher::Times& t) {
   return {{"launches", t.launches},     {"meshes", t.grids},
-          {"turn_seconds", t.turn},     {"memory_seconds", t.memory},
+          {"turn_seconds", t.lock},     {"memory_seconds", t.memory},
           {"device_seconds", t.device}, {"hand_out_seconds", t.deliver}};
 }
 
 /// Whether the picture shows all that there is, as well as it can.
 bool complete_in_full(Session& session) {
-  const PictureState& state = session.picture().state();
-  return state.complete && !state.plain;
+  const FrameState& state = session.renderer().state();
+  return state.complete && !state.reduced_quality;
 }
 
 /// The first store of a process, beside the opening of the device.
 Json first_opening(const Arguments& arguments, const PictureBudgets& budgets,
                    const std::shared_ptr<PictureSetup>& setup) {
   Session session(arguments, budgets, setup);
-  session.draw_until(true, [&] { return session.picture().state().covers; });
+  session.draw_until(true, [&] { return session.renderer().state().covers; });
   Json result{{"first_surface_ms", session.since_opened() * 1e3}};
   session.draw_until(false, [&] { return complete_in_full(session); });
   result["complete_ms"] = session.since_opened() * 1e3;
   // The device may be there only now.
   session.draw_until(false, [&] {
     const auto& device = setup->device();
-    return !device->begun() || device->over();
+    return !device->has_begun() || device->is_done();
   });
   result["frames"] = session.take_times();
   return result;
@@ -122,7 +122,7 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
                  const std::shared_ptr<PictureSetup>& setup) {
   Session session(arguments, budgets, setup);
   Json result;
-  const auto covers = [&] { return session.picture().state().covers; };
+  const auto covers = [&] { return session.renderer().state().covers; };
   const auto complete = [&] { return complete_in_full(session); };
   session.draw_until(true, covers);
   result["open"] = {{"store_ms", session.read_seconds * 1e3},
@@ -130,9 +130,9 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
                     {"first_surface_ms", session.since_opened() * 1e3}};
   session.draw_until(false, complete);
   result["open"]["complete_ms"] = session.since_opened() * 1e3;
-  result["open"]["triangles"] = session.picture().state().triangles;
-  result["open"]["nodes"] = session.picture().state().nodes;
-  result["open"]["limited_by_budget"] = session.picture().state().limited_by_budget;
+  result["open"]["triangles"] = session.renderer().state().triangles;
+  result["open"]["nodes"] = session.renderer().state().nodes;
+  result["open"]["limited_by_budget"] = session.renderer().state().limited_by_budget;
   Json jumps = Json::array();
   for (int i = 1; i <= arguments.jumps; ++i) {
     const double part = static_cast<double>(i) / arguments.jumps;
@@ -163,12 +163,12 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
     return turn >= 1;
   });
   result["while_turning"] = session.take_times();
-  const CutTimes cut = session.picture().scene().times();
+  const CutTimes cut = session.renderer().scene().times();
   result["last_cut"] = {
       {"search_ms", cut.search * 1e3}, {"cut_ms", cut.cut * 1e3}, {"plan_ms", cut.plan * 1e3}};
-  result["meshes_by"] = session.picture().device().describe();
-  result["stream"] = stream_json(session.picture().scene().stream().counters());
-  result["device"] = device_json(session.picture().device().times());
+  result["meshes_by"] = session.renderer().device().describe();
+  result["stream"] = stream_json(session.renderer().scene().stream().counters());
+  result["device"] = device_json(session.renderer().device().times());
   result["device_bytes_peak"] = session.device_peak;
   return result;
 }
@@ -222,20 +222,20 @@ Json refine_region(const StoreReader& store, Box3 roi, const Arguments& argument
   const auto start = Clock::now();
   Json ends = Json::array();  // of pictures, and how much each showed
   session.draw_until(false, [&] {
-    const PictureState& state = session.picture().state();
+    const FrameState& state = session.renderer().state();
     ends.push_back({seconds_since(start) * 1e3, state.nodes, state.triangles});
     return complete_in_full(session);
   });
   return {{"seconds", seconds_since(start)},
-          {"triangles", session.picture().state().triangles},
-          {"nodes", session.picture().state().nodes},
-          {"limited_by_budget", session.picture().state().limited_by_budget},
+          {"triangles", session.renderer().state().triangles},
+          {"nodes", session.renderer().state().nodes},
+          {"limited_by_budget", session.renderer().state().limited_by_budget},
           {"picture_ends_ms_nodes_triangles", ends},
           {"last_mesh_seconds", session.changed_after(start)},
           {"frames", session.take_times()},
           {"at_rest", session.at_rest.summary()},
-          {"device", device_json(session.picture().device().times())},
-          {"stream", stream_json(session.picture().scene().stream().counters())}};
+          {"device", device_json(session.renderer().device().times())},
+          {"stream", stream_json(session.renderer().scene().stream().counters())}};
 }
 
 /// A region's refinement beside its extraction, by turns. The medians, and all.

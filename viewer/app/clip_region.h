@@ -39,9 +39,9 @@ class ClipTest {
  public:
   explicit ClipTest(const PictureSettings& picture);
   /// MeshStyle::clip_mask of what lies around `middle`.
-  std::uint16_t of(Vec3d middle, double radius) const;
+  std::uint16_t mask(Vec3d middle, double radius) const;
   /// Of a node's mesh.
-  std::uint16_t of(const NodeGrid& grid, const NodeKey& node) const;
+  std::uint16_t mask(const NodeGrid& grid, const NodeKey& node) const;
 
  private:
   std::vector<HalfSpace> half_spaces_;  ///< with normals of length 1

@@ -28,26 +28,26 @@ class DeviceOpener {
   /// Unless it has begun: that of the current OpenGL context, if possible. Throws Error, and has
   /// not begun, when that context cannot say which it is.
   void begin();
-  bool begun() const { return mesher_.valid(); }
+  bool has_begun() const { return mesher_.valid(); }
   /// Whether the device is there, perhaps without its memory, or is known not to come.
-  bool opened() const;
+  bool is_open() const;
   /// Whether the device is there with its memory, or is known not to come.
-  bool over() const;
+  bool is_done() const;
   /// Waits for that. Null where there is no device; throws Error when it cannot be opened.
   std::shared_ptr<DeviceMesher> get();
   /// Imports one piece of the memory, once it is there. Whether there was one.
   bool import_next();
 
   /// Device memory for meshes: that is taken, and that may be taken.
-  std::uint64_t held() const;
-  std::uint64_t reserved() const;
+  std::uint64_t allocated_bytes() const;
+  std::uint64_t reserved_bytes() const;
 
   const ImportedBuffers& buffers_of(const DeviceBlock& block) const {
     return imported_.at(block.owner.get())->buffers;
   }
 
  private:
-  struct Imported {
+  struct ImportedBlock {
     std::shared_ptr<const void> owner;
     ImportedBuffers buffers;
   };
@@ -57,7 +57,7 @@ class DeviceOpener {
 
   std::uint64_t budget_;
   std::function<void()> on_change_;
-  std::unordered_map<const void*, std::unique_ptr<Imported>> imported_;
+  std::unordered_map<const void*, std::unique_ptr<ImportedBlock>> imported_;
   std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;
   std::jthread opener_;  ///< last: ends before the others
 };
@@ -66,7 +66,7 @@ class DeviceOpener {
 /// of the picture's context.
 class DeviceMeshes {
  public:
-  DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opening);
+  DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opener);
 
   /// From now on: Backend::automatic takes a CUDA device where there is one, as soon as it is
   /// open, without waiting for it. Backend::cuda waits, and throws Error where there is none.
@@ -76,7 +76,7 @@ class DeviceMeshes {
   /// each call. Whether it has imported one.
   bool update();
   /// Whether update() has something to do.
-  bool more() const { return !opened_ && opening_->opened(); }
+  bool has_work() const { return !taken_over_ && opener_->is_open(); }
 
   /// Who makes meshes now, in a line: a device's name and how meshes get into pictures, or
   /// "CPU" and why.
@@ -89,15 +89,15 @@ class DeviceMeshes {
   /// DeviceMesher::kernel_lock(), where the device makes meshes and draws; else null.
   TicketLock* kernel_lock() const;
 
-  /// A mesh on the device, to be drawn until the next forget(). Where memory is shared, whoever
-  /// draws waits for the end of each picture: only then may meshes go, and their places be given
-  /// to others.
-  const PooledMesh& drawn(const NodeMesh& mesh, Vec3d origin);
-  void forget() { borrowed_.clear(); }
+  /// A mesh on the device, to be drawn until the next release_borrowed(). Where memory is shared,
+  /// whoever draws waits for the end of each picture: only then may meshes go, and their places be
+  /// given to others.
+  const PooledMesh& borrow(const NodeMesh& mesh, Vec3d origin);
+  void release_borrowed() { borrowed_.clear(); }
 
   /// Device memory for meshes that devices make: that is taken, and that may be taken.
-  std::uint64_t held() const { return opening_->held(); }
-  std::uint64_t reserved() const { return opening_->reserved(); }
+  std::uint64_t allocated_bytes() const { return opener_->allocated_bytes(); }
+  std::uint64_t reserved_bytes() const { return opener_->reserved_bytes(); }
 
   /// Of that memory: what is in meshes; the rest falls between.
   static std::uint64_t cache_bytes(std::uint64_t memory) { return memory / 4 * 3; }
@@ -106,10 +106,10 @@ class DeviceMeshes {
   void take_over();
 
   SceneStream& stream_;
-  std::shared_ptr<DeviceOpener> opening_;
+  std::shared_ptr<DeviceOpener> opener_;
   Backend backend_ = Backend::cpu;
   std::shared_ptr<DeviceMesher> mesher_;
-  bool opened_ = false;  ///< or tried in vain
+  bool taken_over_ = false;  ///< or tried in vain
   std::string failure_;
   std::deque<PooledMesh> borrowed_;
 };

@@ -29,25 +29,25 @@ class FramePacer {
   static FramePacer for_device(bool software) {
     FramePacer pacer(software ? kSoftwareLimit : kDeviceLimit);
     if (!software) return pacer;
-    pacer.plain_ = true;
+    pacer.reduced_quality_ = true;
     pacer.triangles_ = kFirstInSoftware;
     return pacer;
   }
 
   /// A picture of all triangles, in full, that took `seconds` while nothing moved: the first
   /// preview is then fluent as well.
-  void drawn_still(double seconds, std::uint64_t triangles) {
+  void add_still(double seconds, std::uint64_t triangles) {
     const double full = kFull * limit_;  // a preview chooses nodes and takes meshes over, too
-    plain_ = seconds > full;
+    reduced_quality_ = seconds > full;
     triangles_ = seconds > limit_
                      ? std::max(static_cast<double>(triangles) * full / seconds, kMinTriangles)
                      : kUnlimited;
   }
 
-  /// A preview that took `seconds` to draw as plain(), max_triangles() and smaller() returned.
+  /// A preview that took `seconds` to draw as plain(), max_triangles() and size_divisor() returned.
   /// `limited`: with more triangles it would be finer. `thin`: it had more than max_triangles(),
   /// for thin structure.
-  void drawn(double seconds, std::uint64_t triangles, bool limited, bool thin = false) {
+  void add_preview(double seconds, std::uint64_t triangles, bool limited, bool thin = false) {
     pace_thin(seconds, static_cast<double>(triangles), limited, thin);
     if (seconds > limit_)
       simplify(std::min(triangles_, static_cast<double>(triangles)));
@@ -56,7 +56,7 @@ class FramePacer {
   }
 
   /// Whether to leave occlusion and multisampling out while something moves.
-  bool plain() const { return plain_; }
+  bool reduces_quality() const { return reduced_quality_; }
   /// Of a preview.
   std::uint64_t max_triangles() const {
     return triangles_ < kUnlimited ? static_cast<std::uint64_t>(triangles_) : kAllTriangles;
@@ -64,7 +64,7 @@ class FramePacer {
   /// Of a preview that needs more than max_triangles() for thin structure.
   std::uint64_t thin_triangles() const { return static_cast<std::uint64_t>(thin_triangles_); }
   /// Divisor of the picture's width and height while something moves. At rest: 1.
-  int smaller() const { return smaller_; }
+  int size_divisor() const { return size_divisor_; }
 
  private:
   /// A device leaves a part of a display's period of 16.7 ms, since single frames take longer.
@@ -76,22 +76,24 @@ class FramePacer {
   /// Of the limit: a preview that takes between kFull and 1 is left as it is.
   static constexpr double kFull = 0.75;
   static constexpr double kGrowth = 1.2;
-  static constexpr int kMaxSmaller = 4;
+  static constexpr int kMaxSizeDivisor = 4;
 
   void simplify(double triangles) {
-    const bool smallest = smaller_ == kMaxSmaller;
-    if (!plain_)
-      plain_ = true;
+    const bool smallest = size_divisor_ == kMaxSizeDivisor;
+    if (!reduced_quality_)
+      reduced_quality_ = true;
     else if (triangles > kFewTriangles || smallest)
       triangles_ = std::max(triangles / 2, smallest ? kMinTriangles : kFewTriangles);
     else
-      ++smaller_;
+      ++size_divisor_;
   }
 
   void refine(double seconds, bool limited) {
-    const double larger = smaller_ > 1 ? static_cast<double>(smaller_) / (smaller_ - 1) : 1;
-    if (smaller_ > 1 && triangles_ >= kFewTriangles && seconds * larger * larger < kFull * limit_)
-      --smaller_;
+    const double larger =
+        size_divisor_ > 1 ? static_cast<double>(size_divisor_) / (size_divisor_ - 1) : 1;
+    if (size_divisor_ > 1 && triangles_ >= kFewTriangles &&
+        seconds * larger * larger < kFull * limit_)
+      --size_divisor_;
     else if (limited)
       triangles_ *= kGrowth;
   }
@@ -100,9 +102,9 @@ class FramePacer {
     const double most = kThinTimes * limit_;
     const double fitting = triangles * kFull * most / seconds;
     if (thin && seconds > most) {
-      if (smaller_ == kMaxSmaller) thin_triangles_ = std::max(fitting, kMinTriangles);
-      plain_ = true;
-      smaller_ = kMaxSmaller;
+      if (size_divisor_ == kMaxSizeDivisor) thin_triangles_ = std::max(fitting, kMinTriangles);
+      reduced_quality_ = true;
+      size_divisor_ = kMaxSizeDivisor;
     } else if (limited && fitting > thin_triangles_) {
       thin_triangles_ =
           std::min({fitting, kGrowth * thin_triangles_, static_cast<double>(kThinTriangles)});
@@ -112,8 +114,8 @@ class FramePacer {
   double limit_;
   double triangles_ = kUnlimited;
   double thin_triangles_ = kThinTriangles;
-  int smaller_ = 1;
-  bool plain_ = false;
+  int size_divisor_ = 1;
+  bool reduced_quality_ = false;
 };
 
 }  // namespace isobrick

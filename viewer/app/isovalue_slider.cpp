@@ -51,18 +51,19 @@ std::string human_count(double n) {
 }
 
 void tell(const ViewerState& state, double isovalue) {
-  const IsovalueCounts& counts = state.facts->counts();
-  const StreamCounters made = state.picture->scene().stream().counters();
-  ImGui::SetTooltip("%s", fmt::format("{:.6g}\nabout {} triangles\nin {} of {} bricks of level 0",
-                                      isovalue, human_count(state.facts->triangles(isovalue, made)),
-                                      counts.active_bricks(isovalue), counts.bricks())
-                              .c_str());
+  const IsovalueCounts& counts = state.isovalue_stats->counts();
+  const StreamCounters made = state.scene_renderer->scene().stream().counters();
+  ImGui::SetTooltip(
+      "%s", fmt::format("{:.6g}\nabout {} triangles\nin {} of {} bricks of level 0", isovalue,
+                        human_count(state.isovalue_stats->triangles(isovalue, made)),
+                        counts.active_bricks(isovalue), counts.bricks())
+                .c_str());
 }
 
 }  // namespace
 
 void draw_isovalue_slider(ViewerState& state, float width, float height) {
-  const auto range = state.facts->counts().range();
+  const auto range = state.isovalue_stats->counts().range();
   if (!(range.lo < range.hi)) {
     ImGui::TextUnformatted(range.empty() ? "There are no samples but NaN."
                                          : "All samples are equal.");
@@ -74,7 +75,7 @@ void draw_isovalue_slider(ViewerState& state, float width, float height) {
   const float top = corner.y, bottom = corner.y + height;
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   draw.AddRectFilled(corner, {corner.x + width, bottom}, kBack);
-  if (const auto histogram = state.facts->histogram())
+  if (const auto histogram = state.isovalue_stats->histogram())
     draw_bars(draw, *histogram, axis, top + 2, bottom);
   for (std::size_t i = 0; i < state.settings.surfaces.size(); ++i) {
     const float x = axis.place(state.settings.surfaces[i].isovalue);

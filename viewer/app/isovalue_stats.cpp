@@ -14,9 +14,9 @@ namespace {
 constexpr int kBins = 256;
 
 /// Ends a count that nobody waits for.
-class Stoppable final : public Progress {
+class StopCheck final : public Progress {
  public:
-  explicit Stoppable(const std::atomic<bool>& stop) : stop_(stop) {}
+  explicit StopCheck(const std::atomic<bool>& stop) : stop_(stop) {}
   void begin(std::string_view, std::uint64_t) override { check(); }
   void advance(std::uint64_t) override { check(); }
   void end() override {}
@@ -34,7 +34,7 @@ IsovalueStats::IsovalueStats(std::shared_ptr<const StoreReader> store)
     : counts_(*store_bricks(store)) {
   thread_ = std::thread([this, store = std::move(store)] {
     try {
-      Stoppable progress(stop_);
+      StopCheck progress(stop_);
       auto counted =
           std::make_shared<const Histogram>(isobrick::histogram(*store, progress, kBins, true));
       const MutexLock lock(mutex_);

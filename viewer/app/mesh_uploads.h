@@ -18,11 +18,11 @@ class MeshUploads {
  public:
   /// What may be taken to the device in a picture while others wait: copies that a driver puts
   /// off take their time later.
-  struct Share {
+  struct Limit {
     std::uint64_t bytes = 0;
     std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
 
-    bool spent() const {
+    bool is_spent() const {
       return bytes > kMaxBytes || std::chrono::steady_clock::now() - begin > kMax;
     }
     static constexpr std::uint64_t kMaxBytes = 16u << 20;
@@ -31,19 +31,19 @@ class MeshUploads {
 
   /// Before the pool grows: meshes that are not used may go, or stay. Where OpenGL is software they
   /// are soon copied again, while new memory is cleared, tens of milliseconds a block.
-  enum class Unused : std::uint8_t { stay, go };
+  enum class UnusedMeshes : std::uint8_t { keep, drop };
 
-  MeshUploads(MeshPool& pool, Unused unused) : pool_(pool), unused_(unused) {}
+  MeshUploads(MeshPool& pool, UnusedMeshes unused) : pool_(pool), unused_(unused) {}
   ~MeshUploads();
   MeshUploads(const MeshUploads&) = delete;
   MeshUploads& operator=(const MeshUploads&) = delete;
 
   /// From now on what was used before may go.
-  void begin_use() { ++now_; }
-  /// Uses a picture's meshes and takes those that are not there; false when `share` (null: without
+  void begin_use() { ++use_; }
+  /// Uses a picture's meshes and takes those that are not there; false when `limit` (null: without
   /// a limit) was spent before all were. `origin`: world position of (0, 0, 0) in meshes'
   /// coordinates. Throws what MeshPool::add does.
-  bool add(const Drawable& drawable, Vec3d origin, Share* share);
+  bool add(const Drawable& drawable, Vec3d origin, Limit* limit);
   /// Uses a picture's meshes that are there.
   void keep(const Drawable& drawable);
   /// Null for what is not there.
@@ -56,23 +56,23 @@ class MeshUploads {
 
  private:
   struct Upload {
-    bool there = false;
-    PooledMesh place;
-    std::uint64_t used = 0;
+    bool complete = false;
+    PooledMesh mesh;
+    std::uint64_t last_use = 0;
     std::optional<MeshCopy> copy;  ///< that has been begun, of `from`
-    MeshPtr from;
+    MeshPtr source;
   };
 
-  bool advance(Upload& upload, Share* share);
+  bool advance(Upload& upload, Limit* limit);
 
   /// Those that are not used, the oldest last.
-  std::vector<MeshId> unused() const;
+  std::vector<MeshId> unused_ids() const;
   void make_room(const MeshChunk& mesh, std::optional<std::vector<MeshId>>& left);
 
   MeshPool& pool_;
-  Unused unused_;
+  UnusedMeshes unused_;
   std::unordered_map<MeshId, Upload, MeshIdHash> uploads_;
-  std::uint64_t now_ = 0;
+  std::uint64_t use_ = 0;
 };
 
 }  // namespace isobrick

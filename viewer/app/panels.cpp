@@ -97,10 +97,10 @@ void slices_panel(ViewerState& state) {
     ImGui::Checkbox(kAxes[axis], &slice.shown);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(scaled(200));
-    ImGui::SliderFloat("##place", &slice.place, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("##place", &slice.position, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::PopID();
   }
-  const auto range = state.facts->counts().range();
+  const auto range = state.isovalue_stats->counts().range();
   if (range.empty()) return;
   const auto lo = static_cast<float>(range.lo), hi = static_cast<float>(range.hi);
   ImGui::DragFloatRange2("Window", &settings.window_lo, &settings.window_hi, (hi - lo) / 500, lo,
@@ -109,7 +109,7 @@ void slices_panel(ViewerState& state) {
 
 /// Which stored level is the finest to be shown.
 void finest_level(ViewerState& state) {
-  const int coarsest = static_cast<int>(state.picture->store().info().levels.size()) - 1;
+  const int coarsest = static_cast<int>(state.scene_renderer->store().info().levels.size()) - 1;
   if (coarsest > 0)
     ImGui::SliderInt("Finest level", &state.settings.finest_level, 0, coarsest, "%d",
                      ImGuiSliderFlags_AlwaysClamp);
@@ -161,7 +161,8 @@ void look_panel(ViewerState& state) {
 }
 
 void picking_panel(ViewerState& state) {
-  const std::string unit = unit_symbol(state.picture->scene().tree().grid().transform().unit);
+  const std::string unit =
+      unit_symbol(state.scene_renderer->scene().tree().grid().transform().unit);
   if (const auto& p = state.picked) {
     text(fmt::format("Position {:.6g}, {:.6g}, {:.6g} {}", p->world.x, p->world.y, p->world.z,
                      unit));
@@ -186,7 +187,7 @@ void attempt(ViewerState& state, F&& f) {
   try {
     f();
   } catch (const std::exception& e) {
-    state.say(error_message(e));
+    state.show_message(error_message(e));
   }
 }
 
@@ -229,21 +230,21 @@ std::uint64_t missing_bricks(ViewerState& state) {
   const double now = ImGui::GetTime();
   if (now >= state.next_brick_count) {
     Stopwatch watch;
-    state.missing_bricks = state.picture->scene().stream().missing_bricks();
+    state.missing_bricks = state.scene_renderer->scene().stream().missing_bricks();
     state.next_brick_count = now + std::max(kSeconds, kPart * watch.lap());
   }
   return state.missing_bricks;
 }
 
 /// What a picture is, or becomes.
-const char* stage_of(const PictureState& p) {
+const char* stage_of(const FrameState& p) {
   if (p.moving) return "preview";
-  return p.complete && !p.plain ? "complete" : "refining";
+  return p.complete && !p.reduced_quality ? "complete" : "refining";
 }
 
 void status_panel(ViewerState& state) {
-  const StreamCounters c = state.picture->scene().stream().counters();
-  const PictureState& p = state.picture->state();
+  const StreamCounters c = state.scene_renderer->scene().stream().counters();
+  const FrameState& p = state.scene_renderer->state();
   ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
                    static_cast<int>(state.frame_number % state.frame_times.size()), nullptr, 0, 50,
                    {ImGui::GetContentRegionAvail().x, scaled(36)});
@@ -252,7 +253,7 @@ void status_panel(ViewerState& state) {
                    state.draw_seconds * 1e3));
   if (p.moving && p.limited)
     text(fmt::format("preview: about {} triangles, 1/{} of the size", state.pacer.max_triangles(),
-                     state.pacer.smaller()));
+                     state.pacer.size_divisor()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
   text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
@@ -264,7 +265,7 @@ void status_panel(ViewerState& state) {
   if (p.limited_by_budget) text("as fine as the memory allows");
   if (!p.damage.empty()) text(fmt::format("{} parts cannot be shown", p.damage.size()));
   if (p.drawing)
-    ImGui::TextDisabled("drawing %.0f %%", 100 * p.drawn_part);
+    ImGui::TextDisabled("drawing %.0f %%", 100 * p.drawn_fraction);
   else
     ImGui::TextDisabled("%s", stage_of(p));
 }
@@ -346,7 +347,7 @@ void main_panel(ViewerState& state) {
   draw_volumes_panel(state);
   section("Surfaces", true, surfaces_panel, state);
   section("Camera and look", false, look_panel, state);
-  section("ClipTest and region", false, draw_clip_panel, state);
+  section("Clipping and region", false, draw_clip_panel, state);
   section("Slices", false, slices_panel, state);
   section("Point and measure", false, picking_panel, state);
   section("Bookmarks", false, bookmarks_panel, state);
@@ -373,7 +374,7 @@ void draw_notice(const std::string& text) {
 
 void draw_panels(ViewerState& state) {
   messages_panel(state);
-  if (state.picture == nullptr)
+  if (state.scene_renderer == nullptr)
     draw_notice(
         "Drop a store, or a volume of any format, on this window.\nF1 shows keys and mouse.");
   else if (state.panels)

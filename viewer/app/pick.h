@@ -7,7 +7,7 @@
 namespace isobrick {
 
 /// What the picture shows at a pixel, rows from the top; nothing on the background.
-std::optional<PickedPoint> pick_point(SceneRenderer& picture, int x, int y);
+std::optional<PickedPoint> pick_point(SceneRenderer& scene_renderer, int x, int y);
 
 /// Draws the points and the line of a measurement over the picture, with Dear ImGui.
 void draw_measure(const ViewerState& state, const PictureArea& area);

@@ -45,7 +45,7 @@ WorldBox SceneRenderer::shown_bounds(const ViewSettings& settings) const {
   for (int axis = 0; axis < 3; ++axis) {
     const SliceSettings& slice = settings.slices[static_cast<std::size_t>(axis)];
     IndexBox plane = part;
-    plane.lo[axis] = plane.hi[axis] = static_cast<double>(slice.place) * last[axis];
+    plane.lo[axis] = plane.hi[axis] = static_cast<double>(slice.position) * last[axis];
     if (slice.shown && part.lo[axis] <= plane.lo[axis] && plane.hi[axis] <= part.hi[axis])
       include(box, plane);
   }

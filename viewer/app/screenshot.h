@@ -9,14 +9,15 @@
 namespace isobrick {
 
 /// A picture that is to be drawn.
-struct Shot {
+struct Screenshot {
   std::string file;
   Camera camera;
 };
 
 /// A full turn of the camera in equal steps about a vertical through its target, as
 /// FOLDER/0000.png and so on.
-std::vector<Shot> turntable(Camera camera, Vec3d vertical, int frames, const std::string& folder);
+std::vector<Screenshot> turntable(Camera camera, Vec3d vertical, int frames,
+                                  const std::string& folder);
 
 /// `file`, or where it is taken its name with -2, -3 and so on behind.
 std::filesystem::path free_name(const std::filesystem::path& file);

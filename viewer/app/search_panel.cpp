@@ -15,7 +15,7 @@ constexpr std::array<const char*, std::size(kIndexKinds)> kNames{"linear scan", 
 }  // namespace
 
 void draw_search_panel(ViewerState& state) {
-  NodeSearch& search = state.picture->scene().search();
+  NodeSearch& search = state.scene_renderer->scene().search();
   const NodeSearch::State now = search.state();
   // What was refused is not what answers; the next store may have room for it.
   int chosen = static_cast<int>(now.refused.empty() ? state.index : now.kind);

@@ -52,7 +52,7 @@ void SliceViews::update(SceneStream& stream, const ViewSettings& settings) {
     SliceRequest request;
     request.axis = axis;
     request.bytes = max_bytes_;
-    request.position = settings.slices[slot].place * last_[axis];
+    request.position = settings.slices[slot].position * last_[axis];
     shown.requested = true;
     stream.set_slice(axis, request);
     const auto slice = stream.slice(axis);

@@ -92,13 +92,13 @@ nlohmann::ordered_json to_json(const ViewSettings& s) {
                         {"colour", list(surface.colour)},
                         {"opacity", surface.opacity},
                         {"shown", surface.shown}});
-  for (const CutSettings& cut : s.cuts)
-    cuts.push_back({{"on", cut.on}, {"place", cut.place}, {"beyond", cut.beyond}});
-  for (const PlaneSettings& plane : s.planes)
+  for (const AxisClipSettings& clip : s.axis_clips)
+    cuts.push_back({{"on", clip.on}, {"place", clip.position}, {"beyond", clip.above}});
+  for (const ClipPlaneSettings& plane : s.planes)
     planes.push_back(
         {{"on", plane.on}, {"normal", list(plane.kept.normal)}, {"least", plane.kept.least}});
   for (const SliceSettings& slice : s.slices)
-    slices.push_back({{"shown", slice.shown}, {"place", slice.place}});
+    slices.push_back({{"shown", slice.shown}, {"place", slice.position}});
   return {{"surfaces", surfaces},
           {"cuts", cuts},
           {"planes", planes},
@@ -127,8 +127,8 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   const Json& cuts = in.array("cuts", 3, 3);
   const Json& slices = in.array("slices", 3, 3);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Fields cut(cuts[axis]), slice(slices[axis]);
-    s.cuts[axis] = {cut.flag("on"), cut.real("place", 0, 1), cut.flag("beyond")};
+    const Fields clip(cuts[axis]), slice(slices[axis]);
+    s.axis_clips[axis] = {clip.flag("on"), clip.real("place", 0, 1), clip.flag("beyond")};
     s.slices[axis] = {slice.flag("shown"), slice.real("place", 0, 1)};
   }
   for (const Json& item : in.array("planes", 0, kMaxClipPlanes)) {

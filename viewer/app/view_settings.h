@@ -23,24 +23,24 @@ struct SurfaceSettings {
 };
 
 /// A plane across an axis of the volume that cuts away what lies beyond it.
-struct CutSettings {
+struct AxisClipSettings {
   bool on = false;
-  float place = 0.5f;  ///< between the volume's first sample (0) and its last (1)
-  bool beyond = true;  ///< what lies at larger places goes; else at smaller ones
-  friend bool operator==(const CutSettings&, const CutSettings&) = default;
+  float position = 0.5f;  ///< between the volume's first sample (0) and its last (1)
+  bool above = true;      ///< what lies at larger places goes; else at smaller ones
+  friend bool operator==(const AxisClipSettings&, const AxisClipSettings&) = default;
 };
 
 /// A plane at any angle that cuts away one side.
-struct PlaneSettings {
+struct ClipPlaneSettings {
   bool on = true;
   HalfSpace kept;
-  friend bool operator==(const PlaneSettings&, const PlaneSettings&) = default;
+  friend bool operator==(const ClipPlaneSettings&, const ClipPlaneSettings&) = default;
 };
 
 /// A picture of the samples across an axis of the volume.
 struct SliceSettings {
   bool shown = false;
-  float place = 0.5f;
+  float position = 0.5f;
   friend bool operator==(const SliceSettings&, const SliceSettings&) = default;
 };
 
@@ -48,9 +48,9 @@ struct SliceSettings {
 /// what of it has been loaded.
 struct ViewSettings {
   std::vector<SurfaceSettings> surfaces;
-  std::array<CutSettings, 3> cuts;      ///< across x, y, z
-  std::vector<PlaneSettings> planes;    ///< kMaxClipPlanes at most
-  std::array<SliceSettings, 3> slices;  ///< across x, y, z
+  std::array<AxisClipSettings, 3> axis_clips;  ///< across x, y, z
+  std::vector<ClipPlaneSettings> planes;       ///< kMaxClipPlanes at most
+  std::array<SliceSettings, 3> slices;         ///< across x, y, z
   float window_lo = 0,
         window_hi = 0;  ///< samples that slices show black and white; equal: for choose_values()
   bool region_on = false;

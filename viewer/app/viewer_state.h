@@ -61,11 +61,11 @@ struct TypedIsovalue {
 
 /// What a window shows and how; panels change it. Not thread-safe.
 struct ViewerState {
-  std::filesystem::path path;              ///< of the store; empty: none is open
-  ImageVolumes volumes;                    ///< of the store, and the one that is shown
-  std::unique_ptr<SceneRenderer> picture;  ///< of the store; null: none is open
-  std::unique_ptr<IsovalueStats> facts;    ///< of the store
-  IndexKind index = IndexKind::linear;     ///< what finds active nodes, of the next store too
+  std::filesystem::path path;                     ///< of the store; empty: none is open
+  ImageVolumes volumes;                           ///< of the store, and the one that is shown
+  std::unique_ptr<SceneRenderer> scene_renderer;  ///< of the store; null: none is open
+  std::unique_ptr<IsovalueStats> isovalue_stats;  ///< of the store
+  IndexKind index = IndexKind::linear;  ///< what finds active nodes, of the next store too
   ViewSettings settings;
   std::size_t selected = 0;  ///< the surface that slider and keys move
   Navigator navigator;
@@ -92,9 +92,9 @@ struct ViewerState {
   /// How much of the left of a window of this width the panel takes from what it shows beside it:
   /// nothing where there is too little room.
   float panel_room(float width) const {
-    return picture != nullptr && panels && width > 2 * panel_width ? panel_width : 0;
+    return scene_renderer != nullptr && panels && width > 2 * panel_width ? panel_width : 0;
   }
-  void say(std::string message) {
+  void show_message(std::string message) {
     messages.push_back({std::move(message), std::chrono::steady_clock::now() + message_time});
   }
   /// Drops messages that have been shown long enough.

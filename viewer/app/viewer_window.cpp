@@ -108,8 +108,8 @@ ViewerWindow::ViewerWindow(WindowOptions options)
 ViewerWindow::~ViewerWindow() {
   glfwMakeContextCurrent(window_);
   state_.import.reset();
-  state_.facts.reset();
-  state_.picture.reset();
+  state_.isovalue_stats.reset();
+  state_.scene_renderer.reset();
   setup_.reset();
   ImGui_ImplOpenGL3_Shutdown();
   ImGui_ImplGlfw_Shutdown();
@@ -134,14 +134,14 @@ double ViewerWindow::aspect() const {
 }
 
 void ViewerWindow::frame_again(FrameTarget framed) {
-  const SceneRenderer& picture = *state_.picture;
-  WorldBox box = picture.bounds();
+  const SceneRenderer& scene_renderer = *state_.scene_renderer;
+  WorldBox box = scene_renderer.bounds();
   try {
-    if (framed == FrameTarget::surface) box = picture.shown_bounds(state_.settings);
+    if (framed == FrameTarget::surface) box = scene_renderer.shown_bounds(state_.settings);
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
-  frame(state_.navigator.camera, picture, box, aspect());
+  frame(state_.navigator.camera, scene_renderer, box, aspect());
   state_.navigator.stop();
 }
 
@@ -161,7 +161,7 @@ void ViewerWindow::look_along(Vec3d direction) {
 void ViewerWindow::handle_requests() {
   const Requests asked = std::exchange(state_.requests, {});
   if (asked.close) glfwSetWindowShouldClose(window_, GLFW_TRUE);
-  if (state_.picture == nullptr) return;
+  if (state_.scene_renderer == nullptr) return;
   if (asked.look_along) look_along(*asked.look_along);
   if (asked.volume) show_volume(*asked.volume);
   if (asked.fit) frame_again(*asked.fit);
@@ -176,17 +176,17 @@ void ViewerWindow::handle_requests() {
 void ViewerWindow::save_picture(const std::filesystem::path& file) {
   try {
     const std::filesystem::path free = free_name(file);
-    write_picture(state_.picture->renderer(), free.string(), false);
-    state_.say(fmt::format("wrote '{}'", std::filesystem::absolute(free).string()));
+    write_picture(state_.scene_renderer->renderer(), free.string(), false);
+    state_.show_message(fmt::format("wrote '{}'", std::filesystem::absolute(free).string()));
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
 }
 
 std::optional<PickedPoint> ViewerWindow::pick(const Click& click) {
   // While something moves the picture may be smaller than the window.
-  const Renderer& renderer = state_.picture->renderer();
-  return pick_point(*state_.picture, static_cast<int>(click.x * renderer.width()),
+  const Renderer& renderer = state_.scene_renderer->renderer();
+  return pick_point(*state_.scene_renderer, static_cast<int>(click.x * renderer.width()),
                     static_cast<int>(click.y * renderer.height()));
 }
 
@@ -213,7 +213,7 @@ std::size_t ViewerWindow::measure(Vec3d world) {
 }
 
 void ViewerWindow::click(double x, double y) {
-  if (state_.picture == nullptr) return;
+  if (state_.scene_renderer == nullptr) return;
   const PictureArea area = picture_area();
   Click click = click_at((x * area.window_width - area.left) / area.width, y);
   state_.picked = pick(click);
@@ -225,7 +225,7 @@ void ViewerWindow::click(double x, double y) {
 
 /// Whether the picture that is shown is the finest there will be.
 bool ViewerWindow::rests() const {
-  const PictureState& state = state_.picture->state();
+  const FrameState& state = state_.scene_renderer->state();
   return !moving() && state.complete && !state.moving;
 }
 

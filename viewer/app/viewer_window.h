@@ -22,7 +22,7 @@ struct WindowOptions {
   CameraRequest camera;                 ///< for the first store
   ViewSettings settings;                ///< for the first store
   std::filesystem::path bookmarks;      ///< file; empty: the user's own
-  std::optional<double> piece_seconds;  ///< nothing: FrameOptions::in_window()
+  std::optional<double> batch_seconds;  ///< nothing: FrameOptions::in_window()
 };
 
 /// A window that shows a store: mouse, keys, panels, files dropped on it. All functions
@@ -48,7 +48,7 @@ class ViewerWindow {
   /// Waits for something to happen, at most so long and not at all while anything moves (some
   /// milliseconds while meshes come in), and shows the next frame if anything has changed. False
   /// once the window is closed.
-  bool step(double most_seconds = 0.1);
+  bool step(double max_seconds = 0.1);
   /// Until the window is closed, or an end is asked for (core/cancel.h).
   void run();
 
@@ -75,8 +75,8 @@ class ViewerWindow {
     friend bool operator==(const WindowKey&, const WindowKey&) = default;
   };
 
-  void wait(double most_seconds);
-  void wait_for_meshes(double most_seconds);
+  void wait(double max_seconds);
+  void wait_for_meshes(double max_seconds);
   void draw_picture(int width, int height);
   void draw_frame(bool asked);
   void begin_frame();
@@ -114,20 +114,20 @@ class ViewerWindow {
   std::unique_ptr<Events> events_;
   ViewerState state_;
   double last_time_ = 0;
-  double opened_ = 0;     ///< when the store was
-  bool covered_ = false;  ///< the store's surface has been shown
-  double shown_ = 0;      ///< when the last frame was
-  WindowKey shown_key_;   ///< of that frame
-  bool changed_ = true;   ///< something has happened: the next frame may differ from the last
-  bool told_ = false;     ///< something had happened before the last step
-  bool more_ = false;     ///< the picture would go on by itself
-  float scale_ = 1;       ///< of the display: 2 where everything is twice as large
-  bool failed_ = false;   ///< the last picture has thrown: it is tried again, but not at once
+  double open_time_ = 0;        ///< when the store was
+  bool surface_shown_ = false;  ///< the store's surface has been shown
+  double last_frame_time_ = 0;  ///< when the last frame was
+  WindowKey last_frame_key_;    ///< of that frame
+  bool has_event_ = true;       ///< something has happened: the next frame may differ from the last
+  bool had_event_ = false;      ///< something had happened before the last step
+  bool needs_draw_ = false;     ///< the picture would go on by itself
+  float scale_ = 1;             ///< of the display: 2 where everything is twice as large
+  bool draw_failed_ = false;    ///< the last picture has thrown: it is tried again, but not at once
   /// On a picture that was not at rest, whose surface may be a coarser one: they are looked at
   /// again once the picture rests, if it is still of the same.
   std::vector<Click> clicks_;
-  std::set<std::string> told_damage_;  ///< of this store
-  std::set<double> reported_empty_;    ///< isovalues without a surface, of this store
+  std::set<std::string> reported_damage_;  ///< of this store
+  std::set<double> reported_empty_;        ///< isovalues without a surface, of this store
 };
 
 }  // namespace isobrick

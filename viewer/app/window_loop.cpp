@@ -23,14 +23,14 @@ namespace isobrick {
 namespace {
 
 /// Above it a frame is no frame but a pause.
-constexpr double kLongestStep = 0.1;
+constexpr double kMaxStepSeconds = 0.1;
 /// While meshes come in and nothing moves, from a step that has drawn nothing new to the next one:
 /// the cores are for meshes.
-constexpr double kNothingNew = 0.008;
+constexpr double kMeshWaitSeconds = 0.008;
 /// While a picture is drawn in pieces or meshes come in, and nothing else happens, from one frame
 /// to the next: frames would keep software from drawing, and where a display sets the pace a
 /// picture of what has come would wait for its turn, after that of a frame that showed nothing new.
-constexpr double kLongestUnseen = 0.25;
+constexpr double kMaxFrameInterval = 0.25;
 /// Where nothing happens, from one look at what others have done (a signal, a count) to the next.
 constexpr double kIdleStep = 0.25;
 /// Messages about damage that are shown one by one.
@@ -51,32 +51,34 @@ bool values_differ(ViewSettings a, const ViewSettings& b) {
 
 /// Says once what cannot be shown.
 void ViewerWindow::report_damage() {
-  if (const std::string why = state_.facts->take_failure(); !why.empty()) state_.say(why);
-  for (const std::string& message : state_.picture->state().damage) {
-    if (told_damage_.size() > kMaxReported) return;
-    if (!told_damage_.insert(message).second) continue;
-    state_.say(told_damage_.size() <= kMaxReported
-                   ? message
-                   : "more is damaged: 'isobrick verify' names all bricks that cannot be read");
+  if (const std::string why = state_.isovalue_stats->take_failure(); !why.empty())
+    state_.show_message(why);
+  for (const std::string& message : state_.scene_renderer->state().damage) {
+    if (reported_damage_.size() > kMaxReported) return;
+    if (!reported_damage_.insert(message).second) continue;
+    state_.show_message(
+        reported_damage_.size() <= kMaxReported
+            ? message
+            : "more is damaged: 'isobrick verify' names all bricks that cannot be read");
   }
 }
 
 /// Says once, of each isovalue that no sample reaches, why nothing of it is seen.
 void ViewerWindow::report_empty_surfaces() {
   if (moving()) return;  // one that is dragged goes by
-  const ValueRange<double> range = state_.facts->counts().range();
+  const ValueRange<double> range = state_.isovalue_stats->counts().range();
   for (const SurfaceSettings& surface : state_.settings.surfaces) {
     if (!surface.shown || reported_empty_.contains(surface.isovalue)) continue;
     const std::string why =
-        why_out_of_range(range, state_.picture->store().info().type, 0, surface.isovalue);
+        why_out_of_range(range, state_.scene_renderer->store().info().type, 0, surface.isovalue);
     if (why.empty()) continue;
     reported_empty_.insert(surface.isovalue);
-    state_.say(why);
+    state_.show_message(why);
   }
 }
 
 double ViewerWindow::settled_at() const {
-  return std::max(events_->last_motion(), opened_) + kSettleSeconds;
+  return std::max(events_->last_motion(), open_time_) + kSettleSeconds;
 }
 
 bool ViewerWindow::moving() const {
@@ -85,23 +87,23 @@ bool ViewerWindow::moving() const {
 
 /// Makes the picture, or goes on with it.
 void ViewerWindow::draw_picture(int width, int height) {
-  SceneRenderer& picture = *state_.picture;
+  SceneRenderer& scene_renderer = *state_.scene_renderer;
   const double begin = glfwGetTime();
   // The first picture of a store should not wait for a good one.
-  covered_ |= picture.state().covers;
-  const bool fluent = moving() || !covered_;
+  surface_shown_ |= scene_renderer.state().covers;
+  const bool fluent = moving() || !surface_shown_;
   FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), fluent);
   options.overlay_scale = scale_;
-  options.piece_seconds = options_.piece_seconds.value_or(options.piece_seconds);
-  const int smaller = fluent ? state_.pacer.smaller() : 1;
+  options.batch_seconds = options_.batch_seconds.value_or(options.batch_seconds);
+  const int size_divisor = fluent ? state_.pacer.size_divisor() : 1;
   try {
-    picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
-                 std::max(height / smaller, 1), state_.settings, options);
+    scene_renderer.draw(state_.navigator.camera, std::max(width / size_divisor, 1),
+                        std::max(height / size_divisor, 1), state_.settings, options);
   } catch (const std::exception& e) {
-    if (!std::exchange(failed_, true)) state_.say(e.what());
+    if (!std::exchange(draw_failed_, true)) state_.show_message(e.what());
     return;
   }
-  failed_ = false;
+  draw_failed_ = false;
   pace(glfwGetTime() - begin);
   report_damage();
   report_empty_surfaces();
@@ -119,18 +121,18 @@ ViewerWindow::WindowKey ViewerWindow::window_key() const {
                 .converting = state_.import != nullptr,
                 .panels = state_.panels,
                 .help = state_.help};
-  if (state_.picture == nullptr) return key;
-  key.pictures = state_.picture->counters().finished;
+  if (state_.scene_renderer == nullptr) return key;
+  key.pictures = state_.scene_renderer->counters().finished;
   key.rests = rests();
-  key.histogram = state_.facts->histogram() != nullptr;
+  key.histogram = state_.isovalue_stats->histogram() != nullptr;
   return key;
 }
 
 /// Whether what tells how far something is, or a cursor that blinks, needs another frame.
 bool ViewerWindow::is_due() const {
   const bool under_way = state_.import != nullptr || ImGui::GetIO().WantTextInput ||
-                         (state_.picture != nullptr && !rests());
-  return under_way && glfwGetTime() - shown_ >= kLongestUnseen;
+                         (state_.scene_renderer != nullptr && !rests());
+  return under_way && glfwGetTime() - last_frame_time_ >= kMaxFrameInterval;
 }
 
 void ViewerWindow::begin_frame() {
@@ -165,17 +167,17 @@ void ViewerWindow::show_notice(const std::string& text) {
 void ViewerWindow::draw_frame(bool asked) {
   if (minimised()) return;
   const PictureArea area = picture_area();
-  if (state_.picture != nullptr) draw_picture(area.width, area.height);
+  if (state_.scene_renderer != nullptr) draw_picture(area.width, area.height);
   const WindowKey key = window_key();
-  if (!asked && key == shown_key_ && !is_due()) return;
-  shown_key_ = key;
+  if (!asked && key == last_frame_key_ && !is_due()) return;
+  last_frame_key_ = key;
   const double now = glfwGetTime();
-  state_.frame_seconds = now - std::exchange(shown_, now);
+  state_.frame_seconds = now - std::exchange(last_frame_time_, now);
   state_.frame_times[state_.frame_number++ % state_.frame_times.size()] =
       static_cast<float>(state_.frame_seconds * 1e3);
   begin_frame();
-  if (state_.picture != nullptr)
-    state_.picture->renderer().copy_to(0, area.width, area.height, area.left);
+  if (state_.scene_renderer != nullptr)
+    state_.scene_renderer->renderer().copy_to(0, area.width, area.height, area.left);
   const ViewSettings settings = state_.settings;
   const Camera camera = state_.navigator.camera;
   draw_panels(state_);
@@ -189,57 +191,61 @@ void ViewerWindow::draw_frame(bool asked) {
 
 /// What a picture, or a piece of one, that took this thread so long says of the next one.
 void ViewerWindow::pace(double seconds) {
-  const SceneRenderer& picture = *state_.picture;
+  const SceneRenderer& scene_renderer = *state_.scene_renderer;
   // There is more to draw; or a better one to come; or something else to do.
-  more_ = picture.state().drawing || picture.state().plain || picture.state().more;
-  if (!picture.drew()) return;
-  state_.draw_seconds = std::max(seconds, picture.picture_seconds());
-  if (picture.state().moving)
-    state_.pacer.drawn(state_.draw_seconds, picture.state().triangles, picture.state().limited,
-                       picture.state().thin);
-  else if (!picture.state().plain)
-    state_.pacer.drawn_still(state_.draw_seconds, picture.state().triangles);
+  needs_draw_ = scene_renderer.state().drawing || scene_renderer.state().reduced_quality ||
+                scene_renderer.state().needs_draw;
+  if (!scene_renderer.has_new_frame()) return;
+  state_.draw_seconds = std::max(seconds, scene_renderer.frame_seconds());
+  if (scene_renderer.state().moving)
+    state_.pacer.add_preview(state_.draw_seconds, scene_renderer.state().triangles,
+                             scene_renderer.state().limited,
+                             scene_renderer.state().thin_over_budget);
+  else if (!scene_renderer.state().reduced_quality)
+    state_.pacer.add_still(state_.draw_seconds, scene_renderer.state().triangles);
 }
 
-void ViewerWindow::wait(double most_seconds) {
-  if (minimised()) return glfwWaitEventsTimeout(most_seconds);
-  const bool there = state_.picture != nullptr;
+void ViewerWindow::wait(double max_seconds) {
+  if (minimised()) return glfwWaitEventsTimeout(max_seconds);
+  const bool there = state_.scene_renderer != nullptr;
   if (there && moving()) {
     // Until the hand moves on, or holds still for good.
-    if (!changed_ && !more_ && !state_.navigator.moving() && !state_.picture->drew())
-      return glfwWaitEventsTimeout(std::clamp(settled_at() - glfwGetTime(), kNothingNew,
-                                              std::max(most_seconds, kNothingNew)));
+    if (!has_event_ && !needs_draw_ && !state_.navigator.moving() &&
+        !state_.scene_renderer->has_new_frame())
+      return glfwWaitEventsTimeout(std::clamp(settled_at() - glfwGetTime(), kMeshWaitSeconds,
+                                              std::max(max_seconds, kMeshWaitSeconds)));
     return glfwPollEvents();
   }
-  if (!changed_ && !more_ && (!there || state_.picture->state().complete))
-    return glfwWaitEventsTimeout(most_seconds);
-  const bool before = std::exchange(changed_, false);
+  if (!has_event_ && !needs_draw_ && (!there || state_.scene_renderer->state().complete))
+    return glfwWaitEventsTimeout(max_seconds);
+  const bool before = std::exchange(has_event_, false);
   glfwPollEvents();
-  wait_for_meshes(most_seconds);
-  changed_ |= before;
+  wait_for_meshes(max_seconds);
+  has_event_ |= before;
 }
 
-void ViewerWindow::wait_for_meshes(double most_seconds) {
-  if (state_.picture == nullptr || state_.picture->drew()) return;
-  if (state_.picture->state().drawing || state_.picture->state().more) return;
+void ViewerWindow::wait_for_meshes(double max_seconds) {
+  if (state_.scene_renderer == nullptr || state_.scene_renderer->has_new_frame()) return;
+  if (state_.scene_renderer->state().drawing || state_.scene_renderer->state().needs_draw) return;
   // Each mesh that comes in ends a wait, and is not worth a step; the last one is, and what a user
   // does.
-  const SceneStream& stream = state_.picture->scene().stream();
-  const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
-  for (double now = glfwGetTime(); !changed_ && now < end && (failed_ || !stream.idle());
+  const SceneStream& stream = state_.scene_renderer->scene().stream();
+  const double end = glfwGetTime() + std::min(kMeshWaitSeconds, max_seconds);
+  for (double now = glfwGetTime(); !has_event_ && now < end && (draw_failed_ || !stream.idle());
        now = glfwGetTime())
     glfwWaitEventsTimeout(end - now);
 }
 
-bool ViewerWindow::step(double most_seconds) {
-  wait(most_seconds);
+bool ViewerWindow::step(double max_seconds) {
+  wait(max_seconds);
   if (glfwWindowShouldClose(window_)) return false;
   // What a panel is told by one event it may show with the second frame.
-  const bool told = std::exchange(changed_, false), asked = std::exchange(told_, told) || told;
-  more_ = false;
+  const bool told = std::exchange(has_event_, false),
+             asked = std::exchange(had_event_, told) || told;
+  needs_draw_ = false;
   const double now = glfwGetTime();
   const double seconds = now - std::exchange(last_time_, now);
-  state_.navigator.update(std::min(seconds, kLongestStep));
+  state_.navigator.update(std::min(seconds, kMaxStepSeconds));
   state_.drop_old_messages();
   handle_import();
   handle_requests();

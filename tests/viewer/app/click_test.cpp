@@ -26,17 +26,17 @@ TEST_F(Click, ClicksPickAndMeasure) {
 /// A press does not make the picture a coarse one, whatever moving pictures are like.
 TEST_F(Click, ClicksPickFromThePictureAtRest) {
   ViewerWindow& window = open();
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
+  for (int i = 0; i < 20; ++i) window.state().pacer.add_preview(2, 10'000, true);
   ASSERT_LT(window.state().pacer.max_triangles(), 4000u);
   until([&] { return rests(); });
   const double isovalue = window.state().settings.surfaces[0].isovalue;
   const Vec3d eye = window.state().navigator.camera.eye;
-  const auto triangles = window.state().picture->state().triangles;
+  const auto triangles = window.state().scene_renderer->state().triangles;
   display_->move_pointer(kWidth / 2 + 40, kHeight / 2 - 50);
   steps(2);
   display_->button(1, true);
   steps(8);
-  EXPECT_EQ(window.state().picture->state().triangles, triangles);
+  EXPECT_EQ(window.state().scene_renderer->state().triangles, triangles);
   display_->move_pointer(kWidth / 2 + 42, kHeight / 2 - 50);  // a hand that trembles
   steps(2);
   display_->button(1, false);
@@ -61,12 +61,12 @@ TEST_F(Click, ATransparentSurfaceIsPickedAsWell) {
 /// What is picked while the picture is a coarse one is looked at again.
 TEST_F(Click, AClickBeforeThePictureRestsIsMadeGood) {
   ViewerWindow& window = open();
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
+  for (int i = 0; i < 20; ++i) window.state().pacer.add_preview(2, 10'000, true);
   drag(3, kWidth / 2, kHeight / 2, kWidth / 2, kHeight / 2 + 20);
   window.state().measuring = true;
   click(kWidth / 2 + 40, kHeight / 2 - 50);
   ASSERT_TRUE(window.state().picked);
-  EXPECT_TRUE(window.state().picture->state().moving);
+  EXPECT_TRUE(window.state().scene_renderer->state().moving);
   const double before = window.state().picked->value.value();
   const double isovalue = window.state().settings.surfaces[0].isovalue;
   until([&] { return rests(); });
@@ -86,7 +86,7 @@ TEST_F(Click, AClickBesideTheSurfaceLeavesWhatWasMeasured) {
   click(kWidth / 2 + 40, kHeight / 2 - 50);
   ASSERT_EQ(window.state().measured.size(), 1u);
   const Vec3d point = window.state().measured[0];
-  for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
+  for (int i = 0; i < 20; ++i) window.state().pacer.add_preview(2, 10'000, true);
   display_->button(4, true);  // nearer
   display_->button(4, false);
   steps(1);

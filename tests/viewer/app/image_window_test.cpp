@@ -55,7 +55,7 @@ class ImageWindow : public test::WindowTest {
     return samples;
   }
 
-  bool is_said(std::string_view text) const {
+  bool has_message(std::string_view text) const {
     const auto& messages = window_->state().messages;
     return std::any_of(messages.begin(), messages.end(), [&](const Message& message) {
       return message.text.find(text) != std::string::npos;
@@ -65,9 +65,9 @@ class ImageWindow : public test::WindowTest {
   double radius_in_the_middle() {
     steps(3);
     until([&] { return rests(); });
-    const PictureState& state = window_->state().picture->state();
+    const FrameState& state = window_->state().scene_renderer->state();
     EXPECT_GT(state.triangles, 0u);
-    const Renderer& renderer = window_->state().picture->renderer();
+    const Renderer& renderer = window_->state().scene_renderer->renderer();
     const auto point = renderer.pick(renderer.width() / 2, renderer.height() / 2);
     if (!point) return 0;
     return length(point->position - Vec3d{20, 20, 20});
@@ -84,7 +84,7 @@ TEST_F(ImageWindow, AnImageThatIsDroppedShowsItsFirstVolumeAndOthersAreChosen) {
   EXPECT_EQ(state.volumes.selection.channel, 0);
   EXPECT_EQ(state.volumes.selection.time, 0);
   EXPECT_EQ(text_of(state.volumes), "time 0, channel 0");
-  EXPECT_TRUE(is_said("the ranges of the samples were computed"));
+  EXPECT_TRUE(has_message("the ranges of the samples were computed"));
   window.state().settings.surfaces[0].isovalue = 128;
   EXPECT_NEAR(radius_in_the_middle(), 6, 0.5);
 
@@ -110,7 +110,7 @@ TEST_F(ImageWindow, AnImageThatIsDroppedShowsItsFirstVolumeAndOthersAreChosen) {
   until([&] { return state.volumes.selection.channel == 0; });
   EXPECT_EQ(state.import, nullptr);
   window.state().requests.volume = Selection{.channel = 7, .time = 0};
-  until([&] { return is_said("--channel 7 is not there"); });
+  until([&] { return has_message("--channel 7 is not there"); });
   EXPECT_EQ(state.volumes.selection.channel, 0);
 }
 
@@ -153,7 +153,7 @@ TEST_F(ImageWindow, ATimeOfAFileThatIsDroppedIsItsFirst) {
   until([&] { return window.state().import == nullptr; });
   EXPECT_EQ(window.state().path, dir_ / "movie.zarr")
       << (window.state().messages.empty() ? "" : window.state().messages[0].text);
-  EXPECT_TRUE(is_said("'movie.nrrd' has several volumes; this is the first"));
+  EXPECT_TRUE(has_message("'movie.nrrd' has several volumes; this is the first"));
   window.state().settings.surfaces[0].isovalue = 128;
   EXPECT_NEAR(radius_in_the_middle(), 8, 0.5);
 }
@@ -166,20 +166,20 @@ TEST_F(ImageWindow, RemarksOfAReaderAreShown) {
   window.drop(dir_ / "long.nrrd");
   until([&] { return window.state().path == dir_ / "long.zarr"; });
   steps(2);
-  EXPECT_TRUE(is_said("14 bytes"));
+  EXPECT_TRUE(has_message("14 bytes"));
 }
 
 TEST_F(ImageWindow, AnIsovalueThatNoSampleReachesIsSaidWithTheRange) {
   WindowOptions options;
   options.settings.surfaces = {{.isovalue = 900}};
   ViewerWindow& window = open(options);
-  const ValueRange<double> range = window.state().facts->counts().range();
+  const ValueRange<double> range = window.state().isovalue_stats->counts().range();
   const auto text = [&](const std::string& isovalue) {
     return "isovalue " + isovalue + ": the surface is empty; the samples of level 0 lie within " +
            std::to_string(static_cast<int>(range.lo)) + " and " +
            std::to_string(static_cast<int>(range.hi));
   };
-  until([&] { return is_said(text("900")); });
+  until([&] { return has_message(text("900")); });
   EXPECT_EQ(window.state().messages.size(), 1u);
   // Once, and one that has a surface not at all.
   window.state().messages.clear();
@@ -189,7 +189,7 @@ TEST_F(ImageWindow, AnIsovalueThatNoSampleReachesIsSaidWithTheRange) {
   steps(5);
   EXPECT_TRUE(window.state().messages.empty());
   window.state().settings.surfaces[0].isovalue = -5;
-  until([&] { return is_said(text("-5")); });
+  until([&] { return has_message(text("-5")); });
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ class Uploads : public testing::Test {
 };
 
 TEST_F(Uploads, WhatIsNotDrawnGoesBeforeThePoolGrows) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::drop);
   Drawable shown = balls(0, 4);
   take(shown, {});
   const std::uint64_t one = uploads_->bytes();
@@ -84,21 +84,21 @@ TEST_F(Uploads, WhatIsNotDrawnGoesBeforeThePoolGrows) {
 }
 
 TEST_F(Uploads, WhatIsNeededFurtherOnStays) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::drop);
   const Drawable first = balls(0, 6), second = balls(6, 5);
   take(first, {});
   take(second, {});              // the pool's block is full
   Drawable next = balls(20, 1);  // and then those that were used least recently
   next.nodes.insert(next.nodes.end(), first.nodes.begin(), first.nodes.end());
-  MeshUploads::Share share;
+  MeshUploads::Limit limit;
   uploads_->begin_use();
-  EXPECT_TRUE(uploads_->add(next, {}, &share));
-  EXPECT_EQ(share.bytes, pool_->bytes() / 11) << "one is copied";
+  EXPECT_TRUE(uploads_->add(next, {}, &limit));
+  EXPECT_EQ(limit.bytes, pool_->bytes() / 11) << "one is copied";
   expect_there(next);
 }
 
 TEST_F(Uploads, NothingGoesForAMeshWithABlockOfItsOwn) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::drop);
   const Drawable small = balls(0, 8), large = balls(100, 1, 60);
   ASSERT_GT(large.nodes[0].mesh->mesh.positions.size(), kVertices);
   take(small, {});
@@ -108,7 +108,7 @@ TEST_F(Uploads, NothingGoesForAMeshWithABlockOfItsOwn) {
 }
 
 TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::stay);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::keep);
   const Drawable large = balls(0, 1, 60), other = balls(1, 2);
   const MeshBuffer& mesh = large.nodes[0].mesh->mesh;
   const std::uint64_t all =
@@ -117,12 +117,12 @@ TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
   int pictures = 0;
   for (bool there = false; !there; ++pictures) {
     ASSERT_LT(pictures, 10);
-    MeshUploads::Share share;
-    share.bytes = MeshUploads::Share::kMaxBytes;  // little is left
-    const std::uint64_t before = share.bytes;
+    MeshUploads::Limit limit;
+    limit.bytes = MeshUploads::Limit::kMaxBytes;  // little is left
+    const std::uint64_t before = limit.bytes;
     uploads_->begin_use();
-    there = uploads_->add(large, {}, &share);
-    copied += share.bytes - before;
+    there = uploads_->add(large, {}, &limit);
+    copied += limit.bytes - before;
     if (!there) take(other, {});  // others come and go meanwhile
   }
   EXPECT_GT(pictures, 2);
@@ -135,7 +135,7 @@ TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
 }
 
 TEST_F(Uploads, WhatIsNotDrawnMayStay) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::stay);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::keep);
   const Drawable first = balls(0, 11), second = balls(11, 11);
   take(first, {});
   const std::uint64_t one = uploads_->bytes();

@@ -29,11 +29,11 @@ int pixels_of_overlays(const std::string& store, int dots_per_inch) {
     window.state().settings.axes = window.state().settings.scale_bar = overlays;
     for (int i = 0; i < 500; ++i) {
       window.step(0.02);
-      const PictureState& state = window.state().picture->state();
-      if (i > 20 && state.complete && !state.moving && !state.plain) break;
+      const FrameState& state = window.state().scene_renderer->state();
+      if (i > 20 && state.complete && !state.moving && !state.reduced_quality) break;
     }
-    EXPECT_EQ(window.state().picture->renderer().width(), 800);
-    return window.state().picture->renderer().read_pixels();
+    EXPECT_EQ(window.state().scene_renderer->renderer().width(), 800);
+    return window.state().scene_renderer->renderer().read_pixels();
   };
   const auto with = picture(true), without = picture(false);
   int pixels = 0;

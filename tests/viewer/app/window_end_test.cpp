@@ -54,7 +54,7 @@ TEST_F(WindowEnd, PicturesReplaceNoOther) {
   ViewerWindow& window = open();
   const std::filesystem::path before = std::filesystem::current_path();
   std::filesystem::current_path(dir_ / "");
-  while (!window.state().picture->renderer().has_picture()) ASSERT_TRUE(window.step(0.02));
+  while (!window.state().scene_renderer->renderer().has_picture()) ASSERT_TRUE(window.step(0.02));
   for (std::size_t i = 0; i < 2; ++i) {
     window.state().requests.screenshot = "isobrick.png";
     const auto start = std::chrono::steady_clock::now();

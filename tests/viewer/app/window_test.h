@@ -44,7 +44,7 @@ class WindowTest : public testing::Test {
     window_ = std::make_unique<ViewerWindow>(options);
     window_->open(dir_ / "sphere.zarr");
     window_->state().panels = false;
-    until([&] { return window_->state().picture->state().complete; });
+    until([&] { return window_->state().scene_renderer->state().complete; });
     glfwSetWindowPos(window_->handle(), 0, 0);
     display_->move_pointer(kWindowWidth / 2, kWindowHeight / 2);
     display_->focus_under_pointer();
@@ -54,7 +54,7 @@ class WindowTest : public testing::Test {
 
   /// Whether the picture shows all there is, and not one that may be coarse.
   bool rests() const {
-    const PictureState& state = window_->state().picture->state();
+    const FrameState& state = window_->state().scene_renderer->state();
     return state.complete && !state.moving;
   }
   /// Steps until it holds. A test that waits for nothing fails.

@@ -123,8 +123,8 @@ int count_blue(const Rgba& rgba) {
 
 TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   constexpr int kWidth = 400, kHeight = 320;
-  const auto draw = [&](int smaller, const PictureSettings& settings) {
-    renderer().begin(front_camera(1.25), kWidth / smaller, kHeight / smaller, settings);
+  const auto draw = [&](int size_divisor, const PictureSettings& settings) {
+    renderer().begin(front_camera(1.25), kWidth / size_divisor, kHeight / size_divisor, settings);
     renderer().draw(make_ball({0, 0, 0}, 0.5f, 60).chunk(), {});
     renderer().draw_box({-1, -1, -1}, {1, 1, 1}, {0.1f, 0.1f, 0.9f}, 3);
     renderer().draw_axes();

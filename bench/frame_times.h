@@ -37,10 +37,10 @@ class Times {
 };
 
 /// How long pictures take, and what the slowest of them consist of.
-class PicturesTimes {
+class FrameTimings {
  public:
   /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds.
-  void add(double total, const PictureTimes& steps, double finish) {
+  void add(double total, const FrameTimes& steps, double finish) {
     total_.add(total);
     pictures_.push_back({pictures_.size(), total, steps, finish});
   }
@@ -63,7 +63,7 @@ class PicturesTimes {
   struct Picture {
     std::size_t number;
     double total;
-    PictureTimes steps;
+    FrameTimes steps;
     double finish;
   };
 
@@ -83,7 +83,7 @@ class PicturesTimes {
     put("drawable_ms", [](const Picture& p) { return p.steps.drawable; });
     put("upload_ms", [](const Picture& p) { return p.steps.upload; });
     put("slices_ms", [](const Picture& p) { return p.steps.slices; });
-    put("turn_ms", [](const Picture& p) { return p.steps.turn; });
+    put("turn_ms", [](const Picture& p) { return p.steps.lock; });
     put("draw_ms", [](const Picture& p) { return p.steps.draw; });
     put("tidy_ms", [](const Picture& p) { return p.steps.tidy; });
     put("finish_ms", [](const Picture& p) { return p.steps.finish + p.finish; });

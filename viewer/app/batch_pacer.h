@@ -8,13 +8,13 @@ namespace isobrick {
 /// How much of a picture one piece holds where OpenGL is software; see Renderer::advance().
 /// The first piece is small. A piece that took longer than its limit halves the next ones, one that
 /// left a quarter of it makes them a quarter larger. Not thread-safe.
-class PiecePacer {
+class BatchPacer {
  public:
   /// Of the next piece.
   std::uint64_t work() const { return static_cast<std::uint64_t>(work_); }
 
   /// A piece of work() took `seconds`, which should be at most `limit`.
-  void drawn(double seconds, double limit) {
+  void add(double seconds, double limit) {
     if (seconds > limit)
       work_ = std::max(work_ / 2, kMinWork);
     else if (seconds < kFull * limit)
