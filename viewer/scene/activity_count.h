@@ -6,10 +6,10 @@
 
 namespace isobrick {
 
-/// Counts activities that somebody who closes something waits for. Thread-safe.
+/// Counts running activities, so that an owner which closes can wait for their end. Thread-safe.
 class ActivityCount {
  public:
-  /// False once it is closed: the activity must not begin.
+  /// Returns false after close(): the activity must not begin.
   bool begin() {
     const MutexLock lock(mutex_);
     if (closed_) return false;
@@ -24,7 +24,7 @@ class ActivityCount {
     const MutexLock lock(mutex_);
     closed_ = true;
   }
-  /// Waits until there is none; whether there is none.
+  /// Waits until no activity runs; returns whether that holds.
   bool wait_for_none(std::chrono::steady_clock::time_point deadline) {
     const MutexLock lock(mutex_);
     while (count_ > 0)

@@ -17,15 +17,14 @@
 namespace isobrick {
 namespace {
 
-/// Grids that are being made or wait for it: while one half is on the device threads fill the
-/// other one.
+/// Slots for grids in flight: threads fill one half while the device works on the other.
 constexpr int kSlots = 16;
 
 DeviceBlock block_of(std::shared_ptr<const gpu::MeshBlock> block) {
   return {block->file, block->bytes, block->vertices, block->triangles, block};
 }
 
-/// A place for a mesh; gives it back when it is destroyed.
+/// Owns the span of a mesh in shared memory and frees it.
 class MeshSpanOwner {
  public:
   MeshSpanOwner(std::shared_ptr<gpu::MeshMemory> memory, gpu::MeshSpan span)
@@ -63,7 +62,7 @@ class SharedMesh final : public DeviceMesh {
   MeshSpanOwner owner_;
 };
 
-/// A grid that was taken.
+/// A grid in a slot, and its mesh.
 struct GridJob {
   int slot;
   NodeMesh mesh;
@@ -75,7 +74,7 @@ struct GridJob {
   }
 };
 
-/// What the device's thread works with. It outlives the mesher while that thread does.
+/// The state of the device's thread, which may outlive the mesher.
 class DeviceWorker {
  public:
   DeviceWorker(int index, std::string device_name, std::shared_ptr<gpu::MeshMemory> shared)
@@ -87,7 +86,7 @@ class DeviceWorker {
   }
 
   bool take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Callback&& done);
-  /// Until end(), and until all that was taken is done.
+  /// Returns after end(), once all accepted grids are done.
   void run();
   void end();
   DeviceMesher::Times times();
@@ -109,7 +108,7 @@ class DeviceWorker {
   void learn(const gpu::GridMeshSize& size);
 
   gpu::GridBatch batch_;
-  /// Room that is taken for a mesh whose size is not known yet.
+  /// Space to reserve for a mesh of unknown size.
   std::uint32_t expected_vertices_ = 1u << 14, expected_triangles_ = 1u << 15;
 
   Mutex mutex_;
@@ -131,7 +130,7 @@ std::string DeviceWorker::failure() {
   return failure_;
 }
 
-/// Waits for it; nothing once the device has failed.
+/// Waits for a free slot; nullopt once the device has failed.
 std::optional<int> DeviceWorker::free_slot() {
   const MutexLock lock(mutex_);
   while (failure_.empty() && free_.empty()) freed_.wait(mutex_);
@@ -161,7 +160,7 @@ void DeviceWorker::end() {
   taken_.notify_one();
 }
 
-/// Waits for them; none once all is done and the end has come.
+/// Waits for jobs; empty after end(), once all are done.
 std::vector<GridJob> DeviceWorker::next_jobs() {
   const MutexLock lock(mutex_);
   while (!end_ && jobs_.empty()) taken_.wait(mutex_);
@@ -226,7 +225,7 @@ void DeviceWorker::learn(const gpu::GridMeshSize& size) {
   expected_triangles_ = std::max(size.triangles + size.triangles / 4, expected_triangles_ / 8 * 7);
 }
 
-/// Room is taken for what meshes were like before, so that the device is waited for once.
+/// Reserves the expected space before the launch, so that the device is waited for only once.
 void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
   Stopwatch watch;
   std::vector<gpu::GridMeshJob> all;
@@ -261,7 +260,7 @@ void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
   }
 }
 
-/// Those that did not fit: now their sizes are known.
+/// Writes the meshes that did not fit, now that their sizes are known.
 void DeviceWorker::write_again(std::vector<GridJob*>& jobs) {
   std::vector<gpu::GridMeshJob> placed;
   for (GridJob* job : jobs) job->span.reset();
@@ -281,7 +280,7 @@ class CudaMesher final : public DeviceMesher {
       : worker_(std::move(worker)), thread_([w = worker_] { w->run(); }) {}
   ~CudaMesher() override {
     worker_->end();
-    // The last one to hold it may be a mesh's receiver, in that thread.
+    // The device's own thread may be the last owner, when it passes on a mesh.
     if (thread_.get_id() == std::this_thread::get_id())
       thread_.detach();
     else
@@ -328,9 +327,9 @@ std::shared_ptr<DeviceMesher> open_device_mesher(const std::optional<DeviceId>& 
   std::shared_ptr<gpu::MeshMemory> memory;
   if (draws) {
     try {
-      // Half of what is free is for making meshes and for drawing them.
+      // The other half of the free memory is for making and drawing meshes.
       memory = std::make_shared<gpu::MeshMemory>(device, std::min(budget, info.free_bytes / 2));
-    } catch (const Error&) {  // through host memory, then
+    } catch (const Error&) {  // meshes go through host memory
     }
   }
   return std::make_shared<CudaMesher>(

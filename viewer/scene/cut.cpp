@@ -8,14 +8,14 @@
 namespace isobrick {
 namespace {
 
-/// By how much cells count as longer in nodes that were refined before.
+/// Factor on the cell length of nodes that were refined in the previous cut.
 constexpr double kHysteresis = 1.3;
-/// The part of a budget that nodes which lose thin structure get before all others.
+/// Fraction of the budget for nodes that lose thin structure; they come first.
 constexpr double kThinPart = 0.5;
-/// Refinements that did not fit into the budget, after which no smaller one is looked for.
+/// Number of refinements that do not fit, after which the search for smaller ones ends.
 constexpr int kMaxMisfits = 64;
 
-/// A node that may be refined. The greatest is the next.
+/// A node that may be refined; the greatest comes first.
 struct Candidate {
   double pixels;
   NodeKey key;
@@ -28,7 +28,7 @@ struct Candidate {
   }
 };
 
-/// CandidateQueue, those that lose thin structure apart.
+/// Candidates; those that lose thin structure are in a queue of their own.
 class CandidateQueue {
  public:
   void push(const Candidate& candidate, bool loses) {
@@ -39,7 +39,7 @@ class CandidateQueue {
     NodeKey key;
     bool thin;  ///< loses thin structure
   };
-  /// `thin_first`: one that loses thin structure, if there is any.
+  /// `thin_first`: prefer a node that loses thin structure.
   Choice pop(bool thin_first) {
     const bool thin =
         !losing_.empty() && (thin_first || regular_.empty() || regular_.top() < losing_.top());
@@ -53,8 +53,8 @@ class CandidateQueue {
   std::priority_queue<Candidate> losing_, regular_;
 };
 
-/// How many triangles a cut may have, and has so far. What thin structure takes beyond the budget
-/// leaves a part of the budget to all else.
+/// Tracks the triangles of a cut against the budget. Thin structure beyond the budget still leaves
+/// a fraction of the budget to all other nodes.
 class TriangleBudget {
  public:
   explicit TriangleBudget(const CutBudget& budget)
@@ -62,9 +62,9 @@ class TriangleBudget {
         thin_limit_(std::max(limit_, bounded(budget.thin_triangles, budget))) {}
 
   double used() const { return used_; }
-  /// Whether thin structure may take more than the budget.
+  /// Whether thin structure may exceed the budget.
   bool stretches() const { return thin_limit_ > limit_; }
-  /// Whether nodes that lose thin structure come before all others.
+  /// Whether nodes that lose thin structure come first.
   bool thin_first() const { return used_ < thin_limit_ - kRegularPart * limit_; }
   bool fits(double more, bool thin) const {
     const double after = used_ + more, rest = kRegularPart * limit_ - std::max(regular_, 0.0);
@@ -83,19 +83,19 @@ class TriangleBudget {
   }
 
   double limit_, thin_limit_;
-  double used_ = 0, regular_ = 0;  ///< the latter for what loses nothing
+  double used_ = 0, regular_ = 0;  ///< of all nodes; of nodes that lose no thin structure
 };
 
 constexpr int kNeighbourhood =
-    27;  ///< a node and its neighbours; bit (z + 1) · 9 + (y + 1) · 3 + x + 1
+    27;  ///< a node and its neighbours: bit (z + 1) · 9 + (y + 1) · 3 + x + 1
 
-/// For a child at each place of its parent, and each direction from the child: the bit of the
-/// parent's neighbour (or of the parent itself) that lies there. A place on an axis: the first of
-/// two children, the second, or the only one.
+/// For a child at each position in its parent and each direction from the child: the bit of the
+/// parent's neighbour (or the parent) that lies there. Positions on an axis: the first of two
+/// children, the second, or the only one.
 using BitTable = std::array<std::array<std::uint8_t, kDirections>, kNeighbourhood>;
 
 constexpr BitTable make_bits() {
-  constexpr int steps[3][3] = {{-1, 0, 0}, {0, 0, 1}, {-1, 0, 1}};  // by place, then direction
+  constexpr int steps[3][3] = {{-1, 0, 0}, {0, 0, 1}, {-1, 0, 1}};  // by position, then direction
   BitTable table{};
   for (std::size_t place = 0; place < kNeighbourhood; ++place)
     for (int i = 0; i < kDirections; ++i) {
@@ -148,7 +148,7 @@ double CutSelector::triangles(const NodeKey& n, const NodeView& view,
   return blocks * per_block;
 }
 
-/// How many more triangles there are when these nodes become their children.
+/// Change of the number of triangles when these nodes are replaced by their children.
 double CutSelector::added_triangles(std::span<const NodeKey> refined, const NodeView& view,
                                     std::span<const double> isovalues, double per_block) const {
   double more = 0;
@@ -161,8 +161,8 @@ double CutSelector::added_triangles(std::span<const NodeKey> refined, const Node
   return more;
 }
 
-/// `n` after all nodes that must be refined before it, so that no two neighbours
-/// are more than a level apart: those that lie around it a level above.
+/// Appends `n` and, before it, all nodes that must be refined first so that neighbours differ by at
+/// most one level.
 void CutSelector::collect(const NodeKey& n, std::vector<NodeKey>& needed) {
   if (refined_(n) || queued_(n)) return;
   queued_(n) = 1;
@@ -170,7 +170,7 @@ void CutSelector::collect(const NodeKey& n, std::vector<NodeKey>& needed) {
   if (grid.has_parent(n)) {
     const Int3 ratio = grid.ratio(n.level);
     const NodeKey parent = grid.parent(n);
-    // Of two children each touches what lies on its own side.
+    // A child touches only the neighbours on its own side of the parent.
     Box3 around{parent.node, parent.node + Int3{1, 1, 1}};
     for (int axis = 0; axis < 3; ++axis) {
       const bool two = ratio[axis] == 2, second = (n.node[axis] & 1) != 0;
@@ -220,7 +220,7 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
     const double more = added_triangles(needed, node_view, isovalues, budget.triangles_per_block);
     if (!allowance.fits(more, thin)) {
       cut.limited_by_budget = true;
-      // Those that do not fit must not keep all else from being refined.
+      // Nodes that do not fit must not keep all others from being refined.
       if (thin && allowance.stretches()) thin_first = false;
       ++misfits;
       continue;
@@ -236,10 +236,10 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   return cut;
 }
 
-/// Which of a node and its neighbours are not refined, shown, and to be met by the node's children.
-/// Where a neighbour has nothing at all the faces that it shares with nodes of the finest level lie
-/// on one side of the isovalue, by its values and by theirs: nothing is to be met, and its samples
-/// need not be read. (Points of coarser levels are mixed of samples from beyond the face as well.)
+/// Bits of the node and its neighbours that are not refined, not clipped, and to be matched by the
+/// node's children. A neighbour without any surface need not be matched at the finest level: both
+/// sides of the common face then lie on one side of the isovalue. (Points of coarser levels also
+/// depend on samples beyond the face.) Its samples need not be read.
 std::uint32_t CutSelector::coarse_around(const NodeKey& n, const NodeView& view,
                                          const ActiveNodes& active) {
   const auto may_meet = [&](const NodeKey& k) { return n.level > 1 || active.below(k); };

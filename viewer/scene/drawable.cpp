@@ -23,8 +23,7 @@ class CoverBuilder {
     const std::size_t mark = nodes_.size();
     bool all = true;
     for_each_child(n, [&](const NodeKey& child) { all &= cover(child); });
-    // Where this level has no surface, its absence shows no more than the children
-    // that are there.
+    // Without a surface on this level, a missing mesh of it hides nothing.
     if (all || !tree_.active(n, isovalue_)) return true;
     const MeshPtr mesh = meshes_.find_any(n, isovalue_, 0);
     if (!mesh) return false;
@@ -44,17 +43,17 @@ class CoverBuilder {
     }
     complete_ = false;
     if (cover_finer(n)) return true;
-    // What a neighbour's values bring onto a border can wait.
+    // Triangles that only come from a neighbour's values can wait.
     return !tree_.active(n, isovalue_);
   }
 
-  /// No surface of its own below, but perhaps on borders to coarser neighbours.
+  /// The node has no surface below, but may have triangles on borders to coarser neighbours.
   bool cover_border(const NodeKey& n) {
     for_each_child(n, [&](const NodeKey& child) { cover(child); });
     return true;
   }
 
-  /// By the node's finer nodes, if all that need it are there.
+  /// Substitutes the node's finer nodes, if all meshes of them exist.
   bool cover_finer(const NodeKey& n) {
     if (n.level <= finest_) return false;
     const std::size_t mark = nodes_.size();
@@ -86,7 +85,7 @@ class CoverBuilder {
   double isovalue_;
   int number_;
   MeshCache& meshes_;
-  int finest_;  ///< level with any mesh of the isovalue: nothing finer is looked for
+  int finest_;  ///< finest level with a mesh of the isovalue
   std::vector<NodeDraw>& nodes_;
   bool& complete_;
 };

@@ -29,7 +29,7 @@ MeshPtr MeshCache::find_any(const NodeKey& key, double isovalue, std::uint32_t c
   if (entries == nullptr) return nullptr;
   const auto exact = std::find_if(entries->begin(), entries->end(),
                                   [&](const Entry& entry) { return entry.coarser == coarser; });
-  // The one made last met neighbours that are most like those of now.
+  // The neighbours of the newest mesh are most like the present ones.
   Entry& entry = exact != entries->end() ? *exact : entries->back();
   entry.used = now_;
   return entry.mesh;
@@ -59,7 +59,7 @@ void MeshCache::put(MeshPtr mesh) {
 
 bool MeshCache::shrink() {
   if (is_within_budgets()) return true;
-  // Not for each mesh that is made anew.
+  // Leaves some room, so that not every new mesh causes another search.
   drop_until(budget_ - budget_ / 8, device_budget_ - device_budget_ / 8);
   return is_within_budgets();
 }
@@ -68,7 +68,7 @@ void MeshCache::shrink_device(std::uint64_t bytes) {
   drop_until(bytes_, device_bytes_ - std::min(bytes, device_bytes_));
 }
 
-/// Drops what was not used since begin_use(), the oldest first, down to this or as far as it goes.
+/// Drops unused meshes, the oldest first, until both limits hold or none is left.
 void MeshCache::drop_until(std::uint64_t bytes, std::uint64_t device_bytes) {
   std::vector<std::pair<std::uint64_t, const NodeMesh*>> old;
   for (const auto& [isovalue, surface] : surfaces_)

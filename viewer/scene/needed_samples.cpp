@@ -5,10 +5,10 @@
 namespace isobrick {
 namespace {
 
-/// Before and behind a block's first sample: those that its cells or their gradients need.
+/// Samples before and after a block's first sample that its cells or their gradients need.
 constexpr Index kBefore = 1, kBehind = kBlockEdge + 2;
 
-/// Whether a block at that place among `blocks` lies beside a neighbour in one of the directions.
+/// Whether the block at `block` among `blocks` lies beside a neighbour in the mask.
 bool beside(Int3 block, Box3 blocks, std::uint32_t directions) {
   for (int i = 0; i < kDirections; ++i) {
     if (!(directions >> i & 1)) continue;

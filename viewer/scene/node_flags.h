@@ -8,11 +8,11 @@
 
 namespace isobrick {
 
-/// A byte for each node above the finest level. Around each level lies a border one
-/// node wide, so that neighbours need no test of whether they are there.
+/// A byte for each node above the finest level. Each level has a border one node wide, so that code
+/// can read neighbours without a bounds check.
 class NodeFlags {
  public:
-  /// All 0; the border is `border`.
+  /// All 0; the border has the value `border`.
   NodeFlags(const NodeGrid& grid, std::uint8_t border) {
     for (int v = 1; v < grid.levels(); ++v) {
       const Int3 n = grid.level(v).nodes;
@@ -23,7 +23,7 @@ class NodeFlags {
     clear();
   }
 
-  /// Sets all to 0.
+  /// Sets all but the border to 0.
   void clear() {
     for (Level& level : levels_)
       for (Index z = 0; z < level.nodes.z; ++z)
@@ -31,7 +31,7 @@ class NodeFlags {
           std::fill_n(level.flags.begin() + level.place({0, y, z}), level.nodes.x, std::uint8_t{0});
   }
 
-  /// n.level >= 1; a node or one beside.
+  /// n.level >= 1; a node or a neighbour of one.
   std::uint8_t& operator()(const NodeKey& n) {
     Level& level = levels_[static_cast<std::size_t>(n.level - 1)];
     return level.flags[static_cast<std::size_t>(level.place(n.node))];

@@ -13,14 +13,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Enough for the headers of two indices and what their arrays are rounded up by.
+/// Bytes for the headers of two indices and for the padding of their arrays.
 constexpr std::uint64_t kHeaders = 1 << 12;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// The index of the finest nodes' ranges. These are in float; T holds them exactly.
+/// Builds the index over the finest nodes' ranges. They are float; T holds them exactly.
 template <class T>
 std::vector<std::byte> build_as(IndexKind kind, const NodeTree& tree) {
   const Int3 nodes = tree.grid().level(0).nodes;
@@ -64,7 +64,7 @@ NodeSearch::~NodeSearch() {
   builder_.join();
 }
 
-/// Measured with floats of which no two are alike, the ranges that it is made of included.
+/// Measured with distinct floats, including the ranges that the index is built from.
 std::uint64_t NodeSearch::building_bytes(IndexKind kind, std::uint64_t nodes) {
   switch (kind) {
     case IndexKind::interval: return nodes * 60;
@@ -79,14 +79,14 @@ std::uint64_t NodeSearch::building_bytes(IndexKind kind, std::uint64_t nodes) {
 std::uint64_t NodeSearch::building_bytes(std::uint64_t nodes) {
   std::uint64_t most = 0;
   for (const IndexKind kind : kIndexKinds) most = std::max(most, building_bytes(kind, nodes));
-  // The one before answers until then, and has given back what it was built with.
+  // The previous index answers meanwhile; its build memory is free again.
   return most + nodes * 25 + kHeaders;
 }
 
 std::vector<std::byte> NodeSearch::build(IndexKind kind) const {
   return visit_scalar(type_, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    // Wider ones were rounded outwards to float.
+    // Ranges of wider types were rounded outwards to float.
     if constexpr (sizeof(T) <= 2)
       return build_as<T>(kind, *tree_);
     else
@@ -117,7 +117,7 @@ void NodeSearch::wait() {
   while (state_.building) change_.wait(mutex_);
 }
 
-/// Waits for it; nothing: there will be none.
+/// Waits for a request; nullopt: there will be none.
 std::optional<IndexKind> NodeSearch::next_to_build() {
   const MutexLock lock(mutex_);
   while (!stop_ && !state_.building) change_.wait(mutex_);
@@ -125,7 +125,7 @@ std::optional<IndexKind> NodeSearch::next_to_build() {
   return requested_;
 }
 
-/// False when another kind has been requested meanwhile.
+/// Returns false if another kind has been requested meanwhile.
 bool NodeSearch::finish_building(IndexKind kind, std::optional<Bytes> built, double seconds,
                                  std::string refused) {
   const MutexLock lock(mutex_);

@@ -6,14 +6,14 @@
 namespace isobrick {
 namespace {
 
-/// Where a device has no room: the part of its budget that older meshes give back.
+/// Divisor: the fraction of a full device's budget that old meshes free.
 constexpr std::uint64_t kPartForNew = 8;
 
 }  // namespace
 
 void ResidentMeshes::set_cut(const Cut& cut, CutIndex index) {
-  // An isovalue that moves on with every picture must not leave what was shown before the
-  // first one: the last that covers stays.
+  // While an isovalue slides, each change replaces the cut before it is complete. The last isovalue
+  // that covered the view must stay visible, not the first.
   if (cut_.isovalues != cut.isovalues) (void)drawable();
   cut_ = cut;
   index_.emplace(std::move(index));
@@ -46,7 +46,7 @@ void ResidentMeshes::set_device_budget(std::uint64_t bytes) {
   make_room();
 }
 
-/// What is shown takes room, too, whatever is wanted now.
+/// Marks the shown meshes as used, even if the cut does not contain them.
 void ResidentMeshes::mark_shown_used() {
   for (const auto& place : shown_)
     for (const NodeDraw& node : place)
@@ -65,7 +65,7 @@ std::shared_ptr<const Drawable> ResidentMeshes::drawable() {
   return drawn_;
 }
 
-/// Shows the isovalue that a place shows already, as this cut wants it.
+/// Updates the previous isovalue of an index, which stays visible, to this cut.
 void ResidentMeshes::update_previous(std::size_t place) {
   std::vector<NodeDraw> nodes;
   bool complete = true;
@@ -87,7 +87,7 @@ void ResidentMeshes::rebuild_drawable() {
                                         cache_, nodes, next->complete);
     next->complete &= covers;
     next->covers &= covers;
-    // The isovalue before is shown for as long as the new one has holes.
+    // The previous isovalue stays visible while the new one has holes.
     const bool old = !shown_[i].empty() && shown_[i].front().mesh->isovalue != cut_.isovalues[i];
     if (covers || !old)
       shown_[i] = std::move(nodes);

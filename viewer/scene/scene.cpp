@@ -9,7 +9,7 @@
 namespace isobrick {
 namespace {
 
-/// A cut that differs in less asks the stream for the same meshes.
+/// Relative change of the estimate below which the cut stays the same.
 bool same_cut(const Cut& a, const Cut& b) {
   return a.isovalues == b.isovalues &&
          std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
@@ -40,7 +40,7 @@ Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
 void Scene::update(const std::vector<double>& isovalues, const View& view,
                    const CutBudget& budget) {
   isovalues_ = isovalues;
-  // A cut at the limit of its budget must not follow every mesh that is made.
+  // A cut at the limit of its budget must not change with every new mesh.
   const double measured = stream_->counters().triangles_per_block;
   if (measured > 0 && std::abs(measured - triangles_per_block_) > 0.2 * triangles_per_block_)
     triangles_per_block_ = measured;
@@ -72,7 +72,7 @@ Cut Scene::select(const ActiveNodes& active, const View& view, const CutBudget& 
   try {
     return selector_->select(active, view, budget);
   } catch (...) {
-    selector_.reset();  // it may have stopped half way
+    selector_.reset();  // its state may be incomplete
     throw;
   }
 }

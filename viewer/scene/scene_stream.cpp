@@ -11,7 +11,7 @@
 namespace isobrick {
 namespace {
 
-/// How long the destructor waits for threads that are held up and for a device.
+/// How long the destructor waits for blocked threads and for a device.
 constexpr std::chrono::milliseconds kClosing{50};
 
 void run_worker(const std::shared_ptr<StreamState>& state) {
@@ -39,7 +39,7 @@ SceneStream::~SceneStream() {
   const bool ended = state_->workers.wait_for_none(deadline);
   state_->queue.wait_until_unused(deadline);
   state_->notifications.wait_for_none(deadline);
-  // What comes later finds nothing, and keeps nothing: contexts may be gone by then.
+  // Meshes that arrive later are dropped: an OpenGL context may be gone by then.
   {
     const MutexLock lock(state_->meshes_mutex);
     state_->meshes.close();

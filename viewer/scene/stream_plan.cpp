@@ -33,7 +33,6 @@ class JobPlanner {
   }
 
  private:
-  /// A node without any mesh.
   struct MissingNode {
     const CutNode* node;
     double isovalue;
@@ -56,7 +55,7 @@ class JobPlanner {
       const auto [place, added] = ancestors_.try_emplace(n);
       Ancestor& ancestor = place->second;
       if (!added) {
-        if (ancestor.visible || !node.visible) return;  // and so are those above
+        if (ancestor.visible || !node.visible) return;  // its ancestors are up to date, too
         ancestor.visible = true;
         if (ancestor.job != kNoJob) jobs[ancestor.job].visible = true;
         if (ancestor.stands_in) return;
@@ -64,7 +63,7 @@ class JobPlanner {
       }
       ancestor.visible = node.visible;
       if (meshes_.has_any(n, isovalue)) {
-        meshes_.find_any(n, isovalue, 0);  // is kept
+        meshes_.find_any(n, isovalue, 0);  // marks the mesh as used
         ancestor.stands_in = true;
         return;
       }
@@ -77,19 +76,19 @@ class JobPlanner {
 
   static constexpr std::size_t kNoJob = ~std::size_t{0};
   struct Ancestor {
-    std::size_t job = kNoJob;  ///< its number
-    bool visible = false;      ///< some node below is
-    bool stands_in = false;    ///< it has a mesh: none above it is needed
+    std::size_t job = kNoJob;  ///< index in the plan's jobs
+    bool visible = false;      ///< a node below is visible
+    bool stands_in = false;    ///< has a mesh that is substituted: no ancestor of it is needed
   };
 
   const NodeTree& tree_;
   const Cut& cut_;
   MeshCache& meshes_;
   MeshPlan& plan_;
-  std::size_t with_surface_ = 0;  ///< nodes of the cut with a surface, for each isovalue
+  std::size_t with_surface_ = 0;  ///< nodes of the cut with a surface, summed over isovalues
   std::vector<MissingNode> missing_;
   std::unordered_map<NodeKey, Ancestor, NodeKeyHash> ancestors_;
-  double ancestors_isovalue_ = 0;  ///< isovalue
+  double ancestors_isovalue_ = 0;  ///< isovalue of `ancestors_`
 };
 
 }  // namespace

@@ -34,8 +34,8 @@ void StreamState::plan(bool overdue) {
 
 void StreamState::add_mesh(NodeMesh mesh, const DeviceMesher* by) {
   statistics.add(mesh, tree->active_blocks(mesh.key, mesh.isovalue), by != nullptr);
-  // What came to host memory for want of room on the device has to be uploaded: older meshes make
-  // room instead, once for all that came so.
+  // A mesh that did not fit on the device needs an upload. Old meshes make room on the device, once
+  // for all meshes in this state.
   const bool had_no_room =
       by != nullptr && !mesh.device && !mesh.empty() && !by->shared_blocks().empty();
   auto shared = std::make_shared<const NodeMesh>(std::move(mesh));

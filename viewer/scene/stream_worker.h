@@ -7,12 +7,12 @@
 
 namespace isobrick {
 
-/// Makes the meshes and slices that a stream's queue holds. One for each thread.
+/// Makes the meshes and slices of a stream's queue. One for each worker thread.
 class StreamWorker {
  public:
   explicit StreamWorker(std::shared_ptr<StreamState> state);
 
-  /// Until the queue is closed.
+  /// Returns once the queue is closed.
   void run();
 
  private:

@@ -11,12 +11,12 @@
 namespace isobrick {
 namespace {
 
-/// Along each edge of a node; of a range chunk.
+/// Blocks along an edge of a node; nodes along an edge of a range chunk.
 constexpr Index kNodeBlocks = kNodeEdge / kBlockEdge;
 constexpr Index kChunkNodes = StoreReader::kRangeChunk / kNodeBlocks;
 static_assert(kChunkNodes * kNodeBlocks == StoreReader::kRangeChunk);
 
-/// The box around all that were included; nothing at first.
+/// The bounding box of all included boxes; nullopt at first.
 class BoxUnion {
  public:
   void include(const IndexBox& box) {
@@ -38,7 +38,7 @@ class BoxUnion {
   std::optional<IndexBox> box_;
 };
 
-/// What is within both; nothing where they only touch. `part` may be flat.
+/// The intersection; nullopt if they only touch. `part` may be flat.
 std::optional<IndexBox> within(const IndexBox& part, const IndexBox& box) {
   IndexBox inside;
   for (int axis = 0; axis < 3; ++axis) {
@@ -50,15 +50,15 @@ std::optional<IndexBox> within(const IndexBox& part, const IndexBox& box) {
   return inside;
 }
 
-/// A box of so few blocks is that of cells.
+/// Maximum blocks of a box that is computed from samples.
 constexpr Index kFewBlocks = 1024;
 
-/// How many of the isovalues each sample of a box reaches.
+/// For each sample of a box: how many isovalues it reaches.
 class ReachCounts {
  public:
   static constexpr std::size_t kMaxIsovalues = 254;
 
-  /// Reads the bricks, one at a time. Throws what that throws.
+  /// Reads the bricks, one at a time. Throws what reading throws.
   ReachCounts(const BrickSource& source, std::span<const double> isovalues, Box3 samples)
       : samples_(samples), reached_(static_cast<std::size_t>(volume(samples.extent())), kNaN) {
     const StoreInfo& info = source.info();
@@ -73,7 +73,7 @@ class ReachCounts {
     });
   }
 
-  /// Around the edges between samples that one of the isovalues crosses.
+  /// The bounding box of the lattice edges that an isovalue crosses.
   std::optional<IndexBox> crossed() const {
     BoxUnion box;
     for_each_point(samples_, [&](Int3 p) {
@@ -124,7 +124,8 @@ class Search {
 
   std::optional<IndexBox> run() {
     std::vector<IndexBox> chunks = active_chunks();
-    // Those at the ends of the volume make the box so large that most others are within.
+    // Chunks at the ends of the volume come first: they make the box so large that it contains most
+    // others.
     BoxUnion all;
     for (const IndexBox& chunk : chunks) all.include(chunk);
     if (!all.box()) return std::nullopt;
@@ -150,7 +151,7 @@ class Search {
                        [&](double isovalue) { return range.stabbed_by(isovalue); });
   }
 
-  /// Around the active nodes within `part_` of each range chunk that has any.
+  /// For each range chunk with active nodes within `part_`: their bounding box.
   std::vector<IndexBox> active_chunks() const {
     const Int3 nodes = tree_.grid().level(0).nodes, edge{kChunkNodes, kChunkNodes, kChunkNodes};
     std::vector<IndexBox> chunks;
@@ -168,14 +169,14 @@ class Search {
     return chunks;
   }
 
-  /// Of the blocks that have any of `box`, which lies within a range chunk.
+  /// Includes the active blocks that meet `box`, which lies within a range chunk.
   void read_blocks(const IndexBox& box) {
     const Int3 all = source_.info().levels.front().lattice.blocks();
     Box3 blocks;
     for (int axis = 0; axis < 3; ++axis) {
       blocks.lo[axis] = static_cast<Index>(std::floor(box.lo[axis] / kBlockEdge));
       blocks.hi[axis] = static_cast<Index>(std::ceil(box.hi[axis] / kBlockEdge));
-      // A part may be a plane between two blocks.
+      // `part` may be a plane between two blocks.
       blocks.hi[axis] = std::min(std::max(blocks.hi[axis], blocks.lo[axis] + 1), all[axis]);
       blocks.lo[axis] = std::min(blocks.lo[axis], blocks.hi[axis] - 1);
     }
@@ -187,7 +188,7 @@ class Search {
     });
   }
 
-  /// The box of the cells within that of blocks, where those are few.
+  /// The box of the cells within the box of blocks, if those are few.
   IndexBox cells_of(const IndexBox& blocks) const {
     Box3 samples;
     for (int axis = 0; axis < 3; ++axis) {
@@ -201,7 +202,7 @@ class Search {
     try {
       const auto crossed = ReachCounts(source_, isovalues_, samples).crossed();
       return (crossed ? within(blocks, *crossed) : crossed).value_or(blocks);
-    } catch (const DamageError&) {  // which is shown where the brick is
+    } catch (const DamageError&) {  // reported where the brick is drawn
       return blocks;
     }
   }

@@ -10,12 +10,12 @@
 namespace isobrick {
 namespace {
 
-/// Of a stored level that is read: a cube of 128³.
+/// Maximum samples of a stored level that is read: 128³.
 constexpr Index kFewSamples = Index{1} << 21;
-/// Of the patches that an isovalue crosses one in so many may be lost.
+/// One in so many of the patches that an isovalue crosses may be lost.
 constexpr int kSpared = 128;
 
-/// Rounded outwards.
+/// Rounds outwards.
 ValueRange<float> in_float(const ValueRange<double>& r) {
   if (r.empty()) return {};
   constexpr float inf = std::numeric_limits<float>::infinity();
@@ -58,7 +58,7 @@ void ThinStructure::include(const RangeTable& table, Box3 blocks) {
     const Int3 p = floor_div(b * block, finest.edge);
     if (here.contains(p)) ranges[place(p - here.lo, here.extent())].include(in_float(table.at(b)));
   });
-  // A patch may be larger than what one thread reads.
+  // A patch may span several calls, perhaps from several threads.
   const MutexLock lock(mutex_);
   std::size_t i = 0;
   for_each_point(here,
@@ -77,7 +77,7 @@ void ThinStructure::merge_below() {
   }
 }
 
-/// One layer of patches after the other: a whole level would take room that a budget may not have.
+/// Reads one layer of patches at a time: a whole level may exceed a budget.
 ThinStructure::Ranges ThinStructure::own_ranges(const Level& level, NodeSamples& samples,
                                                 const CancellationToken& token) const {
   const NodeGrid::Level& grid = grid_.level(level.level);
@@ -109,7 +109,7 @@ void ThinStructure::read_levels(ResidentBricks& bricks, const CancellationToken&
       level.own = own_ranges(level, samples, token);
     } catch (const OperationCancelled&) {
       throw;
-    } catch (const std::exception&) {  // meshes of the level report it
+    } catch (const std::exception&) {  // reported when the level is meshed
     }
 }
 
