@@ -7,7 +7,6 @@ namespace isobrick {
 
 void draw_backend_panel(ViewerState& state) {
   DeviceMeshes& device = state.scene_renderer->device();
-  // In the order of Backend.
   const char* const names[] = {"auto", "cpu", "cuda"};
   int chosen = static_cast<int>(device.backend());
   ImGui::SetNextItemWidth(scaled(130));

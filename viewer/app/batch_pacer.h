@@ -5,15 +5,15 @@
 
 namespace isobrick {
 
-/// How much of a picture one piece holds where OpenGL is software; see Renderer::advance().
-/// The first piece is small. A piece that took longer than its limit halves the next ones, one that
-/// left a quarter of it makes them a quarter larger. Not thread-safe.
+/// Chooses the work of a draw batch in software; see Renderer::advance(). The first batch is small.
+/// A batch that exceeds its time limit halves the next ones; one that leaves a quarter of it makes
+/// them a quarter larger. Not thread-safe.
 class BatchPacer {
  public:
-  /// Of the next piece.
+  /// Work of the next batch.
   std::uint64_t work() const { return static_cast<std::uint64_t>(work_); }
 
-  /// A piece of work() took `seconds`, which should be at most `limit`.
+  /// Reports that a batch of work() took `seconds`; it should take at most `limit`.
   void add(double seconds, double limit) {
     if (seconds > limit)
       work_ = std::max(work_ / 2, kMinWork);
@@ -22,7 +22,7 @@ class BatchPacer {
   }
 
  private:
-  /// Less takes no shorter, since each piece has a price of its own.
+  /// Smaller batches take no less time, since each batch has a fixed cost.
   static constexpr double kMinWork = 5'000;
   static constexpr double kFull = 0.75, kGrowth = 1.25;
 

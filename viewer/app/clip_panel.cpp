@@ -26,7 +26,7 @@ void axis_clips(ViewSettings& settings) {
   }
 }
 
-/// Where planes across `normal` meet the box: the least and the largest of a HalfSpace's `least`.
+/// The range of HalfSpace::least for planes with this normal that meet the box.
 std::pair<double, double> offset_range(const WorldBox& box, Vec3d normal) {
   double lo = 0, hi = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -37,8 +37,7 @@ std::pair<double, double> offset_range(const WorldBox& box, Vec3d normal) {
   return {lo, hi};
 }
 
-/// Turns a plane about the place where it goes through the box, so that what lies along
-/// `normal` stays.
+/// Sets a plane's normal and keeps its relative position in the box.
 void rotate(HalfSpace& kept, const WorldBox& box, Vec3d normal) {
   const auto [old_lo, old_hi] = offset_range(box, kept.normal);
   const double part = old_hi > old_lo ? (kept.least - old_lo) / (old_hi - old_lo) : 0.5;
@@ -47,7 +46,7 @@ void rotate(HalfSpace& kept, const WorldBox& box, Vec3d normal) {
   kept.least = lo + std::clamp(part, 0.0, 1.0) * (hi - lo);
 }
 
-/// False when its user removes it.
+/// Returns false if the user removes it.
 bool one_plane(ClipPlaneSettings& plane, const WorldBox& box, Vec3d ahead) {
   HalfSpace& kept = plane.kept;
   ImGui::Checkbox("##on", &plane.on);

@@ -11,7 +11,7 @@
 namespace isobrick {
 namespace {
 
-/// Of the coarsest level's nodes: their own ranges or those with all below.
+/// The range of the coarsest level's nodes: of their own samples, or of all below.
 template <class RangeOf>
 ValueRange<float> range_of_all(const NodeTree& tree, RangeOf&& range_of) {
   const int top = tree.grid().levels() - 1;
@@ -126,7 +126,7 @@ std::uint16_t ClipTest::mask(Vec3d middle, double radius) const {
   return static_cast<std::uint16_t>(bits);
 }
 
-/// Seam strips go a little beyond the node, less than a cell.
+/// Seam strips extend less than a cell beyond the node.
 std::uint16_t ClipTest::mask(const NodeGrid& grid, const NodeKey& node) const {
   const IndexBox box = grid.box(node);
   const Transform& t = grid.transform();

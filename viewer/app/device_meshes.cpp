@@ -26,7 +26,7 @@ void DeviceOpener::begin() {
   });
 }
 
-/// Whether there was anything to import.
+/// Returns whether there was a block to import.
 bool DeviceOpener::import_one(DeviceMesher& mesher) {
   const std::vector<DeviceBlock> blocks = mesher.shared_blocks();
   const std::size_t done = imported_.size();
@@ -37,7 +37,7 @@ bool DeviceOpener::import_one(DeviceMesher& mesher) {
         block.owner.get(),
         std::unique_ptr<ImportedBlock>(new ImportedBlock{
             block.owner, {block.file, block.bytes, block.vertices, block.triangles}}));
-  } catch (const Error&) {  // what is there must do
+  } catch (const Error&) {  // continue with the blocks imported so far
     mesher.share_only(done);
   }
   return true;
@@ -47,7 +47,7 @@ bool DeviceOpener::is_open() const {
   return has_begun() && mesher_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
-/// Once it is open; null where there is none.
+/// The device, once is_open(); null if there is none.
 DeviceMesher* DeviceOpener::mesher() const {
   try {
     return mesher_.get().get();

@@ -6,26 +6,26 @@
 
 namespace isobrick {
 
-/// Keeps frames within a time limit while something moves, by previews. The rule is fixed: a
-/// preview that took longer makes the next one a step simpler, one that left a quarter of the
-/// limit makes it a step finer. The steps down are: no occlusion and multisampling, half the
-/// triangles, a smaller picture, and at last half the triangles again. Occlusion and multisampling
-/// come back with the next picture at rest that leaves time for them.
+/// Keeps frames within a time limit during motion, by previews. A preview that exceeds the limit
+/// makes the next one a step coarser; one that leaves a quarter of the limit makes it a step finer.
+/// The steps are: no occlusion and multisampling, half the triangles, a smaller picture, and
+/// finally half the triangles again. Occlusion and multisampling return after a still frame that
+/// leaves time for them.
 ///
-/// Thin structure that coarse levels have lost may take kThinTimes the limit: a preview in which it
-/// took longer makes the next one as small as can be, and if that does not help it gets fewer
-/// triangles, as many as the time lasts for. Not thread-safe.
+/// Thin structure that coarse levels have lost may take kThinTimes the limit. If it exceeds that,
+/// the next preview has the smallest size; if that does not suffice, fewer triangles. Not
+/// thread-safe.
 class FramePacer {
  public:
   static constexpr std::uint64_t kAllTriangles = std::numeric_limits<std::uint64_t>::max();
-  /// The most that previews may have for thin structure, and in how many times the limit.
+  /// Maximum triangles of previews with thin structure, and multiple of the limit for them.
   static constexpr std::uint64_t kThinTriangles = 600'000;
   static constexpr double kThinTimes = 4;
 
-  /// `limit`: how long a picture may take while something moves, seconds.
+  /// `limit`: seconds for a frame during motion.
   explicit FramePacer(double limit = kSoftwareLimit) : limit_(limit) {}
 
-  /// For a store that has just been opened. Software begins with simple pictures.
+  /// The pacer for a newly opened store. Software starts with coarse previews.
   static FramePacer for_device(bool software) {
     FramePacer pacer(software ? kSoftwareLimit : kDeviceLimit);
     if (!software) return pacer;
@@ -34,19 +34,18 @@ class FramePacer {
     return pacer;
   }
 
-  /// A picture of all triangles, in full, that took `seconds` while nothing moved: the first
-  /// preview is then fluent as well.
+  /// Reports a still frame in full quality with all triangles, which took `seconds`. The first
+  /// preview is set to meet the limit, too.
   void add_still(double seconds, std::uint64_t triangles) {
-    const double full = kFull * limit_;  // a preview chooses nodes and takes meshes over, too
+    const double full = kFull * limit_;  // a preview also chooses nodes and uploads meshes
     reduced_quality_ = seconds > full;
     triangles_ = seconds > limit_
                      ? std::max(static_cast<double>(triangles) * full / seconds, kMinTriangles)
                      : kUnlimited;
   }
 
-  /// A preview that took `seconds` to draw as plain(), max_triangles() and size_divisor() returned.
-  /// `limited`: with more triangles it would be finer. `thin`: it had more than max_triangles(),
-  /// for thin structure.
+  /// Reports a preview with the present settings, which took `seconds`. `limited`: more triangles
+  /// would make it finer. `thin`: it exceeded max_triangles() for thin structure.
   void add_preview(double seconds, std::uint64_t triangles, bool limited, bool thin = false) {
     pace_thin(seconds, static_cast<double>(triangles), limited, thin);
     if (seconds > limit_)
@@ -55,25 +54,25 @@ class FramePacer {
       refine(seconds, limited);
   }
 
-  /// Whether to leave occlusion and multisampling out while something moves.
+  /// Whether to leave out occlusion and multisampling during motion.
   bool reduces_quality() const { return reduced_quality_; }
-  /// Of a preview.
+  /// Maximum triangles of a preview.
   std::uint64_t max_triangles() const {
     return triangles_ < kUnlimited ? static_cast<std::uint64_t>(triangles_) : kAllTriangles;
   }
-  /// Of a preview that needs more than max_triangles() for thin structure.
+  /// Maximum triangles of a preview with thin structure.
   std::uint64_t thin_triangles() const { return static_cast<std::uint64_t>(thin_triangles_); }
-  /// Divisor of the picture's width and height while something moves. At rest: 1.
+  /// Divisor of the picture's width and height during motion.
   int size_divisor() const { return size_divisor_; }
 
  private:
-  /// A device leaves a part of a display's period of 16.7 ms, since single frames take longer.
+  /// A device leaves a part of the display's period of 16.7 ms, since frame times vary.
   static constexpr double kDeviceLimit = 0.0125, kSoftwareLimit = 0.045;
   static constexpr double kUnlimited = 1e12;
   static constexpr double kFirstInSoftware = 60'000;
-  /// Before previews become smaller, and at the very least.
+  /// Triangles below which the size is reduced first; and the minimum.
   static constexpr double kFewTriangles = 40'000, kMinTriangles = 2'000;
-  /// Of the limit: a preview that takes between kFull and 1 is left as it is.
+  /// Fraction of the limit: a preview between kFull and 1 changes nothing.
   static constexpr double kFull = 0.75;
   static constexpr double kGrowth = 1.2;
   static constexpr int kMaxSizeDivisor = 4;

@@ -3,7 +3,7 @@
 namespace isobrick {
 namespace {
 
-/// All of the volume may be drawn, its box and slices too, whatever is framed.
+/// Sets the camera's depth range to the whole volume, its box and slices.
 void see_all(Camera& camera, const SceneRenderer& scene_renderer) {
   const WorldBox all = scene_renderer.bounds();
   camera.scene = ball_around(all.lo, all.hi);

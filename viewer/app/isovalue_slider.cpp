@@ -24,7 +24,7 @@ struct Axis {
   }
 };
 
-/// Bars as high as the logarithm of their counts.
+/// Draws bars with the logarithm of the counts as height.
 void draw_bars(ImDrawList& draw, const Histogram& h, const Axis& axis, float top, float bottom) {
   std::uint64_t most = 1;
   for (const std::uint64_t n : h.counts) most = std::max(most, n);

@@ -7,8 +7,8 @@
 namespace isobrick {
 namespace {
 
-/// Bytes that are copied at a time: where a driver gets memory for copies while something else
-/// holds it up, a megabyte takes it some milliseconds.
+/// Bytes of one copy. While a driver is busy, allocating memory for a megabyte takes it some
+/// milliseconds.
 constexpr std::uint64_t kCopyBytes = 256 << 10;
 
 }  // namespace
@@ -19,7 +19,7 @@ MeshUploads::~MeshUploads() {
 }
 
 bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Limit* limit) {
-  keep(drawable);  // what comes further on is used, too
+  keep(drawable);  // marks later meshes as used, too
   std::optional<std::vector<MeshId>> left;
   for (const NodeDraw& node : drawable.nodes) {
     if (node.mesh->device) continue;
@@ -37,7 +37,7 @@ bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Limit* limit) {
   return true;
 }
 
-/// False when `limit` was spent before it was there.
+/// Returns false if `limit` was spent before the mesh was complete.
 bool MeshUploads::advance(Upload& upload, Limit* limit) {
   while (upload.copy && !upload.copy->done()) {
     if (limit != nullptr && limit->is_spent()) return false;
@@ -84,7 +84,7 @@ void MeshUploads::drop(std::uint64_t most) {
     uploads_.erase(left.back());
 }
 
-/// `left`: what is not used, once that has been asked for.
+/// `left`: the unused meshes, once they have been listed.
 void MeshUploads::make_room(const MeshChunk& mesh, std::optional<std::vector<MeshId>>& left) {
   if (unused_ == UnusedMeshes::keep || !pool_.shares_block(mesh)) return;
   while (!pool_.has_room(mesh)) {

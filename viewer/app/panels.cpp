@@ -30,7 +30,7 @@ std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
 
-/// The whole text as a number.
+/// Parses the whole text as a number.
 std::optional<double> number_of(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
@@ -40,7 +40,7 @@ std::optional<double> number_of(std::string_view text) {
   return value;
 }
 
-/// What is typed counts once it is all there: after Enter, or when the field is left.
+/// Edits an isovalue. The text takes effect after Enter, or when the field loses focus.
 void type_isovalue(ViewerState& state, std::size_t number) {
   double& isovalue = state.settings.surfaces[number].isovalue;
   const bool going_on = state.typed && state.typed->surface == number;
@@ -50,7 +50,7 @@ void type_isovalue(ViewerState& state, std::size_t number) {
     state.typed = {number, text};
   if (!state.typed || state.typed->surface != number || ImGui::IsItemActive()) return;
   const std::optional<double> value = number_of(state.typed->text);
-  // What is shown is rounded, and so no other value.
+  // The text is a rounded value; unchanged text must not change the isovalue.
   if (ImGui::IsItemDeactivated() && value && state.typed->text != shown) isovalue = *value;
   state.typed.reset();
 }
@@ -107,7 +107,7 @@ void slices_panel(ViewerState& state) {
                          hi, "%.5g");
 }
 
-/// Which stored level is the finest to be shown.
+/// Draws the choice of the finest stored level.
 void finest_level(ViewerState& state) {
   const int coarsest = static_cast<int>(state.scene_renderer->store().info().levels.size()) - 1;
   if (coarsest > 0)
@@ -181,7 +181,7 @@ void picking_panel(ViewerState& state) {
                                                : "Click on its other end.");
 }
 
-/// Runs what may fail; a failure is shown.
+/// Calls f() and shows an exception as a message.
 template <class F>
 void attempt(ViewerState& state, F&& f) {
   try {
@@ -222,10 +222,10 @@ void bookmarks_panel(ViewerState& state) {
     });
 }
 
-/// Counted some times a second: it takes as long as to plan.
+/// Counts a few times a second, since that takes as long as planning.
 std::uint64_t missing_bricks(ViewerState& state) {
   constexpr double kSeconds = 0.25;
-  // Of many a fiftieth of the time at most.
+  // If there are many, counting takes at most a fiftieth of the time.
   constexpr double kPart = 50;
   const double now = ImGui::GetTime();
   if (now >= state.next_brick_count) {
@@ -236,7 +236,7 @@ std::uint64_t missing_bricks(ViewerState& state) {
   return state.missing_bricks;
 }
 
-/// What a picture is, or becomes.
+/// Describes the state of a frame.
 const char* stage_of(const FrameState& p) {
   if (p.moving) return "preview";
   return p.complete && !p.reduced_quality ? "complete" : "refining";
@@ -295,13 +295,13 @@ void messages_panel(ViewerState& state) {
     state.messages_shown = 0;
     return;
   }
-  // Beside the panel where there is room, and always above it.
+  // Beside the panel if there is room, and always in front of it.
   const ImVec2 all = ImGui::GetMainViewport()->Size;
   const float taken = state.panel_room(all.x);
   const float width = 0.9f * (all.x - taken);
   ImGui::SetNextWindowPos({(all.x + taken) / 2, all.y - 20}, ImGuiCond_Always, {0.5f, 1});
   ImGui::SetNextWindowSizeConstraints({std::min(scaled(300), width), 0}, {width, all.y * 0.4f});
-  // A new one comes to the front, but takes nobody's field or slider away.
+  // A new message comes to the front, but takes no field's or slider's focus.
   const bool busy = ImGui::IsAnyItemActive() || ImGui::GetIO().WantTextInput;
   if (!busy && std::exchange(state.messages_shown, state.messages.size()) != state.messages.size())
     ImGui::SetNextWindowFocus();
@@ -311,7 +311,7 @@ void messages_panel(ViewerState& state) {
   ImGui::PushTextWrapPos(width - scaled(20));
   for (const Message& message : state.messages) text(message.text);
   ImGui::PopTextWrapPos();
-  // While the pointer is on them they stay.
+  // Messages under the pointer stay.
   if (ImGui::IsWindowHovered())
     for (Message& message : state.messages)
       message.until = std::chrono::steady_clock::now() + state.message_time;
@@ -325,7 +325,7 @@ void streaming_panel(ViewerState& state) {
   status_panel(state);
 }
 
-/// Widgets of different sections may have the same names.
+/// Draws a section; widgets of different sections may have equal names.
 template <class Body>
 void section(const char* name, bool open, Body&& body, ViewerState& state) {
   if (!ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0)) return;
@@ -334,7 +334,7 @@ void section(const char* name, bool open, Body&& body, ViewerState& state) {
   ImGui::PopID();
 }
 
-/// Along the left side of the window; the picture has the rest.
+/// Along the left side of the window, beside the picture.
 void main_panel(ViewerState& state) {
   const ImVec2 all = ImGui::GetMainViewport()->Size;
   const float least = scaled(250);
@@ -380,8 +380,8 @@ void draw_panels(ViewerState& state) {
   else if (state.panels)
     main_panel(state);
   draw_help(state);
-  // ImGui 1.86 stops at a window that is new after a modal one that is new, too, and at one
-  // that comes while a modal one is open but no more begun.
+  // ImGui 1.86 fails an assertion for a new window after a new modal one, and for a window that
+  // appears while an open modal one is no longer drawn.
   import_panel(state);
 }
 

@@ -6,7 +6,7 @@
 
 namespace isobrick {
 
-/// What the picture shows at a pixel, rows from the top; nothing on the background.
+/// The point that the picture shows at a pixel, rows from the top; nullopt on the background.
 std::optional<PickedPoint> pick_point(SceneRenderer& scene_renderer, int x, int y);
 
 /// Draws the points and the line of a measurement over the picture, with Dear ImGui.

@@ -15,15 +15,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// While meshes come in and nothing else changes: seconds between pictures, which would keep the
-/// device that draws them from making meshes.
+/// Seconds between frames while meshes arrive and nothing else changes: a frame keeps the device
+/// from making meshes.
 constexpr double kRefiningSeconds = 0.04;
-/// The same, in times of the last picture: pictures that are soon out of date, and may take
-/// seconds in software, take a third of the time at most.
+/// The same as a multiple of the last frame's time: frames that are soon out of date take at most a
+/// third of the time. In software a frame may take seconds.
 constexpr double kRefiningPause = 2;
 constexpr double kWaitSeconds = 0.05;
 
-/// `software`: then others than this thread draw, and what they draw of is made beside them.
+/// `software`: other threads draw, too, so mesh threads keep their priority.
 StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change,
                              bool software) {
   StreamOptions options;
@@ -37,15 +37,14 @@ StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()
   return options;
 }
 
-/// The finest level of nodes that has samples of this stored level, or of the next coarser one that
-/// any has; of those above the stored ones none.
+/// The finest level of nodes with samples of this stored level, or of the next coarser one that any
+/// has.
 int finest_node_level(const NodeGrid& grid, int stored) {
   int v = 0;
   while (v < grid.coarsest_stored() && grid.level(v).source < stored) ++v;
   return v;
 }
 
-/// Whether both show the same.
 bool same_meshes(const Drawable* a, const Drawable* b) {
   if (a == nullptr || b == nullptr || a == b) return a == b;
   return std::equal(a->nodes.begin(), a->nodes.end(), b->nodes.begin(), b->nodes.end(),
@@ -63,7 +62,7 @@ FrameOptions FrameOptions::in_window(const FramePacer& pacer, bool software, boo
       .batch_seconds = software ? kBatchSeconds : std::numeric_limits<double>::infinity(),
       .moving = moving,
       .size_divisor = moving ? pacer.size_divisor() : 1};
-  // Nor should pictures that follow while meshes come in wait for a good one.
+  // Intermediate frames need not wait for full quality, either.
   if (pacer.reduces_quality())
     options.quality = moving ? Quality::reduced : Quality::reduced_until_complete;
   return options;
@@ -87,7 +86,7 @@ SceneRenderer::SceneRenderer(std::shared_ptr<const StoreReader> store,
   scene_ = scene_future_.get();
   device_ = std::make_unique<DeviceMeshes>(scene_->stream(), setup_->device());
   device_->use(budgets.backend);
-  renderer().discard();  // that of another store
+  renderer().discard();  // the picture of another store
 }
 
 SceneRenderer::~SceneRenderer() = default;
@@ -113,7 +112,7 @@ void SceneRenderer::update_scene(const Camera& camera, int width, int height,
   CutBudget budget;
   budget.triangles = std::min(budget.triangles, options.max_triangles);
   budget.thin_triangles = options.thin_triangles;
-  // What stands in until the cut is there takes room beside it.
+  // Half of the memory is for meshes that are substituted until the cut is complete.
   const std::uint64_t device_bytes = device_->kernel_lock() != nullptr
                                          ? DeviceMeshes::cache_bytes(device_->allocated_bytes())
                                          : upload_memory();
@@ -123,13 +122,13 @@ void SceneRenderer::update_scene(const Camera& camera, int width, int height,
 
 void SceneRenderer::upload(const std::shared_ptr<const Drawable>& newest) {
   MeshUploads::Limit limit;
-  // The first picture takes what it needs.
+  // The first frame has no limit.
   const auto add = [&](const Drawable& drawable) {
     return uploads_.add(drawable, scene_->origin(), shown_meshes_ == nullptr ? nullptr : &limit);
   };
   if (shown_meshes_ != nullptr) uploads_.keep(*shown_meshes_);
-  // What was begun first, or nothing would be finished while there is always something newer; but
-  // nothing newer than all of a surface will come.
+  // The upload that has begun is finished first, or none would be while newer meshes keep arriving.
+  // But a complete surface has no newer one.
   const bool last =
       next_meshes_ != nullptr && newest->complete && next_meshes_->isovalues == newest->isovalues;
   if (next_meshes_ != nullptr && next_meshes_ != shown_meshes_ && !last) {
@@ -140,7 +139,7 @@ void SceneRenderer::upload(const std::shared_ptr<const Drawable>& newest) {
   if (add(*next_meshes_)) shown_meshes_ = next_meshes_;
 }
 
-/// Whether what is new can be shown a little later, since more is to come.
+/// Whether new meshes can wait, because more will arrive.
 bool SceneRenderer::can_wait(const Drawable& newest) const {
   if (shown_meshes_ == nullptr || !shown_meshes_->covers || newest.complete ||
       shown_meshes_->isovalues != newest.isovalues)
@@ -154,7 +153,7 @@ bool SceneRenderer::may_reduce_quality(const FrameRequest& request) const {
   if (request.options.quality != FrameOptions::Quality::reduced_until_complete)
     return request.options.quality == FrameOptions::Quality::reduced;
   if (setup_->software()) return !state_.complete;
-  // A full budget may leave the newest incomplete.
+  // With a full budget the newest may stay incomplete.
   return shown_meshes_ != request.newest || !(request.idle || request.newest->complete);
 }
 
@@ -164,35 +163,35 @@ void SceneRenderer::drop_unused() {
   state_.device_bytes = uploads_.bytes() + device_->allocated_bytes() + slices_.bytes();
 }
 
-/// What is uploaded, slices and the device's own meshes limit its memory.
+/// Uploads, slices and the device's own meshes share the device memory.
 std::uint64_t SceneRenderer::upload_memory() const {
   const std::uint64_t others = device_->reserved_bytes() + slices_.bytes();
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
 }
 
-/// Whether a picture that has been begun is still worth finishing.
+/// Whether an unfinished frame is still worth finishing.
 bool SceneRenderer::is_still_needed(const PendingFrame& pending,
                                     const FrameRequest& request) const {
   const FrameKey& key = pending.frame.key;
-  // A picture in full serves as a plain one, and a plain one comes first.
+  // A frame in full quality also serves as a reduced one, and a reduced one comes first.
   const bool same_view = key == request.key || key == request.reduced_key;
   if (same_view && pending.isovalues == scene_->isovalues()) return true;
   return pending.state.moving && request.options.moving &&
          2 * request.newest->triangles >= pending.state.triangles;
 }
 
-/// Whether the next picture would show no more than the last one.
+/// Whether the next frame would show no more than the last one.
 bool SceneRenderer::has_nothing_new(const ShownFrame& next, const FrameRequest& request) const {
   if (shown_frame_.key != next.key && shown_frame_.key != request.key) return false;
   if (!shown_frame_.stale && shown_frame_.slices == next.slices &&
       same_meshes(shown_frame_.meshes.get(), next.meshes.get()))
     return true;
-  // Meshes of another isovalue are awaited; a picture of this one was dropped for that.
+  // A frame of this isovalue was dropped because another one is expected.
   return !request.idle && shown_frame_.stale && shown_frame_.slices == next.slices &&
          shown_frame_.isovalues == next.isovalues && next.isovalues != scene_->isovalues();
 }
 
-/// Unless it would show nothing new.
+/// Chooses the next frame, unless it would show nothing new.
 void SceneRenderer::choose_frame(const FrameRequest& request) {
   Stopwatch watch;
   const bool reduced_is_enough = request.options.quality != FrameOptions::Quality::full &&
@@ -209,7 +208,7 @@ void SceneRenderer::choose_frame(const FrameRequest& request) {
                   .slices = slices_.samples(),
                   .isovalues = {}};
   if (shown_meshes_ != nullptr) next.isovalues = shown_meshes_->isovalues;
-  // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
+  // Pointer motion over panels must not cause a frame, nor a cut without new meshes.
   if (has_nothing_new(next, request)) return;
   if (shown_frame_.slices != next.slices ||
       !same_meshes(shown_frame_.meshes.get(), shown_meshes_.get())) {
@@ -230,7 +229,7 @@ void SceneRenderer::draw(const Camera& camera, int width, int height, const View
   } catch (...) {
     glFinish();
     if (pending_) drop_frame();
-    shown_frame_ = {};  // half a picture is none
+    shown_frame_ = {};  // the picture may be incomplete
     has_new_frame_ = imported_block_ = false;
     state_.drawing = state_.needs_draw = state_.complete = false;
     state_.drawn_fraction = 0;
@@ -243,12 +242,13 @@ void SceneRenderer::draw_frame(const Camera& camera, int width, int height,
   uploads_.begin_use();
   has_new_frame_ = false;
   Stopwatch watch;
-  // Until there is a picture of what is request for, every other time is for what has arrived.
+  // Until the requested surface is shown, only every second call imports memory; the others show
+  // new meshes.
   imported_block_ = !pending_ && (state_.covers || !imported_block_) && device_->update();
   times_ = {.device = watch.lap()};
   update_scene(camera, width, height, settings, options);
   times_.scene = watch.lap();
-  const bool idle = scene_->idle();  // first: then the newest has everything
+  const bool idle = scene_->idle();  // read first: then `newest` is complete
   FrameKey key{camera, width, height, settings};
   for (SurfaceSettings& surface : key.settings.surfaces) surface.isovalue = 0;
   FrameKey reduced_key = key;
@@ -268,8 +268,8 @@ void SceneRenderer::draw_frame(const Camera& camera, int width, int height,
   if (!continues) choose_frame(request);
   if (pending_) {
     watch.lap();
-    // Two contexts of one device are changed slowly and to and fro: one after the other is
-    // sooner done, for both.
+    // A device switches slowly between two contexts; using them one after the other is faster for
+    // both.
     const TicketGuard guard(device_->kernel_lock());
     times_.lock = watch.lap();
     if (!continues) begin_frame(request);
@@ -288,7 +288,7 @@ void SceneRenderer::update_state(const FrameRequest& request) {
                                         static_cast<double>(pending_->total_work)
                               : 0;
   state_.reduced_quality = shown_frame_.key != request.key;
-  // One that is no simpler than those at rest is not drawn again.
+  // A preview in full quality is not drawn again.
   if (!pending_ && !request.options.moving && !state_.reduced_quality) state_.moving = false;
   state_.limited = scene_->cut().limited_by_budget;
   state_.thin_over_budget = scene_->cut().triangles > request.options.max_triangles;
@@ -307,7 +307,7 @@ void SceneRenderer::draw_complete(const Camera& camera, int width, int height,
   const FrameOptions options{.batch_seconds = kBatchSeconds, .in_order = true};
   for (;;) {
     draw(camera, width, height, settings, options);
-    // The cut depends on what meshes were like; once more, it may be another.
+    // New meshes change the cut's estimates, so it is chosen once more.
     if (state_.complete) {
       draw(camera, width, height, settings, options);
       if (state_.complete) return;

@@ -4,7 +4,7 @@
 #include "viewer/app/scene_renderer.h"
 #include "viewer/scene/surface_box.h"
 
-// Where in the world a store, and what is shown of it, lies.
+// World-space bounds of a store, and of what is shown of it.
 
 namespace isobrick {
 namespace {

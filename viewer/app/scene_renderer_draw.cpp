@@ -10,7 +10,7 @@
 #include "core/stopwatch.h"
 #include "viewer/app/damage_markers.h"
 
-// How a picture that has been chosen is made, in pieces; scene_renderer.cpp chooses it.
+// Draws a chosen frame, in batches; scene_renderer.cpp chooses it.
 
 namespace isobrick {
 namespace {
@@ -19,8 +19,8 @@ constexpr std::uint64_t kAllWork = std::numeric_limits<std::uint64_t>::max();
 
 }  // namespace
 
-/// Which of the settings' surfaces a mesh of `shown_meshes_` belongs to. That may have been made
-/// when others were request for: where there were as many, one has another isovalue by now.
+/// The settings' surface of a mesh of `shown_meshes_`. Those may still show previous isovalues:
+/// then the surface has another isovalue by now.
 std::optional<std::size_t> SceneRenderer::surface_of(const NodeDraw& node,
                                                      const ViewSettings& settings) const {
   const auto number = static_cast<std::size_t>(node.isovalue);
@@ -78,12 +78,11 @@ void SceneRenderer::begin_frame(const FrameRequest& request) {
   times_.draw = watch.lap();
 }
 
-/// Waits until OpenGL has drawn the piece before the one that was just submitted, or everything.
-/// llvmpipe draws in part on this thread and in part beside it: the rest of a piece is drawn
-/// beside the next one.
+/// Waits until OpenGL has drawn the previous batch, or everything. llvmpipe draws partly on this
+/// thread and partly on others: the rest of a batch is drawn beside the next one.
 void SceneRenderer::wait_for_gl(bool everything) {
   if (everything) {
-    glFinish();  // see DeviceMeshes::drawn(); and drawing counts for the pause after it
+    glFinish();  // see DeviceMeshes::borrow(); the time also sets the pause between frames
     return batch_fence_.reset();
   }
   GlFence fence = GlFence::insert();
@@ -91,20 +90,21 @@ void SceneRenderer::wait_for_gl(bool everything) {
   batch_fence_ = std::move(fence);
 }
 
-/// Draws the rest of the picture, or a piece of it where `limit` is finite.
+/// Draws the rest of the frame, or a batch of it if `limit` is finite.
 void SceneRenderer::draw_batch(double limit) {
   const bool in_batches = std::isfinite(limit);
   Stopwatch watch;
   const bool finished = renderer().advance(in_batches ? batch_pacer_.work() : kAllWork);
   const double submitted = watch.lap();
-  const int batches = (batch_fence_ ? 1 : 0) + (finished ? 1 : 0);  // that are waited for
+  const int batches =
+      (batch_fence_ ? 1 : 0) + (finished ? 1 : 0);  // batches that wait_for_gl() waits for
   wait_for_gl(finished);
   const double waited = watch.lap();
   times_.draw += submitted;
   times_.finish += waited;
   if (in_batches && batches > 0) {
     const double seconds = (submitted + waited) / batches;
-    // The last piece is a small one, which makes no other larger.
+    // The last batch is small, so it is no reason for larger ones.
     if (!finished || seconds > limit) batch_pacer_.add(seconds, limit);
   }
   if (finished) return finish_frame();
@@ -127,7 +127,7 @@ void SceneRenderer::finish_frame() {
   device_->release_borrowed();
 }
 
-/// Waits for the piece that is still being drawn, if any: then its meshes may go.
+/// Waits for a batch that is still being drawn, so that its meshes may be freed.
 void SceneRenderer::drop_frame() {
   ++counters_.dropped;
   if (batch_fence_) wait_for_gl(true);

@@ -6,7 +6,7 @@
 namespace isobrick {
 namespace {
 
-/// Most that the samples of one slice may take: beside them are as many floats, and on the device.
+/// Maximum bytes of one slice's samples. There are as many floats besides, also on the device.
 std::uint64_t slice_bytes(const PictureBudgets& budgets, ScalarType type) {
   const std::uint64_t sample = std::min<std::uint64_t>(size_of(type), sizeof(float));
   const std::uint64_t samples = std::min(SliceViews::memory(budgets) / 3 / (sample + sizeof(float)),

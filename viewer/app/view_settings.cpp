@@ -17,7 +17,7 @@ Json list(Vec3<T> v) {
   return Json::array({v.x, v.y, v.z});
 }
 
-/// Reads fields; whatever is wrong is an Error that names the field.
+/// Reads fields of a JSON object. Throws Error, which names the field.
 class Fields {
  public:
   explicit Fields(const Json& json) : json_(json) {}
@@ -47,7 +47,7 @@ class Fields {
     const Vec3d v = vector(name);
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
   }
-  /// Parts of a whole.
+  /// A fraction or colour component for each axis.
   Vec3f parts(const char* name) const {
     const Vec3f v = vector_f(name);
     for (int axis = 0; axis < 3; ++axis)

@@ -1,7 +1,7 @@
 #include "viewer/app/viewer_window.h"
 
 #include <epoxy/gl.h>
-// After OpenGL's.
+// After OpenGL's header.
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
@@ -41,9 +41,9 @@ GLFWwindow* make_window(const WindowOptions& options) {
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-  glfwWindowHint(GLFW_DEPTH_BITS, 0);  // the renderer has its own
+  glfwWindowHint(GLFW_DEPTH_BITS, 0);  // the renderer has its own buffer
   glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
-  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);  // until there is something to be seen
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);  // shown with the first notice
   GLFWwindow* window =
       glfwCreateWindow(options.width, options.height, "Isobrick", nullptr, nullptr);
   if (window == nullptr) {
@@ -54,8 +54,8 @@ GLFWwindow* make_window(const WindowOptions& options) {
   return window;
 }
 
-/// What names of files and our own texts are written with: Latin, Greek, Cyrillic, punctuation,
-/// arrows, signs of mathematics.
+/// Characters of file names and messages: Latin, Greek, Cyrillic, punctuation, arrows, mathematical
+/// signs.
 constexpr ImWchar kGlyphs[] = {0x20,   0x17f,  0x370,  0x3ff,  0x400,  0x45f,
                                0x2010, 0x2044, 0x20ac, 0x20ac, 0x2190, 0x2195,
                                0x2212, 0x2212, 0x2248, 0x2265, 0};
@@ -63,16 +63,16 @@ constexpr ImWchar kGlyphs[] = {0x20,   0x17f,  0x370,  0x3ff,  0x400,  0x45f,
 void load_font(float scale) {
   const std::string_view bytes = font_bytes();
   ImFontConfig config;
-  config.FontDataOwnedByAtlas = false;  // and so it is only read
+  config.FontDataOwnedByAtlas = false;  // so ImGui does not free it
   ImGui::GetIO().Fonts->AddFontFromMemoryTTF(const_cast<char*>(bytes.data()),
                                              static_cast<int>(bytes.size()), kFontPixels * scale,
                                              &config, kGlyphs);
 }
 
-/// Returns the display's scale.
+/// Initialises Dear ImGui; returns the display's scale.
 float set_up_imgui(GLFWwindow* window) {
   ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // nothing is left in whatever folder this is
+  ImGui::GetIO().IniFilename = nullptr;  // no file in the current folder
   ImGui::StyleColorsDark();
   ImGui::GetStyle().WindowRounding = 4;
   float scale = 1, other = 1;
@@ -90,11 +90,11 @@ ViewerWindow::ViewerWindow(WindowOptions options)
     : options_(std::move(options)), window_(make_window(options_)) {
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
-  // Before ImGui's, which calls those that it finds.
+  // Installed before ImGui's callbacks, which call these.
   events_ = std::make_unique<Events>(*this);
   scale_ = set_up_imgui(window_);
   state_.panel_width = kPanelWidth * scale_;
-  // Compiling shaders takes a while.
+  // Compiling shaders takes some time.
   glfwShowWindow(window_);
   show_notice("Starting …");
   PictureSize size;
@@ -166,7 +166,7 @@ void ViewerWindow::handle_requests() {
   if (asked.volume) show_volume(*asked.volume);
   if (asked.fit) frame_again(*asked.fit);
   if (!asked.screenshot) return;
-  // One that moves may be smaller, and without box and axes: that at rest is worth keeping.
+  // A preview may be smaller and have no box and axes, so the still frame is saved.
   if (rests())
     save_picture(*asked.screenshot);
   else
@@ -184,7 +184,7 @@ void ViewerWindow::save_picture(const std::filesystem::path& file) {
 }
 
 std::optional<PickedPoint> ViewerWindow::pick(const Click& click) {
-  // While something moves the picture may be smaller than the window.
+  // A preview may be smaller than the window.
   const Renderer& renderer = state_.scene_renderer->renderer();
   return pick_point(*state_.scene_renderer, static_cast<int>(click.x * renderer.width()),
                     static_cast<int>(click.y * renderer.height()));
@@ -205,7 +205,7 @@ ViewerWindow::Click ViewerWindow::click_at(double x, double y) const {
   return click;
 }
 
-/// Which point of the measurement it becomes.
+/// Adds a point to the measurement; returns its index.
 std::size_t ViewerWindow::measure(Vec3d world) {
   if (state_.measured.size() == 2) state_.measured.clear();
   state_.measured.push_back(world);
@@ -218,12 +218,12 @@ void ViewerWindow::click(double x, double y) {
   Click click = click_at((x * area.window_width - area.left) / area.width, y);
   state_.picked = pick(click);
   if (state_.measuring && state_.picked) click.point = measure(state_.picked->world);
-  // Those before were of a measurement that is over, or of none.
+  // Earlier clicks belong to a finished measurement, or to none.
   if (!click.measuring || click.point == 0u) clicks_.clear();
   if (!rests()) clicks_.push_back(std::move(click));
 }
 
-/// Whether the picture that is shown is the finest there will be.
+/// Whether the picture is the finest possible one.
 bool ViewerWindow::rests() const {
   const FrameState& state = state_.scene_renderer->state();
   return !moving() && state.complete && !state.moving;
@@ -247,7 +247,7 @@ void ViewerWindow::settle_clicks() {
     if (click.point)
       state_.measured[*click.point] = point->world;
     else if (click.measuring && (state_.measured.size() < 2 || clicks.size() == 1))
-      measure(point->world);  // and so ends no measurement that clicks after it have made
+      measure(point->world);  // never ends a measurement of later clicks
   }
 }
 

@@ -10,7 +10,7 @@
 namespace isobrick {
 namespace {
 
-/// Further than this a press and a release are a drag, not a click: pixels.
+/// Pixels between press and release, above which they are a drag and not a click.
 constexpr double kClickPixels = 4;
 constexpr double kIsovalueSteps = 200;  ///< from the lowest sample to the highest
 
@@ -36,7 +36,7 @@ ViewerWindow::Events::Events(ViewerWindow& owner) : owner_(owner) {
   glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
     with_window(w, [&](ViewerWindow& v) { v.events_->on_key(key, action, mods); });
   });
-  // Where "?" lies depends on the keyboard.
+  // The key of "?" depends on the keyboard.
   glfwSetCharCallback(window, [](GLFWwindow* w, unsigned character) {
     with_window(w, [&](ViewerWindow& v) {
       v.has_event_ = true;
@@ -79,7 +79,7 @@ void ViewerWindow::Events::on_button(int button, int action, int mods) {
 void ViewerWindow::Events::on_pointer(double x, double y) {
   owner_.has_event_ = true;
   if (button_ >= 0) {
-    // A click leaves the camera, and the picture at rest, as they are.
+    // A click changes neither the camera nor the still frame.
     dragged_ |= std::hypot(x - x_, y - y_) >= kClickPixels;
     if (!dragged_) return;
     int width = 1, height = 1;
@@ -174,7 +174,7 @@ void ViewerWindow::Events::on_press(int key, int mods, bool again) {
     case GLFW_KEY_DOWN: return move_isovalue(fine ? -0.1 : -1);
     default: break;
   }
-  if (again) return;  // one that is held does not do the rest over and over
+  if (again) return;  // no repetition for a held key
   switch (key) {
     case GLFW_KEY_TAB:
       if (!state.settings.surfaces.empty())

@@ -1,7 +1,7 @@
 #include "viewer/app/viewer_window.h"
 
 #include <epoxy/gl.h>
-// After OpenGL's.
+// After OpenGL's header.
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
@@ -17,28 +17,28 @@
 #include "viewer/app/pick.h"
 #include "viewer/app/window_events.h"
 
-// What a window does again and again: wait for input, draw, show.
+// The loop of a window: wait for events, draw, show.
 
 namespace isobrick {
 namespace {
 
-/// Above it a frame is no frame but a pause.
+/// Maximum step of motions; a longer frame is a pause.
 constexpr double kMaxStepSeconds = 0.1;
-/// While meshes come in and nothing moves, from a step that has drawn nothing new to the next one:
-/// the cores are for meshes.
+/// Wait after a step that drew nothing new, while meshes arrive and nothing moves: the cores are
+/// for meshes.
 constexpr double kMeshWaitSeconds = 0.008;
-/// While a picture is drawn in pieces or meshes come in, and nothing else happens, from one frame
-/// to the next: frames would keep software from drawing, and where a display sets the pace a
-/// picture of what has come would wait for its turn, after that of a frame that showed nothing new.
+/// Interval of frames while a picture is drawn in batches or meshes arrive, and nothing else
+/// happens. More frames would delay software drawing; and with vertical sync a new picture would
+/// wait behind a frame without anything new.
 constexpr double kMaxFrameInterval = 0.25;
-/// Where nothing happens, from one look at what others have done (a signal, a count) to the next.
+/// Interval for checking signals and counts while nothing happens.
 constexpr double kIdleStep = 0.25;
-/// Messages about damage that are shown one by one.
+/// Maximum number of separate messages about damage.
 constexpr std::size_t kMaxReported = 3;
-/// Moving pictures may be coarser for so long after the last motion.
+/// Previews last for this time after the last motion.
 constexpr double kSettleSeconds = 0.25;
 
-/// Whether anything but colours differs: those change no mesh, and nobody waits for them.
+/// Whether the settings differ in more than colours, which change no mesh and need no preview.
 bool values_differ(ViewSettings a, const ViewSettings& b) {
   a.background_top = b.background_top;
   a.background_bottom = b.background_bottom;
@@ -49,7 +49,7 @@ bool values_differ(ViewSettings a, const ViewSettings& b) {
 
 }  // namespace
 
-/// Says once what cannot be shown.
+/// Shows each damage message once.
 void ViewerWindow::report_damage() {
   if (const std::string why = state_.isovalue_stats->take_failure(); !why.empty())
     state_.show_message(why);
@@ -63,9 +63,9 @@ void ViewerWindow::report_damage() {
   }
 }
 
-/// Says once, of each isovalue that no sample reaches, why nothing of it is seen.
+/// Shows once, for each isovalue outside the range of the samples, why it has no surface.
 void ViewerWindow::report_empty_surfaces() {
-  if (moving()) return;  // one that is dragged goes by
+  if (moving()) return;  // a sliding isovalue passes quickly
   const ValueRange<double> range = state_.isovalue_stats->counts().range();
   for (const SurfaceSettings& surface : state_.settings.surfaces) {
     if (!surface.shown || reported_empty_.contains(surface.isovalue)) continue;
@@ -85,11 +85,11 @@ bool ViewerWindow::moving() const {
   return state_.navigator.moving() || glfwGetTime() < settled_at();
 }
 
-/// Makes the picture, or goes on with it.
+/// Draws the picture, or a batch of it.
 void ViewerWindow::draw_picture(int width, int height) {
   SceneRenderer& scene_renderer = *state_.scene_renderer;
   const double begin = glfwGetTime();
-  // The first picture of a store should not wait for a good one.
+  // The first picture of a store is a preview, too.
   surface_shown_ |= scene_renderer.state().covers;
   const bool fluent = moving() || !surface_shown_;
   FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), fluent);
@@ -128,7 +128,7 @@ ViewerWindow::WindowKey ViewerWindow::window_key() const {
   return key;
 }
 
-/// Whether what tells how far something is, or a cursor that blinks, needs another frame.
+/// Whether progress or a blinking cursor needs another frame.
 bool ViewerWindow::is_due() const {
   const bool under_way = state_.import != nullptr || ImGui::GetIO().WantTextInput ||
                          (state_.scene_renderer != nullptr && !rests());
@@ -156,14 +156,14 @@ void ViewerWindow::end_frame() {
   glfwSwapBuffers(window_);
 }
 
-/// A frame with a line of text, before something that takes long.
+/// Shows a frame with a line of text, before a long operation.
 void ViewerWindow::show_notice(const std::string& text) {
   begin_frame();
   draw_notice(text);
   end_frame();
 }
 
-/// Unless it would show nothing new. `asked`: somebody has done something.
+/// Shows a frame, unless it would equal the last one. `asked`: show it in any case.
 void ViewerWindow::draw_frame(bool asked) {
   if (minimised()) return;
   const PictureArea area = picture_area();
@@ -181,7 +181,7 @@ void ViewerWindow::draw_frame(bool asked) {
   const ViewSettings settings = state_.settings;
   const Camera camera = state_.navigator.camera;
   draw_panels(state_);
-  // A slider that is dragged, and no click on a widget, is a motion.
+  // Dragging a slider is a motion; clicking a widget is not.
   if (ImGui::IsMouseDown(ImGuiMouseButton_Left) && ImGui::IsAnyItemActive() &&
       (values_differ(settings, state_.settings) || camera != state_.navigator.camera))
     events_->moved();
@@ -189,10 +189,10 @@ void ViewerWindow::draw_frame(bool asked) {
   end_frame();
 }
 
-/// What a picture, or a piece of one, that took this thread so long says of the next one.
+/// Adapts the previews to the time that this thread took for a picture or a batch.
 void ViewerWindow::pace(double seconds) {
   const SceneRenderer& scene_renderer = *state_.scene_renderer;
-  // There is more to draw; or a better one to come; or something else to do.
+  // More to draw, a better picture to come, or other work.
   needs_draw_ = scene_renderer.state().drawing || scene_renderer.state().reduced_quality ||
                 scene_renderer.state().needs_draw;
   if (!scene_renderer.has_new_frame()) return;
@@ -209,7 +209,7 @@ void ViewerWindow::wait(double max_seconds) {
   if (minimised()) return glfwWaitEventsTimeout(max_seconds);
   const bool there = state_.scene_renderer != nullptr;
   if (there && moving()) {
-    // Until the hand moves on, or holds still for good.
+    // Until the next motion, or until the camera counts as still.
     if (!has_event_ && !needs_draw_ && !state_.navigator.moving() &&
         !state_.scene_renderer->has_new_frame())
       return glfwWaitEventsTimeout(std::clamp(settled_at() - glfwGetTime(), kMeshWaitSeconds,
@@ -227,8 +227,7 @@ void ViewerWindow::wait(double max_seconds) {
 void ViewerWindow::wait_for_meshes(double max_seconds) {
   if (state_.scene_renderer == nullptr || state_.scene_renderer->has_new_frame()) return;
   if (state_.scene_renderer->state().drawing || state_.scene_renderer->state().needs_draw) return;
-  // Each mesh that comes in ends a wait, and is not worth a step; the last one is, and what a user
-  // does.
+  // Each new mesh ends a wait but needs no step. The last mesh and user input do.
   const SceneStream& stream = state_.scene_renderer->scene().stream();
   const double end = glfwGetTime() + std::min(kMeshWaitSeconds, max_seconds);
   for (double now = glfwGetTime(); !has_event_ && now < end && (draw_failed_ || !stream.idle());
@@ -239,7 +238,7 @@ void ViewerWindow::wait_for_meshes(double max_seconds) {
 bool ViewerWindow::step(double max_seconds) {
   wait(max_seconds);
   if (glfwWindowShouldClose(window_)) return false;
-  // What a panel is told by one event it may show with the second frame.
+  // A panel may need a second frame to show the effect of an event.
   const bool told = std::exchange(has_event_, false),
              asked = std::exchange(had_event_, told) || told;
   needs_draw_ = false;

@@ -15,16 +15,16 @@
 #include "viewer/app/framing.h"
 #include "viewer/render/gl_context.h"
 
-// Which volume a window shows: opened, dropped, converted, chosen from an image.
+// The volume of a window: opened, dropped, converted, chosen from an image.
 
 namespace isobrick {
 
-/// Shows a volume in place of the one before; the settings stay as they are.
+/// Replaces the volume; the settings stay.
 void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection) {
   ImageVolumes volumes = image_volumes(path, selection);
   auto store = std::make_shared<const StoreReader>(path, volumes.selection);
   auto stats = std::make_unique<IsovalueStats>(store);
-  // Last: once it is made, that of the store before has gone from the renderer.
+  // Last: making it drops the previous store's picture from the renderer.
   auto renderer =
       std::make_unique<SceneRenderer>(store, options_.budgets, glfwPostEmptyEvent, setup_);
   renderer->scene().search().use(state_.index);
@@ -54,7 +54,7 @@ void ViewerWindow::open(const std::filesystem::path& path, const Selection& sele
   load(path, selection);
   state_.selected = 0;
   state_.settings = options_.settings;
-  // In software four samples a pixel take longer than anything else.
+  // In software four samples per pixel take more time than anything else.
   if (current_gl_device().software) state_.settings.multisample = false;
   choose_values(state_.settings, state_.scene_renderer->scene().tree());
   state_.navigator.stop();
@@ -68,7 +68,7 @@ void ViewerWindow::open(const std::filesystem::path& path, const Selection& sele
   } catch (const std::exception& e) {
     state_.show_message(error_message(e));
   }
-  // The next store is seen whole and with its own isovalue.
+  // The next store is framed anew, with an isovalue of its own.
   options_.camera = {};
   options_.settings.surfaces.clear();
   options_.settings.region_on = false;
@@ -100,7 +100,7 @@ ConvertOptions ViewerWindow::import_options() const {
   return options;
 }
 
-/// Begins to compute the ranges that a volume lacks; false where it has them.
+/// Starts to compute the ranges that a volume lacks; returns false if it lacks none.
 bool ViewerWindow::begin_ranges(const std::filesystem::path& path, const Selection& selection) {
   const Selection shown = image_volumes(path, selection).selection;
   if (has_all_ranges(StoreReader(path, shown))) return false;

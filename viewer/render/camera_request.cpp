@@ -54,7 +54,8 @@ Vec3d direction(std::string_view part, std::string_view text) {
   return v;
 }
 
-/// `back`: from the target towards the eye. Up as it is when nobody says so gives way.
+/// `back`: from the target towards the eye. The default of `up` is replaced if it is parallel to
+/// the view.
 void check_view(const CameraRequest& request, Vec3d back) {
   if (!has_direction(back))
     throw UsageError("a camera's eye is where its target is; one of them has to be elsewhere");
@@ -94,10 +95,10 @@ void take(CameraRequest& request, std::string_view part) {
   }
 }
 
-/// The direction towards the eye that the two angles mean.
+/// Converts the two angles to the direction towards the eye.
 Vec3d direction_of(const CameraRequest& request) {
   const Vec3d up = unit(request.up, {0, 0, 1});
-  // Around z azimuth 0 is the front, -y; another `up` turns the world by the shortest way.
+  // With up = z, azimuth 0 is the front, -y. Another `up` rotates the world by the shortest way.
   Vec3d right = cross(up, {0, -1, 0});
   if (length(right) < 1e-6) right = {1, 0, 0};
   right = unit(right, {1, 0, 0});

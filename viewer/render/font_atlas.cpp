@@ -12,7 +12,7 @@
 #include <stb/stb_truetype.h>
 #pragma GCC diagnostic pop
 
-// The assembler puts the file in as it is.
+// The assembler embeds the file.
 __asm__(
     ".pushsection .rodata\n"
     "isobrick_font_begin:\n"
@@ -60,7 +60,7 @@ const Glyph& FontAtlas::glyph_of(std::string_view text, std::size_t& at) const {
   };
   unsigned code = byte(at++);
   if (code >= 0xc0 && (byte(at) & 0xc0) == 0x80) code = (code & 0x1f) << 6 | (byte(at++) & 0x3f);
-  while ((byte(at) & 0xc0) == 0x80) {  // of longer ones the rest
+  while ((byte(at) & 0xc0) == 0x80) {  // skips the rest of longer sequences
     code = '?';
     ++at;
   }

@@ -16,18 +16,18 @@
 namespace isobrick {
 namespace {
 
-/// How one mesh is drawn; std430.
+/// Parameters of one mesh; std430.
 struct DrawParameters {
   glm::vec4 offset;  ///< from the eye; w: has normals
   glm::vec4 colour;  ///< linear; alpha: opacity
   glm::vec4 inside;
-  glm::uvec4 id;  ///< y: the half spaces that may cut it, as bits
+  glm::uvec4 id;  ///< y: clip mask
 };
 
 /// See MeshPass::max_triangles().
 constexpr std::uint64_t kSoftwareTriangles = std::uint64_t{1} << 14;
 
-/// What glMultiDrawElementsIndirect reads.
+/// The command layout of glMultiDrawElementsIndirect.
 struct Command {
   std::uint32_t count, instances, first_index;
   std::int32_t base_vertex;
@@ -49,14 +49,14 @@ centroid out vec3 surface_colour;
 #endif
 centroid out vec3 world_normal;
 #if FRONT
-// Within the triangle, also where a pixel's centre is beside it.
+// Centroid: within the triangle even if the pixel's centre is beside it.
 noperspective centroid out float stored_depth;
 #endif
 #if SOFTWARE
-// Fragments get the parameters from here and not from the buffer: Mesa's llvmpipe draws them
-// when the buffer may hold the next mesh's already.
+// Fragments get the parameters here and not from the buffer: when Mesa's llvmpipe draws them, the
+// buffer may already hold the next mesh's.
 flat out vec4 outer_colour, inner_colour;
-flat out uvec3 mesh;  // id, cut by, has normals
+flat out uvec3 mesh;  // id, clip mask, has normals
 #else
 flat out uint draw_index;
 #endif
@@ -109,7 +109,7 @@ Seen see() {
   s.position = here();
   vec3 facet = cross(dFdx(s.position), dFdy(s.position));
   s.slope = fwidth(gl_FragCoord.z);
-  clip(mesh.y);  // after what is looked at across pixels
+  clip(mesh.y);  // after all derivatives
   s.eye = towards_eye(s.position);
   facet = dot(facet, facet) > 0 ? normalize(facet) : s.eye;
   if (dot(facet, s.eye) < 0) facet = -facet;
@@ -119,7 +119,7 @@ Seen see() {
     s.normal = facet;
   else
     s.normal *= inversesqrt(size);
-  // Both sides are lit, whatever way round the file has them.
+  // Both sides are lit, whatever the winding.
   if (dot(s.normal, facet) < 0) s.normal = -s.normal;
   float facing = dot(s.normal, s.eye);
   if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
@@ -143,7 +143,7 @@ void main() {
 )";
 
 const char* const kTransparent = R"(
-// What is hidden by opaque meshes is not in front, either.
+// Fragments behind opaque meshes do not count as front.
 layout(early_fragment_tests) in;
 layout(binding = 0, r32ui) uniform uimage2D front;
 noperspective centroid in float stored_depth;
@@ -152,17 +152,17 @@ layout(location = 1) out float hidden;
 
 void main() {
   Seen s = see();
-  // What it is where the pixel's centre is beside the triangle; not farther off than that is, for
-  // one that goes past the eye has none in between.
+  // The depth at the centroid. It is limited to the slope within a pixel, since a triangle that
+  // passes the eye has no depth in between.
   float within = clamp(stored_depth, gl_FragCoord.z - s.slope, gl_FragCoord.z + s.slope);
   if (counts.y != 0) {
     bool whole = gl_SampleMaskIn[0] == counts.z;
     float depth = whole ? gl_FragCoord.z : clamp(within, 0.0, 1.0);
-    // Near is large; of the depth what leaves room for a number.
+    // Larger is nearer; the low bits of the depth make room for the id.
     imageAtomicMax(front, ivec2(gl_FragCoord.xy),
                    floatBitsToUint(depth) & 0xffffff00u | mesh.x & 0xffu);
   }
-  // Slanting rays have a longer way through it.
+  // Slanting rays pass through more of it.
   float facing = max(dot(s.normal, s.eye), 0.12);
   float alpha = 1 - pow(1 - outer_colour.a, 1 / facing);
   sum = vec4(min(s.light, vec3(2)), 1) * alpha * weight_at(-s.position.z);
@@ -175,7 +175,7 @@ glm::vec4 offset_of(Vec3d origin, Vec3d eye, bool normals) {
   return {from_eye.x, from_eye.y, from_eye.z, normals ? 1.0f : 0.0f};
 }
 
-/// But for its offset.
+/// All parameters but the offset.
 DrawParameters parameters_of(const MeshStyle& style) {
   const Vec3f c = style.colour;
   const Vec3f darker{0.30f + 0.42f * c.x, 0.24f + 0.38f * c.y, 0.22f + 0.34f * c.z};
@@ -297,7 +297,7 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
   }
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
   check_gl("drawing meshes");
-  // Devices hold these meshes anyway.
+  // On a device these meshes are in device memory.
   if (software_) wait_for_previous_call();
 }
 

@@ -18,10 +18,10 @@ struct OpenMesh {
   std::string path;
   std::unique_ptr<MeshFile> file;
   MeshStyle style;
-  double scale = 1;  ///< from its unit to that of the picture
+  double scale = 1;  ///< from the mesh's unit to the picture's
 };
 
-/// The unit of the picture, and what scales each mesh to it.
+/// Chooses the picture's unit and sets each mesh's scale to it.
 std::string choose_unit(std::vector<OpenMesh>& meshes) {
   std::string unit;
   for (OpenMesh& mesh : meshes) {
@@ -33,13 +33,13 @@ std::string choose_unit(std::vector<OpenMesh>& meshes) {
   return unit;
 }
 
-/// Draws the bar of a picture in `unit`, in the unit that is asked for.
+/// Draws the scale bar of a picture in `unit`, in the requested unit.
 void draw_scale_bar(Renderer& renderer, const std::string& unit, const std::string& requested) {
   if (requested.empty()) return renderer.draw_scale_bar(unit_symbol(unit));
   renderer.draw_scale_bar(unit_symbol(requested), unit_ratio(requested, unit).value_or(1));
 }
 
-/// A chunk whose coordinates count from an origin, scaled.
+/// Scales the chunks of a mesh; coordinates are relative to an origin.
 class ScaledChunk {
  public:
   explicit ScaledChunk(double scale) : scale_(static_cast<float>(scale)), scaled_(scale != 1) {}
@@ -58,7 +58,7 @@ class ScaledChunk {
   std::vector<Vec3f> positions_;
 };
 
-/// Bounds of all meshes that have a vertex; two equal corners if none has.
+/// Bounds of all meshes that have a vertex; `lo` and `hi` stay if none has.
 void find_bounds(const std::vector<OpenMesh>& meshes, Vec3d& lo, Vec3d& hi) {
   bool any = false;
   for (const OpenMesh& mesh : meshes) {
@@ -78,12 +78,12 @@ void find_bounds(const std::vector<OpenMesh>& meshes, Vec3d& lo, Vec3d& hi) {
   }
 }
 
-/// What a batch of triangles takes: with normals and colours of its vertices, in vectors that may
-/// have twice the room that they need, and once more on the way to the device.
+/// Maximum bytes of a batch of triangles: with normals and colours, in vectors with up to twice the
+/// capacity, and once more during the upload.
 constexpr std::uint64_t kBatchBytes =
     MeshFile::kBatch * 3 * (sizeof(Triangle) / 3 + 2 * sizeof(Vec3f) + sizeof(VertexColour)) * 3;
 
-/// The most of mapped files that lies in memory, where triangles name vertices that are far apart.
+/// Maximum resident bytes of mapped files, if triangles name vertices that are far apart.
 std::uint64_t mapped_memory(const MeshPictureRequest& request) {
   std::uint64_t bytes = 0;
   for (const MeshInput& mesh : request.meshes) {
@@ -91,7 +91,7 @@ std::uint64_t mapped_memory(const MeshPictureRequest& request) {
     const std::uintmax_t size = std::filesystem::file_size(mesh.path, failure);
     if (!failure) bytes += size;
   }
-  // What is text or packed is also in a file of numbers, which may be larger.
+  // Text and compressed files are also decoded into a file of numbers, which may be larger.
   return std::min<std::uint64_t>(4 * bytes, 4 * MappedFile::kWindow);
 }
 
@@ -123,7 +123,7 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
         "'{}' has no unit, so that a scale bar cannot be in {}; without a unit it counts in the "
         "mesh's own",
         meshes.front().path, request.scale_bar_unit));
-  // Those that are seen through come last.
+  // Transparent meshes come last.
   std::stable_sort(meshes.begin(), meshes.end(), [](const OpenMesh& a, const OpenMesh& b) {
     return a.style.opacity >= 1 && b.style.opacity < 1;
   });

@@ -35,7 +35,7 @@ struct MeshBlock {
         normals(make_buffer(vertex_count * sizeof(Vec3f), "memory for normals")),
         triangles(make_buffer(triangle_count * sizeof(Triangle), "memory for triangles")) {}
 
-  /// The places of both kinds, or nothing of either.
+  /// Reserves vertices and triangles, or neither.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> take(std::uint32_t vertex_count,
                                                               std::uint32_t triangle_count) {
     const auto vertex = free_vertices.take(vertex_count);
@@ -69,7 +69,7 @@ struct MeshPool::State {
   std::uint32_t block_vertices = 0;
   std::vector<std::shared_ptr<MeshBlock>> blocks;
 
-  /// One empty block stays for what comes next; more go back to the device.
+  /// Keeps one empty block for the next mesh; frees the others.
   void tidy() {
     bool kept = false;
     std::erase_if(blocks, [&](const std::shared_ptr<MeshBlock>& block) {

@@ -15,7 +15,7 @@ namespace isobrick {
 namespace {
 
 constexpr float kFontHeight = 40;
-constexpr float kSmallestText = 11;  ///< pixels of a line, where the display is not scaled
+constexpr float kSmallestText = 11;  ///< pixels of a line, on a display without scaling
 
 const char* const kVertex = R"(
 layout(location = 0) in vec3 place;  // pixels from the top left; depth or its reciprocal
@@ -51,7 +51,7 @@ void main() {
     picture = vec4(tint, texture(atlas, uv).r);
     return;
   }
-  // Distance from the segment, whose ends are round.
+  // Distance from the segment, which has round ends.
   vec2 off = vec2(max(max(-uv.x, uv.x - line_size.y), 0.0), uv.y);
   float alpha = clamp(line_size.x + 0.5 - length(off), 0.0, 1.0);
   if (depth > 0) {
@@ -117,7 +117,7 @@ void OverlayPass::add_projected(Vec3d from, Vec3d to, Vec3f colour, float width)
     const bool end = i & 2;
     const double u = end ? size + reach : -reach, v = i & 1 ? reach : -reach;
     const Vec3d at = from + ahead * u + beside * v;
-    // Straight on beyond the ends, so that depth is right in between.
+    // Extended beyond the ends with the same slope, so that the depth in between is right.
     const double slope = size > 0 ? (to.z - from.z) / size : 0;
     const Vec3f p = to_float({at.x, at.y, from.z + slope * u});
     corners[i] = {p.x,
@@ -141,7 +141,7 @@ void OverlayPass::add_flat_line(Vec3d from, Vec3d to, Vec3f colour, float width)
 
 void OverlayPass::add_line(const WorldLine& line, Vec3f colour, float width) {
   std::array<Vec3d, 2> ends{line.from, line.to};
-  // What lies behind the eye is cut off.
+  // Clips the part behind the eye.
   const double near = camera_.orthographic ? -1e30 : camera_.near_depth();
   const auto depth = [&](Vec3d p) { return -dot(p - camera_.eye, camera_.back); };
   const double d0 = depth(ends[0]), d1 = depth(ends[1]);
@@ -152,7 +152,7 @@ void OverlayPass::add_line(const WorldLine& line, Vec3f colour, float width) {
   }
   for (Vec3d& end : ends) {
     end = camera_.project(end, width_, height_);
-    // Reciprocal depth is linear in a picture in perspective.
+    // In perspective the reciprocal depth is linear on the picture.
     if (!camera_.orthographic) end.z = 1 / std::max(end.z, near);
   }
   add_projected(ends[0], ends[1], colour, width);
@@ -188,7 +188,7 @@ void OverlayPass::add_axes() {
   static constexpr std::array<const char*, 3> names{"x", "y", "z"};
   const double height = unit_height(), size = 2.6 * height;
   const Vec3d centre{1.5 * size, height_ - 1.5 * size, 0};
-  std::array<int, 3> order{0, 1, 2};  // the farthest first
+  std::array<int, 3> order{0, 1, 2};  // farthest first
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return camera_.back[a] < camera_.back[b]; });
   for (const int axis : order) {

@@ -13,7 +13,7 @@
 namespace isobrick {
 namespace {
 
-constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that are drawn at once
+constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that one call draws
 
 const PreviewOptions& checked(const PreviewOptions& options) {
   for (const int edge : {options.width, options.height})
@@ -24,7 +24,7 @@ const PreviewOptions& checked(const PreviewOptions& options) {
   return options;
 }
 
-/// The context belongs to the thread of the call at hand.
+/// Makes the context current for one call.
 class ContextGuard {
  public:
   explicit ContextGuard(GlContext& context) : context_(context) { context_.make_current(); }
@@ -50,7 +50,7 @@ PreviewSink::~PreviewSink() {
 }
 
 std::uint64_t PreviewSink::memory_with(const PreviewOptions& options) {
-  // The batch, also on the way to the device, and the pixels on the way to the file.
+  // The batch and its upload; the pixels and their conversion for the file.
   constexpr std::uint64_t batch = 2 * kBatch * (sizeof(Triangle) + 2 * 2 * sizeof(Vec3f));
   const auto pixels =
       static_cast<std::uint64_t>(options.width) * static_cast<std::uint64_t>(options.height);
@@ -86,7 +86,7 @@ MeshBounds PreviewSink::bounds_of_batch() const {
 }
 
 void PreviewSink::write(const MeshChunk& chunk) {
-  // A batch has normals or has none.
+  // All or none of a batch has normals.
   if (!positions_.empty() && normals_.empty() != chunk.normals.empty()) draw_batch();
   for (std::span<const Triangle> left = chunk.triangles; !left.empty();) {
     if (triangles_.size() == kBatch) draw_batch();
@@ -96,7 +96,7 @@ void PreviewSink::write(const MeshChunk& chunk) {
   }
 }
 
-/// Adds triangles of a chunk to the batch with the vertices between their first and their last.
+/// Adds triangles of a chunk to the batch, with all vertices from their first to their last.
 void PreviewSink::add(const MeshChunk& chunk, std::span<const Triangle> triangles) {
   std::uint32_t lo = triangles.front()[0], hi = lo;
   for (const Triangle& t : triangles) {
@@ -126,7 +126,7 @@ void PreviewSink::draw_batch() {
 }
 
 void PreviewSink::finish() {
-  // Nothing was drawn so far: this batch is the mesh.
+  // If nothing was drawn yet, this batch is the whole mesh.
   if (!renderer_) begin_picture(bounds_of_batch());
   draw_batch();
   {

@@ -20,16 +20,15 @@
 namespace isobrick {
 namespace {
 
-/// World length in front of the eye, of a word of PictureResult::front.
+/// Depth as a world length, from a word of PictureResult::front.
 float depth_of_front(const Camera& camera, std::uint32_t word) {
-  const auto stored =
-      std::bit_cast<float>((word & ~0xffu) | 0x80u);  // the middle of what it may be
+  const auto stored = std::bit_cast<float>((word & ~0xffu) |
+                                           0x80u);  // middle of the range that the lost bits leave
   const double near = camera.near_depth(), far = camera.far_depth();
   return static_cast<float>(camera.orthographic ? far - stored * (far - near) : near / stored);
 }
 
-/// Of Mesa's llvmpipe 66 MiB of libraries, some 12 of shaders and as many of triangles were
-/// measured.
+/// Measured with Mesa's llvmpipe: 66 MiB of libraries, 12 of shaders, about 12 of triangles.
 constexpr std::uint64_t kLibraries = std::uint64_t{70} << 20, kOfRenderer = std::uint64_t{30} << 20;
 
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
@@ -50,7 +49,7 @@ struct Renderer::State {
   void clear();
   void clear_transparent();
   void bind_frame() { glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.get()); }
-  /// Makes ready to draw meshes or slices.
+  /// Binds the targets for meshes and slices.
   void bind_target(const DrawSwitches& switches, bool blended);
   bool draw_surfaces(const DrawSwitches& switches, bool blended, std::uint64_t& work);
   void choose_result(bool at_once);
@@ -60,15 +59,16 @@ struct Renderer::State {
   GlDevice device;
   int largest_edge = 0;
   PicturePasses passes;
-  // One for each way to sample: switching to and fro while something moves costs nothing.
+  // One for each sampling mode: switching during motion costs nothing.
   std::array<std::optional<ScreenPass>, 2> screens;
   std::array<std::optional<PictureTargets>, 2> all_targets;
-  ScreenPass* screen = nullptr;                 ///< of this picture
-  PictureTargets* targets = nullptr;            ///< likewise
-  std::optional<PictureResult> finished, next;  ///< the finished picture; what the next one becomes
+  ScreenPass* screen = nullptr;       ///< of the present picture
+  PictureTargets* targets = nullptr;  ///< of the present picture
+  std::optional<PictureResult> finished,
+      next;  ///< the finished picture; the result of the present one
   Camera finished_camera;
   PictureSettings finished_settings;
-  Overlays deferred_overlays;  ///< overlays that the finished picture does not have
+  Overlays deferred_overlays;  ///< overlays that copy_to() adds to the finished picture
 
   Camera camera;
   PictureSettings settings;
@@ -76,7 +76,7 @@ struct Renderer::State {
   Overlays overlays;
   GlBuffer frame_buffer, overlay_frame_buffer;
   PictureWork work;
-  bool any_transparent = false;  ///< in this picture
+  bool any_transparent = false;  ///< in the present picture
 };
 
 void Renderer::State::start(const Camera& new_camera, int width, int height,
@@ -110,7 +110,7 @@ void Renderer::State::choose_targets(int width, int height) {
   if (!screens[mode]) screens[mode].emplace(samples);
   screen = &*screens[mode];
   targets = nullptr;
-  // What has another size goes first, so that it and the new are never there at once.
+  // Targets of another size are freed first, to save memory.
   for (std::optional<PictureTargets>& other : all_targets)
     if (other &&
         (other->width != width || other->height != height || other->ids != settings.picking))
@@ -119,7 +119,7 @@ void Renderer::State::choose_targets(int width, int height) {
   targets = &*all_targets[mode];
 }
 
-/// The depth alone: where nothing is drawn nobody looks at the rest.
+/// Clears only the depth: nothing reads the rest where nothing is drawn.
 void Renderer::State::clear() {
   const DrawSwitches switches(frame);
   const unsigned target = targets->opaque.get();
@@ -138,7 +138,7 @@ void Renderer::State::clear_transparent() {
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 0, nothing.data());
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 1, all.data());
   if (!targets->ids) return;
-  glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);  // after a picture that was dropped
+  glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);  // after a dropped picture
   glClearTexImage(targets->front.get(), 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
 
@@ -157,8 +157,8 @@ bool Renderer::State::draw_surfaces(const DrawSwitches& switches, bool blended,
   return work.draw_surfaces(passes, camera.eye, blended, max_work);
 }
 
-/// `at_once`: nobody sees the picture before until the next one is there, which may take its
-/// place.
+/// `at_once`: the picture is finished in this call, so that it may reuse the memory of the previous
+/// one.
 void Renderer::State::choose_result(bool at_once) {
   const auto keep_fitting = [&](std::optional<PictureResult>& result) {
     if (result && !result->fits(targets->width, targets->height, targets->ids)) result.reset();
@@ -171,7 +171,7 @@ void Renderer::State::choose_result(bool at_once) {
   if (!next) next.emplace(targets->width, targets->height, targets->ids);
 }
 
-/// Whether the picture is finished.
+/// Returns whether the picture is finished.
 bool Renderer::State::advance(std::uint64_t max_work) {
   const bool at_once = max_work >= work.left();
   const DrawSwitches switches(frame);
@@ -352,7 +352,7 @@ std::optional<PickResult> Renderer::pick(int x, int y) const {
   check_gl("reading a pixel");
   if (!(depth > 0)) return std::nullopt;
   const WorldRay ray = camera.ray(x + 0.5, y + 0.5, width(), height());
-  // The depth is along the line of sight, the ray may slant.
+  // The depth is along the line of sight; the ray may be oblique.
   picked.position = ray.origin + ray.direction * (depth / -dot(ray.direction, camera.back));
   return picked;
 }

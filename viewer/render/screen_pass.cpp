@@ -17,7 +17,7 @@ void main() {
 }
 )";
 
-/// Textures of samples, or of pixels where there is one sample each.
+/// Samplers for multisampled textures, or for textures with one sample per pixel.
 std::string sampled(int samples) {
   return samples > 1 ? fmt::format(
                            "#define SAMPLES {}\n#define PICTURE sampler2DMS\n"
@@ -47,7 +47,7 @@ void main() {
     sum += other;
   }
   near_depth = stored > 0 ? depth_of(stored) : 0.0;
-  // Samples lie around the pixel's centre, and what is stored is linear in the picture.
+  // Samples lie around the pixel's centre; the stored depth is linear on the picture.
   if (farthest > 0 && depth_of(farthest) < near_depth + 8 * pixel_length(near_depth))
     near_depth = depth_of(sum / float(SAMPLES));
   near_normal = texelFetch(normals, at, AT(nearest)).rg;
@@ -55,8 +55,8 @@ void main() {
 }
 )";
 
-/// Scalable ambient obscurance (McGuire, Mara, Luebke 2012) at two sizes, one for
-/// creases and one for whole hollows.
+/// Scalable ambient obscurance (McGuire, Mara, Luebke 2012) at two radii: one for creases, one for
+/// cavities.
 const char* const kOcclusion = R"(
 layout(binding = 0) uniform sampler2D depths;
 layout(binding = 1) uniform sampler2D normals;
@@ -76,7 +76,7 @@ float closed_within(ivec2 at, vec3 p, vec3 n, float turn, float pixels) {
     if (depth <= 0) continue;
     vec3 v = view_position(vec2(there) + 0.5, depth) - p;
     float vv = dot(v, v), vn = dot(v, n);
-    // What is far in front closes a deep hollow a little, too.
+    // Surfaces far in front occlude a deep cavity a little, too.
     float near = 1 / (1 + vv / (1.5 * radius2));
     sum += near * max(vn - 0.02 * radius, 0.0) * inversesqrt(vv + 1e-4 * radius2);
   }
@@ -98,7 +98,7 @@ void main() {
 }
 )";
 
-/// Along rows, then along columns; never across steps in depth.
+/// Smooths along rows, then along columns; not across steps in depth.
 const char* const kSmooth = R"(
 layout(binding = 0) uniform sampler2D depths;
 layout(binding = 1) uniform sampler2D rough;
@@ -136,8 +136,8 @@ layout(location = 0) out vec4 picture;
 
 vec3 normal_at(ivec2 at) { return normal_of(texelFetch(near_normals, at, 0).rg); }
 
-// How much of an edge goes through the pixel: something farther begins beside it, or
-// the surface breaks off.
+// Strength of an edge in the pixel: a farther surface begins beside it, or the surface has a
+// crease.
 float edge_at(ivec2 at) {
   float depth = texelFetch(near_depths, at, 0).r;
   if (depth <= 0) return 0;
@@ -185,7 +185,7 @@ void main() {
     vec4 sum = texelFetch(sums, at, AT(i));
     if (seen < 1 && sum.a > 0) colour = mix(sum.rgb / sum.a, colour, seen);
 #endif
-    // Bright spots are cut before they are averaged, or edges beside them would be jagged.
+    // Bright samples are clamped before averaging, or edges beside them would be jagged.
     mean += min(colour, vec3(1));
   }
   picture = vec4(to_srgb(mean / float(SAMPLES)), 1);
@@ -207,7 +207,7 @@ const GlProgram& ScreenPass::compose(const PictureSettings& settings, bool trans
   const std::size_t number =
       (settings.occlusion ? 1u : 0u) + (settings.edges ? 2u : 0u) + (transparent ? 4u : 0u);
   GlProgram& program = compose_[number];
-  // Software runs through both sides of a condition: what is not wanted is left out.
+  // A software driver executes both branches of a condition, so unused code is left out.
   if (!program)
     program = make_program(
         kVertex,
@@ -231,7 +231,7 @@ std::vector<ScreenPass::Step> ScreenPass::steps(const PictureSettings& settings)
   return {Step::nearest, Step::occlusion, Step::smooth_rows, Step::smooth_columns, Step::compose};
 }
 
-/// What the last step reads.
+/// Binds the inputs of the last step.
 void ScreenPass::bind_samples(const ScreenPicture& picture) {
   bind(0, picture.targets.colour);
   bind(1, picture.targets.depth);

@@ -31,7 +31,7 @@ layout(binding = 1) uniform sampler2D colours;
 layout(location = 3) uniform vec3 window_opacity;  // first value, 1 / width, opacity
 in vec2 uv;
 
-// After all that is looked at across pixels.
+// After all derivatives.
 vec3 shown() {
   float value = texture(samples, uv).r;
   clip(~0u);
@@ -45,7 +45,7 @@ vec3 shown() {
 }
 )";
 
-// Alpha 0: a slice's colours mean numbers, and no shadow may change them.
+// Alpha 0: a slice's colours are data, so no occlusion may change them.
 const char* const kOpaque = R"(
 layout(location = 0) out vec4 colour;
 layout(location = 1) out vec2 normal;
