@@ -25,7 +25,7 @@ Json read(const fs::path& file) {
   const std::uintmax_t size = fs::file_size(file, missing);
   if (missing) return Json::object();
   if (size > kMaxBytes)
-    throw Error(fmt::format("'{}' is larger than bookmarks can be", file.string()));
+    throw Error(fmt::format("'{}' is too large for a file of bookmarks", file.string()));
   std::ifstream in(file, std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(in), {});
   Json json = Json::parse(text, nullptr, false);
@@ -50,7 +50,7 @@ fs::path Bookmarks::default_file() {
   if (data != nullptr && *data != '\0') return fs::path(data) / "isobrick" / "bookmarks.json";
   const char* home = std::getenv("HOME");
   if (home == nullptr || *home == '\0')
-    throw Error("bookmarks have no place: neither XDG_DATA_HOME nor HOME is set");
+    throw Error("there is no folder for bookmarks: neither XDG_DATA_HOME nor HOME is set");
   return fs::path(home) / ".local" / "share" / "isobrick" / "bookmarks.json";
 }
 

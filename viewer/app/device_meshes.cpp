@@ -143,10 +143,10 @@ std::string DeviceMeshes::describe() const {
 }
 
 const PooledMesh& DeviceMeshes::borrow(const NodeMesh& mesh, Vec3d origin) {
-  const DeviceMesh& there = *mesh.device;
-  const MeshPlace place =
-      opener_->buffers_of(there.block)
-          .place(there.first_vertex, there.vertices, there.first_triangle, there.triangles);
+  const DeviceMesh& device_mesh = *mesh.device;
+  const MeshPlace place = opener_->buffers_of(device_mesh.block)
+                              .place(device_mesh.first_vertex, device_mesh.vertices,
+                                     device_mesh.first_triangle, device_mesh.triangles);
   return borrowed_.emplace_back(MeshPool::borrow(place, origin));
 }
 

@@ -98,9 +98,9 @@ class FramePacer {
   }
 
   void pace_thin(double seconds, double triangles, bool limited, bool thin) {
-    const double most = kThinTimes * limit_;
-    const double fitting = triangles * kFull * most / seconds;
-    if (thin && seconds > most) {
+    const double max_seconds = kThinTimes * limit_;
+    const double fitting = triangles * kFull * max_seconds / seconds;
+    if (thin && seconds > max_seconds) {
       if (size_divisor_ == kMaxSizeDivisor) thin_triangles_ = std::max(fitting, kMinTriangles);
       reduced_quality_ = true;
       size_divisor_ = kMaxSizeDivisor;

@@ -26,9 +26,9 @@ struct Axis {
 
 /// Draws bars with the logarithm of the counts as height.
 void draw_bars(ImDrawList& draw, const Histogram& h, const Axis& axis, float top, float bottom) {
-  std::uint64_t most = 1;
-  for (const std::uint64_t n : h.counts) most = std::max(most, n);
-  const float full = std::log1p(static_cast<float>(most));
+  std::uint64_t max_count = 1;
+  for (const std::uint64_t n : h.counts) max_count = std::max(max_count, n);
+  const float full = std::log1p(static_cast<float>(max_count));
   for (std::size_t i = 0; i < h.counts.size(); ++i) {
     if (h.counts[i] == 0) continue;
     const double from = h.lo + static_cast<double>(i) * h.bin_width;

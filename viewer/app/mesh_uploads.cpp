@@ -76,10 +76,10 @@ std::vector<MeshId> MeshUploads::unused_ids() const {
   return ids;
 }
 
-void MeshUploads::drop(std::uint64_t most) {
-  if (pool_.capacity() <= most) return;
+void MeshUploads::drop(std::uint64_t max_bytes) {
+  if (pool_.capacity() <= max_bytes) return;
   pool_.trim();
-  for (std::vector<MeshId> left = unused_ids(); pool_.capacity() > most && !left.empty();
+  for (std::vector<MeshId> left = unused_ids(); pool_.capacity() > max_bytes && !left.empty();
        left.pop_back(), pool_.trim())
     uploads_.erase(left.back());
 }

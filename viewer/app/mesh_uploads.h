@@ -50,7 +50,7 @@ class MeshUploads {
   const PooledMesh* find(const NodeMesh& mesh) const;
 
   /// Drops unused meshes, the oldest first, until the pool has at most `max_bytes`.
-  void drop(std::uint64_t most);
+  void drop(std::uint64_t max_bytes);
   /// Bytes of device memory.
   std::uint64_t bytes() const { return pool_.capacity(); }
 

@@ -256,13 +256,13 @@ void status_panel(ViewerState& state) {
                      state.pacer.size_divisor()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
-  text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
+  text(fmt::format("bricks: {} resident ({}), {} missing", c.bricks_resident,
                    mebibytes(c.brick_bytes), missing_bricks(state)));
   text(fmt::format("read {} in {:.2f} s, decode {:.2f} s, mesh {:.2f} s", mebibytes(c.bytes_read),
                    c.read_seconds, c.decode_seconds, c.mesh_seconds));
-  text(fmt::format("{} meshes ({}), {} wait, {} in work", c.meshes, mebibytes(c.mesh_bytes),
+  text(fmt::format("{} meshes ({}), {} waiting, {} in progress", c.meshes, mebibytes(c.mesh_bytes),
                    c.queue, c.working));
-  if (p.limited_by_budget) text("as fine as the memory allows");
+  if (p.limited_by_budget) text("detail limited by the memory budget");
   if (!p.damage.empty()) text(fmt::format("{} parts cannot be shown", p.damage.size()));
   if (p.drawing)
     ImGui::TextDisabled("drawing %.0f %%", 100 * p.drawn_fraction);

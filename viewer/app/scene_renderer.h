@@ -28,7 +28,7 @@ inline constexpr double kBatchSeconds = 0.045;
 
 /// The state of the shown frame and of the one being drawn.
 struct FrameState {
-  /// The frame is final: it is no preview, and no mesh or slice is missing.
+  /// The frame is final: it is no preview, and no finer mesh or other slice will arrive.
   bool complete = false;
   bool drawing = false;       ///< a frame is unfinished; the next draw() continues it
   double drawn_fraction = 0;  ///< of the unfinished frame, 0 … 1
@@ -54,11 +54,8 @@ struct FrameOptions {
   std::uint64_t thin_triangles = 0;
   /// Reduced quality is without occlusion and multisampling. `reduced_until_complete`: until no
   /// finer mesh will arrive; in software until one reduced frame is complete.
-  enum class Quality : std::uint8_t {
-    full,
-    reduced_until_complete,
-    reduced
-  } quality = Quality::full;
+  enum class Quality : std::uint8_t { full, reduced_until_complete, reduced };
+  Quality quality = Quality::full;
   /// A frame that takes longer is drawn in batches of about this time, one for each draw(). It has
   /// the same pixels, is shown when finished, and is dropped if the view changes before. Only
   /// software needs it: a device draws a whole picture in about a frame's time.

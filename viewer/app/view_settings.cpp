@@ -29,9 +29,9 @@ class Fields {
   }
   double number(const char* name) const { return number(at(name), name); }
   float real(const char* name) const { return static_cast<float>(number(name)); }
-  float real(const char* name, float least, float most) const {
+  float real(const char* name, float min, float max) const {
     const float value = real(name);
-    if (!(value >= least && value <= most)) wrong(name);
+    if (!(value >= min && value <= max)) wrong(name);
     return value;
   }
   bool flag(const char* name) const {
@@ -54,15 +54,15 @@ class Fields {
       if (!(v[axis] >= 0 && v[axis] <= 1)) wrong(name);
     return v;
   }
-  const Json& array(const char* name, std::size_t least, std::size_t most) const {
+  const Json& array(const char* name, std::size_t min, std::size_t max) const {
     const Json& v = at(name);
-    if (!v.is_array() || v.size() < least || v.size() > most) wrong(name);
+    if (!v.is_array() || v.size() < min || v.size() > max) wrong(name);
     return v;
   }
 
  private:
   [[noreturn]] static void wrong(const char* name) {
-    throw Error(fmt::format("bookmark with a \"{}\" that makes no sense", name));
+    throw Error(fmt::format("bookmark with an invalid \"{}\"", name));
   }
   static double number(const Json& v, const char* name) {
     if (!v.is_number()) wrong(name);
@@ -135,7 +135,7 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
     const Fields plane(item);
     s.planes.push_back({plane.flag("on"), {plane.vector("normal"), plane.number("least")}});
     if (s.planes.back().kept.normal == Vec3d{})
-      throw Error("bookmark with a plane of no direction");
+      throw Error("bookmark with a plane without a direction");
   }
   const Json& window = in.array("window", 2, 2);
   const Json& background = in.array("background", 2, 2);

@@ -159,18 +159,18 @@ void ViewerWindow::look_along(Vec3d direction) {
 }
 
 void ViewerWindow::handle_requests() {
-  const Requests asked = std::exchange(state_.requests, {});
-  if (asked.close) glfwSetWindowShouldClose(window_, GLFW_TRUE);
+  const Requests requests = std::exchange(state_.requests, {});
+  if (requests.close) glfwSetWindowShouldClose(window_, GLFW_TRUE);
   if (state_.scene_renderer == nullptr) return;
-  if (asked.look_along) look_along(*asked.look_along);
-  if (asked.volume) show_volume(*asked.volume);
-  if (asked.fit) frame_again(*asked.fit);
-  if (!asked.screenshot) return;
+  if (requests.look_along) look_along(*requests.look_along);
+  if (requests.volume) show_volume(*requests.volume);
+  if (requests.fit) frame_again(*requests.fit);
+  if (!requests.screenshot) return;
   // A preview may be smaller and have no box and axes, so the still frame is saved.
   if (rests())
-    save_picture(*asked.screenshot);
+    save_picture(*requests.screenshot);
   else
-    state_.requests.screenshot = asked.screenshot;
+    state_.requests.screenshot = requests.screenshot;
 }
 
 void ViewerWindow::save_picture(const std::filesystem::path& file) {

@@ -78,7 +78,7 @@ class ViewerWindow {
   void wait(double max_seconds);
   void wait_for_meshes(double max_seconds);
   void draw_picture(int width, int height);
-  void draw_frame(bool asked);
+  void draw_frame(bool forced);
   void begin_frame();
   void end_frame();
   void show_notice(const std::string& text);

@@ -91,11 +91,11 @@ void ViewerWindow::draw_picture(int width, int height) {
   const double begin = glfwGetTime();
   // The first picture of a store is a preview, too.
   surface_shown_ |= scene_renderer.state().covers;
-  const bool fluent = moving() || !surface_shown_;
-  FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), fluent);
+  const bool preview = moving() || !surface_shown_;
+  FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), preview);
   options.overlay_scale = scale_;
   options.batch_seconds = options_.batch_seconds.value_or(options.batch_seconds);
-  const int size_divisor = fluent ? state_.pacer.size_divisor() : 1;
+  const int size_divisor = preview ? state_.pacer.size_divisor() : 1;
   try {
     scene_renderer.draw(state_.navigator.camera, std::max(width / size_divisor, 1),
                         std::max(height / size_divisor, 1), state_.settings, options);
@@ -163,13 +163,13 @@ void ViewerWindow::show_notice(const std::string& text) {
   end_frame();
 }
 
-/// Shows a frame, unless it would equal the last one. `asked`: show it in any case.
-void ViewerWindow::draw_frame(bool asked) {
+/// Shows a frame, unless it would equal the last one. `forced`: show it in any case.
+void ViewerWindow::draw_frame(bool forced) {
   if (minimised()) return;
   const PictureArea area = picture_area();
   if (state_.scene_renderer != nullptr) draw_picture(area.width, area.height);
   const WindowKey key = window_key();
-  if (!asked && key == last_frame_key_ && !is_due()) return;
+  if (!forced && key == last_frame_key_ && !is_due()) return;
   last_frame_key_ = key;
   const double now = glfwGetTime();
   state_.frame_seconds = now - std::exchange(last_frame_time_, now);
@@ -207,8 +207,8 @@ void ViewerWindow::pace(double seconds) {
 
 void ViewerWindow::wait(double max_seconds) {
   if (minimised()) return glfwWaitEventsTimeout(max_seconds);
-  const bool there = state_.scene_renderer != nullptr;
-  if (there && moving()) {
+  const bool has_store = state_.scene_renderer != nullptr;
+  if (has_store && moving()) {
     // Until the next motion, or until the camera counts as still.
     if (!has_event_ && !needs_draw_ && !state_.navigator.moving() &&
         !state_.scene_renderer->has_new_frame())
@@ -216,7 +216,7 @@ void ViewerWindow::wait(double max_seconds) {
                                               std::max(max_seconds, kMeshWaitSeconds)));
     return glfwPollEvents();
   }
-  if (!has_event_ && !needs_draw_ && (!there || state_.scene_renderer->state().complete))
+  if (!has_event_ && !needs_draw_ && (!has_store || state_.scene_renderer->state().complete))
     return glfwWaitEventsTimeout(max_seconds);
   const bool before = std::exchange(has_event_, false);
   glfwPollEvents();
@@ -239,8 +239,8 @@ bool ViewerWindow::step(double max_seconds) {
   wait(max_seconds);
   if (glfwWindowShouldClose(window_)) return false;
   // A panel may need a second frame to show the effect of an event.
-  const bool told = std::exchange(has_event_, false),
-             asked = std::exchange(had_event_, told) || told;
+  const bool event = std::exchange(has_event_, false),
+             forced = std::exchange(had_event_, event) || event;
   needs_draw_ = false;
   const double now = glfwGetTime();
   const double seconds = now - std::exchange(last_time_, now);
@@ -248,7 +248,7 @@ bool ViewerWindow::step(double max_seconds) {
   state_.drop_old_messages();
   handle_import();
   handle_requests();
-  draw_frame(asked);
+  draw_frame(forced);
   return true;
 }
 

@@ -27,10 +27,10 @@ double number(std::string_view part, std::string_view text) {
   return value;
 }
 
-double number_in(std::string_view part, std::string_view text, double least, double most) {
+double number_in(std::string_view part, std::string_view text, double min, double max) {
   const double value = number(part, text);
-  if (value < least || value > most)
-    throw UsageError(fmt::format("'{}' in a camera must be {} to {}", part, least, most));
+  if (value < min || value > max)
+    throw UsageError(fmt::format("'{}' in a camera must be {} to {}", part, min, max));
   return value;
 }
 
@@ -50,7 +50,7 @@ bool has_direction(Vec3d v) {
 
 Vec3d direction(std::string_view part, std::string_view text) {
   const Vec3d v = triple(part, text);
-  if (!has_direction(v)) throw UsageError(fmt::format("'{}' in a camera is no direction", part));
+  if (!has_direction(v)) throw UsageError(fmt::format("'{}' in a camera has no direction", part));
   return v;
 }
 
@@ -91,7 +91,7 @@ void take(CameraRequest& request, std::string_view part) {
   } else if (key == "target") {
     request.target = triple(part, text);
   } else {
-    throw UsageError(fmt::format("'{}' is nothing that a camera has; it is {}", part, kForm));
+    throw UsageError(fmt::format("'{}' is no part of a camera; the form is {}", part, kForm));
   }
 }
 

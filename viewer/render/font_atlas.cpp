@@ -41,7 +41,7 @@ FontAtlas::FontAtlas(float height)
   if (!stbtt_InitFont(&info, font, 0) ||
       stbtt_BakeFontBitmap(font, 0, height, picture_.data(), kEdge, kEdge, kFirst, kCount,
                            baked.data()) <= 0)
-    throw Error("the font that the program brings along cannot be drawn at this size");
+    throw Error("the embedded font cannot be drawn at this size");
   int ascent = 0, descent = 0, gap = 0;
   stbtt_GetFontVMetrics(&info, &ascent, &descent, &gap);
   ascent_ = static_cast<float>(ascent) * stbtt_ScaleForPixelHeight(&info, height);

@@ -144,7 +144,7 @@ GlFramebuffer make_framebuffer(std::span<const unsigned> colours, unsigned depth
   glNamedFramebufferDrawBuffers(name, static_cast<GLsizei>(buffers.size()), buffers.data());
   check_gl(what);
   if (glCheckNamedFramebufferStatus(name, GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-    throw Error(fmt::format("OpenGL: {}: this driver cannot draw into such a picture", what));
+    throw Error(fmt::format("OpenGL: {}: this driver does not support such a framebuffer", what));
   return framebuffer;
 }
 

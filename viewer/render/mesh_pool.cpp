@@ -134,8 +134,8 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
 MeshCopy MeshPool::begin(const MeshChunk& chunk, Vec3d origin) {
   MeshCopy copy;
   const std::span<const Triangle> triangles = drawable_triangles(chunk, copy.finite_triangles_);
-  constexpr std::size_t most = std::numeric_limits<std::int32_t>::max() / 3;
-  if (chunk.positions.size() > most || triangles.size() > most)
+  constexpr std::size_t max_count = std::numeric_limits<std::int32_t>::max() / 3;
+  if (chunk.positions.size() > max_count || triangles.size() > max_count)
     throw Error(
         fmt::format("a mesh of {} vertices and {} triangles is too large to be drawn as one",
                     chunk.positions.size(), triangles.size()));

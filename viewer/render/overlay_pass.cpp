@@ -204,9 +204,9 @@ void OverlayPass::add_axes() {
 void OverlayPass::add_scale_bar(const Overlays::ScaleBar& bar) {
   const double pixel =
       camera_.extent_at(camera_.distance()) / std::min(width_, height_) / bar.unit_length;
-  const double most = 0.22 * width_ * pixel;
-  if (!(most > 0) || !std::isfinite(most)) return;
-  const double size = round_length(most), pixels = size / pixel, height = unit_height();
+  const double max_length = 0.22 * width_ * pixel;
+  if (!(max_length > 0) || !std::isfinite(max_length)) return;
+  const double size = round_length(max_length), pixels = size / pixel, height = unit_height();
   const Vec3f dark{0.16f, 0.18f, 0.21f};
   const Vec3d right{width_ - 1.4 * height, height_ - 1.4 * height, 0};
   const Vec3d left = right - Vec3d{pixels, 0, 0}, tick{0, 0.28 * height, 0};

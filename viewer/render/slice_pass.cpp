@@ -89,7 +89,7 @@ void SlicePass::add(const SliceImage& image) {
   if (image.width < 1 || image.height < 1 ||
       image.samples.size() !=
           static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height))
-    throw UsageError(fmt::format("{} samples are no slice of {} x {}", image.samples.size(),
+    throw UsageError(fmt::format("{} samples do not match a slice of {} x {}", image.samples.size(),
                                  image.width, image.height));
   Slice slice{image, make_texture(GL_R32F, image.width, image.height, 1, "a slice"), {}};
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);

@@ -77,10 +77,10 @@ std::uint64_t NodeSearch::building_bytes(IndexKind kind, std::uint64_t nodes) {
 }
 
 std::uint64_t NodeSearch::building_bytes(std::uint64_t nodes) {
-  std::uint64_t most = 0;
-  for (const IndexKind kind : kIndexKinds) most = std::max(most, building_bytes(kind, nodes));
+  std::uint64_t largest = 0;
+  for (const IndexKind kind : kIndexKinds) largest = std::max(largest, building_bytes(kind, nodes));
   // The previous index answers meanwhile; its build memory is free again.
-  return most + nodes * 25 + kHeaders;
+  return largest + nodes * 25 + kHeaders;
 }
 
 std::vector<std::byte> NodeSearch::build(IndexKind kind) const {

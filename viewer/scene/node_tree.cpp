@@ -18,18 +18,18 @@ constexpr Index kGroup = StoreReader::kRangeChunk * kBlockEdge / kNodeEdge;
 ValueRange<float> outwards(const ValueRange<double>& r) {
   ValueRange<float> out;
   if (r.empty()) return out;
-  constexpr double most = std::numeric_limits<float>::max();
+  constexpr double max_float = std::numeric_limits<float>::max();
   constexpr float inf = std::numeric_limits<float>::infinity();
   const auto convert = [](double v) {
-    return std::abs(v) > most ? std::copysign(inf, static_cast<float>(v > 0 ? 1 : -1))
-                              : static_cast<float>(v);
+    return std::abs(v) > max_float ? std::copysign(inf, static_cast<float>(v > 0 ? 1 : -1))
+                                   : static_cast<float>(v);
   };
   out.lo = convert(r.lo);
   out.hi = convert(r.hi);
   if (static_cast<double>(out.lo) > r.lo) out.lo = std::nextafter(out.lo, -inf);
   if (static_cast<double>(out.hi) < r.hi) out.hi = std::nextafter(out.hi, inf);
-  if (r.lo < -most) out.lo = -inf;
-  if (r.hi > most) out.hi = inf;
+  if (r.lo < -max_float) out.lo = -inf;
+  if (r.hi > max_float) out.hi = inf;
   return out;
 }
 
@@ -93,7 +93,8 @@ std::uint8_t NodeTree::blocks_in(const NodeKey& n) const {
       volume(ceil_div(grid_.node_cells(n), {kBlockEdge, kBlockEdge, kBlockEdge})));
 }
 
-NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks, std::uint8_t most) const {
+NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks,
+                                 std::uint8_t max_blocks) const {
   Node node;
   ValueRange<double> own;
   for_each_point(blocks, [&](Int3 b) { own.include(table.at(b)); });
@@ -104,7 +105,7 @@ NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks, std::uint
     const auto first = static_cast<std::size_t>(part(node, range.lo));
     const auto last = static_cast<std::size_t>(part(node, range.hi));
     for (std::size_t i = first; i <= last; ++i)
-      if (node.blocks[i] < most) ++node.blocks[i];
+      if (node.blocks[i] < max_blocks) ++node.blocks[i];
   });
   return node;
 }

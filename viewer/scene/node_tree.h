@@ -61,7 +61,7 @@ class NodeTree {
   }
   void read_nodes(const BrickSource& source, int v, Box3 nodes);
   std::uint8_t blocks_in(const NodeKey& n) const;
-  Node summary(const RangeTable& table, Box3 blocks, std::uint8_t most) const;
+  Node summary(const RangeTable& table, Box3 blocks, std::uint8_t max_blocks) const;
   void merge_below(int v);
   static double part(const Node& node, double value);
 

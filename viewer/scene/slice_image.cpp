@@ -75,7 +75,7 @@ SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request,
   const StoreInfo& info = bricks.source().info();
   const auto levels = static_cast<int>(info.levels.size());
   if (request.axis < 0 || request.axis > 2 || request.stored < 0 || request.stored >= levels)
-    throw UsageError("a slice of an axis or a level that there is not");
+    throw UsageError("a slice of an axis or level that does not exist");
   SliceSamples image;
   image.request = request;
   image.stored = request.stored;
@@ -88,7 +88,7 @@ SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request,
   const LevelInfo& level = level_of(image.stored);
   const Lattice& lattice = level.lattice;
   if (image_bytes(lattice, request.axis) > request.bytes)
-    throw UsageError("a slice that does not fit its memory at any level");
+    throw UsageError("a slice exceeds its memory budget at every level");
   Plane plane{request.axis, request.axis == 0 ? 1 : 0, request.axis == 2 ? 1 : 2, 0};
   // All levels have the same directions, so only the origin differs.
   const Transform &finest = level_of(0).transform, &t = level.transform;

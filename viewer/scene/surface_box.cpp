@@ -65,10 +65,10 @@ class ReachCounts {
     const Lattice& lattice = info.levels.front().lattice;
     std::vector<std::byte> brick(lattice.brick_bytes());
     for_each_point(lattice.bricks_of(samples), [&](Int3 b) {
-      const bool there = source.read_brick(0, b, brick.data());
+      const bool stored = source.read_brick(0, b, brick.data());
       for_each_point(intersect(lattice.brick_box(b), samples), [&](Int3 p) {
         const Int3 q = p - b * lattice.brick;
-        at(p) = count(isovalues, there ? value(brick, lattice, q) : info.fill_value);
+        at(p) = count(isovalues, stored ? value(brick, lattice, q) : info.fill_value);
       });
     });
   }
@@ -131,10 +131,10 @@ class Search {
     if (!all.box()) return std::nullopt;
     const Vec3d middle = (all.box()->lo + all.box()->hi) * 0.5;
     const auto outwards = [&](const IndexBox& box) {
-      double most = 0;
+      double distance = 0;
       for (int axis = 0; axis < 3; ++axis)
-        most = std::max({most, middle[axis] - box.lo[axis], box.hi[axis] - middle[axis]});
-      return most;
+        distance = std::max({distance, middle[axis] - box.lo[axis], box.hi[axis] - middle[axis]});
+      return distance;
     };
     std::stable_sort(chunks.begin(), chunks.end(), [&](const IndexBox& a, const IndexBox& b) {
       return outwards(a) > outwards(b);

@@ -52,10 +52,10 @@ NodeView::Plane NodeView::to_index_space(Vec3d normal, double offset) const {
 }
 
 bool NodeView::Plane::meets(const IndexBox& box) const {
-  double most = offset;
+  double max_distance = offset;
   for (int axis = 0; axis < 3; ++axis)
-    most += normal[axis] * (normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
-  return most >= 0;
+    max_distance += normal[axis] * (normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
+  return max_distance >= 0;
 }
 
 bool NodeView::clipped(const IndexBox& box) const {
