@@ -1,13 +1,13 @@
-// How many pictures a second a store gives while the camera flies around it, off-screen, as the
-// window draws them (simpler ones where full ones take too long): from opening on, when all of
-// it is there, and while the isovalue slides as well. Then how long a picture at rest takes, and
-// how long input waits for a piece of it.
+// Frames per second of a store while the camera orbits it, off-screen, as the window draws them
+// (with previews if full frames take too long): from opening on, with all meshes resident, and
+// while the isovalue slides. Then the time of a still frame, and of its draw batches, which delay
+// input.
 //
 //   isobrick synth gyroid g.zarr --frequency 6 --dims 512,512,512 --type u8
 //   bench_viewer_orbit g.zarr --isovalue 127.5 --to 140
 //
-// Pictures follow each other at once; a picture's time ends with glFinish.
-// Built as bench/README.md says.
+// Frames follow each other without a pause; a frame's time ends with glFinish. Built as
+// bench/README.md says.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -38,7 +38,7 @@ struct Arguments {
   std::string store;
   double isovalue = 127.5, to = 140;
   int width = 1280, height = 800;
-  double seconds = 8;  ///< of each phase, once around
+  double seconds = 8;  ///< of each phase: one orbit
   double memory_gib = 2;
   std::optional<double> batch_seconds;
   bool no_rest = false, pictures = false;
@@ -62,7 +62,7 @@ class Flight {
     start_ = camera_;
   }
 
-  /// Once around. `slide`: the isovalue goes to the other one and back.
+  /// One orbit. `slide`: the isovalue goes to the other one and back.
   Json around(bool slide) {
     FrameTimings times;
     Json pictures = Json::array();
@@ -97,8 +97,8 @@ class Flight {
     return result;
   }
 
-  /// As the window draws when nothing moves, until nothing is missing. Of the pictures that it
-  /// takes, all but the last are simpler ones or lack meshes.
+  /// Draws as a window without motion until the frame is complete. All frames but the last have
+  /// reduced quality or lack meshes.
   Json rest() {
     FrameTimings steps;
     const std::uint64_t before = scene_renderer_->counters().finished;
@@ -125,7 +125,7 @@ class Flight {
   }
 
  private:
-  /// Seconds until OpenGL was told.
+  /// Seconds until all commands were submitted.
   double draw(const FrameOptions& options, int size_divisor) {
     Stopwatch watch;
     scene_renderer_->draw(camera_, arguments_.width / size_divisor,

@@ -21,7 +21,7 @@ namespace isobrick::bench {
 
 using Clock = std::chrono::steady_clock;
 
-/// Of bench_viewer_stream.
+/// Arguments of bench_viewer_stream.
 struct Arguments {
   std::string store;
   double isovalue = 127.5, to = 160.5;
@@ -37,7 +37,7 @@ inline double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// A store on a screen of no window.
+/// A store drawn off-screen.
 class Session {
  public:
   Session(const Arguments& arguments, const PictureBudgets& budgets,
@@ -58,16 +58,15 @@ class Session {
 
   SceneRenderer& renderer() { return *scene_renderer_; }
   double since_opened() const { return seconds_since(opened_); }
-  /// Seconds from `start` until the last mesh came.
+  /// Seconds from `start` until the last mesh arrived.
   double changed_after(Clock::time_point start) const {
     return std::chrono::duration<double>(changed_.load() - start).count();
   }
 
-  /// One frame as the window makes it. `moving`: its picture may be a simpler one.
+  /// Draws a frame as the window does. `moving`: it may be a preview.
   void draw(bool moving) { make_frame(moving); }
-  /// At most 60 times a second until `done`, and when all is there without waiting for the
-  /// next turn of a display, unless the picture before the last is waiting for it. Throws Error
-  /// when that takes longer than two minutes.
+  /// Draws at most 60 frames per second until `done`. A frame that completes the scene need not
+  /// wait for the next period, unless the previous one does. Throws Error after two minutes.
   template <class F>
   void draw_until(bool moving, F&& done) {
     const auto start = Clock::now();
@@ -87,9 +86,9 @@ class Session {
   Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   double read_seconds = 0, set_up_seconds = 0;
   std::uint64_t device_peak = 0;
-  Times at_rest;  ///< pictures in full when nothing moves and nothing is missing
+  Times at_rest;  ///< complete still frames in full quality
 
-  /// Since it was last asked: frames, and whole pictures but for those at rest.
+  /// Statistics since the last call: all frames, and finished frames other than at_rest.
   nlohmann::ordered_json take_times() {
     nlohmann::ordered_json json = std::exchange(frames_, {}).summary();
     json["whole_pictures"] = std::exchange(pictures_, {}).summary();
@@ -98,7 +97,7 @@ class Session {
 
  private:
   static constexpr auto kPeriod = std::chrono::microseconds(16'667);
-  static constexpr double kMin = 1e-3;  ///< seconds of a frame that counts
+  static constexpr double kMin = 1e-3;  ///< seconds; shorter frames do not count
 
   void make_frame(bool moving) {
     const auto start = Clock::now();
@@ -114,7 +113,7 @@ class Session {
     device_peak = std::max(device_peak, state.device_bytes);
     if (scene_renderer_->has_new_frame() || state.needs_draw)
       began_before_ = std::exchange(began_, start);
-    if (!scene_renderer_->has_new_frame()) return;  // nothing is drawn that would look the same
+    if (!scene_renderer_->has_new_frame()) return;  // the picture would be equal
     const double whole = std::max(seconds, scene_renderer_->frame_seconds());
     (!moving && state.complete && !state.reduced_quality ? at_rest : pictures_).add(whole);
     if (moving)
@@ -125,7 +124,8 @@ class Session {
 
   const Arguments& arguments_;
   Clock::time_point opened_;
-  Clock::time_point began_, began_before_;  ///< the last frames that may have been shown
+  Clock::time_point began_,
+      began_before_;  ///< starts of the last two frames that a display may have shown
   std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
   std::unique_ptr<SceneRenderer> scene_renderer_;

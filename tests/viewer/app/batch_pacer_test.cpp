@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kLimit = 0.05;
 
-/// Of so much work a second, and a millisecond for each piece.
+/// Time of a batch with `rate` work a second and a fixed cost of a millisecond.
 double seconds_of(std::uint64_t work, double rate) {
   return 1e-3 + static_cast<double>(work) / rate;
 }

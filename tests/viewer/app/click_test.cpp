@@ -23,7 +23,7 @@ TEST_F(Click, ClicksPickAndMeasure) {
   EXPECT_EQ(window.state().measured.size(), 2u);
 }
 
-/// A press does not make the picture a coarse one, whatever moving pictures are like.
+/// A button press does not cause a preview.
 TEST_F(Click, ClicksPickFromThePictureAtRest) {
   ViewerWindow& window = open();
   for (int i = 0; i < 20; ++i) window.state().pacer.add_preview(2, 10'000, true);
@@ -37,7 +37,7 @@ TEST_F(Click, ClicksPickFromThePictureAtRest) {
   display_->button(1, true);
   steps(8);
   EXPECT_EQ(window.state().scene_renderer->state().triangles, triangles);
-  display_->move_pointer(kWidth / 2 + 42, kHeight / 2 - 50);  // a hand that trembles
+  display_->move_pointer(kWidth / 2 + 42, kHeight / 2 - 50);  // the mouse trembles
   steps(2);
   display_->button(1, false);
   steps(3);
@@ -58,7 +58,7 @@ TEST_F(Click, ATransparentSurfaceIsPickedAsWell) {
   EXPECT_NEAR(*window.state().picked->value, window.state().settings.surfaces[0].isovalue, 0.5);
 }
 
-/// What is picked while the picture is a coarse one is looked at again.
+/// A pick on a preview is repeated on the still frame.
 TEST_F(Click, AClickBeforeThePictureRestsIsMadeGood) {
   ViewerWindow& window = open();
   for (int i = 0; i < 20; ++i) window.state().pacer.add_preview(2, 10'000, true);
@@ -78,7 +78,7 @@ TEST_F(Click, AClickBeforeThePictureRestsIsMadeGood) {
   EXPECT_EQ(length(window.state().measured[0] - window.state().picked->world), 0);
 }
 
-/// A click that meets nothing makes no point, also once the picture rests.
+/// A click on the background picks nothing, also on the still frame.
 TEST_F(Click, AClickBesideTheSurfaceLeavesWhatWasMeasured) {
   ViewerWindow& window = open();
   until([&] { return rests(); });

@@ -8,7 +8,7 @@
 namespace isobrick {
 namespace {
 
-/// Pieces of so many seconds are many, however quick the machine is.
+/// A limit so short that a frame takes many batches on any machine.
 constexpr double kShort = 1e-4;
 
 using DrawBatches = SceneRendererTest;
@@ -38,7 +38,7 @@ TEST_F(DrawBatches, GiveTheSamePicture) {
     settings_.multisample = multisample;
     const auto expected = pixels_of(whole);
     const std::uint64_t before = scene_renderer_->counters().unfinished_batches;
-    settings_.occlusion = false;  // a picture in between
+    settings_.occlusion = false;  // another frame in between
     EXPECT_NE(pixels_of(pieces), expected);
     settings_.occlusion = true;
     EXPECT_EQ(pixels_of(pieces), expected) << multisample;
@@ -65,12 +65,12 @@ TEST_F(DrawBatches, AreDroppedWhenTheViewChangesUnlessItKeepsChanging) {
   EXPECT_EQ(counters.dropped, 0u);
   draw_one(0.3);
   EXPECT_EQ(counters.dropped, 1u);
-  settings_.surfaces[0].isovalue += 7;  // as good as another view
+  settings_.surfaces[0].isovalue += 7;  // counts as another view
   draw_one(0);
   EXPECT_EQ(counters.dropped, 2u);
   EXPECT_EQ(counters.finished, before.finished);
   EXPECT_EQ(scene_renderer_->renderer().read_pixels(), first) << "what is not whole is not shown";
-  // While something moves there would never be any picture.
+  // During continuous motion no frame would ever finish otherwise.
   options.moving = true;
   draw_one(0.1);
   EXPECT_EQ(counters.dropped, 3u);
@@ -80,7 +80,7 @@ TEST_F(DrawBatches, AreDroppedWhenTheViewChangesUnlessItKeepsChanging) {
   }
   EXPECT_TRUE(scene_renderer_->has_new_frame());
   EXPECT_TRUE(scene_renderer_->state().moving);
-  // What moves no more is seen as it stands.
+  // After the motion a still frame replaces the preview.
   draw_one(0);
   ASSERT_TRUE(scene_renderer_->state().drawing);
   options.moving = false;
@@ -123,7 +123,7 @@ TEST_F(DrawBatches, NothingIsBeingDrawnAfterAFailure) {
     EXPECT_EQ(scene_renderer_->state().drawn_fraction, 0);
   };
   fail();
-  // One that has been begun goes with it.
+  // An unfinished frame is dropped, too.
   const FrameOptions options{.batch_seconds = kShort};
   const Camera front = camera_;
   camera_.orbit(0.3, 0, {0, 0, 1});

@@ -12,7 +12,7 @@
 namespace isobrick {
 namespace {
 
-/// A finished picture of many triangles, and a pacer that has no time for them.
+/// A finished frame of many triangles, and a pacer without time for them.
 class FinishedFrame : public test::WindowTest {
  protected:
   void SetUp() override {
@@ -37,7 +37,7 @@ class FinishedFrame : public test::WindowTest {
     steps(3);
     until([&] { return rests(); });
   }
-  /// Presses there, holds, lets go; the least triangles of a picture meanwhile.
+  /// Presses, holds and releases the button; returns the minimum of triangles meanwhile.
   std::uint64_t least_while_clicking(int x, int y) {
     moved_ = false;
     std::uint64_t least = triangles();
@@ -56,7 +56,7 @@ class FinishedFrame : public test::WindowTest {
     step(15);
     return least;
   }
-  /// What sliders of values and the camera change: they may lower a picture.
+  /// The values that sliders and the camera change: their motion causes previews.
   auto values() const {
     const ViewSettings& s = window_->state().settings;
     std::vector<float> places{s.pixel_error, s.surfaces[0].opacity, s.window_lo, s.window_hi};
@@ -68,11 +68,11 @@ class FinishedFrame : public test::WindowTest {
                       s.surfaces[0].shown, places);
   }
   std::uint64_t triangles_ = 0;
-  bool moved_ = false;  ///< a picture was one in motion
+  bool moved_ = false;  ///< a preview was drawn
 };
 
 TEST_F(FinishedFrame, IsNotLoweredByClicksOnWidgets) {
-  // Of the first column of the panel: sections, radio buttons, boxes, buttons, and what is beside.
+  // Clicks down the panel's first column and beside it: sections, radio buttons, boxes, buttons.
   int clicks = 0;
   for (int y = 35; y < test::kWindowHeight; y += 24) {
     if (y > 25 && y < 150) continue;  // the histogram is a slider
@@ -110,7 +110,7 @@ TEST_F(FinishedFrame, IsLoweredByASliderAndNeverCalledCompleteThen) {
     EXPECT_FALSE(state.complete);
   }
   EXPECT_TRUE(lowered);
-  // A hand that holds still sees all of it, with the button down.
+  // With the mouse held still the still frame appears, even with the button down.
   rest();
   EXPECT_GT(triangles(), triangles_ / 2);
   display_->button(1, false);

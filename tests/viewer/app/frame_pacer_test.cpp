@@ -8,7 +8,7 @@
 namespace isobrick {
 namespace {
 
-/// Previews of a surface: `full` triangles, of which a million take `seconds_per_million`.
+/// Simulates previews of a surface of `full` triangles; a million take `seconds_per_million`.
 struct Previews {
   FramePacer& pacer;
   double full, pixels, seconds_per_million, occlusion = 0;
@@ -88,7 +88,7 @@ TEST(FramePacer, SettlesWhereTrianglesTakeTheTime) {
 }
 
 TEST(FramePacer, MakesPicturesSmallerWhereTheirPixelsTakeTheTime) {
-  // As llvmpipe: 70 ms for the pixels of a plain picture, 60 ms more for its triangles.
+  // As llvmpipe: 70 ms for the pixels at reduced quality, 60 ms more for the triangles.
   FramePacer pacer(0.05);
   Previews previews{pacer, 60'000, 0.07, 1, 0.2};
   for (int i = 0; i < 60; ++i) {
@@ -124,8 +124,8 @@ TEST(FramePacer, RefinesAgainWhereThereIsTime) {
   EXPECT_EQ(pacer.size_divisor(), 1);
 }
 
-/// Previews of a surface with thin structure that needs 200,000 triangles, and has as many where it
-/// may; a million take `seconds_per_million`.
+/// Simulates previews of a surface whose thin structure needs 200,000 triangles; a million take
+/// `seconds_per_million`.
 struct ThinPreviews {
   FramePacer& pacer;
   double pixels, seconds_per_million;
@@ -169,7 +169,8 @@ TEST(FramePacer, ThinStructureTakesFourTimesTheLimitAtMost) {
     }
     EXPECT_LE(long_ones, 2) << seconds_per_million;
     EXPECT_EQ(previews.thin, seconds_per_million == 0.5) << "that much may be had in time";
-    EXPECT_LT(previews.seconds, 0.18 + 2e-3 * seconds_per_million);  // of the least triangles
+    EXPECT_LT(previews.seconds,
+              0.18 + 2e-3 * seconds_per_million);  // with the minimum of triangles
   }
 }
 

@@ -10,7 +10,7 @@
 #include "core/vectors.h"
 #include "tests/viewer/app/window_test.h"
 
-// Images with channels and times, and isovalues and remarks that a window tells about.
+// Images with channels and times; messages about isovalues and the input.
 
 namespace isobrick {
 namespace {
@@ -19,8 +19,8 @@ constexpr int kEdge = 40;
 
 class ImageWindow : public test::WindowTest {
  protected:
-  /// OME-Zarr 0.4 of two times and three channels: balls of radius 6 + 3 · channel + time, 128 on
-  /// their surface; the last channel's samples are all below 100.
+  /// Writes an OME-Zarr 0.4 image of two times and three channels: balls of radius 6 + 3 · channel
+  /// + time, 128 on their surface. All samples of the last channel are below 100.
   std::filesystem::path write_image() {
     namespace fs = std::filesystem;
     const fs::path image = dir_ / "image.zarr";
@@ -61,7 +61,7 @@ class ImageWindow : public test::WindowTest {
       return message.text.find(text) != std::string::npos;
     });
   }
-  /// Of the surface in the middle of the picture, from the ball's middle.
+  /// The radius of the surface in the middle of the picture.
   double radius_in_the_middle() {
     steps(3);
     until([&] { return rests(); });
@@ -88,7 +88,7 @@ TEST_F(ImageWindow, AnImageThatIsDroppedShowsItsFirstVolumeAndOthersAreChosen) {
   window.state().settings.surfaces[0].isovalue = 128;
   EXPECT_NEAR(radius_in_the_middle(), 6, 0.5);
 
-  // What was set stays: the camera, and an isovalue that the other volume has, too.
+  // Camera and isovalue stay, if the other volume has the isovalue, too.
   window.state().settings.edges = true;
   const Camera camera = state.navigator.camera;
   window.state().requests.volume = Selection{.channel = 1, .time = 1};
@@ -99,13 +99,13 @@ TEST_F(ImageWindow, AnImageThatIsDroppedShowsItsFirstVolumeAndOthersAreChosen) {
   EXPECT_EQ(state.navigator.camera, camera);
   EXPECT_NEAR(radius_in_the_middle(), 10, 0.5);
 
-  // One that it does not have is chosen anew.
+  // An isovalue out of its range is replaced.
   window.state().requests.volume = Selection{.channel = 2, .time = 1};
   until([&] { return state.volumes.selection.channel == 2; });
   EXPECT_LT(state.settings.surfaces[0].isovalue, 100);
   EXPECT_GT(radius_in_the_middle(), 5);
 
-  // By now the first one has ranges, and what is not there leaves what is.
+  // The first volume has ranges now; a missing volume leaves the present one open.
   window.state().requests.volume = Selection{.channel = 0, .time = 0};
   until([&] { return state.volumes.selection.channel == 0; });
   EXPECT_EQ(state.import, nullptr);
@@ -129,7 +129,7 @@ TEST_F(ImageWindow, RangesThatAreCancelledLeaveTheImageAsItWas) {
   ASSERT_NE(window.state().import, nullptr);
   window.state().import->cancel();
   until([&] { return window.state().import == nullptr; });
-  if (window.state().path != image) {  // else it was done by then
+  if (window.state().path != image) {  // else it has finished
     EXPECT_EQ(files(), before);
   }
 }
@@ -181,7 +181,7 @@ TEST_F(ImageWindow, AnIsovalueThatNoSampleReachesIsSaidWithTheRange) {
   };
   until([&] { return has_message(text("900")); });
   EXPECT_EQ(window.state().messages.size(), 1u);
-  // Once, and one that has a surface not at all.
+  // Shown once; never for an isovalue with a surface.
   window.state().messages.clear();
   window.state().settings.surfaces[0].isovalue = 100;
   steps(5);

@@ -1,6 +1,6 @@
 #include "viewer/app/panels.h"
 
-// ImVec2 can be added up with this.
+// Enables operators of ImVec2.
 #define IMGUI_DEFINE_MATH_OPERATORS
 #include <imgui.h>
 #include <imgui_internal.h>
@@ -15,7 +15,7 @@
 namespace isobrick {
 namespace {
 
-/// Panels without a window: frames of Dear ImGui that nobody draws, a pointer and keys.
+/// Panels without a window: frames of Dear ImGui that are not drawn, a pointer and keys.
 class Panels : public SceneRendererTest {
  protected:
   void SetUp() override {
@@ -77,7 +77,7 @@ class Panels : public SceneRendererTest {
     frame();
   }
 
-  /// Where in a window each widget is under the pointer.
+  /// Records the widget under each pointer position of a window.
   std::map<ImGuiID, std::vector<ImVec2>> widgets(const char* window = "###panel") {
     std::map<ImGuiID, std::vector<ImVec2>> places;
     const ImGuiWindow* w = ImGui::FindWindowByName(window);
@@ -112,7 +112,7 @@ class Panels : public SceneRendererTest {
   ViewerState state_;
 };
 
-/// Two that share an ID are one to Dear ImGui: the first takes the other's clicks.
+/// Dear ImGui treats two widgets with one ID as one: the first takes the other's clicks.
 TEST_F(Panels, EveryWidgetIsInOnePlace) {
   state_.settings.surfaces.push_back(state_.settings.surfaces[0]);
   state_.settings.planes.push_back({true, {{0, 0, 1}, 10}});
@@ -127,7 +127,7 @@ TEST_F(Panels, EveryWidgetIsInOnePlace) {
       lowest = std::min(lowest, p.y);
       highest = std::max(highest, p.y);
     }
-    // All rows in between are its own.
+    // All rows in between belong to it.
     std::map<float, int> rows;
     for (const ImVec2& p : places) ++rows[p.y];
     EXPECT_EQ(rows.size(), static_cast<std::size_t>((highest - lowest) / kStep + 1))
@@ -185,7 +185,7 @@ TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
   EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
   type("12");
   for (int i = 0; i < 2; ++i) press(ImGuiKey_Backspace);
-  type("99");  // what it was
+  type("99");  // the old value
   press(ImGuiKey_Enter);
   EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
   type("nonsense");
@@ -277,7 +277,7 @@ TEST_F(Panels, ListsOfChannelsAndTimesChooseAnotherVolume) {
   EXPECT_EQ(state_.requests.volume->time, 4);
   choose("Channel", 0);
   EXPECT_FALSE(state_.requests.volume) << "it is shown";
-  // The list of times begins with the one that is shown.
+  // The list of times starts at the shown one.
   choose("Time", 2);
   ASSERT_TRUE(state_.requests.volume);
   EXPECT_EQ(state_.requests.volume->time, 6);

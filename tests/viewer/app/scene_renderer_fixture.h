@@ -26,7 +26,7 @@ class SceneRendererTest : public testing::Test {
     context_ = std::make_unique<GlContext>();
   }
 
-  /// A picture of a synthetic volume, from the front.
+  /// Opens a synthetic volume, seen from the front.
   void open(SynthKind kind, Int3 extent, PictureBudgets budgets = {}) {
     const auto source = make_synth({.kind = kind, .extent = extent});
     NoProgress progress;
@@ -45,7 +45,7 @@ class SceneRendererTest : public testing::Test {
   void draw() {
     scene_renderer_->draw_complete(camera_, kWidth, kHeight, settings_, [] {});
   }
-  /// Something in each of the larger files of level 0.
+  /// Damages each of the larger files of level 0.
   void damage_bricks() {
     for (const auto& entry : std::filesystem::recursive_directory_iterator(dir_ / "store.zarr/0")) {
       if (!entry.is_regular_file() || entry.path().extension() == ".json" ||

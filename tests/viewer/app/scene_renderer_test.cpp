@@ -66,7 +66,7 @@ TEST_F(SceneRendererTest, WhileMeshesComeInMostOfTheTimeIsTheirs) {
         .count();
   };
   int pictures = 0, left_out = 0;
-  // Where all meshes come within one picture there is nothing to be seen of it.
+  // If all meshes arrive within one frame, this cannot be observed.
   for (int round = 0; round < 20 && pictures == 0; ++round) {
     show({.threads = 1, .backend = Backend::cpu});
     double ended = 0, took = 0;
@@ -111,7 +111,7 @@ TEST_F(SceneRendererTest, PlanesCutAtAnyAngleAndHideWhatIsBehindThem) {
   ASSERT_TRUE(front);
   const auto triangles = scene_renderer_->state().triangles;
   const Vec3d middle{79.5, 79.5, 79.5};
-  // The half that faces the camera goes: the back of the sphere's inside is seen.
+  // The half towards the camera is clipped: the inside of the sphere's back is visible.
   const HalfSpace kept = half_space_at(middle, camera_.back * -1.0);
   settings_.planes = {{true, kept}};
   draw();
@@ -120,7 +120,7 @@ TEST_F(SceneRendererTest, PlanesCutAtAnyAngleAndHideWhatIsBehindThem) {
   ASSERT_TRUE(behind);
   EXPECT_TRUE(kept.contains(behind->world));
   EXPECT_FALSE(kept.contains(front->world));
-  // Six at once, beside a cut and a region: a small piece of the other half.
+  // Six planes, an axis clip and a region: a small part of the other half remains.
   settings_.planes[0].kept = {kept.normal * -1.0, -kept.least};
   for (int i = 0; i < 5; ++i) settings_.planes.push_back({true, {{0, 0, 1.0 + i}, -1e6}});
   settings_.axis_clips = {{{true, 0.99f, true}, {true, 0.99f, true}, {true, 0.01f, false}}};
@@ -253,7 +253,7 @@ TEST_F(SceneRendererTest, IsTheSameWhoeverMakesTheMeshes) {
   EXPECT_EQ(made.device_meshes_made, made.meshes_made);
   EXPECT_EQ(made.device_failure, "");
   EXPECT_EQ(made.device_bytes > 0, scene_renderer_->device().shares_memory());
-  // Switched while running, some of the meshes here and some there.
+  // Switched while meshes are made, some on the CPU and some on the device.
   show({.backend = Backend::cuda});
   for (std::size_t i = 0; i < isovalues.size(); ++i) {
     scene_renderer_->device().use(i % 2 ? Backend::cuda : Backend::cpu);
@@ -314,7 +314,7 @@ TEST_F(SceneRendererTest, CanBeHadWhereItCannotBeSetUpBefore) {
 TEST_F(SceneRendererTest, ADeviceThatCouldNotBeAskedForHasNotBegunToOpen) {
   if (!current_gl_device_id()) GTEST_SKIP() << "OpenGL imports no memory here";
   DeviceOpener opening(1 << 20, [] {});
-  glEnable(GL_RGBA8);  // no switch: an error that somebody finds
+  glEnable(GL_RGBA8);  // an invalid capability: an error that the next check finds
   EXPECT_THROW(opening.begin(), Error);
   EXPECT_FALSE(opening.has_begun());
   opening.begin();
@@ -353,7 +353,7 @@ TEST_F(SceneRendererTest, ADamagedBrickIsMarkedAndTheRestIsShown) {
   EXPECT_FALSE(scene_renderer_->state().damage.empty());
   EXPECT_GT(scene_renderer_->state().triangles, 100u);
   const auto rgba = scene_renderer_->renderer().read_pixels();
-  int red = 0;  // as nothing else in this picture is
+  int red = 0;  // no other part of the picture is red
   for (std::size_t i = 0; i < rgba.size(); i += 4)
     red += rgba[i] > 150 && rgba[i + 1] < 90 && rgba[i + 2] < 90;
   EXPECT_GT(red, 100) << "lines around what cannot be shown, and through it";

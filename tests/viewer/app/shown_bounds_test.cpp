@@ -4,7 +4,7 @@
 
 #include "tests/viewer/app/scene_renderer_fixture.h"
 
-// How fine a picture is at most, and what it frames.
+// The finest level of a picture, and its framing.
 
 namespace isobrick {
 namespace {
@@ -49,7 +49,7 @@ TEST_F(ShownBounds, WhatIsShownHasBounds) {
   EXPECT_EQ(sliced.hi.x, 47.5);
   EXPECT_EQ(sliced.hi.z, 95);
   EXPECT_EQ(sliced.lo.z, ball.lo.z);
-  // All of the volume where there is nothing.
+  // The whole volume if nothing is shown.
   settings_.slices[2].shown = settings_.surfaces[0].shown = false;
   EXPECT_EQ(scene_renderer_->shown_bounds(settings_).hi, volume.hi);
   EXPECT_EQ(scene_renderer_->shown_bounds(settings_).lo, volume.lo);

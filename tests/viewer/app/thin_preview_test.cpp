@@ -11,7 +11,7 @@
 namespace isobrick {
 namespace {
 
-/// Rods along z, four samples thick: coarse levels have nothing of them.
+/// Rods along z, four samples thick: coarse levels lose them.
 class Rods final : public VolumeSource {
  public:
   Rods() {
@@ -45,13 +45,13 @@ class ThinPreview : public SceneRendererTest {
     settings_.box = settings_.axes = settings_.scale_bar = false;
     settings_.occlusion = settings_.multisample = false;
   }
-  /// What is drawn for 2,000 triangles while the view moves, when all of it is there.
+  /// Draws a preview of 2,000 triangles with all meshes resident.
   std::vector<std::uint8_t> preview(std::uint64_t thin_triangles) {
     const FrameOptions options{.max_triangles = 2'000,
                                .thin_triangles = thin_triangles,
                                .quality = FrameOptions::Quality::reduced,
                                .moving = true};
-    for (int i = 0; i < 20; ++i) {  // each finer cut is one of meshes of the one before
+    for (int i = 0; i < 20; ++i) {  // each cut refines the previous one's nodes
       scene_renderer_->draw(camera_, kWidth, kHeight, settings_, options);
       scene_renderer_->scene().stream().wait_idle(10);
     }
@@ -87,7 +87,7 @@ TEST_F(ThinPreview, HasWhatCoarseLevelsHaveLost) {
   EXPECT_EQ(pixels(), whole) << "previews change nothing of it";
 }
 
-/// Previews are shown larger: what is thin is looked for as in the picture that they are shown as.
+/// Previews are enlarged: thin structure is searched for at the size that is shown.
 TEST_F(ThinPreview, HasItInASmallerPictureAsWell) {
   FrameOptions options{.max_triangles = 2'000,
                        .thin_triangles = FramePacer::kThinTriangles,

@@ -29,7 +29,7 @@ constexpr int kFieldRow = 155;  ///< of the first isovalue, on the panel
 
 TEST_F(Window, ShowsAStore) {
   ViewerWindow& window = open();
-  // The first picture may be a simple one.
+  // The first picture may be a preview.
   until([&] { return window.state().scene_renderer->state().triangles > 1000u; });
   EXPECT_TRUE(window.state().messages.empty());
   // The middle of the picture shows the sphere, its corner nothing.
@@ -90,7 +90,7 @@ TEST_F(Window, KeysCutTheVolume) {
   EXPECT_NE(renderer.read_pixels(), whole);
 }
 
-/// Where pictures in motion are as good as those at rest, none is drawn again.
+/// If previews have full quality, no still frame is drawn after them.
 TEST_F(Window, RestsAfterMotionThatLeftNothingOut) {
   ViewerWindow& window = open();
   until([&] { return rests(); });
@@ -176,7 +176,7 @@ TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   until(
       [&] { return rests() && window.state().scene_renderer->renderer().width() == kWidth - 250; });
   EXPECT_EQ(window.state().scene_renderer->renderer().height(), kHeight);
-  // The middle of what is left shows the middle of the sphere, also for a click there.
+  // The middle of the remaining area shows the middle of the sphere, also for a click.
   display_->tap(XK_r);
   steps(3);
   until([&] { return rests(); });
@@ -288,10 +288,10 @@ TEST_F(Window, DrawsNothingWhileItIsMinimised) {
 TEST_F(Window, ClosesAtOnceWhileItStreams) {
   make_store("big.zarr", {320, 320, 320});
   double least = 1;
-  for (int i = 0; i < 4 && least > 0.1; ++i) {  // others may keep the cores busy
+  for (int i = 0; i < 4 && least > 0.1; ++i) {  // other processes may keep the cores busy
     ViewerWindow& window = open();
     window.open(dir_ / "big.zarr");
-    window.state().settings.pixel_error = 0.1f;  // much to do, also for pictures that may be coarse
+    window.state().settings.pixel_error = 0.1f;  // much to do, also for previews
     steps(2);
     EXPECT_FALSE(window.state().scene_renderer->state().complete);
     const auto start = std::chrono::steady_clock::now();
@@ -317,13 +317,13 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
   until(rests);
   steps(15);  // nothing moves any more
   until(rests);
-  // A picture at rest of the same view, with edges.
+  // A still frame of the same view, with edges.
   window.state().settings.edges = true;
   glfwPostEmptyEvent();
   until([&] { return scene_renderer.state().drawing; });
   const FrameCounters before = scene_renderer.counters();
   const Vec3d eye = window.state().navigator.camera.eye;
-  // A pointer that does nothing to the view leaves it.
+  // Pointer motion without effect on the view keeps it.
   display_->move_pointer(kWidth / 2 + 5, kHeight / 2);
   steps(1);
   EXPECT_EQ(scene_renderer.counters().dropped, before.dropped);
@@ -334,7 +334,7 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
       << "the test has too few triangles";
   display_->move_pointer(kWidth / 2 + 80, kHeight / 2 + 20);
   until([&] { return length(window.state().navigator.camera.eye - eye) > 1; });
-  // Where the pointer's way comes in parts, the next picture is dropped as well.
+  // If the motion arrives in parts, the next frame is dropped as well.
   EXPECT_GT(scene_renderer.counters().dropped, before.dropped);
   display_->button(1, false);
   until(rests);
@@ -377,7 +377,7 @@ TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
   });  // nothing moves any more
   int pauses = 0;
   for (int round = 0; round < 20 && pauses < 3; ++round) {
-    window.state().settings.surfaces[0].isovalue += 2;  // as nobody does who moves it
+    window.state().settings.surfaces[0].isovalue += 2;  // not reported as motion
     steps(1);
     while (!scene_renderer.state().complete) {
       const bool busy = scene_renderer.has_new_frame() || scene_renderer.state().drawing ||

@@ -30,7 +30,7 @@ TEST_F(RenderTest, ABallIsADiscOfTheRightSize) {
   renderer().draw(mesh, {});
   renderer().end();
   const Pixels pixels(renderer());
-  // Rays that touch the ball leave the eye at asin(1 / distance).
+  // Rays tangent to the ball leave the eye at asin(1 / distance).
   const double angle = std::asin(1 / camera.distance());
   const double radius = std::tan(angle) / (camera.extent_at(1) / 160);
   EXPECT_NEAR(pixels.count_surface(), 3.14159265 * radius * radius, 0.02 * 3.14 * radius * radius);
@@ -59,7 +59,7 @@ double distance_from_middle(const PickResult& picked) {
   return std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
 }
 
-/// A small opaque ball in a transparent one in a larger, and beside them nothing.
+/// A small opaque ball in a transparent one in a larger one; else background.
 TEST_F(RenderTest, TransparentMeshesCanBePicked) {
   const TestMesh small = make_ball({0, 0, 0}, 0.3f, 100), middle = make_ball({0, 0, 0}, 0.6f, 100),
                  large = make_ball({0, 0, 0}, 1, 200);
@@ -70,7 +70,7 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
         Camera camera = front_camera(1.25);
         camera.orthographic = orthographic;
         PictureSettings settings{.multisample = multisample, .picking = true};
-        // Away with the near half of the large ones.
+        // Clips the near half of the large balls.
         if (cut) settings.planes = {{{0, 1, 0}, -0.31}};
         renderer().begin(camera, 200, 160, settings);
         renderer().draw(small.chunk(), {.id = 3});
@@ -82,7 +82,7 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
         EXPECT_EQ(picked->id, cut ? 3u : 5u);
         EXPECT_NEAR(distance_from_middle(*picked), cut ? 0.3 : 1, 2e-3);
         EXPECT_FALSE(renderer().pick(3, 3));
-        // The next picture has none.
+        // The next picture has no transparent meshes.
         renderer().begin(camera, 200, 160, settings);
         renderer().draw(small.chunk(), {.id = 3});
         renderer().end();
@@ -91,7 +91,8 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
       }
 }
 
-/// Triangles that cover a part of a pixel are picked where they are, not where their plane is.
+/// Triangles that cover a part of a pixel are picked at their own depth, not at that of their
+/// plane.
 TEST_F(RenderTest, TransparentEdgesArePickedOnTheSurface) {
   for (const bool orthographic : {false, true})
     for (const int segments : {30, 100}) {
@@ -112,7 +113,7 @@ TEST_F(RenderTest, TransparentEdgesArePickedOnTheSurface) {
     }
 }
 
-/// Pixels that are as blue as the z axis.
+/// Number of pixels with the blue of the z axis.
 template <class Rgba>
 int count_blue(const Rgba& rgba) {
   int blue = 0;
@@ -143,7 +144,7 @@ TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
                     rgba.data());
   EXPECT_NEAR(count_blue(rgba), wanted, 0.03 * wanted);
-  // What hides them hides them, too, where the picture has fewer pixels.
+  // Surfaces also hide them if the picture has fewer pixels.
   draw(1, {.defer_overlays = true});
   renderer().copy_to(window.get(), kWidth, kHeight);
   glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
@@ -151,7 +152,7 @@ TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   EXPECT_EQ(count_blue(rgba), wanted);
 }
 
-/// Width and height of what differs between the columns `from` and `to`.
+/// Width and height of the difference between the columns `from` and `to`.
 std::array<int, 2> extent_of_difference(const Pixels& a, const Pixels& b, int from, int to) {
   int left = to, right = from - 1, top = a.height, bottom = -1;
   for (int y = 0; y < a.height; ++y)
@@ -183,7 +184,7 @@ TEST_F(RenderTest, OverlaysAreTwiceAsLargeOnADisplayOfTwiceTheScale) {
   EXPECT_GT(axes[0], 25);
   EXPECT_NEAR(axes_2[0], 2 * axes[0], 3);
   EXPECT_NEAR(axes_2[1], 2 * axes[1], 3);
-  // The bar is as long as the length that it shows, and twice as high with its text.
+  // The bar has the length that its text states; with its text it is twice as high.
   const auto bar = extent_of_difference(one, none, kWidth / 2, kWidth),
              bar_2 = extent_of_difference(two, none, kWidth / 2, kWidth);
   EXPECT_GT(bar[1], 12);
@@ -200,7 +201,7 @@ TEST_F(RenderTest, OverlaysAreTwiceAsLargeOnADisplayOfTwiceTheScale) {
   EXPECT_NEAR(blue(2), 2 * thin, 0.25 * thin);
 }
 
-/// What an opaque mesh hides is not picked through it.
+/// A mesh behind an opaque mesh is not picked.
 TEST_F(RenderTest, TransparentMeshesBehindOpaqueOnesAreNotPicked) {
   const TestMesh near = make_ball({0, -0.5f, 0}, 0.15f, 100),
                  far = make_ball({0, 0.5f, 0}, 0.5f, 100);

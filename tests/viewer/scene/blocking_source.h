@@ -7,7 +7,7 @@
 
 namespace isobrick::test {
 
-/// A source whose bricks are read only when they may be.
+/// A source whose reads block until open().
 class BlockingSource final : public ForwardingSource {
  public:
   using ForwardingSource::ForwardingSource;

@@ -25,8 +25,8 @@ inline void expect_no_overlap(const NodeGrid& grid, const Drawable& drawable) {
       }
 }
 
-/// Whether every finest node with a surface lies in some node that is drawn, or in
-/// one whose own level has none.
+/// Whether each finest node with a surface lies in a drawn node, or in one whose own level has no
+/// surface.
 inline bool covers(const NodeTree& tree, const Drawable& drawable, double isovalue) {
   bool all = true;
   for_each_point({{0, 0, 0}, tree.grid().level(0).nodes}, [&](Int3 p) {

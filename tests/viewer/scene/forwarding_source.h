@@ -7,7 +7,7 @@
 
 namespace isobrick::test {
 
-/// A source that gives what another one gives, but for how bricks are read.
+/// Forwards to another source; derived classes replace read_brick().
 class ForwardingSource : public BrickSource {
  public:
   explicit ForwardingSource(std::shared_ptr<const BrickSource> from) : from_(std::move(from)) {}

@@ -70,7 +70,7 @@ TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {
     }
     EXPECT_EQ(stream.drawable(), last) << "the same until something changes";
   }
-  // The last cut has few nodes, of which a busy machine misses some.
+  // The last cut has few nodes; on a busy machine some are missed.
   EXPECT_GT(versions_seen, 9u);
 }
 
@@ -127,7 +127,7 @@ TEST(SceneStream, AnotherIsovalueNeedsNoBrickAgain) {
   ASSERT_TRUE(stream.wait_idle(60));
   EXPECT_LE(source->reads(), reads + reads / 2);
   for (const NodeDraw& node : stream.drawable()->nodes) EXPECT_EQ(node.mesh->isovalue, -0.5);
-  // And back without any work at all.
+  // The previous cut needs no work.
   const auto made = stream.counters().meshes_made;
   cut.isovalues = {0.0};
   stream.set_cut(cut);
@@ -175,7 +175,7 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
   EXPECT_TRUE(drawable->complete);
 }
 
-/// Takes some grids and then says of all of them that it has failed.
+/// Accepts some grids, then fails for all of them.
 class FailingDevice final : public TestDevice {
  public:
   explicit FailingDevice(std::size_t taken = kTaken) : most_(taken) {}
@@ -236,7 +236,7 @@ TEST(SceneStream, WhatADeviceFailsToMakeIsMadeWithoutIt) {
   EXPECT_EQ(device.asked, 0u) << "nobody asks it in vain";
 }
 
-/// A device is sent samples as they are stored, of which nobody else makes meshes.
+/// Only a device receives stored samples.
 TEST(SceneStream, WhatADeviceFailsToMakeOfStoredSamplesIsMadeWithoutIt) {
   constexpr Index n = 200;
   const auto source = std::make_shared<MemoryBricks>(
@@ -246,7 +246,7 @@ TEST(SceneStream, WhatADeviceFailsToMakeOfStoredSamplesIsMadeWithoutIt) {
       MemoryBricks::Options{.brick = 32});
   const auto tree = std::make_shared<const NodeTree>(*source);
   const Cut cut = RandomCut(tree->grid(), 1, 100).cut({127.5});
-  FailingDevice device(12);  // among them some of the finest level
+  FailingDevice device(12);  // includes some of the finest level
   SceneStream stream(source, tree, {.threads = 4}), without(source, tree, {.threads = 4});
   stream.set_device(std::shared_ptr<DeviceMesher>(&device, [](DeviceMesher*) {}));
   for (SceneStream* s : {&stream, &without}) {
@@ -324,7 +324,7 @@ TEST(SceneStream, KeepsBricksAndMeshesWithinTheirBudgets) {
   }
   EXPECT_LE(stream.counters().brick_bytes_peak, options.brick_bytes);
   EXPECT_GT(stream.counters().brick_bytes_peak, options.brick_bytes / 2);
-  // One mesh of each thread may come on top.
+  // Each thread may add one mesh.
   EXPECT_LE(most_meshes, options.mesh_bytes + 2 * (2 << 20));
 }
 

@@ -60,7 +60,7 @@ TEST(Scene, AWindowsLoopEndsWithTheWholeCut) {
       EXPECT_LT(std::abs(p.x) + std::abs(p.y) + std::abs(p.z), 200.0f) << "around the origin";
 }
 
-/// Another isovalue and another view with every frame.
+/// Changes isovalue and view in every frame.
 TEST(Scene, UntilACutIsCoveredTheOneBeforeIsShown) {
   Scene scene(gyroid(), {.threads = 2});
   const View from = view_from({99.5, 99.5, 500});
@@ -83,7 +83,7 @@ TEST(Scene, UntilACutIsCoveredTheOneBeforeIsShown) {
   EXPECT_TRUE(covers(scene.tree(), *scene.drawable(), 0.2));
 }
 
-/// What is dropped for a budget is gone.
+/// Meshes that were dropped for a budget are destroyed.
 TEST(Scene, KeepsNoMeshesOfCutsBefore) {
   Scene scene(gyroid(), {.threads = 2, .mesh_bytes = 12 << 20});
   const View from = view_from({99.5, 99.5, 500});

@@ -1,4 +1,4 @@
-// Where a stream's device has no room for more.
+// A stream whose device is full.
 
 #include <gtest/gtest.h>
 
@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::uint64_t kMeshBytes = 1000;
 
-/// Has places for so many meshes; what comes beside them goes to host memory.
+/// A device with space for `places` meshes; other meshes go to host memory.
 class SmallDevice final : public TestDevice {
  public:
   explicit SmallDevice(int places)
       : places_(places), free_(std::make_shared<std::atomic<int>>(places)) {}
-  /// Bytes of the meshes that somebody still has.
+  /// Bytes of the meshes that are alive.
   std::uint64_t held() const { return static_cast<std::uint64_t>(places_ - *free_) * kMeshBytes; }
   bool make(const GridView&, NodeMesh mesh, Callback done) override {
     if (*free_ > 0) {
@@ -65,7 +65,7 @@ TEST(StreamDevice, OlderMeshesMakeRoomBeforeTheBudgetIsReached) {
   show(all, 0);
   const auto meshes = static_cast<int>(all.counters().meshes_made);
   ASSERT_GT(meshes, 20);
-  // Of a larger budget, since places fall between.
+  // The budget is larger, since fragmentation takes some.
   const int places = meshes * 3 / 2;
   SceneStream stream(
       source, tree,
@@ -79,7 +79,7 @@ TEST(StreamDevice, OlderMeshesMakeRoomBeforeTheBudgetIsReached) {
     EXPECT_TRUE(drawn->complete);
     EXPECT_GT(static_cast<std::size_t>(there), drawn->nodes.size() / 3) << isovalue;
   }
-  // Meshes that are shown have their places whatever comes, so they count.
+  // Shown meshes keep their space, so they count.
   for (const double isovalue : {0.5, 0.6, 0.7}) {
     stream.set_cut(cut.cut({isovalue}));
     EXPECT_TRUE(stream.wait_idle(60));

@@ -1,4 +1,4 @@
-// What closing a stream gives back, and when, whatever is going on.
+// What closing a stream releases, and when, whatever its threads are doing.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-/// Makes empty meshes on a thread of its own, some time after they are asked for.
+/// Makes empty meshes on a thread of its own, some time after the request.
 class SlowDevice final : public TestDevice {
  public:
   explicit SlowDevice(milliseconds time) : time_(time), thread_([this] { run(); }) {}
@@ -48,12 +48,12 @@ class SlowDevice final : public TestDevice {
     std::unique_lock lock(mutex_);
     change_.wait(lock, [&] { return !taken_.empty(); });
   }
-  /// How many meshes it was asked for.
+  /// Number of requested meshes.
   int asked() const {
     const std::lock_guard lock(mutex_);
     return asked_;
   }
-  /// Meshes that somebody holds.
+  /// Number of meshes that are alive.
   int held() const { return *held_; }
   std::shared_ptr<const std::atomic<int>> held_count() const { return held_; }
 
@@ -102,11 +102,11 @@ class StreamEnd : public testing::Test {
     EXPECT_LT(Clock::now() - start, milliseconds(100));
   }
   void begin(int threads = 2) {
-    // Not all bricks fit: another isovalue has to read.
+    // Not all bricks fit, so another isovalue has to read.
     stream_ = std::make_unique<SceneStream>(
         source_, tree_, StreamOptions{.threads = threads, .brick_bytes = 4 << 20});
   }
-  /// With a device that is at a mesh.
+  /// Opens a stream whose device is making a mesh.
   void begin_with(const std::shared_ptr<SlowDevice>& device) {
     begin();
     stream_->set_device(device);
@@ -115,7 +115,7 @@ class StreamEnd : public testing::Test {
     device->wait_until_asked();
   }
   void want(double isovalue) { stream_->set_cut(RandomCut(tree_->grid(), 1, 100).cut({isovalue})); }
-  /// Whether the stream's threads have ended: they hold the source.
+  /// Whether the stream's threads have ended: they own the source.
   bool threads_end() {
     for (int i = 0; i < 1000 && source_.use_count() > 1; ++i)
       std::this_thread::sleep_for(milliseconds(10));

@@ -23,7 +23,7 @@ namespace {
 class PlanTest : public testing::Test {
  protected:
   MeshPlan plan(double max_meshes) { return plan_jobs(tree_, cut_, meshes_, mesher_, max_meshes); }
-  /// Jobs that are no nodes of the cut.
+  /// Number of jobs for nodes that are not in the cut.
   std::size_t ancestors(const MeshPlan& plan, bool coarsest_only) const {
     std::size_t count = 0;
     for (const MeshJob& job : plan.jobs) {
@@ -144,7 +144,7 @@ TEST(Plan, ANodeIsThereWhenHalfOfWhatItsMeshNeedsIs) {
                                   [&](const MeshJob& j) { return j.key == cut.nodes.front().key; });
     return job != plan.jobs.end() && job->resident;
   };
-  // Those around the ball, a small part of the 5³ of the node.
+  // The bricks around the ball, a small part of the node's 5³.
   for_each_point({{0, 0, 0}, {3, 3, 3}}, [&](Int3 b) { (void)bricks.get(0, b, Always()); });
   EXPECT_FALSE(resident()) << "no ranges have been read: all might be needed";
   EXPECT_EQ(bricks.known_block_ranges(0, {0, 0, 0}), nullptr);
@@ -188,7 +188,7 @@ TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
   for (int i = 0; i < 8; ++i)
     threads.emplace_back([&, i] { bricks.read_together(0, i == 7 ? one : many, Always()); });
   for (std::thread& thread : threads) thread.join();
-  // One after the other these would take 0.68 s.
+  // Read one after the other, they would take 0.68 s.
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(500));
   EXPECT_EQ(bricks.counters().reads, many.size() + one.size()) << "each once";
   for (const Int3 b : many) {
@@ -208,7 +208,7 @@ TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
   EXPECT_EQ(bricks.find(0, others[0]), nullptr) << "nobody wants it any more";
 }
 
-/// A brick that comes only when another one has been read.
+/// A source whose brick `held` is read only after brick `first`.
 class OrderedSource final : public ForwardingSource {
  public:
   OrderedSource(std::shared_ptr<const BrickSource> from, Int3 held, Int3 first)

@@ -7,7 +7,7 @@
 
 namespace isobrick::test {
 
-/// What devices of tests have in common: no memory that is shared, and no failure.
+/// Base of test devices: no shared memory, no failure.
 class TestDevice : public DeviceMesher {
  public:
   std::string failure() const override { return {}; }
