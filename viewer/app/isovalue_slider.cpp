@@ -50,7 +50,7 @@ std::string human_count(double n) {
   return fmt::format("{:.0f}", n);
 }
 
-void tell(const ViewerState& state, double isovalue) {
+void show_tooltip(const ViewerState& state, double isovalue) {
   const IsovalueCounts& counts = state.isovalue_stats->counts();
   const StreamCounters made = state.scene_renderer->scene().stream().counters();
   ImGui::SetTooltip(
@@ -85,7 +85,7 @@ void draw_isovalue_slider(ViewerState& state, float width, float height) {
   const float pointer = ImGui::GetIO().MousePos.x;
   if (ImGui::IsItemHovered() || ImGui::IsItemActive()) {
     draw.AddLine({pointer, top}, {pointer, bottom}, kCursor, scaled(1));
-    tell(state, axis.value(pointer));
+    show_tooltip(state, axis.value(pointer));
   }
   if (!ImGui::IsItemActive() || state.settings.surfaces.empty()) return;
   state.settings.surfaces[state.selected].isovalue = axis.value(pointer);

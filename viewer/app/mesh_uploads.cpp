@@ -15,7 +15,7 @@ constexpr std::uint64_t kCopyBytes = 256 << 10;
 
 MeshUploads::~MeshUploads() {
   uploads_.clear();
-  pool_.tidy();
+  pool_.trim_but_one();
 }
 
 bool MeshUploads::add(const Drawable& drawable, Vec3d origin, Limit* limit) {

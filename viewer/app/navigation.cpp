@@ -83,7 +83,7 @@ void Navigator::stop() {
   spin_right_ = spin_down_ = push_right_ = push_up_ = push_ahead_ = 0;
 }
 
-bool Navigator::moving() const {
+bool Navigator::is_moving() const {
   return (!held_ && (spin_right_ != 0 || spin_down_ != 0)) || !(keys_ == FlyKeys{}) ||
          push_right_ != 0 || push_up_ != 0 || push_ahead_ != 0;
 }
@@ -108,7 +108,7 @@ bool Navigator::update(double seconds) {
       (camera.right * push_right_ + camera.up * push_up_ - camera.back * push_ahead_) * way;
   camera.eye = camera.eye + move;
   camera.target = camera.target + move;
-  return moving();
+  return is_moving();
 }
 
 }  // namespace isobrick

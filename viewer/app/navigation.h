@@ -44,7 +44,7 @@ class Navigator {
 
   /// Advances all motions by `seconds`. Returns whether anything moves.
   bool update(double seconds);
-  bool moving() const;
+  bool is_moving() const;
 
  private:
   void turn(double right, double down);

@@ -43,9 +43,9 @@ std::optional<double> number_of(std::string_view text) {
 /// Edits an isovalue. The text takes effect after Enter, or when the field loses focus.
 void type_isovalue(ViewerState& state, std::size_t number) {
   double& isovalue = state.settings.surfaces[number].isovalue;
-  const bool going_on = state.typed && state.typed->surface == number;
+  const bool is_typing = state.typed && state.typed->surface == number;
   const std::string shown = fmt::format("{:.6g}", isovalue);
-  std::string text = going_on ? state.typed->text : shown;
+  std::string text = is_typing ? state.typed->text : shown;
   if (ImGui::InputText("##isovalue", &text, ImGuiInputTextFlags_CharsScientific))
     state.typed = {number, text};
   if (!state.typed || state.typed->surface != number || ImGui::IsItemActive()) return;

@@ -18,7 +18,7 @@ namespace {
 constexpr PictureSize kCompileSize{16, 16};
 
 /// Whether CUDA's initialisation may delay OpenGL, which waits if both use one driver.
-bool cuda_may_hold_up(Backend backend) {
+bool cuda_may_delay_gl(Backend backend) {
   return backend != Backend::cpu && built_with_cuda() && current_gl_device().nvidia;
 }
 
@@ -66,7 +66,7 @@ PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> 
   if (!software_)
     for (const PictureSettings& settings : usual_settings())
       renderer_.prepare(settings, kCompileSize.width, kCompileSize.height);
-  if (likely && !software_ && cuda_may_hold_up(budgets.backend)) warm_up(*likely);
+  if (likely && !software_ && cuda_may_delay_gl(budgets.backend)) warm_up(*likely);
   // Comes last: while CUDA is initialised, an OpenGL call that allocates memory waits for tens of
   // milliseconds.
   if (budgets.backend != Backend::cpu) device_->begin();

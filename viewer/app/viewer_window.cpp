@@ -133,7 +133,7 @@ double ViewerWindow::aspect() const {
   return static_cast<double>(area.width) / area.height;
 }
 
-void ViewerWindow::frame_again(FrameTarget framed) {
+void ViewerWindow::frame_camera(FrameTarget framed) {
   const SceneRenderer& scene_renderer = *state_.scene_renderer;
   WorldBox box = scene_renderer.bounds();
   try {
@@ -164,10 +164,10 @@ void ViewerWindow::handle_requests() {
   if (state_.scene_renderer == nullptr) return;
   if (requests.look_along) look_along(*requests.look_along);
   if (requests.volume) show_volume(*requests.volume);
-  if (requests.fit) frame_again(*requests.fit);
+  if (requests.fit) frame_camera(*requests.fit);
   if (!requests.screenshot) return;
   // A preview may be smaller and have no box and axes, so the still frame is saved.
-  if (rests())
+  if (is_still())
     save_picture(*requests.screenshot);
   else
     state_.requests.screenshot = requests.screenshot;
@@ -220,25 +220,25 @@ void ViewerWindow::click(double x, double y) {
   if (state_.measuring && state_.picked) click.point = measure(state_.picked->world);
   // Earlier clicks belong to a finished measurement, or to none.
   if (!click.measuring || click.point == 0u) clicks_.clear();
-  if (!rests()) clicks_.push_back(std::move(click));
+  if (!is_still()) clicks_.push_back(std::move(click));
 }
 
 /// Whether the picture is the finest possible one.
-bool ViewerWindow::rests() const {
+bool ViewerWindow::is_still() const {
   const FrameState& state = state_.scene_renderer->state();
-  return !moving() && state.complete && !state.moving;
+  return !is_moving() && state.complete && !state.moving;
 }
 
-void ViewerWindow::settle_clicks() {
+void ViewerWindow::repeat_clicks() {
   if (clicks_.empty()) return;
   const Click now = click_at(0, 0);
-  const auto is_over = [&](const Click& c) {
+  const auto is_outdated = [&](const Click& c) {
     return !(c.camera == now.camera) || !(c.settings == now.settings) || c.width != now.width ||
            c.height != now.height || c.measuring != now.measuring ||
            (c.point && *c.point >= state_.measured.size());
   };
-  std::erase_if(clicks_, is_over);
-  if (clicks_.empty() || !rests()) return;
+  std::erase_if(clicks_, is_outdated);
+  if (clicks_.empty() || !is_still()) return;
   const std::vector<Click> clicks = std::exchange(clicks_, {});
   for (const Click& click : clicks) {
     const auto point = pick(click);

@@ -71,7 +71,7 @@ class ViewerWindow {
   struct WindowKey {
     std::uint64_t pictures = 0;  ///< frames finished so far
     std::size_t messages = 0;
-    bool rests = false, histogram = false, converting = false, panels = false, help = false;
+    bool still = false, histogram = false, converting = false, panels = false, help = false;
     friend bool operator==(const WindowKey&, const WindowKey&) = default;
   };
 
@@ -85,15 +85,15 @@ class ViewerWindow {
   void load(const std::filesystem::path& path, const Selection& selection);
   bool begin_ranges(const std::filesystem::path& path, const Selection& selection);
   ConvertOptions import_options() const;
-  void frame_again(FrameTarget framed);
+  void frame_camera(FrameTarget framed);
   void report_empty_surfaces();
   WindowKey window_key() const;
   bool is_due() const;
   PictureArea picture_area() const;
   void pace(double seconds);
   void report_damage();
-  bool rests() const;
-  void settle_clicks();
+  bool is_still() const;
+  void repeat_clicks();
   void handle_requests();
   void handle_import();
   void look_along(Vec3d direction);
@@ -103,9 +103,9 @@ class ViewerWindow {
   /// In fractions of the window's width and height.
   void click(double x, double y);
   void save_picture(const std::filesystem::path& file);
-  bool moving() const;
-  double settled_at() const;
-  bool minimised() const;
+  bool is_moving() const;
+  double still_time() const;
+  bool is_minimised() const;
   double aspect() const;
 
   WindowOptions options_;

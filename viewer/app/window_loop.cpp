@@ -65,7 +65,7 @@ void ViewerWindow::report_damage() {
 
 /// Shows once, for each isovalue outside the range of the samples, why it has no surface.
 void ViewerWindow::report_empty_surfaces() {
-  if (moving()) return;  // a sliding isovalue passes quickly
+  if (is_moving()) return;  // a sliding isovalue passes quickly
   const ValueRange<double> range = state_.isovalue_stats->counts().range();
   for (const SurfaceSettings& surface : state_.settings.surfaces) {
     if (!surface.shown || reported_empty_.contains(surface.isovalue)) continue;
@@ -77,12 +77,12 @@ void ViewerWindow::report_empty_surfaces() {
   }
 }
 
-double ViewerWindow::settled_at() const {
+double ViewerWindow::still_time() const {
   return std::max(events_->last_motion(), open_time_) + kSettleSeconds;
 }
 
-bool ViewerWindow::moving() const {
-  return state_.navigator.moving() || glfwGetTime() < settled_at();
+bool ViewerWindow::is_moving() const {
+  return state_.navigator.is_moving() || glfwGetTime() < still_time();
 }
 
 /// Draws the picture, or a batch of it.
@@ -91,7 +91,7 @@ void ViewerWindow::draw_picture(int width, int height) {
   const double begin = glfwGetTime();
   // The first picture of a store is a preview, too.
   surface_shown_ |= scene_renderer.state().covers;
-  const bool preview = moving() || !surface_shown_;
+  const bool preview = is_moving() || !surface_shown_;
   FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), preview);
   options.overlay_scale = scale_;
   options.batch_seconds = options_.batch_seconds.value_or(options.batch_seconds);
@@ -107,10 +107,10 @@ void ViewerWindow::draw_picture(int width, int height) {
   pace(glfwGetTime() - begin);
   report_damage();
   report_empty_surfaces();
-  settle_clicks();
+  repeat_clicks();
 }
 
-bool ViewerWindow::minimised() const {
+bool ViewerWindow::is_minimised() const {
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
   return width == 0 || height == 0 || glfwGetWindowAttrib(window_, GLFW_ICONIFIED) == GLFW_TRUE;
@@ -123,7 +123,7 @@ ViewerWindow::WindowKey ViewerWindow::window_key() const {
                 .help = state_.help};
   if (state_.scene_renderer == nullptr) return key;
   key.pictures = state_.scene_renderer->counters().finished;
-  key.rests = rests();
+  key.still = is_still();
   key.histogram = state_.isovalue_stats->histogram() != nullptr;
   return key;
 }
@@ -131,7 +131,7 @@ ViewerWindow::WindowKey ViewerWindow::window_key() const {
 /// Whether progress or a blinking cursor needs another frame.
 bool ViewerWindow::is_due() const {
   const bool under_way = state_.import != nullptr || ImGui::GetIO().WantTextInput ||
-                         (state_.scene_renderer != nullptr && !rests());
+                         (state_.scene_renderer != nullptr && !is_still());
   return under_way && glfwGetTime() - last_frame_time_ >= kMaxFrameInterval;
 }
 
@@ -165,7 +165,7 @@ void ViewerWindow::show_notice(const std::string& text) {
 
 /// Shows a frame, unless it would equal the last one. `forced`: show it in any case.
 void ViewerWindow::draw_frame(bool forced) {
-  if (minimised()) return;
+  if (is_minimised()) return;
   const PictureArea area = picture_area();
   if (state_.scene_renderer != nullptr) draw_picture(area.width, area.height);
   const WindowKey key = window_key();
@@ -206,13 +206,13 @@ void ViewerWindow::pace(double seconds) {
 }
 
 void ViewerWindow::wait(double max_seconds) {
-  if (minimised()) return glfwWaitEventsTimeout(max_seconds);
+  if (is_minimised()) return glfwWaitEventsTimeout(max_seconds);
   const bool has_store = state_.scene_renderer != nullptr;
-  if (has_store && moving()) {
+  if (has_store && is_moving()) {
     // Until the next motion, or until the camera counts as still.
-    if (!has_event_ && !needs_draw_ && !state_.navigator.moving() &&
+    if (!has_event_ && !needs_draw_ && !state_.navigator.is_moving() &&
         !state_.scene_renderer->has_new_frame())
-      return glfwWaitEventsTimeout(std::clamp(settled_at() - glfwGetTime(), kMeshWaitSeconds,
+      return glfwWaitEventsTimeout(std::clamp(still_time() - glfwGetTime(), kMeshWaitSeconds,
                                               std::max(max_seconds, kMeshWaitSeconds)));
     return glfwPollEvents();
   }

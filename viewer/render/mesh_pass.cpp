@@ -102,10 +102,10 @@ vec3 outer() {
 vec3 outer() { return outer_colour.rgb; }
 #endif
 
-struct Seen { vec3 position, normal, eye, light; float slope; };
+struct ShadedPoint { vec3 position, normal, eye, light; float slope; };
 
-Seen see() {
-  Seen s;
+ShadedPoint shade() {
+  ShadedPoint s;
   s.position = here();
   vec3 facet = cross(dFdx(s.position), dFdy(s.position));
   s.slope = fwidth(gl_FragCoord.z);
@@ -135,7 +135,7 @@ layout(location = 1) out vec2 normal;
 layout(location = 2) out uint id;
 
 void main() {
-  Seen s = see();
+  ShadedPoint s = shade();
   colour = vec4(min(s.light, vec3(4)), 1);
   normal = s.normal.xy;
   id = mesh.x;
@@ -151,7 +151,7 @@ layout(location = 0) out vec4 sum;
 layout(location = 1) out float hidden;
 
 void main() {
-  Seen s = see();
+  ShadedPoint s = shade();
   // The depth at the centroid. It is limited to the slope within a pixel, since a triangle that
   // passes the eye has no depth in between.
   float within = clamp(stored_depth, gl_FragCoord.z - s.slope, gl_FragCoord.z + s.slope);

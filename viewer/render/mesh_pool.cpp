@@ -70,7 +70,7 @@ struct MeshPool::State {
   std::vector<std::shared_ptr<MeshBlock>> blocks;
 
   /// Keeps one empty block for the next mesh; frees the others.
-  void tidy() {
+  void trim_but_one() {
     bool kept = false;
     std::erase_if(blocks, [&](const std::shared_ptr<MeshBlock>& block) {
       return block->used == 0 && (block->vertex_room > block_vertices || std::exchange(kept, true));
@@ -114,7 +114,7 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
       break;
     }
   if (!at) {
-    state_->tidy();
+    state_->trim_but_one();
     const std::uint32_t room = state_->block_vertices;
     mesh.block_ =
         std::make_shared<MeshBlock>(std::max(room, vertices), std::max(2 * room, triangles));
@@ -204,7 +204,7 @@ void MeshPool::trim() {
                 [](const std::shared_ptr<MeshBlock>& block) { return block->used == 0; });
 }
 
-void MeshPool::tidy() { state_->tidy(); }
+void MeshPool::trim_but_one() { state_->trim_but_one(); }
 
 std::uint64_t MeshPool::bytes() const {
   std::uint64_t sum = 0;

@@ -97,7 +97,7 @@ class MeshPool {
   /// Frees empty blocks.
   void trim();
   /// Frees all empty blocks but one, which the next mesh reuses.
-  void tidy();
+  void trim_but_one();
 
   /// Device memory in use by meshes, and allocated for blocks.
   std::uint64_t bytes() const;

@@ -7,7 +7,7 @@ namespace isobrick {
 
 void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
   draws_.push_back({&mesh, style, 0, mesh.place().triangle_count});
-  left_ += mesh.place().triangle_count;
+  remaining_ += mesh.place().triangle_count;
 }
 
 std::span<const MeshDraw> MeshQueue::take(std::uint64_t max_triangles) {
@@ -27,7 +27,7 @@ std::span<const MeshDraw> MeshQueue::take(std::uint64_t max_triangles) {
     rest.first_triangle += taken.triangles;
     rest.triangles -= taken.triangles;
     max_triangles -= taken.triangles;
-    left_ -= taken.triangles;
+    remaining_ -= taken.triangles;
     if (rest.triangles == 0) ++next_;
   }
   return batch_;

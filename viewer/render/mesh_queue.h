@@ -36,9 +36,9 @@ class MeshQueue {
   /// Call it before the first take(). `mesh` must live until the last one.
   void add(const PooledMesh& mesh, const MeshStyle& style);
 
-  bool empty() const { return left_ == 0; }
+  bool empty() const { return remaining_ == 0; }
   /// Triangles that remain.
-  std::uint64_t triangles() const { return left_; }
+  std::uint64_t triangles() const { return remaining_; }
 
   /// Takes the next batch: at least one triangle, at most `max_triangles`. Valid until the next
   /// call. The queue must not be empty.
@@ -47,7 +47,7 @@ class MeshQueue {
  private:
   std::vector<MeshDraw> draws_, batch_;
   std::size_t next_ = 0;
-  std::uint64_t left_ = 0;
+  std::uint64_t remaining_ = 0;
   bool sorted_;
 };
 

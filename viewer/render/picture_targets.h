@@ -53,12 +53,12 @@ struct PictureTargets {
   GlTexture colour, normal, id, depth;
   GlFramebuffer opaque;
   // For each sample: weighted sum of colours, and visible fraction of the background.
-  GlTexture sum, seen;
+  GlTexture sum, transmittance;
   GlTexture front;  ///< with ids: see PictureResult
   GlFramebuffer transparent;
   // For each pixel: openness (1: no occlusion), and openness smoothed along rows.
-  GlTexture open, open_rows;
-  GlFramebuffer open_target, open_rows_target;
+  GlTexture openness, openness_rows;
+  GlFramebuffer openness_target, openness_rows_target;
 
  private:
   void find_samples();

@@ -39,7 +39,7 @@ std::uint64_t PictureWork::row_work(std::size_t step) const {
   return (static_cast<std::uint64_t>(width_) * hundredths_of(steps_[step]) + 99) / 100;
 }
 
-std::uint64_t PictureWork::left() const {
+std::uint64_t PictureWork::remaining() const {
   std::uint64_t sum = opaque_.triangles() + transparent_.triangles();
   for (std::size_t step = step_; step < steps_.size(); ++step)
     sum += row_work(step) * static_cast<std::uint64_t>(height_ - (step == step_ ? row_ : 0));

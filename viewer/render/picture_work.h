@@ -31,7 +31,7 @@ class PictureWork {
 
   MeshQueue& meshes(bool transparent) { return transparent ? transparent_ : opaque_; }
   /// Remaining work, without slices and lines, which take almost no time.
-  std::uint64_t left() const;
+  std::uint64_t remaining() const;
 
   /// Draws opaque or transparent meshes and slices into the bound framebuffer. Subtracts the work
   /// done from `work`. Returns whether none is left.

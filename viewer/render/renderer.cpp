@@ -173,7 +173,7 @@ void Renderer::State::choose_result(bool at_once) {
 
 /// Returns whether the picture is finished.
 bool Renderer::State::advance(std::uint64_t max_work) {
-  const bool at_once = max_work >= work.left();
+  const bool at_once = max_work >= work.remaining();
   const DrawSwitches switches(frame);
   bind_frame();
   if (!draw_surfaces(switches, false, max_work) || !draw_surfaces(switches, true, max_work))
@@ -266,7 +266,7 @@ void Renderer::draw_scale_bar(const std::string& unit, double unit_length) {
 
 void Renderer::end() { state_->advance(std::numeric_limits<std::uint64_t>::max()); }
 bool Renderer::advance(std::uint64_t work) { return state_->advance(work); }
-std::uint64_t Renderer::work_left() const { return state_->work.left(); }
+std::uint64_t Renderer::work_left() const { return state_->work.remaining(); }
 
 void Renderer::discard() {
   if (state_->finished) state_->next = std::exchange(state_->finished, std::nullopt);

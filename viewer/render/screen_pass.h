@@ -43,7 +43,8 @@ class ScreenPass {
   void draw(const GlProgram& program, const GlFramebuffer& target);
 
   int samples_;
-  GlVertexArray nothing_;  ///< empty: vertices of the full-screen triangle come from their index
+  GlVertexArray
+      no_attributes_;  ///< empty: vertices of the full-screen triangle come from their index
   GlProgram nearest_, occlusion_, smooth_;
   std::array<GlProgram, 8> compose_;  ///< variants, made at first use
 };

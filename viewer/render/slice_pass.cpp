@@ -78,7 +78,7 @@ void set(const GlProgram& program, int location, Vec3f v) {
 
 }  // namespace
 
-SlicePass::SlicePass() : nothing_(make_vertex_array()) {
+SlicePass::SlicePass() : no_attributes_(make_vertex_array()) {
   const std::string frame = kFrameGlsl, vertex = frame + kPlaceGlsl + kVertex,
                     fragment = frame + fragment_glsl(true) + kColour;
   opaque_ = make_program(vertex, fragment + kOpaque, "slices");
@@ -113,7 +113,7 @@ bool SlicePass::any(bool transparent) const {
 void SlicePass::draw(Vec3d eye, bool transparent) {
   const GlProgram& program = transparent ? transparent_ : opaque_;
   glUseProgram(program.get());
-  glBindVertexArray(nothing_.get());
+  glBindVertexArray(no_attributes_.get());
   for (const Slice& slice : slices_) {
     const SliceImage& image = slice.image;
     if ((image.opacity < 1) != transparent) continue;

@@ -29,7 +29,7 @@ class SlicePass {
 
   std::vector<Slice> slices_;
   GlProgram opaque_, transparent_;
-  GlVertexArray nothing_;  ///< empty: corners come from the vertex index
+  GlVertexArray no_attributes_;  ///< empty: corners come from the vertex index
 };
 
 }  // namespace isobrick

@@ -18,7 +18,7 @@ class ActivityCount {
   }
   void end() {
     const MutexLock lock(mutex_);
-    if (--count_ == 0) none_.notify_all();
+    if (--count_ == 0) idle_.notify_all();
   }
   void close() {
     const MutexLock lock(mutex_);
@@ -28,13 +28,13 @@ class ActivityCount {
   bool wait_for_none(std::chrono::steady_clock::time_point deadline) {
     const MutexLock lock(mutex_);
     while (count_ > 0)
-      if (!none_.wait_until(mutex_, deadline)) break;
+      if (!idle_.wait_until(mutex_, deadline)) break;
     return count_ == 0;
   }
 
  private:
   Mutex mutex_;
-  CondVar none_;
+  CondVar idle_;
   int count_ ISOBRICK_GUARDED_BY(mutex_) = 0;
   bool closed_ ISOBRICK_GUARDED_BY(mutex_) = false;
 };

@@ -104,8 +104,8 @@ class DeviceWorker {
   std::optional<int> free_slot();
   std::vector<GridJob> next_jobs();
   void free_slots(const std::vector<GridJob>& jobs, const std::string& failure);
-  void write_again(std::vector<GridJob*>& jobs);
-  void learn(const gpu::GridMeshSize& size);
+  void write_oversized(std::vector<GridJob*>& jobs);
+  void update_expected(const gpu::GridMeshSize& size);
 
   gpu::GridBatch batch_;
   /// Space to reserve for a mesh of unknown size.
@@ -219,7 +219,7 @@ std::optional<MeshSpanOwner> DeviceWorker::reserve_span(std::uint32_t vertices,
   return MeshSpanOwner(memory, *std::move(span));
 }
 
-void DeviceWorker::learn(const gpu::GridMeshSize& size) {
+void DeviceWorker::update_expected(const gpu::GridMeshSize& size) {
   if (size.triangles == 0) return;
   expected_vertices_ = std::max(size.vertices + size.vertices / 4, expected_vertices_ / 8 * 7);
   expected_triangles_ = std::max(size.triangles + size.triangles / 4, expected_triangles_ / 8 * 7);
@@ -237,19 +237,19 @@ void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
   const TicketGuard guard(&kernel_lock);
   now.lock = watch.lap();
   batch_.make(all);
-  std::vector<GridJob*> again;
+  std::vector<GridJob*> oversized;
   for (GridJob& job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job.slot);
-    learn(size);
+    update_expected(size);
     job.mesh.seam_triangles = size.seam_triangles;
     if (size.triangles == 0)
       job.span.reset();
     else if (job.span && job.span->get().place.holds(size.vertices, size.triangles))
       job.span->trim(size);
     else
-      again.push_back(&job);
+      oversized.push_back(&job);
   }
-  write_again(again);
+  write_oversized(oversized);
   now.device = watch.lap();
   for (GridJob& job : jobs) {
     if (!job.span) continue;
@@ -261,7 +261,7 @@ void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
 }
 
 /// Writes the meshes that did not fit, now that their sizes are known.
-void DeviceWorker::write_again(std::vector<GridJob*>& jobs) {
+void DeviceWorker::write_oversized(std::vector<GridJob*>& jobs) {
   std::vector<gpu::GridMeshJob> placed;
   for (GridJob* job : jobs) job->span.reset();
   for (GridJob* job : jobs) {

@@ -63,7 +63,7 @@ class TriangleBudget {
 
   double used() const { return used_; }
   /// Whether thin structure may exceed the budget.
-  bool stretches() const { return thin_limit_ > limit_; }
+  bool can_exceed() const { return thin_limit_ > limit_; }
   /// Whether nodes that lose thin structure come first.
   bool thin_first() const { return used_ < thin_limit_ - kRegularPart * limit_; }
   bool fits(double more, bool thin) const {
@@ -125,7 +125,7 @@ std::size_t place_of(Int3 child, Int3 ratio, Int3 nodes) {
 CutSelector::CutSelector(const NodeTree& tree)
     : tree_(tree), refined_(tree.grid(), 1), previous_(tree.grid(), 1), queued_(tree.grid(), 1) {}
 
-double CutSelector::urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active) {
+double CutSelector::priority(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active) {
   const bool before = previous_(n) != 0;
   if (!(before ? sight.nearly_visible : sight.visible) || !active.below(n)) return 0;
   return sight.pixels * (before ? kHysteresis : 1);
@@ -189,13 +189,13 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   std::swap(refined_, previous_);
   refined_.clear();
   CandidateQueue queue;
-  TriangleBudget allowance(budget);
+  TriangleBudget triangle_budget(budget);
   const double least_error = budget.thin_triangles > 0
                                  ? std::min(view.pixel_error, view.thin_pixel_error)
                                  : view.pixel_error;
-  const auto enter = [&](const NodeKey& n) {
+  const auto add_candidate = [&](const NodeKey& n) {
     if (n.level <= view.finest_level) return;
-    const double pixels = urgency(n, node_view.see(n), active);
+    const double pixels = priority(n, node_view.sight(n), active);
     if (pixels <= least_error) return;
     const bool thin = loses(n, active, budget);
     if (pixels > (thin ? least_error : view.pixel_error)) queue.push({pixels, n}, thin);
@@ -203,8 +203,9 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   const int top = grid.levels() - 1;
   const Box3 top_nodes{{0, 0, 0}, grid.level(top).nodes};
   for_each_point(top_nodes, [&](Int3 p) {
-    allowance.take(triangles({top, p}, node_view, isovalues, budget.triangles_per_block), true);
-    enter({top, p});
+    triangle_budget.take(triangles({top, p}, node_view, isovalues, budget.triangles_per_block),
+                         true);
+    add_candidate({top, p});
   });
 
   Cut cut;
@@ -212,26 +213,26 @@ Cut CutSelector::select(const ActiveNodes& active, const View& view, const CutBu
   std::vector<NodeKey> needed;
   bool thin_first = true;
   for (int misfits = 0; misfits < kMaxMisfits && !queue.empty();) {
-    const auto [n, thin] = queue.pop(thin_first && allowance.thin_first());
+    const auto [n, thin] = queue.pop(thin_first && triangle_budget.thin_first());
     if (refined_(n)) continue;
     needed.clear();
     collect(n, needed);
     for (const NodeKey& r : needed) queued_(r) = 0;
     const double more = added_triangles(needed, node_view, isovalues, budget.triangles_per_block);
-    if (!allowance.fits(more, thin)) {
+    if (!triangle_budget.fits(more, thin)) {
       cut.limited_by_budget = true;
       // Nodes that do not fit must not keep all others from being refined.
-      if (thin && allowance.stretches()) thin_first = false;
+      if (thin && triangle_budget.can_exceed()) thin_first = false;
       ++misfits;
       continue;
     }
-    allowance.take(more, thin);
+    triangle_budget.take(more, thin);
     for (const NodeKey& r : needed) {
       refined_(r) = 1;
-      for_each_point(grid.children(r), [&](Int3 c) { enter({r.level - 1, c}); });
+      for_each_point(grid.children(r), [&](Int3 c) { add_candidate({r.level - 1, c}); });
     }
   }
-  cut.triangles = static_cast<std::uint64_t>(std::max(allowance.used(), 0.0));
+  cut.triangles = static_cast<std::uint64_t>(std::max(triangle_budget.used(), 0.0));
   for_each_point(top_nodes, [&](Int3 p) { append({top, p}, 0, node_view, active, cut); });
   return cut;
 }
@@ -256,7 +257,7 @@ std::uint32_t CutSelector::coarse_around(const NodeKey& n, const NodeView& view,
 void CutSelector::append(const NodeKey& n, std::uint32_t coarser, const NodeView& view,
                          const ActiveNodes& active, Cut& cut) {
   if (n.level == 0 || !refined_(n)) {
-    const NodeSight sight = view.see(n);
+    const NodeSight sight = view.sight(n);
     cut.nodes.push_back({n, coarser, static_cast<float>(sight.pixels),
                          static_cast<float>(sight.distance), sight.visible, sight.clipped});
     return;

@@ -66,7 +66,7 @@ class CutSelector {
 
  private:
   bool loses(const NodeKey& n, const ActiveNodes& active, const CutBudget& budget) const;
-  double urgency(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active);
+  double priority(const NodeKey& n, const NodeSight& sight, const ActiveNodes& active);
   double triangles(const NodeKey& n, const NodeView& view, std::span<const double> isovalues,
                    double per_block) const;
   double added_triangles(std::span<const NodeKey> refined, const NodeView& view,

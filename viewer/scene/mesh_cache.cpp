@@ -18,7 +18,7 @@ MeshPtr MeshCache::find(const NodeKey& key, double isovalue, std::uint32_t coars
   if (entries == nullptr) return nullptr;
   for (Entry& entry : *entries)
     if (entry.coarser == coarser) {
-      entry.used = now_;
+      entry.used = use_;
       return entry.mesh;
     }
   return nullptr;
@@ -31,7 +31,7 @@ MeshPtr MeshCache::find_any(const NodeKey& key, double isovalue, std::uint32_t c
                                   [&](const Entry& entry) { return entry.coarser == coarser; });
   // The neighbours of the newest mesh are most like the present ones.
   Entry& entry = exact != entries->end() ? *exact : entries->back();
-  entry.used = now_;
+  entry.used = use_;
   return entry.mesh;
 }
 
@@ -54,7 +54,7 @@ void MeshCache::put(MeshPtr mesh) {
   Surface& surface = surfaces_[mesh->isovalue];
   std::vector<Entry>& entries = surface.nodes[mesh->key];
   if (entries.empty()) ++surface.levels[mesh->key.level];
-  entries.push_back({mesh->coarser, now_, std::move(mesh)});
+  entries.push_back({mesh->coarser, use_, std::move(mesh)});
 }
 
 bool MeshCache::shrink() {
@@ -74,12 +74,12 @@ void MeshCache::drop_until(std::uint64_t bytes, std::uint64_t device_bytes) {
   for (const auto& [isovalue, surface] : surfaces_)
     for (const auto& [key, entries] : surface.nodes)
       for (const Entry& entry : entries)
-        if (entry.used < now_) old.emplace_back(entry.used, entry.mesh.get());
+        if (entry.used < use_) old.emplace_back(entry.used, entry.mesh.get());
   std::sort(old.begin(), old.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [used, mesh] : old) {
-    const bool here_too_many = bytes_ > bytes, there_too_many = device_bytes_ > device_bytes;
-    if (!here_too_many && !there_too_many) break;
-    if (here_too_many || mesh->device_bytes > 0) drop(*mesh);
+    const bool too_many_on_host = bytes_ > bytes, too_many_on_device = device_bytes_ > device_bytes;
+    if (!too_many_on_host && !too_many_on_device) break;
+    if (too_many_on_host || mesh->device_bytes > 0) drop(*mesh);
   }
 }
 

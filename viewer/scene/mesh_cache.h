@@ -32,7 +32,7 @@ class MeshCache {
   void put(MeshPtr mesh);
 
   /// Meshes that are found from now on are in use: shrink() keeps them.
-  void begin_use() { ++now_; }
+  void begin_use() { ++use_; }
   bool is_within_budgets() const { return bytes_ <= budget_ && device_bytes_ <= device_budget_; }
   /// If a budget is exceeded, drops unused meshes until there is some room again. Returns false if
   /// the meshes in use alone exceed a budget.
@@ -64,7 +64,7 @@ class MeshCache {
   void drop(const NodeMesh& mesh);
   void drop_until(std::uint64_t bytes, std::uint64_t device_bytes);
 
-  std::uint64_t budget_, device_budget_, bytes_ = 0, device_bytes_ = 0, meshes_ = 0, now_ = 1;
+  std::uint64_t budget_, device_budget_, bytes_ = 0, device_bytes_ = 0, meshes_ = 0, use_ = 1;
   /// By isovalue: a search for a new isovalue ends at once.
   std::map<double, Surface> surfaces_;
 };

@@ -211,11 +211,13 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
   return impl_->read(key, isovalue, coarser, token);
 }
 
-bool NodeMesher::half_resident(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
+bool NodeMesher::is_half_resident(const NodeKey& key, double isovalue,
+                                  std::uint32_t coarser) const {
   const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
   const int stored = impl_->grid.level(key.level).source;
   const Box3 points = impl_->points(key);
-  if (!needed) return impl_->bricks.half_resident(stored, impl_->samples.bricks(key.level, points));
+  if (!needed)
+    return impl_->bricks.half_resident(stored, impl_->samples.bricks(key.level, points));
   return impl_->bricks.half_resident(stored, impl_->bricks_of(key, points, needed));
 }
 

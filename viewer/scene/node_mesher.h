@@ -47,7 +47,7 @@ class NodeMesher {
 
   /// Whether at least half of the bricks that the node's mesh needs are resident. Reads nothing:
   /// without known ranges it counts all bricks of the node's points.
-  bool half_resident(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
+  bool is_half_resident(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
 
   /// Adds the bricks that the mesh needs and that are not resident.
   void add_missing(const NodeKey& key, double isovalue, std::uint32_t coarser,

@@ -160,13 +160,13 @@ std::shared_ptr<const NodeSearch::Bytes> NodeSearch::index() const {
   return index_;
 }
 
-bool NodeSearch::found(std::span<const double> isovalues) const {
+bool NodeSearch::is_current(std::span<const double> isovalues) const {
   return index() == searched_ && std::equal(isovalues.begin(), isovalues.end(),
                                             active_.isovalues().begin(), active_.isovalues().end());
 }
 
 const ActiveNodes& NodeSearch::find(std::span<const double> isovalues) {
-  if (found(isovalues)) return active_;
+  if (is_current(isovalues)) return active_;
   std::shared_ptr<const Bytes> index = this->index();
   const IndexView view = view_index(*index);
   std::vector<std::uint64_t> finest(mask_words(view.items()));

@@ -23,7 +23,7 @@ std::string size_text(std::uint64_t bytes);
 
 /// Finds the active nodes of isovalues through an index over the ranges of the finest nodes. All
 /// kinds of index find the same nodes. A thread of its own builds another kind while the present
-/// one answers. find() and found() are for one thread at a time; the rest is thread-safe.
+/// one answers. find() and is_current() are for one thread at a time; the rest is thread-safe.
 class NodeSearch {
  public:
   /// Starts with a linear scan. `type`: of the samples. An index that needs more than `max_bytes`
@@ -45,7 +45,7 @@ class NodeSearch {
   /// Returns the nodes that any of the isovalues crosses. Valid until the next call.
   const ActiveNodes& find(std::span<const double> isovalues);
   /// Whether the last find() was for these isovalues, through the present index.
-  bool found(std::span<const double> isovalues) const;
+  bool is_current(std::span<const double> isovalues) const;
 
   struct State {
     IndexKind kind = IndexKind::linear;  ///< of the index in use
@@ -83,7 +83,7 @@ class NodeSearch {
   std::shared_ptr<const Bytes> index_ ISOBRICK_GUARDED_BY(mutex_);
   State state_ ISOBRICK_GUARDED_BY(mutex_);
 
-  // Only find() and found() use these.
+  // Only find() and is_current() use these.
   ActiveNodes active_;
   std::shared_ptr<const Bytes> searched_;  ///< index that gave active_
 

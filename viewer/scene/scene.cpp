@@ -47,7 +47,7 @@ void Scene::update(const std::vector<double>& isovalues, const View& view,
   CutRequest request{isovalues, view, budget, tree_->thin_structure().known()};
   if (triangles_per_block_ > 0) request.budget.triangles_per_block = triangles_per_block_;
   const bool same = chosen_ == request;
-  if (same && search_->found(isovalues)) return;
+  if (same && search_->is_current(isovalues)) return;
 
   Stopwatch watch;
   CutTimes times;

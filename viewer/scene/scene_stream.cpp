@@ -12,7 +12,7 @@ namespace isobrick {
 namespace {
 
 /// How long the destructor waits for blocked threads and for a device.
-constexpr std::chrono::milliseconds kClosing{50};
+constexpr std::chrono::milliseconds kCloseTimeout{50};
 
 void run_worker(const std::shared_ptr<StreamState>& state) {
   if (state->options.lower_thread_priority) lower_thread_priority();
@@ -35,7 +35,7 @@ SceneStream::SceneStream(std::shared_ptr<const BrickSource> source,
 SceneStream::~SceneStream() {
   state_->queue.close();
   state_->notifications.close();
-  const auto deadline = std::chrono::steady_clock::now() + kClosing;
+  const auto deadline = std::chrono::steady_clock::now() + kCloseTimeout;
   const bool ended = state_->workers.wait_for_none(deadline);
   state_->queue.wait_until_unused(deadline);
   state_->notifications.wait_for_none(deadline);

@@ -98,7 +98,7 @@ MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
   MeshPlan plan;
   JobPlanner(tree, cut, meshes, plan).run(max_meshes);
   for (MeshJob& job : plan.jobs)
-    job.resident = mesher.half_resident(job.key, job.isovalue, job.coarser);
+    job.resident = mesher.is_half_resident(job.key, job.isovalue, job.coarser);
   std::sort(plan.jobs.begin(), plan.jobs.end(), more_urgent);
   return plan;
 }

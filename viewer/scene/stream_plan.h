@@ -23,9 +23,9 @@ struct MeshJob {
 
 struct MeshPlan {
   /// The meshes that a cut lacks, the most urgent first: visible nodes; of those, nodes with half
-  /// of their bricks resident (NodeMesher::half_resident()); coarse ones; the longest cells on the
-  /// picture; the nearest. A node without any mesh adds its stored ancestors, which are substituted
-  /// for it.
+  /// of their bricks resident (NodeMesher::is_half_resident()); coarse ones; the longest cells on
+  /// the picture; the nearest. A node without any mesh adds its stored ancestors, which are
+  /// substituted for it.
   std::vector<MeshJob> jobs;
   /// Of the ancestors only the coarsest stored ones are made, because all meshes of the cut come
   /// soon.

@@ -106,11 +106,11 @@ class ReachCounts {
     return static_cast<std::uint8_t>(
         std::count_if(isovalues.begin(), isovalues.end(), [&](double v) { return v <= value; }));
   }
-  std::size_t place(Int3 p) const {
+  std::size_t index(Int3 p) const {
     return static_cast<std::size_t>(linear_index(p - samples_.lo, samples_.extent()));
   }
-  std::uint8_t& at(Int3 p) { return reached_[place(p)]; }
-  std::uint8_t at(Int3 p) const { return reached_[place(p)]; }
+  std::uint8_t& at(Int3 p) { return reached_[index(p)]; }
+  std::uint8_t at(Int3 p) const { return reached_[index(p)]; }
 
   Box3 samples_;
   std::vector<std::uint8_t> reached_;

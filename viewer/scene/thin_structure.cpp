@@ -25,7 +25,7 @@ ValueRange<float> in_float(const ValueRange<double>& r) {
   return out;
 }
 
-std::size_t place(Int3 patch, Int3 patches) {
+std::size_t patch_index(Int3 patch, Int3 patches) {
   return static_cast<std::size_t>(linear_index(patch, patches));
 }
 
@@ -56,13 +56,14 @@ void ThinStructure::include(const RangeTable& table, Box3 blocks) {
   Ranges ranges(static_cast<std::size_t>(volume(here.extent())));
   for_each_point(blocks, [&](Int3 b) {
     const Int3 p = floor_div(b * block, finest.edge);
-    if (here.contains(p)) ranges[place(p - here.lo, here.extent())].include(in_float(table.at(b)));
+    if (here.contains(p))
+      ranges[patch_index(p - here.lo, here.extent())].include(in_float(table.at(b)));
   });
   // A patch may span several calls, perhaps from several threads.
   const MutexLock lock(mutex_);
   std::size_t i = 0;
-  for_each_point(here,
-                 [&](Int3 p) { finest.below[place(p, finest.patches)].include(ranges[i++]); });
+  for_each_point(
+      here, [&](Int3 p) { finest.below[patch_index(p, finest.patches)].include(ranges[i++]); });
 }
 
 void ThinStructure::merge_below() {
@@ -72,7 +73,7 @@ void ThinStructure::merge_below() {
     std::size_t from = 0;
     for_each_point({{0, 0, 0}, finer.patches}, [&](Int3 p) {
       const Int3 patch = floor_div(p * finer.edge, level.edge);
-      level.below[place(patch, level.patches)].include(finer.below[from++]);
+      level.below[patch_index(patch, level.patches)].include(finer.below[from++]);
     });
   }
 }
@@ -136,7 +137,7 @@ bool ThinStructure::lost(const NodeKey& n, double isovalue) const {
   for_each_point(
       intersect({n.node * per_node, (n.node + Int3{1, 1, 1}) * per_node}, {{}, found->patches}),
       [&](Int3 p) {
-        const std::size_t i = place(p, found->patches);
+        const std::size_t i = patch_index(p, found->patches);
         if (!found->below[i].stabbed_by(isovalue)) return;
         ++crossed;
         lost += !found->own[i].stabbed_by(isovalue);

@@ -51,7 +51,7 @@ NodeView::Plane NodeView::to_index_space(Vec3d normal, double offset) const {
           dot(normal, t.origin) + offset};
 }
 
-bool NodeView::Plane::meets(const IndexBox& box) const {
+bool NodeView::Plane::intersects(const IndexBox& box) const {
   double max_distance = offset;
   for (int axis = 0; axis < 3; ++axis)
     max_distance += normal[axis] * (normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
@@ -61,17 +61,17 @@ bool NodeView::Plane::meets(const IndexBox& box) const {
 bool NodeView::clipped(const IndexBox& box) const {
   return (clip_ && !touch(box, *clip_)) ||
          !std::all_of(planes_.begin(), planes_.end(),
-                      [&](const Plane& plane) { return plane.meets(box); });
+                      [&](const Plane& plane) { return plane.intersects(box); });
 }
 
-NodeSight NodeView::see(const NodeKey& n) const {
+NodeSight NodeView::sight(const NodeKey& n) const {
   const IndexBox box = grid_.box(n);
   NodeSight sight;
   sight.distance = distance(box);
   sight.pixels = pixels(n.level, sight.distance);
   sight.clipped = clipped(box);
   if (sight.clipped) return sight;
-  const auto inside = [&](const Plane& plane) { return plane.meets(box); };
+  const auto inside = [&](const Plane& plane) { return plane.intersects(box); };
   sight.nearly_visible = std::all_of(wider_.begin(), wider_.end(), inside);
   // The larger picture contains the other one.
   sight.visible = sight.nearly_visible && std::all_of(picture_.begin(), picture_.end(), inside);

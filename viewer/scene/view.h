@@ -45,7 +45,7 @@ class NodeView {
  public:
   NodeView(const View& view, const NodeGrid& grid);
 
-  NodeSight see(const NodeKey& n) const;
+  NodeSight sight(const NodeKey& n) const;
   /// Computes NodeSight::clipped alone.
   bool clips(const NodeKey& n) const {
     return (clip_ || !planes_.empty()) && clipped(grid_.box(n));
@@ -57,7 +57,7 @@ class NodeView {
     double offset;  ///< inside: normal · p + offset >= 0
 
     /// Whether some point of the box lies inside.
-    bool meets(const IndexBox& box) const;
+    bool intersects(const IndexBox& box) const;
   };
   using Planes = std::array<Plane, 6>;
 

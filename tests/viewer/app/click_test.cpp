@@ -28,7 +28,7 @@ TEST_F(Click, ClicksPickFromThePictureAtRest) {
   ViewerWindow& window = open();
   for (int i = 0; i < 20; ++i) window.state().pacer.add_preview(2, 10'000, true);
   ASSERT_LT(window.state().pacer.max_triangles(), 4000u);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   const double isovalue = window.state().settings.surfaces[0].isovalue;
   const Vec3d eye = window.state().navigator.camera.eye;
   const auto triangles = window.state().scene_renderer->state().triangles;
@@ -49,9 +49,9 @@ TEST_F(Click, ClicksPickFromThePictureAtRest) {
 TEST_F(Click, ATransparentSurfaceIsPickedAsWell) {
   ViewerWindow& window = open();
   window.state().settings.surfaces[0].opacity = 0.4f;
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   steps(3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   click(kWidth / 2 + 40, kHeight / 2 - 50);
   ASSERT_TRUE(window.state().picked && window.state().picked->value);
   EXPECT_EQ(window.state().picked->surface, 1u);
@@ -69,7 +69,7 @@ TEST_F(Click, AClickBeforeThePictureRestsIsMadeGood) {
   EXPECT_TRUE(window.state().scene_renderer->state().moving);
   const double before = window.state().picked->value.value();
   const double isovalue = window.state().settings.surfaces[0].isovalue;
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   steps(3);
   ASSERT_TRUE(window.state().picked->value);
   EXPECT_NE(*window.state().picked->value, before);
@@ -81,7 +81,7 @@ TEST_F(Click, AClickBeforeThePictureRestsIsMadeGood) {
 /// A click on the background picks nothing, also on the still frame.
 TEST_F(Click, AClickBesideTheSurfaceLeavesWhatWasMeasured) {
   ViewerWindow& window = open();
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   window.state().measuring = true;
   click(kWidth / 2 + 40, kHeight / 2 - 50);
   ASSERT_EQ(window.state().measured.size(), 1u);
@@ -91,7 +91,7 @@ TEST_F(Click, AClickBesideTheSurfaceLeavesWhatWasMeasured) {
   display_->button(4, false);
   steps(1);
   click(3, 3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   steps(3);
   ASSERT_EQ(window.state().measured.size(), 1u);
   EXPECT_EQ(length(window.state().measured[0] - point), 0);

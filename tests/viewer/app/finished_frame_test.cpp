@@ -33,9 +33,9 @@ class FinishedFrame : public test::WindowTest {
   }
   std::uint64_t triangles() const { return window_->state().scene_renderer->state().triangles; }
   void rest() {
-    until([&] { return rests(); });
+    until([&] { return is_still(); });
     steps(3);
-    until([&] { return rests(); });
+    until([&] { return is_still(); });
   }
   /// Presses, holds and releases the button; returns the minimum of triangles meanwhile.
   std::uint64_t least_while_clicking(int x, int y) {

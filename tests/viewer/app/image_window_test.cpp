@@ -64,7 +64,7 @@ class ImageWindow : public test::WindowTest {
   /// The radius of the surface in the middle of the picture.
   double radius_in_the_middle() {
     steps(3);
-    until([&] { return rests(); });
+    until([&] { return is_still(); });
     const FrameState& state = window_->state().scene_renderer->state();
     EXPECT_GT(state.triangles, 0u);
     const Renderer& renderer = window_->state().scene_renderer->renderer();

@@ -43,7 +43,7 @@ TEST_F(Window, DragsMoveTheCameraAndSpinsRunOut) {
   const Vec3d eye = window.state().navigator.camera.eye;
   drag(1, 300, 240, 400, 260);
   EXPECT_GT(length(window.state().navigator.camera.eye - eye), 1);
-  until([&] { return !window.state().navigator.moving(); });
+  until([&] { return !window.state().navigator.is_moving(); });
   const double distance = window.state().navigator.camera.distance();
   display_->button(4, true);
   display_->button(4, false);
@@ -93,11 +93,11 @@ TEST_F(Window, KeysCutTheVolume) {
 /// If previews have full quality, no still frame is drawn after them.
 TEST_F(Window, RestsAfterMotionThatLeftNothingOut) {
   ViewerWindow& window = open();
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   window.state().pacer = FramePacer(10);
   drag(1, kWidth / 2, kHeight / 2, kWidth / 2 + 60, kHeight / 2);
-  until([&] { return !window.state().navigator.moving(); });
-  until([&] { return rests(); });
+  until([&] { return !window.state().navigator.is_moving(); });
+  until([&] { return is_still(); });
 }
 
 TEST_F(Window, KeysThatAreHeldDoMostThingsOnce) {
@@ -142,7 +142,7 @@ TEST_F(Window, SaysWhatIsDamaged) {
     file.write("damage", 6);
   }
   window.open(dir_ / "damaged.zarr");
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   steps(3);
   ASSERT_FALSE(window.state().scene_renderer->state().damage.empty());
   const auto has_message = [&](const std::string& text) {
@@ -166,20 +166,21 @@ TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   ViewerWindow& window = open();
   window.state().panels = true;
   steps(3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   EXPECT_LE(window.state().panel_width, 0.6f * kWidth + 1);
   EXPECT_EQ(window.state().scene_renderer->renderer().width(), kWidth)
       << "a panel of more than half is over it";
   ImGui::SetWindowSize("###panel", {250, static_cast<float>(kHeight)});
   display_->move_pointer(kWidth / 2, 20);  // nothing is drawn before something happens
   steps(3);
-  until(
-      [&] { return rests() && window.state().scene_renderer->renderer().width() == kWidth - 250; });
+  until([&] {
+    return is_still() && window.state().scene_renderer->renderer().width() == kWidth - 250;
+  });
   EXPECT_EQ(window.state().scene_renderer->renderer().height(), kHeight);
   // The middle of the remaining area shows the middle of the sphere, also for a click.
   display_->tap(XK_r);
   steps(3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   click(250 + (kWidth - 250) / 2, kHeight / 2);
   ASSERT_TRUE(window.state().picked);
   const Vec3d middle{47.5, 47.5, 47.5};
@@ -204,11 +205,11 @@ TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   display_->tap(XK_r);
   display_->key(XK_Shift_L, false);
   steps(3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   EXPECT_TRUE(is_seen(0, 95));
   EXPECT_GT(camera.distance(), surface) << "the surface fills more of it";
   display_->tap(XK_h);
-  until([&] { return rests() && window.state().scene_renderer->renderer().width() == kWidth; });
+  until([&] { return is_still() && window.state().scene_renderer->renderer().width() == kWidth; });
 }
 
 TEST_F(Window, ShowsHelpForF1AndQuestionMark) {
@@ -227,7 +228,7 @@ TEST_F(Window, ShowsHelpForF1AndQuestionMark) {
 TEST_F(Window, ShowsNoFrameWhereNothingChanges) {
   ViewerWindow& window = open();
   window.state().panels = true;
-  until([&] { return rests() && window.state().isovalue_stats->histogram() != nullptr; });
+  until([&] { return is_still() && window.state().isovalue_stats->histogram() != nullptr; });
   steps(20);
   const std::size_t before = window.state().frame_number;
   const std::clock_t used = std::clock();
@@ -269,7 +270,7 @@ TEST_F(Window, SurvivesOtherSizesAndNone) {
 
 TEST_F(Window, DrawsNothingWhileItIsMinimised) {
   ViewerWindow& window = open();
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   display_->minimise(window.handle());
   until([&] { return glfwGetWindowAttrib(window.handle(), GLFW_ICONIFIED) == GLFW_TRUE; });
   const std::uint64_t before = window.state().scene_renderer->counters().finished;
@@ -280,7 +281,7 @@ TEST_F(Window, DrawsNothingWhileItIsMinimised) {
   EXPECT_EQ(window.state().scene_renderer->counters().finished, before);
   EXPECT_GT(spent.count(), 0.04) << "nor does it spin";
   display_->restore(window.handle());
-  until([&] { return rests() && window.state().scene_renderer->counters().finished > before; });
+  until([&] { return is_still() && window.state().scene_renderer->counters().finished > before; });
   EXPECT_EQ(window.state().scene_renderer->state().isovalues[0],
             window.state().settings.surfaces[0].isovalue);
 }

@@ -53,7 +53,7 @@ class WindowTest : public testing::Test {
   }
 
   /// Whether the window shows a complete still frame.
-  bool rests() const {
+  bool is_still() const {
     const FrameState& state = window_->state().scene_renderer->state();
     return state.complete && !state.moving;
   }

@@ -109,7 +109,7 @@ TEST_F(CutTest, NearNodesAreFinerAndWhatIsNotSeenStaysCoarse) {
   const NodeView seen(view, tree().grid());
   for (const CutNode& node : cut.nodes) {
     const bool crossed = active.below(node.key);
-    const NodeSight sight = seen.see(node.key);
+    const NodeSight sight = seen.sight(node.key);
     if (node.key.level > 0 && crossed && sight.visible) {
       EXPECT_LE(sight.pixels, 3.0);
     }

@@ -112,9 +112,9 @@ TEST(Scene, ASwitchOfTheIndexIsSearchedAtOnce) {
   scene.search().use(IndexKind::octree);
   scene.search().wait();
   const auto before = scene.drawable();
-  EXPECT_FALSE(scene.search().found(std::vector<double>{0.0}));
+  EXPECT_FALSE(scene.search().is_current(std::vector<double>{0.0}));
   scene.update({0.0}, from, {});
-  EXPECT_TRUE(scene.search().found(std::vector<double>{0.0}));
+  EXPECT_TRUE(scene.search().is_current(std::vector<double>{0.0}));
   EXPECT_EQ(scene.search().state().active, active);
   EXPECT_TRUE(scene.is_newest(*before)) << "the same nodes";
 }
