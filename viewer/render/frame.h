@@ -21,9 +21,9 @@ struct FrameBlock {
   glm::mat4 projection, rotation;
   /// A point is kept where dot(xyz, position relative to the eye) + w >= 0.
   std::array<glm::vec4, kMaxHalfSpaces> half_spaces;
-  glm::vec4 depth;        ///< near, far, orthographic, 1 / depth of the scene
-  glm::vec4 viewport;     ///< width, height; half width and half height at depth 1 (anywhere if
-                          ///< orthographic)
+  glm::vec4 depth;  ///< near, far, orthographic, 1 / depth of the scene
+  /// Width, height; half width and half height at depth 1 (anywhere if orthographic).
+  glm::vec4 viewport;
   glm::vec4 pixel;        ///< length of a pixel at depth 1 (anywhere if orthographic)
   glm::vec4 top, bottom;  ///< background, linear
   /// Number of half spaces; whether picking; mask of all samples of a pixel.

@@ -45,8 +45,8 @@ struct PictureSettings {
 struct MeshStyle {
   Vec3f colour{0.87f, 0.80f, 0.70f};
   float opacity = 1;  ///< seen face to face; below 1: transparent
-  std::optional<Vec3f> inside =
-      {};  ///< colour of back faces in a clipped picture; default: a darker tone
+  /// Colour of back faces in a clipped picture; nullopt: a darker tone.
+  std::optional<Vec3f> inside = {};
   bool vertex_colours = true;  ///< a mesh's vertex colours override `colour`
   /// The id that pick() returns; 0: none. Transparent meshes keep the lowest 8 bits.
   std::uint32_t id = 0;
@@ -80,9 +80,8 @@ struct PickResult {
 /// one thread; the context it was made in must be current for every call. Each call leaves the
 /// framebuffer, program, vertex array, viewport and switches at OpenGL's defaults.
 ///
-/// Transparency is weighted blended order-independent (McGuire and Bavoil 2013): one pass in any
-/// order, so that meshes need not be kept. Depth peeling would be exact, but needs all meshes once
-/// for each layer.
+/// Transparency uses weighted blending (McGuire and Bavoil 2013): one pass in any order, so that
+/// meshes need not be kept. Depth peeling would be exact, but needs all meshes once for each layer.
 class Renderer {
  public:
   /// Throws Error if the current context is older than OpenGL 4.5.

@@ -52,10 +52,9 @@ class NodeSearch {
     bool building = false;               ///< another index is being built
     std::uint64_t bytes = 0;             ///< of the index
     double build_seconds = 0;
-    double search_seconds = 0;  ///< of the last search, for all its isovalues
-    std::uint64_t active = 0,
-                  nodes = 0;  ///< active nodes that it found, and all nodes of the finest level
-    std::string refused;      ///< why the requested kind is not used; or empty
+    double search_seconds = 0;            ///< of the last search, for all its isovalues
+    std::uint64_t active = 0, nodes = 0;  ///< found, and all of the finest level
+    std::string refused;                  ///< why the requested kind is not used; or empty
   };
   State state() const;
 
