@@ -1,13 +1,13 @@
-// How many pictures a second a store gives while the camera flies around it, off-screen, as the
-// window draws them (simpler ones where full ones take too long): from opening on, when all of
-// it is there, and while the isovalue slides as well. Then how long a picture at rest takes, and
-// how long input waits for a piece of it.
+// Frames per second of a store while the camera orbits it, off-screen, as the window draws them
+// (with previews if full frames take too long): from opening on, with all meshes resident, and
+// while the isovalue slides. Then the time of a still frame, and of its draw batches, which delay
+// input.
 //
 //   isobrick synth gyroid g.zarr --frequency 6 --dims 512,512,512 --type u8
 //   bench_viewer_orbit g.zarr --isovalue 127.5 --to 140
 //
-// Pictures follow each other at once; a picture's time ends with glFinish.
-// Built as bench/README.md says.
+// Frames follow each other without a pause; a frame's time ends with glFinish. Built as
+// bench/README.md says.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -20,8 +20,8 @@
 #include <optional>
 #include <utility>
 
+#include "bench/frame_times.h"
 #include "bench/guarded_main.h"
-#include "bench/picture_times.h"
 #include "core/stopwatch.h"
 #include "viewer/app/frame_pacer.h"
 #include "viewer/app/scene_renderer.h"
@@ -38,9 +38,9 @@ struct Arguments {
   std::string store;
   double isovalue = 127.5, to = 140;
   int width = 1280, height = 800;
-  double seconds = 8;  ///< of each phase, once around
+  double seconds = 8;  ///< of each phase: one orbit
   double memory_gib = 2;
-  std::optional<double> piece_seconds;
+  std::optional<double> batch_seconds;
   bool no_rest = false, pictures = false;
 };
 
@@ -52,19 +52,19 @@ class Flight {
     budgets.device_memory = budgets.memory;
     setup_ = std::make_shared<PictureSetup>(
         budgets, [] {}, PictureSize{arguments.width, arguments.height});
-    picture_ = std::make_unique<SceneRenderer>(
+    scene_renderer_ = std::make_unique<SceneRenderer>(
         std::make_shared<const StoreReader>(arguments.store), budgets, [] {}, setup_);
     settings_.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
     settings_.multisample = !current_gl_device().software;
-    choose_values(settings_, picture_->scene().tree());
-    const WorldBox box = picture_->bounds();
+    choose_values(settings_, scene_renderer_->scene().tree());
+    const WorldBox box = scene_renderer_->bounds();
     camera_.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
     start_ = camera_;
   }
 
-  /// Once around. `slide`: the isovalue goes to the other one and back.
+  /// One orbit. `slide`: the isovalue goes to the other one and back.
   Json around(bool slide) {
-    PicturesTimes times;
+    FrameTimings times;
     Json pictures = Json::array();
     double spent = 0;
     while (spent < arguments_.seconds) {
@@ -79,15 +79,16 @@ class Flight {
       const double submitted =
           draw({.max_triangles = pacer_.max_triangles(),
                 .thin_triangles = pacer_.thin_triangles(),
-                .plain = pacer_.plain() ? FrameOptions::Plain::yes : FrameOptions::Plain::no,
-                .smaller = pacer_.smaller()},
-               pacer_.smaller());
+                .quality = pacer_.reduces_quality() ? FrameOptions::Quality::reduced
+                                                    : FrameOptions::Quality::full,
+                .size_divisor = pacer_.size_divisor()},
+               pacer_.size_divisor());
       const double seconds = watch.lap();
-      const PictureState& state = picture_->state();
-      pictures.push_back({seconds * 1e3, pacer_.max_triangles(), pacer_.smaller(), pacer_.plain(),
-                          state.nodes, state.triangles, state.covers});
-      pacer_.drawn(seconds, state.triangles, state.limited, state.thin);
-      times.add(seconds, picture_->times(), seconds - submitted);
+      const FrameState& state = scene_renderer_->state();
+      pictures.push_back({seconds * 1e3, pacer_.max_triangles(), pacer_.size_divisor(),
+                          pacer_.reduces_quality(), state.nodes, state.triangles, state.covers});
+      pacer_.add_preview(seconds, state.triangles, state.limited, state.thin_over_budget);
+      times.add(seconds, scene_renderer_->times(), seconds - submitted);
       spent += seconds;
     }
     Json result = times.summary();
@@ -96,38 +97,39 @@ class Flight {
     return result;
   }
 
-  /// As the window draws when nothing moves, until nothing is missing. Of the pictures that it
-  /// takes, all but the last are simpler ones or lack meshes.
+  /// Draws as a window without motion until the frame is complete. All frames but the last have
+  /// reduced quality or lack meshes.
   Json rest() {
-    PicturesTimes steps;
-    const std::uint64_t before = picture_->counters().finished;
+    FrameTimings steps;
+    const std::uint64_t before = scene_renderer_->counters().finished;
     double all = 0, until_there = 0;
     do {
       FrameOptions options = FrameOptions::in_window(pacer_, current_gl_device().software, false);
-      options.piece_seconds = arguments_.piece_seconds.value_or(options.piece_seconds);
+      options.batch_seconds = arguments_.batch_seconds.value_or(options.batch_seconds);
       Stopwatch watch;
-      picture_->draw(camera_, arguments_.width, arguments_.height, settings_, options);
+      scene_renderer_->draw(camera_, arguments_.width, arguments_.height, settings_, options);
       const double step = watch.lap();
-      if (picture_->drew() || picture_->state().drawing) steps.add(step, picture_->times(), 0);
+      if (scene_renderer_->has_new_frame() || scene_renderer_->state().drawing)
+        steps.add(step, scene_renderer_->times(), 0);
       all += step;
-      if (!picture_->scene().stream().idle()) until_there = all;
-      if (picture_->drew() && !picture_->state().plain)
-        pacer_.drawn_still(picture_->picture_seconds(), picture_->state().triangles);
-    } while (!picture_->state().complete || picture_->state().plain);
+      if (!scene_renderer_->scene().stream().idle()) until_there = all;
+      if (scene_renderer_->has_new_frame() && !scene_renderer_->state().reduced_quality)
+        pacer_.add_still(scene_renderer_->frame_seconds(), scene_renderer_->state().triangles);
+    } while (!scene_renderer_->state().complete || scene_renderer_->state().reduced_quality);
     return {{"seconds", all},
             {"seconds_until_meshes_are_there", until_there},
-            {"pictures", picture_->counters().finished - before},
-            {"last_picture_seconds", picture_->picture_seconds()},
-            {"triangles", picture_->state().triangles},
+            {"pictures", scene_renderer_->counters().finished - before},
+            {"last_picture_seconds", scene_renderer_->frame_seconds()},
+            {"triangles", scene_renderer_->state().triangles},
             {"steps", steps.summary()}};
   }
 
  private:
-  /// Seconds until OpenGL was told.
-  double draw(const FrameOptions& options, int smaller) {
+  /// Seconds until all commands were submitted.
+  double draw(const FrameOptions& options, int size_divisor) {
     Stopwatch watch;
-    picture_->draw(camera_, arguments_.width / smaller, arguments_.height / smaller, settings_,
-                   options);
+    scene_renderer_->draw(camera_, arguments_.width / size_divisor,
+                          arguments_.height / size_divisor, settings_, options);
     const double submitted = watch.lap();
     glFinish();
     return submitted;
@@ -135,7 +137,7 @@ class Flight {
 
   const Arguments& arguments_;
   std::shared_ptr<PictureSetup> setup_;
-  std::unique_ptr<SceneRenderer> picture_;
+  std::unique_ptr<SceneRenderer> scene_renderer_;
   ViewSettings settings_;
   Camera camera_{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   Camera start_;
@@ -153,7 +155,7 @@ int run(int argc, char** argv) {
   app.add_option("--height", arguments.height);
   app.add_option("--memory", arguments.memory_gib, "GiB");
   app.add_flag("--no-rest", arguments.no_rest, "Do not wait until all is there");
-  app.add_option("--piece", arguments.piece_seconds, "Of pictures at rest, seconds");
+  app.add_option("--batch", arguments.batch_seconds, "Of pictures at rest, seconds");
   app.add_flag("--pictures", arguments.pictures, "Tell of every picture");
   CLI11_PARSE(app, argc, argv);
 

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include <isobrick/error.h>
-#include "bench/picture_times.h"
+#include "bench/frame_times.h"
 #include "viewer/app/frame_pacer.h"
 #include "viewer/app/scene_renderer.h"
 #include "viewer/render/gl_context.h"
@@ -21,7 +21,7 @@ namespace isobrick::bench {
 
 using Clock = std::chrono::steady_clock;
 
-/// Of bench_viewer_stream.
+/// Arguments of bench_viewer_stream.
 struct Arguments {
   std::string store;
   double isovalue = 127.5, to = 160.5;
@@ -37,7 +37,7 @@ inline double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// A store on a screen of no window.
+/// A store drawn off-screen.
 class Session {
  public:
   Session(const Arguments& arguments, const PictureBudgets& budgets,
@@ -46,28 +46,27 @@ class Session {
         opened_(Clock::now()),
         store_(std::make_shared<const StoreReader>(arguments.store)) {
     read_seconds = seconds_since(opened_);
-    picture_ = std::make_unique<SceneRenderer>(
+    scene_renderer_ = std::make_unique<SceneRenderer>(
         store_, budgets, [this] { changed_ = Clock::now(); }, setup);
     set_up_seconds = seconds_since(opened_);
     settings.surfaces = {{arguments.isovalue, surface_colour(0), 1, true}};
     settings.multisample = !software_;
-    choose_values(settings, picture_->scene().tree());
-    const WorldBox box = picture_->bounds();
+    choose_values(settings, scene_renderer_->scene().tree());
+    const WorldBox box = scene_renderer_->bounds();
     camera.fit(box.lo, box.hi, static_cast<double>(arguments.width) / arguments.height);
   }
 
-  SceneRenderer& picture() { return *picture_; }
+  SceneRenderer& renderer() { return *scene_renderer_; }
   double since_opened() const { return seconds_since(opened_); }
-  /// Seconds from `start` until the last mesh came.
+  /// Seconds from `start` until the last mesh arrived.
   double changed_after(Clock::time_point start) const {
     return std::chrono::duration<double>(changed_.load() - start).count();
   }
 
-  /// One frame as the window makes it. `moving`: its picture may be a simpler one.
+  /// Draws a frame as the window does. `moving`: it may be a preview.
   void draw(bool moving) { make_frame(moving); }
-  /// At most 60 times a second until `done`, and when all is there without waiting for the
-  /// next turn of a display, unless the picture before the last is waiting for it. Throws Error
-  /// when that takes longer than two minutes.
+  /// Draws at most 60 frames per second until `done`. A frame that completes the scene need not
+  /// wait for the next period, unless the previous one does. Throws Error after two minutes.
   template <class F>
   void draw_until(bool moving, F&& done) {
     const auto start = Clock::now();
@@ -75,9 +74,9 @@ class Session {
       const auto next = Clock::now() + kPeriod;
       draw(moving);
       if (done()) return;
-      if (picture_->state().drawing) continue;
+      if (scene_renderer_->state().drawing) continue;
       const std::chrono::duration<double> left = next - Clock::now();
-      const bool all_there = !moving && picture_->scene().stream().wait_idle(left.count());
+      const bool all_there = !moving && scene_renderer_->scene().stream().wait_idle(left.count());
       std::this_thread::sleep_until(all_there ? std::min(next, began_before_ + kPeriod) : next);
     }
     throw Error("what is waited for is not there after 120 s");
@@ -87,9 +86,9 @@ class Session {
   Camera camera{{0.5, -1, 0.35}, {0, 0, 0}, {0, 0, 1}};
   double read_seconds = 0, set_up_seconds = 0;
   std::uint64_t device_peak = 0;
-  Times at_rest;  ///< pictures in full when nothing moves and nothing is missing
+  Times at_rest;  ///< complete still frames in full quality
 
-  /// Since it was last asked: frames, and whole pictures but for those at rest.
+  /// Statistics since the last call: all frames, and finished frames other than at_rest.
   nlohmann::ordered_json take_times() {
     nlohmann::ordered_json json = std::exchange(frames_, {}).summary();
     json["whole_pictures"] = std::exchange(pictures_, {}).summary();
@@ -98,37 +97,39 @@ class Session {
 
  private:
   static constexpr auto kPeriod = std::chrono::microseconds(16'667);
-  static constexpr double kMin = 1e-3;  ///< seconds of a frame that counts
+  static constexpr double kMin = 1e-3;  ///< seconds; shorter frames do not count
 
   void make_frame(bool moving) {
     const auto start = Clock::now();
     const FrameOptions options = FrameOptions::in_window(pacer_, software_, moving);
-    const int smaller = moving ? pacer_.smaller() : 1;
-    picture_->draw(camera, arguments_.width / smaller, arguments_.height / smaller, settings,
-                   options);
+    const int size_divisor = moving ? pacer_.size_divisor() : 1;
+    scene_renderer_->draw(camera, arguments_.width / size_divisor, arguments_.height / size_divisor,
+                          settings, options);
     const double submitted = seconds_since(start);
     glFinish();
     const double seconds = seconds_since(start);
-    const PictureState& state = picture_->state();
-    if (seconds >= kMin) frames_.add(seconds, picture_->times(), seconds - submitted);
+    const FrameState& state = scene_renderer_->state();
+    if (seconds >= kMin) frames_.add(seconds, scene_renderer_->times(), seconds - submitted);
     device_peak = std::max(device_peak, state.device_bytes);
-    if (picture_->drew() || state.more) began_before_ = std::exchange(began_, start);
-    if (!picture_->drew()) return;  // nothing is drawn that would look the same
-    const double whole = std::max(seconds, picture_->picture_seconds());
-    (!moving && state.complete && !state.plain ? at_rest : pictures_).add(whole);
+    if (scene_renderer_->has_new_frame() || state.needs_draw)
+      began_before_ = std::exchange(began_, start);
+    if (!scene_renderer_->has_new_frame()) return;  // the picture would be equal
+    const double whole = std::max(seconds, scene_renderer_->frame_seconds());
+    (!moving && state.complete && !state.reduced_quality ? at_rest : pictures_).add(whole);
     if (moving)
-      pacer_.drawn(whole, state.triangles, state.limited, state.thin);
-    else if (!state.plain)
-      pacer_.drawn_still(whole, state.triangles);
+      pacer_.add_preview(whole, state.triangles, state.limited, state.thin_over_budget);
+    else if (!state.reduced_quality)
+      pacer_.add_still(whole, state.triangles);
   }
 
   const Arguments& arguments_;
   Clock::time_point opened_;
-  Clock::time_point began_, began_before_;  ///< the last frames that may have been shown
+  Clock::time_point began_,
+      began_before_;  ///< starts of the last two frames that a display may have shown
   std::atomic<Clock::time_point> changed_{Clock::time_point()};
   std::shared_ptr<const StoreReader> store_;
-  std::unique_ptr<SceneRenderer> picture_;
-  PicturesTimes frames_;
+  std::unique_ptr<SceneRenderer> scene_renderer_;
+  FrameTimings frames_;
   Times pictures_;
   const bool software_ = current_gl_device().software;
   FramePacer pacer_ = FramePacer::for_device(software_);

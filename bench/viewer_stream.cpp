@@ -1,17 +1,15 @@
-// What somebody at the viewer waits for, off-screen, through the code of its window: the
-// first surface after opening and after each jump of the isovalue, how long pictures take while
-// meshes come in, while the isovalue slides and while the camera turns, and the full
-// refinement of a region beside the batch extraction of the same region.
+// What a user of the viewer waits for, off-screen, through the code of its window: the first
+// surface after opening and after each jump of the isovalue; frame times while meshes arrive, while
+// the isovalue slides and while the camera orbits; and the full refinement of a region, compared
+// with its batch extraction.
 //
 //   isobrick synth gyroid g.zarr --dims 512,512,512
 //   bench_viewer_stream g.zarr --isovalue 127.5 --to 160.5 --json
 //
-// A picture's time ends with glFinish. Pictures are started at most 60 times a second, as a
-// display would have them; the one that shows everything when all is there, since a display has
-// room for one more that waits for its turn. A frame is what input waits for: a whole picture, in
-// software a piece of one, or what is done between two; those of less than a millisecond do not
-// count.
-// Built as bench/README.md says.
+// A frame's time ends with glFinish. Frames start at most 60 times a second, as on a display; the
+// final one starts as soon as all meshes are resident. A frame is what delays input: a whole
+// picture, in software a draw batch, or the work between two; frames below a millisecond do not
+// count. Built as bench/README.md says.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -42,7 +40,7 @@ using Json = nlohmann::ordered_json;
 
 std::uint64_t bytes_of(double gib) { return static_cast<std::uint64_t>(gib * (1 << 30)); }
 
-/// Takes a mesh and keeps nothing.
+/// A sink that discards the mesh.
 class NoSink final : public MeshSink {
  public:
   Indexing indexing() const override { return Indexing::welded; }
@@ -65,13 +63,13 @@ Json stream_json(const StreamCounters& c) {
           {"mesh_bytes", c.mesh_bytes},          {"brick_bytes_peak", c.brick_bytes_peak}};
 }
 
-/// The isovalue goes to and fro, another one with every picture.
+/// Slides the isovalue to and fro, another one for each frame.
 Json slide(Session& session, const Arguments& arguments) {
   Times behind;
   std::map<double, Clock::time_point> asked;
   const auto start = Clock::now();
   session.draw_until(true, [&] {
-    const std::vector<double>& shown = session.picture().state().isovalues;
+    const std::vector<double>& shown = session.renderer().state().isovalues;
     const auto found = shown.empty() ? asked.end() : asked.find(shown[0]);
     if (found != asked.end()) behind.add(seconds_since(found->second));
     const double turn = seconds_since(start) / arguments.seconds;
@@ -82,47 +80,46 @@ Json slide(Session& session, const Arguments& arguments) {
     return turn >= 1;
   });
   Json result = session.take_times();
-  // From asking for an isovalue to the end of a picture of its surface.
+  // From the request of an isovalue to the end of a frame that shows it.
   result["surface_behind_slider"] = behind.summary();
   return result;
 }
 
 Json device_json(const DeviceMesher::Times& t) {
   return {{"launches", t.launches},     {"meshes", t.grids},
-          {"turn_seconds", t.turn},     {"memory_seconds", t.memory},
-          {"device_seconds", t.device}, {"hand_out_seconds", t.hand_out}};
+          {"turn_seconds", t.lock},     {"memory_seconds", t.memory},
+          {"device_seconds", t.device}, {"hand_out_seconds", t.deliver}};
 }
 
-/// Whether the picture shows all that there is, as well as it can.
+/// Whether the frame is complete and in full quality.
 bool complete_in_full(Session& session) {
-  const PictureState& state = session.picture().state();
-  return state.complete && !state.plain;
+  const FrameState& state = session.renderer().state();
+  return state.complete && !state.reduced_quality;
 }
 
-/// The first store of a process, beside the opening of the device.
+/// Opens the first store of a process, while the device is opened.
 Json first_opening(const Arguments& arguments, const PictureBudgets& budgets,
                    const std::shared_ptr<PictureSetup>& setup) {
   Session session(arguments, budgets, setup);
-  session.draw_until(true, [&] { return session.picture().state().covers; });
+  session.draw_until(true, [&] { return session.renderer().state().covers; });
   Json result{{"first_surface_ms", session.since_opened() * 1e3}};
   session.draw_until(false, [&] { return complete_in_full(session); });
   result["complete_ms"] = session.since_opened() * 1e3;
-  // The device may be there only now.
+  // The device may open only now.
   session.draw_until(false, [&] {
     const auto& device = setup->device();
-    return !device->begun() || device->over();
+    return !device->has_begun() || device->is_done();
   });
   result["frames"] = session.take_times();
   return result;
 }
 
-/// Opening until the whole volume is refined as far as picture and budget go; jumps;
-/// sliding; turning.
+/// Opening, until the volume is refined within the budget; jumps; sliding; orbiting.
 Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
                  const std::shared_ptr<PictureSetup>& setup) {
   Session session(arguments, budgets, setup);
   Json result;
-  const auto covers = [&] { return session.picture().state().covers; };
+  const auto covers = [&] { return session.renderer().state().covers; };
   const auto complete = [&] { return complete_in_full(session); };
   session.draw_until(true, covers);
   result["open"] = {{"store_ms", session.read_seconds * 1e3},
@@ -130,9 +127,9 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
                     {"first_surface_ms", session.since_opened() * 1e3}};
   session.draw_until(false, complete);
   result["open"]["complete_ms"] = session.since_opened() * 1e3;
-  result["open"]["triangles"] = session.picture().state().triangles;
-  result["open"]["nodes"] = session.picture().state().nodes;
-  result["open"]["limited_by_budget"] = session.picture().state().limited_by_budget;
+  result["open"]["triangles"] = session.renderer().state().triangles;
+  result["open"]["nodes"] = session.renderer().state().nodes;
+  result["open"]["limited_by_budget"] = session.renderer().state().limited_by_budget;
   Json jumps = Json::array();
   for (int i = 1; i <= arguments.jumps; ++i) {
     const double part = static_cast<double>(i) / arguments.jumps;
@@ -140,7 +137,7 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
         arguments.isovalue + part * (arguments.to - arguments.isovalue);
     const auto start = Clock::now();
     Json jump{{"isovalue", session.settings.surfaces[0].isovalue}};
-    // As the window does: simpler pictures until there is one of the new surface.
+    // As in the window: previews until the new surface is shown.
     session.draw(true);
     session.draw_until(true, covers);
     jump["first_surface_ms"] = seconds_since(start) * 1e3;
@@ -163,12 +160,12 @@ Json interactive(const Arguments& arguments, const PictureBudgets& budgets,
     return turn >= 1;
   });
   result["while_turning"] = session.take_times();
-  const CutTimes cut = session.picture().scene().times();
+  const CutTimes cut = session.renderer().scene().times();
   result["last_cut"] = {
       {"search_ms", cut.search * 1e3}, {"cut_ms", cut.cut * 1e3}, {"plan_ms", cut.plan * 1e3}};
-  result["meshes_by"] = session.picture().device().describe();
-  result["stream"] = stream_json(session.picture().scene().stream().counters());
-  result["device"] = device_json(session.picture().device().times());
+  result["meshes_by"] = session.renderer().device().describe();
+  result["stream"] = stream_json(session.renderer().scene().stream().counters());
+  result["device"] = device_json(session.renderer().device().times());
   result["device_bytes_peak"] = session.device_peak;
   return result;
 }
@@ -185,7 +182,7 @@ Box3 region_of(const StoreReader& store, int edge_cells) {
   return roi;
 }
 
-/// The batch extraction of its samples; seconds and triangles.
+/// Batch extraction of the region's samples; returns seconds and triangles.
 std::pair<double, std::uint64_t> extract_region(const StoreReader& store, Box3 roi,
                                                 const Arguments& arguments,
                                                 const PictureBudgets& budgets, Backend backend) {
@@ -203,7 +200,7 @@ std::pair<double, std::uint64_t> extract_region(const StoreReader& store, Box3 r
   return {seconds_since(start), report.triangles};
 }
 
-/// From nothing to complete.
+/// Refines the region from the start until it is complete.
 Json refine_region(const StoreReader& store, Box3 roi, const Arguments& arguments,
                    const PictureBudgets& budgets, const std::shared_ptr<PictureSetup>& setup) {
   glFinish();  // the session before may still be giving memory back
@@ -212,7 +209,7 @@ Json refine_region(const StoreReader& store, Box3 roi, const Arguments& argument
   const Int3 extent = store.info().levels.front().lattice.extent;
   for (int axis = 0; axis < 3; ++axis) {
     const auto last = static_cast<double>(extent[axis] - 1);
-    // Neighbours that only touch it stay out.
+    // Neighbours that only touch the region are left out.
     session.settings.region_lo[axis] =
         static_cast<float>((static_cast<double>(roi.lo[axis]) + 0.5) / last);
     session.settings.region_hi[axis] =
@@ -220,25 +217,25 @@ Json refine_region(const StoreReader& store, Box3 roi, const Arguments& argument
   }
   session.settings.pixel_error = 0.02f;
   const auto start = Clock::now();
-  Json ends = Json::array();  // of pictures, and how much each showed
+  Json ends = Json::array();  // end of each frame, and its triangles
   session.draw_until(false, [&] {
-    const PictureState& state = session.picture().state();
+    const FrameState& state = session.renderer().state();
     ends.push_back({seconds_since(start) * 1e3, state.nodes, state.triangles});
     return complete_in_full(session);
   });
   return {{"seconds", seconds_since(start)},
-          {"triangles", session.picture().state().triangles},
-          {"nodes", session.picture().state().nodes},
-          {"limited_by_budget", session.picture().state().limited_by_budget},
+          {"triangles", session.renderer().state().triangles},
+          {"nodes", session.renderer().state().nodes},
+          {"limited_by_budget", session.renderer().state().limited_by_budget},
           {"picture_ends_ms_nodes_triangles", ends},
           {"last_mesh_seconds", session.changed_after(start)},
           {"frames", session.take_times()},
           {"at_rest", session.at_rest.summary()},
-          {"device", device_json(session.picture().device().times())},
-          {"stream", stream_json(session.picture().scene().stream().counters())}};
+          {"device", device_json(session.renderer().device().times())},
+          {"stream", stream_json(session.renderer().scene().stream().counters())}};
 }
 
-/// A region's refinement beside its extraction, by turns. The medians, and all.
+/// Alternates a region's refinement and its extraction. Reports medians, and all times.
 Json refinement(const Arguments& arguments, const PictureBudgets& budgets,
                 const std::shared_ptr<PictureSetup>& setup) {
   const StoreReader store(arguments.store);
@@ -299,12 +296,12 @@ int run(int argc, char** argv) {
               {"renderer", current_gl_device().renderer},
               {"cores", std::thread::hardware_concurrency()},
               {"size", fmt::format("{}x{}", arguments.width, arguments.height)}};
-  // As a window does when it is made, before any store is opened.
+  // As a window does before it opens a store.
   const auto start = Clock::now();
   const auto setup = std::make_shared<PictureSetup>(
       budgets, [] {}, PictureSize{arguments.width, arguments.height});
   result["set_up_ms"] = seconds_since(start) * 1e3;
-  // First what is best measured in a process that has drawn nothing yet.
+  // First the measurement that needs a process which has drawn nothing.
   result["first_opening"] = first_opening(arguments, budgets, setup);
   glFinish();  // the session before may still be giving memory back
   result["interactive"] = interactive(arguments, budgets, setup);

@@ -103,26 +103,26 @@ void make_folder(const std::string& folder) {
 }
 
 /// Moves the cameras of a turn so far back that all of them see the box whole.
-void see_whole(std::vector<Shot>& turn, const WorldBox& box, double aspect) {
+void see_whole(std::vector<Screenshot>& turn, const WorldBox& box, double aspect) {
   const auto fitting = [&](Camera camera) {
     camera.fit(box.lo, box.hi, aspect);
     return camera.distance();
   };
   double most = 0;
-  for (const Shot& shot : turn) most = std::max(most, fitting(shot.camera));
+  for (const Screenshot& shot : turn) most = std::max(most, fitting(shot.camera));
   const double first = fitting(turn.front().camera);
-  for (Shot& shot : turn) shot.camera.zoom(first / most);
+  for (Screenshot& shot : turn) shot.camera.zoom(first / most);
 }
 
 /// The pictures that are asked for, of which none may be there already.
-std::vector<Shot> shots_of(const Arguments& arguments, const SceneRenderer& picture,
-                           const ViewSettings& settings) {
+std::vector<Screenshot> shots_of(const Arguments& arguments, const SceneRenderer& picture,
+                                 const ViewSettings& settings) {
   if (!arguments.screenshot.empty()) check_picture_name(arguments.screenshot);
   const CameraRequest& request = arguments.picture.camera;
   const double aspect =
       static_cast<double>(arguments.picture.size.width) / arguments.picture.size.height;
   const Camera camera = make_camera(request, picture, settings, aspect);
-  std::vector<Shot> shots;
+  std::vector<Screenshot> shots;
   if (!arguments.turntable.empty()) {
     make_folder(arguments.turntable);
     shots = turntable(camera, request.up, arguments.frames, arguments.turntable);
@@ -130,12 +130,13 @@ std::vector<Shot> shots_of(const Arguments& arguments, const SceneRenderer& pict
   }
   if (!arguments.screenshot.empty()) shots.insert(shots.begin(), {arguments.screenshot, camera});
   const std::array<std::filesystem::path, 1> inputs{arguments.store};
-  for (const Shot& shot : shots) {
+  for (const Screenshot& shot : shots) {
     check_replaces_no_input(shot.file, inputs);
     check_output(shot.file, arguments.force);
   }
   // Also shows that there is such a folder, and that it can be written to.
-  for (const Shot* shot : {&shots.front(), &shots.back()}) OutputFile(shot->file, arguments.force);
+  for (const Screenshot* shot : {&shots.front(), &shots.back()})
+    OutputFile(shot->file, arguments.force);
   return shots;
 }
 
@@ -146,16 +147,16 @@ struct ScreenshotReport {
   bool limited_by_budget = false;
 };
 
-ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Shot>& shots,
+ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Screenshot>& shots,
                             PictureSize size, const ViewSettings& settings, bool force,
                             Progress& progress) {
   ScreenshotReport drawn;
   progress.begin("draw", 0);
-  for (const Shot& shot : shots) {
+  for (const Screenshot& shot : shots) {
     picture.draw_complete(shot.camera, size.width, size.height, settings,
                           [&] { progress.advance(0); });
     write_picture(picture.renderer(), shot.file, force);
-    const PictureState& state = picture.state();
+    const FrameState& state = picture.state();
     drawn.damage.insert(state.damage.begin(), state.damage.end());
     drawn.most_triangles = std::max(drawn.most_triangles, state.triangles);
     drawn.limited_by_budget |= state.limited_by_budget;
@@ -180,7 +181,7 @@ int draw(const Arguments& arguments, Console& console) {
                                            transparent, current_gl_device().software),
                         {});
   choose_values(settings, picture.scene().tree());
-  const std::vector<Shot> shots = shots_of(arguments, picture, settings);
+  const std::vector<Screenshot> shots = shots_of(arguments, picture, settings);
   NodeSearch& search = picture.scene().search();
   search.use(arguments.index);
   search.wait();

@@ -6,8 +6,7 @@
 namespace isobrick {
 
 void draw_backend_panel(ViewerState& state) {
-  DeviceMeshes& device = state.picture->device();
-  // In the order of Backend.
+  DeviceMeshes& device = state.scene_renderer->device();
   const char* const names[] = {"auto", "cpu", "cuda"};
   int chosen = static_cast<int>(device.backend());
   ImGui::SetNextItemWidth(scaled(130));
@@ -15,7 +14,7 @@ void draw_backend_panel(ViewerState& state) {
     try {
       device.use(static_cast<Backend>(chosen));
     } catch (const Error& e) {
-      state.say(e.what());
+      state.show_message(e.what());
     }
   }
   ImGui::TextWrapped("%s", device.describe().c_str());

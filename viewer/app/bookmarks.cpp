@@ -19,13 +19,13 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uintmax_t kMaxBytes = 16u << 20;
 
-/// All bookmarks of the user: an object of lists by the stores' absolute paths.
+/// Reads all bookmarks of the user: an object of lists, by the stores' absolute paths.
 Json read(const fs::path& file) {
   std::error_code missing;
   const std::uintmax_t size = fs::file_size(file, missing);
   if (missing) return Json::object();
   if (size > kMaxBytes)
-    throw Error(fmt::format("'{}' is larger than bookmarks can be", file.string()));
+    throw Error(fmt::format("'{}' is too large for a file of bookmarks", file.string()));
   std::ifstream in(file, std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(in), {});
   Json json = Json::parse(text, nullptr, false);
@@ -50,7 +50,7 @@ fs::path Bookmarks::default_file() {
   if (data != nullptr && *data != '\0') return fs::path(data) / "isobrick" / "bookmarks.json";
   const char* home = std::getenv("HOME");
   if (home == nullptr || *home == '\0')
-    throw Error("bookmarks have no place: neither XDG_DATA_HOME nor HOME is set");
+    throw Error("there is no folder for bookmarks: neither XDG_DATA_HOME nor HOME is set");
   return fs::path(home) / ".local" / "share" / "isobrick" / "bookmarks.json";
 }
 
@@ -83,12 +83,12 @@ void Bookmarks::remove(std::size_t number) {
 
 void Bookmarks::save(std::vector<Bookmark> list) {
   fs::create_directories(file_.parent_path());
-  Json all = read(file_);  // others may have written since
+  Json all = read(file_);  // another process may have written it
   Json mine = Json::array();
   for (const Bookmark& b : list) {
     mine.push_back(
         {{"name", b.name}, {"camera", to_json(b.camera)}, {"settings", to_json(b.settings)}});
-    bookmark_from(mine.back());  // one that cannot be read would hide all of them
+    bookmark_from(mine.back());  // throws; an unreadable one would hide all others
   }
   all[store_] = std::move(mine);
   OutputFile out(file_.string(), true);

@@ -8,27 +8,27 @@
 
 namespace isobrick {
 
-/// A view that somebody wants to come back to.
+/// A stored view.
 struct Bookmark {
   std::string name;
   Camera camera;
   ViewSettings settings;
 };
 
-/// The bookmarks of one store, in a file of the user's (a store may be read-only).
+/// The bookmarks of one store, in a file of the user's, since a store may be read-only.
 class Bookmarks {
  public:
-  /// $XDG_DATA_HOME/isobrick/bookmarks.json, or that below ~/.local/share. Throws Error
-  /// when neither variable is set.
+  /// $XDG_DATA_HOME/isobrick/bookmarks.json, or the same below ~/.local/share. Throws Error if
+  /// neither XDG_DATA_HOME nor HOME is set.
   static std::filesystem::path default_file();
 
-  /// Reads what `file` holds for `store`; a file that is not there holds nothing.
-  /// Throws Error for one that is no file of bookmarks.
+  /// Reads the bookmarks of `store` from `file`, which need not exist. Throws Error if `file` is no
+  /// file of bookmarks.
   Bookmarks(std::filesystem::path file, const std::filesystem::path& store);
 
   const std::vector<Bookmark>& list() const { return list_; }
-  // Both write the file; when that fails they throw Error and nothing has changed.
-  /// Adds it, in place of one of the same name.
+  // Both write the file. If that fails they throw Error and change nothing.
+  /// Adds a bookmark; it replaces one of the same name.
   void add(Bookmark bookmark);
   void remove(std::size_t number);
 

@@ -12,22 +12,22 @@ namespace {
 
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
 
-void across_axes(ViewSettings& settings) {
+void axis_clips(ViewSettings& settings) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    CutSettings& cut = settings.cuts[axis];
+    AxisClipSettings& clip = settings.axis_clips[axis];
     ImGui::PushID(kAxes[axis]);
-    ImGui::Checkbox(kAxes[axis], &cut.on);
+    ImGui::Checkbox(kAxes[axis], &clip.on);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(scaled(150));
-    ImGui::SliderFloat("##place", &cut.place, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("##place", &clip.position, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::SameLine();
-    if (ImGui::SmallButton(cut.beyond ? "above" : "below")) cut.beyond = !cut.beyond;
+    if (ImGui::SmallButton(clip.above ? "above" : "below")) clip.above = !clip.above;
     ImGui::PopID();
   }
 }
 
-/// Where planes across `normal` meet the box: the least and the largest of a HalfSpace's `least`.
-std::pair<double, double> places(const WorldBox& box, Vec3d normal) {
+/// The range of HalfSpace::least for planes with this normal that meet the box.
+std::pair<double, double> offset_range(const WorldBox& box, Vec3d normal) {
   double lo = 0, hi = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const double a = normal[axis] * box.lo[axis], b = normal[axis] * box.hi[axis];
@@ -37,41 +37,40 @@ std::pair<double, double> places(const WorldBox& box, Vec3d normal) {
   return {lo, hi};
 }
 
-/// Turns a plane about the place where it goes through the box, so that what lies along
-/// `normal` stays.
-void turn(HalfSpace& kept, const WorldBox& box, Vec3d normal) {
-  const auto [old_lo, old_hi] = places(box, kept.normal);
+/// Sets a plane's normal and keeps its relative position in the box.
+void rotate(HalfSpace& kept, const WorldBox& box, Vec3d normal) {
+  const auto [old_lo, old_hi] = offset_range(box, kept.normal);
   const double part = old_hi > old_lo ? (kept.least - old_lo) / (old_hi - old_lo) : 0.5;
   kept.normal = normal;
-  const auto [lo, hi] = places(box, normal);
+  const auto [lo, hi] = offset_range(box, normal);
   kept.least = lo + std::clamp(part, 0.0, 1.0) * (hi - lo);
 }
 
-/// False when its user removes it.
-bool one_plane(PlaneSettings& plane, const WorldBox& box, Vec3d ahead) {
+/// Returns false if the user removes it.
+bool one_plane(ClipPlaneSettings& plane, const WorldBox& box, Vec3d ahead) {
   HalfSpace& kept = plane.kept;
   ImGui::Checkbox("##on", &plane.on);
   ImGui::SameLine();
-  const auto [lo, hi] = places(box, kept.normal);
+  const auto [lo, hi] = offset_range(box, kept.normal);
   ImGui::SetNextItemWidth(scaled(150));
   ImGui::SliderScalar("##place", ImGuiDataType_Double, &kept.least, &lo, &hi, "%.4g");
   ImGui::SameLine();
   if (ImGui::SmallButton("Flip")) kept = {kept.normal * -1.0, -kept.least};
   ImGui::SameLine();
-  if (ImGui::SmallButton("Face me")) turn(kept, box, ahead);
+  if (ImGui::SmallButton("Face me")) rotate(kept, box, ahead);
   ImGui::SameLine();
   const bool stays = !ImGui::SmallButton("x");
   std::array<double, 3> normal{kept.normal.x, kept.normal.y, kept.normal.z};
   ImGui::SetNextItemWidth(scaled(220));
   if (ImGui::InputScalarN("direction", ImGuiDataType_Double, normal.data(), 3, nullptr, nullptr,
                           "%.3f", ImGuiInputTextFlags_EnterReturnsTrue))
-    turn(kept, box, unit({normal[0], normal[1], normal[2]}, kept.normal));
+    rotate(kept, box, unit({normal[0], normal[1], normal[2]}, kept.normal));
   return stays;
 }
 
 void planes(ViewerState& state) {
   auto& list = state.settings.planes;
-  const WorldBox box = state.picture->bounds();
+  const WorldBox box = state.scene_renderer->bounds();
   const Vec3d ahead = state.navigator.camera.back * -1.0;
   for (std::size_t i = 0; i < list.size();) {
     ImGui::PushID(static_cast<int>(i));
@@ -90,7 +89,7 @@ void planes(ViewerState& state) {
 
 void draw_clip_panel(ViewerState& state) {
   ViewSettings& settings = state.settings;
-  across_axes(settings);
+  axis_clips(settings);
   planes(state);
   ImGui::Checkbox("Region", &settings.region_on);
   if (!settings.region_on) return;

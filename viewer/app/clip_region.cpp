@@ -11,7 +11,7 @@
 namespace isobrick {
 namespace {
 
-/// Of the coarsest level's nodes: their own ranges or those with all below.
+/// The range of the coarsest level's nodes: of their own samples, or of all below.
 template <class RangeOf>
 ValueRange<float> range_of_all(const NodeTree& tree, RangeOf&& range_of) {
   const int top = tree.grid().levels() - 1;
@@ -67,19 +67,19 @@ ClipRegion clip_region(const ViewSettings& settings) {
       box.lo[axis] = std::clamp<double>(settings.region_lo[axis], 0, 1);
       box.hi[axis] = std::clamp<double>(settings.region_hi[axis], 0, 1);
     }
-    const CutSettings& cut = settings.cuts[static_cast<std::size_t>(axis)];
-    if (!cut.on) continue;
-    if (cut.beyond)
-      box.hi[axis] = std::min<double>(box.hi[axis], cut.place);
+    const AxisClipSettings& clip = settings.axis_clips[static_cast<std::size_t>(axis)];
+    if (!clip.on) continue;
+    if (clip.above)
+      box.hi[axis] = std::min<double>(box.hi[axis], clip.position);
     else
-      box.lo[axis] = std::max<double>(box.lo[axis], cut.place);
+      box.lo[axis] = std::max<double>(box.lo[axis], clip.position);
   }
   return box;
 }
 
 std::vector<HalfSpace> clip_half_spaces(const ViewSettings& settings) {
   std::vector<HalfSpace> kept;
-  for (const PlaneSettings& plane : settings.planes)
+  for (const ClipPlaneSettings& plane : settings.planes)
     if (plane.on) kept.push_back(plane.kept);
   return kept;
 }
@@ -117,19 +117,19 @@ ClipTest::ClipTest(const PictureSettings& picture) : half_spaces_(picture.half_s
   }
 }
 
-std::uint16_t ClipTest::of(Vec3d middle, double radius) const {
+std::uint16_t ClipTest::mask(Vec3d middle, double radius) const {
   unsigned bits = 0;
   for (std::size_t i = 0; i < half_spaces_.size(); ++i)
     if (dot(half_spaces_[i].normal, middle) - radius < half_spaces_[i].least) bits |= 1u << i;
   return static_cast<std::uint16_t>(bits);
 }
 
-/// Seam strips go a little beyond the node, less than a cell.
-std::uint16_t ClipTest::of(const NodeGrid& grid, const NodeKey& node) const {
+/// Seam strips extend less than a cell beyond the node.
+std::uint16_t ClipTest::mask(const NodeGrid& grid, const NodeKey& node) const {
   const IndexBox box = grid.box(node);
   const Transform& t = grid.transform();
   const Vec3d middle = t.apply((box.lo + box.hi) * 0.5);
-  return of(middle, length(t.apply(box.hi) - middle) + grid.level(node.level).spacing);
+  return mask(middle, length(t.apply(box.hi) - middle) + grid.level(node.level).spacing);
 }
 
 View view_of(const Camera& camera, int width, int height, double pixel_error) {

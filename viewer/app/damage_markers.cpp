@@ -16,12 +16,12 @@ void draw_markers(Renderer& renderer, const ViewSettings& settings, const NodeGr
                   Vec3d last, const Drawable* shown) {
   const Transform& transform = grid.transform();
   if (shown != nullptr)
-    for (const DrawnNode& node : shown->nodes) {
+    for (const NodeDraw& node : shown->nodes) {
       if (node.mesh->damage.empty()) continue;
       const IndexBox box = grid.box(node.mesh->key);
       const auto c = corners(transform, box.lo, box.hi);
       std::vector<WorldLine> lines = edges(c);
-      for (std::size_t i = 0; i < 4; ++i) lines.push_back({c[i], c[7 - i]});  // a cross inside
+      for (std::size_t i = 0; i < 4; ++i) lines.push_back({c[i], c[7 - i]});  // space diagonals
       renderer.draw_lines(lines, kMarkColour, 2);
     }
   if (settings.box) renderer.draw_lines(edges(corners(transform, {0, 0, 0}, last)), kBoxColour);

@@ -7,9 +7,8 @@
 
 namespace isobrick {
 
-/// Draws what a picture shows beside surfaces and slices: boxes with a cross where `shown` (null:
-/// nothing) is damaged, and the volume's box, axes and scale bar where settings want them. `last`:
-/// the last sample of level 0.
+/// Draws boxes with a cross around damaged nodes of `shown` (null: none). Draws the volume's box,
+/// axes and scale bar if the settings have them. `last`: the last sample of level 0.
 void draw_markers(Renderer& renderer, const ViewSettings& settings, const NodeGrid& grid,
                   Vec3d last, const Drawable* shown);
 

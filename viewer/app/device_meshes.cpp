@@ -12,7 +12,7 @@
 namespace isobrick {
 
 void DeviceOpener::begin() {
-  if (begun()) return;
+  if (has_begun()) return;
   const auto id = current_gl_device_id();  // may throw
   std::promise<std::shared_ptr<DeviceMesher>> opened;
   mesher_ = opened.get_future().share();
@@ -26,7 +26,7 @@ void DeviceOpener::begin() {
   });
 }
 
-/// Whether there was anything to import.
+/// Returns whether there was a block to import.
 bool DeviceOpener::import_one(DeviceMesher& mesher) {
   const std::vector<DeviceBlock> blocks = mesher.shared_blocks();
   const std::size_t done = imported_.size();
@@ -35,19 +35,19 @@ bool DeviceOpener::import_one(DeviceMesher& mesher) {
   try {
     imported_.emplace(
         block.owner.get(),
-        std::unique_ptr<Imported>(
-            new Imported{block.owner, {block.file, block.bytes, block.vertices, block.triangles}}));
-  } catch (const Error&) {  // what is there must do
+        std::unique_ptr<ImportedBlock>(new ImportedBlock{
+            block.owner, {block.file, block.bytes, block.vertices, block.triangles}}));
+  } catch (const Error&) {  // continue with the blocks imported so far
     mesher.share_only(done);
   }
   return true;
 }
 
-bool DeviceOpener::opened() const {
-  return begun() && mesher_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+bool DeviceOpener::is_open() const {
+  return has_begun() && mesher_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
-/// Once it is open; null where there is none.
+/// The device, once is_open(); null if there is none.
 DeviceMesher* DeviceOpener::mesher() const {
   try {
     return mesher_.get().get();
@@ -56,14 +56,14 @@ DeviceMesher* DeviceOpener::mesher() const {
   }
 }
 
-bool DeviceOpener::over() const {
-  if (!opened()) return false;
+bool DeviceOpener::is_done() const {
+  if (!is_open()) return false;
   const DeviceMesher* const device = mesher();
   return device == nullptr || imported_.size() == device->shared_blocks().size();
 }
 
 bool DeviceOpener::import_next() {
-  if (!opened()) return false;
+  if (!is_open()) return false;
   DeviceMesher* const device = mesher();
   return device != nullptr && import_one(*device);
 }
@@ -75,15 +75,17 @@ std::shared_ptr<DeviceMesher> DeviceOpener::get() {
   return device;
 }
 
-std::uint64_t DeviceOpener::held() const {
-  const DeviceMesher* const device = opened() ? mesher() : nullptr;
+std::uint64_t DeviceOpener::allocated_bytes() const {
+  const DeviceMesher* const device = is_open() ? mesher() : nullptr;
   return device == nullptr ? 0 : device->bytes();
 }
 
-std::uint64_t DeviceOpener::reserved() const { return begun() && !opened() ? budget_ : held(); }
+std::uint64_t DeviceOpener::reserved_bytes() const {
+  return has_begun() && !is_open() ? budget_ : allocated_bytes();
+}
 
-DeviceMeshes::DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opening)
-    : stream_(stream), opening_(std::move(opening)) {}
+DeviceMeshes::DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opener)
+    : stream_(stream), opener_(std::move(opener)) {}
 
 void DeviceMeshes::use(Backend backend) {
   const bool must = backend == Backend::cuda;
@@ -91,10 +93,10 @@ void DeviceMeshes::use(Backend backend) {
     throw Error("--backend cuda: this isobrick was built without CUDA; use --backend cpu");
   backend_ = backend;
   if (backend == Backend::cpu) return stream_.set_device(nullptr);
-  opening_->begin();
-  if (opened_)
+  opener_->begin();
+  if (taken_over_)
     stream_.set_device(mesher_);
-  else if (must || opening_->over())
+  else if (must || opener_->is_done())
     take_over();
   if (mesher_ && !mesher_->failure().empty()) failure_ = mesher_->failure();
   if (!must || (mesher_ && failure_.empty())) return;
@@ -104,16 +106,16 @@ void DeviceMeshes::use(Backend backend) {
 }
 
 bool DeviceMeshes::update() {
-  if (opened_) return false;
-  const bool imported = !opening_->over() && opening_->import_next();
-  if (opening_->over()) take_over();
+  if (taken_over_) return false;
+  const bool imported = !opener_->is_done() && opener_->import_next();
+  if (opener_->is_done()) take_over();
   return imported;
 }
 
 void DeviceMeshes::take_over() {
-  opened_ = true;
+  taken_over_ = true;
   try {
-    mesher_ = opening_->get();
+    mesher_ = opener_->get();
   } catch (const Error& e) {
     failure_ = e.what();
   }
@@ -137,14 +139,14 @@ std::string DeviceMeshes::describe() const {
     return fmt::format("{}{}", mesher_->name(),
                        shares_memory() ? ", into OpenGL's buffers" : ", through host memory");
   if (!failure_.empty()) return fmt::format("CPU ({})", failure_);
-  return opened_ ? "CPU (there is no CUDA device)" : "CPU";
+  return taken_over_ ? "CPU (there is no CUDA device)" : "CPU";
 }
 
-const PooledMesh& DeviceMeshes::drawn(const NodeMesh& mesh, Vec3d origin) {
-  const DeviceMesh& there = *mesh.device;
-  const MeshPlace place =
-      opening_->buffers_of(there.block)
-          .place(there.first_vertex, there.vertices, there.first_triangle, there.triangles);
+const PooledMesh& DeviceMeshes::borrow(const NodeMesh& mesh, Vec3d origin) {
+  const DeviceMesh& device_mesh = *mesh.device;
+  const MeshPlace place = opener_->buffers_of(device_mesh.block)
+                              .place(device_mesh.first_vertex, device_mesh.vertices,
+                                     device_mesh.first_triangle, device_mesh.triangles);
   return borrowed_.emplace_back(MeshPool::borrow(place, origin));
 }
 

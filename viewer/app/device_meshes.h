@@ -15,39 +15,39 @@
 
 namespace isobrick {
 
-/// The device that makes meshes, opened once and beside everything else, and its memory as OpenGL
-/// sees it. All of that memory is taken and imported before the device makes any mesh, one piece at
-/// a time: an import takes as long as half a picture may. For the thread of the context.
+/// Opens the device that makes meshes, on a thread of its own, and imports its memory into OpenGL.
+/// All memory is allocated and imported before the first mesh, one block at a time, since an import
+/// may take half the time of a frame. For the thread of the context.
 class DeviceOpener {
  public:
-  /// `budget`: of the device's memory for meshes. `on_change` is called from another thread when
-  /// the device is there, or is known not to come.
+  /// `budget`: bytes of device memory for meshes. `on_change` is called from another thread once
+  /// the device is open, or has failed to open.
   DeviceOpener(std::uint64_t budget, std::function<void()> on_change)
       : budget_(budget), on_change_(std::move(on_change)) {}
 
-  /// Unless it has begun: that of the current OpenGL context, if possible. Throws Error, and has
-  /// not begun, when that context cannot say which it is.
+  /// Starts to open the device of the current OpenGL context, if possible; only the first call
+  /// does. Throws Error if the context cannot report its device; then has_begun() stays false.
   void begin();
-  bool begun() const { return mesher_.valid(); }
-  /// Whether the device is there, perhaps without its memory, or is known not to come.
-  bool opened() const;
-  /// Whether the device is there with its memory, or is known not to come.
-  bool over() const;
-  /// Waits for that. Null where there is no device; throws Error when it cannot be opened.
+  bool has_begun() const { return mesher_.valid(); }
+  /// Whether opening has ended, with or without success; the memory may not be imported yet.
+  bool is_open() const;
+  /// Whether opening has ended and all memory is imported.
+  bool is_done() const;
+  /// Waits for is_done(). Returns null if there is no device; throws Error if it cannot be opened.
   std::shared_ptr<DeviceMesher> get();
-  /// Imports one piece of the memory, once it is there. Whether there was one.
+  /// Imports one block of memory, if the device is open. Returns whether it did.
   bool import_next();
 
-  /// Device memory for meshes: that is taken, and that may be taken.
-  std::uint64_t held() const;
-  std::uint64_t reserved() const;
+  /// Bytes of device memory for meshes: allocated now, and reserved.
+  std::uint64_t allocated_bytes() const;
+  std::uint64_t reserved_bytes() const;
 
   const ImportedBuffers& buffers_of(const DeviceBlock& block) const {
     return imported_.at(block.owner.get())->buffers;
   }
 
  private:
-  struct Imported {
+  struct ImportedBlock {
     std::shared_ptr<const void> owner;
     ImportedBuffers buffers;
   };
@@ -57,59 +57,58 @@ class DeviceOpener {
 
   std::uint64_t budget_;
   std::function<void()> on_change_;
-  std::unordered_map<const void*, std::unique_ptr<Imported>> imported_;
+  std::unordered_map<const void*, std::unique_ptr<ImportedBlock>> imported_;
   std::shared_future<std::shared_ptr<DeviceMesher>> mesher_;
-  std::jthread opener_;  ///< last: ends before the others
+  std::jthread opener_;  ///< last member: joined before the others are destroyed
 };
 
-/// The device that makes a picture's meshes, and its memory as OpenGL sees it. For the thread
-/// of the picture's context.
+/// The device that makes a scene's meshes, and its memory as OpenGL sees it. For the thread of the
+/// context.
 class DeviceMeshes {
  public:
-  DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opening);
+  DeviceMeshes(SceneStream& stream, std::shared_ptr<DeviceOpener> opener);
 
-  /// From now on: Backend::automatic takes a CUDA device where there is one, as soon as it is
-  /// open, without waiting for it. Backend::cuda waits, and throws Error where there is none.
+  /// Sets the backend. Backend::automatic takes a CUDA device, if there is one, once it is open; it
+  /// does not wait. Backend::cuda waits, and throws Error if there is none.
   void use(Backend backend);
   Backend backend() const { return backend_; }
-  /// Takes over a device that has been opened meanwhile; before, imports its memory, a piece with
-  /// each call. Whether it has imported one.
+  /// Imports one block of the device's memory, or takes over a device that is complete. Returns
+  /// whether it imported a block.
   bool update();
-  /// Whether update() has something to do.
-  bool more() const { return !opened_ && opening_->opened(); }
+  /// Whether update() has work.
+  bool has_work() const { return !taken_over_ && opener_->is_open(); }
 
-  /// Who makes meshes now, in a line: a device's name and how meshes get into pictures, or
-  /// "CPU" and why.
+  /// Describes what makes meshes, in a line: the device's name and how its meshes reach pictures,
+  /// or "CPU" and the reason.
   std::string describe() const;
-  /// Whether what a device makes is drawn from where it made it.
+  /// Whether OpenGL draws the device's meshes from where they were made.
   bool shares_memory() const;
 
-  /// What the device has done; nothing where there is none.
+  /// Totals of the device; zero if there is none.
   DeviceMesher::Times times() const { return mesher_ ? mesher_->times() : DeviceMesher::Times{}; }
-  /// DeviceMesher::kernel_lock(), where the device makes meshes and draws; else null.
+  /// DeviceMesher::kernel_lock(), if the device makes meshes that are also drawn; else null.
   TicketLock* kernel_lock() const;
 
-  /// A mesh on the device, to be drawn until the next forget(). Where memory is shared, whoever
-  /// draws waits for the end of each picture: only then may meshes go, and their places be given
-  /// to others.
-  const PooledMesh& drawn(const NodeMesh& mesh, Vec3d origin);
-  void forget() { borrowed_.clear(); }
+  /// Returns a mesh on the device, to draw until release_borrowed(). With shared memory the caller
+  /// waits for the end of each picture before it releases meshes, since their space is reused.
+  const PooledMesh& borrow(const NodeMesh& mesh, Vec3d origin);
+  void release_borrowed() { borrowed_.clear(); }
 
-  /// Device memory for meshes that devices make: that is taken, and that may be taken.
-  std::uint64_t held() const { return opening_->held(); }
-  std::uint64_t reserved() const { return opening_->reserved(); }
+  /// Bytes of device memory for meshes: allocated now, and reserved.
+  std::uint64_t allocated_bytes() const { return opener_->allocated_bytes(); }
+  std::uint64_t reserved_bytes() const { return opener_->reserved_bytes(); }
 
-  /// Of that memory: what is in meshes; the rest falls between.
+  /// The part of that memory for meshes; fragmentation takes the rest.
   static std::uint64_t cache_bytes(std::uint64_t memory) { return memory / 4 * 3; }
 
  private:
   void take_over();
 
   SceneStream& stream_;
-  std::shared_ptr<DeviceOpener> opening_;
+  std::shared_ptr<DeviceOpener> opener_;
   Backend backend_ = Backend::cpu;
   std::shared_ptr<DeviceMesher> mesher_;
-  bool opened_ = false;  ///< or tried in vain
+  bool taken_over_ = false;  ///< or failed to
   std::string failure_;
   std::deque<PooledMesh> borrowed_;
 };

@@ -13,8 +13,8 @@ struct HelpLine {
 };
 
 constexpr std::array kLines{
-    HelpLine{"left button", "turn (in fly mode: look around)"},
-    HelpLine{"middle button, or shift + left", "shift"},
+    HelpLine{"left button", "rotate (in fly mode: look around)"},
+    HelpLine{"middle button, or shift + left", "pan"},
     HelpLine{"right button, or wheel", "zoom (in fly mode the wheel changes the speed)"},
     HelpLine{"control + left button", "roll"},
     HelpLine{"click", "position, value and normal of the surface"},
@@ -25,7 +25,7 @@ constexpr std::array kLines{
     HelpLine{"P", "perspective or orthographic"},
     HelpLine{"F", "orbit, trackball, fly"},
     HelpLine{"W A S D Q E", "move, in fly mode"},
-    HelpLine{"1 2 3", "cut across x, y, z"},
+    HelpLine{"1 2 3", "clip across x, y, z"},
     HelpLine{"M", "measure between two clicks"},
     HelpLine{"O L B", "occlusion, edges, box"},
     HelpLine{"H", "show or hide the panel"},

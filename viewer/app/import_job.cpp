@@ -25,7 +25,7 @@ namespace isobrick {
 
 namespace fs = std::filesystem;
 
-/// Tells the window how far it is, and throws where the window does not want it any more.
+/// Reports progress to the window, and throws when the window cancels.
 class ImportJob::Reporter final : public Progress {
  public:
   explicit Reporter(ImportJob& job) : job_(job) {}
@@ -72,7 +72,7 @@ void ImportJob::add_note(std::string note) {
   state_.notes.push_back(std::move(note));
 }
 
-/// Of a file with several volumes, of which somebody would have to choose, the first.
+/// Opens the first volume of a file with several.
 std::unique_ptr<VolumeSource> ImportJob::open_first(VolumeRequest request) {
   const std::string input = input_.string();
   std::exception_ptr why;
@@ -107,7 +107,7 @@ std::unique_ptr<VolumeSource> ImportJob::open() {
                             shell_word(picture.replace_extension(".png").string())));
   }
   request.memory = options_.memory;
-  // A folder of slices has no format of its own.
+  // A folder of slices has no format.
   if (fs::is_regular_file(input_) && recognise_format(input) == VolumeFormat::vdb)
     request.grid = grid_to_show(read_vdb_header(input));
   if (request.grid)
@@ -128,8 +128,8 @@ void ImportJob::add_ranges(Progress& progress) {
                        (store_ / "isobrick").string()));
 }
 
-/// A conversion keeps what it has so that it can be resumed; a cancelled drop is not. What another
-/// process has taken over meanwhile, and so has locked, stays.
+/// Removes a cancelled conversion, which is not resumed after a drop. Another process may have
+/// taken it over, and locked it; then it stays.
 void ImportJob::discard() const {
   const fs::path partial = staging_path(store_);
   const UniqueFd folder(::open(partial.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));

@@ -18,31 +18,30 @@
 
 namespace isobrick {
 
-/// A conversion, or what else makes a volume ready to be shown, in a thread of its own, for a
-/// window that goes on meanwhile. The destructor cancels it and waits until nothing unfinished is
-/// left.
+/// Makes a volume ready to view, on a thread of its own: converts it, or adds ranges to an image.
+/// The destructor cancels it and waits until no unfinished files are left.
 class ImportJob {
  public:
-  /// Converts `input` (any format that open_source or a store can be) to `store`.
+  /// Converts `input`, a store or any format of open_source(), to `store`.
   ImportJob(std::filesystem::path input, std::filesystem::path store, ConvertOptions options);
-  /// Adds to an image, in its place, the ranges that a volume of it lacks.
+  /// Adds the ranges that a volume of an image lacks, in place.
   ImportJob(std::filesystem::path image, const Selection& volume, ConvertOptions options);
   ~ImportJob();
 
   struct State {
-    std::string stage;                  ///< what goes on
-    std::uint64_t done = 0, total = 0;  ///< bytes of the stage; total 0: unknown
-    bool finished = false;              ///< well, cancelled or not
-    std::string failure;                ///< empty when all went well or was cancelled
+    std::string stage;                  ///< description of the present step
+    std::uint64_t done = 0, total = 0;  ///< bytes of the step; total 0: unknown
+    bool finished = false;              ///< also after failure or cancellation
+    std::string failure;                ///< empty after success or cancellation
     bool cancelled = false;
-    std::vector<std::string> notes;  ///< remarks about the input, as `convert` has them
+    std::vector<std::string> notes;  ///< messages about the input, as `convert` prints them
   };
   State state() const;
   void cancel() { cancel_ = true; }
 
   const std::filesystem::path& input() const { return input_; }
   const std::filesystem::path& store() const { return store_; }
-  /// Whose ranges are added; nothing of a conversion.
+  /// The volume whose ranges are added; nullopt for a conversion.
   const std::optional<Selection>& volume() const { return volume_; }
 
  private:
@@ -61,16 +60,16 @@ class ImportJob {
   mutable Mutex mutex_;
   State state_ ISOBRICK_GUARDED_BY(mutex_);
   std::atomic<bool> cancel_ = false;
-  bool begun_ = false;  ///< the conversion has a folder of its own; of the thread
-  std::thread thread_;  ///< last: it uses the others
+  bool begun_ = false;  ///< the conversion has made its folder; for the thread only
+  std::thread thread_;  ///< last member: it uses the others
 };
 
-/// The grid of a dropped OpenVDB file, where somebody would have to choose: the first of
-/// floats, else the first that can be read.
+/// Chooses the grid of a dropped OpenVDB file with several: the first of floats, else the first
+/// that can be read.
 std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids);
 
-/// Where a dropped file's store goes: beside it if its folder can be written to, else
-/// among temporary files; a name that is not taken.
+/// The path of a dropped file's store, which does not exist yet: beside the file if its folder is
+/// writable, else among temporary files.
 std::filesystem::path store_for(const std::filesystem::path& input);
 
 }  // namespace isobrick

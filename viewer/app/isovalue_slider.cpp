@@ -24,11 +24,11 @@ struct Axis {
   }
 };
 
-/// Bars as high as the logarithm of their counts.
+/// Draws bars with the logarithm of the counts as height.
 void draw_bars(ImDrawList& draw, const Histogram& h, const Axis& axis, float top, float bottom) {
-  std::uint64_t most = 1;
-  for (const std::uint64_t n : h.counts) most = std::max(most, n);
-  const float full = std::log1p(static_cast<float>(most));
+  std::uint64_t max_count = 1;
+  for (const std::uint64_t n : h.counts) max_count = std::max(max_count, n);
+  const float full = std::log1p(static_cast<float>(max_count));
   for (std::size_t i = 0; i < h.counts.size(); ++i) {
     if (h.counts[i] == 0) continue;
     const double from = h.lo + static_cast<double>(i) * h.bin_width;
@@ -50,19 +50,20 @@ std::string human_count(double n) {
   return fmt::format("{:.0f}", n);
 }
 
-void tell(const ViewerState& state, double isovalue) {
-  const IsovalueCounts& counts = state.facts->counts();
-  const StreamCounters made = state.picture->scene().stream().counters();
-  ImGui::SetTooltip("%s", fmt::format("{:.6g}\nabout {} triangles\nin {} of {} bricks of level 0",
-                                      isovalue, human_count(state.facts->triangles(isovalue, made)),
-                                      counts.active_bricks(isovalue), counts.bricks())
-                              .c_str());
+void show_tooltip(const ViewerState& state, double isovalue) {
+  const IsovalueCounts& counts = state.isovalue_stats->counts();
+  const StreamCounters made = state.scene_renderer->scene().stream().counters();
+  ImGui::SetTooltip(
+      "%s", fmt::format("{:.6g}\nabout {} triangles\nin {} of {} bricks of level 0", isovalue,
+                        human_count(state.isovalue_stats->triangles(isovalue, made)),
+                        counts.active_bricks(isovalue), counts.bricks())
+                .c_str());
 }
 
 }  // namespace
 
 void draw_isovalue_slider(ViewerState& state, float width, float height) {
-  const auto range = state.facts->counts().range();
+  const auto range = state.isovalue_stats->counts().range();
   if (!(range.lo < range.hi)) {
     ImGui::TextUnformatted(range.empty() ? "There are no samples but NaN."
                                          : "All samples are equal.");
@@ -74,7 +75,7 @@ void draw_isovalue_slider(ViewerState& state, float width, float height) {
   const float top = corner.y, bottom = corner.y + height;
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   draw.AddRectFilled(corner, {corner.x + width, bottom}, kBack);
-  if (const auto histogram = state.facts->histogram())
+  if (const auto histogram = state.isovalue_stats->histogram())
     draw_bars(draw, *histogram, axis, top + 2, bottom);
   for (std::size_t i = 0; i < state.settings.surfaces.size(); ++i) {
     const float x = axis.place(state.settings.surfaces[i].isovalue);
@@ -84,7 +85,7 @@ void draw_isovalue_slider(ViewerState& state, float width, float height) {
   const float pointer = ImGui::GetIO().MousePos.x;
   if (ImGui::IsItemHovered() || ImGui::IsItemActive()) {
     draw.AddLine({pointer, top}, {pointer, bottom}, kCursor, scaled(1));
-    tell(state, axis.value(pointer));
+    show_tooltip(state, axis.value(pointer));
   }
   if (!ImGui::IsItemActive() || state.settings.surfaces.empty()) return;
   state.settings.surfaces[state.selected].isovalue = axis.value(pointer);

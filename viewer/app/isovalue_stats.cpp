@@ -13,10 +13,10 @@ namespace {
 
 constexpr int kBins = 256;
 
-/// Ends a count that nobody waits for.
-class Stoppable final : public Progress {
+/// Cancels the count when `stop` is set.
+class StopCheck final : public Progress {
  public:
-  explicit Stoppable(const std::atomic<bool>& stop) : stop_(stop) {}
+  explicit StopCheck(const std::atomic<bool>& stop) : stop_(stop) {}
   void begin(std::string_view, std::uint64_t) override { check(); }
   void advance(std::uint64_t) override { check(); }
   void end() override {}
@@ -34,7 +34,7 @@ IsovalueStats::IsovalueStats(std::shared_ptr<const StoreReader> store)
     : counts_(*store_bricks(store)) {
   thread_ = std::thread([this, store = std::move(store)] {
     try {
-      Stoppable progress(stop_);
+      StopCheck progress(stop_);
       auto counted =
           std::make_shared<const Histogram>(isobrick::histogram(*store, progress, kBins, true));
       const MutexLock lock(mutex_);
@@ -43,7 +43,7 @@ IsovalueStats::IsovalueStats(std::shared_ptr<const StoreReader> store)
                                counted->left_out, counted->level, counted->damage);
       histogram_ = std::move(counted);
     } catch (const Cancelled&) {
-      // Nobody waits for it any more.
+      // The destructor cancelled it.
     } catch (const std::exception& error) {
       const MutexLock lock(mutex_);
       failure_ = "the histogram cannot be counted: " + error_message(error);
@@ -69,7 +69,8 @@ std::string IsovalueStats::take_failure() {
 double IsovalueStats::triangles(double isovalue, const StreamCounters& made) const {
   const std::uint64_t blocks = counts_.active_blocks(isovalue);
   double each = made.triangles_per_block;
-  // A small surface is measured once as much as all of it was made; until then as cuts guess.
+  // Too few blocks for the average may still be all blocks of a small surface. Else the estimate is
+  // that of cuts.
   if (each == 0 && made.blocks_made > 0 && made.blocks_made >= blocks)
     each = static_cast<double>(made.triangles_made) / static_cast<double>(made.blocks_made);
   if (each == 0) each = CutBudget().triangles_per_block;

@@ -13,22 +13,22 @@
 
 namespace isobrick {
 
-/// What is known about the isovalues of a store: how its samples spread, counted in a
-/// thread of its own, and how much surface there is, from the ranges.
+/// Statistics of a store's isovalues: the histogram of its samples, counted by a thread of its own,
+/// and the size of surfaces, from the ranges.
 class IsovalueStats {
  public:
   explicit IsovalueStats(std::shared_ptr<const StoreReader> store);
-  /// Ends the count.
+  /// Cancels the count.
   ~IsovalueStats();
 
-  /// The histogram, once it is counted. Null before and when it failed.
+  /// The histogram; null until it is counted, and if that failed.
   std::shared_ptr<const Histogram> histogram() const;
-  /// Why it failed, once; empty when it has not, or that was taken before.
+  /// Returns why the count failed, once; else empty.
   std::string take_failure();
 
   /// Of level 0.
   const IsovalueCounts& counts() const { return counts_; }
-  /// About how many triangles level 0 has, as many a block as the meshes made so far.
+  /// Estimates the triangles of an isosurface of level 0. `made`: for the triangles per block.
   double triangles(double isovalue, const StreamCounters& made) const;
 
  private:

@@ -9,20 +9,20 @@
 namespace isobrick {
 namespace {
 
-/// A drag across the picture's shorter side.
+/// Angle of a drag across the picture's shorter side.
 constexpr double kFullTurn = std::numbers::pi;
-constexpr double kSpinSeconds = 0.25;  ///< until a spin has 1/e of its speed
+constexpr double kSpinSeconds = 0.25;  ///< time in which a spin slows down to 1/e
 constexpr double kPushSeconds = 0.12;
 constexpr double kStillSpin = 0.01, kStillPush = 0.01;
 constexpr double kWheelStep = 1.15;
 
-/// `v` turned about the unit vector `axis` (Rodrigues).
+/// Rotates `v` about the unit vector `axis` (Rodrigues).
 Vec3d turned(Vec3d v, Vec3d axis, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   return v * c + cross(axis, v) * s + axis * (dot(axis, v) * (1 - c));
 }
 
-/// Turns the camera about its own eye.
+/// Rotates the camera about its eye.
 void look(Camera& camera, double right, double up, Vec3d vertical) {
   const double distance = camera.distance();
   const auto turn = [&](Vec3d axis, double angle) {
@@ -33,7 +33,7 @@ void look(Camera& camera, double right, double up, Vec3d vertical) {
   camera.target = camera.eye - camera.back * distance;
 }
 
-/// Moves `value` to `goal`, the rest shrinking to 1/e in `time`.
+/// Moves `value` towards `goal`; the difference shrinks to 1/e in `time`.
 void approach(double& value, double goal, double seconds, double time) {
   value = goal + (value - goal) * std::exp(-seconds / time);
   if (goal == 0 && std::abs(value) < kStillPush) value = 0;
@@ -47,7 +47,7 @@ void Navigator::turn(double right, double down) {
     case NavigationMode::orbit: camera.orbit(angle, over, vertical); break;
     case NavigationMode::trackball: camera.orbit(angle, over, camera.up); break;
     case NavigationMode::fly: {
-      // What is under the pointer stays there.
+      // The point under the pointer stays there.
       const double view = camera.field_of_view * std::numbers::pi / 180;
       look(camera, -right * view, down * view, vertical);
       break;
@@ -57,7 +57,7 @@ void Navigator::turn(double right, double down) {
 
 void Navigator::rotate(double right, double down, double seconds) {
   turn(right, down);
-  // The speed of the last few events, since single ones jump.
+  // An average of the last few events, since single ones vary.
   const double time = std::max(seconds, 1e-3);
   const double blend = held_ ? std::exp(-time / 0.05) : 0;
   spin_right_ = blend * spin_right_ + (1 - blend) * right / time;
@@ -83,14 +83,14 @@ void Navigator::stop() {
   spin_right_ = spin_down_ = push_right_ = push_up_ = push_ahead_ = 0;
 }
 
-bool Navigator::moving() const {
+bool Navigator::is_moving() const {
   return (!held_ && (spin_right_ != 0 || spin_down_ != 0)) || !(keys_ == FlyKeys{}) ||
          push_right_ != 0 || push_up_ != 0 || push_ahead_ != 0;
 }
 
 bool Navigator::update(double seconds) {
   if (held_) {
-    // A hand that holds still stops the spin.
+    // Holding the mouse still stops the spin.
     approach(spin_right_, 0, seconds, 0.05);
     approach(spin_down_, 0, seconds, 0.05);
   } else if (spin_right_ != 0 || spin_down_ != 0) {
@@ -108,7 +108,7 @@ bool Navigator::update(double seconds) {
       (camera.right * push_right_ + camera.up * push_up_ - camera.back * push_ahead_) * way;
   camera.eye = camera.eye + move;
   camera.target = camera.target + move;
-  return moving();
+  return is_moving();
 }
 
 }  // namespace isobrick

@@ -30,7 +30,7 @@ std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
 
-/// The whole text as a number.
+/// Parses the whole text as a number.
 std::optional<double> number_of(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
@@ -40,17 +40,17 @@ std::optional<double> number_of(std::string_view text) {
   return value;
 }
 
-/// What is typed counts once it is all there: after Enter, or when the field is left.
+/// Edits an isovalue. The text takes effect after Enter, or when the field loses focus.
 void type_isovalue(ViewerState& state, std::size_t number) {
   double& isovalue = state.settings.surfaces[number].isovalue;
-  const bool going_on = state.typed && state.typed->surface == number;
+  const bool is_typing = state.typed && state.typed->surface == number;
   const std::string shown = fmt::format("{:.6g}", isovalue);
-  std::string text = going_on ? state.typed->text : shown;
+  std::string text = is_typing ? state.typed->text : shown;
   if (ImGui::InputText("##isovalue", &text, ImGuiInputTextFlags_CharsScientific))
     state.typed = {number, text};
   if (!state.typed || state.typed->surface != number || ImGui::IsItemActive()) return;
   const std::optional<double> value = number_of(state.typed->text);
-  // What is shown is rounded, and so no other value.
+  // The text is a rounded value; unchanged text must not change the isovalue.
   if (ImGui::IsItemDeactivated() && value && state.typed->text != shown) isovalue = *value;
   state.typed.reset();
 }
@@ -97,19 +97,19 @@ void slices_panel(ViewerState& state) {
     ImGui::Checkbox(kAxes[axis], &slice.shown);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(scaled(200));
-    ImGui::SliderFloat("##place", &slice.place, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("##place", &slice.position, 0, 1, "%.3f", ImGuiSliderFlags_AlwaysClamp);
     ImGui::PopID();
   }
-  const auto range = state.facts->counts().range();
+  const auto range = state.isovalue_stats->counts().range();
   if (range.empty()) return;
   const auto lo = static_cast<float>(range.lo), hi = static_cast<float>(range.hi);
   ImGui::DragFloatRange2("Window", &settings.window_lo, &settings.window_hi, (hi - lo) / 500, lo,
                          hi, "%.5g");
 }
 
-/// Which stored level is the finest to be shown.
+/// Draws the choice of the finest stored level.
 void finest_level(ViewerState& state) {
-  const int coarsest = static_cast<int>(state.picture->store().info().levels.size()) - 1;
+  const int coarsest = static_cast<int>(state.scene_renderer->store().info().levels.size()) - 1;
   if (coarsest > 0)
     ImGui::SliderInt("Finest level", &state.settings.finest_level, 0, coarsest, "%d",
                      ImGuiSliderFlags_AlwaysClamp);
@@ -161,7 +161,8 @@ void look_panel(ViewerState& state) {
 }
 
 void picking_panel(ViewerState& state) {
-  const std::string unit = unit_symbol(state.picture->scene().tree().grid().transform().unit);
+  const std::string unit =
+      unit_symbol(state.scene_renderer->scene().tree().grid().transform().unit);
   if (const auto& p = state.picked) {
     text(fmt::format("Position {:.6g}, {:.6g}, {:.6g} {}", p->world.x, p->world.y, p->world.z,
                      unit));
@@ -180,13 +181,13 @@ void picking_panel(ViewerState& state) {
                                                : "Click on its other end.");
 }
 
-/// Runs what may fail; a failure is shown.
+/// Calls f() and shows an exception as a message.
 template <class F>
 void attempt(ViewerState& state, F&& f) {
   try {
     f();
   } catch (const std::exception& e) {
-    state.say(error_message(e));
+    state.show_message(error_message(e));
   }
 }
 
@@ -221,29 +222,29 @@ void bookmarks_panel(ViewerState& state) {
     });
 }
 
-/// Counted some times a second: it takes as long as to plan.
-std::uint64_t bricks_wanted(ViewerState& state) {
+/// Counts a few times a second, since that takes as long as planning.
+std::uint64_t missing_bricks(ViewerState& state) {
   constexpr double kSeconds = 0.25;
-  // Of many a fiftieth of the time at most.
+  // If there are many, counting takes at most a fiftieth of the time.
   constexpr double kPart = 50;
   const double now = ImGui::GetTime();
-  if (now >= state.count_wanted_at) {
+  if (now >= state.next_brick_count) {
     Stopwatch watch;
-    state.bricks_wanted = state.picture->scene().stream().bricks_wanted();
-    state.count_wanted_at = now + std::max(kSeconds, kPart * watch.lap());
+    state.missing_bricks = state.scene_renderer->scene().stream().missing_bricks();
+    state.next_brick_count = now + std::max(kSeconds, kPart * watch.lap());
   }
-  return state.bricks_wanted;
+  return state.missing_bricks;
 }
 
-/// What a picture is, or becomes.
-const char* stage_of(const PictureState& p) {
+/// Describes the state of a frame.
+const char* stage_of(const FrameState& p) {
   if (p.moving) return "preview";
-  return p.complete && !p.plain ? "complete" : "refining";
+  return p.complete && !p.reduced_quality ? "complete" : "refining";
 }
 
 void status_panel(ViewerState& state) {
-  const StreamCounters c = state.picture->scene().stream().counters();
-  const PictureState& p = state.picture->state();
+  const StreamCounters c = state.scene_renderer->scene().stream().counters();
+  const FrameState& p = state.scene_renderer->state();
   ImGui::PlotLines("##frames", state.frame_times.data(), static_cast<int>(state.frame_times.size()),
                    static_cast<int>(state.frame_number % state.frame_times.size()), nullptr, 0, 50,
                    {ImGui::GetContentRegionAvail().x, scaled(36)});
@@ -252,19 +253,19 @@ void status_panel(ViewerState& state) {
                    state.draw_seconds * 1e3));
   if (p.moving && p.limited)
     text(fmt::format("preview: about {} triangles, 1/{} of the size", state.pacer.max_triangles(),
-                     state.pacer.smaller()));
+                     state.pacer.size_divisor()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
-  text(fmt::format("bricks: {} resident ({}), {} wanted", c.bricks_resident,
-                   mebibytes(c.brick_bytes), bricks_wanted(state)));
+  text(fmt::format("bricks: {} resident ({}), {} missing", c.bricks_resident,
+                   mebibytes(c.brick_bytes), missing_bricks(state)));
   text(fmt::format("read {} in {:.2f} s, decode {:.2f} s, mesh {:.2f} s", mebibytes(c.bytes_read),
                    c.read_seconds, c.decode_seconds, c.mesh_seconds));
-  text(fmt::format("{} meshes ({}), {} wait, {} in work", c.meshes, mebibytes(c.mesh_bytes),
+  text(fmt::format("{} meshes ({}), {} waiting, {} in progress", c.meshes, mebibytes(c.mesh_bytes),
                    c.queue, c.working));
-  if (p.limited_by_budget) text("as fine as the memory allows");
+  if (p.limited_by_budget) text("detail limited by the memory budget");
   if (!p.damage.empty()) text(fmt::format("{} parts cannot be shown", p.damage.size()));
   if (p.drawing)
-    ImGui::TextDisabled("drawing %.0f %%", 100 * p.drawn_part);
+    ImGui::TextDisabled("drawing %.0f %%", 100 * p.drawn_fraction);
   else
     ImGui::TextDisabled("%s", stage_of(p));
 }
@@ -294,13 +295,13 @@ void messages_panel(ViewerState& state) {
     state.messages_shown = 0;
     return;
   }
-  // Beside the panel where there is room, and always above it.
+  // Beside the panel if there is room, and always in front of it.
   const ImVec2 all = ImGui::GetMainViewport()->Size;
   const float taken = state.panel_room(all.x);
   const float width = 0.9f * (all.x - taken);
   ImGui::SetNextWindowPos({(all.x + taken) / 2, all.y - 20}, ImGuiCond_Always, {0.5f, 1});
   ImGui::SetNextWindowSizeConstraints({std::min(scaled(300), width), 0}, {width, all.y * 0.4f});
-  // A new one comes to the front, but takes nobody's field or slider away.
+  // A new message comes to the front, but takes no field's or slider's focus.
   const bool busy = ImGui::IsAnyItemActive() || ImGui::GetIO().WantTextInput;
   if (!busy && std::exchange(state.messages_shown, state.messages.size()) != state.messages.size())
     ImGui::SetNextWindowFocus();
@@ -310,7 +311,7 @@ void messages_panel(ViewerState& state) {
   ImGui::PushTextWrapPos(width - scaled(20));
   for (const Message& message : state.messages) text(message.text);
   ImGui::PopTextWrapPos();
-  // While the pointer is on them they stay.
+  // Messages under the pointer stay.
   if (ImGui::IsWindowHovered())
     for (Message& message : state.messages)
       message.until = std::chrono::steady_clock::now() + state.message_time;
@@ -324,7 +325,7 @@ void streaming_panel(ViewerState& state) {
   status_panel(state);
 }
 
-/// Widgets of different sections may have the same names.
+/// Draws a section; widgets of different sections may have equal names.
 template <class Body>
 void section(const char* name, bool open, Body&& body, ViewerState& state) {
   if (!ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : 0)) return;
@@ -333,7 +334,7 @@ void section(const char* name, bool open, Body&& body, ViewerState& state) {
   ImGui::PopID();
 }
 
-/// Along the left side of the window; the picture has the rest.
+/// Along the left side of the window, beside the picture.
 void main_panel(ViewerState& state) {
   const ImVec2 all = ImGui::GetMainViewport()->Size;
   const float least = scaled(250);
@@ -346,7 +347,7 @@ void main_panel(ViewerState& state) {
   draw_volumes_panel(state);
   section("Surfaces", true, surfaces_panel, state);
   section("Camera and look", false, look_panel, state);
-  section("ClipTest and region", false, draw_clip_panel, state);
+  section("Clipping and region", false, draw_clip_panel, state);
   section("Slices", false, slices_panel, state);
   section("Point and measure", false, picking_panel, state);
   section("Bookmarks", false, bookmarks_panel, state);
@@ -373,14 +374,14 @@ void draw_notice(const std::string& text) {
 
 void draw_panels(ViewerState& state) {
   messages_panel(state);
-  if (state.picture == nullptr)
+  if (state.scene_renderer == nullptr)
     draw_notice(
         "Drop a store, or a volume of any format, on this window.\nF1 shows keys and mouse.");
   else if (state.panels)
     main_panel(state);
   draw_help(state);
-  // ImGui 1.86 stops at a window that is new after a modal one that is new, too, and at one
-  // that comes while a modal one is open but no more begun.
+  // ImGui 1.86 fails an assertion for a new window after a new modal one, and for a window that
+  // appears while an open modal one is no longer drawn.
   import_panel(state);
 }
 

@@ -6,36 +6,35 @@
 
 namespace isobrick {
 
-/// The height of the font, and the panel's width at first, where the display is not scaled.
+/// Height of the font and initial width of the panel, on a display without scaling.
 inline constexpr float kFontPixels = 13, kPanelWidth = 390;
 
-/// Pixels of a display that is not scaled, in those of this one.
+/// Converts pixels of a display without scaling to pixels of this one.
 float scaled(float pixels);
 
-/// Draws all panels into the current frame of Dear ImGui and does to `state` what its
-/// user does to them.
+/// Draws all panels into the current frame of Dear ImGui and applies the user's changes to `state`.
 void draw_panels(ViewerState& state);
 
-/// Keys and mouse, while state.help says so.
+/// Draws the help on keys and mouse, if state.help.
 void draw_help(ViewerState& state);
 
-/// A line in the middle of the window, in place of a picture.
+/// Draws a line of text in the middle of the window, instead of a picture.
 void draw_notice(const std::string& text);
 
-/// Isovalue over the histogram: a drag moves the selected surface, the pointer tells how
-/// much surface there is.
+/// Draws the histogram with the isovalues. Dragging moves the selected surface; the tooltip shows
+/// how large the surface is.
 void draw_isovalue_slider(ViewerState& state, float width, float height);
 
-/// What is cut away: across axes, by planes at any angle, outside of a region.
+/// Draws the clipping settings: across axes, by planes at any angle, by a region.
 void draw_clip_panel(ViewerState& state);
 
-/// Which volume of an image with channels or times is shown; nothing of one without.
+/// Draws the choice of a volume, for images with channels or times only.
 void draw_volumes_panel(ViewerState& state);
 
-/// What makes meshes.
+/// Draws the choice of the backend that makes meshes.
 void draw_backend_panel(ViewerState& state);
 
-/// Which index finds the nodes that isovalues cross, and what that takes.
+/// Draws the choice of the index over active nodes, and its costs.
 void draw_search_panel(ViewerState& state);
 
 }  // namespace isobrick

@@ -15,15 +15,15 @@ constexpr ImU32 kInk = IM_COL32(20, 20, 20, 255), kPaper = IM_COL32(255, 230, 90
 
 }  // namespace
 
-std::optional<PickedPoint> pick_point(SceneRenderer& picture, int x, int y) {
-  const auto hit = picture.renderer().pick(x, y);
+std::optional<PickedPoint> pick_point(SceneRenderer& scene_renderer, int x, int y) {
+  const auto hit = scene_renderer.renderer().pick(x, y);
   if (!hit) return std::nullopt;
   PickedPoint point;
   point.world = hit->position;
   point.surface = hit->id;
-  const NodeGrid& grid = picture.scene().tree().grid();
+  const NodeGrid& grid = scene_renderer.scene().tree().grid();
   point.index = to_index_space(grid, hit->position);
-  if (const auto field = probe(grid, picture.scene().stream().bricks(), hit->position)) {
+  if (const auto field = probe(grid, scene_renderer.scene().stream().bricks(), hit->position)) {
     point.value = field->value;
     point.normal = to_double(field->normal);
   }
@@ -31,7 +31,7 @@ std::optional<PickedPoint> pick_point(SceneRenderer& picture, int x, int y) {
 }
 
 void draw_measure(const ViewerState& state, const PictureArea& area) {
-  if (state.measured.empty() || state.picture == nullptr) return;
+  if (state.measured.empty() || state.scene_renderer == nullptr) return;
   const ImVec2 size = ImGui::GetIO().DisplaySize;
   const auto place = [&](Vec3d world) {
     const Vec3d p = state.navigator.camera.project(world, area.width, area.height);
@@ -47,7 +47,7 @@ void draw_measure(const ViewerState& state, const PictureArea& area) {
     draw.AddLine(first, second, kPaper, scaled(2));
     const std::string text =
         fmt::format("{:.6g} {}", length(state.measured[1] - state.measured[0]),
-                    unit_symbol(state.picture->scene().tree().grid().transform().unit));
+                    unit_symbol(state.scene_renderer->scene().tree().grid().transform().unit));
     const ImVec2 middle((first.x + second.x) / 2 + scaled(8), (first.y + second.y) / 2);
     draw.AddText({middle.x + 1, middle.y + 1}, kInk, text.c_str());
     draw.AddText(middle, kPaper, text.c_str());

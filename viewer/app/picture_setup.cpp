@@ -14,31 +14,31 @@
 namespace isobrick {
 namespace {
 
-/// Pixels enough to have everything compiled.
-constexpr PictureSize kFew{16, 16};
+/// A size that suffices to compile all shaders.
+constexpr PictureSize kCompileSize{16, 16};
 
-/// While CUDA is set up, OpenGL by the same driver waits for it.
-bool cuda_may_hold_up(Backend backend) {
+/// Whether CUDA's initialisation may delay OpenGL, which waits if both use one driver.
+bool cuda_may_delay_gl(Backend backend) {
   return backend != Backend::cpu && built_with_cuda() && current_gl_device().nvidia;
 }
 
-/// Full pictures, and those while something moves.
+/// Settings of still frames and of previews.
 std::array<PictureSettings, 2> usual_settings() {
   PictureSettings full, plain;
-  full.picking = plain.picking = true;  // as SceneRenderer's pictures
+  full.picking = plain.picking = true;  // as in SceneRenderer
   plain.occlusion = plain.multisample = false;
   return {full, plain};
 }
 
-/// Room of a block of what is uploaded: little of the budget, so that little of it is idle. Meshes
-/// that are larger have blocks of their own.
+/// Capacity of a block of the upload pool: a small part of the budget, so that little of it is
+/// unused. Larger meshes have blocks of their own.
 std::uint32_t block_vertices(std::uint64_t device_memory) {
   constexpr std::uint64_t vertex = 4 * sizeof(Vec3f);  // with a normal and two triangles
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(device_memory / 128 / vertex, 1u << 12, 1u << 19));
 }
 
-/// A flat mesh of about as many triangles as vertices.
+/// Adds a flat mesh with about as many triangles as vertices.
 PooledMesh add_sheet(MeshPool& pool, std::uint32_t vertices) {
   const std::uint32_t row = vertices / 100;
   std::vector<Vec3f> positions(vertices), normals(vertices, {0, 0, 1});
@@ -62,27 +62,26 @@ PictureSetup::PictureSetup(const PictureBudgets& budgets, std::function<void()> 
       pool_(block_vertices_),
       software_(software.value_or(current_gl_device().software)),
       device_(std::make_shared<DeviceOpener>(budgets.device_mesh_memory(), std::move(on_change))) {
-  // Software compiles quickly and draws slowly.
+  // A software driver compiles fast and draws slowly.
   if (!software_)
     for (const PictureSettings& settings : usual_settings())
-      renderer_.prepare(settings, kFew.width, kFew.height);
-  if (likely && !software_ && cuda_may_hold_up(budgets.backend)) warm_up(*likely);
-  // Only now: while CUDA is set up, whoever makes OpenGL ask for memory waits for it, tens of
-  // milliseconds at a time.
+      renderer_.prepare(settings, kCompileSize.width, kCompileSize.height);
+  if (likely && !software_ && cuda_may_delay_gl(budgets.backend)) warm_up(*likely);
+  // Comes last: while CUDA is initialised, an OpenGL call that allocates memory waits for tens of
+  // milliseconds.
   if (budgets.backend != Backend::cpu) device_->begin();
 }
 
 void PictureSetup::warm_up(PictureSize size) {
   try {
     draw_first(size);
-  } catch (const Error&) {  // pictures that are asked for say so where somebody reads it
+  } catch (const Error&) {  // a later picture reports the error
   }
   renderer_.discard();
   glFinish();
 }
 
-/// As a first store is drawn, some times over: that much it takes until a driver has all that it
-/// wants.
+/// Draws like a first store, several times: only then has a driver allocated all that it needs.
 void PictureSetup::draw_first(PictureSize size) {
   for (const PictureSettings& settings : usual_settings())
     renderer_.prepare(settings, size.width, size.height);

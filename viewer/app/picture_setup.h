@@ -12,39 +12,39 @@
 
 namespace isobrick {
 
-/// What a picture of a store may use, and how its surfaces are made.
+/// Budgets and options for pictures of a store.
 struct PictureBudgets {
-  std::uint64_t memory = std::uint64_t{2} << 30;         ///< host: decoded bricks and meshes
-  std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< meshes and slices on the device
+  std::uint64_t memory = std::uint64_t{2} << 30;  ///< host memory for resident bricks and meshes
+  std::uint64_t device_memory = std::uint64_t{1} << 30;  ///< device memory for meshes and slices
   int threads = 0;                                       ///< 0: all cores but one
-  Backend backend = Backend::automatic;                  ///< what makes meshes; see DeviceMeshes
+  Backend backend = Backend::automatic;                  ///< makes meshes; see DeviceMeshes
   std::optional<Inside> inside;                          ///< see StreamOptions
 
-  /// Of device_memory: the part for meshes that the device makes itself. Slices and what is
-  /// uploaded have the rest, and all where no device shares its memory.
+  /// The part of device_memory for meshes that the device makes. Slices and uploads have the rest,
+  /// or all if no device shares its memory.
   std::uint64_t device_mesh_memory() const { return device_memory / 4 * 3; }
 };
 
-/// Pixels.
+/// In pixels.
 struct PictureSize {
   int width = 1, height = 1;
 };
 
-/// What pictures of stores need of a context and what takes time to set up: compiled shaders,
-/// memory, and a device that makes meshes. Made with the context, so that stores open quickly; one
-/// picture after the other uses it. For the thread of the context, which must outlive it.
+/// The resources of a context that take time to set up: compiled shaders, memory, and the device
+/// that makes meshes. Made once for a context, so that stores open quickly; one scene renderer
+/// after the other uses it. For the thread of the context, which must outlive it.
 class PictureSetup {
  public:
-  /// Begins to open the device that budgets.backend may use, and does not wait for it; see
-  /// DeviceOpener. `likely`: of the first pictures, for warm_up() where they would wait for CUDA.
-  /// `software`: whether to take OpenGL for software; nothing: what it is. Throws what Renderer and
-  /// DeviceOpener::begin() do.
+  /// Starts to open the device for budgets.backend and does not wait for it; see DeviceOpener.
+  /// `likely`: size of the first pictures; if CUDA would delay them, warm_up() runs first.
+  /// `software`: whether OpenGL counts as software; nullopt: detected. Throws what Renderer and
+  /// DeviceOpener::begin() throw.
   PictureSetup(const PictureBudgets& budgets, std::function<void()> on_change,
                std::optional<PictureSize> likely = std::nullopt,
                std::optional<bool> software = std::nullopt);
 
-  /// Gets what a driver needs for pictures of this size and a first block of meshes, so that they
-  /// do not wait for that. Where memory is short it is left to them.
+  /// Draws pictures of this size and a first block of meshes, so that the driver allocates what
+  /// they need. Does nothing if memory is short.
   void warm_up(PictureSize size);
 
   Renderer& renderer() { return renderer_; }

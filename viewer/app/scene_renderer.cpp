@@ -15,15 +15,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// While meshes come in and nothing else changes: seconds between pictures, which would keep the
-/// device that draws them from making meshes.
+/// Seconds between frames while meshes arrive and nothing else changes: a frame keeps the device
+/// from making meshes.
 constexpr double kRefiningSeconds = 0.04;
-/// The same, in times of the last picture: pictures that are soon out of date, and may take
-/// seconds in software, take a third of the time at most.
+/// The same as a multiple of the last frame's time: frames that are soon out of date take at most a
+/// third of the time. In software a frame may take seconds.
 constexpr double kRefiningPause = 2;
-constexpr double kMarginOfWait = 0.05;
+constexpr double kWaitSeconds = 0.05;
 
-/// `software`: then others than this thread draw, and what they draw of is made beside them.
+/// `software`: other threads draw, too, so mesh threads keep their priority.
 StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()> on_change,
                              bool software) {
   StreamOptions options;
@@ -37,19 +37,18 @@ StreamOptions stream_options(const PictureBudgets& budgets, std::function<void()
   return options;
 }
 
-/// The finest level of nodes that has samples of this stored level, or of the next coarser one that
-/// any has; of those above the stored ones none.
+/// The finest level of nodes with samples of this stored level, or of the next coarser one that any
+/// has.
 int finest_node_level(const NodeGrid& grid, int stored) {
   int v = 0;
   while (v < grid.coarsest_stored() && grid.level(v).source < stored) ++v;
   return v;
 }
 
-/// Whether both show the same.
 bool same_meshes(const Drawable* a, const Drawable* b) {
   if (a == nullptr || b == nullptr || a == b) return a == b;
   return std::equal(a->nodes.begin(), a->nodes.end(), b->nodes.begin(), b->nodes.end(),
-                    [](const DrawnNode& p, const DrawnNode& q) {
+                    [](const NodeDraw& p, const NodeDraw& q) {
                       return p.mesh == q.mesh && p.isovalue == q.isovalue;
                     });
 }
@@ -57,15 +56,16 @@ bool same_meshes(const Drawable* a, const Drawable* b) {
 }  // namespace
 
 FrameOptions FrameOptions::in_window(const FramePacer& pacer, bool software, bool moving) {
-  FrameOptions way{
+  FrameOptions options{
       .max_triangles = moving ? pacer.max_triangles() : FramePacer::kAllTriangles,
       .thin_triangles = moving ? pacer.thin_triangles() : 0,
-      .piece_seconds = software ? kPieceSeconds : std::numeric_limits<double>::infinity(),
+      .batch_seconds = software ? kBatchSeconds : std::numeric_limits<double>::infinity(),
       .moving = moving,
-      .smaller = moving ? pacer.smaller() : 1};
-  // Nor should pictures that follow while meshes come in wait for a good one.
-  if (pacer.plain()) way.plain = moving ? Plain::yes : Plain::until_complete;
-  return way;
+      .size_divisor = moving ? pacer.size_divisor() : 1};
+  // Intermediate frames need not wait for full quality, either.
+  if (pacer.reduces_quality())
+    options.quality = moving ? Quality::reduced : Quality::reduced_until_complete;
+  return options;
 }
 
 SceneRenderer::SceneRenderer(std::shared_ptr<const StoreReader> store,
@@ -73,26 +73,26 @@ SceneRenderer::SceneRenderer(std::shared_ptr<const StoreReader> store,
                              std::shared_ptr<PictureSetup> setup)
     : store_(std::move(store)),
       budgets_(budgets),
-      reading_(std::async(std::launch::async,
-                          [&, software = current_gl_device().software] {
-                            return std::make_unique<Scene>(
-                                store_bricks(store_),
-                                stream_options(budgets_, on_change, software));
-                          })),
+      scene_future_(std::async(std::launch::async,
+                               [&, software = current_gl_device().software] {
+                                 return std::make_unique<Scene>(
+                                     store_bricks(store_),
+                                     stream_options(budgets_, on_change, software));
+                               })),
       setup_(setup ? std::move(setup) : std::make_shared<PictureSetup>(budgets, on_change)),
-      uploads_(setup_->pool(),
-               setup_->software() ? MeshUploads::Unused::go : MeshUploads::Unused::stay),
+      uploads_(setup_->pool(), setup_->software() ? MeshUploads::UnusedMeshes::drop
+                                                  : MeshUploads::UnusedMeshes::keep),
       slices_(budgets, last_sample(*store_), store_->info().type) {
-  scene_ = reading_.get();
+  scene_ = scene_future_.get();
   device_ = std::make_unique<DeviceMeshes>(scene_->stream(), setup_->device());
   device_->use(budgets.backend);
-  renderer().discard();  // that of another store
+  renderer().discard();  // the picture of another store
 }
 
 SceneRenderer::~SceneRenderer() = default;
 
 void SceneRenderer::update_scene(const Camera& camera, int width, int height,
-                                 const ViewSettings& settings, const FrameOptions& way) {
+                                 const ViewSettings& settings, const FrameOptions& options) {
   std::vector<double> isovalues;
   shown_surfaces_.clear();
   for (std::size_t i = 0; i < settings.surfaces.size(); ++i)
@@ -102,7 +102,7 @@ void SceneRenderer::update_scene(const Camera& camera, int width, int height,
     }
   View view = view_of(camera, width, height, settings.pixel_error);
   view.finest_level = finest_node_level(scene_->tree().grid(), settings.finest_level);
-  view.thin_pixel_error = view.pixel_error / way.smaller;
+  view.thin_pixel_error = view.pixel_error / options.size_divisor;
   const ClipRegion box = clip_region(settings);
   if (!box.whole()) {
     const Vec3d last = last_sample(*store_);
@@ -110,201 +110,210 @@ void SceneRenderer::update_scene(const Camera& camera, int width, int height,
   }
   view.planes = clip_half_spaces(settings);
   CutBudget budget;
-  budget.triangles = std::min(budget.triangles, way.max_triangles);
-  budget.thin_triangles = way.thin_triangles;
-  // What stands in until the cut is there takes room beside it.
-  const std::uint64_t there = device_->kernel_lock() != nullptr
-                                  ? DeviceMeshes::cache_bytes(device_->held())
-                                  : upload_memory();
-  budget.mesh_bytes = std::min(there, budgets_.memory / 2) / 2;
+  budget.triangles = std::min(budget.triangles, options.max_triangles);
+  budget.thin_triangles = options.thin_triangles;
+  // Half of the memory is for meshes that are substituted until the cut is complete.
+  const std::uint64_t device_bytes = device_->kernel_lock() != nullptr
+                                         ? DeviceMeshes::cache_bytes(device_->allocated_bytes())
+                                         : upload_memory();
+  budget.mesh_bytes = std::min(device_bytes, budgets_.memory / 2) / 2;
   scene_->update(isovalues, view, budget);
 }
 
 void SceneRenderer::upload(const std::shared_ptr<const Drawable>& newest) {
-  MeshUploads::Share share;
-  // The first picture takes what it needs.
+  MeshUploads::Limit limit;
+  // The first frame has no limit.
   const auto add = [&](const Drawable& drawable) {
-    return uploads_.add(drawable, scene_->origin(), shown_ == nullptr ? nullptr : &share);
+    return uploads_.add(drawable, scene_->origin(), shown_meshes_ == nullptr ? nullptr : &limit);
   };
-  if (shown_ != nullptr) uploads_.keep(*shown_);
-  // What was begun first, or nothing would be finished while there is always something newer; but
-  // nothing newer than all of a surface will come.
-  const bool last = next_ != nullptr && newest->complete && next_->isovalues == newest->isovalues;
-  if (next_ != nullptr && next_ != shown_ && !last) {
-    if (!add(*next_)) return;
-    shown_ = next_;
+  if (shown_meshes_ != nullptr) uploads_.keep(*shown_meshes_);
+  // The upload that has begun is finished first, or none would be while newer meshes keep arriving.
+  // But a complete surface has no newer one.
+  const bool last =
+      next_meshes_ != nullptr && newest->complete && next_meshes_->isovalues == newest->isovalues;
+  if (next_meshes_ != nullptr && next_meshes_ != shown_meshes_ && !last) {
+    if (!add(*next_meshes_)) return;
+    shown_meshes_ = next_meshes_;
   }
-  next_ = newest;
-  if (add(*next_)) shown_ = next_;
+  next_meshes_ = newest;
+  if (add(*next_meshes_)) shown_meshes_ = next_meshes_;
 }
 
-/// Whether what is new can be shown a little later, since more is to come.
+/// Whether new meshes can wait, because more will arrive.
 bool SceneRenderer::can_wait(const Drawable& newest) const {
-  if (shown_ == nullptr || !shown_->covers || newest.complete ||
-      shown_->isovalues != newest.isovalues)
+  if (shown_meshes_ == nullptr || !shown_meshes_->covers || newest.complete ||
+      shown_meshes_->isovalues != newest.isovalues)
     return false;
-  const double pause = kRefiningPause * picture_seconds_;
-  return std::chrono::duration<double>(Clock::now() - drawn_).count() <
+  const double pause = kRefiningPause * frame_seconds_;
+  return std::chrono::duration<double>(Clock::now() - finish_time_).count() <
          (device_->kernel_lock() != nullptr ? std::max(pause, kRefiningSeconds) : pause);
 }
 
-bool SceneRenderer::may_be_plain(const Asked& asked) const {
-  if (asked.way.plain != FrameOptions::Plain::until_complete)
-    return asked.way.plain == FrameOptions::Plain::yes;
+bool SceneRenderer::may_reduce_quality(const FrameRequest& request) const {
+  if (request.options.quality != FrameOptions::Quality::reduced_until_complete)
+    return request.options.quality == FrameOptions::Quality::reduced;
   if (setup_->software()) return !state_.complete;
-  // A full budget may leave the newest incomplete.
-  return shown_ != asked.newest || !(asked.idle || asked.newest->complete);
+  // With a full budget the newest may stay incomplete.
+  return shown_meshes_ != request.newest || !(request.idle || request.newest->complete);
 }
 
 void SceneRenderer::drop_unused() {
-  if (shown_ != nullptr) uploads_.keep(*shown_);
+  if (shown_meshes_ != nullptr) uploads_.keep(*shown_meshes_);
   uploads_.drop(upload_memory());
-  state_.device_bytes = uploads_.bytes() + device_->held() + slices_.bytes();
+  state_.device_bytes = uploads_.bytes() + device_->allocated_bytes() + slices_.bytes();
 }
 
-/// What is uploaded, slices and the device's own meshes share its memory.
+/// Uploads, slices and the device's own meshes share the device memory.
 std::uint64_t SceneRenderer::upload_memory() const {
-  const std::uint64_t others = device_->reserved() + slices_.bytes();
+  const std::uint64_t others = device_->reserved_bytes() + slices_.bytes();
   return budgets_.device_memory - std::min(others, budgets_.device_memory);
 }
 
-/// Whether a picture that has been begun is still worth finishing.
-bool SceneRenderer::still_wanted(const Work& work, const Asked& asked) const {
-  const Shows& shows = work.becomes.shows;
-  // A picture in full serves as a plain one, and a plain one comes first.
-  const bool same_view = shows == asked.shows || shows == asked.shows_plain;
-  if (same_view && work.isovalues == scene_->isovalues()) return true;
-  return work.state.moving && asked.way.moving &&
-         2 * asked.newest->triangles >= work.state.triangles;
+/// Whether an unfinished frame is still worth finishing.
+bool SceneRenderer::is_still_needed(const PendingFrame& pending,
+                                    const FrameRequest& request) const {
+  const FrameKey& key = pending.frame.key;
+  // A frame in full quality also serves as a reduced one, and a reduced one comes first.
+  const bool same_view = key == request.key || key == request.reduced_key;
+  if (same_view && pending.isovalues == scene_->isovalues()) return true;
+  return pending.state.moving && request.options.moving &&
+         2 * request.newest->triangles >= pending.state.triangles;
 }
 
-/// Whether the next picture would show no more than the last one.
-bool SceneRenderer::shows_all_there_is(const Pictured& next, const Asked& asked) const {
-  if (pictured_.shows != next.shows && pictured_.shows != asked.shows) return false;
-  if (!pictured_.stale && pictured_.slices == next.slices &&
-      same_meshes(pictured_.meshes.get(), next.meshes.get()))
+/// Whether the next frame would show no more than the last one.
+bool SceneRenderer::has_nothing_new(const ShownFrame& next, const FrameRequest& request) const {
+  if (shown_frame_.key != next.key && shown_frame_.key != request.key) return false;
+  if (!shown_frame_.stale && shown_frame_.slices == next.slices &&
+      same_meshes(shown_frame_.meshes.get(), next.meshes.get()))
     return true;
-  // Meshes of another isovalue are awaited; a picture of this one was dropped for that.
-  return !asked.idle && pictured_.stale && pictured_.slices == next.slices &&
-         pictured_.isovalues == next.isovalues && next.isovalues != scene_->isovalues();
+  // A frame of this isovalue was dropped because another one is expected.
+  return !request.idle && shown_frame_.stale && shown_frame_.slices == next.slices &&
+         shown_frame_.isovalues == next.isovalues && next.isovalues != scene_->isovalues();
 }
 
-/// Unless it would show nothing new.
-void SceneRenderer::choose_picture(const Asked& asked) {
+/// Chooses the next frame, unless it would show nothing new.
+void SceneRenderer::choose_frame(const FrameRequest& request) {
   Stopwatch watch;
-  const bool plain_serves =
-      asked.way.plain != FrameOptions::Plain::no && pictured_.shows == asked.shows_plain;
-  const bool other_view = pictured_.shows != asked.shows && !plain_serves;
-  const bool enough = imported_ && shown_ != nullptr;
-  if (!enough && (other_view || asked.idle || !can_wait(*asked.newest))) upload(asked.newest);
+  const bool reduced_is_enough = request.options.quality != FrameOptions::Quality::full &&
+                                 shown_frame_.key == request.reduced_key;
+  const bool other_view = shown_frame_.key != request.key && !reduced_is_enough;
+  const bool enough = imported_block_ && shown_meshes_ != nullptr;
+  if (!enough && (other_view || request.idle || !can_wait(*request.newest))) upload(request.newest);
   times_.upload = watch.lap();
-  slices_.update(scene_->stream(), asked.settings);
+  slices_.update(scene_->stream(), request.settings);
   times_.slices = watch.lap();
-  const bool plain = may_be_plain(asked);
-  Pictured next{.shows = plain ? asked.shows_plain : asked.shows,
-                .meshes = shown_,
-                .slices = slices_.samples(),
-                .isovalues = {}};
-  if (shown_ != nullptr) next.isovalues = shown_->isovalues;
-  // A pointer that moves over panels must not cost a picture, nor a cut that shows nothing new yet.
-  if (shows_all_there_is(next, asked)) return;
-  if (pictured_.slices != next.slices || !same_meshes(pictured_.meshes.get(), shown_.get())) {
-    pictured_.stale = true;
-    pictured_.meshes.reset();
-    pictured_.slices = next.slices;
+  const bool reduced = may_reduce_quality(request);
+  ShownFrame next{.key = reduced ? request.reduced_key : request.key,
+                  .meshes = shown_meshes_,
+                  .slices = slices_.samples(),
+                  .isovalues = {}};
+  if (shown_meshes_ != nullptr) next.isovalues = shown_meshes_->isovalues;
+  // Pointer motion over panels must not cause a frame, nor a cut without new meshes.
+  if (has_nothing_new(next, request)) return;
+  if (shown_frame_.slices != next.slices ||
+      !same_meshes(shown_frame_.meshes.get(), shown_meshes_.get())) {
+    shown_frame_.stale = true;
+    shown_frame_.meshes.reset();
+    shown_frame_.slices = next.slices;
   }
-  work_.emplace(Work{.becomes = std::move(next), .state = {}, .isovalues = scene_->isovalues()});
-  work_->state.moving = asked.way.moving;
-  work_->state.plain = plain;
+  pending_.emplace(
+      PendingFrame{.frame = std::move(next), .state = {}, .isovalues = scene_->isovalues()});
+  pending_->state.moving = request.options.moving;
+  pending_->state.reduced_quality = reduced;
 }
 
 void SceneRenderer::draw(const Camera& camera, int width, int height, const ViewSettings& settings,
-                         const FrameOptions& way) {
+                         const FrameOptions& options) {
   try {
-    draw_next(camera, width, height, settings, way);
+    draw_frame(camera, width, height, settings, options);
   } catch (...) {
     glFinish();
-    if (work_) drop_picture();
-    pictured_ = {};  // half a picture is none
-    drew_ = imported_ = false;
-    state_.drawing = state_.more = state_.complete = false;
-    state_.drawn_part = 0;
+    if (pending_) drop_frame();
+    shown_frame_ = {};  // the picture may be incomplete
+    has_new_frame_ = imported_block_ = false;
+    state_.drawing = state_.needs_draw = state_.complete = false;
+    state_.drawn_fraction = 0;
     throw;
   }
 }
 
-void SceneRenderer::draw_next(const Camera& camera, int width, int height,
-                              const ViewSettings& settings, const FrameOptions& way) {
+void SceneRenderer::draw_frame(const Camera& camera, int width, int height,
+                               const ViewSettings& settings, const FrameOptions& options) {
   uploads_.begin_use();
-  drew_ = false;
+  has_new_frame_ = false;
   Stopwatch watch;
-  // Until there is a picture of what is asked for, every other time is for what has arrived.
-  imported_ = !work_ && (state_.covers || !imported_) && device_->update();
+  // Until the requested surface is shown, only every second call imports memory; the others show
+  // new meshes.
+  imported_block_ = !pending_ && (state_.covers || !imported_block_) && device_->update();
   times_ = {.device = watch.lap()};
-  update_scene(camera, width, height, settings, way);
+  update_scene(camera, width, height, settings, options);
   times_.scene = watch.lap();
-  const bool idle = scene_->idle();  // first: then the newest has everything
-  Shows shows{camera, width, height, settings};
-  for (SurfaceSettings& surface : shows.settings.surfaces) surface.isovalue = 0;
-  Shows plain = shows;
-  plain.settings.occlusion = plain.settings.multisample = false;
-  const Asked asked{.camera = camera,
-                    .width = width,
-                    .height = height,
-                    .settings = settings,
-                    .way = way,
-                    .shows = std::move(shows),
-                    .shows_plain = std::move(plain),
-                    .idle = idle,
-                    .newest = scene_->drawable()};
+  const bool idle = scene_->idle();  // read first: then `newest` is complete
+  FrameKey key{camera, width, height, settings};
+  for (SurfaceSettings& surface : key.settings.surfaces) surface.isovalue = 0;
+  FrameKey reduced_key = key;
+  reduced_key.settings.occlusion = reduced_key.settings.multisample = false;
+  const FrameRequest request{.camera = camera,
+                             .width = width,
+                             .height = height,
+                             .settings = settings,
+                             .options = options,
+                             .key = std::move(key),
+                             .reduced_key = std::move(reduced_key),
+                             .idle = idle,
+                             .newest = scene_->drawable()};
   times_.drawable = watch.lap();
-  if (work_ && !still_wanted(*work_, asked)) drop_picture();
-  const bool goes_on = work_.has_value();
-  if (!goes_on) choose_picture(asked);
-  if (work_) {
+  if (pending_ && !is_still_needed(*pending_, request)) drop_frame();
+  const bool continues = pending_.has_value();
+  if (!continues) choose_frame(request);
+  if (pending_) {
     watch.lap();
-    // Two contexts of one device are changed slowly and to and fro: one after the other is
-    // sooner done, for both.
+    // A device switches slowly between two contexts; using them one after the other is faster for
+    // both.
     const TicketGuard guard(device_->kernel_lock());
-    times_.turn = watch.lap();
-    if (!goes_on) begin_picture(asked);
-    draw_piece(asked.way.piece_seconds);
+    times_.lock = watch.lap();
+    if (!continues) begin_frame(request);
+    draw_batch(request.options.batch_seconds);
   }
   watch.lap();
   drop_unused();
-  update_state(asked);
+  update_state(request);
   times_.tidy = watch.lap();
 }
 
-void SceneRenderer::update_state(const Asked& asked) {
-  state_.drawing = work_.has_value();
-  state_.drawn_part = work_ && work_->all > 0 ? 1 - static_cast<double>(renderer().work_left()) /
-                                                        static_cast<double>(work_->all)
-                                              : 0;
-  state_.plain = pictured_.shows != asked.shows;
-  // One that is no simpler than those at rest is not drawn again.
-  if (!work_ && !asked.way.moving && !state_.plain) state_.moving = false;
+void SceneRenderer::update_state(const FrameRequest& request) {
+  state_.drawing = pending_.has_value();
+  state_.drawn_fraction = pending_ && pending_->total_work > 0
+                              ? 1 - static_cast<double>(renderer().work_left()) /
+                                        static_cast<double>(pending_->total_work)
+                              : 0;
+  state_.reduced_quality = shown_frame_.key != request.key;
+  // A preview in full quality is not drawn again.
+  if (!pending_ && !request.options.moving && !state_.reduced_quality) state_.moving = false;
   state_.limited = scene_->cut().limited_by_budget;
-  state_.thin = scene_->cut().triangles > asked.way.max_triangles;
-  state_.limited_by_budget = state_.limited && asked.way.max_triangles == FramePacer::kAllTriangles;
-  state_.covers = shown_ != nullptr && shown_->covers && shown_->isovalues == scene_->isovalues();
-  state_.more = imported_ || device_->more();
-  state_.complete = !asked.way.moving && !work_ && shown_ != nullptr &&
-                    scene_->is_newest(*shown_) && (shown_->complete || scene_->idle());
+  state_.thin_over_budget = scene_->cut().triangles > request.options.max_triangles;
+  state_.limited_by_budget =
+      state_.limited && request.options.max_triangles == FramePacer::kAllTriangles;
+  state_.covers = shown_meshes_ != nullptr && shown_meshes_->covers &&
+                  shown_meshes_->isovalues == scene_->isovalues();
+  state_.needs_draw = imported_block_ || device_->has_work();
+  state_.complete = !request.options.moving && !pending_ && shown_meshes_ != nullptr &&
+                    scene_->is_newest(*shown_meshes_) &&
+                    (shown_meshes_->complete || scene_->idle());
 }
 
 void SceneRenderer::draw_complete(const Camera& camera, int width, int height,
                                   const ViewSettings& settings, const std::function<void()>& wait) {
-  const FrameOptions way{.piece_seconds = kPieceSeconds, .in_order = true};
+  const FrameOptions options{.batch_seconds = kBatchSeconds, .in_order = true};
   for (;;) {
-    draw(camera, width, height, settings, way);
-    // The cut depends on what meshes were like; once more, it may be another.
+    draw(camera, width, height, settings, options);
+    // New meshes change the cut's estimates, so it is chosen once more.
     if (state_.complete) {
-      draw(camera, width, height, settings, way);
+      draw(camera, width, height, settings, options);
       if (state_.complete) return;
     }
     wait();
-    if (!state_.drawing && !state_.more) scene_->stream().wait_idle(kMarginOfWait);
+    if (!state_.drawing && !state_.needs_draw) scene_->stream().wait_idle(kWaitSeconds);
   }
 }
 

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "viewer/app/batch_pacer.h"
 #include "viewer/app/clip_region.h"
 #include "viewer/app/device_meshes.h"
 #include "viewer/app/frame_pacer.h"
 #include "viewer/app/mesh_uploads.h"
 #include "viewer/app/picture_setup.h"
-#include "viewer/app/piece_pacer.h"
 #include "viewer/app/slice_views.h"
 #include "viewer/app/view_settings.h"
 #include "viewer/render/renderer.h"
@@ -23,87 +23,86 @@
 
 namespace isobrick {
 
-/// How long a piece of a picture may take where OpenGL is software: input is answered in between.
-inline constexpr double kPieceSeconds = 0.045;
+/// Seconds of a draw batch in software: input is handled in between.
+inline constexpr double kBatchSeconds = 0.045;
 
-/// What a picture shows and what it still lacks.
-struct PictureState {
-  /// Nothing finer, nothing else is on its way, and it is no preview.
+/// The state of the shown frame and of the one being drawn.
+struct FrameState {
+  /// The frame is final: it is no preview, and no finer mesh or other slice will arrive.
   bool complete = false;
-  bool drawing = false;   ///< a picture has been begun, and the next draw() goes on with it
-  double drawn_part = 0;  ///< of that one, 0 … 1
-  /// Of each surface that is drawn, by its number: at first, and while the one that was asked
-  /// for does not cover the view, not the settings'. NaN: nothing of it is drawn.
+  bool drawing = false;       ///< a frame is unfinished; the next draw() continues it
+  double drawn_fraction = 0;  ///< of the unfinished frame, 0 … 1
+  /// The shown isovalue of each surface, by the surface's index. It differs from the settings until
+  /// the requested isovalue covers the view. NaN: nothing is drawn.
   std::vector<double> isovalues;
-  bool covers = false;  ///< every surface at its isovalue, without holes, however coarse
+  bool covers = false;  ///< every surface is shown at its isovalue without holes, however coarse
   std::uint64_t triangles = 0, nodes = 0;
-  bool plain = false;               ///< drawn without occlusion and multisampling to be quick
-  bool moving = false;              ///< a preview: drawn as FrameOptions::moving
-  std::uint64_t device_bytes = 0;   ///< taken for meshes and slices
-  bool more = false;                ///< the next draw() has something to do, whatever comes
-  bool limited = false;             ///< by FrameOptions::max_triangles, or by memory
-  bool thin = false;                ///< more than FrameOptions::max_triangles, for thin structure
-  bool limited_by_budget = false;   ///< with more memory it would be finer
-  std::vector<std::string> damage;  ///< messages, one for each node that cannot be shown
+  bool reduced_quality = false;     ///< without occlusion and multisampling, to be fast
+  bool moving = false;              ///< a preview, drawn with FrameOptions::moving
+  std::uint64_t device_bytes = 0;   ///< allocated for meshes and slices
+  bool needs_draw = false;          ///< the next draw() has work, without any new event
+  bool limited = false;             ///< limited by FrameOptions::max_triangles or memory
+  bool thin_over_budget = false;    ///< exceeds FrameOptions::max_triangles, for thin structure
+  bool limited_by_budget = false;   ///< more memory would make it finer
+  std::vector<std::string> damage;  ///< a message for each node that cannot be shown
 };
 
-/// How a picture may be simpler than its settings say.
+/// Allowed simplifications of a frame.
 struct FrameOptions {
   std::uint64_t max_triangles = FramePacer::kAllTriangles;
-  /// So many where coarse levels have lost thin structure; see CutBudget.
+  /// Maximum triangles where coarse levels have lost thin structure; see CutBudget.
   std::uint64_t thin_triangles = 0;
-  /// Without occlusion and multisampling; `until_complete`: unless nothing finer is to come. In
-  /// software, which draws slowly, that is one picture later: first a plain one of all.
-  enum class Plain : std::uint8_t { no, until_complete, yes } plain = Plain::no;
-  /// A picture that would take longer is drawn in pieces of about so many seconds, one with each
-  /// draw(): the same picture, shown when it is whole, dropped when the view changes before. Only
-  /// software needs them: a device draws a whole picture in about a frame.
-  double piece_seconds = std::numeric_limits<double>::infinity();
-  /// The view changes all the time: a picture that has been begun is finished all the same, unless
-  /// there are much fewer triangles to draw by now.
+  /// Reduced quality is without occlusion and multisampling. `reduced_until_complete`: until no
+  /// finer mesh will arrive; in software until one reduced frame is complete.
+  enum class Quality : std::uint8_t { full, reduced_until_complete, reduced };
+  Quality quality = Quality::full;
+  /// A frame that takes longer is drawn in batches of about this time, one for each draw(). It has
+  /// the same pixels, is shown when finished, and is dropped if the view changes before. Only
+  /// software needs it: a device draws a whole picture in about a frame's time.
+  double batch_seconds = std::numeric_limits<double>::infinity();
+  /// The view changes all the time: an unfinished frame is finished in any case, unless the next
+  /// one has much fewer triangles.
   bool moving = false;
-  /// Divisor of the width and height that it is shown with. Where it is more than 1, box, axes and
-  /// scale bar are drawn there, and as large as always.
-  int smaller = 1;
-  /// Of the display: text, axes and lines are so much larger at least.
+  /// The picture is shown enlarged by this factor. If it is more than 1, box, axes and scale bar
+  /// are drawn at the target's size.
+  int size_divisor = 1;
+  /// Scale of the display; see PictureSettings::overlay_scale.
   float overlay_scale = 1;
-  /// The same picture every time, whichever mesh came first. A device takes longer for it; in
-  /// software it is always so.
+  /// The same pixels whatever the order in which meshes arrived. It is slower on a device; software
+  /// always does so.
   bool in_order = false;
 
-  /// As windows draw, whose pictures become simpler as `pacer` says while something moves.
-  /// `software`: whether OpenGL is.
+  /// The options of a window, which `pacer` simplifies during motion. `software`: whether OpenGL
+  /// is.
   static FrameOptions in_window(const FramePacer& pacer, bool software, bool moving);
 };
 
-/// What has become of pictures so far.
-struct PictureCounters {
+/// Numbers of frames so far.
+struct FrameCounters {
   std::uint64_t finished = 0, dropped = 0;
-  std::uint64_t pieces = 0;  ///< after which a picture was not finished yet
+  std::uint64_t unfinished_batches = 0;  ///< batches after which a frame was unfinished
 };
 
-/// Seconds that the steps of a draw() took this thread; where nothing was drawn, from `turn` to
-/// `finish` are 0.
-struct PictureTimes {
-  double device = 0;    ///< taking over a device, or a part of its memory
-  double scene = 0;     ///< choosing nodes
-  double drawable = 0;  ///< asking what can be drawn
-  double upload = 0;    ///< taking meshes to the device
+/// Seconds of the steps of a draw() on this thread. If it drew nothing, `lock` to `finish` are 0.
+struct FrameTimes {
+  double device = 0;  ///< taking over a device, or importing its memory
+  double scene = 0;
+  double drawable = 0;  ///< finding the meshes to draw
+  double upload = 0;    ///< uploading meshes
   double slices = 0;
-  double turn = 0;    ///< waiting for a device that makes meshes as well
-  double draw = 0;    ///< telling OpenGL what to draw, memory imported for it included
-  double finish = 0;  ///< waiting until OpenGL has drawn it
+  double lock = 0;    ///< waiting for a device that also makes meshes
+  double draw = 0;    ///< submitting to OpenGL
+  double finish = 0;  ///< waiting for OpenGL
   double tidy = 0;    ///< dropping meshes
 };
 
-/// Draws a store: chooses nodes for a view, takes their meshes from the scene to the
-/// device, and makes the picture. The same for windows and off-screen. One thread, with
-/// the context current that it was made in.
+/// Draws a store: chooses nodes for a view, uploads their meshes, and draws frames. The same for
+/// windows and off-screen. For one thread, with the context current in which it was made.
 class SceneRenderer {
  public:
-  /// Reads the ranges. `on_change` is called from worker threads when a new
-  /// picture would show more. `setup`: of the current context, for as long as this picture is
-  /// drawn; null: one of its own. Throws what Scene, PictureSetup and DeviceMeshes::use() do.
+  /// Reads the ranges. `on_change` is called from worker threads when a new frame would show more.
+  /// `setup`: of the current context, for the lifetime of this; null: makes its own. Throws what
+  /// Scene, PictureSetup and DeviceMeshes::use() throw.
   SceneRenderer(std::shared_ptr<const StoreReader> store, const PictureBudgets& budgets,
                 std::function<void()> on_change, std::shared_ptr<PictureSetup> setup = nullptr);
   ~SceneRenderer();
@@ -113,112 +112,112 @@ class SceneRenderer {
   Renderer& renderer() { return setup_->renderer(); }
   DeviceMeshes& device() { return *device_; }
 
-  /// The box around the volume, axis by axis of world space.
+  /// The axis-aligned bounding box of the volume in world space.
   WorldBox bounds() const;
-  /// The box around what such settings show of it: the blocks of 16³ cells that shown surfaces pass
-  /// through, and slices, within cuts and region. bounds() where they show nothing. May read
+  /// The bounding box of what these settings show: the active blocks of 16³ cells of shown
+  /// surfaces, and slices, within axis clips and region. bounds() if they show nothing. May read
   /// ranges, and throws what that throws.
   WorldBox shown_bounds(const ViewSettings& settings) const;
 
-  /// Makes the picture in the renderer, of what is there by now, or goes on with it; leaves the one
-  /// before until it is whole, and where it would show the same. Throws what Scene, Renderer and
-  /// DeviceMeshes do; what had been begun is dropped then.
+  /// Draws a frame of the present meshes, or continues the unfinished one. The previous picture
+  /// stays until the new one is finished, and if the new one would be equal. Throws what Scene,
+  /// Renderer and DeviceMeshes throw; then an unfinished frame is dropped.
   void draw(const Camera& camera, int width, int height, const ViewSettings& settings,
-            const FrameOptions& way = {});
-  const PictureState& state() const { return state_; }
-  /// Whether the last draw() finished a picture, rather than to leave the one before.
-  bool drew() const { return drew_; }
-  /// That the last finished picture took to be drawn, in all of its pieces.
-  double picture_seconds() const { return picture_seconds_; }
-  const PictureCounters& counters() const { return counters_; }
+            const FrameOptions& options = {});
+  const FrameState& state() const { return state_; }
+  /// Whether the last draw() finished a frame.
+  bool has_new_frame() const { return has_new_frame_; }
+  /// Seconds of drawing the last finished frame, in all of its batches.
+  double frame_seconds() const { return frame_seconds_; }
+  const FrameCounters& counters() const { return counters_; }
   /// Of the last draw().
-  const PictureTimes& times() const { return times_; }
+  const FrameTimes& times() const { return times_; }
 
-  /// Draws again and again until the picture is complete. Calls `wait` between, which may throw,
-  /// some ten times a second.
+  /// Draws until the frame is complete. Calls `wait` in between, about ten times a second; it may
+  /// throw.
   void draw_complete(const Camera& camera, int width, int height, const ViewSettings& settings,
                      const std::function<void()>& wait);
 
  private:
-  /// What a picture depends on beside the meshes and slices that there are.
-  struct Shows {
+  /// What a frame depends on, besides the present meshes and slices.
+  struct FrameKey {
     Camera camera;
     int width = 0, height = 0;
-    ViewSettings settings;  ///< without isovalues: one shows when meshes of it are there
-    friend bool operator==(const Shows&, const Shows&) = default;
+    ViewSettings settings;  ///< without isovalues: the meshes determine them
+    friend bool operator==(const FrameKey&, const FrameKey&) = default;
   };
-  /// What somebody asks to see.
-  struct Asked {
+  /// The arguments of draw(), and the state of the scene.
+  struct FrameRequest {
     const Camera& camera;
     int width, height;
     const ViewSettings& settings;
-    const FrameOptions& way;
-    Shows shows, shows_plain;
-    bool idle;  ///< nothing finer than `newest` is to come
+    const FrameOptions& options;
+    FrameKey key, reduced_key;
+    bool idle;  ///< no finer mesh than in `newest` will arrive
     std::shared_ptr<const Drawable> newest;
   };
-  /// What a picture shows.
-  struct Pictured {
-    Shows shows;
+  /// The content of a frame.
+  struct ShownFrame {
+    FrameKey key;
     std::shared_ptr<const Drawable> meshes;
     SliceViews::Samples slices;
-    std::vector<double> isovalues;  ///< of the meshes
-    bool stale = false;  ///< meshes or slices are others by now; these are not kept for that
+    std::vector<double> isovalues;
+    bool stale = false;  ///< newer meshes or slices exist; these were released
   };
-  /// A picture that has been begun.
-  struct Work {
-    Pictured becomes;
-    PictureState state;             ///< what changes with the picture
-    std::vector<double> isovalues;  ///< that were asked for
-    std::uint64_t all = 0;          ///< what there was to draw
-    double seconds = 0;             ///< that it has taken so far
+  /// An unfinished frame.
+  struct PendingFrame {
+    ShownFrame frame;
+    FrameState state;               ///< becomes part of state_
+    std::vector<double> isovalues;  ///< requested
+    std::uint64_t total_work = 0;   ///< work when it was begun
+    double seconds = 0;             ///< drawing time so far
   };
 
-  void draw_next(const Camera& camera, int width, int height, const ViewSettings& settings,
-                 const FrameOptions& way);
+  void draw_frame(const Camera& camera, int width, int height, const ViewSettings& settings,
+                  const FrameOptions& options);
   void update_scene(const Camera& camera, int width, int height, const ViewSettings& settings,
-                    const FrameOptions& way);
-  /// Takes meshes of the newest drawable to the device; shows it once all are there.
+                    const FrameOptions& options);
+  /// Uploads meshes of the newest drawable; shows it once all are uploaded.
   void upload(const std::shared_ptr<const Drawable>& newest);
   bool can_wait(const Drawable& newest) const;
-  bool may_be_plain(const Asked& asked) const;
+  bool may_reduce_quality(const FrameRequest& request) const;
   std::uint64_t upload_memory() const;
   void drop_unused();
-  bool still_wanted(const Work& work, const Asked& asked) const;
-  bool shows_all_there_is(const Pictured& next, const Asked& asked) const;
-  void choose_picture(const Asked& asked);
-  void begin_picture(const Asked& asked);
-  void draw_piece(double limit_seconds);
-  void wait_drawn(bool everything);
-  void finish_picture();
-  void drop_picture();
-  std::optional<std::size_t> surface_of(const DrawnNode& node, const ViewSettings& settings) const;
+  bool is_still_needed(const PendingFrame& pending, const FrameRequest& request) const;
+  bool has_nothing_new(const ShownFrame& next, const FrameRequest& request) const;
+  void choose_frame(const FrameRequest& request);
+  void begin_frame(const FrameRequest& request);
+  void draw_batch(double limit_seconds);
+  void wait_for_gl(bool everything);
+  void finish_frame();
+  void drop_frame();
+  std::optional<std::size_t> surface_of(const NodeDraw& node, const ViewSettings& settings) const;
   void draw_surfaces(const ViewSettings& settings, const PictureSettings& picture,
-                     PictureState& state);
-  void update_state(const Asked& asked);
+                     FrameState& state);
+  void update_state(const FrameRequest& request);
 
   std::shared_ptr<const StoreReader> store_;
   PictureBudgets budgets_;
-  std::future<std::unique_ptr<Scene>> reading_;  ///< beside the set-up
+  std::future<std::unique_ptr<Scene>> scene_future_;  ///< read while OpenGL is set up
   std::shared_ptr<PictureSetup> setup_;
   MeshUploads uploads_;
   SliceViews slices_;
   std::unique_ptr<Scene> scene_;
   std::unique_ptr<DeviceMeshes> device_;
-  std::shared_ptr<const Drawable> shown_, next_;
-  std::vector<std::size_t> shown_surfaces_;  ///< which surface each isovalue of the scene is
-  Pictured pictured_;                        ///< the finished picture
-  std::optional<Work> work_;                 ///< `shown_` does not change while it is there
-  PiecePacer pieces_;
+  std::shared_ptr<const Drawable> shown_meshes_, next_meshes_;
+  std::vector<std::size_t> shown_surfaces_;  ///< the surface of each isovalue of the scene
+  ShownFrame shown_frame_;                   ///< the finished frame
+  std::optional<PendingFrame> pending_;      ///< `shown_meshes_` does not change meanwhile
+  BatchPacer batch_pacer_;
   std::optional<GlFence>
-      piece_fence_;  ///< behind the last piece of `work_`, if it may not be drawn
-  std::chrono::steady_clock::time_point drawn_;  ///< when the last picture was finished
-  double picture_seconds_ = 0;
-  bool drew_ = false;
-  bool imported_ = false;  ///< a piece of a device's memory, in the last draw()
-  PictureCounters counters_;
-  PictureState state_;
-  PictureTimes times_;
+      batch_fence_;  ///< after the last batch of `pending_`, if it may be unfinished
+  std::chrono::steady_clock::time_point finish_time_;  ///< of the last finished frame
+  double frame_seconds_ = 0;
+  bool has_new_frame_ = false;
+  bool imported_block_ = false;  ///< the last draw() imported a block of device memory
+  FrameCounters counters_;
+  FrameState state_;
+  FrameTimes times_;
 };
 
 }  // namespace isobrick

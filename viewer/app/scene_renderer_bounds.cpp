@@ -4,7 +4,7 @@
 #include "viewer/app/scene_renderer.h"
 #include "viewer/scene/surface_box.h"
 
-// Where in the world a store, and what is shown of it, lies.
+// World-space bounds of a store, and of what is shown of it.
 
 namespace isobrick {
 namespace {
@@ -32,7 +32,7 @@ WorldBox SceneRenderer::shown_bounds(const ViewSettings& settings) const {
   for (int axis = 0; axis < 3; ++axis) {
     const SliceSettings& slice = settings.slices[static_cast<std::size_t>(axis)];
     IndexBox plane = part;
-    plane.lo[axis] = plane.hi[axis] = static_cast<double>(slice.place) * last[axis];
+    plane.lo[axis] = plane.hi[axis] = static_cast<double>(slice.position) * last[axis];
     if (slice.shown && part.lo[axis] <= plane.lo[axis] && plane.hi[axis] <= part.hi[axis])
       shown_box.include(plane);
   }

@@ -9,8 +9,9 @@
 
 namespace isobrick {
 
-std::vector<Shot> turntable(Camera camera, Vec3d vertical, int frames, const std::string& folder) {
-  std::vector<Shot> shots;
+std::vector<Screenshot> turntable(Camera camera, Vec3d vertical, int frames,
+                                  const std::string& folder) {
+  std::vector<Screenshot> shots;
   for (int frame = 0; frame < frames; ++frame) {
     shots.push_back({fmt::format("{}/{:04}.png", folder, frame), camera});
     camera.orbit(2 * std::numbers::pi / frames, 0, vertical);

@@ -8,21 +8,22 @@
 
 namespace isobrick {
 
-/// A picture that is to be drawn.
-struct Shot {
+/// A picture to draw into a file.
+struct Screenshot {
   std::string file;
   Camera camera;
 };
 
-/// A full turn of the camera in equal steps about a vertical through its target, as
+/// A full turn of the camera in equal steps about the vertical through its target. The files are
 /// FOLDER/0000.png and so on.
-std::vector<Shot> turntable(Camera camera, Vec3d vertical, int frames, const std::string& folder);
+std::vector<Screenshot> turntable(Camera camera, Vec3d vertical, int frames,
+                                  const std::string& folder);
 
-/// `file`, or where it is taken its name with -2, -3 and so on behind.
+/// Returns `file`, or if that exists the name with -2, -3, … appended.
 std::filesystem::path free_name(const std::filesystem::path& file);
 
-/// Writes the renderer's last finished picture as a PNG. Throws Error when there is none; see
-/// OutputFile for what else it may throw.
+/// Writes the renderer's finished picture as a PNG. Throws Error if there is none, and what
+/// OutputFile throws.
 void write_picture(const Renderer& renderer, const std::string& file, bool force);
 
 }  // namespace isobrick

@@ -8,16 +8,16 @@
 namespace isobrick {
 namespace {
 
-/// In the order of kIndexKinds.
+/// Names of kIndexKinds, in their order.
 constexpr std::array<const char*, std::size(kIndexKinds)> kNames{"linear scan", "interval tree",
                                                                  "k-d tree", "quadtree", "octree"};
 
 }  // namespace
 
 void draw_search_panel(ViewerState& state) {
-  NodeSearch& search = state.picture->scene().search();
+  NodeSearch& search = state.scene_renderer->scene().search();
   const NodeSearch::State now = search.state();
-  // What was refused is not what answers; the next store may have room for it.
+  // A refused index is not in use; but the next store may have room for it.
   int chosen = static_cast<int>(now.refused.empty() ? state.index : now.kind);
   ImGui::SetNextItemWidth(scaled(130));
   if (ImGui::Combo("finds active nodes", &chosen, kNames.data(), static_cast<int>(kNames.size()))) {

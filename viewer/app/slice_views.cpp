@@ -6,7 +6,7 @@
 namespace isobrick {
 namespace {
 
-/// Most that the samples of one slice may take: beside them are as many floats, and on the device.
+/// Maximum bytes of one slice's samples. There are as many floats besides, also on the device.
 std::uint64_t slice_bytes(const PictureBudgets& budgets, ScalarType type) {
   const std::uint64_t sample = std::min<std::uint64_t>(size_of(type), sizeof(float));
   const std::uint64_t samples = std::min(SliceViews::memory(budgets) / 3 / (sample + sizeof(float)),
@@ -38,7 +38,7 @@ std::vector<float> floats_of(const SliceSamples& slice) {
 }  // namespace
 
 SliceViews::SliceViews(const PictureBudgets& budgets, Vec3d last, ScalarType type)
-    : last_(last), most_bytes_(slice_bytes(budgets, type)) {}
+    : last_(last), max_bytes_(slice_bytes(budgets, type)) {}
 
 void SliceViews::update(SceneStream& stream, const ViewSettings& settings) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -51,8 +51,8 @@ void SliceViews::update(SceneStream& stream, const ViewSettings& settings) {
     }
     SliceRequest request;
     request.axis = axis;
-    request.bytes = most_bytes_;
-    request.position = settings.slices[slot].place * last_[axis];
+    request.bytes = max_bytes_;
+    request.position = settings.slices[slot].position * last_[axis];
     shown.requested = true;
     stream.set_slice(axis, request);
     const auto slice = stream.slice(axis);

@@ -14,7 +14,7 @@
 
 namespace isobrick {
 
-/// Slices of a store, as a renderer takes them. Not thread-safe.
+/// The slices of a store in a renderer's format. Not thread-safe.
 class SliceViews {
  public:
   using Samples = std::array<std::shared_ptr<const SliceSamples>, 3>;
@@ -22,18 +22,18 @@ class SliceViews {
   /// `last`: the last sample of level 0; `type`: of the samples.
   SliceViews(const PictureBudgets& budgets, Vec3d last, ScalarType type);
 
-  /// Of host memory: what slices take, with what renderers are given of them.
+  /// Bytes of host memory for slices, including the renderer's copies.
   static std::uint64_t memory(const PictureBudgets& budgets) { return budgets.memory / 8; }
 
-  /// Asks for the samples that settings want, and takes those that have come; until new ones are
-  /// there the last ones stay.
+  /// Requests the slices of the settings and takes finished ones; the previous images stay until
+  /// then.
   void update(SceneStream& stream, const ViewSettings& settings);
-  /// What is there, across x, y, z; null: nothing.
+  /// The present slices across x, y, z; null: none.
   Samples samples() const;
-  /// Draws them; appends what is wrong with them to `damage`.
+  /// Draws the slices and appends their damage to `damage`.
   void draw(Renderer& renderer, const ViewSettings& settings,
             std::vector<std::string>& damage) const;
-  /// Of device memory, while they are drawn.
+  /// Bytes of device memory while they are drawn.
   std::uint64_t bytes() const;
 
  private:
@@ -44,7 +44,7 @@ class SliceViews {
   };
 
   Vec3d last_;
-  std::uint64_t most_bytes_;  ///< of the samples of one
+  std::uint64_t max_bytes_;  ///< of one slice's samples
   std::array<Slice, 3> slices_;
 };
 

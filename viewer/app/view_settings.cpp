@@ -17,7 +17,7 @@ Json list(Vec3<T> v) {
   return Json::array({v.x, v.y, v.z});
 }
 
-/// Reads fields; whatever is wrong is an Error that names the field.
+/// Reads fields of a JSON object. Throws Error, which names the field.
 class Fields {
  public:
   explicit Fields(const Json& json) : json_(json) {}
@@ -29,9 +29,9 @@ class Fields {
   }
   double number(const char* name) const { return number(at(name), name); }
   float real(const char* name) const { return static_cast<float>(number(name)); }
-  float real(const char* name, float least, float most) const {
+  float real(const char* name, float min, float max) const {
     const float value = real(name);
-    if (!(value >= least && value <= most)) wrong(name);
+    if (!(value >= min && value <= max)) wrong(name);
     return value;
   }
   bool flag(const char* name) const {
@@ -47,22 +47,22 @@ class Fields {
     const Vec3d v = vector(name);
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
   }
-  /// Parts of a whole.
+  /// A fraction or colour component for each axis.
   Vec3f parts(const char* name) const {
     const Vec3f v = vector_f(name);
     for (int axis = 0; axis < 3; ++axis)
       if (!(v[axis] >= 0 && v[axis] <= 1)) wrong(name);
     return v;
   }
-  const Json& array(const char* name, std::size_t least, std::size_t most) const {
+  const Json& array(const char* name, std::size_t min, std::size_t max) const {
     const Json& v = at(name);
-    if (!v.is_array() || v.size() < least || v.size() > most) wrong(name);
+    if (!v.is_array() || v.size() < min || v.size() > max) wrong(name);
     return v;
   }
 
  private:
   [[noreturn]] static void wrong(const char* name) {
-    throw Error(fmt::format("bookmark with a \"{}\" that makes no sense", name));
+    throw Error(fmt::format("bookmark with an invalid \"{}\"", name));
   }
   static double number(const Json& v, const char* name) {
     if (!v.is_number()) wrong(name);
@@ -92,13 +92,13 @@ nlohmann::ordered_json to_json(const ViewSettings& s) {
                         {"colour", list(surface.colour)},
                         {"opacity", surface.opacity},
                         {"shown", surface.shown}});
-  for (const CutSettings& cut : s.cuts)
-    cuts.push_back({{"on", cut.on}, {"place", cut.place}, {"beyond", cut.beyond}});
-  for (const PlaneSettings& plane : s.planes)
+  for (const AxisClipSettings& clip : s.axis_clips)
+    cuts.push_back({{"on", clip.on}, {"place", clip.position}, {"beyond", clip.above}});
+  for (const ClipPlaneSettings& plane : s.planes)
     planes.push_back(
         {{"on", plane.on}, {"normal", list(plane.kept.normal)}, {"least", plane.kept.least}});
   for (const SliceSettings& slice : s.slices)
-    slices.push_back({{"shown", slice.shown}, {"place", slice.place}});
+    slices.push_back({{"shown", slice.shown}, {"place", slice.position}});
   return {{"surfaces", surfaces},
           {"cuts", cuts},
           {"planes", planes},
@@ -127,15 +127,15 @@ ViewSettings view_settings_from(const nlohmann::ordered_json& json) {
   const Json& cuts = in.array("cuts", 3, 3);
   const Json& slices = in.array("slices", 3, 3);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Fields cut(cuts[axis]), slice(slices[axis]);
-    s.cuts[axis] = {cut.flag("on"), cut.real("place", 0, 1), cut.flag("beyond")};
+    const Fields clip(cuts[axis]), slice(slices[axis]);
+    s.axis_clips[axis] = {clip.flag("on"), clip.real("place", 0, 1), clip.flag("beyond")};
     s.slices[axis] = {slice.flag("shown"), slice.real("place", 0, 1)};
   }
   for (const Json& item : in.array("planes", 0, kMaxClipPlanes)) {
     const Fields plane(item);
     s.planes.push_back({plane.flag("on"), {plane.vector("normal"), plane.number("least")}});
     if (s.planes.back().kept.normal == Vec3d{})
-      throw Error("bookmark with a plane of no direction");
+      throw Error("bookmark with a plane without a direction");
   }
   const Json& window = in.array("window", 2, 2);
   const Json& background = in.array("background", 2, 2);

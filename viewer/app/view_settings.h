@@ -22,43 +22,43 @@ struct SurfaceSettings {
   friend bool operator==(const SurfaceSettings&, const SurfaceSettings&) = default;
 };
 
-/// A plane across an axis of the volume that cuts away what lies beyond it.
-struct CutSettings {
+/// A clip plane across an axis of the volume.
+struct AxisClipSettings {
   bool on = false;
-  float place = 0.5f;  ///< between the volume's first sample (0) and its last (1)
-  bool beyond = true;  ///< what lies at larger places goes; else at smaller ones
-  friend bool operator==(const CutSettings&, const CutSettings&) = default;
+  float position = 0.5f;  ///< 0: the volume's first sample, 1: its last
+  bool above = true;      ///< clips what lies above `position`; else what lies below
+  friend bool operator==(const AxisClipSettings&, const AxisClipSettings&) = default;
 };
 
-/// A plane at any angle that cuts away one side.
-struct PlaneSettings {
+/// A clip plane at any angle.
+struct ClipPlaneSettings {
   bool on = true;
   HalfSpace kept;
-  friend bool operator==(const PlaneSettings&, const PlaneSettings&) = default;
+  friend bool operator==(const ClipPlaneSettings&, const ClipPlaneSettings&) = default;
 };
 
-/// A picture of the samples across an axis of the volume.
+/// A slice across an axis of the volume.
 struct SliceSettings {
   bool shown = false;
-  float place = 0.5f;
+  float position = 0.5f;
   friend bool operator==(const SliceSettings&, const SliceSettings&) = default;
 };
 
-/// Everything that a picture of a store depends on besides the camera, the store and
-/// what of it has been loaded.
+/// All settings of a picture of a store. Besides them a picture depends on the camera, the store,
+/// and the data that is loaded.
 struct ViewSettings {
   std::vector<SurfaceSettings> surfaces;
-  std::array<CutSettings, 3> cuts;      ///< across x, y, z
-  std::vector<PlaneSettings> planes;    ///< kMaxClipPlanes at most
-  std::array<SliceSettings, 3> slices;  ///< across x, y, z
-  float window_lo = 0,
-        window_hi = 0;  ///< samples that slices show black and white; equal: for choose_values()
+  std::array<AxisClipSettings, 3> axis_clips;  ///< across x, y, z
+  std::vector<ClipPlaneSettings> planes;       ///< kMaxClipPlanes at most
+  std::array<SliceSettings, 3> slices;         ///< across x, y, z
+  /// Samples that slices show black and white; both 0: for choose_values().
+  float window_lo = 0, window_hi = 0;
   bool region_on = false;
-  Vec3f region_lo{0, 0, 0}, region_hi{1, 1, 1};  ///< box shown, in parts of the volume
+  Vec3f region_lo{0, 0, 0}, region_hi{1, 1, 1};  ///< clip box in fractions of the volume
   bool occlusion = true, edges = false, multisample = true;
   bool box = true, axes = true, scale_bar = true;
-  float pixel_error = 1.5f;  ///< how long a cell may be on the picture
-  int finest_level = 0;      ///< of the store: no finer one is shown
+  float pixel_error = 1.5f;  ///< maximum length of a cell on the picture, in pixels
+  int finest_level = 0;      ///< stored level; finer ones are not shown
   Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
   friend bool operator==(const ViewSettings&, const ViewSettings&) = default;
 };
@@ -66,10 +66,10 @@ struct ViewSettings {
 inline constexpr std::size_t kMaxSurfaces = 16;
 inline constexpr float kMinPixelError = 0.1f, kMaxPixelError = 1000;
 
-/// Colours for the first surfaces of a scene, told apart in any order.
+/// The default colour of a surface; colours of the first surfaces are distinct.
 Vec3f surface_colour(std::size_t number);
 
-// As JSON, for bookmarks. Reading throws Error for what is missing or makes no sense.
+// JSON for bookmarks. Reading throws Error for missing or invalid fields.
 nlohmann::ordered_json to_json(const ViewSettings& settings);
 ViewSettings view_settings_from(const nlohmann::ordered_json& json);
 nlohmann::ordered_json to_json(const Camera& camera);

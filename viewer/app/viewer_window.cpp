@@ -1,7 +1,7 @@
 #include "viewer/app/viewer_window.h"
 
 #include <epoxy/gl.h>
-// After OpenGL's.
+// After OpenGL's header.
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
@@ -41,9 +41,9 @@ GLFWwindow* make_window(const WindowOptions& options) {
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-  glfwWindowHint(GLFW_DEPTH_BITS, 0);  // the renderer has its own
+  glfwWindowHint(GLFW_DEPTH_BITS, 0);  // the renderer has its own buffer
   glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
-  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);  // until there is something to be seen
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);  // shown with the first notice
   GLFWwindow* window =
       glfwCreateWindow(options.width, options.height, "Isobrick", nullptr, nullptr);
   if (window == nullptr) {
@@ -54,8 +54,8 @@ GLFWwindow* make_window(const WindowOptions& options) {
   return window;
 }
 
-/// What names of files and our own texts are written with: Latin, Greek, Cyrillic, punctuation,
-/// arrows, signs of mathematics.
+/// Characters of file names and messages: Latin, Greek, Cyrillic, punctuation, arrows, mathematical
+/// signs.
 constexpr ImWchar kGlyphs[] = {0x20,   0x17f,  0x370,  0x3ff,  0x400,  0x45f,
                                0x2010, 0x2044, 0x20ac, 0x20ac, 0x2190, 0x2195,
                                0x2212, 0x2212, 0x2248, 0x2265, 0};
@@ -63,16 +63,16 @@ constexpr ImWchar kGlyphs[] = {0x20,   0x17f,  0x370,  0x3ff,  0x400,  0x45f,
 void load_font(float scale) {
   const std::string_view bytes = font_bytes();
   ImFontConfig config;
-  config.FontDataOwnedByAtlas = false;  // and so it is only read
+  config.FontDataOwnedByAtlas = false;  // so ImGui does not free it
   ImGui::GetIO().Fonts->AddFontFromMemoryTTF(const_cast<char*>(bytes.data()),
                                              static_cast<int>(bytes.size()), kFontPixels * scale,
                                              &config, kGlyphs);
 }
 
-/// Returns the display's scale.
+/// Initialises Dear ImGui; returns the display's scale.
 float set_up_imgui(GLFWwindow* window) {
   ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // nothing is left in whatever folder this is
+  ImGui::GetIO().IniFilename = nullptr;  // no file in the current folder
   ImGui::StyleColorsDark();
   ImGui::GetStyle().WindowRounding = 4;
   float scale = 1, other = 1;
@@ -90,11 +90,11 @@ ViewerWindow::ViewerWindow(WindowOptions options)
     : options_(std::move(options)), window_(make_window(options_)) {
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
-  // Before ImGui's, which calls those that it finds.
+  // Installed before ImGui's callbacks, which call these.
   events_ = std::make_unique<Events>(*this);
   scale_ = set_up_imgui(window_);
   state_.panel_width = kPanelWidth * scale_;
-  // Compiling shaders takes a while.
+  // Compiling shaders takes some time.
   glfwShowWindow(window_);
   show_notice("Starting …");
   PictureSize size;
@@ -108,8 +108,8 @@ ViewerWindow::ViewerWindow(WindowOptions options)
 ViewerWindow::~ViewerWindow() {
   glfwMakeContextCurrent(window_);
   state_.import.reset();
-  state_.facts.reset();
-  state_.picture.reset();
+  state_.isovalue_stats.reset();
+  state_.scene_renderer.reset();
   setup_.reset();
   ImGui_ImplOpenGL3_Shutdown();
   ImGui_ImplGlfw_Shutdown();
@@ -133,15 +133,15 @@ double ViewerWindow::aspect() const {
   return static_cast<double>(area.width) / area.height;
 }
 
-void ViewerWindow::frame_again(FrameTarget framed) {
-  const SceneRenderer& picture = *state_.picture;
-  WorldBox box = picture.bounds();
+void ViewerWindow::frame_camera(FrameTarget framed) {
+  const SceneRenderer& scene_renderer = *state_.scene_renderer;
+  WorldBox box = scene_renderer.bounds();
   try {
-    if (framed == FrameTarget::surface) box = picture.shown_bounds(state_.settings);
+    if (framed == FrameTarget::surface) box = scene_renderer.shown_bounds(state_.settings);
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
-  frame(state_.navigator.camera, picture, box, aspect());
+  frame(state_.navigator.camera, scene_renderer, box, aspect());
   state_.navigator.stop();
 }
 
@@ -159,34 +159,34 @@ void ViewerWindow::look_along(Vec3d direction) {
 }
 
 void ViewerWindow::handle_requests() {
-  const Requests asked = std::exchange(state_.requests, {});
-  if (asked.close) glfwSetWindowShouldClose(window_, GLFW_TRUE);
-  if (state_.picture == nullptr) return;
-  if (asked.look_along) look_along(*asked.look_along);
-  if (asked.volume) show_volume(*asked.volume);
-  if (asked.fit) frame_again(*asked.fit);
-  if (!asked.screenshot) return;
-  // One that moves may be smaller, and without box and axes: that at rest is worth keeping.
-  if (rests())
-    save_picture(*asked.screenshot);
+  const Requests requests = std::exchange(state_.requests, {});
+  if (requests.close) glfwSetWindowShouldClose(window_, GLFW_TRUE);
+  if (state_.scene_renderer == nullptr) return;
+  if (requests.look_along) look_along(*requests.look_along);
+  if (requests.volume) show_volume(*requests.volume);
+  if (requests.fit) frame_camera(*requests.fit);
+  if (!requests.screenshot) return;
+  // A preview may be smaller and have no box and axes, so the still frame is saved.
+  if (is_still())
+    save_picture(*requests.screenshot);
   else
-    state_.requests.screenshot = asked.screenshot;
+    state_.requests.screenshot = requests.screenshot;
 }
 
 void ViewerWindow::save_picture(const std::filesystem::path& file) {
   try {
     const std::filesystem::path free = free_name(file);
-    write_picture(state_.picture->renderer(), free.string(), false);
-    state_.say(fmt::format("wrote '{}'", std::filesystem::absolute(free).string()));
+    write_picture(state_.scene_renderer->renderer(), free.string(), false);
+    state_.show_message(fmt::format("wrote '{}'", std::filesystem::absolute(free).string()));
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
 }
 
 std::optional<PickedPoint> ViewerWindow::pick(const Click& click) {
-  // While something moves the picture may be smaller than the window.
-  const Renderer& renderer = state_.picture->renderer();
-  return pick_point(*state_.picture, static_cast<int>(click.x * renderer.width()),
+  // A preview may be smaller than the window.
+  const Renderer& renderer = state_.scene_renderer->renderer();
+  return pick_point(*state_.scene_renderer, static_cast<int>(click.x * renderer.width()),
                     static_cast<int>(click.y * renderer.height()));
 }
 
@@ -205,7 +205,7 @@ ViewerWindow::Click ViewerWindow::click_at(double x, double y) const {
   return click;
 }
 
-/// Which point of the measurement it becomes.
+/// Adds a point to the measurement; returns its index.
 std::size_t ViewerWindow::measure(Vec3d world) {
   if (state_.measured.size() == 2) state_.measured.clear();
   state_.measured.push_back(world);
@@ -213,32 +213,32 @@ std::size_t ViewerWindow::measure(Vec3d world) {
 }
 
 void ViewerWindow::click(double x, double y) {
-  if (state_.picture == nullptr) return;
+  if (state_.scene_renderer == nullptr) return;
   const PictureArea area = picture_area();
   Click click = click_at((x * area.window_width - area.left) / area.width, y);
   state_.picked = pick(click);
   if (state_.measuring && state_.picked) click.point = measure(state_.picked->world);
-  // Those before were of a measurement that is over, or of none.
+  // Earlier clicks belong to a finished measurement, or to none.
   if (!click.measuring || click.point == 0u) clicks_.clear();
-  if (!rests()) clicks_.push_back(std::move(click));
+  if (!is_still()) clicks_.push_back(std::move(click));
 }
 
-/// Whether the picture that is shown is the finest there will be.
-bool ViewerWindow::rests() const {
-  const PictureState& state = state_.picture->state();
-  return !moving() && state.complete && !state.moving;
+/// Whether the picture is the finest possible one.
+bool ViewerWindow::is_still() const {
+  const FrameState& state = state_.scene_renderer->state();
+  return !is_moving() && state.complete && !state.moving;
 }
 
-void ViewerWindow::settle_clicks() {
+void ViewerWindow::repeat_clicks() {
   if (clicks_.empty()) return;
   const Click now = click_at(0, 0);
-  const auto is_over = [&](const Click& c) {
+  const auto is_outdated = [&](const Click& c) {
     return !(c.camera == now.camera) || !(c.settings == now.settings) || c.width != now.width ||
            c.height != now.height || c.measuring != now.measuring ||
            (c.point && *c.point >= state_.measured.size());
   };
-  std::erase_if(clicks_, is_over);
-  if (clicks_.empty() || !rests()) return;
+  std::erase_if(clicks_, is_outdated);
+  if (clicks_.empty() || !is_still()) return;
   const std::vector<Click> clicks = std::exchange(clicks_, {});
   for (const Click& click : clicks) {
     const auto point = pick(click);
@@ -247,7 +247,7 @@ void ViewerWindow::settle_clicks() {
     if (click.point)
       state_.measured[*click.point] = point->world;
     else if (click.measuring && (state_.measured.size() < 2 || clicks.size() == 1))
-      measure(point->world);  // and so ends no measurement that clicks after it have made
+      measure(point->world);  // never ends a measurement of later clicks
   }
 }
 

@@ -14,42 +14,42 @@ struct GLFWwindow;
 
 namespace isobrick {
 
-/// How a window is opened.
+/// Options of a window.
 struct WindowOptions {
   int width = 1280, height = 800;
   PictureBudgets budgets;
-  IndexKind index = IndexKind::linear;  ///< what finds active nodes
+  IndexKind index = IndexKind::linear;  ///< index over active nodes
   CameraRequest camera;                 ///< for the first store
   ViewSettings settings;                ///< for the first store
-  std::filesystem::path bookmarks;      ///< file; empty: the user's own
-  std::optional<double> piece_seconds;  ///< nothing: FrameOptions::in_window()
+  std::filesystem::path bookmarks;      ///< file; empty: Bookmarks::default_file()
+  std::optional<double> batch_seconds;  ///< nullopt: as FrameOptions::in_window()
 };
 
-/// A window that shows a store: mouse, keys, panels, files dropped on it. All functions
-/// are for the thread that made it; one window at a time.
+/// A window that shows a store, with mouse, keys, panels and dropped files. All functions are for
+/// the thread that made it. One window at a time.
 class ViewerWindow {
  public:
-  /// Throws Error when there is no display or no OpenGL 4.5.
+  /// Throws Error without a display or OpenGL 4.5.
   explicit ViewerWindow(WindowOptions options);
   ~ViewerWindow();
   ViewerWindow(const ViewerWindow&) = delete;
   ViewerWindow& operator=(const ViewerWindow&) = delete;
 
-  /// Shows a store, or the chosen volume of an image with channels or times: the first one where
-  /// nothing is chosen. Throws what opening it throws; what was shown before stays then.
+  /// Opens a store, or a volume of an image with channels or times; by default the first. Throws
+  /// what opening throws; the present store stays then.
   void open(const std::filesystem::path& store, const Selection& selection = {});
-  /// Shows another volume of the same image; camera and settings stay, but for isovalues that it
-  /// does not have. Failures are shown.
+  /// Opens another volume of the same image. Camera and settings stay, but isovalues outside its
+  /// range are replaced. Failures become messages.
   void show_volume(const Selection& selection);
-  /// Shows a store, or converts another format and shows that. An image without ranges gets them
-  /// first. Failures are shown.
+  /// Opens a store, or converts a file of another format and opens the result. Computes the ranges
+  /// of an image without any first. Failures become messages.
   void drop(const std::filesystem::path& path);
 
-  /// Waits for something to happen, at most so long and not at all while anything moves (some
-  /// milliseconds while meshes come in), and shows the next frame if anything has changed. False
-  /// once the window is closed.
-  bool step(double most_seconds = 0.1);
-  /// Until the window is closed, or an end is asked for (core/cancel.h).
+  /// Waits for events and shows the next frame if it may differ. The wait is at most `max_seconds`,
+  /// some milliseconds while meshes arrive, and 0 during motion. Returns false once the window is
+  /// closed.
+  bool step(double max_seconds = 0.1);
+  /// Runs until the window is closed or cancellation is requested (core/cancel.h).
   void run();
 
   ViewerState& state() { return state_; }
@@ -57,55 +57,55 @@ class ViewerWindow {
 
  private:
   class Events;
-  /// Parts of the picture's width and height, and what was seen then.
+  /// Position as fractions of the picture's width and height, and the view at that time.
   struct Click {
     double x, y;
     int width, height;
     Camera camera;
     ViewSettings settings;
     bool measuring;
-    std::optional<std::size_t> point;  ///< of the measurement, that it made
+    std::optional<std::size_t> point;  ///< index of the measured point that it set
   };
 
-  /// What is seen beside the picture; another one is a reason for another frame.
+  /// The visible state besides the picture; a change requires a new frame.
   struct WindowKey {
-    std::uint64_t pictures = 0;  ///< finished so far
+    std::uint64_t pictures = 0;  ///< frames finished so far
     std::size_t messages = 0;
-    bool rests = false, histogram = false, converting = false, panels = false, help = false;
+    bool still = false, histogram = false, converting = false, panels = false, help = false;
     friend bool operator==(const WindowKey&, const WindowKey&) = default;
   };
 
-  void wait(double most_seconds);
-  void wait_for_meshes(double most_seconds);
+  void wait(double max_seconds);
+  void wait_for_meshes(double max_seconds);
   void draw_picture(int width, int height);
-  void draw_frame(bool asked);
+  void draw_frame(bool forced);
   void begin_frame();
   void end_frame();
   void show_notice(const std::string& text);
   void load(const std::filesystem::path& path, const Selection& selection);
   bool begin_ranges(const std::filesystem::path& path, const Selection& selection);
   ConvertOptions import_options() const;
-  void frame_again(FrameTarget framed);
+  void frame_camera(FrameTarget framed);
   void report_empty_surfaces();
   WindowKey window_key() const;
   bool is_due() const;
   PictureArea picture_area() const;
   void pace(double seconds);
   void report_damage();
-  bool rests() const;
-  void settle_clicks();
+  bool is_still() const;
+  void repeat_clicks();
   void handle_requests();
   void handle_import();
   void look_along(Vec3d direction);
   Click click_at(double x, double y) const;
   std::optional<PickedPoint> pick(const Click& click);
   std::size_t measure(Vec3d world);
-  /// At parts of the window's width and height.
+  /// In fractions of the window's width and height.
   void click(double x, double y);
   void save_picture(const std::filesystem::path& file);
-  bool moving() const;
-  double settled_at() const;
-  bool minimised() const;
+  bool is_moving() const;
+  double still_time() const;
+  bool is_minimised() const;
   double aspect() const;
 
   WindowOptions options_;
@@ -114,20 +114,20 @@ class ViewerWindow {
   std::unique_ptr<Events> events_;
   ViewerState state_;
   double last_time_ = 0;
-  double opened_ = 0;     ///< when the store was
-  bool covered_ = false;  ///< the store's surface has been shown
-  double shown_ = 0;      ///< when the last frame was
-  WindowKey shown_key_;   ///< of that frame
-  bool changed_ = true;   ///< something has happened: the next frame may differ from the last
-  bool told_ = false;     ///< something had happened before the last step
-  bool more_ = false;     ///< the picture would go on by itself
-  float scale_ = 1;       ///< of the display: 2 where everything is twice as large
-  bool failed_ = false;   ///< the last picture has thrown: it is tried again, but not at once
-  /// On a picture that was not at rest, whose surface may be a coarser one: they are looked at
-  /// again once the picture rests, if it is still of the same.
+  double open_time_ = 0;        ///< when the store was opened
+  bool surface_shown_ = false;  ///< the store's surface has been shown once
+  double last_frame_time_ = 0;  ///< of the last frame
+  WindowKey last_frame_key_;    ///< of the last frame
+  bool has_event_ = true;       ///< an event since the last step: the next frame may differ
+  bool had_event_ = false;      ///< an event before the last step
+  bool needs_draw_ = false;     ///< the scene renderer has work
+  float scale_ = 1;             ///< of the display
+  bool draw_failed_ = false;    ///< the last frame has thrown; the next try waits
+  /// Clicks on a preview, whose surface may be coarser. They are repeated on the still frame if the
+  /// view is the same.
   std::vector<Click> clicks_;
-  std::set<std::string> told_damage_;  ///< of this store
-  std::set<double> reported_empty_;    ///< isovalues without a surface, of this store
+  std::set<std::string> reported_damage_;  ///< messages of this store
+  std::set<double> reported_empty_;        ///< isovalues outside the range of this store
 };
 
 }  // namespace isobrick

@@ -12,18 +12,18 @@ namespace {
 constexpr std::size_t kMaxNameLength = 60;  ///< characters of a channel's name
 constexpr Index kMaxItems = 1'000'000;
 
-/// The number on the axis, and the name of a channel that has one.
+/// The number on the axis, and the channel's name if it has one.
 std::string item_text(const ImageVolumes& volumes, bool channel, Index number) {
   const auto i = static_cast<std::size_t>(number);
   if (!channel || i >= volumes.channel_names.size()) return fmt::format("{}", number);
   return fmt::format("{}: {}", number, printable(volumes.channel_names[i], kMaxNameLength));
 }
 
-/// The items of an open list; the one that was clicked.
+/// Draws the items of an open list; returns the one that was clicked.
 std::optional<Index> choose_item(const ImageVolumes& volumes, bool channel, Index count,
                                  Index chosen) {
   std::optional<Index> clicked;
-  // Only what is seen is drawn: there may be very many.
+  // Draws only the visible items: there may be very many.
   if (ImGui::IsWindowAppearing())
     ImGui::SetScrollY(static_cast<float>(chosen) * ImGui::GetTextLineHeightWithSpacing());
   ImGuiListClipper clipper;

@@ -10,7 +10,7 @@
 namespace isobrick {
 namespace {
 
-/// Further than this a press and a release are a drag, not a click: pixels.
+/// Pixels between press and release, above which they are a drag and not a click.
 constexpr double kClickPixels = 4;
 constexpr double kIsovalueSteps = 200;  ///< from the lowest sample to the highest
 
@@ -36,28 +36,28 @@ ViewerWindow::Events::Events(ViewerWindow& owner) : owner_(owner) {
   glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
     with_window(w, [&](ViewerWindow& v) { v.events_->on_key(key, action, mods); });
   });
-  // Where "?" lies depends on the keyboard.
+  // The key of "?" depends on the keyboard.
   glfwSetCharCallback(window, [](GLFWwindow* w, unsigned character) {
     with_window(w, [&](ViewerWindow& v) {
-      v.changed_ = true;
+      v.has_event_ = true;
       if (character == '?' && !ImGui::GetIO().WantTextInput) v.state_.help = !v.state_.help;
     });
   });
   glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
     with_window(w, [&](ViewerWindow& v) {
       if (count > 0) v.drop(paths[0]);
-      if (count > 1) v.state_.say("one file at a time: the first is opened");
+      if (count > 1) v.state_.show_message("one file at a time: the first is opened");
     });
   });
   glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) {
-    with_window(w, [](ViewerWindow& v) { v.changed_ = true; });
+    with_window(w, [](ViewerWindow& v) { v.has_event_ = true; });
   });
   glfwSetWindowRefreshCallback(
-      window, [](GLFWwindow* w) { with_window(w, [](ViewerWindow& v) { v.changed_ = true; }); });
+      window, [](GLFWwindow* w) { with_window(w, [](ViewerWindow& v) { v.has_event_ = true; }); });
 }
 
 void ViewerWindow::Events::on_button(int button, int action, int mods) {
-  owner_.changed_ = true;
+  owner_.has_event_ = true;
   if (action == GLFW_PRESS) {
     if (button_ >= 0 || ImGui::GetIO().WantCaptureMouse) return;
     button_ = button;
@@ -77,9 +77,9 @@ void ViewerWindow::Events::on_button(int button, int action, int mods) {
 }
 
 void ViewerWindow::Events::on_pointer(double x, double y) {
-  owner_.changed_ = true;
+  owner_.has_event_ = true;
   if (button_ >= 0) {
-    // A click leaves the camera, and the picture at rest, as they are.
+    // A click changes neither the camera nor the still frame.
     dragged_ |= std::hypot(x - x_, y - y_) >= kClickPixels;
     if (!dragged_) return;
     int width = 1, height = 1;
@@ -103,7 +103,7 @@ void ViewerWindow::Events::on_pointer(double x, double y) {
 }
 
 void ViewerWindow::Events::on_wheel(double steps) {
-  owner_.changed_ = true;
+  owner_.has_event_ = true;
   if (ImGui::GetIO().WantCaptureMouse) return;
   owner_.state_.navigator.wheel(steps);
   last_motion_ = glfwGetTime();
@@ -138,7 +138,7 @@ void ViewerWindow::Events::tap(int) {}
 #endif
 
 void ViewerWindow::Events::on_key(int key, int action, int mods) {
-  owner_.changed_ = true;
+  owner_.has_event_ = true;
   if (action == GLFW_PRESS) tap(key);
   const bool typing = ImGui::GetIO().WantTextInput;
   Navigator& navigator = owner_.state_.navigator;
@@ -148,8 +148,8 @@ void ViewerWindow::Events::on_key(int key, int action, int mods) {
 
 void ViewerWindow::Events::move_isovalue(double steps) {
   ViewerState& state = owner_.state_;
-  if (state.facts == nullptr || state.settings.surfaces.empty()) return;
-  const auto range = state.facts->counts().range();
+  if (state.isovalue_stats == nullptr || state.settings.surfaces.empty()) return;
+  const auto range = state.isovalue_stats->counts().range();
   if (range.empty()) return;
   double& isovalue = state.settings.surfaces[state.selected].isovalue;
   isovalue =
@@ -174,7 +174,7 @@ void ViewerWindow::Events::on_press(int key, int mods, bool again) {
     case GLFW_KEY_DOWN: return move_isovalue(fine ? -0.1 : -1);
     default: break;
   }
-  if (again) return;  // one that is held does not do the rest over and over
+  if (again) return;  // no repetition for a held key
   switch (key) {
     case GLFW_KEY_TAB:
       if (!state.settings.surfaces.empty())
@@ -209,8 +209,8 @@ void ViewerWindow::Events::on_press(int key, int mods, bool again) {
     default: break;
   }
   if (!flying && key >= GLFW_KEY_1 && key <= GLFW_KEY_3) {
-    auto& cut = state.settings.cuts[static_cast<std::size_t>(key - GLFW_KEY_1)];
-    cut.on = !cut.on;
+    auto& clip = state.settings.axis_clips[static_cast<std::size_t>(key - GLFW_KEY_1)];
+    clip.on = !clip.on;
   }
 }
 

@@ -6,18 +6,19 @@
 
 namespace isobrick {
 
-/// What mouse, keys and dropped files do to a window.
+/// Applies mouse, keys and dropped files to a window.
 class ViewerWindow::Events {
  public:
   /// Sets the window's callbacks, for its lifetime.
   explicit Events(ViewerWindow& owner);
 
-  /// Around a frame of Dear ImGui, which would not see a key that went down and up since the last.
+  /// Called around a frame of Dear ImGui, which otherwise misses a key that was pressed and
+  /// released between two frames.
   void hold_tapped_keys();
   void release_tapped_keys();
-  /// When the camera or a slider's value moved last, GLFW's time.
+  /// GLFW time of the last motion of the camera or a slider.
   double last_motion() const { return last_motion_; }
-  /// One of them has just moved.
+  /// Reports such a motion.
   void moved();
 
  private:
@@ -32,9 +33,9 @@ class ViewerWindow::Events {
   FlyKeys fly_keys() const;
 
   ViewerWindow& owner_;
-  int button_ = -1, mods_ = 0;  ///< of the drag; −1: none
-  bool dragged_ = false;        ///< further than a click
-  double x_ = 0, y_ = 0;        ///< of the pointer; until it is dragged where it was pressed
+  int button_ = -1, mods_ = 0;  ///< of the present drag; −1: none
+  bool dragged_ = false;        ///< farther than a click
+  double x_ = 0, y_ = 0;        ///< of the pointer; of the press until the drag begins
   double time_ = 0;
   double last_motion_ = -1e9;
   std::vector<int> tapped_;  ///< keys that went down since the last frame

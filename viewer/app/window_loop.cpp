@@ -1,7 +1,7 @@
 #include "viewer/app/viewer_window.h"
 
 #include <epoxy/gl.h>
-// After OpenGL's.
+// After OpenGL's header.
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
@@ -17,28 +17,28 @@
 #include "viewer/app/pick.h"
 #include "viewer/app/window_events.h"
 
-// What a window does again and again: wait for input, draw, show.
+// The loop of a window: wait for events, draw, show.
 
 namespace isobrick {
 namespace {
 
-/// Above it a frame is no frame but a pause.
-constexpr double kLongestStep = 0.1;
-/// While meshes come in and nothing moves, from a step that has drawn nothing new to the next one:
-/// the cores are for meshes.
-constexpr double kNothingNew = 0.008;
-/// While a picture is drawn in pieces or meshes come in, and nothing else happens, from one frame
-/// to the next: frames would keep software from drawing, and where a display sets the pace a
-/// picture of what has come would wait for its turn, after that of a frame that showed nothing new.
-constexpr double kLongestUnseen = 0.25;
-/// Where nothing happens, from one look at what others have done (a signal, a count) to the next.
+/// Maximum step of motions; a longer frame is a pause.
+constexpr double kMaxStepSeconds = 0.1;
+/// Wait after a step that drew nothing new, while meshes arrive and nothing moves: the cores are
+/// for meshes.
+constexpr double kMeshWaitSeconds = 0.008;
+/// Interval of frames while a picture is drawn in batches or meshes arrive, and nothing else
+/// happens. More frames would delay software drawing; and with vertical sync a new picture would
+/// wait behind a frame without anything new.
+constexpr double kMaxFrameInterval = 0.25;
+/// Interval for checking signals and counts while nothing happens.
 constexpr double kIdleStep = 0.25;
-/// Messages about damage that are shown one by one.
+/// Maximum number of separate messages about damage.
 constexpr std::size_t kMaxReported = 3;
-/// Moving pictures may be coarser for so long after the last motion.
+/// Previews last for this time after the last motion.
 constexpr double kSettleSeconds = 0.25;
 
-/// Whether anything but colours differs: those change no mesh, and nobody waits for them.
+/// Whether the settings differ in more than colours, which change no mesh and need no preview.
 bool values_differ(ViewSettings a, const ViewSettings& b) {
   a.background_top = b.background_top;
   a.background_bottom = b.background_bottom;
@@ -49,66 +49,68 @@ bool values_differ(ViewSettings a, const ViewSettings& b) {
 
 }  // namespace
 
-/// Says once what cannot be shown.
+/// Shows each damage message once.
 void ViewerWindow::report_damage() {
-  if (const std::string why = state_.facts->take_failure(); !why.empty()) state_.say(why);
-  for (const std::string& message : state_.picture->state().damage) {
-    if (told_damage_.size() > kMaxReported) return;
-    if (!told_damage_.insert(message).second) continue;
-    state_.say(told_damage_.size() <= kMaxReported
-                   ? message
-                   : "more is damaged: 'isobrick verify' names all bricks that cannot be read");
+  if (const std::string why = state_.isovalue_stats->take_failure(); !why.empty())
+    state_.show_message(why);
+  for (const std::string& message : state_.scene_renderer->state().damage) {
+    if (reported_damage_.size() > kMaxReported) return;
+    if (!reported_damage_.insert(message).second) continue;
+    state_.show_message(
+        reported_damage_.size() <= kMaxReported
+            ? message
+            : "more is damaged: 'isobrick verify' names all bricks that cannot be read");
   }
 }
 
-/// Says once, of each isovalue that no sample reaches, why nothing of it is seen.
+/// Shows once, for each isovalue outside the range of the samples, why it has no surface.
 void ViewerWindow::report_empty_surfaces() {
-  if (moving()) return;  // one that is dragged goes by
-  const ValueRange<double> range = state_.facts->counts().range();
+  if (is_moving()) return;  // a sliding isovalue passes quickly
+  const ValueRange<double> range = state_.isovalue_stats->counts().range();
   for (const SurfaceSettings& surface : state_.settings.surfaces) {
     if (!surface.shown || reported_empty_.contains(surface.isovalue)) continue;
     const std::string why =
-        why_out_of_range(range, state_.picture->store().info().type, 0, surface.isovalue);
+        why_out_of_range(range, state_.scene_renderer->store().info().type, 0, surface.isovalue);
     if (why.empty()) continue;
     reported_empty_.insert(surface.isovalue);
-    state_.say(why);
+    state_.show_message(why);
   }
 }
 
-double ViewerWindow::settled_at() const {
-  return std::max(events_->last_motion(), opened_) + kSettleSeconds;
+double ViewerWindow::still_time() const {
+  return std::max(events_->last_motion(), open_time_) + kSettleSeconds;
 }
 
-bool ViewerWindow::moving() const {
-  return state_.navigator.moving() || glfwGetTime() < settled_at();
+bool ViewerWindow::is_moving() const {
+  return state_.navigator.is_moving() || glfwGetTime() < still_time();
 }
 
-/// Makes the picture, or goes on with it.
+/// Draws the picture, or a batch of it.
 void ViewerWindow::draw_picture(int width, int height) {
-  SceneRenderer& picture = *state_.picture;
+  SceneRenderer& scene_renderer = *state_.scene_renderer;
   const double begin = glfwGetTime();
-  // The first picture of a store should not wait for a good one.
-  covered_ |= picture.state().covers;
-  const bool fluent = moving() || !covered_;
-  FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), fluent);
+  // The first picture of a store is a preview, too.
+  surface_shown_ |= scene_renderer.state().covers;
+  const bool preview = is_moving() || !surface_shown_;
+  FrameOptions options = FrameOptions::in_window(state_.pacer, setup_->software(), preview);
   options.overlay_scale = scale_;
-  options.piece_seconds = options_.piece_seconds.value_or(options.piece_seconds);
-  const int smaller = fluent ? state_.pacer.smaller() : 1;
+  options.batch_seconds = options_.batch_seconds.value_or(options.batch_seconds);
+  const int size_divisor = preview ? state_.pacer.size_divisor() : 1;
   try {
-    picture.draw(state_.navigator.camera, std::max(width / smaller, 1),
-                 std::max(height / smaller, 1), state_.settings, options);
+    scene_renderer.draw(state_.navigator.camera, std::max(width / size_divisor, 1),
+                        std::max(height / size_divisor, 1), state_.settings, options);
   } catch (const std::exception& e) {
-    if (!std::exchange(failed_, true)) state_.say(e.what());
+    if (!std::exchange(draw_failed_, true)) state_.show_message(e.what());
     return;
   }
-  failed_ = false;
+  draw_failed_ = false;
   pace(glfwGetTime() - begin);
   report_damage();
   report_empty_surfaces();
-  settle_clicks();
+  repeat_clicks();
 }
 
-bool ViewerWindow::minimised() const {
+bool ViewerWindow::is_minimised() const {
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
   return width == 0 || height == 0 || glfwGetWindowAttrib(window_, GLFW_ICONIFIED) == GLFW_TRUE;
@@ -119,18 +121,18 @@ ViewerWindow::WindowKey ViewerWindow::window_key() const {
                 .converting = state_.import != nullptr,
                 .panels = state_.panels,
                 .help = state_.help};
-  if (state_.picture == nullptr) return key;
-  key.pictures = state_.picture->counters().finished;
-  key.rests = rests();
-  key.histogram = state_.facts->histogram() != nullptr;
+  if (state_.scene_renderer == nullptr) return key;
+  key.pictures = state_.scene_renderer->counters().finished;
+  key.still = is_still();
+  key.histogram = state_.isovalue_stats->histogram() != nullptr;
   return key;
 }
 
-/// Whether what tells how far something is, or a cursor that blinks, needs another frame.
+/// Whether progress or a blinking cursor needs another frame.
 bool ViewerWindow::is_due() const {
   const bool under_way = state_.import != nullptr || ImGui::GetIO().WantTextInput ||
-                         (state_.picture != nullptr && !rests());
-  return under_way && glfwGetTime() - shown_ >= kLongestUnseen;
+                         (state_.scene_renderer != nullptr && !is_still());
+  return under_way && glfwGetTime() - last_frame_time_ >= kMaxFrameInterval;
 }
 
 void ViewerWindow::begin_frame() {
@@ -154,32 +156,32 @@ void ViewerWindow::end_frame() {
   glfwSwapBuffers(window_);
 }
 
-/// A frame with a line of text, before something that takes long.
+/// Shows a frame with a line of text, before a long operation.
 void ViewerWindow::show_notice(const std::string& text) {
   begin_frame();
   draw_notice(text);
   end_frame();
 }
 
-/// Unless it would show nothing new. `asked`: somebody has done something.
-void ViewerWindow::draw_frame(bool asked) {
-  if (minimised()) return;
+/// Shows a frame, unless it would equal the last one. `forced`: show it in any case.
+void ViewerWindow::draw_frame(bool forced) {
+  if (is_minimised()) return;
   const PictureArea area = picture_area();
-  if (state_.picture != nullptr) draw_picture(area.width, area.height);
+  if (state_.scene_renderer != nullptr) draw_picture(area.width, area.height);
   const WindowKey key = window_key();
-  if (!asked && key == shown_key_ && !is_due()) return;
-  shown_key_ = key;
+  if (!forced && key == last_frame_key_ && !is_due()) return;
+  last_frame_key_ = key;
   const double now = glfwGetTime();
-  state_.frame_seconds = now - std::exchange(shown_, now);
+  state_.frame_seconds = now - std::exchange(last_frame_time_, now);
   state_.frame_times[state_.frame_number++ % state_.frame_times.size()] =
       static_cast<float>(state_.frame_seconds * 1e3);
   begin_frame();
-  if (state_.picture != nullptr)
-    state_.picture->renderer().copy_to(0, area.width, area.height, area.left);
+  if (state_.scene_renderer != nullptr)
+    state_.scene_renderer->renderer().copy_to(0, area.width, area.height, area.left);
   const ViewSettings settings = state_.settings;
   const Camera camera = state_.navigator.camera;
   draw_panels(state_);
-  // A slider that is dragged, and no click on a widget, is a motion.
+  // Dragging a slider is a motion; clicking a widget is not.
   if (ImGui::IsMouseDown(ImGuiMouseButton_Left) && ImGui::IsAnyItemActive() &&
       (values_differ(settings, state_.settings) || camera != state_.navigator.camera))
     events_->moved();
@@ -187,63 +189,66 @@ void ViewerWindow::draw_frame(bool asked) {
   end_frame();
 }
 
-/// What a picture, or a piece of one, that took this thread so long says of the next one.
+/// Adapts the previews to the time that this thread took for a picture or a batch.
 void ViewerWindow::pace(double seconds) {
-  const SceneRenderer& picture = *state_.picture;
-  // There is more to draw; or a better one to come; or something else to do.
-  more_ = picture.state().drawing || picture.state().plain || picture.state().more;
-  if (!picture.drew()) return;
-  state_.draw_seconds = std::max(seconds, picture.picture_seconds());
-  if (picture.state().moving)
-    state_.pacer.drawn(state_.draw_seconds, picture.state().triangles, picture.state().limited,
-                       picture.state().thin);
-  else if (!picture.state().plain)
-    state_.pacer.drawn_still(state_.draw_seconds, picture.state().triangles);
+  const SceneRenderer& scene_renderer = *state_.scene_renderer;
+  // More to draw, a better picture to come, or other work.
+  needs_draw_ = scene_renderer.state().drawing || scene_renderer.state().reduced_quality ||
+                scene_renderer.state().needs_draw;
+  if (!scene_renderer.has_new_frame()) return;
+  state_.draw_seconds = std::max(seconds, scene_renderer.frame_seconds());
+  if (scene_renderer.state().moving)
+    state_.pacer.add_preview(state_.draw_seconds, scene_renderer.state().triangles,
+                             scene_renderer.state().limited,
+                             scene_renderer.state().thin_over_budget);
+  else if (!scene_renderer.state().reduced_quality)
+    state_.pacer.add_still(state_.draw_seconds, scene_renderer.state().triangles);
 }
 
-void ViewerWindow::wait(double most_seconds) {
-  if (minimised()) return glfwWaitEventsTimeout(most_seconds);
-  const bool there = state_.picture != nullptr;
-  if (there && moving()) {
-    // Until the hand moves on, or holds still for good.
-    if (!changed_ && !more_ && !state_.navigator.moving() && !state_.picture->drew())
-      return glfwWaitEventsTimeout(std::clamp(settled_at() - glfwGetTime(), kNothingNew,
-                                              std::max(most_seconds, kNothingNew)));
+void ViewerWindow::wait(double max_seconds) {
+  if (is_minimised()) return glfwWaitEventsTimeout(max_seconds);
+  const bool has_store = state_.scene_renderer != nullptr;
+  if (has_store && is_moving()) {
+    // Until the next motion, or until the camera counts as still.
+    if (!has_event_ && !needs_draw_ && !state_.navigator.is_moving() &&
+        !state_.scene_renderer->has_new_frame())
+      return glfwWaitEventsTimeout(std::clamp(still_time() - glfwGetTime(), kMeshWaitSeconds,
+                                              std::max(max_seconds, kMeshWaitSeconds)));
     return glfwPollEvents();
   }
-  if (!changed_ && !more_ && (!there || state_.picture->state().complete))
-    return glfwWaitEventsTimeout(most_seconds);
-  const bool before = std::exchange(changed_, false);
+  if (!has_event_ && !needs_draw_ && (!has_store || state_.scene_renderer->state().complete))
+    return glfwWaitEventsTimeout(max_seconds);
+  const bool before = std::exchange(has_event_, false);
   glfwPollEvents();
-  wait_for_meshes(most_seconds);
-  changed_ |= before;
+  wait_for_meshes(max_seconds);
+  has_event_ |= before;
 }
 
-void ViewerWindow::wait_for_meshes(double most_seconds) {
-  if (state_.picture == nullptr || state_.picture->drew()) return;
-  if (state_.picture->state().drawing || state_.picture->state().more) return;
-  // Each mesh that comes in ends a wait, and is not worth a step; the last one is, and what a user
-  // does.
-  const SceneStream& stream = state_.picture->scene().stream();
-  const double end = glfwGetTime() + std::min(kNothingNew, most_seconds);
-  for (double now = glfwGetTime(); !changed_ && now < end && (failed_ || !stream.idle());
+void ViewerWindow::wait_for_meshes(double max_seconds) {
+  if (state_.scene_renderer == nullptr || state_.scene_renderer->has_new_frame()) return;
+  if (state_.scene_renderer->state().drawing || state_.scene_renderer->state().needs_draw) return;
+  // Each new mesh ends a wait but needs no step. The last mesh and user input do.
+  const SceneStream& stream = state_.scene_renderer->scene().stream();
+  const double end = glfwGetTime() + std::min(kMeshWaitSeconds, max_seconds);
+  for (double now = glfwGetTime(); !has_event_ && now < end && (draw_failed_ || !stream.idle());
        now = glfwGetTime())
     glfwWaitEventsTimeout(end - now);
 }
 
-bool ViewerWindow::step(double most_seconds) {
-  wait(most_seconds);
+bool ViewerWindow::step(double max_seconds) {
+  wait(max_seconds);
   if (glfwWindowShouldClose(window_)) return false;
-  // What a panel is told by one event it may show with the second frame.
-  const bool told = std::exchange(changed_, false), asked = std::exchange(told_, told) || told;
-  more_ = false;
+  // A panel may need a second frame to show the effect of an event.
+  const bool event = std::exchange(has_event_, false),
+             forced = std::exchange(had_event_, event) || event;
+  needs_draw_ = false;
   const double now = glfwGetTime();
   const double seconds = now - std::exchange(last_time_, now);
-  state_.navigator.update(std::min(seconds, kLongestStep));
+  state_.navigator.update(std::min(seconds, kMaxStepSeconds));
   state_.drop_old_messages();
   handle_import();
   handle_requests();
-  draw_frame(asked);
+  draw_frame(forced);
   return true;
 }
 

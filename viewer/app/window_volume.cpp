@@ -15,60 +15,60 @@
 #include "viewer/app/framing.h"
 #include "viewer/render/gl_context.h"
 
-// Which volume a window shows: opened, dropped, converted, chosen from an image.
+// The volume of a window: opened, dropped, converted, chosen from an image.
 
 namespace isobrick {
 
-/// Shows a volume in place of the one before; the settings stay as they are.
+/// Replaces the volume; the settings stay.
 void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection) {
   ImageVolumes volumes = image_volumes(path, selection);
   auto store = std::make_shared<const StoreReader>(path, volumes.selection);
-  auto facts = std::make_unique<IsovalueStats>(store);
-  // Last: once it is made, that of the store before has gone from the renderer.
-  auto picture =
+  auto stats = std::make_unique<IsovalueStats>(store);
+  // Last: making it drops the previous store's picture from the renderer.
+  auto renderer =
       std::make_unique<SceneRenderer>(store, options_.budgets, glfwPostEmptyEvent, setup_);
-  picture->scene().search().use(state_.index);
-  state_.facts = std::move(facts);
-  state_.picture = std::move(picture);
+  renderer->scene().search().use(state_.index);
+  state_.isovalue_stats = std::move(stats);
+  state_.scene_renderer = std::move(renderer);
   state_.path = path;
   state_.volumes = std::move(volumes);
   state_.pacer = FramePacer::for_device(current_gl_device().software);
-  opened_ = glfwGetTime();
-  covered_ = false;
+  open_time_ = glfwGetTime();
+  surface_shown_ = false;
   state_.picked.reset();
   state_.measured.clear();
   clicks_.clear();
   state_.typed.reset();
-  told_damage_.clear();
+  reported_damage_.clear();
   reported_empty_.clear();
   const std::string volume = text_of(state_.volumes);
   glfwSetWindowTitle(window_, fmt::format("{}{}{} - Isobrick", path.filename().string(),
                                           volume.empty() ? "" : ", ", volume)
                                   .c_str());
-  changed_ = true;
+  has_event_ = true;
 }
 
 void ViewerWindow::open(const std::filesystem::path& path, const Selection& selection) {
-  if (state_.picture == nullptr)
+  if (state_.scene_renderer == nullptr)
     show_notice(fmt::format("Opening '{}' …", path.filename().string()));
   load(path, selection);
   state_.selected = 0;
   state_.settings = options_.settings;
-  // In software four samples a pixel take longer than anything else.
+  // In software four samples per pixel take more time than anything else.
   if (current_gl_device().software) state_.settings.multisample = false;
-  choose_values(state_.settings, state_.picture->scene().tree());
+  choose_values(state_.settings, state_.scene_renderer->scene().tree());
   state_.navigator.stop();
   state_.navigator.vertical = options_.camera.up;
   state_.navigator.camera =
-      make_camera(options_.camera, *state_.picture, state_.settings, aspect());
+      make_camera(options_.camera, *state_.scene_renderer, state_.settings, aspect());
   state_.bookmarks.reset();
   try {
     state_.bookmarks = std::make_unique<Bookmarks>(
         options_.bookmarks.empty() ? Bookmarks::default_file() : options_.bookmarks, path);
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
-  // The next store is seen whole and with its own isovalue.
+  // The next store is framed anew, with an isovalue of its own.
   options_.camera = {};
   options_.settings.surfaces.clear();
   options_.settings.region_on = false;
@@ -80,15 +80,15 @@ void ViewerWindow::show_volume(const Selection& selection) {
     if (begin_ranges(state_.path, selection)) return;
     load(state_.path, selection);
     ViewSettings& settings = state_.settings;
-    const ValueRange<double> range = state_.facts->counts().range();
+    const ValueRange<double> range = state_.isovalue_stats->counts().range();
     for (SurfaceSettings& surface : settings.surfaces)
       if (!range.stabbed_by(surface.isovalue))
         surface.isovalue = std::numeric_limits<double>::quiet_NaN();
     if (settings.window_hi <= range.lo || settings.window_lo >= range.hi)
       settings.window_lo = settings.window_hi = 0;
-    choose_values(settings, state_.picture->scene().tree());
+    choose_values(settings, state_.scene_renderer->scene().tree());
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
 }
 
@@ -100,7 +100,7 @@ ConvertOptions ViewerWindow::import_options() const {
   return options;
 }
 
-/// Begins to compute the ranges that a volume lacks; false where it has them.
+/// Starts to compute the ranges that a volume lacks; returns false if it lacks none.
 bool ViewerWindow::begin_ranges(const std::filesystem::path& path, const Selection& selection) {
   const Selection shown = image_volumes(path, selection).selection;
   if (has_all_ranges(StoreReader(path, shown))) return false;
@@ -115,7 +115,7 @@ void ViewerWindow::drop(const std::filesystem::path& path) {
     else if (!begin_ranges(path, {}))
       open(path);
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
 }
 
@@ -127,16 +127,16 @@ void ViewerWindow::handle_import() {
   const std::optional<Selection> volume = state_.import->volume();
   state_.import.reset();
   if (now.cancelled) return;
-  if (!now.failure.empty()) return state_.say(now.failure);
+  if (!now.failure.empty()) return state_.show_message(now.failure);
   try {
     if (volume && store == state_.path)
       show_volume(*volume);
     else
       open(store, volume.value_or(Selection()));
   } catch (const std::exception& e) {
-    state_.say(error_message(e));
+    state_.show_message(error_message(e));
   }
-  for (const std::string& note : now.notes) state_.say(note);
+  for (const std::string& note : now.notes) state_.show_message(note);
 }
 
 }  // namespace isobrick

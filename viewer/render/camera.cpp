@@ -9,7 +9,7 @@
 namespace isobrick {
 namespace {
 
-/// Turns v about the unit vector `axis`.
+/// Rotates v about the unit vector `axis`.
 Vec3d turned(Vec3d v, Vec3d axis, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   return v * c + cross(axis, v) * s + axis * (dot(axis, v) * (1 - c));
@@ -28,7 +28,7 @@ WorldBall ball_around(Vec3d lo, Vec3d hi) {
 Camera::Camera(Vec3d from, Vec3d to, Vec3d upwards) : eye(from), target(to) {
   back = unit(eye - target, {0, -1, 0});
   right = cross(upwards, back);
-  if (length(right) < 1e-6 * length(upwards)) {  // looking along `up`
+  if (length(right) < 1e-6 * length(upwards)) {  // the view is parallel to `up`
     right = cross({0, 1, 0}, back);
     if (length(right) < 1e-6) right = {1, 0, 0};
   }
@@ -41,7 +41,7 @@ double Camera::distance() const { return length(eye - target); }
 void Camera::orbit(double around, double over, Vec3d axis) {
   const double away = distance();
   const Vec3d pole = unit(axis, {0, 0, 1});
-  // Upside down, to the left is the other way round.
+  // Upside down, left and right are exchanged.
   const double angle = dot(up, pole) < 0 ? -around : around;
   for (Vec3d* v : {&right, &up, &back}) *v = turned(*v, pole, -angle);
   for (Vec3d* v : {&up, &back}) *v = turned(*v, right, -over);
@@ -67,7 +67,7 @@ void Camera::zoom(double factor) {
 }
 
 void Camera::fit(Vec3d lo, Vec3d hi, double aspect) {
-  constexpr double filled = 0.92;  // of the picture
+  constexpr double filled = 0.92;  // fraction of the picture
   scene = ball_around(lo, hi);
   const double tangent = std::tan(glm::radians(field_of_view) / 2) * filled;
   const double across = aspect > 1 ? aspect * tangent : tangent;
@@ -99,7 +99,7 @@ double Camera::extent_at(double depth) const {
 double Camera::near_depth() const {
   const double centre = dot(eye - scene.centre, back);
   if (orthographic) return centre - 1.01 * scene.radius;
-  // An eye inside the scene keeps a little room before it.
+  // If the eye is inside the scene, the near plane stays a small distance in front of it.
   return std::max({0.99 * (centre - scene.radius), 1e-4 * scene.radius, 1e-9 * length(eye)});
 }
 

@@ -15,7 +15,7 @@ struct WorldBall {
   friend bool operator==(const WorldBall&, const WorldBall&) = default;
 };
 
-/// The smallest ball around a box; of radius 1 if the box is a point or not finite.
+/// The smallest ball around a box; its radius is 1 if the box is a point or not finite.
 WorldBall ball_around(Vec3d lo, Vec3d hi);
 
 /// The half line from `origin` along the unit vector `direction`.
@@ -23,58 +23,59 @@ struct WorldRay {
   Vec3d origin, direction;
 };
 
-/// Where pictures are taken from, in world space. Camera space: x to the right, y
-/// up, z towards the eye, origin at the eye; it keeps world lengths.
+/// The camera of a picture, in world space. Camera space: x to the right, y up, z towards the eye,
+/// origin at the eye, world units.
 class Camera {
  public:
-  /// Looks from `eye` to `target`. `up`: world direction that shows upwards;
-  /// another is taken where it is along the view.
+  /// Looks from `eye` to `target`. `up`: world direction that is upwards on the picture; another
+  /// one is chosen if it is parallel to the view.
   Camera(Vec3d eye, Vec3d target, Vec3d up);
   Camera() : Camera({0, -1, 0}, {0, 0, 0}, {0, 0, 1}) {}
 
   Vec3d eye, target;
-  /// Unit vectors of camera space in the world.
+  /// Unit vectors of camera space, in world space.
   Vec3d right, up, back;
-  /// Across the shorter side of the picture, degrees, 1 … 170.
+  /// Field of view across the picture's shorter side, degrees, 1 … 170.
   double field_of_view = 30;
-  /// Parallel rays: the picture shows what perspective shows at the target.
+  /// Parallel projection with the same extent at the target as the perspective one.
   bool orthographic = false;
-  /// Everything that is drawn: where depth begins (and ends, if orthographic).
+  /// Bounds of everything that is drawn: they set the near plane (and the far plane of a parallel
+  /// projection).
   WorldBall scene{{0, 0, 0}, 1};
 
   double distance() const;
 
-  // Moves for a mouse. Angles in radians.
+  // Motions by mouse. Angles in radians.
 
-  /// Turns around the target: `around` the axis `axis` of the world (to the left), then
-  /// `over` the camera's own horizontal one (upwards). Without end: over the poles, too.
+  /// Rotates around the target: by `around` about the axis `axis` of the world (to the left), then
+  /// by `over` about the camera's own horizontal axis (upwards). It does not stop at the poles.
   void orbit(double around, double over, Vec3d axis);
-  /// Turns the picture about the line of sight.
+  /// Rotates about the line of sight.
   void roll(double angle);
-  /// Shifts eye and target by parts of the picture's shorter side.
+  /// Shifts eye and target by fractions of the picture's shorter side.
   void pan(double to_right, double to_top);
-  /// Divides the distance from the target.
+  /// Divides the distance to the target by `factor`.
   void zoom(double factor);
-  /// Moves the eye so that the box fills a picture of width / height `aspect` but for a
-  /// margin, seen from the same direction; looks at its centre. Sets `scene` too.
+  /// Moves the eye along the present direction, and the target to the box's centre, so that the box
+  /// fills a picture of width / height `aspect` up to a margin. Sets `scene` too.
   void fit(Vec3d lo, Vec3d hi, double aspect);
 
-  /// World directions into camera space.
+  /// Rotation from world space to camera space.
   glm::dmat3 rotation() const;
-  /// Camera space to clip space with depth 1 near and 0 far (GL_ZERO_TO_ONE).
-  /// `aspect`: width / height.
+  /// Camera space to clip space, with depth 1 near and 0 far (GL_ZERO_TO_ONE). `aspect`: width /
+  /// height.
   glm::dmat4 projection(double aspect) const;
-  /// Nearest and farthest depth; perspective has no end.
+  /// Nearest and farthest depth; a perspective projection has no far plane.
   double near_depth() const;
   double far_depth() const;
   /// World length of the picture's shorter side at a depth.
   double extent_at(double depth) const;
 
-  /// Through a point of a picture of width × height pixels; rows from the top,
-  /// pixel centres at .5.
+  /// The ray through a point of a picture of width × height pixels; rows from the top, pixel
+  /// centres at .5.
   WorldRay ray(double x, double y, int width, int height) const;
-  /// The picture's point of a world position; the third is its depth (in front of
-  /// the eye: > 0), world units.
+  /// The pixel position of a world position; z is its depth in world units, positive in front of
+  /// the eye.
   Vec3d project(Vec3d world, int width, int height) const;
 
   friend bool operator==(const Camera&, const Camera&) = default;

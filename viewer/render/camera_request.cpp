@@ -27,10 +27,10 @@ double number(std::string_view part, std::string_view text) {
   return value;
 }
 
-double number_in(std::string_view part, std::string_view text, double least, double most) {
+double number_in(std::string_view part, std::string_view text, double min, double max) {
   const double value = number(part, text);
-  if (value < least || value > most)
-    throw UsageError(fmt::format("'{}' in a camera must be {} to {}", part, least, most));
+  if (value < min || value > max)
+    throw UsageError(fmt::format("'{}' in a camera must be {} to {}", part, min, max));
   return value;
 }
 
@@ -50,11 +50,12 @@ bool has_direction(Vec3d v) {
 
 Vec3d direction(std::string_view part, std::string_view text) {
   const Vec3d v = triple(part, text);
-  if (!has_direction(v)) throw UsageError(fmt::format("'{}' in a camera is no direction", part));
+  if (!has_direction(v)) throw UsageError(fmt::format("'{}' in a camera has no direction", part));
   return v;
 }
 
-/// `back`: from the target towards the eye. Up as it is when nobody says so gives way.
+/// `back`: from the target towards the eye. The default of `up` is replaced if it is parallel to
+/// the view.
 void check_view(const CameraRequest& request, Vec3d back) {
   if (!has_direction(back))
     throw UsageError("a camera's eye is where its target is; one of them has to be elsewhere");
@@ -90,14 +91,14 @@ void take(CameraRequest& request, std::string_view part) {
   } else if (key == "target") {
     request.target = triple(part, text);
   } else {
-    throw UsageError(fmt::format("'{}' is nothing that a camera has; it is {}", part, kForm));
+    throw UsageError(fmt::format("'{}' is no part of a camera; the form is {}", part, kForm));
   }
 }
 
-/// The direction towards the eye that the two angles mean.
+/// Converts the two angles to the direction towards the eye.
 Vec3d direction_of(const CameraRequest& request) {
   const Vec3d up = unit(request.up, {0, 0, 1});
-  // Around z azimuth 0 is the front, -y; another `up` turns the world by the shortest way.
+  // With up = z, azimuth 0 is the front, -y. Another `up` rotates the world by the shortest way.
   Vec3d right = cross(up, {0, -1, 0});
   if (length(right) < 1e-6) right = {1, 0, 0};
   right = unit(right, {1, 0, 0});

@@ -8,7 +8,7 @@
 
 namespace isobrick {
 
-/// What drawing needs of a context's switches; leaves OpenGL's defaults.
+/// Sets the context's state for drawing; restores OpenGL's defaults.
 class DrawSwitches {
  public:
   explicit DrawSwitches(const FrameBlock& frame) {
@@ -34,7 +34,7 @@ class DrawSwitches {
   DrawSwitches(const DrawSwitches&) = delete;
   DrawSwitches& operator=(const DrawSwitches&) = delete;
 
-  /// Depth test, weighted blending.
+  /// Sets the depth test and the weighted blending for meshes.
   void meshes(bool depth_test, bool blended) const {
     set(GL_DEPTH_TEST, depth_test);
     glDepthMask(!blended);

@@ -12,7 +12,7 @@
 #include <stb/stb_truetype.h>
 #pragma GCC diagnostic pop
 
-// The assembler puts the file in as it is.
+// The assembler embeds the file.
 __asm__(
     ".pushsection .rodata\n"
     "isobrick_font_begin:\n"
@@ -41,7 +41,7 @@ FontAtlas::FontAtlas(float height)
   if (!stbtt_InitFont(&info, font, 0) ||
       stbtt_BakeFontBitmap(font, 0, height, picture_.data(), kEdge, kEdge, kFirst, kCount,
                            baked.data()) <= 0)
-    throw Error("the font that the program brings along cannot be drawn at this size");
+    throw Error("the embedded font cannot be drawn at this size");
   int ascent = 0, descent = 0, gap = 0;
   stbtt_GetFontVMetrics(&info, &ascent, &descent, &gap);
   ascent_ = static_cast<float>(ascent) * stbtt_ScaleForPixelHeight(&info, height);
@@ -60,7 +60,7 @@ const Glyph& FontAtlas::glyph_of(std::string_view text, std::size_t& at) const {
   };
   unsigned code = byte(at++);
   if (code >= 0xc0 && (byte(at) & 0xc0) == 0x80) code = (code & 0x1f) << 6 | (byte(at++) & 0x3f);
-  while ((byte(at) & 0xc0) == 0x80) {  // of longer ones the rest
+  while ((byte(at) & 0xc0) == 0x80) {  // skips the rest of longer sequences
     code = '?';
     ++at;
   }

@@ -7,29 +7,30 @@
 
 namespace isobrick {
 
-/// The bytes of the font (DejaVu Sans, TrueType) that the program brings along.
+/// The embedded font (DejaVu Sans, TrueType).
 std::string_view font_bytes();
 
-/// Where a glyph lies in the atlas, and around the pen, in pixels of the atlas.
+/// A glyph's rectangle in the atlas, and relative to the pen, in pixels of the atlas.
 struct Glyph {
   float u0 = 0, v0 = 0, u1 = 0, v1 = 0;
   float x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< from the pen on the base line, y down
   float advance = 0;
 };
 
-/// The glyphs of ASCII and Latin-1 in one 8-bit picture.
+/// The glyphs of ASCII and Latin-1 in one 8-bit image.
 class FontAtlas {
  public:
-  /// `height`: pixels of a line.
+  /// `height`: of a line, in pixels.
   explicit FontAtlas(float height);
 
   int edge() const { return kEdge; }
   const std::vector<std::uint8_t>& picture() const { return picture_; }
   float height() const { return height_; }
-  /// From the top of a line to its base.
+  /// Distance from the top of a line to its base line.
   float ascent() const { return ascent_; }
 
-  /// Calls f(glyph, pen x) for each character of UTF-8 text; what is not Latin-1 shows as '?'.
+  /// Calls f(glyph, pen x) for each character of UTF-8 text and returns the width. Characters
+  /// beyond Latin-1 become '?'.
   template <class F>
   float place(std::string_view text, F&& f) const {
     float pen = 0;
@@ -40,7 +41,7 @@ class FontAtlas {
     }
     return pen;
   }
-  /// Pixels that a line of text takes.
+  /// Width of a line of text, in pixels.
   float width(std::string_view text) const {
     return place(text, [](const Glyph&, float) {});
   }

@@ -16,7 +16,7 @@ float to_linear(float v) {
   return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
 }
 
-/// In double up to the eye, so that far from the world's origin nothing jitters.
+/// Differences to the eye in double, so that nothing jitters far from the world's origin.
 glm::vec4 from_eye(const HalfSpace& half, Vec3d eye) {
   const double size = length(half.normal);
   const Vec3f n = to_float(half.normal * (1 / size));
@@ -79,7 +79,7 @@ layout(std140, binding = 0) uniform Frame {
   vec4 samples_x, samples_y;
 };
 
-// World length in front of the eye, from what the depth buffer holds.
+// World length in front of the eye, from a value of the depth buffer.
 float depth_of(float stored) {
   return depth_range.z > 0.5 ? depth_range.y - stored * (depth_range.y - depth_range.x)
                              : depth_range.x / stored;
@@ -92,16 +92,16 @@ float pixel_length(float depth) { return depth_range.z > 0.5 ? pixel.x : pixel.x
 vec3 towards_eye(vec3 position) {
   return depth_range.z > 0.5 ? vec3(0, 0, 1) : normalize(-position);
 }
-// A direction towards the eye, of which only x and y are kept.
+// The unit vector towards the eye with the given x and y.
 vec3 normal_of(vec2 xy) { return vec3(xy, sqrt(max(1 - dot(xy, xy), 0.0))); }
-// How much a transparent fragment counts at a depth: near ones more. Half floats hold it.
+// Weight of a transparent fragment: larger for nearer ones, within the range of half floats.
 float weight_at(float depth) {
   return 64 * exp2(-12 * clamp((depth - depth_range.x) * depth_range.w, 0.0, 1.0));
 }
 )";
 
 const char* const kPlaceGlsl = R"(
-// The same in all forms, or meshes drawn by different ones would not meet.
+// The same expression in all variants, or meshes drawn by different ones would not meet.
 invariant gl_Position;
 
 void place(vec3 from_eye) { gl_Position = projection * vec4(mat3(rotation) * from_eye, 1); }
@@ -109,21 +109,21 @@ void place(vec3 from_eye) { gl_Position = projection * vec4(mat3(rotation) * fro
 
 namespace {
 
-// What small triangles take goes with what their corners hand on, and clip distances make them go
-// another way still: so corners hand on neither where they are nor how far from planes.
+// Small triangles are bound by the size of the interpolated vertex outputs, and clip distances use
+// a slower path. So vertices pass neither their position nor distances to planes.
 const char* const kHereGlsl = R"(
-// Camera space. The middle of the pixel, which may be beside the triangle: on its plane then, but
-// for triangles that are seen from their edge not behind everything.
+// Camera space, at the pixel's centre. If that is beside the triangle, the point is on the
+// triangle's plane, but for a triangle seen edge-on not behind everything.
 vec3 here() {
   float farthest = depth_range.z > 0.5 ? 0.0 : 0.5 * depth_range.x / depth_range.y;
   return view_position(gl_FragCoord.xy, depth_of(max(gl_FragCoord.z, farthest)));
 }
 )";
 
-const char* const kCutGlsl = R"(
-// A sample lies where a half space ends by what is linear on the picture: its distance, times the
-// stored depth with perspective, and never divided by that.
-void cut(uint bits) {
+const char* const kClipGlsl = R"(
+// A half space is tested with a value that is linear on the picture: the distance, in perspective
+// multiplied by the stored depth instead of divided.
+void clip(uint bits) {
   vec2 across = (gl_FragCoord.xy / viewport.xy * 2 - 1) * viewport.zw;
   bool parallel = depth_range.z > 0.5;
   vec3 at = parallel ? vec3(across, -depth_of(gl_FragCoord.z)) : vec3(across, -1) * depth_range.x;
@@ -143,12 +143,12 @@ void cut(uint bits) {
 
 }  // namespace
 
-std::string fragment_glsl(bool cut) {
-  return kHereGlsl + std::string(cut ? kCutGlsl : "void cut(uint bits) {}\n");
+std::string fragment_glsl(bool clips) {
+  return kHereGlsl + std::string(clips ? kClipGlsl : "void clip(uint bits) {}\n");
 }
 
 const char* const kLightGlsl = R"(
-// Linear light that a surface sends to the eye; all in camera space. A key light from
+// Light that a surface reflects to the eye, linear; arguments in camera space. A key light from
 // above and left, sky and ground, a little light from the eye, gloss and a bright rim.
 vec3 lit(vec3 normal, vec3 eye, vec3 colour) {
   const vec3 key = normalize(vec3(-0.46, 0.64, 0.62));

@@ -26,8 +26,8 @@ bool has_word(const char* list, std::string_view word) {
   return false;
 }
 
-/// EGL gives out one display for a platform and device however often it is asked,
-/// and terminating it ends all contexts there: the last one out does.
+/// EGL returns the same display for each request of a platform and device, and terminating it ends
+/// all contexts on it. So the last owner terminates it.
 class Display {
  public:
   explicit Display(EGLDisplay display) : display_(display) {
@@ -61,7 +61,7 @@ class Display {
   EGLDisplay display_;
 };
 
-/// A way to a display, in the order in which they are tried.
+/// A display to try; see candidates() for the order.
 struct Candidate {
   EGLenum platform;
   void* device;
@@ -135,7 +135,7 @@ struct GlContext::State {
 };
 
 GlContext::GlContext() {
-  // libepoxy would end the program if it could not load these.
+  // libepoxy ends the program if it cannot load these libraries.
   for (const char* library : {"libEGL.so.1", "libOpenGL.so.0"})
     if (dlopen(library, RTLD_LAZY | RTLD_LOCAL) == nullptr)
       throw Error(fmt::format(
@@ -162,7 +162,7 @@ GlContext::GlContext() {
 GlContext::~GlContext() = default;
 
 void GlContext::make_current() {
-  eglBindAPI(EGL_OPENGL_API);  // each thread has its own
+  eglBindAPI(EGL_OPENGL_API);  // per thread
   if (!eglMakeCurrent(state_->display.get(), EGL_NO_SURFACE, EGL_NO_SURFACE, state_->context))
     throw Error("its OpenGL cannot be used in this thread");
 }

@@ -24,7 +24,7 @@ const char* name_of(unsigned error) {
   }
 }
 
-/// A shader or a whole program until it is known to be right.
+/// Owns a shader or program until it is complete.
 class Shader {
  public:
   Shader(unsigned kind, const std::string& source, const char* what) : name_(glCreateShader(kind)) {
@@ -77,8 +77,8 @@ void GlFence::wait() const {
 void check_gl(const char* what) {
   const unsigned error = glGetError();
   if (error == GL_NO_ERROR) return;
-  // One call may leave several flags; the first says enough. A lost context
-  // would answer for ever.
+  // One call may set several flags; the first one suffices. A lost context would return errors for
+  // ever.
   for (int i = 0; i < 16 && glGetError() != GL_NO_ERROR; ++i) {
   }
   throw Error(fmt::format("OpenGL: {}: {}", what, name_of(error)));
@@ -144,7 +144,7 @@ GlFramebuffer make_framebuffer(std::span<const unsigned> colours, unsigned depth
   glNamedFramebufferDrawBuffers(name, static_cast<GLsizei>(buffers.size()), buffers.data());
   check_gl(what);
   if (glCheckNamedFramebufferStatus(name, GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-    throw Error(fmt::format("OpenGL: {}: this driver cannot draw into such a picture", what));
+    throw Error(fmt::format("OpenGL: {}: this driver does not support such a framebuffer", what));
   return framebuffer;
 }
 

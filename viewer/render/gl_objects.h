@@ -8,10 +8,10 @@
 
 namespace isobrick {
 
-// Owners of OpenGL objects. Each is made and destroyed in the context that is
-// current; moved-from owners hold 0, which OpenGL ignores.
+// Owners of OpenGL objects. Make and destroy them in a current context. Moved-from owners hold 0,
+// which OpenGL ignores.
 
-/// Owns one object's name; `Delete` gives it back.
+/// Owns an object's name; `Delete` deletes the object.
 template <void (*Delete)(unsigned)>
 class GlName {
  public:
@@ -47,26 +47,26 @@ using GlTexture = GlName<&gl::delete_texture>;
 using GlFramebuffer = GlName<&gl::delete_framebuffer>;
 using GlProgram = GlName<&gl::delete_program>;
 
-/// A buffer of `bytes` bytes that OpenGL, CUDA or a mapping may write.
+/// Makes a buffer of `bytes` bytes that OpenGL, CUDA or a mapping may write. `what`: for messages.
 GlBuffer make_buffer(std::uint64_t bytes, const char* what);
-/// A buffer whose content is replaced often; see fill_buffer.
+/// Makes a buffer whose content is replaced often; see fill_buffer().
 GlBuffer make_stream_buffer();
-/// Replaces content and size of a stream buffer.
+/// Replaces the content and the size of a stream buffer.
 void fill_buffer(const GlBuffer& buffer, std::span<const std::byte> bytes);
 
 GlVertexArray make_vertex_array();
 
-/// A 2D texture without mipmaps, read at pixel centres; `samples` > 1: multisampled.
+/// Makes a 2D texture without mipmaps and filtering; multisampled if `samples` > 1.
 GlTexture make_texture(unsigned format, int width, int height, int samples, const char* what);
 
-/// A framebuffer of colour attachments 0, 1, … and a depth attachment (0: none).
+/// Makes a framebuffer of colour attachments 0, 1, … and a depth attachment (0: none).
 GlFramebuffer make_framebuffer(std::span<const unsigned> colours, unsigned depth, const char* what);
 
-/// Compiles and links; both sources without their #version line. Throws Error
-/// with the compiler's words.
+/// Compiles and links a program; the sources have no #version line. Throws Error with the
+/// compiler's message.
 GlProgram make_program(const std::string& vertex, const std::string& fragment, const char* what);
 
-/// A place in what the current context has been told.
+/// A fence in the current context's command stream.
 class GlFence {
  public:
   static GlFence insert();
@@ -77,7 +77,7 @@ class GlFence {
   }
   ~GlFence();
 
-  /// Until everything before it is drawn.
+  /// Waits until all commands before it have finished.
   void wait() const;
 
  private:

@@ -26,7 +26,7 @@ std::optional<std::array<std::uint8_t, 16>> current_gl_device_id() {
 
 ImportedBuffers::ImportedBuffers(int file, std::uint64_t bytes, std::uint32_t vertices,
                                  std::uint32_t triangles) {
-  const int own = dup(file);  // OpenGL keeps what it imports
+  const int own = dup(file);  // OpenGL takes ownership of the descriptor
   if (own < 0)
     throw Error(fmt::format("OpenGL: memory of another interface: {}", std::strerror(errno)));
   glCreateMemoryObjectsEXT(1, &memory_);

@@ -9,17 +9,17 @@
 
 namespace isobrick {
 
-/// By which drivers of all kinds tell devices apart: that of the current context; nothing
-/// where OpenGL cannot import memory.
+/// The UUID of the current context's device, which CUDA reports too; nullopt if OpenGL cannot
+/// import memory.
 std::optional<std::array<std::uint8_t, 16>> current_gl_device_id();
 
-/// Buffers for meshes in memory that another interface of the same device owns (CUDA): an array of
-/// positions, one of as many normals, one of triangles, one behind the other. What is
-/// written there by work that has ended before a drawing call is what the call draws.
+/// OpenGL buffers in memory of another interface of the same device (CUDA): an array of positions,
+/// one of as many normals, one of triangles, in this order. A draw call sees the data of writes
+/// that finished before it.
 class ImportedBuffers {
  public:
-  /// `file`: descriptor of `bytes` bytes of exported memory; stays the caller's. Throws Error
-  /// when it cannot be imported.
+  /// `file`: descriptor of `bytes` bytes of exported memory; the caller keeps it. Throws Error if
+  /// the import fails.
   ImportedBuffers(int file, std::uint64_t bytes, std::uint32_t vertices, std::uint32_t triangles);
   ~ImportedBuffers();
   ImportedBuffers(const ImportedBuffers&) = delete;

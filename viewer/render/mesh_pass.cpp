@@ -16,27 +16,27 @@
 namespace isobrick {
 namespace {
 
-/// How one mesh is drawn; std430.
-struct Look {
+/// Parameters of one mesh; std430.
+struct DrawParameters {
   glm::vec4 offset;  ///< from the eye; w: has normals
   glm::vec4 colour;  ///< linear; alpha: opacity
   glm::vec4 inside;
-  glm::uvec4 id;  ///< y: the half spaces that may cut it, as bits
+  glm::uvec4 id;  ///< y: clip mask
 };
 
 /// See MeshPass::max_triangles().
 constexpr std::uint64_t kSoftwareTriangles = std::uint64_t{1} << 14;
 
-/// What glMultiDrawElementsIndirect reads.
+/// The command layout of glMultiDrawElementsIndirect.
 struct Command {
   std::uint32_t count, instances, first_index;
   std::int32_t base_vertex;
   std::uint32_t base_instance;
 };
 
-const char* const kLooks = R"(
-struct Look { vec4 offset, colour, inside; uvec4 id; };
-layout(std430, binding = 0) readonly buffer Looks { Look looks[]; };
+const char* const kParametersGlsl = R"(
+struct DrawParameters { vec4 offset, colour, inside; uvec4 id; };
+layout(std430, binding = 0) readonly buffer Parameters { DrawParameters parameters[]; };
 )";
 
 const char* const kVertex = R"(
@@ -49,20 +49,20 @@ centroid out vec3 surface_colour;
 #endif
 centroid out vec3 world_normal;
 #if FRONT
-// Within the triangle, also where a pixel's centre is beside it.
+// Centroid: within the triangle even if the pixel's centre is beside it.
 noperspective centroid out float stored_depth;
 #endif
 #if SOFTWARE
-// Fragments get the look from here and not from the buffer: Mesa's llvmpipe draws them
-// when the buffer may hold the next mesh's already.
+// Fragments get the parameters here and not from the buffer: when Mesa's llvmpipe draws them, the
+// buffer may already hold the next mesh's.
 flat out vec4 outer_colour, inner_colour;
-flat out uvec3 mesh;  // id, cut by, has normals
+flat out uvec3 mesh;  // id, clip mask, has normals
 #else
-flat out uint look;
+flat out uint draw_index;
 #endif
 
 void main() {
-  place(position + looks[number].offset.xyz);
+  place(position + parameters[number].offset.xyz);
   world_normal = normal;
 #if COLOURED
   surface_colour = vertex_colour;
@@ -71,11 +71,11 @@ void main() {
   stored_depth = gl_Position.z / gl_Position.w;
 #endif
 #if SOFTWARE
-  outer_colour = looks[number].colour;
-  inner_colour = looks[number].inside;
-  mesh = uvec3(looks[number].id.xy, looks[number].offset.w > 0.5 ? 1 : 0);
+  outer_colour = parameters[number].colour;
+  inner_colour = parameters[number].inside;
+  mesh = uvec3(parameters[number].id.xy, parameters[number].offset.w > 0.5 ? 1 : 0);
 #else
-  look = number;
+  draw_index = number;
 #endif
 }
 )";
@@ -86,10 +86,10 @@ centroid in vec3 world_normal;
 flat in vec4 outer_colour, inner_colour;
 flat in uvec3 mesh;
 #else
-flat in uint look;
-#define outer_colour looks[look].colour
-#define inner_colour looks[look].inside
-#define mesh uvec3(looks[look].id.xy, looks[look].offset.w > 0.5 ? 1 : 0)
+flat in uint draw_index;
+#define outer_colour parameters[draw_index].colour
+#define inner_colour parameters[draw_index].inside
+#define mesh uvec3(parameters[draw_index].id.xy, parameters[draw_index].offset.w > 0.5 ? 1 : 0)
 #endif
 
 #if COLOURED
@@ -102,14 +102,14 @@ vec3 outer() {
 vec3 outer() { return outer_colour.rgb; }
 #endif
 
-struct Seen { vec3 position, normal, eye, light; float slope; };
+struct ShadedPoint { vec3 position, normal, eye, light; float slope; };
 
-Seen see() {
-  Seen s;
+ShadedPoint shade() {
+  ShadedPoint s;
   s.position = here();
   vec3 facet = cross(dFdx(s.position), dFdy(s.position));
   s.slope = fwidth(gl_FragCoord.z);
-  cut(mesh.y);  // after what is looked at across pixels
+  clip(mesh.y);  // after all derivatives
   s.eye = towards_eye(s.position);
   facet = dot(facet, facet) > 0 ? normalize(facet) : s.eye;
   if (dot(facet, s.eye) < 0) facet = -facet;
@@ -119,12 +119,12 @@ Seen see() {
     s.normal = facet;
   else
     s.normal *= inversesqrt(size);
-  // Both sides are lit, whatever way round the file has them.
+  // Both sides are lit, whatever the winding.
   if (dot(s.normal, facet) < 0) s.normal = -s.normal;
   float facing = dot(s.normal, s.eye);
   if (facing < 0.02) s.normal = normalize(s.normal + s.eye * (0.02 - facing));
-  bool opened = OPEN != 0 && !gl_FrontFacing;
-  s.light = lit(s.normal, s.eye, opened ? inner_colour.rgb : outer());
+  bool back = CLIPS != 0 && !gl_FrontFacing;
+  s.light = lit(s.normal, s.eye, back ? inner_colour.rgb : outer());
   return s;
 }
 )";
@@ -135,7 +135,7 @@ layout(location = 1) out vec2 normal;
 layout(location = 2) out uint id;
 
 void main() {
-  Seen s = see();
+  ShadedPoint s = shade();
   colour = vec4(min(s.light, vec3(4)), 1);
   normal = s.normal.xy;
   id = mesh.x;
@@ -143,7 +143,7 @@ void main() {
 )";
 
 const char* const kTransparent = R"(
-// What is hidden by opaque meshes is not in front, either.
+// Fragments behind opaque meshes do not count as front.
 layout(early_fragment_tests) in;
 layout(binding = 0, r32ui) uniform uimage2D front;
 noperspective centroid in float stored_depth;
@@ -151,18 +151,18 @@ layout(location = 0) out vec4 sum;
 layout(location = 1) out float hidden;
 
 void main() {
-  Seen s = see();
-  // What it is where the pixel's centre is beside the triangle; not farther off than that is, for
-  // one that goes past the eye has none in between.
+  ShadedPoint s = shade();
+  // The depth at the centroid. It is limited to the slope within a pixel, since a triangle that
+  // passes the eye has no depth in between.
   float within = clamp(stored_depth, gl_FragCoord.z - s.slope, gl_FragCoord.z + s.slope);
   if (counts.y != 0) {
     bool whole = gl_SampleMaskIn[0] == counts.z;
     float depth = whole ? gl_FragCoord.z : clamp(within, 0.0, 1.0);
-    // Near is large; of the depth what leaves room for a number.
+    // Larger is nearer; the low bits of the depth make room for the id.
     imageAtomicMax(front, ivec2(gl_FragCoord.xy),
                    floatBitsToUint(depth) & 0xffffff00u | mesh.x & 0xffu);
   }
-  // Slanting rays have a longer way through it.
+  // Slanting rays pass through more of it.
   float facing = max(dot(s.normal, s.eye), 0.12);
   float alpha = 1 - pow(1 - outer_colour.a, 1 / facing);
   sum = vec4(min(s.light, vec3(2)), 1) * alpha * weight_at(-s.position.z);
@@ -175,27 +175,27 @@ glm::vec4 offset_of(Vec3d origin, Vec3d eye, bool normals) {
   return {from_eye.x, from_eye.y, from_eye.z, normals ? 1.0f : 0.0f};
 }
 
-/// But for its offset.
-Look look_of(const MeshStyle& style) {
+/// All parameters but the offset.
+DrawParameters parameters_of(const MeshStyle& style) {
   const Vec3f c = style.colour;
   const Vec3f darker{0.30f + 0.42f * c.x, 0.24f + 0.38f * c.y, 0.22f + 0.34f * c.z};
   const float opacity = std::clamp(style.opacity, 0.0f, 1.0f);
   return {{},
           to_linear(c, opacity),
           to_linear(style.inside.value_or(darker), opacity),
-          {style.id, style.cut_by, 0, 0}};
+          {style.id, style.clip_mask, 0, 0}};
 }
 
 }  // namespace
 
-MeshPass::Programs::Programs(bool cut, bool picture_is_cut, bool software, bool coloured) {
+MeshPass::Programs::Programs(bool clips, bool picture_clips, bool software, bool coloured) {
   const std::string frame =
-      fmt::format("#define OPEN {}\n#define SOFTWARE {}\n#define COLOURED {}\n",
-                  picture_is_cut ? 1 : 0, software ? 1 : 0, coloured ? 1 : 0) +
+      fmt::format("#define CLIPS {}\n#define SOFTWARE {}\n#define COLOURED {}\n",
+                  picture_clips ? 1 : 0, software ? 1 : 0, coloured ? 1 : 0) +
       kFrameGlsl;
-  const std::string vertex = kPlaceGlsl + std::string(kLooks) + kVertex,
-                    fragment = frame + (software ? "" : kLooks) + fragment_glsl(cut) + kLightGlsl +
-                               kFragment;
+  const std::string vertex = kPlaceGlsl + std::string(kParametersGlsl) + kVertex,
+                    fragment = frame + (software ? "" : kParametersGlsl) + fragment_glsl(clips) +
+                               kLightGlsl + kFragment;
   opaque = make_program("#define FRONT 0\n" + frame + vertex, fragment + kOpaque, "meshes");
   transparent = make_program("#define FRONT 1\n" + frame + vertex, fragment + kTransparent,
                              "transparent meshes");
@@ -204,7 +204,7 @@ MeshPass::Programs::Programs(bool cut, bool picture_is_cut, bool software, bool 
 MeshPass::MeshPass()
     : software_(current_gl_device().software),
       vertices_(make_vertex_array()),
-      looks_(make_stream_buffer()),
+      parameters_(make_stream_buffer()),
       numbers_(make_stream_buffer()),
       commands_(make_stream_buffer()),
       positions_(make_stream_buffer()),
@@ -226,7 +226,7 @@ MeshPass::MeshPass()
   check_gl("the attributes of meshes");
 }
 
-void MeshPass::need_numbers(std::size_t count) {
+void MeshPass::fill_numbers(std::size_t count) {
   if (count > number_count_) {
     std::vector<std::uint32_t> numbers(std::max<std::size_t>(2 * count, 1024));
     std::iota(numbers.begin(), numbers.end(), 0u);
@@ -236,15 +236,15 @@ void MeshPass::need_numbers(std::size_t count) {
   glVertexArrayVertexBuffer(vertices_.get(), 2, numbers_.get(), 0, sizeof(std::uint32_t));
 }
 
-void MeshPass::bind(bool cut, bool transparent, bool coloured) {
-  cut &= cuts_;
+void MeshPass::bind(bool clips, bool transparent, bool coloured) {
+  clips &= clips_;
   const std::size_t colours = coloured ? 1 : 0;
   std::optional<Programs>& programs =
-      cuts_ ? programs_[colours][cut ? 1 : 0] : whole_programs_[colours];
-  if (!programs) programs.emplace(cut, cuts_, software_, coloured);
+      clips_ ? programs_[colours][clips ? 1 : 0] : whole_programs_[colours];
+  if (!programs) programs.emplace(clips, clips_, software_, coloured);
   glUseProgram((transparent ? programs->transparent : programs->opaque).get());
   glBindVertexArray(vertices_.get());
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, looks_.get());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, parameters_.get());
 }
 
 void MeshPass::bind_block(const MeshPlace& place) {
@@ -257,7 +257,7 @@ std::uint64_t MeshPass::max_triangles() const {
   return software_ ? kSoftwareTriangles : std::numeric_limits<std::uint64_t>::max();
 }
 
-void MeshPass::wait_for_call_before() {
+void MeshPass::wait_for_previous_call() {
   GlFence fence = GlFence::insert();
   if (last_call_) last_call_->wait();
   last_call_ = std::move(fence);
@@ -265,31 +265,31 @@ void MeshPass::wait_for_call_before() {
 
 void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent) {
   if (meshes.empty()) return;
-  std::vector<Look> looks;
+  std::vector<DrawParameters> parameters;
   std::vector<Command> commands;
-  looks.reserve(meshes.size());
+  parameters.reserve(meshes.size());
   commands.reserve(meshes.size());
   const MeshStyle* before = nullptr;
   for (const MeshDraw& draw : meshes) {
     const MeshPlace& place = draw.mesh->place();
     commands.push_back({3 * draw.triangles, 1, 3 * (place.first_triangle + draw.first_triangle),
                         static_cast<std::int32_t>(place.first_vertex),
-                        static_cast<std::uint32_t>(looks.size())});
+                        static_cast<std::uint32_t>(parameters.size())});
     const bool again = before != nullptr && draw.style == *before;
     before = &draw.style;
-    looks.push_back(again ? looks.back() : look_of(draw.style));
-    looks.back().offset = offset_of(draw.mesh->origin(), eye, draw.mesh->has_normals());
+    parameters.push_back(again ? parameters.back() : parameters_of(draw.style));
+    parameters.back().offset = offset_of(draw.mesh->origin(), eye, draw.mesh->has_normals());
   }
-  fill_buffer(looks_, std::as_bytes(std::span(looks)));
+  fill_buffer(parameters_, std::as_bytes(std::span(parameters)));
   fill_buffer(commands_, std::as_bytes(std::span(commands)));
-  need_numbers(looks.size());
+  fill_numbers(parameters.size());
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.get());
   for (std::size_t first = 0, end = 0; first < meshes.size(); first = end) {
-    const bool cut = may_be_cut(meshes[first].style);
+    const bool clips = may_be_clipped(meshes[first].style);
     while (end < meshes.size() && meshes[end].block() == meshes[first].block() &&
-           may_be_cut(meshes[end].style) == cut)
+           may_be_clipped(meshes[end].style) == clips)
       ++end;
-    bind(cut, transparent);
+    bind(clips, transparent);
     bind_block(meshes[first].mesh->place());
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
                                 reinterpret_cast<const void*>(first * sizeof(Command)),
@@ -297,22 +297,22 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
   }
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
   check_gl("drawing meshes");
-  // Devices hold these meshes anyway.
-  if (software_) wait_for_call_before();
+  // On a device these meshes are in device memory.
+  if (software_) wait_for_previous_call();
 }
 
 void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin, Vec3d eye,
                     bool transparent) {
-  kept_.clear();
-  const std::span<const Triangle> triangles = drawable_triangles(mesh, kept_);
+  finite_triangles_.clear();
+  const std::span<const Triangle> triangles = drawable_triangles(mesh, finite_triangles_);
   if (triangles.empty()) return;
-  Look look = look_of(style);
-  look.offset = offset_of(origin, eye, !mesh.normals.empty());
-  fill_buffer(looks_, std::as_bytes(std::span(&look, 1)));
+  DrawParameters draw = parameters_of(style);
+  draw.offset = offset_of(origin, eye, !mesh.normals.empty());
+  fill_buffer(parameters_, std::as_bytes(std::span(&draw, 1)));
   fill_buffer(positions_, std::as_bytes(mesh.positions));
   if (!mesh.normals.empty()) fill_buffer(normals_, std::as_bytes(mesh.normals));
   fill_buffer(triangles_, std::as_bytes(triangles));
-  need_numbers(1);
+  fill_numbers(1);
   const GlBuffer& normals = mesh.normals.empty() ? positions_ : normals_;
   bind_block(
       {.positions = positions_.get(), .normals = normals.get(), .triangles = triangles_.get()});
@@ -323,14 +323,14 @@ void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin,
     glVertexArrayVertexBuffer(array, 3, colours_.get(), 0, sizeof(VertexColour));
     glEnableVertexArrayAttrib(array, 3);
   }
-  bind(may_be_cut(style), transparent, coloured);
-  const auto at_once =
+  bind(may_be_clipped(style), transparent, coloured);
+  const auto per_call =
       static_cast<std::size_t>(std::min<std::uint64_t>(max_triangles(), triangles.size()));
-  for (std::size_t first = 0; first < triangles.size(); first += at_once) {
-    const std::size_t count = std::min(at_once, triangles.size() - first);
+  for (std::size_t first = 0; first < triangles.size(); first += per_call) {
+    const std::size_t count = std::min(per_call, triangles.size() - first);
     glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * count), GL_UNSIGNED_INT,
                    reinterpret_cast<const void*>(first * sizeof(Triangle)));
-    wait_for_call_before();
+    wait_for_previous_call();
   }
   if (coloured) glDisableVertexArrayAttrib(array, 3);
   check_gl("drawing a mesh");

@@ -13,49 +13,49 @@
 
 namespace isobrick {
 
-/// Draws meshes into the framebuffer that is bound, opaque or weighted for blending.
+/// Draws meshes into the bound framebuffer, opaque or with weights for blending.
 class MeshPass {
  public:
   MeshPass();
 
-  /// From now on half spaces cut what is drawn, or none does.
-  void start(bool cuts) { cuts_ = cuts; }
-  /// Those that follow each other in one block of a pool with one call.
+  /// Starts a picture. `clips`: whether it has half spaces.
+  void start(bool clips) { clips_ = clips; }
+  /// Draws pooled meshes; consecutive ones of one block take one call.
   void draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparent);
-  /// One that lies in memory.
+  /// Draws a mesh in host memory.
   void draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin, Vec3d eye,
             bool transparent);
 
-  /// Triangles that should be drawn with one call. A software driver takes some 500 bytes for each
-  /// until it is drawn, and is not waited for within a call.
+  /// Maximum triangles for one call. A software driver keeps about 500 bytes for each triangle
+  /// until it has drawn it, and OpenGL cannot wait within a call.
   std::uint64_t max_triangles() const;
 
  private:
-  /// One source in several forms.
+  /// Variants of one source.
   struct Programs {
-    Programs(bool cut, bool picture_is_cut, bool software, bool coloured);
+    Programs(bool clips, bool picture_clips, bool software, bool coloured);
     GlProgram opaque, transparent;
   };
 
-  void bind(bool cut, bool transparent, bool coloured = false);
+  void bind(bool clips, bool transparent, bool coloured = false);
   void bind_block(const MeshPlace& place);
-  /// Waits until everything before the last call has been drawn. So a driver keeps two calls at
-  /// most, and draws one while it receives the next.
-  void wait_for_call_before();
-  /// Numbers 0 … count − 1, which tell each mesh's vertices what it is drawn like.
-  void need_numbers(std::size_t count);
+  /// Waits for the previous call, so that a driver holds at most two: it draws one while it
+  /// receives the next.
+  void wait_for_previous_call();
+  /// Fills numbers_ with 0 … count − 1: the index of each mesh's DrawParameters.
+  void fill_numbers(std::size_t count);
 
   bool software_;
-  /// Without and with colours at the vertices: where nothing is cut; elsewhere for what is not
-  /// cut, and what is.
+  /// Without and with vertex colours. whole_programs_: for pictures without half spaces; programs_:
+  /// for unclipped and clipped meshes of the others.
   std::array<std::optional<Programs>, 2> whole_programs_;
   std::array<std::array<std::optional<Programs>, 2>, 2> programs_;
-  bool cuts_ = false;
+  bool clips_ = false;
   GlVertexArray vertices_;
-  GlBuffer looks_, numbers_, commands_;
-  GlBuffer positions_, normals_, colours_, triangles_;  ///< of meshes that lie in memory
+  GlBuffer parameters_, numbers_, commands_;
+  GlBuffer positions_, normals_, colours_, triangles_;  ///< of meshes in host memory
   std::size_t number_count_ = 0;
-  std::vector<Triangle> kept_;
+  std::vector<Triangle> finite_triangles_;
   std::optional<GlFence> last_call_;
 };
 

@@ -15,17 +15,17 @@
 namespace isobrick {
 namespace {
 
-struct Opened {
+struct OpenMesh {
   std::string path;
   std::unique_ptr<MeshFile> file;
   MeshStyle style;
-  double scale = 1;  ///< from its unit to that of the picture
+  double scale = 1;  ///< from the mesh's unit to the picture's
 };
 
-/// The unit of the picture, and what scales each mesh to it.
-std::string choose_unit(std::vector<Opened>& meshes) {
+/// Chooses the picture's unit and sets each mesh's scale to it.
+std::string choose_unit(std::vector<OpenMesh>& meshes) {
   std::string unit;
-  for (Opened& mesh : meshes) {
+  for (OpenMesh& mesh : meshes) {
     const std::string own = mesh.file->info().unit;
     if (own.empty()) continue;
     if (unit.empty()) unit = own;
@@ -34,13 +34,13 @@ std::string choose_unit(std::vector<Opened>& meshes) {
   return unit;
 }
 
-/// Draws the bar of a picture in `unit`, in the unit that is asked for.
-void draw_scale_bar(Renderer& renderer, const std::string& unit, const std::string& wanted) {
-  if (wanted.empty()) return renderer.draw_scale_bar(unit_symbol(unit));
-  renderer.draw_scale_bar(unit_symbol(wanted), unit_ratio(wanted, unit).value_or(1));
+/// Draws the scale bar of a picture in `unit`, in the requested unit.
+void draw_scale_bar(Renderer& renderer, const std::string& unit, const std::string& requested) {
+  if (requested.empty()) return renderer.draw_scale_bar(unit_symbol(unit));
+  renderer.draw_scale_bar(unit_symbol(requested), unit_ratio(requested, unit).value_or(1));
 }
 
-/// A chunk whose coordinates count from an origin, scaled.
+/// Scales the chunks of a mesh; coordinates are relative to an origin.
 class ScaledChunk {
  public:
   explicit ScaledChunk(double scale) : scale_(static_cast<float>(scale)), scaled_(scale != 1) {}
@@ -59,10 +59,10 @@ class ScaledChunk {
   std::vector<Vec3f> positions_;
 };
 
-/// Bounds of all meshes that have a vertex; two equal corners if none has.
-void find_bounds(const std::vector<Opened>& meshes, Vec3d& lo, Vec3d& hi) {
+/// Bounds of all meshes that have a vertex; `lo` and `hi` stay if none has.
+void find_bounds(const std::vector<OpenMesh>& meshes, Vec3d& lo, Vec3d& hi) {
   bool any = false;
-  for (const Opened& mesh : meshes) {
+  for (const OpenMesh& mesh : meshes) {
     if (mesh.file->info().vertices == 0) continue;
     Vec3d mesh_lo, mesh_hi;
     mesh.file->bounds(mesh_lo, mesh_hi);
@@ -76,20 +76,20 @@ void find_bounds(const std::vector<Opened>& meshes, Vec3d& lo, Vec3d& hi) {
   }
 }
 
-/// What a batch of triangles takes: with normals and colours of its vertices, in vectors that may
-/// have twice the room that they need, and once more on the way to the device.
+/// Maximum bytes of a batch of triangles: with normals and colours, in vectors with up to twice the
+/// capacity, and once more during the upload.
 constexpr std::uint64_t kBatchBytes =
     MeshFile::kBatch * 3 * (sizeof(Triangle) / 3 + 2 * sizeof(Vec3f) + sizeof(VertexColour)) * 3;
 
-/// The most of mapped files that lies in memory, where triangles name vertices that are far apart.
+/// Maximum resident bytes of mapped files, if triangles name vertices that are far apart.
 std::uint64_t mapped_memory(const MeshPictureRequest& request) {
   std::uint64_t bytes = 0;
-  for (const PicturedMesh& mesh : request.meshes) {
+  for (const MeshInput& mesh : request.meshes) {
     std::error_code failure;
     const std::uintmax_t size = std::filesystem::file_size(mesh.path, failure);
     if (!failure) bytes += size;
   }
-  // What is text or packed is also in a file of numbers, which may be larger.
+  // Text and compressed files are also decoded into a file of numbers, which may be larger.
   return std::min<std::uint64_t>(4 * bytes, 4 * MappedFile::kWindow);
 }
 
@@ -107,9 +107,9 @@ std::uint64_t mesh_picture_memory(const MeshPictureRequest& request) {
 
 MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progress) {
   MeshPicture picture;
-  std::vector<Opened> meshes;
+  std::vector<OpenMesh> meshes;
   std::uint64_t faces = 0;
-  for (const PicturedMesh& mesh : request.meshes) {
+  for (const MeshInput& mesh : request.meshes) {
     meshes.push_back({.path = mesh.path, .file = open_mesh_file(mesh.path), .style = mesh.style});
     const MeshFileInfo info = meshes.back().file->info();
     picture.vertices += info.vertices;
@@ -121,8 +121,8 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
         "'{}' has no unit, so that a scale bar cannot be in {}; without a unit it counts in the "
         "mesh's own",
         meshes.front().path, request.scale_bar_unit));
-  // Those that are seen through come last.
-  std::stable_sort(meshes.begin(), meshes.end(), [](const Opened& a, const Opened& b) {
+  // Transparent meshes come last.
+  std::stable_sort(meshes.begin(), meshes.end(), [](const OpenMesh& a, const OpenMesh& b) {
     return a.style.opacity >= 1 && b.style.opacity < 1;
   });
   find_bounds(meshes, picture.lo, picture.hi);
@@ -135,7 +135,7 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
                  request.height, request.settings);
   const Vec3d origin = (picture.lo + picture.hi) * 0.5;
   progress.begin("draw", faces * sizeof(Triangle));
-  for (const Opened& mesh : meshes) {
+  for (const OpenMesh& mesh : meshes) {
     const std::uint64_t before = picture.triangles;
     ScaledChunk scaled(mesh.scale);
     mesh.file->read(origin * (1 / mesh.scale), [&](const MeshChunk& chunk, Vec3d from) {

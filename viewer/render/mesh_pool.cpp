@@ -55,8 +55,8 @@ struct MeshPool::State {
   std::uint32_t block_vertices = 0;
   std::vector<std::shared_ptr<MeshBlock>> blocks;
 
-  /// One empty block stays for what comes next; more go back to the device.
-  void tidy() {
+  /// Keeps one empty block for the next mesh; frees the others.
+  void trim_but_one() {
     bool kept = false;
     std::erase_if(blocks, [&](const std::shared_ptr<MeshBlock>& block) {
       return block->used == 0 && (block->vertex_room > block_vertices || std::exchange(kept, true));
@@ -100,7 +100,7 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
       break;
     }
   if (!range) {
-    state_->tidy();
+    state_->trim_but_one();
     const std::uint32_t room = state_->block_vertices;
     mesh.block_ =
         std::make_shared<MeshBlock>(std::max(room, vertices), std::max(2 * room, triangles));
@@ -119,9 +119,9 @@ PooledMesh MeshPool::reserve(std::uint32_t vertices, std::uint32_t triangles, bo
 
 MeshCopy MeshPool::begin(const MeshChunk& chunk, Vec3d origin) {
   MeshCopy copy;
-  const std::span<const Triangle> triangles = drawable_triangles(chunk, copy.kept_);
-  constexpr std::size_t most = std::numeric_limits<std::int32_t>::max() / 3;
-  if (chunk.positions.size() > most || triangles.size() > most)
+  const std::span<const Triangle> triangles = drawable_triangles(chunk, copy.finite_triangles_);
+  constexpr std::size_t max_count = std::numeric_limits<std::int32_t>::max() / 3;
+  if (chunk.positions.size() > max_count || triangles.size() > max_count)
     throw Error(
         fmt::format("a mesh of {} vertices and {} triangles is too large to be drawn as one",
                     chunk.positions.size(), triangles.size()));
@@ -145,7 +145,7 @@ std::uint64_t MeshCopy::bytes_left() const {
   return sum;
 }
 
-void MeshCopy::go_on(std::uint64_t bytes) {
+void MeshCopy::advance(std::uint64_t bytes) {
   if (done()) return;
   Part& part = parts_.back();
   const std::size_t now = static_cast<std::size_t>(
@@ -160,7 +160,7 @@ void MeshCopy::go_on(std::uint64_t bytes) {
 
 PooledMesh MeshPool::add(const MeshChunk& chunk, Vec3d origin) {
   MeshCopy copy = begin(chunk, origin);
-  while (!copy.done()) copy.go_on(std::numeric_limits<std::uint64_t>::max());
+  while (!copy.done()) copy.advance(std::numeric_limits<std::uint64_t>::max());
   return copy.take();
 }
 
@@ -190,7 +190,7 @@ void MeshPool::trim() {
                 [](const std::shared_ptr<MeshBlock>& block) { return block->used == 0; });
 }
 
-void MeshPool::tidy() { state_->tidy(); }
+void MeshPool::trim_but_one() { state_->trim_but_one(); }
 
 std::uint64_t MeshPool::bytes() const {
   std::uint64_t sum = 0;

@@ -10,44 +10,44 @@
 
 namespace isobrick {
 
-/// Triangles of a mesh and how they look.
+/// Triangles of a mesh and their style.
 struct MeshDraw {
   const PooledMesh* mesh;
   MeshStyle style;
-  std::uint32_t first_triangle, triangles;  ///< of the mesh's
+  std::uint32_t first_triangle, triangles;
 
-  /// Tells the blocks of a pool apart.
+  /// Identifies the block of the pool.
   unsigned block() const { return mesh->place().positions; }
 };
 
-/// Whether any half space of the picture may cut a mesh of this style.
-inline bool may_be_cut(const MeshStyle& style) { return style.cut_by != 0; }
+/// Whether a half space of the picture may clip a mesh of this style.
+inline bool may_be_clipped(const MeshStyle& style) { return style.clip_mask != 0; }
 
-/// Meshes that are to be drawn, in pieces of any size. However large the pieces are, the triangles
-/// have one order.
+/// Meshes to draw, taken in batches. The size of the batches does not change the order of the
+/// triangles.
 class MeshQueue {
  public:
-  /// Meshes of one block of a pool that are cut, or not, together, which takes fewer calls, or all
-  /// as they were added, so that it does not show where in the pool they lie.
+  /// `blocks` groups meshes by pool block and by whether they are clipped, which takes fewer calls.
+  /// `added` keeps the order of add(), so that a mesh's position in the pool does not show.
   enum class Order : std::uint8_t { blocks, added };
 
   explicit MeshQueue(Order order = Order::added) : sorted_(order == Order::added) {}
 
-  /// Before the first take(); `mesh` must live until the last of those.
+  /// Call it before the first take(). `mesh` must live until the last one.
   void add(const PooledMesh& mesh, const MeshStyle& style);
 
-  bool empty() const { return left_ == 0; }
-  /// That have not been taken.
-  std::uint64_t triangles() const { return left_; }
+  bool empty() const { return remaining_ == 0; }
+  /// Triangles that remain.
+  std::uint64_t triangles() const { return remaining_; }
 
-  /// The next ones, `most` triangles at most and one at least; valid until the next call. The queue
-  /// must not be empty.
-  std::span<const MeshDraw> take(std::uint64_t most);
+  /// Takes the next batch: at least one triangle, at most `max_triangles`. Valid until the next
+  /// call. The queue must not be empty.
+  std::span<const MeshDraw> take(std::uint64_t max_triangles);
 
  private:
-  std::vector<MeshDraw> draws_, piece_;
+  std::vector<MeshDraw> draws_, batch_;
   std::size_t next_ = 0;
-  std::uint64_t left_ = 0;
+  std::uint64_t remaining_ = 0;
   bool sorted_;
 };
 

@@ -15,7 +15,7 @@ namespace isobrick {
 namespace {
 
 constexpr float kFontHeight = 40;
-constexpr float kSmallestText = 11;  ///< pixels of a line, where the display is not scaled
+constexpr float kSmallestText = 11;  ///< pixels of a line, on a display without scaling
 
 const char* const kVertex = R"(
 layout(location = 0) in vec3 place;  // pixels from the top left; depth or its reciprocal
@@ -51,7 +51,7 @@ void main() {
     picture = vec4(tint, texture(atlas, uv).r);
     return;
   }
-  // Distance from the segment, whose ends are round.
+  // Distance from the segment, which has round ends.
   vec2 off = vec2(max(max(-uv.x, uv.x - line_size.y), 0.0), uv.y);
   float alpha = clamp(line_size.x + 0.5 - length(off), 0.0, 1.0);
   if (depth > 0) {
@@ -117,7 +117,7 @@ void OverlayPass::add_projected(Vec3d from, Vec3d to, Vec3f colour, float width)
     const bool end = i & 2;
     const double u = end ? size + reach : -reach, v = i & 1 ? reach : -reach;
     const Vec3d at = from + ahead * u + beside * v;
-    // Straight on beyond the ends, so that depth is right in between.
+    // Extended beyond the ends with the same slope, so that the depth in between is right.
     const double slope = size > 0 ? (to.z - from.z) / size : 0;
     const Vec3f p = to_float({at.x, at.y, from.z + slope * u});
     corners[i] = {p.x,
@@ -141,18 +141,18 @@ void OverlayPass::add_flat_line(Vec3d from, Vec3d to, Vec3f colour, float width)
 
 void OverlayPass::add_line(const WorldLine& line, Vec3f colour, float width) {
   std::array<Vec3d, 2> ends{line.from, line.to};
-  // What lies behind the eye is cut off.
+  // Clips the part behind the eye.
   const double near = camera_.orthographic ? -1e30 : camera_.near_depth();
   const auto depth = [&](Vec3d p) { return -dot(p - camera_.eye, camera_.back); };
   const double d0 = depth(ends[0]), d1 = depth(ends[1]);
   if (d0 < near && d1 < near) return;
   if (d0 < near || d1 < near) {
-    const Vec3d cut = ends[0] + (ends[1] - ends[0]) * ((near - d0) / (d1 - d0));
-    ends[d0 < near ? 0 : 1] = cut;
+    const Vec3d clipped = ends[0] + (ends[1] - ends[0]) * ((near - d0) / (d1 - d0));
+    ends[d0 < near ? 0 : 1] = clipped;
   }
   for (Vec3d& end : ends) {
     end = camera_.project(end, width_, height_);
-    // Reciprocal depth is linear in a picture in perspective.
+    // In perspective the reciprocal depth is linear on the picture.
     if (!camera_.orthographic) end.z = 1 / std::max(end.z, near);
   }
   add_projected(ends[0], ends[1], colour, width);
@@ -188,7 +188,7 @@ void OverlayPass::add_axes() {
   static constexpr std::array<const char*, 3> names{"x", "y", "z"};
   const double height = unit_height(), size = 2.6 * height;
   const Vec3d centre{1.5 * size, height_ - 1.5 * size, 0};
-  std::array<int, 3> order{0, 1, 2};  // the farthest first
+  std::array<int, 3> order{0, 1, 2};  // farthest first
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return camera_.back[a] < camera_.back[b]; });
   for (const int axis : order) {
@@ -204,9 +204,9 @@ void OverlayPass::add_axes() {
 void OverlayPass::add_scale_bar(const Overlays::ScaleBar& bar) {
   const double pixel =
       camera_.extent_at(camera_.distance()) / std::min(width_, height_) / bar.unit_length;
-  const double most = 0.22 * width_ * pixel;
-  if (!(most > 0) || !std::isfinite(most)) return;
-  const double size = round_length(most), pixels = size / pixel, height = unit_height();
+  const double max_length = 0.22 * width_ * pixel;
+  if (!(max_length > 0) || !std::isfinite(max_length)) return;
+  const double size = round_length(max_length), pixels = size / pixel, height = unit_height();
   const Vec3f dark{0.16f, 0.18f, 0.21f};
   const Vec3d right{width_ - 1.4 * height, height_ - 1.4 * height, 0};
   const Vec3d left = right - Vec3d{pixels, 0, 0}, tick{0, 0.28 * height, 0};

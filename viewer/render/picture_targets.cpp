@@ -41,10 +41,10 @@ PictureTargets::PictureTargets(int picture_width, int picture_height, int sample
   opaque = make_framebuffer(each, depth.get(), "the picture of opaque meshes");
   if (samples > 1) find_samples();
 
-  open = texture(GL_R8, 1);
-  open_rows = texture(GL_R8, 1);
-  open_target = make_framebuffer(std::array{open.get()}, 0, "the occlusion");
-  open_rows_target = make_framebuffer(std::array{open_rows.get()}, 0, "the occlusion");
+  openness = texture(GL_R8, 1);
+  openness_rows = texture(GL_R8, 1);
+  openness_target = make_framebuffer(std::array{openness.get()}, 0, "the occlusion");
+  openness_rows_target = make_framebuffer(std::array{openness_rows.get()}, 0, "the occlusion");
 }
 
 void PictureTargets::find_samples() {
@@ -62,9 +62,10 @@ void PictureTargets::find_samples() {
 void PictureTargets::add_transparent() {
   if (transparent) return;
   sum = make_texture(GL_RGBA16F, width, height, samples, "memory for transparency");
-  seen = make_texture(GL_R16F, width, height, samples, "memory for transparency");
+  transmittance = make_texture(GL_R16F, width, height, samples, "memory for transparency");
   if (ids) front = make_texture(GL_R32UI, width, height, 1, "memory for transparency");
-  transparent = make_framebuffer(std::array{sum.get(), seen.get()}, depth.get(), "transparency");
+  transparent =
+      make_framebuffer(std::array{sum.get(), transmittance.get()}, depth.get(), "transparency");
 }
 
 void PictureResult::take_front(const GlTexture& drawn) {

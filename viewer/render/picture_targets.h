@@ -7,7 +7,7 @@
 
 namespace isobrick {
 
-/// A picture, and what is kept of it beside its colours: what picking and lines read.
+/// A picture, with the textures that picking and overlays read later.
 struct PictureResult {
   PictureResult(int picture_width, int picture_height, bool with_ids);
 
@@ -18,46 +18,47 @@ struct PictureResult {
   int width, height;
   bool ids;
 
-  /// Takes what is known of transparent meshes over from where it was drawn.
+  /// Copies the depths and ids of transparent meshes from where they were drawn.
   void take_front(const GlTexture& drawn);
 
-  // Of each pixel: the nearest opaque sample's depth (world length; 0: background), normal, mesh.
+  // For each pixel: depth (world length; 0: background), normal and id of the nearest opaque
+  // sample.
   GlTexture near_depth, near_normal, near_id;
   GlFramebuffer nearest;
-  // Of each pixel: the nearest transparent mesh's depth, as it is stored and but for its last 8
-  // bits, which are those of its number; 0: none.
+  // For each pixel: stored depth of the nearest transparent mesh; its last 8 bits hold the id
+  // instead; 0: none.
   GlTexture front;
   bool has_front = false;
   GlTexture picture;
   GlFramebuffer picture_target;
 };
 
-/// The textures that a picture goes through, and framebuffers of them.
+/// The textures that a picture is drawn into, and their framebuffers.
 struct PictureTargets {
   PictureTargets(int picture_width, int picture_height, int sample_count, bool with_ids);
 
-  /// Those of transparent meshes, made when the first one comes.
+  /// Makes the textures for transparent meshes, if they do not exist.
   void add_transparent();
 
-  /// Device memory in all, with that of one result.
+  /// Total bytes of device memory, including one result.
   static std::uint64_t bytes(int width, int height, int samples, bool ids, bool transparent);
 
   int width, height, samples;
   bool ids;
 
-  /// Where a pixel's samples lie, pixels from its middle; 0 beyond `samples`.
+  /// Positions of a pixel's samples, in pixels from its centre; 0 beyond `samples`.
   glm::vec4 samples_x{0}, samples_y{0};
 
-  // Of each sample: lit colour (alpha 0: no light is taken away later), normal, mesh, depth.
+  // For each sample: lit colour (alpha 0: occlusion does not apply), normal, id, depth.
   GlTexture colour, normal, id, depth;
   GlFramebuffer opaque;
-  // Of each sample: weighted sum, and what part of the background is still seen.
-  GlTexture sum, seen;
+  // For each sample: weighted sum of colours, and visible fraction of the background.
+  GlTexture sum, transmittance;
   GlTexture front;  ///< with ids: see PictureResult
   GlFramebuffer transparent;
-  // Of each pixel: how open it is, and that smoothed along rows.
-  GlTexture open, open_rows;
-  GlFramebuffer open_target, open_rows_target;
+  // For each pixel: openness (1: no occlusion), and openness smoothed along rows.
+  GlTexture openness, openness_rows;
+  GlFramebuffer openness_target, openness_rows_target;
 
  private:
   void find_samples();

@@ -7,10 +7,10 @@
 namespace isobrick {
 namespace {
 
-/// Fewer rows at a time are not worth a call: software works on tiles of so many.
+/// Minimum rows of a call: a software driver works on tiles of this size.
 constexpr int kMinRows = 64;
 
-/// What a pixel takes, in hundredths of what a triangle takes in software (Mesa, 0.2 us).
+/// Time for a pixel, in hundredths of the time for a triangle in software (Mesa, 0.2 us).
 std::uint64_t hundredths_of(ScreenPass::Step step) {
   switch (step) {
     case ScreenPass::Step::nearest: return 5;
@@ -39,7 +39,7 @@ std::uint64_t PictureWork::row_work(std::size_t step) const {
   return (static_cast<std::uint64_t>(width_) * hundredths_of(steps_[step]) + 99) / 100;
 }
 
-std::uint64_t PictureWork::left() const {
+std::uint64_t PictureWork::remaining() const {
   std::uint64_t sum = opaque_.triangles() + transparent_.triangles();
   for (std::size_t step = step_; step < steps_.size(); ++step)
     sum += row_work(step) * static_cast<std::uint64_t>(height_ - (step == step_ ? row_ : 0));

@@ -13,32 +13,32 @@
 
 namespace isobrick {
 
-/// What draws a picture.
+/// The passes that draw a picture.
 struct PicturePasses {
   MeshPass meshes;
   SlicePass slices;
   OverlayPass overlays;
 };
 
-/// What is left to do of a picture whose parts are all known: meshes and slices, opaque ones
-/// first, then the steps over the whole picture, then what lies on top. Done in pieces of any
-/// size, it gives the same bytes. Work is counted in triangles; a pixel of a step counts as
-/// many as take as long in software.
+/// The remaining work of a picture whose content is known: opaque meshes and slices, then
+/// transparent ones, then the screen steps. Overlays follow. It can be done in batches of any size,
+/// with the same bytes as a result. Work is counted in triangles; a pixel of a step counts as many
+/// as take the same time in software.
 class PictureWork {
  public:
-  /// Starts anew, with the queues empty.
+  /// Starts a picture with empty queues.
   void start(const PictureTargets& targets, const PictureSettings& settings);
 
   MeshQueue& meshes(bool transparent) { return transparent ? transparent_ : opaque_; }
-  /// What is left, slices and lines aside, which take next to nothing.
-  std::uint64_t left() const;
+  /// Remaining work, without slices and lines, which take almost no time.
+  std::uint64_t remaining() const;
 
-  /// Draws meshes and slices: opaque ones or transparent ones, into the framebuffer that is bound.
-  /// Takes what that comes to from `work`; whether none of them is left.
+  /// Draws opaque or transparent meshes and slices into the bound framebuffer. Subtracts the work
+  /// done from `work`. Returns whether none is left.
   bool draw_surfaces(PicturePasses& passes, Vec3d eye, bool transparent, std::uint64_t& work);
-  /// Whether there is anything to draw there.
+  /// Whether draw_surfaces() has anything to draw.
   bool any_surfaces(const PicturePasses& passes, bool transparent) const;
-  /// The steps over the whole picture; otherwise as draw_surfaces().
+  /// Runs the screen steps; `work` and the result as in draw_surfaces().
   bool run_steps(ScreenPass& screen, const ScreenPicture& picture, std::uint64_t& work);
 
  private:

@@ -13,7 +13,7 @@
 namespace isobrick {
 namespace {
 
-constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that are drawn at once
+constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that one call draws
 
 const PreviewOptions& checked(const PreviewOptions& options) {
   for (const int edge : {options.width, options.height})
@@ -24,13 +24,13 @@ const PreviewOptions& checked(const PreviewOptions& options) {
   return options;
 }
 
-/// The context belongs to the thread of the call at hand.
-class Current {
+/// Makes the context current for one call.
+class ContextGuard {
  public:
-  explicit Current(GlContext& context) : context_(context) { context_.make_current(); }
-  ~Current() { context_.release_current(); }
-  Current(const Current&) = delete;
-  Current& operator=(const Current&) = delete;
+  explicit ContextGuard(GlContext& context) : context_(context) { context_.make_current(); }
+  ~ContextGuard() { context_.release_current(); }
+  ContextGuard(const ContextGuard&) = delete;
+  ContextGuard& operator=(const ContextGuard&) = delete;
 
  private:
   GlContext& context_;
@@ -45,12 +45,12 @@ PreviewSink::PreviewSink(std::string path, bool force, const PreviewOptions& opt
 
 PreviewSink::~PreviewSink() {
   if (!context_) return;
-  const Current current(*context_);
+  const ContextGuard guard(*context_);
   renderer_.reset();
 }
 
 std::uint64_t PreviewSink::memory_with(const PreviewOptions& options) {
-  // The batch, also on the way to the device, and the pixels on the way to the file.
+  // The batch and its upload; the pixels and their conversion for the file.
   constexpr std::uint64_t batch = 2 * kBatch * (sizeof(Triangle) + 2 * 2 * sizeof(Vec3f));
   const auto pixels =
       static_cast<std::uint64_t>(options.width) * static_cast<std::uint64_t>(options.height);
@@ -59,12 +59,12 @@ std::uint64_t PreviewSink::memory_with(const PreviewOptions& options) {
 }
 
 void PreviewSink::begin(const MeshHeader& header) {
-  largest_ = header.surface.value_or(MeshBounds{header.world_lo, header.world_hi});
-  origin_ = (largest_.lo + largest_.hi) * 0.5;
+  max_bounds_ = header.surface.value_or(MeshBounds{header.world_lo, header.world_hi});
+  origin_ = (max_bounds_.lo + max_bounds_.hi) * 0.5;
 }
 
 void PreviewSink::begin_picture(const MeshBounds& frame) {
-  const Current current(*context_);
+  const ContextGuard guard(*context_);
   renderer_.emplace();
   const CameraRequest request{.up = options_.up, .from = options_.towards_eye};
   const double aspect = static_cast<double>(options_.width) / options_.height;
@@ -73,20 +73,20 @@ void PreviewSink::begin_picture(const MeshBounds& frame) {
 }
 
 MeshBounds PreviewSink::bounds_of_batch() const {
-  if (positions_.empty()) return largest_;
-  MeshBounds bounds{largest_.hi, largest_.lo};
+  if (positions_.empty()) return max_bounds_;
+  MeshBounds bounds{max_bounds_.hi, max_bounds_.lo};
   for (const Vec3f& position : positions_) {
     const Vec3d p = to_double(position) + origin_;
     for (int axis = 0; axis < 3; ++axis) {
-      bounds.lo[axis] = std::fmin(bounds.lo[axis], std::fmax(p[axis], largest_.lo[axis]));
-      bounds.hi[axis] = std::fmax(bounds.hi[axis], std::fmin(p[axis], largest_.hi[axis]));
+      bounds.lo[axis] = std::fmin(bounds.lo[axis], std::fmax(p[axis], max_bounds_.lo[axis]));
+      bounds.hi[axis] = std::fmax(bounds.hi[axis], std::fmin(p[axis], max_bounds_.hi[axis]));
     }
   }
   return bounds;
 }
 
 void PreviewSink::write(const MeshChunk& chunk) {
-  // A batch has normals or has none.
+  // All or none of a batch has normals.
   if (!positions_.empty() && normals_.empty() != chunk.normals.empty()) draw_batch();
   for (std::span<const Triangle> left = chunk.triangles; !left.empty();) {
     if (triangles_.size() == kBatch) draw_batch();
@@ -96,7 +96,7 @@ void PreviewSink::write(const MeshChunk& chunk) {
   }
 }
 
-/// Adds triangles of a chunk to the batch with the vertices between their first and their last.
+/// Adds triangles of a chunk to the batch, with all vertices from their first to their last.
 void PreviewSink::add(const MeshChunk& chunk, std::span<const Triangle> triangles) {
   std::uint32_t lo = triangles.front()[0], hi = lo;
   for (const Triangle& t : triangles) {
@@ -117,8 +117,8 @@ void PreviewSink::add(const MeshChunk& chunk, std::span<const Triangle> triangle
 
 void PreviewSink::draw_batch() {
   if (triangles_.empty()) return;
-  if (!renderer_) begin_picture(largest_);
-  const Current current(*context_);
+  if (!renderer_) begin_picture(max_bounds_);
+  const ContextGuard guard(*context_);
   renderer_->draw({0, positions_, normals_, triangles_}, {.colour = options_.colour}, origin_);
   positions_.clear();
   normals_.clear();
@@ -126,11 +126,11 @@ void PreviewSink::draw_batch() {
 }
 
 void PreviewSink::finish() {
-  // Nothing was drawn so far: this batch is the mesh.
+  // If nothing was drawn yet, this batch is the whole mesh.
   if (!renderer_) begin_picture(bounds_of_batch());
   draw_batch();
   {
-    const Current current(*context_);
+    const ContextGuard guard(*context_);
     renderer_->end();
     write_png(out_, options_.width, options_.height, without_alpha(renderer_->read_pixels()));
     renderer_.reset();

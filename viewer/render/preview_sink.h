@@ -15,17 +15,17 @@
 
 namespace isobrick {
 
-/// Draws the mesh into a PNG picture, off-screen, as large as fits: a mesh of one batch of
-/// triangles by its own bounds, a larger one by those of the blocks that it passes through. How the
-/// mesh is divided into chunks never shows. Looks best with normals; without them facets show.
+/// Draws the mesh into a PNG picture, off-screen, framed to fill it. A mesh of one batch of
+/// triangles is framed by its own bounds, a larger one by those of its active blocks. The division
+/// into chunks never shows. Without normals facets are visible.
 class PreviewSink final : public MeshSink {
  public:
-  /// Throws UsageError for a size that makes no sense, Error where there is no OpenGL;
-  /// see OutputFile for what `path` and `force` may throw.
+  /// Throws UsageError for an invalid size, Error without OpenGL, and what OutputFile throws for
+  /// `path` and `force`.
   PreviewSink(std::string path, bool force, const PreviewOptions& options = {});
   ~PreviewSink() override;
 
-  /// What memory() of such a picture is.
+  /// memory() with these options.
   static std::uint64_t memory_with(const PreviewOptions& options);
 
   Indexing indexing() const override { return Indexing::chunk_local; }
@@ -33,7 +33,7 @@ class PreviewSink final : public MeshSink {
   void write(const MeshChunk& chunk) override;
   void finish() override;
   std::uint64_t bytes() const override { return out_.writer().size(); }
-  /// Beside what OpenGL's driver takes for all pictures, Renderer::driver_memory(0).
+  /// Without what OpenGL's driver takes for all pictures, Renderer::driver_memory(0).
   std::uint64_t memory() const override { return memory_with(options_); }
 
  private:
@@ -44,10 +44,11 @@ class PreviewSink final : public MeshSink {
 
   PreviewOptions options_;
   OutputFile out_;
-  /// Current only within a call: they may come from any thread. Until the picture is finished.
+  /// Current only within a call, since calls may come from any thread. Destroyed once the picture
+  /// is finished.
   std::optional<GlContext> context_{std::in_place};
-  std::optional<Renderer> renderer_;  ///< from the first triangles that are drawn
-  MeshBounds largest_;                ///< that the mesh can have
+  std::optional<Renderer> renderer_;  ///< made for the first batch
+  MeshBounds max_bounds_;             ///< maximum bounds of the mesh
   Vec3d origin_;
   std::vector<Vec3f> positions_, normals_;
   std::vector<Triangle> triangles_;

@@ -20,16 +20,15 @@
 namespace isobrick {
 namespace {
 
-/// World length in front of the eye, of a word of PictureResult::front.
+/// Depth as a world length, from a word of PictureResult::front.
 float depth_of_front(const Camera& camera, std::uint32_t word) {
-  const auto stored =
-      std::bit_cast<float>((word & ~0xffu) | 0x80u);  // the middle of what it may be
+  const auto stored = std::bit_cast<float>((word & ~0xffu) |
+                                           0x80u);  // middle of the range that the lost bits leave
   const double near = camera.near_depth(), far = camera.far_depth();
   return static_cast<float>(camera.orthographic ? far - stored * (far - near) : near / stored);
 }
 
-/// Of Mesa's llvmpipe 66 MiB of libraries, some 12 of shaders and as many of triangles were
-/// measured.
+/// Measured with Mesa's llvmpipe: 66 MiB of libraries, 12 of shaders, about 12 of triangles.
 constexpr std::uint64_t kLibraries = std::uint64_t{70} << 20, kOfRenderer = std::uint64_t{30} << 20;
 
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }
@@ -40,7 +39,7 @@ struct Renderer::State {
   State()
       : device(current_gl_device()),
         frame_buffer(make_stream_buffer()),
-        later_buffer(make_stream_buffer()) {
+        overlay_frame_buffer(make_stream_buffer()) {
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest_edge);
     check_gl("the limits of the device");
   }
@@ -50,33 +49,34 @@ struct Renderer::State {
   void clear();
   void clear_transparent();
   void bind_frame() { glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.get()); }
-  /// Makes ready to draw meshes or slices.
+  /// Binds the targets for meshes and slices.
   void bind_target(const DrawSwitches& switches, bool blended);
   bool draw_surfaces(const DrawSwitches& switches, bool blended, std::uint64_t& work);
-  void choose_result(bool in_one_go);
-  bool go_on(std::uint64_t most);
-  void draw_overlays_later(unsigned framebuffer, int width, int height, int left);
+  void choose_result(bool at_once);
+  bool advance(std::uint64_t max_work);
+  void draw_deferred_overlays(unsigned framebuffer, int width, int height, int left);
 
   GlDevice device;
   int largest_edge = 0;
   PicturePasses passes;
-  // One for each way to sample: switching to and fro while something moves costs nothing.
+  // One for each sampling mode: switching during motion costs nothing.
   std::array<std::optional<ScreenPass>, 2> screens;
-  std::array<std::optional<PictureTargets>, 2> kept_targets;
-  ScreenPass* screen = nullptr;              ///< of this picture
-  PictureTargets* targets = nullptr;         ///< likewise
-  std::optional<PictureResult> shown, next;  ///< the finished picture; what the next one becomes
-  Camera shown_camera;
-  PictureSettings shown_settings;
-  Overlays shown_later;  ///< overlays that the finished picture does not have
+  std::array<std::optional<PictureTargets>, 2> all_targets;
+  ScreenPass* screen = nullptr;       ///< of the present picture
+  PictureTargets* targets = nullptr;  ///< of the present picture
+  std::optional<PictureResult> finished,
+      next;  ///< the finished picture; the result of the present one
+  Camera finished_camera;
+  PictureSettings finished_settings;
+  Overlays deferred_overlays;  ///< overlays that copy_to() adds to the finished picture
 
   Camera camera;
   PictureSettings settings;
   FrameBlock frame{};
   Overlays overlays;
-  GlBuffer frame_buffer, later_buffer;
+  GlBuffer frame_buffer, overlay_frame_buffer;
   PictureWork work;
-  bool any_transparent = false;  ///< in this picture
+  bool any_transparent = false;  ///< in the present picture
 };
 
 void Renderer::State::start(const Camera& new_camera, int width, int height,
@@ -106,19 +106,20 @@ void Renderer::State::start(const Camera& new_camera, int width, int height,
 
 void Renderer::State::choose_targets(int width, int height) {
   const int samples = samples_of(settings);
-  const std::size_t way = settings.multisample ? 1 : 0;
-  if (!screens[way]) screens[way].emplace(samples);
-  screen = &*screens[way];
+  const std::size_t mode = settings.multisample ? 1 : 0;
+  if (!screens[mode]) screens[mode].emplace(samples);
+  screen = &*screens[mode];
   targets = nullptr;
-  // What has another size goes first, so that it and the new are never there at once.
-  for (std::optional<PictureTargets>& kept : kept_targets)
-    if (kept && (kept->width != width || kept->height != height || kept->ids != settings.picking))
-      kept.reset();
-  if (!kept_targets[way]) kept_targets[way].emplace(width, height, samples, settings.picking);
-  targets = &*kept_targets[way];
+  // Targets of another size are freed first, to save memory.
+  for (std::optional<PictureTargets>& other : all_targets)
+    if (other &&
+        (other->width != width || other->height != height || other->ids != settings.picking))
+      other.reset();
+  if (!all_targets[mode]) all_targets[mode].emplace(width, height, samples, settings.picking);
+  targets = &*all_targets[mode];
 }
 
-/// The depth alone: where nothing is drawn nobody looks at the rest.
+/// Clears only the depth: nothing reads the rest where nothing is drawn.
 void Renderer::State::clear() {
   const DrawSwitches switches(frame);
   const unsigned target = targets->opaque.get();
@@ -137,7 +138,7 @@ void Renderer::State::clear_transparent() {
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 0, nothing.data());
   glClearNamedFramebufferfv(targets->transparent.get(), GL_COLOR, 1, all.data());
   if (!targets->ids) return;
-  glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);  // after a picture that was dropped
+  glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);  // after a dropped picture
   glClearTexImage(targets->front.get(), 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
 
@@ -150,58 +151,61 @@ void Renderer::State::bind_target(const DrawSwitches& switches, bool blended) {
 }
 
 bool Renderer::State::draw_surfaces(const DrawSwitches& switches, bool blended,
-                                    std::uint64_t& most) {
+                                    std::uint64_t& max_work) {
   if (!work.any_surfaces(passes, blended)) return true;
   bind_target(switches, blended);
-  return work.draw_surfaces(passes, camera.eye, blended, most);
+  return work.draw_surfaces(passes, camera.eye, blended, max_work);
 }
 
-/// `in_one_go`: nobody sees the picture before until the next one is there, which may take its
-/// place.
-void Renderer::State::choose_result(bool in_one_go) {
+/// `at_once`: the picture is finished in this call, so that it may reuse the memory of the previous
+/// one.
+void Renderer::State::choose_result(bool at_once) {
   const auto keep_fitting = [&](std::optional<PictureResult>& result) {
     if (result && !result->fits(targets->width, targets->height, targets->ids)) result.reset();
   };
   keep_fitting(next);
-  if (in_one_go && !next) {
-    next = std::exchange(shown, std::nullopt);
+  if (at_once && !next) {
+    next = std::exchange(finished, std::nullopt);
     keep_fitting(next);
   }
   if (!next) next.emplace(targets->width, targets->height, targets->ids);
 }
 
-/// Whether the picture is finished.
-bool Renderer::State::go_on(std::uint64_t most) {
-  const bool in_one_go = most >= work.left();
+/// Returns whether the picture is finished.
+bool Renderer::State::advance(std::uint64_t max_work) {
+  const bool at_once = max_work >= work.remaining();
   const DrawSwitches switches(frame);
   bind_frame();
-  if (!draw_surfaces(switches, false, most) || !draw_surfaces(switches, true, most)) return false;
+  if (!draw_surfaces(switches, false, max_work) || !draw_surfaces(switches, true, max_work))
+    return false;
   switches.meshes(false, false);
-  choose_result(in_one_go);
-  if (!work.run_steps(*screen, {*targets, *next, settings, any_transparent}, most)) return false;
+  choose_result(at_once);
+  if (!work.run_steps(*screen, {*targets, *next, settings, any_transparent}, max_work))
+    return false;
   next->has_front = false;
   if (any_transparent && targets->ids) next->take_front(targets->front);
-  shown_later = {};
+  deferred_overlays = {};
   overlays.scale = settings.overlay_scale;
-  if (settings.overlays_later)
-    shown_later = std::move(overlays);
+  if (settings.defer_overlays)
+    deferred_overlays = std::move(overlays);
   else
     passes.overlays.run(overlays, camera, next->picture_target.get(), next->width, next->height,
                         next->near_depth);
-  std::swap(shown, next);
-  shown_camera = camera;
-  shown_settings = settings;
+  std::swap(finished, next);
+  finished_camera = camera;
+  finished_settings = settings;
   return true;
 }
 
-void Renderer::State::draw_overlays_later(unsigned framebuffer, int width, int height, int left) {
-  if (shown_later.empty() || width < 1 || height < 1) return;
-  const FrameBlock block = make_frame(shown_camera, width, height, shown_settings);
+void Renderer::State::draw_deferred_overlays(unsigned framebuffer, int width, int height,
+                                             int left) {
+  if (deferred_overlays.empty() || width < 1 || height < 1) return;
+  const FrameBlock block = make_frame(finished_camera, width, height, finished_settings);
   const DrawSwitches switches(block);
-  fill_buffer(later_buffer, std::as_bytes(std::span(&block, 1)));
-  glBindBufferBase(GL_UNIFORM_BUFFER, 0, later_buffer.get());
-  passes.overlays.run(shown_later, shown_camera, framebuffer, width, height, shown->near_depth,
-                      left);
+  fill_buffer(overlay_frame_buffer, std::as_bytes(std::span(&block, 1)));
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, overlay_frame_buffer.get());
+  passes.overlays.run(deferred_overlays, finished_camera, framebuffer, width, height,
+                      finished->near_depth, left);
 }
 
 Renderer::Renderer() : state_(std::make_unique<State>()) {}
@@ -260,14 +264,14 @@ void Renderer::draw_scale_bar(const std::string& unit, double unit_length) {
   state_->overlays.scale_bar = {unit, unit_length};
 }
 
-void Renderer::end() { state_->go_on(std::numeric_limits<std::uint64_t>::max()); }
-bool Renderer::end_piece(std::uint64_t work) { return state_->go_on(work); }
-std::uint64_t Renderer::work_left() const { return state_->work.left(); }
+void Renderer::end() { state_->advance(std::numeric_limits<std::uint64_t>::max()); }
+bool Renderer::advance(std::uint64_t work) { return state_->advance(work); }
+std::uint64_t Renderer::work_left() const { return state_->work.remaining(); }
 
 void Renderer::discard() {
-  if (state_->shown) state_->next = std::exchange(state_->shown, std::nullopt);
+  if (state_->finished) state_->next = std::exchange(state_->finished, std::nullopt);
 }
-bool Renderer::has_picture() const { return state_->shown.has_value(); }
+bool Renderer::has_picture() const { return state_->finished.has_value(); }
 
 void Renderer::prepare(const PictureSettings& settings, int width, int height) {
   const std::array<Vec3f, 3> corners{Vec3f{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -276,14 +280,14 @@ void Renderer::prepare(const PictureSettings& settings, int width, int height) {
   mesh.positions = corners;
   mesh.normals = corners;
   mesh.triangles = triangle;
-  PictureSettings whole = settings, cut = settings;
+  PictureSettings whole = settings, clipped = settings;
   whole.planes.clear();
   whole.region.reset();
-  cut.planes = {{{1, 0, 0}, 0}};
-  for (const PictureSettings& form : {whole, cut}) {
+  clipped.planes = {{{1, 0, 0}, 0}};
+  for (const PictureSettings& form : {whole, clipped}) {
     begin(Camera({0, 0, 1}, {0, 0, 0}, {0, 1, 0}), width, height, form);
-    for (const std::uint16_t by : {MeshStyle{}.cut_by, std::uint16_t{0}})
-      draw(mesh, {.cut_by = by}, {});
+    for (const std::uint16_t mask : {MeshStyle{}.clip_mask, std::uint16_t{0}})
+      draw(mesh, {.clip_mask = mask}, {});
     draw_box({0, 0, 0}, {1, 1, 1}, {0, 0, 0});
     draw_axes();
     draw_scale_bar("");
@@ -292,8 +296,8 @@ void Renderer::prepare(const PictureSettings& settings, int width, int height) {
   discard();
 }
 
-int Renderer::width() const { return state_->shown ? state_->shown->width : 0; }
-int Renderer::height() const { return state_->shown ? state_->shown->height : 0; }
+int Renderer::width() const { return state_->finished ? state_->finished->width : 0; }
+int Renderer::height() const { return state_->finished ? state_->finished->height : 0; }
 
 std::vector<std::uint8_t> Renderer::read_pixels() const {
   if (!has_picture()) return {};
@@ -309,30 +313,32 @@ std::vector<std::uint8_t> Renderer::read_pixels() const {
   return pixels;
 }
 
-unsigned Renderer::texture() const { return state_->shown ? state_->shown->picture.get() : 0; }
+unsigned Renderer::texture() const {
+  return state_->finished ? state_->finished->picture.get() : 0;
+}
 
 void Renderer::copy_to(unsigned framebuffer, int to_width, int to_height, int left) const {
   if (!has_picture()) return;
   const bool same = to_width == width() && to_height == height();
-  glBlitNamedFramebuffer(state_->shown->picture_target.get(), framebuffer, 0, 0, width(), height(),
-                         left, 0, left + to_width, to_height, GL_COLOR_BUFFER_BIT,
+  glBlitNamedFramebuffer(state_->finished->picture_target.get(), framebuffer, 0, 0, width(),
+                         height(), left, 0, left + to_width, to_height, GL_COLOR_BUFFER_BIT,
                          same ? GL_NEAREST : GL_LINEAR);
-  state_->draw_overlays_later(framebuffer, to_width, to_height, left);
+  state_->draw_deferred_overlays(framebuffer, to_width, to_height, left);
   check_gl("showing the picture");
 }
 
-std::optional<Picked> Renderer::pick(int x, int y) const {
+std::optional<PickResult> Renderer::pick(int x, int y) const {
   if (x < 0 || y < 0 || x >= width() || y >= height()) return std::nullopt;
-  const PictureResult& result = *state_->shown;
+  const PictureResult& result = *state_->finished;
   const int from_bottom = height() - 1 - y;
   float depth = 0;
   glGetTextureSubImage(result.near_depth.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED, GL_FLOAT,
                        sizeof(depth), &depth);
-  Picked picked;
+  PickResult picked;
   if (result.ids)
     glGetTextureSubImage(result.near_id.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED_INTEGER,
                          GL_UNSIGNED_INT, sizeof(picked.id), &picked.id);
-  const Camera& camera = state_->shown_camera;
+  const Camera& camera = state_->finished_camera;
   if (result.has_front) {
     std::uint32_t front = 0;
     glGetTextureSubImage(result.front.get(), 0, x, from_bottom, 0, 1, 1, 1, GL_RED_INTEGER,
@@ -346,7 +352,7 @@ std::optional<Picked> Renderer::pick(int x, int y) const {
   check_gl("reading a pixel");
   if (!(depth > 0)) return std::nullopt;
   const WorldRay ray = camera.ray(x + 0.5, y + 0.5, width(), height());
-  // The depth is along the line of sight, the ray may slant.
+  // The depth is along the line of sight; the ray may be oblique.
   picked.position = ray.origin + ray.direction * (depth / -dot(ray.direction, camera.back));
   return picked;
 }

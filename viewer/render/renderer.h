@@ -14,155 +14,153 @@
 
 namespace isobrick {
 
-/// A box of world space, axis by axis.
+/// An axis-aligned box in world space.
 struct WorldBox {
   Vec3d lo, hi;
 };
 
-/// How a picture is made. Colours are sRGB in [0, 1].
+/// Settings of a picture. Colours are sRGB in [0, 1].
 struct PictureSettings {
   Vec3f background_top{0.95f, 0.96f, 0.97f}, background_bottom{0.74f, 0.77f, 0.80f};
-  bool multisample = true;  ///< four samples a pixel
-  bool occlusion = true;    ///< less light where the surroundings are near
-  bool edges = false;       ///< dark lines where depth or direction break off
-  bool picking = false;     ///< keep which mesh each pixel shows
-  /// Lines, axes and the scale bar are drawn where the picture is copied to, and at that size: it
-  /// is smaller than what it is shown in. The picture itself has none then.
-  bool overlays_later = false;
-  /// Of a display that is scaled: lines are so many times as thick, text and axes at least so many
-  /// times the smallest that can be read.
+  bool multisample = true;  ///< four samples per pixel
+  bool occlusion = true;    ///< screen-space ambient occlusion
+  bool edges = false;       ///< dark lines at steps of depth or normal
+  bool picking = false;     ///< keep each pixel's mesh id
+  /// copy_to() draws lines, axes and the scale bar at the size of its target, because the picture
+  /// is smaller than the target. The picture itself has none.
+  bool defer_overlays = false;
+  /// Scale of the display: the thickness of lines is multiplied by it, and so is the minimum size
+  /// of text and axes.
   float overlay_scale = 1;
-  /// Meshes are drawn as they come. It shows at pixels where two are equally far, and of
-  /// transparent ones in the last bits. Without, those that lie together in memory take one call.
+  /// Draws meshes in the order of draw(). The order shows where two meshes have equal depth, and in
+  /// the last bits of transparent ones. Without it, meshes of one pool block take one call.
   bool in_order = true;
-  std::vector<HalfSpace> planes;   ///< what lies within all of them is drawn
-  std::optional<WorldBox> region;  ///< and within this box, which counts as 6 planes of at most 12
+  std::vector<HalfSpace> planes;   ///< clip planes: what lies within all of them is drawn
+  std::optional<WorldBox> region;  ///< clip box; it counts as 6 of at most 12 planes
 
-  /// Those of the planes, then those of the region.
+  /// The half spaces of the planes, then those of the region.
   std::vector<HalfSpace> half_spaces() const;
 };
 
-/// How a mesh is drawn.
 struct MeshStyle {
   Vec3f colour{0.87f, 0.80f, 0.70f};
-  float opacity = 1;                 ///< of a piece seen face to face; below 1: transparent
-  std::optional<Vec3f> inside = {};  ///< of the back where something is cut off; else a darker tone
-  bool vertex_colours = true;        ///< where the mesh has them they go before `colour`
-  /// What pick() tells; 0: nothing. Of transparent ones the lowest 8 bits.
+  float opacity = 1;  ///< seen face to face; below 1: transparent
+  /// Colour of back faces in a clipped picture; nullopt: a darker tone.
+  std::optional<Vec3f> inside = {};
+  bool vertex_colours = true;  ///< a mesh's vertex colours override `colour`
+  /// The id that pick() returns; 0: none. Transparent meshes keep the lowest 8 bits.
   std::uint32_t id = 0;
-  /// Of the picture's half spaces those that may cut it, a bit each: with none it is drawn sooner.
-  std::uint16_t cut_by = 0xffff;
+  /// Mask of the picture's half spaces that may clip the mesh; 0 is the fastest.
+  std::uint16_t clip_mask = 0xffff;
   friend bool operator==(const MeshStyle&, const MeshStyle&) = default;
 };
 
-/// A plane picture in space: samples from corner to corner.
+/// A rectangular image in world space.
 struct SliceImage {
-  Vec3d corner, along_x, along_y;  ///< world space: the picture's first corner and its two edges
-  int width = 0, height = 0;       ///< samples, x fastest
-  std::span<const float> samples;  ///< NaN: nothing there
-  float window_lo = 0, window_hi = 1;   ///< what becomes the map's first and last colour
-  std::span<const Vec3f> colours = {};  ///< map, sRGB; empty: grey
+  Vec3d corner, along_x, along_y;       ///< world space: first corner and the two edges
+  int width = 0, height = 0;            ///< extent in samples, x fastest
+  std::span<const float> samples;       ///< NaN: not drawn
+  float window_lo = 0, window_hi = 1;   ///< values of the map's first and last colour
+  std::span<const Vec3f> colours = {};  ///< colour map, sRGB; empty: grey
   float opacity = 1;
 };
 
-/// A segment of world space.
+/// A line segment in world space.
 struct WorldLine {
   Vec3d from, to;
 };
 
-/// What is under a pixel.
-struct Picked {
-  Vec3d position;        ///< world space, of the nearest surface, transparent meshes among them
-  std::uint32_t id = 0;  ///< of its MeshStyle; 0 for others, and without PictureSettings::picking
+/// What a pixel shows.
+struct PickResult {
+  Vec3d position;        ///< world space, on the nearest surface, opaque or transparent
+  std::uint32_t id = 0;  ///< MeshStyle::id; 0 for others, and without PictureSettings::picking
 };
 
-/// Draws meshes into a picture of its own, in whatever context is current: that of a
-/// window or a GlContext. One thread; the context that it was made in must be
-/// current for every call. It leaves that context's framebuffer, program, vertex
-/// array, viewport and switches at OpenGL's defaults.
+/// Draws meshes into an off-screen picture, in any context: that of a window or a GlContext. For
+/// one thread; the context it was made in must be current for every call. Each call leaves the
+/// framebuffer, program, vertex array, viewport and switches at OpenGL's defaults.
 ///
-/// Transparency is weighted and blended (McGuire and Bavoil 2013): one pass, any
-/// order, which is what meshes need that pass by once and are not kept. Peeling would be exact
-/// where several surfaces lie behind each other, but would need them all once a layer.
+/// Transparency uses weighted blending (McGuire and Bavoil 2013): one pass in any order, so that
+/// meshes need not be kept. Depth peeling would be exact, but needs all meshes once for each layer.
 class Renderer {
  public:
-  /// Throws Error when the current context is older than OpenGL 4.5.
+  /// Throws Error if the current context is older than OpenGL 4.5.
   Renderer();
   ~Renderer();
 
-  /// Device memory of a picture of this size while it is made. With transparent meshes: more;
-  /// where pictures of one size are made with and without multisampling, the samples of both are
-  /// kept; and where one is drawn in pieces, what the one before has become.
+  /// Device memory while a picture of this size is drawn. `transparent`: with transparent meshes.
+  /// Not included: the samples of the other multisampling mode, if both are in use, and the
+  /// previous picture while a new one is drawn in batches.
   static std::uint64_t memory(int width, int height, const PictureSettings& settings,
                               bool transparent);
 
-  /// What OpenGL takes of the host's memory beside pictures and meshes, with so many renderers at a
-  /// time: the driver's libraries once, and for each renderer its compiled shaders and what a
-  /// software driver keeps of the meshes that it is drawing.
+  /// Host memory of OpenGL besides pictures and meshes, with `renderers` renderers at a time: the
+  /// driver's libraries once, and for each renderer its shaders and what a software driver keeps of
+  /// queued meshes.
   static std::uint64_t driver_memory(int renderers = 1);
 
-  /// Draws a triangle as pictures of this size and with these settings are drawn, cut or not:
-  /// drivers compile shaders, and get memory, when something is first drawn, and no picture waits
-  /// for that any more.
+  /// Draws a triangle with these settings and this size, clipped and unclipped. Drivers compile
+  /// shaders and allocate memory at the first use; later pictures then need not wait for that.
   void prepare(const PictureSettings& settings, int width, int height);
 
-  /// Starts a picture; one that is not finished is dropped. Throws UsageError for a size that
-  /// cannot be.
+  /// Starts a picture and drops an unfinished one. Throws UsageError for an invalid size or too
+  /// many planes.
   void begin(const Camera& camera, int width, int height, const PictureSettings& settings);
 
-  /// Draws a mesh at end(); it must live until the picture is finished or the next one begins.
+  /// Draws a mesh at end(). The mesh must live until the picture is finished or dropped.
   void draw(const PooledMesh& mesh, const MeshStyle& style);
-  /// Draws a mesh now, without keeping it; numbers count from its first vertex.
-  /// Opaque ones before transparent ones.
+  /// Draws a mesh now and does not keep it; triangles index from its first vertex. Draw opaque
+  /// meshes before transparent ones.
   void draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin = {});
   /// Draws a slice at end(); copies its samples now.
   void draw(const SliceImage& slice);
 
-  // On top of the finished picture, at end().
+  // Overlays, drawn on top of the finished picture at end().
 
-  /// Lines `width` pixels thick, faint where a surface hides them.
+  /// Draws lines `width` pixels thick, faint where a surface hides them.
   void draw_lines(std::span<const WorldLine> lines, Vec3f colour, float width = 1.5f);
   void draw_box(Vec3d lo, Vec3d hi, Vec3f colour, float width = 1.5f);
-  /// The world's axes x (red), y (green) and z (blue) in the lower left corner.
+  /// Draws the world's axes x (red), y (green) and z (blue) in the lower left corner.
   void draw_axes();
-  /// A bar of a round length at the target's depth in the lower right corner, such as
-  /// "20 mm". `unit` may be empty; it is `unit_length` long in the world.
+  /// Draws a scale bar in the lower right corner: a round length at the target's depth, such as "20
+  /// mm". `unit` may be empty; it is `unit_length` long in the world.
   void draw_scale_bar(const std::string& unit, double unit_length = 1);
 
   /// Finishes the picture.
   void end();
-  /// Does about `work`, at least 1, more of what end() does. True once the picture is finished,
-  /// which then is the same bytes; until then the one before stays whole, for all functions below.
-  /// Other drawing in the context may come in between. Work is counted in triangles; a step over
-  /// the whole picture counts as many as take as long in software.
-  bool end_piece(std::uint64_t work);
-  /// What end() would have to do.
+  /// Does about `work` (at least 1) more of what end() does. Returns true once the picture is
+  /// finished; it has the same bytes. Until then the previous picture stays, and the functions
+  /// below refer to it. Other code may draw in the context between calls. Work is counted in
+  /// triangles; a step over the whole picture counts as many as take the same time in software.
+  bool advance(std::uint64_t work);
+  /// Work that end() would do.
   std::uint64_t work_left() const;
 
-  /// Forgets the finished picture; its memory is for the next one.
+  /// Drops the finished picture; the next one reuses its memory.
   void discard();
-  /// Whether one has been finished since. Without one the functions below give and do nothing.
+  /// Whether there is a finished picture. Without one the functions below return nothing and do
+  /// nothing.
   bool has_picture() const;
 
   int width() const;
   int height() const;
-  /// The picture: RGBA, 4 bytes a pixel, sRGB, rows from the top.
+  /// Returns the picture: RGBA, 4 bytes per pixel, sRGB, rows from the top.
   std::vector<std::uint8_t> read_pixels() const;
-  /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for ImGui::Image say.
+  /// Its texture (GL_RGBA8, sRGB-encoded, rows from the bottom), for example for ImGui::Image.
   unsigned texture() const;
-  /// Copies it into a framebuffer (0: the window's), lower left corner at (left, 0), enlarged or
-  /// reduced to this size; see PictureSettings::overlays_later.
+  /// Copies it into a framebuffer (0: the window's), scaled to this size, with its lower left
+  /// corner at (left, 0); see PictureSettings::defer_overlays.
   void copy_to(unsigned framebuffer, int to_width, int to_height, int left = 0) const;
 
-  /// What the picture shows at pixel (x, y), rows from the top; nothing on the background.
-  std::optional<Picked> pick(int x, int y) const;
+  /// What the picture shows at pixel (x, y), rows from the top; nullopt on the background.
+  std::optional<PickResult> pick(int x, int y) const;
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
 
-/// The colours of RGBA pixels alone, as write_png takes them.
+/// Converts RGBA pixels to RGB, as write_png takes them.
 std::vector<std::uint8_t> without_alpha(std::vector<std::uint8_t> rgba);
 
 }  // namespace isobrick

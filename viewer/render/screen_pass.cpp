@@ -17,7 +17,7 @@ void main() {
 }
 )";
 
-/// Textures of samples, or of pixels where there is one sample each.
+/// Samplers for multisampled textures, or for textures with one sample per pixel.
 std::string sampled(int samples) {
   return samples > 1 ? fmt::format(
                            "#define SAMPLES {}\n#define PICTURE sampler2DMS\n"
@@ -47,7 +47,7 @@ void main() {
     sum += other;
   }
   near_depth = stored > 0 ? depth_of(stored) : 0.0;
-  // Samples lie around the pixel's centre, and what is stored is linear in the picture.
+  // Samples lie around the pixel's centre; the stored depth is linear on the picture.
   if (farthest > 0 && depth_of(farthest) < near_depth + 8 * pixel_length(near_depth))
     near_depth = depth_of(sum / float(SAMPLES));
   near_normal = texelFetch(normals, at, AT(nearest)).rg;
@@ -55,12 +55,12 @@ void main() {
 }
 )";
 
-/// Scalable ambient obscurance (McGuire, Mara, Luebke 2012) at two sizes, one for
-/// creases and one for whole hollows.
+/// Scalable ambient obscurance (McGuire, Mara, Luebke 2012) at two radii: one for creases, one for
+/// cavities.
 const char* const kOcclusion = R"(
 layout(binding = 0) uniform sampler2D depths;
 layout(binding = 1) uniform sampler2D normals;
-layout(location = 0) out float open;
+layout(location = 0) out float openness;
 
 float closed_within(ivec2 at, vec3 p, vec3 n, float turn, float pixels) {
   const int count = 14;
@@ -76,7 +76,7 @@ float closed_within(ivec2 at, vec3 p, vec3 n, float turn, float pixels) {
     if (depth <= 0) continue;
     vec3 v = view_position(vec2(there) + 0.5, depth) - p;
     float vv = dot(v, v), vn = dot(v, n);
-    // What is far in front closes a deep hollow a little, too.
+    // Surfaces far in front occlude a deep cavity a little, too.
     float near = 1 / (1 + vv / (1.5 * radius2));
     sum += near * max(vn - 0.02 * radius, 0.0) * inversesqrt(vv + 1e-4 * radius2);
   }
@@ -86,7 +86,7 @@ float closed_within(ivec2 at, vec3 p, vec3 n, float turn, float pixels) {
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   float depth = texelFetch(depths, at, 0).r;
-  open = 1;
+  openness = 1;
   if (depth <= 0) return;
   vec3 p = view_position(gl_FragCoord.xy, depth);
   vec3 n = normal_of(texelFetch(normals, at, 0).rg);
@@ -94,21 +94,21 @@ void main() {
   float shorter = min(viewport.x, viewport.y);
   float fine = closed_within(at, p, n, turn, max(0.018 * shorter, 4));
   float coarse = closed_within(at, p, n, turn + 1.2, max(0.085 * shorter, 12));
-  open = 1 / ((1 + 0.8 * fine) * (1 + 1.8 * coarse));
+  openness = 1 / ((1 + 0.8 * fine) * (1 + 1.8 * coarse));
 }
 )";
 
-/// Along rows, then along columns; never across steps in depth.
+/// Smooths along rows, then along columns; not across steps in depth.
 const char* const kSmooth = R"(
 layout(binding = 0) uniform sampler2D depths;
 layout(binding = 1) uniform sampler2D rough;
 layout(location = 0) uniform ivec2 step_;
-layout(location = 0) out float open;
+layout(location = 0) out float openness;
 
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   float depth = texelFetch(depths, at, 0).r;
-  open = 1;
+  openness = 1;
   if (depth <= 0) return;
   float sum = 0, weights = 0, length = pixel_length(depth);
   for (int i = -4; i <= 4; ++i) {
@@ -120,7 +120,7 @@ void main() {
     sum += weight * texelFetch(rough, there, 0).r;
     weights += weight;
   }
-  open = sum / weights;
+  openness = sum / weights;
 }
 )";
 
@@ -128,16 +128,16 @@ const char* const kCompose = R"(
 layout(binding = 0) uniform PICTURE colours;
 layout(binding = 1) uniform PICTURE depths;
 layout(binding = 2) uniform PICTURE sums;
-layout(binding = 3) uniform PICTURE seens;
+layout(binding = 3) uniform PICTURE transmittances;
 layout(binding = 4) uniform sampler2D near_depths;
 layout(binding = 5) uniform sampler2D near_normals;
-layout(binding = 6) uniform sampler2D opens;
+layout(binding = 6) uniform sampler2D openness_map;
 layout(location = 0) out vec4 picture;
 
 vec3 normal_at(ivec2 at) { return normal_of(texelFetch(near_normals, at, 0).rg); }
 
-// How much of an edge goes through the pixel: something farther begins beside it, or
-// the surface breaks off.
+// Strength of an edge in the pixel: a farther surface begins beside it, or the surface has a
+// crease.
 float edge_at(ivec2 at) {
   float depth = texelFetch(near_depths, at, 0).r;
   if (depth <= 0) return 0;
@@ -169,23 +169,23 @@ vec3 to_srgb(vec3 v) {
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec3 behind = mix(background_bottom.rgb, background_top.rgb, gl_FragCoord.y / viewport.y);
-  float open = OCCLUSION ? texelFetch(opens, at, 0).r : 1.0;
+  float openness = OCCLUSION ? texelFetch(openness_map, at, 0).r : 1.0;
 #if EDGES
-  open *= 1 - 0.8 * edge_at(at);
+  openness *= 1 - 0.8 * edge_at(at);
 #endif
   vec3 mean = vec3(0);
   for (int i = 0; i < SAMPLES; ++i) {
     vec3 colour = behind;
     if (texelFetch(depths, at, AT(i)).r > 0) {
       vec4 surface = texelFetch(colours, at, AT(i));
-      colour = surface.rgb * mix(1.0, open, surface.a);
+      colour = surface.rgb * mix(1.0, openness, surface.a);
     }
 #if TRANSPARENT
-    float seen = texelFetch(seens, at, AT(i)).r;
+    float transmittance = texelFetch(transmittances, at, AT(i)).r;
     vec4 sum = texelFetch(sums, at, AT(i));
-    if (seen < 1 && sum.a > 0) colour = mix(sum.rgb / sum.a, colour, seen);
+    if (transmittance < 1 && sum.a > 0) colour = mix(sum.rgb / sum.a, colour, transmittance);
 #endif
-    // Bright spots are cut before they are averaged, or edges beside them would be jagged.
+    // Bright samples are clamped before averaging, or edges beside them would be jagged.
     mean += min(colour, vec3(1));
   }
   picture = vec4(to_srgb(mean / float(SAMPLES)), 1);
@@ -196,7 +196,7 @@ void bind(unsigned unit, const GlTexture& texture) { glBindTextureUnit(unit, tex
 
 }  // namespace
 
-ScreenPass::ScreenPass(int samples) : samples_(samples), nothing_(make_vertex_array()) {
+ScreenPass::ScreenPass(int samples) : samples_(samples), no_attributes_(make_vertex_array()) {
   const std::string frame = kFrameGlsl, variant = sampled(samples);
   nearest_ = make_program(kVertex, variant + frame + kNearest, "the nearest samples");
   occlusion_ = make_program(kVertex, frame + kOcclusion, "occlusion");
@@ -207,7 +207,7 @@ const GlProgram& ScreenPass::compose(const PictureSettings& settings, bool trans
   const std::size_t number =
       (settings.occlusion ? 1u : 0u) + (settings.edges ? 2u : 0u) + (transparent ? 4u : 0u);
   GlProgram& program = compose_[number];
-  // Software runs through both sides of a condition: what is not wanted is left out.
+  // A software driver executes both branches of a condition, so unused code is left out.
   if (!program)
     program = make_program(
         kVertex,
@@ -222,7 +222,7 @@ const GlProgram& ScreenPass::compose(const PictureSettings& settings, bool trans
 void ScreenPass::draw(const GlProgram& program, const GlFramebuffer& target) {
   glBindFramebuffer(GL_FRAMEBUFFER, target.get());
   glUseProgram(program.get());
-  glBindVertexArray(nothing_.get());
+  glBindVertexArray(no_attributes_.get());
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
@@ -231,17 +231,17 @@ std::vector<ScreenPass::Step> ScreenPass::steps(const PictureSettings& settings)
   return {Step::nearest, Step::occlusion, Step::smooth_rows, Step::smooth_columns, Step::compose};
 }
 
-/// What the last step reads.
+/// Binds the inputs of the last step.
 void ScreenPass::bind_samples(const ScreenPicture& picture) {
   bind(0, picture.targets.colour);
   bind(1, picture.targets.depth);
   if (picture.transparent) {
     bind(2, picture.targets.sum);
-    bind(3, picture.targets.seen);
+    bind(3, picture.targets.transmittance);
   }
   bind(4, picture.result.near_depth);
   bind(5, picture.result.near_normal);
-  bind(6, picture.targets.open);
+  bind(6, picture.targets.openness);
 }
 
 void ScreenPass::run(Step step, const ScreenPicture& picture, PictureRows rows) {
@@ -259,19 +259,19 @@ void ScreenPass::run(Step step, const ScreenPicture& picture, PictureRows rows) 
     case Step::occlusion:
       bind(0, picture.result.near_depth);
       bind(1, picture.result.near_normal);
-      draw(occlusion_, targets.open_target);
+      draw(occlusion_, targets.openness_target);
       break;
     case Step::smooth_rows:
       bind(0, picture.result.near_depth);
-      bind(1, targets.open);
+      bind(1, targets.openness);
       glProgramUniform2i(smooth_.get(), 0, 1, 0);
-      draw(smooth_, targets.open_rows_target);
+      draw(smooth_, targets.openness_rows_target);
       break;
     case Step::smooth_columns:
       bind(0, picture.result.near_depth);
-      bind(1, targets.open_rows);
+      bind(1, targets.openness_rows);
       glProgramUniform2i(smooth_.get(), 0, 0, 1);
-      draw(smooth_, targets.open_target);
+      draw(smooth_, targets.openness_target);
       break;
     case Step::compose:
       bind_samples(picture);

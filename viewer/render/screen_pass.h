@@ -9,12 +9,12 @@
 
 namespace isobrick {
 
-/// What a picture is made of: what was drawn, and where the picture becomes whole.
+/// Input and output of the screen steps.
 struct ScreenPicture {
   const PictureTargets& targets;
   const PictureResult& result;
   const PictureSettings& settings;
-  bool transparent;  ///< whether anything is
+  bool transparent;  ///< whether any mesh or slice is
 };
 
 /// Rows of a picture, from the bottom.
@@ -22,20 +22,19 @@ struct PictureRows {
   int first, count;
 };
 
-/// Turns what was drawn into a picture: nearest samples, occlusion, edges, blending,
-/// the background.
+/// Makes a picture from the drawn samples: nearest samples, occlusion, edges, blending, background.
 class ScreenPass {
  public:
-  /// Each reads what those before have left, of other rows as well.
+  /// Each step reads the results of the previous ones, also in other rows.
   enum class Step { nearest, occlusion, smooth_rows, smooth_columns, compose };
 
-  /// For targets of this many samples.
+  /// `samples`: per pixel of the targets.
   explicit ScreenPass(int samples);
 
-  /// Those that a picture with these settings goes through, in order.
+  /// The steps of a picture with these settings, in order.
   static std::vector<Step> steps(const PictureSettings& settings);
 
-  /// Takes some rows of the picture through a step.
+  /// Runs a step on some rows.
   void run(Step step, const ScreenPicture& picture, PictureRows rows);
 
  private:
@@ -44,9 +43,10 @@ class ScreenPass {
   void draw(const GlProgram& program, const GlFramebuffer& target);
 
   int samples_;
-  GlVertexArray nothing_;  ///< the triangle over all comes from its vertices' numbers
+  GlVertexArray
+      no_attributes_;  ///< empty: vertices of the full-screen triangle come from their index
   GlProgram nearest_, occlusion_, smooth_;
-  std::array<GlProgram, 8> compose_;  ///< by what they do; made when first wanted
+  std::array<GlProgram, 8> compose_;  ///< variants, made at first use
 };
 
 }  // namespace isobrick

@@ -31,10 +31,10 @@ layout(binding = 1) uniform sampler2D colours;
 layout(location = 3) uniform vec3 window_opacity;  // first value, 1 / width, opacity
 in vec2 uv;
 
-// After all that is looked at across pixels.
+// After all derivatives.
 vec3 shown() {
   float value = texture(samples, uv).r;
-  cut(~0u);
+  clip(~0u);
   if (isnan(value)) discard;
   float part = clamp((value - window_opacity.x) * window_opacity.y, 0.0, 1.0);
   int last = textureSize(colours, 0).x - 1;
@@ -45,7 +45,7 @@ vec3 shown() {
 }
 )";
 
-// Alpha 0: a slice's colours mean numbers, and no shadow may change them.
+// Alpha 0: a slice's colours are data, so no occlusion may change them.
 const char* const kOpaque = R"(
 layout(location = 0) out vec4 colour;
 layout(location = 1) out vec2 normal;
@@ -78,7 +78,7 @@ void set(const GlProgram& program, int location, Vec3f v) {
 
 }  // namespace
 
-SlicePass::SlicePass() : nothing_(make_vertex_array()) {
+SlicePass::SlicePass() : no_attributes_(make_vertex_array()) {
   const std::string frame = kFrameGlsl, vertex = frame + kPlaceGlsl + kVertex,
                     fragment = frame + fragment_glsl(true) + kColour;
   opaque_ = make_program(vertex, fragment + kOpaque, "slices");
@@ -89,7 +89,7 @@ void SlicePass::add(const SliceImage& image) {
   if (image.width < 1 || image.height < 1 ||
       image.samples.size() !=
           static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height))
-    throw UsageError(fmt::format("{} samples are no slice of {} x {}", image.samples.size(),
+    throw UsageError(fmt::format("{} samples do not match a slice of {} x {}", image.samples.size(),
                                  image.width, image.height));
   Slice slice{image, make_texture(GL_R32F, image.width, image.height, 1, "a slice"), {}};
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
@@ -113,7 +113,7 @@ bool SlicePass::any(bool transparent) const {
 void SlicePass::draw(Vec3d eye, bool transparent) {
   const GlProgram& program = transparent ? transparent_ : opaque_;
   glUseProgram(program.get());
-  glBindVertexArray(nothing_.get());
+  glBindVertexArray(no_attributes_.get());
   for (const Slice& slice : slices_) {
     const SliceImage& image = slice.image;
     if ((image.opacity < 1) != transparent) continue;

@@ -8,28 +8,28 @@
 
 namespace isobrick {
 
-/// Draws slices into the framebuffer that is bound.
+/// Draws slices into the bound framebuffer.
 class SlicePass {
  public:
   SlicePass();
 
-  /// Copies a slice to the device, for the picture at hand. Throws UsageError for a
-  /// size that does not fit its samples.
+  /// Copies a slice to the device, for the present picture. Throws UsageError for a size that does
+  /// not match its samples.
   void add(const SliceImage& slice);
   void clear() { slices_.clear(); }
-  /// Whether any is opaque (transparent).
+  /// Whether any slice is opaque (or transparent).
   bool any(bool transparent) const;
   void draw(Vec3d eye, bool transparent);
 
  private:
   struct Slice {
-    SliceImage image;  ///< its spans are not used any more
+    SliceImage image;  ///< without its spans, which are copied
     GlTexture samples, colours;
   };
 
   std::vector<Slice> slices_;
   GlProgram opaque_, transparent_;
-  GlVertexArray nothing_;  ///< corners come from their numbers
+  GlVertexArray no_attributes_;  ///< empty: corners come from the vertex index
 };
 
 }  // namespace isobrick

@@ -38,7 +38,7 @@ void ActiveNodes::set(std::span<const double> isovalues, std::vector<std::uint64
   }
 }
 
-/// Calls f(i) for the bits first + i, i < count, that are set.
+/// Calls f(i) for each i < count whose bit first + i is set.
 template <class F>
 void ActiveNodes::for_each_bit(Index first, Index count, F&& f) const {
   for (Index at = first; at < first + count;) {

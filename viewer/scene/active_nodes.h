@@ -9,23 +9,22 @@
 
 namespace isobrick {
 
-/// The nodes in which something of a few isosurfaces may lie. A bit for each node of
-/// the finest level, a byte for each of the others. Reading is thread-safe.
+/// The active nodes of a few isovalues: one bit for each node of the finest level, one byte for
+/// each node of the other levels. Reading is thread-safe.
 class ActiveNodes {
  public:
-  /// None.
+  /// Without any active node. `tree` must outlive it.
   explicit ActiveNodes(const NodeTree& tree);
 
-  /// `finest`: a bit for each node of level 0, x fastest, set where one of the
+  /// Replaces all. `finest`: one bit for each node of level 0, x fastest, set where one of the
   /// isovalues stabs the node's range.
   void set(std::span<const double> isovalues, std::vector<std::uint64_t> finest);
 
   const std::vector<double>& isovalues() const { return isovalues_; }
-  /// Active nodes of level 0.
+  /// Number of active nodes of level 0.
   std::uint64_t count() const { return count_; }
 
-  /// Whether the node's own field crosses one of the isovalues, or that of a node of
-  /// level 0 below it.
+  /// Whether the node itself, or a node of level 0 below it, is active.
   bool below(const NodeKey& n) const;
 
  private:
@@ -35,7 +34,7 @@ class ActiveNodes {
   const NodeTree& tree_;
   std::vector<double> isovalues_;
   std::vector<std::uint64_t> finest_;
-  NodeFlags above_;  ///< whether a node of level 0 below is active
+  NodeFlags above_;  ///< set where a node of level 0 below is active
   std::uint64_t count_ = 0;
 };
 

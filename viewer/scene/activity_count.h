@@ -6,10 +6,10 @@
 
 namespace isobrick {
 
-/// Counts activities that somebody who closes something waits for. Thread-safe.
+/// Counts running activities, so that an owner which closes can wait for their end. Thread-safe.
 class ActivityCount {
  public:
-  /// False once it is closed: the activity must not begin.
+  /// Returns false after close(): the activity must not begin.
   bool begin() {
     const MutexLock lock(mutex_);
     if (closed_) return false;
@@ -18,23 +18,23 @@ class ActivityCount {
   }
   void end() {
     const MutexLock lock(mutex_);
-    if (--count_ == 0) none_.notify_all();
+    if (--count_ == 0) idle_.notify_all();
   }
   void close() {
     const MutexLock lock(mutex_);
     closed_ = true;
   }
-  /// Waits until there is none; whether there is none.
+  /// Waits until no activity runs; returns whether that holds.
   bool wait_for_none(std::chrono::steady_clock::time_point deadline) {
     const MutexLock lock(mutex_);
     while (count_ > 0)
-      if (!none_.wait_until(mutex_, deadline)) break;
+      if (!idle_.wait_until(mutex_, deadline)) break;
     return count_ == 0;
   }
 
  private:
   Mutex mutex_;
-  CondVar none_;
+  CondVar idle_;
   int count_ ISOBRICK_GUARDED_BY(mutex_) = 0;
   bool closed_ ISOBRICK_GUARDED_BY(mutex_) = false;
 };

@@ -17,8 +17,7 @@
 namespace isobrick {
 namespace {
 
-/// Grids that are being made or wait for it: while one half is on the device threads fill the
-/// other one.
+/// Slots for grids in flight: threads fill one half while the device works on the other.
 constexpr int kSlots = 16;
 
 DeviceBlock block_of(std::shared_ptr<const gpu::SharedMeshBlock> block) {
@@ -40,20 +39,20 @@ class SharedMesh final : public DeviceMesh {
   gpu::MeshSlice slice_;
 };
 
-/// A grid that was taken.
-struct Job {
+/// A grid in a slot, and its mesh.
+struct GridJob {
   int slot;
   NodeMesh mesh;
-  DeviceMesher::Done done;
-  std::optional<gpu::MeshSlice> room;
+  DeviceMesher::Callback done;
+  std::optional<gpu::MeshSlice> span;
 
-  gpu::GridMeshJob on_device() const { return {slot, room ? room->place() : gpu::GridMeshPlace{}}; }
+  gpu::GridMeshJob on_device() const { return {slot, span ? span->place() : gpu::GridMeshPlace{}}; }
 };
 
-/// What the device's thread works with. It outlives the mesher while that thread does.
-class Work {
+/// The state of the device's thread, which may outlive the mesher.
+class DeviceWorker {
  public:
-  Work(int index, std::string device_name, std::shared_ptr<gpu::MeshMemory> shared)
+  DeviceWorker(int index, std::string device_name, std::shared_ptr<gpu::MeshMemory> shared)
       : device(index),
         name(std::move(device_name)),
         memory(std::move(shared)),
@@ -61,8 +60,8 @@ class Work {
     for (int i = 0; i < kSlots; ++i) free_.push_back(i);
   }
 
-  bool take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done);
-  /// Until end(), and until all that was taken is done.
+  bool take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Callback&& done);
+  /// Returns after end(), once all accepted grids are done.
   void run();
   void end();
   DeviceMesher::Times times();
@@ -74,40 +73,40 @@ class Work {
   TicketLock kernel_lock;
 
  private:
-  std::optional<gpu::MeshSlice> room_for(std::uint32_t vertices, std::uint32_t triangles) const;
-  void make(std::vector<Job>& jobs, DeviceMesher::Times& now);
+  std::optional<gpu::MeshSlice> reserve_span(std::uint32_t vertices, std::uint32_t triangles) const;
+  void make(std::vector<GridJob>& jobs, DeviceMesher::Times& now);
   void add(const DeviceMesher::Times& now);
   std::optional<int> free_slot();
-  std::vector<Job> next_jobs();
-  void free_slots(const std::vector<Job>& jobs, const std::string& failure);
-  void write_again(std::vector<Job*>& jobs);
-  void learn(const gpu::GridMeshSize& size);
+  std::vector<GridJob> next_jobs();
+  void free_slots(const std::vector<GridJob>& jobs, const std::string& failure);
+  void write_oversized(std::vector<GridJob*>& jobs);
+  void update_expected(const gpu::GridMeshSize& size);
 
   gpu::GridBatch batch_;
-  /// Room that is taken for a mesh whose size is not known yet.
-  std::uint32_t likely_vertices_ = 1u << 14, likely_triangles_ = 1u << 15;
+  /// Space to reserve for a mesh of unknown size.
+  std::uint32_t expected_vertices_ = 1u << 14, expected_triangles_ = 1u << 15;
 
   Mutex mutex_;
   CondVar freed_, taken_;
   std::vector<int> free_ ISOBRICK_GUARDED_BY(mutex_);  ///< slots
-  std::vector<Job> jobs_ ISOBRICK_GUARDED_BY(mutex_);
+  std::vector<GridJob> jobs_ ISOBRICK_GUARDED_BY(mutex_);
   std::string failure_ ISOBRICK_GUARDED_BY(mutex_);  ///< empty: none
   bool end_ ISOBRICK_GUARDED_BY(mutex_) = false;
   DeviceMesher::Times times_ ISOBRICK_GUARDED_BY(mutex_);
 };
 
-DeviceMesher::Times Work::times() {
+DeviceMesher::Times DeviceWorker::times() {
   const MutexLock lock(mutex_);
   return times_;
 }
 
-std::string Work::failure() {
+std::string DeviceWorker::failure() {
   const MutexLock lock(mutex_);
   return failure_;
 }
 
-/// Waits for it; nothing once the device has failed.
-std::optional<int> Work::free_slot() {
+/// Waits for a free slot; nullopt once the device has failed.
+std::optional<int> DeviceWorker::free_slot() {
   const MutexLock lock(mutex_);
   while (failure_.empty() && free_.empty()) freed_.wait(mutex_);
   if (!failure_.empty()) return std::nullopt;
@@ -116,7 +115,7 @@ std::optional<int> Work::free_slot() {
   return slot;
 }
 
-bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done) {
+bool DeviceWorker::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Callback&& done) {
   const std::optional<int> slot = free_slot();
   if (!slot) return false;
   batch_.stage(*slot, grid);
@@ -128,7 +127,7 @@ bool Work::take(const GridView& grid, NodeMesh&& mesh, DeviceMesher::Done&& done
   return true;
 }
 
-void Work::end() {
+void DeviceWorker::end() {
   {
     const MutexLock lock(mutex_);
     end_ = true;
@@ -136,23 +135,23 @@ void Work::end() {
   taken_.notify_one();
 }
 
-/// Waits for them; none once all is done and the end has come.
-std::vector<Job> Work::next_jobs() {
+/// Waits for jobs; empty after end(), once all are done.
+std::vector<GridJob> DeviceWorker::next_jobs() {
   const MutexLock lock(mutex_);
   while (!end_ && jobs_.empty()) taken_.wait(mutex_);
   return std::exchange(jobs_, {});
 }
 
-void Work::free_slots(const std::vector<Job>& jobs, const std::string& failure) {
+void DeviceWorker::free_slots(const std::vector<GridJob>& jobs, const std::string& failure) {
   {
     const MutexLock lock(mutex_);
     failure_ = failure;
-    for (const Job& job : jobs) free_.push_back(job.slot);
+    for (const GridJob& job : jobs) free_.push_back(job.slot);
   }
   freed_.notify_all();
 }
 
-void Work::run() {
+void DeviceWorker::run() {
   std::string failure;
   try {
     gpu::open_device(device);
@@ -160,7 +159,7 @@ void Work::run() {
     failure = e.what();
   }
   for (;;) {
-    std::vector<Job> jobs = next_jobs();
+    std::vector<GridJob> jobs = next_jobs();
     if (jobs.empty()) return;
     DeviceMesher::Times now{.launches = 1, .grids = jobs.size()};
     try {
@@ -170,117 +169,117 @@ void Work::run() {
     }
     free_slots(jobs, failure);
     Stopwatch watch;
-    for (Job& job : jobs) job.done(std::move(job.mesh), failure);
+    for (GridJob& job : jobs) job.done(std::move(job.mesh), failure);
     jobs.clear();
-    now.hand_out = watch.lap();
+    now.deliver = watch.lap();
     add(now);
   }
 }
 
-void Work::add(const DeviceMesher::Times& now) {
+void DeviceWorker::add(const DeviceMesher::Times& now) {
   const MutexLock lock(mutex_);
   times_.launches += now.launches;
   times_.grids += now.grids;
-  times_.turn += now.turn;
+  times_.lock += now.lock;
   times_.memory += now.memory;
   times_.device += now.device;
-  times_.hand_out += now.hand_out;
+  times_.deliver += now.deliver;
 }
 
-std::optional<gpu::MeshSlice> Work::room_for(std::uint32_t vertices,
-                                             std::uint32_t triangles) const {
+std::optional<gpu::MeshSlice> DeviceWorker::reserve_span(std::uint32_t vertices,
+                                                         std::uint32_t triangles) const {
   if (memory == nullptr) return std::nullopt;
   return memory->take(vertices, triangles);
 }
 
-void Work::learn(const gpu::GridMeshSize& size) {
+void DeviceWorker::update_expected(const gpu::GridMeshSize& size) {
   if (size.triangles == 0) return;
-  likely_vertices_ = std::max(size.vertices + size.vertices / 4, likely_vertices_ / 8 * 7);
-  likely_triangles_ = std::max(size.triangles + size.triangles / 4, likely_triangles_ / 8 * 7);
+  expected_vertices_ = std::max(size.vertices + size.vertices / 4, expected_vertices_ / 8 * 7);
+  expected_triangles_ = std::max(size.triangles + size.triangles / 4, expected_triangles_ / 8 * 7);
 }
 
-/// Room is taken for what meshes were like before, so that the device is waited for once.
-void Work::make(std::vector<Job>& jobs, DeviceMesher::Times& now) {
+/// Reserves the expected space before the launch, so that the device is waited for only once.
+void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
   Stopwatch watch;
   std::vector<gpu::GridMeshJob> all;
-  for (Job& job : jobs) {
-    job.room = room_for(likely_vertices_, likely_triangles_);
+  for (GridJob& job : jobs) {
+    job.span = reserve_span(expected_vertices_, expected_triangles_);
     all.push_back(job.on_device());
   }
   now.memory = watch.lap();
   const TicketGuard guard(&kernel_lock);
-  now.turn = watch.lap();
+  now.lock = watch.lap();
   batch_.make(all);
-  std::vector<Job*> again;
-  for (Job& job : jobs) {
+  std::vector<GridJob*> oversized;
+  for (GridJob& job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job.slot);
-    learn(size);
+    update_expected(size);
     job.mesh.seam_triangles = size.seam_triangles;
     if (size.triangles == 0)
-      job.room.reset();
-    else if (job.room && job.room->place().holds(size.vertices, size.triangles))
-      job.room->trim(size.vertices, size.triangles);
+      job.span.reset();
+    else if (job.span && job.span->place().holds(size.vertices, size.triangles))
+      job.span->trim(size.vertices, size.triangles);
     else
-      again.push_back(&job);
+      oversized.push_back(&job);
   }
-  write_again(again);
+  write_oversized(oversized);
   now.device = watch.lap();
-  for (Job& job : jobs) {
-    if (!job.room) continue;
-    const MeshRange& range = job.room->range();
+  for (GridJob& job : jobs) {
+    if (!job.span) continue;
+    const MeshRange& range = job.span->range();
     job.mesh.device_triangles = range.triangles;
     job.mesh.device_bytes = range.vertices * 2 * sizeof(Vec3f) + range.triangles * sizeof(Triangle);
-    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.room, std::nullopt));
+    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.span, std::nullopt));
   }
 }
 
-/// Those that did not fit: now their sizes are known.
-void Work::write_again(std::vector<Job*>& jobs) {
+/// Writes the meshes that did not fit, now that their sizes are known.
+void DeviceWorker::write_oversized(std::vector<GridJob*>& jobs) {
   std::vector<gpu::GridMeshJob> placed;
-  for (Job* job : jobs) job->room.reset();
-  for (Job* job : jobs) {
+  for (GridJob* job : jobs) job->span.reset();
+  for (GridJob* job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job->slot);
-    job->room = room_for(size.vertices, size.triangles);
-    if (job->room) placed.push_back(job->on_device());
+    job->span = reserve_span(size.vertices, size.triangles);
+    if (job->span) placed.push_back(job->on_device());
   }
   batch_.write(placed);
-  for (Job* job : jobs)
-    if (!job->room) batch_.download(job->slot, job->mesh.mesh);
+  for (GridJob* job : jobs)
+    if (!job->span) batch_.download(job->slot, job->mesh.mesh);
 }
 
 class CudaMesher final : public DeviceMesher {
  public:
-  explicit CudaMesher(std::shared_ptr<Work> work)
-      : work_(std::move(work)), thread_([w = work_] { w->run(); }) {}
+  explicit CudaMesher(std::shared_ptr<DeviceWorker> worker)
+      : worker_(std::move(worker)), thread_([w = worker_] { w->run(); }) {}
   ~CudaMesher() override {
-    work_->end();
-    // The last one to hold it may be a mesh's receiver, in that thread.
+    worker_->end();
+    // The device's own thread may be the last owner, when it passes on a mesh.
     if (thread_.get_id() == std::this_thread::get_id())
       thread_.detach();
     else
       thread_.join();
   }
 
-  bool make(const GridView& grid, NodeMesh mesh, Done done) override {
-    return work_->take(grid, std::move(mesh), std::move(done));
+  bool make(const GridView& grid, NodeMesh mesh, Callback done) override {
+    return worker_->take(grid, std::move(mesh), std::move(done));
   }
-  std::string failure() const override { return work_->failure(); }
-  const std::string& name() const override { return work_->name; }
+  std::string failure() const override { return worker_->failure(); }
+  const std::string& name() const override { return worker_->name; }
   std::vector<DeviceBlock> shared_blocks() const override {
     std::vector<DeviceBlock> blocks;
-    if (work_->memory)
-      for (auto& block : work_->memory->blocks()) blocks.push_back(block_of(std::move(block)));
+    if (worker_->memory)
+      for (auto& block : worker_->memory->blocks()) blocks.push_back(block_of(std::move(block)));
     return blocks;
   }
-  Times times() const override { return work_->times(); }
+  Times times() const override { return worker_->times(); }
   void share_only(std::size_t blocks) override {
-    if (work_->memory) work_->memory->keep(blocks);
+    if (worker_->memory) worker_->memory->keep(blocks);
   }
-  std::uint64_t bytes() const override { return work_->memory ? work_->memory->bytes() : 0; }
-  TicketLock& kernel_lock() override { return work_->kernel_lock; }
+  std::uint64_t bytes() const override { return worker_->memory ? worker_->memory->bytes() : 0; }
+  TicketLock& kernel_lock() override { return worker_->kernel_lock; }
 
  private:
-  std::shared_ptr<Work> work_;
+  std::shared_ptr<DeviceWorker> worker_;
   std::thread thread_;
 };
 
@@ -301,12 +300,13 @@ std::shared_ptr<DeviceMesher> open_device_mesher(const std::optional<DeviceId>& 
   std::shared_ptr<gpu::MeshMemory> memory;
   if (draws) {
     try {
-      // Half of what is free is for making meshes and for drawing them.
+      // The other half of the free memory is for making and drawing meshes.
       memory = std::make_shared<gpu::MeshMemory>(device, std::min(budget, info.free_bytes / 2));
-    } catch (const Error&) {  // through host memory, then
+    } catch (const Error&) {  // meshes go through host memory
     }
   }
-  return std::make_shared<CudaMesher>(std::make_shared<Work>(device, info.name, std::move(memory)));
+  return std::make_shared<CudaMesher>(
+      std::make_shared<DeviceWorker>(device, info.name, std::move(memory)));
 }
 
 }  // namespace isobrick

@@ -9,16 +9,16 @@
 
 namespace isobrick {
 
-/// The device that makes a stream's meshes, until it fails. Thread-safe.
+/// The device that makes a stream's meshes, until the device fails. Thread-safe.
 class CurrentDevice {
  public:
-  /// Null: none. One that has failed is not taken.
+  /// Null: no device. A device that has failed is not taken.
   void set(std::shared_ptr<DeviceMesher> device) {
     std::string failure = device ? device->failure() : std::string();
     if (!failure.empty()) device.reset();
     const MutexLock lock(mutex_);
     failure_ = std::move(failure);
-    std::swap(device_, device);  // the one before goes without the lock
+    std::swap(device_, device);  // the previous device is destroyed without the lock
   }
   std::shared_ptr<DeviceMesher> get() const {
     const MutexLock lock(mutex_);
@@ -28,14 +28,14 @@ class CurrentDevice {
     const MutexLock lock(mutex_);
     return device_ != nullptr;
   }
-  /// Lets go of a device that has failed, unless there is another one by now.
+  /// Releases a device that has failed, unless another one has been set meanwhile.
   void drop(const std::shared_ptr<DeviceMesher>& failed, const std::string& failure) {
     const MutexLock lock(mutex_);
     if (device_ != failed) return;
     device_.reset();
     failure_ = failure;
   }
-  /// Why the last device makes no more; or empty.
+  /// Why the last device failed; empty if it has not.
   std::string failure() const {
     const MutexLock lock(mutex_);
     return failure_;

@@ -3,10 +3,10 @@
 namespace isobrick {
 namespace {
 
-class Cover {
+class CoverBuilder {
  public:
-  Cover(const NodeTree& tree, const CutIndex& cut, double isovalue, int number, MeshCache& meshes,
-        std::vector<DrawnNode>& nodes, bool& complete)
+  CoverBuilder(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
+               MeshCache& meshes, std::vector<NodeDraw>& nodes, bool& complete)
       : tree_(tree),
         cut_(cut),
         isovalue_(isovalue),
@@ -18,13 +18,12 @@ class Cover {
 
   bool cover(const NodeKey& n) {
     if (const CutNode* in_cut = cut_.find(n))
-      return in_cut->cut_away || cover_cut(n, in_cut->coarser);
+      return in_cut->clipped || cover_cut(n, in_cut->coarser);
     if (!tree_.active_below(n, isovalue_)) return cover_border(n);
     const std::size_t mark = nodes_.size();
     bool all = true;
     for_each_child(n, [&](const NodeKey& child) { all &= cover(child); });
-    // Where this level has no surface, its absence shows no more than the children
-    // that are there.
+    // Without a surface on this level, a missing mesh of it hides nothing.
     if (all || !tree_.active(n, isovalue_)) return true;
     const MeshPtr mesh = meshes_.find_any(n, isovalue_, 0);
     if (!mesh) return false;
@@ -44,17 +43,17 @@ class Cover {
     }
     complete_ = false;
     if (cover_finer(n)) return true;
-    // What a neighbour's values bring onto a border can wait.
+    // Triangles that only come from a neighbour's values can wait.
     return !tree_.active(n, isovalue_);
   }
 
-  /// No surface of its own below, but perhaps on borders to coarser neighbours.
+  /// The node has no surface below, but may have triangles on borders to coarser neighbours.
   bool cover_border(const NodeKey& n) {
     for_each_child(n, [&](const NodeKey& child) { cover(child); });
     return true;
   }
 
-  /// By the node's finer nodes, if all that need it are there.
+  /// Substitutes the node's finer nodes, if all meshes of them exist.
   bool cover_finer(const NodeKey& n) {
     if (n.level <= finest_) return false;
     const std::size_t mark = nodes_.size();
@@ -86,8 +85,8 @@ class Cover {
   double isovalue_;
   int number_;
   MeshCache& meshes_;
-  int finest_;  ///< level with any mesh of the isovalue: nothing finer is looked for
-  std::vector<DrawnNode>& nodes_;
+  int finest_;  ///< finest level with a mesh of the isovalue
+  std::vector<NodeDraw>& nodes_;
   bool& complete_;
 };
 
@@ -106,8 +105,8 @@ const CutNode* CutIndex::find(const NodeKey& key) const {
 }
 
 bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
-                     MeshCache& meshes, std::vector<DrawnNode>& nodes, bool& complete) {
-  Cover cover(tree, cut, isovalue, number, meshes, nodes, complete);
+                     MeshCache& meshes, std::vector<NodeDraw>& nodes, bool& complete) {
+  CoverBuilder cover(tree, cut, isovalue, number, meshes, nodes, complete);
   const int top = tree.grid().levels() - 1;
   bool all = true;
   for_each_point({{0, 0, 0}, tree.grid().level(top).nodes}, [&](Int3 p) {

@@ -10,28 +10,27 @@
 
 namespace isobrick {
 
-/// A mesh to be drawn.
-struct DrawnNode {
+struct NodeDraw {
   MeshPtr mesh;
-  int isovalue = 0;  ///< which of the cut's, for its colour
+  int isovalue = 0;  ///< index in the cut's isovalues; selects the colour
 };
 
-/// What shows the scene now: for each isovalue meshes of nodes no two of which lie
-/// over the same place. Meshes without triangles are left out unless they are damaged.
+/// The meshes that show the scene now. For each isovalue no two nodes overlap. Meshes without
+/// triangles are left out unless they are damaged.
 struct Drawable {
-  std::vector<DrawnNode> nodes;
-  std::uint64_t version = 0;      ///< differs when the nodes do
-  bool complete = false;          ///< the whole cut, nothing stands in
-  std::vector<double> isovalues;  ///< that the cut asks for
-  bool covers = false;            ///< each of them is shown, without holes
+  std::vector<NodeDraw> nodes;
+  std::uint64_t version = 0;      ///< changes with the nodes
+  bool complete = false;          ///< shows every node of the cut, without substitutes
+  std::vector<double> isovalues;  ///< of the cut
+  bool covers = false;            ///< every isovalue is shown without holes
   std::uint64_t triangles = 0;
 };
 
-/// A cut that is looked up.
+/// Finds nodes of a cut by their keys.
 class CutIndex {
  public:
   explicit CutIndex(const Cut& cut);
-  /// Null when it is not in the cut.
+  /// Null if the key is not in the cut.
   const CutNode* find(const NodeKey& key) const;
 
  private:
@@ -39,11 +38,11 @@ class CutIndex {
   FlatMap<std::uint32_t, NodeKey> numbers_;
 };
 
-/// Appends the meshes that show one isovalue of a cut as far as they are there: a
-/// node of the cut, its finished finer nodes, or its nearest finished ancestor
-/// instead. False when some part can not be shown; then its surroundings are.
-/// `complete` becomes false where anything stands in.
+/// Appends the meshes that show one isovalue of a cut. A missing mesh is substituted by the node's
+/// finished finer nodes, or by its nearest finished ancestor. `number`: the isovalue's index.
+/// Returns false if some part cannot be shown; the parts around it are appended. Sets `complete` to
+/// false where there is any substitute.
 bool append_drawable(const NodeTree& tree, const CutIndex& cut, double isovalue, int number,
-                     MeshCache& meshes, std::vector<DrawnNode>& nodes, bool& complete);
+                     MeshCache& meshes, std::vector<NodeDraw>& nodes, bool& complete);
 
 }  // namespace isobrick

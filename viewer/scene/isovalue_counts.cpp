@@ -6,10 +6,10 @@
 namespace isobrick {
 namespace {
 
-/// Values between which the counts of blocks are interpolated.
+/// Number of values between which block counts are interpolated.
 constexpr std::size_t kMaxEdges = 1 << 16;
 
-/// Calls f(RangeTable) for all items, some range chunks at a time.
+/// Calls f(RangeTable) for all items, a few range chunks at a time.
 template <class Read, class F>
 void for_each_table(Int3 items, Read&& read, F&& f) {
   constexpr Index n = StoreReader::kRangeChunk;
@@ -48,12 +48,11 @@ void IsovalueCounts::read_bricks(const BrickSource& source, int level) {
   std::sort(hi_.begin(), hi_.end());
 }
 
-/// The edges lie where the bounds of bricks do, so that they are dense where
-/// surfaces change.
+/// The edges are bounds of bricks, so that they are dense where surfaces change.
 void IsovalueCounts::read_blocks(const BrickSource& source, int level) {
   std::vector<double> bounds = lo_;
   bounds.insert(bounds.end(), hi_.begin(), hi_.end());
-  // Few bricks say little about what lies between.
+  // Few bricks have few bounds, so even steps are added.
   const bool whole = !is_floating(source.info().type);
   for (int i = 0; i <= 256 && !range_.empty(); ++i) {
     const double edge = range_.lo + (range_.hi / 256 - range_.lo / 256) * i;
@@ -64,8 +63,8 @@ void IsovalueCounts::read_blocks(const BrickSource& source, int level) {
   const std::size_t step = bounds.size() / kMaxEdges + 1;
   for (std::size_t i = 0; i < bounds.size(); i += step) edges_.push_back(bounds[i]);
   if (!bounds.empty() && edges_.back() != bounds.back()) edges_.push_back(bounds.back());
-  // First how many bounds lie in each place, then sums of them. Place 2 i is edge i
-  // itself, which is where all bounds of whole numbers lie; 2 i + 1 is what follows.
+  // First counts the bounds in each position, then sums them up. Position 2 i is edge i itself,
+  // where all bounds of integers lie; position 2 i + 1 is the interval after it.
   lo_below_.assign(2 * edges_.size(), 0);
   hi_below_.assign(2 * edges_.size(), 0);
   const auto place = [&](double v) {

@@ -8,22 +8,22 @@
 
 namespace isobrick {
 
-/// How much of a level any isovalue touches, answered in O(log n).
+/// Counts how much of a level an isovalue stabs, in O(log n) a query.
 class IsovalueCounts {
  public:
-  /// Reads the brick and block ranges of a stored level; 16 bytes a brick and at
-  /// most 2 MB for blocks are kept. Throws what reading them throws.
+  /// Reads the brick and block ranges of a stored level. It keeps 16 bytes for each brick and at
+  /// most 2 MB for blocks. Throws what reading ranges throws.
   explicit IsovalueCounts(const BrickSource& source, int level = 0);
 
-  /// Bricks that the isovalue touches, exactly.
+  /// Number of bricks that the isovalue stabs; exact.
   std::uint64_t active_bricks(double isovalue) const;
-  /// About how many of the 16³ blocks it touches; times the triangles of a block
-  /// (StreamCounters::triangles_per_block) the size of the surface.
+  /// Estimate of the blocks that it stabs. Times StreamCounters::triangles_per_block it estimates
+  /// the size of the surface.
   std::uint64_t active_blocks(double isovalue) const;
 
   std::uint64_t bricks() const { return bricks_; }
   std::uint64_t blocks() const { return blocks_; }
-  /// Of all samples but NaN; empty when there are none.
+  /// Of all samples but NaN; empty if there are none.
   ValueRange<double> range() const { return range_; }
 
  private:
@@ -32,8 +32,8 @@ class IsovalueCounts {
 
   std::uint64_t bricks_ = 0, blocks_ = 0;
   ValueRange<double> range_;
-  std::vector<double> lo_, hi_;  ///< of bricks that are not empty, each sorted
-  /// Of blocks: how many have their lo, and their hi, at or below an edge, and below the next.
+  std::vector<double> lo_, hi_;  ///< bounds of the bricks that are not empty, sorted
+  /// For each edge: how many blocks have their lo (hi) at or below it, or below the next edge.
   std::vector<double> edges_;
   std::vector<std::uint64_t> lo_below_, hi_below_;
 };

@@ -7,15 +7,15 @@
 
 namespace isobrick {
 
-/// Decides when a plan skips intermediate levels: where most of a cut is new and all of it comes
-/// soon, meshes of levels between the coarsest one and the cut's would be replaced at once.
-/// Thread-safe.
+/// Decides when a plan skips the levels between the coarsest one and the cut's. That is where most
+/// of a cut is new and all of it can be made soon: the intermediate meshes would be replaced at
+/// once. Thread-safe.
 class LevelSkipping {
  public:
-  /// For so many threads that make meshes.
+  /// `threads`: how many make meshes.
   explicit LevelSkipping(int threads) : threads_(threads) {}
 
-  /// Another isovalue was requested. While it is being slid nothing is skipped.
+  /// Reports another isovalue. Nothing is skipped while an isovalue slides.
   void isovalue_changed() {
     const MutexLock lock(mutex_);
     const auto now = Clock::now();
@@ -23,45 +23,45 @@ class LevelSkipping {
     last_isovalue_ = now;
     skipping_until_.reset();
   }
-  /// A mesh took a thread so long.
-  void mesh_took(double seconds) {
+  /// Reports the time that a thread took for a mesh.
+  void add_mesh_seconds(double seconds) {
     const MutexLock lock(mutex_);
     seconds_per_mesh_ += (seconds - seconds_per_mesh_) * kWeight;
   }
 
-  /// How many meshes come soon enough for a plan that skips; see plan_jobs().
-  double soon() const {
+  /// How many meshes can be made within kMaxDelay; see plan_jobs().
+  double max_meshes() const {
     const MutexLock lock(mutex_);
     if (changed_twice_ && Clock::now() - *last_isovalue_ < kSliding) return 0;
-    return kSoon.count() / seconds_per_mesh_ * threads_;
+    return kMaxDelay.count() / seconds_per_mesh_ * threads_;
   }
-  /// Whether the plan that is worked on now skips levels.
-  void planned(bool skips) {
+  /// Reports whether the current plan skips levels.
+  void set_plan(bool skips) {
     const MutexLock lock(mutex_);
     if (!skips)
       skipping_until_.reset();
     else if (!skipping_until_)
-      skipping_until_ = Clock::now() + kLate;
+      skipping_until_ = Clock::now() + kDeadline;
   }
-  /// Whether meshes of a plan that skips have not come soon enough: the levels between are needed.
-  bool late() const {
+  /// Whether the meshes of a plan that skips are overdue: then the intermediate levels are needed.
+  bool is_overdue() const {
     const MutexLock lock(mutex_);
     return skipping_until_ && Clock::now() > *skipping_until_;
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::duration<double> kSoon{0.1};
-  static constexpr std::chrono::milliseconds kLate{300};
-  /// An isovalue that changes again within this time is being slid.
+  static constexpr std::chrono::duration<double> kMaxDelay{0.1};
+  static constexpr std::chrono::milliseconds kDeadline{300};
+  /// An isovalue that changes again within this time is sliding.
   static constexpr std::chrono::milliseconds kSliding{300};
-  /// Of one mesh in the mean of those before.
+  /// Weight of one mesh in the moving average.
   static constexpr double kWeight = 1.0 / 32;
 
   const double threads_;
   mutable Mutex mutex_;
-  double seconds_per_mesh_ ISOBRICK_GUARDED_BY(mutex_) = 0.003;  ///< a guess, then a mean
-  bool changed_twice_ ISOBRICK_GUARDED_BY(mutex_) = false;  ///< the last time soon after another
+  double seconds_per_mesh_ ISOBRICK_GUARDED_BY(mutex_) = 0.003;  ///< moving average
+  bool changed_twice_ ISOBRICK_GUARDED_BY(mutex_) = false;       ///< the isovalue slides
   std::optional<Clock::time_point> last_isovalue_ ISOBRICK_GUARDED_BY(mutex_);
   std::optional<Clock::time_point> skipping_until_ ISOBRICK_GUARDED_BY(mutex_);
 };

@@ -18,7 +18,7 @@ MeshPtr MeshCache::find(const NodeKey& key, double isovalue, std::uint32_t coars
   if (entries == nullptr) return nullptr;
   for (Entry& entry : *entries)
     if (entry.coarser == coarser) {
-      entry.used = now_;
+      entry.used = use_;
       return entry.mesh;
     }
   return nullptr;
@@ -29,9 +29,9 @@ MeshPtr MeshCache::find_any(const NodeKey& key, double isovalue, std::uint32_t c
   if (entries == nullptr) return nullptr;
   const auto exact = std::find_if(entries->begin(), entries->end(),
                                   [&](const Entry& entry) { return entry.coarser == coarser; });
-  // The one made last met neighbours that are most like those of now.
+  // The neighbours of the newest mesh are most like the present ones.
   Entry& entry = exact != entries->end() ? *exact : entries->back();
-  entry.used = now_;
+  entry.used = use_;
   return entry.mesh;
 }
 
@@ -54,32 +54,32 @@ void MeshCache::put(MeshPtr mesh) {
   Surface& surface = surfaces_[mesh->isovalue];
   std::vector<Entry>& entries = surface.nodes[mesh->key];
   if (entries.empty()) ++surface.levels[mesh->key.level];
-  entries.push_back({mesh->coarser, now_, std::move(mesh)});
+  entries.push_back({mesh->coarser, use_, std::move(mesh)});
 }
 
 bool MeshCache::shrink() {
-  if (keeps_budgets()) return true;
-  // Not for each mesh that is made anew.
+  if (is_within_budgets()) return true;
+  // Leaves some room, so that not every new mesh causes another search.
   drop_until(budget_ - budget_ / 8, device_budget_ - device_budget_ / 8);
-  return keeps_budgets();
+  return is_within_budgets();
 }
 
 void MeshCache::shrink_device(std::uint64_t bytes) {
   drop_until(bytes_, device_bytes_ - std::min(bytes, device_bytes_));
 }
 
-/// Drops what was not used since begin_use(), the oldest first, down to this or as far as it goes.
+/// Drops unused meshes, the oldest first, until both limits hold or none is left.
 void MeshCache::drop_until(std::uint64_t bytes, std::uint64_t device_bytes) {
   std::vector<std::pair<std::uint64_t, const NodeMesh*>> old;
   for (const auto& [isovalue, surface] : surfaces_)
     for (const auto& [key, entries] : surface.nodes)
       for (const Entry& entry : entries)
-        if (entry.used < now_) old.emplace_back(entry.used, entry.mesh.get());
+        if (entry.used < use_) old.emplace_back(entry.used, entry.mesh.get());
   std::sort(old.begin(), old.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [used, mesh] : old) {
-    const bool here_too_many = bytes_ > bytes, there_too_many = device_bytes_ > device_bytes;
-    if (!here_too_many && !there_too_many) break;
-    if (here_too_many || mesh->device_bytes > 0) drop(*mesh);
+    const bool too_many_on_host = bytes_ > bytes, too_many_on_device = device_bytes_ > device_bytes;
+    if (!too_many_on_host && !too_many_on_device) break;
+    if (too_many_on_host || mesh->device_bytes > 0) drop(*mesh);
   }
 }
 

@@ -13,32 +13,31 @@ namespace isobrick {
 
 using MeshPtr = std::shared_ptr<const NodeMesh>;
 
-/// Node meshes under a budget, of all isovalues and borders, the least recently
-/// used dropped first. Not thread-safe.
+/// Node meshes of all isovalues and borders within a budget. The least recently used ones are
+/// dropped first. Not thread-safe.
 class MeshCache {
  public:
-  /// In bytes of host memory, and of a device's for meshes that lie there.
+  /// Budgets in bytes of host memory, and of device memory for meshes that lie there.
   MeshCache(std::uint64_t budget, std::uint64_t device_budget)
       : budget_(budget), device_budget_(device_budget) {}
 
-  /// The node's mesh with exactly these coarser neighbours, or null.
+  /// The node's mesh with exactly this mask of coarser neighbours, or null.
   MeshPtr find(const NodeKey& key, double isovalue, std::uint32_t coarser);
-  /// The same, or else one with other neighbours.
+  /// The same; if there is none, the newest one with another mask.
   MeshPtr find_any(const NodeKey& key, double isovalue, std::uint32_t coarser);
   bool has_any(const NodeKey& key, double isovalue) const;
-  /// Of all meshes of an isovalue: the finest one's level; above all levels where there is none.
+  /// The finest level that has a mesh of the isovalue; a number above all levels if there is none.
   int finest_level(double isovalue) const;
 
   void put(MeshPtr mesh);
 
-  /// What is found from now on is kept by the next shrink().
-  void begin_use() { ++now_; }
-  bool keeps_budgets() const { return bytes_ <= budget_ && device_bytes_ <= device_budget_; }
-  /// When a budget is exceeded, drops what was not used since begin_use() until there is
-  /// some room again. False when the budgets are exceeded all the same.
+  /// Meshes that are found from now on are in use: shrink() keeps them.
+  void begin_use() { ++use_; }
+  bool is_within_budgets() const { return bytes_ <= budget_ && device_bytes_ <= device_budget_; }
+  /// If a budget is exceeded, drops unused meshes until there is some room again. Returns false if
+  /// the meshes in use alone exceed a budget.
   bool shrink();
-  /// Drops so many bytes of what lies on the device and was not used since begin_use(), or as much
-  /// as there is.
+  /// Drops unused meshes on the device, `bytes` bytes of them if there are as many.
   void shrink_device(std::uint64_t bytes);
 
   void set_device_budget(std::uint64_t bytes) { device_budget_ = bytes; }
@@ -49,24 +48,24 @@ class MeshCache {
   std::uint64_t meshes() const { return meshes_; }
 
  private:
-  /// What is compared lies here: a mesh is looked at only when it is the one.
+  /// Holds what a search compares, so that it reads only the mesh that it returns.
   struct Entry {
     std::uint32_t coarser;
     std::uint64_t used;
     MeshPtr mesh;
   };
   struct Surface {
-    /// Each node's in the order in which they were made.
+    /// The meshes of a node, the newest last.
     std::unordered_map<NodeKey, std::vector<Entry>, NodeKeyHash> nodes;
-    std::map<int, std::size_t> levels;  ///< how many of its nodes lie in each
+    std::map<int, std::size_t> levels;  ///< number of nodes on each level
   };
 
   std::vector<Entry>* entries_of(const NodeKey& key, double isovalue);
   void drop(const NodeMesh& mesh);
   void drop_until(std::uint64_t bytes, std::uint64_t device_bytes);
 
-  std::uint64_t budget_, device_budget_, bytes_ = 0, device_bytes_ = 0, meshes_ = 0, now_ = 1;
-  /// By isovalue: nothing is looked for in many nodes where one is new.
+  std::uint64_t budget_, device_budget_, bytes_ = 0, device_bytes_ = 0, meshes_ = 0, use_ = 1;
+  /// By isovalue: a search for a new isovalue ends at once.
   std::map<double, Surface> surfaces_;
 };
 

@@ -7,22 +7,22 @@
 
 namespace isobrick {
 
-/// What the meshes that were made amount to. Thread-safe.
+/// Totals of the meshes that were made. Thread-safe.
 class MeshStatistics {
  public:
   struct Totals {
     std::uint64_t meshes = 0, by_device = 0, damaged = 0;
     std::uint64_t triangles = 0, blocks = 0;
-    double seconds = 0;  ///< summed over threads; no device
+    double seconds = 0;  ///< of meshing, summed over threads, without a device
 
-    /// 0: too few yet.
+    /// 0 until enough blocks were meshed.
     double triangles_per_block() const {
       if (blocks < kMeasuredBlocks) return 0;
       return static_cast<double>(triangles) / static_cast<double>(blocks);
     }
   };
 
-  /// A mesh of so many active blocks was made.
+  /// Adds a mesh of `blocks` active blocks.
   void add(const NodeMesh& mesh, int blocks, bool by_device) {
     const MutexLock lock(mutex_);
     ++totals_.meshes;
@@ -31,7 +31,7 @@ class MeshStatistics {
     totals_.triangles += mesh.triangles();
     totals_.blocks += static_cast<std::uint64_t>(blocks);
   }
-  /// A thread meshed for so long.
+  /// Adds meshing time of a thread.
   void add_seconds(double seconds) {
     const MutexLock lock(mutex_);
     totals_.seconds += seconds;
@@ -42,7 +42,7 @@ class MeshStatistics {
   }
 
  private:
-  /// A few coarse meshes are not like the rest.
+  /// A few coarse meshes are not representative.
   static constexpr std::uint64_t kMeasuredBlocks = 512;
 
   mutable Mutex mutex_;

@@ -5,10 +5,10 @@
 namespace isobrick {
 namespace {
 
-/// Before and behind a block's first sample: those that its cells or their gradients need.
-constexpr Index kBefore = 1, kBehind = kBlockEdge + 2;
+/// Samples before and after a block's first sample that its cells or their gradients need.
+constexpr Index kBefore = 1, kAfter = kBlockEdge + 2;
 
-/// Whether a block at that place among `blocks` lies beside a neighbour in one of the directions.
+/// Whether the block at `block` among `blocks` lies beside a neighbour in the mask.
 bool beside(Int3 block, Box3 blocks, std::uint32_t directions) {
   for (int i = 0; i < kDirections; ++i) {
     if (!(directions >> i & 1)) continue;
@@ -40,7 +40,7 @@ bool NeededSamples::any(Box3 part) const {
   for_each_point(blocks_, [&](Int3 b) {
     const Int3 first = b * kBlockEdge;
     const Box3 around{first - Int3{kBefore, kBefore, kBefore},
-                      first + Int3{kBehind, kBehind, kBehind}};
+                      first + Int3{kAfter, kAfter, kAfter}};
     found |= sides_[i++] == Side::needed && !intersect(around, part).empty();
   });
   return found;

@@ -8,29 +8,30 @@
 
 namespace isobrick {
 
-/// Which samples a node of the finest level needs, by the ranges of its 16³ blocks: where all
-/// samples of a block lie on one side of the isovalue nothing has to be known but the side.
+/// Which samples a node of the finest level needs, by the ranges of its blocks of 16³ cells. Where
+/// all samples of a block lie on one side of the isovalue, only the side is needed.
 class NeededSamples {
  public:
-  /// `samples`: those of the node's cells; `table`: the ranges of the blocks that they lie in, or
-  /// of more. A block beside a neighbour in `coarser`, whose values come onto the border, is needed
-  /// whatever its range.
+  /// `samples`: those of the node's cells. `table`: ranges of at least the blocks that hold them. A
+  /// block beside a neighbour in the mask `coarser` is always needed, since the neighbour's values
+  /// are written onto the border.
   NeededSamples(Box3 samples, const RangeTable& table, double isovalue, std::uint32_t coarser);
 
-  /// Whether any of `part` is needed, as the corner of a cell with a surface or for its gradient.
+  /// Whether any sample of `part` is needed, as a corner of a cell with a surface or for its
+  /// gradient.
   bool any(Box3 part) const;
-  /// Writes `below` or `above`, whichever side they are on, for samples of `part` that are not
-  /// needed, to rows of an array of that extent.
+  /// Writes `below` or `above`, by their side, for the samples of `part` that are not needed. `to`:
+  /// rows of an array of extent `to_extent`.
   template <class T>
   void fill(Box3 part, T below, T above, T* to, Int3 to_extent) const;
 
  private:
   Box3 blocks_;
   enum class Side : std::uint8_t { needed, below, above };
-  std::vector<Side> sides_;  ///< of blocks
+  std::vector<Side> sides_;  ///< for each block
 };
 
-/// Those of the border take the side of the node's own block beside them.
+/// Samples of the border take the side of the node's own block beside them.
 template <class T>
 void NeededSamples::fill(Box3 part, T below, T above, T* to, Int3 to_extent) const {
   const auto block = [&](int axis, Index p) {

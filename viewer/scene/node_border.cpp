@@ -11,7 +11,8 @@ namespace {
 constexpr int first_axis(int normal) { return normal == 0 ? 1 : 0; }
 constexpr int second_axis(int normal) { return normal == 2 ? 1 : 2; }
 
-/// Whether direction i is among those of a face in `mask`, or of an edge.
+/// Whether direction i is part of another direction in the mask: an edge of its face, a corner of
+/// its face or edge.
 bool on_larger(std::uint32_t mask, int i) {
   const Int3 d = direction(i);
   for (int j = 0; j < kDirections; ++j) {
@@ -89,9 +90,9 @@ void NodeBorder::take_values(int i, double isovalue, const CancellationToken& to
   connect_inside(face, field);
 }
 
-/// Where the coarser side has an ambiguous cell it connects the inside; the finer
-/// side does the same when the middle of that cell is inside. Clearly so: at the isovalue
-/// itself the vertices around the middle would be in one place.
+/// The coarser side connects the inside corners of an ambiguous cell. The finer side does so only
+/// if the cell's middle is inside, so this makes it inside, by a margin: at the isovalue itself all
+/// vertices around the middle would coincide.
 void NodeBorder::connect_inside(int face, GridValues& field) const {
   const int normal = face / 2, u = first_axis(normal), v = second_axis(normal);
   if (ratio_[u] != 2 && ratio_[v] != 2) return;
@@ -115,22 +116,21 @@ void NodeBorder::connect_inside(int face, GridValues& field) const {
     }
 }
 
-/// Connects the corners of an ambiguous cell of the coarser side that are inside, through its
-/// middle or, where it is halved along one axis only, through the middle of one of two opposite
-/// edges.
+/// Connects the inside corners of an ambiguous cell of the coarser side through its middle. If the
+/// cell is halved along one axis only, through the middle of one of two opposite edges.
 void NodeBorder::connect_through(Int3 middle, int u, int v, float inside, GridValues& field) const {
-  // A cell that is cut short by the volume's border may have no middle.
+  // A cell that ends at the volume's border may have no middle.
   const auto exists = [&](int axis) { return ratio_[axis] == 1 || middle[axis] < hi_[axis]; };
   if (!exists(u) || !exists(v)) return;
   if (ratio_[u] == 2 && ratio_[v] == 2) {
     if (field.at(middle) < 0) field.at(middle) = inside;
     return;
   }
-  const int whole = ratio_[u] == 2 ? v : u;  // the axis along which the cell is not halved
+  const int whole = ratio_[u] == 2 ? v : u;  // axis along which the cell is not halved
   Int3 other = middle;
   ++other[whole];
   if (field.at(middle) >= 0 || field.at(other) >= 0) return;
-  // Points on the node's own edges are other nodes', too.
+  // Points on the node's edges belong to other nodes, too.
   if (other[whole] < hi_[whole])
     field.at(other) = inside;
   else if (middle[whole] > lo_[whole])

@@ -10,18 +10,18 @@
 
 namespace isobrick {
 
-/// Where a node meets coarser neighbours: the values on its border.
+/// The values on a node's border to coarser neighbours.
 class NodeBorder {
  public:
   NodeBorder(const NodeGrid& grid, NodeSamples& samples) : grid_(grid), samples_(samples) {}
 
-  /// Reads the neighbours' values and writes them over `field`: the grid points of
-  /// the node, C order.
+  /// Reads the values of the neighbours in the mask `coarser` and writes them over those of
+  /// `field`, the grid points of the node in C order.
   void apply(const NodeKey& key, std::uint32_t coarser, double isovalue,
              const CancellationToken& token, GridValues& field);
 
-  /// After apply(): what a mesh of the node has to know of the coarser side. Valid until
-  /// the next apply().
+  /// After apply(): adds to `view` what the extractor needs of the coarser side. Valid until the
+  /// next apply().
   void describe(GridView& view);
 
  private:
@@ -29,7 +29,8 @@ class NodeBorder {
   void connect_inside(int face, GridValues& field) const;
   void connect_through(Int3 middle, int u, int v, float inside, GridValues& field) const;
   float interpolated(const GridValues& coarse, Int3 point) const;
-  /// The two coarse grid points around a grid point, and how far it is from the first.
+  /// The first of the two coarse grid points around a grid point, and the fraction of the way to
+  /// the second.
   struct Interpolation {
     Index first;
     double weight;
@@ -39,9 +40,9 @@ class NodeBorder {
   const NodeGrid& grid_;
   NodeSamples& samples_;
   NodeKey key_;
-  Int3 ratio_, lo_, hi_;                            ///< grid points of the node, both inclusive
-  std::array<std::optional<GridValues>, 6> faces_;  ///< the coarser side's values
-  std::array<std::vector<double>, 3> places_;       ///< of the coarser grid's points
+  Int3 ratio_, lo_, hi_;                            ///< grid points of the node; `hi_` is inclusive
+  std::array<std::optional<GridValues>, 6> faces_;  ///< values of the coarser side
+  std::array<std::vector<double>, 3> places_;       ///< positions of the coarser grid's points
   GridValues scratch_;
 };
 

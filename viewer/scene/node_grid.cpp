@@ -34,9 +34,9 @@ Int3 exponents_of(const Transform& finest, const Transform& t) {
 
 constexpr Index power(Index e) { return Index{1} << e; }
 
-/// Along each axis, of the coarsest level of all.
+/// Maximum cells along each axis of the coarsest level.
 constexpr Index kFewCells = 16;
-/// Levels above a stored one read all of its samples: only where these are few.
+/// Levels above a stored one read all of its samples, so it must be small.
 constexpr Index kFewSamples = Index{1} << 24;
 
 }  // namespace
@@ -53,8 +53,8 @@ NodeGrid::NodeGrid(const StoreInfo& info) : transform_(info.levels.front().trans
   if (volume(coarsest) <= kFewSamples) add_levels_above(info, exponents);
 }
 
-/// Where a stored level is more than twice as coarse as the one before, levels
-/// between them take the finer one's samples.
+/// If a stored level is more than twice as coarse as the previous one, levels between them use the
+/// previous one's samples.
 void NodeGrid::add_levels(const StoreInfo& info, int source, Int3& exponents) {
   const Transform& t = info.levels[static_cast<std::size_t>(source)].transform;
   check_direction(info, t);
@@ -126,7 +126,7 @@ NodeGrid::Interpolation NodeGrid::interpolation(int v, int axis, Index point) co
       static_cast<double>(stored_extents_[static_cast<std::size_t>(l.source)][axis] - 1);
   const double at = std::clamp(
       l.scale[axis] * static_cast<double>(position(v, axis, point)) + l.offset[axis], 0.0, last);
-  // Rounding must not make a sample's value one between it and its neighbour.
+  // Rounding must not turn a sample into a value between it and its neighbour.
   const double nearest = std::round(at);
   if (std::abs(at - nearest) < 1e-6) return {static_cast<Index>(nearest), 0};
   const double below = std::floor(at);

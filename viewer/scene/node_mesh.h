@@ -10,7 +10,7 @@
 
 namespace isobrick {
 
-/// What a node's mesh is a function of: two meshes with one id are the same.
+/// Identifies a node's mesh: meshes with one id have the same bytes.
 struct MeshId {
   NodeKey key;
   double isovalue = 0;
@@ -27,27 +27,27 @@ struct MeshIdHash {
 
 class DeviceMesh;
 
-/// The surface in one node. Immutable once it is made.
+/// The surface in one node. Immutable once made.
 struct NodeMesh {
   NodeKey key;
   double isovalue = 0;
-  std::uint32_t coarser = 0;  ///< directions of the neighbours one level above that it meets
-  /// Positions in world space minus the scene's origin; unit normals towards the
-  /// outside; triangles number the mesh's own vertices, counter-clockwise from there.
+  std::uint32_t coarser = 0;  ///< mask of neighbours one level above whose border it matches
+  /// Positions in world space minus the scene's origin; unit normals towards the outside. Triangles
+  /// index the mesh's own vertices, counter-clockwise seen from outside.
   MeshBuffer mesh;
-  /// The same on a device, instead; see device_mesher.h.
+  /// The same in device memory; then `mesh` is empty. See device_mesher.h.
   std::shared_ptr<const DeviceMesh> device;
-  std::uint64_t device_triangles = 0, device_bytes = 0;  ///< of that
-  /// How many of the triangles, the last ones, are the seam strips along the borders to coarser
-  /// neighbours: a small part of a cell wide, across the surface, seen from both sides.
+  std::uint64_t device_triangles = 0, device_bytes = 0;  ///< of the mesh on the device
+  /// The last `seam_triangles` triangles are seam strips along the borders to coarser neighbours.
+  /// They lie across the surface, a small part of a cell wide, and are visible from both sides.
   std::uint32_t seam_triangles = 0;
-  /// What is wrong with the samples; empty when all is well. The mesh is empty otherwise.
+  /// Message about damaged samples; the mesh is empty then. Empty if all is well.
   std::string damage;
 
   MeshId id() const { return {key, isovalue, coarser}; }
   std::uint64_t triangles() const { return mesh.triangles.size() + device_triangles; }
   bool empty() const { return triangles() == 0; }
-  /// Of host memory.
+  /// Bytes of host memory.
   std::uint64_t bytes() const {
     return sizeof(NodeMesh) + mesh.positions.capacity() * sizeof(Vec3f) +
            mesh.normals.capacity() * sizeof(Vec3f) + mesh.triangles.capacity() * sizeof(Triangle);

@@ -16,8 +16,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Half the width of a seam strip, in cells: enough for what a rasteriser rounds, too
-/// little to be seen.
+/// Half the width of a seam strip in cells: enough for a rasteriser's rounding, too little to be
+/// visible.
 constexpr double kSeam = 0.02;
 
 }  // namespace
@@ -27,10 +27,11 @@ struct NodeMesher::Impl {
   ResidentBricks& bricks;
   NodeSamples samples;
   NodeBorder border;
-  GridView view;             ///< what is the same for all nodes
-  GridValues around, field;  ///< with a layer around for gradients; with neighbours' values
-  std::vector<std::byte> stored_samples;  ///< instead of the values of `around`
-  std::vector<double> places[3];          ///< of the points of `around`, level-0 index space
+  GridView view;  ///< fields that are the same for all nodes
+  GridValues around,
+      field;  ///< node with a layer around for gradients; node with neighbours' values
+  std::vector<std::byte> stored_samples;  ///< stored samples instead of `around`
+  std::vector<double> places[3];  ///< positions of the points of `around`, level-0 index space
   std::vector<float> inverse[3];
   GridExtractor extractor;
   MeshBuffer work;
@@ -71,7 +72,7 @@ struct NodeMesher::Impl {
         std::copy_n(&around.at(box.lo + Int3{0, y, z}), n.x, &field.at(box.lo + Int3{0, y, z}));
   }
 
-  /// The places of the points of `around`.
+  /// Computes the positions of the points of `around`.
   void find_places(int level) {
     for (int axis = 0; axis < 3; ++axis) {
       auto& at = places[axis];
@@ -86,7 +87,7 @@ struct NodeMesher::Impl {
     }
   }
 
-  /// The node as a grid, with `field` where neighbours are coarser. Of values, or of nothing yet.
+  /// The node as a grid, with `field` on borders to coarser neighbours; without samples yet.
   GridView view_of(const NodeKey& key, bool coarser, bool values_too = true) {
     find_places(key.level);
     GridView v = view;
@@ -113,9 +114,9 @@ struct NodeMesher::Impl {
 
   enum class Ranges { kRead, kKnown };
 
-  /// Nothing: all samples are needed, or their bricks are there anyway, or the ranges, if only
-  /// known ones are asked for, are not. With NaN between them two sides may lie beside each other
-  /// without any surface.
+  /// Which samples are needed; nullopt means all. That is so if the bricks are resident anyway, or
+  /// if the ranges are unknown and may not be read. It is so with NaN, too: blocks on different
+  /// sides may then be neighbours without a surface between them.
   std::optional<NeededSamples> needed_of(const NodeKey& key, double isovalue, std::uint32_t coarser,
                                          Ranges ranges = Ranges::kRead) const {
     if (key.level != 0 || view.may_have_nan) return std::nullopt;
@@ -128,7 +129,7 @@ struct NodeMesher::Impl {
     return NeededSamples(own, *table, isovalue, coarser);
   }
 
-  /// Those of the bricks around `box`, points of the node, that are needed.
+  /// The needed ones of the bricks that hold the points `box` of the node.
   std::vector<Int3> bricks_of(const NodeKey& key, Box3 box,
                               const std::optional<NeededSamples>& needed) const {
     const auto stored = static_cast<std::size_t>(grid.level(key.level).source);
@@ -140,8 +141,8 @@ struct NodeMesher::Impl {
     return found;
   }
 
-  /// Whether a node's grid can be of stored samples: its points are samples, all its own, of types
-  /// that take less than values.
+  /// Whether a node's grid can hold stored samples: its points are samples, no border has a
+  /// neighbour's values, and the type is smaller than a value.
   bool may_be_stored(const NodeKey& key, std::uint32_t coarser) const {
     const ScalarType type = bricks.source().info().type;
     return key.level == 0 && coarser == 0 && size_of(type) < sizeof(float);
@@ -168,7 +169,7 @@ struct NodeMesher::Impl {
     return view_of(key, coarser != 0);
   }
 
-  /// A copy without what growing left over: it is kept for long.
+  /// Copies without spare capacity, since the mesh is kept for long.
   static void shrink(const MeshBuffer& from, MeshBuffer& to) {
     const auto copy = [](const auto& a, auto& b) {
       b.reserve(a.size());
@@ -210,11 +211,13 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
   return impl_->read(key, isovalue, coarser, token);
 }
 
-bool NodeMesher::half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const {
+bool NodeMesher::is_half_resident(const NodeKey& key, double isovalue,
+                                  std::uint32_t coarser) const {
   const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
   const int stored = impl_->grid.level(key.level).source;
   const Box3 points = impl_->points(key);
-  if (!needed) return impl_->bricks.half_resident(stored, impl_->samples.bricks(key.level, points));
+  if (!needed)
+    return impl_->bricks.half_resident(stored, impl_->samples.bricks(key.level, points));
   return impl_->bricks.half_resident(stored, impl_->bricks_of(key, points, needed));
 }
 

@@ -18,49 +18,46 @@ struct StoredBrick {
   friend auto operator<=>(const StoredBrick&, const StoredBrick&) = default;
 };
 
-/// Makes node meshes. One for each thread: keeps its work space.
+/// Makes node meshes. Not thread-safe; it keeps its buffers, so use one for each thread.
 ///
-/// A grid point that lies in a coarser neighbour as well (on a face, an edge or a
-/// corner) takes the value that the neighbour has there. Both sides then cross the
-/// same edges of the coarser grid at the same points; vertices of the finer side
-/// between them are moved onto the coarser side's chords. Nodes of one level have
-/// the same samples on the face between them and so the same vertices, bit by bit.
+/// A grid point on a face, edge or corner that a coarser neighbour shares takes the neighbour's
+/// value. Both sides then cross the edges of the coarser grid at the same points. Vertices of the
+/// finer side between them are moved onto the coarser side's chords. Nodes of one level have the
+/// same samples on a common face, and so the same vertices, bit by bit.
 class NodeMesher {
  public:
-  /// `origin`, in world space, is subtracted from all positions. `inside`: nothing is what
-  /// inside_of() says.
+  /// `origin`: world space, subtracted from all positions. `inside`: nullopt means inside_of().
   NodeMesher(const NodeGrid& grid, ResidentBricks& bricks, Vec3d origin,
              std::optional<Inside> inside = std::nullopt);
   ~NodeMesher();
 
-  /// The mesh of a node whose neighbours in `coarser` (directions) lie one level
-  /// above. Throws OperationCancelled, DamageError and what else reading bricks throws.
+  /// Makes the mesh of a node; the neighbours in the mask `coarser` lie one level above. Throws
+  /// OperationCancelled, DamageError, and what reading bricks throws.
   NodeMesh mesh(const NodeKey& key, double isovalue, std::uint32_t coarser,
                 const CancellationToken& token);
 
-  /// Whether a grid may hold samples as they are stored instead of values, which takes less time
-  /// and memory: for a device.
+  /// Form of a grid's samples. Stored samples, for a device, take less time and memory than values.
   enum class Form : std::uint8_t { values, stored_if_possible };
-  /// What that mesh is made of. Valid until the next call; throws the same.
+  /// Returns the grid that mesh() extracts from, valid until the next call. Throws the same.
   GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser,
                 const CancellationToken& token, Form form = Form::values);
 
-  /// The mesh of the values that grid() gave last. `mesh` says which it is.
+  /// Makes the mesh of the values that grid() returned last. `mesh` says which node it is.
   NodeMesh extract(const GridView& grid, NodeMesh mesh);
 
-  /// Whether at least half of the bricks are there that hold a node's points and that the mesh
-  /// needs. Reads nothing: where ranges have not been read, it seems to need all of them.
-  bool half_there(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
+  /// Whether at least half of the bricks that the node's mesh needs are resident. Reads nothing:
+  /// without known ranges it counts all bricks of the node's points.
+  bool is_half_resident(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
 
-  /// Adds those of these bricks that are not there.
+  /// Adds the bricks that the mesh needs and that are not resident.
   void add_missing(const NodeKey& key, double isovalue, std::uint32_t coarser,
                    std::vector<StoredBrick>& missing) const;
 
-  /// Says which bricks the mesh needs soon, its neighbours' left out; see
-  /// ResidentBricks::will_need(). Throws what reading ranges does.
+  /// Announces the bricks that the mesh needs soon, but not those of its neighbours; see
+  /// ResidentBricks::will_need(). Throws what reading ranges throws.
   void will_need(const NodeKey& key, double isovalue, std::uint32_t coarser) const;
 
-  /// Seconds that this thread spent on meshing so far, without waiting for bricks or a device.
+  /// Seconds of meshing so far, without waiting for bricks or a device.
   double seconds() const;
 
  private:

@@ -11,7 +11,8 @@
 namespace isobrick {
 namespace {
 
-/// Between a and b. An end is itself whatever the other one is, infinite or no number.
+/// Interpolates between a and b. At an end it returns that end, even if the other is infinite or
+/// NaN.
 float mix(float a, float b, float weight) { return a + weight * (b - a); }
 
 }  // namespace
@@ -34,7 +35,7 @@ Box3 NodeSamples::bricks(int v, Box3 points) const {
   return bricks;
 }
 
-/// Grid points may lie many samples apart: what is between is not looked at.
+/// Grid points may be many samples apart; samples between them are not read.
 void NodeSamples::find_axis(int v, int axis, Index lo, Index hi) {
   Axis& a = axes_[static_cast<std::size_t>(axis)];
   a.samples.clear();
@@ -51,8 +52,8 @@ void NodeSamples::find_axis(int v, int axis, Index lo, Index hi) {
   }
 }
 
-/// Calls f(offset in the brick, of the first sample, number of it in gathered_, places of the
-/// samples of a row).
+/// Calls f(offset in the brick of a row's first sample, pointer into gathered_, positions of the
+/// row's samples).
 template <class F>
 void NodeSamples::for_each_row(Int3 corner, Int3 edge, F&& f) {
   const auto [x0, x1] = axes_[0].range(corner.x, corner.x + edge.x);
@@ -83,7 +84,7 @@ void NodeSamples::copy_part(const std::byte* brick, Int3 corner, Int3 edge, doub
   });
 }
 
-/// Around all that is looked at.
+/// The bounding box of all samples to read.
 Box3 NodeSamples::box() const {
   Box3 box;
   for (int axis = 0; axis < 3; ++axis) {
@@ -94,25 +95,25 @@ Box3 NodeSamples::box() const {
   return box;
 }
 
-/// Of the bricks that lie in `box`: calls take(brick, samples) for those that are needed, skip(part
-/// of the box) for the others.
+/// For the bricks in `box`: calls take(brick, samples) for those that are needed, and skip(part of
+/// the box) for the others.
 template <class Take, class Skip>
 void NodeSamples::for_each_brick(int stored, Box3 box, const CancellationToken& token,
                                  const NeededSamples* needed, Take&& take, Skip&& skip) {
   const Lattice& lattice = bricks_.source().info().levels[static_cast<std::size_t>(stored)].lattice;
-  wanted_.clear();
+  needed_.clear();
   for_each_point(lattice.bricks_of(box), [&](Int3 b) {
     const Box3 part = intersect(box, lattice.full_brick_box(b));
     if (needed == nullptr || needed->any(part))
-      wanted_.push_back(b);
+      needed_.push_back(b);
     else
       skip(part);
   });
-  bricks_.read_together(stored, wanted_, token);
-  // Threads at nodes beside each other want the same bricks: were each to wait for what another
-  // one is reading, all would read one brick after the other.
+  bricks_.read_together(stored, needed_, token);
+  // Threads with adjacent nodes need the same bricks. If each waited for the brick that another
+  // thread reads, all bricks would be read one after the other.
   std::vector<Int3> busy;
-  for (const Int3 b : wanted_)
+  for (const Int3 b : needed_)
     if (const auto brick = bricks_.get_unless_busy(stored, b, token))
       take(b, *brick);
     else
@@ -190,7 +191,7 @@ void NodeSamples::read(int v, Box3 points, double isovalue, const CancellationTo
     for (const Axis::Point& s : axes_[0].points)
       *to++ = s.weight > 0 ? mix(in[s.first], in[s.first + 1], s.weight) : in[s.first];
   }
-  // Rows that are a whole step apart are mixed as rows.
+  // Whole rows are interpolated at once.
   const auto mix_rows = [](const float* a, const Axis::Point& s, Index stride, Index length,
                            float* to) {
     if (s.weight > 0)

@@ -24,39 +24,38 @@ struct GridValues {
   }
 };
 
-/// Reads the values at grid points from resident bricks. One for each thread: keeps
-/// its work space.
+/// Reads the values at grid points from resident bricks. Not thread-safe; it keeps its buffers, so
+/// use one for each thread.
 class NodeSamples {
  public:
   NodeSamples(const NodeGrid& grid, ResidentBricks& bricks) : grid_(grid), bricks_(bricks) {}
 
-  /// Sample − isovalue at the grid points `points` (of level v, all inside the
-  /// volume), in float: the isosurface is where these cross 0. The subtraction is
-  /// exact enough in double that no sample changes sides.
-  /// Of level 0, bricks that `needed` has no need of are not read, unless it is null.
+  /// Writes sample − isovalue at the grid points `points` (of level v, inside the volume) as float:
+  /// the isosurface is where the values cross 0. The subtraction is in double, so that no sample
+  /// changes sides. At level 0 it does not read bricks that `needed` (null: all) does not need.
   void read(int v, Box3 points, double isovalue, const CancellationToken& token, GridValues& out,
             const NeededSamples* needed = nullptr);
 
-  /// The samples themselves at the points `points` of level 0, in the store's type; those that
-  /// `needed` has no need of are the least or the largest there is, unless it is null.
+  /// Writes the samples at the points `points` of level 0, in the store's type. Samples that
+  /// `needed` (null: all) does not need get the smallest or the largest value of the type.
   void read_stored(Box3 points, const CancellationToken& token, std::vector<std::byte>& out,
                    const NeededSamples* needed);
 
-  /// Bricks of the stored level that read() looks at.
+  /// The bricks of the stored level that read() reads.
   Box3 bricks(int v, Box3 points) const;
 
  private:
-  /// What is looked at along an axis, and where grid points lie among that.
+  /// The samples that are read along an axis, and the positions of grid points among them.
   struct Axis {
     std::vector<Index> samples;  ///< ascending
     struct Point {
-      Index first;  ///< of the two numbers in `samples` that it lies between
+      Index first;  ///< index in `samples` of the first of its two samples
       float weight;
     };
     std::vector<Point> points;
 
     Index count() const { return static_cast<Index>(samples.size()); }
-    /// Which of the samples lie from `lo` on and before `hi`.
+    /// The range of indices of the samples in [lo, hi).
     std::pair<Index, Index> range(Index lo, Index hi) const;
   };
 
@@ -75,7 +74,7 @@ class NodeSamples {
   const NodeGrid& grid_;
   ResidentBricks& bricks_;
   std::array<Axis, 3> axes_;
-  std::vector<Int3> wanted_;  ///< bricks
+  std::vector<Int3> needed_;  ///< bricks to read
   std::vector<float> gathered_, along_x_, along_y_;
 };
 

@@ -13,14 +13,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Enough for the headers of two indices and what their arrays are rounded up by.
+/// Bytes for the headers of two indices and for the padding of their arrays.
 constexpr std::uint64_t kHeaders = 1 << 12;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// The index of the finest nodes' ranges. These are in float; T holds them exactly.
+/// Builds the index over the finest nodes' ranges. They are float; T holds them exactly.
 template <class T>
 std::vector<std::byte> build_as(IndexKind kind, const NodeTree& tree) {
   const Int3 nodes = tree.grid().level(0).nodes;
@@ -42,10 +42,10 @@ std::string size_text(std::uint64_t bytes) {
 }
 
 NodeSearch::NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type,
-                       std::uint64_t most_bytes, std::function<void()> on_change)
+                       std::uint64_t max_bytes, std::function<void()> on_change)
     : tree_(std::move(tree)),
       type_(type),
-      most_bytes_(most_bytes),
+      max_bytes_(max_bytes),
       on_change_(std::move(on_change)),
       active_(*tree_) {
   state_.nodes = static_cast<std::uint64_t>(volume(tree_->grid().level(0).nodes));
@@ -64,7 +64,7 @@ NodeSearch::~NodeSearch() {
   builder_.join();
 }
 
-/// Measured with floats of which no two are alike, the ranges that it is made of included.
+/// Measured with distinct floats, including the ranges that the index is built from.
 std::uint64_t NodeSearch::building_bytes(IndexKind kind, std::uint64_t nodes) {
   switch (kind) {
     case IndexKind::interval: return nodes * 60;
@@ -77,16 +77,16 @@ std::uint64_t NodeSearch::building_bytes(IndexKind kind, std::uint64_t nodes) {
 }
 
 std::uint64_t NodeSearch::building_bytes(std::uint64_t nodes) {
-  std::uint64_t most = 0;
-  for (const IndexKind kind : kIndexKinds) most = std::max(most, building_bytes(kind, nodes));
-  // The one before answers until then, and has given back what it was built with.
-  return most + nodes * 25 + kHeaders;
+  std::uint64_t largest = 0;
+  for (const IndexKind kind : kIndexKinds) largest = std::max(largest, building_bytes(kind, nodes));
+  // The previous index answers meanwhile; its build memory is free again.
+  return largest + nodes * 25 + kHeaders;
 }
 
 std::vector<std::byte> NodeSearch::build(IndexKind kind) const {
   return visit_scalar(type_, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    // Wider ones were rounded outwards to float.
+    // Ranges of wider types were rounded outwards to float.
     if constexpr (sizeof(T) <= 2)
       return build_as<T>(kind, *tree_);
     else
@@ -117,7 +117,7 @@ void NodeSearch::wait() {
   while (state_.building) change_.wait(mutex_);
 }
 
-/// Waits for it; nothing: there will be none.
+/// Waits for a request; nullopt: there will be none.
 std::optional<IndexKind> NodeSearch::next_to_build() {
   const MutexLock lock(mutex_);
   while (!stop_ && !state_.building) change_.wait(mutex_);
@@ -125,7 +125,7 @@ std::optional<IndexKind> NodeSearch::next_to_build() {
   return requested_;
 }
 
-/// False when another kind has been requested meanwhile.
+/// Returns false if another kind has been requested meanwhile.
 bool NodeSearch::finish_building(IndexKind kind, std::optional<Bytes> built, double seconds,
                                  std::string refused) {
   const MutexLock lock(mutex_);
@@ -144,9 +144,9 @@ void NodeSearch::build_requested() {
     std::string refused;
     std::optional<Bytes> built;
     const auto start = Clock::now();
-    if (need > most_bytes_)
+    if (need > max_bytes_)
       refused = fmt::format("the {} index of {} nodes takes {} to build, of {}", name_of(*kind),
-                            now.nodes, size_text(need), size_text(most_bytes_));
+                            now.nodes, size_text(need), size_text(max_bytes_));
     else
       built = build(*kind);
     const double seconds = seconds_since(start);
@@ -160,13 +160,13 @@ std::shared_ptr<const NodeSearch::Bytes> NodeSearch::index() const {
   return index_;
 }
 
-bool NodeSearch::found(std::span<const double> isovalues) const {
+bool NodeSearch::is_current(std::span<const double> isovalues) const {
   return index() == searched_ && std::equal(isovalues.begin(), isovalues.end(),
                                             active_.isovalues().begin(), active_.isovalues().end());
 }
 
 const ActiveNodes& NodeSearch::find(std::span<const double> isovalues) {
-  if (found(isovalues)) return active_;
+  if (is_current(isovalues)) return active_;
   std::shared_ptr<const Bytes> index = this->index();
   const IndexView view = view_index(*index);
   std::vector<std::uint64_t> finest(mask_words(view.items()));

@@ -18,44 +18,43 @@
 
 namespace isobrick {
 
-/// Bytes as somebody reads them: "1.5 KiB", "3.0 MiB".
+/// Formats a number of bytes: "1.5 KiB", "3.0 MiB".
 std::string size_text(std::uint64_t bytes);
 
-/// Finds the active nodes of isovalues through an index of the finest nodes' ranges, of
-/// any kind; all kinds find the same. Another kind is built by a thread of its own while
-/// the one before goes on answering. find() and found() are for one thread at a time, the rest is
-/// thread-safe.
+/// Finds the active nodes of isovalues through an index over the ranges of the finest nodes. All
+/// kinds of index find the same nodes. A thread of its own builds another kind while the present
+/// one answers. find() and is_current() are for one thread at a time; the rest is thread-safe.
 class NodeSearch {
  public:
-  /// Begins with a linear scan. `type` is that of the samples. Indices that need more
-  /// than `most_bytes`, what stays and what building takes, are refused. `on_change` is
-  /// called from the building thread when there is another index, or it was refused.
-  NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type, std::uint64_t most_bytes,
+  /// Starts with a linear scan. `type`: of the samples. An index that needs more than `max_bytes`
+  /// in all, while it is built, is refused. The builder thread calls `on_change` when it has built
+  /// or refused an index.
+  NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type, std::uint64_t max_bytes,
              std::function<void()> on_change);
-  /// Waits for an index that is being built.
+  /// Waits for the builder thread.
   ~NodeSearch();
 
-  /// The most that any kind takes while it is built for so many nodes.
+  /// Maximum bytes that any kind needs while it is built for `nodes` nodes.
   static std::uint64_t building_bytes(std::uint64_t nodes);
 
-  /// Searches through this kind from when it is built.
+  /// Builds an index of this kind, then searches through it.
   void use(IndexKind kind);
-  /// Until the kind that was asked for last is built or refused.
+  /// Waits until the last requested kind is built or refused.
   void wait();
 
-  /// The nodes that any of the isovalues crosses. Until the next call.
+  /// Returns the nodes that any of the isovalues crosses. Valid until the next call.
   const ActiveNodes& find(std::span<const double> isovalues);
-  /// Whether that is what the call before gave, by the same index.
-  bool found(std::span<const double> isovalues) const;
+  /// Whether the last find() was for these isovalues, through the present index.
+  bool is_current(std::span<const double> isovalues) const;
 
   struct State {
-    IndexKind kind = IndexKind::linear;  ///< what answers now
-    bool building = false;               ///< another one is on its way
+    IndexKind kind = IndexKind::linear;  ///< of the index in use
+    bool building = false;               ///< another index is being built
     std::uint64_t bytes = 0;             ///< of the index
     double build_seconds = 0;
-    double search_seconds = 0;            ///< of the last search, through all its isovalues
-    std::uint64_t active = 0, nodes = 0;  ///< found by it, of so many of the finest level
-    std::string refused;                  ///< why the kind that was asked for is not used
+    double search_seconds = 0;            ///< of the last search, for all its isovalues
+    std::uint64_t active = 0, nodes = 0;  ///< found, and all of the finest level
+    std::string refused;                  ///< why the requested kind is not used; or empty
   };
   State state() const;
 
@@ -73,7 +72,7 @@ class NodeSearch {
 
   std::shared_ptr<const NodeTree> tree_;
   ScalarType type_;
-  std::uint64_t most_bytes_;
+  std::uint64_t max_bytes_;
   std::function<void()> on_change_;
 
   mutable Mutex mutex_;
@@ -83,9 +82,9 @@ class NodeSearch {
   std::shared_ptr<const Bytes> index_ ISOBRICK_GUARDED_BY(mutex_);
   State state_ ISOBRICK_GUARDED_BY(mutex_);
 
-  // Of find() alone.
+  // Only find() and is_current() use these.
   ActiveNodes active_;
-  std::shared_ptr<const Bytes> searched_;  ///< the index that active_ comes from
+  std::shared_ptr<const Bytes> searched_;  ///< index that gave active_
 
   std::thread builder_;
 };

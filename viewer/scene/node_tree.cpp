@@ -10,31 +10,31 @@
 namespace isobrick {
 namespace {
 
-/// Nodes along each axis whose ranges are read together: at level 0 those of one
-/// stored chunk of block ranges.
+/// Nodes along each axis whose ranges are read together: at level 0 one stored chunk of block
+/// ranges.
 constexpr Index kGroup = StoreReader::kRangeChunk * kBlockEdge / kNodeEdge;
 
-/// What holds `r` in float. An empty range stays empty.
+/// Rounds `r` outwards to float. An empty range stays empty.
 ValueRange<float> outwards(const ValueRange<double>& r) {
   ValueRange<float> out;
   if (r.empty()) return out;
-  constexpr double most = std::numeric_limits<float>::max();
+  constexpr double max_float = std::numeric_limits<float>::max();
   constexpr float inf = std::numeric_limits<float>::infinity();
   const auto convert = [](double v) {
-    return std::abs(v) > most ? std::copysign(inf, static_cast<float>(v > 0 ? 1 : -1))
-                              : static_cast<float>(v);
+    return std::abs(v) > max_float ? std::copysign(inf, static_cast<float>(v > 0 ? 1 : -1))
+                                   : static_cast<float>(v);
   };
   out.lo = convert(r.lo);
   out.hi = convert(r.hi);
   if (static_cast<double>(out.lo) > r.lo) out.lo = std::nextafter(out.lo, -inf);
   if (static_cast<double>(out.hi) < r.hi) out.hi = std::nextafter(out.hi, inf);
-  if (r.lo < -most) out.lo = -inf;
-  if (r.hi > most) out.hi = inf;
+  if (r.lo < -max_float) out.lo = -inf;
+  if (r.hi > max_float) out.hi = inf;
   return out;
 }
 
 Box3 blocks_of(Box3 samples, Int3 all) {
-  // Block b has the samples 16 b … 16 b + 16, so cells are enough to look at.
+  // Block b has the samples 16 b to 16 b + 16, so the blocks of the cells suffice.
   const Int3 edge{kBlockEdge, kBlockEdge, kBlockEdge};
   const Int3 lo{samples.lo.x / edge.x, samples.lo.y / edge.y, samples.lo.z / edge.z};
   const Int3 cells = samples.hi - Int3{1, 1, 1};
@@ -45,7 +45,7 @@ Box3 blocks_of(Box3 samples, Int3 all) {
 
 NodeTree::NodeTree(const BrickSource& source)
     : grid_(source.info()), thin_structure_(std::make_unique<ThinStructure>(grid_, source.info())) {
-  // Of all levels at once: the next one may be a single group.
+  // Runs all levels at once, since a level may be a single group.
   std::vector<std::pair<int, Box3>> groups;
   for (int v = 0; v < grid_.levels(); ++v) {
     const Int3 all = grid_.level(v).nodes;
@@ -86,14 +86,15 @@ double NodeTree::part(const Node& node, double value) {
   return std::clamp((value - lo) / width * kParts, 0.0, static_cast<double>(kParts - 1));
 }
 
-/// Blocks of 16³ of the node's own cells: where grid points lie several samples apart, fewer than
-/// blocks of samples.
+/// Number of 16³ blocks of the node's cells. Where grid points are several samples apart, there are
+/// fewer than blocks of samples.
 std::uint8_t NodeTree::blocks_in(const NodeKey& n) const {
   return static_cast<std::uint8_t>(
       volume(ceil_div(grid_.node_cells(n), {kBlockEdge, kBlockEdge, kBlockEdge})));
 }
 
-NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks, std::uint8_t most) const {
+NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks,
+                                 std::uint8_t max_blocks) const {
   Node node;
   ValueRange<double> own;
   for_each_point(blocks, [&](Int3 b) { own.include(table.at(b)); });
@@ -104,12 +105,12 @@ NodeTree::Node NodeTree::summary(const RangeTable& table, Box3 blocks, std::uint
     const auto first = static_cast<std::size_t>(part(node, range.lo));
     const auto last = static_cast<std::size_t>(part(node, range.hi));
     for (std::size_t i = first; i <= last; ++i)
-      if (node.blocks[i] < most) ++node.blocks[i];
+      if (node.blocks[i] < max_blocks) ++node.blocks[i];
   });
   return node;
 }
 
-/// Positions of the nodes of parts_level() within a node.
+/// The nodes of parts_level() within a node, as a box.
 Box3 NodeTree::parts_of(const NodeKey& n) const {
   Box3 parts = grid_.children(n);
   if (n.level < 2) return parts;

@@ -29,7 +29,7 @@ class Field {
   Field(const StoreInfo& info, int stored, Find find)
       : info_(info), lattice_(info.levels[static_cast<std::size_t>(stored)].lattice), find_(find) {}
 
-  /// Trilinear; nothing when a sample is not there.
+  /// Trilinear interpolation; nullopt if a sample is not resident.
   std::optional<double> at(Vec3d p) const {
     Int3 first;
     double part[3];

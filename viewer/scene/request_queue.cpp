@@ -21,7 +21,7 @@ void RequestQueue::replace_meshes(std::vector<MeshJob> meshes) {
       if (found == meshes.end()) {
         running->set_cancelled(true);
       } else if (!running->cancelled() || running->sent_to_device()) {
-        running->set_cancelled(false);  // a device makes it anyway
+        running->set_cancelled(false);  // a device makes the mesh in any case
         meshes.erase(found);
       }
     }

@@ -12,49 +12,48 @@
 
 namespace isobrick {
 
-/// The meshes and slices that threads are to make, by priority, and those that are being made.
-/// Slices come before meshes. Thread-safe.
+/// Requests for meshes and slices, by priority: those that wait, and those that threads are
+/// running. Slices come before meshes. Thread-safe.
 class RequestQueue {
  public:
   using RequestPtr = std::shared_ptr<StreamRequest>;
   using Time = std::chrono::steady_clock::time_point;
 
-  /// Replaces the meshes that wait; the most urgent first. Those of them that are being made go on,
-  /// and all others that are being made are cancelled.
+  /// Replaces the waiting meshes, the most urgent first. Running requests for one of them continue;
+  /// all other running meshes are cancelled.
   void replace_meshes(std::vector<MeshJob> meshes);
-  /// While meshes are paused none is taken: there is no room for them.
+  /// While paused, take() returns no meshes: there is no room for them.
   void pause_meshes(bool paused);
-  /// Adds a slice in place of the one that waits for the same slot.
+  /// Adds a slice; it replaces one that waits for the same slot.
   void add_slice(RequestPtr slice);
-  /// Cancels a slice that waits or is being made.
+  /// Cancels a waiting or running slice.
   void cancel_slice(const StreamRequest& slice);
 
-  /// Waits for the most urgent request, which then is being made until finish() or retry(). Null
-  /// once the queue is closed.
+  /// Waits for the most urgent request and returns it. The request runs until finish() or retry().
+  /// Returns null once the queue is closed.
   RequestPtr take();
   void finish(const RequestPtr& request);
-  /// The mesh could not be made: it waits again, before all others, unless it was cancelled.
+  /// The mesh could not be made: puts it back, before all others, unless it was cancelled.
   void retry(const RequestPtr& request);
 
-  /// The mesh that comes after so many others; nothing where there are fewer.
+  /// The mesh with `others` waiting meshes before it; nullopt if there are fewer.
   std::optional<MeshJob> mesh_after(std::size_t others) const;
-  /// Those that wait.
   std::vector<MeshJob> waiting_meshes() const;
 
-  /// Whether no request is being made, and none waits that may be taken.
+  /// Whether no request runs, and none that take() may return waits.
   bool idle() const;
-  /// Waits for that at most so long.
+  /// Waits for idle() at most `seconds`; returns whether it holds.
   bool wait_idle(double seconds) const;
 
-  /// Cancels everything. From now on the queue takes and gives nothing.
+  /// Cancels everything. A closed queue accepts and returns no requests.
   void close();
   bool closed() const;
-  /// Waits until nothing is being made.
+  /// Waits until no request runs; returns whether that holds.
   bool wait_until_unused(Time deadline) const;
 
   struct Counters {
     std::size_t waiting_meshes = 0, running = 0;
-    bool stalled = false;  ///< meshes wait, and are paused
+    bool stalled = false;  ///< meshes wait but are paused
   };
   Counters counters() const;
 

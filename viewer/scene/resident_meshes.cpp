@@ -6,23 +6,23 @@
 namespace isobrick {
 namespace {
 
-/// Where a device has no room: the part of its budget that older meshes give back.
+/// Divisor: the fraction of a full device's budget that old meshes free.
 constexpr std::uint64_t kPartForNew = 8;
 
 }  // namespace
 
 void ResidentMeshes::set_cut(const Cut& cut, CutIndex index) {
-  // An isovalue that moves on with every picture must not leave what was shown before the
-  // first one: the last that covers stays.
+  // While an isovalue slides, each change replaces the cut before it is complete. The last isovalue
+  // that covered the view must stay visible, not the first.
   if (cut_.isovalues != cut.isovalues) (void)drawable();
   cut_ = cut;
   index_.emplace(std::move(index));
   ++version_;
 }
 
-MeshPlan ResidentMeshes::plan(const NodeMesher& mesher, double soon) {
+MeshPlan ResidentMeshes::plan(const NodeMesher& mesher, double max_meshes) {
   cache_.begin_use();
-  MeshPlan plan = plan_jobs(*tree_, cut_, cache_, mesher, soon);
+  MeshPlan plan = plan_jobs(*tree_, cut_, cache_, mesher, max_meshes);
   make_room();
   return plan;
 }
@@ -37,7 +37,7 @@ void ResidentMeshes::put(std::shared_ptr<const NodeMesh> mesh) {
 void ResidentMeshes::make_device_room() {
   const std::uint64_t budget = cache_.device_budget(), part = budget / kPartForNew;
   if (cache_.device_bytes() + part <= budget) return;
-  keep_shown();
+  mark_shown_used();
   cache_.shrink_device(part);
 }
 
@@ -46,17 +46,17 @@ void ResidentMeshes::set_device_budget(std::uint64_t bytes) {
   make_room();
 }
 
-/// What is shown takes room, too, whatever is wanted now.
-void ResidentMeshes::keep_shown() {
+/// Marks the shown meshes as used, even if the cut does not contain them.
+void ResidentMeshes::mark_shown_used() {
   for (const auto& place : shown_)
-    for (const DrawnNode& node : place)
+    for (const NodeDraw& node : place)
       cache_.find(node.mesh->key, node.mesh->isovalue, node.mesh->coarser);
 }
 
 void ResidentMeshes::make_room() {
   full_ = false;
-  if (cache_.keeps_budgets()) return;
-  keep_shown();
+  if (cache_.is_within_budgets()) return;
+  mark_shown_used();
   full_ = !cache_.shrink();
 }
 
@@ -65,9 +65,9 @@ std::shared_ptr<const Drawable> ResidentMeshes::drawable() {
   return drawn_;
 }
 
-/// Shows the isovalue that a place shows already, as this cut wants it.
-void ResidentMeshes::show_before(std::size_t place) {
-  std::vector<DrawnNode> nodes;
+/// Updates the previous isovalue of an index, which stays visible, to this cut.
+void ResidentMeshes::update_previous(std::size_t place) {
+  std::vector<NodeDraw> nodes;
   bool complete = true;
   if (append_drawable(*tree_, *index_, shown_[place].front().mesh->isovalue,
                       static_cast<int>(place), cache_, nodes, complete))
@@ -82,20 +82,20 @@ void ResidentMeshes::rebuild_drawable() {
   cache_.begin_use();
   shown_.resize(cut_.isovalues.size());
   for (std::size_t i = 0; index_ && i < cut_.isovalues.size(); ++i) {
-    std::vector<DrawnNode> nodes;
+    std::vector<NodeDraw> nodes;
     const bool covers = append_drawable(*tree_, *index_, cut_.isovalues[i], static_cast<int>(i),
                                         cache_, nodes, next->complete);
     next->complete &= covers;
     next->covers &= covers;
-    // The isovalue before is shown for as long as the new one has holes.
+    // The previous isovalue stays visible while the new one has holes.
     const bool old = !shown_[i].empty() && shown_[i].front().mesh->isovalue != cut_.isovalues[i];
     if (covers || !old)
       shown_[i] = std::move(nodes);
     else
-      show_before(i);
+      update_previous(i);
     next->nodes.insert(next->nodes.end(), shown_[i].begin(), shown_[i].end());
   }
-  for (const DrawnNode& node : next->nodes) next->triangles += node.mesh->triangles();
+  for (const NodeDraw& node : next->nodes) next->triangles += node.mesh->triangles();
   drawn_ = std::move(next);
   make_room();
 }

@@ -11,54 +11,54 @@
 
 namespace isobrick {
 
-/// The node meshes that are resident, within their budgets, and what of them shows an LOD cut.
-/// Not thread-safe.
+/// The resident node meshes, within their budgets, and the part of them that shows an LOD cut. Not
+/// thread-safe.
 class ResidentMeshes {
  public:
-  /// Budgets in bytes, of host memory and of a device's.
+  /// Budgets in bytes of host memory, and of device memory.
   ResidentMeshes(std::shared_ptr<const NodeTree> tree, std::uint64_t budget,
                  std::uint64_t device_budget)
       : tree_(std::move(tree)), cache_(budget, device_budget) {}
 
-  /// From now on this cut is to be shown. `index`: of the same cut.
+  /// Sets the cut to show. `index`: of the same cut.
   void set_cut(const Cut& cut, CutIndex index);
   const Cut& cut() const { return cut_; }
 
-  /// The meshes that the cut lacks; see plan_jobs(). What the cut uses is kept from now on.
-  MeshPlan plan(const NodeMesher& mesher, double soon);
+  /// Plans the meshes that the cut lacks; see plan_jobs(). The meshes that the cut uses are kept.
+  MeshPlan plan(const NodeMesher& mesher, double max_meshes);
   void put(std::shared_ptr<const NodeMesh> mesh);
-  /// For meshes that do not fit on the device beside those that are there: older ones give back a
-  /// part of the budget. The budget itself may never be reached, since places fall between.
+  /// Makes room for meshes that do not fit on the device: drops a fraction of the budget of old
+  /// meshes. Fragmentation may leave the budget itself out of reach.
   void make_device_room();
   void set_device_budget(std::uint64_t bytes);
 
-  /// What to draw now; the same object until something changes. Until an isovalue covers the view,
-  /// what the one in its place showed before is kept.
+  /// The meshes to draw now; the same object until something changes. Until an isovalue covers the
+  /// view, the previous isovalue of its index stays visible.
   std::shared_ptr<const Drawable> drawable();
   bool is_newest(const Drawable& drawable) const { return drawable.version == version_; }
 
-  /// Whether what is shown and planned fills a budget: nothing more fits.
+  /// Whether the meshes in use fill a budget, so that no mesh fits.
   bool full() const { return full_; }
   std::uint64_t meshes() const { return cache_.meshes(); }
   std::uint64_t bytes() const { return cache_.bytes(); }
   std::uint64_t device_bytes() const { return cache_.device_bytes(); }
 
-  /// Drops all meshes, and takes none any more.
+  /// Drops all meshes and accepts no others.
   void close();
 
  private:
-  void keep_shown();
+  void mark_shown_used();
   void make_room();
   void rebuild_drawable();
-  void show_before(std::size_t place);
+  void update_previous(std::size_t place);
 
   std::shared_ptr<const NodeTree> tree_;
   MeshCache cache_;
   Cut cut_;
   std::optional<CutIndex> index_;
-  std::vector<std::vector<DrawnNode>> shown_;  ///< what each isovalue's place shows
+  std::vector<std::vector<NodeDraw>> shown_;  ///< meshes shown for each isovalue
   bool full_ = false, closed_ = false;
-  std::uint64_t version_ = 0;  ///< of what could be drawn
+  std::uint64_t version_ = 0;  ///< changes with the meshes and the cut
   std::shared_ptr<const Drawable> drawn_;
 };
 

@@ -9,13 +9,13 @@
 namespace isobrick {
 namespace {
 
-/// A cut that differs in less asks the stream for the same meshes.
+/// Relative change of the estimate below which the cut stays the same.
 bool same_cut(const Cut& a, const Cut& b) {
   return a.isovalues == b.isovalues &&
          std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
                     [](const CutNode& p, const CutNode& q) {
                       return p.key == q.key && p.coarser == q.coarser && p.visible == q.visible &&
-                             p.cut_away == q.cut_away;
+                             p.clipped == q.clipped;
                     });
 }
 
@@ -40,14 +40,14 @@ Scene::Scene(std::shared_ptr<const BrickSource> source, StreamOptions options)
 void Scene::update(const std::vector<double>& isovalues, const View& view,
                    const CutBudget& budget) {
   isovalues_ = isovalues;
-  // A cut at the limit of its budget must not follow every mesh that is made.
+  // A cut at the limit of its budget must not change with every new mesh.
   const double measured = stream_->counters().triangles_per_block;
   if (measured > 0 && std::abs(measured - triangles_per_block_) > 0.2 * triangles_per_block_)
     triangles_per_block_ = measured;
   CutRequest request{isovalues, view, budget, tree_->thin_structure().known()};
   if (triangles_per_block_ > 0) request.budget.triangles_per_block = triangles_per_block_;
   const bool same = chosen_ == request;
-  if (same && search_->found(isovalues)) return;
+  if (same && search_->is_current(isovalues)) return;
 
   Stopwatch watch;
   CutTimes times;
@@ -72,7 +72,7 @@ Cut Scene::select(const ActiveNodes& active, const View& view, const CutBudget& 
   try {
     return selector_->select(active, view, budget);
   } catch (...) {
-    selector_.reset();  // it may have stopped half way
+    selector_.reset();  // its state may be incomplete
     throw;
   }
 }

@@ -9,40 +9,40 @@
 
 namespace isobrick {
 
-/// Seconds that the steps of the last LOD cut took.
+/// Seconds for each step of the last LOD cut.
 struct CutTimes {
-  double search = 0;  ///< finding the nodes that isovalues cross
-  double cut = 0;     ///< choosing nodes
-  double plan = 0;    ///< handing them to the stream
+  double search = 0;  ///< finding active nodes
+  double cut = 0;
+  double plan = 0;  ///< planning the stream's meshes
 };
 
-/// A store on the screen, without the screen: choose a view, draw what there is.
-/// Functions are called from one thread.
+/// The scene of a store, without OpenGL: chooses nodes for a view and returns the meshes to draw.
+/// All functions are for one thread.
 class Scene {
  public:
-  /// Reads the ranges of all levels. options.origin is set to the volume's middle
-  /// (see origin()); an index of active nodes takes up to a quarter of
-  /// options.brick_bytes. Throws what NodeTree does.
+  /// Reads the ranges of all levels. Replaces options.origin by the volume's middle (see origin()).
+  /// The index over active nodes may take a quarter of options.brick_bytes. Throws what NodeTree
+  /// throws.
   Scene(std::shared_ptr<const BrickSource> source, StreamOptions options);
 
-  /// World space; positions of meshes are relative to it.
+  /// World space; mesh positions are relative to it.
   Vec3d origin() const { return origin_; }
   const NodeTree& tree() const { return *tree_; }
 
-  /// Chooses the LOD cut for a view and hands it to the stream. `budget.triangles_per_block` is
-  /// replaced by the measured value, once that has moved by a fifth. Does nothing when view,
-  /// isovalues and budget equal those before, and does not disturb the stream when the cut does.
-  /// Takes about 0.3 µs for each node of the cut, whose number the budget bounds. After an
-  /// exception the next call tries again.
+  /// Chooses the LOD cut for a view and passes it to the stream. Replaces
+  /// `budget.triangles_per_block` by the measured value, once that has changed by a fifth. Does
+  /// nothing if view, isovalues and budget equal the last ones; does not call the stream if the cut
+  /// does. The time grows with the nodes of the cut, which the budget bounds. After an exception
+  /// the next call tries again.
   void update(const std::vector<double>& isovalues, const View& view, const CutBudget& budget);
   /// Of the last update().
   const std::vector<double>& isovalues() const { return isovalues_; }
 
-  /// Finds the nodes that isovalues cross; find() is for update() alone.
+  /// Finds active nodes. Only update() may call its find().
   NodeSearch& search() { return *search_; }
   const NodeSearch& search() const { return *search_; }
 
-  /// Of the cut that was chosen last.
+  /// Of the last chosen cut.
   const CutTimes& times() const { return times_; }
   const Cut& cut() const { return cut_; }
 
@@ -55,7 +55,7 @@ class Scene {
   const SceneStream& stream() const { return *stream_; }
 
  private:
-  /// What a cut is a function of, beside the cut before.
+  /// The arguments of a cut, besides the previous cut.
   struct CutRequest {
     std::vector<double> isovalues;
     View view;
@@ -72,13 +72,13 @@ class Scene {
   std::unique_ptr<SceneStream> stream_;
   std::optional<CutSelector> selector_;
   std::vector<double> isovalues_;
-  std::optional<CutRequest> chosen_;  ///< that cut_ was chosen for; nothing after a failure
+  std::optional<CutRequest> chosen_;  ///< of cut_; nullopt after a failure
   Cut cut_;
   CutTimes times_;
-  double triangles_per_block_ = 0;  ///< that cuts are estimated with; 0: the budget's
+  double triangles_per_block_ = 0;  ///< for estimates; 0: the budget's
 };
 
-/// World space of a volume's middle.
+/// The middle of a volume in world space.
 Vec3d middle_of(const NodeGrid& grid);
 
 }  // namespace isobrick

@@ -11,10 +11,10 @@
 namespace isobrick {
 namespace {
 
-/// How long the destructor waits for threads that are held up and for a device.
-constexpr std::chrono::milliseconds kClosing{50};
+/// How long the destructor waits for blocked threads and for a device.
+constexpr std::chrono::milliseconds kCloseTimeout{50};
 
-void work(const std::shared_ptr<StreamState>& state) {
+void run_worker(const std::shared_ptr<StreamState>& state) {
   if (state->options.lower_thread_priority) lower_thread_priority();
   StreamWorker(state).run();
   state->workers.end();
@@ -28,18 +28,18 @@ SceneStream::SceneStream(std::shared_ptr<const BrickSource> source,
           std::make_shared<StreamState>(std::move(source), std::move(tree), std::move(options))) {
   for (int i = 0; i < state_->threads; ++i) {
     state_->workers.begin();
-    threads_.emplace_back([state = state_] { work(state); });
+    threads_.emplace_back([state = state_] { run_worker(state); });
   }
 }
 
 SceneStream::~SceneStream() {
   state_->queue.close();
   state_->notifications.close();
-  const auto deadline = std::chrono::steady_clock::now() + kClosing;
+  const auto deadline = std::chrono::steady_clock::now() + kCloseTimeout;
   const bool ended = state_->workers.wait_for_none(deadline);
   state_->queue.wait_until_unused(deadline);
   state_->notifications.wait_for_none(deadline);
-  // What comes later finds nothing, and keeps nothing: contexts may be gone by then.
+  // Meshes that arrive later are dropped: an OpenGL context may be gone by then.
   {
     const MutexLock lock(state_->meshes_mutex);
     state_->meshes.close();
@@ -127,7 +127,7 @@ StreamCounters SceneStream::counters() const {
   return c;
 }
 
-std::uint64_t SceneStream::bricks_wanted() const {
+std::uint64_t SceneStream::missing_bricks() const {
   std::vector<StoredBrick> missing;
   for (const MeshJob& job : state_->queue.waiting_meshes())
     state_->planner.add_missing(job.key, job.isovalue, job.coarser, missing);

@@ -19,45 +19,43 @@ namespace isobrick {
 struct StreamState;
 
 struct StreamOptions {
-  int threads = 0;  ///< that read, decode and mesh; 0: all cores but one
+  int threads = 0;  ///< threads that read, decode and mesh; 0: all cores but one
   std::uint64_t brick_bytes = std::uint64_t{1} << 30;   ///< budget of decoded bricks
   std::uint64_t mesh_bytes = std::uint64_t{1} << 30;    ///< budget of node meshes
   std::uint64_t device_bytes = std::uint64_t{1} << 30;  ///< budget of those on a device
   Vec3d origin;                  ///< world space; subtracted from all positions
-  std::optional<Inside> inside;  ///< nothing: as inside_of() the store
-  /// Whether the threads give way to others of the process where cores are short.
+  std::optional<Inside> inside;  ///< nullopt: inside_of() the store
+  /// Lowers the priority of the worker threads, for other threads of the process.
   bool lower_thread_priority = false;
-  /// Called from a worker's thread whenever drawable() may give something new. Must
-  /// not call the stream.
+  /// Called from a worker thread when drawable() may return something new. Must not call the
+  /// stream.
   std::function<void()> on_change;
 };
 
-/// What a stream has done so far and has before it.
+/// Totals and state of a stream.
 struct StreamCounters {
   double read_seconds = 0, decode_seconds = 0,
-         mesh_seconds = 0;       ///< summed over threads; no device
+         mesh_seconds = 0;       ///< summed over threads, without a device
   std::uint64_t bytes_read = 0;  ///< encoded
   std::uint64_t bricks_resident = 0, brick_bytes = 0, brick_bytes_peak = 0, bricks_read = 0;
   std::uint64_t meshes = 0, mesh_bytes = 0, meshes_made = 0;
-  std::uint64_t queue = 0, working = 0;  ///< meshes that wait, that are being made
-  std::uint64_t damaged = 0;             ///< of meshes_made, without triangles for that reason
-  std::uint64_t device_meshes_made = 0;  ///< of meshes_made, by a device
+  std::uint64_t queue = 0, working = 0;  ///< waiting and running meshes
+  std::uint64_t damaged = 0;             ///< of meshes_made: without triangles because of damage
+  std::uint64_t device_meshes_made = 0;  ///< of meshes_made: made by a device
   std::uint64_t device_bytes = 0;        ///< of meshes on a device
-  std::string device_failure;            ///< why the device makes no more meshes; or empty
-  std::uint64_t triangles_made = 0, blocks_made = 0;  ///< by all meshes, and in such blocks
-  double triangles_per_block = 0;                     ///< of the meshes made; 0: too few yet
-  bool mesh_budget_full = false;                      ///< meshes are not made for lack of room
+  std::string device_failure;            ///< why the device failed; or empty
+  std::uint64_t triangles_made = 0, blocks_made = 0;  ///< totals of all meshes made
+  double triangles_per_block = 0;  ///< of the meshes made; 0 until enough are made
+  bool mesh_budget_full = false;   ///< meshes wait because the budget is full
 };
 
-/// Makes the meshes of cuts on threads of its own, the most urgent first, and says
-/// what can be drawn meanwhile.
+/// Makes the meshes of LOD cuts on threads of its own, the most urgent first, and returns what can
+/// be drawn meanwhile.
 ///
-/// All functions may be called from any thread; none of them waits for a brick or a
-/// mesh. The destructor gives back all bricks and meshes, those of a device included, but for
-/// those that others hold. It waits for its threads and for what a device makes for it, but no
-/// longer than 100 ms: a thread that is held up in a read then ends by itself when the read does,
-/// and keeps the source and the tree alive until then, nothing else; what a device makes
-/// meanwhile is dropped.
+/// All functions are thread-safe and wait for neither bricks nor meshes. The destructor releases
+/// all bricks and meshes, also those on a device. It waits at most 100 ms for its threads and the
+/// device. A thread that is blocked in a read then ends after the read; until then it keeps only
+/// the source and the tree alive. Meshes that a device makes later are dropped.
 class SceneStream {
  public:
   SceneStream(std::shared_ptr<const BrickSource> source, std::shared_ptr<const NodeTree> tree,
@@ -66,39 +64,38 @@ class SceneStream {
   SceneStream(const SceneStream&) = delete;
   SceneStream& operator=(const SceneStream&) = delete;
 
-  /// From now on this is wanted. Work that it does not need is abandoned at the next brick.
+  /// Sets the cut to make. Running requests that it does not need are cancelled at the next brick.
   void set_cut(const Cut& cut);
 
-  /// What to draw now. The same object until something changes. Until an isovalue covers the
-  /// view, what the one in its place showed before is kept.
+  /// The meshes to draw now; the same object until something changes. Until an isovalue covers the
+  /// view, the previous isovalue of its index stays visible.
   std::shared_ptr<const Drawable> drawable();
-  /// Whether drawable() would give this one, without making another.
+  /// Whether drawable() would return this object.
   bool is_newest(const Drawable& drawable) const;
 
-  /// From now on this device makes meshes of what the threads read; null: the threads do. What
-  /// has been made stays. Where it fails the threads go on alone; see
+  /// Sets the device that makes meshes from the data that the threads read; null: the threads make
+  /// them. Existing meshes stay. If the device fails, the threads take over; see
   /// StreamCounters::device_failure.
   void set_device(std::shared_ptr<DeviceMesher> device);
 
-  /// Another budget of meshes on a device.
+  /// Sets the budget of meshes on a device.
   void set_device_budget(std::uint64_t bytes);
 
-  /// From now on this slice is wanted in place `slot`, or none; before all meshes.
+  /// Requests a slice for a slot, or clears the slot. Slices come before all meshes.
   void set_slice(int slot, const std::optional<SliceRequest>& request);
-  /// The image of that place: the last one that is finished, until the wanted one is.
-  /// Null while there is none.
+  /// The last finished image of a slot; null if there is none.
   std::shared_ptr<const SliceSamples> slice(int slot) const;
 
-  /// Whether nothing is left to be done, or nothing can be.
+  /// Whether nothing is left to do, or nothing can be done.
   bool idle() const;
-  /// Waits for that at most so long.
+  /// Waits for idle() at most `seconds`; returns whether it holds.
   bool wait_idle(double seconds) const;
 
   StreamCounters counters() const;
-  /// Bricks that meshes need which wait to be made, and that are not there. Takes about as long as
-  /// to plan them.
-  std::uint64_t bricks_wanted() const;
-  /// The decoded bricks; thread-safe by itself.
+  /// Number of bricks that waiting meshes need and that are not resident. Takes about as long as
+  /// planning.
+  std::uint64_t missing_bricks() const;
+  /// The resident bricks; thread-safe.
   ResidentBricks& bricks() const;
 
  private:

@@ -16,7 +16,7 @@ ScalarType image_type(ScalarType stored) {
 /// A plane of a lattice and its two axes.
 struct Plane {
   int normal, u, v;
-  Index at;  ///< sample along the normal
+  Index at;  ///< index along the normal
 };
 
 std::uint64_t image_bytes(const Lattice& lattice, int normal) {
@@ -37,7 +37,7 @@ void copy_pixels(const From* brick, Int3 strides, const Plane& plane, Int3 lo, I
   }
 }
 
-/// Writes the pixels of one brick; a null one is the fill value.
+/// Writes the pixels of one brick; null: the fill value.
 template <class From>
 void write_brick(const std::byte* brick, double fill, const Lattice& lattice, const Plane& plane,
                  Int3 b, SliceSamples& image) {
@@ -75,7 +75,7 @@ SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request,
   const StoreInfo& info = bricks.source().info();
   const auto levels = static_cast<int>(info.levels.size());
   if (request.axis < 0 || request.axis > 2 || request.stored < 0 || request.stored >= levels)
-    throw UsageError("a slice of an axis or a level that there is not");
+    throw UsageError("a slice of an axis or level that does not exist");
   SliceSamples image;
   image.request = request;
   image.stored = request.stored;
@@ -88,9 +88,9 @@ SliceSamples read_slice(ResidentBricks& bricks, const SliceRequest& request,
   const LevelInfo& level = level_of(image.stored);
   const Lattice& lattice = level.lattice;
   if (image_bytes(lattice, request.axis) > request.bytes)
-    throw UsageError("a slice that does not fit its memory at any level");
+    throw UsageError("a slice exceeds its memory budget at every level");
   Plane plane{request.axis, request.axis == 0 ? 1 : 0, request.axis == 2 ? 1 : 2, 0};
-  // Levels lie along each other's axes: the origin's shift is all that is needed.
+  // All levels have the same directions, so only the origin differs.
   const Transform &finest = level_of(0).transform, &t = level.transform;
   Vec3d apart = finest.origin - t.origin;
   double shift = 0;

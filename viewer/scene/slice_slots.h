@@ -9,28 +9,27 @@
 
 namespace isobrick {
 
-/// The slices that somebody looks at, each in a slot of its own, and the last finished image of
-/// each. Thread-safe.
+/// The requested slices, each in a numbered slot, and the last finished image of each. Thread-safe.
 class SliceSlots {
  public:
-  /// `queue` outlives it.
+  /// `queue` must outlive it.
   explicit SliceSlots(RequestQueue& queue) : queue_(queue) {}
 
-  /// From now on the slot holds this slice, or none. An image that is there stays until the
-  /// requested one is finished.
+  /// Requests a slice for a slot, or clears the slot. The present image stays until the new one is
+  /// finished.
   void set(int slot, const std::optional<SliceRequest>& slice);
-  /// Null while there is none.
+  /// The last finished image of a slot; null if there is none.
   std::shared_ptr<const SliceSamples> image(int slot) const;
 
-  /// Takes over what was made for a request; null: nothing. False where the slot holds another
-  /// slice by now.
+  /// Stores the image made for a request; null: none was made. Returns false if the slot holds
+  /// another request now.
   bool put(const StreamRequest& request, std::shared_ptr<const SliceSamples> image);
   /// Drops all images.
   void clear();
 
  private:
   struct Slot {
-    RequestQueue::RequestPtr requested;  ///< that waits or is being made
+    RequestQueue::RequestPtr requested;  ///< waiting or running
     std::shared_ptr<const SliceSamples> image;
   };
 

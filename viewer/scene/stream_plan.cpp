@@ -15,33 +15,32 @@ bool more_urgent(const MeshJob& a, const MeshJob& b) {
   return key(a) < key(b);
 }
 
-class Planner {
+class JobPlanner {
  public:
-  Planner(const NodeTree& tree, const Cut& cut, MeshCache& meshes, MeshPlan& plan)
+  JobPlanner(const NodeTree& tree, const Cut& cut, MeshCache& meshes, MeshPlan& plan)
       : tree_(tree), cut_(cut), meshes_(meshes), plan_(plan) {}
 
-  void run(double soon) {
+  void run(double max_meshes) {
     for (const double isovalue : cut_.isovalues)
       for (const CutNode& node : cut_.nodes) add(node, isovalue);
     plan_.skips_levels =
-        2 * missing_.size() > held_ && static_cast<double>(plan_.jobs.size()) <= soon;
+        2 * missing_.size() > with_surface_ && static_cast<double>(plan_.jobs.size()) <= max_meshes;
     for (const MissingNode& missing : missing_) {
-      if (missing.isovalue != ancestors_of_) ancestors_.clear();
-      ancestors_of_ = missing.isovalue;
+      if (missing.isovalue != ancestors_isovalue_) ancestors_.clear();
+      ancestors_isovalue_ = missing.isovalue;
       add_ancestors(*missing.node, missing.isovalue);
     }
   }
 
  private:
-  /// A node without any mesh.
   struct MissingNode {
     const CutNode* node;
     double isovalue;
   };
 
   void add(const CutNode& node, double isovalue) {
-    if (node.cut_away || !tree_.may_hold_surface(node.key, isovalue, node.coarser)) return;
-    ++held_;
+    if (node.clipped || !tree_.may_hold_surface(node.key, isovalue, node.coarser)) return;
+    ++with_surface_;
     if (meshes_.find(node.key, isovalue, node.coarser)) return;
     if (!meshes_.has_any(node.key, isovalue)) missing_.push_back({&node, isovalue});
     plan_.jobs.push_back(
@@ -56,7 +55,7 @@ class Planner {
       const auto [place, added] = ancestors_.try_emplace(n);
       Ancestor& ancestor = place->second;
       if (!added) {
-        if (ancestor.visible || !node.visible) return;  // and so are those above
+        if (ancestor.visible || !node.visible) return;  // its ancestors are up to date, too
         ancestor.visible = true;
         if (ancestor.job != kNoJob) jobs[ancestor.job].visible = true;
         if (ancestor.stands_in) return;
@@ -64,7 +63,7 @@ class Planner {
       }
       ancestor.visible = node.visible;
       if (meshes_.has_any(n, isovalue)) {
-        meshes_.find_any(n, isovalue, 0);  // is kept
+        meshes_.find_any(n, isovalue, 0);  // marks the mesh as used
         ancestor.stands_in = true;
         return;
       }
@@ -77,29 +76,29 @@ class Planner {
 
   static constexpr std::size_t kNoJob = ~std::size_t{0};
   struct Ancestor {
-    std::size_t job = kNoJob;  ///< its number
-    bool visible = false;      ///< some node below is
-    bool stands_in = false;    ///< it has a mesh: none above it is needed
+    std::size_t job = kNoJob;  ///< index in the plan's jobs
+    bool visible = false;      ///< a node below is visible
+    bool stands_in = false;    ///< has a mesh that is substituted: no ancestor of it is needed
   };
 
   const NodeTree& tree_;
   const Cut& cut_;
   MeshCache& meshes_;
   MeshPlan& plan_;
-  std::size_t held_ = 0;  ///< nodes of the cut with a surface, for each isovalue
+  std::size_t with_surface_ = 0;  ///< nodes of the cut with a surface, summed over isovalues
   std::vector<MissingNode> missing_;
   std::unordered_map<NodeKey, Ancestor, NodeKeyHash> ancestors_;
-  double ancestors_of_ = 0;  ///< isovalue
+  double ancestors_isovalue_ = 0;  ///< isovalue of `ancestors_`
 };
 
 }  // namespace
 
 MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
-                   const NodeMesher& mesher, double soon) {
+                   const NodeMesher& mesher, double max_meshes) {
   MeshPlan plan;
-  Planner(tree, cut, meshes, plan).run(soon);
+  JobPlanner(tree, cut, meshes, plan).run(max_meshes);
   for (MeshJob& job : plan.jobs)
-    job.resident = mesher.half_there(job.key, job.isovalue, job.coarser);
+    job.resident = mesher.is_half_resident(job.key, job.isovalue, job.coarser);
   std::sort(plan.jobs.begin(), plan.jobs.end(), more_urgent);
   return plan;
 }

@@ -8,7 +8,7 @@
 
 namespace isobrick {
 
-/// A mesh that is wanted.
+/// A mesh to make.
 struct MeshJob {
   NodeKey key;
   double isovalue = 0;
@@ -21,21 +21,20 @@ struct MeshJob {
   }
 };
 
-/// The meshes that a cut lacks.
 struct MeshPlan {
-  /// Most urgent first: visible ones, of them those of whose bricks at least half are there (see
-  /// NodeMesher::half_there(): planning reads nothing), of them coarse ones, then those with the
-  /// longest cells on the picture, then near ones. Nodes without any mesh bring the ancestors along
-  /// that will stand in for them, of levels that are stored.
+  /// The meshes that a cut lacks, the most urgent first: visible nodes; of those, nodes with half
+  /// of their bricks resident (NodeMesher::is_half_resident()); coarse ones; the longest cells on
+  /// the picture; the nearest. A node without any mesh adds its stored ancestors, which are
+  /// substituted for it.
   std::vector<MeshJob> jobs;
-  /// Intermediate levels are skipped: of ancestors only the coarsest that are stored are made,
-  /// because all the rest comes soon.
+  /// Of the ancestors only the coarsest stored ones are made, because all meshes of the cut come
+  /// soon.
   bool skips_levels = false;
 };
 
-/// `soon`: how many meshes are made so quickly that nothing needs to stand in for them but the
-/// coarsest level; that is done where most of a cut is new.
+/// Plans the meshes that a cut lacks; reads nothing. Where most of a cut is new and it lacks no
+/// more than `max_meshes` meshes, the plan skips intermediate levels.
 MeshPlan plan_jobs(const NodeTree& tree, const Cut& cut, MeshCache& meshes,
-                   const NodeMesher& mesher, double soon);
+                   const NodeMesher& mesher, double max_meshes);
 
 }  // namespace isobrick

@@ -9,7 +9,7 @@
 
 namespace isobrick {
 
-/// A mesh, or the slice of a slot, that a thread is to make; and the cancellation token that the
+/// A request for a mesh, or for the slice of a slot. It is also the cancellation token that the
 /// thread checks. Thread-safe.
 class StreamRequest final : public CancellationToken {
  public:
@@ -22,7 +22,7 @@ class StreamRequest final : public CancellationToken {
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
   void set_cancelled(bool cancelled) { cancelled_ = cancelled; }
 
-  /// A device makes what it was sent, whether it is cancelled or not.
+  /// A device makes what it has received, even if the request is cancelled.
   bool sent_to_device() const { return sent_; }
   void set_sent_to_device(bool sent) { sent_ = sent; }
 

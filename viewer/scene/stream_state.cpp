@@ -24,18 +24,18 @@ StreamState::StreamState(std::shared_ptr<const BrickSource> s, std::shared_ptr<c
       planner(tree->grid(), bricks, options.origin, options.inside),
       meshes(tree, options.mesh_bytes, options.device_bytes) {}
 
-void StreamState::plan(bool late) {
+void StreamState::plan(bool overdue) {
   bricks.forget_needs();
-  MeshPlan next = meshes.plan(planner, late ? 0 : skipping.soon());
-  skipping.planned(next.skips_levels && !next.jobs.empty());
+  MeshPlan next = meshes.plan(planner, overdue ? 0 : skipping.max_meshes());
+  skipping.set_plan(next.skips_levels && !next.jobs.empty());
   pause_if_full();
   queue.replace_meshes(std::move(next.jobs));
 }
 
 void StreamState::add_mesh(NodeMesh mesh, const DeviceMesher* by) {
   statistics.add(mesh, tree->active_blocks(mesh.key, mesh.isovalue), by != nullptr);
-  // What came to host memory for want of room on the device has to be uploaded: older meshes make
-  // room instead, once for all that came so.
+  // A mesh that did not fit on the device needs an upload. Old meshes make room on the device, once
+  // for all meshes in this state.
   const bool had_no_room =
       by != nullptr && !mesh.device && !mesh.empty() && !by->shared_blocks().empty();
   auto shared = std::make_shared<const NodeMesh>(std::move(mesh));

@@ -14,12 +14,12 @@
 
 namespace isobrick {
 
-/// What a stream and its threads share. Parts lock themselves, but for the meshes. It outlives the
-/// stream for as long as a thread is held up in a read, or a device in making what it was sent;
-/// then the queue is closed, and neither meshes nor a device are here any more.
+/// The state that a stream shares with its threads. All parts but `meshes` have locks of their own.
+/// It outlives the stream while a thread is blocked in a read, or a device makes a mesh; then the
+/// queue is closed, and `meshes` and `device` are empty.
 ///
-/// Lock order: `meshes_mutex` or the slice slots' before the queue's. Under the others nothing is
-/// called.
+/// Lock order: `meshes_mutex` or the slice slots' lock before the queue's. Code that holds another
+/// lock calls nothing.
 struct StreamState {
   StreamState(std::shared_ptr<const BrickSource> source, std::shared_ptr<const NodeTree> tree,
               StreamOptions options);
@@ -27,29 +27,29 @@ struct StreamState {
   const std::shared_ptr<const BrickSource> source;
   const std::shared_ptr<const NodeTree> tree;
   const StreamOptions options;
-  const int threads;  ///< that make meshes
+  const int threads;  ///< number of worker threads
   ResidentBricks bricks;
-  const NodeMesher planner;  ///< tells what a mesh needs, and makes none
+  const NodeMesher planner;  ///< reports what a mesh needs; makes none
 
   RequestQueue queue;
   SliceSlots slices{queue};
   CurrentDevice device;
   MeshStatistics statistics;
   LevelSkipping skipping{threads};
-  ActivityCount workers;        ///< threads
-  ActivityCount notifications;  ///< calls of options.on_change
+  ActivityCount workers;        ///< worker threads
+  ActivityCount notifications;  ///< running calls of options.on_change
 
   mutable Mutex meshes_mutex;
   ResidentMeshes meshes ISOBRICK_GUARDED_BY(meshes_mutex);
 
-  /// Queues the meshes that the cut lacks and cancels all others. `late`: meshes of a plan that
-  /// skips levels have not come soon enough.
-  void plan(bool late) ISOBRICK_REQUIRES(meshes_mutex);
-  /// Meshes are made while there is room for them.
+  /// Queues the meshes that the cut lacks and cancels all others. `overdue`: a plan that skips
+  /// levels was too slow, so the new one skips none.
+  void plan(bool overdue) ISOBRICK_REQUIRES(meshes_mutex);
+  /// Pauses the queue's meshes while the budget is full.
   void pause_if_full() ISOBRICK_REQUIRES(meshes_mutex) { queue.pause_meshes(meshes.full()); }
-  /// Takes over a mesh; `by`: the device that made it, or null.
+  /// Stores a mesh. `by`: the device that made it; null: a worker thread.
   void add_mesh(NodeMesh mesh, const DeviceMesher* by) ISOBRICK_EXCLUDES(meshes_mutex);
-  /// drawable() or slice() may give something new. Without any lock.
+  /// Calls options.on_change, without holding a lock.
   void notify_change() ISOBRICK_EXCLUDES(meshes_mutex);
 };
 

@@ -18,7 +18,7 @@ NodeMesh empty_mesh(const MeshJob& job) {
   return mesh;
 }
 
-/// For work that belongs to no request: it ends when the queue is closed.
+/// Cancels work without a request when the queue is closed.
 class CloseCheck final : public CancellationToken {
  public:
   explicit CloseCheck(const RequestQueue& queue) : queue_(queue) {}
@@ -30,7 +30,7 @@ class CloseCheck final : public CancellationToken {
   const RequestQueue& queue_;
 };
 
-/// Gets what a device has made, on the device's thread.
+/// Receives a mesh from the device, on the device's thread.
 void receive(StreamState& state, const RequestQueue::RequestPtr& request, NodeMesh&& mesh,
              const std::string& failure, std::shared_ptr<DeviceMesher> by) {
   const bool made = failure.empty();
@@ -38,8 +38,7 @@ void receive(StreamState& state, const RequestQueue::RequestPtr& request, NodeMe
     state.add_mesh(std::move(mesh), by.get());
   else
     state.device.drop(by, failure);
-  // Before the request ends: this is the device's thread, which should not be the last to hold the
-  // device.
+  // Released before the request ends: the device's own thread should not be its last owner.
   by.reset();
   if (!made) return state.queue.retry(request);
   state.queue.finish(request);
@@ -63,7 +62,7 @@ void StreamWorker::run() {
   }
 }
 
-/// Once there is something to see: most of the bricks are there then.
+/// Runs after the first request, when most of the bricks are resident.
 void StreamWorker::find_thin_structure() {
   try {
     if (state_->tree->thin_structure().read(state_->bricks, CloseCheck(state_->queue)))
@@ -80,16 +79,17 @@ void StreamWorker::make_mesh(const RequestPtr& request) {
   const double seconds = watch.lap();
   const bool sent = request->sent_to_device();
   state_->statistics.add_seconds(mesher_.seconds() - before);
-  if (mesh || sent) state_->skipping.mesh_took(seconds);
-  plan_if_late();
-  if (sent) return;  // receive() ends it, perhaps has already
+  if (mesh || sent) state_->skipping.add_mesh_seconds(seconds);
+  plan_if_overdue();
+  if (sent) return;  // receive() finishes the request, perhaps already
   const bool made = mesh.has_value();
   if (made) state_->add_mesh(std::move(*mesh), nullptr);
   state_->queue.finish(request);
   if (made) state_->notify_change();
 }
 
-/// For a mesh so far back that other threads take all those before it at the same time.
+/// Prefetches the bricks of the mesh that this thread will make after the other threads have taken
+/// those before it.
 void StreamWorker::prefetch_bricks() {
   const auto others = static_cast<std::size_t>(state_->threads) - 1;
   const std::optional<MeshJob> next = state_->queue.mesh_after(others);
@@ -100,14 +100,14 @@ void StreamWorker::prefetch_bricks() {
   }
 }
 
-/// What was made here; nothing when the request was cancelled, or sent to a device.
+/// Returns the mesh; nullopt if the request was cancelled or sent to a device.
 std::optional<NodeMesh> StreamWorker::mesh_of(const RequestPtr& request) {
   const MeshJob& job = request->mesh();
   try {
     const auto read = [&](NodeMesher::Form form) {
       return mesher_.grid(job.key, job.isovalue, job.coarser, *request, form);
     };
-    // The device itself is looked up after reading: a read that is held up keeps none.
+    // The device is taken only after reading, so that a blocked read keeps no device alive.
     GridView grid = read(state_->device.is_set() ? NodeMesher::Form::stored_if_possible
                                                  : NodeMesher::Form::values);
     request->check();
@@ -123,7 +123,7 @@ std::optional<NodeMesh> StreamWorker::mesh_of(const RequestPtr& request) {
   }
 }
 
-/// False where there is no device, or it has failed.
+/// Returns false without a working device.
 bool StreamWorker::send(const GridView& grid, const RequestPtr& request) {
   const std::shared_ptr<DeviceMesher> device = state_->device.get();
   if (!device) return false;
@@ -139,10 +139,11 @@ bool StreamWorker::send(const GridView& grid, const RequestPtr& request) {
   return false;
 }
 
-void StreamWorker::plan_if_late() {
-  if (!state_->skipping.late() || state_->queue.counters().waiting_meshes == 0) return;
+void StreamWorker::plan_if_overdue() {
+  if (!state_->skipping.is_overdue() || state_->queue.counters().waiting_meshes == 0) return;
   const MutexLock lock(state_->meshes_mutex);
-  if (state_->skipping.late()) state_->plan(true);  // no other thread was first
+  if (state_->skipping.is_overdue())
+    state_->plan(true);  // checked again: another thread may have planned
 }
 
 void StreamWorker::make_slice(const RequestPtr& request) {
@@ -155,9 +156,9 @@ void StreamWorker::make_slice(const RequestPtr& request) {
     image->request = request->slice();
     image->damage = e.what();
   }
-  const bool token = state_->slices.put(*request, std::move(image));
+  const bool accepted = state_->slices.put(*request, std::move(image));
   state_->queue.finish(request);
-  if (token) state_->notify_change();
+  if (accepted) state_->notify_change();
 }
 
 }  // namespace isobrick

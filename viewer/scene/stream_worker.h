@@ -7,12 +7,12 @@
 
 namespace isobrick {
 
-/// Makes the meshes and slices that a stream's queue holds. One for each thread.
+/// Makes the meshes and slices of a stream's queue. One for each worker thread.
 class StreamWorker {
  public:
   explicit StreamWorker(std::shared_ptr<StreamState> state);
 
-  /// Until the queue is closed.
+  /// Returns once the queue is closed.
   void run();
 
  private:
@@ -24,7 +24,7 @@ class StreamWorker {
   void find_thin_structure();
   std::optional<NodeMesh> mesh_of(const RequestPtr& request);
   bool send(const GridView& grid, const RequestPtr& request);
-  void plan_if_late();
+  void plan_if_overdue();
 
   const std::shared_ptr<StreamState> state_;
   NodeMesher mesher_;

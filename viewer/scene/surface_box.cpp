@@ -12,12 +12,12 @@
 namespace isobrick {
 namespace {
 
-/// Along each edge of a node; of a range chunk.
+/// Blocks along an edge of a node; nodes along an edge of a range chunk.
 constexpr Index kNodeBlocks = kNodeEdge / kBlockEdge;
 constexpr Index kChunkNodes = StoreReader::kRangeChunk / kNodeBlocks;
 static_assert(kChunkNodes * kNodeBlocks == StoreReader::kRangeChunk);
 
-/// What is within both; nothing where they only touch. `part` may be flat.
+/// The intersection; nullopt if they only touch. `part` may be flat.
 std::optional<IndexBox> within(const IndexBox& part, const IndexBox& box) {
   IndexBox inside;
   for (int axis = 0; axis < 3; ++axis) {
@@ -29,30 +29,30 @@ std::optional<IndexBox> within(const IndexBox& part, const IndexBox& box) {
   return inside;
 }
 
-/// A box of so few blocks is that of cells.
+/// Maximum blocks of a box that is computed from samples.
 constexpr Index kFewBlocks = 1024;
 
-/// How many of the isovalues each sample of a box reaches.
+/// For each sample of a box: how many isovalues it reaches.
 class ReachCounts {
  public:
   static constexpr std::size_t kMaxIsovalues = 254;
 
-  /// Reads the bricks, one at a time. Throws what that throws.
+  /// Reads the bricks, one at a time. Throws what reading throws.
   ReachCounts(const BrickSource& source, std::span<const double> isovalues, Box3 samples)
       : samples_(samples), reached_(static_cast<std::size_t>(volume(samples.extent())), kNaN) {
     const StoreInfo& info = source.info();
     const Lattice& lattice = info.levels.front().lattice;
     std::vector<std::byte> brick(lattice.brick_bytes());
     for_each_point(lattice.bricks_of(samples), [&](Int3 b) {
-      const bool there = source.read_brick(0, b, brick.data());
+      const bool stored = source.read_brick(0, b, brick.data());
       for_each_point(intersect(lattice.brick_box(b), samples), [&](Int3 p) {
         const Int3 q = p - b * lattice.brick;
-        at(p) = count(isovalues, there ? value(brick, lattice, q) : info.fill_value);
+        at(p) = count(isovalues, stored ? value(brick, lattice, q) : info.fill_value);
       });
     });
   }
 
-  /// Around the edges between samples that one of the isovalues crosses.
+  /// The bounding box of the lattice edges that an isovalue crosses.
   std::optional<IndexBox> crossed() const {
     BoxUnion<IndexBox> box;
     for_each_point(samples_, [&](Int3 p) {
@@ -85,11 +85,11 @@ class ReachCounts {
     return static_cast<std::uint8_t>(
         std::count_if(isovalues.begin(), isovalues.end(), [&](double v) { return v <= value; }));
   }
-  std::size_t place(Int3 p) const {
+  std::size_t index(Int3 p) const {
     return static_cast<std::size_t>(linear_index(p - samples_.lo, samples_.extent()));
   }
-  std::uint8_t& at(Int3 p) { return reached_[place(p)]; }
-  std::uint8_t at(Int3 p) const { return reached_[place(p)]; }
+  std::uint8_t& at(Int3 p) { return reached_[index(p)]; }
+  std::uint8_t at(Int3 p) const { return reached_[index(p)]; }
 
   Box3 samples_;
   std::vector<std::uint8_t> reached_;
@@ -103,16 +103,17 @@ class Search {
 
   std::optional<IndexBox> run() {
     std::vector<IndexBox> chunks = active_chunks();
-    // Those at the ends of the volume make the box so large that most others are within.
+    // Chunks at the ends of the volume come first: they make the box so large that it contains most
+    // others.
     BoxUnion<IndexBox> all;
     for (const IndexBox& chunk : chunks) all.include(chunk);
     if (!all.box()) return std::nullopt;
     const Vec3d middle = (all.box()->lo + all.box()->hi) * 0.5;
     const auto outwards = [&](const IndexBox& box) {
-      double most = 0;
+      double distance = 0;
       for (int axis = 0; axis < 3; ++axis)
-        most = std::max({most, middle[axis] - box.lo[axis], box.hi[axis] - middle[axis]});
-      return most;
+        distance = std::max({distance, middle[axis] - box.lo[axis], box.hi[axis] - middle[axis]});
+      return distance;
     };
     std::stable_sort(chunks.begin(), chunks.end(), [&](const IndexBox& a, const IndexBox& b) {
       return outwards(a) > outwards(b);
@@ -129,7 +130,7 @@ class Search {
                        [&](double isovalue) { return range.stabbed_by(isovalue); });
   }
 
-  /// Around the active nodes within `part_` of each range chunk that has any.
+  /// For each range chunk with active nodes within `part_`: their bounding box.
   std::vector<IndexBox> active_chunks() const {
     const Int3 nodes = tree_.grid().level(0).nodes, edge{kChunkNodes, kChunkNodes, kChunkNodes};
     std::vector<IndexBox> chunks;
@@ -147,14 +148,14 @@ class Search {
     return chunks;
   }
 
-  /// Of the blocks that have any of `box`, which lies within a range chunk.
+  /// Includes the active blocks that meet `box`, which lies within a range chunk.
   void read_blocks(const IndexBox& box) {
     const Int3 all = source_.info().levels.front().lattice.blocks();
     Box3 blocks;
     for (int axis = 0; axis < 3; ++axis) {
       blocks.lo[axis] = static_cast<Index>(std::floor(box.lo[axis] / kBlockEdge));
       blocks.hi[axis] = static_cast<Index>(std::ceil(box.hi[axis] / kBlockEdge));
-      // A part may be a plane between two blocks.
+      // `part` may be a plane between two blocks.
       blocks.hi[axis] = std::min(std::max(blocks.hi[axis], blocks.lo[axis] + 1), all[axis]);
       blocks.lo[axis] = std::min(blocks.lo[axis], blocks.hi[axis] - 1);
     }
@@ -166,7 +167,7 @@ class Search {
     });
   }
 
-  /// The box of the cells within that of blocks, where those are few.
+  /// The box of the cells within the box of blocks, if those are few.
   IndexBox cells_of(const IndexBox& blocks) const {
     Box3 samples;
     for (int axis = 0; axis < 3; ++axis) {
@@ -180,7 +181,7 @@ class Search {
     try {
       const auto crossed = ReachCounts(source_, isovalues_, samples).crossed();
       return (crossed ? within(blocks, *crossed) : crossed).value_or(blocks);
-    } catch (const DamageError&) {  // which is shown where the brick is
+    } catch (const DamageError&) {  // reported where the brick is drawn
       return blocks;
     }
   }

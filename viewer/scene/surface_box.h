@@ -8,14 +8,14 @@
 
 namespace isobrick {
 
-/// The box, in level-0 index space, around the surfaces of level 0 within `part`; nothing where
-/// there are none. `tree` is that of the source.
+/// The bounding box, in level-0 index space, of the surfaces of level 0 within `part`; nullopt if
+/// there are none. `tree`: of the same source.
 ///
-/// It is that of the blocks of 16³ cells that the isovalues cross, by their ranges, and so larger
-/// than the surfaces by less than a block on each side. Where it has few blocks, of which that
-/// would be much, it is that of the cells, by their samples. Block ranges are read only where they
-/// may make it larger, a range chunk at a time: memory does not grow with the surface. Throws what
-/// reading ranges throws; damaged bricks leave the box of the blocks.
+/// It is the box of the active blocks of 16³ cells, which exceeds the surfaces by less than a block
+/// on each side. If it has few blocks, the samples give the box of the active cells. Only range
+/// chunks that may enlarge the box are read, one at a time, so memory does not grow with the
+/// surface. Throws what reading ranges throws; with damaged bricks the box of the blocks is
+/// returned.
 std::optional<IndexBox> surface_box(const BrickSource& source, const NodeTree& tree,
                                     std::span<const double> isovalues, const IndexBox& part);
 

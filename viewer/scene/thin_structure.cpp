@@ -10,12 +10,12 @@
 namespace isobrick {
 namespace {
 
-/// Of a stored level that is read: a cube of 128³.
+/// Maximum samples of a stored level that is read: 128³.
 constexpr Index kFewSamples = Index{1} << 21;
-/// Of the patches that an isovalue crosses one in so many may be lost.
+/// One in so many of the patches that an isovalue crosses may be lost.
 constexpr int kSpared = 128;
 
-/// Rounded outwards.
+/// Rounds outwards.
 ValueRange<float> in_float(const ValueRange<double>& r) {
   if (r.empty()) return {};
   constexpr float inf = std::numeric_limits<float>::infinity();
@@ -25,7 +25,7 @@ ValueRange<float> in_float(const ValueRange<double>& r) {
   return out;
 }
 
-std::size_t place(Int3 patch, Int3 patches) {
+std::size_t patch_index(Int3 patch, Int3 patches) {
   return static_cast<std::size_t>(linear_index(patch, patches));
 }
 
@@ -56,13 +56,14 @@ void ThinStructure::include(const RangeTable& table, Box3 blocks) {
   Ranges ranges(static_cast<std::size_t>(volume(here.extent())));
   for_each_point(blocks, [&](Int3 b) {
     const Int3 p = floor_div(b * block, finest.edge);
-    if (here.contains(p)) ranges[place(p - here.lo, here.extent())].include(in_float(table.at(b)));
+    if (here.contains(p))
+      ranges[patch_index(p - here.lo, here.extent())].include(in_float(table.at(b)));
   });
-  // A patch may be larger than what one thread reads.
+  // A patch may span several calls, perhaps from several threads.
   const MutexLock lock(mutex_);
   std::size_t i = 0;
-  for_each_point(here,
-                 [&](Int3 p) { finest.below[place(p, finest.patches)].include(ranges[i++]); });
+  for_each_point(
+      here, [&](Int3 p) { finest.below[patch_index(p, finest.patches)].include(ranges[i++]); });
 }
 
 void ThinStructure::merge_below() {
@@ -72,12 +73,12 @@ void ThinStructure::merge_below() {
     std::size_t from = 0;
     for_each_point({{0, 0, 0}, finer.patches}, [&](Int3 p) {
       const Int3 patch = floor_div(p * finer.edge, level.edge);
-      level.below[place(patch, level.patches)].include(finer.below[from++]);
+      level.below[patch_index(patch, level.patches)].include(finer.below[from++]);
     });
   }
 }
 
-/// One layer of patches after the other: a whole level would take room that a budget may not have.
+/// Reads one layer of patches at a time: a whole level may exceed a budget.
 ThinStructure::Ranges ThinStructure::own_ranges(const Level& level, NodeSamples& samples,
                                                 const CancellationToken& token) const {
   const NodeGrid::Level& grid = grid_.level(level.level);
@@ -109,16 +110,16 @@ void ThinStructure::read_levels(ResidentBricks& bricks, const CancellationToken&
       level.own = own_ranges(level, samples, token);
     } catch (const OperationCancelled&) {
       throw;
-    } catch (const std::exception&) {  // meshes of the level report it
+    } catch (const std::exception&) {  // reported when the level is meshed
     }
 }
 
 bool ThinStructure::read(ResidentBricks& bricks, const CancellationToken& token) {
-  if (levels_.empty() || taken_.exchange(true)) return false;
+  if (levels_.empty() || claimed_.exchange(true)) return false;
   try {
     read_levels(bricks, token);
   } catch (...) {
-    taken_ = false;
+    claimed_ = false;
     throw;
   }
   known_.store(true, std::memory_order_release);
@@ -136,7 +137,7 @@ bool ThinStructure::lost(const NodeKey& n, double isovalue) const {
   for_each_point(
       intersect({n.node * per_node, (n.node + Int3{1, 1, 1}) * per_node}, {{}, found->patches}),
       [&](Int3 p) {
-        const std::size_t i = place(p, found->patches);
+        const std::size_t i = patch_index(p, found->patches);
         if (!found->below[i].stabbed_by(isovalue)) return;
         ++crossed;
         lost += !found->own[i].stabbed_by(isovalue);

@@ -13,41 +13,41 @@ namespace isobrick {
 
 class NodeSamples;
 
-/// Where coarse levels have lost what finer ones hold: thin structure that averaging, or leaving
-/// samples out, has removed. Known to within a few cells of a level, for the levels of few
-/// samples, which are read for that: the ranges of their blocks span far too much.
+/// Where coarse levels have lost thin structure, which averaging or leaving out samples has
+/// removed. The ranges of a coarse level's blocks are too wide for that, so the samples of the few
+/// coarsest levels are read.
 ///
-/// A patch is two cells of a level along each axis, four where the level has more than kNodeEdge,
-/// and never less than a block of level 0. It is lost where level 0 crosses the isovalue in it and
-/// the level itself does not, even within a cell of it. Thread-safe.
+/// A patch is a box of two cells of a level along each axis, of four where the level is longer than
+/// kNodeEdge, and at least a block of level 0. It is lost where level 0 crosses the isovalue within
+/// it, and the level itself does not even within one cell around it. Thread-safe.
 class ThinStructure {
  public:
   ThinStructure(const NodeGrid& grid, const StoreInfo& info);
 
-  /// Takes the ranges of these blocks of level 0.
+  /// Adds the ranges of these blocks of level 0.
   void include(const RangeTable& table, Box3 blocks);
-  /// After the ranges of all blocks: reads the samples of the levels, unless somebody does or has.
-  /// Of a level that cannot be read nothing counts as lost. False when it did nothing. Throws
-  /// OperationCancelled; then another call begins again.
+  /// Call it after the ranges of all blocks: reads the samples of the levels, unless another call
+  /// does or has. A level that cannot be read counts as not lost. Returns false if it did nothing.
+  /// After OperationCancelled another call starts again.
   bool read(ResidentBricks& bricks, const CancellationToken& token);
-  /// Whether read() has ended.
+  /// Whether read() has finished.
   bool known() const { return known_.load(std::memory_order_acquire); }
 
-  /// Whether the node has lost a 128th of its patches that the isovalue crosses, or more: what is
-  /// less may be noise. False until it is known.
+  /// Whether the node has lost at least a 128th of its patches that the isovalue crosses; less may
+  /// be noise. False until known().
   bool lost(const NodeKey& n, double isovalue) const;
 
-  /// Once it is known.
+  /// Bytes of host memory, once known.
   std::uint64_t bytes() const;
 
  private:
   using Ranges = std::vector<ValueRange<float>>;
   struct Level {
     int level = 0;
-    Int3 edge;     ///< of a patch, samples of level 0; powers of two
-    Int3 patches;  ///< how many there are
-    Ranges own;    ///< of the level's field in a patch and a cell around it; empty: unknown
-    Ranges below;  ///< of level 0 in a patch
+    Int3 edge;     ///< of a patch, in samples of level 0; powers of two
+    Int3 patches;  ///< number of patches
+    Ranges own;    ///< of the level's field in each patch and a cell around it; empty: unknown
+    Ranges below;  ///< of level 0 in each patch
   };
 
   void merge_below();
@@ -55,10 +55,10 @@ class ThinStructure {
   Ranges own_ranges(const Level& level, NodeSamples& samples, const CancellationToken& token) const;
 
   const NodeGrid& grid_;
-  Mutex mutex_;                      ///< of include()
-  std::vector<Level> levels_;        ///< the finest first
-  std::atomic<bool> taken_ = false;  ///< somebody reads, or has read
-  std::atomic<bool> known_ = false;  ///< from now on nothing changes
+  Mutex mutex_;                        ///< guards include()
+  std::vector<Level> levels_;          ///< finest first
+  std::atomic<bool> claimed_ = false;  ///< a call of read() runs or has finished
+  std::atomic<bool> known_ = false;    ///< once true, nothing changes
 };
 
 }  // namespace isobrick

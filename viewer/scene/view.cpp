@@ -6,7 +6,7 @@
 namespace isobrick {
 namespace {
 
-/// How much larger the picture is in which nodes that were refined stay so.
+/// Scale of the picture in which refined nodes stay refined.
 constexpr double kWider = 1.15;
 
 bool touch(const IndexBox& a, const IndexBox& b) {
@@ -44,36 +44,36 @@ NodeView::NodeView(const View& view, const NodeGrid& grid) : grid_(grid), clip_(
   pixels_per_length_ = view.height / 2.0 * std::sqrt(dot(second, second)) / (parallel_ ? 1 : w);
 }
 
-/// The plane of world space where normal · p + offset is 0.
+/// Converts the plane normal · p + offset = 0 of world space.
 NodeView::Plane NodeView::to_index_space(Vec3d normal, double offset) const {
   const Transform& t = grid_.transform();
   return {{dot(normal, t.step(0)), dot(normal, t.step(1)), dot(normal, t.step(2))},
           dot(normal, t.origin) + offset};
 }
 
-bool NodeView::Plane::meets(const IndexBox& box) const {
-  double most = offset;
+bool NodeView::Plane::intersects(const IndexBox& box) const {
+  double max_distance = offset;
   for (int axis = 0; axis < 3; ++axis)
-    most += normal[axis] * (normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
-  return most >= 0;
+    max_distance += normal[axis] * (normal[axis] > 0 ? box.hi[axis] : box.lo[axis]);
+  return max_distance >= 0;
 }
 
-bool NodeView::cut_away(const IndexBox& box) const {
+bool NodeView::clipped(const IndexBox& box) const {
   return (clip_ && !touch(box, *clip_)) ||
          !std::all_of(planes_.begin(), planes_.end(),
-                      [&](const Plane& plane) { return plane.meets(box); });
+                      [&](const Plane& plane) { return plane.intersects(box); });
 }
 
-NodeSight NodeView::see(const NodeKey& n) const {
+NodeSight NodeView::sight(const NodeKey& n) const {
   const IndexBox box = grid_.box(n);
   NodeSight sight;
   sight.distance = distance(box);
   sight.pixels = pixels(n.level, sight.distance);
-  sight.cut_away = cut_away(box);
-  if (sight.cut_away) return sight;
-  const auto inside = [&](const Plane& plane) { return plane.meets(box); };
+  sight.clipped = clipped(box);
+  if (sight.clipped) return sight;
+  const auto inside = [&](const Plane& plane) { return plane.intersects(box); };
   sight.nearly_visible = std::all_of(wider_.begin(), wider_.end(), inside);
-  // The wider picture holds the other one.
+  // The larger picture contains the other one.
   sight.visible = sight.nearly_visible && std::all_of(picture_.begin(), picture_.end(), inside);
   return sight;
 }
@@ -90,8 +90,7 @@ double NodeView::distance(const IndexBox& box) const {
 double NodeView::pixels(int level, double distance) const {
   const double cell = grid_.level(level).spacing;
   if (parallel_) return cell * pixels_per_length_;
-  // Inside a node its surface may be as near as one likes; finer than the finest
-  // cell at the distance of one makes no sense.
+  // Inside a node the distance may be 0; cells nearer than the length of one are not distinguished.
   return cell * pixels_per_length_ / std::max(distance, grid_.level(0).spacing);
 }
 

@@ -15,7 +15,7 @@ Bookmark jaw() {
   b.camera.field_of_view = 42;
   b.camera.orthographic = true;
   b.settings.surfaces = {{127.25, {0.1f, 0.2f, 0.3f}, 0.5f, true}, {-3e-7, {1, 1, 1}, 1, false}};
-  b.settings.cuts[1] = {true, 0.25f, false};
+  b.settings.axis_clips[1] = {true, 0.25f, false};
   b.settings.planes = {{true, {{1, -2, 0.5}, 12.5}}, {false, {{0, 0, 1}, -3}}};
   b.settings.slices[2] = {true, 0.75f};
   b.settings.region_on = true;

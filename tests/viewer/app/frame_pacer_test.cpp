@@ -8,18 +8,18 @@
 namespace isobrick {
 namespace {
 
-/// Previews of a surface: `full` triangles, of which a million take `seconds_per_million`.
+/// Simulates previews of a surface of `full` triangles; a million take `seconds_per_million`.
 struct Previews {
   FramePacer& pacer;
   double full, pixels, seconds_per_million, occlusion = 0;
   double seconds = 0, triangles = 0;
 
   void draw() {
-    const double s = pacer.smaller();
+    const double s = pacer.size_divisor();
     triangles = std::min(full, static_cast<double>(pacer.max_triangles()));
-    seconds =
-        pixels / (s * s) + triangles / 1e6 * seconds_per_million + (pacer.plain() ? 0 : occlusion);
-    pacer.drawn(seconds, static_cast<std::uint64_t>(triangles), triangles < full);
+    seconds = pixels / (s * s) + triangles / 1e6 * seconds_per_million +
+              (pacer.reduces_quality() ? 0 : occlusion);
+    pacer.add_preview(seconds, static_cast<std::uint64_t>(triangles), triangles < full);
   }
 };
 
@@ -27,51 +27,51 @@ TEST(FramePacer, PreviewsUseTheWholeTime) {
   for (const double full : {6e5, 6e6})
     for (const double pixels : {0.0, 0.01}) {
       FramePacer pacer(0.05);
-      pacer.drawn_still(pixels + full / 1e6 + 0.3, static_cast<std::uint64_t>(full));
+      pacer.add_still(pixels + full / 1e6 + 0.3, static_cast<std::uint64_t>(full));
       Previews previews{pacer, full, pixels, 1};
       for (int i = 0; i < 15; ++i) {
         previews.draw();
         EXPECT_LT(previews.seconds, 0.05) << full << ": from the first one on";
       }
       EXPECT_GE(previews.seconds, 0.0375) << full;
-      EXPECT_EQ(pacer.smaller(), 1);
+      EXPECT_EQ(pacer.size_divisor(), 1);
     }
 }
 
 TEST(FramePacer, PicturesThatAreQuickEnoughLoseNothing) {
   FramePacer pacer = FramePacer::for_device(true);
-  EXPECT_TRUE(pacer.plain()) << "until one in full was quick";
-  pacer.drawn_still(0.02, 600'000);
+  EXPECT_TRUE(pacer.reduces_quality()) << "until one in full was quick";
+  pacer.add_still(0.02, 600'000);
   for (int i = 0; i < 100; ++i) {
     EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
-    EXPECT_EQ(pacer.smaller(), 1);
-    EXPECT_FALSE(pacer.plain());
-    pacer.drawn(0.03, 600'000, false);
+    EXPECT_EQ(pacer.size_divisor(), 1);
+    EXPECT_FALSE(pacer.reduces_quality());
+    pacer.add_preview(0.03, 600'000, false);
   }
 }
 
 TEST(FramePacer, LeavesOcclusionOutBeforeDetail) {
   FramePacer pacer(0.05);
-  pacer.drawn(0.08, 100'000, false);
-  EXPECT_TRUE(pacer.plain());
+  pacer.add_preview(0.08, 100'000, false);
+  EXPECT_TRUE(pacer.reduces_quality());
   EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
-  for (int i = 0; i < 5; ++i) pacer.drawn(0.03, 100'000, false);
-  EXPECT_TRUE(pacer.plain()) << "until a picture at rest leaves time for it";
+  for (int i = 0; i < 5; ++i) pacer.add_preview(0.03, 100'000, false);
+  EXPECT_TRUE(pacer.reduces_quality()) << "until a picture at rest leaves time for it";
   EXPECT_EQ(pacer.max_triangles(), FramePacer::kAllTriangles);
-  pacer.drawn_still(0.04, 100'000);
-  EXPECT_TRUE(pacer.plain()) << "a preview takes longer than that";
-  pacer.drawn_still(0.03, 100'000);
-  EXPECT_FALSE(pacer.plain());
+  pacer.add_still(0.04, 100'000);
+  EXPECT_TRUE(pacer.reduces_quality()) << "a preview takes longer than that";
+  pacer.add_still(0.03, 100'000);
+  EXPECT_FALSE(pacer.reduces_quality());
 }
 
 TEST(FramePacer, HalvesTrianglesThatTakeTooLong) {
   FramePacer pacer = FramePacer::for_device(false);
-  pacer.drawn(0.1, 8'000'000, false);  // occlusion goes
-  pacer.drawn(0.1, 8'000'000, false);
+  pacer.add_preview(0.1, 8'000'000, false);  // occlusion goes
+  pacer.add_preview(0.1, 8'000'000, false);
   EXPECT_EQ(pacer.max_triangles(), 4'000'000u);
-  pacer.drawn(0.1, 3'000'000, true);
+  pacer.add_preview(0.1, 3'000'000, true);
   EXPECT_EQ(pacer.max_triangles(), 1'500'000u);
-  pacer.drawn(0.012, 1'500'000, true);
+  pacer.add_preview(0.012, 1'500'000, true);
   EXPECT_EQ(pacer.max_triangles(), 1'500'000u) << "as long as a frame may take";
 }
 
@@ -80,7 +80,7 @@ TEST(FramePacer, SettlesWhereTrianglesTakeTheTime) {
   Previews previews{pacer, 1e7, 0, 4e-3};
   for (int i = 0; i < 200; ++i) {
     previews.draw();
-    EXPECT_EQ(pacer.smaller(), 1);
+    EXPECT_EQ(pacer.size_divisor(), 1);
     if (i <= 20) continue;
     EXPECT_LE(previews.seconds, 0.0125);
     EXPECT_GE(previews.seconds, 0.75 * 0.0125);
@@ -88,7 +88,7 @@ TEST(FramePacer, SettlesWhereTrianglesTakeTheTime) {
 }
 
 TEST(FramePacer, MakesPicturesSmallerWhereTheirPixelsTakeTheTime) {
-  // As llvmpipe: 70 ms for the pixels of a plain picture, 60 ms more for its triangles.
+  // As llvmpipe: 70 ms for the pixels at reduced quality, 60 ms more for the triangles.
   FramePacer pacer(0.05);
   Previews previews{pacer, 60'000, 0.07, 1, 0.2};
   for (int i = 0; i < 60; ++i) {
@@ -97,18 +97,18 @@ TEST(FramePacer, MakesPicturesSmallerWhereTheirPixelsTakeTheTime) {
       EXPECT_LT(previews.seconds, 0.05);
     }
   }
-  EXPECT_GT(pacer.smaller(), 1);
-  EXPECT_LT(pacer.smaller(), 4);
+  EXPECT_GT(pacer.size_divisor(), 1);
+  EXPECT_LT(pacer.size_divisor(), 4);
   EXPECT_GT(previews.triangles, 20'000) << "there is time for them";
-  for (int i = 0; i < 100; ++i) pacer.drawn(0.002, 60'000, previews.triangles < 60'000);
-  EXPECT_EQ(pacer.smaller(), 1);
+  for (int i = 0; i < 100; ++i) pacer.add_preview(0.002, 60'000, previews.triangles < 60'000);
+  EXPECT_EQ(pacer.size_divisor(), 1);
 }
 
 TEST(FramePacer, LeavesAlmostNothingWhereAllTakesTooLong) {
   FramePacer pacer = FramePacer::for_device(true);
   for (int i = 0; i < 30; ++i)
-    pacer.drawn(2, std::min<std::uint64_t>(pacer.max_triangles(), 1e6), true);
-  EXPECT_EQ(pacer.smaller(), 4);
+    pacer.add_preview(2, std::min<std::uint64_t>(pacer.max_triangles(), 1e6), true);
+  EXPECT_EQ(pacer.size_divisor(), 4);
   EXPECT_EQ(pacer.max_triangles(), 2'000u);
 }
 
@@ -117,15 +117,15 @@ TEST(FramePacer, RefinesAgainWhereThereIsTime) {
   Previews slow{pacer, 1e5, 0.2, 1};
   for (int i = 0; i < 10; ++i) slow.draw();
   EXPECT_LT(pacer.max_triangles(), 50'000u);
-  EXPECT_GT(pacer.smaller(), 1);
+  EXPECT_GT(pacer.size_divisor(), 1);
   Previews quick{pacer, 1e5, 0, 0.04};
   for (int i = 0; i < 100; ++i) quick.draw();
   EXPECT_EQ(quick.triangles, 1e5);
-  EXPECT_EQ(pacer.smaller(), 1);
+  EXPECT_EQ(pacer.size_divisor(), 1);
 }
 
-/// Previews of a surface with thin structure that needs 200,000 triangles, and has as many where it
-/// may; a million take `seconds_per_million`.
+/// Simulates previews of a surface whose thin structure needs 200,000 triangles; a million take
+/// `seconds_per_million`.
 struct ThinPreviews {
   FramePacer& pacer;
   double pixels, seconds_per_million;
@@ -134,12 +134,12 @@ struct ThinPreviews {
 
   void draw() {
     constexpr std::uint64_t kNeeded = 200'000;
-    const double s = pacer.smaller();
+    const double s = pacer.size_divisor();
     thin = pacer.thin_triangles() >= kNeeded && pacer.max_triangles() < kNeeded;
     const std::uint64_t most = std::max(pacer.max_triangles(), pacer.thin_triangles());
     const std::uint64_t triangles = std::min(thin ? kNeeded : pacer.max_triangles(), most);
     seconds = pixels / (s * s) + static_cast<double>(triangles) / 1e6 * seconds_per_million;
-    pacer.drawn(seconds, triangles, true, thin);
+    pacer.add_preview(seconds, triangles, true, thin);
   }
 };
 
@@ -153,14 +153,14 @@ TEST(FramePacer, ThePictureGivesWayBeforeThinStructure) {
     EXPECT_TRUE(previews.thin) << i;
     EXPECT_LE(previews.seconds, 0.18);
   }
-  EXPECT_EQ(pacer.smaller(), 4);
+  EXPECT_EQ(pacer.size_divisor(), 4);
   EXPECT_EQ(pacer.thin_triangles(), FramePacer::kThinTriangles);
 }
 
 TEST(FramePacer, ThinStructureTakesFourTimesTheLimitAtMost) {
   for (const double seconds_per_million : {0.5, 3.0, 10.0, 1000.0}) {
     FramePacer pacer(0.045);
-    pacer.drawn_still(1, 20'000);
+    pacer.add_still(1, 20'000);
     ThinPreviews previews{pacer, 0.1, seconds_per_million};
     int long_ones = 0;
     for (int i = 0; i < 100; ++i) {
@@ -169,7 +169,8 @@ TEST(FramePacer, ThinStructureTakesFourTimesTheLimitAtMost) {
     }
     EXPECT_LE(long_ones, 2) << seconds_per_million;
     EXPECT_EQ(previews.thin, seconds_per_million == 0.5) << "that much may be had in time";
-    EXPECT_LT(previews.seconds, 0.18 + 2e-3 * seconds_per_million);  // of the least triangles
+    EXPECT_LT(previews.seconds,
+              0.18 + 2e-3 * seconds_per_million);  // with the minimum of triangles
   }
 }
 
@@ -181,7 +182,7 @@ TEST(FramePacer, ThinStructureComesBackWhereThereIsTime) {
   ThinPreviews quick{pacer, 0.01, 0.02};
   for (int i = 0; i < 100; ++i) quick.draw();
   EXPECT_GE(std::max(pacer.thin_triangles(), pacer.max_triangles()), 200'000u);
-  EXPECT_EQ(pacer.smaller(), 1);
+  EXPECT_EQ(pacer.size_divisor(), 1);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include "core/vectors.h"
 #include "tests/viewer/app/window_test.h"
 
-// Images with channels and times, and isovalues and remarks that a window tells about.
+// Images with channels and times; messages about isovalues and the input.
 
 namespace isobrick {
 namespace {
@@ -19,8 +19,8 @@ constexpr int kEdge = 40;
 
 class ImageWindow : public test::WindowTest {
  protected:
-  /// OME-Zarr 0.4 of two times and three channels: balls of radius 6 + 3 · channel + time, 128 on
-  /// their surface; the last channel's samples are all below 100.
+  /// Writes an OME-Zarr 0.4 image of two times and three channels: balls of radius 6 + 3 · channel
+  /// + time, 128 on their surface. All samples of the last channel are below 100.
   std::filesystem::path write_image() {
     namespace fs = std::filesystem;
     const fs::path image = dir_ / "image.zarr";
@@ -55,19 +55,19 @@ class ImageWindow : public test::WindowTest {
     return samples;
   }
 
-  bool is_said(std::string_view text) const {
+  bool has_message(std::string_view text) const {
     const auto& messages = window_->state().messages;
     return std::any_of(messages.begin(), messages.end(), [&](const Message& message) {
       return message.text.find(text) != std::string::npos;
     });
   }
-  /// Of the surface in the middle of the picture, from the ball's middle.
+  /// The radius of the surface in the middle of the picture.
   double radius_in_the_middle() {
     steps(3);
-    until([&] { return rests(); });
-    const PictureState& state = window_->state().picture->state();
+    until([&] { return is_still(); });
+    const FrameState& state = window_->state().scene_renderer->state();
     EXPECT_GT(state.triangles, 0u);
-    const Renderer& renderer = window_->state().picture->renderer();
+    const Renderer& renderer = window_->state().scene_renderer->renderer();
     const auto point = renderer.pick(renderer.width() / 2, renderer.height() / 2);
     if (!point) return 0;
     return length(point->position - Vec3d{20, 20, 20});
@@ -84,11 +84,11 @@ TEST_F(ImageWindow, AnImageThatIsDroppedShowsItsFirstVolumeAndOthersAreChosen) {
   EXPECT_EQ(state.volumes.selection.channel, 0);
   EXPECT_EQ(state.volumes.selection.time, 0);
   EXPECT_EQ(text_of(state.volumes), "time 0, channel 0");
-  EXPECT_TRUE(is_said("the ranges of the samples were computed"));
+  EXPECT_TRUE(has_message("the ranges of the samples were computed"));
   window.state().settings.surfaces[0].isovalue = 128;
   EXPECT_NEAR(radius_in_the_middle(), 6, 0.5);
 
-  // What was set stays: the camera, and an isovalue that the other volume has, too.
+  // Camera and isovalue stay, if the other volume has the isovalue, too.
   window.state().settings.edges = true;
   const Camera camera = state.navigator.camera;
   window.state().requests.volume = Selection{.channel = 1, .time = 1};
@@ -99,18 +99,18 @@ TEST_F(ImageWindow, AnImageThatIsDroppedShowsItsFirstVolumeAndOthersAreChosen) {
   EXPECT_EQ(state.navigator.camera, camera);
   EXPECT_NEAR(radius_in_the_middle(), 10, 0.5);
 
-  // One that it does not have is chosen anew.
+  // An isovalue out of its range is replaced.
   window.state().requests.volume = Selection{.channel = 2, .time = 1};
   until([&] { return state.volumes.selection.channel == 2; });
   EXPECT_LT(state.settings.surfaces[0].isovalue, 100);
   EXPECT_GT(radius_in_the_middle(), 5);
 
-  // By now the first one has ranges, and what is not there leaves what is.
+  // The first volume has ranges now; a missing volume leaves the present one open.
   window.state().requests.volume = Selection{.channel = 0, .time = 0};
   until([&] { return state.volumes.selection.channel == 0; });
   EXPECT_EQ(state.import, nullptr);
   window.state().requests.volume = Selection{.channel = 7, .time = 0};
-  until([&] { return is_said("--channel 7 is not there"); });
+  until([&] { return has_message("--channel 7 is not there"); });
   EXPECT_EQ(state.volumes.selection.channel, 0);
 }
 
@@ -129,7 +129,7 @@ TEST_F(ImageWindow, RangesThatAreCancelledLeaveTheImageAsItWas) {
   ASSERT_NE(window.state().import, nullptr);
   window.state().import->cancel();
   until([&] { return window.state().import == nullptr; });
-  if (window.state().path != image) {  // else it was done by then
+  if (window.state().path != image) {  // else it has finished
     EXPECT_EQ(files(), before);
   }
 }
@@ -153,7 +153,7 @@ TEST_F(ImageWindow, ATimeOfAFileThatIsDroppedIsItsFirst) {
   until([&] { return window.state().import == nullptr; });
   EXPECT_EQ(window.state().path, dir_ / "movie.zarr")
       << (window.state().messages.empty() ? "" : window.state().messages[0].text);
-  EXPECT_TRUE(is_said("'movie.nrrd' has several volumes; this is the first"));
+  EXPECT_TRUE(has_message("'movie.nrrd' has several volumes; this is the first"));
   window.state().settings.surfaces[0].isovalue = 128;
   EXPECT_NEAR(radius_in_the_middle(), 8, 0.5);
 }
@@ -166,22 +166,22 @@ TEST_F(ImageWindow, RemarksOfAReaderAreShown) {
   window.drop(dir_ / "long.nrrd");
   until([&] { return window.state().path == dir_ / "long.zarr"; });
   steps(2);
-  EXPECT_TRUE(is_said("14 bytes"));
+  EXPECT_TRUE(has_message("14 bytes"));
 }
 
 TEST_F(ImageWindow, AnIsovalueThatNoSampleReachesIsSaidWithTheRange) {
   WindowOptions options;
   options.settings.surfaces = {{.isovalue = 900}};
   ViewerWindow& window = open(options);
-  const ValueRange<double> range = window.state().facts->counts().range();
+  const ValueRange<double> range = window.state().isovalue_stats->counts().range();
   const auto text = [&](const std::string& isovalue) {
     return "isovalue " + isovalue + ": the surface is empty; the samples of level 0 lie within " +
            std::to_string(static_cast<int>(range.lo)) + " and " +
            std::to_string(static_cast<int>(range.hi));
   };
-  until([&] { return is_said(text("900")); });
+  until([&] { return has_message(text("900")); });
   EXPECT_EQ(window.state().messages.size(), 1u);
-  // Once, and one that has a surface not at all.
+  // Shown once; never for an isovalue with a surface.
   window.state().messages.clear();
   window.state().settings.surfaces[0].isovalue = 100;
   steps(5);
@@ -189,7 +189,7 @@ TEST_F(ImageWindow, AnIsovalueThatNoSampleReachesIsSaidWithTheRange) {
   steps(5);
   EXPECT_TRUE(window.state().messages.empty());
   window.state().settings.surfaces[0].isovalue = -5;
-  until([&] { return is_said(text("-5")); });
+  until([&] { return has_message(text("-5")); });
 }
 
 }  // namespace

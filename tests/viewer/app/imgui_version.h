@@ -2,11 +2,11 @@
 
 #include <imgui.h>
 
-// What versions of Dear ImGui call by other names, for tests.
+// Wrappers of functions that differ between versions of Dear ImGui, for tests.
 
 namespace isobrick::test {
 
-/// Whether the font of the window has a character of its own.
+/// Whether the window's font has a glyph for a character.
 inline bool has_glyph(ImWchar character) {
   ImFont* font = ImGui::GetIO().Fonts->Fonts[0];
 #if IMGUI_VERSION_NUM >= 19200
@@ -16,7 +16,7 @@ inline bool has_glyph(ImWchar character) {
 #endif
 }
 
-/// The size that it was loaded in.
+/// The font's size.
 inline float font_pixels() {
   const ImFont* font = ImGui::GetIO().Fonts->Fonts[0];
 #if IMGUI_VERSION_NUM >= 19200
@@ -26,7 +26,7 @@ inline float font_pixels() {
 #endif
 }
 
-/// Makes text larger than that.
+/// Scales the text.
 inline void scale_font(float scale) {
 #if IMGUI_VERSION_NUM >= 19200
   ImGui::GetStyle().FontScaleMain = scale;

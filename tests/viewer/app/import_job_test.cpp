@@ -50,7 +50,7 @@ TEST(ImportJob, HasTheRemarksOfTheReader) {
   EXPECT_TRUE(contains(state.notes[0], "9 bytes")) << state.notes[0];
 }
 
-/// Of several volumes the first is taken, whether they are channels or times.
+/// The first of several volumes is converted, channels or times.
 TEST(ImportJob, TakesTheFirstOfSeveralVolumes) {
   const TempDir dir;
   const std::string head = "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\n";
@@ -122,7 +122,7 @@ TEST(ImportJob, NamesAMeshAsOne) {
   EXPECT_EQ(dir.list(), std::vector<std::string>{"head.STL"});
 }
 
-/// A folder of slices is opened as one, whatever it holds.
+/// A folder of slices is opened as one, whatever its content.
 TEST(ImportJob, TakesFolders) {
   const TempDir dir;
   std::filesystem::create_directory(dir / "slices");

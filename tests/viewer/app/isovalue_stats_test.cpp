@@ -7,7 +7,7 @@
 #include <numeric>
 #include <thread>
 
-#include "tests/viewer/app/picture_test.h"
+#include "tests/viewer/app/scene_renderer_fixture.h"
 
 namespace isobrick {
 namespace {
@@ -20,7 +20,7 @@ bool comes(const std::function<bool()>& holds) {
   return false;
 }
 
-class Facts : public Picture {
+class Statistics : public SceneRendererTest {
  protected:
   void make_store(Int3 extent) {
     NoProgress progress;
@@ -32,7 +32,7 @@ class Facts : public Picture {
   }
 };
 
-TEST_F(Facts, LeaveOutBricksThatCannotBeRead) {
+TEST_F(Statistics, LeaveOutBricksThatCannotBeRead) {
   make_store({96, 96, 96});
   IsovalueStats whole(store());
   EXPECT_TRUE(comes([&] { return whole.histogram() != nullptr; }));
@@ -44,8 +44,8 @@ TEST_F(Facts, LeaveOutBricksThatCannotBeRead) {
   EXPECT_TRUE(contains(why, "store.zarr")) << why;
   EXPECT_TRUE(contains(why, "1 of level 0")) << why;
   ASSERT_NE(damaged.histogram(), nullptr);
-  const auto count = [](const IsovalueStats& facts) {
-    const auto& counts = facts.histogram()->counts;
+  const auto count = [](const IsovalueStats& stats) {
+    const auto& counts = stats.histogram()->counts;
     return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
   };
   EXPECT_EQ(count(whole), 96u * 96 * 96);
@@ -54,33 +54,33 @@ TEST_F(Facts, LeaveOutBricksThatCannotBeRead) {
   EXPECT_EQ(damaged.take_failure(), "") << "once";
 }
 
-TEST_F(Facts, ThereIsAlwaysAnEstimateOfTriangles) {
+TEST_F(Statistics, ThereIsAlwaysAnEstimateOfTriangles) {
   make_store({48, 48, 48});  // of 27 blocks
-  const IsovalueStats facts(store());
+  const IsovalueStats stats(store());
   const double iso = default_isovalue(ScalarType::u8);
-  const auto blocks = static_cast<double>(facts.counts().active_blocks(iso));
+  const auto blocks = static_cast<double>(stats.counts().active_blocks(iso));
   ASSERT_GT(blocks, 0);
   StreamCounters made;
-  EXPECT_EQ(facts.triangles(iso, made), blocks * CutBudget().triangles_per_block);
+  EXPECT_EQ(stats.triangles(iso, made), blocks * CutBudget().triangles_per_block);
   made.blocks_made = 1;  // less than there are
   made.triangles_made = 7;
-  EXPECT_EQ(facts.triangles(iso, made), blocks * CutBudget().triangles_per_block);
+  EXPECT_EQ(stats.triangles(iso, made), blocks * CutBudget().triangles_per_block);
   made.blocks_made = 100;
   made.triangles_made = 20'000;
-  EXPECT_EQ(facts.triangles(iso, made), blocks * 200);
+  EXPECT_EQ(stats.triangles(iso, made), blocks * 200);
   made.triangles_per_block = 300;
-  EXPECT_EQ(facts.triangles(iso, made), blocks * 300);
-  EXPECT_EQ(facts.triangles(1e9, made), 0);
+  EXPECT_EQ(stats.triangles(iso, made), blocks * 300);
+  EXPECT_EQ(stats.triangles(1e9, made), 0);
 }
 
-TEST_F(Facts, AFewBlocksAreMeasured) {
+TEST_F(Statistics, AFewBlocksAreMeasured) {
   open(SynthKind::sphere, {48, 48, 48});
   settings_.pixel_error = 0.5f;  // the finest level
   draw();
-  const IsovalueStats facts(store());
+  const IsovalueStats stats(store());
   const double iso = settings_.surfaces[0].isovalue;
-  const double told = facts.triangles(iso, picture_->scene().stream().counters());
-  const auto there = static_cast<double>(picture_->state().triangles);
+  const double told = stats.triangles(iso, scene_renderer_->scene().stream().counters());
+  const auto there = static_cast<double>(scene_renderer_->state().triangles);
   EXPECT_NEAR(told, there, 0.3 * there);
 }
 

@@ -46,14 +46,14 @@ class Uploads : public testing::Test {
     }
     return drawable;
   }
-  /// As a picture of `drawable` does while `shown` is on the screen.
+  /// Uploads as a frame of `drawable` does while `shown` is visible.
   void take(const Drawable& drawable, const Drawable& shown) {
     uploads_->begin_use();
     uploads_->keep(shown);
     EXPECT_TRUE(uploads_->add(drawable, {}, nullptr));
   }
-  void expect_there(const Drawable& drawable) const {
-    for (const DrawnNode& node : drawable.nodes) EXPECT_NE(uploads_->find(*node.mesh), nullptr);
+  void expect_uploaded(const Drawable& drawable) const {
+    for (const NodeDraw& node : drawable.nodes) EXPECT_NE(uploads_->find(*node.mesh), nullptr);
   }
 
   static constexpr std::uint32_t kVertices = 5000;  ///< room for eleven balls
@@ -63,67 +63,67 @@ class Uploads : public testing::Test {
 };
 
 TEST_F(Uploads, WhatIsNotDrawnGoesBeforeThePoolGrows) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::drop);
   Drawable shown = balls(0, 4);
   take(shown, {});
   const std::uint64_t one = uploads_->bytes();
   for (int first = 4; first < 80; first += 4) {
     const Drawable next = balls(first, 4);
     take(next, shown);
-    expect_there(shown);
-    expect_there(next);
+    expect_uploaded(shown);
+    expect_uploaded(next);
     EXPECT_EQ(uploads_->bytes(), one);
     shown = next;
   }
-  // What is drawn needs more.
+  // The drawn meshes need more.
   const Drawable many = balls(100, 12);
   take(many, shown);
-  expect_there(shown);
-  expect_there(many);
+  expect_uploaded(shown);
+  expect_uploaded(many);
   EXPECT_EQ(uploads_->bytes(), 2 * one);
 }
 
 TEST_F(Uploads, WhatIsNeededFurtherOnStays) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::drop);
   const Drawable first = balls(0, 6), second = balls(6, 5);
   take(first, {});
   take(second, {});              // the pool's block is full
-  Drawable next = balls(20, 1);  // and then those that were used least recently
+  Drawable next = balls(20, 1);  // then the least recently used ones
   next.nodes.insert(next.nodes.end(), first.nodes.begin(), first.nodes.end());
-  MeshUploads::Share share;
+  MeshUploads::Limit limit;
   uploads_->begin_use();
-  EXPECT_TRUE(uploads_->add(next, {}, &share));
-  EXPECT_EQ(share.bytes, pool_->bytes() / 11) << "one is copied";
-  expect_there(next);
+  EXPECT_TRUE(uploads_->add(next, {}, &limit));
+  EXPECT_EQ(limit.bytes, pool_->bytes() / 11) << "one is copied";
+  expect_uploaded(next);
 }
 
 TEST_F(Uploads, NothingGoesForAMeshWithABlockOfItsOwn) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::go);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::drop);
   const Drawable small = balls(0, 8), large = balls(100, 1, 60);
   ASSERT_GT(large.nodes[0].mesh->mesh.positions.size(), kVertices);
   take(small, {});
   take(large, {});
-  expect_there(large);
-  expect_there(small);
+  expect_uploaded(large);
+  expect_uploaded(small);
 }
 
 TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::stay);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::keep);
   const Drawable large = balls(0, 1, 60), other = balls(1, 2);
   const MeshBuffer& mesh = large.nodes[0].mesh->mesh;
   const std::uint64_t all =
       2 * mesh.positions.span().size_bytes() + mesh.triangles.span().size_bytes();
   std::uint64_t copied = 0;
   int pictures = 0;
-  for (bool there = false; !there; ++pictures) {
+  for (bool uploaded = false; !uploaded; ++pictures) {
     ASSERT_LT(pictures, 10);
-    MeshUploads::Share share;
-    share.bytes = MeshUploads::Share::kMaxBytes;  // little is left
-    const std::uint64_t before = share.bytes;
+    MeshUploads::Limit limit;
+    limit.bytes = MeshUploads::Limit::kMaxBytes;  // little is left
+    const std::uint64_t before = limit.bytes;
     uploads_->begin_use();
-    there = uploads_->add(large, {}, &share);
-    copied += share.bytes - before;
-    if (!there) take(other, {});  // others come and go meanwhile
+    uploaded = uploads_->add(large, {}, &limit);
+    copied += limit.bytes - before;
+    if (!uploaded) take(other, {});  // other meshes are uploaded and dropped meanwhile
   }
   EXPECT_GT(pictures, 2);
   EXPECT_EQ(copied, all);
@@ -135,17 +135,17 @@ TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
 }
 
 TEST_F(Uploads, WhatIsNotDrawnMayStay) {
-  uploads_.emplace(*pool_, MeshUploads::Unused::stay);
+  uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::keep);
   const Drawable first = balls(0, 11), second = balls(11, 11);
   take(first, {});
   const std::uint64_t one = uploads_->bytes();
   take(second, {});
-  expect_there(first);
+  expect_uploaded(first);
   EXPECT_EQ(uploads_->bytes(), 2 * one);
   uploads_->begin_use();
   uploads_->keep(second);
   uploads_->drop(one);
-  expect_there(second);
+  expect_uploaded(second);
   EXPECT_EQ(uploads_->find(*first.nodes[0].mesh), nullptr);
   EXPECT_EQ(uploads_->bytes(), one);
 }

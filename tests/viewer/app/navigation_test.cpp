@@ -42,7 +42,7 @@ TEST_P(AllModes, ADragKeepsDistanceAndAxes) {
 TEST_P(AllModes, ASpinGoesOnAfterReleaseAndRunsOut) {
   Navigator n = navigator(GetParam());
   for (int i = 0; i < 5; ++i) n.rotate(0.02, 0, 0.016);
-  EXPECT_FALSE(n.moving());
+  EXPECT_FALSE(n.is_moving());
   n.release();
   const Vec3d before = n.camera.back;
   ASSERT_TRUE(n.update(0.016));

@@ -1,6 +1,6 @@
 #include "viewer/app/panels.h"
 
-// ImVec2 can be added up with this.
+// Enables operators of ImVec2.
 #define IMGUI_DEFINE_MATH_OPERATORS
 #include <imgui.h>
 #include <imgui_internal.h>
@@ -10,16 +10,16 @@
 #include <thread>
 
 #include "tests/viewer/app/imgui_version.h"
-#include "tests/viewer/app/picture_test.h"
+#include "tests/viewer/app/scene_renderer_fixture.h"
 
 namespace isobrick {
 namespace {
 
-/// Panels without a window: frames of Dear ImGui that nobody draws, a pointer and keys.
-class Panels : public Picture {
+/// Panels without a window: frames of Dear ImGui that are not drawn, a pointer and keys.
+class Panels : public SceneRendererTest {
  protected:
   void SetUp() override {
-    Picture::SetUp();
+    SceneRendererTest::SetUp();
     if (IsSkipped()) return;
     ImGui::CreateContext();
     ImGuiIO& io = ImGui::GetIO();
@@ -31,26 +31,26 @@ class Panels : public Picture {
     io.Fonts->GetTexDataAsRGBA32(&font, &width, &height);
     open(SynthKind::sphere, {64, 64, 64});
     state_.path = dir_ / "store.zarr";
-    state_.facts =
+    state_.isovalue_stats =
         std::make_unique<IsovalueStats>(std::make_shared<const StoreReader>(dir_ / "store.zarr"));
     state_.settings = settings_;
     state_.navigator.camera = camera_;
     state_.bookmarks = std::make_unique<Bookmarks>(dir_ / "bookmarks.json", dir_ / "store.zarr");
     draw();
-    state_.picture = std::move(picture_);
+    state_.scene_renderer = std::move(scene_renderer_);
     frame();
     ImGuiWindow* panel = ImGui::FindWindowByName("###panel");
     ASSERT_NE(panel, nullptr);
     ImGui::SetWindowSize(panel, {390, 1300});
     for (const char* section :
-         {"Camera and look", "ClipTest and region", "Slices", "Point and measure", "Bookmarks"})
+         {"Camera and look", "Clipping and region", "Slices", "Point and measure", "Bookmarks"})
       panel->StateStorage.SetInt(panel->GetID(section), 1);
     frame();
   }
   void TearDown() override {
-    state_.picture.reset();
+    state_.scene_renderer.reset();
     if (ImGui::GetCurrentContext() != nullptr) ImGui::DestroyContext();
-    Picture::TearDown();
+    SceneRendererTest::TearDown();
   }
 
   void frame() {
@@ -77,7 +77,7 @@ class Panels : public Picture {
     frame();
   }
 
-  /// Where in a window each widget is under the pointer.
+  /// Records the widget under each pointer position of a window.
   std::map<ImGuiID, std::vector<ImVec2>> widgets(const char* window = "###panel") {
     std::map<ImGuiID, std::vector<ImVec2>> places;
     const ImGuiWindow* w = ImGui::FindWindowByName(window);
@@ -112,7 +112,7 @@ class Panels : public Picture {
   ViewerState state_;
 };
 
-/// Two that share an ID are one to Dear ImGui: the first takes the other's clicks.
+/// Dear ImGui treats two widgets with one ID as one: the first takes the other's clicks.
 TEST_F(Panels, EveryWidgetIsInOnePlace) {
   state_.settings.surfaces.push_back(state_.settings.surfaces[0]);
   state_.settings.planes.push_back({true, {{0, 0, 1}, 10}});
@@ -127,7 +127,7 @@ TEST_F(Panels, EveryWidgetIsInOnePlace) {
       lowest = std::min(lowest, p.y);
       highest = std::max(highest, p.y);
     }
-    // All rows in between are its own.
+    // All rows in between belong to it.
     std::map<float, int> rows;
     for (const ImVec2& p : places) ++rows[p.y];
     EXPECT_EQ(rows.size(), static_cast<std::size_t>((highest - lowest) / kStep + 1))
@@ -140,7 +140,7 @@ TEST_F(Panels, PlanesBookmarksAndSurfacesAreRemovedOneByOne) {
   state_.settings.planes.push_back({true, {{0, 0, 1}, 10}});
   state_.bookmarks->add({"one", camera_, settings_});
   frame();
-  click(place_of({"ClipTest and region", "x"}, 0));
+  click(place_of({"Clipping and region", "x"}, 0));
   EXPECT_TRUE(state_.settings.planes.empty());
   click(place_of({"Bookmarks", "x"}, 0));
   EXPECT_TRUE(state_.bookmarks->list().empty());
@@ -152,11 +152,11 @@ TEST_F(Panels, PlanesBookmarksAndSurfacesAreRemovedOneByOne) {
 TEST_F(Panels, SlicesAndCutsHaveTheirOwnBoxes) {
   click(place_of({"Slices", "x", "x"}));
   EXPECT_TRUE(state_.settings.slices[0].shown);
-  EXPECT_FALSE(state_.settings.cuts[0].on);
-  click(place_of({"ClipTest and region", "y", "y"}));
-  EXPECT_TRUE(state_.settings.cuts[1].on);
+  EXPECT_FALSE(state_.settings.axis_clips[0].on);
+  click(place_of({"Clipping and region", "y", "y"}));
+  EXPECT_TRUE(state_.settings.axis_clips[1].on);
   EXPECT_FALSE(state_.settings.slices[1].shown);
-  click(place_of({"ClipTest and region", "Region"}));
+  click(place_of({"Clipping and region", "Region"}));
   EXPECT_TRUE(state_.settings.region_on);
 }
 
@@ -185,7 +185,7 @@ TEST_F(Panels, ATypedIsovalueCountsOnceItIsWhole) {
   EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
   type("12");
   for (int i = 0; i < 2; ++i) press(ImGuiKey_Backspace);
-  type("99");  // what it was
+  type("99");  // the old value
   press(ImGuiKey_Enter);
   EXPECT_EQ(state_.settings.surfaces[0].isovalue, 99);
   type("nonsense");
@@ -229,7 +229,7 @@ TEST_F(Panels, WhatIsTypedGoesToItsOwnFieldOrNone) {
 TEST_F(Panels, AMessageTakesNobodysFieldAway) {
   click(place_of({"Surfaces", "##isovalue"}, 0));
   ASSERT_TRUE(ImGui::GetIO().WantTextInput);
-  state_.say("something");
+  state_.show_message("something");
   for (int i = 0; i < 3; ++i) frame();
   EXPECT_TRUE(ImGui::GetIO().WantTextInput);
   press(ImGuiKey_Enter);
@@ -239,7 +239,8 @@ TEST_F(Panels, AMessageTakesNobodysFieldAway) {
 
 TEST_F(Panels, MessagesAreNotBehindThePanel) {
   ImGui::GetIO().DisplaySize = {1000, 800};
-  state_.say("one two three four five six seven eight nine ten eleven twelve thirteen fourteen");
+  state_.show_message(
+      "one two three four five six seven eight nine ten eleven twelve thirteen fourteen");
   frame();
   frame();
   const ImGuiWindow* messages = ImGui::FindWindowByName("Messages");
@@ -276,7 +277,7 @@ TEST_F(Panels, ListsOfChannelsAndTimesChooseAnotherVolume) {
   EXPECT_EQ(state_.requests.volume->time, 4);
   choose("Channel", 0);
   EXPECT_FALSE(state_.requests.volume) << "it is shown";
-  // The list of times begins with the one that is shown.
+  // The list of times starts at the shown one.
   choose("Time", 2);
   ASSERT_TRUE(state_.requests.volume);
   EXPECT_EQ(state_.requests.volume->time, 6);
@@ -342,7 +343,7 @@ TEST_F(Panels, GrowWithTheFont) {
 
 TEST_F(Panels, MessagesGoAwayUnlessSomebodyReadsThem) {
   state_.message_time = std::chrono::milliseconds(50);
-  state_.say("something");
+  state_.show_message("something");
   frame();
   frame();
   state_.drop_old_messages();
@@ -376,20 +377,20 @@ TEST_F(Panels, HelpShowsKeysAndCloses) {
 }
 
 TEST_F(Panels, TheStatusNamesBricks) {
-  EXPECT_EQ(state_.picture->scene().stream().bricks_wanted(), 0u) << "all are there";
+  EXPECT_EQ(state_.scene_renderer->scene().stream().missing_bricks(), 0u) << "all are there";
   // One thread, and a cut of many bricks.
   open(SynthKind::gyroid, {200, 200, 200}, {.threads = 1});
-  const SceneStream& stream = picture_->scene().stream();
+  const SceneStream& stream = scene_renderer_->scene().stream();
   const auto all = static_cast<std::uint64_t>(7 * 7 * 7);
-  picture_->scene().update({settings_.surfaces[0].isovalue},
-                           view_of(camera_, kWidth, kHeight, settings_.pixel_error), {});
-  const std::uint64_t most = stream.bricks_wanted();
+  scene_renderer_->scene().update({settings_.surfaces[0].isovalue},
+                                  view_of(camera_, kWidth, kHeight, settings_.pixel_error), {});
+  const std::uint64_t most = stream.missing_bricks();
   EXPECT_GT(most, all / 4);
   EXPECT_LE(most, 2 * all) << "each counts once";
   do {
-    picture_->draw(camera_, kWidth, kHeight, settings_);
-  } while (!picture_->state().complete);
-  EXPECT_EQ(stream.bricks_wanted(), 0u);
+    scene_renderer_->draw(camera_, kWidth, kHeight, settings_);
+  } while (!scene_renderer_->state().complete);
+  EXPECT_EQ(stream.missing_bricks(), 0u);
 }
 
 }  // namespace

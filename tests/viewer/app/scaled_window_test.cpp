@@ -7,14 +7,14 @@
 #include "tests/viewer/app/window_test.h"
 #include "viewer/app/panels.h"
 
-// Displays on which everything is to be larger.
+// Displays with a scale.
 
 namespace isobrick {
 namespace {
 
 using ScaledDisplay = test::WindowTest;
 
-/// How many pixels of the picture of a window, as large on every display, axes and scale bar take.
+/// Number of pixels of axes and scale bar, in a window of the same size on each display.
 int pixels_of_overlays(const std::string& store, int dots_per_inch) {
   const VirtualDisplay display(1000, 700, dots_per_inch);
   WindowOptions options;
@@ -29,11 +29,11 @@ int pixels_of_overlays(const std::string& store, int dots_per_inch) {
     window.state().settings.axes = window.state().settings.scale_bar = overlays;
     for (int i = 0; i < 500; ++i) {
       window.step(0.02);
-      const PictureState& state = window.state().picture->state();
-      if (i > 20 && state.complete && !state.moving && !state.plain) break;
+      const FrameState& state = window.state().scene_renderer->state();
+      if (i > 20 && state.complete && !state.moving && !state.reduced_quality) break;
     }
-    EXPECT_EQ(window.state().picture->renderer().width(), 800);
-    return window.state().picture->renderer().read_pixels();
+    EXPECT_EQ(window.state().scene_renderer->renderer().width(), 800);
+    return window.state().scene_renderer->renderer().read_pixels();
   };
   const auto with = picture(true), without = picture(false);
   int pixels = 0;
@@ -47,8 +47,8 @@ TEST_F(ScaledDisplay, AxesAndScaleBarGrowWithTheDisplay) {
   const int one = pixels_of_overlays(dir_ / "sphere.zarr", 96),
             two = pixels_of_overlays(dir_ / "sphere.zarr", 192);
   EXPECT_GT(one, 400);
-  // As high as a 45th of the picture, which is 13 pixels, or twice 11 of them: lines and text
-  // are 1.65 times as large in both directions, but for the bar's length.
+  // Text is a 45th of the picture high, 13 pixels, and at least 11 times the scale: so lines and
+  // text are 1.65 times as large in both directions, except for the bar's length.
   EXPECT_GT(two, 1.8 * one);
 }
 

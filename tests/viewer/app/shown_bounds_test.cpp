@@ -2,38 +2,38 @@
 
 #include <algorithm>
 
-#include "tests/viewer/app/picture_test.h"
+#include "tests/viewer/app/scene_renderer_fixture.h"
 
-// How fine a picture is at most, and what it frames.
+// The finest level of a picture, and its framing.
 
 namespace isobrick {
 namespace {
 
-using ShownBounds = Picture;
+using ShownBounds = SceneRendererTest;
 
 TEST_F(ShownBounds, ShowsNoFinerLevelThanItsSettingsSay) {
   open(SynthKind::gyroid, {128, 128, 128});
   settings_.pixel_error = 0.1f;
   draw();
-  const double finest = static_cast<double>(picture_->state().triangles);
-  const auto levels = static_cast<int>(picture_->store().info().levels.size());
+  const double finest = static_cast<double>(scene_renderer_->state().triangles);
+  const auto levels = static_cast<int>(scene_renderer_->store().info().levels.size());
   ASSERT_GE(levels, 3);
   for (int level = 1; level <= levels + 3; ++level) {
     settings_.finest_level = level;
     draw();
-    EXPECT_TRUE(picture_->state().complete);
-    const NodeGrid& grid = picture_->scene().tree().grid();
-    for (const CutNode& node : picture_->scene().cut().nodes)
+    EXPECT_TRUE(scene_renderer_->state().complete);
+    const NodeGrid& grid = scene_renderer_->scene().tree().grid();
+    for (const CutNode& node : scene_renderer_->scene().cut().nodes)
       EXPECT_EQ(grid.level(node.key.level).source, std::min(level, levels - 1));
-    EXPECT_LT(static_cast<double>(picture_->state().triangles), 0.4 * finest) << level;
+    EXPECT_LT(static_cast<double>(scene_renderer_->state().triangles), 0.4 * finest) << level;
   }
 }
 
 TEST_F(ShownBounds, WhatIsShownHasBounds) {
   open(SynthKind::sphere, {96, 96, 96});
-  const WorldBox volume = picture_->bounds();
+  const WorldBox volume = scene_renderer_->bounds();
   settings_.surfaces[0].isovalue = 200;
-  const WorldBox ball = picture_->shown_bounds(settings_);
+  const WorldBox ball = scene_renderer_->shown_bounds(settings_);
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_GT(ball.lo[axis], volume.lo[axis]);
     EXPECT_LT(ball.hi[axis], volume.hi[axis]);
@@ -42,17 +42,17 @@ TEST_F(ShownBounds, WhatIsShownHasBounds) {
   // Within a region, and with a slice.
   settings_.region_on = true;
   settings_.region_hi = {0.5f, 1, 1};
-  EXPECT_EQ(picture_->shown_bounds(settings_).hi.x, 47.5);
+  EXPECT_EQ(scene_renderer_->shown_bounds(settings_).hi.x, 47.5);
   settings_.slices[2] = {true, 1};
-  const WorldBox sliced = picture_->shown_bounds(settings_);
+  const WorldBox sliced = scene_renderer_->shown_bounds(settings_);
   EXPECT_EQ(sliced.lo.x, 0);
   EXPECT_EQ(sliced.hi.x, 47.5);
   EXPECT_EQ(sliced.hi.z, 95);
   EXPECT_EQ(sliced.lo.z, ball.lo.z);
-  // All of the volume where there is nothing.
+  // The whole volume if nothing is shown.
   settings_.slices[2].shown = settings_.surfaces[0].shown = false;
-  EXPECT_EQ(picture_->shown_bounds(settings_).hi, volume.hi);
-  EXPECT_EQ(picture_->shown_bounds(settings_).lo, volume.lo);
+  EXPECT_EQ(scene_renderer_->shown_bounds(settings_).hi, volume.hi);
+  EXPECT_EQ(scene_renderer_->shown_bounds(settings_).lo, volume.lo);
 }
 
 }  // namespace

@@ -6,12 +6,12 @@
 #include <vector>
 
 #include <isobrick/volume_source.h>
-#include "tests/viewer/app/picture_test.h"
+#include "tests/viewer/app/scene_renderer_fixture.h"
 
 namespace isobrick {
 namespace {
 
-/// Rods along z, four samples thick: coarse levels have nothing of them.
+/// Rods along z, four samples thick: coarse levels lose them.
 class Rods final : public VolumeSource {
  public:
   Rods() {
@@ -32,10 +32,10 @@ class Rods final : public VolumeSource {
   VolumeInfo info_;
 };
 
-class ThinPreview : public Picture {
+class ThinPreview : public SceneRendererTest {
  protected:
   void SetUp() override {
-    Picture::SetUp();
+    SceneRendererTest::SetUp();
     if (IsSkipped()) return;
     Rods rods;
     NoProgress progress;
@@ -45,20 +45,20 @@ class ThinPreview : public Picture {
     settings_.box = settings_.axes = settings_.scale_bar = false;
     settings_.occlusion = settings_.multisample = false;
   }
-  /// What is drawn for 2,000 triangles while the view moves, when all of it is there.
+  /// Draws a preview of 2,000 triangles with all meshes resident.
   std::vector<std::uint8_t> preview(std::uint64_t thin_triangles) {
     const FrameOptions options{.max_triangles = 2'000,
                                .thin_triangles = thin_triangles,
-                               .plain = FrameOptions::Plain::yes,
+                               .quality = FrameOptions::Quality::reduced,
                                .moving = true};
-    for (int i = 0; i < 20; ++i) {  // each finer cut is one of meshes of the one before
-      picture_->draw(camera_, kWidth, kHeight, settings_, options);
-      picture_->scene().stream().wait_idle(10);
+    for (int i = 0; i < 20; ++i) {  // each cut refines the previous one's nodes
+      scene_renderer_->draw(camera_, kWidth, kHeight, settings_, options);
+      scene_renderer_->scene().stream().wait_idle(10);
     }
-    EXPECT_TRUE(picture_->state().moving);
-    EXPECT_FALSE(picture_->state().complete) << "a preview never is";
-    EXPECT_TRUE(picture_->state().limited);
-    return picture_->renderer().read_pixels();
+    EXPECT_TRUE(scene_renderer_->state().moving);
+    EXPECT_FALSE(scene_renderer_->state().complete) << "a preview never is";
+    EXPECT_TRUE(scene_renderer_->state().limited);
+    return scene_renderer_->renderer().read_pixels();
   }
   static std::size_t different(const std::vector<std::uint8_t>& a,
                                const std::vector<std::uint8_t>& b) {
@@ -79,29 +79,29 @@ TEST_F(ThinPreview, HasWhatCoarseLevelsHaveLost) {
   const std::size_t rods = different(whole, nothing);
   ASSERT_GT(rods, kWidth * kHeight / 20u);
   EXPECT_LT(different(preview(0), nothing), rods / 20);
-  EXPECT_FALSE(picture_->state().thin);
+  EXPECT_FALSE(scene_renderer_->state().thin_over_budget);
   EXPECT_GT(different(preview(FramePacer::kThinTriangles), nothing), rods * 6 / 10)
       << "a coarse rod is thinner";
-  EXPECT_TRUE(picture_->state().thin);
-  EXPECT_LE(picture_->state().triangles, FramePacer::kThinTriangles);
+  EXPECT_TRUE(scene_renderer_->state().thin_over_budget);
+  EXPECT_LE(scene_renderer_->state().triangles, FramePacer::kThinTriangles);
   EXPECT_EQ(pixels(), whole) << "previews change nothing of it";
 }
 
-/// Previews are shown larger: what is thin is looked for as in the picture that they are shown as.
+/// Previews are enlarged: thin structure is searched for at the size that is shown.
 TEST_F(ThinPreview, HasItInASmallerPictureAsWell) {
   FrameOptions options{.max_triangles = 2'000,
                        .thin_triangles = FramePacer::kThinTriangles,
-                       .plain = FrameOptions::Plain::yes,
+                       .quality = FrameOptions::Quality::reduced,
                        .moving = true};
   const auto finest = [&] {
     for (int i = 0; i < 20; ++i) {
-      picture_->draw(camera_, kWidth / 4, kHeight / 4, settings_, options);
-      picture_->scene().stream().wait_idle(10);
+      scene_renderer_->draw(camera_, kWidth / 4, kHeight / 4, settings_, options);
+      scene_renderer_->scene().stream().wait_idle(10);
     }
-    return picture_->state().triangles;
+    return scene_renderer_->state().triangles;
   };
   const std::uint64_t as_it_is = finest();
-  options.smaller = 4;
+  options.size_divisor = 4;
   EXPECT_GT(finest(), as_it_is + 10'000);
 }
 

@@ -29,11 +29,11 @@ constexpr int kFieldRow = 155;  ///< of the first isovalue, on the panel
 
 TEST_F(Window, ShowsAStore) {
   ViewerWindow& window = open();
-  // The first picture may be a simple one.
-  until([&] { return window.state().picture->state().triangles > 1000u; });
+  // The first picture may be a preview.
+  until([&] { return window.state().scene_renderer->state().triangles > 1000u; });
   EXPECT_TRUE(window.state().messages.empty());
   // The middle of the picture shows the sphere, its corner nothing.
-  Renderer& renderer = window.state().picture->renderer();
+  Renderer& renderer = window.state().scene_renderer->renderer();
   EXPECT_TRUE(renderer.pick(renderer.width() / 2, renderer.height() / 2));
   EXPECT_FALSE(renderer.pick(2, 2));
 }
@@ -43,7 +43,7 @@ TEST_F(Window, DragsMoveTheCameraAndSpinsRunOut) {
   const Vec3d eye = window.state().navigator.camera.eye;
   drag(1, 300, 240, 400, 260);
   EXPECT_GT(length(window.state().navigator.camera.eye - eye), 1);
-  until([&] { return !window.state().navigator.moving(); });
+  until([&] { return !window.state().navigator.is_moving(); });
   const double distance = window.state().navigator.camera.distance();
   display_->button(4, true);
   display_->button(4, false);
@@ -57,22 +57,22 @@ TEST_F(Window, DragsMoveTheCameraAndSpinsRunOut) {
 TEST_F(Window, KeysMoveTheIsovalueAndThePictureFollows) {
   ViewerWindow& window = open();
   const double before = window.state().settings.surfaces[0].isovalue;
-  const auto triangles = window.state().picture->state().triangles;
+  const auto triangles = window.state().scene_renderer->state().triangles;
   for (int i = 0; i < 8; ++i) {
     display_->tap(XK_bracketright);
     steps(1);
   }
   until([&] {
     return window.state().settings.surfaces[0].isovalue > before &&
-           window.state().picture->state().complete;
+           window.state().scene_renderer->state().complete;
   });
-  EXPECT_NE(window.state().picture->state().triangles, triangles);
+  EXPECT_NE(window.state().scene_renderer->state().triangles, triangles);
 }
 
 TEST_F(Window, TheSliderMovesTheIsovalue) {
   ViewerWindow& window = open();
   window.state().panels = true;
-  until([&] { return window.state().facts->histogram() != nullptr; });
+  until([&] { return window.state().isovalue_stats->histogram() != nullptr; });
   steps(3);
   const double before = window.state().settings.surfaces[0].isovalue;
   drag(1, 100, 80, 220, 80);  // within the histogram, on the panel
@@ -81,23 +81,23 @@ TEST_F(Window, TheSliderMovesTheIsovalue) {
 
 TEST_F(Window, KeysCutTheVolume) {
   ViewerWindow& window = open();
-  const Renderer& renderer = window.state().picture->renderer();
+  const Renderer& renderer = window.state().scene_renderer->renderer();
   const auto whole = renderer.read_pixels();
   display_->tap(XK_1);
-  until([&] { return window.state().settings.cuts[0].on; });
-  until([&] { return window.state().picture->state().complete; });
+  until([&] { return window.state().settings.axis_clips[0].on; });
+  until([&] { return window.state().scene_renderer->state().complete; });
   steps(2);
   EXPECT_NE(renderer.read_pixels(), whole);
 }
 
-/// Where pictures in motion are as good as those at rest, none is drawn again.
+/// If previews have full quality, no still frame is drawn after them.
 TEST_F(Window, RestsAfterMotionThatLeftNothingOut) {
   ViewerWindow& window = open();
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   window.state().pacer = FramePacer(10);
   drag(1, kWidth / 2, kHeight / 2, kWidth / 2 + 60, kHeight / 2);
-  until([&] { return !window.state().navigator.moving(); });
-  until([&] { return rests(); });
+  until([&] { return !window.state().navigator.is_moving(); });
+  until([&] { return is_still(); });
 }
 
 TEST_F(Window, KeysThatAreHeldDoMostThingsOnce) {
@@ -114,14 +114,14 @@ TEST_F(Window, KeysThatAreHeldDoMostThingsOnce) {
   hold(XK_b);
   EXPECT_NE(window.state().settings.box, box);
   hold(XK_bracketright);
-  const double step = window.state().facts->counts().range().hi / 200;
+  const double step = window.state().isovalue_stats->counts().range().hi / 200;
   EXPECT_GT(window.state().settings.surfaces[0].isovalue, isovalue + 2.5 * step);
 }
 
 TEST_F(Window, KeysThatComeAtOnceAreTyped) {
   ViewerWindow& window = open();
   window.state().panels = true;
-  until([&] { return window.state().facts->histogram() != nullptr; });
+  until([&] { return window.state().isovalue_stats->histogram() != nullptr; });
   steps(3);
   display_->key(XK_Control_L, true);
   click(140, kFieldRow);  // the field of the isovalue, all of it selected
@@ -142,41 +142,45 @@ TEST_F(Window, SaysWhatIsDamaged) {
     file.write("damage", 6);
   }
   window.open(dir_ / "damaged.zarr");
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   steps(3);
-  ASSERT_FALSE(window.state().picture->state().damage.empty());
-  const auto is_said = [&](const std::string& text) {
+  ASSERT_FALSE(window.state().scene_renderer->state().damage.empty());
+  const auto has_message = [&](const std::string& text) {
     return std::any_of(window.state().messages.begin(), window.state().messages.end(),
                        [&](const Message& message) { return message.text.find(text) == 0; });
   };
-  EXPECT_TRUE(is_said(window.state().picture->state().damage[0]));
-  until([&] { return is_said("the histogram lacks bricks that cannot be read, 1 of level 0: "); });
-  EXPECT_NE(window.state().facts->histogram(), nullptr);
-  const std::size_t said = window.state().messages.size();
+  EXPECT_TRUE(has_message(window.state().scene_renderer->state().damage[0]));
+  until([&] {
+    return has_message("the histogram lacks bricks that cannot be read, 1 of level 0: ");
+  });
+  EXPECT_NE(window.state().isovalue_stats->histogram(), nullptr);
+  const std::size_t shown = window.state().messages.size();
   window.state().messages.clear();
   window.state().settings.edges = true;
   steps(5);
-  EXPECT_TRUE(window.state().messages.empty()) << "said once";
-  EXPECT_LE(said, 5u);
+  EXPECT_TRUE(window.state().messages.empty()) << "shown once";
+  EXPECT_LE(shown, 5u);
 }
 
 TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   ViewerWindow& window = open();
   window.state().panels = true;
   steps(3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   EXPECT_LE(window.state().panel_width, 0.6f * kWidth + 1);
-  EXPECT_EQ(window.state().picture->renderer().width(), kWidth)
+  EXPECT_EQ(window.state().scene_renderer->renderer().width(), kWidth)
       << "a panel of more than half is over it";
   ImGui::SetWindowSize("###panel", {250, static_cast<float>(kHeight)});
   display_->move_pointer(kWidth / 2, 20);  // nothing is drawn before something happens
   steps(3);
-  until([&] { return rests() && window.state().picture->renderer().width() == kWidth - 250; });
-  EXPECT_EQ(window.state().picture->renderer().height(), kHeight);
-  // The middle of what is left shows the middle of the sphere, also for a click there.
+  until([&] {
+    return is_still() && window.state().scene_renderer->renderer().width() == kWidth - 250;
+  });
+  EXPECT_EQ(window.state().scene_renderer->renderer().height(), kHeight);
+  // The middle of the remaining area shows the middle of the sphere, also for a click.
   display_->tap(XK_r);
   steps(3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   click(250 + (kWidth - 250) / 2, kHeight / 2);
   ASSERT_TRUE(window.state().picked);
   const Vec3d middle{47.5, 47.5, 47.5};
@@ -201,11 +205,11 @@ TEST_F(Window, ThePictureHasWhatThePanelLeaves) {
   display_->tap(XK_r);
   display_->key(XK_Shift_L, false);
   steps(3);
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   EXPECT_TRUE(is_seen(0, 95));
   EXPECT_GT(camera.distance(), surface) << "the surface fills more of it";
   display_->tap(XK_h);
-  until([&] { return rests() && window.state().picture->renderer().width() == kWidth; });
+  until([&] { return is_still() && window.state().scene_renderer->renderer().width() == kWidth; });
 }
 
 TEST_F(Window, ShowsHelpForF1AndQuestionMark) {
@@ -224,7 +228,7 @@ TEST_F(Window, ShowsHelpForF1AndQuestionMark) {
 TEST_F(Window, ShowsNoFrameWhereNothingChanges) {
   ViewerWindow& window = open();
   window.state().panels = true;
-  until([&] { return rests() && window.state().facts->histogram() != nullptr; });
+  until([&] { return is_still() && window.state().isovalue_stats->histogram() != nullptr; });
   steps(20);
   const std::size_t before = window.state().frame_number;
   const std::clock_t used = std::clock();
@@ -257,40 +261,40 @@ TEST_F(Window, SurvivesOtherSizesAndNone) {
     glfwSetWindowSize(window.handle(), width, height);
     steps(6);
   }
-  until([&] { return window.state().picture->renderer().width() == kWidth; });
+  until([&] { return window.state().scene_renderer->renderer().width() == kWidth; });
   glfwHideWindow(window.handle());
   steps(5);
   glfwShowWindow(window.handle());
-  until([&] { return window.state().picture->state().complete; });
+  until([&] { return window.state().scene_renderer->state().complete; });
 }
 
 TEST_F(Window, DrawsNothingWhileItIsMinimised) {
   ViewerWindow& window = open();
-  until([&] { return rests(); });
+  until([&] { return is_still(); });
   display_->minimise(window.handle());
   until([&] { return glfwGetWindowAttrib(window.handle(), GLFW_ICONIFIED) == GLFW_TRUE; });
-  const std::uint64_t before = window.state().picture->counters().finished;
+  const std::uint64_t before = window.state().scene_renderer->counters().finished;
   window.state().settings.surfaces[0].isovalue -= 20;
   const auto start = std::chrono::steady_clock::now();
   steps(5);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-  EXPECT_EQ(window.state().picture->counters().finished, before);
+  EXPECT_EQ(window.state().scene_renderer->counters().finished, before);
   EXPECT_GT(spent.count(), 0.04) << "nor does it spin";
   display_->restore(window.handle());
-  until([&] { return rests() && window.state().picture->counters().finished > before; });
-  EXPECT_EQ(window.state().picture->state().isovalues[0],
+  until([&] { return is_still() && window.state().scene_renderer->counters().finished > before; });
+  EXPECT_EQ(window.state().scene_renderer->state().isovalues[0],
             window.state().settings.surfaces[0].isovalue);
 }
 
 TEST_F(Window, ClosesAtOnceWhileItStreams) {
   make_store("big.zarr", {320, 320, 320});
   double least = 1;
-  for (int i = 0; i < 4 && least > 0.1; ++i) {  // others may keep the cores busy
+  for (int i = 0; i < 4 && least > 0.1; ++i) {  // other processes may keep the cores busy
     ViewerWindow& window = open();
     window.open(dir_ / "big.zarr");
-    window.state().settings.pixel_error = 0.1f;  // much to do, also for pictures that may be coarse
+    window.state().settings.pixel_error = 0.1f;  // much to do, also for previews
     steps(2);
-    EXPECT_FALSE(window.state().picture->state().complete);
+    EXPECT_FALSE(window.state().scene_renderer->state().complete);
     const auto start = std::chrono::steady_clock::now();
     window_.reset();
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
@@ -304,54 +308,58 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
       make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}, .frequency = 4});
   NoProgress progress;
   convert(*source, dir_ / "many.zarr", {}, progress);
-  ViewerWindow& window = open({.piece_seconds = 0.01});
+  ViewerWindow& window = open({.batch_seconds = 0.01});
   window.open(dir_ / "many.zarr");
   window.state().settings.pixel_error = 0.2f;
-  const SceneRenderer& picture = *window.state().picture;
-  const auto rests = [&] { return picture.state().complete && !picture.state().plain; };
+  const SceneRenderer& scene_renderer = *window.state().scene_renderer;
+  const auto rests = [&] {
+    return scene_renderer.state().complete && !scene_renderer.state().reduced_quality;
+  };
   until(rests);
   steps(15);  // nothing moves any more
   until(rests);
-  // A picture at rest of the same view, with edges.
+  // A still frame of the same view, with edges.
   window.state().settings.edges = true;
   glfwPostEmptyEvent();
-  until([&] { return picture.state().drawing; });
-  const PictureCounters before = picture.counters();
+  until([&] { return scene_renderer.state().drawing; });
+  const FrameCounters before = scene_renderer.counters();
   const Vec3d eye = window.state().navigator.camera.eye;
-  // A pointer that does nothing to the view leaves it.
+  // Pointer motion without effect on the view keeps it.
   display_->move_pointer(kWidth / 2 + 5, kHeight / 2);
   steps(1);
-  EXPECT_EQ(picture.counters().dropped, before.dropped);
-  EXPECT_TRUE(picture.state().drawing) << "the test has too few triangles";
+  EXPECT_EQ(scene_renderer.counters().dropped, before.dropped);
+  EXPECT_TRUE(scene_renderer.state().drawing) << "the test has too few triangles";
   display_->button(1, true);
   steps(1);
-  EXPECT_EQ(picture.counters().finished, before.finished) << "the test has too few triangles";
+  EXPECT_EQ(scene_renderer.counters().finished, before.finished)
+      << "the test has too few triangles";
   display_->move_pointer(kWidth / 2 + 80, kHeight / 2 + 20);
   until([&] { return length(window.state().navigator.camera.eye - eye) > 1; });
-  // Where the pointer's way comes in parts, the next picture is dropped as well.
-  EXPECT_GT(picture.counters().dropped, before.dropped);
+  // If the motion arrives in parts, the next frame is dropped as well.
+  EXPECT_GT(scene_renderer.counters().dropped, before.dropped);
   display_->button(1, false);
   until(rests);
-  EXPECT_GT(picture.counters().finished, before.finished);
+  EXPECT_GT(scene_renderer.counters().finished, before.finished);
 }
 
 TEST_F(Window, ClosesWithinAPieceOfAPicture) {
   const auto source = make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}});
   NoProgress progress;
   convert(*source, dir_ / "many.zarr", {}, progress);
-  ViewerWindow& window = open({.piece_seconds = 0.01});
+  ViewerWindow& window = open({.batch_seconds = 0.01});
   window.open(dir_ / "many.zarr");
   window.state().settings.pixel_error = 0.2f;
-  const SceneRenderer& picture = *window.state().picture;
-  until([&] { return picture.state().complete && !picture.state().plain; });
+  const SceneRenderer& scene_renderer = *window.state().scene_renderer;
+  until([&] { return scene_renderer.state().complete && !scene_renderer.state().reduced_quality; });
   steps(15);
   window.state().settings.edges = !window.state().settings.edges;
   glfwPostEmptyEvent();
-  until([&] { return picture.state().drawing; });
-  const PictureCounters before = picture.counters();
+  until([&] { return scene_renderer.state().drawing; });
+  const FrameCounters before = scene_renderer.counters();
   glfwSetWindowShouldClose(window.handle(), GLFW_TRUE);
   EXPECT_FALSE(window.step());
-  EXPECT_EQ(picture.counters().pieces, before.pieces) << "no further piece is drawn";
+  EXPECT_EQ(scene_renderer.counters().unfinished_batches, before.unfinished_batches)
+      << "no further piece is drawn";
 }
 
 TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
@@ -361,26 +369,27 @@ TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
   ViewerWindow& window = open(options);
   window.open(dir_ / "big.zarr");
   window.state().settings.pixel_error = 0.5f;
-  const SceneRenderer& picture = *window.state().picture;
-  const SceneStream& stream = window.state().picture->scene().stream();
+  const SceneRenderer& scene_renderer = *window.state().scene_renderer;
+  const SceneStream& stream = window.state().scene_renderer->scene().stream();
   const auto opened = std::chrono::steady_clock::now();
   until([&] {
-    return picture.state().complete && !picture.drew() &&
+    return scene_renderer.state().complete && !scene_renderer.has_new_frame() &&
            std::chrono::steady_clock::now() - opened > std::chrono::milliseconds(400);
   });  // nothing moves any more
   int pauses = 0;
   for (int round = 0; round < 20 && pauses < 3; ++round) {
-    window.state().settings.surfaces[0].isovalue += 2;  // as nobody does who moves it
+    window.state().settings.surfaces[0].isovalue += 2;  // not reported as motion
     steps(1);
-    while (!picture.state().complete) {
-      const bool busy = picture.drew() || picture.state().drawing || picture.state().more;
+    while (!scene_renderer.state().complete) {
+      const bool busy = scene_renderer.has_new_frame() || scene_renderer.state().drawing ||
+                        scene_renderer.state().needs_draw;
       const auto start = std::chrono::steady_clock::now();
       steps(1);
       if (busy || stream.idle()) continue;  // the last mesh ends a pause
       ++pauses;
       EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(7));
     }
-    until([&] { return picture.state().complete && !picture.drew(); });
+    until([&] { return scene_renderer.state().complete && !scene_renderer.has_new_frame(); });
   }
   EXPECT_GE(pauses, 3);
 }
@@ -423,7 +432,7 @@ TEST_F(Window, MessagesMayComeWithAConversion) {
   window.state().import->cancel();
   until([&] { return window.state().import == nullptr; });
   steps(3);
-  window.state().say("some time after the conversion");
+  window.state().show_message("some time after the conversion");
   steps(3);
 }
 

@@ -12,7 +12,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
-// glfw3native.h wants headers of XRandR for it.
+// glfw3native.h needs headers of XRandR for this.
 extern "C" Window glfwGetX11Window(GLFWwindow* window);
 
 namespace isobrick {
@@ -22,7 +22,7 @@ struct VirtualDisplay::State {
   Display* display = nullptr;
   std::string before;
 
-  /// ICCCM 4.1.3.1: how a window learns that it is minimised.
+  /// ICCCM 4.1.3.1: tells a window that it is minimised.
   void set_state(Window window, long value) const {
     const Atom name = XInternAtom(display, "WM_STATE", False);
     const long state[] = {value, None};
@@ -66,7 +66,7 @@ VirtualDisplay::VirtualDisplay(int width, int height, int dots_per_inch)
   setenv("DISPLAY", name.c_str(), 1);
   state_->display = XOpenDisplay(nullptr);
   if (state_->display == nullptr) throw std::runtime_error("no connection to Xvfb");
-  // Where desktops say how large everything is to be; GLFW looks there.
+  // Desktops set the display's scale here; GLFW reads it.
   const std::string resources = "Xft.dpi:\t" + std::to_string(dots_per_inch) + "\n";
   XChangeProperty(state_->display, DefaultRootWindow(state_->display), XA_RESOURCE_MANAGER,
                   XA_STRING, 8, PropModeReplace,

@@ -7,7 +7,7 @@ struct GLFWwindow;
 
 namespace isobrick {
 
-/// A display without a screen (Xvfb) and hands for it (the XTEST extension). DISPLAY names it
+/// A display without a screen (Xvfb), with simulated input (the XTEST extension). DISPLAY names it
 /// while it lives.
 class VirtualDisplay {
  public:
@@ -20,13 +20,13 @@ class VirtualDisplay {
   /// Whether there is an Xvfb program.
   static bool available();
 
-  /// What a window manager does to minimise a window, and to bring it back.
+  /// Minimises a window, and restores it, as a window manager does.
   void minimise(GLFWwindow* window);
   void restore(GLFWwindow* window);
 
-  /// Keys go to the window under the pointer from now on, as there is no window manager.
+  /// Sends keys to the window under the pointer, as there is no window manager.
   void focus_under_pointer();
-  /// What the display shows there of a window: 0xRRGGBB.
+  /// The colour that the display shows at a pixel of a window: 0xRRGGBB.
   unsigned long pixel(GLFWwindow* window, int x, int y);
   void move_pointer(int x, int y);
   void button(int number, bool down);  ///< 1 left, 2 middle, 3 right, 4 and 5 the wheel

@@ -10,12 +10,12 @@
 namespace isobrick {
 namespace {
 
-/// Ways in which a window ends, or does not.
+/// How a window ends, or does not end.
 class WindowEnd : public test::WindowTest {
  protected:
   void TearDown() override { detail::cancel_requested = false; }
 
-  /// Something that takes a while to convert.
+  /// Writes a volume that takes some time to convert.
   void drop_much() {
     const std::string file = dir_.write("b_1024x1024x1024_uint8.raw", "");
     std::filesystem::resize_file(file, std::uintmax_t{1} << 30);
@@ -54,11 +54,11 @@ TEST_F(WindowEnd, PicturesReplaceNoOther) {
   ViewerWindow& window = open();
   const std::filesystem::path before = std::filesystem::current_path();
   std::filesystem::current_path(dir_ / "");
-  while (!window.state().picture->renderer().has_picture()) ASSERT_TRUE(window.step(0.02));
+  while (!window.state().scene_renderer->renderer().has_picture()) ASSERT_TRUE(window.step(0.02));
   for (std::size_t i = 0; i < 2; ++i) {
     window.state().requests.screenshot = "isobrick.png";
     const auto start = std::chrono::steady_clock::now();
-    // Of the picture at rest, and so when there is one.
+    // Saves the still frame, as soon as there is one.
     while (window.state().messages.size() <= i &&
            std::chrono::steady_clock::now() - start < std::chrono::seconds(60))
       ASSERT_TRUE(window.step(0.02));

@@ -21,7 +21,7 @@ namespace isobrick::test {
 
 inline constexpr int kWindowWidth = 640, kWindowHeight = 480;
 
-/// A window with a sphere, and hands.
+/// A window that shows a sphere, with simulated input.
 class WindowTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -44,7 +44,7 @@ class WindowTest : public testing::Test {
     window_ = std::make_unique<ViewerWindow>(options);
     window_->open(dir_ / "sphere.zarr");
     window_->state().panels = false;
-    until([&] { return window_->state().picture->state().complete; });
+    until([&] { return window_->state().scene_renderer->state().complete; });
     glfwSetWindowPos(window_->handle(), 0, 0);
     display_->move_pointer(kWindowWidth / 2, kWindowHeight / 2);
     display_->focus_under_pointer();
@@ -52,12 +52,12 @@ class WindowTest : public testing::Test {
     return *window_;
   }
 
-  /// Whether the picture shows all there is, and not one that may be coarse.
-  bool rests() const {
-    const PictureState& state = window_->state().picture->state();
+  /// Whether the window shows a complete still frame.
+  bool is_still() const {
+    const FrameState& state = window_->state().scene_renderer->state();
     return state.complete && !state.moving;
   }
-  /// Steps until it holds. A test that waits for nothing fails.
+  /// Steps until holds() is true; fails after a minute.
   void until(const std::function<bool()>& holds) {
     const auto start = std::chrono::steady_clock::now();
     while (!holds()) {

@@ -103,10 +103,10 @@ TEST(CameraText, NonsenseIsRefused) {
         "eye=1:2:3,target=1:2:3", "up=0:1:0,eye=1:2:3,target=1:9:3", "from=1:1:0,up=-2:-2:0",
         "from=1e-200:0:0"})
     message_of<UsageError>([&] { parse_camera(text); });
-  // Where the scene's centre is the target.
+  // The default target is the scene's centre.
   const CameraRequest centre = parse_camera("eye=0:0:0");
   message_of<UsageError>([&] { make_camera(centre, {-1, -1, -1}, {1, 1, 1}, 1); });
-  // From above something else is up.
+  // Seen from above, `up` is another axis.
   const Camera above = make_camera(parse_camera("from=0:0:1"), {-1, -1, -1}, {1, 1, 1}, 1);
   EXPECT_NEAR(above.back.z, 1, 1e-12);
 }
@@ -118,7 +118,7 @@ TEST(CameraMoves, OrbitKeepsDistanceAndAxes) {
   EXPECT_NEAR(camera.distance(), away, 1e-9);
   EXPECT_NEAR(dot(camera.up, camera.back), 0, 1e-12);
   EXPECT_NEAR(dot(camera.right, camera.right), 1, 1e-12);
-  // A ray through where a point is seen meets it.
+  // The ray through a projected point meets the point.
   const Vec3d point{0.3, 0.2, -0.4}, seen = camera.project(point, 300, 200);
   const WorldRay ray = camera.ray(seen.x, seen.y, 300, 200);
   const Vec3d v = point - ray.origin;

@@ -16,7 +16,7 @@
 namespace isobrick {
 namespace {
 
-/// A triangle in a picture from above.
+/// A picture of a triangle from above.
 MeshPictureRequest request_of(const std::vector<std::string>& paths) {
   MeshPictureRequest request{.width = 64, .height = 64};
   for (const std::string& path : paths) request.meshes.push_back({path, {}});
@@ -24,7 +24,7 @@ MeshPictureRequest request_of(const std::vector<std::string>& paths) {
   return request;
 }
 
-/// How many pixels are mostly red, green and blue.
+/// Numbers of pixels that are mostly red, green and blue.
 std::array<int, 3> pixels_by_colour(const MeshPicture& picture) {
   std::array<int, 3> count{};
   for (std::size_t i = 0; i < picture.rgba.size(); i += 4)
@@ -84,7 +84,7 @@ TEST(MeshPictures, UnitsOfSeveralMeshesBecomeThatOfTheFirst) {
 TEST(MeshPictures, AScaleBarIsTheSameLengthInAnyUnit) {
   if (!GlContext::available()) GTEST_SKIP() << "no OpenGL 4.5 without a window here";
   const TempDir dir;
-  // The same triangle twice: what the bar says must not depend on what the file measures in.
+  // The same triangle in two units: the bar's text must not depend on the file's unit.
   const std::string mm = dir.write("mm.obj", "# unit mm\nv 0 0 0\nv 2 0 0\nv 0 2 0\nf 1 2 3\n"),
                     um = dir.write("um.obj",
                                    "# unit um\nv 0 0 0\nv 2000 0 0\nv 0 2000 0\nf 1 2 3\n");
@@ -110,10 +110,10 @@ TEST(MeshPictures, ColoursOfVerticesAreDrawn) {
       MeshPictureRequest request{.width = 64, .height = 64};
       request.camera.elevation = 80;
       request.meshes = {{path, {.opacity = opacity}}};
-      if (cut) request.settings.planes = {{{0, 0, 1}, -1}};  // nothing of it goes
+      if (cut) request.settings.planes = {{{0, 0, 1}, -1}};  // clips nothing
       for (const int count : pixels_by_colour(draw_mesh_files(request, progress)))
         EXPECT_GT(count, 15) << opacity << cut;
-      // A colour that is asked for goes before.
+      // A requested colour overrides the vertex colours.
       request.meshes[0].style.vertex_colours = false;
       request.meshes[0].style.colour = {1, 0, 0};
       const std::array<int, 3> one = pixels_by_colour(draw_mesh_files(request, progress));

@@ -22,7 +22,7 @@ std::vector<Pixel> linear(const PngPicture& picture) {
   return pixels;
 }
 
-/// Along one direction; beyond the border the last pixel goes on.
+/// Filters along one direction; the border pixel is repeated.
 std::vector<Pixel> blurred(const std::vector<Pixel>& from, int width, int height, int dx, int dy) {
   constexpr std::array<double, 5> weights{1 / 16.0, 4 / 16.0, 6 / 16.0, 4 / 16.0, 1 / 16.0};
   std::vector<Pixel> to(from.size());

@@ -6,7 +6,7 @@
 namespace isobrick::test {
 namespace {
 
-/// Budgets hold where pictures are drawn, whatever OpenGL's driver keeps.
+/// Memory budgets hold for pictures, including OpenGL's driver.
 class PictureMemory : public ProgramTest {
  protected:
   void SetUp() override {
@@ -19,7 +19,7 @@ class PictureMemory : public ProgramTest {
 
   std::string store() const { return path("g.zarr"); }
 
-  /// Runs with a budget that is too small, then with the one that the message names: within it.
+  /// Runs with a budget that is too small, then within the one that the message names.
   void expect_least_holds(Arguments arguments, std::uint64_t most_mib) const {
     arguments.insert(arguments.end(), {"--force", "--memory", "64M"});
     const Outcome refused = run(arguments);

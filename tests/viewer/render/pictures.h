@@ -11,7 +11,7 @@
 
 namespace isobrick {
 
-/// Tests with a context of their own; skipped where there is no EGL.
+/// Tests with a context of their own; skipped without EGL.
 class RenderTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -31,7 +31,7 @@ class RenderTest : public ::testing::Test {
   std::optional<Renderer> renderer_;
 };
 
-/// What read_pixels gives, with its size.
+/// The result of read_pixels() with its size.
 struct Pixels {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgba;

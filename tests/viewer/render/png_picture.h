@@ -9,7 +9,7 @@
 
 namespace isobrick::test {
 
-/// A picture of a file.
+/// A picture read from a PNG file.
 struct PngPicture {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;  ///< rows from the top

@@ -52,7 +52,7 @@ TEST(PreviewSink, ABallIsARoundSpotInTheMiddle) {
   EXPECT_NEAR(across, down, 3);
   EXPECT_GT(down, 60);
   EXPECT_LT(down, 150);
-  // No hole: as many pixels as a disc has.
+  // No hole: as many pixels as in a disc.
   EXPECT_NEAR(area, 3.14159 / 4 * across * down, 0.03 * area);
 }
 
@@ -65,7 +65,7 @@ TEST(PreviewSink, LightComesFromAboveAndLeft) {
 
 TEST(PreviewSink, TheNearestIsSeenWhateverTheOrder) {
   const TestMesh ball = make_ball({0, 0, 0}, 1, 60);
-  // Between the eye and the ball, facing away: hides it, lit all the same.
+  // A back face between the eye and the ball hides the ball and is lit.
   const TestMesh front = make_ball({0.5f, -0.9f, 0.45f}, 0.2f, 30);
   const Picture one = draw({ball.chunk(), front.chunk()});
   const Picture other = draw({front.chunk(), ball.chunk()});
@@ -75,13 +75,13 @@ TEST(PreviewSink, TheNearestIsSeenWhateverTheOrder) {
     apart += difference > 0;
     most = std::max(most, difference);
   }
-  // Where both lie at the same depth, the first one is seen.
+  // At equal depth the first one is visible.
   EXPECT_LE(apart, 30);
   EXPECT_LE(most, 60);
   EXPECT_NE(one.rgb, draw({ball.chunk()}).rgb);
 }
 
-/// Also of a mesh of more triangles than are drawn at once, which is framed by the header's bounds.
+/// Also for a mesh of several batches, which is framed by the header's bounds.
 TEST(PreviewSink, HowAMeshIsDividedNeverShows) {
   const MeshHeader header{.has_normals = true,
                           .world_lo = {-1, -1, -1},
@@ -145,7 +145,7 @@ TEST(PreviewSink, UpIsUpAndRightIsRight) {
   EXPECT_FALSE(lying.surface(100 - 70, 80));
 }
 
-/// Pixels from the first to the last column and row that show the surface.
+/// Width and height of the surface in pixels.
 std::pair<int, int> spot(const Picture& picture) {
   int left = picture.width, right = -1, top = picture.height, bottom = -1;
   for (int y = 0; y < picture.height; ++y)
@@ -168,7 +168,7 @@ TEST(PreviewSink, FramesTheMeshAndNotTheVolume) {
   }
 }
 
-/// The first triangles of a large mesh are drawn before the last ones are there.
+/// The first triangles of a large mesh are drawn before the last ones arrive.
 TEST(PreviewSink, FramesALargeMeshByWhatItPassesThrough) {
   MeshHeader header{true, {-1, -1, -1}, {1, 1, 1}};
   const TestMesh ball = make_ball({0.5f, 0.5f, 0.5f}, 0.1f, 300);

@@ -25,7 +25,7 @@ class RenderCommand : public ProgramTest {
 TEST_F(RenderCommand, TheScaleBarHasTheUnitOfTheMesh) {
   const std::string um = triangle("um.obj", "um"), none = triangle("none.obj", "");
   EXPECT_EQ(run_json(render({um, "--scale-bar"}))["unit"], "micrometer");
-  // A mesh behind an option without its value is no unit.
+  // A mesh after an option that lacks its value is not taken for a unit.
   EXPECT_EQ(run_json(render({"--scale-bar", um}))["unit"], "micrometer");
   for (const char* unit : {"auto", "km", "micrometer", "µm", "inches"})
     EXPECT_EQ(run(render({"--scale-bar", unit, um})).exit_code, 0) << unit;

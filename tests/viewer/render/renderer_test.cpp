@@ -30,7 +30,7 @@ TEST_F(RenderTest, ABallIsADiscOfTheRightSize) {
   renderer().draw(mesh, {});
   renderer().end();
   const Pixels pixels(renderer());
-  // Rays that touch the ball leave the eye at asin(1 / distance).
+  // Rays tangent to the ball leave the eye at asin(1 / distance).
   const double angle = std::asin(1 / camera.distance());
   const double radius = std::tan(angle) / (camera.extent_at(1) / 160);
   EXPECT_NEAR(pixels.count_surface(), 3.14159265 * radius * radius, 0.02 * 3.14 * radius * radius);
@@ -43,7 +43,7 @@ TEST_F(RenderTest, PickingTellsPlaceAndMesh) {
   renderer().begin(front_camera(1.25), 200, 160, {.picking = true});
   renderer().draw(ball.chunk(), {.id = 7});
   renderer().end();
-  const std::optional<Picked> picked = renderer().pick(110, 60);
+  const std::optional<PickResult> picked = renderer().pick(110, 60);
   ASSERT_TRUE(picked);
   EXPECT_EQ(picked->id, 7u);
   const Vec3d p = picked->position;
@@ -54,12 +54,12 @@ TEST_F(RenderTest, PickingTellsPlaceAndMesh) {
   EXPECT_FALSE(renderer().pick(-1, 80));
 }
 
-double distance_from_middle(const Picked& picked) {
+double distance_from_middle(const PickResult& picked) {
   const Vec3d p = picked.position;
   return std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
 }
 
-/// A small opaque ball in a transparent one in a larger, and beside them nothing.
+/// A small opaque ball in a transparent one in a larger one; else background.
 TEST_F(RenderTest, TransparentMeshesCanBePicked) {
   const TestMesh small = make_ball({0, 0, 0}, 0.3f, 100), middle = make_ball({0, 0, 0}, 0.6f, 100),
                  large = make_ball({0, 0, 0}, 1, 200);
@@ -70,19 +70,19 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
         Camera camera = front_camera(1.25);
         camera.orthographic = orthographic;
         PictureSettings settings{.multisample = multisample, .picking = true};
-        // Away with the near half of the large ones.
+        // Clips the near half of the large balls.
         if (cut) settings.planes = {{{0, 1, 0}, -0.31}};
         renderer().begin(camera, 200, 160, settings);
         renderer().draw(small.chunk(), {.id = 3});
         renderer().draw(large.chunk(), {.opacity = 0.2f, .id = 5});
         renderer().draw(middle.chunk(), {.opacity = 0.2f, .id = 4});
         renderer().end();
-        const std::optional<Picked> picked = renderer().pick(100, 80);
+        const std::optional<PickResult> picked = renderer().pick(100, 80);
         ASSERT_TRUE(picked);
         EXPECT_EQ(picked->id, cut ? 3u : 5u);
         EXPECT_NEAR(distance_from_middle(*picked), cut ? 0.3 : 1, 2e-3);
         EXPECT_FALSE(renderer().pick(3, 3));
-        // The next picture has none.
+        // The next picture has no transparent meshes.
         renderer().begin(camera, 200, 160, settings);
         renderer().draw(small.chunk(), {.id = 3});
         renderer().end();
@@ -91,7 +91,8 @@ TEST_F(RenderTest, TransparentMeshesCanBePicked) {
       }
 }
 
-/// Triangles that cover a part of a pixel are picked where they are, not where their plane is.
+/// Triangles that cover a part of a pixel are picked at their own depth, not at that of their
+/// plane.
 TEST_F(RenderTest, TransparentEdgesArePickedOnTheSurface) {
   for (const bool orthographic : {false, true})
     for (const int segments : {30, 100}) {
@@ -112,7 +113,7 @@ TEST_F(RenderTest, TransparentEdgesArePickedOnTheSurface) {
     }
 }
 
-/// Pixels that are as blue as the z axis.
+/// Number of pixels with the blue of the z axis.
 template <class Rgba>
 int count_blue(const Rgba& rgba) {
   int blue = 0;
@@ -123,8 +124,8 @@ int count_blue(const Rgba& rgba) {
 
 TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   constexpr int kWidth = 400, kHeight = 320;
-  const auto draw = [&](int smaller, const PictureSettings& settings) {
-    renderer().begin(front_camera(1.25), kWidth / smaller, kHeight / smaller, settings);
+  const auto draw = [&](int size_divisor, const PictureSettings& settings) {
+    renderer().begin(front_camera(1.25), kWidth / size_divisor, kHeight / size_divisor, settings);
     renderer().draw(make_ball({0, 0, 0}, 0.5f, 60).chunk(), {});
     renderer().draw_box({-1, -1, -1}, {1, 1, 1}, {0.1f, 0.1f, 0.9f}, 3);
     renderer().draw_axes();
@@ -134,7 +135,7 @@ TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   draw(1, {});
   const int wanted = count_blue(renderer().read_pixels());
   EXPECT_GT(wanted, 500);
-  draw(4, {.overlays_later = true});
+  draw(4, {.defer_overlays = true});
   EXPECT_EQ(count_blue(renderer().read_pixels()), 0);
   const GlTexture shown = make_texture(GL_RGBA8, kWidth, kHeight, 1, "a window");
   const GlFramebuffer window = make_framebuffer(std::array{shown.get()}, 0, "a window");
@@ -143,15 +144,15 @@ TEST_F(RenderTest, OverlaysOfASmallPictureAreAsLargeAsWhatShowsIt) {
   glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
                     rgba.data());
   EXPECT_NEAR(count_blue(rgba), wanted, 0.03 * wanted);
-  // What hides them hides them, too, where the picture has fewer pixels.
-  draw(1, {.overlays_later = true});
+  // Surfaces also hide them if the picture has fewer pixels.
+  draw(1, {.defer_overlays = true});
   renderer().copy_to(window.get(), kWidth, kHeight);
   glGetTextureImage(shown.get(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<int>(rgba.size()),
                     rgba.data());
   EXPECT_EQ(count_blue(rgba), wanted);
 }
 
-/// Width and height of what differs between the columns `from` and `to`.
+/// Width and height of the difference between the columns `from` and `to`.
 std::array<int, 2> extent_of_difference(const Pixels& a, const Pixels& b, int from, int to) {
   int left = to, right = from - 1, top = a.height, bottom = -1;
   for (int y = 0; y < a.height; ++y)
@@ -183,7 +184,7 @@ TEST_F(RenderTest, OverlaysAreTwiceAsLargeOnADisplayOfTwiceTheScale) {
   EXPECT_GT(axes[0], 25);
   EXPECT_NEAR(axes_2[0], 2 * axes[0], 3);
   EXPECT_NEAR(axes_2[1], 2 * axes[1], 3);
-  // The bar is as long as the length that it shows, and twice as high with its text.
+  // The bar has the length that its text states; with its text it is twice as high.
   const auto bar = extent_of_difference(one, none, kWidth / 2, kWidth),
              bar_2 = extent_of_difference(two, none, kWidth / 2, kWidth);
   EXPECT_GT(bar[1], 12);
@@ -200,7 +201,7 @@ TEST_F(RenderTest, OverlaysAreTwiceAsLargeOnADisplayOfTwiceTheScale) {
   EXPECT_NEAR(blue(2), 2 * thin, 0.25 * thin);
 }
 
-/// What an opaque mesh hides is not picked through it.
+/// A mesh behind an opaque mesh is not picked.
 TEST_F(RenderTest, TransparentMeshesBehindOpaqueOnesAreNotPicked) {
   const TestMesh near = make_ball({0, -0.5f, 0}, 0.15f, 100),
                  far = make_ball({0, 0.5f, 0}, 0.5f, 100);

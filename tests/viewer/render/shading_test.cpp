@@ -19,7 +19,7 @@ Camera front_camera() {
   return camera;
 }
 
-/// A grid of cells × cells in the plane y = `y`, of edge 2·half.
+/// A grid of cells × cells in the plane y = `y`, with edges of length 2·half.
 TestMesh make_sheet(float y, float half, std::uint32_t cells) {
   TestMesh mesh;
   for (std::uint32_t i = 0; i <= cells; ++i)
@@ -106,7 +106,7 @@ TEST_F(Shading, PlanesCutAndShowAnotherTone) {
   const Pixels half(renderer());
   EXPECT_TRUE(half.surface(80, 80));
   EXPECT_FALSE(half.surface(103, 80));
-  settings.planes = {{{0, 1, 0}, 0}};  // the back half stays: its inside is seen
+  settings.planes = {{{0, 1, 0}, 0}};  // the back half stays; its inside is visible
   renderer().begin(front_camera(), kWidth, kHeight, settings);
   renderer().draw(ball.chunk(), {.colour = {0.8f, 0.8f, 0.8f}, .inside = Vec3f{0, 0, 1}});
   renderer().end();
@@ -118,7 +118,7 @@ TEST_F(Shading, ARegionCutsAllSixSides) {
   const TestMesh sheet = make_sheet(0, 1, 20);
   PictureSettings settings;
   settings.region = WorldBox{{-0.5, -0.5, -0.25}, {0.5, 0.5, 0.25}};
-  // More half spaces than OpenGL clips by itself.
+  // More half spaces than OpenGL's clip distances.
   for (int i = 0; i < 4; ++i) settings.planes.push_back({{0, -1, 0}, -5});
   Camera camera = front_camera();
   camera.orthographic = true;
@@ -131,7 +131,7 @@ TEST_F(Shading, ARegionCutsAllSixSides) {
 }
 
 TEST_F(Shading, HollowsAreDarkerWithOcclusion) {
-  // A bowl: the back half of a ball, seen from within.
+  // A bowl: the back half of a ball, seen from inside.
   const TestMesh ball = make_ball({0, 0, 0}, 1, 60);
   int brightness[2];
   for (const bool occlusion : {false, true}) {
@@ -189,7 +189,7 @@ TEST_F(Shading, ASliceShowsItsSamplesThroughTheWindow) {
   EXPECT_LT(pixels.brightness(75, 105), 10);                // lower left: black
   EXPECT_GT(pixels.brightness(75, 55), 740);                // upper left: white
   EXPECT_NEAR(pixels.brightness(125, 105), 3 * 188, 12);    // half the light
-  EXPECT_GT(pixels.at(125, 55)[2], pixels.at(125, 55)[0]);  // nothing there
+  EXPECT_GT(pixels.at(125, 55)[2], pixels.at(125, 55)[0]);  // background
   slice.width = 3;
   EXPECT_THROW(renderer().draw(slice), Error);
 }

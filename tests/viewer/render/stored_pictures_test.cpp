@@ -14,8 +14,8 @@ Arguments operator+(Arguments a, const Arguments& b) {
   return a;
 }
 
-/// Pictures that the program draws, beside those of tests/render/pictures, which somebody
-/// has looked at. ISOBRICK_KEEP_PICTURES=1 in the environment stores them anew.
+/// Compares pictures that the program draws with those in tests/viewer/render/pictures, which were
+/// checked by eye. ISOBRICK_KEEP_PICTURES=1 in the environment stores new ones.
 class StoredPictures : public ProgramTest {
  protected:
   void SetUp() override {
@@ -42,7 +42,7 @@ class StoredPictures : public ProgramTest {
     return read_png(path("seen.png"));
   }
 
-  /// A surface in a PLY that has a unit, which made-up volumes lack.
+  /// A surface in a PLY with a unit, which synthetic volumes lack.
   static void write_millimetres(const std::string& store, const std::string& mesh) {
     run_json({"extract", store, "--isovalue", "127.5", "-o", mesh});
     std::string bytes = read_file(mesh);
@@ -53,7 +53,7 @@ class StoredPictures : public ProgramTest {
     return std::string(ISOBRICK_PICTURES) + "/" + name + ".png";
   }
 
-  /// Compares the picture that was drawn last.
+  /// Compares the last picture.
   void expect_stored(const std::string& name, const PngPicture& picture) {
     if (std::getenv("ISOBRICK_KEEP_PICTURES") != nullptr) {
       std::filesystem::copy_file(path("seen.png"), stored(name),
@@ -115,7 +115,7 @@ TEST_F(StoredPictures, WhatLooksDifferentIsNotTolerated) {
   expect_noticed(view(store, {"--isovalue", "127.5", "--colour", "#dec0b2"}), "a colour");
   expect_noticed(view(store, {"--isovalue", "127.5", "--no-occlusion"}), "no occlusion");
   expect_noticed(view(store, {"--isovalue", "127.5", "--camera", "azimuth=31"}), "a camera");
-  // A light that is 3 % weaker.
+  // The light 3 % weaker.
   PngPicture darker = right;
   for (std::uint8_t& v : darker.rgb) {
     const double linear = std::pow(v / 255.0, 2.2) * 0.97;
@@ -127,7 +127,7 @@ TEST_F(StoredPictures, WhatLooksDifferentIsNotTolerated) {
 TEST_F(StoredPictures, WhatDriversDifferByIsTolerated) {
   const PngPicture picture = view(volume("gyroid"), {"--isovalue", "127.5"});
   EXPECT_EQ(difference(picture, picture).mean, 0);
-  // Every colour rounded another way, and edges smoothed by half a pixel more.
+  // Each colour rounded differently, and edges smoothed by half a pixel more.
   PngPicture other = picture;
   for (int y = 0; y < picture.height; ++y)
     for (int x = 1; x < picture.width; ++x)

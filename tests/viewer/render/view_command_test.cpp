@@ -87,7 +87,7 @@ TEST_F(ViewPicture, FramesTheSurfaceAndNotTheVolume) {
             "--size", "300x200", "--plain"});
   for (const char* name : {"turn/0000.png", "turn/0001.png", "turn/0002.png"})
     expect_framed(read_png(path(name)));
-  // A slice is shown, too, and with nothing to be seen the volume is framed.
+  // A slice is framed, too; if nothing is visible, the volume is framed.
   const Rectangle with_slice = surface_of(view(store, {"--slice", "z:0.9"}));
   EXPECT_LT(with_slice.bottom - with_slice.top, 100);
   EXPECT_EQ(
@@ -144,7 +144,7 @@ TEST_F(ViewPicture, ARegionCountsTheSamplesOfTheLevel) {
   expect_refused(beyond, 2, {"81"});
 }
 
-/// A ball that is cut open shows its inner side darker, unless that is its outer one.
+/// A clipped ball shows its inside darker, unless `inside` makes that its outside.
 TEST_F(ViewPicture, InsideSaysWhichSideIsTheOuterOne) {
   const std::string store = small_ball();
   const auto brightness = [&](const Arguments& more) {

@@ -9,7 +9,7 @@
 
 namespace isobrick::test {
 
-/// By the nodes' ranges, one after the other.
+/// Tests the range of each node.
 inline ActiveNodes active_of(const NodeTree& tree, std::span<const double> isovalues) {
   const Int3 nodes = tree.grid().level(0).nodes;
   std::vector<std::uint64_t> finest(static_cast<std::size_t>(volume(nodes) + 63) / 64);

@@ -16,11 +16,11 @@ namespace {
 struct Shape {
   const char* name;
   std::function<double(Int3, Index)> field;
-  int levels = 0;                  ///< that are stored; 0: until one brick holds the coarsest
+  int levels = 0;                  ///< stored levels; 0: until one brick holds the coarsest
   std::vector<Int3> factors = {};  ///< of the pyramid; none: all axes are halved
 };
 
-/// Of a volume whose planes lie far apart, and of one whose axes take turns.
+/// Pyramids of a volume with distant planes, and of one whose axes are halved alternately.
 const std::vector<Int3> kFlat{{2, 2, 1}, {2, 2, 1}, {2, 2, 2}};
 const std::vector<Int3> kTurns{{1, 2, 1}, {2, 1, 1}, {1, 1, 2}, {2, 2, 2}};
 
@@ -60,8 +60,8 @@ class Cracks : public ::testing::TestWithParam<Shape> {
   NodeMesher mesher_;
 };
 
-/// Along every ray through a closed surface as many sheets face the eye as face
-/// away, and the first one faces it: whatever the cut and from wherever it is seen.
+/// Along each ray through a closed surface as many sheets face the eye as face away, and the first
+/// one faces it: for any cut and any direction of view.
 TEST_P(Cracks, AreNotBetweenLevels) {
   std::size_t covered = 0, unbalanced = 0, inside_seen = 0, seam_strips = 0;
   for (unsigned seed = 1; seed <= 6; ++seed) {
@@ -80,12 +80,12 @@ TEST_P(Cracks, AreNotBetweenLevels) {
   }
   EXPECT_GT(covered, 500000u);
   EXPECT_GT(seam_strips, 1000u) << "there are borders between levels";
-  // A vertex on a chord is on it to within float's rounding.
+  // A vertex lies on its chord to within the rounding of float.
   EXPECT_LE(unbalanced, covered / 100000);
   EXPECT_EQ(inside_seen, 0u);
 }
 
-/// What ends just before coarser nodes that have nothing.
+/// Surfaces that end just before coarser nodes without a surface.
 double beside_nothing(Int3 p, Index) {
   const auto ball_at = [&](Vec3d centre, double radius) {
     const Vec3d d =
@@ -97,10 +97,11 @@ double beside_nothing(Int3 p, Index) {
       {ball_at({100, 60, 60}, 26.6), ball_at({60, 101, 30}, 26.9), ball_at({40, 40, 112}, 15.4)});
 }
 
-/// Nodes of the finest level that do not meet what has nothing end nowhere either.
-class Nothing : public Cracks {};
+/// Nodes of the finest level that need not match a neighbour without a surface have no open edge
+/// there.
+class EmptyNeighbours : public Cracks {};
 
-TEST_P(Nothing, NeedsNotBeMet) {
+TEST_P(EmptyNeighbours, NeedNotBeMatched) {
   const ActiveNodes active = active_of(tree_, std::vector<double>{0});
   std::size_t covered = 0, unbalanced = 0, inside_seen = 0, unmet = 0;
   for (unsigned seed = 1; seed <= 12; ++seed) {
@@ -122,10 +123,10 @@ TEST_P(Nothing, NeedsNotBeMet) {
   EXPECT_EQ(inside_seen, 0u);
 }
 
-/// Of a shape that coarse levels have as well.
+/// A shape that coarse levels have as well.
 class Holes : public Cracks {};
 
-/// Where the finest mesh shows something all around, every cut shows something.
+/// Where the finest mesh covers a neighbourhood of pixels, each cut covers the pixel.
 TEST_P(Holes, AreNotInsideTheSilhouette) {
   constexpr int kCoarseCell = 8 * kPicture / (2 * 68);  // of the coarsest level, pixels
   Cut finest;
@@ -164,7 +165,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Shape{"ball_of_one_level", ball, 1}, Shape{"blobs_of_one_level", blobs, 1}),
     [](const auto& shape) { return shape.param.name; });
 
-INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, Nothing,
+INSTANTIATE_TEST_SUITE_P(ClosedSurfaces, EmptyNeighbours,
                          ::testing::Values(Shape{"balls", beside_nothing},
                                            Shape{"balls_flat", beside_nothing, 0, kFlat},
                                            Shape{"balls_of_one_level", beside_nothing, 1}),

@@ -44,9 +44,9 @@ class CutTest : public ::testing::Test {
   }
 };
 
-/// Every finest node's place belongs to one node of the cut, and neighbours differ
-/// by at most a level; masks say where, but for what is cut away, and for what has nothing beside
-/// the finest nodes.
+/// Each finest node belongs to one node of the cut, and neighbours differ by at most one level. The
+/// masks tell coarser neighbours, without those that are clipped or, beside the finest nodes, have
+/// no surface.
 void expect_sound(const NodeGrid& grid, const Cut& cut, const ActiveNodes& active) {
   std::map<std::tuple<Index, Index, Index>, NodeKey> owner;
   const Box3 finest{{0, 0, 0}, grid.level(0).nodes};
@@ -65,7 +65,7 @@ void expect_sound(const NodeGrid& grid, const Cut& cut, const ActiveNodes& activ
   for (const CutNode& node : cut.nodes) {
     const std::tuple key(node.key.level, node.key.node.x, node.key.node.y, node.key.node.z);
     masks[key] = node.coarser;
-    if (!node.cut_away) shown.insert(key);
+    if (!node.clipped) shown.insert(key);
   }
   std::map<std::tuple<int, Index, Index, Index>, std::uint32_t> expected;
   for_each_point(finest, [&](Int3 p) {
@@ -109,7 +109,7 @@ TEST_F(CutTest, NearNodesAreFinerAndWhatIsNotSeenStaysCoarse) {
   const NodeView seen(view, tree().grid());
   for (const CutNode& node : cut.nodes) {
     const bool crossed = active.below(node.key);
-    const NodeSight sight = seen.see(node.key);
+    const NodeSight sight = seen.sight(node.key);
     if (node.key.level > 0 && crossed && sight.visible) {
       EXPECT_LE(sight.pixels, 3.0);
     }
@@ -150,7 +150,7 @@ TEST_F(CutTest, IsTheSameEveryTimeAndStaysWhenTheCameraTrembles) {
   CutSelector selector(tree());
   Cut last = selector.select(active, look({150, 150, 500}, {150, 150, 150}, 2), {});
   int changes = 0;
-  // There and back a little: without memory each distance has its own cut.
+  // Moves back and forth a little: without hysteresis each distance would have its own cut.
   for (int i = 0; i < 40; ++i) {
     const double z = 440 + (i % 2 ? 5 : -5);
     const Cut cut = selector.select(active, look({150, 150, z}, {150, 150, 150}, 2), {});
@@ -183,19 +183,19 @@ TEST_F(CutTest, WhatPlanesCutAwayIsNotWanted) {
     const IndexBox box = tree().grid().box(node.key);
     bool any = box.hi.z >= 20;
     any &= kept.contains({box.hi.x, box.hi.y, 0});
-    EXPECT_EQ(node.cut_away, !any);
-    EXPECT_FALSE(node.cut_away && node.visible);
-    away += node.cut_away;
+    EXPECT_EQ(node.clipped, !any);
+    EXPECT_FALSE(node.clipped && node.visible);
+    away += node.clipped;
   }
   EXPECT_GT(away, cut.nodes.size() / 4);
-  double triangles = 0;  // takes no part of the budget either
+  double triangles = 0;  // not counted in the budget
   for (const CutNode& node : cut.nodes)
-    if (!node.cut_away)
+    if (!node.clipped)
       triangles += tree().active_blocks(node.key, 128) * CutBudget{}.triangles_per_block;
   EXPECT_NEAR(static_cast<double>(cut.triangles), triangles, 1);
 }
 
-/// A ball, and beside it a plate that averaging removes at level 1 already.
+/// A ball, and beside it a plate that is lost on level 1.
 std::uint8_t ball_and_plate(Int3 p) {
   if (p.x == 230 && p.y < 240 && p.z > 20) return 200;
   return p.x < 180 ? static_cast<std::uint8_t>(128 + ball(p, 180) / 3) : 0;
@@ -225,7 +225,7 @@ TEST(ThinStructure, ComesBeforeLongerCells) {
   EXPECT_GT(coarse, 0) << "all of it fits";
 }
 
-/// A coarse level of noise has nothing of it: that may not take what the rest needs.
+/// Noise is lost on each coarse level; it must not take the budget of the rest.
 TEST(ThinStructure, TakesNoMoreThanHalfOfABudget) {
   const auto noise = [](Int3 p) {
     const auto hash = static_cast<std::uint64_t>(p.x * 73856093 ^ p.y * 19349663 ^ p.z * 83492791);
@@ -259,7 +259,7 @@ TEST_F(CutTest, RefinesNoFurtherThanTheFinestLevelAskedFor) {
   EXPECT_FALSE(cut.limited_by_budget);
 }
 
-/// Ranges of a field that is known without samples: a store of 2048³ in no memory.
+/// Ranges of an analytic field: a store of 2048³ without samples.
 class LargeBall final : public BrickSource {
  public:
   LargeBall() {

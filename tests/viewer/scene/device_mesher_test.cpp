@@ -21,7 +21,7 @@ bool same_bytes(const PodBuffer<T>& a, const PodBuffer<T>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
 }
 
-/// Meshes of a device are those of this thread, byte for byte.
+/// A device makes the same bytes as this thread.
 class Device : public testing::Test {
  protected:
   void SetUp() override {
@@ -34,7 +34,7 @@ class Device : public testing::Test {
     ResidentBricks bricks(source, std::uint64_t{1} << 30);
     NodeMesher mesher(grid, bricks, {1, 2, 3});
     const double isovalue = cut.isovalues.front();
-    // All at once, so that grids of all kinds meet in what is made together.
+    // Requested together, so that one launch has grids of all kinds.
     std::vector<std::promise<NodeMesh>> made(cut.nodes.size());
     for (std::size_t i = 0; i < made.size(); ++i) {
       const CutNode& node = cut.nodes[i];
@@ -98,14 +98,13 @@ TEST_F(Device, MakesTheSameMeshesWhereTheVolumeEndsAndAxesDiffer) {
       options);
   const NodeGrid grid(source->info());
   for (unsigned seed = 1; seed < 3; ++seed) {
-    expect_same(source, RandomCut(grid, seed, 3).cut({100}));  // samples that are it
+    expect_same(source, RandomCut(grid, seed, 3).cut({100}));  // samples that equal the isovalue
     expect_same(source, RandomCut(grid, seed, 3).cut({100.25}));
   }
   EXPECT_GT(triangles_, 100'000u);
 }
 
-/// Every type that grids hold as it is stored, with blocks that are not needed and bricks that are
-/// absent.
+/// Every type of stored samples, with blocks that are not needed and absent bricks.
 template <class T>
 class DeviceOfType : public Device {};
 using StoredTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t>;

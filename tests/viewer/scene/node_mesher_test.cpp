@@ -47,7 +47,7 @@ Cut uniform_cut(const NodeGrid& grid, int level, double isovalue) {
   return cut;
 }
 
-/// One mesh of many: vertices at the same place, bit by bit, become one.
+/// Joins meshes: vertices at the same position, bit by bit, become one.
 testing::Mesh weld(const std::vector<NodeMesh>& meshes) {
   testing::Mesh whole;
   std::map<std::array<float, 3>, std::uint32_t> numbers;
@@ -70,7 +70,7 @@ testing::Mesh weld(const std::vector<NodeMesh>& meshes) {
   return whole;
 }
 
-/// Every side is there as often in one direction as in the other.
+/// Each edge occurs as often in one direction as in the other.
 bool closed(const testing::Mesh& mesh) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> forward, backward;
   for (const Triangle& t : mesh.triangles)
@@ -175,7 +175,7 @@ TEST(NodeMesher, HolesOfNaNAndAbsentBricksDoNotDisturbIt) {
   }
 }
 
-/// What a device makes of stored samples, made here.
+/// The mesh that a device makes of stored samples, made here.
 template <class T>
 void expect_the_mesh_of_stored_samples() {
   const Index n = 150;
@@ -238,7 +238,7 @@ TEST(NodeMesher, ValuesAreGivenWhereStoredSamplesWouldNotDo) {
 }
 
 TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
-  class Never final : public CancellationToken {
+  class AlwaysCancelled final : public CancellationToken {
    public:
     void check() const override { throw OperationCancelled(); }
   };
@@ -246,7 +246,7 @@ TEST(NodeMesher, SaysNothingAndThrowsWhenItIsAbandoned) {
   const NodeGrid grid(source->info());
   ResidentBricks bricks(source, 1 << 20);
   NodeMesher mesher(grid, bricks, {});
-  EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, Never()), OperationCancelled);
+  EXPECT_THROW(mesher.mesh({0, {0, 0, 0}}, 0, 0, AlwaysCancelled()), OperationCancelled);
 }
 
 template <class T>
@@ -256,9 +256,9 @@ bool same_bytes(const PodBuffer<T>& a, const PodBuffer<T>& b) {
                     [](const T& p, const T& q) { return std::memcmp(&p, &q, sizeof(T)) == 0; });
 }
 
-/// How many bricks of the finest level a mesher reads that has none, for the nodes of that level.
-/// Its meshes must have the bytes of those made where all bricks are there, and no brick be
-/// announced that is not read.
+/// Number of bricks of the finest level that a mesher without resident bricks reads for that
+/// level's nodes. Its meshes must equal those made with all bricks resident, and it must read each
+/// announced brick.
 std::uint64_t reads_of_same_meshes(const std::shared_ptr<MemoryBricks>& source, const Cut& cut) {
   const NodeGrid grid(source->info());
   ResidentBricks all(source, std::uint64_t{1} << 30), some(source, std::uint64_t{1} << 30);
@@ -310,7 +310,7 @@ TEST(NodeMesher, BesideWhatIsNoNumberTwoSidesMeetWithoutASurface) {
   const Index n = 150;
   const auto field = [&](Int3 p) {
     if (p.y > 70) return static_cast<float>(blobs(p, n));
-    // A plane of blocks' first samples: each block beside it has one side alone.
+    // A plane at the first samples of blocks: each adjacent block lies on one side.
     if (p.x == 48) return std::numeric_limits<float>::quiet_NaN();
     return p.x < 48 ? 5.0f : -5.0f;
   };

@@ -40,9 +40,9 @@ std::vector<std::vector<double>> queries(const NodeTree& tree) {
   return queries;
 }
 
-class Kinds : public testing::TestWithParam<IndexKind> {
+class IndexKinds : public testing::TestWithParam<IndexKind> {
  protected:
-  /// Compares with each node's range.
+  /// Compares the result with each node's range.
   void expect_right(const std::shared_ptr<const MemoryBricks>& source) {
     const auto tree = std::make_shared<const NodeTree>(*source);
     NodeSearch search(tree, source->info().type, kPlenty, {});
@@ -86,7 +86,7 @@ class Kinds : public testing::TestWithParam<IndexKind> {
   }
 };
 
-TEST_P(Kinds, FindWhatEachNodesRangeSays) {
+TEST_P(IndexKinds, FindWhatEachNodesRangeSays) {
   expect_right(waves<std::uint8_t>({330, 150, 200}, 60, 120));
   expect_right(waves<std::int16_t>({200, 260, 70}, 9000, -500));
   expect_right(waves<float>({330, 150, 200}, 0.37, 0.001));
@@ -94,7 +94,7 @@ TEST_P(Kinds, FindWhatEachNodesRangeSays) {
   expect_right(waves<std::uint8_t>({20, 9, 30}, 60, 120));  // one node
 }
 
-TEST_P(Kinds, MakeTheSameCuts) {
+TEST_P(IndexKinds, MakeTheSameCuts) {
   const auto source = waves<std::uint8_t>({330, 150, 200}, 60, 120);
   Scene plain(source, {.threads = 1}), other(source, {.threads = 1});
   other.search().use(GetParam());
@@ -117,7 +117,7 @@ TEST_P(Kinds, MakeTheSameCuts) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Kinds, testing::ValuesIn(kIndexKinds),
+INSTANTIATE_TEST_SUITE_P(All, IndexKinds, testing::ValuesIn(kIndexKinds),
                          [](const auto& kind) { return std::string(name_of(kind.param)); });
 
 TEST(NodeSearch, GoesOnAnsweringWhileItIsSwitched) {
@@ -134,7 +134,7 @@ TEST(NodeSearch, GoesOnAnsweringWhileItIsSwitched) {
   }
   search.use(IndexKind::quadtree);
   search.wait();
-  // What is taken back while it is built does not come after all.
+  // A request that is replaced while it is built does not take effect later.
   for (int i = 0; i < 20; ++i) {
     search.use(IndexKind::kdtree);
     std::this_thread::sleep_for(std::chrono::microseconds(20 * i));

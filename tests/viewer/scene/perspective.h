@@ -7,8 +7,8 @@
 
 namespace isobrick::test {
 
-/// The matrix of View for a camera that looks from `eye` at `target`. `fov_y` in radians; near and
-/// far are distances. Where `up` is along the view another direction is taken.
+/// The matrix of View for a camera at `eye` that looks at `target`. `fov_y`: radians; near and far:
+/// distances. If `up` is parallel to the view another direction is used.
 inline std::array<double, 16> perspective_view(Vec3d eye, Vec3d target, Vec3d up, double fov_y,
                                                double aspect, double near, double far) {
   const auto unit = [](Vec3d v) { return v * (1 / std::sqrt(dot(v, v))); };

@@ -16,7 +16,7 @@ inline bool has_node(const NodeGrid& grid, const NodeKey& n) {
          Box3{{0, 0, 0}, grid.level(n.level).nodes}.contains(n.node);
 }
 
-/// A balanced cut with `refinements` nodes refined at random, made the slow way.
+/// A balanced LOD cut with `refinements` nodes refined at random, by a slow and simple algorithm.
 class RandomCut {
  public:
   RandomCut(const NodeGrid& grid, unsigned seed, int refinements) : grid_(grid) {
@@ -28,7 +28,7 @@ class RandomCut {
     }
   }
 
-  /// With `active`, nodes of the finest level need not meet neighbours that have nothing.
+  /// With `active`, nodes of the finest level need not match neighbours without a surface.
   Cut cut(const std::vector<double>& isovalues, const ActiveNodes* active = nullptr) const {
     Cut cut;
     cut.isovalues = isovalues;

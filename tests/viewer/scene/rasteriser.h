@@ -11,7 +11,7 @@
 
 namespace isobrick::test {
 
-/// What lies along the rays of a parallel projection.
+/// Rasterises meshes in a parallel projection; counts the surfaces along each ray.
 class Rasteriser {
  public:
   Rasteriser(int size, Vec3d middle, double radius, unsigned seed)
@@ -30,7 +30,7 @@ class Rasteriser {
               {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}}};
   }
 
-  /// The seam strips are counted apart: they lie across the surface.
+  /// Seam strips are counted apart: they lie across the surface.
   void draw(const NodeMesh& mesh) {
     const std::size_t seam_strips = mesh.mesh.triangles.size() - mesh.seam_triangles;
     for (std::size_t t = 0; t < mesh.mesh.triangles.size(); ++t) {
@@ -61,7 +61,7 @@ class Rasteriser {
     }
     return {out.x + size_ / 2.0, out.y + size_ / 2.0, out.z};
   }
-  /// Which side of a → b; the exact opposite of b → a.
+  /// The side of the line a → b; exactly the opposite for b → a.
   static double side(const Vec3d& a, const Vec3d& b, double x, double y) {
     if (b.x < a.x || (b.x == a.x && b.y < a.y)) return -side(b, a, x, y);
     return (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
@@ -69,7 +69,7 @@ class Rasteriser {
   void draw(std::array<Vec3d, 3> c, bool seam_strip) {
     const double area = side(c[0], c[1], c[2].x, c[2].y);
     if (area == 0) return;
-    // Towards the viewer are small z; counter-clockwise there is clockwise in (x, y).
+    // Small z is towards the viewer; counter-clockwise seen from there is clockwise in (x, y).
     const bool front = area < 0;
     const auto low = [&](auto get) { return std::min({get(c[0]), get(c[1]), get(c[2])}); };
     const auto high = [&](auto get) { return std::max({get(c[0]), get(c[1]), get(c[2])}); };

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/drawn_nodes.h"
+#include "tests/viewer/scene/drawable_checks.h"
 #include "tests/viewer/scene/perspective.h"
-#include "tests/viewer/scene/plain_device.h"
 #include "tests/viewer/scene/random_cut.h"
+#include "tests/viewer/scene/test_device.h"
 
 namespace isobrick::test {
 namespace {
@@ -62,7 +62,7 @@ TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {
     const auto last = stream.drawable();
     EXPECT_TRUE(last->complete);
     versions_seen += versions.size();
-    for (const DrawnNode& drawn : last->nodes) {
+    for (const NodeDraw& drawn : last->nodes) {
       const auto in_cut = std::find_if(cut.nodes.begin(), cut.nodes.end(), [&](const CutNode& n) {
         return n.key == drawn.mesh->key && n.coarser == drawn.mesh->coarser;
       });
@@ -70,7 +70,7 @@ TEST(SceneStream, CoversTheViewFromTheFirstMeshOnAndEndsWithTheCut) {
     }
     EXPECT_EQ(stream.drawable(), last) << "the same until something changes";
   }
-  // The last cut has few nodes, of which a busy machine misses some.
+  // The last cut has few nodes; on a busy machine some are missed.
   EXPECT_GT(versions_seen, 9u);
 }
 
@@ -83,7 +83,7 @@ TEST(SceneStream, CoarseNodesComeFirst) {
   int finest_seen = tree->grid().levels();
   while (!stream.idle()) {
     const auto drawable = stream.drawable();
-    for (const DrawnNode& node : drawable->nodes)
+    for (const NodeDraw& node : drawable->nodes)
       finest_seen = std::min(finest_seen, node.mesh->key.level);
     if (finest_seen == 0) break;
     const auto made = stream.counters().meshes_made;
@@ -101,15 +101,15 @@ TEST(SceneStream, WhatIsCutAwayIsNeitherReadNorMeshed) {
   SceneStream stream(source, tree, {.threads = 2});
   Cut cut = RandomCut(tree->grid(), 2, 3).cut({0.0});
   for (CutNode& node : cut.nodes) {
-    node.cut_away = tree->grid().box(node.key).lo.x > 0;
-    node.visible = !node.cut_away;
+    node.clipped = tree->grid().box(node.key).lo.x > 0;
+    node.visible = !node.clipped;
   }
   stream.set_cut(cut);
   ASSERT_TRUE(stream.wait_idle(60));
   const auto drawn = stream.drawable();
   EXPECT_TRUE(drawn->complete);
   EXPECT_FALSE(drawn->nodes.empty());
-  for (const DrawnNode& node : drawn->nodes) EXPECT_EQ(node.mesh->key.node.x, 0);
+  for (const NodeDraw& node : drawn->nodes) EXPECT_EQ(node.mesh->key.node.x, 0);
 }
 
 TEST(SceneStream, AnotherIsovalueNeedsNoBrickAgain) {
@@ -126,8 +126,8 @@ TEST(SceneStream, AnotherIsovalueNeedsNoBrickAgain) {
   EXPECT_FALSE(stream.drawable()->nodes.empty()) << "the isovalue before stays until then";
   ASSERT_TRUE(stream.wait_idle(60));
   EXPECT_LE(source->reads(), reads + reads / 2);
-  for (const DrawnNode& node : stream.drawable()->nodes) EXPECT_EQ(node.mesh->isovalue, -0.5);
-  // And back without any work at all.
+  for (const NodeDraw& node : stream.drawable()->nodes) EXPECT_EQ(node.mesh->isovalue, -0.5);
+  // The previous cut needs no work.
   const auto made = stream.counters().meshes_made;
   cut.isovalues = {0.0};
   stream.set_cut(cut);
@@ -145,7 +145,7 @@ TEST(SceneStream, ShowsSeveralIsovaluesAtOnce) {
   const auto drawable = stream.drawable();
   EXPECT_TRUE(drawable->complete);
   std::set<int> numbers;
-  for (const DrawnNode& node : drawable->nodes) {
+  for (const NodeDraw& node : drawable->nodes) {
     numbers.insert(node.isovalue);
     EXPECT_EQ(node.mesh->isovalue, node.isovalue - 1.0);
   }
@@ -162,7 +162,7 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
   ASSERT_TRUE(stream.wait_idle(60));
   const auto drawable = stream.drawable();
   int damaged = 0, whole = 0;
-  for (const DrawnNode& node : drawable->nodes) {
+  for (const NodeDraw& node : drawable->nodes) {
     damaged += !node.mesh->damage.empty();
     whole += node.mesh->damage.empty();
     if (!node.mesh->damage.empty()) {
@@ -175,14 +175,14 @@ TEST(SceneStream, ADamagedBrickMarksItsNodesAndTheRestGoesOn) {
   EXPECT_TRUE(drawable->complete);
 }
 
-/// Takes some grids and then says of all of them that it has failed.
-class FailingDevice final : public PlainDevice {
+/// Accepts some grids, then fails for all of them.
+class FailingDevice final : public TestDevice {
  public:
   explicit FailingDevice(std::size_t taken = kTaken) : most_(taken) {}
   ~FailingDevice() override {
     for (std::thread& thread : threads_) thread.join();
   }
-  bool make(const GridView& grid, NodeMesh mesh, Done done) override {
+  bool make(const GridView& grid, NodeMesh mesh, Callback done) override {
     const std::lock_guard lock(mutex_);
     ++asked;
     stored += grid.stored.samples != nullptr;
@@ -207,7 +207,7 @@ class FailingDevice final : public PlainDevice {
   std::size_t most_;
   mutable std::mutex mutex_;
   bool failed_ = false;
-  std::vector<std::pair<NodeMesh, Done>> taken_;
+  std::vector<std::pair<NodeMesh, Callback>> taken_;
   std::vector<std::thread> threads_;
 };
 
@@ -236,7 +236,7 @@ TEST(SceneStream, WhatADeviceFailsToMakeIsMadeWithoutIt) {
   EXPECT_EQ(device.asked, 0u) << "nobody asks it in vain";
 }
 
-/// A device is sent samples as they are stored, of which nobody else makes meshes.
+/// Only a device receives stored samples.
 TEST(SceneStream, WhatADeviceFailsToMakeOfStoredSamplesIsMadeWithoutIt) {
   constexpr Index n = 200;
   const auto source = std::make_shared<MemoryBricks>(
@@ -246,7 +246,7 @@ TEST(SceneStream, WhatADeviceFailsToMakeOfStoredSamplesIsMadeWithoutIt) {
       MemoryBricks::Options{.brick = 32});
   const auto tree = std::make_shared<const NodeTree>(*source);
   const Cut cut = RandomCut(tree->grid(), 1, 100).cut({127.5});
-  FailingDevice device(12);  // among them some of the finest level
+  FailingDevice device(12);  // includes some of the finest level
   SceneStream stream(source, tree, {.threads = 4}), without(source, tree, {.threads = 4});
   stream.set_device(std::shared_ptr<DeviceMesher>(&device, [](DeviceMesher*) {}));
   for (SceneStream* s : {&stream, &without}) {
@@ -273,7 +273,7 @@ TEST(SceneStream, WhatAStraightPlanIsLateWithBringsTheLevelsBetween) {
   std::set<int> levels;
   for (bool idle = false; !idle;) {
     idle = stream.wait_idle(0.002);
-    for (const DrawnNode& node : stream.drawable()->nodes) levels.insert(node.mesh->key.level);
+    for (const NodeDraw& node : stream.drawable()->nodes) levels.insert(node.mesh->key.level);
   }
   EXPECT_TRUE(stream.drawable()->complete);
   EXPECT_GT(stream.counters().meshes_made, planned);
@@ -324,7 +324,7 @@ TEST(SceneStream, KeepsBricksAndMeshesWithinTheirBudgets) {
   }
   EXPECT_LE(stream.counters().brick_bytes_peak, options.brick_bytes);
   EXPECT_GT(stream.counters().brick_bytes_peak, options.brick_bytes / 2);
-  // One mesh of each thread may come on top.
+  // Each thread may add one mesh.
   EXPECT_LE(most_meshes, options.mesh_bytes + 2 * (2 << 20));
 }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/drawn_nodes.h"
+#include "tests/viewer/scene/drawable_checks.h"
 #include "tests/viewer/scene/perspective.h"
 
 namespace isobrick::test {
@@ -55,12 +55,12 @@ TEST(Scene, AWindowsLoopEndsWithTheWholeCut) {
   expect_no_overlap(scene.tree().grid(), *drawable);
   EXPECT_TRUE(scene.is_newest(*drawable));
   EXPECT_GT(drawable->triangles, 10000u);
-  for (const DrawnNode& node : drawable->nodes)
+  for (const NodeDraw& node : drawable->nodes)
     for (const Vec3f p : node.mesh->mesh.positions)
       EXPECT_LT(std::abs(p.x) + std::abs(p.y) + std::abs(p.z), 200.0f) << "around the origin";
 }
 
-/// Another isovalue and another view with every frame.
+/// Changes isovalue and view in every frame.
 TEST(Scene, UntilACutIsCoveredTheOneBeforeIsShown) {
   Scene scene(gyroid(), {.threads = 2});
   const View from = view_from({99.5, 99.5, 500});
@@ -83,7 +83,7 @@ TEST(Scene, UntilACutIsCoveredTheOneBeforeIsShown) {
   EXPECT_TRUE(covers(scene.tree(), *scene.drawable(), 0.2));
 }
 
-/// What is dropped for a budget is gone.
+/// Meshes that were dropped for a budget are destroyed.
 TEST(Scene, KeepsNoMeshesOfCutsBefore) {
   Scene scene(gyroid(), {.threads = 2, .mesh_bytes = 12 << 20});
   const View from = view_from({99.5, 99.5, 500});
@@ -94,7 +94,7 @@ TEST(Scene, KeepsNoMeshesOfCutsBefore) {
       const auto drawable = scene.drawable();
       return drawable->complete && scene.idle() && drawable->isovalues[0] == isovalue;
     }));
-    for (const DrawnNode& node : scene.drawable()->nodes) shown.push_back(node.mesh);
+    for (const NodeDraw& node : scene.drawable()->nodes) shown.push_back(node.mesh);
   }
   std::uint64_t bytes = 0;
   for (const auto& mesh : shown)
@@ -112,9 +112,9 @@ TEST(Scene, ASwitchOfTheIndexIsSearchedAtOnce) {
   scene.search().use(IndexKind::octree);
   scene.search().wait();
   const auto before = scene.drawable();
-  EXPECT_FALSE(scene.search().found(std::vector<double>{0.0}));
+  EXPECT_FALSE(scene.search().is_current(std::vector<double>{0.0}));
   scene.update({0.0}, from, {});
-  EXPECT_TRUE(scene.search().found(std::vector<double>{0.0}));
+  EXPECT_TRUE(scene.search().is_current(std::vector<double>{0.0}));
   EXPECT_EQ(scene.search().state().active, active);
   EXPECT_TRUE(scene.is_newest(*before)) << "the same nodes";
 }

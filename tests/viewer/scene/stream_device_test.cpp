@@ -1,4 +1,4 @@
-// Where a stream's device has no room for more.
+// A stream whose device is full.
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/plain_device.h"
 #include "tests/viewer/scene/random_cut.h"
+#include "tests/viewer/scene/test_device.h"
 #include "viewer/scene/scene_stream.h"
 
 namespace isobrick::test {
@@ -17,16 +17,16 @@ namespace {
 
 constexpr std::uint64_t kMeshBytes = 1000;
 
-/// Has places for so many meshes; what comes beside them goes to host memory.
-class SmallDevice final : public PlainDevice {
+/// A device with space for `places` meshes; other meshes go to host memory.
+class SmallDevice final : public TestDevice {
  public:
   explicit SmallDevice(int places)
       : places_(places), free_(std::make_shared<std::atomic<int>>(places)) {}
-  /// Bytes of the meshes that somebody still has.
+  /// Bytes of the meshes that are alive.
   std::uint64_t held() const { return static_cast<std::uint64_t>(places_ - *free_) * kMeshBytes; }
-  bool make(const GridView&, NodeMesh mesh, Done done) override {
+  bool make(const GridView&, NodeMesh mesh, Callback done) override {
     if (*free_ > 0) {
-      mesh.device = std::make_shared<const Place>(free_);
+      mesh.device = std::make_shared<const SlotMesh>(free_);
       mesh.device_triangles = 1;
       mesh.device_bytes = kMeshBytes;
     } else {
@@ -38,9 +38,9 @@ class SmallDevice final : public PlainDevice {
   std::vector<DeviceBlock> shared_blocks() const override { return {{}}; }
 
  private:
-  struct Place final : DeviceMesh {
-    explicit Place(std::shared_ptr<std::atomic<int>> f) : free(std::move(f)) { --*free; }
-    ~Place() override { ++*free; }
+  struct SlotMesh final : DeviceMesh {
+    explicit SlotMesh(std::shared_ptr<std::atomic<int>> f) : free(std::move(f)) { --*free; }
+    ~SlotMesh() override { ++*free; }
     std::shared_ptr<std::atomic<int>> free;
   };
   int places_;
@@ -65,7 +65,7 @@ TEST(StreamDevice, OlderMeshesMakeRoomBeforeTheBudgetIsReached) {
   show(all, 0);
   const auto meshes = static_cast<int>(all.counters().meshes_made);
   ASSERT_GT(meshes, 20);
-  // Of a larger budget, since places fall between.
+  // The budget is larger, since fragmentation takes some.
   const int places = meshes * 3 / 2;
   SceneStream stream(
       source, tree,
@@ -75,11 +75,11 @@ TEST(StreamDevice, OlderMeshesMakeRoomBeforeTheBudgetIsReached) {
   for (const double isovalue : {0.0, 0.1, 0.2, 0.3, 0.4}) {
     const auto drawn = show(stream, isovalue);
     const auto there = std::count_if(drawn->nodes.begin(), drawn->nodes.end(),
-                                     [](const DrawnNode& node) { return node.mesh->device; });
+                                     [](const NodeDraw& node) { return node.mesh->device; });
     EXPECT_TRUE(drawn->complete);
     EXPECT_GT(static_cast<std::size_t>(there), drawn->nodes.size() / 3) << isovalue;
   }
-  // Meshes that are shown have their places whatever comes, so they count.
+  // Shown meshes keep their space, so they count.
   for (const double isovalue : {0.5, 0.6, 0.7}) {
     stream.set_cut(cut.cut({isovalue}));
     EXPECT_TRUE(stream.wait_idle(60));

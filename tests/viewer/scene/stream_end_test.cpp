@@ -1,4 +1,4 @@
-// What closing a stream gives back, and when, whatever is going on.
+// What closing a stream releases, and when, whatever its threads are doing.
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/held_up.h"
-#include "tests/viewer/scene/plain_device.h"
+#include "tests/viewer/scene/blocking_source.h"
 #include "tests/viewer/scene/random_cut.h"
+#include "tests/viewer/scene/test_device.h"
 #include "viewer/scene/scene_stream.h"
 
 namespace isobrick::test {
@@ -22,8 +22,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-/// Makes empty meshes on a thread of its own, some time after they are asked for.
-class SlowDevice final : public PlainDevice {
+/// Makes empty meshes on a thread of its own, some time after the request.
+class SlowDevice final : public TestDevice {
  public:
   explicit SlowDevice(milliseconds time) : time_(time), thread_([this] { run(); }) {}
   ~SlowDevice() override {
@@ -34,7 +34,7 @@ class SlowDevice final : public PlainDevice {
     change_.notify_all();
     thread_.join();
   }
-  bool make(const GridView&, NodeMesh mesh, Done done) override {
+  bool make(const GridView&, NodeMesh mesh, Callback done) override {
     {
       const std::lock_guard lock(mutex_);
       taken_.emplace_back(std::move(mesh), std::move(done));
@@ -48,19 +48,19 @@ class SlowDevice final : public PlainDevice {
     std::unique_lock lock(mutex_);
     change_.wait(lock, [&] { return !taken_.empty(); });
   }
-  /// How many meshes it was asked for.
+  /// Number of requested meshes.
   int asked() const {
     const std::lock_guard lock(mutex_);
     return asked_;
   }
-  /// Meshes that somebody holds.
+  /// Number of meshes that are alive.
   int held() const { return *held_; }
   std::shared_ptr<const std::atomic<int>> held_count() const { return held_; }
 
  private:
-  struct Counted final : DeviceMesh {
-    explicit Counted(std::shared_ptr<std::atomic<int>> c) : count(std::move(c)) { ++*count; }
-    ~Counted() override { --*count; }
+  struct CountedMesh final : DeviceMesh {
+    explicit CountedMesh(std::shared_ptr<std::atomic<int>> c) : count(std::move(c)) { ++*count; }
+    ~CountedMesh() override { --*count; }
     std::shared_ptr<std::atomic<int>> count;
   };
 
@@ -72,10 +72,10 @@ class SlowDevice final : public PlainDevice {
       lock.unlock();
       std::this_thread::sleep_for(time_);
       lock.lock();
-      std::vector<std::pair<NodeMesh, Done>> made = std::exchange(taken_, {});
+      std::vector<std::pair<NodeMesh, Callback>> made = std::exchange(taken_, {});
       lock.unlock();
       for (auto& [mesh, done] : made) {
-        mesh.device = std::make_shared<const Counted>(held_);
+        mesh.device = std::make_shared<const CountedMesh>(held_);
         mesh.device_triangles = 1;
         done(std::move(mesh), "");
       }
@@ -88,7 +88,7 @@ class SlowDevice final : public PlainDevice {
   std::shared_ptr<std::atomic<int>> held_ = std::make_shared<std::atomic<int>>(0);
   mutable std::mutex mutex_;
   std::condition_variable change_;
-  std::vector<std::pair<NodeMesh, Done>> taken_;
+  std::vector<std::pair<NodeMesh, Callback>> taken_;
   int asked_ = 0;
   bool end_ = false;
   std::thread thread_;
@@ -102,11 +102,11 @@ class StreamEnd : public testing::Test {
     EXPECT_LT(Clock::now() - start, milliseconds(100));
   }
   void begin(int threads = 2) {
-    // Not all bricks fit: another isovalue has to read.
+    // Not all bricks fit, so another isovalue has to read.
     stream_ = std::make_unique<SceneStream>(
         source_, tree_, StreamOptions{.threads = threads, .brick_bytes = 4 << 20});
   }
-  /// With a device that is at a mesh.
+  /// Opens a stream whose device is making a mesh.
   void begin_with(const std::shared_ptr<SlowDevice>& device) {
     begin();
     stream_->set_device(device);
@@ -115,17 +115,18 @@ class StreamEnd : public testing::Test {
     device->wait_until_asked();
   }
   void want(double isovalue) { stream_->set_cut(RandomCut(tree_->grid(), 1, 100).cut({isovalue})); }
-  /// Whether the stream's threads have ended: they hold the source.
+  /// Whether the stream's threads have ended: they own the source.
   bool threads_end() {
     for (int i = 0; i < 1000 && source_.use_count() > 1; ++i)
       std::this_thread::sleep_for(milliseconds(10));
     return source_.use_count() == 1;
   }
 
-  std::shared_ptr<HeldUp> source_ = std::make_shared<HeldUp>(std::make_shared<MemoryBricks>(
-      Int3{150, 150, 150},
-      std::function<float(Int3)>([](Int3 p) { return static_cast<float>(ball(p, 150)); }),
-      MemoryBricks::Options{.brick = 16}));
+  std::shared_ptr<BlockingSource> source_ =
+      std::make_shared<BlockingSource>(std::make_shared<MemoryBricks>(
+          Int3{150, 150, 150},
+          std::function<float(Int3)>([](Int3 p) { return static_cast<float>(ball(p, 150)); }),
+          MemoryBricks::Options{.brick = 16}));
   std::shared_ptr<const NodeTree> tree_ = std::make_shared<const NodeTree>(*source_);
   std::unique_ptr<SceneStream> stream_;
 };

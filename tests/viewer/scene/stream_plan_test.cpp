@@ -13,8 +13,8 @@
 
 #include "tests/stream/always.h"
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/forwarding.h"
-#include "tests/viewer/scene/held_up.h"
+#include "tests/viewer/scene/blocking_source.h"
+#include "tests/viewer/scene/forwarding_source.h"
 #include "tests/viewer/scene/random_cut.h"
 
 namespace isobrick::test {
@@ -22,8 +22,8 @@ namespace {
 
 class PlanTest : public testing::Test {
  protected:
-  MeshPlan plan(double soon) { return plan_jobs(tree_, cut_, meshes_, mesher_, soon); }
-  /// Jobs that are no nodes of the cut.
+  MeshPlan plan(double max_meshes) { return plan_jobs(tree_, cut_, meshes_, mesher_, max_meshes); }
+  /// Number of jobs for nodes that are not in the cut.
   std::size_t ancestors(const MeshPlan& plan, bool coarsest_only) const {
     std::size_t count = 0;
     for (const MeshJob& job : plan.jobs) {
@@ -144,7 +144,7 @@ TEST(Plan, ANodeIsThereWhenHalfOfWhatItsMeshNeedsIs) {
                                   [&](const MeshJob& j) { return j.key == cut.nodes.front().key; });
     return job != plan.jobs.end() && job->resident;
   };
-  // Those around the ball, a small part of the 5³ of the node.
+  // The bricks around the ball, a small part of the node's 5³.
   for_each_point({{0, 0, 0}, {3, 3, 3}}, [&](Int3 b) { (void)bricks.get(0, b, Always()); });
   EXPECT_FALSE(resident()) << "no ranges have been read: all might be needed";
   EXPECT_EQ(bricks.known_block_ranges(0, {0, 0, 0}), nullptr);
@@ -160,7 +160,7 @@ TEST(ResidentBricks, WhatAnotherThreadReadsIsBusy) {
   const auto memory = std::make_shared<MemoryBricks>(
       Int3{40, 40, 40}, std::function<float(Int3)>([](Int3 p) { return static_cast<float>(p.x); }),
       MemoryBricks::Options{});
-  const auto source = std::make_shared<HeldUp>(memory);
+  const auto source = std::make_shared<BlockingSource>(memory);
   ResidentBricks bricks(source, 10 << 20);
   std::shared_ptr<const BrickSamples> read;
   std::thread reader([&] { read = bricks.get(0, {1, 0, 0}, Always()); });
@@ -188,7 +188,7 @@ TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
   for (int i = 0; i < 8; ++i)
     threads.emplace_back([&, i] { bricks.read_together(0, i == 7 ? one : many, Always()); });
   for (std::thread& thread : threads) thread.join();
-  // One after the other these would take 0.68 s.
+  // Read one after the other, they would take 0.68 s.
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(500));
   EXPECT_EQ(bricks.counters().reads, many.size() + one.size()) << "each once";
   for (const Int3 b : many) {
@@ -198,21 +198,21 @@ TEST(ResidentBricks, ThreadsReadTogetherWhatAnyOfThemWants) {
       EXPECT_NE(bricks.find(0, b), nullptr);
     }
   }
-  class Never final : public CancellationToken {
+  class AlwaysCancelled final : public CancellationToken {
    public:
     void check() const override { throw OperationCancelled(); }
   };
   const std::vector<Int3> others{{0, 1, 3}, {1, 1, 3}};
-  EXPECT_THROW(bricks.read_together(0, others, Never()), OperationCancelled);
+  EXPECT_THROW(bricks.read_together(0, others, AlwaysCancelled()), OperationCancelled);
   bricks.read_together(0, one, Always());
   EXPECT_EQ(bricks.find(0, others[0]), nullptr) << "nobody wants it any more";
 }
 
-/// A brick that comes only when another one has been read.
-class OneAfterAnother final : public Forwarding {
+/// A source whose brick `held` is read only after brick `first`.
+class OrderedSource final : public ForwardingSource {
  public:
-  OneAfterAnother(std::shared_ptr<const BrickSource> from, Int3 held, Int3 first)
-      : Forwarding(std::move(from)), held_(held), first_(first) {}
+  OrderedSource(std::shared_ptr<const BrickSource> from, Int3 held, Int3 first)
+      : ForwardingSource(std::move(from)), held_(held), first_(first) {}
   bool read_brick(int level, Int3 brick, std::byte* samples) const override {
     std::unique_lock lock(mutex_);
     if (brick == first_) {
@@ -237,7 +237,7 @@ TEST(ResidentBricks, WhoWouldWaitReadsWhatIsWantedSoon) {
       std::function<float(Int3)>([](Int3 p) { return static_cast<float>(p.x); }),
       MemoryBricks::Options{});
   const Int3 held{1, 0, 0}, soon{3, 0, 0}, forgotten{3, 1, 0};
-  ResidentBricks bricks(std::make_shared<OneAfterAnother>(memory, held, soon), 100 << 20);
+  ResidentBricks bricks(std::make_shared<OrderedSource>(memory, held, soon), 100 << 20);
   bricks.will_need(0, forgotten);
   bricks.forget_needs();
   bricks.will_need(0, soon);

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "tests/stream/memory_bricks.h"
-#include "tests/viewer/scene/forwarding.h"
+#include "tests/viewer/scene/forwarding_source.h"
 
 namespace isobrick::test {
 namespace {
@@ -19,7 +19,7 @@ std::shared_ptr<const MemoryBricks> bricks(Int3 extent, std::function<std::uint8
 constexpr Vec3d kMiddle{100, 60, 45};
 constexpr double kRadius = 20;
 
-/// 128 on a sphere.
+/// A field that is 128 on a sphere.
 std::uint8_t ball(Int3 p, Vec3d middle, double radius) {
   const Vec3d d{static_cast<double>(p.x) - middle.x, static_cast<double>(p.y) - middle.y,
                 static_cast<double>(p.z) - middle.z};
@@ -54,7 +54,7 @@ TEST(SurfaceBox, OfFewBlocksIsLessThanACellLarger) {
   const NodeTree tree(*source);
   const auto box = surface_box(*source, tree, std::vector<double>{128, 100}, whole(*source));
   ASSERT_TRUE(box);
-  // 100 lies 5.6 further out.
+  // The isosurface of 100 is 5.6 samples farther out.
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_NEAR(box->lo[axis], kMiddle[axis] - kRadius - 5.6, 1) << axis;
   }
@@ -105,10 +105,10 @@ TEST(SurfaceBox, IsThatOfAllIsovaluesOrNone) {
   EXPECT_EQ(both, surface_box(*source, tree, std::vector<double>{30}, whole(*source)));
 }
 
-/// Counts what is read of block ranges.
-class Counting final : public Forwarding {
+/// Counts the block ranges that are read.
+class CountingSource final : public ForwardingSource {
  public:
-  using Forwarding::Forwarding;
+  using ForwardingSource::ForwardingSource;
   bool read_brick(int level, Int3 brick, std::byte* out) const override {
     return from_->read_brick(level, brick, out);
   }
@@ -123,7 +123,7 @@ class Counting final : public Forwarding {
 
 TEST(SurfaceBox, ReadsOnlyWhatMayBeAtItsEnds) {
   // Active everywhere, over five range chunks.
-  const Counting source(
+  const CountingSource source(
       bricks({2500, 64, 40}, [](Int3 p) { return static_cast<std::uint8_t>(p.x % 2 * 200); }));
   const NodeTree tree(source);
   source.tables = 0;

@@ -23,12 +23,12 @@ namespace {
 
 constexpr Index kEdge = 256;
 constexpr double kIsovalue = 128;
-/// Rods along z, four samples thick: level 1 has them, level 2 does not.
+/// Rods along z, four samples thick: visible on level 1, not on level 2.
 constexpr std::array<Index, 4> kRodsY{30, 94, 158, 222};
 constexpr Index kRodsX = 174, kThick = 4;
 constexpr std::uint64_t kThinTriangles = 300'000;
 
-/// A ball, whose surface shares all large parts of the volume with what lies beside it.
+/// A ball beside the rods, in the same large parts of the volume.
 std::uint8_t only_ball(Int3 p) {
   return p.x < 170 ? static_cast<std::uint8_t>(128 + ball(p, 180) / 3) : 0;
 }
@@ -38,7 +38,7 @@ std::uint8_t ball_and_rods(Int3 p) {
       if (p.y >= y && p.y < y + kThick) return 200;
   return only_ball(p);
 }
-/// Specks that no coarse level has.
+/// Specks, which no coarse level has.
 std::uint8_t specks(Int3 p) {
   const auto hash = static_cast<std::uint64_t>(p.x * 73856093 ^ p.y * 19349663 ^ p.z * 83492791);
   return hash * 0x9e3779b97f4a7c15ULL >> 56 == 0 ? 255 : 20;
@@ -71,7 +71,7 @@ Cut preview(const NodeTree& tree, std::uint64_t triangles, std::uint64_t thin_tr
                                   {.triangles = triangles, .thin_triangles = thin_triangles});
 }
 
-/// Of the pieces of all rods, 16 samples long, those that vertices of the cut's meshes lie on.
+/// Number of rod segments, 16 samples long, that a vertex of the cut's meshes lies on.
 int pieces_shown(Volume& volume, const Cut& cut) {
   NodeMesher mesher(volume.tree.grid(), volume.bricks, {});
   std::array<std::array<bool, kEdge / 16>, kRodsY.size()> shown{};
@@ -124,7 +124,7 @@ TEST(ThinStructure, NeverTakesMoreThanItsLimit) {
           << budget << ' ' << limit;
 }
 
-/// What loses nothing keeps half of the budget.
+/// Nodes that lose nothing keep half of the budget.
 TEST(ThinStructure, LeavesAPartOfTheBudgetToAllElse) {
   const auto field = [](Int3 p) -> std::uint8_t {
     if (p.z >= 2 * kEdge / 3) return specks(p);
@@ -157,18 +157,18 @@ TEST(ThinStructure, WhatCannotBeReadCountsAsThere) {
 }
 
 TEST(ThinStructure, IsReadAgainAfterItWasAbandoned) {
-  class Never final : public CancellationToken {
+  class AlwaysCancelled final : public CancellationToken {
     void check() const override { throw OperationCancelled(); }
   };
   Volume volume(ball_and_rods);
   ThinStructure& thin = volume.tree.thin_structure();
-  EXPECT_THROW(thin.read(volume.bricks, Never()), OperationCancelled);
+  EXPECT_THROW(thin.read(volume.bricks, AlwaysCancelled()), OperationCancelled);
   EXPECT_FALSE(thin.known());
   EXPECT_TRUE(thin.read(volume.bricks, Always()));
   EXPECT_TRUE(thin.lost({2, {0, 0, 0}}, kIsovalue));
 }
 
-/// Once somebody has read what it takes, the same request gets another cut.
+/// After ThinStructure::read() the same request gives another cut.
 TEST(ThinStructure, BecomesKnownBesideTheFirstMeshes) {
   Volume volume(ball_and_rods);
   Scene scene(volume.source, {.threads = 1});

@@ -19,14 +19,14 @@ namespace isobrick {
 inline constexpr int kWidth = 320, kHeight = 240;
 
 /// Pictures of synthetic volumes, off-screen.
-class Picture : public testing::Test {
+class SceneRendererTest : public testing::Test {
  protected:
   void SetUp() override {
     if (!GlContext::available()) GTEST_SKIP() << "there is no OpenGL 4.5";
     context_ = std::make_unique<GlContext>();
   }
 
-  /// A picture of a synthetic volume, from the front.
+  /// Opens a synthetic volume, seen from the front.
   void open(SynthKind kind, Int3 extent, PictureBudgets budgets = {}) {
     const auto source = make_synth({.kind = kind, .extent = extent});
     NoProgress progress;
@@ -36,16 +36,16 @@ class Picture : public testing::Test {
     settings_.box = settings_.axes = settings_.scale_bar = false;
   }
   void show(PictureBudgets budgets = {}) {
-    picture_.reset();
-    picture_ = std::make_unique<SceneRenderer>(
+    scene_renderer_.reset();
+    scene_renderer_ = std::make_unique<SceneRenderer>(
         std::make_shared<const StoreReader>(dir_ / "store.zarr"), budgets, [] {});
-    const WorldBox box = picture_->bounds();
+    const WorldBox box = scene_renderer_->bounds();
     camera_.fit(box.lo, box.hi, static_cast<double>(kWidth) / kHeight);
   }
   void draw() {
-    picture_->draw_complete(camera_, kWidth, kHeight, settings_, [] {});
+    scene_renderer_->draw_complete(camera_, kWidth, kHeight, settings_, [] {});
   }
-  /// Something in each of the larger files of level 0.
+  /// Damages each of the larger files of level 0.
   void damage_bricks() {
     for (const auto& entry : std::filesystem::recursive_directory_iterator(dir_ / "store.zarr/0")) {
       if (!entry.is_regular_file() || entry.path().extension() == ".json" ||
@@ -58,12 +58,12 @@ class Picture : public testing::Test {
   }
   std::vector<std::uint8_t> pixels() {
     draw();
-    return picture_->renderer().read_pixels();
+    return scene_renderer_->renderer().read_pixels();
   }
 
   TempDir dir_;
   std::unique_ptr<GlContext> context_;
-  std::unique_ptr<SceneRenderer> picture_;
+  std::unique_ptr<SceneRenderer> scene_renderer_;
   Camera camera_{{0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1}};
   ViewSettings settings_;
 };

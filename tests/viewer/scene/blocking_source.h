@@ -3,14 +3,14 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "tests/viewer/scene/forwarding.h"
+#include "tests/viewer/scene/forwarding_source.h"
 
 namespace isobrick::test {
 
-/// A source whose bricks are read only when they may be.
-class HeldUp final : public Forwarding {
+/// A source whose reads block until open().
+class BlockingSource final : public ForwardingSource {
  public:
-  using Forwarding::Forwarding;
+  using ForwardingSource::ForwardingSource;
   bool read_brick(int level, Int3 brick, std::byte* samples) const override {
     std::unique_lock lock(mutex_);
     reading_ = true;

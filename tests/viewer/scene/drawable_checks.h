@@ -25,13 +25,13 @@ inline void expect_no_overlap(const NodeGrid& grid, const Drawable& drawable) {
       }
 }
 
-/// Whether every finest node with a surface lies in some node that is drawn, or in
-/// one whose own level has none.
+/// Whether each finest node with a surface lies in a drawn node, or in one whose own level has no
+/// surface.
 inline bool covers(const NodeTree& tree, const Drawable& drawable, double isovalue) {
   bool all = true;
   for_each_point({{0, 0, 0}, tree.grid().level(0).nodes}, [&](Int3 p) {
     bool found = false, shown = true;
-    for (const DrawnNode& node : drawable.nodes)
+    for (const NodeDraw& node : drawable.nodes)
       found |= overlap(tree.grid(), node.mesh->key, {0, p});
     for (NodeKey n{0, p};;) {
       shown &= tree.active(n, isovalue);

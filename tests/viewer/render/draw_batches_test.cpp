@@ -15,9 +15,9 @@ namespace {
 
 constexpr int kWidth = 230, kHeight = 170;
 
-/// A picture with something of everything: opaque and transparent meshes of several blocks, one
-/// with a block of its own, through each other; slices of both kinds; planes, edges, lines, text.
-class Pieces : public RenderTest {
+/// A picture with every kind of content: intersecting opaque and transparent meshes of several pool
+/// blocks, one with a block of its own; slices of both kinds; planes, edges, lines, text.
+class DrawBatches : public RenderTest {
  protected:
   void SetUp() override {
     RenderTest::SetUp();
@@ -64,11 +64,11 @@ class Pieces : public RenderTest {
     renderer().draw_scale_bar("mm");
   }
 
-  /// How many pieces it took.
-  int draw_in_pieces(std::uint64_t work) {
-    int pieces = 1;
-    while (!renderer().end_piece(work)) ++pieces;
-    return pieces;
+  /// Returns the number of batches.
+  int draw_in_batches(std::uint64_t work) {
+    int batches = 1;
+    while (!renderer().advance(work)) ++batches;
+    return batches;
   }
 
   std::vector<std::uint32_t> ids() {
@@ -92,7 +92,7 @@ PictureSettings with_everything(bool multisample) {
   return settings;
 }
 
-/// Balls around each other, the next one so much larger, added to a pool in the order of `order`.
+/// Concentric balls, each larger than the one before by `larger`, added to a pool in `order`.
 std::vector<PooledMesh> add_shells(MeshPool& pool, const std::vector<std::size_t>& order,
                                    float larger) {
   std::vector<PooledMesh> shells(order.size());
@@ -101,7 +101,7 @@ std::vector<PooledMesh> add_shells(MeshPool& pool, const std::vector<std::size_t
   return shells;
 }
 
-TEST_F(Pieces, MeshesMayBeDrawnByTheBlocksThatTheyLieIn) {
+TEST_F(DrawBatches, MeshesMayBeDrawnByTheBlocksThatTheyLieIn) {
   const auto picture = [&](bool opaque, bool in_order, std::uint64_t work) {
     MeshPool pool(1500);
     std::vector<PooledMesh> balls;
@@ -117,13 +117,14 @@ TEST_F(Pieces, MeshesMayBeDrawnByTheBlocksThatTheyLieIn) {
     renderer().begin(camera, kWidth, kHeight,
                      {.multisample = false, .occlusion = false, .in_order = in_order});
     for (std::size_t i = 0; i < 12; ++i) {
-      const std::size_t ball = i * 5 % 12;  // four of each look, one after another in no block
-      const auto look = static_cast<std::uint32_t>(ball / 4);
-      renderer().draw(balls[ball], {.colour = {0.9f, 0.4f, 0.2f * static_cast<float>(look)},
+      const std::size_t ball =
+          i * 5 % 12;  // four of each style, never two of a style in a row within a block
+      const auto style = static_cast<std::uint32_t>(ball / 4);
+      renderer().draw(balls[ball], {.colour = {0.9f, 0.4f, 0.2f * static_cast<float>(style)},
                                     .opacity = opaque ? 1.0f : 0.5f,
-                                    .id = look + 1});
+                                    .id = style + 1});
     }
-    while (!renderer().end_piece(work)) {
+    while (!renderer().advance(work)) {
     }
     auto pixels = renderer().read_pixels();
     for (const auto id : ids()) pixels.push_back(static_cast<std::uint8_t>(id));
@@ -138,7 +139,7 @@ TEST_F(Pieces, MeshesMayBeDrawnByTheBlocksThatTheyLieIn) {
   }
 }
 
-TEST_F(Pieces, WhereMeshesLieDoesNotShow) {
+TEST_F(DrawBatches, WhereMeshesLieDoesNotShow) {
   const auto picture = [&](bool opaque, const std::vector<std::size_t>& order) {
     MeshPool pool(3000);
     const std::vector<PooledMesh> shells = add_shells(pool, order, opaque ? 0 : 0.05f);
@@ -160,7 +161,7 @@ TEST_F(Pieces, WhereMeshesLieDoesNotShow) {
   }
 }
 
-TEST_F(Pieces, GiveTheSameBytesWhateverTheirSize) {
+TEST_F(DrawBatches, OfAnySizeGiveTheSameBytes) {
   for (const bool multisample : {false, true}) {
     begin(with_everything(multisample));
     const std::uint64_t all = renderer().work_left();
@@ -173,29 +174,29 @@ TEST_F(Pieces, GiveTheSameBytesWhateverTheirSize) {
       renderer().discard();
       begin(with_everything(multisample));
       EXPECT_EQ(renderer().work_left(), all);
-      EXPECT_GE(draw_in_pieces(work), work == 97 ? 100 : 2) << work;
+      EXPECT_GE(draw_in_batches(work), work == 97 ? 100 : 2) << work;
       EXPECT_EQ(renderer().work_left(), 0u);
       EXPECT_EQ(renderer().read_pixels(), expected) << work << ' ' << multisample;
       EXPECT_EQ(ids(), expected_ids) << work << ' ' << multisample;
     }
     begin(with_everything(multisample));
-    EXPECT_EQ(draw_in_pieces(all), 1);
+    EXPECT_EQ(draw_in_batches(all), 1);
     EXPECT_EQ(renderer().read_pixels(), expected);
   }
 }
 
-TEST_F(Pieces, ThePictureBeforeStaysUntilTheNextOneIsWhole) {
+TEST_F(DrawBatches, KeepThePreviousPictureUntilTheNextOneIsFinished) {
   begin(with_everything(false));
   EXPECT_FALSE(renderer().has_picture());
   EXPECT_FALSE(renderer().pick(kWidth / 2, kHeight / 2));
   renderer().end();
   const auto first = renderer().read_pixels();
   const auto first_ids = ids();
-  // One of another view, of other samples: dropped when it is nearly done; and finished.
+  // Another view with multisampling: first dropped when it is nearly finished, then finished.
   for (const bool dropped : {true, false}) {
     begin(with_everything(true), 1.5);
     const std::uint64_t all = renderer().work_left();
-    while (!renderer().end_piece(1500)) {
+    while (!renderer().advance(1500)) {
       ASSERT_EQ(renderer().read_pixels(), first);
       if (dropped && renderer().work_left() < all / 5) break;
     }
@@ -204,19 +205,19 @@ TEST_F(Pieces, ThePictureBeforeStaysUntilTheNextOneIsWhole) {
     EXPECT_EQ(ids(), first_ids);
   }
   EXPECT_NE(renderer().read_pixels(), first);
-  // What was dropped has left nothing behind.
+  // A dropped picture leaves no state.
   begin(with_everything(false));
-  draw_in_pieces(4000);
+  draw_in_batches(4000);
   EXPECT_EQ(renderer().read_pixels(), first);
 }
 
-TEST_F(Pieces, MayBeOfAnotherSizeThanThePictureBefore) {
+TEST_F(DrawBatches, MayBeOfAnotherSizeThanThePreviousPicture) {
   begin(with_everything(false));
   renderer().end();
   const auto first = renderer().read_pixels();
   renderer().begin(Camera({0, -3, 0}, {0, 0, 0}, {0, 0, 1}), 40, 30, {});
   renderer().draw(meshes_[4], {});
-  ASSERT_FALSE(renderer().end_piece(1000));
+  ASSERT_FALSE(renderer().advance(1000));
   EXPECT_EQ(renderer().width(), kWidth);
   EXPECT_EQ(renderer().read_pixels(), first);
   renderer().end();

@@ -10,11 +10,11 @@
 
 namespace isobrick::bench {
 
-/// Milliseconds of many events.
+/// Statistics of the durations of many events.
 class Times {
  public:
   void add(double seconds) { ms_.push_back(seconds * 1e3); }
-  /// Ascending.
+  /// Sorts the durations and summarises them.
   nlohmann::ordered_json summary() {
     std::sort(ms_.begin(), ms_.end());
     if (ms_.empty()) return {{"pictures", 0}};
@@ -36,17 +36,17 @@ class Times {
   std::vector<double> ms_;
 };
 
-/// How long pictures take, and what the slowest of them consist of.
-class PicturesTimes {
+/// Statistics of frame times, with the steps of the slowest frames.
+class FrameTimings {
  public:
-  /// `total`: from the beginning to the end of glFinish, which took `finish`; seconds.
-  void add(double total, const PictureTimes& steps, double finish) {
+  /// `total`: seconds to the end of glFinish, which took `finish`.
+  void add(double total, const FrameTimes& steps, double finish) {
     total_.add(total);
     pictures_.push_back({pictures_.size(), total, steps, finish});
   }
 
-  /// "all" and "slowest": the means of steps, of all pictures and of the slowest hundredth.
-  /// "numbers": which pictures those are, counted from 0.
+  /// "all" and "slowest": means of the steps of all frames, and of the slowest hundredth.
+  /// "numbers": the indices of these, from 0.
   nlohmann::ordered_json summary() {
     auto json = total_.summary();
     if (pictures_.empty()) return json;
@@ -63,7 +63,7 @@ class PicturesTimes {
   struct Picture {
     std::size_t number;
     double total;
-    PictureTimes steps;
+    FrameTimes steps;
     double finish;
   };
 
@@ -83,7 +83,7 @@ class PicturesTimes {
     put("drawable_ms", [](const Picture& p) { return p.steps.drawable; });
     put("upload_ms", [](const Picture& p) { return p.steps.upload; });
     put("slices_ms", [](const Picture& p) { return p.steps.slices; });
-    put("turn_ms", [](const Picture& p) { return p.steps.turn; });
+    put("turn_ms", [](const Picture& p) { return p.steps.lock; });
     put("draw_ms", [](const Picture& p) { return p.steps.draw; });
     put("tidy_ms", [](const Picture& p) { return p.steps.tidy; });
     put("finish_ms", [](const Picture& p) { return p.steps.finish + p.finish; });

@@ -7,8 +7,8 @@
 
 namespace isobrick::test {
 
-/// What devices of tests have in common: no memory that is shared, and no failure.
-class PlainDevice : public DeviceMesher {
+/// Base of test devices: no shared memory, no failure.
+class TestDevice : public DeviceMesher {
  public:
   std::string failure() const override { return {}; }
   const std::string& name() const override { return name_; }

@@ -12,8 +12,8 @@
 namespace isobrick {
 namespace {
 
-/// A finished picture of many triangles, and a pacer that has no time for them.
-class FinishedPicture : public test::WindowTest {
+/// A finished frame of many triangles, and a pacer without time for them.
+class FinishedFrame : public test::WindowTest {
  protected:
   void SetUp() override {
     WindowTest::SetUp();
@@ -27,17 +27,17 @@ class FinishedPicture : public test::WindowTest {
     window.state().settings.pixel_error = 0.3f;
     window.state().panels = true;
     rest();
-    for (int i = 0; i < 20; ++i) window.state().pacer.drawn(2, 10'000, true);
+    for (int i = 0; i < 20; ++i) window.state().pacer.add_preview(2, 10'000, true);
     triangles_ = triangles();
     ASSERT_GT(triangles_, 50'000u);
   }
-  std::uint64_t triangles() const { return window_->state().picture->state().triangles; }
+  std::uint64_t triangles() const { return window_->state().scene_renderer->state().triangles; }
   void rest() {
-    until([&] { return rests(); });
+    until([&] { return is_still(); });
     steps(3);
-    until([&] { return rests(); });
+    until([&] { return is_still(); });
   }
-  /// Presses there, holds, lets go; the least triangles of a picture meanwhile.
+  /// Presses, holds and releases the button; returns the minimum of triangles meanwhile.
   std::uint64_t least_while_clicking(int x, int y) {
     moved_ = false;
     std::uint64_t least = triangles();
@@ -45,7 +45,7 @@ class FinishedPicture : public test::WindowTest {
       for (int i = 0; i < n; ++i) {
         steps(1);
         least = std::min(least, triangles());
-        moved_ |= window_->state().picture->state().moving;
+        moved_ |= window_->state().scene_renderer->state().moving;
       }
     };
     display_->move_pointer(x, y);
@@ -56,23 +56,23 @@ class FinishedPicture : public test::WindowTest {
     step(15);
     return least;
   }
-  /// What sliders of values and the camera change: they may lower a picture.
+  /// The values that sliders and the camera change: their motion causes previews.
   auto values() const {
     const ViewSettings& s = window_->state().settings;
     std::vector<float> places{s.pixel_error, s.surfaces[0].opacity, s.window_lo, s.window_hi};
-    for (const CutSettings& cut : s.cuts) places.push_back(cut.place);
-    for (const SliceSettings& slice : s.slices) places.push_back(slice.place);
+    for (const AxisClipSettings& clip : s.axis_clips) places.push_back(clip.position);
+    for (const SliceSettings& slice : s.slices) places.push_back(slice.position);
     for (const Vec3f corner : {s.region_lo, s.region_hi})
       places.insert(places.end(), {corner.x, corner.y, corner.z});
     return std::tuple(window_->state().navigator.camera, s.surfaces[0].isovalue,
                       s.surfaces[0].shown, places);
   }
   std::uint64_t triangles_ = 0;
-  bool moved_ = false;  ///< a picture was one in motion
+  bool moved_ = false;  ///< a preview was drawn
 };
 
-TEST_F(FinishedPicture, IsNotLoweredByClicksOnWidgets) {
-  // Of the first column of the panel: sections, radio buttons, boxes, buttons, and what is beside.
+TEST_F(FinishedFrame, IsNotLoweredByClicksOnWidgets) {
+  // Clicks down the panel's first column and beside it: sections, radio buttons, boxes, buttons.
   int clicks = 0;
   for (int y = 35; y < test::kWindowHeight; y += 24) {
     if (y > 25 && y < 150) continue;  // the histogram is a slider
@@ -96,7 +96,7 @@ TEST_F(FinishedPicture, IsNotLoweredByClicksOnWidgets) {
   EXPECT_GT(clicks, 25);
 }
 
-TEST_F(FinishedPicture, IsLoweredByASliderAndNeverCalledCompleteThen) {
+TEST_F(FinishedFrame, IsLoweredByASliderAndNeverCalledCompleteThen) {
   display_->move_pointer(100, 80);
   steps(2);
   display_->button(1, true);
@@ -104,20 +104,20 @@ TEST_F(FinishedPicture, IsLoweredByASliderAndNeverCalledCompleteThen) {
   for (int i = 1; i <= 20; ++i) {
     display_->move_pointer(100 + 3 * i, 80);
     steps(1);
-    const PictureState& state = window_->state().picture->state();
+    const FrameState& state = window_->state().scene_renderer->state();
     if (!state.moving) continue;
     lowered |= state.triangles < triangles_ / 2;
     EXPECT_FALSE(state.complete);
   }
   EXPECT_TRUE(lowered);
-  // A hand that holds still sees all of it, with the button down.
+  // With the mouse held still the still frame appears, even with the button down.
   rest();
   EXPECT_GT(triangles(), triangles_ / 2);
   display_->button(1, false);
   steps(3);
 }
 
-TEST_F(FinishedPicture, ComesBackWhereTheHandHoldsStill) {
+TEST_F(FinishedFrame, ComesBackWhereTheHandHoldsStill) {
   display_->move_pointer(520, 240);
   steps(2);
   display_->button(1, true);
@@ -125,7 +125,7 @@ TEST_F(FinishedPicture, ComesBackWhereTheHandHoldsStill) {
   for (int i = 1; i <= 10; ++i) {
     display_->move_pointer(520 + 5 * i, 240);
     steps(1);
-    lowered |= window_->state().picture->state().moving && triangles() < triangles_ / 2;
+    lowered |= window_->state().scene_renderer->state().moving && triangles() < triangles_ / 2;
   }
   EXPECT_TRUE(lowered);
   rest();

@@ -7,10 +7,10 @@
 
 namespace isobrick::test {
 
-/// A source that gives what another one gives, but for how bricks are read.
-class Forwarding : public BrickSource {
+/// Forwards to another source; derived classes replace read_brick().
+class ForwardingSource : public BrickSource {
  public:
-  explicit Forwarding(std::shared_ptr<const BrickSource> from) : from_(std::move(from)) {}
+  explicit ForwardingSource(std::shared_ptr<const BrickSource> from) : from_(std::move(from)) {}
   const StoreInfo& info() const override { return from_->info(); }
   RangeTable brick_ranges(int level, Box3 bricks) const override {
     return from_->brick_ranges(level, bricks);

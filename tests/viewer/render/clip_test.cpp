@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kWidth = 200, kHeight = 160;
 
-/// Meshes are drawn by one program where something cuts them and by another where nothing does.
-class Cut : public RenderTest {
+/// Meshes that are clipped and meshes that are not use different shader programs.
+class Clipping : public RenderTest {
  protected:
   void SetUp() override {
     RenderTest::SetUp();
@@ -28,7 +28,8 @@ class Cut : public RenderTest {
     RenderTest::TearDown();
   }
 
-  /// What can be cut: meshes in a pool and in memory, opaque and transparent ones, slices.
+  /// Everything that can be clipped: meshes in a pool and in memory, opaque and transparent,
+  /// slices.
   void draw_all(Renderer& renderer, const PictureSettings& settings) {
     Camera camera({0.4, -1, 0.3}, {0, 0, 0}, {0, 0, 1});
     camera.fit({-1, -1, -1}, {1, 1, 1}, double{kWidth} / kHeight);
@@ -51,21 +52,21 @@ class Cut : public RenderTest {
   }
 
   MeshStyle style(Vec3f colour, float opacity, std::uint32_t id) const {
-    MeshStyle style{.colour = colour, .opacity = opacity, .id = id, .cut_by = cut_by_};
+    MeshStyle style{.colour = colour, .opacity = opacity, .id = id, .clip_mask = clip_mask_};
     if (one_tone_) style.inside = colour;
     return style;
   }
 
-  bool one_tone_ = false;  ///< backs are drawn as fronts
-  std::uint16_t cut_by_ = MeshStyle{}.cut_by;
+  bool one_tone_ = false;  ///< back faces have the colour of front faces
+  std::uint16_t clip_mask_ = MeshStyle{}.clip_mask;
   std::optional<MeshPool> pool_;
   PooledMesh pooled_;
   TestMesh ball_ = make_ball({-0.4f, 0.1f, -0.2f}, 0.5f, 30);
   std::vector<float> samples_{0, 0.4f, 0.7f, 1};
 };
 
-/// Nothing cuts; a plane; a region; many.
-std::vector<PictureSettings> ways_to_cut() {
+/// No clipping; a plane; a region; several planes.
+std::vector<PictureSettings> clip_settings() {
   PictureSettings whole{.picking = true}, plane = whole, region = whole, many = whole;
   plane.planes = {{{0.3, 1, 0.1}, -0.2}};
   region.region = WorldBox{{-0.6, -0.3, -0.7}, {0.5, 0.9, 0.4}};
@@ -85,44 +86,44 @@ Picture read(const Renderer& renderer) {
   Picture picture{renderer.read_pixels(), {}};
   for (int y = 0; y < kHeight; y += 4)
     for (int x = 0; x < kWidth; x += 4) {
-      const std::optional<Picked> picked = renderer.pick(x, y);
+      const std::optional<PickResult> picked = renderer.pick(x, y);
       picture.ids.push_back(picked ? picked->id : 99);
     }
   return picture;
 }
 
-TEST_F(Cut, WhatWasCutBeforeChangesNothing) {
-  const std::vector<PictureSettings> ways = ways_to_cut();
+TEST_F(Clipping, EarlierClippingChangesNothing) {
+  const std::vector<PictureSettings> settings = clip_settings();
   std::vector<Picture> expected;
-  for (const PictureSettings& way : ways) {
+  for (const PictureSettings& clip : settings) {
     Renderer fresh;
-    draw_all(fresh, way);
+    draw_all(fresh, clip);
     expected.push_back(read(fresh));
     for (std::size_t other = 0; other + 1 < expected.size(); ++other)
       EXPECT_NE(expected.back().pixels, expected[other].pixels) << other;
   }
-  for (std::size_t before = 0; before < ways.size(); ++before)
-    for (std::size_t after = 0; after < ways.size(); ++after) {
-      draw_all(renderer(), ways[before]);
-      draw_all(renderer(), ways[after]);
+  for (std::size_t before = 0; before < settings.size(); ++before)
+    for (std::size_t after = 0; after < settings.size(); ++after) {
+      draw_all(renderer(), settings[before]);
+      draw_all(renderer(), settings[after]);
       EXPECT_TRUE(read(renderer()) == expected[after]) << after << " after " << before;
     }
 }
 
-TEST_F(Cut, PreparingChangesNothing) {
-  for (const PictureSettings& way : ways_to_cut()) {
+TEST_F(Clipping, PreparingChangesNothing) {
+  for (const PictureSettings& clip : clip_settings()) {
     Renderer fresh;
-    draw_all(fresh, way);
+    draw_all(fresh, clip);
     for (const int width : {16, kWidth}) {
-      renderer().prepare(way, width, kHeight);
+      renderer().prepare(clip, width, kHeight);
       EXPECT_FALSE(renderer().has_picture());
-      draw_all(renderer(), way);
+      draw_all(renderer(), clip);
       EXPECT_TRUE(read(renderer()) == read(fresh));
     }
   }
 }
 
-/// Pixels that differ by more than what another program may round otherwise.
+/// Pixels that differ by more than the rounding of two shader programs.
 int pixels_apart(const Picture& a, const Picture& b) {
   int apart = 0;
   for (std::size_t i = 0; i < a.pixels.size(); ++i)
@@ -130,7 +131,7 @@ int pixels_apart(const Picture& a, const Picture& b) {
   return apart;
 }
 
-/// A square that is seen at an angle, but for what lies beyond `right` and `top` of it.
+/// The lower left part of a square that is seen at an angle; `right` and `top`: its size, 0 … 1.
 TestMesh leaning_square(float right, float top) {
   TestMesh mesh;
   const Vec3f corner{-0.8f, -0.6f, -0.7f}, along_x{1.5f, 1.1f, 0.1f}, along_y{0.2f, 0.4f, 1.4f};
@@ -141,9 +142,8 @@ TestMesh leaning_square(float right, float top) {
   return mesh;
 }
 
-/// Where a half space ends it is as smooth as where a triangle does, and lies where it should to a
-/// fraction of a pixel.
-TEST_F(Cut, CutEdgesAreThoseOfAMeshThatEndsThere) {
+/// A clipped edge is antialiased as a triangle's edge is, and accurate to a fraction of a pixel.
+TEST_F(Clipping, ClippedEdgesEqualThoseOfAMeshThatEndsThere) {
   const TestMesh all = leaning_square(1, 1), part = leaning_square(0.55f, 0.35f);
   // Planes through the edges of `part`, along the normal of the square.
   const auto vec = [](Vec3f v) { return Vec3d{v.x, v.y, v.z}; };
@@ -167,55 +167,55 @@ TEST_F(Cut, CutEdgesAreThoseOfAMeshThatEndsThere) {
       };
       const Picture expected = picture(part), whole = picture(all);
       settings.planes = {inward(down, across), inward(across, down)};
-      const Picture cut = picture(all);
+      const Picture clipped = picture(all);
       EXPECT_GT(pixels_apart(whole, expected), 1000);
       // A sample may lie on the edge itself.
-      EXPECT_LT(pixels_apart(cut, expected), 8) << orthographic << multisample;
-      EXPECT_EQ(cut.ids, expected.ids);
+      EXPECT_LT(pixels_apart(clipped, expected), 8) << orthographic << multisample;
+      EXPECT_EQ(clipped.ids, expected.ids);
     }
 }
 
-/// Slices, which come last, are cut all the same.
-TEST_F(Cut, HalfSpacesThatAreSaidToCutNothingAreNotLookedAt) {
+/// Slices have no mask: every half space clips them.
+TEST_F(Clipping, HalfSpacesOutsideTheMaskAreIgnored) {
   PictureSettings settings{.picking = true, .in_order = false};
-  // The first one cuts everything, the others nothing that is drawn.
+  // The first plane clips something; the others clip nothing that is drawn.
   settings.planes = {{{0.3, 1, 0.1}, -0.2}, {{-1, 0, 0}, -9}};
   settings.region = WorldBox{{-7, -7, -7}, {7, 7, 7}};
   for (const std::size_t planes : {2u, 3u}) {
     settings.planes.resize(planes, {{0, 0, 1}, -9});
     draw_all(renderer(), settings);
     const Picture expected = read(renderer());
-    for (const int by : {0b1, 0b1001, 0b1111, 0b11111, 0b101010101}) {
-      cut_by_ = static_cast<std::uint16_t>(by);
+    for (const int mask : {0b1, 0b1001, 0b1111, 0b11111, 0b101010101}) {
+      clip_mask_ = static_cast<std::uint16_t>(mask);
       draw_all(renderer(), settings);
       const Picture few = read(renderer());
-      EXPECT_EQ(few.ids, expected.ids) << by;
-      EXPECT_LT(pixels_apart(few, expected), 60) << by;
+      EXPECT_EQ(few.ids, expected.ids) << mask;
+      EXPECT_LT(pixels_apart(few, expected), 60) << mask;
     }
-    cut_by_ = 0;
+    clip_mask_ = 0;
     draw_all(renderer(), settings);
     EXPECT_NE(read(renderer()).ids, expected.ids);
-    cut_by_ = 0b10;
+    clip_mask_ = 0b10;
     draw_all(renderer(), settings);
     EXPECT_NE(read(renderer()).ids, expected.ids);
-    cut_by_ = MeshStyle{}.cut_by;
+    clip_mask_ = MeshStyle{}.clip_mask;
   }
 }
 
-TEST_F(Cut, PlanesThatLeaveAllChangeNothing) {
+TEST_F(Clipping, PlanesThatClipNothingChangeNothing) {
   one_tone_ = true;
   PictureSettings settings{.picking = true};
   draw_all(renderer(), settings);
   const Picture whole = read(renderer());
   settings.planes = {{{0.3, 1, 0.1}, -9}, {{-1, 0, 0}, -9}};
   settings.region = WorldBox{{-7, -7, -7}, {7, 7, 7}};
-  // Also with many.
+  // With few planes and with many.
   for (const std::size_t planes : {1u, 3u}) {
     settings.planes.resize(planes, {{0, 0, 1}, -9});
     draw_all(renderer(), settings);
-    const Picture cut = read(renderer());
-    EXPECT_EQ(cut.ids, whole.ids);
-    EXPECT_LT(pixels_apart(cut, whole), 60) << planes;
+    const Picture clipped = read(renderer());
+    EXPECT_EQ(clipped.ids, whole.ids);
+    EXPECT_LT(pixels_apart(clipped, whole), 60) << planes;
   }
 }
 
