@@ -5,14 +5,13 @@
 #include <utility>
 
 #include <isobrick/error.h>
+#include "core/stopwatch.h"
 
 namespace isobrick {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// How often a thread that waits for another's brick asks whether it is still wanted.
-constexpr std::chrono::milliseconds kPatience{5};
+constexpr std::chrono::milliseconds kPollInterval{5};
 
 /// Of the budget: the part for bricks that are read together, and for those that are read before
 /// they are asked for. More of them would displace one another.
@@ -90,7 +89,7 @@ std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key,
       return entry.samples;
     }
     if (!may_wait) return nullptr;
-    loaded_.wait_for(lock, kPatience);
+    loaded_.wait_for(lock, kPollInterval);
   }
   LoadResult made = read(key, lock);
   if (made.failure) std::rethrow_exception(made.failure);
@@ -150,7 +149,7 @@ void ResidentBricks::read_together(int level, std::span<const Int3> bricks,
       if (const auto key = next_wanted())
         (void)read(*key, lock);
       else
-        loaded_.wait_for(lock, kPatience);
+        loaded_.wait_for(lock, kPollInterval);
     }
   } catch (...) {
     requests_.erase(own);
@@ -171,14 +170,14 @@ ResidentBricks::LoadResult ResidentBricks::read(const Key& key,
   counters_.peak_bytes = std::max(counters_.peak_bytes, counters_.bytes);
   lock.unlock();
   LoadResult made;
-  const auto start = Clock::now();
+  Stopwatch watch;
   try {
     made.samples = load(key);
   } catch (...) {
     made.failure = std::current_exception();
   }
   lock.lock();
-  counters_.read_seconds += std::chrono::duration<double>(Clock::now() - start).count();
+  counters_.read_seconds += watch.lap();
   ++counters_.reads;
   counters_.bytes -= bytes;
   if (made.samples) {

@@ -1,12 +1,12 @@
 #include <isobrick/convert.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "bricks/store_writer.h"
+#include "core/stopwatch.h"
 #include "pipeline/convert/convert_cascade.h"
 #include "pipeline/convert/convert_journal.h"
 #include "pipeline/convert/convert_level.h"
@@ -206,7 +206,7 @@ std::unique_ptr<SpooledVolume> Conversion::spool_stream() {
 
 ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   const StoreLayout layout = plan_layout(source.info(), options, source.sparse());
   const Lattice& finest = layout.levels.front().lattice;
   const std::uint64_t least_of_index =
@@ -229,7 +229,7 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       options, progress)
         .run();
   });
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.seconds = watch.lap();
   return report;
 }
 

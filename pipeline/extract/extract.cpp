@@ -9,11 +9,11 @@
 
 #include <isobrick/estimate.h>
 #include "core/length_unit.h"
+#include "core/stopwatch.h"
 #include "pipeline/extract/backend_choice.h"
 #include "pipeline/extract/extract_pass.h"
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/extract_tiles.h"
-#include "pipeline/seconds_sum.h"
 #include "pipeline/workers.h"
 
 namespace isobrick {
@@ -86,7 +86,7 @@ class Extraction {
   std::vector<ExtractReport> run(Progress& progress) {
     double count_seconds = 0;
     {
-      const SecondsSum watch(count_seconds);
+      const Stopwatch watch(count_seconds);
       begin();
     }
     std::uint64_t bytes = 0;
@@ -153,10 +153,10 @@ class Extraction {
     double seconds = 0, plan_seconds = 0;
     PassSurfaces made;
     {
-      const SecondsSum whole(seconds);
+      const Stopwatch whole(seconds);
       ChosenBackend backend;
       {
-        const SecondsSum watch(plan_seconds);
+        const Stopwatch watch(plan_seconds);
         backend = set_up(left);
       }
       made = left.first(backend.surfaces.size());

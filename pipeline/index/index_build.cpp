@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <optional>
 
@@ -12,6 +11,7 @@
 #include "bricks/stored_index.h"
 #include "bricks/zarr/json_reader.h"
 #include "core/morton.h"
+#include "core/stopwatch.h"
 #include "index/leaf_ranges.h"
 #include "io/bytes/exchange.h"
 #include "io/bytes/output_folder.h"
@@ -26,10 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kZstdLevel = 3;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 std::string kind_of(const IndexOptions& options) { return std::string(name_of(options.kind)); }
 
@@ -177,11 +173,11 @@ void complete_ranges(std::unique_ptr<StoreReader>& store, const IndexOptions& op
                      Progress& progress, IndexReport& report) {
   const bool anew = !store->info().ours && options.force;
   if (!anew && has_all_ranges(*store)) return;
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   add_ranges(*store, options.memory, threads, progress);
   store = std::make_unique<StoreReader>(store->info().path, options.selection);
   report.ranges_added = true;
-  report.range_seconds = seconds_since(start);
+  report.range_seconds = watch.lap();
 }
 
 IndexReport build_all(const fs::path& path, const IndexOptions& given, int threads,
@@ -240,11 +236,11 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
 }
 
 IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   Workers workers(options.threads);
   IndexReport report =
       workers.execute([&] { return build_all(store, options, workers.threads(), progress); });
-  report.seconds = seconds_since(start);
+  report.seconds = watch.lap();
   return report;
 }
 
