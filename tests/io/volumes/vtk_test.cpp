@@ -6,6 +6,7 @@
 #include <isobrick/open_source.h>
 #include "damaged_files.h"
 #include "test_samples.h"
+#include "tests/io/bytes/base64_text.h"
 #include "tests/io/bytes/packed.h"
 #include "tests/io/bytes/temp_dir.h"
 
@@ -14,19 +15,6 @@ namespace {
 
 constexpr Int3 kExtent{7, 5, 4};
 constexpr Box3 kWhole{{0, 0, 0}, kExtent};
-
-std::string base64(std::string_view bytes) {
-  constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t j = 0; j < 3; ++j)
-      bits = bits << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0u);
-    for (std::size_t j = 0; j < 4; ++j)
-      text += i + j < bytes.size() + 1 ? digits[bits >> (18 - 6 * j) & 63] : '=';
-  }
-  return text;
-}
 
 std::string number(std::uint32_t value) {
   std::string bytes(4, '\0');
