@@ -106,7 +106,7 @@ int run(const Arguments& arguments, Console& console) {
 void add_convert(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
-      program, "convert", "TicketGuard a volume into a store, within a memory budget.",
+      program, "convert", "Turn a volume into a store, within a memory budget.",
       "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
       "  isobrick convert head_64x64x93_int16.raw ct.zarr   # the name says it all");
   add_path(app, "IN", arguments->in,
