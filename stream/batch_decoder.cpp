@@ -9,11 +9,11 @@ namespace isobrick {
 namespace {
 
 /// Bytes of the bricks that a thread takes at a time: small bricks come in groups.
-constexpr std::size_t kBytesOfJob = std::size_t{128} << 10;
+constexpr std::size_t kJobBytes = std::size_t{128} << 10;
 /// Memory that is allocated at a time.
-constexpr std::size_t kBytesOfSlab = std::size_t{16} << 20;
+constexpr std::size_t kPieceBytes = std::size_t{16} << 20;
 /// Pieces of memory that are allocated before they are needed.
-constexpr std::size_t kSlabsAhead = 3;
+constexpr std::size_t kPiecesAhead = 3;
 /// Batches that are decoded ahead in any case: one for next(), one in use.
 constexpr std::size_t kBatchesAhead = 2;
 
@@ -21,8 +21,8 @@ constexpr std::size_t kBatchesAhead = 2;
 
 DecodedBatch::~DecodedBatch() { decoder_.release(*this); }
 
-std::size_t BatchDecoder::slab_bricks(const Lattice& lattice, std::size_t capacity) {
-  return std::clamp<std::size_t>(kBytesOfSlab / lattice.brick_bytes(), 1, capacity);
+std::size_t BatchDecoder::piece_bricks(const Lattice& lattice, std::size_t capacity) {
+  return std::clamp<std::size_t>(kPieceBytes / lattice.brick_bytes(), 1, capacity);
 }
 
 BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& planner, Index reach,
@@ -31,7 +31,7 @@ BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& pl
       planner_(planner),
       capacity_(capacity),
       threads_count_(threads),
-      bricks_of_job_(std::clamp<std::size_t>(kBytesOfJob / reader_.lattice().brick_bytes(), 1, 64)),
+      bricks_of_job_(std::clamp<std::size_t>(kJobBytes / reader_.lattice().brick_bytes(), 1, 64)),
       memory_(memory),
       slots_(reader_.lattice(), reach) {
   {
@@ -157,9 +157,9 @@ void BatchDecoder::hint(const TileBatch& batch) {
 
 /// Allocates memory before it is needed, since that takes a while.
 void BatchDecoder::grow_if_short() {
-  const std::size_t piece = slab_bricks(reader_.lattice(), capacity_);
+  const std::size_t piece = piece_bricks(reader_.lattice(), capacity_);
   const std::size_t enough =
-      std::max(kSlabsAhead * piece, static_cast<std::size_t>(threads_count_));
+      std::max(kPiecesAhead * piece, static_cast<std::size_t>(threads_count_));
   while (slots_.slots() + pending_slots_ < capacity_ &&
          slots_.free_slots() + pending_slots_ < enough) {
     const std::size_t count = std::min(piece, capacity_ - slots_.slots() - pending_slots_);
@@ -169,9 +169,9 @@ void BatchDecoder::grow_if_short() {
 }
 
 void BatchDecoder::grow(std::size_t count) {
-  auto slab = memory_.room(count * reader_.lattice().brick_bytes());
+  auto piece = memory_.room(count * reader_.lattice().brick_bytes());
   const std::lock_guard lock(mutex_);
-  slots_.add_slots(std::move(slab), count);
+  slots_.add_slots(std::move(piece), count);
   pending_slots_ -= count;
   changed_.notify_all();
 }

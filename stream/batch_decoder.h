@@ -57,8 +57,8 @@ class DecodedBatch final : public BrickLookup {
 class BatchDecoder {
  public:
   /// `threads` threads decode. At most `capacity` bricks are held at a time, which must be enough
-  /// for any batch. They lie in `memory`, from which the decoder takes pieces of slab_bricks() when
-  /// it needs them. One thread, not the caller's, uses the planner.
+  /// for any batch. They lie in `memory`, from which the decoder takes pieces of piece_bricks()
+  /// when it needs them. One thread, not the caller's, uses the planner.
   BatchDecoder(const StoreReader& store, int level, BatchPlanner& planner, Index reach,
                std::size_t capacity, int threads, BrickMemory& memory);
   /// Stops. All batches must have been destroyed.
@@ -76,7 +76,7 @@ class BatchDecoder {
 
   /// Bricks in a piece of memory: large pieces are faster to allocate, but must not take all of a
   /// small capacity.
-  static std::size_t slab_bricks(const Lattice& lattice, std::size_t capacity);
+  static std::size_t piece_bricks(const Lattice& lattice, std::size_t capacity);
 
  private:
   friend class DecodedBatch;
