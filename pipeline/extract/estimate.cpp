@@ -254,8 +254,8 @@ std::size_t groups_to_sample(const Lattice& lattice) {
   return std::clamp<std::size_t>(kMaxBytes / bytes & ~std::uint64_t{1}, kMinGroups, kMaxGroups);
 }
 
-/// Scales what was seen in some groups to all active cells, and says how sure
-/// that is: the standard error of a ratio of sums.
+/// Scales what was seen in some groups to all active cells, and computes
+/// the standard error of that ratio of sums.
 void scale(std::span<const Sampled> sampled, std::uint64_t cells, ExtractEstimate& result) {
   Sampled sum;
   for (const Sampled& s : sampled) sum += s;

@@ -67,7 +67,7 @@ EarlyWork begin_early(const StoreReader& store, const ExtractOptions& options,
   return early;
 }
 
-/// The surfaces that extract() is asked for.
+/// The surfaces of one extract().
 class Extraction {
  public:
   Extraction(const StoreReader& store, const ExtractOptions& options,
@@ -238,8 +238,8 @@ std::string_view bound_of(const ExtractReport& report) {
       ->first;
 }
 
-std::uint64_t least_extract_memory(const StoreReader& store, const ExtractOptions& options,
-                                   Indexing indexing, std::uint64_t sink_bytes) {
+std::uint64_t min_extract_memory(const StoreReader& store, const ExtractOptions& options,
+                                 Indexing indexing, std::uint64_t sink_bytes) {
   ExtractRequest request = check_request(store, options, indexing);
   request.sink_bytes = sink_bytes;
   return least_memory({&request, 1}, decode_extra(store.info(), request.threads));

@@ -56,7 +56,7 @@ class LevelIndex {
         store.info().levels[static_cast<std::size_t>(level)].block_ranges_crc32c;
   }
 
-  /// Throws UsageError when something is there and nobody said what to do with it.
+  /// Throws UsageError when there is one and neither `resume` nor `force` is set.
   void check() const;
   /// Decides what of an earlier run stays, and makes the folder.
   void prepare(Publisher& publisher);
@@ -214,18 +214,18 @@ IndexReport build_all(const fs::path& path, const IndexOptions& given, int threa
 
 }  // namespace
 
-std::uint64_t least_index_memory(const IndexOptions& options, const Lattice& lattice) {
+std::uint64_t min_index_memory(const IndexOptions& options, const Lattice& lattice) {
   if (options.kind == IndexKind::linear)
     throw UsageError("a linear scan needs no index: that is what a store's ranges are for");
   if (!is_leaf(options.leaf))
     throw UsageError(
         fmt::format("a leaf has 1, 2, 4, 8 or 16 cells along an edge, not {}", options.leaf));
-  return IndexChunkBuilder::least_memory(lattice, options.leaf, Workers(options.threads).threads());
+  return IndexChunkBuilder::min_memory(lattice, options.leaf, Workers(options.threads).threads());
 }
 
 void check_index_options(const IndexOptions& options, const Lattice& lattice,
                          std::uint64_t others) {
-  const std::uint64_t least = others + least_index_memory(options, lattice);
+  const std::uint64_t least = others + min_index_memory(options, lattice);
   if (options.memory < least)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: an index with leaf {} needs --memory {}M at "

@@ -56,8 +56,8 @@ struct Parts {
 
 class Vtk : public ::testing::Test {
  protected:
-  std::unique_ptr<VolumeSource> open(const std::string& bytes, const VolumeRequest& said = {}) {
-    return open_source(dir.write("v.vtx", bytes), said);  // known by its content alone
+  std::unique_ptr<VolumeSource> open(const std::string& bytes, const VolumeRequest& request = {}) {
+    return open_source(dir.write("v.vtx", bytes), request);  // known by its content alone
   }
   /// Opens and reads, which must fail with one line that names the file.
   std::string refuse(const std::string& bytes) {
@@ -120,7 +120,7 @@ TEST_F(VtkXml, ReadsPlainSamples) {
   EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
 }
 
-// VTK's writer repeats the whole extent in each piece that it is asked for.
+// VTK's writer repeats the whole extent in each requested piece.
 TEST_F(VtkXml, OfInlinePiecesTheFirstIsReadIfItIsTheWhole) {
   const auto with_two_pieces = [](std::string text) {
     const std::size_t begin = text.find("<Piece"), end = text.find("</ImageData>");
