@@ -60,7 +60,7 @@ def measure(arguments, raw, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("isobrick", help="the program")
-    parser.add_argument("raw", nargs="+", help="raw files whose name tells extent and type")
+    parser.add_argument("raw", nargs="+", help="raw files with extent and type in their names")
     parser.add_argument("--folder", help="where to write (default: the temporary folder)")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--level", type=int, default=3, help="of zstd")

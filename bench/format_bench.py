@@ -5,7 +5,7 @@ The samples of a raw volume are repeated to fill a cube of u16, written in each 
 by its Python library, and then, in turn, so that whatever else the machine does meets
 all alike: the library reads the file, isobrick converts the raw file, isobrick converts
 the file. The last should take at most 1.3 times the slower of the first two. Wall
-and processor seconds, medians; on a busy machine the latter say more.
+and processor seconds, medians; on a busy machine the latter are more reliable.
 
     bench/format_bench.py build/release/bin/isobrick bonsai_256x256x256_uint8.raw
 
@@ -120,7 +120,7 @@ def zarr_gzip(path, samples):
 
 def zarr_v3(path, samples):
     """Chunks of 64³ by zstd. Debian's zarr-python knows no version 3 as it was published, so that
-    its numcodecs encodes and what is said of the array is written here."""
+    its numcodecs encodes and the array's metadata is written here."""
     import itertools
     import json
     import numcodecs
@@ -198,7 +198,7 @@ def index_in_place(program, path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("isobrick")
-    parser.add_argument("raw", help="a volume of u8 whose name tells its extent")
+    parser.add_argument("raw", help="a volume of u8 with its extent in its name")
     parser.add_argument("--edge", type=int, default=512, help="samples along each edge of the cube")
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--only", nargs="*", default=list(CASES))

@@ -3,7 +3,7 @@
 //
 // "warm" is the best of many searches, "cold" the median of some for which the
 // files were dropped from the page cache.
-// Built as bench/README.md says.
+// Built as in bench/README.md.
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -9,7 +9,7 @@
 // with reading and decoding alone, so that what the machine does meanwhile meets both alike, and
 // medians are compared. --check compares the mesh with the CPU's by a hash. With --cold
 // the store is dropped from the page cache before each extraction, and before the reads alone.
-// Built as bench/README.md says.
+// Built as in bench/README.md.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -44,7 +44,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Takes the mesh in host memory and, when asked to, hashes it.
+/// Takes the mesh in host memory and hashes it on request.
 class HashSink final : public MeshSink {
  public:
   explicit HashSink(bool hash) : hash_(hash) {}

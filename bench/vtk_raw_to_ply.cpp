@@ -2,7 +2,7 @@
 // The peer of `isobrick extract` in bench/end_to_end.
 //
 //   vtk_raw_to_ply IN.raw X Y Z u8|i16|u16|f32 ISOVALUE OUT.ply THREADS
-// Built as bench/README.md says.
+// Built as in bench/README.md.
 
 #include <vtkFlyingEdges3D.h>
 #include <vtkImageReader2.h>

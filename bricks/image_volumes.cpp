@@ -7,7 +7,7 @@
 namespace isobrick {
 
 std::optional<Index>& place_on(const VolumeAxis& axis, Selection& selection) {
-  // An axis that does not say what it is takes what was given.
+  // An axis without a role takes what was given.
   const bool by_channel = axis.by_channel && !(axis.by_time && selection.time);
   return by_channel ? selection.channel : selection.time;
 }

@@ -11,7 +11,7 @@ namespace isobrick {
 /// Whether the samples are signed distances, negative inside.
 inline bool is_level_set(const StoreInfo& info) { return info.grid_class == "level set"; }
 
-/// What is inside unless users say it.
+/// The inside where the user gives none.
 inline Inside inside_of(const StoreInfo& info) {
   return is_level_set(info) ? Inside::below : Inside::above;
 }

@@ -137,7 +137,7 @@ StoreEntries StoreEntries::of(const fs::path& folder) {
       store.add_level(array);
   } catch (const Error& error) {
     store.any_ = true;
-    store.why_ = fmt::format("its metadata does not say what belongs to it: {}", error.what());
+    store.why_ = fmt::format("its metadata does not list what belongs to it: {}", error.what());
   }
   return store;
 }

@@ -16,13 +16,14 @@ namespace isobrick {
 class StoreEntries {
  public:
   /// Those of the store in `folder`, or of the conversion that was interrupted there, as its
-  /// metadata says. If it does not say so, any number of levels and chunks belongs to it and why()
-  /// says what is wrong.
+  /// metadata lists them. Without such a list any number of levels and chunks belongs to it, and
+  /// why() is the reason.
   static StoreEntries of(const std::filesystem::path& folder);
   /// Those of a store with these levels, for what is below its isobrick/.
   static StoreEntries of(std::span<const LevelInfo> levels);
 
-  /// Why the metadata does not say what the store has, as the end of a sentence; empty if it does.
+  /// Why the metadata does not list the store's entries, as the end of a sentence; empty if it
+  /// does.
   const std::string& why() const { return why_; }
 
   /// Whether the store has a file or a folder of this name, relative to it. Temporary files belong

@@ -14,7 +14,7 @@
 
 namespace isobrick {
 
-/// Everything that the metadata of a store will say. All levels share type and codec.
+/// Everything that the metadata of a store will hold. All levels share type and codec.
 struct StoreLayout {
   std::vector<LevelInfo> levels;
   std::vector<Int3> factors;  ///< of each level but the last: 1 or 2 an axis, to the next one

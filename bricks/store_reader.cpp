@@ -29,7 +29,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::uint64_t kMaxOpenFiles = 128;
 
 // No encoder makes a brick much larger than it is; a length beyond is damage,
-// and must not make us ask for that much memory.
+// and must not make the reader allocate that much memory.
 std::uint64_t largest_encoded(std::uint64_t decoded) { return decoded + decoded / 8 + (64 << 10); }
 
 /// Of a whole brick that is not the one which belongs to its place, the end of a message.

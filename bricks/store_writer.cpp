@@ -41,7 +41,7 @@ struct OpenShard {
   bool created = false;
   bool counted = false;  // one of kMaxOpenShards
   std::uint64_t end = 0;
-  std::uint64_t writeback_end = 0;  // the disk was told of what is before
+  std::uint64_t writeback_end = 0;  // writing back has begun up to here
   ShardIndex index;
   std::vector<std::uint32_t> checksums;  // of its bricks, in the order of the index
 };
@@ -208,7 +208,7 @@ std::optional<ShardIndex> StoreWriter::Impl::whole_index(const Level& l, const F
   file.read_at(size - index_size, bytes);
   try {
     ShardIndex index = ShardIndex::decode(bytes, true, size - index_size);
-    // The bricks of our shards leave no gaps, so their sizes tell the file's.
+    // The bricks of our shards leave no gaps, so their sizes sum up to the file's.
     if (index.brick_bytes() == size - index_size) return index;
   } catch (const DamageError&) {
     // As one whose sizes do not add up.

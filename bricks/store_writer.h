@@ -56,7 +56,7 @@ class StoreWriter {
   /// Metadata, the group's last of all; then everything in `dir` is on disk (its
   /// own name is the caller's to sync).
   /// `may_have_nan` replaces the layout's, known only now. `window`, if there is one, reads the
-  /// store and says how it is shown at first. `more`, if there is one, adds to the store, which
+  /// store and returns how it is shown at first. `more`, if there is one, adds to the store, which
   /// can be read by then, and may rename `dir`; until it returns the store keeps the mark of an
   /// interrupted conversion, so that a resume goes on.
   void finish(bool may_have_nan,

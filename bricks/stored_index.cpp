@@ -85,7 +85,7 @@ IndexChunk StoredIndex::open(Int3 chunk) const {
 std::uint64_t index_bytes(const StoredIndex& index) {
   std::uint64_t bytes = fs::file_size(index_description(index.folder()));
   for_each_point({{0, 0, 0}, index.layout().chunks()}, [&](Int3 c) {
-    std::error_code missing;  // verify says so; here it has no bytes
+    std::error_code missing;  // verify reports it; here it has no bytes
     const std::uint64_t size = fs::file_size(index_chunk_path(index.folder(), c), missing);
     if (!missing) bytes += size;
   });

@@ -33,7 +33,7 @@ else()
   message(STATUS "HDF5 not found or turned off: HDF5 datasets cannot be read")
 endif()
 
-# DCMTK's packages of CMake and pkg-config ask for more than Debian's libdcmtk-dev has.
+# DCMTK's packages of CMake and pkg-config need more than Debian's libdcmtk-dev has.
 set(isobrick_dcmtk dcmjpls dcmjpeg dcmdata oflog ofstd)
 find_path(ISOBRICK_DCMTK_INCLUDE dcmtk/dcmdata/dctk.h)
 find_library(ISOBRICK_DCMTK_LIBRARY dcmdata)
@@ -54,7 +54,7 @@ endmacro()
 isobrick_codec_library(ISOBRICK_BLOSC blosc blosc)
 isobrick_codec_library(ISOBRICK_LZ4 lz4 liblz4)
 
-# OpenVDB's own module for CMake asks for all that the library is made with.
+# OpenVDB's own module for CMake needs all that the library is made with.
 find_path(ISOBRICK_OPENVDB_INCLUDE openvdb/openvdb.h)
 find_library(ISOBRICK_OPENVDB_LIBRARY openvdb)
 # Its headers call what it may have been built with for 16-bit floats.

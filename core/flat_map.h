@@ -8,7 +8,7 @@
 
 namespace isobrick {
 
-/// What FlatMap needs of keys: one that is never used, and a number that tells most others apart.
+/// What FlatMap needs of keys: one that is never used, and a number that differs for most keys.
 template <class Key>
 struct FlatKey;
 template <>
@@ -17,9 +17,9 @@ struct FlatKey<std::uint64_t> {
   static std::uint64_t number(std::uint64_t key) { return key; }
 };
 
-/// A hash map from numbers, or other small keys, to small values in one array, for books that are
-/// looked up for every tile. Any key but FlatKey<Key>::kFree. What it points to may move with the
-/// next insertion or erasure.
+/// A hash map from numbers, or other small keys, to small values in one array, for bookkeeping that
+/// is looked up for every tile. Any key but FlatKey<Key>::kFree. What it points to may move with
+/// the next insertion or erasure.
 template <class Value, class Key = std::uint64_t>
 class FlatMap {
  public:

@@ -46,8 +46,8 @@ constexpr LengthUnit kUnits[] = {
     {"pc", "parsec", 3.0856775814913673e28},
 };
 
-/// Other spellings of the same: capitals, plurals, British ones, and "micron". Of symbols, whose
-/// case says which unit they are (Mm, mm), none becomes a name so.
+/// Other spellings of the same: capitals, plurals, British ones, and "micron". Symbols, whose
+/// case is part of the unit (Mm, mm), stay as they are.
 std::string singular(std::string_view unit) {
   std::string name(unit);
   for (char& c : name)

@@ -4,10 +4,19 @@
 
 namespace isobrick {
 
-/// Tells how long steps take that follow each other.
+/// Measures steps that follow each other, or adds the time of a scope to a sum.
 class Stopwatch {
  public:
-  /// Seconds since the last call, or since this was made.
+  Stopwatch() = default;
+  /// Adds the seconds until its destruction to `sum`.
+  explicit Stopwatch(double& sum) : sum_(&sum) {}
+  ~Stopwatch() {
+    if (sum_) *sum_ += lap();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+  /// Seconds since the last call, or since the construction.
   double lap() {
     const auto now = Clock::now();
     const std::chrono::duration<double> passed = now - last_;
@@ -17,6 +26,7 @@ class Stopwatch {
 
  private:
   using Clock = std::chrono::steady_clock;
+  double* sum_ = nullptr;
   Clock::time_point last_ = Clock::now();
 };
 

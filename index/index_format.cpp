@@ -51,7 +51,7 @@ using index_detail::require;
 
 namespace {
 
-/// The header, once all that can be told without the arrays is right.
+/// The header, after all checks that need no arrays.
 IndexHeader read_header(std::span<const std::byte> bytes) {
   require(bytes.size() >= sizeof(IndexHeader), "shorter than its header");
   IndexHeader header;
@@ -66,7 +66,7 @@ IndexHeader read_header(std::span<const std::byte> bytes) {
   require(head[7] == 0, "reserved bytes are not zero");
   std::memcpy(&header, bytes.data(), sizeof header);
   require(header.reserved1 == 0, "reserved bytes are not zero");
-  require(header.bytes == bytes.size(), "has not the size that its header says");
+  require(header.bytes == bytes.size(), "has not the size that its header states");
   require(header.stored <= header.items, "stores more items than there are");
 
   const std::uint64_t plane = std::uint64_t{header.grid[0]} * header.grid[1];
@@ -83,7 +83,7 @@ IndexView view_index(std::span<const std::byte> bytes) {
   const IndexHeader header = read_header(bytes);
   // Measured before any pointer into the block exists.
   require(index_detail::block_bytes(header) == bytes.size(),
-          "has not the size that its counts say");
+          "has not the size that its counts make");
   return IndexView(header, bytes.data());
 }
 

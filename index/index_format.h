@@ -89,8 +89,8 @@ IndexView view_index(std::span<const std::byte> bytes);
 /// A view of bytes from anywhere. Throws DamageError, saying what is wrong,
 /// unless every count, offset and id is in its bounds and the arrays are in the
 /// order that queries rely on; O(bytes). Whatever passes can be queried with no
-/// access out of bounds and in finitely many steps. That the answers are right
-/// only a checksum can tell.
+/// access out of bounds and in finitely many steps. Only a
+/// checksum proves that the answers are right.
 IndexView open_index(std::span<const std::byte> bytes);
 
 namespace index_detail {

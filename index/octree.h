@@ -24,7 +24,7 @@ struct OctreeView {
     std::uint32_t extent[3] = {};  ///< ⌈extent of the grid / 2^level⌉
   };
   int levels = 0;
-  Level pyramid[kMaxLevels + 1];  ///< and one that says where the last ends
+  Level pyramid[kMaxLevels + 1];  ///< and one that marks the end of the last
   const ValueRange<T>* ranges;
 
   ISOBRICK_HD OctreeView(const IndexHeader& header, SectionCursor& cursor) {

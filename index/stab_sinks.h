@@ -4,13 +4,13 @@
 #include <cstdint>
 #include <vector>
 
-// What a query does with its answers. A traversal calls, in its own order,
-//   ids(list, n)       for a run of ids that lie one after the other,
-//   id(i)              for a single one,
-//   bits(first, word)  for first + b for each set bit b,
-// and, for those who count its steps,
-//   node()             for each node it looks at,
-//   tested(n)          for n items whose range it compares.
+// Sinks take the answers of a query. A traversal calls, in its own order:
+//   ids(list, n)       n ids that lie one after the other.
+//   id(i)              One id.
+//   bits(first, word)  first + b for each set bit b.
+// It also reports its steps:
+//   node()             It visits a node.
+//   tested(n)          It compares the ranges of n items.
 
 namespace isobrick {
 

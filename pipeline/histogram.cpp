@@ -64,16 +64,16 @@ void for_each_sample(const StoreReader& store, int level, Progress& progress, F&
 }
 
 /// Bins of equal width from lo to hi; whole numbers get bins of whole width.
-void lay_bins(Histogram& h, bool whole_numbers, int most_bins) {
+void lay_bins(Histogram& h, bool whole_numbers, int max_bins) {
   if (h.hi < h.lo) return;
   const double span = h.hi - h.lo;
   if (whole_numbers) {
-    h.bin_width = std::ceil((span + 1) / most_bins);
+    h.bin_width = std::ceil((span + 1) / max_bins);
     h.counts.resize(static_cast<std::size_t>(std::floor(span / h.bin_width)) + 1);
   } else {
     // Halved first: the span of doubles may itself be no finite number.
-    h.bin_width = h.hi / most_bins - h.lo / most_bins;
-    h.counts.resize(h.bin_width > 0 ? static_cast<std::size_t>(most_bins) : 1);
+    h.bin_width = h.hi / max_bins - h.lo / max_bins;
+    h.counts.resize(h.bin_width > 0 ? static_cast<std::size_t>(max_bins) : 1);
   }
 }
 
@@ -104,7 +104,7 @@ std::string why_no_histogram(const StoreReader& store, std::uint64_t memory) {
   return "";
 }
 
-Histogram histogram(const StoreReader& store, Progress& progress, int most_bins, bool leaves_out) {
+Histogram histogram(const StoreReader& store, Progress& progress, int max_bins, bool leaves_out) {
   Histogram h;
   h.level = choose_level(store.info());
   ValueRange<double> range;
@@ -124,7 +124,7 @@ Histogram histogram(const StoreReader& store, Progress& progress, int most_bins,
   if (h.left_out == static_cast<std::uint64_t>(volume(lattice.bricks()))) throw Error(h.damage);
   h.lo = range.lo;
   h.hi = range.hi;
-  lay_bins(h, !is_floating(store.info().type), most_bins);
+  lay_bins(h, !is_floating(store.info().type), max_bins);
   for_each_sample(
       store, h.level, progress,
       [&](double value, std::uint64_t times) {

@@ -8,7 +8,7 @@ namespace isobrick {
 /// were measured of commands on a volume of a few samples.
 inline constexpr std::uint64_t kProgramBytes = std::uint64_t{20} << 20;
 
-// How messages say budgets: bytes as MiB, and the least whole number of MiB that is enough.
+// Budgets in messages: bytes as MiB, and the least whole number of MiB that is enough.
 inline double in_mib(std::uint64_t bytes) { return static_cast<double>(bytes) / 1048576; }
 inline std::uint64_t mib_above(std::uint64_t bytes) { return (bytes >> 20) + 1; }
 

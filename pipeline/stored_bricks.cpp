@@ -13,7 +13,7 @@ std::uint64_t for_each_stored_brick(const StoreReader& store, int level, Box3 bo
                                     Progress& progress, const std::function<void(Int3 brick)>& f) {
   const StoreInfo& info = store.info();
   const Lattice& lattice = info.levels[static_cast<std::size_t>(level)].lattice;
-  // Ranges say nothing of samples that are no numbers, nor of the signs of zeros.
+  // Ranges include neither NaN nor the signs of zeros.
   const bool by_ranges = store.has_ranges(level) && !info.may_have_nan &&
                          (!is_floating(lattice.type) || info.fill_value != 0);
   std::uint64_t looked_up = 0, passed = 0;

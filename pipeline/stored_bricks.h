@@ -13,10 +13,10 @@ namespace isobrick {
 void for_each_range_file(Box3 bricks, const std::function<void(Box3 part)>& f);
 
 /// Calls f(brick) for the bricks of a level that hold samples of `box` (in samples) and are
-/// stored. Where there are ranges, these tell in which bricks there can be anything but the
-/// fill value, and only those are looked up; else all are, as they are where the fill value is
-/// a zero of two signs, which ranges do not tell apart. Every brick of the box advances
-/// `progress` by its bytes. Returns how many were looked up.
+/// stored. Ranges show which bricks can hold anything but the fill value, and only those are
+/// looked up. Without ranges all are, as well as where the fill value is a zero, whose sign
+/// ranges lack. Every brick of the box advances `progress` by its bytes. Returns how many were
+/// looked up.
 std::uint64_t for_each_stored_brick(const StoreReader& store, int level, Box3 box,
                                     Progress& progress, const std::function<void(Int3 brick)>& f);
 

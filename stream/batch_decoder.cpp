@@ -3,53 +3,37 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cassert>
 #include <utility>
-
-#include "core/morton.h"
 
 namespace isobrick {
 namespace {
 
-/// Bricks that a thread takes at a time: small ones come in groups.
-constexpr std::size_t kBytesOfJob = std::size_t{128} << 10;
-/// Memory that is got at a time.
-constexpr std::size_t kBytesOfSlab = std::size_t{16} << 20;
-/// Pieces of it that are got before they are needed.
-constexpr std::size_t kSlabsAhead = 3;
-/// Batches that are decoded ahead in any case: one to take, one to work on.
+/// Bytes of the bricks that a thread takes at a time: small bricks come in groups.
+constexpr std::size_t kJobBytes = std::size_t{128} << 10;
+/// Memory that is allocated at a time.
+constexpr std::size_t kPieceBytes = std::size_t{16} << 20;
+/// Pieces of memory that are allocated before they are needed.
+constexpr std::size_t kPiecesAhead = 3;
+/// Batches that are decoded ahead in any case: one for next(), one in use.
 constexpr std::size_t kBatchesAhead = 2;
-
-std::uint64_t key_of(Int3 brick, Int3 grid) {
-  return static_cast<std::uint64_t>(linear_index(brick, grid));
-}
 
 }  // namespace
 
 DecodedBatch::~DecodedBatch() { decoder_.release(*this); }
 
-const std::byte* DecodedBatch::find(Int3 brick) const {
-  const auto* found = samples_.find(key_of(brick, grid_));
-  assert(found);
-  return *found;
-}
-
-std::size_t BatchDecoder::slab_bricks(const Lattice& lattice, std::size_t capacity) {
-  return std::clamp<std::size_t>(kBytesOfSlab / lattice.brick_bytes(), 1, capacity);
+std::size_t BatchDecoder::piece_bricks(const Lattice& lattice, std::size_t capacity) {
+  return std::clamp<std::size_t>(kPieceBytes / lattice.brick_bytes(), 1, capacity);
 }
 
 BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& planner, Index reach,
                            std::size_t capacity, int threads, BrickMemory& memory)
-    : store_(store),
-      level_(level),
-      lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
+    : reader_(store, level),
       planner_(planner),
       capacity_(capacity),
       threads_count_(threads),
-      bricks_of_job_(std::clamp<std::size_t>(kBytesOfJob / lattice_.brick_bytes(), 1, 64)),
+      bricks_of_job_(std::clamp<std::size_t>(kJobBytes / reader_.lattice().brick_bytes(), 1, 64)),
       memory_(memory),
-      check_(store, level),
-      slots_(lattice_, reach) {
+      slots_(reader_.lattice(), reach) {
   {
     const std::lock_guard lock(mutex_);
     grow_if_short();
@@ -77,36 +61,30 @@ void BatchDecoder::wait(std::unique_lock<std::mutex>& lock, const Ready& ready) 
 }
 
 std::shared_ptr<const DecodedBatch> BatchDecoder::next() {
+  Batch batch;  // an error destroys it after the lock, which its destructor takes
   std::unique_lock lock(mutex_);
   wait(lock, [&] {
     return batches_.empty() ? planned_
-                            : batches_.front()->begun_ && batches_.front()->missing_ == 0;
+                            : batches_.front()->begun_ && batches_.front()->pending_ == 0;
   });
   if (batches_.empty()) return nullptr;
-  const Batch batch = std::move(batches_.front());
+  batch = std::move(batches_.front());
   batches_.pop_front();
-  const std::vector<Int3>& bricks = batch->batch_.bricks;
-  const std::size_t first_load = bricks.size() - batch->loads_;
-  ahead_ -= batch->loads_;
-  batch->samples_ = FlatMap<const std::byte*>(bricks.size());
-  for (std::size_t i = 0; i < bricks.size(); ++i) {
-    const std::byte* const samples = slots_.find(bricks[i]);
-    if (samples && i >= first_load) slots_.count_read(bricks[i]);
-    batch->samples_.insert(key_of(bricks[i], batch->grid_)).first = samples;
-  }
+  ahead_ -= batch->bricks_->loads();
+  batch->bricks_->set_decoded();
   changed_.notify_all();
   return batch;
 }
 
 std::uint64_t BatchDecoder::memory_bytes() const {
   const std::lock_guard lock(mutex_);
-  return memory_bytes_;
+  return slots_.slots() * reader_.lattice().brick_bytes();
 }
 
 void BatchDecoder::plan() {
   try {
     for (TileBatch batch; next_planned(batch);) {
-      // The disk works on what comes next, while this waits for its turn.
+      // The disk reads ahead while this thread waits for room.
       hint(batch);
       begin(std::make_shared<DecodedBatch>(*this, std::move(batch)));
       const std::lock_guard lock(mutex_);
@@ -129,33 +107,25 @@ bool BatchDecoder::next_planned(TileBatch& batch) {
 
 void BatchDecoder::begin(const Batch& batch) {
   std::unique_lock lock(mutex_);
-  const std::vector<Int3>& bricks = batch->batch_.bricks;
-  batch->grid_ = lattice_.bricks();
   wait(lock, [&] {
     return batches_.size() < kBatchesAhead ||
            ahead_ < memory_.bricks_ahead() * static_cast<std::size_t>(threads_count_);
   });
   if (stop_) return;
   batches_.push_back(batch);
-  // First what is here: it must not go as needed by nobody later, nor for what is missing.
-  const auto missing =
-      std::stable_partition(batch->batch_.bricks.begin(), batch->batch_.bricks.end(),
-                            [&](Int3 b) { return slots_.hold(b); });
-  batch->held_ = static_cast<std::size_t>(missing - batch->batch_.bricks.begin());
-  slots_.advance(morton_encode(batch->batch_.tiles.back().tile) + 1);
-  batch->missing_ = batch->loads_ = bricks.size() - batch->held_;
-  ahead_ += batch->loads_;
-  std::vector<Load> loads;
-  while (batch->held_ < bricks.size()) {
-    const Int3 brick = bricks[batch->held_];
-    std::byte* slot = place(brick);
-    if (!slot) {
-      load(batch, std::exchange(loads, {}));  // nothing is to wait for this
-      wait(lock, [&] { return (slot = place(brick)) != nullptr; });
-      if (!slot) return;
+  BatchBricks& bricks =
+      batch->bricks_.emplace(slots_, batch->batch_.bricks, batch->batch_.tiles.back().tile);
+  batch->pending_ = bricks.loads();
+  ahead_ += bricks.loads();
+  std::vector<BrickLoad> loads;
+  while (bricks.missing() > 0) {
+    BrickLoad next = place(bricks);
+    if (!next.slot) {
+      load(batch, std::exchange(loads, {}));  // these need not wait for room
+      wait(lock, [&] { return (next = place(bricks)).slot != nullptr; });
+      if (!next.slot) return;
     }
-    ++batch->held_;
-    loads.push_back({brick, slot});
+    loads.push_back(next);
     if (loads.size() == bricks_of_job_) load(batch, std::exchange(loads, {}));
   }
   load(batch, std::move(loads));
@@ -163,50 +133,46 @@ void BatchDecoder::begin(const Batch& batch) {
   changed_.notify_all();
 }
 
-void BatchDecoder::load(const Batch& batch, std::vector<Load> loads) {
+void BatchDecoder::load(const Batch& batch, std::vector<BrickLoad> loads) {
   if (loads.empty()) return;
   jobs_.push(
       [this, batch, loads = std::move(loads)](int thread) { decode(thread, *batch, loads); });
 }
 
-/// Null when there is no room now. A brick that is not needed for long goes rather than that
-/// more memory is waited for.
-std::byte* BatchDecoder::place(Int3 brick) {
+/// The slot is null when there is no room now. Rather than wait for more memory, a brick that is
+/// not needed for long is dropped.
+BrickLoad BatchDecoder::place(BatchBricks& bricks) {
   grow_if_short();
-  return slots_.place(brick);
+  return bricks.place();
 }
 
 void BatchDecoder::hint(const TileBatch& batch) {
-  if (store_.brick_times().from_memory()) return;
+  if (!reader_.reads_disk()) return;
   std::vector<Int3> missing;
   const std::lock_guard lock(mutex_);
   std::copy_if(batch.bricks.begin(), batch.bricks.end(), std::back_inserter(missing),
                [&](Int3 b) { return !slots_.contains(b); });
-  jobs_.push_front([this, missing = std::move(missing)](int) {
-    for (const Int3 b : missing) store_.will_need(level_, b);
-  });
+  jobs_.push_front([this, missing = std::move(missing)](int) { reader_.will_need(missing); });
 }
 
-/// Gets more memory beforehand, for that takes a while.
+/// Allocates memory before it is needed, since that takes a while.
 void BatchDecoder::grow_if_short() {
-  const std::size_t piece = slab_bricks(lattice_, capacity_);
+  const std::size_t piece = piece_bricks(reader_.lattice(), capacity_);
   const std::size_t enough =
-      std::max(kSlabsAhead * piece, static_cast<std::size_t>(threads_count_));
-  while (slots_count_ < capacity_ && slots_.free_slots() + coming_ < enough) {
-    const std::size_t count = std::min(piece, capacity_ - slots_count_);
-    slots_count_ += count;
-    coming_ += count;
+      std::max(kPiecesAhead * piece, static_cast<std::size_t>(threads_count_));
+  while (slots_.slots() + pending_slots_ < capacity_ &&
+         slots_.free_slots() + pending_slots_ < enough) {
+    const std::size_t count = std::min(piece, capacity_ - slots_.slots() - pending_slots_);
+    pending_slots_ += count;
     jobs_.push_front([this, count](int) { grow(count); });
   }
 }
 
 void BatchDecoder::grow(std::size_t count) {
-  auto slab = memory_.room(count * lattice_.brick_bytes());
+  auto piece = memory_.room(count * reader_.lattice().brick_bytes());
   const std::lock_guard lock(mutex_);
-  slabs_.push_back(std::move(slab));
-  slots_.add_slots(slabs_.back().get(), count);
-  memory_bytes_ += count * lattice_.brick_bytes();
-  coming_ -= count;
+  slots_.add_slots(std::move(piece), count);
+  pending_slots_ -= count;
   changed_.notify_all();
 }
 
@@ -218,27 +184,24 @@ void BatchDecoder::work(int thread) {
   }
 }
 
-void BatchDecoder::decode(int thread, DecodedBatch& batch, const std::vector<Load>& loads) {
-  for (const Load& load : loads) {
-    std::byte* const to = memory_.begin(thread, load.place);
-    const bool present = store_.read_brick(level_, load.brick, to);
-    check_.check(load.brick, present ? to : nullptr);
-    if (present) {
-      memory_.end(thread, load.place);
+void BatchDecoder::decode(int thread, DecodedBatch& batch, const std::vector<BrickLoad>& loads) {
+  for (const BrickLoad& load : loads) {
+    if (reader_.read(load.brick, memory_.begin(thread, load.slot))) {
+      memory_.end(thread, load.slot);
     } else {
       const std::lock_guard lock(mutex_);
-      slots_.set_absent(load.brick);
+      batch.bricks_->set_absent(load.brick);
     }
   }
-  if (batch.missing_.fetch_sub(loads.size()) > loads.size()) return;
-  // Under the lock, or whoever has just looked would not be told.
+  if (batch.pending_.fetch_sub(loads.size()) > loads.size()) return;
+  // Under the lock, or a thread that has just read the count would miss the notification.
   const std::lock_guard lock(mutex_);
   changed_.notify_all();
 }
 
-void BatchDecoder::release(const DecodedBatch& batch) {
+void BatchDecoder::release(DecodedBatch& batch) {
   const std::lock_guard lock(mutex_);
-  for (std::size_t i = 0; i < batch.held_; ++i) slots_.release(batch.batch_.bricks[i]);
+  batch.bricks_.reset();
   changed_.notify_all();
 }
 

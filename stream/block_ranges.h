@@ -11,8 +11,8 @@
 
 namespace isobrick {
 
-/// Ranges of 16³ blocks, read in the chunks in which they are stored; those that were asked for
-/// last stay. Thread-safe.
+/// Ranges of 16³ blocks, read in the chunks in which they are stored; the most
+/// recently used stay. Thread-safe.
 class BlockRanges {
  public:
   /// `budget` in bytes; one chunk is kept in any case.
@@ -21,13 +21,13 @@ class BlockRanges {
 
   /// The ranges of the chunk that holds a block of a stored level. Throws what reading throws.
   std::shared_ptr<const RangeTable> around(int level, Int3 block);
-  /// The same if they are there, null otherwise: reads nothing and waits for nobody who reads.
+  /// The same if they have been read, null otherwise. Neither reads nor waits.
   std::shared_ptr<const RangeTable> find(int level, Int3 block);
   /// Drops what is there.
   void clear() { chunks_.clear(); }
 
  private:
-  /// Read by whoever asks for it first, while others read other chunks.
+  /// The first thread that needs it reads it, while others read other chunks.
   struct Chunk {
     mutable std::once_flag once;
     mutable std::shared_ptr<const RangeTable> table;

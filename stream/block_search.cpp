@@ -42,7 +42,7 @@ class RangeSearch final : public BlockSearch {
   std::uint64_t bytes_read_ = 0;
 };
 
-/// Asks the index first how much of a chunk is active. Where that is more than
+/// First finds in the index how much of a chunk is active. Where that is more than
 /// kFew, looking at all ranges is faster: docs/experiments/2026-11-index.md has the figures.
 class SparseSearch final : public BlockSearch {
  public:

@@ -3,100 +3,77 @@
 #include <sys/mman.h>
 
 #include <algorithm>
-#include <cassert>
+#include <cstdlib>
 #include <new>
 #include <stdexcept>
 #include <utility>
 
-#include "core/morton.h"
-
 namespace isobrick {
+namespace {
+
+constexpr std::size_t kLargePage = std::size_t{2} << 20;
+
+/// Memory in large pages, since the first touch of a small page costs as much as decoding its
+/// samples.
+std::shared_ptr<std::byte> allocate(std::size_t bytes) {
+  const bool large = bytes >= kLargePage;
+  const std::size_t align = large ? kLargePage : 64;
+  void* const memory = std::aligned_alloc(align, (bytes + align - 1) / align * align);
+  if (!memory) throw std::bad_alloc();
+  if (large) (void)madvise(memory, bytes, MADV_HUGEPAGE);
+  return {static_cast<std::byte*>(memory), &std::free};
+}
+
+}  // namespace
+
+CachedBricks::CachedBricks(BrickSlots& slots, std::span<const Int3> bricks, Int3 last)
+    : bricks_(slots, bricks, last) {}
 
 CachedBricks::~CachedBricks() noexcept {
   tasks_.cancel();
   try {
     tasks_.wait();
   } catch (...) {
-    // Nobody waits for these bricks any more.
+    // Nothing reads these bricks any more.
   }
-  for (const Int3 b : bricks_) cache_.slots_.release(b);
 }
 
 void CachedBricks::wait() {
   tasks_.wait();
   for (const Load& load : loads_)
-    if (load.present)
-      cache_.slots_.count_read(load.brick);
-    else
-      cache_.slots_.set_absent(load.brick);
+    if (!load.present) bricks_.set_absent(load.brick);
   loads_.clear();
-  for (const Int3 b : bricks_) samples_[cache_.key(b)] = cache_.slots_.find(b);
-}
-
-const std::byte* CachedBricks::find(Int3 brick) const {
-  const auto found = samples_.find(cache_.key(brick));
-  assert(found != samples_.end());
-  return found->second;
+  bricks_.set_decoded();
 }
 
 BrickCache::BrickCache(const StoreReader& store, int level, Index reach, std::size_t capacity)
-    : store_(store),
-      level_(level),
-      lattice_(store.info().levels[static_cast<std::size_t>(level)].lattice),
-      capacity_(capacity),
-      check_(store, level),
-      slots_(lattice_, reach) {}
+    : reader_(store, level), capacity_(capacity), slots_(reader_.lattice(), reach) {}
 
 std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, Int3 last) {
-  auto begun = std::make_unique<CachedBricks>(*this);
-  begun->bricks_.reserve(bricks.size());
-  std::vector<Int3> missing;
-  // First what is here: it must not go as needed by nobody later, nor for what is missing.
-  for (const Int3 b : bricks) (slots_.hold(b) ? begun->bricks_ : missing).push_back(b);
-  slots_.advance(morton_encode(last) + 1);
-  for (const Int3 b : missing) {
-    begun->loads_.push_back({b, place(b)});
-    begun->bricks_.push_back(b);
+  auto begun = std::make_unique<CachedBricks>(slots_, bricks, last);
+  begun->loads_.reserve(begun->bricks_.loads());
+  while (begun->bricks_.missing() > 0) {
+    if (slots_.free_slots() == 0 && slots_.slots() < capacity_) grow();
+    const BrickLoad load = begun->bricks_.place();
+    if (!load.slot) throw std::logic_error("more bricks are in use than there is room for");
+    begun->loads_.push_back({load});
   }
   for (CachedBricks::Load& load : begun->loads_)
-    begun->tasks_.run([this, &load] {
-      load.present = store_.read_brick(level_, load.brick, load.samples);
-      check_.check(load.brick, load.present ? load.samples : nullptr);
-    });
+    begun->tasks_.run([this, &load] { load.present = reader_.read(load.brick, load.slot); });
   return begun;
 }
 
-std::byte* BrickCache::place(Int3 brick) {
-  if (slots_.free_slots() == 0 && places_ < capacity_) grow();
-  std::byte* const samples = slots_.place(brick);
-  if (!samples) throw std::logic_error("more bricks are in use than there is room for");
-  return samples;
-}
-
-/// Memory comes in large pages, for the first touch of a small one costs as much as the
-/// decoding of what it holds.
 void BrickCache::grow() {
-  constexpr std::size_t page = std::size_t{2} << 20, good = 16 * page;
-  const std::size_t brick = lattice_.brick_bytes();
-  const std::size_t count = std::clamp<std::size_t>(good / brick, 1, capacity_ - places_);
-  const std::size_t bytes = count * brick;
-  const bool large = bytes >= page;
-  const std::size_t align = large ? page : 64;
-  auto* slab =
-      static_cast<std::byte*>(std::aligned_alloc(align, (bytes + align - 1) / align * align));
-  if (!slab) throw std::bad_alloc();
-  slabs_.emplace_back(slab);
-  if (large) (void)madvise(slab, bytes, MADV_HUGEPAGE);
-  slots_.add_slots(slab, count);
-  places_ += count;
+  const std::size_t brick = reader_.lattice().brick_bytes();
+  const std::size_t count =
+      std::clamp<std::size_t>(16 * kLargePage / brick, 1, capacity_ - slots_.slots());
+  slots_.add_slots(allocate(count * brick), count);
 }
 
 void BrickCache::will_need(CachedBricks& begun, std::vector<Int3> bricks) {
-  if (store_.brick_times().from_memory()) return;
+  if (!reader_.reads_disk()) return;
   std::erase_if(bricks, [&](Int3 b) { return slots_.contains(b); });
-  begun.tasks_.run([this, bricks = std::move(bricks)] {
-    for (const Int3 b : bricks) store_.will_need(level_, b);
-  });
+  begun.tasks_.run([this, bricks = std::move(bricks)] { reader_.will_need(bricks); });
 }
 
 }  // namespace isobrick

@@ -4,71 +4,60 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include <isobrick/store_reader.h>
-#include "core/tile.h"
-#include "stream/brick_check.h"
+#include "stream/batch_bricks.h"
+#include "stream/brick_reader.h"
 #include "stream/brick_slots.h"
 
 namespace isobrick {
 
-class BrickCache;
-
-/// The bricks of tiles that are worked on together, which stay where they are until this is
-/// destroyed (by the cache's thread, and before the cache). They are waited for in the order in
-/// which they were begun; once that failed or was given up, the cache is of no use any more.
+/// The bricks of tiles that are extracted together, which stay in place until this is destroyed,
+/// by the cache's thread and before the cache. The caller waits for them in the order in which it
+/// began them. After an error or an early destruction the cache cannot be used any more.
 class CachedBricks final : public BrickLookup {
  public:
-  explicit CachedBricks(BrickCache& cache) : cache_(cache) {}
+  CachedBricks(BrickSlots& slots, std::span<const Int3> bricks, Int3 last);
   CachedBricks(const CachedBricks&) = delete;
   CachedBricks& operator=(const CachedBricks&) = delete;
-  /// Decodes nothing more, but waits for what is being decoded.
+  /// Begins no more decoding, and waits for the bricks that are being decoded.
   ~CachedBricks() noexcept override;
 
-  /// Decodes, along with the other threads, until all is there: find() is for afterwards.
-  /// Throws what went wrong in reading or decoding.
+  /// Decodes, along with the other threads, until all bricks are resident: find() is valid
+  /// afterwards. Called once. Throws the errors of reading and decoding.
   void wait();
 
-  const std::byte* find(Int3 brick) const override;
+  const std::byte* find(Int3 brick) const override { return bricks_.find(brick); }
 
  private:
   friend class BrickCache;
-  struct Load {
-    Int3 brick;
-    std::byte* samples = nullptr;
+  struct Load : BrickLoad {
     bool present = false;
   };
 
-  BrickCache& cache_;
-  std::vector<Int3> bricks_;  ///< held
-  std::vector<Load> loads_;   ///< what was not there
-  std::unordered_map<std::uint64_t, const std::byte*> samples_;
+  BatchBricks bricks_;
+  std::vector<Load> loads_;
   tbb::task_group tasks_;
 };
 
-/// Decoded bricks of a level, for batches of tiles in Morton order. Decoding is done by the
-/// threads of the TBB arena that all calls come from, beside whatever else they have to do; so
-/// the bricks of one batch may be begun while those of another are used. For one thread.
+/// Decoded bricks of a level, for batches of tiles in Morton order. The threads of the caller's
+/// TBB arena decode them as tasks beside their other work, so the bricks of one batch can be begun
+/// while those of another are used. For one thread. (BatchDecoder has threads of its own.)
 class BrickCache {
  public:
-  /// At most `capacity` bricks are held at a time. They are used by tiles with `reach` layers of
-  /// samples around them. Memory is got when it is needed.
+  /// Holds at most `capacity` bricks at a time, for tiles with `reach` layers of samples around
+  /// them. Allocates memory when it is needed.
   BrickCache(const StoreReader& store, int level, Index reach, std::size_t capacity);
 
-  /// Begins to decode what is missing of `bricks`, which must fit beside those that are in use;
-  /// no brick is there twice. `last` is the last of the tiles that they are for: what neither it
-  /// nor a later tile needs goes when it is not used any more. Where there is no room, what is
-  /// needed last goes first.
+  /// Begins to decode those of `bricks` that are not resident. They must fit beside the bricks
+  /// that are in use. See BatchBricks.
   std::unique_ptr<CachedBricks> begin(std::span<const Int3> bricks, Int3 last);
 
-  /// Hints that these bricks come after those that were begun: starts the disk for what is not
-  /// here. Where they are stored is looked up beside the decoding; begun.wait() throws what goes
-  /// wrong with it.
+  /// Hints to the disk that these bricks follow those that were begun. A task looks up where they
+  /// are stored; begun.wait() throws its errors.
   void will_need(CachedBricks& begun, std::vector<Int3> bricks);
 
   /// Bricks read and decoded so far, and how many different ones.
@@ -76,24 +65,11 @@ class BrickCache {
   std::uint64_t bricks_read() const { return slots_.bricks_read(); }
 
  private:
-  friend class CachedBricks;
-  std::uint64_t key(Int3 brick) const {
-    return static_cast<std::uint64_t>(linear_index(brick, lattice_.bricks()));
-  }
-  std::byte* place(Int3 brick);
   void grow();
 
-  const StoreReader& store_;
-  const int level_;
-  const Lattice lattice_;
+  const BrickReader reader_;
   const std::size_t capacity_;
-  const BrickCheck check_;
   BrickSlots slots_;
-  struct Free {
-    void operator()(std::byte* slab) const { std::free(slab); }
-  };
-  std::vector<std::unique_ptr<std::byte, Free>> slabs_;  ///< memory of many bricks each
-  std::size_t places_ = 0;                               ///< that there is memory for
 };
 
 }  // namespace isobrick

@@ -5,21 +5,21 @@
 
 namespace isobrick {
 
-/// Where decoded bricks lie, and how they come there. Called from any thread.
+/// Memory for decoded bricks, and their transfer into it. Thread-safe.
 class BrickMemory {
  public:
   virtual ~BrickMemory() = default;
 
-  /// Room for bricks, one after the other; given back when nothing points to it any more.
+  /// Memory for bricks, one after the other; freed with the last pointer to it.
   virtual std::shared_ptr<std::byte> room(std::size_t bytes) = 0;
-  /// Where decoder `thread`, counted from 0, is to decode the brick of a place in that room,
-  /// which need not be memory that a processor writes.
+  /// The buffer that decoder `thread`, counted from 0, writes a brick to. `place` in that memory
+  /// need not be writable by the CPU.
   virtual std::byte* begin(int /*thread*/, std::byte* place) { return place; }
-  /// The samples that were begun last are whole and belong to `place`: they are to be there for
-  /// whoever reads that memory.
+  /// The thread's last buffer is complete and belongs to `place`. Transfers it, so that readers of
+  /// that memory find it.
   virtual void end(int /*thread*/, std::byte* /*place*/) {}
-  /// Bricks a thread that should be decoded ahead: enough for all to be busy while whoever
-  /// takes batches does something else.
+  /// Bricks per thread to decode ahead: enough to keep all threads busy while the consumer of
+  /// batches does something else.
   virtual std::size_t bricks_ahead() const { return 12; }
 };
 

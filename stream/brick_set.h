@@ -9,7 +9,7 @@
 namespace isobrick {
 
 /// Some of a store's bricks, a bit for each; of levels that are stored, and bricks within their
-/// lattices. One thread at a time changes it; others may ask meanwhile, without waiting.
+/// lattices. One thread at a time changes it; others may call has() meanwhile, without waiting.
 class BrickSet {
  public:
   explicit BrickSet(const StoreInfo& info) {

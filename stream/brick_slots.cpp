@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "core/morton.h"
 
@@ -40,11 +41,12 @@ std::uint64_t last_use(const Lattice& lattice, Index reach, Int3 brick) {
   return morton_encode(tiles_using(lattice, reach, brick).hi - Int3{1, 1, 1});
 }
 
-void BrickSlots::add_slots(std::byte* memory, std::size_t count) {
-  // The slot that was freed last is taken first, and these in their order.
+void BrickSlots::add_slots(std::shared_ptr<std::byte> memory, std::size_t count) {
+  // place() takes the slot that was freed last, and new slots in their order.
   const std::size_t bytes = lattice_.brick_bytes();
   std::vector<std::byte*> slots;
-  for (std::size_t i = count; i > 0; --i) slots.push_back(memory + (i - 1) * bytes);
+  for (std::size_t i = count; i > 0; --i) slots.push_back(memory.get() + (i - 1) * bytes);
+  memory_.push_back(std::move(memory));
   free_.reserve(slots_ + count);
   free_.insert(free_.begin(), slots.begin(), slots.end());
   slots_ += count;
@@ -86,10 +88,8 @@ void BrickSlots::set_absent(Int3 brick) {
 }
 
 void BrickSlots::count_read(Int3 brick) {
-  auto is_seen = seen_[static_cast<std::size_t>(key(brick))];
   ++reads_;
-  bricks_read_ += !is_seen;
-  is_seen = true;
+  bricks_read_.add(static_cast<std::size_t>(key(brick)));
 }
 
 BrickSlots::IdleSet::node_type BrickSlots::new_node() {

@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <set>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <isobrick/lattice.h>
+#include "stream/distinct_bricks.h"
 
 namespace isobrick {
 
@@ -22,26 +24,26 @@ std::uint64_t next_use(const Lattice& lattice, Index reach, Int3 brick, std::uin
 std::uint64_t last_use(const Lattice& lattice, Index reach, Int3 brick);
 
 /// Which decoded brick lies in which slot of memory. As tiles come in Morton order, it is
-/// known when a brick will be needed next: where room is short, the brick goes that is not
-/// needed for the longest time. Books only; not thread-safe.
+/// known when a brick will be needed next. Where room is short, the brick that is needed last is
+/// dropped. Bookkeeping only; not thread-safe.
 class BrickSlots {
  public:
   BrickSlots(const Lattice& lattice, Index reach)
-      : lattice_(lattice),
-        reach_(reach),
-        seen_(static_cast<std::size_t>(volume(lattice.bricks()))) {}
+      : lattice_(lattice), reach_(reach), bricks_read_(lattice) {}
+
+  Int3 grid() const { return lattice_.bricks(); }
 
   /// Takes over memory for `count` bricks, one after the other.
-  void add_slots(std::byte* memory, std::size_t count);
-  /// All tiles before `code` have had their bricks held: what nobody holds and only they need
-  /// goes.
+  void add_slots(std::shared_ptr<std::byte> memory, std::size_t count);
+  /// The bricks of all tiles before `code` have been held. Drops bricks that nobody holds and no
+  /// later tile needs.
   void advance(std::uint64_t code);
 
   /// Keeps a brick until release(). False when it is not here.
   bool hold(Int3 brick);
   /// Puts a brick that is not here into a slot, and holds it. Null when all slots are held.
   std::byte* place(Int3 brick);
-  /// The brick, which is here, turned out to be absent: its slot is free again.
+  /// The store has no such brick, so its slot is free again.
   void set_absent(Int3 brick);
   /// The brick was read and decoded.
   void count_read(Int3 brick);
@@ -50,15 +52,15 @@ class BrickSlots {
   bool contains(Int3 brick) const { return entries_.count(key(brick)) > 0; }
   /// The samples of a brick that is held; null when it is absent.
   const std::byte* find(Int3 brick) const { return entries_.at(key(brick)).slot; }
-  /// Slots that nothing is lost by using.
+  /// Slots that there is memory for.
+  std::size_t slots() const { return slots_; }
+  /// Slots without a brick.
   std::size_t free_slots() const { return free_.size(); }
   /// Bricks decoded so far, and how many different ones.
   std::uint64_t reads() const { return reads_; }
-  std::uint64_t bricks_read() const { return bricks_read_; }
-  /// What telling those apart takes.
-  static std::uint64_t bytes(const Lattice& lattice) {
-    return static_cast<std::uint64_t>(volume(lattice.bricks())) / 8;
-  }
+  std::uint64_t bricks_read() const { return bricks_read_.count(); }
+  /// Memory that grows with the lattice.
+  static std::uint64_t bytes(const Lattice& lattice) { return DistinctBricks::bytes(lattice); }
 
  private:
   using IdleSet = std::set<std::pair<std::uint64_t, std::uint64_t>>;
@@ -82,8 +84,9 @@ class BrickSlots {
   IdleSet idle_;  ///< held by nobody: next use, key
   std::size_t slots_ = 0;
   std::vector<std::byte*> free_;  ///< has room for all slots
-  std::vector<bool> seen_;
-  std::uint64_t reads_ = 0, bricks_read_ = 0;
+  std::vector<std::shared_ptr<std::byte>> memory_;
+  std::uint64_t reads_ = 0;
+  DistinctBricks bricks_read_;
 };
 
 }  // namespace isobrick

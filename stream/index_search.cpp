@@ -124,7 +124,7 @@ std::uint64_t IndexSearch::active_blocks(const IndexChunk& chunk, Int3 brick,
   try {
     if (!chunk.read(part, bytes))
       throw DamageError(
-          fmt::format("'{}' has no part for it, but its directory says that the "
+          fmt::format("'{}' has no part for it, but by its directory the "
                       "isovalue is in its range",
                       chunk.path().string()));
   } catch (const DamageError& e) {

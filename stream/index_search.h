@@ -12,7 +12,7 @@
 namespace isobrick {
 
 /// A decoded part of an index chunk: checked, and the index of `grid` that its
-/// layout says it must be. Throws DamageError saying what is wrong, not where.
+/// layout requires. Throws DamageError with what is wrong, not where.
 /// The view lasts as long as the bytes.
 IndexView open_index_part(std::span<const std::byte> bytes, IndexKind kind, ScalarType type,
                           Int3 grid);

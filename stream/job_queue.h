@@ -11,7 +11,7 @@ namespace isobrick {
 /// never waits long to take one. Thread-safe.
 class JobQueue {
  public:
-  /// Is told which thread does it, by the number that it takes jobs under.
+  /// Gets the number of the thread that runs it.
   using Job = std::function<void(int thread)>;
 
   void push(Job job);

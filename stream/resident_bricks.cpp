@@ -5,17 +5,16 @@
 #include <utility>
 
 #include <isobrick/error.h>
+#include "core/stopwatch.h"
 
 namespace isobrick {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+/// How often a thread that waits for another's brick checks whether it was cancelled.
+constexpr std::chrono::milliseconds kPollInterval{5};
 
-/// How often a thread that waits for another's brick asks whether it is still wanted.
-constexpr std::chrono::milliseconds kPatience{5};
-
-/// Of the budget: the part for bricks that are read together, and for those that are read before
-/// they are asked for. More of them would displace one another.
+/// The part of the budget for bricks that are read together, and for those that are prefetched.
+/// More of them would displace one another.
 constexpr std::uint64_t kPartTogether = 8;
 
 /// Of a budget: what ranges take.
@@ -40,7 +39,7 @@ ResidentBricks::ResidentBricks(std::shared_ptr<const BrickSource> source, std::u
       budget_(budget - range_bytes(budget)),
       resident_(source_->info()) {}
 
-/// Drops what nobody uses until so many bytes fit, as far as that goes.
+/// Drops unused bricks until so many bytes fit, as far as possible.
 void ResidentBricks::make_room(std::uint64_t bytes) {
   for (auto at = order_.end(); at != order_.begin() && counters_.bytes + bytes > budget_;) {
     --at;
@@ -90,7 +89,7 @@ std::shared_ptr<const BrickSamples> ResidentBricks::get(const Key& key,
       return entry.samples;
     }
     if (!may_wait) return nullptr;
-    loaded_.wait_for(lock, kPatience);
+    loaded_.wait_for(lock, kPollInterval);
   }
   LoadResult made = read(key, lock);
   if (made.failure) std::rethrow_exception(made.failure);
@@ -101,9 +100,9 @@ std::uint64_t ResidentBricks::brick_bytes(int level) const {
   return source_->info().levels[static_cast<std::size_t>(level)].lattice.brick_bytes();
 }
 
-/// The next brick of the oldest request that has one which nobody reads; else one that is wanted
-/// soon.
-std::optional<ResidentBricks::Key> ResidentBricks::next_wanted() {
+/// The next brick that no thread reads, of the oldest request with such a brick; else the front of
+/// the prefetch queue.
+std::optional<ResidentBricks::Key> ResidentBricks::next_to_read() {
   for (Request& request : requests_)
     while (request.next < request.bricks.size()) {
       const Key key{request.level, request.bricks[request.next++]};
@@ -117,13 +116,13 @@ std::optional<ResidentBricks::Key> ResidentBricks::next_wanted() {
   return prefetch_queue_.front();
 }
 
-/// Takes a brick off those that are wanted soon.
+/// Removes a brick from the prefetch queue.
 void ResidentBricks::forget_need(const Key& key) {
-  const auto found = soon_places_.find(key);
-  if (found == soon_places_.end()) return;
+  const auto found = prefetch_places_.find(key);
+  if (found == prefetch_places_.end()) return;
   prefetch_queue_.erase(found->second);
-  soon_places_.erase(found);
-  soon_bytes_ -= brick_bytes(key.level);
+  prefetch_places_.erase(found);
+  prefetch_bytes_ -= brick_bytes(key.level);
 }
 
 bool ResidentBricks::over(const Request& request) const {
@@ -147,10 +146,10 @@ void ResidentBricks::read_together(int level, std::span<const Int3> bricks,
   try {
     while (!over(*own)) {
       token.check();
-      if (const auto key = next_wanted())
+      if (const auto key = next_to_read())
         (void)read(*key, lock);
       else
-        loaded_.wait_for(lock, kPatience);
+        loaded_.wait_for(lock, kPollInterval);
     }
   } catch (...) {
     requests_.erase(own);
@@ -159,7 +158,7 @@ void ResidentBricks::read_together(int level, std::span<const Int3> bricks,
   requests_.erase(own);
 }
 
-/// Reads what is not there, and nobody else reads; gives the lock up meanwhile.
+/// Reads a missing brick that no other thread reads. Releases the lock meanwhile.
 ResidentBricks::LoadResult ResidentBricks::read(const Key& key,
                                                 std::unique_lock<std::mutex>& lock) {
   entries_[key];
@@ -171,14 +170,14 @@ ResidentBricks::LoadResult ResidentBricks::read(const Key& key,
   counters_.peak_bytes = std::max(counters_.peak_bytes, counters_.bytes);
   lock.unlock();
   LoadResult made;
-  const auto start = Clock::now();
+  Stopwatch watch;
   try {
     made.samples = load(key);
   } catch (...) {
     made.failure = std::current_exception();
   }
   lock.lock();
-  counters_.read_seconds += std::chrono::duration<double>(Clock::now() - start).count();
+  counters_.read_seconds += watch.lap();
   ++counters_.reads;
   counters_.bytes -= bytes;
   if (made.samples) {
@@ -243,12 +242,12 @@ void ResidentBricks::will_need(int level, Int3 brick) {
   {
     const std::lock_guard lock(mutex_);
     const Key key{level, brick};
-    if (entries_.contains(key) || soon_places_.contains(key)) return;
+    if (entries_.contains(key) || prefetch_places_.contains(key)) return;
     const std::uint64_t bytes = brick_bytes(level), most = budget_ / kPartTogether;
     if (bytes <= most) {
-      while (soon_bytes_ + bytes > most) forget_need(Key(prefetch_queue_.front()));
-      soon_places_.emplace(key, prefetch_queue_.insert(prefetch_queue_.end(), key));
-      soon_bytes_ += bytes;
+      while (prefetch_bytes_ + bytes > most) forget_need(Key(prefetch_queue_.front()));
+      prefetch_places_.emplace(key, prefetch_queue_.insert(prefetch_queue_.end(), key));
+      prefetch_bytes_ += bytes;
     }
   }
   source_->will_need(level, brick);
@@ -257,8 +256,8 @@ void ResidentBricks::will_need(int level, Int3 brick) {
 void ResidentBricks::forget_needs() {
   const std::lock_guard lock(mutex_);
   prefetch_queue_.clear();
-  soon_places_.clear();
-  soon_bytes_ = 0;
+  prefetch_places_.clear();
+  prefetch_bytes_ = 0;
 }
 
 ResidentBricks::Counters ResidentBricks::counters() const {

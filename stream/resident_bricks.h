@@ -17,14 +17,14 @@
 
 namespace isobrick {
 
-/// Thrown out of work that nobody wants any more. Says nothing to a user.
+/// Thrown to unwind cancelled work; never shown to users.
 class OperationCancelled final : public std::exception {};
 
-/// Whether somebody still wants the work that a thread is at; asked between bricks.
+/// Whether an operation was cancelled. Its thread checks that between bricks.
 class CancellationToken {
  public:
   virtual ~CancellationToken() = default;
-  /// Throws OperationCancelled when nobody does.
+  /// Throws OperationCancelled when it was.
   virtual void check() const = 0;
 };
 
@@ -49,37 +49,36 @@ class BrickSamples {
   std::size_t size_;
 };
 
-/// Decoded bricks of all levels under one budget, the least recently used dropped
-/// first. Thread-safe: threads that want the same brick wait for the one that
-/// reads it. (stream/brick_cache.h serves one caller and one level at a time.)
+/// Decoded bricks of all levels under one budget; the least recently used is dropped first.
+/// Thread-safe: threads that need the same brick wait for the one that reads it. (BrickCache serves
+/// one caller and one level.)
 class ResidentBricks {
  public:
-  /// `budget` in bytes; what is in use counts, too, and a small part is for ranges. A brick that
-  /// does not fit beside those in use is given out all the same and dropped at once afterwards.
+  /// `budget` in bytes includes the bricks in use, and a small part for ranges. A brick that does
+  /// not fit beside those in use is returned all the same, and dropped after its use.
   ResidentBricks(std::shared_ptr<const BrickSource> source, std::uint64_t budget);
 
-  /// The brick, read and decoded by the caller's thread if need be. Throws
-  /// OperationCancelled, or what reading throws: a brick that is damaged is not read twice.
+  /// The brick, which the caller's thread reads and decodes if it is missing. Throws
+  /// OperationCancelled, or the error of reading: a damaged brick is not read twice.
   std::shared_ptr<const BrickSamples> get(int level, Int3 brick, const CancellationToken& token);
   /// The same, but null at once where another thread is reading it.
   std::shared_ptr<const BrickSamples> get_unless_busy(int level, Int3 brick,
                                                       const CancellationToken& token);
-  /// Reads those of these bricks that are missing. Threads that are in here at the same time read
-  /// one another's, whoever came first first, then those that will_need() named while there is room
-  /// for them, rather than wait for what others are reading. Does nothing where fewer than two
-  /// bricks are missing, which get() reads or waits for, nor where they would take much of the
-  /// budget: then they would displace one another. Throws OperationCancelled; what cannot be read
-  /// says so when it is got.
+  /// Reads those of these bricks that are missing. Concurrent callers read one another's bricks in
+  /// the order of their calls. Then they read the bricks of will_need() while there is room, rather
+  /// than wait for other threads. Does nothing where fewer than two bricks are missing: get() reads
+  /// those. Does nothing either where the bricks would take much of the budget, and so displace one
+  /// another. Throws OperationCancelled; get() reports the errors of reading.
   void read_together(int level, std::span<const Int3> bricks, const CancellationToken& token);
-  /// The brick if it is there.
+  /// The brick if it is resident.
   std::shared_ptr<const BrickSamples> find(int level, Int3 brick);
-  /// Whether all bricks of `box` (in bricks, within the lattice) are there. Waits for nobody, like
-  /// the next two: bricks may come and go while it looks.
+  /// Whether all bricks of `box` (in bricks, within the lattice) are resident. Takes no lock, like
+  /// the next two: bricks may come and go meanwhile.
   bool resident(int level, Box3 box) const;
   /// Whether at least half of these are.
   bool half_resident(int level, std::span<const Int3> bricks) const;
   bool half_resident(int level, Box3 bricks) const;
-  /// Drops what is there, ranges as well; from now on no brick is kept.
+  /// Drops all bricks and ranges; from now on no brick is kept.
   void close();
   /// The ranges of blocks around this one, those of its node of 64³ cells among them.
   std::shared_ptr<const RangeTable> block_ranges(int level, Int3 block) {
@@ -89,12 +88,12 @@ class ResidentBricks {
   std::shared_ptr<const RangeTable> known_block_ranges(int level, Int3 block) {
     return ranges_.find(level, block);
   }
-  /// Says that the brick is wanted soon, unless it is there or somebody has said so: hints it to
-  /// the disk, and threads that would wait in read_together() read it meanwhile, those first that
-  /// were named first. Together they take an eighth of the budget at most; what was named first is
-  /// forgotten for what was named last. A brick that is larger is hinted only.
+  /// Announces a brick that is needed soon, unless it is resident or announced. Hints it to the
+  /// disk, and queues it: threads that would wait in read_together() read the queue from its front.
+  /// The queue takes an eighth of the budget at most; a new brick displaces the oldest. A brick
+  /// that is larger than that is hinted only.
   void will_need(int level, Int3 brick);
-  /// What will_need() named is not wanted any more.
+  /// Empties the queue of will_need().
   void forget_needs();
 
   const BrickSource& source() const { return *source_; }
@@ -122,11 +121,11 @@ class ResidentBricks {
     std::list<Key>::iterator order;
   };
 
-  /// What a thread in read_together() wants.
+  /// The bricks of a thread in read_together().
   struct Request {
     int level;
     std::span<const Int3> bricks;
-    std::size_t next = 0;  ///< the first so many are there, or being read
+    std::size_t next = 0;  ///< the bricks before it are resident, or being read
   };
   /// One of both.
   struct LoadResult {
@@ -137,7 +136,7 @@ class ResidentBricks {
   std::shared_ptr<const BrickSamples> get(const Key& key, const CancellationToken& token,
                                           bool may_wait);
   LoadResult read(const Key& key, std::unique_lock<std::mutex>& lock);
-  std::optional<Key> next_wanted();
+  std::optional<Key> next_to_read();
   void forget_need(const Key& key);
   std::uint64_t brick_bytes(int level) const;
   bool over(const Request& request) const;
@@ -151,13 +150,13 @@ class ResidentBricks {
   mutable std::mutex mutex_;
   std::condition_variable loaded_;
   std::unordered_map<Key, Entry, KeyHash> entries_;
-  BrickSet resident_;     ///< those of entries_ that are loaded; may be asked without the lock
+  BrickSet resident_;     ///< those of entries_ that are loaded; can be read without the lock
   std::list<Key> order_;  ///< most recently used first; only what is loaded
   std::list<Request> requests_;
-  /// That will_need() named and nobody has begun to read, those first that were named first.
+  /// Bricks of will_need() that no thread has begun to read, oldest first.
   std::list<Key> prefetch_queue_;
-  std::unordered_map<Key, std::list<Key>::iterator, KeyHash> soon_places_;  ///< in `soon_`
-  std::uint64_t soon_bytes_ = 0;                                            ///< of those
+  std::unordered_map<Key, std::list<Key>::iterator, KeyHash> prefetch_places_;
+  std::uint64_t prefetch_bytes_ = 0;
   Counters counters_;
 };
 

@@ -1,11 +1,11 @@
 #include "stream/tile_stream.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "core/flat_map.h"
 #include "core/morton.h"
+#include "core/stopwatch.h"
 
 namespace isobrick {
 namespace {
@@ -44,11 +44,10 @@ TileStream::TileStream(const StoreReader& store, int level, std::vector<double> 
 
 bool TileStream::load_next_chunk() {
   if (next_chunk_ == chunks_.size()) return false;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch(seconds_);
   for (std::vector<TileWork>& tiles : tiles_of_) tiles.clear();
   search_->append_tiles(chunks_[next_chunk_++], roi_tiles_, isovalues_, tiles_of_);
   merge();
-  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return true;
 }
 

@@ -16,8 +16,7 @@ namespace isobrick {
 /// They are found range chunk by range chunk: memory does not grow with the volume.
 class TileStream {
  public:
-  /// Tiles without a cell in `roi` (samples) are left out. `by` says how
-  /// they are found.
+  /// Tiles without a cell in `roi` (samples) are left out. `by` is the search method.
   TileStream(const StoreReader& store, int level, std::vector<double> isovalues, Box3 roi,
              SearchMethod by = {});
   TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchMethod by = {})
@@ -65,7 +64,7 @@ struct TileBatch {
 /// Cuts a tile stream into batches of at most `max_tiles` tiles that need at
 /// most `max_bricks` bricks, which must be enough for any single tile
 /// (max_bricks_of_tile). With `whole_tiles` all blocks of a tile count as
-/// active: ranges say nothing of NaN, so where there may be some every sample is
+/// active. Ranges do not include NaN, so where there may be some, every sample is
 /// looked at.
 class BatchPlanner {
  public:

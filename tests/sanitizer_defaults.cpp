@@ -2,7 +2,7 @@
 
 extern "C" {
 
-/// libhdf5 asks for as much memory as a damaged file says, and copes with getting none.
+/// libhdf5 requests as much memory as a damaged file states, and copes with getting none.
 const char* __asan_default_options() { return "allocator_may_return_null=1"; }
 
 /// Nothing is unloaded, so that what a driver has kept is reported with its name.

@@ -31,8 +31,8 @@ void put(std::FILE* file, std::string_view text) {
   if (!whole || std::fflush(file) != 0) throw system_error("write to", "standard output", errno);
 }
 
-/// Nobody is left to be told when this fails.
-void say(std::string_view text) noexcept {
+/// A failure here cannot be reported.
+void write_error(std::string_view text) noexcept {
   static_cast<void>(std::fwrite(text.data(), 1, text.size(), stderr));
 }
 
@@ -92,11 +92,12 @@ void TerminalProgress::redraw(Clock::time_point now) {
   last_ = now;
   drawn_ = true;
   const double seconds = std::chrono::duration<double>(now - start_).count();
-  say(fmt::format("\r{}\x1b[K", progress_line(stage_, done_, total_, seconds, terminal_columns())));
+  write_error(
+      fmt::format("\r{}\x1b[K", progress_line(stage_, done_, total_, seconds, terminal_columns())));
 }
 
 void TerminalProgress::erase() {
-  if (drawn_) say("\r\x1b[K");
+  if (drawn_) write_error("\r\x1b[K");
   drawn_ = false;
 }
 
@@ -125,7 +126,7 @@ void Console::result_text(std::string_view command, std::string_view text) const
 }
 
 void Console::note(std::string_view text) const {
-  if (!mode_.quiet) say(fmt::format("{}{}", text, text.ends_with('\n') ? "" : "\n"));
+  if (!mode_.quiet) write_error(fmt::format("{}{}", text, text.ends_with('\n') ? "" : "\n"));
 }
 
 void print_error(std::string_view command, std::string_view what) {
@@ -133,13 +134,13 @@ void print_error(std::string_view command, std::string_view what) {
   line += what;
   std::replace(line.begin(), line.end(), '\n', ' ');
   line += '\n';
-  say(line);
+  write_error(line);
 }
 
 void print_out_of_memory(std::string_view command) noexcept {
-  say(command.empty() ? "isobrick" : "isobrick ");
-  say(command);
-  say(": out of memory; a smaller --memory may help\n");
+  write_error(command.empty() ? "isobrick" : "isobrick ");
+  write_error(command);
+  write_error(": out of memory; a smaller --memory may help\n");
 }
 
 nlohmann::ordered_json to_json(Int3 v) { return {v.x, v.y, v.z}; }

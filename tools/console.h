@@ -12,7 +12,7 @@
 
 namespace isobrick::tools {
 
-/// How the program was told to speak.
+/// What the program writes to its terminal.
 struct OutputMode {
   bool json = false;
   bool quiet = false;

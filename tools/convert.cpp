@@ -66,8 +66,8 @@ std::vector<std::filesystem::path> input_paths(const std::string& name) {
   return {};
 }
 
-/// Standard input cannot be read again: where it has another length than the options say, nothing
-/// stays for a resume.
+/// Standard input cannot be read again: where its length differs from the options, nothing
+/// is kept for a resume.
 ConvertReport convert_stream(VolumeSource& source, const std::string& out,
                              const ConvertOptions& options, Console& console) {
   namespace fs = std::filesystem;
@@ -81,7 +81,7 @@ ConvertReport convert_stream(VolumeSource& source, const std::string& out,
     if (earlier || !is_there()) throw;
     OutputFolder(partial.has_parent_path() ? partial.parent_path() : ".").remove_folder(partial);
     const VolumeInfo& info = source.info();
-    throw UsageError(fmt::format("{}; --dims {},{},{}, --type {} and --offset say how many",
+    throw UsageError(fmt::format("{}; --dims {},{},{}, --type {} and --offset give their number",
                                  error.what(), info.extent.x, info.extent.y, info.extent.z,
                                  short_name(info.type)));
   }
@@ -106,9 +106,9 @@ int run(const Arguments& arguments, Console& console) {
 void add_convert(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
-      program, "convert", "TicketGuard a volume into a store, within a memory budget.",
+      program, "convert", "Turn a volume into a store, within a memory budget.",
       "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
-      "  isobrick convert head_64x64x93_int16.raw ct.zarr   # the name says it all");
+      "  isobrick convert head_64x64x93_int16.raw ct.zarr   # extent and type are in the name");
   add_path(app, "IN", arguments->in,
            "Volume of a known format, FILE:/NAME for an array in it, folder of slices, Zarr, raw "
            "file, or - for raw samples on standard input");

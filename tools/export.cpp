@@ -44,13 +44,13 @@ std::string_view name_of(ExportFormat format) {
   return formats()[static_cast<std::size_t>(format)].word;
 }
 
-/// By the name, which must say no other format than the one that is asked for.
-ExportFormat format_of(const std::string& path, std::optional<ExportFormat> asked) {
-  if (asked) {
-    const NamedFormat& format = formats()[static_cast<std::size_t>(*asked)];
+/// By the option or the name, which must not contradict each other.
+ExportFormat format_of(const std::string& path, std::optional<ExportFormat> option) {
+  if (option) {
+    const NamedFormat& format = formats()[static_cast<std::size_t>(*option)];
     refuse_misleading_name(path, format.extensions,
                            fmt::format("--format {} writes another format", format.word));
-    return *asked;
+    return *option;
   }
   const std::string extension = extension_of(path);
   for (const NamedFormat& format : formats())
@@ -58,7 +58,7 @@ ExportFormat format_of(const std::string& path, std::optional<ExportFormat> aske
       if (extension == known) return format.format;
   throw UsageError(
       fmt::format("'{}' is no volume that can be written; name it .nrrd, .vdb, .raw or .bin (raw "
-                  "samples with a .nhdr beside them), or say --format",
+                  "samples with a .nhdr beside them), or add --format",
                   path));
 }
 
@@ -70,9 +70,9 @@ int run(const Arguments& arguments, Console& console) {
   const Box3 box = store_region(store, options.level, arguments.roi);
   options.roi = box;
   if (arguments.half_band && !options.isovalue)
-    throw UsageError("--half-band is the width of a level set: say its --isovalue, too");
+    throw UsageError("--half-band is the width of a level set: add its --isovalue");
   if (options.inside && !options.isovalue)
-    throw UsageError("--inside is a side of an isosurface: say its --isovalue, too");
+    throw UsageError("--inside is a side of an isosurface: add its --isovalue");
   options.half_band = arguments.half_band.value_or(options.half_band);
   export_volume(store, arguments.out, options, console.progress());
   if (options.isovalue)

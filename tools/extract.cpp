@@ -53,7 +53,7 @@ struct Arguments {
   bool estimate = false, force = false, no_space_check = false;
 };
 
-/// `path`, told apart by isovalue when there are several.
+/// `path`, with the isovalue in its name when there are several.
 fs::path named(const std::string& path, const Arguments& arguments, double isovalue) {
   if (path.empty() || arguments.isovalues.size() == 1) return path;
   return with_isovalue(path, isovalue);
@@ -180,7 +180,7 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
         human_bytes(shortage->needed), human_bytes(shortage->free)));
 }
 
-/// The files of one surface; null where none was asked for.
+/// The files of one surface; null where none was requested.
 struct Sinks {
   std::unique_ptr<MeshSink> mesh, preview;
 };
@@ -218,17 +218,17 @@ std::string why_empty(const ExtractOptions& options, const ExtractReport& report
 }
 
 /// The least budget of the whole command for a surface with a picture.
-std::uint64_t least_with_picture(const ExtractedSurface& surface, const Arguments& arguments,
-                                 const StoreReader& store) {
+std::uint64_t min_with_picture(const ExtractedSurface& surface, const Arguments& arguments,
+                               const StoreReader& store) {
   ExtractOptions picture = surface.options;
   picture.normals = true;
-  std::uint64_t least = least_extract_memory(store, picture, Indexing::chunk_local,
-                                             preview_memory(arguments.picture));
+  std::uint64_t least =
+      min_extract_memory(store, picture, Indexing::chunk_local, preview_memory(arguments.picture));
   if (!surface.output.empty())
-    least = std::max(least,
-                     least_extract_memory(store, surface.options, Indexing::welded,
-                                          mesh_file_memory(surface.form.format, arguments.threads,
-                                                           memory_of_mesh(surface, arguments))));
+    least =
+        std::max(least, min_extract_memory(store, surface.options, Indexing::welded,
+                                           mesh_file_memory(surface.form.format, arguments.threads,
+                                                            memory_of_mesh(surface, arguments))));
   return surface.options.memory_of_others + least;
 }
 
@@ -237,7 +237,7 @@ void check_pictures(const std::vector<ExtractedSurface>& surfaces, const Argumen
                     const StoreReader& store) {
   for (const ExtractedSurface& surface : surfaces) {
     if (surface.preview.empty()) continue;
-    const std::uint64_t least = least_with_picture(surface, arguments, store);
+    const std::uint64_t least = min_with_picture(surface, arguments, store);
     if (arguments.memory < least)
       throw UsageError(fmt::format(
           "a memory budget of {:.1f} MiB is too small: with a picture of {} x {} pixels at least "
@@ -279,7 +279,7 @@ SurfaceReports make(const std::vector<ExtractedSurface>& surfaces, const std::ve
   return made;
 }
 
-/// What there is to say of each surface.
+/// Reports each surface.
 struct CommandOutput {
   ordered_json objects = ordered_json::array(), passes;  ///< no passes of an estimate
   std::string text;
@@ -432,7 +432,7 @@ void add_extract(Program& program) {
   add_backend_options(app, *arguments);
   add_force(app, arguments->force);
   add_flag(app, "--no-space-check", arguments->no_space_check,
-           "Begin even if the estimate says that the disk is too small");
+           "Begin even if, by the estimate, the disk is too small");
   add_run(program, app, arguments, run);
 }
 

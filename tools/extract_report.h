@@ -12,7 +12,7 @@
 #include <isobrick/extract.h>
 #include "tools/mesh_output.h"
 
-// What `isobrick extract` says of each surface.
+// What `isobrick extract` reports of each surface.
 
 namespace isobrick::tools {
 

@@ -79,8 +79,8 @@ std::vector<IndexFacts> indexes_of(const StoreReader& store) {
   return list;
 }
 
-/// All that `info` tells, gathered before anything is said.
-struct Facts {
+/// All that `info` reports, gathered before anything is written.
+struct StoreFacts {
   std::uint64_t bytes = 0, raw_bytes = 0;
   std::vector<std::optional<std::uint64_t>> stored;  ///< bricks, a level
   ValueRange<double> range;
@@ -92,10 +92,10 @@ struct Facts {
   double ratio() const { return static_cast<double>(raw_bytes) / static_cast<double>(bytes); }
 };
 
-Facts gather(const StoreReader& store, std::uint64_t memory, Progress& progress) {
+StoreFacts gather(const StoreReader& store, std::uint64_t memory, Progress& progress) {
   const StoreInfo& info = store.info();
   const Lattice& finest = info.levels.front().lattice;
-  Facts facts;
+  StoreFacts facts;
   facts.bytes = directory_bytes(info.path);
   facts.raw_bytes = static_cast<std::uint64_t>(volume(finest.extent)) * finest.sample_bytes();
   for (int level = 0; level < static_cast<int>(info.levels.size()); ++level)
@@ -108,7 +108,7 @@ Facts gather(const StoreReader& store, std::uint64_t memory, Progress& progress)
   return facts;
 }
 
-ordered_json levels_json(const StoreInfo& info, const Facts& facts) {
+ordered_json levels_json(const StoreInfo& info, const StoreFacts& facts) {
   ordered_json levels = ordered_json::array();
   for (std::size_t i = 0; i < info.levels.size(); ++i) {
     const LevelInfo& level = info.levels[i];
@@ -129,7 +129,7 @@ ordered_json histogram_json(const Histogram& h) {
           {"infinite", h.infinite}};
 }
 
-ordered_json indexes_json(const Facts& facts) {
+ordered_json indexes_json(const StoreFacts& facts) {
   ordered_json indexes = ordered_json::array();
   for (const IndexFacts& index : facts.indexes) {
     ordered_json levels = ordered_json::array();
@@ -143,7 +143,7 @@ ordered_json indexes_json(const Facts& facts) {
   return indexes;
 }
 
-ordered_json json_of(const StoreInfo& info, const Facts& facts) {
+ordered_json json_of(const StoreInfo& info, const StoreFacts& facts) {
   const LevelInfo& finest = info.levels.front();
   ordered_json object{
       {"command", "info"},
@@ -172,7 +172,7 @@ ordered_json json_of(const StoreInfo& info, const Facts& facts) {
   return object;
 }
 
-std::string levels_text(const StoreInfo& info, const Facts& facts) {
+std::string levels_text(const StoreInfo& info, const StoreFacts& facts) {
   std::string text;
   for (std::size_t i = 0; i < info.levels.size(); ++i) {
     const Lattice& lattice = info.levels[i].lattice;
@@ -186,7 +186,7 @@ std::string levels_text(const StoreInfo& info, const Facts& facts) {
   return text;
 }
 
-std::string indexes_text(const Facts& facts) {
+std::string indexes_text(const StoreFacts& facts) {
   if (facts.indexes.empty()) return "index kinds  none\n";
   std::string text;
   for (const IndexFacts& index : facts.indexes) {
@@ -200,7 +200,7 @@ std::string indexes_text(const Facts& facts) {
   return text;
 }
 
-std::string histogram_text(const StoreInfo& info, const Facts& facts) {
+std::string histogram_text(const StoreInfo& info, const StoreFacts& facts) {
   if (!facts.histogram) return fmt::format("histogram    none: {}\n", facts.no_histogram);
   const Histogram& h = *facts.histogram;
   std::string text = fmt::format("histogram    of level {}, square-root scale\n{}", h.level,
@@ -211,7 +211,7 @@ std::string histogram_text(const StoreInfo& info, const Facts& facts) {
   return text;
 }
 
-std::string text_of(const StoreInfo& info, const Facts& facts) {
+std::string text_of(const StoreInfo& info, const StoreFacts& facts) {
   const Transform& transform = info.levels.front().transform;
   const Vec3d spacing = transform.spacing, origin = transform.origin;
   std::string text = fmt::format("store        {}\n", info.path.string());
@@ -259,7 +259,7 @@ void add_info(Program& program) {
          check_store(arguments->path);
          if (list_volumes(arguments->path, arguments->selection, console)) return 0;
          const StoreReader store = open_store(arguments->path, arguments->selection);
-         const Facts facts = gather(store, arguments->memory, console.progress());
+         const StoreFacts facts = gather(store, arguments->memory, console.progress());
          console.result(json_of(store.info(), facts), text_of(store.info(), facts));
          return 0;
        }});

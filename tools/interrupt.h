@@ -6,8 +6,8 @@
 #include <string_view>
 
 // SIGINT and SIGTERM. The first one makes the progress calls throw, so that destructors remove what
-// is unfinished. Some work never asks, such as the encoding of a brick or a driver that draws: when
-// the program is still there after a moment, it is ended as it stands.
+// is unfinished. Some work calls no progress, such as the encoding of a brick or a driver that
+// draws: when the program is still there after a moment, it is ended as it stands.
 
 namespace isobrick::tools {
 

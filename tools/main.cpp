@@ -119,7 +119,7 @@ int main(int argc, char** argv) {
   isobrick::tools::g_usual_end = std::set_terminate(isobrick::tools::end_at_once);
   try {
     return isobrick::tools::run_program(argc, argv);
-  } catch (const std::bad_alloc&) {  // also while an error was being told
+  } catch (const std::bad_alloc&) {  // also while an error was being reported
     isobrick::tools::print_out_of_memory("");
     return 1;
   }

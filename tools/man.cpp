@@ -93,7 +93,7 @@ The request makes no sense: an unknown option, a wrong size for the dimensions, 
 Either failure writes one line to standard error. Except for the damages that
 .B verify
 lists, nothing goes to standard output then. An output appears under its name only when it is whole;
-SIGINT and SIGTERM end a command within a second, with a line that says how to go on.
+SIGINT and SIGTERM end a command within a second, with a line that names the way to go on.
 What an interrupted
 .B convert
 leaves under a name that ends in .partial serves

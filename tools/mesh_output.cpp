@@ -15,11 +15,11 @@ namespace fs = std::filesystem;
 
 MeshFormat mesh_format(const fs::path& path) {
   if (is_standard_output(path.native()))
-    throw UsageError("standard output has no name that says a format: say --format obj");
+    throw UsageError("standard output has no name with a format: add --format obj");
   if (const auto format = find_mesh_format(path.extension().string())) return *format;
   throw UsageError(
       fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp or "
-                  ".pvtp, or say --format",
+                  ".pvtp, or add --format",
                   path.string()));
 }
 
@@ -29,7 +29,7 @@ void check_mesh_name(const fs::path& path, MeshFormat format) {
     if (format == MeshFormat::obj) return;
     throw UsageError(
         fmt::format("{} cannot go to standard output, because its beginning is written last: "
-                    "name a file, or say --format obj",
+                    "name a file, or add --format obj",
                     name_of(format)));
   }
   const std::string_view extensions[] = {extension};

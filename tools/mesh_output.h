@@ -17,7 +17,7 @@ struct MeshForm {
 
 /// By the name's extension. Throws UsageError for any other.
 MeshFormat mesh_format(const std::filesystem::path& path);
-/// Throws UsageError where the name says another format than `format`, or standard output where
+/// Throws UsageError where the name has the extension of another format, or standard output where
 /// that cannot be streamed.
 void check_mesh_name(const std::filesystem::path& path, MeshFormat format);
 /// By a word such as "ply". Throws UsageError for any other.

@@ -19,7 +19,7 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
     case MeshFormat::stl: return {header + t * 50, header + t * 50};
     case MeshFormat::ply: return {header + rows + t * 13, header + rows + 2 * t * 13};
     case MeshFormat::obj: {
-      // As long as such lines are mostly; decimals end where they say enough.
+      // As long as such lines are mostly; decimals end where they are exact.
       constexpr std::uint64_t vertex_line = 22, normal_line = 34;
       const std::uint64_t digits = fmt::formatted_size("{}", v / 2);
       const std::uint64_t vertices = v * (vertex_line + (form.normals ? normal_line : 0));
@@ -51,7 +51,7 @@ std::uint64_t free_space(const fs::path& path) {
     throw Error(
         fmt::format("cannot create '{}': there is no folder '{}'", path.string(), folder.string()));
   const fs::space_info space = fs::space(folder, failure);
-  if (failure) throw system_error("tell how full the disk is of", folder.string(), failure.value());
+  if (failure) throw system_error("read the free space of", folder.string(), failure.value());
   return space.available;
 }
 

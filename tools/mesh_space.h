@@ -35,7 +35,7 @@ struct Shortage {
   std::uint64_t needed = 0, free = 0;  ///< bytes; `needed` with the meshes before it
 };
 
-/// Whether the meshes, made one after the other, fit what `free_space` says.
+/// Whether the meshes, made one after the other, fit `free_space`.
 std::optional<Shortage> find_shortage(
     std::span<const PlannedMesh> meshes,
     const std::function<std::uint64_t(const std::filesystem::path&)>& free_space);

@@ -49,7 +49,7 @@ std::string convert_command(const fs::path& volume, const std::string& options =
          fmt::format("make one: isobrick convert VOLUME {}", shell_word(path)));
 }
 
-/// A name that says nothing about its samples needs options.
+/// Options for samples that the name does not describe.
 std::string raw_options(const fs::path& path) {
   const RawName name = parse_raw_name(path.stem().string());
   return name.extent && name.type ? "" : " --dims X,Y,Z --type TYPE";

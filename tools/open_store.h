@@ -6,8 +6,8 @@
 
 namespace isobrick::tools {
 
-/// Throws Error where `path` is neither a store nor Zarr of another program. It says what is there
-/// and ends in the command to type next.
+/// Throws Error where `path` is neither a store nor Zarr of another program. The message names what
+/// is there and ends in the command to type next.
 void check_store(const std::string& path);
 
 /// Opens a store to read, after check_store().

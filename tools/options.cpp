@@ -44,7 +44,7 @@ CLI::App* add_subcommand(Program& program, const std::string& name, const std::s
   CLI::App* app = program.app.add_subcommand(name, description);
   app->footer("Example:\n  " + example);
   add_flag(app, "--json", program.mode.json, "Write the result as one JSON object");
-  add_flag(app, "--quiet", program.mode.quiet, "Say nothing but errors (and the JSON)");
+  add_flag(app, "--quiet", program.mode.quiet, "Write nothing but errors (and the JSON)");
   return app;
 }
 

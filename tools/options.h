@@ -108,7 +108,7 @@ void add_store_options(CLI::App* app, ConvertOptions& options);
 /// From now on an interrupt is reported with what it leaves of a conversion to `output`.
 void note_conversion(const std::string& output);
 
-/// Says what a conversion by `command` did; `notes` are its source's.
+/// Reports a conversion by `command`; `notes` are its source's.
 void report_conversion(Console& console, const std::string& command, const std::string& input,
                        const std::string& output, const VolumeInfo& volume,
                        const ConvertReport& report, const std::vector<std::string>& notes = {});

@@ -33,7 +33,7 @@ void refuse_misleading_name(const std::string& path, std::span<const std::string
                             std::string_view instead) {
   const std::string extension = extension_of_folder(path);
   if (is_among(extension, kKnown) && !is_among(extension, own))
-    throw UsageError(fmt::format("'{}' would not be what its name says; {}", path, instead));
+    throw UsageError(fmt::format("'{}' would not have the format of its name; {}", path, instead));
 }
 
 void check_picture_name(const std::string& path) {

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-// Names of outputs: none may say another format than what is written.
+// Names of outputs: none may have the extension of another format.
 namespace isobrick::tools {
 
 /// Whether an output goes to standard output instead of a file.

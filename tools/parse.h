@@ -14,7 +14,7 @@
 #include "core/half_space.h"
 
 // The values of the command line: text to meaning. Every function throws
-// UsageError with a line that says what was given and what would do.
+// UsageError with a line that names what was given and what is valid.
 namespace isobrick::tools {
 
 /// "100000", "64K", "512M", "1.5G", "2T", "1GiB": binary units.

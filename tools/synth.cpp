@@ -1,7 +1,6 @@
 #include <isobrick/synth_source.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <span>
 
@@ -10,6 +9,7 @@
 #include <tbb/task_arena.h>
 
 #include <isobrick/error.h>
+#include "core/stopwatch.h"
 #include "io/bytes/output_file.h"
 #include "tools/format.h"
 #include "tools/mesh_space.h"
@@ -79,7 +79,7 @@ ConvertReport write_raw(VolumeSource& source, const std::string& path,
   check_space(path, static_cast<std::uint64_t>(volume(extent)) * sample_bytes);
   std::vector<std::byte> samples(static_cast<std::size_t>(volume(piece)) * sample_bytes);
   OutputFile out(path, options.force);
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   progress.begin("write", static_cast<std::uint64_t>(volume(extent)) * sample_bytes);
   tbb::task_arena arena(options.threads > 0 ? options.threads : tbb::task_arena::automatic);
   for_each_point({{0, 0, 0}, ceil_div(extent, piece)}, [&](Int3 p) {
@@ -93,7 +93,7 @@ ConvertReport write_raw(VolumeSource& source, const std::string& path,
   out.publish();
   ConvertReport report;
   report.bytes_in = report.bytes_out = out.writer().size();
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.seconds = watch.lap();
   return report;
 }
 

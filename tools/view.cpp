@@ -114,7 +114,7 @@ void see_whole(std::vector<Screenshot>& turn, const WorldBox& box, double aspect
   for (Screenshot& shot : turn) shot.camera.zoom(first / most);
 }
 
-/// The pictures that are asked for, of which none may be there already.
+/// The requested pictures, of which none may be there already.
 std::vector<Screenshot> shots_of(const Arguments& arguments, const SceneRenderer& picture,
                                  const ViewSettings& settings) {
   if (!arguments.screenshot.empty()) check_picture_name(arguments.screenshot);
@@ -196,7 +196,7 @@ int draw(const Arguments& arguments, Console& console) {
       console.note(why);
   if (drawn.limited_by_budget)
     console.note(
-        "coarser than --pixel-error asks for: there is no room for more triangles; a larger "
+        "coarser than --pixel-error: there is no room for more triangles; a larger "
         "--memory or --gpu-memory makes it finer");
   nlohmann::ordered_json isovalues = nlohmann::ordered_json::array();
   for (const SurfaceSettings& surface : settings.surfaces) isovalues.push_back(surface.isovalue);

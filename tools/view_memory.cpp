@@ -24,7 +24,7 @@ std::uint64_t picture_memory(PictureSize size, bool transparent) {
          pixels * (before + to_file);
 }
 
-std::uint64_t least_scene(const StoreReader& store) {
+std::uint64_t min_scene(const StoreReader& store) {
   std::uint64_t brick = 0;
   for (const LevelInfo& level : store.info().levels)
     brick = std::max<std::uint64_t>(brick, level.lattice.brick_bytes());
@@ -38,7 +38,7 @@ PictureBudgets divide_view_memory(const PictureBudgets& budgets, const StoreRead
   // A device holds its pictures itself.
   const std::uint64_t picture = software ? picture_memory(size, transparent) : 0;
   const std::uint64_t fixed = kProgramBytes + Renderer::driver_memory() + picture;
-  const std::uint64_t least = fixed + least_scene(store);
+  const std::uint64_t least = fixed + min_scene(store);
   if (budgets.memory < least)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: a picture of {} x {} pixels needs --memory "

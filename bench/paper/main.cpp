@@ -7,7 +7,7 @@
 //
 //   bench_paper --data FOLDER > paper.jsonl
 //   bench_paper --gyroid 512 --frequency 1        # one volume, 1 % of its cells active
-// Built as bench/README.md says.
+// Built as in bench/README.md.
 
 #include <fmt/format.h>
 
@@ -40,7 +40,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   options.cells = !no_cells;
   options.peers = !no_peers;
-  const auto say = [&](const bench::LoadedVolume& v) {
+  const auto report = [&](const bench::LoadedVolume& v) {
     nlohmann::json out = measure(v, options);
     out["machine"] = machine;
 #ifdef ISOBRICK_WITH_CUDA
@@ -50,10 +50,10 @@ int main(int argc, char** argv) {
     std::fflush(stdout);
   };
   if (edge > 0) {
-    say(bench::gyroid({edge, edge, edge}, frequency));
+    report(bench::gyroid({edge, edge, edge}, frequency));
   } else if (!raw.empty()) {
-    say(bench::load_raw(raw, isovalue));
+    report(bench::load_raw(raw, isovalue));
   } else {
-    for (const bench::PaperVolume& paper : bench::kPaperVolumes) say(bench::load(paper, data));
+    for (const bench::PaperVolume& paper : bench::kPaperVolumes) report(bench::load(paper, data));
   }
 }

@@ -81,7 +81,7 @@ IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, boo
     throw DamageError(
         fmt::format("'{}': {}; is it a chunk of another place or store?", path.string(), e.what()));
   }
-  // Parts leave no gaps, so their sizes tell the file's.
+  // Parts leave no gaps, so their sizes sum up to the file's.
   if (places_.brick_bytes() != size_ - tail)
     throw DamageError(fmt::format("'{}' has {} bytes, but its parts and their places {}",
                                   path.string(), size_, places_.brick_bytes() + tail));

@@ -19,7 +19,7 @@
 namespace isobrick {
 
 /// A decoded part has no more bytes than this; longer ones are refused, so that
-/// broken files cannot ask for all the memory.
+/// broken files cannot take all the memory.
 inline constexpr std::uint64_t kMaxIndexPartBytes = std::uint64_t{64} << 20;
 
 /// Which chunk of which index a file is. This enters the checksum of its places, so that a whole

@@ -26,7 +26,7 @@ std::filesystem::path checksums_file(const std::filesystem::path& folder) {
 
 void check_box_within(Box3 box, Int3 items) {
   if (box.empty() || intersect(box, {{0, 0, 0}, items}) != box)
-    throw UsageError("items were asked for or given outside of the volume");
+    throw UsageError("items were requested or given outside of the volume");
 }
 
 }  // namespace

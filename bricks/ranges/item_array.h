@@ -31,7 +31,7 @@ class ItemArrayWriter {
   /// Items that were not put are zeros, in all chunks that end at or below `z` (in items).
   void fill_below(Index z);
   /// Writes the chunks' checksums and the metadata if there are items at all; the checksum of
-  /// those checksums, which tells these items from others. Throws Error when only some are there.
+  /// those checksums, which identifies these items. Throws Error when only some are there.
   std::optional<std::uint32_t> finish();
 
  private:

@@ -236,7 +236,7 @@ void parse_key_encoding(const JsonReader& json, ArrayMetadata& array) {
   }
 }
 
-// Members that we do not know must not be ignored unless they say that they may be.
+// Unknown members must not be ignored unless they permit it.
 void check_members(const JsonReader& json) {
   static constexpr std::string_view known[] = {
       "zarr_format",         "node_type",  "shape",  "data_type",       "chunk_grid",

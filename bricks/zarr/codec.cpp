@@ -24,14 +24,14 @@ static_assert(std::endian::native == std::endian::little, "samples are copied as
 
 constexpr std::size_t kCrcBytes = 4;
 
-struct FreeContext {
+struct ContextDeleter {
   void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
 };
 
 // A context costs a megabyte and its creation more than a small brick, so each
 // thread keeps one.
 ZSTD_CCtx* compression_context() {
-  thread_local const std::unique_ptr<ZSTD_CCtx, FreeContext> context(ZSTD_createCCtx());
+  thread_local const std::unique_ptr<ZSTD_CCtx, ContextDeleter> context(ZSTD_createCCtx());
   if (!context) throw std::bad_alloc();
   return context.get();
 }
@@ -209,7 +209,7 @@ std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> e
   const unsigned long long size =
       ZSTD_getFrameContentSize(encoded.data(), encoded.size() - kCrcBytes);
   if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR)
-    throw DamageError("is no zstd frame that says its size");
+    throw DamageError("is no zstd frame that states its size");
   return size;
 }
 

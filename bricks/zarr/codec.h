@@ -36,7 +36,7 @@ struct CodecChain {
 std::uint32_t crc32c(std::span<const std::byte> bytes);
 
 /// A decoded chunk may not be larger than this; larger ones are refused, so that
-/// broken metadata cannot ask for all the memory.
+/// broken metadata cannot take all the memory.
 inline constexpr std::uint64_t kMaxBrickBytes = std::uint64_t{1} << 31;
 
 /// The bytes of the fill value as a sample of `type`, native order; the first
@@ -68,8 +68,8 @@ std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_byte
 /// Encodes bytes by a chain of our own making. Thread-safe.
 std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes);
 
-/// The bytes that `encoded` decodes to, as it says itself; for chains of our own
-/// making. Throws DamageError when it does not say. Nothing is checked but that.
+/// The bytes that `encoded` decodes to, as it states itself; for chains of our own
+/// making. Throws DamageError when it does not. Nothing else is checked.
 std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> encoded);
 
 /// Decodes into exactly `out`, native byte order. Throws DamageError saying what

@@ -22,13 +22,13 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kNames{"zstd", "crc32c", "gzip", "zlib", "lz4", "blosc"};
 
-struct FreeContext {
+struct ContextDeleter {
   void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
 };
 
 std::size_t decompress_zstd(std::span<const std::byte> encoded, std::span<std::byte> out) {
   // A context costs a megabyte, so each thread keeps one.
-  thread_local const std::unique_ptr<ZSTD_DCtx, FreeContext> context(ZSTD_createDCtx());
+  thread_local const std::unique_ptr<ZSTD_DCtx, ContextDeleter> context(ZSTD_createDCtx());
   if (!context) throw std::bad_alloc();
   const std::size_t size =
       ZSTD_decompressDCtx(context.get(), out.data(), out.size(), encoded.data(), encoded.size());
@@ -39,12 +39,13 @@ std::size_t decompress_zstd(std::span<const std::byte> encoded, std::span<std::b
 
 std::size_t decompress_deflate(Wrapper wrapper, std::span<const std::byte> encoded,
                                std::span<std::byte> out) {
-  const Inflated done = inflate(wrapper, encoded, out);
-  switch (done.end) {
-    case Inflated::End::complete: return done.size;
-    case Inflated::End::no_room: throw DamageError("the deflate stream is longer than its samples");
-    case Inflated::End::cut_off: throw DamageError("the deflate stream is cut off");
-    case Inflated::End::invalid: break;
+  const InflateResult done = inflate(wrapper, encoded, out);
+  switch (done.status) {
+    case InflateResult::Status::complete: return done.size;
+    case InflateResult::Status::no_room:
+      throw DamageError("the deflate stream is longer than its samples");
+    case InflateResult::Status::cut_off: throw DamageError("the deflate stream is cut off");
+    case InflateResult::Status::invalid: break;
   }
   throw DamageError(fmt::format("no valid deflate stream (code {})", done.code));
 }
@@ -58,7 +59,7 @@ std::size_t decompress_lz4([[maybe_unused]] std::span<const std::byte> encoded,
   std::memcpy(&length, encoded.data(), sizeof(length));
   const auto block = encoded.subspan(sizeof(length));
   if (length > out.size())
-    throw DamageError(fmt::format("LZ4 says {} bytes, must be {}", length, out.size()));
+    throw DamageError(fmt::format("LZ4 states {} bytes, must be {}", length, out.size()));
   const int size = LZ4_decompress_safe(reinterpret_cast<const char*>(block.data()),
                                        reinterpret_cast<char*>(out.data()),
                                        static_cast<int>(block.size()), static_cast<int>(length));
@@ -78,7 +79,7 @@ std::size_t decompress_blosc([[maybe_unused]] std::span<const std::byte> encoded
       blosc_cbuffer_validate(encoded.data(), encoded.size(), &size) != 0)
     throw DamageError("no valid Blosc header");
   if (size > out.size())
-    throw DamageError(fmt::format("Blosc says {} bytes, must be {}", size, out.size()));
+    throw DamageError(fmt::format("Blosc states {} bytes, must be {}", size, out.size()));
   const int got = blosc_decompress_ctx(encoded.data(), out.data(), out.size(), 1);
   if (got < 0 || static_cast<std::size_t>(got) != size)
     throw DamageError(fmt::format("Blosc cannot decompress (code {})", got));

@@ -8,7 +8,7 @@
 
 namespace isobrick {
 
-/// Metadata of others and of broken disks: every access says where and what is
+/// Metadata of others and of broken disks: every access reports where and what is
 /// wrong instead of trusting that a member is there and of the right type.
 class JsonReader {
  public:
@@ -34,7 +34,7 @@ class JsonReader {
   Index integer() const;
   /// An integer in [1, 2⁶²].
   Index positive() const;
-  /// Throws Error unless this version of `what` is `known`; `renewal` says what to do about an
+  /// Throws Error unless this version of `what` is `known`; `renewal` is what to do about an
   /// older one.
   void check_version(const char* what, Index known, const char* renewal) const;
 

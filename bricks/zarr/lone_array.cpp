@@ -13,8 +13,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Names of an array's axes before its last three: those that it says itself. Where it says
-/// none, five dimensions are t, c, z, y, x, and other axes have no name ("?").
+/// Names of an array's axes before its last three: its own where it has
+/// them. Without them, five dimensions are t, c, z, y, x, and other axes have no name ("?").
 std::vector<std::string> leading_names(const ArrayMetadata& array) {
   const std::size_t count = array.shape.size() - 3;
   std::vector<std::string> names(count, "?");

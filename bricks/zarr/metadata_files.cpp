@@ -63,7 +63,7 @@ Text read_root(const fs::path& path) {
   throw Error(fmt::format("'{}' is no store: it has no zarr.json", path.string()));
 }
 
-// Metadata of ours says what it must be; that of others has only its syntax.
+// Our metadata has a checksum; that of others has only its syntax.
 void check_ours(const MetadataFiles& files, const fs::path& path) {
   const std::string where = quoted(files.root);
   if (!files.image.ours) {

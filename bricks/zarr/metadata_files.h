@@ -10,7 +10,7 @@
 
 namespace isobrick {
 
-/// What the metadata files of an image say, whichever version of Zarr they are
+/// The content of the metadata files of an image, whichever version of Zarr they are
 /// of: a store of ours, an OME-Zarr 0.5 or 0.4 image, or one Zarr array, which
 /// counts as an image of one level with samples at 0, 1, 2, …
 struct MetadataFiles {

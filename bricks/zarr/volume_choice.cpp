@@ -9,8 +9,8 @@ namespace {
 
 using Role = ImageMetadata::Axis::Role;
 
-/// Roles that no axis of the image has by its own words: whoever chooses by such a role on
-/// an axis that says nothing of itself says what it is.
+/// Roles that no axis of the image states. A selection by such a role gives it to an axis without
+/// one.
 struct FreeRoles {
   bool time = true, channel = true;
 

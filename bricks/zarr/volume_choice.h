@@ -24,12 +24,12 @@ struct VolumeAxis {
   bool by_channel = false, by_time = false;  ///< which options choose on it; both: either does
 };
 
-/// Those axes, if the selection says less than which volume is meant; else none.
+/// Those axes, if the selection leaves open which volume is meant; else none.
 std::vector<VolumeAxis> open_axes(const ImageMetadata& image, const ArrayMetadata& array,
                                   const Selection& selection);
 
 /// Throws UsageError when there are several volumes and the selection does not
-/// say which, or says one that is not there. `array` is that of a level.
+/// name one, or names one that is not there. `array` is that of a level.
 VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadata& image,
                            const ArrayMetadata& array, const Selection& selection);
 

@@ -8,7 +8,7 @@
 
 namespace isobrick {
 
-// Zarr version 2, said in the words of version 3, so that one parser reads
+// Zarr version 2, translated to version 3, so that one parser reads
 // both. `where` names the file; DamageError for what is no valid Zarr, Error
 // for what is not supported, naming it.
 
@@ -19,7 +19,7 @@ std::string v3_from_zarray(std::string_view text, const std::string& where);
 /// empty when it is no image.
 std::string v3_from_zattrs(std::string_view text, const std::string& where);
 
-// And ours, said in the words of version 2.
+// And ours, translated to version 2.
 
 /// The .zarray of an array without shards whose samples are one of our types.
 std::string to_zarray(const ArrayMetadata& array);

@@ -42,7 +42,7 @@ ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes
                         const Selection& selection);
 
 /// Where a file leaves open which three of its axes (fastest first) are space:
-/// those of size 1 are not, nor is the first when a channel is asked for, nor the
+/// those of size 1 are not, nor is the first when a channel is selected, nor the
 /// last when a time is. False when that leaves other than three.
 bool guess_roles(std::vector<ArrayAxis>& axes, const Selection& selection);
 

@@ -19,7 +19,7 @@ struct DeviceInfo {
   std::uint64_t free_bytes = 0, total_bytes = 0;  ///< of its memory, now
 };
 
-/// The device has less memory left than was asked for.
+/// The device has less memory left than was requested.
 class OutOfDeviceMemory : public Error {
   using Error::Error;
 };
@@ -27,7 +27,7 @@ class OutOfDeviceMemory : public Error {
 /// Whether kernels read block-locked host memory under the address that the host knows.
 bool reads_host_memory(int device);
 
-/// 16 bytes by which drivers of all kinds tell devices apart. Throws Error for a device that
+/// 16 bytes by which drivers of all kinds identify a device. Throws Error for a device that
 /// does not exist.
 std::array<std::uint8_t, 16> device_id(int device);
 

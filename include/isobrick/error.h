@@ -5,8 +5,8 @@
 
 namespace isobrick {
 
-/// Anything that stops a command: the message says what, where (file, offset,
-/// brick) and what to do, in one line. The program prints it and exits with 1.
+/// Anything that stops a command. The message is one line: what is wrong, where (file, offset,
+/// brick) and what to do. The program prints it and exits with 1.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -26,7 +26,7 @@ class DamageError : public Error {
   using Error::Error;
 };
 
-/// Somebody asked for an end (see cancel.h) while input was waited for.
+/// The user ended the program (see cancel.h) while it waited for input.
 class Cancelled : public Error {
  public:
   using Error::Error;

@@ -64,7 +64,7 @@ struct ExtractReport {
   std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
   std::uint64_t bytes_read = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0;
-  std::optional<IndexKind> index;  ///< that was asked for active blocks; nothing: only ranges
+  std::optional<IndexKind> index;  ///< that found the active blocks; none: ranges alone did
   std::string backend = "cpu";     ///< or "cuda"
   std::string device;              ///< its name, of the latter
   /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.
@@ -90,8 +90,8 @@ std::string_view bound_of(const ExtractReport& report);
 
 /// The least `memory` that extract() takes without a GPU, for a sink of this indexing that holds
 /// `sink_bytes` (MeshSink::memory()). Throws as it does for options that make no sense.
-std::uint64_t least_extract_memory(const StoreReader& store, const ExtractOptions& options,
-                                   Indexing indexing, std::uint64_t sink_bytes);
+std::uint64_t min_extract_memory(const StoreReader& store, const ExtractOptions& options,
+                                 Indexing indexing, std::uint64_t sink_bytes);
 
 /// Streams the isosurface of one level into `sink` (begin … finish).
 /// Throws UsageError for a level, ROI or isovalue that makes no sense, a budget too small

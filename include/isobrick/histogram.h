@@ -30,7 +30,7 @@ std::string why_no_histogram(const StoreReader& store, std::uint64_t memory);
 /// The histogram, in at most so many bins, of the finest level with at most 2²⁴ samples (or
 /// else of the coarsest), read brick by brick. Throws Error for a brick that cannot be read, unless
 /// those are to be left out and others are left.
-Histogram histogram(const StoreReader& store, Progress& progress, int most_bins = 64,
+Histogram histogram(const StoreReader& store, Progress& progress, int max_bins = 64,
                     bool leaves_out = false);
 
 }  // namespace isobrick

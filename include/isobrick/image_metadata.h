@@ -42,13 +42,13 @@ struct ImageMetadata {
   std::vector<std::string> channel_names;  ///< as `omero` calls them; empty where it does not
   std::vector<Level> levels;
   bool ours = true;  ///< has `attributes.isobrick`
-  /// Nothing when the store doesn't say.
+  /// nullopt when the store doesn't state it.
   std::optional<bool> may_have_nan;
   std::string grid_class;               ///< as OpenVDB calls it ("level set"), or empty
   std::string grid_name;                ///< of the OpenVDB grid, or empty
   std::string downsampling;             ///< how coarser levels were made ("mean"): `type`; or empty
   std::optional<DisplayWindow> window;  ///< `omero`, which is written and never read
-  /// What the root says that metadata_checksum() must be.
+  /// The metadata_checksum() that the root states.
   std::optional<std::uint32_t> checksum;
 
   friend bool operator==(const ImageMetadata&, const ImageMetadata&) = default;
@@ -64,7 +64,7 @@ std::string to_json(const ImageMetadata& image);
 ImageMetadata parse_image_metadata(std::string_view text, const std::string& where);
 
 /// CRC-32C over the values that the root's zarr.json and those of its levels
-/// hold, in the order of the levels; docs/reference/store_format.md says over which and
+/// hold, in the order of the levels; docs/reference/store_format.md defines over which and
 /// how. The root's own checksum does not enter it, nor does how the JSON is laid
 /// out. Images of others, without `attributes.isobrick`, have one, too.
 /// `where` names the root's file.

@@ -11,7 +11,7 @@
 
 namespace isobrick {
 
-/// Cells along each edge of an item where nobody says otherwise: the blocks by
+/// Cells along each edge of an item by default: the blocks by
 /// which an extraction skips, whose ranges every store has. docs/design/search.md.
 inline constexpr Index kDefaultLeaf = 16;
 
@@ -36,7 +36,7 @@ struct IndexReport {
 
 /// The least budget of such an index of `lattice`. Throws UsageError for a kind or leaf that stores
 /// cannot have.
-std::uint64_t least_index_memory(const IndexOptions& options, const Lattice& lattice);
+std::uint64_t min_index_memory(const IndexOptions& options, const Lattice& lattice);
 
 /// Throws UsageError for a kind or leaf that stores cannot have, and for a budget
 /// that is too small for such an index of `lattice`, naming the least that does: that of the
@@ -48,7 +48,7 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
 /// that it lacks are computed first, and with `force` those of an image of others
 /// again. An index grows as KIND.partial beside its place and moves there once it
 /// is whole; until then the store is as it was. Throws UsageError when there is
-/// one and neither `resume` nor `force` says what to do, or when the budget is too
+/// one and neither `resume` nor `force` is set, or when the budget is too
 /// small (naming the least that does), Error when another process is at it.
 IndexReport add_index(const std::filesystem::path& store, const IndexOptions& options,
                       Progress& progress);

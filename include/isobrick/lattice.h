@@ -52,7 +52,7 @@ constexpr std::optional<Index> checked_volume(Int3 e) {
   return e.x * e.y * e.z;
 }
 
-/// Looks decoded bricks up. Pointers stay valid as long as the owner says.
+/// Looks decoded bricks up. The owner documents how long pointers stay valid.
 class BrickLookup {
  public:
   virtual ~BrickLookup() = default;

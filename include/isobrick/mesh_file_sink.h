@@ -39,7 +39,7 @@ struct MeshFileOptions {
 
 /// Opens a mesh file for extract(). It has its name once it is finished; a sink that is destroyed
 /// before leaves nothing. Throws UsageError when the file exists and `force` is not set or its name
-/// tells no format, Error when it cannot be made.
+/// has no known extension, Error when it cannot be made.
 std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                            const MeshFileOptions& options);
 

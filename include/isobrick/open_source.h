@@ -10,9 +10,9 @@ namespace isobrick {
 
 /// Opens a volume: a file of a known format (recognised by its content before
 /// its extension; docs/reference/formats.md lists them), a raw file, or standard input ("-").
-/// Throws UsageError when what the file and the caller say makes no volume: no
+/// Throws UsageError when file and request together make no volume: no
 /// known extent or type, sizes that are zero, overflow or contradict the file's
 /// size, a channel that must be chosen; Error when the file cannot be read.
-std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeRequest& said);
+std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeRequest& request);
 
 }  // namespace isobrick

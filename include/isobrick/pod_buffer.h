@@ -9,8 +9,8 @@
 
 namespace isobrick {
 
-/// A growing array that neither initialises nor gives back: memory is touched
-/// first by whoever writes the values, and is reused after clear(). Growth goes
+/// A growing array that neither initialises nor frees its memory: the thread that writes the values
+/// touches it first, and clear() keeps it for reuse. Growth goes
 /// through realloc, which moves large blocks by remapping pages.
 template <class T>
 class PodBuffer {

@@ -15,13 +15,13 @@
 
 namespace isobrick {
 
-/// What a store's metadata says.
+/// A store's metadata.
 struct StoreInfo {
   std::filesystem::path path;
   /// What ranges and indices are found under: `path`, or a folder in it that
   /// belongs to one of several channels or times.
   std::filesystem::path additions;
-  Selection selection;  ///< as it was asked for
+  Selection selection;  ///< as requested
   std::vector<LevelInfo> levels;
   ScalarType type = ScalarType::u8;
   double fill_value = 0;   ///< of absent bricks; exact for every type
@@ -54,8 +54,8 @@ struct BrickTimes {
   /// Whether reads come from memory, going by their speed: then hints to the disk (will_need)
   /// gain nothing, and each is a call of the system.
   bool from_memory() const {
-    constexpr double most_seconds_a_byte = 1e-9;
-    return bytes_read > 0 && read_seconds < most_seconds_a_byte * static_cast<double>(bytes_read);
+    constexpr double max_seconds_per_byte = 1e-9;
+    return bytes_read > 0 && read_seconds < max_seconds_per_byte * static_cast<double>(bytes_read);
   }
 };
 

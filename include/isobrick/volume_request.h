@@ -22,9 +22,9 @@ struct RegionRequest {
   std::array<std::optional<Index>, 3> lo, hi;
 };
 
-/// What the caller says about a volume. The first four are for raw files, where
-/// they go before what a header beside the file or its name says; the others
-/// are for all formats and go before what the file says.
+/// What the caller specifies about a volume. The first four members are for raw files, where
+/// they override a header beside the file and the file's name. The others
+/// are for all formats and override the file.
 struct VolumeRequest {
   std::optional<Int3> extent;
   std::optional<ScalarType> type;
@@ -42,20 +42,20 @@ struct VolumeRequest {
   int threads = 0;  ///< with which a source may decode by itself; 0: all cores
 };
 
-/// What a file and the caller together say of a volume. Throws UsageError for
+/// Describes a volume by its file and the request. Throws UsageError for
 /// extents and geometry that make no sense.
 VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
-                           Transform transform, const VolumeRequest& said);
+                           Transform transform, const VolumeRequest& request);
 
 /// Throws UsageError when the caller describes raw samples although the file, a
 /// `format` ("a NIfTI file"), describes itself.
 void refuse_raw_description(const std::string& path, std::string_view format,
-                            const VolumeRequest& said);
+                            const VolumeRequest& request);
 
 /// Throws UsageError for a grid or a region of grids where there are none.
-void refuse_grid(const std::string& path, const VolumeRequest& said);
+void refuse_grid(const std::string& path, const VolumeRequest& request);
 
 /// Throws UsageError for a channel or a time that a file with one of each lacks.
-void refuse_selection(const std::string& path, const VolumeRequest& said);
+void refuse_selection(const std::string& path, const VolumeRequest& request);
 
 }  // namespace isobrick

@@ -13,7 +13,7 @@
 
 namespace isobrick {
 
-/// What a file says about its volume before any sample is read.
+/// What is known of a volume before any sample is read.
 struct VolumeInfo {
   Int3 extent;  ///< samples along x, y, z
   ScalarType type = ScalarType::u8;
@@ -36,27 +36,27 @@ class VolumeSource {
 
   /// True when boxes may be read in any order, each as often as one likes.
   /// Otherwise only whole planes [0,X)×[0,Y)×[z0,z1) with increasing z may be
-  /// asked for, each once, from one thread.
+  /// requested, each once, from one thread.
   virtual bool random_access() const = 0;
 
   /// Of a source with random access: true when several threads may read at once.
   virtual bool parallel() const { return random_access(); }
 
   /// Bytes of memory that the source takes for itself at most, beside the
-  /// samples that it is asked for; budgets count them.
+  /// requested samples; budgets count them.
   virtual std::size_t memory() const { return 0; }
 
   /// True of a source with random access most of which may be the fill value;
-  /// is_fill() then tells quickly of what.
+  /// is_fill() is then fast.
   virtual bool sparse() const { return false; }
 
   /// True when every sample of `box` is known, without looking at each, to be
-  /// the fill value; false says nothing. Thread-safe.
+  /// the fill value; false means unknown. Thread-safe.
   virtual bool is_fill(Box3) const { return false; }
 
   /// The value of all samples of `box`, when it is known, without looking at each, that
   /// they have the same: one sample of the volume's type, in the first of eight bytes, the
-  /// rest zero. Nothing says nothing. Thread-safe.
+  /// rest zero. nullopt means unknown. Thread-safe.
   virtual std::optional<std::uint64_t> constant(Box3) const { return std::nullopt; }
 
   /// Copies the samples of `box` to `out`, C order [z, y, x], native byte

@@ -70,7 +70,7 @@ class Base64Stream final : public ByteStream {
   }
 
   std::string name() const override { return text_.text().name(); }
-  std::uint64_t most_bytes() const override { return text_.text().most_bytes() / 4 * 3; }
+  std::uint64_t max_bytes() const override { return text_.text().max_bytes() / 4 * 3; }
   std::size_t memory() const override { return text_.text().memory() + kBuffer; }
 
  private:
@@ -154,7 +154,7 @@ class ElementStream final : public ByteStream {
   }
 
   std::string name() const override { return text_.text().name(); }
-  std::uint64_t most_bytes() const override { return text_.text().most_bytes(); }
+  std::uint64_t max_bytes() const override { return text_.text().max_bytes(); }
   std::size_t memory() const override { return text_.text().memory() + kBuffer; }
 
  private:

@@ -21,7 +21,7 @@ class ByteStream {
 
   /// The most bytes that there can be: refuses headers that promise more before
   /// anything is read. Unlimited where nothing is known.
-  virtual std::uint64_t most_bytes() const = 0;
+  virtual std::uint64_t max_bytes() const = 0;
 
   /// Once read() has met the end: bytes of the file behind it that belong to no compressed data.
   virtual std::uint64_t left_over() const { return 0; }
@@ -30,7 +30,7 @@ class ByteStream {
   virtual std::size_t memory() const { return 0; }
 
   /// Passes over `size` bytes; throws Error when there are fewer, and Cancelled
-  /// when an end is asked for meanwhile.
+  /// when the user ends the program meanwhile.
   void skip(std::uint64_t size);
 
   /// Fills `out`; throws Error when there are fewer bytes.

@@ -16,8 +16,8 @@ class ConcatStream final : public ByteStream {
                std::function<std::unique_ptr<ByteStream>(std::size_t)> open)
       : name_(std::move(name)), count_(count), open_(std::move(open)), part_(open_(0)) {
     memory_ = part_->memory();
-    const std::uint64_t most = part_->most_bytes();
-    most_ = most > std::numeric_limits<std::uint64_t>::max() / count ? most : most * count;
+    const std::uint64_t most = part_->max_bytes();
+    max_ = most > std::numeric_limits<std::uint64_t>::max() / count ? most : most * count;
   }
 
   std::size_t read(std::byte* out, std::size_t size) override {
@@ -34,7 +34,7 @@ class ConcatStream final : public ByteStream {
   }
 
   std::string name() const override { return name_; }
-  std::uint64_t most_bytes() const override { return most_; }
+  std::uint64_t max_bytes() const override { return max_; }
   std::size_t memory() const override { return memory_; }
 
  private:
@@ -53,7 +53,7 @@ class ConcatStream final : public ByteStream {
   std::function<std::unique_ptr<ByteStream>(std::size_t)> open_;
   std::unique_ptr<ByteStream> part_;
   std::size_t memory_ = 0;
-  std::uint64_t most_ = 0, part_bytes_ = 0, first_bytes_ = 0;
+  std::uint64_t max_ = 0, part_bytes_ = 0, first_bytes_ = 0;
 };
 
 }  // namespace

@@ -35,7 +35,7 @@ class FileStream final : public ByteStream {
   }
 
   std::string name() const override { return quoted(file_.path()); }
-  std::uint64_t most_bytes() const override { return end_ - begin_; }
+  std::uint64_t max_bytes() const override { return end_ - begin_; }
 
  private:
   File file_;
@@ -66,11 +66,11 @@ class StdinStream final : public ByteStream {
   }
 
   std::string name() const override { return "standard input"; }
-  std::uint64_t most_bytes() const override { return std::numeric_limits<std::uint64_t>::max(); }
+  std::uint64_t max_bytes() const override { return std::numeric_limits<std::uint64_t>::max(); }
 
  private:
-  /// Returns when a read would not block (or would fail). The signal that asks
-  /// for an end may reach another thread, so this one looks now and then.
+  /// Returns when a read would not block (or would fail). The signal that
+  /// ends the program may reach another thread, so this one polls.
   static void wait() {
     constexpr int milliseconds = 100;
     for (int ready = 0; ready <= 0;) {

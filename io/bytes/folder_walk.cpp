@@ -15,10 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct CloseFolder {
-  void operator()(DIR* folder) const { ::closedir(folder); }
-};
-
 fs::file_type type_of(mode_t mode) {
   switch (mode & S_IFMT) {
     case S_IFREG: return fs::file_type::regular;
@@ -41,7 +37,7 @@ fs::file_type type_of(DIR* folder, const dirent& entry, const fs::path& path) {
 }  // namespace
 
 std::vector<FolderEntry> folder_entries(const fs::path& path) {
-  const std::unique_ptr<DIR, CloseFolder> folder(::opendir(path.c_str()));
+  const std::unique_ptr<DIR, FolderDeleter> folder(::opendir(path.c_str()));
   if (!folder) throw system_error("look into the folder", path.string(), errno);
   std::vector<FolderEntry> entries;
   for (;;) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <dirent.h>
+
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -8,6 +10,10 @@
 namespace isobrick {
 
 // The standard library's iterators over folders end the program where memory is short.
+
+struct FolderDeleter {
+  void operator()(DIR* folder) const { ::closedir(folder); }
+};
 
 struct FolderEntry {
   std::string name;

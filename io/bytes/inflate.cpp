@@ -7,18 +7,19 @@
 namespace isobrick {
 namespace {
 
-Inflated::End end_of(int code) {
+InflateResult::Status status_of(int code) {
   switch (code) {
-    case ISAL_DECOMP_OK: return Inflated::End::complete;
-    case ISAL_OUT_OVERFLOW: return Inflated::End::no_room;
-    case ISAL_END_INPUT: return Inflated::End::cut_off;
-    default: return Inflated::End::invalid;
+    case ISAL_DECOMP_OK: return InflateResult::Status::complete;
+    case ISAL_OUT_OVERFLOW: return InflateResult::Status::no_room;
+    case ISAL_END_INPUT: return InflateResult::Status::cut_off;
+    default: return InflateResult::Status::invalid;
   }
 }
 
 }  // namespace
 
-Inflated inflate(Wrapper wrapper, std::span<const std::byte> packed, std::span<std::byte> out) {
+InflateResult inflate(Wrapper wrapper, std::span<const std::byte> packed,
+                      std::span<std::byte> out) {
   inflate_state state;
   isal_inflate_init(&state);
   state.crc_flag = wrapper == Wrapper::gzip ? ISAL_GZIP : ISAL_ZLIB;
@@ -27,7 +28,7 @@ Inflated inflate(Wrapper wrapper, std::span<const std::byte> packed, std::span<s
   state.next_out = reinterpret_cast<std::uint8_t*>(out.data());
   state.avail_out = static_cast<std::uint32_t>(out.size());
   const int code = isal_inflate_stateless(&state);
-  return {end_of(code), out.size() - state.avail_out, code};
+  return {status_of(code), out.size() - state.avail_out, code};
 }
 
 }  // namespace isobrick

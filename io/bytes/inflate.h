@@ -12,19 +12,19 @@ enum class Wrapper : unsigned char {
 };
 
 /// What inflate() has done.
-struct Inflated {
-  enum class End : unsigned char {
+struct InflateResult {
+  enum class Status : unsigned char {
     complete,  ///< the stream ended and its checksum is right
     no_room,   ///< the stream goes on behind the end of the output
     cut_off,   ///< the input ends before the stream does
     invalid,   ///< no deflate stream, or a wrong checksum
   };
-  End end = End::invalid;
+  Status status = Status::invalid;
   std::size_t size = 0;  ///< bytes written
   int code = 0;          ///< of the library, for messages; 0 when complete
 
   /// Whether the stream is whole and has filled an output of `expected` bytes.
-  bool filled(std::size_t expected) const { return end == End::complete && size == expected; }
+  bool filled(std::size_t expected) const { return status == Status::complete && size == expected; }
 };
 
 /// Nothing that zlib makes of so many bytes is longer.
@@ -32,6 +32,6 @@ constexpr std::size_t max_deflated(std::size_t bytes) { return bytes + bytes / 1
 
 /// Inflates one stream that is in memory as a whole, of gzip the first member. Neither span has
 /// 4 GiB or more. Thread-safe.
-Inflated inflate(Wrapper wrapper, std::span<const std::byte> packed, std::span<std::byte> out);
+InflateResult inflate(Wrapper wrapper, std::span<const std::byte> packed, std::span<std::byte> out);
 
 }  // namespace isobrick

@@ -40,15 +40,15 @@ class InflateStream final : public ByteStream {
 
   std::string name() const override { return packed_->name(); }
 
-  std::uint64_t most_bytes() const override {
-    const std::uint64_t packed = packed_->most_bytes();
+  std::uint64_t max_bytes() const override {
+    const std::uint64_t packed = packed_->max_bytes();
     return packed > std::numeric_limits<std::uint64_t>::max() / kMaxRatio
                ? std::numeric_limits<std::uint64_t>::max()
                : packed * kMaxRatio;
   }
 
   std::uint64_t left_over() const override {
-    return ended_ ? packed_->most_bytes() - fetched_ + state_->avail_in : 0;
+    return ended_ ? packed_->max_bytes() - fetched_ + state_->avail_in : 0;
   }
 
   std::size_t memory() const override { return packed_->memory() + sizeof(inflate_state) + kInput; }

@@ -38,7 +38,7 @@ void FileWriter::make_buffer(std::size_t capacity) {
   const bool large = capacity >= large_page;
   const std::size_t align = large ? large_page : 64;
   const std::size_t bytes = (capacity + align - 1) / align * align;
-  std::unique_ptr<std::byte, Free> buffer(
+  std::unique_ptr<std::byte, BufferDeleter> buffer(
       static_cast<std::byte*>(std::aligned_alloc(align, bytes)));
   if (!buffer) throw std::bad_alloc();
   if (large) (void)::madvise(buffer.get(), bytes, MADV_HUGEPAGE);
@@ -69,7 +69,7 @@ void FileWriter::flush() {
 
 void FileWriter::finish() {
   flush();
-  // A network's file system may store only now, and say only to who closes that it could not.
+  // A network's file system may store only now, and report a failure only to close().
   const int copy = duplicate(file_.fd()).release();
   if (copy < 0 || ::close(copy) != 0) fail(errno);
   buffer_.reset();
@@ -158,7 +158,7 @@ void check_output(const std::string& path, bool force) {
   if (!S_ISREG(status.st_mode))
     throw UsageError(fmt::format("'{}' is{} {} regular file", path, link,
                                  is_link ? "something that is no" : "not a"));
-  if (!force) throw UsageError(fmt::format("'{}' exists already; say --force to replace it", path));
+  if (!force) throw UsageError(fmt::format("'{}' exists already; add --force to replace it", path));
 }
 
 OutputFile::OutputFile(std::string path, bool force)

@@ -15,8 +15,8 @@ namespace isobrick {
 /// Appends to a file through a large buffer.
 class FileWriter {
  public:
-  /// The first `memory` bytes stay in memory, as long as there are no
-  /// more and nothing asks for them to be in the file; at least kBuffer, and no more afterwards.
+  /// The first `memory` bytes, at least kBuffer, stay in memory until there are more or a function
+  /// needs them in the file. After that the buffer has kBuffer bytes.
   explicit FileWriter(File file, std::size_t memory = kBuffer);
 
   /// Room for `size` <= kBuffer bytes, to be filled in place and then committed.
@@ -57,13 +57,13 @@ class FileWriter {
   void write_all(const std::byte* bytes, std::size_t size);
   [[noreturn]] void fail(int errno_value) const;
 
-  struct Free {
+  struct BufferDeleter {
     void operator()(std::byte* buffer) const { std::free(buffer); }
   };
 
   File file_;
   std::size_t capacity_ = 0;  ///< of the buffer; kBuffer when something has been written
-  std::unique_ptr<std::byte, Free> buffer_;
+  std::unique_ptr<std::byte, BufferDeleter> buffer_;
   std::size_t used_ = 0;
   std::uint64_t written_ = 0;
 };

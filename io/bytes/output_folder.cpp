@@ -14,6 +14,7 @@
 
 #include <isobrick/error.h>
 #include "io/bytes/exchange.h"
+#include "io/bytes/folder_walk.h"
 
 namespace isobrick {
 namespace {
@@ -57,15 +58,11 @@ UniqueFd open_below(int folder, const std::string& name, bool make) {
   return UniqueFd(::openat(folder, name.c_str(), kFolder));
 }
 
-struct CloseFolder {
-  void operator()(DIR* folder) const { ::closedir(folder); }
-};
-
 /// Removes all that `fd` holds; 0, or the errno of what failed.
 int remove_entries(UniqueFd fd) {
   UniqueFd copy = duplicate(fd.get());
-  const std::unique_ptr<DIR, CloseFolder> folder(copy.get() < 0 ? nullptr
-                                                                : ::fdopendir(copy.get()));
+  const std::unique_ptr<DIR, FolderDeleter> folder(copy.get() < 0 ? nullptr
+                                                                  : ::fdopendir(copy.get()));
   if (!folder) return errno;
   copy.release();  // closedir() closes it
   std::vector<std::string> names;
@@ -202,7 +199,7 @@ void OutputFolder::sync_folder(const fs::path& path) const {
   // Entries may be made in a folder that one may not read; others sync it then.
   if (fd < 0 && errno == EACCES) return;
   if (fd < 0) throw system_error("open", path.string(), errno);
-  // Some file systems cannot sync a folder and say EINVAL; there is nothing more to do then.
+  // Some file systems cannot sync a folder and return EINVAL; there is nothing more to do then.
   if (::fsync(fd) != 0 && errno != EINVAL) throw system_error("sync", path.string(), errno);
 }
 

@@ -28,7 +28,7 @@ bool is_there(const fs::path& path) {
 void check_folder(const fs::path& folder, bool replace) {
   if (!replace)
     throw UsageError(
-        fmt::format("'{}' exists already; say --force to replace it", folder.string()));
+        fmt::format("'{}' exists already; add --force to replace it", folder.string()));
   if (fs::symlink_status(folder).type() != fs::file_type::directory)
     throw UsageError(fmt::format("'{}' is no folder of parts", folder.string()));
   for (const FolderEntry& entry : folder_entries(folder))

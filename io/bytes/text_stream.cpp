@@ -79,8 +79,8 @@ class TextStream final : public ByteStream {
 
   std::string name() const override { return text_->name(); }
   /// A number takes a digit and a blank, the last one no blank.
-  std::uint64_t most_bytes() const override {
-    const std::uint64_t text = text_->most_bytes(), numbers = text / 2 + text % 2;
+  std::uint64_t max_bytes() const override {
+    const std::uint64_t text = text_->max_bytes(), numbers = text / 2 + text % 2;
     return numbers > std::numeric_limits<std::uint64_t>::max() / size_of(type_)
                ? std::numeric_limits<std::uint64_t>::max()
                : numbers * size_of(type_);

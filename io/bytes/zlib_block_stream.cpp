@@ -27,7 +27,7 @@ class ZlibBlockStream final : public ByteStream {
           fmt::format("{}: compressed blocks of {} bytes, the last one of {}, make no "
                       "sense (at most {} are supported)",
                       packed_->name(), table_.block_bytes, table_.last_bytes, kMaxBlock));
-    if (table_.blocks > sizes_->most_bytes() / static_cast<std::uint64_t>(table_.entry_bytes))
+    if (table_.blocks > sizes_->max_bytes() / static_cast<std::uint64_t>(table_.entry_bytes))
       throw UsageError(fmt::format("{}: the file has no room for the sizes of {} compressed blocks",
                                    packed_->name(), table_.blocks));
     if (table_.last_bytes == 0) table_.last_bytes = table_.block_bytes;
@@ -58,7 +58,7 @@ class ZlibBlockStream final : public ByteStream {
   }
 
   std::string name() const override { return packed_->name(); }
-  std::uint64_t most_bytes() const override {
+  std::uint64_t max_bytes() const override {
     return table_.blocks == 0 ? 0 : (table_.blocks - 1) * table_.block_bytes + table_.last_bytes;
   }
   std::size_t memory() const override {
@@ -82,7 +82,7 @@ class ZlibBlockStream final : public ByteStream {
                       "{} unpacked",
                       name(), index_, packed, bytes));
     packed_->read_exactly(input_.data(), static_cast<std::size_t>(packed));
-    const Inflated done = inflate(
+    const InflateResult done = inflate(
         Wrapper::zlib, std::span(input_).first(static_cast<std::size_t>(packed)), {out, bytes});
     if (!done.filled(bytes))
       throw DamageError(

@@ -36,7 +36,7 @@ Vec3f facet_normal(Vec3f a, Vec3f b, Vec3f c) {
 StlSink::StlSink(std::string path, bool force) : out_(std::move(path), force) {}
 
 void StlSink::begin(const MeshHeader&) {
-  // Must not begin with "solid", which is how text files are told apart.
+  // Must not begin with "solid": readers take such files for text.
   std::string header = "Isobrick binary STL";
   header.resize(kHeaderBytes + sizeof(std::uint32_t), '\0');
   out_.writer().append(header);

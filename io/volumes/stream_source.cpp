@@ -17,11 +17,11 @@ class StreamSource final : public VolumeSource {
   StreamSource(SampleLayout layout, std::unique_ptr<ByteStream> stream, std::uint64_t end,
                AfterEnd after_end)
       : layout_(std::move(layout)), stream_(std::move(stream)), end_(end), after_end_(after_end) {
-    if (stream_->most_bytes() < layout_.end())
+    if (stream_->max_bytes() < layout_.end())
       throw UsageError(fmt::format(
           "{} can hold at most {} bytes of samples, but its header{} "
           "promises {}",
-          stream_->name(), stream_->most_bytes(), layout_.header_in_message(), layout_.end()));
+          stream_->name(), stream_->max_bytes(), layout_.header_in_message(), layout_.end()));
   }
 
   const VolumeInfo& info() const override { return layout_.info; }

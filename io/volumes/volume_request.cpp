@@ -38,44 +38,44 @@ std::string checked_unit(const std::string& unit) {
 }  // namespace
 
 VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
-                           Transform transform, const VolumeRequest& said) {
+                           Transform transform, const VolumeRequest& request) {
   VolumeInfo info;
   info.extent = extent;
   info.type = type;
   info.transform = std::move(transform);
   info.name = path;
   info.files = {path};
-  if (said.spacing) info.transform.spacing = *said.spacing;
-  if (said.origin) info.transform.origin = *said.origin;
+  if (request.spacing) info.transform.spacing = *request.spacing;
+  if (request.origin) info.transform.origin = *request.origin;
   // What is no length ("pixel") is left out: viewers refuse a store with it.
-  info.transform.unit = said.unit ? checked_unit(*said.unit) : unit_name(info.transform.unit);
+  info.transform.unit = request.unit ? checked_unit(*request.unit) : unit_name(info.transform.unit);
   check_geometry(info);
   return info;
 }
 
 void refuse_raw_description(const std::string& path, std::string_view format,
-                            const VolumeRequest& said) {
-  const char* option = said.extent   ? "--dims"
-                       : said.type   ? "--type"
-                       : said.order  ? "--endian"
-                       : said.offset ? "--offset"
-                                     : nullptr;
+                            const VolumeRequest& request) {
+  const char* option = request.extent   ? "--dims"
+                       : request.type   ? "--type"
+                       : request.order  ? "--endian"
+                       : request.offset ? "--offset"
+                                        : nullptr;
   if (option)
     throw UsageError(
-        fmt::format("'{}' is {}, which says itself what --dims, --type, --endian and "
+        fmt::format("'{}' is {}, which itself states what --dims, --type, --endian and "
                     "--offset are for: leave {} out",
                     path, format, option));
 }
 
-void refuse_grid(const std::string& path, const VolumeRequest& said) {
-  if (said.grid || said.region)
-    throw UsageError(
-        fmt::format("'{}' is no OpenVDB file: leave {} out", path, said.grid ? "--grid" : "--roi"));
+void refuse_grid(const std::string& path, const VolumeRequest& request) {
+  if (request.grid || request.region)
+    throw UsageError(fmt::format("'{}' is no OpenVDB file: leave {} out", path,
+                                 request.grid ? "--grid" : "--roi"));
 }
 
-void refuse_selection(const std::string& path, const VolumeRequest& said) {
-  choose(path, "--channel", 1, said.selection.channel);
-  choose(path, "--time", 1, said.selection.time);
+void refuse_selection(const std::string& path, const VolumeRequest& request) {
+  choose(path, "--channel", 1, request.selection.channel);
+  choose(path, "--time", 1, request.selection.time);
 }
 
 }  // namespace isobrick

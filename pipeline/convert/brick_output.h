@@ -36,7 +36,7 @@ class BrickOutput {
               Progress& progress);
 
   /// Encodes a brick of the samples of `box`, dense, in which it lies. `kept`: it is on disk
-  /// already, and only the journal asks for it. Thread-safe.
+  /// already, and only the journal needs it. Thread-safe.
   PackedBrick pack(Int3 brick, Box3 box, const std::byte* samples, bool kept) const;
   /// The same of a brick all of whose samples are `bits` (see VolumeSource::constant); its box
   /// must be a full brick. Bricks of one value that come one after the other are encoded once.

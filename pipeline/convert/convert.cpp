@@ -1,12 +1,12 @@
 #include <isobrick/convert.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "bricks/store_writer.h"
+#include "core/stopwatch.h"
 #include "pipeline/convert/convert_cascade.h"
 #include "pipeline/convert/convert_journal.h"
 #include "pipeline/convert/convert_level.h"
@@ -206,19 +206,19 @@ std::unique_ptr<SpooledVolume> Conversion::spool_stream() {
 
 ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   const StoreLayout layout = plan_layout(source.info(), options, source.sparse());
   const Lattice& finest = layout.levels.front().lattice;
-  const std::uint64_t least_of_index =
-      options.index ? least_index_memory(index_options(options, false), finest) : 0;
+  const std::uint64_t index_memory =
+      options.index ? min_index_memory(index_options(options, false), finest) : 0;
   const int threads = Workers(options.threads).threads();
   std::optional<ConvertPlan> plan;
   std::optional<SparsePyramid> sparse;
   if (SparsePyramid::possible(source, layout))
-    sparse.emplace(source, layout, options, threads, least_of_index);
+    sparse.emplace(source, layout, options, threads, index_memory);
   else
     plan.emplace(layout, options.memory, threads, source.random_access(), source.memory(),
-                 least_of_index);
+                 index_memory);
   if (options.index) check_index_options(index_options(options, false), finest);
   std::vector<std::filesystem::path> inputs = options.inputs;
   inputs.insert(inputs.end(), source.info().files.begin(), source.info().files.end());
@@ -229,7 +229,7 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       options, progress)
         .run();
   });
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.seconds = watch.lap();
   return report;
 }
 

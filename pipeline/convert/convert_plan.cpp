@@ -100,7 +100,7 @@ bool is_coarsest(const ConvertOptions& options, const LevelInfo& level, std::siz
          !halves_long_axis(options.factors.back(), level.lattice);
 }
 
-/// Adds coarser levels to the finest one, as many as are asked for or until one brick holds the
+/// Adds coarser levels to the finest one, as many as requested or until one brick holds the
 /// last. Where the factors leave an axis as it is, they may end before.
 void add_levels(StoreLayout& layout, const ConvertOptions& options) {
   const auto wanted = static_cast<std::size_t>(options.levels.value_or(kMaxLevels));
@@ -167,14 +167,14 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options,
 }
 
 ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads,
-                         bool random_access, std::size_t source_bytes, std::uint64_t least_of_index)
+                         bool random_access, std::size_t source_bytes, std::uint64_t index_memory)
     : layout_(layout),
       source_bytes_(source_bytes),
       threads_(threads),
       bricks_in_flight_(2 * threads + 2) {
   const Lattice& lattice = layout.levels.front().lattice;
   slab_planes_ = lattice.brick.z % 2 == 0 ? lattice.brick.z : 2 * lattice.brick.z;
-  const std::size_t samples = least_room(random_access);
+  const std::size_t samples = min_room(random_access);
   // Large bricks in a small budget: rather fewer at a time than none at all.
   while (bricks_in_flight_ > 1 && encoding_bytes() + samples > memory) {
     --bricks_in_flight_;
@@ -187,8 +187,8 @@ ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int th
         "--memory {}M at least, {} MiB of it for the program and its libraries, the "
         "rest for a layer of bricks, its ranges and encoding them",
         in_mib(memory), lattice.brick.x, lattice.brick.y, lattice.brick.z,
-        least_of_index > least ? " and the index" : "",
-        mib_above(std::max<std::uint64_t>(least, least_of_index)), kProgramBytes / kMiB));
+        index_memory > least ? " and the index" : "",
+        mib_above(std::max<std::uint64_t>(least, index_memory)), kProgramBytes / kMiB));
   room_ = static_cast<std::size_t>(memory) - encoding_bytes();
 }
 
@@ -227,11 +227,11 @@ Int3 ConvertPlan::piece(int level) const {
   // Beside a piece lies the part of it that goes to the next level.
   const std::size_t parts = coarser_part();
   const std::size_t room = (room_ - ranges_bytes(level)) / (parts + 1) * parts;
-  return largest_piece(lattice.extent, least_piece(), room / lattice.sample_bytes());
+  return largest_piece(lattice.extent, min_piece(), room / lattice.sample_bytes());
 }
 
 /// A brick, or two where its samples would not pair up for the next level.
-Int3 ConvertPlan::least_piece() const {
+Int3 ConvertPlan::min_piece() const {
   Int3 piece = layout_.levels.front().lattice.brick;
   for (int axis = 0; axis < 3; ++axis)
     if (piece[axis] % 2 != 0) piece[axis] *= 2;
@@ -252,9 +252,9 @@ Index ConvertPlan::spool_planes() const {
   return std::max<Index>(1, static_cast<Index>(std::min(room_, kEnough) / plane));
 }
 
-std::size_t ConvertPlan::least_room(bool random_access) const {
+std::size_t ConvertPlan::min_room(bool random_access) const {
   const Lattice& lattice = layout_.levels.front().lattice;
-  const std::size_t cube = static_cast<std::size_t>(volume(least_piece())) * lattice.sample_bytes();
+  const std::size_t cube = static_cast<std::size_t>(volume(min_piece())) * lattice.sample_bytes();
   const std::size_t parts = coarser_part();
   const std::size_t pieces = ranges_bytes(0) + cube / parts * (parts + 1) + parts + 1;
   const std::size_t plane =

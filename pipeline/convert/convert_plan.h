@@ -24,11 +24,11 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options,
 class ConvertPlan {
  public:
   /// `source_bytes`: what the source takes for itself. Throws UsageError when not even one piece
-  /// fits, naming the least budget, which is `least_of_index` at least.
+  /// fits, naming the least budget, which is `index_memory` at least.
   ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int threads, bool random_access,
-              std::size_t source_bytes, std::uint64_t least_of_index = 0);
+              std::size_t source_bytes, std::uint64_t index_memory = 0);
 
-  /// As many as asked for, or fewer where the budget is small for the bricks.
+  /// As many as requested, or fewer where the budget is small for the bricks.
   int threads() const { return threads_; }
   /// Bricks being encoded or waiting for their turn to be written.
   int bricks_in_flight() const { return bricks_in_flight_; }
@@ -46,10 +46,10 @@ class ConvertPlan {
  private:
   std::size_t encoding_bytes() const;
   std::size_t slab_bytes(int level) const;
-  Int3 least_piece() const;
+  Int3 min_piece() const;
   std::size_t cascade_bytes(int level) const;
   std::size_t ranges_bytes(int level) const;
-  std::size_t least_room(bool random_access) const;
+  std::size_t min_room(bool random_access) const;
   /// The least samples of any level that become one of the next.
   std::size_t coarser_part() const;
 

@@ -59,7 +59,7 @@ class BrickSpool {
 };
 
 /// A family, and what has become of it.
-struct Parcel {
+struct PackedFamily {
   struct Brick {
     PackedBrick packed;
     BrickBlocks ranges;
@@ -127,13 +127,13 @@ class SparsePyramid::Level {
   void write(VolumeSource& source, const BrickSpool* spool, BrickSpool* next,
              std::size_t in_flight) {
     std::size_t taken = 0;
-    const auto take = [&](Parcel& parcel) {
+    const auto take = [&](PackedFamily& parcel) {
       parcel.family = bricks_.family_at(taken);
       taken += parcel.family.size();
       return !parcel.family.empty();
     };
     Index layer = 0;
-    const auto deliver = [&](const Parcel& parcel) {
+    const auto deliver = [&](const PackedFamily& parcel) {
       for (; layer < parcel.parent.z; ++layer)
         close((layer + 1) * factors_.z * info_.lattice.brick.z);
       put(parcel);
@@ -141,8 +141,8 @@ class SparsePyramid::Level {
           !all_fill(info_.lattice.type, parcel.coarser.span(), layout_.fill_value))
         next->append(parcel.parent, parcel.coarser.span());
     };
-    run_in_order<Parcel>(
-        in_flight, take, [&](Parcel& parcel) { pack(parcel, source, spool, next); }, deliver);
+    run_in_order<PackedFamily>(
+        in_flight, take, [&](PackedFamily& parcel) { pack(parcel, source, spool, next); }, deliver);
     close(info_.lattice.extent.z);
     if (next != nullptr) next->finish();
   }
@@ -191,7 +191,8 @@ class SparsePyramid::Level {
     });
   }
 
-  void pack(Parcel& parcel, VolumeSource& source, const BrickSpool* spool, const BrickSpool* next) {
+  void pack(PackedFamily& parcel, VolumeSource& source, const BrickSpool* spool,
+            const BrickSpool* next) {
     const Lattice& lattice = info_.lattice;
     parcel.parent = bricks_.parent_of(parcel.family.front().brick);
     if (next != nullptr) {
@@ -207,8 +208,8 @@ class SparsePyramid::Level {
     });
   }
 
-  Parcel::Brick pack_brick(const SparseBrick& item, VolumeSource& source, const BrickSpool* spool,
-                           Parcel* parcel) {
+  PackedFamily::Brick pack_brick(const SparseBrick& item, VolumeSource& source,
+                                 const BrickSpool* spool, PackedFamily* parcel) {
     const Lattice& lattice = info_.lattice;
     const Box3 box = lattice.brick_box(item.brick);
     const bool kept = shard_at(floor_div(item.brick, bricks_per_shard_))->whole;
@@ -226,7 +227,7 @@ class SparsePyramid::Level {
     } else {
       source.read(box, samples.data());
     }
-    Parcel::Brick brick;
+    PackedFamily::Brick brick;
     brick.ranges = scan_brick(lattice, box, samples.data());
     if (parcel != nullptr) {
       coarser.resize(lattice.brick_bytes());
@@ -245,7 +246,8 @@ class SparsePyramid::Level {
   }
 
   /// A full brick of one value, which is that of the coarser level, too.
-  Parcel::Brick pack_constant(Int3 place, std::uint64_t bits, bool kept, Parcel* parcel) {
+  PackedFamily::Brick pack_constant(Int3 place, std::uint64_t bits, bool kept,
+                                    PackedFamily* parcel) {
     const Lattice& lattice = info_.lattice;
     const Box3 box = lattice.brick_box(place);
     if (parcel != nullptr)
@@ -254,8 +256,8 @@ class SparsePyramid::Level {
     return {output_.pack_constant(place, bits, kept), constant_brick(lattice, box, bits)};
   }
 
-  void put(const Parcel& parcel) {
-    for (const Parcel::Brick& brick : parcel.bricks) {
+  void put(const PackedFamily& parcel) {
+    for (const PackedFamily::Brick& brick : parcel.bricks) {
       ranges_->add(brick.ranges);
       has_nan_ |= brick.ranges.has_nan;
       output_.deliver(brick.packed);
@@ -301,8 +303,7 @@ bool SparsePyramid::possible(const VolumeSource& source, const StoreLayout& layo
 }
 
 SparsePyramid::SparsePyramid(VolumeSource& source, const StoreLayout& layout,
-                             const ConvertOptions& options, int threads,
-                             std::uint64_t least_of_index)
+                             const ConvertOptions& options, int threads, std::uint64_t index_memory)
     : source_(source),
       layout_(layout),
       threads_(threads),
@@ -315,7 +316,7 @@ SparsePyramid::SparsePyramid(VolumeSource& source, const StoreLayout& layout,
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {} MiB of it "
         "for the program and its libraries, {:.1f} for the grid",
-        in_mib(options.memory), mib_above(std::max<std::uint64_t>(least, least_of_index)),
+        in_mib(options.memory), mib_above(std::max<std::uint64_t>(least, index_memory)),
         kProgramBytes / kMiB, in_mib(source.memory())));
   };
   const bool fits = fit(fixed, options.memory);

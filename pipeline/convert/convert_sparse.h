@@ -32,9 +32,9 @@ class SparsePyramid {
   static bool possible(const VolumeSource& source, const StoreLayout& layout);
 
   /// Looks for the bricks that are there. Throws UsageError for a budget that is too small, naming
-  /// one that does, which is `least_of_index` at least.
+  /// one that does, which is `index_memory` at least.
   SparsePyramid(VolumeSource& source, const StoreLayout& layout, const ConvertOptions& options,
-                int threads, std::uint64_t least_of_index = 0);
+                int threads, std::uint64_t index_memory = 0);
 
   int threads() const { return threads_; }
 

@@ -15,8 +15,8 @@ std::filesystem::path staging_path(const std::filesystem::path& out);
 /// The folder at staging_path(). It stays when a conversion fails, for a resume.
 ///
 /// A store keeps the marker of an unfinished conversion until it has its place and the one that
-/// was there is gone. So a marker at `out` says that a process was killed while it published:
-/// what lies at ".partial" then is the old store, whatever is left of it.
+/// was there is gone. So a marker at `out` means that a process was killed while it
+/// published: then ".partial" is what is left of the old store.
 class ConvertStaging {
  public:
   /// First ends what a killed process began to publish; with `resume` its store goes back to
@@ -24,7 +24,7 @@ class ConvertStaging {
   /// Throws UsageError when `out` is a symbolic link, or exists and `force` may not replace it:
   /// `force` replaces a store of ours that has nothing else in it, none of `inputs` and not the
   /// current directory. Throws UsageError too when anything but an interrupted conversion is at
-  /// ".partial", or when one is there and neither `resume` nor `force` says what to do. Throws
+  /// ".partial", or when one is there and neither `resume` nor `force` is set. Throws
   /// Error when another process is writing it.
   ConvertStaging(std::filesystem::path out, bool resume, bool force,
                  std::vector<std::filesystem::path> inputs);

@@ -12,8 +12,8 @@
 namespace isobrick {
 namespace {
 
-/// The four rows that become one. At an odd end, and along an axis that stays, a row comes twice:
-/// counting every sample twice leaves the mean, its rounding and the mode as they are.
+/// The four rows that become one. At an odd end, and along an axis that is not halved, a row comes
+/// twice: counting every sample twice leaves the mean, its rounding and the mode as they are.
 template <class T>
 struct Rows {
   const T *a, *b, *c, *d;

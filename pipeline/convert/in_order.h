@@ -8,8 +8,8 @@
 namespace isobrick {
 
 /// Takes things one after the other, works on them with all threads, and delivers them in the
-/// order in which they were taken; at most `in_flight` (at least 1) are under way. What is
-/// under way lies here: TBB does not free what its filters have handed on when one of them throws.
+/// order in which they were taken; at most `in_flight` (at least 1) are under way. This
+/// function owns them: TBB does not free the items between its filters when one of them throws.
 ///
 ///     bool take(T&)      fills a new thing in; false: there are no more. One call at a time.
 ///     void work(T&)      on any thread, several at a time
@@ -19,7 +19,7 @@ void run_in_order(std::size_t in_flight, Take&& take, Work&& work, Deliver&& del
   std::vector<T> slots(in_flight);
   std::size_t taken = 0;
   const auto begin = [&](tbb::flow_control& flow) -> T* {
-    // Delivered in order, so whoever was here `in_flight` things ago is done.
+    // Delivered in order, so the earlier user of this slot is done.
     T& slot = slots[taken++ % in_flight];
     if (take(slot)) return &slot;
     flow.stop();

@@ -13,13 +13,13 @@ namespace {
 
 class StoreSource final : public VolumeSource {
  public:
-  StoreSource(const std::string& path, const VolumeRequest& said, int threads)
-      : store_(path, said.selection),
+  StoreSource(const std::string& path, const VolumeRequest& request, int threads)
+      : store_(path, request.selection),
         threads_(threads > 0 ? threads : tbb::info::default_concurrency()),
         arena_(threads_) {
     const LevelInfo& finest = store_.info().levels.front();
-    info_ =
-        describe_volume(path, finest.lattice.extent, finest.lattice.type, finest.transform, said);
+    info_ = describe_volume(path, finest.lattice.extent, finest.lattice.type, finest.transform,
+                            request);
     info_.fill_value = store_.info().fill_value;
     info_.grid_class = store_.info().grid_class;
     info_.grid_name = store_.info().grid_name;
@@ -46,10 +46,10 @@ class StoreSource final : public VolumeSource {
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> open_store_source(const std::string& path, const VolumeRequest& said,
-                                                int threads) {
-  refuse_raw_description(path, "Zarr", said);
-  return std::make_unique<StoreSource>(path, said, threads);
+std::unique_ptr<VolumeSource> open_store_source(const std::string& path,
+                                                const VolumeRequest& request, int threads) {
+  refuse_raw_description(path, "Zarr", request);
+  return std::make_unique<StoreSource>(path, request, threads);
 }
 
 }  // namespace isobrick

@@ -9,9 +9,9 @@
 namespace isobrick {
 
 /// The finest level of a store, or of another program's Zarr, as the input of a
-/// conversion. Throws what StoreReader does, and UsageError for what the request
-/// says of raw samples. `threads` will decode at once; 0: all cores.
-std::unique_ptr<VolumeSource> open_store_source(const std::string& path, const VolumeRequest& said,
-                                                int threads);
+/// conversion. Throws what StoreReader does, and UsageError for a request with
+/// options of raw samples. `threads` will decode at once; 0: all cores.
+std::unique_ptr<VolumeSource> open_store_source(const std::string& path,
+                                                const VolumeRequest& request, int threads);
 
 }  // namespace isobrick

@@ -102,7 +102,7 @@ struct Piece {
 };
 
 /// The most that the grid of a box takes: all that is stored of it.
-std::uint64_t most_of_grid(const Piece& in) {
+std::uint64_t max_grid(const Piece& in) {
   const Lattice& lattice = in.lattice();
   std::uint64_t leaves = 0;
   NoProgress silent;
@@ -124,7 +124,7 @@ void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, W
   const std::uint64_t others = fixed_bytes(in.store.info(), in.level, workers.threads()) +
                                lattice.brick_bytes() + kVdbLibraryBytes;
   const auto refuse = [&] {
-    const std::uint64_t most = most_of_grid(in);
+    const std::uint64_t most = max_grid(in);
     refuse_vdb_budget(memory, others + most, most);
   };
   if (memory < others + vdb_grid_bytes({1, 1, 1}, 1, 8)) refuse();
@@ -270,7 +270,7 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   if (streamed && options.format == ExportFormat::vdb)
     throw UsageError(
         "an OpenVDB file cannot go to standard output, because its beginning is written last: "
-        "name a file, or say --format nrrd");
+        "name a file, or add --format nrrd");
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   VolumeInfo info = describe(level, box, out.string());

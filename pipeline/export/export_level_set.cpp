@@ -29,7 +29,8 @@ constexpr std::uint64_t kExtractBytes = 256 * kMiB;
 
 /// The most that the level set of active parts takes, with what it keeps of the triangles of a tile
 /// or two.
-std::uint64_t most_of_level_set(const ActiveParts& active, const VolumeInfo& info, int half_band) {
+std::uint64_t max_level_set_bytes(const ActiveParts& active, const VolumeInfo& info,
+                                  int half_band) {
   const Vec3d spacing = info.transform.spacing;
   const double longest = std::max({spacing.x, spacing.y, spacing.z});
   std::uint64_t leaves_of_block = 1, leaves_of_triangle = 1;
@@ -54,19 +55,19 @@ std::uint64_t most_of_level_set(const ActiveParts& active, const VolumeInfo& inf
 }
 
 /// How a budget is divided.
-struct Shares {
+struct MemoryShares {
   std::uint64_t extraction = 0, grid = 0;
-  std::uint64_t enough = 0, most_of_grid = 0;  ///< the whole and the grid's, so that it surely fits
+  std::uint64_t enough = 0, max_grid = 0;  ///< the whole and the grid's, so that it surely fits
 };
 
-Shares divide(const StoreReader& store, const VolumeInfo& info, const ExtractOptions& extraction,
-              int half_band, std::uint64_t memory) {
-  const std::uint64_t least = least_extract_memory(store, extraction, Indexing::chunk_local, 0);
-  Shares shares;
-  shares.most_of_grid = most_of_level_set(count_active(store, extraction), info, half_band);
-  shares.enough = least + kVdbLibraryBytes + shares.most_of_grid;
+MemoryShares divide(const StoreReader& store, const VolumeInfo& info,
+                    const ExtractOptions& extraction, int half_band, std::uint64_t memory) {
+  const std::uint64_t least = min_extract_memory(store, extraction, Indexing::chunk_local, 0);
+  MemoryShares shares;
+  shares.max_grid = max_level_set_bytes(count_active(store, extraction), info, half_band);
+  shares.enough = least + kVdbLibraryBytes + shares.max_grid;
   if (memory < least + kVdbLibraryBytes + vdb_grid_bytes({1, 1, 1}, 1, sizeof(float)))
-    refuse_vdb_budget(memory, shares.enough, shares.most_of_grid);
+    refuse_vdb_budget(memory, shares.enough, shares.max_grid);
   // Larger pieces of mesh take more of the grid's share.
   const std::uint64_t spare = memory - std::min(memory, shares.enough);
   shares.extraction = std::max(least, std::min(least + spare / 2, kExtractBytes));
@@ -89,10 +90,10 @@ class DistanceSink final : public MeshSink {
   VdbLevelSet& set_;
 };
 
-/// Says which samples are inside, brick by brick; only bricks of both kinds are read.
-class Signs {
+/// Passes on which samples are inside, brick by brick. Only bricks of both kinds are read.
+class InsideWriter {
  public:
-  Signs(const StoreReader& store, Box3 box, const ExportOptions& options, VdbLevelSet& set)
+  InsideWriter(const StoreReader& store, Box3 box, const ExportOptions& options, VdbLevelSet& set)
       : store_(store),
         level_(options.level),
         lattice_(store.info().levels[static_cast<std::size_t>(options.level)].lattice),
@@ -113,7 +114,7 @@ class Signs {
       if (below_ ? none_below : none_above) return;
       const Box3 part = intersect(lattice_.brick_box(b), box_);
       const Box3 out{part.lo - box_.lo, part.hi - box_.lo};
-      // Ranges say nothing of samples that are no numbers; those are outside.
+      // Ranges do not include NaN; such samples are outside.
       if ((below_ ? none_above : none_below) && !store_.info().may_have_nan)
         return set_.put_all_inside(out);
       workers.execute([&] { read_slab(store_, level_, part, samples_.data()); });
@@ -155,7 +156,7 @@ void fill_level_set(const StoreReader& store, Box3 box, const ExportOptions& opt
 
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(options.level)].lattice;
   Workers workers(options.threads);
-  Signs signs(store, box, options, set);
+  InsideWriter signs(store, box, options, set);
   const Box3 bricks = lattice.bricks_of(box);
   const auto bytes = [&](Box3 b) {
     return static_cast<std::uint64_t>(volume(b.extent())) * lattice.brick_bytes();
@@ -182,7 +183,7 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
   extraction.roi = box;
   extraction.threads = options.threads;
   extraction.backend = Backend::cpu;
-  const Shares shares = divide(store, info, extraction, options.half_band, options.memory);
+  const MemoryShares shares = divide(store, info, extraction, options.half_band, options.memory);
   extraction.memory = shares.extraction;
   extraction.memory_of_others = options.memory - shares.extraction;
   const auto set =
@@ -190,7 +191,7 @@ void export_level_set(const StoreReader& store, Box3 box, const VolumeInfo& info
   try {
     fill_level_set(store, box, options, extraction, *set, progress);
   } catch (const BudgetError&) {
-    refuse_vdb_budget(options.memory, shares.enough, shares.most_of_grid);
+    refuse_vdb_budget(options.memory, shares.enough, shares.max_grid);
   }
   set->write(file);
 }

@@ -26,7 +26,7 @@ struct ChosenBackend {
   ExtractPlan plan;
   std::unique_ptr<GpuSession> gpu;        ///< null: the CPU
   std::unique_ptr<DecodedTiles> decoded;  ///< for the GPU
-  /// Of the first surfaces that were asked for, as many as the budgets have room for together.
+  /// The first of the requested surfaces, as many as the budgets have room for together.
   std::vector<std::unique_ptr<SurfaceExtractor>> surfaces;
   std::string gpu_refusal;  ///< why the GPU that was to make them does not
 };

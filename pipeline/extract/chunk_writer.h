@@ -13,7 +13,7 @@
 namespace isobrick {
 
 /// Hands mesh chunks to a sink on a thread of its own, so that writing overlaps
-/// with making the next one. Either two buffers go round, or whoever makes the mesh lends
+/// with making the next one. Either two buffers go round, or the extractor lends
 /// its own; either way nothing is copied.
 class ChunkWriter {
  public:

@@ -1,6 +1,6 @@
-#include <chrono>
 #include <utility>
 
+#include "core/stopwatch.h"
 #include "pipeline/extract/chunk_writer.h"
 #include "pipeline/extract/surface_extractor.h"
 #include "surface/cpu_extractor.h"
@@ -17,13 +17,12 @@ class CpuSurface final : public SurfaceExtractor {
 
   void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                const std::shared_ptr<const void>&) override {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch(seconds_);
     extractor_.extract(tiles, bricks, mesh_, [&](MeshBuffer& mesh, std::uint64_t first) {
       bytes_ += mesh.positions.span().size_bytes() + mesh.normals.span().size_bytes() +
                 mesh.triangles.span().size_bytes();
       writer_.write(mesh, first);
     });
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
 
   void finish() override { writer_.finish(); }

@@ -17,6 +17,7 @@
 #include "pipeline/extract/tile_sample.h"
 #include "pipeline/workers.h"
 #include "stream/brick_cache.h"
+#include "stream/distinct_bricks.h"
 #include "stream/tile_stream.h"
 #include "surface/case_rule.h"
 
@@ -61,44 +62,26 @@ void count_tile(const ExtractRequest& request, const TileWork& work, ActiveParts
   }
 }
 
-/// Bricks that were seen.
-class BrickSet {
- public:
-  explicit BrickSet(const Lattice& lattice)
-      : seen_(static_cast<std::size_t>(volume(lattice.bricks()))) {}
-  void add(std::size_t brick) {
-    auto seen = seen_[brick];
-    size_ += !seen;
-    seen = true;
-  }
-  std::uint64_t size() const { return size_; }
-  std::uint64_t of() const { return seen_.size(); }
-
- private:
-  std::vector<bool> seen_;
-  std::uint64_t size_ = 0;
-};
-
 /// What is active at each of several isovalues.
 class ActiveCounts {
  public:
   ActiveCounts(const ExtractRequest& request, std::size_t isovalues)
-      : parts_(isovalues), bricks_(isovalues, BrickSet(request.level->lattice)) {}
+      : parts_(isovalues), bricks_(isovalues, DistinctBricks(request.level->lattice)) {}
 
   std::size_t isovalues() const { return parts_.size(); }
   ActiveParts& parts(std::size_t i) { return parts_[i]; }
-  BrickSet& bricks(std::size_t i) { return bricks_[i]; }
+  DistinctBricks& bricks(std::size_t i) { return bricks_[i]; }
   std::vector<ActiveParts> counted() {
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      parts_[i].bricks = bricks_[i].of();
-      parts_[i].active_bricks = bricks_[i].size();
+      parts_[i].bricks = bricks_[i].all();
+      parts_[i].active_bricks = bricks_[i].count();
     }
     return std::move(parts_);
   }
 
  private:
   std::vector<ActiveParts> parts_;
-  std::vector<BrickSet> bricks_;
+  std::vector<DistinctBricks> bricks_;
 };
 
 /// Counts what is active and calls visit(TileWork) for every tile that is active at any of the
@@ -266,8 +249,8 @@ std::size_t groups_to_sample(const Lattice& lattice) {
   return std::clamp<std::size_t>(kMaxBytes / bytes & ~std::uint64_t{1}, kMinGroups, kMaxGroups);
 }
 
-/// Scales what was seen in some groups to all active cells, and says how sure
-/// that is: the standard error of a ratio of sums.
+/// Scales what was seen in some groups to all active cells, and computes
+/// the standard error of that ratio of sums.
 void scale(std::span<const Sampled> sampled, std::uint64_t cells, ExtractEstimate& result) {
   Sampled sum;
   for (const Sampled& s : sampled) sum += s;

@@ -9,11 +9,11 @@
 
 #include <isobrick/estimate.h>
 #include "core/length_unit.h"
+#include "core/stopwatch.h"
 #include "pipeline/extract/backend_choice.h"
 #include "pipeline/extract/extract_pass.h"
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/extract_tiles.h"
-#include "pipeline/seconds_sum.h"
 #include "pipeline/workers.h"
 
 namespace isobrick {
@@ -67,7 +67,7 @@ EarlyWork begin_early(const StoreReader& store, const ExtractOptions& options,
   return early;
 }
 
-/// The surfaces that extract() is asked for.
+/// The surfaces of one extract().
 class Extraction {
  public:
   Extraction(const StoreReader& store, const ExtractOptions& options,
@@ -86,7 +86,7 @@ class Extraction {
   std::vector<ExtractReport> run(Progress& progress) {
     double count_seconds = 0;
     {
-      const SecondsSum watch(count_seconds);
+      const Stopwatch watch(count_seconds);
       begin();
     }
     std::uint64_t bytes = 0;
@@ -153,10 +153,10 @@ class Extraction {
     double seconds = 0, plan_seconds = 0;
     PassSurfaces made;
     {
-      const SecondsSum whole(seconds);
+      const Stopwatch whole(seconds);
       ChosenBackend backend;
       {
-        const SecondsSum watch(plan_seconds);
+        const Stopwatch watch(plan_seconds);
         backend = set_up(left);
       }
       made = left.first(backend.surfaces.size());
@@ -238,8 +238,8 @@ std::string_view bound_of(const ExtractReport& report) {
       ->first;
 }
 
-std::uint64_t least_extract_memory(const StoreReader& store, const ExtractOptions& options,
-                                   Indexing indexing, std::uint64_t sink_bytes) {
+std::uint64_t min_extract_memory(const StoreReader& store, const ExtractOptions& options,
+                                 Indexing indexing, std::uint64_t sink_bytes) {
   ExtractRequest request = check_request(store, options, indexing);
   request.sink_bytes = sink_bytes;
   return least_memory({&request, 1}, decode_extra(store.info(), request.threads));

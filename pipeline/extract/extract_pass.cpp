@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/stopwatch.h"
 #include "pipeline/extract/extract_tiles.h"
-#include "pipeline/seconds_sum.h"
 #include "pipeline/workers.h"
 #include "stream/brick_cache.h"
 
@@ -44,7 +44,7 @@ void extract_batch(const Work& work, std::span<const std::unique_ptr<SurfaceExtr
     const std::span<const TileWork> tiles = tiles_of(work.isovalue_of[i]);
     if (tiles.empty()) continue;
     {
-      const SecondsSum watch(work.reports[i].surface_seconds);
+      const Stopwatch watch(work.reports[i].surface_seconds);
       surfaces[i]->extract(tiles, bricks, samples);
     }
     work.done(i, tiles);
@@ -129,12 +129,12 @@ void extract_on_cpu(const Work& work, std::span<const std::unique_ptr<SurfaceExt
       CpuBatch next = batches.next();
       if (room_for_two) batches.begin(next);
       {
-        const SecondsSum watch(decode_seconds);
+        const Stopwatch watch(decode_seconds);
         now.bricks->wait();
       }
       const double decoded_before = bricks_seconds(work.store);
       {
-        const SecondsSum watch(extract_seconds);
+        const Stopwatch watch(extract_seconds);
         extract_batch(
             work, surfaces,
             [&](std::size_t i) { return std::span<const TileWork>(now.batch.tiles_of[i]); },
@@ -165,7 +165,7 @@ void extract_on_gpu(const Work& work, ChosenBackend& backend) {
   for (;;) {
     std::shared_ptr<const DecodedBatch> batch;
     {
-      const SecondsSum watch(decode_seconds);
+      const Stopwatch watch(decode_seconds);
       batch = decoder.next();
     }
     if (!batch) break;

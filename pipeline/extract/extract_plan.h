@@ -20,7 +20,7 @@ struct ExtractPlan {
   std::uint64_t bytes = 0;       ///< all of it, the program itself included
 };
 
-/// What the options say of the store's level, checked.
+/// The options for the store's level, checked.
 struct ExtractRequest {
   const LevelInfo* level = nullptr;
   SurfaceOptions surface;

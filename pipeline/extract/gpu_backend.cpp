@@ -128,7 +128,7 @@ class CudaSession final : public GpuSession {
   }
 
  private:
-  /// False when the device has less room than it said.
+  /// False when the device has less room than it reported.
   bool make_pool(const Lattice& lattice) {
     const gpu::PoolSizes& pool = sizes_.front().pool;
     try {

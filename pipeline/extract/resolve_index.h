@@ -6,7 +6,7 @@
 
 namespace isobrick {
 
-/// How a level is searched. Throws UsageError when the level lacks the index that was asked for.
+/// How a level is searched. Throws UsageError when the level lacks the requested index.
 SearchMethod resolve_index(const StoreReader& store, int level, const IndexChoice& choice);
 
 }  // namespace isobrick

@@ -15,8 +15,8 @@ class SurfaceExtractor {
  public:
   virtual ~SurfaceExtractor() = default;
 
-  /// Over all calls, tiles come in Morton order, none twice; `bricks` holds what
-  /// for_each_needed_box says. It is not looked up any more afterwards, but its samples may be
+  /// Over all calls, tiles come in Morton order, none twice; `bricks` holds those of
+  /// for_each_needed_box. It is not looked up any more afterwards, but its samples may be
   /// read until `samples`, which owns them, is let go. Called in the TBB arena that does the
   /// work.
   virtual void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,

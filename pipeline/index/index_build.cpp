@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <optional>
 
@@ -12,6 +11,7 @@
 #include "bricks/stored_index.h"
 #include "bricks/zarr/json_reader.h"
 #include "core/morton.h"
+#include "core/stopwatch.h"
 #include "index/leaf_ranges.h"
 #include "io/bytes/exchange.h"
 #include "io/bytes/output_folder.h"
@@ -26,10 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kZstdLevel = 3;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 std::string kind_of(const IndexOptions& options) { return std::string(name_of(options.kind)); }
 
@@ -60,7 +56,7 @@ class LevelIndex {
         store.info().levels[static_cast<std::size_t>(level)].block_ranges_crc32c;
   }
 
-  /// Throws UsageError when something is there and nobody said what to do with it.
+  /// Throws UsageError when there is one and neither `resume` nor `force` is set.
   void check() const;
   /// Decides what of an earlier run stays, and makes the folder.
   void prepare(Publisher& publisher);
@@ -177,11 +173,11 @@ void complete_ranges(std::unique_ptr<StoreReader>& store, const IndexOptions& op
                      Progress& progress, IndexReport& report) {
   const bool anew = !store->info().ours && options.force;
   if (!anew && has_all_ranges(*store)) return;
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   add_ranges(*store, options.memory, threads, progress);
   store = std::make_unique<StoreReader>(store->info().path, options.selection);
   report.ranges_added = true;
-  report.range_seconds = seconds_since(start);
+  report.range_seconds = watch.lap();
 }
 
 IndexReport build_all(const fs::path& path, const IndexOptions& given, int threads,
@@ -218,18 +214,18 @@ IndexReport build_all(const fs::path& path, const IndexOptions& given, int threa
 
 }  // namespace
 
-std::uint64_t least_index_memory(const IndexOptions& options, const Lattice& lattice) {
+std::uint64_t min_index_memory(const IndexOptions& options, const Lattice& lattice) {
   if (options.kind == IndexKind::linear)
     throw UsageError("a linear scan needs no index: that is what a store's ranges are for");
   if (!is_leaf(options.leaf))
     throw UsageError(
         fmt::format("a leaf has 1, 2, 4, 8 or 16 cells along an edge, not {}", options.leaf));
-  return IndexChunkBuilder::least_memory(lattice, options.leaf, Workers(options.threads).threads());
+  return IndexChunkBuilder::min_memory(lattice, options.leaf, Workers(options.threads).threads());
 }
 
 void check_index_options(const IndexOptions& options, const Lattice& lattice,
                          std::uint64_t others) {
-  const std::uint64_t least = others + least_index_memory(options, lattice);
+  const std::uint64_t least = others + min_index_memory(options, lattice);
   if (options.memory < least)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: an index with leaf {} needs --memory {}M at "
@@ -240,11 +236,11 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
 }
 
 IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
+  Stopwatch watch;
   Workers workers(options.threads);
   IndexReport report =
       workers.execute([&] { return build_all(store, options, workers.threads(), progress); });
-  report.seconds = seconds_since(start);
+  report.seconds = watch.lap();
   return report;
 }
 

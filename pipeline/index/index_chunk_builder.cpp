@@ -52,7 +52,7 @@ std::uint64_t memory_for(const Lattice& lattice, Index leaf, int threads, Index 
 
 }  // namespace
 
-std::uint64_t IndexChunkBuilder::least_memory(const Lattice& lattice, Index leaf, int threads) {
+std::uint64_t IndexChunkBuilder::min_memory(const Lattice& lattice, Index leaf, int threads) {
   return memory_for(lattice, leaf, threads, 1, 1);
 }
 

@@ -17,7 +17,7 @@ namespace isobrick {
 class IndexChunkBuilder {
  public:
   /// The least memory for a level of this lattice.
-  static std::uint64_t least_memory(const Lattice& lattice, Index leaf, int threads);
+  static std::uint64_t min_memory(const Lattice& lattice, Index leaf, int threads);
 
   /// `memory` is no less than the least.
   IndexChunkBuilder(const StoreReader& store, int level, const IndexLayout& layout, IndexKind kind,

@@ -63,10 +63,10 @@ class ColumnRanges {
 template <class T>
 bool holds_nan(const T* samples, std::size_t count) {
   if constexpr (std::numeric_limits<T>::has_quiet_NaN) {
-    // Lanes as wide as the samples, so that the loop vectorises.
-    using Lane = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
-    Lane found = 0;
-    for (std::size_t i = 0; i < count; ++i) found |= samples[i] != samples[i] ? Lane{1} : Lane{0};
+    // As wide as the samples, so that the loop vectorises.
+    using Word = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
+    Word found = 0;
+    for (std::size_t i = 0; i < count; ++i) found |= samples[i] != samples[i] ? Word{1} : Word{0};
     return found != 0;
   } else {
     static_cast<void>(samples);

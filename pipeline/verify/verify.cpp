@@ -32,7 +32,7 @@ constexpr std::size_t kMaxUnreadable = std::size_t{1} << 17;
 /// Shards of a level that are looked for, each a file: about half a minute.
 constexpr Index kMaxShards = Index{1} << 21;
 
-/// Collects damages. A broken shard index says the same for each of its
+/// Collects damages. A broken shard index causes the same message for each of its
 /// bricks: that is one damage. Thread-safe.
 class DamageList {
  public:
@@ -116,11 +116,12 @@ void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pai
           range.empty()
               ? ValueRange<double>{}
               : ValueRange<double>{static_cast<double>(range.lo), static_cast<double>(range.hi)};
-      const ValueRange<double>& said = stored.at(p);
-      if (said == samples || (said.empty() && samples.empty()) || sees_unreadable(p, edge)) return;
-      damages_.add(
-          fmt::format("level {}, {} ({}, {}, {}): its range says [{}, {}], its samples [{}, {}]",
-                      level_, what, p.x, p.y, p.z, said.lo, said.hi, samples.lo, samples.hi));
+      const ValueRange<double>& expected = stored.at(p);
+      if (expected == samples || (expected.empty() && samples.empty()) || sees_unreadable(p, edge))
+        return;
+      damages_.add(fmt::format(
+          "level {}, {} ({}, {}, {}): its range is [{}, {}], that of its samples [{}, {}]", level_,
+          what, p.x, p.y, p.z, expected.lo, expected.hi, samples.lo, samples.hi));
     });
   });
 }

@@ -19,8 +19,8 @@ constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 /// For making the parts anew: more is no faster.
 constexpr std::uint64_t kEnough = 512 * kMiB;
 
-/// What a part must be: these bytes, absent (null), or nobody knows.
-struct Expected {
+/// The bytes that a part must have; null: it must be absent. Not `known`: neither can be checked.
+struct ExpectedPart {
   const std::vector<std::byte>* bytes = nullptr;
   bool known = true;
 };
@@ -43,7 +43,7 @@ class IndexCheck {
  private:
   std::string name_of_part(Box3 bricks, std::size_t part) const;
   std::optional<std::string> wrong(const IndexChunk& chunk, Box3 bricks, std::size_t part,
-                                   const Expected& expected) const;
+                                   const ExpectedPart& expected) const;
   void check_parts(const IndexChunk& chunk, Int3 c, const IndexChunkBuilder& builder);
 
   int level_;
@@ -67,7 +67,7 @@ std::string IndexCheck::name_of_part(Box3 bricks, std::size_t part) const {
 
 /// What is wrong with a part, if anything.
 std::optional<std::string> IndexCheck::wrong(const IndexChunk& chunk, Box3 bricks, std::size_t part,
-                                             const Expected& expected) const {
+                                             const ExpectedPart& expected) const {
   std::vector<std::byte> bytes;
   try {
     if (!chunk.read(part, bytes)) {
@@ -96,7 +96,7 @@ std::optional<std::string> IndexCheck::wrong(const IndexChunk& chunk, Box3 brick
 void IndexCheck::check_parts(const IndexChunk& chunk, Int3 c, const IndexChunkBuilder& builder) {
   const Box3 bricks = layout().bricks_of_chunk(c);
   std::vector<bool> seen(layout().parts_of_chunk(c));
-  const auto check = [&](std::size_t part, const Expected& expected) {
+  const auto check = [&](std::size_t part, const ExpectedPart& expected) {
     seen[part] = true;
     if (const auto what = wrong(chunk, bricks, part, expected))
       damage_(name_of_part(bricks, part) + ": " + *what);
@@ -107,7 +107,7 @@ void IndexCheck::check_parts(const IndexChunk& chunk, Int3 c, const IndexChunkBu
         c, [](std::vector<std::byte> part) { return part; },
         [&](std::size_t part, const std::vector<std::byte>& bytes) { check(part, {&bytes}); });
   } catch (const DamageError&) {
-    known = false;  // ranges or bricks are damaged, which is told elsewhere
+    known = false;  // ranges or bricks are damaged, which others report
   }
   for (std::size_t part = 0; part < seen.size(); ++part)
     if (!seen[part]) check(part, {nullptr, known});
@@ -140,9 +140,7 @@ std::uint64_t verify_index(const StoreReader& store, int level, const std::strin
     IndexCheck check(store, level, *known, damage);
     const IndexLayout& layout = check.layout();
     const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-    const auto least = [&] {
-      return IndexChunkBuilder::least_memory(lattice, layout.leaf, threads);
-    };
+    const auto least = [&] { return IndexChunkBuilder::min_memory(lattice, layout.leaf, threads); };
     while (threads > 1 && least() > memory) --threads;
     if (least() > memory)
       throw UsageError(

@@ -11,7 +11,7 @@
 namespace isobrick {
 
 /// Reads all of one index: every part's checksum and structure, and whether it is
-/// what the store's ranges and samples make. `damage` is told a line for each that
+/// what the store's ranges and samples make. `damage` gets a line for each part that
 /// is wrong; called from one thread at a time. Within `memory` bytes, with fewer threads where they
 /// take too much of it; UsageError when that is too little. Returns the bytes read.
 std::uint64_t verify_index(const StoreReader& store, int level, const std::string& kind,

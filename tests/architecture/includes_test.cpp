@@ -19,8 +19,9 @@ using Names = std::set<std::string>;
 const std::map<std::string, Names> kMayInclude = {
     {"core", {}},
     {"io/bytes", {"core"}},
-    {"io/volumes", {"core", "io/bytes"}},
-    {"io/meshes", {"core", "io/bytes", "isobrick/mesh.h"}},
+    {"io/vtk", {"core", "io/bytes"}},
+    {"io/volumes", {"core", "io/bytes", "io/vtk"}},
+    {"io/meshes", {"core", "io/bytes", "io/vtk", "isobrick/mesh.h"}},
     {"bricks", {"core", "io/bytes"}},
     {"index", {"core"}},
     {"surface", {"core"}},

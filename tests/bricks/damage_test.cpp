@@ -197,7 +197,7 @@ TEST(Damage, ChangedMetadataIsNamedAndReformattedMetadataIsNot) {
   expect_changed(whole);
 }
 
-// Metadata that says of itself that it is right, as an attacker would write it.
+// Metadata with the right checksum of its wrong values, as an attacker would write it.
 TEST(Damage, AHostileShapeIsRefusedAtOnce) {
   using Shape = std::array<Index, 3>;  // z, y, x
   for (const Shape& shape : {Shape{524288, 524288, 524288}, Shape{1, 1 << 29, 1 << 30},

@@ -190,7 +190,7 @@ TEST_F(Foreign, WhatIsNotSupportedIsNamed) {
   metadata.dimension_names = {"z", "", ""};
   write_metadata();
   EXPECT_NO_THROW(StoreReader{path});
-  metadata.dimension_names = {"row", "y", "x"};  // says nothing of the order
+  metadata.dimension_names = {"row", "y", "x"};  // no order follows from it
   write_metadata();
   EXPECT_NO_THROW(StoreReader{path});
   metadata.dimension_names.clear();

@@ -57,7 +57,7 @@ TEST_F(ImageVolumesTest, WhatIsLeftOpenIsTheFirst) {
   EXPECT_EQ(place_on(chosen.axes[0], chosen.selection), 2);
 }
 
-/// One that does not say what it is takes either number.
+/// An axis without a role takes either number.
 TEST_F(ImageVolumesTest, AnAxisOfNoKindIsChosenByEither) {
   const std::filesystem::path image = write(R"({"name": "q"},)", "5,");
   const ImageVolumes first = image_volumes(image);

@@ -127,7 +127,7 @@ TEST_F(Resume, AnotherLayoutIsRefused) {
 }
 
 TEST_F(Resume, OnlyWhatWasBegun) {
-  // Not over a finished store, not over something else, not without being asked.
+  // Not over a finished store, not over something else, not without resume.
   write_store(folder / "whole.zarr", levels, 3, 3);
   EXPECT_THROW(StoreWriter(folder / "whole.zarr", layout, true), Error);
   EXPECT_THROW(StoreWriter(folder / "whole.zarr", layout, false), Error);

@@ -58,7 +58,7 @@ TEST_F(StoreEntriesTest, WhatAConversionLeavesBelongsToIt) {
     fs::remove(store_ / other);
   }
   write_file(store_ / kLayoutMarker, "");
-  EXPECT_NE(why_not_our_store(store_).find("does not say"), std::string::npos);
+  EXPECT_NE(why_not_our_store(store_).find("does not list"), std::string::npos);
 }
 
 /// Names as ours are, of what this store does not have.
@@ -119,7 +119,7 @@ TEST_F(StoreEntriesTest, TheMetadataShowsWhoWroteIt) {
   EXPECT_EQ(why_not_our_store(store_), "");
   // Without its levels it is not known what else belongs to it.
   write_file(store_ / "zarr.json", R"({"attributes":{"isobrick":{"version":99}}})");
-  EXPECT_NE(why_not_our_store(store_).find("does not say what belongs to it"), std::string::npos);
+  EXPECT_NE(why_not_our_store(store_).find("does not list what belongs to it"), std::string::npos);
   fs::remove(store_ / "zarr.json");
   EXPECT_EQ(why_not_our_store(store_), "it has no zarr.json");
 }

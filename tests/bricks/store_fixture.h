@@ -57,7 +57,7 @@ struct Level {
   LevelInfo info() const { return {lattice, shard, transform}; }
 };
 
-/// Noise, with a region of fill value where `with_absent` asks for it.
+/// Noise, with a region of fill value where `with_absent` is set.
 inline Level make_level(ScalarType type, Int3 extent, Index brick, Index shard, double fill,
                         bool with_absent, unsigned seed = 1) {
   Level level{{extent, {brick, brick, brick}, type}, {shard, shard, shard}, {}, {}};

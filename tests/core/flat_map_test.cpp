@@ -27,11 +27,11 @@ TEST(FlatMap, HoldsWhatAStandardMapHolds) {
         expected[key] = value = random();
       }
       ASSERT_EQ(map.size(), expected.size());
-      const std::uint64_t asked = random() % keys;
-      const std::uint64_t* found = map.find(asked);
-      ASSERT_EQ(found != nullptr, expected.count(asked) > 0);
+      const std::uint64_t key = random() % keys;
+      const std::uint64_t* found = map.find(key);
+      ASSERT_EQ(found != nullptr, expected.count(key) > 0);
       if (found) {
-        ASSERT_EQ(*found, expected[asked]);
+        ASSERT_EQ(*found, expected[key]);
       }
     }
     for (const auto& [key, value] : expected) {

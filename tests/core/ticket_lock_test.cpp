@@ -16,7 +16,7 @@ TEST(TicketLock, GoesToThreadsInTurn) {
     for (int i = 0; i < kRounds; ++i) {
       const TicketGuard guard(&lock);
       order.push_back(number);
-      // Long enough for the other one to ask for the next.
+      // Long enough for the other one to take the next ticket.
       std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
   };

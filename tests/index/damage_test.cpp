@@ -52,7 +52,7 @@ TYPED_TEST(Damage, TruncatedIndicesAreRefused) {
   for (const auto& whole : indices<TypeParam>()) {
     for (std::size_t n = 0; n < whole.size(); ++n)
       EXPECT_TRUE(refused({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)}));
-    // Also when the header says so.
+    // Also when the header agrees.
     for (std::uint64_t n = sizeof(IndexHeader); n < whole.size(); ++n) {
       std::vector<std::byte> cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n));
       std::memcpy(cut.data() + offsetof(IndexHeader, bytes), &n, sizeof n);

@@ -32,7 +32,7 @@ void expect_order(const IndexView& index, const std::vector<std::uint32_t>& ids)
   }
 }
 
-/// All ways to ask agree with the definition.
+/// All queries agree with the definition.
 template <class T>
 bool answers_right(const IndexView& index, const std::vector<ValueRange<T>>& ranges, double iso) {
   const std::vector<std::uint32_t> expected = stabbed(ranges, iso);
@@ -90,7 +90,7 @@ TYPED_TEST(Query, OneInputMakesTheSameBytes) {
     for (const IndexKind kind : kIndexKinds) {
       const auto bytes = build_index<T>(kind, set.ranges, set.grid);
       EXPECT_EQ(bytes, build_index<T>(kind, set.ranges, set.grid));
-      // What is never active has no say.
+      // What is never active does not count.
       auto same = set.ranges;
       for (auto& range : same)
         if (!(range.lo < range.hi)) range = {T(3), T(3)};

@@ -93,7 +93,7 @@ TEST(ConvertLayout, BytesDependOnNothingButTheInputAndTheOptions) {
   }
 }
 
-/// The least budget, as the message of a smaller one says it.
+/// The least budget, from the message of a smaller one.
 std::uint64_t least_budget(VolumeSource& source, ConvertOptions options,
                            const TemporaryFolder& folder) {
   options.memory = 1;
@@ -182,7 +182,7 @@ TEST(ConvertResume, RefusesAnotherInputOrOtherOptions) {
   ConvertOptions options = small_bricks();
   EXPECT_THROW(convert_quietly(broken, folder / "a", options), Error);
   EXPECT_THROW(convert_quietly(source, folder / "a", options),
-               UsageError);  // says --resume, --force
+               UsageError);  // names --resume, --force
   options.resume = true;
   MemorySource other = make_source<std::uint8_t>(extent, 4);
   EXPECT_THROW(convert_quietly(other, folder / "a", options), Error);

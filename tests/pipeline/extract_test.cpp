@@ -169,7 +169,7 @@ TEST_F(Extract, LeavesDegenerateTrianglesOutWhateverTheBudget) {
   Mesh expected = isobrick::testing::extract(field, request);
   const std::uint64_t left_out = expected.degenerate;
   ASSERT_GT(left_out, 1000u);
-  expected.degenerate = 0;  // which a sink is not told
+  expected.degenerate = 0;  // sinks do not get that number
   for (const Index brick : {16, 64}) {
     const StoreReader reader = store(field, {.brick = brick, .shard = 64});
     for (const std::uint64_t memory : {std::uint64_t{160} << 20, std::uint64_t{1} << 30}) {

@@ -67,7 +67,7 @@ class KeptMesh final : public MeshSink {
   std::string vertices_, normals_, triangles_;
 };
 
-/// A surface that is asked for.
+/// A requested surface.
 struct CancellationToken {
   double isovalue;
   bool normals;

@@ -78,7 +78,7 @@ class Stopping final : public Progress {
 inline constexpr IndexKind kStoredKinds[] = {IndexKind::interval, IndexKind::kdtree,
                                              IndexKind::quadtree, IndexKind::octree};
 
-/// What a DamageError or other Error says; empty when there is none.
+/// The message of a DamageError or other Error; empty when there is none.
 template <class F>
 std::string message_of(F&& f) {
   try {

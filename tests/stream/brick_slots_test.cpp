@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <vector>
+
 #include "core/morton.h"
 #include "core/tile.h"
+#include "stream/batch_bricks.h"
 
 namespace isobrick::test {
 namespace {
@@ -14,6 +18,10 @@ bool uses(const Lattice& lattice, Index reach, Int3 tile, Int3 brick) {
   const Int3 lo = tile * kTileEdge;
   const Box3 samples{lo - Int3{reach, reach, reach}, lo + Int3{edge, edge, edge}};
   return !intersect(intersect(samples, lattice.box()), lattice.brick_box(brick)).empty();
+}
+
+std::shared_ptr<std::byte> slot_memory(const Lattice& lattice, std::size_t bricks) {
+  return {new std::byte[bricks * lattice.brick_bytes()], std::default_delete<std::byte[]>()};
 }
 
 TEST(BrickSlots, NextUseIsTheFirstTileThatLooksAtTheBrick) {
@@ -35,11 +43,11 @@ TEST(BrickSlots, NextUseIsTheFirstTileThatLooksAtTheBrick) {
 
 TEST(BrickSlots, WhatIsNeededLastGoesFirstAndWhatIsHeldStays) {
   const Lattice lattice{{256, 64, 64}, {64, 64, 64}, ScalarType::u8};
-  std::vector<std::byte> memory(3 * lattice.brick_bytes());
+  const auto memory = slot_memory(lattice, 3);
   BrickSlots slots(lattice, 0);
-  slots.add_slots(memory.data(), 3);
+  slots.add_slots(memory, 3);
   std::byte* const first = slots.place({0, 0, 0});
-  EXPECT_EQ(first, memory.data());
+  EXPECT_EQ(first, memory.get());
   slots.place({1, 0, 0});
   std::byte* const third = slots.place({2, 0, 0});
   EXPECT_EQ(slots.place({3, 0, 0}), nullptr) << "all are held";
@@ -55,9 +63,9 @@ TEST(BrickSlots, WhatIsNeededLastGoesFirstAndWhatIsHeldStays) {
 
 TEST(BrickSlots, WhatNobodyNeedsAnyMoreIsFreed) {
   const Lattice lattice{{256, 64, 64}, {64, 64, 64}, ScalarType::u8};
-  std::vector<std::byte> memory(2 * lattice.brick_bytes());
+  const auto memory = slot_memory(lattice, 2);
   BrickSlots slots(lattice, 0);
-  slots.add_slots(memory.data(), 2);
+  slots.add_slots(memory, 2);
   slots.place({0, 0, 0});
   slots.place({1, 0, 0});
   slots.set_absent({1, 0, 0});
@@ -77,9 +85,9 @@ TEST(BrickSlots, WhatNobodyNeedsAnyMoreIsFreed) {
 
 TEST(BrickSlots, CountsWhatIsDecodedAgain) {
   const Lattice lattice{{256, 64, 64}, {64, 64, 64}, ScalarType::u8};
-  std::vector<std::byte> memory(lattice.brick_bytes());
+  const auto memory = slot_memory(lattice, 1);
   BrickSlots slots(lattice, 0);
-  slots.add_slots(memory.data(), 1);
+  slots.add_slots(memory, 1);
   for (const Index x : {0, 1, 0, 2, 0}) {
     slots.place({x, 0, 0});
     if (x == 2)
@@ -90,6 +98,46 @@ TEST(BrickSlots, CountsWhatIsDecodedAgain) {
   }
   EXPECT_EQ(slots.reads(), 4u) << "absent bricks are none";
   EXPECT_EQ(slots.bricks_read(), 2u);
+}
+
+TEST(BatchBricks, HoldsResidentBricksBeforeItDropsOthersAndCountsWhatItLoads) {
+  const Lattice lattice{{256, 64, 64}, {64, 64, 64}, ScalarType::u8};
+  BrickSlots slots(lattice, 0);
+  slots.add_slots(slot_memory(lattice, 3), 3);
+  const auto load_all = [](BatchBricks& batch) {
+    std::vector<Int3> loaded;
+    while (batch.missing() > 0) loaded.push_back(batch.place().brick);
+    batch.set_decoded();
+    return loaded;
+  };
+  const std::byte* first = nullptr;
+  {
+    BatchBricks batch(slots, std::vector<Int3>{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {0, 0, 0});
+    EXPECT_EQ(batch.loads(), 3u);
+    EXPECT_EQ(load_all(batch), (std::vector<Int3>{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}));
+    first = batch.find({0, 0, 0});
+    EXPECT_NE(first, nullptr);
+  }
+  EXPECT_EQ(slots.reads(), 3u);
+  {
+    // No tile after the last one needs brick 0, but this batch does.
+    BatchBricks batch(slots, std::vector<Int3>{{3, 0, 0}, {0, 0, 0}}, {7, 1, 1});
+    EXPECT_EQ(batch.loads(), 1u);
+    EXPECT_FALSE(slots.contains({1, 0, 0}));
+    const BrickLoad load = batch.place();
+    EXPECT_EQ(load.brick, (Int3{3, 0, 0}));
+    batch.set_absent(load.brick);
+    batch.set_decoded();
+    EXPECT_EQ(batch.find({0, 0, 0}), first);
+    EXPECT_EQ(batch.find({3, 0, 0}), nullptr) << "absent";
+    BatchBricks others(slots, std::vector<Int3>{{1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, {7, 1, 1});
+    EXPECT_EQ(others.loads(), 2u);
+    for (int i = 0; i < 2; ++i) EXPECT_NE(others.place().slot, nullptr);
+    EXPECT_EQ(others.missing(), 0u);
+    EXPECT_EQ(slots.place({2, 0, 0}), nullptr) << "all are held";
+  }
+  EXPECT_EQ(slots.reads(), 3u) << "absent bricks are none";
+  EXPECT_EQ(slots.free_slots(), 3u) << "no tile is left";
 }
 
 }  // namespace

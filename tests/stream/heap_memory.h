@@ -8,7 +8,7 @@
 
 namespace isobrick::test {
 
-/// Room for bricks on the heap, and how many bytes of it were asked for.
+/// Room for bricks on the heap, and how many bytes of it were requested.
 class HeapMemory : public BrickMemory {
  public:
   std::shared_ptr<std::byte> room(std::size_t size) override {
@@ -16,7 +16,7 @@ class HeapMemory : public BrickMemory {
     bytes.notify_all();
     return {new std::byte[size], std::default_delete<std::byte[]>()};
   }
-  /// Returns once somebody has asked for room.
+  /// Returns after the first call of room().
   void wait_for_demand() const { bytes.wait(0); }
 
   std::atomic<std::size_t> bytes = 0;

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::chrono::seconds kLong{20};
 
-/// Whether the kernel says that a thread of this process sleeps.
+/// Whether a thread of this process sleeps, by the kernel's state.
 bool is_asleep(long thread) {
   std::ifstream stat("/proc/self/task/" + std::to_string(thread) + "/stat");
   // What follows the name, which may hold anything: " S ".

@@ -139,7 +139,7 @@ TEST_F(WantedSoon, IsNotReadWhereThereIsNoRoomForIt) {
   for (int i = 20; i < 22; ++i) bricks.will_need(0, brick(i));
   read_soon(bricks);
   EXPECT_EQ(bricks.counters().reads, 17u);
-  EXPECT_EQ(bricks.counters().peak_bytes, 17 * kBrick) << "as much as is asked for, and no more";
+  EXPECT_EQ(bricks.counters().peak_bytes, 17 * kBrick) << "as much as is requested, and no more";
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ TYPED_TEST(EveryType, EqualsPlainMarchingCubesOnNoise) {
                             Int3{65, 37, 41}, Int3{1, 20, 20}, Int3{70, 2, 66}}) {
     const double lo = std::is_signed_v<T> ? -100 : 10;
     const auto field = padded_noise<T>(extent, lo, 110, static_cast<T>(lo), 7);
-    const double iso = 49.5;  // no sample equals it, so that vertices tell their edges
+    const double iso = 49.5;  // no sample equals it, so that vertices identify their edges
     const Mesh mesh = extract(field, {.isovalue = iso});
     EXPECT_EQ(edge_triangles(mesh), reference_triangles(field, iso))
         << extent.x << " " << extent.y << " " << extent.z;

@@ -26,7 +26,7 @@ inline EdgeTriangles without_equal_vertices(EdgeTriangles triangles) {
   return triangles;
 }
 
-/// A vertex on a sample has axis −1, as edge_of tells of a position.
+/// A vertex on a sample has axis −1; edge_of() finds that by a position.
 template <class T>
 EdgeTriangles kept_triangles(const Field<T>& field, double isovalue) {
   EdgeTriangles triangles = reference_triangles(field, isovalue);

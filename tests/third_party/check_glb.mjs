@@ -1,6 +1,6 @@
 // Has Khronos' validator look at every GLB of a folder, external buffers included.
 //   node check_glb.mjs FOLDER
-// What it says must be nothing. Exit status: 0 nothing found, 1 otherwise, 77 gltf-validator is missing.
+// It must report nothing. Exit status: 0 nothing found, 1 otherwise, 77 gltf-validator is missing.
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 

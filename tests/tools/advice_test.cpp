@@ -67,8 +67,8 @@ TEST_F(Advice, OfTheViewerIsThatOfInfo) {
   write_file(path("scan.raw"), "abc");
   write_file(path("smoke.vdb"), std::string(" BDV\0\0\0\0", 8));
   for (const std::string name : {"scan.raw", "smoke.vdb", "no.zarr"}) {
-    const std::string told = run({"info", path(name)}).err;
-    const std::string expected = "isobrick view" + told.substr(told.find(':'));
+    const std::string message = run({"info", path(name)}).err;
+    const std::string expected = "isobrick view" + message.substr(message.find(':'));
     EXPECT_EQ(run({"view", path(name)}).err, expected);
     EXPECT_EQ(run({"view", path(name), "--screenshot", path("a.png")}).err, expected);
   }

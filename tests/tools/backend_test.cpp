@@ -8,7 +8,7 @@
 namespace isobrick::test {
 namespace {
 
-/// Whether an outcome says that CUDA cannot work on this machine.
+/// Whether an outcome reports that CUDA cannot work on this machine.
 bool without_cuda(const Outcome& outcome) {
   return outcome.exit_code == 1 && (outcome.err.find("no CUDA device") != std::string::npos ||
                                     outcome.err.find("built without CUDA") != std::string::npos);
@@ -125,7 +125,7 @@ class Cuda : public Backend {
     if (without_cuda(on_cuda(make_store("probe")))) GTEST_SKIP() << "no CUDA device";
   }
 
-  /// Makes the surface on both backends, expects equal files and returns what CUDA said.
+  /// Makes the surface on both backends, expects equal files and returns CUDA's report.
   nlohmann::json compare(const std::string& store, const std::string& extension,
                          const Arguments& more, const Arguments& on_device = {}) const {
     Arguments arguments{"extract", store, "--isovalue", middle_of(store), "--force"};

@@ -28,7 +28,7 @@ class Damage : public ProgramTest {
     }
   }
 
-  /// `verify` says so: exit code 1, the file by name.
+  /// `verify` reports it: exit code 1, the file by name.
   void expect_verify_names(const fs::path& part) {
     const Outcome outcome = run({"verify", store_});
     EXPECT_EQ(outcome.exit_code, 1);
@@ -93,7 +93,7 @@ TEST_F(Damage, ExtractAndExportStopAtDamagedBricks) {
 }
 
 TEST_F(Damage, AMissingShardOfBricksIsNoted) {
-  // A missing file is how Zarr says "all fill value", but the ranges know better.
+  // A missing file means "all fill value" in Zarr, but the ranges know better.
   for (const fs::path& part : parts_) {
     if (part.filename() == "zarr.json") continue;
     const std::string whole = read_file(part);

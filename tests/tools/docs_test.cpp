@@ -153,7 +153,7 @@ TEST_F(Docs, ExamplesOfHelpRun) {
   }
 }
 
-// What scripts/quickstart says after it has made its store.
+// What scripts/quickstart writes after it has made its store.
 TEST_F(Docs, NextLinesOfTheQuickstartRun) {
   unpack("head_64x64x93_int16.raw");
   expect_runs("mkdir -p out && isobrick convert head_64x64x93_int16.raw out/head.zarr");

@@ -60,7 +60,7 @@ TEST_F(Extract, WritesEveryFormatOfTheSameMesh) {
   const std::string obj = read_file(path("a.obj"));
   EXPECT_EQ(std::count(obj.begin(), obj.end(), '\n') - 1,
             2 * ply["vertices"].get<int>() + ply["triangles"].get<int>());
-  // The name need not say the format.
+  // The name need not have the format.
   extract("mesh", {"--format", "vtp"});
   EXPECT_TRUE(read_file(path("mesh")) == read_file(path("a.vtp")));
   extract("mesh.out", {"--format", "glb", "--quantize"});
@@ -175,9 +175,9 @@ TEST_F(Extract, DegenerateTrianglesAreLeftOutOnRequest) {
   surface("127.5", "a.ply", {});
   EXPECT_EQ(surface("127.5", "b.ply", {"--drop-degenerate"})["degenerate_triangles"], 0);
   EXPECT_TRUE(read_file(path("a.ply")) == read_file(path("b.ply")));
-  const Outcome said =
-      run({"extract", store, "--isovalue", "128", "-o", path("said.ply"), "--drop-degenerate"});
-  EXPECT_NE(said.out.find("degenerate triangles left out"), std::string::npos);
+  const Outcome reported =
+      run({"extract", store, "--isovalue", "128", "-o", path("reported.ply"), "--drop-degenerate"});
+  EXPECT_NE(reported.out.find("degenerate triangles left out"), std::string::npos);
 }
 
 TEST_F(Extract, SeveralIsovaluesGetNamesOfTheirOwn) {
@@ -294,7 +294,7 @@ TEST_F(Extract, AnInterruptEndsTheWaitForStandardInput) {
   const Outcome outcome = run(
       {"convert", "-", path("a.zarr"), "--dims", "100,100,100", "--type", "u8", "--brick", "16"},
       {.input = pipe, .interrupt_after = 0.4});
-  // Should it not have ended by itself, the runner's time limit says so.
+  // If it has not ended by itself, the runner's time limit fails.
   EXPECT_EQ(outcome.signal, SIGINT);
   EXPECT_FALSE(std::filesystem::exists(path("a.zarr")));
   close(writer);

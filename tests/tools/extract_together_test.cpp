@@ -125,8 +125,8 @@ TEST_F(ExtractTogether, ASmallBudgetTakesMorePassesAndIsKept) {
         << memory;
 #endif
   }
-  const Outcome said = run(extract(kIsovalues, {"-o", path("m.ply"), "--memory", least}));
-  EXPECT_NE(said.out.find("4 passes over the store"), std::string::npos) << said.out;
+  const Outcome reported = run(extract(kIsovalues, {"-o", path("m.ply"), "--memory", least}));
+  EXPECT_NE(reported.out.find("4 passes over the store"), std::string::npos) << reported.out;
 }
 
 }  // namespace

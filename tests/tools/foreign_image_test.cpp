@@ -137,7 +137,7 @@ TEST_F(ForeignImage, ATurnedImageBecomesAMeshThatIsTurned) {
                               path("a.ply")})["surfaces"][0];
   EXPECT_GT(mesh["triangles"].get<int>(), 100);
   ASSERT_EQ(run({"verify", image, "--channel", "1"}).exit_code, 0);
-  // The same after a conversion, which says the direction in its own words.
+  // The same after a conversion, which stores the direction in a key of its own.
   const Outcome converted = run({"convert", image, path("b.zarr"), "--channel", "1"});
   ASSERT_EQ(converted.exit_code, 0) << converted.err;
   const json info = run_json({"info", path("b.zarr")});

@@ -5,7 +5,7 @@
 
 #include "tests/tools/program.h"
 
-// Volumes whose headers lie: one line says so, at once, whatever they promise.
+// Volumes whose headers lie: one line reports it, at once, whatever they promise.
 namespace isobrick::test {
 namespace {
 

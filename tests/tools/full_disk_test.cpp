@@ -163,8 +163,8 @@ TEST_F(FullDisk, OfASmallFileSystem) {
                     writer.output, command));
     EXPECT_EQ(outcome.out, "1 good 1\n") << outcome.err;
     // A field is not computed for a disk that it does not fit.
-    const char* said = writer.words[0] == "synth" ? "its disk has" : "No space left";
-    EXPECT_NE(outcome.err.find(said), std::string::npos) << outcome.err;
+    const char* expected = writer.words[0] == "synth" ? "its disk has" : "No space left";
+    EXPECT_NE(outcome.err.find(expected), std::string::npos) << outcome.err;
   }
 }
 

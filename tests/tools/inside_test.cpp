@@ -23,9 +23,9 @@ class InsideOption : public ProgramTest {
 
 TEST_F(InsideOption, TurnsTrianglesRoundAndNothingElse) {
   const std::string above = extracted("a.obj", {"--normals", "none"}),
-                    said = extracted("b.obj", {"--inside", "above", "--normals", "none"}),
+                    with_option = extracted("b.obj", {"--inside", "above", "--normals", "none"}),
                     below = extracted("c.obj", {"--inside", "below", "--normals", "none"});
-  EXPECT_TRUE(above == said);
+  EXPECT_TRUE(above == with_option);
   EXPECT_FALSE(above == below);
   const std::size_t faces = above.find("\nf ");
   ASSERT_NE(faces, std::string::npos);

@@ -86,7 +86,7 @@ TEST_F(Killed, AConversionIsResumed) {
     killed = run_until(at, convert("new.raw", {}));
     const bool published = fs::exists(path("out.zarr"));
     const Outcome outcome = run(convert("new.raw", {"--resume"}));
-    // Once nothing is left to do, it says so.
+    // Once nothing is left to do, it reports that.
     if (!published || outcome.exit_code == 0)
       EXPECT_EQ(outcome.exit_code, 0) << at << ": " << outcome.err;
     else

@@ -15,7 +15,7 @@
 
 namespace isobrick::test {
 
-/// How a process ended and what it said.
+/// How a process ended and what it wrote.
 struct Outcome {
   int exit_code = -1;  ///< -1: a signal ended it
   int signal = 0;

@@ -1,6 +1,6 @@
 #include "tests/tools/program.h"
 
-// What says how a store's pyramid is made, and of which version it is.
+// The options for a store's pyramid and for its version of Zarr.
 namespace isobrick::test {
 namespace {
 

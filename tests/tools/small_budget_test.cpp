@@ -35,11 +35,11 @@ class SmallBudget : public ProgramTest {
     arguments.back() = found.str(1) + "M";
     const Outcome done = run(arguments);
     EXPECT_EQ(done.exit_code, 0) << done.err;
-    const auto said = nlohmann::json::parse(done.out, nullptr, false);
+    const auto report = nlohmann::json::parse(done.out, nullptr, false);
     const long mib = std::stol(found.str(1));
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-    if (within && said.is_object() && said.contains("peak_resident_bytes")) {
-      EXPECT_LE(said["peak_resident_bytes"].get<long>(), mib << 20) << arguments[0];
+    if (within && report.is_object() && report.contains("peak_resident_bytes")) {
+      EXPECT_LE(report["peak_resident_bytes"].get<long>(), mib << 20) << arguments[0];
     }
 #endif
     return mib;

@@ -49,7 +49,7 @@ bool is_output(int fd) {
          (::fcntl(fd, F_GETFL) & O_ACCMODE) != O_RDONLY;
 }
 
-/// Whether a call is interrupted: errno says so then.
+/// Whether a call is interrupted, which sets errno.
 bool interrupted() {
   if (!fault().interrupts || fault().calls++ % 2 != 0) return false;
   errno = EINTR;

@@ -56,9 +56,9 @@ class GltfTriangles final : public TriangleReader {
 };
 
 /// Vertices in their own order, where there are no indices.
-class PlainTriangles final : public TriangleReader {
+class UnindexedTriangles final : public TriangleReader {
  public:
-  explicit PlainTriangles(std::uint64_t triangles) : triangles_(triangles) {}
+  explicit UnindexedTriangles(std::uint64_t triangles) : triangles_(triangles) {}
   bool next(std::array<std::uint64_t, 3>& triangle) override {
     if (done_ == triangles_) return false;
     triangle = {3 * done_, 3 * done_ + 1, 3 * done_ + 2};
@@ -278,7 +278,7 @@ class GltfReader {
     else {
       part.faces = part.vertices / 3;
       part.open_triangles = [count = part.faces] {
-        return std::make_unique<PlainTriangles>(count);
+        return std::make_unique<UnindexedTriangles>(count);
       };
     }
     parts_.push_back(std::move(part));

@@ -23,7 +23,7 @@ class MemoryStream final : public ByteStream {
     return count;
   }
   std::string name() const override { return name_; }
-  std::uint64_t most_bytes() const override { return all_; }
+  std::uint64_t max_bytes() const override { return all_; }
 
  private:
   std::string name_;

@@ -10,7 +10,7 @@
 
 namespace isobrick {
 
-/// What a mesh file says of itself.
+/// The description of a mesh file.
 struct MeshFileInfo {
   /// Faces of PLY may have more than three corners: several triangles each.
   std::uint64_t vertices = 0, faces = 0;

@@ -65,7 +65,7 @@ class Batch {
     normals_.clear();
     colours_.clear();
     triangles_.clear();
-    std::fill(recent_.begin(), recent_.end(), Recent{});
+    std::fill(recent_.begin(), recent_.end(), RecentVertex{});
   }
 
  private:
@@ -73,13 +73,13 @@ class Batch {
   /// Bytes that the system maps with a vertex, where none of the others is near it: up to four
   /// times as many with each array.
   static constexpr std::size_t kPagesOfVertex = std::size_t{1} << 14;
-  struct Recent {
+  struct RecentVertex {
     std::uint64_t vertex = ~std::uint64_t{0};
     std::uint32_t number = 0;
   };
 
   std::uint32_t number_of(std::uint64_t vertex) {
-    Recent& recent = recent_[vertex % kRecent];
+    RecentVertex& recent = recent_[vertex % kRecent];
     if (recent.vertex != vertex) {
       MappedFile::note_read(kPagesOfVertex);
       recent = {vertex, static_cast<std::uint32_t>(positions_.size())};
@@ -97,7 +97,7 @@ class Batch {
   WorldMatrix to_world_of_normals_;
   Vec3d origin_;
   const MeshFile::Take& take_;
-  std::vector<Recent> recent_;
+  std::vector<RecentVertex> recent_;
   std::vector<Vec3f> positions_, normals_;
   std::vector<VertexColour> colours_;
   std::vector<Triangle> triangles_;

@@ -150,7 +150,7 @@ PlyHeader parse_ply_header(const std::string& path, std::string_view text) {
     else if (words[0] == "property")
       take_property(path, header, words);
     else
-      fail_ply(path, fmt::format("its header says '{}'", words[0]));
+      fail_ply(path, fmt::format("its header has '{}'", words[0]));
   }
 }
 

@@ -67,7 +67,7 @@ std::unique_ptr<MeshFile> read_stl(const std::string& path, std::shared_ptr<Mapp
   std::uint32_t count = 0;
   if (bytes.size() >= kStart) std::memcpy(&count, bytes.data() + kStart - 4, sizeof(count));
   const std::uint64_t needed = kStart + std::uint64_t{count} * kFacet;
-  // Some programs begin binary files with "solid", too: the size tells.
+  // Some programs begin binary files with "solid", too: the size decides.
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (bytes.size() >= kStart && needed == bytes.size())
     return std::make_unique<StlFile>(path, std::move(file), count);

@@ -36,7 +36,7 @@ class FacetReader {
       word = text_.next_word();
     }
     if (!is(word, "facet")) fail_at(word, "facet");
-    // The normal says nothing that the corners don't, and need not be a number.
+    // The corners make the normal; the stored one need not be a number.
     expect("normal");
     for (int i = 0; i < 3; ++i) text_.next_word();
     expect("outer");

@@ -57,9 +57,10 @@ class VtpTriangles final : public TriangleReader {
 class VtpReader {
  public:
   std::unique_ptr<MeshFile> read(const std::string& path, std::shared_ptr<MappedFile> file) {
-    const VtpHeader header = parse_vtp_header(path, file->bytes());
-    if (header.file.get("type") == "PolyData") {
-      add_file(path, header, std::move(file));
+    const VtkFile vtk = vtp_file(path, file->bytes());
+    const VtpHeader header = parse_vtp_header(vtk);
+    if (header.vtk.file.get("type") == "PolyData") {
+      add_file(vtk, header, std::move(file));
     } else {
       for (const std::string& source : header.sources) add_part(path, source);
     }
@@ -73,17 +74,17 @@ class VtpReader {
       fail_vtp(index, fmt::format("its part '{}' is not below its folder", source));
     const std::string path = (std::filesystem::path(index).parent_path() / name).string();
     auto file = std::make_shared<MappedFile>(path);
-    const VtpHeader header = parse_vtp_header(path, file->bytes());
-    if (header.file.get("type") != "PolyData") fail_vtp(path, "it is an index, and no part");
-    add_file(path, header, std::move(file));
+    const VtkFile vtk = vtp_file(path, file->bytes());
+    const VtpHeader header = parse_vtp_header(vtk);
+    if (header.vtk.file.get("type") != "PolyData") vtk.fail("it is an index, and no part");
+    add_file(vtk, header, std::move(file));
   }
 
-  void add_file(const std::string& path, const VtpHeader& header,
-                std::shared_ptr<MappedFile> file) {
-    constexpr std::size_t most_unit = 64;
-    const VtpArrays arrays(path, file->bytes(), header, keep_);
-    if (header.unit && unit_.empty()) unit_ = unit_name(arrays.text(*header.unit, most_unit));
-    for (const VtpPiece& piece : header.pieces) add_piece(path, piece, arrays);
+  void add_file(const VtkFile& vtk, const VtpHeader& header, std::shared_ptr<MappedFile> file) {
+    constexpr std::size_t kMaxUnit = 64;
+    const VtpArrays arrays(vtk, file->bytes(), header.vtk, keep_);
+    if (header.unit && unit_.empty()) unit_ = unit_name(arrays.text(*header.unit, kMaxUnit));
+    for (const VtpPiece& piece : header.pieces) add_piece(vtk.path, piece, arrays);
     keep_.push_back(std::move(file));
   }
 
@@ -94,10 +95,10 @@ class VtpReader {
     IndexedPart part{.vertices = piece.points, .faces = piece.polygons};
     part.positions = vectors(path, piece, piece.positions.front(), arrays);
     const std::string& normals = piece.normals.empty() ? "Normals" : piece.normals;
-    for (const VtkArray& array : piece.point_data)
+    for (const VtkElement& array : piece.point_data)
       if (array.get("Name") == normals && array.get("NumberOfComponents") == "3")
         part.normals = vectors(path, piece, array, arrays);
-    for (const VtkArray& array : piece.point_data)
+    for (const VtkElement& array : piece.point_data)
       if (is_colour(piece, array)) {
         part.colours = vectors(path, piece, array, arrays);
         part.colours->scale = 1.0 / 255;
@@ -113,18 +114,18 @@ class VtpReader {
   }
 
   /// Bytes of red, green, blue and perhaps alpha that are the scalars, which VTK shows as they are.
-  static bool is_colour(const VtpPiece& piece, const VtkArray& array) {
+  static bool is_colour(const VtpPiece& piece, const VtkElement& array) {
     return array.get("type") == "UInt8" && components_of(array) >= 3 && !piece.scalars.empty() &&
            array.get("Name") == piece.scalars;
   }
   /// Of an item, 3 or 4; 0 for others.
-  static std::uint32_t components_of(const VtkArray& array) {
+  static std::uint32_t components_of(const VtkElement& array) {
     const std::string number = array.get("NumberOfComponents", "1");
     return number == "3" ? 3 : number == "4" ? 4 : 0;
   }
 
-  static VertexField vectors(const std::string& path, const VtpPiece& piece, const VtkArray& array,
-                             const VtpArrays& arrays) {
+  static VertexField vectors(const std::string& path, const VtpPiece& piece,
+                             const VtkElement& array, const VtpArrays& arrays) {
     const NumberArray numbers = arrays.numbers(array);
     const std::uint32_t components = std::max(components_of(array), 3u);
     if (numbers.count / components < piece.points)
@@ -140,7 +141,7 @@ class VtpReader {
 
   static NumberArray named(const std::string& path, const VtpPiece& piece, const std::string& name,
                            const VtpArrays& arrays) {
-    for (const VtkArray& array : piece.polygon_arrays)
+    for (const VtkElement& array : piece.polygon_arrays)
       if (array.get("Name") == name) return arrays.numbers(array);
     fail_vtp(path, fmt::format("its polygons have no {}", name));
   }

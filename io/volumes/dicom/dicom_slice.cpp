@@ -24,7 +24,7 @@
 namespace isobrick {
 namespace {
 
-/// Longer elements stay in the file until they are asked for.
+/// Longer elements stay in the file until they are needed.
 constexpr Uint32 kMaxElement = 4096;
 
 void prepare_library() {
@@ -122,7 +122,7 @@ ScalarType read_type(const std::string& path, const Attributes& a, int& bits) {
   refuse(path, fmt::format("samples of {} bits are not supported", allocated));
 }
 
-/// From one frame of a dose to the next, along the normal; 0 where the file does not say it.
+/// From one frame of a dose to the next, along the normal; 0 where the file lacks it.
 double read_frame_step(const std::string& path, const Attributes& a, Index frames) {
   std::vector<double> steps;
   auto before = a.real(DCM_GridFrameOffsetVector, 0);
@@ -149,12 +149,12 @@ void read_geometry(const std::string& path, const Attributes& a, DicomSlice& sli
   // First from row to row, then from column to column.
   slice.spacing.y = a.real(tag, 0).value_or(1);
   slice.spacing.x = a.real(tag, 1).value_or(slice.spacing.y);
-  const double said =
+  const double stated_step =
       a.real(DCM_SpacingBetweenSlices).value_or(a.real(DCM_SliceThickness).value_or(0));
   const double step = read_frame_step(path, a, slice.extent.z);
   const bool is_dose = a.has(DCM_DoseGridScaling) || a.text(DCM_Modality) == "RTDOSE";
-  slice.has_frame_step = step != 0 || (said > 0 && !is_dose);
-  slice.spacing.z = step != 0 ? step : said > 0 ? said : 1;
+  slice.has_frame_step = step != 0 || (stated_step > 0 && !is_dose);
+  slice.spacing.z = step != 0 ? step : stated_step > 0 ? stated_step : 1;
   slice.position = a.vector(DCM_ImagePositionPatient);
   const auto row = a.vector(DCM_ImageOrientationPatient, 0),
              column = a.vector(DCM_ImageOrientationPatient, 3);

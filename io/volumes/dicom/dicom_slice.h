@@ -11,7 +11,7 @@
 
 namespace isobrick {
 
-/// What a DICOM file says of its image.
+/// The image of a DICOM file.
 struct DicomSlice {
   std::string path;
   std::string series;                ///< its SeriesInstanceUID
@@ -22,7 +22,7 @@ struct DicomSlice {
   /// Of columns, rows, frames or slices. That of frames is negative where they go against the
   /// normal, row × column.
   Vec3d spacing{1, 1, 1};
-  /// Whether the file says how far apart its frames lie. A dose does so by its
+  /// Whether the file states the distance of its frames. A dose does so by its
   /// GridFrameOffsetVector only.
   bool has_frame_step = false;
   std::optional<Vec3d> position;        ///< of the first sample in space, millimetres

@@ -185,16 +185,16 @@ std::vector<double> steps_of(const std::vector<DicomSlice>& slices) {
       name, after.path, step, before.path, usual));
 }
 
-/// Frames must say how far apart they lie, unless the caller does.
-void check_frame_step(const DicomSlice& slice, const VolumeRequest& said) {
-  if (slice.extent.z < 2 || slice.has_frame_step || said.spacing) return;
+/// The distance of frames must be in the file or the request.
+void check_frame_step(const DicomSlice& slice, const VolumeRequest& request) {
+  if (slice.extent.z < 2 || slice.has_frame_step || request.spacing) return;
   throw UsageError(
-      fmt::format("'{}' does not say how far apart its {} frames lie (GridFrameOffsetVector of a "
+      fmt::format("'{}' does not state how far apart its {} frames lie (GridFrameOffsetVector of a "
                   "dose, else SpacingBetweenSlices or SliceThickness): add --spacing X,Y,Z",
                   slice.path, slice.extent.z));
 }
 
-/// Of slices without positions only their InstanceNumbers say whether one is missing. With a
+/// Without positions only the InstanceNumbers of slices show whether one is missing. With a
 /// spacing that the user gives they are taken as they are.
 void check_numbers(const std::string& name, const std::vector<DicomSlice>& slices) {
   const double usual = usual_step(steps_of(slices));
@@ -212,8 +212,8 @@ void check_numbers(const std::string& name, const std::vector<DicomSlice>& slice
 /// From one slice to the next, which must be the same throughout and along the
 /// normal.
 double find_step(const std::string& name, const std::vector<DicomSlice>& slices,
-                 const VolumeRequest& said) {
-  if (slices.size() > 1 && !slices[0].position && !said.spacing) check_numbers(name, slices);
+                 const VolumeRequest& request) {
+  if (slices.size() > 1 && !slices[0].position && !request.spacing) check_numbers(name, slices);
   if (slices.size() < 2 || !slices[0].position) return slices[0].spacing.z;
   const Vec3d normal = cross(slices[0].row, slices[0].column);
   const auto last = static_cast<double>(slices.size() - 1);
@@ -251,31 +251,31 @@ ScalarType real_type(const std::vector<DicomSlice>& slices) {
 
 std::unique_ptr<VolumeSource> open_dicom(const std::string& name,
                                          const std::vector<std::string>& files,
-                                         const VolumeRequest& said) {
-  refuse_raw_description(name, "a DICOM series", said);
+                                         const VolumeRequest& request) {
+  refuse_raw_description(name, "a DICOM series", request);
   std::vector<DicomSlice> slices = read_slices(name, files);
   for (const DicomSlice& slice : slices) check_alike(slices[0], slice);
   const DicomSlice first = slices[0];
   if (slices.size() > 1 && first.extent.z > 1)
     throw UsageError(
         fmt::format("'{}' holds several files of several frames each: give one of them", name));
-  check_frame_step(first, said);
-  choose(name, "--channel", 1, said.selection.channel);
+  check_frame_step(first, request);
+  choose(name, "--channel", 1, request.selection.channel);
   std::sort(slices.begin(), slices.end(),
             [](const DicomSlice& a, const DicomSlice& b) { return height_of(a) < height_of(b); });
-  slices = choose_time(name, std::move(slices), said.selection);
+  slices = choose_time(name, std::move(slices), request.selection);
   bool scaled = false;
   for (const DicomSlice& slice : slices) scaled = scaled || !slice.scale.identity();
   Transform transform;
   const Vec3d normal = cross(first.row, first.column);
   const Vec3d axes[3] = {first.row * first.spacing.x, first.column * first.spacing.y,
-                         normal * find_step(name, slices, said)};
+                         normal * find_step(name, slices, request)};
   set_axes(name, transform, axes);
   transform.origin = slices[0].position.value_or(Vec3d{0, 0, 0});
   transform.unit = "millimeter";
   const Index planes = slices.size() == 1 ? first.extent.z : static_cast<Index>(slices.size());
   VolumeInfo info = describe_volume(name, {first.extent.x, first.extent.y, planes},
-                                    scaled ? real_type(slices) : first.type, transform, said);
+                                    scaled ? real_type(slices) : first.type, transform, request);
   info.files.assign(files.begin(), files.end());
   return std::make_unique<DicomSource>(std::move(info), std::move(slices), scaled);
 }

@@ -13,6 +13,6 @@ namespace isobrick {
 /// Throws UsageError for files that do not make one regular volume.
 std::unique_ptr<VolumeSource> open_dicom(const std::string& name,
                                          const std::vector<std::string>& files,
-                                         const VolumeRequest& said);
+                                         const VolumeRequest& request);
 
 }  // namespace isobrick

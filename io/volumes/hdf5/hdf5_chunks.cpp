@@ -59,9 +59,9 @@ Hdf5Chunks::Hdf5Chunks(Hdf5ChunkLayout layout, Hdf5Fetch fetch, int threads)
     : layout_(std::move(layout)),
       fetch_(std::move(fetch)),
       arena_(threads > 0 ? threads : tbb::info::default_concurrency()),
-      items_(std::clamp<std::size_t>(kEnoughOnTheirWay / (2 * layout_.encoding.most_packed()), 1,
+      items_(std::clamp<std::size_t>(kEnoughOnTheirWay / (2 * layout_.encoding.max_packed()), 1,
                                      static_cast<std::size_t>(arena_.max_concurrency()) + 1)),
-      most_kept_(layer_bytes() / layout_.encoding.chunk_bytes) {}
+      max_kept_(layer_bytes() / layout_.encoding.chunk_bytes) {}
 
 /// Of a layer of chunks along all but the slowest axis, or nothing if that is much.
 std::size_t Hdf5Chunks::layer_bytes() const {
@@ -72,8 +72,8 @@ std::size_t Hdf5Chunks::layer_bytes() const {
 }
 
 std::size_t Hdf5Chunks::memory() const {
-  return items_.size() * 2 * layout_.encoding.most_packed() +
-         most_kept_ * layout_.encoding.most_packed();
+  return items_.size() * 2 * layout_.encoding.max_packed() +
+         max_kept_ * layout_.encoding.max_packed();
 }
 
 void Hdf5Chunks::read(const std::vector<Index>& start, const std::vector<Index>& count,
@@ -152,8 +152,8 @@ void Hdf5Chunks::fetch(Item& item) {
       return;
     }
   }
-  item.buffers.bytes.reserve(layout_.encoding.most_packed());
-  item.buffers.other.reserve(layout_.encoding.most_packed());
+  item.buffers.bytes.reserve(layout_.encoding.max_packed());
+  item.buffers.other.reserve(layout_.encoding.max_packed());
   item.skipped = fetch_(item.first, item.buffers.bytes);
 }
 
@@ -197,7 +197,7 @@ void Hdf5Chunks::finish(Item& item, const Box& box) {
     cut = cut || std::min(item.first[i] + layout_.edge[i], layout_.extent[i]) >
                      box.start[i] + box.count[i];
   const std::lock_guard lock(mutex_);
-  if (cut && item.skipped && kept_.size() < most_kept_)
+  if (cut && item.skipped && kept_.size() < max_kept_)
     std::swap(kept_[item.first], item.buffers.bytes);
   free_.push_back(&item);
 }

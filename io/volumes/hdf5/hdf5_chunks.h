@@ -40,7 +40,7 @@ class Hdf5Chunks {
   /// `threads` 0: all cores.
   Hdf5Chunks(Hdf5ChunkLayout layout, Hdf5Fetch fetch, int threads);
 
-  /// Bytes that reading takes at most, beside the samples asked for.
+  /// Bytes that reading takes at most, beside the requested samples.
   std::size_t memory() const;
 
   /// Copies the box whose first sample is `start` and which has `count` samples along
@@ -72,7 +72,7 @@ class Hdf5Chunks {
   Hdf5Fetch fetch_;
   tbb::task_arena arena_;
   std::vector<Item> items_;
-  std::size_t most_kept_;  ///< chunks
+  std::size_t max_kept_;  ///< chunks
 
   std::mutex mutex_;
   std::vector<Item*> free_;

@@ -99,8 +99,8 @@ bool Hdf5Dataset::Handles::decode_chunks(hid_t creation, const std::vector<Index
   Hdf5ChunkLayout layout{
       path, {}, edges, *encoding, size_of(type), *swap, read_hdf5_fill(creation, type)};
   for (const ArrayAxis& axis : axes) layout.extent.push_back(axis.size);
-  const auto fetch = [this, most = encoding->most_packed()](const std::vector<Index>& first,
-                                                            PodBuffer<std::byte>& bytes) {
+  const auto fetch = [this, most = encoding->max_packed()](const std::vector<Index>& first,
+                                                           PodBuffer<std::byte>& bytes) {
     return fetch_chunk(first, most, bytes);
   };
   chunks.emplace(std::move(layout), fetch, threads);
@@ -133,7 +133,7 @@ std::optional<std::uint32_t> Hdf5Dataset::Handles::fetch_chunk(const std::vector
 void Hdf5Dataset::Handles::open(const std::string& name, int threads) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   register_hdf5_lzf();
-  open_input(path);  // says better than the library why a file cannot be opened
+  open_input(path);  // reports better than the library why a file cannot be opened
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access, false, true);
   file = Hdf5Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access), H5Fclose);

@@ -21,9 +21,9 @@ class Hdf5Dataset {
   ~Hdf5Dataset();
 
   ScalarType type() const;
-  /// Fastest first. Roles and directions are those that labels of the dimensions say.
+  /// Fastest first, with roles and directions from the labels of the dimensions.
   const std::vector<ArrayAxis>& axes() const;
-  /// Whether labels said all roles.
+  /// Whether labels give all roles.
   bool labelled() const;
   /// The attribute `element_size_um` that Fiji and ilastik write, of the axes of space, fastest
   /// first; or zeros.

@@ -53,7 +53,7 @@ std::vector<double> read_numbers(hid_t dataset, const char* name) {
   return numbers;
 }
 
-/// What a label such as "t", "time" or "C" says of its dimension.
+/// The role of a dimension with a label such as "t", "time" or "C".
 std::optional<AxisRole> role_of(const std::string& label) {
   if (label == "t" || label == "time") return AxisRole::time;
   if (label == "c" || label == "channel" || label == "channels") return AxisRole::channel;
@@ -124,9 +124,9 @@ void check_filters(const std::string& path, hid_t creation) {
     if (H5Zfilter_avail(filter) > 0) continue;
     name[sizeof(name) - 1] = '\0';
     throw UsageError(
-        fmt::format("'{}': the filter {} ('{}') is not there; HDF5_PLUGIN_PATH says "
+        fmt::format("'{}': the filter {} ('{}') is not there; HDF5_PLUGIN_PATH is "
                     "where libhdf5 looks for others' filters",
-                    path, filter, printable(name, kHdf5MostShown)));
+                    path, filter, printable(name, kHdf5MaxShown)));
   }
 }
 
@@ -143,7 +143,7 @@ std::string choose_hdf5_dataset(const std::string& path, hid_t file, const std::
 }
 
 void refuse_hdf5_dataset(const std::string& path, hid_t file, const std::string& name) {
-  const std::string shown = printable(name, kHdf5MostShown);
+  const std::string shown = printable(name, kHdf5MaxShown);
   const Hdf5Handle group(H5Gopen2(file, name.c_str(), hdf5_access(H5P_GROUP_ACCESS)), H5Gclose);
   if (!group.valid() && H5Lexists(file, name.c_str(), hdf5_access(H5P_LINK_ACCESS)) > 0)
     hdf5_fail(path, fmt::format("'/{}' cannot be opened as a dataset", shown));

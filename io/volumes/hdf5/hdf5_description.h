@@ -13,13 +13,13 @@
 
 namespace isobrick {
 
-// What an HDF5 file says of its datasets. The caller holds hdf5_mutex().
+// The datasets of an HDF5 file. The caller holds hdf5_mutex().
 
 /// The dataset that is meant: `name`, or if that is empty the only one of three or
 /// more dimensions. Throws UsageError that lists them otherwise.
 std::string choose_hdf5_dataset(const std::string& path, hid_t file, const std::string& name);
 
-/// Why a dataset of a name that was asked for cannot be opened: throws UsageError
+/// Reports why a requested dataset cannot be opened: throws UsageError
 /// where there is none, DamageError otherwise.
 [[noreturn]] void refuse_hdf5_dataset(const std::string& path, hid_t file, const std::string& name);
 
@@ -31,8 +31,8 @@ hid_t hdf5_native_type(ScalarType type);
 /// nothing where they differ in more than that.
 std::optional<bool> hdf5_swapped(hid_t dataset, ScalarType type);
 
-/// The sizes, fastest first, with the roles and directions that the attribute DIMENSION_LABELS
-/// says; `labelled` becomes whether it says all roles.
+/// The sizes, fastest first, with the roles and directions of the attribute DIMENSION_LABELS.
+/// `labelled` becomes whether it gives all roles.
 std::vector<ArrayAxis> read_hdf5_axes(const std::string& path, hid_t dataset, bool& labelled);
 /// The attribute `element_size_um` that Fiji and ilastik write, of the axes of space, fastest
 /// first; or zeros.

@@ -56,8 +56,8 @@ void undo_fletcher32(PodBuffer<std::byte>& bytes) {
 
 void undo_deflate(Hdf5ChunkBuffers& buffers, std::size_t size) {
   buffers.other.resize(size);
-  const Inflated done = inflate(Wrapper::zlib, {buffers.bytes.data(), buffers.bytes.size()},
-                                {buffers.other.data(), size});
+  const InflateResult done = inflate(Wrapper::zlib, {buffers.bytes.data(), buffers.bytes.size()},
+                                     {buffers.other.data(), size});
   if (!done.filled(size))
     throw DamageError(fmt::format("it does not unpack to {} bytes (code {})", size, done.code));
   std::swap(buffers.bytes, buffers.other);
@@ -104,7 +104,7 @@ std::size_t size_before(const Hdf5Encoding& encoding, std::uint32_t skipped, std
 
 }  // namespace
 
-std::size_t Hdf5Encoding::most_packed() const {
+std::size_t Hdf5Encoding::max_packed() const {
   return max_deflated(chunk_bytes) + filters.size() * kChecksumBytes;
 }
 

@@ -18,7 +18,7 @@ struct Hdf5Encoding {
   std::size_t chunk_bytes = 0;      ///< of a chunk's samples, at most kMaxHdf5Chunk
 
   /// No chunk has more bytes in a file.
-  std::size_t most_packed() const;
+  std::size_t max_packed() const;
 };
 
 inline constexpr std::size_t kMaxHdf5Chunk = std::size_t{1} << 31;

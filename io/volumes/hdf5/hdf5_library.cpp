@@ -20,7 +20,7 @@ void hdf5_fail(const std::string& path, const std::string& what) {
     return 0;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep, &text);
-  if (!text.empty()) text = fmt::format(" ({})", printable(text, kHdf5MostShown));
+  if (!text.empty()) text = fmt::format(" ({})", printable(text, kHdf5MaxShown));
   throw DamageError(fmt::format("'{}': {}{}", path, what, text));
 }
 

@@ -17,8 +17,8 @@ std::mutex& hdf5_mutex();
 /// Throws DamageError that names the file and adds what the library complains of.
 [[noreturn]] void hdf5_fail(const std::string& path, const std::string& what);
 
-/// As much of what a file says of itself as is shown.
-inline constexpr std::size_t kHdf5MostShown = 200;
+/// Messages show so many characters of a file's own text.
+inline constexpr std::size_t kHdf5MaxShown = 200;
 
 /// Owns a handle of any kind.
 class Hdf5Handle {

@@ -12,7 +12,7 @@
 namespace isobrick {
 namespace {
 
-/// Of a smaller control byte literals follow, one more than it says.
+/// A smaller control byte n is followed by n + 1 literals.
 constexpr unsigned kFirstReference = 32;
 /// A reference of this length has a byte more for it.
 constexpr unsigned kLongReference = 7;
@@ -68,7 +68,7 @@ class Unpacker {
   std::size_t at_ = 0, done_ = 0;
 };
 
-/// Bytes that a packed stream says it unpacks to.
+/// Bytes that a packed stream states it unpacks to.
 std::size_t unpacked_size(std::span<const std::byte> packed) {
   std::size_t size = 0;
   for (std::size_t at = 0; at < packed.size();) {

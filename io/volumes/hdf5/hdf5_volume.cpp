@@ -123,8 +123,8 @@ Vec3d spacing_of(const ArrayView& view, Vec3d in_file) {
   return spacing;
 }
 
-/// Labels of some dimensions do not say what the others are: those must agree with where they are
-/// taken to be.
+/// Labels of some dimensions leave the others open: they must agree with the positions of the
+/// others.
 void check_directions(const std::string& path, std::span<const ArrayAxis> axes) {
   int next = 0;
   for (const ArrayAxis& axis : axes) {
@@ -142,29 +142,29 @@ void check_directions(const std::string& path, std::span<const ArrayAxis> axes) 
 }  // namespace
 
 std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::string& dataset,
-                                        const VolumeRequest& said) {
-  refuse_raw_description(file, "an HDF5 file", said);
-  auto opened = std::make_unique<Hdf5Dataset>(file, dataset, said.threads);
+                                        const VolumeRequest& request) {
+  refuse_raw_description(file, "an HDF5 file", request);
+  auto opened = std::make_unique<Hdf5Dataset>(file, dataset, request.threads);
   std::vector<ArrayAxis> axes = opened->axes();
-  if (!opened->labelled() && !guess_roles(axes, said.selection))
+  if (!opened->labelled() && !guess_roles(axes, request.selection))
     throw UsageError(
         fmt::format("'{}': a dataset of {} dimensions, without DIMENSION_LABELS that "
-                    "say which 3 are space: {}",
+                    "mark which 3 are space: {}",
                     file, axes.size(), kRolesHint));
   if (!opened->labelled()) check_directions(file, axes);
-  const ArrayView view = select_volume(file, axes, said.selection);
+  const ArrayView view = select_volume(file, axes, request.selection);
   std::vector<Index> fixed(axes.size(), 0);
   for (std::size_t i = 0; i < axes.size(); ++i) {
     if (axes[i].size == 1 || axes[i].role == AxisRole::space) continue;
-    fixed[i] =
-        (axes[i].role == AxisRole::time ? said.selection.time : said.selection.channel).value_or(0);
+    fixed[i] = (axes[i].role == AxisRole::time ? request.selection.time : request.selection.channel)
+                   .value_or(0);
   }
   Transform transform;
   if (opened->element_size().x > 0) {
     transform.spacing = spacing_of(view, opened->element_size());
     transform.unit = "micrometer";
   }
-  VolumeInfo info = describe_volume(file, view.extent, opened->type(), transform, said);
+  VolumeInfo info = describe_volume(file, view.extent, opened->type(), transform, request);
   return std::make_unique<Hdf5Source>(std::move(info), std::move(opened), view, std::move(fixed));
 }
 

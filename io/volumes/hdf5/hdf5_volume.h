@@ -10,6 +10,6 @@ namespace isobrick {
 /// Opens a dataset of an HDF5 file; `dataset` empty: the only one that can be a
 /// volume.
 std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::string& dataset,
-                                        const VolumeRequest& said);
+                                        const VolumeRequest& request);
 
 }  // namespace isobrick

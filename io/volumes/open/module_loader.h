@@ -20,7 +20,7 @@ namespace isobrick {
 struct Hdf5Module {
   const char* version;
   std::unique_ptr<VolumeSource> (*open)(const std::string& file, const std::string& dataset,
-                                        const VolumeRequest& said);
+                                        const VolumeRequest& request);
 };
 
 /// lib/isobrick/isobrick_dicom.so
@@ -28,13 +28,13 @@ struct DicomModule {
   const char* version;
   std::unique_ptr<VolumeSource> (*open)(const std::string& name,
                                         const std::vector<std::string>& files,
-                                        const VolumeRequest& said);
+                                        const VolumeRequest& request);
 };
 
 /// lib/isobrick/isobrick_openvdb.so
 struct VdbModule {
   const char* version;
-  std::unique_ptr<VolumeSource> (*open)(const std::string& file, const VolumeRequest& said);
+  std::unique_ptr<VolumeSource> (*open)(const std::string& file, const VolumeRequest& request);
   std::unique_ptr<VdbWriter> (*make_writer)(const VolumeInfo& info, const std::string& name,
                                             std::uint64_t budget);
   std::unique_ptr<VdbLevelSet> (*make_level_set)(const VolumeInfo& info, const std::string& name,

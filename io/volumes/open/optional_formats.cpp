@@ -33,9 +33,9 @@ namespace {
 
 std::unique_ptr<VolumeSource> open_vti_if_built(const std::string& file,
                                                 [[maybe_unused]] const std::string& array,
-                                                [[maybe_unused]] const VolumeRequest& said) {
+                                                [[maybe_unused]] const VolumeRequest& request) {
 #ifdef ISOBRICK_WITH_EXPAT
-  return open_vti(file, array, said);
+  return open_vti(file, array, request);
 #else
   built_without(file, "a VTK image", "libexpat1-dev");
 #endif
@@ -43,9 +43,9 @@ std::unique_ptr<VolumeSource> open_vti_if_built(const std::string& file,
 
 std::unique_ptr<VolumeSource> open_tiff_if_built(
     const std::string& name, [[maybe_unused]] const std::vector<std::string>& files,
-    [[maybe_unused]] const VolumeRequest& said) {
+    [[maybe_unused]] const VolumeRequest& request) {
 #ifdef ISOBRICK_WITH_TIFF
-  return open_tiff(name, files, said);
+  return open_tiff(name, files, request);
 #else
   built_without(name, "a TIFF stack", "libtiff-dev 4.5");
 #endif
@@ -53,18 +53,18 @@ std::unique_ptr<VolumeSource> open_tiff_if_built(
 
 std::unique_ptr<VolumeSource> open_hdf5_if_built(const std::string& file,
                                                  [[maybe_unused]] const std::string& dataset,
-                                                 [[maybe_unused]] const VolumeRequest& said) {
+                                                 [[maybe_unused]] const VolumeRequest& request) {
 #ifdef ISOBRICK_WITH_HDF5
-  return hdf5_module().open(file, dataset, said);
+  return hdf5_module().open(file, dataset, request);
 #else
   built_without(file, "an HDF5 file", "libhdf5-dev");
 #endif
 }
 
 std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file,
-                                                [[maybe_unused]] const VolumeRequest& said) {
+                                                [[maybe_unused]] const VolumeRequest& request) {
 #ifdef ISOBRICK_WITH_OPENVDB
-  return vdb_module().open(file, said);
+  return vdb_module().open(file, request);
 #else
   built_without(file, "an OpenVDB file", "libopenvdb-dev and libboost-dev");
 #endif
@@ -94,9 +94,9 @@ std::unique_ptr<VdbLevelSet> make_vdb_level_set_if_built([[maybe_unused]] const 
 
 std::unique_ptr<VolumeSource> open_dicom_if_built(
     const std::string& name, [[maybe_unused]] const std::vector<std::string>& files,
-    [[maybe_unused]] const VolumeRequest& said) {
+    [[maybe_unused]] const VolumeRequest& request) {
 #ifdef ISOBRICK_WITH_DICOM
-  return dicom_module().open(name, files, said);
+  return dicom_module().open(name, files, request);
 #else
   built_without(name, "a DICOM series", "libdcmtk-dev");
 #endif

@@ -9,19 +9,20 @@
 namespace isobrick {
 
 // Formats that are read by a library which may have been missing when this was
-// built; then each throws UsageError that says so. `name` is for messages.
+// built; then each throws a UsageError about it. `name` is for messages.
 
 std::unique_ptr<VolumeSource> open_vti_if_built(const std::string& file, const std::string& array,
-                                                const VolumeRequest& said);
+                                                const VolumeRequest& request);
 std::unique_ptr<VolumeSource> open_tiff_if_built(const std::string& name,
                                                  const std::vector<std::string>& files,
-                                                 const VolumeRequest& said);
+                                                 const VolumeRequest& request);
 std::unique_ptr<VolumeSource> open_hdf5_if_built(const std::string& file,
                                                  const std::string& dataset,
-                                                 const VolumeRequest& said);
-std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file, const VolumeRequest& said);
+                                                 const VolumeRequest& request);
+std::unique_ptr<VolumeSource> open_vdb_if_built(const std::string& file,
+                                                const VolumeRequest& request);
 std::unique_ptr<VolumeSource> open_dicom_if_built(const std::string& name,
                                                   const std::vector<std::string>& files,
-                                                  const VolumeRequest& said);
+                                                  const VolumeRequest& request);
 
 }  // namespace isobrick

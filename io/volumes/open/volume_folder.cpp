@@ -50,7 +50,7 @@ bool before(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> open_folder(const std::string& path, const VolumeRequest& said) {
+std::unique_ptr<VolumeSource> open_folder(const std::string& path, const VolumeRequest& request) {
   std::vector<std::string> tiff, dicom;
   for (const FolderEntry& entry : folder_entries(path)) {
     const std::string file = (fs::path(path) / entry.name).string();
@@ -66,8 +66,8 @@ std::unique_ptr<VolumeSource> open_folder(const std::string& path, const VolumeR
     throw UsageError(fmt::format("'{}' is a directory without TIFF or DICOM files", path));
   std::sort(tiff.begin(), tiff.end(), before);
   std::sort(dicom.begin(), dicom.end(), before);
-  return tiff.empty() ? open_dicom_if_built(path, dicom, said)
-                      : open_tiff_if_built(path, tiff, said);
+  return tiff.empty() ? open_dicom_if_built(path, dicom, request)
+                      : open_tiff_if_built(path, tiff, request);
 }
 
 }  // namespace isobrick

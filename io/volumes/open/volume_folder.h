@@ -10,6 +10,6 @@ namespace isobrick {
 /// Opens a folder that holds a stack of TIFF files, in the order of their names
 /// (numbers in them count as numbers), or a DICOM series. Throws UsageError when
 /// it holds neither, or both.
-std::unique_ptr<VolumeSource> open_folder(const std::string& path, const VolumeRequest& said);
+std::unique_ptr<VolumeSource> open_folder(const std::string& path, const VolumeRequest& request);
 
 }  // namespace isobrick

@@ -206,7 +206,7 @@ std::uint64_t read_offset(const std::string& path, const Numbers& n, const Versi
   if (!(n.offset >= 0 && n.offset < 0x1p62))
     header_error(path, fmt::format("vox_offset {} makes no sense", n.offset));
   const auto offset = static_cast<std::uint64_t>(n.offset);
-  // Samples follow the header and four bytes that say whether extensions do.
+  // Samples follow the header and four bytes that mark extensions.
   const std::uint64_t least =
       version.detached ? 0
                        : static_cast<std::uint64_t>(version.number == 1 ? kBytes1 : kBytes2) + 4;

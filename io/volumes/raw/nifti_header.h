@@ -11,7 +11,7 @@
 
 namespace isobrick {
 
-/// What the header of a NIfTI file says.
+/// The header of a NIfTI file.
 struct NiftiHeader {
   ArrayView view;
   ScalarType type = ScalarType::u8;  ///< as stored
@@ -34,7 +34,8 @@ bool is_nifti_pair(std::span<const std::byte> head);
 /// Whether it is ANALYZE 7.5, whose headers parse_nifti_header() refuses with this.
 bool is_analyze(std::span<const std::byte> head);
 inline constexpr const char* kAnalyzeRefusal =
-    "ANALYZE 7.5, which does not say where its samples are in space, is not supported; convert it "
+    "ANALYZE 7.5, which does not state where its samples are in space, is not supported; convert "
+    "it "
     "to NIfTI";
 
 /// Parses a header and selects one volume where there are several. `path` is for

@@ -91,13 +91,14 @@ std::string nifti_pair_hint(const std::string& path) {
              : fmt::format("; the image of a NIfTI pair needs its header '{}' beside it", header);
 }
 
-std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& said) {
-  refuse_raw_description(path, "a NIfTI file", said);
-  const NiftiHeader header = parse_nifti_header(path, read_head(path), said.selection);
+std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& request) {
+  refuse_raw_description(path, "a NIfTI file", request);
+  const NiftiHeader header = parse_nifti_header(path, read_head(path), request.selection);
   const std::string data_path = header.detached ? image_path(path) : path;
   const std::size_t sample = size_of(header.type);
   SampleLayout layout;
-  layout.info = describe_volume(data_path, header.view.extent, header.type, header.transform, said);
+  layout.info =
+      describe_volume(data_path, header.view.extent, header.type, header.transform, request);
   layout.info.files = {path, data_path};
   layout.offset = header.offset + static_cast<std::uint64_t>(header.view.first) * sample;
   layout.swap = header.swap && sample > 1;

@@ -9,7 +9,7 @@ namespace isobrick {
 
 /// Opens a NIfTI-1 or NIfTI-2 volume: `.nii`, or `.hdr` with the `.img` beside it,
 /// each also compressed as a whole (`.nii.gz`).
-std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& said);
+std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRequest& request);
 
 /// The header that lies beside an image of a pair ("head.hdr" for "head.img", either
 /// compressed or not); empty where the path is no such image's or no header lies there.

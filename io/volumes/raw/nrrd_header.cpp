@@ -18,11 +18,11 @@ namespace isobrick {
 namespace {
 
 std::optional<ScalarType> parse_type(const std::string& name) {
-  struct Spellings {
+  struct TypeNames {
     ScalarType type;
     std::array<std::string_view, 6> names;
   };
-  static constexpr Spellings all[] = {
+  static constexpr TypeNames all[] = {
       {ScalarType::i8, {"signed char", "int8", "int8_t"}},
       {ScalarType::u8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
       {ScalarType::i16,
@@ -34,7 +34,7 @@ std::optional<ScalarType> parse_type(const std::string& name) {
       {ScalarType::f64, {"double"}},
   };
   if (name.empty()) return std::nullopt;
-  for (const Spellings& s : all)
+  for (const TypeNames& s : all)
     if (std::find(s.names.begin(), s.names.end(), name) != s.names.end()) return s.type;
   return std::nullopt;
 }
@@ -171,7 +171,7 @@ Vec3d parse_vector(const Fields& fields, const std::string& name, std::string_vi
   return vector;
 }
 
-/// What the kinds say of an axis; nothing where they leave it open.
+/// The role of an axis by its kind; nullopt where that leaves it open.
 std::optional<AxisRole> role_of_kind(const std::string& kind) {
   if (kind == "domain" || kind == "space") return AxisRole::space;
   if (kind == "time") return AxisRole::time;
@@ -218,7 +218,7 @@ std::size_t read_view(const Fields& fields, const Selection& selection, TextHead
     axes.push_back({parse_integer(fields.path(), "sizes", word), AxisRole::space});
   if (!find_roles(fields, axes) && !guess_roles(axes, selection))
     header_error(fields.path(),
-                 fmt::format("{} dimensions, and neither 'kinds' nor 'space directions' say which "
+                 fmt::format("{} dimensions, and neither 'kinds' nor 'space directions' mark which "
                              "3 are space: {}",
                              axes.size(), kRolesHint));
   header.view = select_volume(fields.path(), axes, selection);

@@ -8,7 +8,7 @@
 
 namespace isobrick {
 
-/// What a file name tells about its samples.
+/// The description of samples in a file's name.
 struct RawName {
   std::optional<Int3> extent;
   std::optional<ScalarType> type;

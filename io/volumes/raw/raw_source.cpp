@@ -57,7 +57,7 @@ class RawSource final : public VolumeSource {
   }
 
   /// `count` pieces of `width` bytes, a row apart. Below a page between them it
-  /// is quicker to read the gaps too than to ask for each piece.
+  /// is faster to read the gaps, too, than to read each piece.
   void read_rows(Int3 from, std::uint64_t count, std::uint64_t width, std::byte* out) const {
     constexpr std::uint64_t page = 4096, most = 256 * 1024;
     const bool with_gaps = row_ - width <= page;

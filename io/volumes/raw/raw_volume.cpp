@@ -27,18 +27,19 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The header beside a raw file, if there is one and it means this very file.
-std::optional<TextHeader> find_header_beside(const std::string& path, const VolumeRequest& said) {
+std::optional<TextHeader> find_header_beside(const std::string& path,
+                                             const VolumeRequest& request) {
   for (const char* extension : {".nhdr", ".mhd"}) {
     const std::string candidate = fs::path(path).replace_extension(extension).string();
     std::error_code error;
     if (!fs::is_regular_file(candidate, error)) continue;
     try {
-      auto header = parse_text_header(candidate, extension[1] == 'n', said.selection);
+      auto header = parse_text_header(candidate, extension[1] == 'n', request.selection);
       if (header.data_paths.size() == 1 && fs::equivalent(header.data_paths[0], path, error))
         return header;
     } catch (const UsageError&) {
-      // Somebody who says everything does not need the header.
-      if (!said.extent || !said.type) throw;
+      // A complete request does not need the header.
+      if (!request.extent || !request.type) throw;
     }
   }
   return std::nullopt;
@@ -52,15 +53,15 @@ bool must_swap(std::optional<ByteOrder> order, ScalarType type) {
   return order && *order != kNativeOrder && size_of(type) > 1;
 }
 
-/// The order that is said, else the header's, which may not be missing where it matters.
+/// The requested order, else the header's, which may not be missing where it matters.
 std::optional<ByteOrder> order_of(const TextHeader& header, ScalarType type,
-                                  const VolumeRequest& said) {
-  const auto order = said.order ? said.order : header.order;
+                                  const VolumeRequest& request) {
+  const auto order = request.order ? request.order : header.order;
   if (!order && size_of(type) > 1) header_error(header.path, "the field 'endian' is missing");
   return order;
 }
 
-/// Where the text lines end that a NRRD header says to skip.
+/// The end of the text lines that a NRRD header skips.
 std::uint64_t after_lines(const File& file, const std::string& path, std::uint64_t begin,
                           std::uint64_t lines) {
   if (lines == 0) return begin;
@@ -76,7 +77,7 @@ std::uint64_t after_lines(const File& file, const std::string& path, std::uint64
   return begin + at;
 }
 
-/// Who says what samples a file has: the header in it or beside it, or its name and options.
+/// What describes a file's samples: the header in it or beside it, or its name and options.
 enum class DescribedBy : std::uint8_t { header, caller };
 
 /// The types of which so many samples would make the file's size, as "u16 or i16".
@@ -88,8 +89,8 @@ std::string types_that_fit(std::uint64_t count, std::uint64_t bytes) {
   return types;
 }
 
-/// What else would make the size right, as " (would fit …)". Where a header says where samples
-/// begin another offset would only shift them.
+/// What else would make the size right, as " (would fit …)". Where a header states the offset,
+/// another one would only shift the samples.
 std::string size_hint(DescribedBy by, const std::string& types, std::uint64_t samples,
                       std::uint64_t size) {
   const bool header = by == DescribedBy::header;
@@ -125,7 +126,7 @@ void check_size(const TextHeader& header, DescribedBy by, const VolumeInfo& info
                                size_hint(by, types, samples, size)));
 }
 
-/// What a header says of the grid that its samples were.
+/// Takes a header's description of the OpenVDB grid that its samples were.
 void take_grid(const TextHeader& header, VolumeInfo& info) {
   info.grid_class = header.grid_class;
   info.grid_name = header.grid_name;
@@ -138,26 +139,25 @@ std::vector<fs::path> files_of(const TextHeader& header) {
   return files;
 }
 
-/// Opens samples that lie as they are in one file: what is said goes before what
-/// the header says.
-std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const VolumeRequest& said,
+/// Opens samples that lie as they are in one file. The request overrides the header.
+std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const VolumeRequest& request,
                                              DescribedBy by, File file) {
   const std::string& path = header.data_paths[0];
-  if (said.extent || said.type || said.offset) by = DescribedBy::caller;
-  const ScalarType type = said.type.value_or(header.type);
+  if (request.extent || request.type || request.offset) by = DescribedBy::caller;
+  const ScalarType type = request.type.value_or(header.type);
   SampleLayout layout;
-  layout.info =
-      describe_volume(path, said.extent.value_or(header.view.extent), type, header.transform, said);
+  layout.info = describe_volume(path, request.extent.value_or(header.view.extent), type,
+                                header.transform, request);
   take_grid(header, layout.info);
   layout.info.files = files_of(header);
-  layout.swap = must_swap(order_of(header, type, said), type);
+  layout.swap = must_swap(order_of(header, type, request), type);
   const auto total =
-      static_cast<std::uint64_t>(said.extent ? volume(*said.extent) : header.view.total) *
+      static_cast<std::uint64_t>(request.extent ? volume(*request.extent) : header.view.total) *
       size_of(type);
   const std::uint64_t size = file.size();
   std::uint64_t offset = header.data_begin;
-  if (said.offset)
-    offset = *said.offset;
+  if (request.offset)
+    offset = *request.offset;
   else if (header.data_at_end)
     offset = std::max(offset, size > total ? size - total : 0);
   else
@@ -166,7 +166,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
   if (const std::uint64_t extra = size - offset - total; extra > 0)
     layout.notes.push_back(trailing_note(quoted(file.path()), extra));
   layout.offset = offset;
-  if (!said.extent) {
+  if (!request.extent) {
     layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);
     layout.stride = header.view.stride;
   }
@@ -191,7 +191,7 @@ std::unique_ptr<ByteStream> open_bytes(const TextHeader& header, const std::stri
   // MetaImage's writers have wrapped deflated data either way.
   constexpr std::byte kGzip{0x1f};
   stream = make_inflate_stream(std::move(stream), first == kGzip ? Wrapper::gzip : Wrapper::zlib);
-  if (header.skip_bytes > stream->most_bytes())
+  if (header.skip_bytes > stream->max_bytes())
     header_error(header.path,
                  fmt::format("'{}' cannot have {} bytes to skip", path, header.skip_bytes));
   stream->skip(header.skip_bytes);
@@ -219,18 +219,18 @@ TextHeader parse_text_header(const std::string& path, bool nrrd, const Selection
 }
 
 std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
-                                               const VolumeRequest& said) {
+                                               const VolumeRequest& request) {
   if (header.encoding == Encoding::raw && header.data_paths.size() == 1)
-    return open_described(header, said, DescribedBy::header,
+    return open_described(header, request, DescribedBy::header,
                           open_data_file(header.data_paths[0], header.path));
-  VolumeRequest rest = said;
+  VolumeRequest rest = request;
   rest.order.reset();
   refuse_raw_description(header.path, "a header that describes its samples", rest);
   if (header.data_at_end)
     header_error(header.path, "samples at the end of a file must be raw and in one file");
   SampleLayout layout;
   layout.info =
-      describe_volume(header.path, header.view.extent, header.type, header.transform, said);
+      describe_volume(header.path, header.view.extent, header.type, header.transform, request);
   take_grid(header, layout.info);
   layout.info.files = files_of(header);
   const std::size_t sample = size_of(header.type);
@@ -240,7 +240,7 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   const std::uint64_t end = static_cast<std::uint64_t>(header.view.total) * sample;
   auto stream = open_all_data(header);
   if (header.encoding != Encoding::text)
-    layout.swap = must_swap(order_of(header, header.type, said), header.type);
+    layout.swap = must_swap(order_of(header, header.type, request), header.type);
   // More files than the header's extent needs are a mistake in it.
   const AfterEnd after_end = header.data_paths.size() > 1        ? AfterEnd::refused
                              : header.encoding == Encoding::text ? AfterEnd::noted_as_numbers
@@ -268,42 +268,44 @@ constexpr const char* kStdinName = "standard input";
                 nifti_pair_hint(path)));
 }
 
-/// Extent and type that are said, else those in the name.
-TextHeader describe_by_name(const std::string& path, const VolumeRequest& said) {
+/// Extent and type of the request, else those in the name.
+TextHeader describe_by_name(const std::string& path, const VolumeRequest& request) {
   const RawName name = parse_raw_name(fs::path(path).stem().string());
-  const auto extent = said.extent ? said.extent : name.extent;
-  const auto type = said.type ? said.type : name.type;
+  const auto extent = request.extent ? request.extent : name.extent;
+  const auto type = request.type ? request.type : name.type;
   if (!extent || !type) refuse_unknown(path, extent.has_value(), type.has_value());
-  refuse_selection(path, said);
+  refuse_selection(path, request);
   TextHeader header;
   header.path = path;
   header.data_paths = {path};
   header.type = *type;
   header.order = ByteOrder::little;
-  const VolumeInfo checked = describe_volume(path, *extent, *type, {}, said);
+  const VolumeInfo checked = describe_volume(path, *extent, *type, {}, request);
   header.view = {checked.extent, {1, extent->x, extent->x * extent->y}, 0, volume(checked.extent)};
   return header;
 }
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& said) {
+std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& request) {
   File file = open_input(path);
-  if (const auto header = find_header_beside(path, said)) return open_text_volume(*header, said);
-  return open_described(describe_by_name(path, said), said, DescribedBy::caller, std::move(file));
+  if (const auto header = find_header_beside(path, request))
+    return open_text_volume(*header, request);
+  return open_described(describe_by_name(path, request), request, DescribedBy::caller,
+                        std::move(file));
 }
 
-std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& said) {
+std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& request) {
   const std::string name = kStdinName;
-  const TextHeader header = describe_by_name(name, said);
-  const std::uint64_t offset = said.offset.value_or(0);
+  const TextHeader header = describe_by_name(name, request);
+  const std::uint64_t offset = request.offset.value_or(0);
   if (offset > std::numeric_limits<std::uint64_t>::max() / 2)
     throw UsageError(fmt::format("an offset of {} bytes is too large", offset));
   SampleLayout layout;
-  layout.info = describe_volume(name, header.view.extent, header.type, {}, said);
+  layout.info = describe_volume(name, header.view.extent, header.type, {}, request);
   layout.info.files.clear();
   layout.offset = offset;
-  layout.swap = must_swap(said.order.value_or(ByteOrder::little), header.type);
+  layout.swap = must_swap(request.order.value_or(ByteOrder::little), header.type);
   const std::uint64_t end = layout.end();
   return make_stream_source(std::move(layout), make_stdin_stream(), end);
 }

@@ -10,14 +10,15 @@ namespace isobrick {
 
 /// Opens a file of raw samples, described by the caller, by a header that lies
 /// beside it (`x.nhdr`, `x.mhd`) or by its name.
-std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& said);
+std::unique_ptr<VolumeSource> open_raw(const std::string& path, const VolumeRequest& request);
 
 /// Standard input, which must end with the last sample.
-std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& said);
+std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& request);
 
 /// Opens the samples that a text header describes. Throws UsageError when their
-/// number is not what the header says.
-std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header, const VolumeRequest& said);
+/// number differs from the header's.
+std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
+                                               const VolumeRequest& request);
 
 /// The header of a NRRD or a MetaImage.
 TextHeader parse_text_header(const std::string& path, bool nrrd, const Selection& selection);

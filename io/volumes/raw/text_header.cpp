@@ -43,15 +43,15 @@ void header_error(const std::string& path, const std::string& what) {
 
 File open_data_file(const std::string& path, const std::string& header) {
   if (path == header) return open_input(path);
-  const auto told = [&](const Error& error) {
+  const auto message = [&](const Error& error) {
     return fmt::format("{}; the header '{}' needs it", error.what(), header);
   };
   try {
     return open_input(path);
   } catch (const UsageError& error) {
-    throw UsageError(told(error));
+    throw UsageError(message(error));
   } catch (const Error& error) {
-    throw Error(told(error));
+    throw Error(message(error));
   }
 }
 

@@ -17,8 +17,7 @@ namespace isobrick {
 
 enum class Encoding : std::uint8_t { raw, gzip, zlib, text };
 
-/// What a text header says about samples that follow it or lie in files of
-/// their own.
+/// A text header of samples that follow it or lie in files of their own.
 struct TextHeader {
   std::string path;                     ///< of the header itself, for messages
   std::vector<std::string> data_paths;  ///< of the samples; several follow one another

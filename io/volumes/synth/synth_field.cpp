@@ -194,9 +194,9 @@ class NoiseOctave {
 };
 
 template <class Real>
-class Mixing final : public SynthField<Real> {
+class MixingLayer final : public SynthField<Real> {
  public:
-  Mixing(const SynthOptions& options, Box3 box)
+  MixingLayer(const SynthOptions& options, Box3 box)
       : extent_(options.extent), width_(static_cast<std::size_t>(box.extent().x)) {
     double cell = static_cast<double>(longest(extent_)) / *options.frequency;
     double amplitude = 1;
@@ -248,7 +248,7 @@ std::unique_ptr<SynthField<Real>> make_synth_field(const SynthOptions& options, 
     case SynthKind::marschner_lobb: return std::make_unique<MarschnerLobb<Real>>(options, box);
     case SynthKind::mixing: break;
   }
-  return std::make_unique<Mixing<Real>>(options, box);
+  return std::make_unique<MixingLayer<Real>>(options, box);
 }
 
 template std::unique_ptr<SynthField<float>> make_synth_field(const SynthOptions&, Box3);

@@ -27,8 +27,8 @@ double read_length(const std::string& path, const char* name, std::string_view t
 
 /// `key=value` lines.
 TiffDescription parse_image_j(const std::string& path, std::string_view text) {
-  TiffDescription said;
-  said.image_j = true;
+  TiffDescription description;
+  description.image_j = true;
   Index images = 1;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -38,15 +38,17 @@ TiffDescription parse_image_j(const std::string& path, std::string_view text) {
     if (equals == std::string_view::npos) continue;
     const std::string_view key = line.substr(0, equals), value = trim(line.substr(equals + 1));
     if (key == "images") images = read_count(path, "images", value);
-    if (key == "channels") said.channels = read_count(path, "channels", value);
-    if (key == "slices") said.slices = read_count(path, "slices", value);
-    if (key == "frames") said.times = read_count(path, "frames", value);
-    if (key == "spacing") said.spacing.z = read_length(path, "spacing", value);
+    if (key == "channels") description.channels = read_count(path, "channels", value);
+    if (key == "slices") description.slices = read_count(path, "slices", value);
+    if (key == "frames") description.times = read_count(path, "frames", value);
+    if (key == "spacing") description.spacing.z = read_length(path, "spacing", value);
     // A micro sign that ImageJ could not write.
-    if (key == "unit") said.unit = value == "\\u00B5m" ? "micrometer" : unit_name(lower(value));
+    if (key == "unit")
+      description.unit = value == "\\u00B5m" ? "micrometer" : unit_name(lower(value));
   }
-  if (said.slices == 0) said.slices = images / said.channels / said.times;
-  return said;
+  if (description.slices == 0)
+    description.slices = images / description.channels / description.times;
+  return description;
 }
 
 /// The value of an attribute in the tag that `text` begins with.
@@ -59,8 +61,9 @@ std::optional<std::string_view> attribute(std::string_view text, std::string_vie
   return rest.substr(0, rest.find('"'));
 }
 
-/// Spacing, in the unit of the first axis that has one; each axis says its own.
-void read_physical_size(const std::string& path, std::string_view pixels, TiffDescription& said) {
+/// Spacing, in the unit of the first axis that has one; each axis has its own.
+void read_physical_size(const std::string& path, std::string_view pixels,
+                        TiffDescription& description) {
   constexpr const char* names[] = {"PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"};
   std::optional<std::string_view> first;
   for (int axis = 0; axis < 3; ++axis) {
@@ -70,40 +73,41 @@ void read_physical_size(const std::string& path, std::string_view pixels, TiffDe
     const auto unit = attribute(pixels, fmt::format("{}Unit", names[axis])).value_or("µm");
     if (!first) {
       first = unit;
-      said.unit = unit_name(unit);
+      description.unit = unit_name(unit);
     }
-    const auto ratio = unit == *first ? std::optional(1.0) : unit_ratio(unit_name(unit), said.unit);
+    const auto ratio =
+        unit == *first ? std::optional(1.0) : unit_ratio(unit_name(unit), description.unit);
     if (!ratio)
       header_error(path, fmt::format("OME: {} is in units of '{}', which cannot be compared with "
                                      "'{}'",
                                      names[axis], printable(unit, 20), printable(*first, 20)));
-    said.spacing[axis] = length * *ratio;
+    description.spacing[axis] = length * *ratio;
   }
 }
 
 TiffDescription parse_ome(const std::string& path, std::string_view text) {
-  TiffDescription said;
+  TiffDescription description;
   const std::string_view pixels = text.substr(text.find("<Pixels"));
   const auto count = [&](const char* name) {
     const auto value = attribute(pixels, name);
     return value ? read_count(path, name, *value) : 1;
   };
-  said.channels = count("SizeC");
-  said.slices = count("SizeZ");
-  said.times = count("SizeT");
+  description.channels = count("SizeC");
+  description.slices = count("SizeZ");
+  description.times = count("SizeT");
   // Colours of a pixel are no pages.
   if (const std::size_t at = pixels.find("<Channel"); at != std::string_view::npos)
     if (const auto samples = attribute(pixels.substr(at), "SamplesPerPixel"))
-      said.channels =
-          std::max<Index>(1, said.channels / read_count(path, "SamplesPerPixel", *samples));
+      description.channels =
+          std::max<Index>(1, description.channels / read_count(path, "SamplesPerPixel", *samples));
   if (const auto order = attribute(pixels, "DimensionOrder")) {
-    said.order = order->starts_with("XY") ? std::string(order->substr(2)) : "";
+    description.order = order->starts_with("XY") ? std::string(order->substr(2)) : "";
     for (const char axis : {'C', 'Z', 'T'})
-      if (said.order.size() != 3 || said.order.find(axis) == std::string::npos)
+      if (description.order.size() != 3 || description.order.find(axis) == std::string::npos)
         header_error(path, "OME: the DimensionOrder is not known");
   }
-  read_physical_size(path, pixels, said);
-  return said;
+  read_physical_size(path, pixels, description);
+  return description;
 }
 
 }  // namespace

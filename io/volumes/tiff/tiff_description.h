@@ -6,11 +6,11 @@
 
 namespace isobrick {
 
-/// What ImageJ or OME say, in the description of the first page, of all pages.
+/// The description of all pages that ImageJ or OME write into the first page.
 struct TiffDescription {
   Index channels = 1, slices = 0, times = 1;  ///< slices 0: all pages that there are
   std::string order = "CZT";  ///< of the pages: which of channel, z and time goes fastest, …
-  Vec3d spacing{0, 0, 0};     ///< 0: not said
+  Vec3d spacing{0, 0, 0};     ///< 0: not given
   std::string unit;
   bool image_j = false;  ///< pages may lie behind the first without headers
 };

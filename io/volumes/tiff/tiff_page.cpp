@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kMaxBlock = std::size_t{512} << 20;
 
 /// libtiff's words into a string, made fit for one line.
-int keep_complaint(TIFF*, void* to, const char*, const char* format, va_list words) {
+int keep_message(TIFF*, void* to, const char*, const char* format, va_list words) {
   char text[400];
   std::vsnprintf(text, sizeof(text), format, words);
   *static_cast<std::string*>(to) = printable(text, sizeof(text));
@@ -27,11 +27,11 @@ int keep_complaint(TIFF*, void* to, const char*, const char* format, va_list wor
 
 int ignore_warning(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
-TIFF* open_quietly(const std::string& path, std::string* complaint) {
+TIFF* open_quietly(const std::string& path, std::string* message) {
   TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
   if (options == nullptr) throw Error("out of memory");
   TIFFOpenOptionsSetMaxSingleMemAlloc(options, static_cast<tmsize_t>(kMaxBlock));
-  TIFFOpenOptionsSetErrorHandlerExtR(options, keep_complaint, complaint);
+  TIFFOpenOptionsSetErrorHandlerExtR(options, keep_message, message);
   TIFFOpenOptionsSetWarningHandlerExtR(options, ignore_warning, nullptr);
   TIFF* file = TIFFOpenExt(path.c_str(), "rm", options);  // m: no memory map
   TIFFOpenOptionsFree(options);
@@ -86,17 +86,18 @@ struct TiffFile::Window {
   }
 };
 
-void TiffFile::Close::operator()(tiff* file) const { TIFFClose(file); }
+void TiffFile::TiffDeleter::operator()(tiff* file) const { TIFFClose(file); }
 
-TiffFile::TiffFile(const std::string& path) : path_(path), file_(open_quietly(path, &complaint_)) {
+TiffFile::TiffFile(const std::string& path)
+    : path_(path), file_(open_quietly(path, &last_message_)) {
   if (!file_) fail("cannot be read as a TIFF file");
 }
 
 TiffFile::~TiffFile() = default;
 
 void TiffFile::fail(const std::string& what) const {
-  throw DamageError(
-      fmt::format("'{}' {}{}", path_, what, complaint_.empty() ? "" : " (" + complaint_ + ")"));
+  throw DamageError(fmt::format("'{}' {}{}", path_, what,
+                                last_message_.empty() ? "" : " (" + last_message_ + ")"));
 }
 
 std::uint32_t TiffFile::number(std::uint32_t tag, std::uint32_t fallback) const {
@@ -106,9 +107,9 @@ std::uint32_t TiffFile::number(std::uint32_t tag, std::uint32_t fallback) const 
 }
 
 bool TiffFile::next_page() {
-  complaint_.clear();
+  last_message_.clear();
   if (TIFFReadDirectory(file_.get()) == 1) return true;
-  if (!complaint_.empty()) fail("has a page that cannot be read");
+  if (!last_message_.empty()) fail("has a page that cannot be read");
   return false;
 }
 
@@ -178,7 +179,7 @@ std::size_t TiffFile::memory() const {
   return 2 * block_bytes() + 16 * blocks + (std::size_t{1} << 16);
 }
 
-bool TiffFile::find_plain(Plain& plain) const {
+bool TiffFile::find_plain(PlainSamples& plain) const {
   std::uint16_t compression = COMPRESSION_NONE;
   TIFFGetFieldDefaulted(file_.get(), TIFFTAG_COMPRESSION, &compression);
   if (compression != COMPRESSION_NONE || TIFFIsTiled(file_.get())) return false;

@@ -10,7 +10,7 @@ struct tiff;
 
 namespace isobrick {
 
-/// What a page of a TIFF file says of its samples.
+/// The samples of a page of a TIFF file.
 struct TiffPage {
   std::uint32_t width = 0, height = 0;
   std::uint16_t samples = 1;  ///< of a pixel
@@ -40,15 +40,15 @@ class TiffFile {
   bool is_reduced() const;
   /// ImageDescription, or empty.
   std::string description() const;
-  /// Pixels along x and y in one unit; 0 where the page does not say.
+  /// Pixels along x and y in one unit; 0 where the page has none.
   double resolution(int axis) const;
   /// Where the samples begin, if they lie uncompressed in one piece, and whether
   /// they are of the other byte order.
-  struct Plain {
+  struct PlainSamples {
     std::uint64_t offset = 0;
     bool swap = false;
   };
-  bool find_plain(Plain& plain) const;
+  bool find_plain(PlainSamples& plain) const;
 
   /// Bytes that reading a page takes for itself.
   std::size_t memory() const;
@@ -60,7 +60,7 @@ class TiffFile {
 
  private:
   struct Window;
-  struct Close {
+  struct TiffDeleter {
     void operator()(tiff* file) const;
   };
 
@@ -71,8 +71,8 @@ class TiffFile {
   std::uint32_t number(std::uint32_t tag, std::uint32_t fallback) const;
 
   std::string path_;
-  std::string complaint_;  ///< what libtiff said last
-  std::unique_ptr<tiff, Close> file_;
+  std::string last_message_;  ///< the last message of libtiff
+  std::unique_ptr<tiff, TiffDeleter> file_;
   std::unique_ptr<std::byte[]> block_;
   std::size_t block_size_ = 0;
 };

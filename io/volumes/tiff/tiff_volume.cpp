@@ -69,11 +69,11 @@ class FilePool {
   FilePool(std::vector<std::string> paths, std::size_t memory_of_one)
       : paths_(std::move(paths)), memory_of_one_(memory_of_one) {
     constexpr std::size_t kEnough = std::size_t{64} << 20;
-    most_ = std::clamp<std::size_t>(kEnough / memory_of_one, 1,
-                                    std::max(1u, std::thread::hardware_concurrency()));
+    max_ = std::clamp<std::size_t>(kEnough / memory_of_one, 1,
+                                   std::max(1u, std::thread::hardware_concurrency()));
   }
 
-  std::size_t memory() const { return most_ * memory_of_one_; }
+  std::size_t memory() const { return max_ * memory_of_one_; }
 
   /// Calls f(TiffFile&) with a file that is open at `place`.
   template <class F>
@@ -99,7 +99,7 @@ class FilePool {
   /// An idle slot with this file, else an empty one.
   Slot take(std::uint32_t index) {
     std::unique_lock lock(mutex_);
-    free_.wait(lock, [&] { return taken_ < most_; });
+    free_.wait(lock, [&] { return taken_ < max_; });
     ++taken_;
     const auto at = std::find_if(idle_.begin(), idle_.end(),
                                  [&](const Slot& slot) { return slot.index == index; });
@@ -107,7 +107,7 @@ class FilePool {
     if (at != idle_.end()) {
       slot = std::move(*at);
       idle_.erase(at);
-    } else if (!idle_.empty() && taken_ + idle_.size() > most_) {
+    } else if (!idle_.empty() && taken_ + idle_.size() > max_) {
       idle_.pop_back();
     }
     return slot;
@@ -123,7 +123,7 @@ class FilePool {
   }
 
   std::vector<std::string> paths_;
-  std::size_t memory_of_one_, most_;
+  std::size_t memory_of_one_, max_;
   std::mutex mutex_;
   std::condition_variable free_;
   std::vector<Slot> idle_;
@@ -165,13 +165,13 @@ class TiffSource final : public VolumeSource {
 };
 
 Transform read_transform(const Pages& pages) {
-  const TiffDescription& said = pages.description;
+  const TiffDescription& description = pages.description;
   Transform transform;
-  transform.unit = said.unit;
+  transform.unit = description.unit;
   for (int axis = 0; axis < 3; ++axis) {
-    double spacing = said.spacing[axis];
+    double spacing = description.spacing[axis];
     // Elsewhere the resolution is that of a print.
-    if (said.image_j && axis < 2 && pages.resolution[axis] > 0)
+    if (description.image_j && axis < 2 && pages.resolution[axis] > 0)
       spacing = 1 / pages.resolution[axis];
     if (spacing > 0) transform.spacing[axis] = spacing;
   }
@@ -182,7 +182,7 @@ Transform read_transform(const Pages& pages) {
 std::unique_ptr<VolumeSource> open_behind_first(const std::string& path, const Pages& pages,
                                                 const ArrayView& view, VolumeInfo info) {
   TiffFile file(path);
-  TiffFile::Plain plain;
+  TiffFile::PlainSamples plain;
   if (!file.find_plain(plain))
     throw UsageError(fmt::format("'{}' has 1 page, but its description promises {}", path,
                                  view.total / pages.page.width / pages.page.height));
@@ -203,8 +203,8 @@ std::unique_ptr<VolumeSource> open_behind_first(const std::string& path, const P
 
 std::unique_ptr<VolumeSource> open_tiff(const std::string& name,
                                         const std::vector<std::string>& files,
-                                        const VolumeRequest& said) {
-  refuse_raw_description(name, "a TIFF stack", said);
+                                        const VolumeRequest& request) {
+  refuse_raw_description(name, "a TIFF stack", request);
   Pages pages = find_pages(files);
   const TiffDescription& description = pages.description;
   const auto count = static_cast<Index>(pages.places.size());
@@ -224,9 +224,9 @@ std::unique_ptr<VolumeSource> open_tiff(const std::string& name,
     if (axis == 'C') axes.push_back({description.channels, AxisRole::channel});
     if (axis == 'T') axes.push_back({description.times, AxisRole::time});
   }
-  const ArrayView view = select_volume(name, axes, said.selection);
+  const ArrayView view = select_volume(name, axes, request.selection);
   VolumeInfo info =
-      describe_volume(name, view.extent, pages.page.type, read_transform(pages), said);
+      describe_volume(name, view.extent, pages.page.type, read_transform(pages), request);
   info.files.assign(files.begin(), files.end());
   if (behind) return open_behind_first(files[0], pages, view, std::move(info));
   const Index plane = Index{pages.page.width} * pages.page.height * pages.page.samples;

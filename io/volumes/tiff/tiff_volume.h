@@ -12,6 +12,6 @@ namespace isobrick {
 /// volume. `name` is what they are called together.
 std::unique_ptr<VolumeSource> open_tiff(const std::string& name,
                                         const std::vector<std::string>& files,
-                                        const VolumeRequest& said);
+                                        const VolumeRequest& request);
 
 }  // namespace isobrick

@@ -130,9 +130,10 @@ std::uint64_t VdbArchive::bytes_of_next(const openvdb::GridBase& grid) {
   in_.seekg(begin);
   if (bytes) return *bytes;
   // What the writer counted, and no less than is in the file.
-  const auto told = metadata.getMetadata<openvdb::Int64Metadata>("file_mem_bytes");
+  const auto counted = metadata.getMetadata<openvdb::Int64Metadata>("file_mem_bytes");
   return std::max(
-      rest, told ? static_cast<std::uint64_t>(std::max<std::int64_t>(0, told->value())) : rest);
+      rest,
+      counted ? static_cast<std::uint64_t>(std::max<std::int64_t>(0, counted->value())) : rest);
 }
 
 std::vector<VdbLoadedGrid> VdbArchive::load_grids(
@@ -183,7 +184,7 @@ std::vector<VdbLoadedGrid> load_vdb_grids(
   } catch (const std::ios_base::failure&) {
     throw refused("it ends too early");
   } catch (const std::bad_alloc&) {
-    throw refused("it asks for more memory than there is");
+    throw refused("it needs more memory than there is");
   } catch (const std::exception& error) {
     throw refused(printable(error.what(), kMaxShown));
   }
@@ -202,7 +203,7 @@ void rethrow_vdb_damage(const std::string& path, std::string_view grid) {
   } catch (const std::ios_base::failure&) {
     throw damaged("the file ends before the grid does");
   } catch (const std::bad_alloc&) {
-    throw damaged("it asks for more memory than there is");
+    throw damaged("it needs more memory than there is");
   } catch (const std::exception& error) {
     throw damaged(printable(error.what(), kMaxShown));
   }

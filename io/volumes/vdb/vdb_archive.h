@@ -24,8 +24,8 @@ struct VdbLoadedGrid {
   openvdb::GridBase::Ptr grid;
 };
 
-/// An OpenVDB file whose grids are read step by step. OpenVDB's own File neither notices
-/// that a file ends early nor can be told to; the stream here throws. OpenVDB's delayed
+/// An OpenVDB file whose grids are read step by step. OpenVDB's own File does not
+/// notice that a file ends early; the stream here throws. OpenVDB's delayed
 /// loading is not used.
 class VdbArchive final : private openvdb::io::Archive {
  public:
@@ -35,8 +35,8 @@ class VdbArchive final : private openvdb::io::Archive {
   /// begins: for a grid that shares another one's, at that one's.
   openvdb::GridBase::Ptr read_grid(const std::vector<VdbGrid>& grids, const VdbGrid& chosen);
 
-  /// Reads all grids one after the other, with OpenVDB's own functions and whatever the file says
-  /// of their places. Calls about_to_read(grid, bytes) before each takes so many bytes.
+  /// Reads all grids one after the other, with OpenVDB's own functions and the offsets
+  /// that the file states. Calls about_to_read(grid, bytes) before each takes so many bytes.
   std::vector<VdbLoadedGrid> load_grids(
       const std::function<void(const VdbGrid&, std::uint64_t)>& about_to_read);
 
@@ -49,7 +49,7 @@ class VdbArchive final : private openvdb::io::Archive {
   void read_header();
 
   std::string path_;
-  std::uint32_t version_ = 0;  ///< as the file says it
+  std::uint32_t version_ = 0;  ///< as the file states it
   VdbFileBuffer buffer_;
   openvdb::io::StreamMetadata::Ptr metadata_;  // the stream refers to this very pointer
   std::istream in_;

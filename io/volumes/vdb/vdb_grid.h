@@ -40,8 +40,8 @@ void for_each_vdb_leaf(Box3 box, F&& f) {
 [[noreturn]] void throw_vdb_budget(std::uint64_t budget);
 
 /// Makes leaves and tiles of leaves in a tree and counts the bytes of the nodes that
-/// come into being, which is quicker than to ask the tree. Throws UsageError before
-/// they, and what else is said to be held, take more than `budget`.
+/// come into being, which is faster than to query the tree. Throws UsageError before
+/// they and the bytes of hold() take more than `budget`.
 template <class Tree>
 class CountedTree {
  public:
@@ -50,7 +50,7 @@ class CountedTree {
 
   CountedTree(Tree& tree, std::uint64_t budget) : tree_(tree), budget_(budget) {}
 
-  /// Says how many bytes its owner holds beside the tree.
+  /// Adds bytes that its owner holds beside the tree.
   void hold(std::uint64_t bytes) {
     held_ = bytes;
     add(0);

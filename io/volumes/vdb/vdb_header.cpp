@@ -92,7 +92,7 @@ class Fields {
   std::uint64_t at_ = 0;
 };
 
-/// As much of what a file says of itself as is shown.
+/// Messages show so many characters of a file's own text.
 constexpr std::size_t kMaxShown = 100;
 /// Of the name that a store keeps.
 constexpr std::size_t kMaxKept = 1000;
@@ -196,7 +196,7 @@ void check_vdb_memory(const std::string& path, const VdbGrid& grid, std::uint64_
   constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
   if (room && needed > *room)
     throw UsageError(fmt::format(
-        "'{}': grid '{}' takes {} MiB in memory, more than the budget of {} MiB leaves: say "
+        "'{}': grid '{}' takes {} MiB in memory, more than the budget of {} MiB leaves: add "
         "--memory {}M",
         path, grid.name, needed / kMiB + 1, *room / kMiB, needed / kMiB * 5 / 4 + 256));
 }

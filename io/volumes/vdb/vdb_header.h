@@ -9,10 +9,10 @@
 
 namespace isobrick {
 
-/// What an OpenVDB file says of one of its grids before any tree is read.
+/// A grid of an OpenVDB file before any tree is read.
 struct VdbGrid {
   std::string unique_name;           ///< as the file keeps it, with the number of a repeated name
-  std::string name;                  ///< as users say it: "density", "density[1]"
+  std::string name;                  ///< as users write it: "density", "density[1]"
   std::string own_name, unit;        ///< of its metadata: its name, and the unit of world space
   std::string type;                  ///< "Tree_float_5_4_3"
   bool half = false;                 ///< floats have 16 bits in the file
@@ -32,7 +32,7 @@ inline constexpr std::uint32_t kVdbOldest = 222, kVdbNewest = 225;
 /// How an OpenVDB file is laid out.
 struct VdbLayout {
   std::uint32_t version = 0;
-  bool has_offsets = false;  ///< it says where its grids are; streams do not
+  bool has_offsets = false;  ///< of its grids; streams have none
 
   /// Whether read_vdb_header() knows it. All else is left to OpenVDB's own reader.
   bool known() const { return version >= kVdbOldest && version <= kVdbNewest && has_offsets; }

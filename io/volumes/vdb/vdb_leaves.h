@@ -76,8 +76,8 @@ VdbNodeCounts count_vdb_nodes(std::istream& in, bool as_half) {
   return counts;
 }
 
-/// Where the values of a tree's leaves are in its file. They are read when they are asked
-/// for, and never kept.
+/// Where the values of a tree's leaves are in its file. They are read when they are
+/// needed, and never kept.
 template <class Tree>
 class VdbLeaves {
  public:
@@ -103,7 +103,7 @@ class VdbLeaves {
    private:
     using Mask = typename Leaf::NodeMaskType;
     void read_leaf(std::span<char> bytes, const Mask& active, Value* values);
-    void restore(const char* said, const Mask& active, const Value* kept, Value* values) const;
+    void restore(const char* code, const Mask& active, const Value* kept, Value* values) const;
 
     const VdbLeaves& leaves_;
     std::vector<char> bytes_;
@@ -152,8 +152,8 @@ VdbLeaves<Tree>::Reader::Reader(const VdbLeaves& leaves)
 }
 
 /// Where only active values are kept, OpenVDB reads them, but the others are put between them by
-/// restore(): OpenVDB asks for each voxel anew whether it is active, and guesses wrong half the
-/// time.
+/// restore(): OpenVDB tests for each voxel whether it is active, a branch that is mispredicted half
+/// the time.
 template <class Tree>
 void VdbLeaves<Tree>::Reader::read_leaf(std::span<char> bytes, const Mask& active, Value* values) {
   buffer_.assign(bytes);
@@ -170,20 +170,20 @@ void VdbLeaves<Tree>::Reader::read_leaf(std::span<char> bytes, const Mask& activ
   restore(bytes.data() + sizeof(Mask), active, kept, values);
 }
 
-/// `said` is what says of the inactive values which two they are, and which is which. It has been
-/// read once: it is whole.
+/// `code` describes the two inactive values, and which voxel has which. It has been read once, so
+/// it is whole.
 template <class Tree>
-void VdbLeaves<Tree>::Reader::restore(const char* said, const Mask& active, const Value* kept,
+void VdbLeaves<Tree>::Reader::restore(const char* code, const Mask& active, const Value* kept,
                                       Value* values) const {
   using namespace openvdb::io;
-  const int kind = *said++;
+  const int kind = *code++;
   const Value background = *static_cast<const Value*>(how_->backgroundPtr());
   Value inactive[2] = {
       kind == NO_MASK_OR_INACTIVE_VALS ? background : openvdb::math::negative(background),
       background};
-  const auto take = [&said](auto& what) {
-    std::memcpy(&what, said, sizeof what);
-    said += sizeof what;
+  const auto take = [&code](auto& what) {
+    std::memcpy(&what, code, sizeof what);
+    code += sizeof what;
   };
   const bool two = kind == MASK_AND_TWO_INACTIVE_VALS;
   if (kind == NO_MASK_AND_ONE_INACTIVE_VAL || kind == MASK_AND_ONE_INACTIVE_VAL || two)

@@ -32,8 +32,8 @@ float inside_value(float distance) {
   return -std::max(distance, std::numeric_limits<float>::min());
 }
 
-/// A triangle that comes near a leaf, and where that is among all leaves.
-struct Near {
+/// A triangle within the band of a leaf, and the index of that leaf.
+struct LeafTriangle {
   Index leaf = 0;
   std::uint32_t triangle = 0;
 };
@@ -66,10 +66,10 @@ class LevelSet final : public VdbLevelSet {
       const openvdb::Vec3d index = grid_->transform().worldToIndex(openvdb::Vec3d(p.x, p.y, p.z));
       points_.push_back(Vec3d{index.x(), index.y(), index.z()} * spacing_);
     }
-    near_.clear();
+    leaf_triangles_.clear();
     for (std::size_t i = 0; i < triangles.size(); ++i) {
       find_leaves(triangles, i);
-      if (near_.size() >= kListed || i + 1 == triangles.size()) measure_listed(triangles);
+      if (leaf_triangles_.size() >= kListed || i + 1 == triangles.size()) measure_listed(triangles);
     }
   }
 
@@ -89,33 +89,36 @@ class LevelSet final : public VdbLevelSet {
   }
 
  private:
-  struct Touched {
+  struct LeafRun {
     Int3 position;
     Leaf* leaf;
-    std::size_t first;  ///< of its triangles in near_
+    std::size_t first;  ///< of its triangles in leaf_triangles_
   };
 
   /// Makes the leaves that are listed, takes their voxels' distances and clears the list.
   void measure_listed(std::span<const std::array<std::uint32_t, 3>> triangles) {
-    counted_.hold(points_.capacity() * sizeof(Vec3d) + near_.capacity() * sizeof(Near) +
-                  leaves_.capacity() * sizeof(Touched));
-    std::sort(near_.begin(), near_.end(),
-              [](const Near& a, const Near& b) { return a.leaf < b.leaf; });
+    counted_.hold(points_.capacity() * sizeof(Vec3d) +
+                  leaf_triangles_.capacity() * sizeof(LeafTriangle) +
+                  leaves_.capacity() * sizeof(LeafRun));
+    std::sort(leaf_triangles_.begin(), leaf_triangles_.end(),
+              [](const LeafTriangle& a, const LeafTriangle& b) { return a.leaf < b.leaf; });
     leaves_.clear();
-    for (std::size_t i = 0; i < near_.size(); ++i)
-      if (i == 0 || near_[i].leaf != near_[i - 1].leaf) {
-        const Index x = near_[i].leaf % leaves_extent_.x, rest = near_[i].leaf / leaves_extent_.x;
+    for (std::size_t i = 0; i < leaf_triangles_.size(); ++i)
+      if (i == 0 || leaf_triangles_[i].leaf != leaf_triangles_[i - 1].leaf) {
+        const Index x = leaf_triangles_[i].leaf % leaves_extent_.x,
+                    rest = leaf_triangles_[i].leaf / leaves_extent_.x;
         const Int3 leaf{x, rest % leaves_extent_.y, rest / leaves_extent_.y};
         leaves_.push_back({leaf, counted_.touch_leaf(vdb_coordinate(leaf * kVdbLeafExtent)), i});
       }
     arena_.execute([&] {
       tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t i) {
-        const std::size_t end = i + 1 < leaves_.size() ? leaves_[i + 1].first : near_.size();
+        const std::size_t end =
+            i + 1 < leaves_.size() ? leaves_[i + 1].first : leaf_triangles_.size();
         for (std::size_t k = leaves_[i].first; k < end; ++k)
-          measure(*leaves_[i].leaf, leaves_[i].position, triangles[near_[k].triangle]);
+          measure(*leaves_[i].leaf, leaves_[i].position, triangles[leaf_triangles_[k].triangle]);
       });
     });
-    near_.clear();
+    leaf_triangles_.clear();
   }
 
   /// The voxels along an axis that a triangle between lo and hi comes near.
@@ -147,7 +150,8 @@ class LevelSet final : public VdbLevelSet {
         nearest[axis] = std::clamp(middle[axis], lo, lo + (kVdbLeaf - 1) * spacing_[axis]);
       }
       if (distance2(nearest, middle) <= reach * reach)
-        near_.push_back({linear_index(leaf, leaves_extent_), static_cast<std::uint32_t>(i)});
+        leaf_triangles_.push_back(
+            {linear_index(leaf, leaves_extent_), static_cast<std::uint32_t>(i)});
     });
   }
 
@@ -235,8 +239,8 @@ class LevelSet final : public VdbLevelSet {
   CountedTree<Tree> counted_;
   tbb::task_arena arena_;
   std::vector<Vec3d> points_;  ///< in index space, times spacing_
-  std::vector<Near> near_;
-  std::vector<Touched> leaves_;
+  std::vector<LeafTriangle> leaf_triangles_;
+  std::vector<LeafRun> leaves_;
 };
 
 }  // namespace

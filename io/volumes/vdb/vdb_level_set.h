@@ -14,7 +14,7 @@ namespace isobrick {
 
 /// An OpenVDB level set of a surface: near it distances from its triangles, negative
 /// inside, and elsewhere the largest of them. First come all triangles, in any
-/// pieces and order, which never shows in the result; then the inside is said.
+/// pieces and order, which never shows in the result; then the inside follows.
 class VdbLevelSet {
  public:
   virtual ~VdbLevelSet() = default;
@@ -25,7 +25,7 @@ class VdbLevelSet {
                    std::span<const std::array<std::uint32_t, 3>> triangles) = 0;
 
   /// Which samples of `box` are inside: one byte each, C order [z, y, x], not 0 for
-  /// inside; or all of them. Boxes do not overlap; what is never said is outside.
+  /// inside; or all of them. Boxes do not overlap; what is in none is outside.
   virtual void put_inside(Box3 box, const std::uint8_t* inside) = 0;
   virtual void put_all_inside(Box3 box) = 0;
 

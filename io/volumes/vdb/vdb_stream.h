@@ -14,8 +14,8 @@
 
 namespace isobrick {
 
-/// A file to be read forward with many small steps: OpenVDB asks where it is and leaves
-/// something out at every node, which costs no system call here. Places behind the end
+/// A file to be read forward with many small steps: at every node OpenVDB queries the position and
+/// skips some bytes, which costs no system call here. Places behind the end
 /// cannot be sought.
 class VdbFileBuffer final : public std::streambuf {
  public:

@@ -94,17 +94,17 @@ Transform transform_of(const std::string& path, const openvdb::math::Transform& 
 
 /// Where to cut the grid, in its own coordinates.
 Box3 region_of(const VdbGrid& grid, const std::string& path, const openvdb::GridBase& read,
-               const std::optional<RegionRequest>& asked) {
+               const std::optional<RegionRequest>& region) {
   Box3 box;
   const openvdb::CoordBBox active = read.evalActiveVoxelBoundingBox();
   const bool none = active.empty();
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    const auto lo = asked ? asked->lo[i] : std::nullopt, hi = asked ? asked->hi[i] : std::nullopt;
+    const auto lo = region ? region->lo[i] : std::nullopt,
+               hi = region ? region->hi[i] : std::nullopt;
     if (none && (!lo || !hi))
-      throw UsageError(
-          fmt::format("'{}': grid '{}' has no active voxels: say with --roi what is wanted of it",
-                      path, grid.name));
+      throw UsageError(fmt::format(
+          "'{}': grid '{}' has no active voxels: choose its part with --roi", path, grid.name));
     box.lo[axis] = lo.value_or(active.min()[axis]);
     box.hi[axis] = hi.value_or(Index{active.max()[axis]} + 1);
     if (box.lo[axis] < std::numeric_limits<int>::min() ||
@@ -132,22 +132,23 @@ ScalarType type_of_int64(const std::string& path, const VdbGrid& grid,
                   path, grid.name, lo, hi));
 }
 
-/// A grid that is being opened.
-struct Opening {
+/// A grid to open, and the request for it.
+struct GridRequest {
   const std::string& path;
-  const VolumeRequest& said;
+  const VolumeRequest& request;
   const VdbGrid& grid;
   openvdb::GridBase::Ptr read;  ///< without its tree, at first
 };
 
 template <class Out, class Tree, class Leaves>
-std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::ConstPtr tree,
+std::unique_ptr<VolumeSource> make_source(const GridRequest& in, typename Tree::ConstPtr tree,
                                           std::shared_ptr<const Leaves> leaves,
                                           std::size_t memory) {
-  const Box3 box = region_of(in.grid, in.path, *in.read, in.said.region);
+  const Box3 box = region_of(in.grid, in.path, *in.read, in.request.region);
   Transform transform = transform_of(in.path, in.read->transform(), box.lo);
   if (!in.grid.unit.empty()) transform.unit = in.grid.unit;
-  VolumeInfo info = describe_volume(in.path, box.extent(), scalar_type_of<Out>, transform, in.said);
+  VolumeInfo info =
+      describe_volume(in.path, box.extent(), scalar_type_of<Out>, transform, in.request);
   info.fill_value = static_cast<double>(tree->background());
   info.grid_class = in.grid.grid_class;
   info.grid_name = in.grid.own_name;
@@ -157,7 +158,8 @@ std::unique_ptr<VolumeSource> make_source(const Opening& in, typename Tree::Cons
 
 /// The same with samples of the type that holds the tree's values.
 template <class Tree, class Leaves>
-std::unique_ptr<VolumeSource> make_source_of_values(const Opening& in, typename Tree::ConstPtr tree,
+std::unique_ptr<VolumeSource> make_source_of_values(const GridRequest& in,
+                                                    typename Tree::ConstPtr tree,
                                                     std::shared_ptr<const Leaves> leaves,
                                                     std::size_t memory) {
   const auto as = [&]<class Out>(Out) {
@@ -183,7 +185,7 @@ std::unique_ptr<VolumeSource> make_source_of_values(const Opening& in, typename 
 /// A grid of numbers, the values of whose leaves stay in the file, or of bits, which is held
 /// whole. `stream` is where its tree begins.
 template <class Grid>
-std::unique_ptr<VolumeSource> open_tree(const Opening& in, std::istream& stream) {
+std::unique_ptr<VolumeSource> open_tree(const GridRequest& in, std::istream& stream) {
   using Tree = typename Grid::TreeType;
   const auto grid = openvdb::gridPtrCast<Grid>(in.read);
   if (!grid) return nullptr;
@@ -191,7 +193,7 @@ std::unique_ptr<VolumeSource> open_tree(const Opening& in, std::istream& stream)
   const VdbNodeCounts nodes = count_vdb_nodes<Tree>(stream, as_half);
   if constexpr (std::is_same_v<typename Tree::ValueType, bool>) {
     using Leaves = VdbLoadedLeaves<Tree>;
-    check_vdb_memory(in.path, in.grid, nodes.bytes, in.said.memory);
+    check_vdb_memory(in.path, in.grid, nodes.bytes, in.request.memory);
     grid->readTopology(stream);
     grid->readBuffers(stream);
     return make_source_of_values<Tree, Leaves>(in, grid->constTreePtr(),
@@ -199,7 +201,7 @@ std::unique_ptr<VolumeSource> open_tree(const Opening& in, std::istream& stream)
   } else {
     using Leaves = VdbLeaves<Tree>;
     const std::size_t memory = nodes.bytes + Leaves::memory(nodes.leaves);
-    check_vdb_memory(in.path, in.grid, memory, in.said.memory);
+    check_vdb_memory(in.path, in.grid, memory, in.request.memory);
     grid->readTopology(stream);
     const auto leaves = std::make_shared<const Leaves>(in.path, stream, grid->tree(), as_half);
     return make_source_of_values<Tree, Leaves>(in, grid->constTreePtr(), leaves, memory);
@@ -208,7 +210,7 @@ std::unique_ptr<VolumeSource> open_tree(const Opening& in, std::istream& stream)
 
 /// A grid that is in memory as a whole and takes `memory` bytes.
 template <class Grid>
-std::unique_ptr<VolumeSource> open_loaded_tree(const Opening& in, std::size_t memory) {
+std::unique_ptr<VolumeSource> open_loaded_tree(const GridRequest& in, std::size_t memory) {
   using Tree = typename Grid::TreeType;
   using Leaves = VdbLoadedLeaves<Tree>;
   const auto grid = openvdb::gridPtrCast<Grid>(in.read);
@@ -230,7 +232,7 @@ std::unique_ptr<VolumeSource> open_by_type(const std::string& path, const VdbGri
           std::type_identity<openvdb::Int64Grid>{}, std::type_identity<openvdb::BoolGrid>{},
           std::type_identity<openvdb::MaskGrid>{});
   if (!source)
-    throw Error(fmt::format("'{}': grid '{}' is not of the type it says", path, grid.name));
+    throw Error(fmt::format("'{}': grid '{}' is not of the type that it states", path, grid.name));
   return source;
 }
 
@@ -243,19 +245,20 @@ void check_transform(const std::string& path, const VdbGrid& grid) {
 }
 
 /// A file of a layout that only OpenVDB's own reader may know: it holds the grids whole.
-std::unique_ptr<VolumeSource> open_loaded(const std::string& file, const VolumeRequest& said) {
+std::unique_ptr<VolumeSource> open_loaded(const std::string& file, const VolumeRequest& request) {
   std::uint64_t memory = 0;
   const std::vector<VdbLoadedGrid> loaded =
       load_vdb_grids(file, [&](const VdbGrid& grid, std::uint64_t bytes) {
         memory += bytes;
-        check_vdb_memory(file, grid, memory, said.memory);
+        check_vdb_memory(file, grid, memory, request.memory);
       });
   std::vector<VdbGrid> grids;
   for (const VdbLoadedGrid& one : loaded) grids.push_back(one.description);
   name_vdb_grids(grids);
-  const VdbGrid& grid = choose_vdb_grid(file, grids, said.grid);
+  const VdbGrid& grid = choose_vdb_grid(file, grids, request.grid);
   check_transform(file, grid);
-  const Opening in{file, said, grid, loaded[static_cast<std::size_t>(&grid - grids.data())].grid};
+  const GridRequest in{file, request, grid,
+                       loaded[static_cast<std::size_t>(&grid - grids.data())].grid};
   return with_vdb_errors(file, grid.name, [&] {
     return open_by_type(file, grid, [&]<class Grid>(std::type_identity<Grid>) {
       return open_loaded_tree<Grid>(in, memory);
@@ -265,16 +268,16 @@ std::unique_ptr<VolumeSource> open_loaded(const std::string& file, const VolumeR
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> open_vdb(const std::string& file, const VolumeRequest& said) {
-  refuse_raw_description(file, "an OpenVDB file", said);
-  refuse_selection(file, said);
-  if (!read_vdb_layout(file).known()) return open_loaded(file, said);
+std::unique_ptr<VolumeSource> open_vdb(const std::string& file, const VolumeRequest& request) {
+  refuse_raw_description(file, "an OpenVDB file", request);
+  refuse_selection(file, request);
+  if (!read_vdb_layout(file).known()) return open_loaded(file, request);
   const std::vector<VdbGrid> grids = read_vdb_header(file);
-  const VdbGrid& grid = choose_vdb_grid(file, grids, said.grid);
+  const VdbGrid& grid = choose_vdb_grid(file, grids, request.grid);
   check_transform(file, grid);
   return with_vdb_errors(file, grid.name, [&] {
     VdbArchive archive(file);
-    const Opening in{file, said, grid, archive.read_grid(grids, grid)};
+    const GridRequest in{file, request, grid, archive.read_grid(grids, grid)};
     return open_by_type(file, grid, [&]<class Grid>(std::type_identity<Grid>) {
       return open_tree<Grid>(in, archive.stream());
     });

@@ -50,7 +50,7 @@ class FractionStream final : public ByteStream {
   }
 
   std::string name() const override { return numbers_->name(); }
-  std::uint64_t most_bytes() const override { return numbers_->most_bytes() / sizeof(float); }
+  std::uint64_t max_bytes() const override { return numbers_->max_bytes() / sizeof(float); }
   std::size_t memory() const override { return numbers_->memory(); }
 
  private:
@@ -201,7 +201,7 @@ class Parser {
       seen += split_words(lines_.next()).size();
   }
 
-  /// Each after its length: the highest two bits say how many more bytes that has.
+  /// Each after its length, whose highest two bits are the number of further bytes that it has.
   void skip_packed_strings(std::uint64_t count) {
     for (; count > 0; --count) {
       if (lines_.at_end()) header_error(path_, "FIELD: a text is missing");
@@ -258,12 +258,13 @@ class Parser {
 
 }  // namespace
 
-std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path, const VolumeRequest& said) {
-  refuse_raw_description(path, "a VTK file", said);
-  const Header header = Parser(path, said.selection).parse();
+std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path,
+                                              const VolumeRequest& request) {
+  refuse_raw_description(path, "a VTK file", request);
+  const Header header = Parser(path, request.selection).parse();
   const std::size_t sample = size_of(header.type);
   SampleLayout layout;
-  layout.info = describe_volume(path, header.view.extent, header.type, header.transform, said);
+  layout.info = describe_volume(path, header.view.extent, header.type, header.transform, request);
   layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
   layout.stride = header.view.stride;
   File file = open_input(path);

@@ -9,6 +9,7 @@ namespace isobrick {
 
 /// Opens a legacy VTK file (`.vtk`) of STRUCTURED_POINTS: the first of its point
 /// data, or cell data where it has no others, which must be SCALARS or a FIELD.
-std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path, const VolumeRequest& said);
+std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path,
+                                              const VolumeRequest& request);
 
 }  // namespace isobrick

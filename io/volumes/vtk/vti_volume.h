@@ -10,6 +10,6 @@ namespace isobrick {
 /// Opens a VTK image file (`.vti`): its array `array`, or its scalars where that
 /// is empty.
 std::unique_ptr<VolumeSource> open_vti(const std::string& path, const std::string& array,
-                                       const VolumeRequest& said);
+                                       const VolumeRequest& request);
 
 }  // namespace isobrick

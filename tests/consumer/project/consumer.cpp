@@ -38,7 +38,7 @@ int run(const std::filesystem::path& folder) {
   return report.triangles > 0 ? 0 : 1;
 }
 
-/// Opens a file that begins as those of a format do, and is none: the format's module says so.
+/// Opens a file that begins as those of a format do, and is none: the format's module refuses it.
 void load_reader(const std::filesystem::path& file, std::string_view begin) {
   std::ofstream(file, std::ios::binary) << begin << std::string(4096, '\0');
   try {

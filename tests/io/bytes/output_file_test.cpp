@@ -172,7 +172,7 @@ TEST(OutputFile, AppendsWhatWaitsInMemoryOrInAFile) {
 }
 
 TEST(OutputFile, KeepsNoLargeBufferForWhatIsInTheFile) {
-  // What is allocated, in bytes; a sanitizer's allocator says 0 throughout.
+  // What is allocated, in bytes; a sanitizer's allocator returns 0 throughout.
   const auto allocated = [] {
     const struct mallinfo2 info = ::mallinfo2();
     return info.uordblks + info.hblkhd;

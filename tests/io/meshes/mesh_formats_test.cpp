@@ -147,7 +147,7 @@ TEST(MeshFormats, AGlbIsInMetres) {
                   file = read_glb(dir.read("a.glb"), dir / ".");
     EXPECT_TRUE(contains(file.json, R"("extras":{"unit":"micrometer"})"));
     EXPECT_FALSE(contains(expected.json, "extras"));
-    // Vertices stay as they are; the node says how long their unit is.
+    // Vertices stay as they are; the node scales their unit.
     EXPECT_NEAR(file.step, quantize ? 1e-6 * expected.step : 1e-6, 1e-15);
     ASSERT_EQ(file.mesh.positions.size(), chunks.mesh.positions.size());
     for (std::size_t i = 0; i < file.mesh.positions.size(); ++i)

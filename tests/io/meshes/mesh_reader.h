@@ -8,7 +8,7 @@
 namespace isobrick {
 
 // Small readers of what the sinks write, independent of them. Each expects what
-// the format says and fails the test otherwise; none is meant for other files.
+// the format specifies and fails the test otherwise; none is meant for other files.
 
 TestMesh read_ply(const std::string& bytes);
 TestMesh read_obj(const std::string& text);

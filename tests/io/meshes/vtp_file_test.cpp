@@ -201,6 +201,8 @@ TEST(VtpFile, DamageIsSaid) {
       {"type=\"Float32\" Name=\"Points\"", "type=\"Float64\" Name=\"Points\""},
       {"<Points>", "<Dots>"},
       {"<VTKFile", "<!DOCTYPE a><VTKFile"},
+      {"header_type=\"UInt32\"", "header_type=\"UInt16\""},
+      {"version=\"1.0\" byte_order", "version=\"" + std::string(2 << 20, '1') + "\" byte_order"},
   };
   for (const Form form : {Form::ascii, Form::base64, Form::appended_raw, Form::appended_zlib})
     for (const auto& [from, to] : changes) {

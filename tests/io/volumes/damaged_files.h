@@ -18,12 +18,12 @@
 namespace isobrick {
 
 /// Opens a damaged file and reads of it what fits a small budget. It may be
-/// readable all the same; otherwise one line must say why and name the file.
+/// readable all the same; otherwise one line must have the reason and the file.
 inline void expect_read_or_refused(const std::string& path, const std::string& name,
-                                   const VolumeRequest& said = {}) {
+                                   const VolumeRequest& request = {}) {
   const std::clock_t start = std::clock();  // whatever else the machine does
   try {
-    const auto source = open_source(path, said);
+    const auto source = open_source(path, request);
     const Int3 e = source->info().extent;
     constexpr Index kMax = 1 << 22;
     if (e.x > kMax / e.y || e.x * e.y > kMax / e.z) return;  // a promise that takes long to break
@@ -39,27 +39,27 @@ inline void expect_read_or_refused(const std::string& path, const std::string& n
 /// `bytes` cut at, and changed in, every `step`-th place.
 inline void expect_damage_is_no_crash(const TempDir& dir, const std::string& name,
                                       const std::string& bytes, std::size_t step,
-                                      const VolumeRequest& said = {}) {
+                                      const VolumeRequest& request = {}) {
   const auto write = [&](const std::string& damaged) {
     std::filesystem::remove(dir / name);  // quicker than to replace its bytes
     return dir.write(name, damaged);
   };
   for (std::size_t at = 0; at < bytes.size(); at += step) {
-    expect_read_or_refused(write(bytes.substr(0, at)), name, said);
+    expect_read_or_refused(write(bytes.substr(0, at)), name, request);
     for (const int change : {0x01, 0x80, 0xff}) {
       std::string changed = bytes;
       changed[at] = static_cast<char>(changed[at] ^ change);
-      expect_read_or_refused(write(changed), name, said);
+      expect_read_or_refused(write(changed), name, request);
     }
     if (::testing::Test::HasFailure()) return;
   }
 }
 
-/// How many mutations of each file are tried: 150, or what ISOBRICK_MUTATIONS says, for a
+/// How many mutations of each file are tried: 150, or ISOBRICK_MUTATIONS, for a
 /// long run under sanitizers.
 inline int mutation_count() {
-  const char* said = std::getenv("ISOBRICK_MUTATIONS");
-  const int count = said != nullptr ? std::atoi(said) : 150;
+  const char* number = std::getenv("ISOBRICK_MUTATIONS");
+  const int count = number != nullptr ? std::atoi(number) : 150;
   EXPECT_GT(count, 0) << "ISOBRICK_MUTATIONS";
   return count;
 }
@@ -91,13 +91,13 @@ inline std::string mutate(std::string bytes, std::mt19937& random) {
 inline void expect_mutations_are_no_crash(const TempDir& dir, const std::string& name,
                                           const std::string& bytes) {
   std::mt19937 random(1);
-  VolumeRequest said;
-  said.memory = std::uint64_t{64} << 20;
+  VolumeRequest request;
+  request.memory = std::uint64_t{64} << 20;
   for (int i = 0; i < mutation_count() && !::testing::Test::HasFailure(); ++i) {
     SCOPED_TRACE(i);
     std::filesystem::remove(dir / name);
     // Some name another file in the folder.
-    expect_read_or_refused(dir.write(name, mutate(bytes, random)), dir / "", said);
+    expect_read_or_refused(dir.write(name, mutate(bytes, random)), dir / "", request);
   }
 }
 

@@ -13,25 +13,25 @@ namespace {
 using DataFile = TextVolume;
 
 TEST_F(DataFile, AWrongSizeNamesBothHalvesAndTypesThatFit) {
-  const auto told = [&](const char* name) {
+  const auto message_for = [&](const char* name) {
     return message_of<UsageError>([&] { open_source(dir / name, {}); });
   };
   const std::string header = nrrd("encoding: raw\nendian: little\n");
   dir.write("attached.nrrd", header + "\n" + whole(ScalarType::i16).substr(1));
-  const std::string attached = told("attached.nrrd");
+  const std::string attached = message_for("attached.nrrd");
   EXPECT_TRUE(contains(attached, "make ")) << attached;
   EXPECT_FALSE(contains(attached, "--offset")) << attached;
   dir.write("v.raw", whole(ScalarType::i16).substr(1));
   dir.write("v.nhdr", header + "data file: v.raw\n");
-  const std::string apart = told("v.nhdr");
+  const std::string apart = message_for("v.nhdr");
   EXPECT_TRUE(contains(apart, "v.raw' has 279 bytes")) << apart;
   EXPECT_TRUE(contains(apart, "v.nhdr' has them")) << apart;
   dir.write("v.raw", whole(ScalarType::i32));
-  EXPECT_TRUE(contains(told("v.nhdr"), "would fit the type u32 or i32 or f32"));
+  EXPECT_TRUE(contains(message_for("v.nhdr"), "would fit the type u32 or i32 or f32"));
 }
 
 TEST_F(DataFile, MissingAndShortDataNameTheHeaderToo) {
-  const auto told = [&](const char* name) {
+  const auto message_for = [&](const char* name) {
     return message_of<Error>([&] { open_and_read(name); });
   };
   const std::string meta =
@@ -40,12 +40,12 @@ TEST_F(DataFile, MissingAndShortDataNameTheHeaderToo) {
   dir.write("v.mhd", meta);
   dir.write("z.nhdr", nrrd("encoding: gzip\nendian: little\ndata file: v.gz\n"));
   for (const char* name : {"v.nhdr", "v.mhd", "z.nhdr"}) {
-    const std::string message = told(name);
+    const std::string message = message_for(name);
     EXPECT_TRUE(contains(message, "No such file")) << message;
     EXPECT_TRUE(contains(message, "the header '" + (dir / name) + "' needs it")) << message;
   }
   dir.write("v.gz", gzip(whole(ScalarType::i16).substr(1)));
-  EXPECT_TRUE(contains(told("z.nhdr"), "were expected by '" + (dir / "z.nhdr")));
+  EXPECT_TRUE(contains(message_for("z.nhdr"), "were expected by '" + (dir / "z.nhdr")));
 }
 
 TEST_F(DataFile, BytesAfterTheSamplesAreIgnoredWithANote) {
@@ -92,13 +92,14 @@ TEST_F(DataFile, BytesAfterTheSamplesAreIgnoredWithANote) {
   }
   dir.write("exact.nrrd", head + "\n" + samples);
   EXPECT_TRUE(open_source(dir / "exact.nrrd", {})->notes().empty());
-  // A note says that the file has more samples than the request describes.
-  VolumeRequest said;
-  said.extent = kExtent;
-  said.type = ScalarType::i16;
+  // A note reports that the file has more samples than the request describes.
+  VolumeRequest request;
+  request.extent = kExtent;
+  request.type = ScalarType::i16;
   dir.write("plain.raw", samples + "0123456789");
   for (const char* raw : {"plain.raw", "v.raw"})
-    EXPECT_TRUE(contains(message_of([&] { open_source(dir / raw, said); }), "--offset 10")) << raw;
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / raw, request); }), "--offset 10"))
+        << raw;
 }
 
 }  // namespace

@@ -149,11 +149,11 @@ TEST_F(Dicom, ADoseHasItsOffsetsAndItsScaling) {
 TEST_F(Dicom, FramesSayHowFarApartTheyLieOrTheCallerDoes) {
   const auto refused = [&](const std::string& file) {
     const std::string text = message_of<UsageError>([&] { open_source(file, {}); });
-    EXPECT_TRUE(contains(text, "does not say how far apart its 5 frames lie")) << text;
+    EXPECT_TRUE(contains(text, "does not state how far apart its 5 frames lie")) << text;
     EXPECT_TRUE(contains(text, "--spacing")) << text;
-    VolumeRequest said;
-    said.spacing = Vec3d{1, 2, 3};
-    EXPECT_EQ(open_source(file, said)->info().transform.spacing, (Vec3d{1, 2, 3}));
+    VolumeRequest request;
+    request.spacing = Vec3d{1, 2, 3};
+    EXPECT_EQ(open_source(file, request)->info().transform.spacing, (Vec3d{1, 2, 3}));
   };
   const auto bare = [](DcmDataset& data) { delete data.remove(DCM_SliceThickness); };
   refused(write("plain", 0, kExtent.z, EXS_LittleEndianExplicit, bare));
@@ -161,7 +161,7 @@ TEST_F(Dicom, FramesSayHowFarApartTheyLieOrTheCallerDoes) {
     bare(data);
     data.putAndInsertString(DCM_DoseGridScaling, "0.25");
   }));
-  // The thickness of a dose says nothing of its frames.
+  // The thickness of a dose is not the distance of its frames.
   refused(write("thick", 0, kExtent.z, EXS_LittleEndianExplicit,
                 [](DcmDataset& data) { data.putAndInsertString(DCM_Modality, "RTDOSE"); }));
   const auto between = open_source(write("between", 0, kExtent.z, EXS_LittleEndianExplicit,
@@ -186,9 +186,9 @@ TEST_F(Dicom, OfSlicesWithoutPositionsTheNumbersShowWhatIsMissing) {
   const std::string text = message_of<UsageError>([&] { open_source(dir / ".", {}); });
   EXPECT_TRUE(contains(text, "s2' and '")) << text;
   EXPECT_TRUE(contains(text, "s3', whose InstanceNumbers are 3 and 5")) << text;
-  VolumeRequest said;
-  said.spacing = Vec3d{1, 2, 3};
-  EXPECT_EQ(open_source(dir / ".", said)->info().extent, kExtent);
+  VolumeRequest request;
+  request.spacing = Vec3d{1, 2, 3};
+  EXPECT_EQ(open_source(dir / ".", request)->info().extent, kExtent);
   number("s3", 3, "4"), number("s4", 4, "5");
   EXPECT_EQ(open_source(dir / ".", {})->info().extent, kExtent);
 }

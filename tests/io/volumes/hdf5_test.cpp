@@ -61,11 +61,11 @@ TEST_F(Hdf5, AnyBoxOfPlainAndChunkedData) {
         "it has /v"));
 }
 
-/// Slabs, as a conversion asks for them, then a box across chunks.
+/// Slabs, as a conversion requests them, then a box across chunks.
 void expect_samples(const std::string& path, ScalarType type, int threads) {
-  VolumeRequest said;
-  said.threads = threads;
-  const auto source = open_source(path, said);
+  VolumeRequest request;
+  request.threads = threads;
+  const auto source = open_source(path, request);
   ASSERT_EQ(source->info().type, type);
   for (const Index planes : {1, 3, 5}) {
     Box3 box = kWhole;
@@ -169,7 +169,7 @@ void replace_labels(const std::string& path, const Set& set) {
   H5Fclose(file);
 }
 
-/// What sample_bytes() has, at the places that labels say, in channel 1 of 2 where there are any;
+/// The samples of sample_bytes() in the order of the labels, in channel 1 of 2 where there are any;
 /// the sizes of its elements are 1, 2, … in the order x, y, z.
 std::string write_labelled(const std::string& path, const std::vector<const char*>& labels,
                            hsize_t chunk) {
@@ -223,9 +223,9 @@ TEST_F(Hdf5, LabelsSayWhichDimensionIsWhich) {
         Labels{"c", "x", "y", "z"}, Labels{"x", "y", "z", "c"}, Labels{"z", "x", "c", "y"}})
     for (const hsize_t chunk : {0, 4}) {
       const auto path = write_labelled(dir / "v.h5", labels, chunk);
-      VolumeRequest said;
-      if (labels.size() > 3) said.selection.channel = 1;
-      const auto source = open_source(path, said);
+      VolumeRequest request;
+      if (labels.size() > 3) request.selection.channel = 1;
+      const auto source = open_source(path, request);
       EXPECT_EQ(source->info().extent, kExtent);
       EXPECT_EQ(source->info().transform.spacing, (Vec3d{1, 2, 3}));
       EXPECT_EQ(read_box(*source, kWhole), sample_bytes(ScalarType::i16, kWhole, kExtent));
@@ -249,9 +249,9 @@ TEST_F(Hdf5, LabelsMayBeStringsOfOneLength) {
       replace_labels(path, [&](hid_t data) {
         set_fixed_labels(data, labels, static_cast<std::size_t>(size), padding);
       });
-      VolumeRequest said;
-      if (labels.size() > 3) said.selection.channel = 1;
-      const auto source = open_source(path, said);
+      VolumeRequest request;
+      if (labels.size() > 3) request.selection.channel = 1;
+      const auto source = open_source(path, request);
       EXPECT_EQ(source->info().extent, kExtent);
       EXPECT_EQ(read_box(*source, kWhole), sample_bytes(ScalarType::i16, kWhole, kExtent));
     }
@@ -270,7 +270,7 @@ TEST_F(Hdf5, LabelsOfSomeDimensionsThatContradictTheirPlaceAreRefused) {
     EXPECT_TRUE(contains(message, "DIMENSION_LABELS name a dimension ")) << message;
     EXPECT_TRUE(contains(message, "v.h5")) << message;
   }
-  // Those that agree, or say nothing of ours, leave the order as it is.
+  // Labels that agree, or are of other axes, leave the order as it is.
   for (const Labels& labels :
        {Labels{"z", "", ""}, Labels{"", "y", "x"}, Labels{"", "", ""}, Labels{"row", "y", "x"}}) {
     label(labels);

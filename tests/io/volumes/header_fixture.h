@@ -26,7 +26,7 @@ class HeaderTest : public ::testing::Test {
   TextHeader parse(std::string_view text) const {
     return parser_(dir.write(name_, text), selection);
   }
-  /// What is said when a header is refused, which names the file.
+  /// The message that refuses a header; it names the file.
   std::string refuse(std::string_view text) const {
     const auto message = message_of([&] { parse(text); });
     EXPECT_TRUE(contains(message, name_)) << message;

@@ -83,11 +83,12 @@ class Header {
 
 class Nifti : public ::testing::Test {
  protected:
-  std::unique_ptr<VolumeSource> open(const std::string& bytes, const VolumeRequest& said = {}) {
-    return open_source(dir.write("v.nii", bytes), said);
+  std::unique_ptr<VolumeSource> open(const std::string& bytes, const VolumeRequest& request = {}) {
+    return open_source(dir.write("v.nii", bytes), request);
   }
-  std::string refuse(const Header& header, const VolumeRequest& said = {}) {
-    const auto message = message_of([&] { open(header.bytes() + std::string(560, '\0'), said); });
+  std::string refuse(const Header& header, const VolumeRequest& request = {}) {
+    const auto message =
+        message_of([&] { open(header.bytes() + std::string(560, '\0'), request); });
     EXPECT_TRUE(contains(message, "v.nii")) << message;
     return message;
   }
@@ -164,14 +165,15 @@ TEST_F(Nifti, ImagesOfNoPairAreRaw) {
   dir.write("other.img", samples());
   dir.write("other.hdr", "ENVI\n");
   EXPECT_EQ(read_box(*open_source(dir / "other.img", raw), kWhole), samples());
-  const auto told = [&](const char* name) {
+  const auto message_for = [&](const char* name) {
     return message_of<UsageError>([&] { open_source(dir / name, {}); });
   };
-  EXPECT_TRUE(contains(told("alone.img"), "needs its header '" + (dir / "alone.hdr")));
-  EXPECT_TRUE(contains(told("other.img"), "other.hdr' beside it is not the header of a NIfTI"));
+  EXPECT_TRUE(contains(message_for("alone.img"), "needs its header '" + (dir / "alone.hdr")));
+  EXPECT_TRUE(
+      contains(message_for("other.img"), "other.hdr' beside it is not the header of a NIfTI"));
   dir.write("old.img", samples());
   dir.write("old.hdr", Header(1).text(344, {"\0\0\0\0", 4}).bytes());
-  const std::string analyze = told("old.img");
+  const std::string analyze = message_for("old.img");
   EXPECT_TRUE(contains(analyze, "old.img' has the header '" + (dir / "old.hdr"))) << analyze;
   EXPECT_TRUE(contains(analyze, "ANALYZE")) << analyze;
   EXPECT_EQ(read_box(*open_source(dir / "old.img", raw), kWhole), samples());
@@ -206,9 +208,9 @@ TEST_F(Nifti, TimesAndChannels) {
   for (const bool packed : {false, true})
     for (Index t = 0; t < 3; ++t)
       for (Index c = 0; c < 2; ++c) {
-        VolumeRequest said;
-        said.selection = {c, t};
-        const auto source = open(packed ? gzip(bytes) : bytes, said);
+        VolumeRequest request;
+        request.selection = {c, t};
+        const auto source = open(packed ? gzip(bytes) : bytes, request);
         EXPECT_EQ(read_box(*source, {{0, 0, 0}, {2, 2, 2}}),
                   all.substr(static_cast<std::size_t>(8 * (t + 3 * c)), 8));
       }
@@ -244,9 +246,9 @@ TEST_F(Nifti, RefusesWhatIsNotSupportedByName) {
   EXPECT_TRUE(contains(refuse(Header(1).type(1024)), "64-bit"));
   EXPECT_TRUE(contains(refuse(Header(1).type(77)), "unknown datatype 77"));
   EXPECT_TRUE(contains(refuse(Header(1).text(344, {"\0\0\0\0", 4})), "ANALYZE"));
-  VolumeRequest said;
-  said.extent = kExtent;
-  EXPECT_TRUE(contains(refuse(Header(1), said), "--dims"));
+  VolumeRequest request;
+  request.extent = kExtent;
+  EXPECT_TRUE(contains(refuse(Header(1), request), "--dims"));
 }
 
 TEST_F(Nifti, HostileHeaders) {

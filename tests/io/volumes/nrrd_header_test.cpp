@@ -134,9 +134,9 @@ TEST_F(NrrdHeader, AMissingByteOrderMustBeSaid) {
   dir.write("v.raw", std::string(280, 'x'));
   dir.write("v.nhdr", with("endian: big\n", ""));
   EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nhdr", {}); }), "endian"));
-  VolumeRequest said;
-  said.order = ByteOrder::little;
-  EXPECT_NO_THROW(open_source(dir / "v.nhdr", said));
+  VolumeRequest request;
+  request.order = ByteOrder::little;
+  EXPECT_NO_THROW(open_source(dir / "v.nhdr", request));
 }
 
 TEST_F(NrrdHeader, AMissingDataFileIsNamed) {

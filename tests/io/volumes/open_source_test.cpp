@@ -18,10 +18,10 @@ std::string whole(ScalarType type, bool swapped = false) {
 }
 
 VolumeRequest describe(Int3 extent, ScalarType type) {
-  VolumeRequest said;
-  said.extent = extent;
-  said.type = type;
-  return said;
+  VolumeRequest request;
+  request.extent = extent;
+  request.type = type;
+  return request;
 }
 
 TEST(OpenSource, AllTypesAndBothByteOrders) {
@@ -29,9 +29,9 @@ TEST(OpenSource, AllTypesAndBothByteOrders) {
   for (const ScalarType type : kScalarTypes)
     for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
       const auto path = dir.write("v.raw", whole(type, order == ByteOrder::big));
-      VolumeRequest said = describe(kExtent, type);
-      said.order = order;
-      const auto source = open_source(path, said);
+      VolumeRequest request = describe(kExtent, type);
+      request.order = order;
+      const auto source = open_source(path, request);
       EXPECT_TRUE(source->random_access());
       EXPECT_EQ(source->info().extent, kExtent);
       EXPECT_EQ(source->info().type, type);
@@ -80,9 +80,9 @@ TEST(OpenSource, ThreadsReadAtOnce) {
 TEST(OpenSource, SkipsAnOffset) {
   const TempDir dir;
   const auto path = dir.write("v.raw", "12345" + whole(ScalarType::f32));
-  VolumeRequest said = describe(kExtent, ScalarType::f32);
-  said.offset = 5;
-  EXPECT_EQ(read_box(*open_source(path, said), {{0, 0, 0}, kExtent}), whole(ScalarType::f32));
+  VolumeRequest request = describe(kExtent, ScalarType::f32);
+  request.offset = 5;
+  EXPECT_EQ(read_box(*open_source(path, request), {{0, 0, 0}, kExtent}), whole(ScalarType::f32));
 }
 
 TEST(OpenSource, SizeErrorsNameBothNumbersAndHelp) {
@@ -96,11 +96,11 @@ TEST(OpenSource, SizeErrorsNameBothNumbersAndHelp) {
   EXPECT_TRUE(contains(message, "--offset 70")) << message;
   message = message_of([&] { open_source(path, describe({100, 100, 100}, ScalarType::u16)); });
   EXPECT_TRUE(contains(message, "280") && contains(message, "2000000")) << message;
-  VolumeRequest said = describe(kExtent, ScalarType::u16);
-  said.offset = ~std::uint64_t{0};
-  message_of([&] { open_source(path, said); });
-  said.offset = 1;
-  message_of([&] { open_source(path, said); });
+  VolumeRequest request = describe(kExtent, ScalarType::u16);
+  request.offset = ~std::uint64_t{0};
+  message_of([&] { open_source(path, request); });
+  request.offset = 1;
+  message_of([&] { open_source(path, request); });
 }
 
 TEST(OpenSource, RefusesExtentsThatMakeNoSense) {
@@ -137,11 +137,11 @@ TEST(OpenSource, NanoVdbIsRefusedWithWhatToDo) {
 
 TEST(OpenSource, RefusesWhatIsNoFile) {
   const TempDir dir;
-  const VolumeRequest said = describe(kExtent, ScalarType::u8);
-  message_of<Error>([&] { open_source(dir / "missing.raw", said); });
-  EXPECT_TRUE(contains(message_of([&] { open_source(dir / ".", said); }), "directory"));
+  const VolumeRequest request = describe(kExtent, ScalarType::u8);
+  message_of<Error>([&] { open_source(dir / "missing.raw", request); });
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / ".", request); }), "directory"));
   ASSERT_EQ(::mkfifo((dir / "pipe").c_str(), 0600), 0);
-  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "pipe", said); }), "regular"));
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "pipe", request); }), "regular"));
 }
 
 TEST(OpenSource, NamesTheFileThatShrank) {
@@ -165,13 +165,13 @@ TEST(OpenSource, SaidBeforeHeaderBeforeName) {
   EXPECT_EQ(source->info().type, ScalarType::u16);
   EXPECT_EQ(source->info().transform.spacing, (Vec3d{1, 2, 3}));
 
-  VolumeRequest said;
-  said.type = ScalarType::i16;
-  said.spacing = Vec3d{4, 4, 4};
-  said.origin = Vec3d{1, 0, 0};
-  said.unit = "um";
-  said.order = ByteOrder::big;
-  source = open_source(path, said);
+  VolumeRequest request;
+  request.type = ScalarType::i16;
+  request.spacing = Vec3d{4, 4, 4};
+  request.origin = Vec3d{1, 0, 0};
+  request.unit = "um";
+  request.order = ByteOrder::big;
+  source = open_source(path, request);
   EXPECT_EQ(source->info().type, ScalarType::i16);
   EXPECT_EQ(source->info().extent, kExtent);
   EXPECT_EQ(source->info().transform.spacing, (Vec3d{4, 4, 4}));
@@ -179,8 +179,8 @@ TEST(OpenSource, SaidBeforeHeaderBeforeName) {
   EXPECT_EQ(source->info().transform.unit, "micrometer");
   EXPECT_NE(read_box(*source, {{0, 0, 0}, kExtent}), whole(ScalarType::u16));
 
-  said.unit = "furlong";
-  const auto message = message_of<UsageError>([&] { open_source(path, said); });
+  request.unit = "furlong";
+  const auto message = message_of<UsageError>([&] { open_source(path, request); });
   EXPECT_TRUE(contains(message, "furlong") && contains(message, "millimeter")) << message;
 }
 
@@ -211,9 +211,9 @@ TEST(OpenSource, RawSamplesMayBeginLikeAnotherFormat) {
 TEST(OpenSource, SpacingMustBePositive) {
   const TempDir dir;
   const auto path = dir.write("v_7x5x4_u8.raw", whole(ScalarType::u8));
-  VolumeRequest said;
-  said.spacing = Vec3d{1, 0, 1};
-  message_of([&] { open_source(path, said); });
+  VolumeRequest request;
+  request.spacing = Vec3d{1, 0, 1};
+  message_of([&] { open_source(path, request); });
 }
 
 }  // namespace

@@ -48,10 +48,10 @@ class StdinPipe {
 };
 
 VolumeRequest said_type(ScalarType type) {
-  VolumeRequest said;
-  said.extent = kExtent;
-  said.type = type;
-  return said;
+  VolumeRequest request;
+  request.extent = kExtent;
+  request.type = type;
+  return request;
 }
 
 TEST(StdinSource, PlanesInOrder) {
@@ -68,10 +68,10 @@ TEST(StdinSource, PlanesInOrder) {
 TEST(StdinSource, OffsetByteOrderAndSkippedPlanes) {
   const StdinPipe pipe(std::string(100000, '!') +
                        sample_bytes(ScalarType::u16, kWhole, kExtent, true));
-  VolumeRequest said = said_type(ScalarType::u16);
-  said.offset = 100000;
-  said.order = ByteOrder::big;
-  const auto source = open_source("-", said);
+  VolumeRequest request = said_type(ScalarType::u16);
+  request.offset = 100000;
+  request.order = ByteOrder::big;
+  const auto source = open_source("-", request);
   const Box3 box{{0, 0, 20}, kExtent};
   EXPECT_EQ(read_box(*source, box), sample_bytes(ScalarType::u16, box, kExtent));
 }
@@ -99,8 +99,8 @@ TEST(StdinSource, MuchTooLongIsNotReadToItsEnd) {
 
 TEST(StdinSource, ExtentAndTypeMustBeSaid) {
   const StdinPipe pipe("");
-  const auto ends_with = [](const VolumeRequest& said, const char* end) {
-    const auto message = message_of([&] { open_source("-", said); });
+  const auto ends_with = [](const VolumeRequest& request, const char* end) {
+    const auto message = message_of([&] { open_source("-", request); });
     EXPECT_TRUE(contains(message, "standard input") && message.ends_with(end)) << message;
   };
   ends_with({}, "add --dims X,Y,Z --type TYPE");

@@ -11,7 +11,7 @@
 
 namespace isobrick {
 
-/// A sample that tells where it is, within every type.
+/// A sample whose value is its place, within every type.
 template <class T>
 T sample_at(Int3 p, Int3 extent) {
   const auto i = static_cast<std::uint64_t>(linear_index(p, extent)) * 2654435761u;

@@ -32,8 +32,8 @@ inline std::string read_all(VolumeSource& source) {
 
 class TextVolume : public ::testing::Test {
  protected:
-  std::string open_and_read(const std::string& name, const VolumeRequest& said = {}) const {
-    return read_all(*open_source(dir / name, said));
+  std::string open_and_read(const std::string& name, const VolumeRequest& request = {}) const {
+    return read_all(*open_source(dir / name, request));
   }
   void expect_whole(const std::string& name) const {
     EXPECT_EQ(open_and_read(name), whole(ScalarType::i16)) << name;

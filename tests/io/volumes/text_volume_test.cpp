@@ -8,7 +8,7 @@
 #include "tests/io/bytes/packed.h"
 #include "text_volume.h"
 
-// NRRD and MetaImage files with everything that their headers may say of samples.
+// NRRD and MetaImage files with everything that their headers may have.
 namespace isobrick {
 namespace {
 
@@ -172,28 +172,28 @@ TEST_F(TextVolume, ChannelsAndTimes) {
   for (const char* name : {"raw.nrrd", "gzip.nrrd", "v.mha"}) {
     for (std::size_t c = 0; c < 3; ++c)
       for (std::size_t t = 0; t < 2; ++t) {
-        VolumeRequest said;
-        said.selection = {static_cast<Index>(c), static_cast<Index>(t)};
-        EXPECT_EQ(open_and_read(name, said), volumes[c][t]) << name;
-        EXPECT_EQ(open_source(dir / name, said)->info().extent, e);
+        VolumeRequest request;
+        request.selection = {static_cast<Index>(c), static_cast<Index>(t)};
+        EXPECT_EQ(open_and_read(name, request), volumes[c][t]) << name;
+        EXPECT_EQ(open_source(dir / name, request)->info().extent, e);
       }
-    VolumeRequest said;
-    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, said); }),
+    VolumeRequest request;
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, request); }),
                          "3 channels: choose one with --channel 0 … 2"));
-    said.selection.channel = 3;
-    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, said); }), "--channel 3"));
-    said.selection.channel = 1;
-    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, said); }),
+    request.selection.channel = 3;
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, request); }), "--channel 3"));
+    request.selection.channel = 1;
+    EXPECT_TRUE(contains(message_of([&] { open_source(dir / name, request); }),
                          "2 times: choose one with --time 0 … 1"));
   }
-  VolumeRequest said;
-  said.selection.time = 1;
+  VolumeRequest request;
+  request.selection.time = 1;
   dir.write("v.nrrd", nrrd("encoding: raw\nendian: little\n\n") + whole(ScalarType::i16));
-  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nrrd", said); }), "1 time:"));
-  // Without kinds the request itself says which axis is not space.
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nrrd", request); }), "1 time:"));
+  // Without kinds the request itself decides which axis is not space.
   dir.write("w.nrrd", "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 2 2 2\nencoding: raw\n\n" +
                           all.substr(0, 24));
-  EXPECT_EQ(open_and_read("w.nrrd", said), all.substr(12, 12));
+  EXPECT_EQ(open_and_read("w.nrrd", request), all.substr(12, 12));
 }
 
 TEST_F(TextVolume, MetaImageLocalPackedAndListed) {
@@ -261,24 +261,24 @@ TEST_F(TextVolume, ABombIsNotUnpacked) {
 
 TEST_F(TextVolume, WhatTheFileSaysItselfIsNotSaidAgain) {
   dir.write("v.nrrd", nrrd("encoding: gzip\nendian: little\n\n") + gzip(whole(ScalarType::i16)));
-  VolumeRequest said;
-  said.type = ScalarType::u16;
-  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nrrd", said); }), "--type"));
-  said.type.reset();
+  VolumeRequest request;
+  request.type = ScalarType::u16;
+  EXPECT_TRUE(contains(message_of([&] { open_source(dir / "v.nrrd", request); }), "--type"));
+  request.type.reset();
   const std::string head = nrrd("encoding: raw\nendian: little\n");
   dir.write("v.raw", whole(ScalarType::i16) + "!!");
   dir.write("apart.nhdr", head + "data file: v.raw\n");
   dir.write("raw.nrrd", head + "\n" + whole(ScalarType::i16) + "!!");
   dir.write("v.mhd",
             "NDims = 3\nDimSize = 7 5 4\nElementType = MET_SHORT\nElementDataFile = v.raw\n");
-  said.offset = 2;
+  request.offset = 2;
   for (const char* name : {"v.nrrd", "apart.nhdr", "raw.nrrd", "v.mhd"})
-    EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(dir / name, said); }),
+    EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(dir / name, request); }),
                          "leave --offset out"))
         << name;
-  said.offset.reset();
-  said.spacing = Vec3d{1, 2, 3};
-  EXPECT_EQ(open_source(dir / "v.nrrd", said)->info().transform.spacing, (Vec3d{1, 2, 3}));
+  request.offset.reset();
+  request.spacing = Vec3d{1, 2, 3};
+  EXPECT_EQ(open_source(dir / "v.nrrd", request)->info().transform.spacing, (Vec3d{1, 2, 3}));
 }
 
 TEST_F(TextVolume, AxesThatFewDigitsLeftAskewAreSquare) {

@@ -79,8 +79,8 @@ class Vdb : public ::testing::Test {
   /// Every voxel of the box of active ones against OpenVDB's accessor.
   template <class Out, class Grid>
   void expect_same(const Grid& grid, const std::string& path,
-                   const VolumeRequest& said = {}) const {
-    const auto source = open_source(path, said);
+                   const VolumeRequest& request = {}) const {
+    const auto source = open_source(path, request);
     ASSERT_EQ(source->info().type, scalar_type_of<Out>);
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
     const Int3 extent = source->info().extent;

@@ -79,13 +79,13 @@ TEST_F(VdbLayouts, StreamsAreReadByOpenVdb) {
   const std::string path = stream({f, d, vectors, shared});
   EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, {}); }),
                        "f (float, level set); d (double); v (vec3s); shared (float"));
-  VolumeRequest said;
+  VolumeRequest request;
   for (const char* name : {"f", "shared"}) {
-    said.grid = name;
-    expect_same<float>(*f, path, said);
+    request.grid = name;
+    expect_same<float>(*f, path, request);
   }
-  said.grid = "f";
-  const VolumeInfo info = open_source(path, said)->info();
+  request.grid = "f";
+  const VolumeInfo info = open_source(path, request)->info();
   EXPECT_EQ(info.grid_class, "level set");
   EXPECT_EQ(info.grid_name, "f");
   EXPECT_EQ(info.transform.unit, "millimeter");
@@ -101,11 +101,11 @@ TEST_F(VdbLayouts, WhatOpenVdbReadsCountsInTheBudget) {
   const auto source = open_source(path, {});
   EXPECT_GT(source->memory(), std::size_t{512} * 4096);
   EXPECT_GE(source->memory() * 11 / 10, grid->memUsage());
-  VolumeRequest said;
-  said.memory = source->memory() - 1;
-  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, said); }), "--memory"));
-  said.memory = source->memory();
-  EXPECT_EQ(open_source(path, said)->info().extent, (Int3{511 * 8 + 1, 1, 1}));
+  VolumeRequest request;
+  request.memory = source->memory() - 1;
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, request); }), "--memory"));
+  request.memory = source->memory();
+  EXPECT_EQ(open_source(path, request)->info().extent, (Int3{511 * 8 + 1, 1, 1}));
 }
 
 }  // namespace

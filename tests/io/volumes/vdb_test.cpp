@@ -71,21 +71,21 @@ TEST_F(Vdb, ChoosesAmongSeveral) {
   const std::string list = message_of<UsageError>([&] { open_source(path, {}); });
   for (const char* part : {"a (float, level set)", "b (float", "c (vec3s", "--grid"})
     EXPECT_TRUE(contains(list, part)) << list;
-  VolumeRequest said;
-  said.grid = "a";
-  expect_same<float>(*a, path, said);
-  EXPECT_EQ(open_source(path, said)->info().grid_class, "level set");
-  said.grid = "b";
-  expect_same<float>(*b, path, said);
-  EXPECT_EQ(open_source(path, said)->info().fill_value, 1);
-  said.grid = "shared";
-  expect_same<float>(*a, path, said);
-  said.grid = "c";
-  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, said); }), "vec3s"));
-  said.grid = "d";
-  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, said); }), "'d'"));
+  VolumeRequest request;
+  request.grid = "a";
+  expect_same<float>(*a, path, request);
+  EXPECT_EQ(open_source(path, request)->info().grid_class, "level set");
+  request.grid = "b";
+  expect_same<float>(*b, path, request);
+  EXPECT_EQ(open_source(path, request)->info().fill_value, 1);
+  request.grid = "shared";
+  expect_same<float>(*a, path, request);
+  request.grid = "c";
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, request); }), "vec3s"));
+  request.grid = "d";
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, request); }), "'d'"));
   EXPECT_TRUE(contains(
-      message_of<UsageError>([&] { open_source(dir.write("r_1x1x1_uint8.raw", "x"), said); }),
+      message_of<UsageError>([&] { open_source(dir.write("r_1x1x1_uint8.raw", "x"), request); }),
       "--grid"));
   EXPECT_EQ(open_source(write({a, c}), {})->info().grid_class, "level set");
 }
@@ -177,9 +177,9 @@ TEST_F(Vdb, DamagedValuesAreNamedWhenTheyAreRead) {
 
 TEST_F(Vdb, RefusesWhatDoesNotFit) {
   const std::string path = write({make_grid<openvdb::FloatGrid>(0)});
-  VolumeRequest said;
-  said.memory = 1000;
-  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, said); }), "--memory"));
+  VolumeRequest request;
+  request.memory = 1000;
+  EXPECT_TRUE(contains(message_of<UsageError>([&] { open_source(path, request); }), "--memory"));
 }
 
 TEST_F(Vdb, WritesWhatItReads) {

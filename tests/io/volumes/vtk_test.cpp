@@ -6,6 +6,7 @@
 #include <isobrick/open_source.h>
 #include "damaged_files.h"
 #include "test_samples.h"
+#include "tests/io/bytes/base64_text.h"
 #include "tests/io/bytes/packed.h"
 #include "tests/io/bytes/temp_dir.h"
 
@@ -14,19 +15,6 @@ namespace {
 
 constexpr Int3 kExtent{7, 5, 4};
 constexpr Box3 kWhole{{0, 0, 0}, kExtent};
-
-std::string base64(std::string_view bytes) {
-  constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t j = 0; j < 3; ++j)
-      bits = bits << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0u);
-    for (std::size_t j = 0; j < 4; ++j)
-      text += i + j < bytes.size() + 1 ? digits[bits >> (18 - 6 * j) & 63] : '=';
-  }
-  return text;
-}
 
 std::string number(std::uint32_t value) {
   std::string bytes(4, '\0');
@@ -68,8 +56,8 @@ struct Parts {
 
 class Vtk : public ::testing::Test {
  protected:
-  std::unique_ptr<VolumeSource> open(const std::string& bytes, const VolumeRequest& said = {}) {
-    return open_source(dir.write("v.vtx", bytes), said);  // known by its content alone
+  std::unique_ptr<VolumeSource> open(const std::string& bytes, const VolumeRequest& request = {}) {
+    return open_source(dir.write("v.vtx", bytes), request);  // known by its content alone
   }
   /// Opens and reads, which must fail with one line that names the file.
   std::string refuse(const std::string& bytes) {
@@ -132,7 +120,7 @@ TEST_F(VtkXml, ReadsPlainSamples) {
   EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
 }
 
-// VTK's writer repeats the whole extent in each piece that it is asked for.
+// VTK's writer repeats the whole extent in each requested piece.
 TEST_F(VtkXml, OfInlinePiecesTheFirstIsReadIfItIsTheWhole) {
   const auto with_two_pieces = [](std::string text) {
     const std::size_t begin = text.find("<Piece"), end = text.find("</ImageData>");

@@ -18,7 +18,7 @@ except ImportError as error:
 
 
 def integer_type(data, stored, scales):
-    """The least type that holds all that the bits in use can say."""
+    """The smallest type that holds all values of the bits in use."""
     bits, signed = data.BitsStored, data.PixelRepresentation == 1
     ends = (-2 ** (bits - 1), 2 ** (bits - 1) - 1) if signed else (0, 2 ** bits - 1)
     real = [end * slope + inter for end in ends for slope, inter in scales]

@@ -109,7 +109,7 @@ def check(state):
                 print(f"{name}: not checked, no library")
                 break
             check_mesh(state, f"{kind} {name}", state.folder / name)
-    # Said on the command line, for a file that does not say it.
+    # Given on the command line, for a file that lacks it.
     plain = numpy.diag([*SPACING, 1.0])
     plain[:3, 3] = CENTRE - SPACING * (shape[::-1] - 1) / 2
     (state.folder / "v.raw").write_bytes(ball(shape, plain).tobytes())

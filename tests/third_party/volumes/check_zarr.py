@@ -116,8 +116,8 @@ def check_wide_types(folder):
     data = numpy.zeros((5, 6, 7), "<u8")
     data[4, 5, 6] = 2**53 + 1
     write_array(path, data)
-    said = run("export", path, folder / "no.raw", expect=1).stderr
-    check("9007199254740993" in said and said.count("\n") == 1, f"large: {said}")
+    errors = run("export", path, folder / "no.raw", expect=1).stderr
+    check("9007199254740993" in errors and errors.count("\n") == 1, f"large: {errors}")
 
 
 def check_compressors(folder):
@@ -144,7 +144,7 @@ def check_fill_values(folder):
         data = samples((20, 33, 41), dtype)
         path = folder / f"fill_{dtype[1:]}_{fill}.zarr"
         array = write_array(path, data, fill_value=fill)
-        # Two chunks are lost, which is how Zarr says that nothing was written there.
+        # Two chunks are lost, which in Zarr means that nothing was written there.
         (path / "1.1.1").unlink()
         (path / "0.0.0").unlink()
         # Zarr-Python leaves what it does not know as it finds it in memory.
@@ -165,15 +165,15 @@ def check_channels_and_times(folder):
                     chunks=chunks)
         for time, channel in itertools.product(range(2), range(3)):
             expect_samples(folder, path, data[time, channel], "--time", time, "--channel", channel)
-        said = run("export", path, folder / "no.raw", expect=2).stderr
-        check("2 times" in said and "--time" in said, f"ambiguous: {said}")
+        errors = run("export", path, folder / "no.raw", expect=2).stderr
+        check("2 times" in errors and "--time" in errors, f"ambiguous: {errors}")
         listed = json.loads(run("info", path, "--json").stdout)
         check([(a["name"], a["count"], a["options"]) for a in listed["axes"]]
               == [("t", 2, ["--time"]), ("c", 3, ["--channel"])], f"listed: {listed}")
         check(listed["extent"] == [41, 33, 19] and len(listed["levels"]) == 2, f"listed: {listed}")
         check("3 volumes: --channel 0 … 2" in run("info", path, "--time", 0).stdout, "listed")
-        said = run("info", path, "--time", 1, "--channel", 3, expect=2).stderr
-        check("--channel 3 is not there" in said, f"not there: {said}")
+        errors = run("info", path, "--time", 1, "--channel", 3, expect=2).stderr
+        check("--channel 3 is not there" in errors, f"not there: {errors}")
         check_in_place(folder, path, data[1, 2], "--time", 1, "--channel", 2)
         # Each volume has ranges of its own.
         check_in_place(folder, path, data[0, 1], "--time", 0, "--channel", 1)
@@ -184,8 +184,8 @@ def check_channels_and_times(folder):
     write_array(four, data[0], chunks=(2, 8, 16, 20))
     expect_samples(folder, four, data[0, 1], "--channel", 1)
     expect_samples(folder, four, data[0, 2], "--time", 2)
-    said = run("export", four, folder / "no.raw", expect=2).stderr
-    check("choose one" in said, f"ambiguous: {said}")
+    errors = run("export", four, folder / "no.raw", expect=2).stderr
+    check("choose one" in errors, f"ambiguous: {errors}")
     check("--channel or --time 0 … 2" in run("info", four).stdout, "a fourth axis is listed")
 
 
@@ -262,8 +262,8 @@ def check_refusals(folder):
             meta = json.loads((path / ".zarray").read_text())
             meta.update(change)
             (path / ".zarray").write_text(json.dumps(meta))
-        said = run("info", path, expect=1).stderr
-        check(part in said and said.count("\n") == 1, f"{part!r} is not in {said!r}")
+        errors = run("info", path, expect=1).stderr
+        check(part in errors and errors.count("\n") == 1, f"{part!r} is not in {errors!r}")
         shutil.rmtree(path)
 
     refused("order 'F'", order="F")
@@ -277,11 +277,11 @@ def check_refusals(folder):
     refused("dimensions", {"shape": [4, 5], "chunks": [4, 5]})
     refused("zarr_format", {"zarr_format": 7})
     zarr.open_group(str(path), mode="w", zarr_version=2)
-    said = run("info", path, expect=1).stderr
-    check("no image" in said, said)
+    errors = run("info", path, expect=1).stderr
+    check("no image" in errors, errors)
     zarr.open_group(str(path), mode="a").attrs["multiscales"] = [{"version": "0.2"}]
-    said = run("info", path, expect=1).stderr
-    check("0.2" in said, said)
+    errors = run("info", path, expect=1).stderr
+    check("0.2" in errors, errors)
 
 
 def check_damage(folder):

@@ -85,7 +85,7 @@ def affine_of(info):
 
 
 def pattern(shape, dtype):
-    """Samples [z, y, x] that tell where they are."""
+    """Samples [z, y, x] whose values are their places."""
     count = numpy.arange(numpy.prod(shape), dtype=numpy.uint64) * 2654435761
     kind = numpy.dtype(dtype)
     if kind.kind == "f":

@@ -1,4 +1,4 @@
-#include "stream/brick_check.h"
+#include "stream/brick_reader.h"
 
 #include <fmt/format.h>
 
@@ -75,13 +75,13 @@ ValueRange<double> range_of_fast(const T* samples, Int3 brick, Int3 extent) {
 
 }  // namespace
 
-BrickCheck::BrickCheck(const StoreReader& store, int level)
+BrickReader::BrickReader(const StoreReader& store, int level)
     : store_(store),
       level_(level),
       lattice_(store.info().levels.at(static_cast<std::size_t>(level)).lattice),
       tables_(kKept) {}
 
-ValueRange<double> BrickCheck::stored_range(Int3 brick) const {
+ValueRange<double> BrickReader::stored_range(Int3 brick) const {
   constexpr Index n = StoreReader::kRangeChunk;
   const Int3 chunk{brick.x / n, brick.y / n, brick.z / n};
   const Int3 chunks = ceil_div(lattice_.bricks(), {n, n, n});
@@ -95,7 +95,18 @@ ValueRange<double> BrickCheck::stored_range(Int3 brick) const {
   return table->at(brick);
 }
 
-void BrickCheck::check(Int3 brick, const std::byte* samples) const {
+bool BrickReader::read(Int3 brick, std::byte* out) const {
+  const bool present = store_.read_brick(level_, brick, out);
+  check(brick, present ? out : nullptr);
+  return present;
+}
+
+void BrickReader::will_need(std::span<const Int3> bricks) const {
+  for (const Int3 b : bricks) store_.will_need(level_, b);
+}
+
+/// An absent brick has no `samples`.
+void BrickReader::check(Int3 brick, const std::byte* samples) const {
   if (!store_.has_ranges(level_)) return;
   const ValueRange<double> stored = stored_range(brick);
   ValueRange<double> found;
@@ -110,8 +121,8 @@ void BrickCheck::check(Int3 brick, const std::byte* samples) const {
   if (!found.empty() && (found.lo < stored.lo || found.hi > stored.hi)) fail(brick, stored, found);
 }
 
-void BrickCheck::fail(Int3 b, const ValueRange<double>& stored,
-                      const ValueRange<double>& found) const {
+void BrickReader::fail(Int3 b, const ValueRange<double>& stored,
+                       const ValueRange<double>& found) const {
   const auto place = store_.locate(level_, b);
   const std::string where =
       place ? fmt::format("'{}' at {} + {}", place->file.string(), place->offset, place->size)

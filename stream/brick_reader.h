@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include <isobrick/store_reader.h>
+#include "bricks/ranges/lru_cache.h"
+
+namespace isobrick {
+
+/// Reads bricks of a level and compares them with their stored ranges: a brick that lies at the
+/// place of another, or comes from another store, has a right checksum and makes a wrong mesh. The
+/// samples of a brick must lie within its range, which the first layer of its neighbours may have
+/// widened. Thread-safe.
+class BrickReader {
+ public:
+  /// `store` must outlive it.
+  BrickReader(const StoreReader& store, int level);
+
+  const Lattice& lattice() const { return lattice_; }
+  /// As StoreReader::read_brick. Throws DamageError, with the brick and its place, for samples
+  /// outside of the range.
+  bool read(Int3 brick, std::byte* out) const;
+  /// Whether will_need() can gain anything.
+  bool reads_disk() const { return !store_.brick_times().from_memory(); }
+  /// Hints to the disk that these bricks are read soon.
+  void will_need(std::span<const Int3> bricks) const;
+
+ private:
+  void check(Int3 brick, const std::byte* samples) const;
+  ValueRange<double> stored_range(Int3 brick) const;
+  [[noreturn]] void fail(Int3 brick, const ValueRange<double>& stored,
+                         const ValueRange<double>& found) const;
+
+  const StoreReader& store_;
+  const int level_;
+  const Lattice lattice_;
+  mutable LruCache<RangeTable> tables_;
+};
+
+}  // namespace isobrick
