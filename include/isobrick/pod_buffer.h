@@ -10,7 +10,7 @@
 namespace isobrick {
 
 /// A growing array that neither initialises nor gives back: memory is touched
-/// first by whoever writes the values, and is reused after clear(). Growth goes
+/// first by the thread that writes the values, and is reused after clear(). Growth goes
 /// through realloc, which moves large blocks by remapping pages.
 template <class T>
 class PodBuffer {
