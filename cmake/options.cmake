@@ -13,6 +13,7 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_OPTIMIZE_DEPENDENCIES ON)  # files of a library compile before the libraries that it links
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 
 # Only libraries that are really called: loading libhwy costs 5 ms, and optimised
@@ -24,14 +25,21 @@ add_link_options(LINKER:--as-needed)
 add_library(isobrick_flags INTERFACE)
 # Private headers are named from here: "core/cancel.h".
 target_include_directories(isobrick_flags INTERFACE ${PROJECT_SOURCE_DIR})
+set(isobrick_warnings -Wall -Wextra -Wpedantic -Wconversion -Wshadow
+  -Wno-missing-field-initializers)  # designated initialisers leave out what keeps its default
 target_compile_options(isobrick_flags INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wconversion -Wshadow
-  -Wno-missing-field-initializers  # designated initialisers leave out what keeps its default
+  $<$<COMPILE_LANGUAGE:CXX>:${isobrick_warnings}
   -ffp-contract=off $<$<BOOL:${ISOBRICK_WERROR}>:-Werror>>)
 if(ISOBRICK_SANITIZE)
   target_compile_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE})
 endif()
+
+# isobrick_alone(source …): sources whose local names are also another file's. Unity builds
+# (scripts/test, architecture.tidy.*) compile them as files of their own.
+function(isobrick_alone)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
 
 # isobrick_library(name SOURCES … LINK … PRIVATE …): one folder, one target
 # isobrick::name. LINK is public: it is the folder's row in the dependency table.

@@ -276,7 +276,7 @@ void write_vertices(const KernelContext& context, const TileState& tile, Vec3f* 
       if (vectors.write(edges + i, positions + i, normals ? normals + i : nullptr))
         i += lanes;
       else
-        for (std::size_t end = i + lanes; i < end;) one();
+        for (std::size_t lane = 0; lane < lanes; ++lane) one();
     }
   }
   while (i < n) one();

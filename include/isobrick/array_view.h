@@ -15,9 +15,10 @@ namespace isobrick {
 /// What an axis of an array in a file stands for.
 enum class AxisRole : std::uint8_t { space, channel, time };
 
+/// One axis of an array in a file.
 struct ArrayAxis {
-  Index size = 0;
-  AxisRole role = AxisRole::space;
+  Index size = 0;                   ///< entries along it
+  AxisRole role = AxisRole::space;  ///< what it stands for
   /// Of an axis of space: 0, 1, 2 for x, y, z where the file names it. Nothing: the fastest of them
   /// is x, the slowest z.
   std::optional<int> direction = std::nullopt;
@@ -25,7 +26,7 @@ struct ArrayAxis {
 
 /// The volume that a selection leaves of an array of several dimensions.
 struct ArrayView {
-  Int3 extent;
+  Int3 extent;                               ///< samples along x, y, z
   Int3 stride;                               ///< samples from one to the next along x, y, z
   Index first = 0;                           ///< its first sample
   Index total = 0;                           ///< samples of the whole array

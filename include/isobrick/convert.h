@@ -15,19 +15,21 @@ namespace isobrick {
 
 /// How a store is written.
 struct ConvertOptions {
-  /// Samples along each edge of a brick, 16 … 256; of a shard, a multiple of `brick`. Nothing: as
-  /// many samples as cubes of 64 and 512 have, in bricks and shards that follow the shape of a thin
-  /// volume. No brick is much longer than the volume.
-  std::optional<Index> brick, shard;
+  /// Samples along each edge of a brick, 16 … 256. Nothing: as many samples as a cube of 64 has, in
+  /// bricks that follow the shape of a thin volume. No brick is much longer than the volume.
+  std::optional<Index> brick;
+  /// Samples along each edge of a shard, a multiple of `brick`. Nothing: the same with a cube of
+  /// 512.
+  std::optional<Index> shard;
   std::optional<int> zstd_level = 3;  ///< nothing: bricks are stored as they are
   std::optional<int> levels;          ///< nothing: until one brick holds the coarsest
   /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
   /// steps. Nothing: factors_by_spacing().
   std::vector<Int3> factors;
-  OmeVersion ome = OmeVersion::v05;  ///< 0.4 has no shards: `shard` does not matter
-  Downsampling downsampling = Downsampling::mean;
-  std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
-  int threads = 0;                                ///< 0: all cores
+  OmeVersion ome = OmeVersion::v05;                ///< 0.4 has no shards: `shard` does not matter
+  Downsampling downsampling = Downsampling::mean;  ///< how a level is made from the finer one
+  std::uint64_t memory = std::uint64_t{1} << 30;   ///< hard budget, bytes
+  int threads = 0;                                 ///< 0: all cores
   bool resume = false;  ///< go on with an interrupted conversion of the same input
   bool force = false;   ///< replace a store that exists (only when the new one is whole)
   std::vector<std::filesystem::path> inputs;  ///< never replaced, beside the source's files
@@ -37,11 +39,15 @@ struct ConvertOptions {
 
 /// What a conversion did.
 struct ConvertReport {
-  std::uint64_t bytes_in = 0, bytes_out = 0;
-  std::uint64_t bricks = 0, bricks_absent = 0, bricks_kept = 0;  ///< all levels; kept: by resume
-  int levels = 0;
-  std::uint64_t index_bytes = 0;  ///< part of bytes_out
-  double seconds = 0, index_seconds = 0;
+  std::uint64_t bytes_in = 0;       ///< bytes of the volume's samples
+  std::uint64_t bytes_out = 0;      ///< bytes of the store's files
+  std::uint64_t bricks = 0;         ///< bricks of all levels
+  std::uint64_t bricks_absent = 0;  ///< of them, those that hold the fill value only
+  std::uint64_t bricks_kept = 0;    ///< of them, those that resume found done
+  int levels = 0;                   ///< resolutions of the store
+  std::uint64_t index_bytes = 0;    ///< part of bytes_out
+  double seconds = 0;               ///< wall time of the conversion, the index included
+  double index_seconds = 0;         ///< wall time of the index
 };
 
 /// Writes `source` as a store at `out`: works in `out` + ".partial" and renames

@@ -14,17 +14,20 @@ int device_count() noexcept;
 /// Whether there is one.
 inline bool device_available() noexcept { return device_count() > 0; }
 
+/// A CUDA device.
 struct DeviceInfo {
-  std::string name;
-  std::uint64_t free_bytes = 0, total_bytes = 0;  ///< of its memory, now
+  std::string name;               ///< as the driver has it
+  std::uint64_t free_bytes = 0;   ///< device memory that is free now
+  std::uint64_t total_bytes = 0;  ///< device memory
 };
 
 /// The device has less memory left than was requested.
 class OutOfDeviceMemory : public Error {
+ public:
   using Error::Error;
 };
 
-/// Whether kernels read block-locked host memory under the address that the host knows.
+/// Whether kernels read page-locked host memory under the address that the host knows.
 bool reads_host_memory(int device);
 
 /// 16 bytes by which drivers of all kinds identify a device. Throws Error for a device that

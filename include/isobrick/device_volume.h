@@ -19,11 +19,13 @@ class DeviceVolume {
   DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value);
   ~DeviceVolume();
 
+  /// The samples and how they lie.
   const Lattice& lattice() const;
   /// Bytes of device memory that it holds.
   std::uint64_t bytes() const;
 
-  struct Impl;
+  struct Impl;  ///< private to the library
+  /// For the library itself.
   Impl& impl() { return *impl_; }
 
  private:
@@ -41,8 +43,9 @@ struct ResidentTuning {
 
 /// What an extraction on the device made.
 struct DeviceCounts {
-  std::uint64_t vertices = 0, triangles = 0;
-  std::uint32_t active_tiles = 0;
+  std::uint64_t vertices = 0;      ///< of the mesh
+  std::uint64_t triangles = 0;     ///< of the mesh
+  std::uint32_t active_tiles = 0;  ///< tiles that the surface passes through
 };
 
 /// Isosurfaces of a resident volume: search and extraction without leaving the

@@ -12,12 +12,12 @@ namespace isobrick {
 struct ActiveParts {
   std::uint64_t bricks = 0;         ///< all of the level
   std::uint64_t active_bricks = 0;  ///< with a block that is stabbed
-  std::uint64_t active_blocks = 0;
-  std::uint64_t active_cells = 0;  ///< cells of those blocks, in the region
-  Box3 bounds;                     ///< of these cells
+  std::uint64_t active_blocks = 0;  ///< stabbed blocks of 16³ cells
+  std::uint64_t active_cells = 0;   ///< cells of those blocks, in the region
+  Box3 bounds;                      ///< of these cells
 };
 
-/// Throws as extract() does for options that make no sense.
+/// Counts the active parts of one level. Throws as extract() does for options that make no sense.
 ActiveParts count_active(const StoreReader& store, const ExtractOptions& options);
 /// The same of each of several isovalues, instead of that of the options. Reads the ranges once.
 std::vector<ActiveParts> count_active(const StoreReader& store, const ExtractOptions& options,
@@ -28,7 +28,7 @@ MeshSize largest_mesh(const ActiveParts& active);
 
 /// What an extraction will need.
 struct ExtractEstimate {
-  ActiveParts active;
+  ActiveParts active;        ///< what the isovalue touches
   MeshSize mesh;             ///< predicted
   double uncertainty = 0;    ///< two standard errors of `mesh`, as a fraction of it
   std::uint64_t memory = 0;  ///< bytes that the extraction will hold, within the budget

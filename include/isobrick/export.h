@@ -16,13 +16,14 @@ enum class ExportFormat : std::uint8_t { raw, nrrd, vdb };
 /// Wider bands of a level set are of no use.
 inline constexpr int kWidestHalfBand = 100;
 
+/// What to write of a store.
 struct ExportOptions {
-  ExportFormat format = ExportFormat::raw;
+  ExportFormat format = ExportFormat::raw;  ///< of the file
   /// Of OpenVDB: a level set of this isosurface in place of the samples.
   std::optional<double> isovalue;
   std::optional<Inside> inside;  ///< of that; as ExtractOptions::inside
-  int half_band = 3;  ///< voxels with distances on either side of that, 1 … kWidestHalfBand
-  int level = 0;
+  int half_band = 3;        ///< voxels with distances on either side of that, 1 … kWidestHalfBand
+  int level = 0;            ///< 0: the finest
   std::optional<Box3> roi;  ///< samples of that level; nothing: all
   bool force = false;       ///< replace a file that exists, once the new one is whole
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes

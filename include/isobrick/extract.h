@@ -25,8 +25,8 @@ enum class Backend : std::uint8_t {
 
 /// Which surface, from which part of a store, and with what means.
 struct ExtractOptions {
-  double isovalue = 0;
-  int level = 0;
+  double isovalue = 0;           ///< in the values of the samples
+  int level = 0;                 ///< 0: the finest
   std::optional<Box3> roi;       ///< samples of that level; nothing: the whole volume
   std::optional<Inside> inside;  ///< nothing: below the isovalue in a level set, else above
   bool normals = false;          ///< gradient normals
@@ -34,9 +34,9 @@ struct ExtractOptions {
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   /// Of the budget of the whole command what others take; messages name both together.
   std::uint64_t memory_of_others = 0;
-  int threads = 0;    ///< 0: all cores
-  IndexChoice index;  ///< how active blocks are found; never shows in the mesh
-  Backend backend = Backend::automatic;
+  int threads = 0;                       ///< 0: all cores
+  IndexChoice index;                     ///< how active blocks are found; never shows in the mesh
+  Backend backend = Backend::automatic;  ///< what makes the surface
   std::uint64_t gpu_memory = 0;  ///< hard budget of device memory, bytes; 0: what is free less 10 %
   int device = 0;                ///< of the CUDA devices, the first is 0
 };
@@ -44,13 +44,13 @@ struct ExtractOptions {
 /// How long a stage was busy, and with how many bytes. What all cores share (read and
 /// decode) counts the time of every thread, divided by their number.
 struct StageReport {
-  double seconds = 0;
-  std::uint64_t bytes = 0;
+  double seconds = 0;       ///< busy time
+  std::uint64_t bytes = 0;  ///< bytes that passed
 };
 
 /// One of several surfaces that are extracted together, and the sink that takes it.
 struct SurfaceOutput {
-  double isovalue = 0;
+  double isovalue = 0;       ///< in the values of the samples
   bool normals = false;      ///< gradient normals
   MeshSink* sink = nullptr;  ///< one for each surface
 };
@@ -58,21 +58,32 @@ struct SurfaceOutput {
 /// What an extraction did. Of surfaces that were made in one pass over the store, what the pass
 /// read, decoded, searched for and waited for is in each one's report.
 struct ExtractReport {
-  std::size_t pass = 0;  ///< which pass made the surface, the first is 0
-  std::uint64_t triangles = 0, vertices = 0;
+  std::size_t pass = 0;                    ///< which pass made the surface, the first is 0
+  std::uint64_t triangles = 0;             ///< of the mesh
+  std::uint64_t vertices = 0;              ///< of the mesh
   std::uint64_t degenerate_triangles = 0;  ///< left out, with drop_degenerate
-  std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
-  std::uint64_t bytes_read = 0;
-  double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0;
+  std::uint64_t bricks = 0;                ///< of the level
+  std::uint64_t active_bricks = 0;         ///< with a block that the isovalue touches
+  std::uint64_t bricks_read = 0;           ///< different bricks that were read
+  std::uint64_t brick_reads = 0;  ///< reads of bricks; more than bricks_read where one was repeated
+  std::uint64_t bytes_read = 0;   ///< from disk
+  double seconds = 0;             ///< wall time of all
+  double plan_seconds = 0;        ///< wall time of finding the active blocks
+  double decode_seconds = 0;      ///< wall time in which bricks were decoded
+  double surface_seconds = 0;     ///< wall time in which the surface was made
   std::optional<IndexKind> index;  ///< that found the active blocks; none: ranges alone did
   std::string backend = "cpu";     ///< or "cuda"
   std::string device;              ///< its name, of the latter
   /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.
   std::string gpu_refusal;
-  /// Encoded bricks, decoded ones; bricks sent to the device, samples read by it where they
-  /// lie, samples there; the mesh. The GPU has no stage `surface` and the CPU only that one
-  /// between decode and sink.
-  StageReport read, decode, upload, gather, kernel, download, surface, sink;
+  StageReport read;                       ///< encoded bricks
+  StageReport decode;                     ///< decoded bricks
+  StageReport upload;                     ///< GPU: bricks sent to the device
+  StageReport gather;                     ///< GPU: samples that the device read where they lie
+  StageReport kernel;                     ///< GPU: samples in device memory
+  StageReport download;                   ///< GPU: the mesh
+  StageReport surface;                    ///< CPU: samples; the GPU has no such stage
+  StageReport sink;                       ///< the mesh
   std::uint64_t device_bytes = 0;         ///< device memory that was held, within gpu_memory
   std::uint64_t device_bytes_in_use = 0;  ///< the same as the driver counts it
   std::uint64_t pinned_bytes = 0;         ///< page-locked host memory, within memory

@@ -11,13 +11,15 @@ namespace isobrick {
 
 /// How the samples of one level spread over their values.
 struct Histogram {
-  int level = 0;
-  double lo = 0, hi = 0;              ///< of the finite samples
+  int level = 0;                      ///< the level that was read
+  double lo = 0;                      ///< the smallest finite sample
+  double hi = 0;                      ///< the largest finite sample
   double bin_width = 0;               ///< 0: all finite samples are equal
   std::vector<std::uint64_t> counts;  ///< from lo upwards; empty when no sample is finite
-  std::uint64_t not_a_number = 0, infinite = 0;
-  std::uint64_t left_out = 0;  ///< bricks that cannot be read
-  std::string damage;          ///< what is wrong with the first of them
+  std::uint64_t not_a_number = 0;     ///< samples that are NaN
+  std::uint64_t infinite = 0;         ///< infinite samples
+  std::uint64_t left_out = 0;         ///< bricks that cannot be read
+  std::string damage;                 ///< what is wrong with the first of them
 };
 
 /// Chunk files of a level that a command which answers in seconds looks for one by one.

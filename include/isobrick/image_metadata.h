@@ -18,30 +18,35 @@ enum class OmeVersion : std::uint8_t { v04, v05 };
 
 /// The range of the samples, and which part of it viewers show at first.
 struct DisplayWindow {
-  double min = 0, max = 0, start = 0, end = 0;
+  double min = 0;    ///< the smallest sample
+  double max = 0;    ///< the largest sample
+  double start = 0;  ///< shown black
+  double end = 0;    ///< shown white
   friend bool operator==(const DisplayWindow&, const DisplayWindow&) = default;
 };
 
 /// The zarr.json of a root group: OME-Zarr's multiscales, of 0.5 in ours, and what
 /// is ours under `attributes.isobrick`.
 struct ImageMetadata {
+  /// A resolution.
   struct Level {
-    std::string path;  ///< of the array, relative to the root
-    Transform transform;
+    std::string path;     ///< of the array, relative to the root
+    Transform transform;  ///< index space of the level to world space
     friend bool operator==(const Level&, const Level&) = default;
   };
   /// An axis before z, y, x.
   struct Axis {
+    /// What such an axis stands for.
     enum class Role : std::uint8_t { time, channel, unknown };
-    std::string name;
-    Role role = Role::unknown;
+    std::string name;           ///< as the image has it
+    Role role = Role::unknown;  ///< what it stands for
     friend bool operator==(const Axis&, const Axis&) = default;
   };
-  std::string name;
+  std::string name;                        ///< of the image, or empty
   std::vector<Axis> leading;               ///< none in ours
   std::vector<std::string> channel_names;  ///< as `omero` calls them; empty where it does not
-  std::vector<Level> levels;
-  bool ours = true;  ///< has `attributes.isobrick`
+  std::vector<Level> levels;               ///< the finest first
+  bool ours = true;                        ///< has `attributes.isobrick`
   /// nullopt when the store doesn't state it.
   std::optional<bool> may_have_nan;
   std::string grid_class;               ///< as OpenVDB calls it ("level set"), or empty
@@ -57,6 +62,7 @@ struct ImageMetadata {
 /// The version of `attributes.isobrick` that we write, and the only one we read.
 inline constexpr int kStoreVersion = 3;
 
+/// The zarr.json of the root group.
 std::string to_json(const ImageMetadata& image);
 
 /// Reads the root's zarr.json; `where` names the file. DamageError for what is

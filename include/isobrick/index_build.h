@@ -17,7 +17,7 @@ inline constexpr Index kDefaultLeaf = 16;
 
 /// An index to add to a store.
 struct IndexOptions {
-  IndexKind kind = IndexKind::octree;
+  IndexKind kind = IndexKind::octree;             ///< its data structure
   Selection selection;                            ///< of an image with several channels or times
   Index leaf = kDefaultLeaf;                      ///< 1, 2, 4, 8 or 16 cells
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
@@ -28,10 +28,12 @@ struct IndexOptions {
 
 /// What adding an index did.
 struct IndexReport {
-  std::vector<std::uint64_t> level_bytes;
-  std::uint64_t chunks = 0, chunks_kept = 0;  ///< all levels; kept: by resume
-  bool ranges_added = false;                  ///< the store had none, or they were made anew
-  double seconds = 0, range_seconds = 0;      ///< the former includes the latter
+  std::vector<std::uint64_t> level_bytes;  ///< of the index, the finest level first
+  std::uint64_t chunks = 0;                ///< chunks of all levels
+  std::uint64_t chunks_kept = 0;           ///< of them, those that resume found done
+  bool ranges_added = false;               ///< the store had none, or they were made anew
+  double seconds = 0;                      ///< wall time, the ranges included
+  double range_seconds = 0;                ///< wall time of the ranges
 };
 
 /// The least budget of such an index of `lattice`. Throws UsageError for a kind or leaf that stores

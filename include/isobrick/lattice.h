@@ -19,19 +19,25 @@ inline constexpr Index kTileEdge = 32;
 
 /// The samples of one level and how they are cut into bricks.
 struct Lattice {
-  Int3 extent;             ///< samples
-  Int3 brick{64, 64, 64};  ///< samples of a brick
-  ScalarType type = ScalarType::u8;
+  Int3 extent;                       ///< samples along x, y, z
+  Int3 brick{64, 64, 64};            ///< samples of a brick along x, y, z
+  ScalarType type = ScalarType::u8;  ///< of the samples
 
   friend bool operator==(const Lattice&, const Lattice&) = default;
 
+  /// Number of bricks along x, y, z.
   Int3 bricks() const { return ceil_div(extent, brick); }
+  /// Number of blocks along x, y, z.
   Int3 blocks() const { return ceil_div(extent, {kBlockEdge, kBlockEdge, kBlockEdge}); }
+  /// Number of tiles along x, y, z.
   Int3 tiles() const { return ceil_div(extent, {kTileEdge, kTileEdge, kTileEdge}); }
+  /// Bytes of a sample.
   std::size_t sample_bytes() const { return size_of(type); }
+  /// Bytes of a decoded brick, at the volume's border too.
   std::size_t brick_bytes() const {
     return static_cast<std::size_t>(volume(brick)) * sample_bytes();
   }
+  /// All samples.
   Box3 box() const { return {{0, 0, 0}, extent}; }
   /// The lattice points of brick `b`, also those beyond the volume's border.
   Box3 full_brick_box(Int3 b) const { return {b * brick, (b + Int3{1, 1, 1}) * brick}; }

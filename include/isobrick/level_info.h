@@ -13,7 +13,7 @@ inline constexpr Index kMaxAxisSamples = Index{1} << 26;
 
 /// One resolution of a store, 0 the finest.
 struct LevelInfo {
-  Lattice lattice;
+  Lattice lattice;      ///< its samples and bricks
   Int3 shard;           ///< samples of a shard
   Transform transform;  ///< index space of this level to world space
   /// Bytes that each thread needs to decode a brick, beyond the brick and what it

@@ -29,27 +29,30 @@ enum class Indexing : std::uint8_t {
 
 /// A piece of a mesh, in world space. A view: valid until the call returns.
 struct MeshChunk {
-  std::uint64_t first_vertex = 0;  ///< number of vertices in the chunks before
-  std::span<const Vec3f> positions;
-  std::span<const Vec3f> normals;  ///< unit length, outward; empty or one a position
-  std::span<const Triangle> triangles;
+  std::uint64_t first_vertex = 0;              ///< number of vertices in the chunks before
+  std::span<const Vec3f> positions;            ///< of the vertices
+  std::span<const Vec3f> normals;              ///< unit length, outward; empty or one a position
+  std::span<const Triangle> triangles;         ///< numbered as MeshSink::indexing() says
   std::span<const VertexColour> colours = {};  ///< of meshes of others; empty or one a position
 };
 
 /// Of what a mesh consists.
 struct MeshSize {
-  std::uint64_t vertices = 0, triangles = 0;
+  std::uint64_t vertices = 0;   ///< number of vertices
+  std::uint64_t triangles = 0;  ///< number of triangles
 };
 
 /// A box in world space.
 struct MeshBounds {
-  Vec3d lo, hi;
+  Vec3d lo;  ///< the smallest coordinates
+  Vec3d hi;  ///< the largest coordinates
 };
 
 /// What is known before the first chunk.
 struct MeshHeader {
-  bool has_normals = false;
-  Vec3d world_lo, world_hi;  ///< bounds of the volume (not of the mesh) in world space
+  bool has_normals = false;  ///< whether every chunk has normals
+  Vec3d world_lo;            ///< the smallest coordinates of the volume, not of the mesh
+  Vec3d world_hi;            ///< the largest coordinates of the volume
   /// Bounds of the blocks that the surface passes through, within the region; nothing: not known.
   std::optional<MeshBounds> surface = {};
   std::string unit = {};  ///< of all coordinates, as unit_name() has it; empty: unknown
@@ -60,8 +63,11 @@ class MeshSink {
  public:
   virtual ~MeshSink() = default;
 
+  /// How the chunks that it takes name their vertices.
   virtual Indexing indexing() const = 0;
+  /// Called once, before the first chunk. Throws Error when the file cannot be written.
   virtual void begin(const MeshHeader& header) = 0;
+  /// Takes the next chunk, which it copies or writes. Throws Error when the file cannot be written.
   virtual void write(const MeshChunk& chunk) = 0;
   /// The mesh is whole: only now may it appear under its final name.
   /// Not called after a failure; the destructor then removes what was written.

@@ -13,10 +13,10 @@ namespace isobrick {
 /// The files that a mesh can become.
 enum class MeshFormat : std::uint8_t { ply, stl, obj, glb, vtp, pvtp };
 
-/// "PLY".
+/// The format's name for people: "PLY".
 std::string_view name_of(MeshFormat format);
 
-/// ".ply".
+/// The usual extension of its files: ".ply".
 std::string_view extension_of(MeshFormat format);
 
 /// The format of files with an extension such as ".ply" (or ".PLY"); nullopt for any other.
@@ -27,6 +27,7 @@ bool has_normals(MeshFormat format);
 /// Whether its triangles share vertices, so that it has a number of them.
 bool has_vertices(MeshFormat format);
 
+/// How a mesh file is written.
 struct MeshFileOptions {
   std::optional<MeshFormat> format;  ///< nullopt: by the name's extension
   bool quantize = false;             ///< GLB: 16 bits a number (KHR_mesh_quantization)

@@ -18,10 +18,12 @@ class PodBuffer {
 
  public:
   PodBuffer() = default;
+  /// Leaves `other` empty.
   PodBuffer(PodBuffer&& other) noexcept
       : data_(std::exchange(other.data_, nullptr)),
         size_(std::exchange(other.size_, 0)),
         capacity_(std::exchange(other.capacity_, 0)) {}
+  /// Exchanges the arrays.
   PodBuffer& operator=(PodBuffer&& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
@@ -30,18 +32,30 @@ class PodBuffer {
   }
   ~PodBuffer() { std::free(data_); }
 
+  /// The first element; may be null when the array is empty. Valid until the array grows.
   T* data() { return data_; }
+  /// The same for reading.
   const T* data() const { return data_; }
+  /// Number of elements.
   std::size_t size() const { return size_; }
+  /// Elements that fit without growth.
   std::size_t capacity() const { return capacity_; }
+  /// Element `i`, which must exist.
   T& operator[](std::size_t i) { return data_[i]; }
+  /// The same for reading.
   const T& operator[](std::size_t i) const { return data_[i]; }
+  /// The first element.
   T* begin() { return data_; }
+  /// Behind the last element.
   T* end() { return data_ + size_; }
+  /// The first element, for reading.
   const T* begin() const { return data_; }
+  /// Behind the last element, for reading.
   const T* end() const { return data_ + size_; }
+  /// All elements. Valid until the array grows.
   std::span<const T> span() const { return {data_, size_}; }
 
+  /// Drops all elements and keeps the memory.
   void clear() { size_ = 0; }
   /// New elements hold no particular value.
   void resize(std::size_t size) {
@@ -49,6 +63,7 @@ class PodBuffer {
       reserve(size > capacity_ + capacity_ / 2 ? size : capacity_ + capacity_ / 2);
     size_ = size;
   }
+  /// Makes room for so many elements. Throws std::bad_alloc.
   void reserve(std::size_t capacity) {
     if (capacity <= capacity_) return;
     void* grown = std::realloc(static_cast<void*>(data_), capacity * sizeof(T));

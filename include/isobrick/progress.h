@@ -13,6 +13,7 @@ class Progress {
   virtual void begin(std::string_view stage, std::uint64_t total) = 0;
   /// `done` more bytes of the stage are finished.
   virtual void advance(std::uint64_t done) = 0;
+  /// The stage is finished.
   virtual void end() = 0;
 };
 

@@ -8,21 +8,26 @@ namespace isobrick {
 /// at all is inverted (lo > hi) and is stabbed by no isovalue.
 template <class T>
 struct ValueRange {
+  /// Of the sample type.
   using Limits = std::numeric_limits<T>;
+  /// No sample is below it.
   static constexpr T kLowest = Limits::has_infinity ? -Limits::infinity() : Limits::lowest();
+  /// No sample is above it.
   static constexpr T kHighest = Limits::has_infinity ? Limits::infinity() : Limits::max();
 
-  T lo = kHighest;
-  T hi = kLowest;
+  T lo = kHighest;  ///< the smallest sample
+  T hi = kLowest;   ///< the largest sample
 
   friend constexpr bool operator==(const ValueRange&, const ValueRange&) = default;
+  /// True of the range of no sample.
   constexpr bool empty() const { return hi < lo; }
 
-  // A comparison with NaN is false, so NaN never enters.
+  /// Extends the range to `v`. A comparison with NaN is false, so NaN never enters.
   constexpr void include(T v) {
     lo = v < lo ? v : lo;
     hi = v > hi ? v : hi;
   }
+  /// Extends the range to all of `r`.
   constexpr void include(ValueRange r) {
     lo = r.lo < lo ? r.lo : lo;
     hi = r.hi > hi ? r.hi : hi;

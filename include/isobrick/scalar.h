@@ -12,10 +12,12 @@ namespace isobrick {
 /// The eight sample types of a store.
 enum class ScalarType : std::uint8_t { u8, i8, u16, i16, u32, i32, f32, f64 };
 
+/// All of them.
 inline constexpr ScalarType kScalarTypes[] = {ScalarType::u8,  ScalarType::i8,  ScalarType::u16,
                                               ScalarType::i16, ScalarType::u32, ScalarType::i32,
                                               ScalarType::f32, ScalarType::f64};
 
+/// The sample type that is `T` in C++.
 template <class T>
 inline constexpr ScalarType scalar_type_of = [] {
   if constexpr (std::is_same_v<T, std::uint8_t>)
@@ -38,8 +40,10 @@ inline constexpr ScalarType scalar_type_of = [] {
   }
 }();
 
+/// Carries a type as a value.
 template <class T>
 struct TypeTag {
+  /// The type.
   using type = T;
 };
 
@@ -59,10 +63,12 @@ constexpr decltype(auto) visit_scalar(ScalarType type, F&& f) {
   return std::forward<F>(f)(TypeTag<double>{});
 }
 
+/// Bytes of a sample.
 constexpr std::size_t size_of(ScalarType type) {
   return visit_scalar(type, [](auto tag) { return sizeof(typename decltype(tag)::type); });
 }
 
+/// Whether samples are floating-point numbers.
 constexpr bool is_floating(ScalarType type) {
   return type == ScalarType::f32 || type == ScalarType::f64;
 }

@@ -17,14 +17,14 @@ namespace isobrick {
 
 /// A store's metadata.
 struct StoreInfo {
-  std::filesystem::path path;
+  std::filesystem::path path;  ///< of the store's folder
   /// What ranges and indices are found under: `path`, or a folder in it that
   /// belongs to one of several channels or times.
   std::filesystem::path additions;
-  Selection selection;  ///< as requested
-  std::vector<LevelInfo> levels;
-  ScalarType type = ScalarType::u8;
-  double fill_value = 0;   ///< of absent bricks; exact for every type
+  Selection selection;               ///< as requested
+  std::vector<LevelInfo> levels;     ///< the finest first
+  ScalarType type = ScalarType::u8;  ///< of the samples
+  double fill_value = 0;             ///< of absent bricks; exact for every type
   std::string grid_class;  ///< of the OpenVDB grid that it came from ("level set"), or empty
   std::string grid_name;   ///< of that grid, or empty
   std::string codec;       ///< "zstd:3" or "none"
@@ -42,14 +42,17 @@ std::uint64_t decode_extra(const StoreInfo& info, int threads);
 
 /// Where a brick lies on disk.
 struct BrickLocation {
-  std::filesystem::path file;
-  std::uint64_t offset = 0, size = 0;
+  std::filesystem::path file;  ///< the shard or chunk file
+  std::uint64_t offset = 0;    ///< of the encoded brick in the file, bytes
+  std::uint64_t size = 0;      ///< of the encoded brick, bytes
 };
 
 /// What reading bricks has cost so far, summed over threads.
 struct BrickTimes {
-  double read_seconds = 0, decode_seconds = 0;
-  std::uint64_t bytes_read = 0, bytes_decoded = 0;  ///< encoded and decoded
+  double read_seconds = 0;          ///< time of reading
+  double decode_seconds = 0;        ///< time of checking and decoding
+  std::uint64_t bytes_read = 0;     ///< encoded bytes
+  std::uint64_t bytes_decoded = 0;  ///< decoded bytes
 
   /// Whether reads come from memory, going by their speed: then hints to the disk (will_need)
   /// gain nothing, and each is a call of the system.
@@ -70,6 +73,7 @@ class StoreReader {
   explicit StoreReader(const std::filesystem::path& path, const Selection& selection = {});
   ~StoreReader();
 
+  /// What the metadata says. Valid as long as the reader.
   const StoreInfo& info() const;
 
   /// Where brick `b` is, or nothing when it is absent (all fill value).
@@ -100,9 +104,9 @@ class StoreReader {
   /// an aligned cube of them touches one file.
   static constexpr Index kRangeChunk = kRangeChunkEdge;
 
-  /// Ranges of the bricks in `box` (in bricks) and of the 16³ blocks in `box`
-  /// (in blocks). Throws Error when the store has no ranges yet.
+  /// Ranges of the bricks in `box` (in bricks). Throws Error when the store has no ranges yet.
   RangeTable brick_ranges(int level, Box3 box) const;
+  /// Ranges of the blocks of 16³ cells in `box` (in blocks). Throws as brick_ranges() does.
   RangeTable block_ranges(int level, Box3 box) const;
 
  private:

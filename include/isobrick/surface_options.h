@@ -12,31 +12,34 @@ namespace isobrick {
 
 /// Which surface of a lattice to extract, and what of it.
 struct SurfaceOptions {
-  double isovalue = 0;
-  Inside inside = Inside::above;
-  bool normals = false;
-  Indexing indexing = Indexing::welded;
+  double isovalue = 0;                   ///< in the values of the samples
+  Inside inside = Inside::above;         ///< which side of the surface is its inside
+  bool normals = false;                  ///< gradient normals
+  Indexing indexing = Indexing::welded;  ///< how triangles name their vertices
   /// Leaves triangles without area out where samples equal the isovalue: the
   /// vertices around such a sample become one, the mesh stays welded and closed.
   bool drop_degenerate = false;
   /// Samples between which cells are looked at.
   Box3 roi;
-  Transform transform;
-  double fill_value = 0;
+  Transform transform;    ///< index space to world space
+  double fill_value = 0;  ///< of absent bricks
   /// Whether samples may be NaN: costs a look at every sample's neighbours.
   bool may_have_nan = false;
 };
 
 /// A mesh, or the piece of one that is being made. Reused, it allocates nothing.
 struct MeshBuffer {
-  PodBuffer<Vec3f> positions, normals;
-  PodBuffer<Triangle> triangles;
+  PodBuffer<Vec3f> positions;     ///< of the vertices, in world space
+  PodBuffer<Vec3f> normals;       ///< empty or one a position
+  PodBuffer<Triangle> triangles;  ///< numbers of vertices
 
+  /// Empties the mesh and keeps the memory.
   void clear() {
     positions.clear();
     normals.clear();
     triangles.clear();
   }
+  /// A view of all of it, as the chunk after `first_vertex` vertices.
   MeshChunk chunk(std::uint64_t first_vertex) const {
     return {first_vertex, positions.span(), normals.span(), triangles.span()};
   }

@@ -9,6 +9,7 @@
 
 namespace isobrick {
 
+/// The fields that can be computed.
 enum class SynthKind : std::uint8_t {
   sphere,          ///< a ball of 0.4 times the shortest edge with a soft rim
   gyroid,          ///< the triply periodic surface, with white noise on top
@@ -16,16 +17,17 @@ enum class SynthKind : std::uint8_t {
   mixing,          ///< two fluids, layered along z, that mix in turbulence at mid-height
 };
 
-/// "sphere", "gyroid", "marschner-lobb", "mixing".
+/// Its name on the command line: "sphere", "gyroid", "marschner-lobb", "mixing".
 std::string_view name_of(SynthKind kind);
+/// The kind of this name; nullopt for any other.
 std::optional<SynthKind> parse_synth_kind(std::string_view name);
 
 /// A volume made by computation.
 struct SynthOptions {
-  SynthKind kind = SynthKind::gyroid;
-  Int3 extent{256, 256, 256};
-  ScalarType type = ScalarType::u8;
-  std::uint64_t seed = 1;
+  SynthKind kind = SynthKind::gyroid;  ///< the field
+  Int3 extent{256, 256, 256};          ///< samples along x, y, z
+  ScalarType type = ScalarType::u8;    ///< of the samples
+  std::uint64_t seed = 1;              ///< of all that is random
   /// gyroid: periods along the longest edge; of N cells along that edge about
   /// 4.6 · frequency / N are active (2 at 512³: 1.8 %).
   /// mixing: largest eddies along the longest edge. Nothing: 2 and 6.

@@ -12,13 +12,14 @@ namespace isobrick {
 /// `direction` is row-major; its columns are the world directions of the index
 /// axes x, y, z and are orthonormal up to rounding.
 struct Transform {
-  Vec3d spacing{1, 1, 1};
-  Vec3d origin{0, 0, 0};
-  std::array<double, 9> direction{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Vec3d spacing{1, 1, 1};  ///< world units between samples along each index axis
+  Vec3d origin{0, 0, 0};   ///< the place of sample (0, 0, 0) in world space
+  std::array<double, 9> direction{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rows of the rotation
   std::string unit;  ///< of the world coordinates, as OME-Zarr writes it ("micrometer"), or empty
 
   friend bool operator==(const Transform&, const Transform&) = default;
 
+  /// Whether index and world axes agree.
   bool axis_aligned() const {
     return direction == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1};
   }
@@ -29,6 +30,7 @@ struct Transform {
     return Vec3d{direction[column], direction[column + 3], direction[column + 6]} * spacing[axis];
   }
 
+  /// From index space to world space.
   Vec3d apply(Vec3d p) const {
     const Vec3d s = spacing * p;
     return {origin.x + direction[0] * s.x + direction[1] * s.y + direction[2] * s.z,

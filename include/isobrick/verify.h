@@ -10,16 +10,19 @@
 
 namespace isobrick {
 
+/// What was checked, and what is wrong.
 struct VerifyReport {
+  /// An index that was checked.
   struct Index {
-    int level;
-    std::string kind;
+    int level;         ///< of the store
+    std::string kind;  ///< its name
   };
-  std::uint64_t bricks = 0, bytes = 0;
-  std::vector<Index> indexes;  ///< those that were checked
-  std::vector<std::string>
-      damages;  ///< one line each: level, brick, file, offset, what; at most 1000 kept
-  std::uint64_t damage_count = 0;
+  std::uint64_t bricks = 0;    ///< bricks that were checked
+  std::uint64_t bytes = 0;     ///< bytes that were read
+  std::vector<Index> indexes;  ///< indices that were checked
+  /// One line each: level, brick, file, offset, what; at most 1000 kept.
+  std::vector<std::string> damages;
+  std::uint64_t damage_count = 0;  ///< all damages, also those that are not kept
 };
 
 /// Reads all of a store: metadata, shard indices, every brick's checksum and

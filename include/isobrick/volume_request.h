@@ -12,28 +12,30 @@
 
 namespace isobrick {
 
+/// How the bytes of a sample lie in a file.
 enum class ByteOrder : std::uint8_t { little, big };
-/// That of this machine.
+/// The byte order of this machine.
 inline constexpr ByteOrder kNativeOrder =
     std::endian::native == std::endian::little ? ByteOrder::little : ByteOrder::big;
 
 /// A box of which every bound may be left out; half-open.
 struct RegionRequest {
-  std::array<std::optional<Index>, 3> lo, hi;
+  std::array<std::optional<Index>, 3> lo;  ///< the first sample along x, y, z
+  std::array<std::optional<Index>, 3> hi;  ///< behind the last sample along x, y, z
 };
 
 /// What the caller specifies about a volume. The first four members are for raw files, where
 /// they override a header beside the file and the file's name. The others
 /// are for all formats and override the file.
 struct VolumeRequest {
-  std::optional<Int3> extent;
-  std::optional<ScalarType> type;
-  std::optional<ByteOrder> order;
+  std::optional<Int3> extent;           ///< samples along x, y, z
+  std::optional<ScalarType> type;       ///< of the samples
+  std::optional<ByteOrder> order;       ///< of the samples
   std::optional<std::uint64_t> offset;  ///< bytes before the first sample
-  std::optional<Vec3d> spacing;
-  std::optional<Vec3d> origin;
-  std::optional<std::string> unit;
-  Selection selection;
+  std::optional<Vec3d> spacing;         ///< as Transform::spacing
+  std::optional<Vec3d> origin;          ///< as Transform::origin
+  std::optional<std::string> unit;      ///< as Transform::unit
+  Selection selection;                  ///< of a file with several volumes
   std::optional<std::string> grid;      ///< of an OpenVDB file
   std::optional<RegionRequest> region;  ///< of a sparse grid, in its own index coordinates
   /// Bytes that a source may take for itself: one that holds its samples in

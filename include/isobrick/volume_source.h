@@ -15,9 +15,9 @@ namespace isobrick {
 
 /// What is known of a volume before any sample is read.
 struct VolumeInfo {
-  Int3 extent;  ///< samples along x, y, z
-  ScalarType type = ScalarType::u8;
-  Transform transform;
+  Int3 extent;                       ///< samples along x, y, z
+  ScalarType type = ScalarType::u8;  ///< of the samples
+  Transform transform;               ///< index space to world space
   std::string name;        ///< for messages and metadata: the path, "standard input", "gyroid"
   double fill_value = 0;   ///< what absent bricks hold: the value of empty space
   std::string grid_class;  ///< what OpenVDB calls it: "level set", "fog volume", …; or empty
@@ -32,6 +32,7 @@ class VolumeSource {
  public:
   virtual ~VolumeSource() = default;
 
+  /// What is known before any sample is read. Valid as long as the source.
   virtual const VolumeInfo& info() const = 0;
 
   /// True when boxes may be read in any order, each as often as one likes.

@@ -26,7 +26,7 @@ fs::file_type type_of(mode_t mode) {
 
 /// Throws for what is wrong; an entry that has gone meanwhile has the type not_found.
 fs::file_type type_of(DIR* folder, const dirent& entry, const fs::path& path) {
-  if (entry.d_type != DT_UNKNOWN) return type_of(DTTOIF(entry.d_type));
+  if (entry.d_type != DT_UNKNOWN) return type_of(static_cast<mode_t>(DTTOIF(entry.d_type)));
   struct stat status {};
   if (::fstatat(::dirfd(folder), entry.d_name, &status, AT_SYMLINK_NOFOLLOW) == 0)
     return type_of(status.st_mode);

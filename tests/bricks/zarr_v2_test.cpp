@@ -290,7 +290,7 @@ TEST(Decompress, RefusesWhatIsNotCompressed) {
   for (const ByteCodec codec :
        {ByteCodec::zstd, ByteCodec::gzip, ByteCodec::zlib, ByteCodec::lz4, ByteCodec::blosc}) {
     if (!can_decompress(codec)) continue;
-    for (const std::size_t size : {0, 1, 3, 15, 16, 17, 200})
+    for (const std::size_t size : {0u, 1u, 3u, 15u, 16u, 17u, 200u})
       for (const int byte : {0, 1, 0x1f, 0x78, 0xff}) {
         const std::vector<std::byte> encoded(size, static_cast<std::byte>(byte));
         try {

@@ -194,7 +194,7 @@ TEST_F(BadInput, AFolderThatIsNotThereIsNamed) {
 }
 
 TEST_F(BadInput, StandardInputOfAnotherLengthLeavesNothing) {
-  for (const std::size_t bytes : {100'000, 200'000}) {
+  for (const std::size_t bytes : {100'000u, 200'000u}) {
     write_file(path("in"), noise(bytes));
     const Outcome outcome =
         run({"convert", "-", path("q.zarr"), "--dims", "50,50,50", "--type", "u8"},

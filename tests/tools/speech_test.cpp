@@ -20,7 +20,8 @@ TEST_F(OutputMode, Version) {
 TEST_F(OutputMode, EverySubcommandHasHelpWithAnExample) {
   const Outcome all = run({"--help"});
   EXPECT_EQ(all.exit_code, 0);
-  for (const std::string command : kCommands) {
+  for (const char* const name : kCommands) {
+    const std::string command = name;
     EXPECT_NE(all.out.find("  " + command), std::string::npos) << command;
     const Outcome outcome = run({command, "--help"});
     EXPECT_EQ(outcome.exit_code, 0);

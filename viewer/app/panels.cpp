@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include <fmt/format.h>
@@ -133,7 +134,9 @@ void look_panel(ViewerState& state) {
   for (int axis = 0; axis < 3; ++axis)
     for (const double sign : {1.0, -1.0}) {
       if (axis + (sign < 0) > 0) ImGui::SameLine();
-      if (!ImGui::SmallButton(fmt::format("{}{}", sign > 0 ? '+' : '-', kAxes[axis]).c_str()))
+      if (!ImGui::SmallButton(
+              fmt::format("{}{}", sign > 0 ? '+' : '-', kAxes[static_cast<std::size_t>(axis)])
+                  .c_str()))
         continue;
       Vec3d along;
       along[axis] = -sign;

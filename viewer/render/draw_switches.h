@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <array>
+#include <initializer_list>
 
 #include "viewer/render/frame.h"
 
@@ -17,8 +18,9 @@ class DrawSwitches {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     glDepthFunc(GL_GREATER);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-    for (const GLenum off : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
-                             GL_FRAMEBUFFER_SRGB, GL_DEPTH_TEST})
+    for (const GLenum off :
+         std::initializer_list<GLenum>{GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
+                                       GL_FRAMEBUFFER_SRGB, GL_DEPTH_TEST})
       glDisable(off);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   }

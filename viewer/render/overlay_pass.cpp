@@ -104,7 +104,7 @@ OverlayPass::OverlayPass()
 }
 
 void OverlayPass::add_rectangle(const std::array<Corner, 4>& c) {
-  for (const std::size_t i : {0, 1, 2, 2, 1, 3}) corners_.push_back(c[i]);
+  for (const std::size_t i : {0u, 1u, 2u, 2u, 1u, 3u}) corners_.push_back(c[i]);
 }
 
 void OverlayPass::add_projected(Vec3d from, Vec3d to, Vec3f colour, float width) {

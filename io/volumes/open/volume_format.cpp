@@ -55,7 +55,7 @@ std::optional<VolumeFormat> by_content(const std::string& path, std::string_view
   for (const auto magic : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
     if (head.starts_with(magic)) return VolumeFormat::tiff;
   // An HDF5 file may begin with something of its user's.
-  for (const std::size_t at : {0, 512, 1024, 2048})
+  for (const std::size_t at : {0u, 512u, 1024u, 2048u})
     if (head.size() > at && head.substr(at).starts_with("\x89HDF\r\n\x1a\n"))
       return VolumeFormat::hdf5;
   if (head.size() >= 132 && head.substr(128, 4) == "DICM") return VolumeFormat::dicom;

@@ -27,7 +27,7 @@ openvdb::math::Transform::Ptr grid_transform(const Transform& t) {
 /// leaves a truncated file and no error.
 class GridArchive final : private openvdb::io::Archive {
  public:
-  void write(std::ostream& out, const openvdb::GridBase::Ptr& grid) const {
+  void write_grid(std::ostream& out, const openvdb::GridBase::Ptr& grid) const {
     Archive::write(out, openvdb::GridCPtrVec{grid}, /*seekable=*/true);
   }
 };
@@ -51,7 +51,7 @@ void throw_vdb_budget(std::uint64_t budget) {
 void write_vdb_grid(OutputFile& file, const openvdb::GridBase::Ptr& grid) {
   try {
     WriterStream stream(file.writer());
-    GridArchive().write(stream, grid);
+    GridArchive().write_grid(stream, grid);
     file.writer().flush();
     const std::vector<VdbGrid> written = read_vdb_header(file.temporary_path());
     if (written.size() != 1 || written[0].end != file.writer().size())

@@ -105,8 +105,8 @@ Box3 region_of(const VdbGrid& grid, const std::string& path, const openvdb::Grid
     if (none && (!lo || !hi))
       throw UsageError(fmt::format(
           "'{}': grid '{}' has no active voxels: choose its part with --roi", path, grid.name));
-    box.lo[axis] = lo.value_or(active.min()[axis]);
-    box.hi[axis] = hi.value_or(Index{active.max()[axis]} + 1);
+    box.lo[axis] = lo.value_or(active.min()[static_cast<std::size_t>(axis)]);
+    box.hi[axis] = hi.value_or(Index{active.max()[static_cast<std::size_t>(axis)]} + 1);
     if (box.lo[axis] < std::numeric_limits<int>::min() ||
         box.hi[axis] > Index{std::numeric_limits<int>::max()} + 1 || box.lo[axis] >= box.hi[axis])
       throw UsageError(

@@ -109,7 +109,7 @@ TEST_F(PlanTest, NothingIsMadeAboveAMeshThatStandsIn) {
   }
   ASSERT_GT(ancestors(plan(0), false), 0u);
   for (const NodeKey& parent : parents) make({.key = parent, .isovalue = 0.0});
-  for (const std::size_t each : {1, 2, 3}) {
+  for (const std::size_t each : {1u, 2u, 3u}) {
     for (std::size_t i = 0; i < cut_.nodes.size(); ++i)
       cut_.nodes[i].visible = i % each == each - 1;
     EXPECT_EQ(ancestors(plan(0), false), 0u) << each;

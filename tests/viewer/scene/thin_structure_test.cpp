@@ -104,7 +104,7 @@ TEST(ThinStructure, IsFoundBesideALargeSurface) {
 TEST(ThinStructure, EveryRodIsInPreviewsOfTheSmallestBudgets) {
   Volume volume(ball_and_rods);
   volume.tree.thin_structure().read(volume.bricks, Always());
-  for (const std::uint64_t budget : {0, 2'000, 20'000, 60'000}) {
+  for (const std::uint64_t budget : {0u, 2'000u, 20'000u, 60'000u}) {
     EXPECT_EQ(pieces_shown(volume, preview(volume.tree, budget, 0)), 0) << budget;
     const Cut cut = preview(volume.tree, budget, kThinTriangles);
     EXPECT_EQ(pieces_shown(volume, cut), kAllPieces) << budget;
@@ -118,8 +118,8 @@ TEST(ThinStructure, NeverTakesMoreThanItsLimit) {
   volume.tree.thin_structure().read(volume.bricks, Always());
   ASSERT_TRUE(volume.tree.thin_structure().lost({2, {0, 0, 0}}, kIsovalue));
   const std::uint64_t least = preview(volume.tree, 0, 0).triangles;  // of the coarsest level
-  for (const std::uint64_t limit : {3'000, 30'000, 300'000, 3'000'000})
-    for (const std::uint64_t budget : {0, 2'000, 20'000, 200'000, 2'000'000})
+  for (const std::uint64_t limit : {3'000u, 30'000u, 300'000u, 3'000'000u})
+    for (const std::uint64_t budget : {0u, 2'000u, 20'000u, 200'000u, 2'000'000u})
       EXPECT_LE(preview(volume.tree, budget, limit).triangles, std::max({budget, limit, least}))
           << budget << ' ' << limit;
 }
@@ -142,7 +142,7 @@ TEST(ThinStructure, LeavesAPartOfTheBudgetToAllElse) {
   };
   const int finest = plane(10'000'000, 0);
   EXPECT_GT(finest, plane(10'000, 0));
-  for (const std::uint64_t budget : {400'000, 600'000, 800'000})  // half of it is enough
+  for (const std::uint64_t budget : {400'000u, 600'000u, 800'000u})  // half of it is enough
     EXPECT_EQ(plane(budget, 1'000'000), finest) << budget;
 }
 
