@@ -1,8 +1,8 @@
 #include <utility>
 
 #include "core/stopwatch.h"
-#include "pipeline/extract/chunk_writer.h"
 #include "pipeline/extract/surface_extractor.h"
+#include "surface/chunk_writer.h"
 #include "surface/cpu_extractor.h"
 
 namespace isobrick {

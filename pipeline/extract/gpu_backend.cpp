@@ -9,7 +9,7 @@
 #include "gpu/memory/host_memory.h"
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/gpu_extractor.h"
-#include "pipeline/extract/chunk_writer.h"
+#include "surface/chunk_writer.h"
 
 namespace isobrick {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/extract/chunk_writer.h"
+#include "surface/chunk_writer.h"
 
 #include <chrono>
 
