@@ -13,6 +13,7 @@
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
+#include <isobrick/surface_report.h>
 
 namespace isobrick {
 
@@ -41,13 +42,6 @@ struct ExtractOptions {
   int device = 0;                ///< of the CUDA devices, the first is 0
 };
 
-/// How long a stage was busy, and with how many bytes. What all cores share (read and
-/// decode) counts the time of every thread, divided by their number.
-struct StageReport {
-  double seconds = 0;
-  std::uint64_t bytes = 0;
-};
-
 /// One of several surfaces that are extracted together, and the sink that takes it.
 struct SurfaceOutput {
   double isovalue = 0;
@@ -57,10 +51,8 @@ struct SurfaceOutput {
 
 /// What an extraction did. Of surfaces that were made in one pass over the store, what the pass
 /// read, decoded, searched for and waited for is in each one's report.
-struct ExtractReport {
+struct ExtractReport : SurfaceReport {
   std::size_t pass = 0;  ///< which pass made the surface, the first is 0
-  std::uint64_t triangles = 0, vertices = 0;
-  std::uint64_t degenerate_triangles = 0;  ///< left out, with drop_degenerate
   std::uint64_t bricks = 0, active_bricks = 0, bricks_read = 0, brick_reads = 0;
   std::uint64_t bytes_read = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0;
@@ -69,15 +61,9 @@ struct ExtractReport {
   std::string device;              ///< its name, of the latter
   /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.
   std::string gpu_refusal;
-  /// Encoded bricks, decoded ones; bricks sent to the device, samples read by it where they
-  /// lie, samples there; the mesh. The GPU has no stage `surface` and the CPU only that one
-  /// between decode and sink.
-  StageReport read, decode, upload, gather, kernel, download, surface, sink;
-  std::uint64_t device_bytes = 0;         ///< device memory that was held, within gpu_memory
-  std::uint64_t device_bytes_in_use = 0;  ///< the same as the driver counts it
-  std::uint64_t pinned_bytes = 0;         ///< page-locked host memory, within memory
+  StageReport read, decode;               ///< encoded bricks, decoded ones
+  std::uint64_t device_bytes_in_use = 0;  ///< by all surfaces of the pass, as the driver counts it
   std::uint64_t pool_bricks = 0;   ///< that the device has room for; 0: bricks lie in host memory
-  std::uint64_t launches = 0;      ///< of kernels
   std::uint64_t search_bytes = 0;  ///< read to find them, once
   double search_seconds = 0;       ///< to find them, once
 };

@@ -75,7 +75,8 @@ ChosenBackend set_up_backend(PassRequests requests, const ExtractOptions& option
   chosen.plan = plan_memory(requests.first(count), options.memory, other_bytes);
   const auto spaces = std::make_shared<TileWorkSpaces>();
   for (std::size_t i = 0; i < count; ++i)
-    chosen.surfaces.push_back(make_cpu_surface(requests[i], chosen.plan.limits, spaces, *sinks[i]));
+    chosen.surfaces.push_back(std::make_unique<CpuExtractor>(
+        requests[i].level->lattice, requests[i].surface, chosen.plan.limits, sinks[i], spaces));
   return chosen;
 }
 

@@ -10,7 +10,6 @@
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/extract_tiles.h"
 #include "pipeline/extract/gpu_backend.h"
-#include "pipeline/extract/surface_extractor.h"
 
 namespace isobrick {
 

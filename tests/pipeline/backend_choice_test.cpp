@@ -17,7 +17,7 @@ class NoSurface final : public SurfaceExtractor {
   void extract(std::span<const TileWork>, const BrickLookup&,
                const std::shared_ptr<const void>&) override {}
   void finish() override {}
-  void report(ExtractReport&) const override {}
+  SurfaceReport report() const override { return {}; }
 };
 
 /// A GPU that is busy or small, or neither; `pinned` is what a surface takes of the host's memory.
@@ -43,6 +43,7 @@ class FakeGpu final : public GpuSession {
     }
     return std::make_unique<NoSurface>();
   }
+  void report(ExtractReport&) const override {}
 
  private:
   std::uint64_t pinned_;
