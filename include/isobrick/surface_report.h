@@ -21,7 +21,7 @@ struct SurfaceReport {
   std::uint64_t device_bytes = 0;  ///< device memory that was held
   std::uint64_t pinned_bytes = 0;  ///< pinned host memory that was held
   std::uint64_t launches = 0;      ///< of kernels
-  std::uint64_t repeats = 0;       ///< of those, for parts of a mesh that did not fit its buffers
+  std::uint64_t repeats = 0;       ///< of those, because a mesh did not fit its buffers
 };
 
 }  // namespace isobrick

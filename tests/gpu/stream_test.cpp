@@ -10,19 +10,13 @@
 #include "gpu/memory/host_memory.h"
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/gpu_extractor.h"
+#include "tests/gpu/collecting_sink.h"
 #include "tests/gpu/compare.h"
 
 // The streamed mesh is the CPU's, byte for byte, however it is cut into launches.
 
 namespace isobrick::testing {
 namespace {
-
-template <class V>
-void append(PodBuffer<V>& to, std::span<const V> values) {
-  const std::size_t before = to.size();
-  to.resize(before + values.size());
-  std::copy(values.begin(), values.end(), to.begin() + before);
-}
 
 /// How a field is streamed.
 struct Way {
@@ -114,35 +108,6 @@ class NeededBricks final : public BrickLookup {
   const BrickLookup& all_;
   Int3 grid_;
   std::vector<char> needed_;
-};
-
-/// Appends chunks to a mesh whose vertices are numbered from its first.
-class CollectingSink : public MeshSink {
- public:
-  explicit CollectingSink(Indexing indexing = Indexing::welded) : indexing_(indexing) {}
-
-  Indexing indexing() const override { return indexing_; }
-  void begin(const MeshHeader&) override {}
-  void write(const MeshChunk& chunk) override {
-    EXPECT_EQ(chunk.first_vertex, mesh.positions.size());
-    append(mesh.positions, chunk.positions);
-    append(mesh.normals, chunk.normals);
-    const std::size_t before = mesh.triangles.size();
-    append(mesh.triangles, chunk.triangles);
-    if (indexing_ == Indexing::welded) return;
-    for (std::size_t i = before; i < mesh.triangles.size(); ++i)
-      for (std::uint32_t& v : mesh.triangles[i]) {
-        EXPECT_LT(v, chunk.positions.size());
-        v += static_cast<std::uint32_t>(chunk.first_vertex);
-      }
-  }
-  void finish() override {}
-  std::uint64_t bytes() const override { return 0; }
-
-  MeshBuffer mesh;
-
- private:
-  Indexing indexing_;
 };
 
 struct Streamed {
@@ -360,15 +325,6 @@ TYPED_TEST(GpuStream, AbsentBricksAreTheFillValue) {
   expect_same(on_cpu(holed.field, holed.lattice, holed.bricks, options), made.mesh);
 }
 
-/// Fails at its third chunk.
-class FailingSink final : public CollectingSink {
- public:
-  void write(const MeshChunk&) override {
-    if (++taken == 3) throw Error("the sink broke");
-  }
-  int taken = 0;
-};
-
 TYPED_TEST(GpuStream, TheSinkMayFail) {
   const auto field = this->waves(kOdd);
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
@@ -378,7 +334,7 @@ TYPED_TEST(GpuStream, TheSinkMayFail) {
   options.isovalue = this->lowest() + 100;
   options.roi = lattice.box();
   const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
-  FailingSink sink;
+  FailingSink sink(3);
   gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, 2), sink);
   EXPECT_THROW(
       {
