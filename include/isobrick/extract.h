@@ -59,6 +59,8 @@ struct ExtractReport : SurfaceReport {
   std::optional<IndexKind> index;  ///< that found the active blocks; none: ranges alone did
   std::string backend = "cpu";     ///< or "cuda"
   std::string device;              ///< its name, of the latter
+  /// The surface was made from samples that stayed on the device, beside its mesh.
+  bool resident = false;
   /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.
   std::string gpu_refusal;
   StageReport read, decode;               ///< encoded bricks, decoded ones
@@ -94,7 +96,14 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
 /// The budgets hold for all surfaces together. Where they have no room for all, the surfaces are
 /// made in several passes over the store, in their order, each of as many as fit; the budget of
 /// the one that needs most is enough. Begins the sinks of a pass before it and finishes them after
-/// it. Throws as above: for options that make no sense, and for a `memory` too small for one of the
+/// it.
+///
+/// On a GPU whose memory has room for all samples that the surfaces touch, these stay there, and
+/// one surface is made after the other. That takes several isovalues and sinks of welded meshes,
+/// which then get all vertices before the triangles. A sink begins when its mesh is made and is
+/// finished before the next one begins.
+///
+/// Throws as above: for options that make no sense, and for a `memory` too small for one of the
 /// surfaces on the CPU, before any sink begins. A report for each surface.
 std::vector<ExtractReport> extract(const StoreReader& store, const ExtractOptions& options,
                                    std::span<const SurfaceOutput> outputs, Progress& progress);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include <isobrick/error.h>
 #include "gpu/tile/supported.h"
 
@@ -48,6 +50,13 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
                                  options.device, devices == 1 ? "is" : "are", devices,
                                  devices == 1 ? "" : "s"));
   return wanted && devices > 0;
+}
+
+bool can_be_resident(PassRequests requests) {
+  return isovalues_of(requests).size() > 1 &&
+         std::all_of(requests.begin(), requests.end(), [](const ExtractRequest& r) {
+           return r.surface.indexing == Indexing::welded && !r.surface.drop_degenerate;
+         });
 }
 
 ChosenBackend set_up_backend(PassRequests requests, const ExtractOptions& options,
