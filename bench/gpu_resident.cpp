@@ -74,13 +74,13 @@ double run_cpu(const Volume& v, const Lattice& lattice, const DenseBricks& brick
     std::vector<TileWork> tiles;
     for (int i = 0; i < runs; ++i) {
       const auto start = Clock::now();
-      mesh.clear();
       tiles.clear();
       extractor.restart();
       append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, ranges, options.isovalue, tiles);
-      extractor.extract(tiles, bricks, mesh);
+      extractor.extract(tiles, bricks, nullptr);
       times.push_back(std::chrono::duration<double>(Clock::now() - start).count());
     }
+    mesh = std::move(extractor.mesh());
   });
   return median(times);
 }

@@ -71,7 +71,6 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_
         options.roi = lattice.box();
         options.drop_degenerate = drop_degenerate;
         CpuExtractor extractor(lattice, options, {.tiles = CpuExtractor::preferred_batch(threads)});
-        MeshBuffer out;
         std::vector<TileWork> tiles;
         tbb::task_arena arena(threads);
         std::vector<double> ours, theirs;
@@ -79,11 +78,10 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_
         for (int i = -2; i < runs; ++i) {
           const auto start = Clock::now();
           arena.execute([&] {
-            out.clear();
             tiles.clear();
             extractor.restart();
             append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, ranges, isovalue, tiles);
-            extractor.extract(tiles, bricks, out);
+            extractor.extract(tiles, bricks, nullptr);
           });
           const std::chrono::duration<double> took = Clock::now() - start;
           if (i >= 0) ours.push_back(took.count());
@@ -98,20 +96,20 @@ void compare(const Volume& v, double isovalue, Index brick, int runs, bool drop_
         std::sort(ours.begin(), ours.end());
         std::sort(theirs.begin(), theirs.end());
         const std::size_t mid = ours.size() / 2;
+        const SurfaceReport made = extractor.report();
         print(fmt::format("isobrick, {} thread(s){}", threads, normals ? ", normals" : ""),
-              ours[mid], ours[0], extractor.triangles(), extractor.vertices());
+              ours[mid], ours[0], made.triangles, made.vertices);
         if (!theirs.empty()) {
           print(fmt::format("flying edges, {} thread(s){}", threads, normals ? ", normals" : ""),
                 theirs[mid], theirs[0], their_triangles, their_vertices);
           fmt::print("  -> {:.2f} times as fast\n", theirs[mid] / ours[mid]);
         }
         if (drop_degenerate)
-          fmt::print("  {} degenerate triangles left out\n", extractor.degenerate_triangles());
+          fmt::print("  {} degenerate triangles left out\n", made.degenerate_triangles);
         if (threads == 1 && !normals) {
           const double cells = static_cast<double>(volume(v.extent - Int3{1, 1, 1}));
           fmt::print("  tiles {} of {}, about {:.2f} % of the cells active\n", tiles.size(),
-                     volume(lattice.tiles()),
-                     50.0 * static_cast<double>(extractor.triangles()) / cells);
+                     volume(lattice.tiles()), 50.0 * static_cast<double>(made.triangles) / cells);
         }
       }
   });

@@ -23,16 +23,20 @@ constexpr Int3 common_sample(Int3 extent, Int3 tile) {
   return min({kBlockEdge, kBlockEdge, kBlockEdge}, extent - Int3{1, 1, 1} - tile * kTileEdge);
 }
 
+/// In place of a reach: only the samples that cells begin at, 32³ of a whole tile.
+inline constexpr Index kFirstCorners = -1;
+
 /// The samples that `active_blocks` of a tile need: their cells' corners and
 /// `reach` layers more on every side, cut at the volume's border. Calls f(Box3)
 /// for up to four boxes of rows that cover them.
 template <class F>
 void for_each_needed_box(const Lattice& lattice, const TileWork& work, Index reach, F&& f) {
   const Int3 origin = work.tile * kTileEdge;
+  const Index before = std::max<Index>(reach, 0);
   const auto emit = [&](int blocks_x, Index y0, Index y1, Index z0, Index z1) {
     const Index x0 = blocks_x & 1 ? 0 : kBlockEdge;
     const Index x1 = blocks_x & 2 ? kTileEdge : kBlockEdge;
-    const Box3 box{origin + Int3{x0 - reach, y0 - reach, z0 - reach},
+    const Box3 box{origin + Int3{x0 - before, y0 - before, z0 - before},
                    origin + Int3{x1 + 1 + reach, y1 + 1 + reach, z1 + 1 + reach}};
     const Box3 inside = intersect(box, lattice.box());
     if (!inside.empty()) f(inside);

@@ -42,6 +42,10 @@ TileStream::TileStream(const StoreReader& store, int level, std::vector<double> 
   });
 }
 
+TileStream::TileStream(std::vector<TileWork> tiles) : isovalues_(1), tiles_(std::move(tiles)) {
+  for (const TileWork& work : tiles_) blocks_.push_back(work.active_blocks);
+}
+
 bool TileStream::load_next_chunk() {
   if (next_chunk_ == chunks_.size()) return false;
   const Stopwatch watch(seconds_);

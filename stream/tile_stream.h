@@ -21,6 +21,8 @@ class TileStream {
              SearchMethod by = {});
   TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchMethod by = {})
       : TileStream(store, level, std::vector<double>{isovalue}, roi, by) {}
+  /// These tiles, as if they were active at one isovalue.
+  explicit TileStream(std::vector<TileWork> tiles);
 
   /// Looks for the first tiles in one range chunk, so that next() need not; where it has none,
   /// next() goes on.
@@ -34,15 +36,15 @@ class TileStream {
   std::size_t isovalues() const { return isovalues_.size(); }
 
   /// What searching has cost so far.
-  std::uint64_t range_bytes() const { return search_->range_bytes(); }
-  std::uint64_t index_bytes() const { return search_->index_bytes(); }
+  std::uint64_t range_bytes() const { return search_ ? search_->range_bytes() : 0; }
+  std::uint64_t index_bytes() const { return search_ ? search_->index_bytes() : 0; }
   double seconds() const { return seconds_; }
 
  private:
   bool load_next_chunk();
   void merge();
 
-  std::unique_ptr<BlockSearch> search_;
+  std::unique_ptr<BlockSearch> search_;  ///< null where all tiles are known
   std::vector<double> isovalues_;
   double seconds_ = 0;
   Box3 roi_tiles_;
@@ -65,7 +67,7 @@ struct TileBatch {
 /// most `max_bricks` bricks, which must be enough for any single tile
 /// (max_bricks_of_tile). With `whole_tiles` all blocks of a tile count as
 /// active. Ranges do not include NaN, so where there may be some, every sample is
-/// looked at.
+/// looked at. `reach` as for_each_needed_box().
 class BatchPlanner {
  public:
   BatchPlanner(TileStream& tiles, const Lattice& lattice, Index reach, bool whole_tiles,

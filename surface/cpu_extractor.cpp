@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include <isobrick/error.h>
+#include "core/stopwatch.h"
 #include "surface/boundary_map.h"
 #include "surface/case_rule.h"
+#include "surface/chunk_writer.h"
 #include "surface/coincident_vertices.h"
 #include "surface/tile_gather.h"
 #include "surface/tile_kernels.h"
@@ -28,10 +31,6 @@ constexpr std::size_t kWorthThreads = 6;
 
 }  // namespace
 
-Index sample_reach(const SurfaceOptions& options) {
-  return options.normals || options.may_have_nan || options.drop_degenerate ? 1 : 0;
-}
-
 TileWorkSpaces::TileWorkSpaces() = default;
 TileWorkSpaces::~TileWorkSpaces() = default;
 
@@ -44,9 +43,11 @@ struct CpuExtractor::Impl {
   BoundaryMap boundaries;
   std::shared_ptr<TileWorkSpaces> spaces;
   std::vector<std::unique_ptr<TileState>>& states;
-  std::uint64_t vertices = 0, triangles = 0, degenerate = 0;
+  MeshBuffer mesh;  ///< not handed on
+  SurfaceReport made;
+  std::optional<ChunkWriter> writer;
 
-  Impl(const Lattice& l, const SurfaceOptions& o, ExtractorLimits bounds,
+  Impl(const Lattice& l, const SurfaceOptions& o, ExtractorLimits bounds, MeshSink* sink,
        std::shared_ptr<TileWorkSpaces> work_spaces)
       : lattice(l),
         options(o),
@@ -63,6 +64,7 @@ struct CpuExtractor::Impl {
                o.normals,  options.may_have_nan,
                l.extent,   options.roi};
     first_tile = tile_of(options.roi.lo);
+    if (sink) writer.emplace(*sink);
   }
 
   static Int3 tile_of(Int3 p) { return {p.x / kTileEdge, p.y / kTileEdge, p.z / kTileEdge}; }
@@ -116,89 +118,107 @@ struct CpuExtractor::Impl {
     return v * sizeof(Vec3f) * (options.normals ? 2 : 1) + t * sizeof(Triangle);
   }
 
-  /// Gives the counted tiles from `begin` on their places in `out`, as many as
+  /// Gives the counted tiles from `begin` on their places in the mesh, as many as
   /// the limits allow; the first that did not fit.
-  std::size_t place(std::size_t begin, std::size_t count, const MeshBuffer& out, bool bounded) {
-    std::uint64_t v = out.positions.size(), t = out.triangles.size();
+  std::size_t place(std::size_t begin, std::size_t count) {
+    std::uint64_t v = mesh.positions.size(), t = mesh.triangles.size();
     std::size_t i = begin;
     for (; i < count; ++i) {
       TileState& state = *states[i];
-      if (bounded && v > 0 &&
+      if (writer && v > 0 &&
           output_bytes(v + state.vertices, t + state.triangles) > limits.output_bytes)
         break;
       state.vertex_base = v;
       state.triangle_base = t;
-      state.number_base = static_cast<std::uint32_t>(welded() ? vertices : v);
+      state.number_base = static_cast<std::uint32_t>(welded() ? made.vertices : v);
       if (state.boundary) state.boundary->base = state.number_base;
       v += state.vertices;
       t += state.triangles;
-      vertices += state.vertices;
-      triangles += state.triangles;
-      if (state.coincident) degenerate += state.coincident->left_out;
+      made.vertices += state.vertices;
+      made.triangles += state.triangles;
+      if (state.coincident) made.degenerate_triangles += state.coincident->left_out;
     }
-    if (welded() && vertices > std::numeric_limits<std::uint32_t>::max())
+    if (welded() && made.vertices > std::numeric_limits<std::uint32_t>::max())
       throw Error(
           "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
           "cannot number; extract it in parts with --roi, or as STL");
     return i;
   }
 
-  void emit(TileState& state, MeshBuffer& out) const {
+  void emit(TileState& state) {
     if (state.vertices == 0 && state.triangles == 0) return;
     adopt_boundaries(state, boundaries);
     if (state.coincident) adopt_coincident(state, boundaries);
-    write_tile(lattice.type, context, state, out.positions.data() + state.vertex_base,
-               options.normals ? out.normals.data() + state.vertex_base : nullptr,
-               out.triangles.data() + state.triangle_base);
+    write_tile(lattice.type, context, state, mesh.positions.data() + state.vertex_base,
+               options.normals ? mesh.normals.data() + state.vertex_base : nullptr,
+               mesh.triangles.data() + state.triangle_base);
   }
 
-  void resize_for(MeshBuffer& out, const TileState& last) const {
-    out.positions.resize(last.vertex_base + last.vertices);
-    if (options.normals) out.normals.resize(last.vertex_base + last.vertices);
-    out.triangles.resize(last.triangle_base + last.triangles);
+  void resize_for(const TileState& last) {
+    mesh.positions.resize(last.vertex_base + last.vertices);
+    if (options.normals) mesh.normals.resize(last.vertex_base + last.vertices);
+    mesh.triangles.resize(last.triangle_base + last.triangles);
   }
 
-  void extract_batch(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out,
-                     const TakeMesh& take) {
+  void extract_batch(std::span<const TileWork> tiles, const BrickLookup& bricks) {
     const std::size_t n = tiles.size();
     while (states.size() < n) states.push_back(std::make_unique<TileState>());
     for (std::size_t i = 0; i < n; ++i)
       states[i]->boundary = welded() ? boundaries.add(tiles[i].tile) : nullptr;
     for_each_tile(0, n, [&](std::size_t i) { count(*states[i], tiles[i], bricks); });
     for (std::size_t begin = 0; begin < n;) {
-      const std::size_t end = place(begin, n, out, static_cast<bool>(take));
+      const std::size_t end = place(begin, n);
       if (end > begin) {
-        resize_for(out, *states[end - 1]);
-        for_each_tile(begin, end, [&](std::size_t i) { emit(*states[i], out); });
+        resize_for(*states[end - 1]);
+        for_each_tile(begin, end, [&](std::size_t i) { emit(*states[i]); });
       }
       begin = end;
-      if (begin < n) hand_on(out, take);
+      if (begin < n) hand_on();
     }
     if (welded()) boundaries.forget_before(tiles.back().tile);
   }
 
-  void hand_on(MeshBuffer& out, const TakeMesh& take) const {
-    const std::uint64_t first = vertices - out.positions.size();
-    if (out.positions.size() + out.triangles.size() > 0) take(out, first);
+  void hand_on() {
+    if (mesh.positions.size() + mesh.triangles.size() > 0)
+      writer->write(mesh, made.vertices - mesh.positions.size());
+  }
+
+  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks) {
+    while (!tiles.empty()) {
+      // Parts of one size: a small last one would keep few threads busy.
+      const std::size_t parts = (tiles.size() + limits.tiles - 1) / limits.tiles;
+      const std::size_t batch = (tiles.size() + parts - 1) / parts;
+      extract_batch(tiles.first(batch), bricks);
+      tiles = tiles.subspan(batch);
+    }
+    if (writer) hand_on();
   }
 };
 
 CpuExtractor::CpuExtractor(const Lattice& lattice, const SurfaceOptions& options,
-                           ExtractorLimits limits, std::shared_ptr<TileWorkSpaces> spaces)
-    : impl_(std::make_unique<Impl>(lattice, options, limits, std::move(spaces))) {}
+                           ExtractorLimits limits, MeshSink* sink,
+                           std::shared_ptr<TileWorkSpaces> spaces)
+    : impl_(std::make_unique<Impl>(lattice, options, limits, sink, std::move(spaces))) {}
 CpuExtractor::~CpuExtractor() = default;
 
 void CpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
-                           MeshBuffer& out, const TakeMesh& take) {
-  while (!tiles.empty()) {
-    // Parts of one size: a small last one would keep few threads busy.
-    const std::size_t parts = (tiles.size() + impl_->limits.tiles - 1) / impl_->limits.tiles;
-    const std::size_t batch = (tiles.size() + parts - 1) / parts;
-    impl_->extract_batch(tiles.first(batch), bricks, out, take);
-    tiles = tiles.subspan(batch);
-  }
-  if (take) impl_->hand_on(out, take);
+                           const std::shared_ptr<const void>&) {
+  const Stopwatch watch(impl_->made.surface.seconds);
+  impl_->extract(tiles, bricks);
 }
+
+void CpuExtractor::finish() {
+  if (impl_->writer) impl_->writer->finish();
+}
+
+SurfaceReport CpuExtractor::report() const {
+  SurfaceReport report = impl_->made;
+  if (impl_->writer) report.sink = impl_->writer->report();
+  report.surface.bytes = report.sink.bytes;
+  return report;
+}
+
+MeshBuffer& CpuExtractor::mesh() { return impl_->mesh; }
 
 MeshSize CpuExtractor::count(const TileWork& tile, const BrickLookup& bricks) const {
   const auto state = std::make_unique<TileState>();
@@ -208,12 +228,9 @@ MeshSize CpuExtractor::count(const TileWork& tile, const BrickLookup& bricks) co
 
 void CpuExtractor::restart() {
   impl_->boundaries.clear();
-  impl_->vertices = impl_->triangles = impl_->degenerate = 0;
+  impl_->mesh.clear();
+  impl_->made = {};
 }
-
-std::uint64_t CpuExtractor::vertices() const { return impl_->vertices; }
-std::uint64_t CpuExtractor::triangles() const { return impl_->triangles; }
-std::uint64_t CpuExtractor::degenerate_triangles() const { return impl_->degenerate; }
 
 std::size_t CpuExtractor::preferred_batch(int threads) {
   return kTilesPerThread * static_cast<std::size_t>(threads);

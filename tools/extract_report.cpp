@@ -29,6 +29,7 @@ void add_backend(ordered_json& object, const ExtractReport& r) {
     object["stages"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
   object["bound"] = bound_of(r);
   if (r.backend != "cuda") return;
+  object["resident"] = r.resident;
   object["launches"] = r.launches;
   object["device_bytes"] = r.device_bytes;
   object["device_bytes_in_use"] = r.device_bytes_in_use;

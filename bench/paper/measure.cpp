@@ -90,12 +90,11 @@ class Measurement {
   }
 
   std::uint64_t triangles() {
-    mesh_.clear();
     extractor_.restart();
     std::vector<TileWork> tiles;
     all_tiles(tiles);
-    arena_.execute([&] { extractor_.extract(tiles, bricks_, mesh_); });
-    return extractor_.triangles();
+    arena_.execute([&] { extractor_.extract(tiles, bricks_, nullptr); });
+    return extractor_.report().triangles;
   }
 
  private:
@@ -115,11 +114,10 @@ class Measurement {
   double contour(const std::function<void(double, std::vector<TileWork>&)>& search) {
     std::vector<TileWork> tiles;
     return median_of(options_.runs, [&] {
-      mesh_.clear();
       tiles.clear();
       extractor_.restart();
       search(volume_.isovalue, tiles);
-      arena_.execute([&] { extractor_.extract(tiles, bricks_, mesh_); });
+      arena_.execute([&] { extractor_.extract(tiles, bricks_, nullptr); });
     });
   }
 
@@ -240,7 +238,6 @@ class Measurement {
   DenseBricks bricks_;
   SurfaceOptions surface_;
   CpuExtractor extractor_;
-  MeshBuffer mesh_;
 };
 
 }  // namespace

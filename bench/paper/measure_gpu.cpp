@@ -51,7 +51,9 @@ class GpuMeasurement {
     find_block_ranges(v, ranges_);
     std::vector<TileWork> tiles;
     append_active_tiles<T>({{0, 0, 0}, lattice_.blocks()}, ranges_, v.isovalue, tiles);
-    CpuExtractor(lattice_, surface_, {}).extract(tiles, bricks_, expected_);
+    CpuExtractor extractor(lattice_, surface_, {});
+    extractor.extract(tiles, bricks_, nullptr);
+    expected_ = std::move(extractor.mesh());
   }
 
   nlohmann::json run() {

@@ -20,73 +20,107 @@ namespace {
 /// Bytes of samples that are gathered while the ones before are copied.
 constexpr std::size_t kStagingBytes = std::size_t{32} << 20;
 
+std::vector<Int3> all_tiles(const Lattice& lattice, bool in_morton_order) {
+  std::vector<Int3> tiles;
+  const auto add = [&](Int3 t) { tiles.push_back(t); };
+  if (in_morton_order)
+    for_each_morton(lattice.tiles(), add);
+  else
+    for_each_point({{0, 0, 0}, lattice.tiles()}, add);
+  return tiles;
+}
+
 }  // namespace
 
-DeviceVolume::Impl::Impl(const Lattice& l, const BrickLookup& bricks, double fill_value)
-    : lattice(l) {
+DeviceVolume::Impl::Impl(const Lattice& l, double fill, const DeviceTiles& wanted,
+                         std::size_t staging_bytes)
+    : lattice(l), fill_value(fill) {
   if (!is_device_scalar(l.type)) throw UsageError(*why_unsupported(l.type, {}));
   if (volume(l.tiles()) >= kNone)
     throw UsageError("the volume has too many tiles to be resident on a device");
-  tile_count = static_cast<std::uint32_t>(volume(l.tiles()));
-  upload_tile_blocks(bricks, fill_value);
-  list_tiles();
-}
-
-void DeviceVolume::Impl::upload_tile_blocks(const BrickLookup& bricks, double fill_value) {
-  const NvtxRange range("upload tile blocks");
-  const Int3 grid = lattice.tiles();
-  const std::size_t tile_block_bytes = kTileBlockSamples * lattice.sample_bytes();
-  tile_blocks = DeviceBuffer<std::byte>((std::size_t{tile_count} + 1) * tile_block_bytes, stream);
-  const std::size_t batch = std::max<std::size_t>(1, kStagingBytes / tile_block_bytes);
-  PinnedBuffer<std::byte> staging[2] = {PinnedBuffer<std::byte>(batch * tile_block_bytes),
-                                        PinnedBuffer<std::byte>(batch * tile_block_bytes)};
-  Event copied[2];
-  fill_tile_block(lattice.type, fill_value, staging[0].data());
-  check(cudaMemcpyAsync(tile_blocks.data(), staging[0].data(), tile_block_bytes,
+  tile_blocks = DeviceBuffer<std::byte>((wanted.loaded.size() + 1) * block_bytes(), stream);
+  columns = DeviceBuffer<std::byte>((wanted.loaded.size() + 1) * kColumnSamples * l.sample_bytes(),
+                                    stream);
+  table_.assign(grid_tiles(), kNone);
+  list_tiles(wanted.searched);
+  staging_ = std::vector<Staging>(2);
+  for (Staging& staging : staging_) {
+    staging.blocks = PinnedBuffer<std::byte>(std::max(block_bytes(), staging_bytes));
+    staging.copied.record(stream);
+  }
+  fill_tile_block(l.type, fill, staging_[0].blocks.data());
+  check(cudaMemcpyAsync(tile_blocks.data(), staging_[0].blocks.data(), block_bytes(),
                         cudaMemcpyHostToDevice, stream.get()));
-  copied[0].record(stream);
-  copied[1].record(stream);
-  std::vector<std::uint32_t> table(tile_count);
-  for (std::size_t first = 0, turn = 0; first < tile_count; first += batch, turn ^= 1) {
-    const std::size_t count = std::min<std::size_t>(batch, tile_count - first);
-    std::byte* to = staging[turn].data();
-    copied[turn].wait();
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      const auto n = static_cast<Index>(first + i);
-      const Int3 tile{n % grid.x, n / grid.x % grid.y, n / (grid.x * grid.y)};
-      const bool any =
-          gather_tile_block(lattice, bricks, fill_value, tile, to + i * tile_block_bytes);
-      table[first + i] = any ? static_cast<std::uint32_t>(first + i + 1) : kNone;
-    });
-    check(cudaMemcpyAsync(tile_blocks.data() + (first + 1) * tile_block_bytes, to,
-                          count * tile_block_bytes, cudaMemcpyHostToDevice, stream.get()));
-    copied[turn].record(stream);
-  }
-  if (std::find(table.begin(), table.end(), kNone) != table.end()) {
-    block_of_tile = DeviceBuffer<std::uint32_t>(tile_count, stream);
-    check(cudaMemcpyAsync(block_of_tile.data(), table.data(), block_of_tile.bytes(),
-                          cudaMemcpyHostToDevice, stream.get()));
-  }
-  columns = DeviceBuffer<std::byte>(
-      (std::size_t{tile_count} + 1) * kColumnSamples * lattice.sample_bytes(), stream);
-  launch_first_columns(lattice.type, tile_blocks.data(), tile_count + 1, columns.data(),
-                       stream.get());
-  stream.wait();
+  staging_[0].copied.record(stream);
+  if (wanted.loaded.empty()) complete();
 }
 
-void DeviceVolume::Impl::list_tiles() {
-  const NvtxRange range("find tile ranges");
+DeviceVolume::Impl::~Impl() {
+  // Samples may still be on their way from what goes now.
+  (void)cudaStreamSynchronize(stream.get());
+}
+
+void DeviceVolume::Impl::list_tiles(std::span<const Int3> searched) {
+  tile_count = static_cast<std::uint32_t>(searched.size());
   std::vector<std::int32_t> order;
-  order.reserve(3 * std::size_t{tile_count});
-  for_each_morton(lattice.tiles(), [&](Int3 t) {
+  order.reserve(3 * searched.size());
+  for (const Int3 t : searched)
     for (int axis = 0; axis < 3; ++axis) order.push_back(static_cast<std::int32_t>(t[axis]));
-  });
   tiles = DeviceBuffer<std::int32_t>(order.size(), stream);
   check(cudaMemcpyAsync(tiles.data(), order.data(), tiles.bytes(), cudaMemcpyHostToDevice,
                         stream.get()));
   ranges = DeviceBuffer<std::byte>(2 * lattice.sample_bytes() * tile_count, stream);
-  launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(), stream.get());
   stream.wait();
+}
+
+void DeviceVolume::Impl::load(std::span<const Int3> more, const BrickLookup& bricks) {
+  while (!more.empty()) {
+    const std::size_t room = staging_[turn_].blocks.size() / block_bytes();
+    const std::size_t count = std::min(room, more.size());
+    load_staged(more.first(count), bricks);
+    more = more.subspan(count);
+  }
+  if (loaded_ == loaded_blocks()) complete();
+}
+
+void DeviceVolume::Impl::load_staged(std::span<const Int3> more, const BrickLookup& bricks) {
+  const NvtxRange range("upload tile blocks");
+  Staging& staging = staging_[turn_];
+  turn_ ^= 1;
+  staging.copied.wait();
+  const std::size_t first = loaded_ + 1;
+  tbb::parallel_for(std::size_t{0}, more.size(), [&](std::size_t i) {
+    const bool any = gather_tile_block(lattice, bricks, fill_value, more[i],
+                                       staging.blocks.data() + i * block_bytes());
+    if (any)
+      table_[static_cast<std::size_t>(linear_index(more[i], lattice.tiles()))] =
+          static_cast<std::uint32_t>(first + i);
+  });
+  check(cudaMemcpyAsync(tile_blocks.data() + first * block_bytes(), staging.blocks.data(),
+                        more.size() * block_bytes(), cudaMemcpyHostToDevice, stream.get()));
+  staging.copied.record(stream);
+  loaded_ += more.size();
+}
+
+/// All samples are there, or on their way.
+void DeviceVolume::Impl::complete() {
+  const NvtxRange range("find tile ranges");
+  bool is_needed = false;
+  for (std::size_t i = 0; i < table_.size(); ++i) is_needed |= table_[i] != i + 1;
+  if (is_needed) {
+    block_of_tile = DeviceBuffer<std::uint32_t>(table_.size(), stream);
+    check(cudaMemcpyAsync(block_of_tile.data(), table_.data(), block_of_tile.bytes(),
+                          cudaMemcpyHostToDevice, stream.get()));
+  }
+  launch_first_columns(lattice.type, tile_blocks.data(),
+                       static_cast<std::uint32_t>(loaded_blocks() + 1), columns.data(),
+                       stream.get());
+  if (tile_count > 0)
+    launch_tile_ranges(lattice.type, params(), tiles.data(), tile_count, ranges.data(),
+                       stream.get());
+  stream.wait();
+  table_ = {};
+  staging_.clear();
 }
 
 TileParams DeviceVolume::Impl::params() const {
@@ -102,9 +136,20 @@ TileParams DeviceVolume::Impl::params() const {
   return p;
 }
 
-DeviceVolume::DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value)
-    : impl_(std::make_unique<Impl>(lattice, bricks, fill_value)) {}
+DeviceVolume::DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value) {
+  const std::vector<Int3> searched = all_tiles(lattice, true), loaded = all_tiles(lattice, false);
+  impl_ = std::make_unique<Impl>(lattice, fill_value, DeviceTiles{searched, loaded}, kStagingBytes);
+  impl_->load(loaded, bricks);
+}
+
+DeviceVolume::DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
+                           std::size_t staging_bytes)
+    : impl_(std::make_unique<Impl>(lattice, fill_value, tiles, staging_bytes)) {}
 DeviceVolume::~DeviceVolume() = default;
+
+void DeviceVolume::load(std::span<const Int3> tiles, const BrickLookup& bricks) {
+  impl_->load(tiles, bricks);
+}
 
 const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include <isobrick/device_volume.h>
 #include "gpu/memory/device_buffer.h"
 #include "gpu/memory/pinned_buffer.h"
@@ -9,22 +11,41 @@ namespace isobrick::gpu {
 
 struct DeviceVolume::Impl {
   Lattice lattice;
+  double fill_value;
   Stream stream;
-  std::uint32_t tile_count = 0;
-  DeviceBuffer<std::byte> tile_blocks;
+  std::uint32_t tile_count = 0;               ///< that are searched
+  DeviceBuffer<std::byte> tile_blocks;        ///< that of the fill value, then of the loaded tiles
   DeviceBuffer<std::byte> columns;            ///< of the tile_blocks: TileParams::columns
-  DeviceBuffer<std::uint32_t> block_of_tile;  ///< [z, y, x]; empty where all tiles have tile_blocks
-  DeviceBuffer<std::int32_t> tiles;           ///< x, y, z of all in Morton order
-  DeviceBuffer<std::byte> ranges;             ///< of all in Morton order
+  DeviceBuffer<std::uint32_t> block_of_tile;  ///< [z, y, x]; empty where block i + 1 is of tile i
+  DeviceBuffer<std::int32_t> tiles;           ///< x, y, z of the searched, in their order
+  DeviceBuffer<std::byte> ranges;             ///< of the searched, in their order
 
-  Impl(const Lattice& lattice, const BrickLookup& bricks, double fill_value);
+  Impl(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
+       std::size_t staging_bytes);
+  ~Impl();
 
+  void load(std::span<const Int3> tiles, const BrickLookup& bricks);
   /// What the kernels need to find samples; block 0 is that of the fill value.
   TileParams params() const;
+  std::size_t grid_tiles() const { return static_cast<std::size_t>(volume(lattice.tiles())); }
 
  private:
-  void upload_tile_blocks(const BrickLookup& bricks, double fill_value);
-  void list_tiles();
+  /// Pinned memory for blocks on their way, and what it needs no longer.
+  struct Staging {
+    PinnedBuffer<std::byte> blocks;
+    Event copied;
+  };
+
+  std::size_t block_bytes() const { return kTileBlockSamples * lattice.sample_bytes(); }
+  std::size_t loaded_blocks() const { return tile_blocks.bytes() / block_bytes() - 1; }
+  void list_tiles(std::span<const Int3> searched);
+  void load_staged(std::span<const Int3> tiles, const BrickLookup& bricks);
+  void complete();
+
+  std::vector<std::uint32_t> table_;  ///< block_of_tile, until all are loaded
+  std::size_t loaded_ = 0;            ///< tiles
+  std::vector<Staging> staging_;      ///< two, until all are loaded
+  std::size_t turn_ = 0;
 };
 
 }  // namespace isobrick::gpu

@@ -1,3 +1,7 @@
+#include <tbb/concurrent_queue.h>
+
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -5,58 +9,111 @@
 #include "gpu/memory/nvtx_range.h"
 #include "gpu/resident/device_volume_impl.h"
 #include "gpu/resident/resident_launcher.h"
+#include "gpu/resident/resident_sizes.h"
+#include "surface/chunk_writer.h"
 
 namespace isobrick::gpu {
 namespace {
 
-/// Mesh to expect of a tile before anything is known: a sheet across it, twice.
-constexpr std::uint64_t kVerticesOfTile = 2500, kTrianglesOfTile = 5000;
+/// Mesh to make room for before anything is known: a sheet across each tile, twice.
+constexpr MeshSize kRoomOfTile{2500, 5000};
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+MeshSize larger(MeshSize a, MeshSize b) {
+  return {std::max(a.vertices, b.vertices), std::max(a.triangles, b.triangles)};
+}
+
+MeshSize room_for(std::uint32_t tiles) {
+  return {tiles * kRoomOfTile.vertices, tiles * kRoomOfTile.triangles};
+}
 
 }  // namespace
 
 struct ResidentExtractor::Impl {
   ResidentLauncher launcher;
+  std::uint64_t max_bytes;
+  std::uint64_t tile_bytes;  ///< of samples
   MeshRoom room;
   double isovalue = 0;
   DeviceCounts made;  ///< by the last extraction
   DeviceCounts last;  ///< what the last launch would have made
+  SurfaceReport report;
+  PinnedBuffer<std::byte> chunks[2];  ///< on their way to a sink
   Event start, end;
 
-  Impl(DeviceVolume& volume, const SurfaceOptions& options, const ResidentTuning& tuning)
-      : launcher(volume.impl(), options, tuning) {}
+  Impl(DeviceVolume& volume, const SurfaceOptions& options, const ResidentTuning& tuning,
+       std::uint64_t most)
+      : launcher(volume.impl(), options, tuning),
+        max_bytes(most),
+        tile_bytes(kTileBlockSamples * volume.lattice().sample_bytes()) {}
 
-  /// Buffers for a mesh of that size. What they held is lost.
-  void make_room(std::uint64_t vertices, std::uint64_t triangles) {
-    const Stream& stream = launcher.stream();
+  const Stream& stream() const { return launcher.stream(); }
+  bool normals() const { return launcher.options().normals; }
+  MeshSize size_of_room() const { return {room.positions.size(), room.triangles.size()}; }
+  std::uint64_t bytes() const { return launcher.bytes() + mesh_bytes(size_of_room(), normals()); }
+
+  /// Buffers for `needed`, or for `wanted` where the bound leaves room. What they held is lost.
+  void make_room(MeshSize needed, MeshSize wanted) {
+    for (const MeshSize size : {larger(wanted, size_of_room()), needed})
+      if (launcher.bytes() + mesh_bytes(size, normals()) <= max_bytes) return allocate(size);
+    throw OutOfDeviceMemory("the mesh does not fit the device beside the volume");
+  }
+
+  void allocate(MeshSize size) {
     made = {};
-    if (vertices > room.positions.size()) {
+    const MeshSize now = size_of_room();
+    const bool vertices = size.vertices != now.vertices,
+               triangles = size.triangles != now.triangles;
+    if (!vertices && !triangles) return;
+    if (vertices) {
       room.positions = {};
       room.normals = {};
-      if (launcher.options().normals) room.normals = DeviceBuffer<Vec3f>(vertices, stream);
-      room.positions = DeviceBuffer<Vec3f>(vertices, stream);  // last: its size is the capacity
     }
-    if (triangles > room.triangles.size()) {
-      room.triangles = {};
-      room.triangles = DeviceBuffer<Triangle>(triangles, stream);
-    }
+    if (triangles) room.triangles = {};
+    stream().wait();  // the driver has the memory back before it is asked for more
+    if (vertices && normals()) room.normals = {size.vertices, stream()};
+    if (vertices) room.positions = {size.vertices, stream()};  // last: its size is the capacity
+    if (triangles) room.triangles = {size.triangles, stream()};
+  }
+
+  void make_row_tables(std::uint32_t tiles) {
+    const std::uint64_t more = (tiles - launcher.tiles_with_room()) * sizeof(RowTable);
+    if (bytes() + more > max_bytes) allocate({});
+    if (bytes() + more > max_bytes)
+      throw OutOfDeviceMemory("the row tables do not fit the device beside the volume");
+    launcher.make_row_tables(tiles);
   }
 
   DeviceCounts extract(double value) {
     if (std::isnan(value)) throw UsageError("the isovalue is not a number");
     isovalue = value;
+    report = {};
+    const auto begun = Clock::now();
     made = make();
+    report.vertices = made.vertices;
+    report.triangles = made.triangles;
+    report.kernel = {
+        seconds_since(begun),
+        made.active_tiles * tile_bytes + mesh_bytes({made.vertices, made.triangles}, normals())};
     return made;
   }
 
   DeviceCounts make() {
-    // Tiles without a row table are not begun: the first launch reports how many there are.
     for (;;) {
       if (!launcher.launch(isovalue, room, last)) return {};
+      ++report.launches;
       last = launcher.wait();
-      const bool begun = last.active_tiles <= launcher.tiles_with_room();
-      launcher.make_row_tables(last.active_tiles);
-      if (!begun || (last.active_tiles > 0 && room.positions.size() == 0)) {
-        make_room(kVerticesOfTile * last.active_tiles, kTrianglesOfTile * last.active_tiles);
+      const MeshSize expected =
+          room.positions.size() == 0 ? room_for(last.active_tiles) : MeshSize{};
+      // Tiles without a row table are not begun: the first launch reports how many there are.
+      if (last.active_tiles > launcher.tiles_with_room()) {
+        make_row_tables(last.active_tiles);
+        make_room({}, expected);
         continue;
       }
       if (last.vertices > std::numeric_limits<std::uint32_t>::max())
@@ -65,24 +122,24 @@ struct ResidentExtractor::Impl {
             "number; extract it in parts with --roi");
       if (last.vertices <= room.positions.size() && last.triangles <= room.triangles.size())
         return last;
-      make_room(last.vertices, last.triangles);
+      const MeshSize needed{last.vertices, last.triangles};
+      make_room(needed, larger(needed, expected));
+      ++report.repeats;
     }
   }
 
   void repeat() {
-    const Stream& stream = launcher.stream();
-    start.record(stream);
+    start.record(stream());
     launcher.launch(isovalue, room, last);
-    end.record(stream);
+    end.record(stream());
   }
 
   void download(MeshBuffer& mesh) {
-    const NvtxRange range("download");
-    launcher.stream().wait();
+    stream().wait();
     mesh.clear();
     mesh.positions.resize(made.vertices);
     mesh.triangles.resize(made.triangles);
-    if (launcher.options().normals) mesh.normals.resize(made.vertices);
+    if (normals()) mesh.normals.resize(made.vertices);
     const auto copy = [](auto& to, const auto& from) {
       if (to.size() > 0)
         check(cudaMemcpy(to.data(), from.data(), to.size() * sizeof(*to.data()),
@@ -92,11 +149,56 @@ struct ResidentExtractor::Impl {
     copy(mesh.normals, room.normals);
     copy(mesh.triangles, room.triangles);
   }
+
+  template <class V>
+  void copy(V* to, const V* from, std::size_t count) const {
+    check(cudaMemcpyAsync(to, from, count * sizeof(V), cudaMemcpyDeviceToHost, stream().get()));
+  }
+
+  void write(MeshSink& sink, std::size_t chunk_bytes) {
+    for (PinnedBuffer<std::byte>& chunk : chunks)
+      if (chunk.size() != chunk_bytes) chunk = PinnedBuffer<std::byte>(chunk_bytes);
+    report.pinned_bytes = 2 * chunk_bytes;
+    tbb::concurrent_bounded_queue<std::byte*> free;
+    for (const PinnedBuffer<std::byte>& chunk : chunks) free.push(chunk.data());
+    ChunkWriter writer(sink);  // ends before the queue that its chunks go back to
+    // Calls copy(to, first, count) for chunks of items, which returns the chunk.
+    const auto write_all = [&](std::uint64_t items, std::size_t item_bytes,
+                               const auto& copy_chunk) {
+      const std::uint64_t at_once = chunk_bytes / item_bytes;
+      for (std::uint64_t first = 0; first < items; first += at_once) {
+        std::byte* to = nullptr;
+        free.pop(to);
+        const auto begun = Clock::now();
+        const MeshChunk chunk = copy_chunk(to, first, std::min(at_once, items - first));
+        stream().wait();
+        report.download.seconds += seconds_since(begun);
+        writer.write(chunk, [&free, to] { free.push(to); });
+      }
+    };
+    write_all(made.vertices, sizeof(Vec3f) * (normals() ? 2 : 1),
+              [&](std::byte* to, std::uint64_t first, std::uint64_t count) {
+                auto* const positions = reinterpret_cast<Vec3f*>(to);
+                copy(positions, room.positions.data() + first, count);
+                if (!normals()) return MeshChunk{first, {positions, count}, {}, {}};
+                copy(positions + count, room.normals.data() + first, count);
+                return MeshChunk{first, {positions, count}, {positions + count, count}, {}};
+              });
+    write_all(made.triangles, sizeof(Triangle),
+              [&](std::byte* to, std::uint64_t first, std::uint64_t count) {
+                auto* const triangles = reinterpret_cast<Triangle*>(to);
+                copy(triangles, room.triangles.data() + first, count);
+                return MeshChunk{made.vertices, {}, {}, {triangles, count}};
+              });
+    writer.finish();
+    report.sink = writer.report();
+    report.download.bytes = report.sink.bytes;
+  }
 };
 
 ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
-                                     const ResidentTuning& tuning)
-    : impl_(std::make_unique<Impl>(volume, options, tuning)) {}
+                                     const ResidentTuning& tuning, std::uint64_t max_bytes)
+    : impl_(std::make_unique<Impl>(volume, options, tuning, max_bytes)) {}
 ResidentExtractor::~ResidentExtractor() = default;
 
 DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
@@ -109,10 +211,16 @@ float ResidentExtractor::milliseconds() {
 
 void ResidentExtractor::download(MeshBuffer& mesh) const { impl_->download(mesh); }
 
-std::uint64_t ResidentExtractor::bytes() const {
-  const MeshRoom& room = impl_->room;
-  return impl_->launcher.bytes() + room.positions.bytes() + room.normals.bytes() +
-         room.triangles.bytes();
+void ResidentExtractor::write(MeshSink& sink, std::size_t chunk_bytes) {
+  impl_->write(sink, chunk_bytes);
 }
+
+SurfaceReport ResidentExtractor::report() const {
+  SurfaceReport report = impl_->report;
+  report.device_bytes = bytes();
+  return report;
+}
+
+std::uint64_t ResidentExtractor::bytes() const { return impl_->bytes(); }
 
 }  // namespace isobrick::gpu

@@ -9,6 +9,7 @@
 #include "core/threshold.h"
 #include "gpu/memory/device_scalar.h"
 #include "gpu/memory/nvtx_range.h"
+#include "gpu/resident/resident_sizes.h"
 #include "gpu/search/search_kernel.h"
 #include "gpu/tile/supported.h"
 #include "surface/world_map.h"
@@ -18,10 +19,6 @@ namespace {
 
 /// How often the host reads a report before it asks the driver whether all is well.
 constexpr std::uint32_t kReadsBetweenQueries = 4096;
-
-/// Row tables from the beginning, 4.4 MiB: with fewer active tiles the first isovalue needs no
-/// second launch.
-constexpr std::uint32_t kFirstRowTables = 1024;
 
 SurfaceOptions checked(SurfaceOptions options, const Lattice& lattice) {
   check_supported(lattice.type, options);
@@ -50,13 +47,16 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
       shapes_(launch_shapes(kernel_of(volume.lattice.type, options))),
       cases_(1, volume.stream),
       items_(volume.tile_count, volume.stream),
-      slot_of_tile_(volume.tile_count, volume.stream),
+      slot_of_tile_(volume.grid_tiles(), volume.stream),
       order_(volume.tile_count, volume.stream),
       words_(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream) {
   const cudaStream_t stream = volume.stream.get();
   const CaseTable table = make_case_table(world_map(options_.transform, options_.inside).mirrored);
   check(cudaMemcpyAsync(cases_.data(), &table, sizeof table, cudaMemcpyHostToDevice, stream));
   check(cudaMemsetAsync(words_.data(), 0, words_.bytes(), stream));
+  // Tiles that are not searched are never active.
+  static_assert(kNone == 0xffffffffu);
+  check(cudaMemsetAsync(slot_of_tile_.data(), 0xff, slot_of_tile_.bytes(), stream));
   make_row_tables(std::min(volume.tile_count, kFirstRowTables));
   volume.stream.wait();
 }
@@ -165,7 +165,7 @@ LaunchShape ResidentLauncher::shape_for(const DeviceCounts& last) const {
 }
 
 bool ResidentLauncher::launch(double isovalue, const MeshRoom& room, const DeviceCounts& last) {
-  if (is_above_all_samples(isovalue)) return false;
+  if (volume_.tile_count == 0 || is_above_all_samples(isovalue)) return false;
   launch_search(isovalue);
   launch_tiles(isovalue, room, last);
   return true;

@@ -11,7 +11,6 @@
 #include "gpu/stream/stream_collector.h"
 #include "gpu/stream/stream_device.h"
 #include "gpu/tile/supported.h"
-#include "surface/cpu_extractor.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -43,7 +42,7 @@ struct GpuExtractor::Impl {
   std::vector<TileWork> whole;
   StreamCollector collector;  // ends first: its thread uses the device
 
-  Impl(int id, const Lattice& l, const SurfaceOptions& o, const StreamSizes& sizes, TakeChunk take,
+  Impl(int id, const Lattice& l, const SurfaceOptions& o, const StreamSizes& sizes, MeshSink& sink,
        std::shared_ptr<BrickPool> brick_pool)
       : cuda_device(make_current(id)),
         lattice(l),
@@ -52,7 +51,7 @@ struct GpuExtractor::Impl {
         pool(std::move(brick_pool)),
         device(l, options, sizes, pool.get()),
         slots(device.sizes().slots, l.tiles()),
-        collector(id, device, welded(), options.normals, std::move(take)) {}
+        collector(id, device, welded(), options.normals, sink) {}
 
   /// Where there may be NaN all of an active tile is looked at, because ranges leave NaN out.
   std::span<const TileWork> all_to_look_at(std::span<const TileWork> tiles) {
@@ -118,9 +117,9 @@ struct GpuExtractor::Impl {
 };
 
 GpuExtractor::GpuExtractor(int device, const Lattice& lattice, const SurfaceOptions& options,
-                           const StreamSizes& sizes, TakeChunk take,
+                           const StreamSizes& sizes, MeshSink& sink,
                            const std::shared_ptr<BrickPool>& pool)
-    : impl_(std::make_unique<Impl>(device, lattice, options, sizes, std::move(take), pool)) {}
+    : impl_(std::make_unique<Impl>(device, lattice, options, sizes, sink, pool)) {}
 GpuExtractor::~GpuExtractor() = default;
 
 void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
@@ -139,14 +138,13 @@ void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& b
 
 void GpuExtractor::finish() { impl_->collector.finish(); }
 
-StreamReport GpuExtractor::report() const {
-  StreamReport report = impl_->collector.report();
+SurfaceReport GpuExtractor::report() const {
+  SurfaceReport report = impl_->collector.report();
   if (impl_->pool) {
     report.upload.seconds += impl_->pool->seconds();
     report.upload.bytes += impl_->pool->bytes();
   }
   const StreamSizes& sizes = impl_->device.sizes();
-  report.tiles_of_launch = sizes.tiles;
   report.device_bytes = sizes.device_bytes;
   report.pinned_bytes = sizes.pinned_bytes;
   return report;

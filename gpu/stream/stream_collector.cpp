@@ -22,14 +22,14 @@ double seconds_between(const Event& start, const Event& end) { return end.since(
 }  // namespace
 
 StreamCollector::StreamCollector(int cuda_device, StreamDevice& device, bool welded, bool normals,
-                                 TakeChunk take)
+                                 MeshSink& sink)
     : cuda_device_(cuda_device),
       device_(device),
       welded_(welded),
       normals_(normals),
-      take_(std::move(take)),
       outputs_(cuda_device, output_chunks(device.sizes())),
-      preferred_tiles_(device.sizes().tiles) {
+      preferred_tiles_(device.sizes().tiles),
+      writer_(sink) {
   for (std::size_t i = 0; i < kOutputs; ++i) free_outputs_.push_back(kOutputs - 1 - i);
   thread_ = std::thread([this] { run(); });
 }
@@ -43,8 +43,6 @@ StreamCollector::~StreamCollector() {
   if (thread_.joinable()) thread_.join();
   // When something went wrong a mesh may still be on its way to an output.
   device_.end_downloads();
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return taken_outputs_ == 0; });
 }
 
 void StreamCollector::wait_for_free_launch() {
@@ -75,6 +73,13 @@ void StreamCollector::finish() {
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
   if (error_) std::rethrow_exception(error_);
+  writer_.finish();
+}
+
+SurfaceReport StreamCollector::report() const {
+  SurfaceReport report = report_;
+  report.sink = writer_.report();
+  return report;
 }
 
 void StreamCollector::run() {
@@ -149,6 +154,7 @@ void StreamCollector::repeat_in_parts(InFlightLaunch& launch) {
       ++end;
     device_.submit_part(launch, first, end - first, start + before.vertices);
     launch.extracted.wait();
+    ++report_.launches;
     ++report_.repeats;
     report_.gather.seconds += seconds_between(launch.unpack_begin, launch.unpacked);
     report_.kernel.seconds += seconds_between(launch.unpacked, launch.extracted);
@@ -187,12 +193,8 @@ void StreamCollector::deliver(const Pending& pending) {
                         {from.positions, vertices},
                         {from.normals, normals_ ? vertices : 0},
                         {from.triangles, pending.size.triangles}};
-  {
-    const std::lock_guard lock(mutex_);
-    ++taken_outputs_;
-  }
   try {
-    take_(chunk, [this, index = pending.output] { give_output(index); });
+    writer_.write(chunk, [this, index = pending.output] { give_output(index); });
   } catch (...) {
     give_output(pending.output);
     throw;
@@ -214,10 +216,10 @@ MeshArrays StreamCollector::output(std::size_t index) {
 }
 
 void StreamCollector::give_output(std::size_t output) {
-  // Notified under the lock: once the last output is back, this object may go.
-  const std::lock_guard lock(mutex_);
-  free_outputs_.push_back(output);
-  --taken_outputs_;
+  {
+    const std::lock_guard lock(mutex_);
+    free_outputs_.push_back(output);
+  }
   changed_.notify_all();
 }
 

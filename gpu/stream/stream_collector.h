@@ -10,17 +10,17 @@
 #include <vector>
 
 #include "gpu/memory/pinned_region.h"
-#include "gpu/stream/gpu_extractor.h"
 #include "gpu/stream/stream_device.h"
+#include "surface/chunk_writer.h"
 
 namespace isobrick::gpu {
 
 /// Follows the launches of a streaming extraction on a thread of its own: waits for their
 /// kernels, repeats in parts what did not fit its output, downloads the meshes and
-/// hands them on in order.
+/// hands them to the sink in order.
 class StreamCollector {
  public:
-  StreamCollector(int cuda_device, StreamDevice& device, bool welded, bool normals, TakeChunk take);
+  StreamCollector(int cuda_device, StreamDevice& device, bool welded, bool normals, MeshSink& sink);
   ~StreamCollector();
 
   /// Waits until the buffers of the next launch are free. Rethrows what went wrong.
@@ -29,10 +29,10 @@ class StreamCollector {
   void submitted(InFlightLaunch& launch);
   /// How many tiles a launch may have, going by the meshes so far.
   std::uint32_t preferred_tiles() const;
-  /// Waits until every mesh was taken. Rethrows what went wrong.
+  /// Waits until the sink has taken every mesh. Rethrows what went wrong.
   void finish();
   /// All but what the host's side knows; after finish().
-  const StreamReport& report() const { return report_; }
+  SurfaceReport report() const;
 
  private:
   /// A mesh on its way to the host.
@@ -59,7 +59,6 @@ class StreamCollector {
   int cuda_device_;
   StreamDevice& device_;
   bool welded_, normals_;
-  TakeChunk take_;
   PinnedRegion outputs_;
 
   mutable std::mutex mutex_;
@@ -70,11 +69,13 @@ class StreamCollector {
   std::exception_ptr error_;
   std::uint32_t preferred_tiles_;
   std::vector<std::size_t> free_outputs_;
-  int taken_outputs_ = 0;  ///< handed on, not released
+
+  // Ends before all above: chunks that it still has go back to the outputs.
+  ChunkWriter writer_;
 
   // Used by the thread only, until it ends.
   std::optional<Pending> pending_;
-  StreamReport report_;
+  SurfaceReport report_;
 
   std::thread thread_;
 };

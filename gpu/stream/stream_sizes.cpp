@@ -10,7 +10,7 @@
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/stream_layout.h"
 #include "gpu/tile/block_groups.h"
-#include "surface/cpu_extractor.h"
+#include "surface/surface_extractor.h"
 
 namespace isobrick::gpu {
 namespace {

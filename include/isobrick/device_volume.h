@@ -1,23 +1,40 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include <isobrick/device.h>
 #include <isobrick/lattice.h>
 #include <isobrick/surface_options.h>
+#include <isobrick/surface_report.h>
 
 namespace isobrick::gpu {
 
-/// A whole volume in device memory, at its own width, as tile_blocks of one tile each,
-/// with the ranges of all tiles. Not thread-safe.
+/// Tiles of 32³ cells of a volume, by their place in units of 32 samples.
+struct DeviceTiles {
+  std::span<const Int3> searched;  ///< where a surface may be, in Morton order
+  std::span<const Int3> loaded;    ///< whose 32³ samples those look at (tiles_to_load)
+};
+
+/// A volume in device memory, at its own width, as blocks of one tile each, with the ranges of the
+/// tiles. Not thread-safe.
 class DeviceVolume {
  public:
-  /// Copies the volume to the current device. `bricks` must hold every brick that
-  /// is not absent. Throws UsageError for a type that has no kernels, Error when
-  /// the device runs out of memory.
+  /// Copies the whole volume to the current device. `bricks` must hold every brick that
+  /// is not absent. Throws UsageError for a type that has no kernels, OutOfDeviceMemory when
+  /// the device has too little.
   DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value);
+  /// Room for the loaded tiles, each of which load() takes once before the first extraction. They
+  /// pass through twice `staging_bytes` of pinned memory, at least a block's. Throws as above.
+  DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
+               std::size_t staging_bytes);
   ~DeviceVolume();
+
+  /// Copies the samples of tiles, in the caller's TBB arena; `bricks` has those that they lie in.
+  void load(std::span<const Int3> tiles, const BrickLookup& bricks);
 
   /// The samples and how they lie.
   const Lattice& lattice() const;
@@ -31,6 +48,11 @@ class DeviceVolume {
  private:
   std::unique_ptr<Impl> impl_;
 };
+
+/// The tiles that surfaces in `searched` look at, with as many layers of samples around as
+/// sample_reach() says, in Morton order.
+std::vector<Int3> tiles_to_load(const Lattice& lattice, std::span<const Int3> searched,
+                                Index reach);
 
 struct LaunchShape;
 
@@ -53,14 +75,15 @@ struct DeviceCounts {
 /// time.
 class ResidentExtractor {
  public:
-  /// The isovalue of `options` does not matter. Throws UsageError for what the
-  /// device cannot do yet: dropping degenerate triangles, meshes that are not welded.
+  /// The isovalue of `options` does not matter. Takes at most `max_bytes` of device memory besides
+  /// the volume's. Throws UsageError for what the device cannot do yet: dropping degenerate
+  /// triangles, meshes that are not welded; OutOfDeviceMemory.
   ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
-                    const ResidentTuning& tuning = {});
+                    const ResidentTuning& tuning = {}, std::uint64_t max_bytes = ~std::uint64_t{0});
   ~ResidentExtractor();
 
   /// The mesh of `isovalue`, in device memory until the next call. Grows the
-  /// buffers and repeats when it does not fit them.
+  /// buffers and repeats when it does not fit them. OutOfDeviceMemory where it cannot.
   DeviceCounts extract(double isovalue);
   /// Makes the last mesh once more, without waiting for it; for measuring, after an extract().
   void repeat();
@@ -69,6 +92,12 @@ class ResidentExtractor {
 
   /// Copies the last mesh to the host.
   void download(MeshBuffer& mesh) const;
+  /// Writes the last mesh to a sink, positions and normals before triangles, in chunks of at most
+  /// `chunk_bytes`. They pass through twice as much pinned memory.
+  void write(MeshSink& sink, std::size_t chunk_bytes);
+  /// Of the last mesh: its size, the stages kernel, download and sink, device memory without the
+  /// volume's.
+  SurfaceReport report() const;
   /// Bytes of device memory besides the volume's.
   std::uint64_t bytes() const;
 

@@ -13,6 +13,7 @@
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
+#include <isobrick/surface_report.h>
 
 namespace isobrick {
 
@@ -41,13 +42,6 @@ struct ExtractOptions {
   int device = 0;                ///< of the CUDA devices, the first is 0
 };
 
-/// How long a stage was busy, and with how many bytes. What all cores share (read and
-/// decode) counts the time of every thread, divided by their number.
-struct StageReport {
-  double seconds = 0;       ///< busy time
-  std::uint64_t bytes = 0;  ///< bytes that passed
-};
-
 /// One of several surfaces that are extracted together, and the sink that takes it.
 struct SurfaceOutput {
   double isovalue = 0;       ///< in the values of the samples
@@ -57,14 +51,11 @@ struct SurfaceOutput {
 
 /// What an extraction did. Of surfaces that were made in one pass over the store, what the pass
 /// read, decoded, searched for and waited for is in each one's report.
-struct ExtractReport {
-  std::size_t pass = 0;                    ///< which pass made the surface, the first is 0
-  std::uint64_t triangles = 0;             ///< of the mesh
-  std::uint64_t vertices = 0;              ///< of the mesh
-  std::uint64_t degenerate_triangles = 0;  ///< left out, with drop_degenerate
-  std::uint64_t bricks = 0;                ///< of the level
-  std::uint64_t active_bricks = 0;         ///< with a block that the isovalue touches
-  std::uint64_t bricks_read = 0;           ///< different bricks that were read
+struct ExtractReport : SurfaceReport {
+  std::size_t pass = 0;             ///< which pass made the surface, the first is 0
+  std::uint64_t bricks = 0;         ///< of the level
+  std::uint64_t active_bricks = 0;  ///< with a block that the isovalue touches
+  std::uint64_t bricks_read = 0;    ///< different bricks that were read
   std::uint64_t brick_reads = 0;  ///< reads of bricks; more than bricks_read where one was repeated
   std::uint64_t bytes_read = 0;   ///< from disk
   double seconds = 0;             ///< wall time of all
@@ -74,21 +65,14 @@ struct ExtractReport {
   std::optional<IndexKind> index;  ///< that found the active blocks; none: ranges alone did
   std::string backend = "cpu";     ///< or "cuda"
   std::string device;              ///< its name, of the latter
+  /// The surface was made from samples that stayed on the device, beside its mesh.
+  bool resident = false;
   /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.
   std::string gpu_refusal;
   StageReport read;                       ///< encoded bricks
   StageReport decode;                     ///< decoded bricks
-  StageReport upload;                     ///< GPU: bricks sent to the device
-  StageReport gather;                     ///< GPU: samples that the device read where they lie
-  StageReport kernel;                     ///< GPU: samples in device memory
-  StageReport download;                   ///< GPU: the mesh
-  StageReport surface;                    ///< CPU: samples; the GPU has no such stage
-  StageReport sink;                       ///< the mesh
-  std::uint64_t device_bytes = 0;         ///< device memory that was held, within gpu_memory
-  std::uint64_t device_bytes_in_use = 0;  ///< the same as the driver counts it
-  std::uint64_t pinned_bytes = 0;         ///< page-locked host memory, within memory
+  std::uint64_t device_bytes_in_use = 0;  ///< by all surfaces of the pass, as the driver counts it
   std::uint64_t pool_bricks = 0;   ///< that the device has room for; 0: bricks lie in host memory
-  std::uint64_t launches = 0;      ///< of kernels
   std::uint64_t search_bytes = 0;  ///< read to find them, once
   double search_seconds = 0;       ///< to find them, once
 };
@@ -119,7 +103,14 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
 /// The budgets hold for all surfaces together. Where they have no room for all, the surfaces are
 /// made in several passes over the store, in their order, each of as many as fit; the budget of
 /// the one that needs most is enough. Begins the sinks of a pass before it and finishes them after
-/// it. Throws as above: for options that make no sense, and for a `memory` too small for one of the
+/// it.
+///
+/// On a GPU whose memory has room for all samples that the surfaces touch, these stay there, and
+/// one surface is made after the other. That takes several isovalues and sinks of welded meshes,
+/// which then get all vertices before the triangles. A sink begins when its mesh is made and is
+/// finished before the next one begins.
+///
+/// Throws as above: for options that make no sense, and for a `memory` too small for one of the
 /// surfaces on the CPU, before any sink begins. A report for each surface.
 std::vector<ExtractReport> extract(const StoreReader& store, const ExtractOptions& options,
                                    std::span<const SurfaceOutput> outputs, Progress& progress);

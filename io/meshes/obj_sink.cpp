@@ -89,6 +89,7 @@ std::uint64_t ObjSink::memory_with(int threads) {
 }
 
 void ObjSink::begin(const MeshHeader& header) {
+  has_normals_ = header.has_normals;
   out_.writer().append("# Isobrick\n");
   if (!header.unit.empty()) out_.writer().append("# unit " + header.unit + "\n");
 }
@@ -99,8 +100,9 @@ void ObjSink::write(const MeshChunk& chunk) {
     to = put_vector(to, "v", chunk.positions[i]);
     return normals ? put_vector(to, "vn", chunk.normals[i]) : to;
   });
-  append_text(faces_, arena_, chunk.triangles.size(),
-              [&](char* to, std::size_t i) { return put_face(to, chunk.triangles[i], normals); });
+  append_text(faces_, arena_, chunk.triangles.size(), [&](char* to, std::size_t i) {
+    return put_face(to, chunk.triangles[i], has_normals_);
+  });
 }
 
 void ObjSink::finish() {

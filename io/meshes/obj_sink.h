@@ -32,6 +32,7 @@ class ObjSink final : public MeshSink {
   OutputFile out_;    ///< vertices; the faces at the end
   FileWriter faces_;  ///< text as well; waits until all vertices are written
   tbb::task_arena arena_;
+  bool has_normals_ = false;
 };
 
 }  // namespace isobrick

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include <isobrick/error.h>
 #include "gpu/tile/supported.h"
 
@@ -50,6 +52,13 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
   return wanted && devices > 0;
 }
 
+bool can_be_resident(PassRequests requests) {
+  return isovalues_of(requests).size() > 1 &&
+         std::all_of(requests.begin(), requests.end(), [](const ExtractRequest& r) {
+           return r.surface.indexing == Indexing::welded && !r.surface.drop_degenerate;
+         });
+}
+
 ChosenBackend set_up_backend(PassRequests requests, const ExtractOptions& options,
                              std::uint64_t other_bytes, std::span<MeshSink* const> sinks,
                              const OpenGpu& open, const BeginDecoding& begin) {
@@ -75,7 +84,8 @@ ChosenBackend set_up_backend(PassRequests requests, const ExtractOptions& option
   chosen.plan = plan_memory(requests.first(count), options.memory, other_bytes);
   const auto spaces = std::make_shared<TileWorkSpaces>();
   for (std::size_t i = 0; i < count; ++i)
-    chosen.surfaces.push_back(make_cpu_surface(requests[i], chosen.plan.limits, spaces, *sinks[i]));
+    chosen.surfaces.push_back(std::make_unique<CpuExtractor>(
+        requests[i].level->lattice, requests[i].surface, chosen.plan.limits, sinks[i], spaces));
   return chosen;
 }
 

@@ -10,7 +10,6 @@
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/extract_tiles.h"
 #include "pipeline/extract/gpu_backend.h"
-#include "pipeline/extract/surface_extractor.h"
 
 namespace isobrick {
 
@@ -20,6 +19,10 @@ namespace isobrick {
 /// UsageError for another one than those, whatever the backend but Backend::cpu.
 bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
               std::uint64_t active_blocks);
+
+/// Whether surfaces that a GPU makes may share samples kept on it (resident_pass.h): there are
+/// several isovalues, all meshes are welded and no triangles are left out.
+bool can_be_resident(PassRequests requests);
 
 /// Who makes the surfaces of a pass, and with what memory. What comes later ends earlier.
 struct ChosenBackend {

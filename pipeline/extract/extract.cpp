@@ -14,6 +14,7 @@
 #include "pipeline/extract/extract_pass.h"
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/extract_tiles.h"
+#include "pipeline/extract/resident_pass.h"
 #include "pipeline/workers.h"
 
 namespace isobrick {
@@ -128,6 +129,12 @@ class Extraction {
     use_gpu_ = early_.gpu.valid() || use_cuda(requests_.front(), options_, blocks);
   }
 
+  TileStream take_tiles(PassRequests requests) {
+    // What was begun early is for all surfaces.
+    const bool is_begun = early_.tiles.valid() && requests.size() == requests_.size();
+    return is_begun ? early_.tiles.get() : tiles_of(store_, options_.level, requests);
+  }
+
   ChosenBackend set_up(const PassSurfaces& left) {
     return set_up_backend(
         left.requests, options_, other_bytes_, left.sinks,
@@ -136,12 +143,8 @@ class Extraction {
           return use_gpu_ ? open_gpu(options_.device) : nullptr;
         },
         [&](PassRequests requests, const ExtractPlan& plan, GpuSession& gpu) {
-          // What was begun early is for all surfaces.
-          const bool is_begun = early_.tiles.valid() && requests.size() == requests_.size();
-          return std::make_unique<DecodedTiles>(
-              store_, options_.level,
-              is_begun ? early_.tiles.get() : tiles_of(store_, options_.level, requests), requests,
-              plan, gpu.bricks());
+          return std::make_unique<DecodedTiles>(store_, options_.level, take_tiles(requests),
+                                                requests, plan, gpu.bricks());
         });
   }
 
@@ -151,28 +154,16 @@ class Extraction {
     const BrickTimes times_before = store_.brick_times();
     if (first > 0) bytes_before_ = store_.bytes_read();
     double seconds = 0, plan_seconds = 0;
-    PassSurfaces made;
+    std::size_t count = 0;
     {
       const Stopwatch whole(seconds);
-      ChosenBackend backend;
-      {
-        const Stopwatch watch(plan_seconds);
-        backend = set_up(left);
-      }
-      made = left.first(backend.surfaces.size());
-      for (std::size_t i = 0; i < made.sinks.size(); ++i) {
-        const ExtractRequest& request = made.requests[i];
-        made.sinks[i]->begin(header_of(*request.level, request.surface, active_[first + i]));
-      }
-      run_pass(store_, options_, backend, made,
-               [&](std::size_t i, std::span<const TileWork> tiles) {
-                 progress.advance(bytes_of(tiles, first + i));
-               });
-      for (ExtractReport& report : made.reports) report.gpu_refusal = backend.gpu_refusal;
-      // Their buffers are freed before the sinks end their files.
-      backend.surfaces.clear();
-      for (MeshSink* sink : made.sinks) sink->finish();
+      if (first == 0 && use_gpu_ && can_be_resident(requests_))
+        count = run_resident_pass(
+            store_, options_, left, take_tiles(requests_), other_bytes_,
+            [&](std::size_t i) { begin_sink(i); }, progress);
+      if (count == 0) count = stream(left, first, plan_seconds, progress);
     }
+    const PassSurfaces made = left.first(count);
     complete(made, first, times_before);
     for (ExtractReport& report : made.reports) {
       report.pass = pass;
@@ -180,6 +171,31 @@ class Extraction {
       report.plan_seconds = plan_seconds;
     }
     return made.requests.size();
+  }
+
+  /// Streams as many of `left`, the surfaces from `first` on, as fit together; how many.
+  std::size_t stream(const PassSurfaces& left, std::size_t first, double& plan_seconds,
+                     Progress& progress) {
+    ChosenBackend backend;
+    {
+      const Stopwatch watch(plan_seconds);
+      backend = set_up(left);
+    }
+    const PassSurfaces made = left.first(backend.surfaces.size());
+    for (std::size_t i = 0; i < made.sinks.size(); ++i) begin_sink(first + i);
+    run_pass(store_, options_, backend, made, [&](std::size_t i, std::span<const TileWork> tiles) {
+      progress.advance(bytes_of(tiles, first + i));
+    });
+    for (ExtractReport& report : made.reports) report.gpu_refusal = backend.gpu_refusal;
+    // Their buffers are freed before the sinks end their files.
+    backend.surfaces.clear();
+    for (MeshSink* sink : made.sinks) sink->finish();
+    return made.sinks.size();
+  }
+
+  void begin_sink(std::size_t surface) {
+    const ExtractRequest& request = requests_[surface];
+    sinks_[surface]->begin(header_of(*request.level, request.surface, active_[surface]));
   }
 
   /// Of a surface's active bricks, the part that lies in these tiles.

@@ -106,6 +106,10 @@ void report_bricks(std::uint64_t bricks_read, std::uint64_t reads, double decode
   }
 }
 
+void report_surface(const SurfaceExtractor& surface, ExtractReport& report) {
+  static_cast<SurfaceReport&>(report) = surface.report();
+}
+
 /// Threads' time of reading and decoding so far.
 double bricks_seconds(const StoreReader& store) {
   const BrickTimes times = store.brick_times();
@@ -151,7 +155,7 @@ void extract_on_cpu(const Work& work, std::span<const std::unique_ptr<SurfaceExt
   // Of the decoding that went on meanwhile every surface had its share.
   const double share = decoded_beside / threads / std::max(extract_seconds, 1e-9);
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    surfaces[i]->report(work.reports[i]);
+    report_surface(*surfaces[i], work.reports[i]);
     double& seconds = work.reports[i].surface.seconds;
     seconds = std::max(0.0, seconds * (1 - share));
   }
@@ -174,7 +178,8 @@ void extract_on_gpu(const Work& work, ChosenBackend& backend) {
   }
   for (const auto& surface : backend.surfaces) surface->finish();
   for (std::size_t i = 0; i < backend.surfaces.size(); ++i) {
-    backend.surfaces[i]->report(work.reports[i]);
+    report_surface(*backend.surfaces[i], work.reports[i]);
+    backend.gpu->report(work.reports[i]);
     if (backend.gpu->pool_bricks() == 0) work.reports[i].pinned_bytes += decoder.memory_bytes();
   }
   report_bricks(decoder.bricks_read(), decoder.reads(), decode_seconds, work);

@@ -66,6 +66,9 @@ void check_transform(const StoreInfo& info, const LevelInfo& level) {
 /// What the CUDA driver and its context take of the host's memory.
 constexpr std::uint64_t kCudaDriver = std::uint64_t{128} << 20;
 
+/// Of a tile of the grid where the samples stay on a GPU: three lists and a table.
+constexpr std::uint64_t kBytesOfListedTile = 3 * sizeof(TileWork);
+
 /// What every extraction takes besides its surface and its bricks.
 std::uint64_t fixed_bytes(const ExtractRequest& request) {
   const Lattice& lattice = request.level->lattice;
@@ -94,6 +97,9 @@ std::uint64_t sink_bytes(PassRequests requests) {
   for (const ExtractRequest& request : requests) bytes += request.sink_bytes;
   return bytes;
 }
+
+/// Larger chunks of a mesh, or of samples for a GPU, gain nothing.
+constexpr std::uint64_t kMaxChunk = std::uint64_t{32} << 20;
 
 /// Bricks that a cache can use: neighbours come on top of the active ones.
 std::uint64_t most_useful(std::size_t tile_bricks, PassRequests requests) {
@@ -191,9 +197,8 @@ ExtractPlan plan_memory(PassRequests requests, std::uint64_t budget, std::uint64
       1 + spare / 6 / workspace, 1, CpuExtractor::preferred_batch(common(requests).threads));
   // One piece of each mesh is written while the next is made.
   const std::uint64_t least_output = tile_output(requests);
-  plan.limits.output_bytes =
-      std::clamp<std::uint64_t>(least_output + spare / 12 / requests.size(), least_output,
-                                std::max(least_output, std::uint64_t{32} << 20));
+  plan.limits.output_bytes = std::clamp<std::uint64_t>(
+      least_output + spare / 12 / requests.size(), least_output, std::max(least_output, kMaxChunk));
   const std::uint64_t used =
       fixed + plan.limits.tiles * workspace + 2 * requests.size() * plan.limits.output_bytes;
   plan.cache_bricks = fit_cache(requests, budget - used, tile_bricks);
@@ -225,6 +230,32 @@ ExtractPlan plan_gpu_memory(PassRequests requests, const ExtractOptions& options
   // Two batches are on their way through the GPU while others are decoded.
   plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 4);
   plan.bytes = used + plan.cache_bricks * brick_bytes;
+  return plan;
+}
+
+std::optional<ExtractPlan> plan_resident_memory(PassRequests requests, std::uint64_t budget,
+                                                std::uint64_t other_bytes) {
+  const Lattice& lattice = common(requests).level->lattice;
+  const std::size_t tile_bricks = max_bricks_of_tile(lattice, 0);
+  const std::uint64_t tile_bytes =
+      std::uint64_t{kTileEdge} * kTileEdge * kTileEdge * lattice.sample_bytes();
+  // Sinks hold memory one after the other.
+  std::uint64_t sink = 0;
+  for (const ExtractRequest& request : requests) sink = std::max(sink, request.sink_bytes);
+  const std::uint64_t fixed =
+      fixed_bytes(common(requests)) + kCudaDriver + other_bytes + sink +
+      (requests.size() - 1) * kSinkBuffers +
+      static_cast<std::uint64_t>(volume(lattice.tiles())) * kBytesOfListedTile;
+  const std::uint64_t least = fixed + 2 * tile_bytes + tile_bricks * lattice.brick_bytes();
+  if (budget < least) return std::nullopt;
+  ExtractPlan plan;
+  plan.limits.output_bytes =
+      std::min(tile_bytes + (budget - least) / 8, std::max(tile_bytes, kMaxChunk));
+  plan.limits.tiles = plan.limits.output_bytes / tile_bytes;
+  const std::uint64_t used = fixed + 2 * plan.limits.output_bytes;
+  plan.cache_bricks = fit_cache(requests, budget - used, tile_bricks);
+  plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 4);
+  plan.bytes = used + plan.cache_bricks * lattice.brick_bytes();
   return plan;
 }
 

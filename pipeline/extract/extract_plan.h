@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -61,5 +62,11 @@ ExtractPlan plan_memory(PassRequests requests, std::uint64_t budget, std::uint64
 /// and what its driver takes are within the budget.
 ExtractPlan plan_gpu_memory(PassRequests requests, const ExtractOptions& options,
                             std::uint64_t other_bytes, GpuSession& gpu);
+
+/// The same for surfaces that are made one after the other from samples kept on a GPU
+/// (resident_pass.h). `limits.output_bytes` are those of a pinned buffer, of which there are two.
+/// None where the budget is too small.
+std::optional<ExtractPlan> plan_resident_memory(PassRequests requests, std::uint64_t budget,
+                                                std::uint64_t other_bytes);
 
 }  // namespace isobrick

@@ -9,64 +9,9 @@
 #include "gpu/memory/host_memory.h"
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/gpu_extractor.h"
-#include "pipeline/extract/chunk_writer.h"
 
 namespace isobrick {
 namespace {
-
-class CudaSurface final : public SurfaceExtractor {
- public:
-  CudaSurface(int device, const gpu::DeviceInfo& info, const ExtractRequest& request,
-              const gpu::StreamSizes& sizes, const std::shared_ptr<gpu::BrickPool>& pool,
-              MeshSink& sink)
-      : info_(info),
-        pool_bricks_(sizes.pool.bricks),
-        writer_(sink),
-        extractor_(
-            device, request.level->lattice, request.surface, sizes,
-            [this](const MeshChunk& chunk, std::function<void()> release) {
-              writer_.write(chunk, std::move(release));
-            },
-            pool) {
-    const std::uint64_t free = gpu::open_device(device).free_bytes;
-    bytes_in_use_ = info_.free_bytes - std::min(free, info_.free_bytes);
-  }
-
-  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
-               const std::shared_ptr<const void>& samples) override {
-    extractor_.extract(tiles, bricks, samples);
-  }
-
-  void finish() override {
-    extractor_.finish();
-    writer_.finish();
-  }
-
-  void report(ExtractReport& report) const override {
-    const gpu::StreamReport r = extractor_.report();
-    const auto stage = [](const gpu::StreamStage& s) { return StageReport{s.seconds, s.bytes}; };
-    report.backend = "cuda";
-    report.device = info_.name;
-    report.vertices = r.vertices;
-    report.triangles = r.triangles;
-    report.gather = stage(r.gather);
-    report.upload = stage(r.upload);
-    report.kernel = stage(r.kernel);
-    report.download = stage(r.download);
-    report.sink = {writer_.seconds(), r.download.bytes};
-    report.device_bytes = r.device_bytes;
-    report.device_bytes_in_use = bytes_in_use_;
-    report.pinned_bytes = r.pinned_bytes;
-    report.pool_bricks = pool_bricks_;
-    report.launches = r.launches + r.repeats;
-  }
-
- private:
-  gpu::DeviceInfo info_;
-  std::uint64_t pool_bricks_, bytes_in_use_ = 0;
-  ChunkWriter writer_;
-  gpu::GpuExtractor extractor_;  // ends first: its thread hands chunks to the writer
-};
 
 /// Bricks in host memory, which the device reads.
 class HostBricks final : public BrickMemory {
@@ -124,7 +69,16 @@ class CudaSession final : public GpuSession {
 
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request, std::size_t number,
                                                  MeshSink& sink) override {
-    return std::make_unique<CudaSurface>(device_, info_, request, sizes_[number], pool_, sink);
+    return std::make_unique<gpu::GpuExtractor>(device_, request.level->lattice, request.surface,
+                                               sizes_[number], sink, pool_);
+  }
+
+  void report(ExtractReport& report) const override {
+    report.backend = "cuda";
+    report.device = info_.name;
+    report.pool_bricks = pool_bricks();
+    const std::uint64_t free = gpu::open_device(device_).free_bytes;
+    report.device_bytes_in_use = info_.free_bytes - std::min(free, info_.free_bytes);
   }
 
  private:

@@ -4,8 +4,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "pipeline/extract/surface_extractor.h"
+#include "pipeline/extract/extract_plan.h"
 #include "stream/brick_memory.h"
+#include "surface/surface_extractor.h"
 
 // The CUDA backend as the pipeline sees it: gpu_backend.cpp where it is built, else
 // no_gpu_backend.cpp.
@@ -39,6 +40,8 @@ class GpuSession {
   /// The surface of a request, by its number, as planned. Session and sink must outlive it.
   virtual std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request,
                                                          std::size_t number, MeshSink& sink) = 0;
+  /// Adds what it is and holds; while its surfaces are there.
+  virtual void report(ExtractReport& report) const = 0;
 };
 
 /// Throws Error when the device cannot be made ready, or without the backend.

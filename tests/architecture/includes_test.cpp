@@ -49,7 +49,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"bricks/ranges", {"range_table"}},
     {"bricks/zarr", {"image_metadata", "level_info"}},
     {"index", {"index_kind"}},
-    {"surface", {"mesh", "surface_options"}},
+    {"surface", {"mesh", "surface_options", "surface_report"}},
     {"gpu/memory", {"device"}},
     {"gpu/resident", {"device_volume"}},
     {"pipeline", {"histogram"}},

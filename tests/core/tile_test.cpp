@@ -36,6 +36,18 @@ TEST(TileWork, NeededBoxesCoverTheActiveBlocks) {
       }
 }
 
+TEST(TileWork, ATileWithoutLayersAroundIsTheSamplesThatItsCellsBeginAt) {
+  const Lattice lattice{{70, 60, 50}, {16, 16, 16}, ScalarType::u8};
+  for (const Int3 tile : {Int3{0, 0, 0}, Int3{1, 1, 1}, Int3{2, 0, 1}}) {
+    std::vector<Box3> boxes;
+    for_each_needed_box(lattice, {tile, 0xff}, kFirstCorners,
+                        [&](Box3 box) { boxes.push_back(box); });
+    ASSERT_EQ(boxes.size(), 1u);
+    const Int3 origin = tile * kTileEdge, edge{kTileEdge, kTileEdge, kTileEdge};
+    EXPECT_EQ(boxes[0], intersect({origin, origin + edge}, lattice.box()));
+  }
+}
+
 // What the side of blocks that are not active is taken from: a sample of every
 // block that exists, and needed whichever of them is active.
 TEST(TileWork, AllBlocksOfATileShareASample) {

@@ -27,9 +27,8 @@ MeshBuffer on_cpu(const Field<T>& field, const Lattice& lattice, const BrickLook
                   const SurfaceOptions& options) {
   const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
   CpuExtractor extractor(lattice, options, {});
-  MeshBuffer mesh;
-  extractor.extract(tiles, bricks, mesh);
-  return mesh;
+  extractor.extract(tiles, bricks, nullptr);
+  return std::move(extractor.mesh());
 }
 
 template <class V>

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <functional>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -11,19 +10,13 @@
 #include "gpu/memory/host_memory.h"
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/gpu_extractor.h"
+#include "tests/gpu/collecting_sink.h"
 #include "tests/gpu/compare.h"
 
 // The streamed mesh is the CPU's, byte for byte, however it is cut into launches.
 
 namespace isobrick::testing {
 namespace {
-
-template <class V>
-void append(PodBuffer<V>& to, std::span<const V> values) {
-  const std::size_t before = to.size();
-  to.resize(before + values.size());
-  std::copy(values.begin(), values.end(), to.begin() + before);
-}
 
 /// How a field is streamed.
 struct Way {
@@ -119,25 +112,8 @@ class NeededBricks final : public BrickLookup {
 
 struct Streamed {
   MeshBuffer mesh;
-  gpu::StreamReport report;
+  SurfaceReport report;
 };
-
-/// Appends a chunk to a mesh whose vertices are numbered from its first, and lets it go.
-void take_chunk(MeshBuffer& mesh, Indexing indexing, const MeshChunk& chunk,
-                const std::function<void()>& release) {
-  EXPECT_EQ(chunk.first_vertex, mesh.positions.size());
-  append(mesh.positions, chunk.positions);
-  append(mesh.normals, chunk.normals);
-  const std::size_t before = mesh.triangles.size();
-  append(mesh.triangles, chunk.triangles);
-  if (indexing == Indexing::chunk_local)
-    for (std::size_t i = before; i < mesh.triangles.size(); ++i)
-      for (std::uint32_t& v : mesh.triangles[i]) {
-        EXPECT_LT(v, chunk.positions.size());
-        v += static_cast<std::uint32_t>(chunk.first_vertex);
-      }
-  release();
-}
 
 Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOptions& options,
                 std::span<const TileWork> tiles, const Way& way) {
@@ -150,17 +126,16 @@ Streamed stream(const Lattice& lattice, const BrickLookup& all, const SurfaceOpt
   if (options.may_have_nan)
     for (TileWork& tile : looked_at) tile.active_blocks = 0xff;
   const NeededBricks bricks(on_device, lattice, looked_at, sample_reach(options));
-  const auto take = [&](const MeshChunk& chunk, const std::function<void()>& release) {
-    take_chunk(result.mesh, options.indexing, chunk, release);
-  };
+  CollectingSink sink(options.indexing);
   const gpu::StreamSizes sizes = gpu::stream_sizes(lattice, options, way.tiles, gpu::kMinInFlight,
                                                    pooled ? pooled->sizes() : gpu::PoolSizes{});
-  gpu::GpuExtractor extractor(0, lattice, options, sizes, take, pooled ? pooled->pool() : nullptr);
+  gpu::GpuExtractor extractor(0, lattice, options, sizes, sink, pooled ? pooled->pool() : nullptr);
   for (std::size_t i = 0; i < tiles.size(); i += std::min(way.call, tiles.size()))
     extractor.extract(tiles.subspan(i, std::min(way.call, tiles.size() - i)), bricks,
                       in_host_memory.memory());
   extractor.finish();
   EXPECT_EQ(in_host_memory.memory().use_count(), 1) << "samples are let go";
+  result.mesh = std::move(sink.mesh);
   result.report = extractor.report();
   return result;
 }
@@ -212,7 +187,7 @@ TYPED_TEST(GpuStream, SmoothFieldHoweverItIsCut) {
 struct Beside {
   SurfaceOptions options;
   std::vector<TileWork> tiles;
-  MeshBuffer mesh;
+  std::unique_ptr<CollectingSink> sink;
   std::unique_ptr<gpu::GpuExtractor> extractor;
 };
 
@@ -246,14 +221,12 @@ TYPED_TEST(GpuStream, SeveralSurfacesReadTheSameBricks) {
     for (Beside& s : surfaces) {
       s.options.roi = lattice.box();
       s.tiles = active_tiles(field, s.options.isovalue);
+      s.sink = std::make_unique<CollectingSink>(s.options.indexing);
       s.extractor = std::make_unique<gpu::GpuExtractor>(
           0, lattice, s.options,
           gpu::stream_sizes(lattice, s.options, 4, gpu::kMinInFlight,
                             pooled ? pooled->sizes() : gpu::PoolSizes{}),
-          [&s](const MeshChunk& chunk, const std::function<void()>& release) {
-            take_chunk(s.mesh, s.options.indexing, chunk, release);
-          },
-          pooled ? pooled->pool() : nullptr);
+          *s.sink, pooled ? pooled->pool() : nullptr);
     }
     std::vector<std::span<const TileWork>> left;
     for (const Beside& s : surfaces) left.emplace_back(s.tiles);
@@ -263,14 +236,14 @@ TYPED_TEST(GpuStream, SeveralSurfacesReadTheSameBricks) {
     for (Beside& s : surfaces) s.extractor->finish();
     EXPECT_EQ(in_host_memory.memory().use_count(), 1) << "samples are let go";
     for (const std::size_t i : {0u, 2u})
-      expect_same(on_cpu(field, lattice, all, surfaces[i].options), surfaces[i].mesh);
-    EXPECT_EQ(surfaces[1].mesh.triangles.size(), surfaces[0].mesh.triangles.size());
+      expect_same(on_cpu(field, lattice, all, surfaces[i].options), surfaces[i].sink->mesh);
+    const MeshBuffer &welded = surfaces[0].sink->mesh, &local = surfaces[1].sink->mesh;
+    EXPECT_EQ(local.triangles.size(), welded.triangles.size());
     const auto corner = [](const MeshBuffer& mesh, std::size_t triangle, std::size_t n) {
       return mesh.positions[mesh.triangles[triangle][n]];
     };
-    for (std::size_t i = 0; i < surfaces[0].mesh.triangles.size(); ++i)
-      for (std::size_t n = 0; n < 3; ++n)
-        ASSERT_EQ(corner(surfaces[1].mesh, i, n), corner(surfaces[0].mesh, i, n));
+    for (std::size_t i = 0; i < welded.triangles.size(); ++i)
+      for (std::size_t n = 0; n < 3; ++n) ASSERT_EQ(corner(local, i, n), corner(welded, i, n));
   }
 }
 
@@ -352,7 +325,7 @@ TYPED_TEST(GpuStream, AbsentBricksAreTheFillValue) {
   expect_same(on_cpu(holed.field, holed.lattice, holed.bricks, options), made.mesh);
 }
 
-TYPED_TEST(GpuStream, WhoTakesTheMeshMayFail) {
+TYPED_TEST(GpuStream, TheSinkMayFail) {
   const auto field = this->waves(kOdd);
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
   const DenseBricks all(lattice, field.samples.data());
@@ -361,19 +334,15 @@ TYPED_TEST(GpuStream, WhoTakesTheMeshMayFail) {
   options.isovalue = this->lowest() + 100;
   options.roi = lattice.box();
   const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
-  int taken = 0;
-  const auto take = [&](const MeshChunk&, const std::function<void()>& release) {
-    if (++taken == 3) throw Error("the sink broke");
-    release();
-  };
-  gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, 2), take);
+  FailingSink sink(3);
+  gpu::GpuExtractor extractor(0, lattice, options, gpu::stream_sizes(lattice, options, 2), sink);
   EXPECT_THROW(
       {
         extractor.extract(tiles, bricks, bricks.memory());
         extractor.finish();
       },
       Error);
-  EXPECT_EQ(taken, 3);
+  EXPECT_EQ(sink.taken, 3);
 }
 
 TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
@@ -382,8 +351,10 @@ TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
     const Lattice lattice{{64, 64, 64}, {64, 64, 64}, type};
     SurfaceOptions options{.roi = lattice.box()};
     change(options);
-    EXPECT_THROW(gpu::GpuExtractor(0, lattice, options, gpu::stream_sizes(lattice, options, 1), {}),
-                 UsageError);
+    CollectingSink sink;
+    EXPECT_THROW(
+        gpu::GpuExtractor(0, lattice, options, gpu::stream_sizes(lattice, options, 1), sink),
+        UsageError);
   };
   refused(ScalarType::f64, [](SurfaceOptions&) {});
   refused(ScalarType::i32, [](SurfaceOptions&) {});

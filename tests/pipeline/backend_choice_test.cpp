@@ -17,7 +17,7 @@ class NoSurface final : public SurfaceExtractor {
   void extract(std::span<const TileWork>, const BrickLookup&,
                const std::shared_ptr<const void>&) override {}
   void finish() override {}
-  void report(ExtractReport&) const override {}
+  SurfaceReport report() const override { return {}; }
 };
 
 /// A GPU that is busy or small, or neither; `pinned` is what a surface takes of the host's memory.
@@ -43,6 +43,7 @@ class FakeGpu final : public GpuSession {
     }
     return std::make_unique<NoSurface>();
   }
+  void report(ExtractReport&) const override {}
 
  private:
   std::uint64_t pinned_;
@@ -145,6 +146,47 @@ TEST_F(BackendChoice, AsManySurfacesAsFitAreSetUpTogether) {
 TEST_F(BackendChoice, AGpuThatIsDemandedFailsAloud) {
   EXPECT_THROW(choose(Backend::cuda, 100 * kMiB, gpu(100 * kMiB)), UsageError);
   EXPECT_THROW(choose(Backend::cuda, 400 * kMiB, gpu(kMiB, true)), Error);
+}
+
+TEST_F(BackendChoice, SeveralIsovaluesOfWeldedMeshesMayShareWhatStaysOnTheGpu) {
+  const auto request = [&](double isovalue, auto... change) {
+    ExtractRequest r = check_request(*store_, {.isovalue = isovalue}, Indexing::welded);
+    (change(r.surface), ...);
+    return r;
+  };
+  const auto local = [](SurfaceOptions& s) { s.indexing = Indexing::chunk_local; };
+  const auto dropping = [](SurfaceOptions& s) { s.drop_degenerate = true; };
+  const auto normals = [](SurfaceOptions& s) { s.normals = true; };
+  using Requests = std::vector<ExtractRequest>;
+  EXPECT_TRUE(can_be_resident(Requests{request(100), request(120, normals)}));
+  EXPECT_FALSE(can_be_resident(Requests{request(100)}));
+  EXPECT_FALSE(can_be_resident(Requests{request(100), request(100, normals)}));
+  EXPECT_FALSE(can_be_resident(Requests{request(100), request(120, local)}));
+  EXPECT_FALSE(can_be_resident(Requests{request(100, dropping), request(120, dropping)}));
+}
+
+TEST_F(BackendChoice, APassOverWhatStaysOnTheGpuKeepsToTheHostsBudget) {
+  std::vector<ExtractRequest> requests(3, check_request(*store_, {.threads = 2}, Indexing::welded));
+  for (ExtractRequest& request : requests) request.active_bricks = 64;
+  std::uint64_t chunk = 0;
+  for (const std::uint64_t budget : {180 * kMiB, 256 * kMiB, 1024 * kMiB, 8192 * kMiB}) {
+    const auto plan = plan_resident_memory(requests, budget, 0);
+    ASSERT_TRUE(plan) << budget;
+    EXPECT_LE(plan->bytes, budget);
+    EXPECT_GE(plan->limits.output_bytes, chunk);
+    EXPECT_GE(plan->limits.tiles * 32768, plan->limits.output_bytes / 2) << "tiles of a byte";
+    EXPECT_LE(plan->batch_bricks, plan->cache_bricks);
+    EXPECT_GE(plan->batch_bricks, 27u) << "of a tile";
+    chunk = plan->limits.output_bytes;
+  }
+  EXPECT_EQ(chunk, 32 * kMiB);
+  EXPECT_FALSE(plan_resident_memory(requests, 120 * kMiB, 0)) << "the driver alone takes that";
+  // Sinks hold memory one after the other, unlike in a pass that streams.
+  const std::uint64_t alone = plan_resident_memory(requests, 1024 * kMiB, 0)->cache_bricks;
+  for (ExtractRequest& request : requests) request.sink_bytes = 300 * kMiB;
+  ASSERT_TRUE(plan_resident_memory(requests, 1024 * kMiB, 0));
+  EXPECT_EQ(plan_resident_memory(requests, 1324 * kMiB, 0)->cache_bricks, alone);
+  EXPECT_FALSE(plan_resident_memory(requests, 300 * kMiB, 0));
 }
 
 }  // namespace

@@ -122,5 +122,32 @@ TEST(TileStream, BatchesOfSeveralIsovalues) {
   EXPECT_GT(std::min(of_first, of_second), 0u);
 }
 
+/// Batches have the bricks of the tiles' own samples, and no others.
+TEST(TileStream, TilesThatAreKnown) {
+  const NoiseStore noise({150, 90, 100});
+  const StoreReader store(noise.path);
+  const Lattice& lattice = store.info().levels[0].lattice;
+  const std::vector<TileWork> tiles{{{0, 0, 0}, 0xff}, {{2, 1, 0}, 0xff}, {{4, 2, 3}, 0xff}};
+  TileStream stream(tiles);
+  EXPECT_EQ(stream.isovalues(), 1u);
+  EXPECT_EQ(stream.range_bytes() + stream.index_bytes(), 0u);
+  BatchPlanner planner(stream, lattice, kFirstCorners, true, 2, 100);
+  std::size_t next = 0;
+  for (TileBatch batch; planner.next(batch);) {
+    std::set<std::array<Index, 3>> needed, planned;
+    for (const TileWork& work : batch.tiles) {
+      EXPECT_EQ(work.tile, tiles[next++].tile);
+      const Int3 origin = work.tile * kTileEdge;
+      const Box3 own{origin, origin + Int3{kTileEdge, kTileEdge, kTileEdge}};
+      for_each_point(lattice.bricks_of(intersect(own, lattice.box())), [&](Int3 b) {
+        needed.insert({b.x, b.y, b.z});
+      });
+    }
+    for (const Int3 b : batch.bricks) planned.insert({b.x, b.y, b.z});
+    EXPECT_EQ(planned, needed);
+  }
+  EXPECT_EQ(next, tiles.size());
+}
+
 }  // namespace
 }  // namespace isobrick::test

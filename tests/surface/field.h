@@ -98,14 +98,14 @@ Mesh extract(const Field<T>& field, const Request& request) {
   const auto ranges = block_ranges(field);
   append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, ranges, request.isovalue, tiles);
   CpuExtractor extractor(lattice, options, {.tiles = request.workspaces});
-  MeshBuffer out;
   for (std::size_t i = 0; i < tiles.size(); i += std::min(request.batch, tiles.size()))
     extractor.extract(std::span(tiles).subspan(i, std::min(request.batch, tiles.size() - i)),
-                      bricks, out);
+                      bricks, nullptr);
+  const MeshBuffer& out = extractor.mesh();
   return {{out.positions.begin(), out.positions.end()},
           {out.normals.begin(), out.normals.end()},
           {out.triangles.begin(), out.triangles.end()},
-          extractor.degenerate_triangles()};
+          extractor.report().degenerate_triangles};
 }
 
 /// Each triangle as the three lattice edges its vertices lie on, rotated so

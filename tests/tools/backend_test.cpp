@@ -193,6 +193,91 @@ TEST_F(Cuda, SeveralSurfacesInOnePassAreThoseOfTheCpu) {
   }
 }
 
+/// Several isovalues on both backends; the report of the GPU.
+class ResidentCuda : public Cuda {
+ protected:
+  /// Expects equal files, and the first `resident` surfaces to be made from what stayed on the GPU.
+  nlohmann::json compare_all(const std::string& store, const Arguments& isovalues,
+                             const std::string& extension, const Arguments& more,
+                             const char* gpu_memory, std::size_t resident) const {
+    const auto extract = [&](const std::string& backend, const Arguments& also) {
+      Arguments all{"extract",   store,  "--force", "-o", path(backend + extension),
+                    "--backend", backend};
+      for (const std::string& isovalue : isovalues) all.insert(all.end(), {"--isovalue", isovalue});
+      all.insert(all.end(), more.begin(), more.end());
+      all.insert(all.end(), also.begin(), also.end());
+      return run_json(all);
+    };
+    extract("cpu", {});
+    const nlohmann::json made = extract("cuda", {"--gpu-memory", gpu_memory});
+    EXPECT_EQ(made["surfaces"].size(), isovalues.size());
+    for (std::size_t i = 0; i < isovalues.size(); ++i) {
+      const nlohmann::json& surface = made["surfaces"][i];
+      EXPECT_EQ(surface["backend"], "cuda");
+      EXPECT_EQ(surface["resident"], i < resident) << isovalues[i];
+      EXPECT_TRUE(read_file(path("cpu_" + isovalues[i] + extension)) ==
+                  read_file(path("cuda_" + isovalues[i] + extension)))
+          << isovalues[i];
+    }
+    return made;
+  }
+};
+
+TEST_F(ResidentCuda, FilesAreThoseOfTheCpu) {
+  for (const std::string type : {"u8", "i8", "u16", "i16", "f32"}) {
+    const std::string store = waves(type, {"--brick", type == "u8" ? "20" : "32"});
+    const double middle = std::stod(middle_of(store));
+    const Arguments isovalues{middle_of(store), std::to_string(middle + std::abs(middle) / 4),
+                              std::to_string(middle - std::abs(middle) / 4)};
+    SCOPED_TRACE(type);
+    const nlohmann::json made = compare_all(store, isovalues, ".ply", {}, "256M", 3);
+    ASSERT_EQ(made["passes"].size(), 1u);
+    EXPECT_EQ(made["passes"][0]["brick_reads"], made["passes"][0]["bricks_read"]);
+    for (const nlohmann::json& surface : made["surfaces"]) {
+      EXPECT_LE(surface["device_bytes"].get<std::uint64_t>(), std::uint64_t{256} << 20);
+      EXPECT_GT(surface["stages"]["upload"]["bytes"].get<std::uint64_t>(), 0u);
+      EXPECT_EQ(surface["stages"]["download"]["bytes"], surface["stages"]["sink"]["bytes"]);
+    }
+    compare_all(store, isovalues, ".ply", {"--normals", "gradient"}, "256M", 3);
+    compare_all(store, isovalues, ".ply", {"--roi", "11:99,40:,:77"}, "256M", 3);
+  }
+}
+
+TEST_F(ResidentCuda, EveryFormatOfSharedVerticesIsThatOfTheCpu) {
+  const std::string store = waves("u16", {"--brick", "32"});
+  for (const std::string extension : {".obj", ".glb", ".vtp"})
+    for (const Arguments& more : {Arguments{}, Arguments{"--normals", "gradient"}}) {
+      SCOPED_TRACE(extension);
+      compare_all(store, {"20000", "45000"}, extension, more, "256M", 2);
+    }
+  compare_all(store, {"20000", "45000"}, ".ply", {"--level", "1"}, "256M", 2);
+  compare_all(store, {"20000", "45000"}, ".stl", {}, "256M", 0);
+}
+
+/// Most bricks of a sphere in a large field are absent, and the inner ones are not looked at.
+TEST_F(ResidentCuda, OnlyBricksThatASurfaceTouchesAreRead) {
+  const std::string store = path("sphere.zarr");
+  ASSERT_EQ(
+      run({"synth", "sphere", store, "--dims", "300,260,280", "--type", "u8", "--brick", "16"})
+          .exit_code,
+      0);
+  const nlohmann::json made = compare_all(store, {"100", "140"}, ".ply", {}, "256M", 2);
+  const nlohmann::json& bricks = made["surfaces"][0]["bricks"];
+  EXPECT_LT(bricks["read"].get<int>(), bricks["total"].get<int>() / 2);
+}
+
+/// The first mesh fits beside the samples, the second does not.
+TEST_F(ResidentCuda, AMeshThatDoesNotFitBesideTheSamplesIsStreamedWithThoseAfterIt) {
+  const std::string store = waves("u16", {"--brick", "32", "--noise", "4"});
+  const Arguments isovalues{"64000", "32000", "64500"};
+  const nlohmann::json made = compare_all(store, isovalues, ".ply", {}, "56M", 1);
+  ASSERT_EQ(made["passes"].size(), 2u);
+  EXPECT_EQ(made["passes"][0]["outputs"].size(), 1u);
+  EXPECT_EQ(made["passes"][1]["outputs"].size(), 2u);
+  compare_all(store, isovalues, ".ply", {}, "1G", 3);
+  compare_all(store, isovalues, ".ply", {}, "40M", 0);
+}
+
 /// A mesh and its picture are two surfaces of one isovalue.
 TEST_F(Cuda, AMeshAndItsPictureReadTheStoreOnce) {
   const std::string store = waves("u8", {"--brick", "32"});

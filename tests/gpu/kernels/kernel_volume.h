@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "core/morton.h"
+#include "gpu/resident/resident_sizes.h"
 #include "gpu/tile/tile_block.h"
+#include "surface/surface_extractor.h"
 #include "surface/world_map.h"
 #include "tests/gpu/compare.h"
 #include "tests/gpu/kernels/tile_runner.h"
@@ -98,18 +100,27 @@ class KernelVolume {
   Lattice lattice;
   SurfaceOptions options;
 
-  /// Keeps `field` and `bricks`. The region of interest is all where `o` leaves it empty.
+  /// Keeps `field` and `bricks`. The region of interest is all where `o` leaves it empty. Only
+  /// tiles that are active at one of `isovalues` are searched, all where there are none.
   KernelVolume(const Field<T>& field, const BrickLookup& bricks, const Lattice& l,
-               const SurfaceOptions& o)
+               const SurfaceOptions& o, const std::vector<double>& isovalues = {})
       : lattice(l), options(o), field_(field), bricks_(bricks) {
     if (options.roi == Box3{}) options.roi = lattice.box();
-    for_each_morton(lattice.tiles(), [&](Int3 t) { tiles_.push_back(t); });
+    std::vector<char> is_searched(grid_tiles(), isovalues.empty());
+    for (const double isovalue : isovalues)
+      for (const TileWork& work : active_tiles(field, isovalue))
+        is_searched[static_cast<std::size_t>(linear_index(work.tile, lattice.tiles()))] = 1;
+    for_each_morton(lattice.tiles(), [&](Int3 t) {
+      if (is_searched[static_cast<std::size_t>(linear_index(t, lattice.tiles()))])
+        tiles_.push_back(t);
+    });
     make_pages();
     list_tiles();
     cases_ = gpu::make_case_table(world_map(options.transform, options.inside).mirrored);
   }
 
   std::uint32_t tiles() const { return static_cast<std::uint32_t>(tiles_.size()); }
+  std::size_t grid_tiles() const { return static_cast<std::size_t>(volume(lattice.tiles())); }
   const gpu::CaseTable& cases() const { return cases_; }
   MeshBuffer mesh(double isovalue) const {
     return expected_mesh(field_, lattice, bricks_, options, isovalue);
@@ -160,16 +171,16 @@ class KernelVolume {
   }
   void make_pages() {
     const Int3 grid = lattice.tiles();
-    tile_blocks_.resize((tiles_.size() + 1) * gpu::kTileBlockSamples);
+    const std::vector<Int3> loaded = gpu::tiles_to_load(lattice, tiles_, sample_reach(options));
+    tile_blocks_.resize((loaded.size() + 1) * gpu::kTileBlockSamples);
     gpu::fill_tile_block(lattice.type, options.fill_value, block(0));
-    for_each_point({{0, 0, 0}, grid}, [&](Int3 tile) {
-      const auto place = static_cast<std::uint32_t>(linear_index(tile, grid)) + 1;
-      const bool any =
-          gpu::gather_tile_block(lattice, bricks_, options.fill_value, tile, block(place));
-      block_of_tile_.push_back(any ? place : gpu::kNone);
-    });
-    columns_.resize((tiles_.size() + 1) * gpu::kColumnSamples);
-    emulated::run_first_columns(lattice.type, tile_blocks_.data(), tiles() + 1, columns_.data());
+    block_of_tile_.assign(grid_tiles(), gpu::kNone);
+    for (std::uint32_t i = 0; i < loaded.size(); ++i)
+      if (gpu::gather_tile_block(lattice, bricks_, options.fill_value, loaded[i], block(i + 1)))
+        block_of_tile_[static_cast<std::size_t>(linear_index(loaded[i], grid))] = i + 1;
+    const auto blocks = static_cast<std::uint32_t>(loaded.size() + 1);
+    columns_.resize(blocks * gpu::kColumnSamples);
+    emulated::run_first_columns(lattice.type, tile_blocks_.data(), blocks, columns_.data());
   }
   std::byte* block(std::size_t i) {
     return reinterpret_cast<std::byte*>(tile_blocks_.data() + i * gpu::kTileBlockSamples);
@@ -185,7 +196,7 @@ class KernelVolume {
 
   const Field<T>& field_;
   const BrickLookup& bricks_;
-  std::vector<Int3> tiles_;  ///< in Morton order
+  std::vector<Int3> tiles_;  ///< that are searched, in Morton order
   std::vector<T> tile_blocks_, columns_, ranges_;
   std::vector<std::uint32_t> block_of_tile_;
   std::vector<std::int32_t> coordinates_;
@@ -194,9 +205,9 @@ class KernelVolume {
 
 /// What extractions of a volume count and report with; ResidentLauncher keeps the same.
 struct KernelState {
-  explicit KernelState(std::uint32_t tiles)
+  KernelState(std::uint32_t tiles, std::size_t grid_tiles)
       : items(tiles),
-        slots(tiles),
+        slots(grid_tiles, gpu::kNone),
         order(tiles),
         row_tables(tiles),
         zeroed(2 + (tiles + gpu::kTilesOfSearchBlock - 1) / gpu::kTilesOfSearchBlock) {}

@@ -27,7 +27,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
   run.type = scalar_type_of<T>;
   run.normals = volume.options.normals;
   run.may_have_nan = volume.options.may_have_nan;
-  KernelState state(volume.tiles());
+  KernelState state(volume.tiles(), volume.grid_tiles());
   std::size_t made = 0;
   for (const double isovalue : isovalues) {
     SCOPED_TRACE("isovalue " + std::to_string(isovalue) + ", " + std::to_string(run.threads) +
@@ -122,7 +122,7 @@ TYPED_TEST(TileKernel, TooLittleRoom) {
   for (const auto& [vertices, triangles] : {std::pair<std::size_t, std::size_t>{0, 0},
                                             {expected.positions.size() - 1, 0},
                                             {0, expected.triangles.size() - 1}}) {
-    KernelState state(volume.tiles());
+    KernelState state(volume.tiles(), volume.grid_tiles());
     MeshRoom room(vertices, triangles);
     run_both(volume, {.type = scalar_type_of<TypeParam>}, TestFixture::kMid, state, room);
     room.expect_untouched(vertices, triangles);
@@ -137,6 +137,22 @@ TYPED_TEST(TileKernel, BricksThatAreAbsent) {
   const SurfaceOptions options = holed.options(TestFixture::kMid);
   compare(KernelVolume<TypeParam>(holed.field, holed, holed.lattice, options), {},
           {TestFixture::kMid});
+}
+
+/// What is not loaded has a fill value that would show.
+TYPED_TEST(TileKernel, APartOfTheVolume) {
+  constexpr double mid = TestFixture::kMid;
+  const auto field = TestFixture::Fields::waves({131, 67, 99});
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  const std::vector<double> isovalues{mid + 72, mid - 60};
+  for (const bool normals : {false, true})
+    for (const double fill : {mid - 90, mid + 90}) {
+      const SurfaceOptions options{.normals = normals, .fill_value = fill};
+      const KernelVolume<TypeParam> volume(field, bricks, lattice, options, isovalues);
+      EXPECT_LT(volume.tiles(), volume.grid_tiles() / 2);
+      compare(volume, {}, isovalues);
+    }
 }
 
 /// 33 × 33 tiles, which two blocks search.

@@ -40,6 +40,15 @@ Chunks make_chunks(std::size_t triangles, std::uint32_t rings = 40) {
   return chunks;
 }
 
+/// The same with all vertices before the triangles.
+Chunks vertices_first(Chunks chunks) {
+  const std::size_t vertices = chunks.mesh.positions.size(),
+                    triangles = chunks.mesh.triangles.size();
+  chunks.ends = {
+      {vertices / 3, 0}, {vertices, 0}, {vertices, triangles / 2}, {vertices, triangles}};
+  return chunks;
+}
+
 void write(MeshSink& sink, const Chunks& chunks, bool normals, const std::string& unit = "") {
   EXPECT_EQ(sink.indexing(), Indexing::welded);
   sink.begin({normals, {0, 0, 0}, {1, 1, 1}, {}, unit});
@@ -163,15 +172,17 @@ TEST(MeshFormats, AGlbIsInMetres) {
 TEST(MeshFormats, ChunksAndThreadsNeverShow) {
   const TempDir dir;
   const std::map<std::string, std::function<std::unique_ptr<MeshSink>(std::string, int)>> sinks{
+      {"ply", [](auto path, int) { return std::make_unique<PlySink>(path, false); }},
       {"obj", [](auto path, int n) { return std::make_unique<ObjSink>(path, false, n); }},
       {"glb", [](auto path, int) { return std::make_unique<GlbSink>(path, false); }},
       {"vtp", [](auto path, int) { return std::make_unique<VtpSink>(path, false); }},
       {"pvtp", [](auto path, int) { return std::make_unique<PvtpSink>(path, false, 1000); }}};
   for (const auto& [name, open] : sinks) {
     int n = 0;
-    for (const std::size_t triangles : {100, 3001, 1 << 30}) {
+    for (const Chunks& chunks : {make_chunks(100), make_chunks(3001), make_chunks(1 << 30),
+                                 vertices_first(make_chunks(1))}) {
       fs::create_directory(dir / std::to_string(n));
-      write(*open(dir / (std::to_string(n) + "/a." + name), n + 1), make_chunks(triangles), true);
+      write(*open(dir / (std::to_string(n) + "/a." + name), n + 1), chunks, true);
       EXPECT_TRUE(dir.read("0/a." + name) == dir.read(std::to_string(n) + "/a." + name)) << name;
       ++n;
     }

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include <isobrick/surface_options.h>
+#include <isobrick/surface_report.h>
 
 namespace isobrick {
 
@@ -29,8 +30,8 @@ class ChunkWriter {
   void write(const MeshChunk& chunk, std::function<void()> release);
   /// Waits until all is written.
   void finish();
-  /// Seconds that the sink was busy.
-  double seconds() const { return seconds_; }
+  /// How long the sink was busy, and the bytes of the mesh; after finish().
+  StageReport report() const { return {seconds_, bytes_}; }
 
  private:
   struct Job {
@@ -47,7 +48,8 @@ class ChunkWriter {
   tbb::concurrent_bounded_queue<std::shared_ptr<MeshBuffer>> free_;
   std::atomic<bool> failed_{false};
   std::exception_ptr error_;
-  std::atomic<double> seconds_{0};
+  double seconds_ = 0;       ///< of the thread
+  std::uint64_t bytes_ = 0;  ///< of who writes
   std::thread thread_;
 };
 

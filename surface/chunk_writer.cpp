@@ -1,4 +1,4 @@
-#include "pipeline/extract/chunk_writer.h"
+#include "surface/chunk_writer.h"
 
 #include <chrono>
 
@@ -26,8 +26,7 @@ void ChunkWriter::run() {
     if (!failed_) try {
         const auto start = std::chrono::steady_clock::now();
         sink_.write(job->chunk);
-        const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-        seconds_ = seconds_ + took.count();
+        seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       } catch (...) {
         error_ = std::current_exception();
         failed_ = true;
@@ -61,6 +60,8 @@ void ChunkWriter::write(MeshBuffer& mesh, std::uint64_t first_vertex) {
 
 void ChunkWriter::write(const MeshChunk& chunk, std::function<void()> release) {
   rethrow();
+  bytes_ +=
+      chunk.positions.size_bytes() + chunk.normals.size_bytes() + chunk.triangles.size_bytes();
   auto job = std::make_shared<Job>();
   job->chunk = chunk;
   job->release = std::move(release);

@@ -1,0 +1,217 @@
+#include "pipeline/extract/resident_pass.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <isobrick/device_volume.h>
+#include <isobrick/error.h>
+#include "core/stopwatch.h"
+#include "gpu/resident/resident_sizes.h"
+#include "pipeline/workers.h"
+
+namespace isobrick {
+namespace {
+
+/// Samples of a tile on the device.
+constexpr std::uint64_t kTileSize = std::uint64_t{kTileEdge} * kTileEdge * kTileEdge;
+/// The driver gets memory that is allocated in the order of a stream in pieces of so much.
+constexpr std::uint64_t kPieceOfDriver = std::uint64_t{32} << 20;
+
+/// Decoded bricks, which only processors read.
+class HostBricks final : public BrickMemory {
+ public:
+  std::shared_ptr<std::byte> room(std::size_t bytes) override {
+    return {new std::byte[bytes], std::default_delete<std::byte[]>()};
+  }
+};
+
+/// What the surfaces of a pass look at.
+struct PassTiles {
+  std::vector<Int3> searched, loaded;  ///< gpu::DeviceTiles
+  std::uint64_t active = 0;            ///< of the isovalue that has most
+
+  gpu::ResidentTiles count() const { return {searched.size(), loaded.size(), active}; }
+};
+
+class ResidentPass {
+ public:
+  ResidentPass(const StoreReader& store, const ExtractOptions& options,
+               const PassSurfaces& surfaces, const ExtractPlan& plan, const gpu::DeviceInfo& device,
+               Progress& progress)
+      : store_(store),
+        options_(options),
+        surfaces_(surfaces),
+        plan_(plan),
+        device_(device),
+        progress_(progress),
+        budget_(options.gpu_memory > 0 ? options.gpu_memory
+                                       : device.free_bytes - device.free_bytes / 10) {}
+
+  /// False where the device has no room.
+  bool load(TileStream& tiles) {
+    const std::optional<PassTiles> found = find_tiles(tiles);
+    if (!found) return false;
+    const gpu::ResidentSizes sizes = gpu::resident_sizes(lattice(), found->count(), any_normals());
+    if (sizes.volume_bytes + sizes.extractor_bytes + kPieceOfDriver > budget_) return false;
+    try {
+      volume_.emplace(lattice(), common().surface.fill_value,
+                      gpu::DeviceTiles{found->searched, found->loaded}, plan_.limits.output_bytes);
+      decode(found->loaded);
+    } catch (const gpu::OutOfDeviceMemory&) {
+      return false;
+    }
+    return true;
+  }
+
+  /// Makes the surfaces from the first on, as many as the device has room for.
+  std::size_t make(const std::function<void(std::size_t)>& begin) {
+    for (std::size_t i = 0; i < surfaces_.requests.size(); ++i) {
+      ExtractReport& report = surfaces_.reports[i];
+      {
+        const Stopwatch watch(report.surface_seconds);
+        if (!extract(surfaces_.requests[i].surface)) return i;
+        begin(i);
+        extractor_->write(*surfaces_.sinks[i], plan_.limits.output_bytes);
+      }
+      add_report(report);
+      surfaces_.sinks[i]->finish();
+      progress_.advance(bytes_of(surfaces_.requests[i]) / 2);
+    }
+    return surfaces_.requests.size();
+  }
+
+ private:
+  const ExtractRequest& common() const { return surfaces_.requests.front(); }
+  const Lattice& lattice() const { return common().level->lattice; }
+  bool any_normals() const {
+    return std::any_of(surfaces_.requests.begin(), surfaces_.requests.end(),
+                       [](const ExtractRequest& r) { return r.surface.normals; });
+  }
+
+  std::uint64_t bytes_of(const ExtractRequest& request) const {
+    return request.active_bricks * lattice().brick_bytes();
+  }
+
+  /// False where the device has no room.
+  bool extract(const SurfaceOptions& surface) {
+    try {
+      if (!extractor_ || surface.normals != has_normals_) {
+        extractor_.reset();
+        extractor_.emplace(*volume_, surface, gpu::ResidentTuning{},
+                           budget_ - kPieceOfDriver - volume_->bytes());
+        has_normals_ = surface.normals;
+      }
+      extractor_->extract(surface.isovalue);
+    } catch (const gpu::OutOfDeviceMemory&) {
+      return false;
+    }
+    return true;
+  }
+
+  /// None where the samples of the tiles alone are too much for the device.
+  std::optional<PassTiles> find_tiles(TileStream& tiles) {
+    const std::uint64_t most = budget_ / (kTileSize * lattice().sample_bytes());
+    PassTiles found;
+    std::vector<std::uint64_t> active(tiles.isovalues());
+    while (const std::optional<TileWork> work = tiles.next()) {
+      if (found.searched.size() == most) return std::nullopt;
+      found.searched.push_back(work->tile);
+      for (std::size_t i = 0; i < active.size(); ++i) active[i] += tiles.blocks_of_each()[i] != 0;
+    }
+    found.active = *std::max_element(active.begin(), active.end());
+    found.loaded = gpu::tiles_to_load(lattice(), found.searched, reach_of(surfaces_.requests));
+    for (ExtractReport& report : surfaces_.reports) {
+      report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
+      report.bytes_read = 2 * tiles.index_bytes();
+      report.search_seconds = tiles.seconds();
+    }
+    return found;
+  }
+
+  void decode(std::span<const Int3> loaded) {
+    std::vector<TileWork> work;
+    for (const Int3 tile : loaded) work.push_back({tile, 0xff});
+    TileStream stream(std::move(work));
+    BatchPlanner batches(stream, lattice(), kFirstCorners, true, plan_.limits.tiles,
+                         plan_.batch_bricks);
+    HostBricks memory;
+    BatchDecoder decoder(store_, options_.level, batches, 0, plan_.cache_bricks, common().threads,
+                         memory);
+    std::uint64_t bytes = 0, done = 0, shown = 0;
+    for (const ExtractRequest& request : surfaces_.requests) bytes += bytes_of(request);
+    double decode_seconds = 0;
+    for (;;) {
+      std::shared_ptr<const DecodedBatch> batch;
+      {
+        const Stopwatch watch(decode_seconds);
+        batch = decoder.next();
+      }
+      if (!batch) break;
+      std::vector<Int3> tiles;
+      for (const TileWork& tile : batch->tiles()) tiles.push_back(tile.tile);
+      {
+        const Stopwatch watch(upload_.seconds);
+        volume_->load(tiles, *batch);
+      }
+      // Half of the way is that the samples are there.
+      done += tiles.size();
+      const auto part = static_cast<double>(done) / static_cast<double>(loaded.size());
+      const auto now = static_cast<std::uint64_t>(part * static_cast<double>(bytes / 2));
+      progress_.advance(now - std::exchange(shown, now));
+    }
+    upload_.bytes = loaded.size() * kTileSize * lattice().sample_bytes();
+    for (ExtractReport& report : surfaces_.reports) {
+      report.bricks_read = decoder.bricks_read();
+      report.brick_reads = decoder.reads();
+      report.decode_seconds = decode_seconds;
+    }
+  }
+
+  void add_report(ExtractReport& report) const {
+    static_cast<SurfaceReport&>(report) = extractor_->report();
+    report.upload = upload_;
+    report.device_bytes += volume_->bytes();
+    report.backend = "cuda";
+    report.device = device_.name;
+    report.resident = true;
+    const std::uint64_t free = gpu::open_device(options_.device).free_bytes;
+    report.device_bytes_in_use = device_.free_bytes - std::min(free, device_.free_bytes);
+  }
+
+  const StoreReader& store_;
+  const ExtractOptions& options_;
+  const PassSurfaces& surfaces_;
+  const ExtractPlan& plan_;
+  const gpu::DeviceInfo& device_;
+  Progress& progress_;
+  std::uint64_t budget_;  ///< of device memory
+  StageReport upload_;
+  std::optional<gpu::DeviceVolume> volume_;
+  std::optional<gpu::ResidentExtractor> extractor_;  ///< of the volume
+  bool has_normals_ = false;                         ///< the extractor's meshes
+};
+
+}  // namespace
+
+std::size_t run_resident_pass(const StoreReader& store, const ExtractOptions& options,
+                              const PassSurfaces& surfaces, TileStream tiles,
+                              std::uint64_t other_bytes,
+                              const std::function<void(std::size_t)>& begin, Progress& progress) {
+  const auto plan = plan_resident_memory(surfaces.requests, options.memory, other_bytes);
+  if (!plan) return 0;
+  return Workers(surfaces.requests.front().threads).execute([&]() -> std::size_t {
+    gpu::DeviceInfo device;
+    try {
+      device = gpu::open_device(options.device);
+    } catch (const Error&) {
+      return 0;  // streaming, which is next, reports it
+    }
+    ResidentPass pass(store, options, surfaces, *plan, device, progress);
+    return pass.load(tiles) ? pass.make(begin) : 0;
+  });
+}
+
+}  // namespace isobrick
