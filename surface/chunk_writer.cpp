@@ -1,6 +1,6 @@
 #include "surface/chunk_writer.h"
 
-#include <chrono>
+#include "core/stopwatch.h"
 
 namespace isobrick {
 
@@ -24,9 +24,8 @@ void ChunkWriter::run() {
     jobs_.pop(job);
     if (job->last) return;
     if (!failed_) try {
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch watch(seconds_);
         sink_.write(job->chunk);
-        seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       } catch (...) {
         error_ = std::current_exception();
         failed_ = true;

@@ -1,11 +1,11 @@
 #include <tbb/concurrent_queue.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
 #include <isobrick/error.h>
+#include "core/stopwatch.h"
 #include "gpu/memory/nvtx_range.h"
 #include "gpu/resident/device_volume_impl.h"
 #include "gpu/resident/resident_launcher.h"
@@ -17,12 +17,6 @@ namespace {
 
 /// Mesh to make room for before anything is known: a sheet across each tile, twice.
 constexpr MeshSize kRoomOfTile{2500, 5000};
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 MeshSize larger(MeshSize a, MeshSize b) {
   return {std::max(a.vertices, b.vertices), std::max(a.triangles, b.triangles)};
@@ -93,13 +87,12 @@ struct ResidentExtractor::Impl {
     if (std::isnan(value)) throw UsageError("the isovalue is not a number");
     isovalue = value;
     report = {};
-    const auto begun = Clock::now();
+    Stopwatch watch;
     made = make();
     report.vertices = made.vertices;
     report.triangles = made.triangles;
-    report.kernel = {
-        seconds_since(begun),
-        made.active_tiles * tile_bytes + mesh_bytes({made.vertices, made.triangles}, normals())};
+    report.kernel = {watch.lap(), made.active_tiles * tile_bytes +
+                                      mesh_bytes({made.vertices, made.triangles}, normals())};
     return made;
   }
 
@@ -135,6 +128,7 @@ struct ResidentExtractor::Impl {
   }
 
   void download(MeshBuffer& mesh) {
+    const NvtxRange range("download");
     stream().wait();
     mesh.clear();
     mesh.positions.resize(made.vertices);
@@ -156,6 +150,7 @@ struct ResidentExtractor::Impl {
   }
 
   void write(MeshSink& sink, std::size_t chunk_bytes) {
+    const NvtxRange range("download");
     for (PinnedBuffer<std::byte>& chunk : chunks)
       if (chunk.size() != chunk_bytes) chunk = PinnedBuffer<std::byte>(chunk_bytes);
     report.pinned_bytes = 2 * chunk_bytes;
@@ -169,10 +164,10 @@ struct ResidentExtractor::Impl {
       for (std::uint64_t first = 0; first < items; first += at_once) {
         std::byte* to = nullptr;
         free.pop(to);
-        const auto begun = Clock::now();
+        Stopwatch watch;
         const MeshChunk chunk = copy_chunk(to, first, std::min(at_once, items - first));
         stream().wait();
-        report.download.seconds += seconds_since(begun);
+        report.download.seconds += watch.lap();
         writer.write(chunk, [&free, to] { free.push(to); });
       }
     };
