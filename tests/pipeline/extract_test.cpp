@@ -145,19 +145,22 @@ TEST_F(Extract, NothingButVolumeAndIsovalueShowsInTheMesh) {
     ASSERT_GT(expected.triangles.size(), 100000u);
     for (const Index brick : {16, 32, 64, 128}) {
       const StoreReader reader = store(field, {.brick = brick, .shard = 2 * brick});
-      for (const int threads : {1, 2, 8})
-        for (const std::uint64_t memory : {std::uint64_t{220} << 20, std::uint64_t{1} << 30}) {
-          MemorySink sink;
-          const ExtractReport report = run(
-              reader, {.isovalue = iso, .normals = normals, .memory = memory, .threads = threads},
-              sink);
-          ASSERT_EQ(sink.mesh, expected)
-              << "brick " << brick << " threads " << threads << " memory " << memory;
-          EXPECT_TRUE(sink.finished);
-          EXPECT_EQ(report.triangles, expected.triangles.size());
-          EXPECT_EQ(report.vertices, expected.positions.size());
-          EXPECT_LE(report.bricks_read, report.bricks);
-        }
+      struct Means {
+        int threads;
+        std::uint64_t mib;
+      };
+      for (const auto [threads, mib] : {Means{1, 220}, Means{2, 1024}, Means{8, 220}}) {
+        MemorySink sink;
+        const ExtractReport report = run(
+            reader, {.isovalue = iso, .normals = normals, .memory = mib << 20, .threads = threads},
+            sink);
+        ASSERT_EQ(sink.mesh, expected)
+            << "brick " << brick << " threads " << threads << " MiB " << mib;
+        EXPECT_TRUE(sink.finished);
+        EXPECT_EQ(report.triangles, expected.triangles.size());
+        EXPECT_EQ(report.vertices, expected.positions.size());
+        EXPECT_LE(report.bricks_read, report.bricks);
+      }
     }
   }
 }
