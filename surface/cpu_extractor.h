@@ -61,7 +61,7 @@ class CpuExtractor {
 
   /// Appends the surface in `tiles` to `out`, or hands it to `take` whenever the
   /// limits say so and at the end. Over all calls, tiles come in
-  /// Morton order, none twice; `bricks` holds what for_each_needed_box says.
+  /// Morton order, none twice; `bricks` holds those of for_each_needed_box.
   /// Runs in the caller's TBB arena. Throws Error when a welded mesh gets more
   /// vertices than 32 bits number.
   void extract(std::span<const TileWork> tiles, const BrickLookup& bricks, MeshBuffer& out,

@@ -16,7 +16,7 @@
 namespace isobrick::gpu {
 namespace {
 
-/// How often the host reads a report before it asks the driver whether all is well.
+/// How often the host reads a report before it queries the driver for errors.
 constexpr std::uint32_t kReadsBetweenQueries = 4096;
 
 /// Row tables from the beginning, 4.4 MiB: with fewer active tiles the first isovalue needs no

@@ -52,7 +52,7 @@ class GpuExtractor {
   ~GpuExtractor();
 
   /// Sends the tiles off. Over all calls tiles come in Morton order, none twice; `bricks`
-  /// holds what for_each_needed_box says (of whole tiles where there may be NaN), in the pool or in
+  /// holds those of for_each_needed_box (of whole tiles where there may be NaN), in the pool or in
   /// memory from host_memory(). It is not looked up any more afterwards, but its samples are read
   /// until `samples` is let go. Throws what went wrong on the device or in `take`, also of earlier
   /// tiles, and Error when a welded mesh gets more vertices than 32 bits number.
