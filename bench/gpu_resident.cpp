@@ -5,7 +5,7 @@
 //   gpu_resident --synth gyroid --frequency 6 --noise 0 --dims 1024,1024,1024 --type u8
 //
 // Correctness first: --check compares the mesh with the CPU's, byte for byte.
-// Built as bench/README.md says.
+// Built as in bench/README.md.
 
 #include <fmt/format.h>
 #include <tbb/task_arena.h>

@@ -4,7 +4,7 @@
 //   bench_surface --raw bonsai_256x256x256_uint8.raw --isovalue 45
 //   bench_surface --gyroid 512
 //   MALLOC_MMAP_MAX_=0 MALLOC_TRIM_THRESHOLD_=100000000000 bench_surface …   # VTK's heap kept warm
-// Built as bench/README.md says.
+// Built as in bench/README.md.
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>

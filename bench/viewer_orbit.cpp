@@ -7,7 +7,7 @@
 //   bench_viewer_orbit g.zarr --isovalue 127.5 --to 140
 //
 // Frames follow each other without a pause; a frame's time ends with glFinish. Built as
-// bench/README.md says.
+// bench/README.md describes.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -156,7 +156,7 @@ int run(int argc, char** argv) {
   app.add_option("--memory", arguments.memory_gib, "GiB");
   app.add_flag("--no-rest", arguments.no_rest, "Do not wait until all is there");
   app.add_option("--batch", arguments.batch_seconds, "Of pictures at rest, seconds");
-  app.add_flag("--pictures", arguments.pictures, "Tell of every picture");
+  app.add_flag("--pictures", arguments.pictures, "Report every picture");
   CLI11_PARSE(app, argc, argv);
 
   const GlContext context;

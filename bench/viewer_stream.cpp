@@ -9,7 +9,7 @@
 // A frame's time ends with glFinish. Frames start at most 60 times a second, as on a display; the
 // final one starts as soon as all meshes are resident. A frame is what delays input: a whole
 // picture, in software a draw batch, or the work between two; frames below a millisecond do not
-// count. Built as bench/README.md says.
+// count. Built as in bench/README.md.
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -66,17 +66,17 @@ Json stream_json(const StreamCounters& c) {
 /// Slides the isovalue to and fro, another one for each frame.
 Json slide(Session& session, const Arguments& arguments) {
   Times behind;
-  std::map<double, Clock::time_point> asked;
+  std::map<double, Clock::time_point> requested;
   const auto start = Clock::now();
   session.draw_until(true, [&] {
     const std::vector<double>& shown = session.renderer().state().isovalues;
-    const auto found = shown.empty() ? asked.end() : asked.find(shown[0]);
-    if (found != asked.end()) behind.add(seconds_since(found->second));
+    const auto found = shown.empty() ? requested.end() : requested.find(shown[0]);
+    if (found != requested.end()) behind.add(seconds_since(found->second));
     const double turn = seconds_since(start) / arguments.seconds;
     const double part = 0.5 + 0.5 * std::cos(turn * 2 * 3.14159265358979);
     const double isovalue = arguments.isovalue + part * (arguments.to - arguments.isovalue);
     session.settings.surfaces[0].isovalue = isovalue;
-    asked.emplace(isovalue, Clock::now());
+    requested.emplace(isovalue, Clock::now());
     return turn >= 1;
   });
   Json result = session.take_times();

@@ -1,4 +1,5 @@
-// Ties, where degenerate triangles are left out; included once for every SIMD target.
+// Coincident vertices, where degenerate triangles are left out; included once for every SIMD
+// target.
 
 #if defined(ISOBRICK_COINCIDENT_VERTICES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOBRICK_COINCIDENT_VERTICES_INL_H_

@@ -53,7 +53,7 @@ struct GridView {
   /// Places to where vertices belong: columns are the axes.
   double to_world[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   double offset[3] = {0, 0, 0};
-  WorldMap map;  ///< only what it says of normals and of mirroring
+  WorldMap map;  ///< only for normals and mirroring
   /// Coarser grids: on faces 2 · axis + side, points between two of theirs along each axis
   /// (1 or 2), their places, and half the width of a seam strip.
   LodSeam faces[6];

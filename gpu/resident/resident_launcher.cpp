@@ -17,7 +17,7 @@
 namespace isobrick::gpu {
 namespace {
 
-/// How often the host reads a report before it asks the driver whether all is well.
+/// How often the host reads a report before it queries the driver for errors.
 constexpr std::uint32_t kReadsBetweenQueries = 4096;
 
 SurfaceOptions checked(SurfaceOptions options, const Lattice& lattice) {

@@ -58,7 +58,7 @@ __device__ inline std::uint32_t increment_shared(std::uint32_t address) {
 
 #if __CUDA_ARCH__ >= 800
 /// Copies 16 bytes to an address in shared memory, on the way while this returns. With several, a
-/// thread says when it has begun all and waits until its own are there.
+/// thread signals when it has begun all and waits until its own are there.
 __device__ inline void begin_copy(std::uint32_t to, const void* from) {
   asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(to), "l"(from) : "memory");
 }
@@ -74,7 +74,7 @@ __device__ inline void arrive_at(std::uint32_t address) {
                : "memory");
 }
 /// Whether the phase with that parity is over. From Hopper on a thread may sleep for a while before
-/// it is told that it is not.
+/// it gets the answer no.
 __device__ inline bool is_phase_over(std::uint32_t address, std::uint32_t parity) {
   std::uint32_t over;
 #if __CUDA_ARCH__ >= 900

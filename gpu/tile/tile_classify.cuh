@@ -9,7 +9,7 @@
 namespace isobrick::gpu {
 
 /// Which samples are inside. Narrow integers are compared within a word, 4 or 2 at
-/// once: the upper bit of (x without it) + c says whether the
+/// once: the upper bit of (x without it) + c is whether the
 /// lower bits reach those of the threshold, and is joined with x's own.
 template <class T>
 struct Classifier {

@@ -32,7 +32,7 @@ struct MeshChunk {
   std::uint64_t first_vertex = 0;              ///< number of vertices in the chunks before
   std::span<const Vec3f> positions;            ///< of the vertices
   std::span<const Vec3f> normals;              ///< unit length, outward; empty or one a position
-  std::span<const Triangle> triangles;         ///< numbered as MeshSink::indexing() says
+  std::span<const Triangle> triangles;         ///< numbered by MeshSink::indexing()
   std::span<const VertexColour> colours = {};  ///< of meshes of others; empty or one a position
 };
 

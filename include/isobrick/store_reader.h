@@ -73,7 +73,7 @@ class StoreReader {
   explicit StoreReader(const std::filesystem::path& path, const Selection& selection = {});
   ~StoreReader();
 
-  /// What the metadata says. Valid as long as the reader.
+  /// The metadata. Valid as long as the reader.
   const StoreInfo& info() const;
 
   /// Where brick `b` is, or nothing when it is absent (all fill value).

@@ -113,7 +113,9 @@ TEST(Documents, ThatSourcesNameAreThere) {
         EXPECT_TRUE(fs::exists(sources() / at->str())) << path << " names " << at->str();
       }
   };
-  for (const char* folder : {"bench", "cmake", "isobrick", "scripts", "tests", "tools"})
+  for (const char* folder :
+       {"bench", "bricks", "cmake", "core", "gpu", "include", "index", "io", "pipeline", "scripts",
+        "stream", "surface", "tests", "tools", "viewer"})
     for (const auto& entry : fs::recursive_directory_iterator(sources() / folder))
       if (entry.is_regular_file() &&
           entry.path().string().find("node_modules") == std::string::npos)

@@ -27,11 +27,11 @@ TEST(FlatMap, HoldsWhatAStandardMapHolds) {
         expected[key] = value = random();
       }
       ASSERT_EQ(map.size(), expected.size());
-      const std::uint64_t key = random() % keys;
-      const std::uint64_t* found = map.find(key);
-      ASSERT_EQ(found != nullptr, expected.count(key) > 0);
+      const std::uint64_t other = random() % keys;
+      const std::uint64_t* found = map.find(other);
+      ASSERT_EQ(found != nullptr, expected.count(other) > 0);
       if (found) {
-        ASSERT_EQ(*found, expected[key]);
+        ASSERT_EQ(*found, expected[other]);
       }
     }
     for (const auto& [key, value] : expected) {

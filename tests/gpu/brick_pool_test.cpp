@@ -104,7 +104,7 @@ TEST_F(GpuBrickPool, WhatCannotBeSentReachesEveryone) {
   const gpu::Stream stream;
   EXPECT_THROW(pool.wait_on(stream), Error);
   EXPECT_THROW(pool.wait_on(stream), Error) << "its bricks will never be there";
-  // Threads that wait for a buffer are told rather than left waiting.
+  // Threads that wait for a buffer get an error rather than wait for ever.
   const auto fill_all = [&] {
     for (std::size_t i = 0; i < 2 * gpu::BrickPool::buffers_of_thread(kBytes); ++i) {
       pool.begin(1);

@@ -47,7 +47,7 @@ class DeviceMesher {
   using Callback = std::function<void(NodeMesh&& mesh, const std::string& failure)>;
 
   /// Requests a mesh, the same bytes as from GridExtractor. It arrives in mesh.device, or in
-  /// mesh.mesh where memory is not shared or the shared memory is full. `mesh` says which node it
+  /// mesh.mesh where memory is not shared or the shared memory is full. `mesh` names which node it
   /// is. The grid is copied before the call returns; the call waits while all slots are in use.
   /// Returns false if the device has failed: then `done` is not called.
   virtual bool make(const GridView& grid, NodeMesh mesh, Callback done) = 0;

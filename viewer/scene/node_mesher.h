@@ -42,7 +42,7 @@ class NodeMesher {
   GridView grid(const NodeKey& key, double isovalue, std::uint32_t coarser,
                 const CancellationToken& token, Form form = Form::values);
 
-  /// Makes the mesh of the values that grid() returned last. `mesh` says which node it is.
+  /// Makes the mesh of the values that grid() returned last. `mesh` names the node.
   NodeMesh extract(const GridView& grid, NodeMesh mesh);
 
   /// Whether at least half of the bricks that the node's mesh needs are resident. Reads nothing:

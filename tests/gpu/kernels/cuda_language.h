@@ -46,7 +46,7 @@ struct alignas(16) uint4 {
   unsigned x, y, z, w;
 };
 
-// Threads of a warp do together what they do; none asks for a part of them.
+// Threads of a warp do together what they do; none needs a part of them.
 
 inline void __syncthreads() { isobrick::emulated::ThreadBlock::current().wait_for_block(); }
 inline void __syncwarp() {

@@ -16,8 +16,8 @@
 
 namespace isobrick::emulated {
 
-/// A thread of a kernel: a stack and where on it it goes on. Sanitizers are told of the switch; for
-/// ThreadSanitizer it orders nothing.
+/// A thread of a kernel: a stack and where on it it goes on. Sanitizers are notified of the switch;
+/// for ThreadSanitizer it orders nothing.
 class Fiber {
  public:
   /// The one that runs already.
@@ -55,7 +55,7 @@ class Fiber {
 #if defined(ISOBRICK_ASAN) || defined(ISOBRICK_TSAN)
     swapcontext(&context_, &other.context_);
 #else
-    // swapcontext asks the system twice for the mask of signals, which is the same for all.
+    // swapcontext makes two system calls for the mask of signals, which is the same for all.
     if (_setjmp(place_) == 0) other.go_on();
 #endif
     arrive();

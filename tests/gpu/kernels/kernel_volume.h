@@ -77,7 +77,7 @@ struct MeshRoom {
   }
 };
 
-/// What an extraction is told of the lattice and the surface, wherever the samples lie.
+/// The lattice and the surface of an extraction, wherever the samples lie.
 inline gpu::TileParams params_of(const Lattice& lattice, const SurfaceOptions& options) {
   gpu::TileParams p{};
   for (int axis = 0; axis < 3; ++axis) {

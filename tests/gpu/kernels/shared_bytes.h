@@ -18,7 +18,7 @@ namespace isobrick::emulated {
 
 inline constexpr std::size_t kMaxSharedBytes = std::size_t{227} << 10;  ///< Hopper's
 
-/// So many bytes of it are a block's; they hold anything at first. AddressSanitizer tells where
+/// So many bytes of it are a block's; they hold anything at first. AddressSanitizer reports where
 /// others are touched.
 class SharedBytes {
  public:

@@ -19,7 +19,7 @@ thread_local unsigned char shared_bytes[emulated::kMaxSharedBytes] __attribute__
 namespace isobrick::emulated {
 namespace {
 
-/// As many as ThreadSanitizer can tell apart.
+/// As many as ThreadSanitizer can distinguish.
 constexpr unsigned kMaxThreads = 7000;
 
 thread_local ThreadBlock* current_block = nullptr;

@@ -18,8 +18,8 @@ class Fiber;
 /// one goes on until it waits for others, and which is the next is left to chance, but some warps
 /// are favoured for a while and run ahead as far as they can, so that what lacks a barrier shows
 /// (Burckhardt et al., A randomized scheduler with probabilistic guarantees of finding bugs, 2010).
-/// What is asked of all threads of a warp, or of the block, and not done by all, ends the program
-/// with a line that says so.
+/// A call that all threads of a warp, or of the block, must make and some don't ends the program
+/// with a line about it.
 class ThreadBlock {
  public:
   /// What a thread of a warp waits for the others with.

@@ -79,9 +79,9 @@ TEST_F(Statistics, AFewBlocksAreMeasured) {
   draw();
   const IsovalueStats stats(store());
   const double iso = settings_.surfaces[0].isovalue;
-  const double told = stats.triangles(iso, scene_renderer_->scene().stream().counters());
+  const double estimated = stats.triangles(iso, scene_renderer_->scene().stream().counters());
   const auto there = static_cast<double>(scene_renderer_->state().triangles);
-  EXPECT_NEAR(told, there, 0.3 * there);
+  EXPECT_NEAR(estimated, there, 0.3 * there);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ struct VirtualDisplay::State {
   Display* display = nullptr;
   std::string before;
 
-  /// ICCCM 4.1.3.1: tells a window that it is minimised.
+  /// ICCCM 4.1.3.1: notifies a window that it is minimised.
   void set_state(Window window, long value) const {
     const Atom name = XInternAtom(display, "WM_STATE", False);
     const long state[] = {value, None};

@@ -45,7 +45,7 @@ class CutTest : public ::testing::Test {
 };
 
 /// Each finest node belongs to one node of the cut, and neighbours differ by at most one level. The
-/// masks tell coarser neighbours, without those that are clipped or, beside the finest nodes, have
+/// masks mark coarser neighbours, without those that are clipped or, beside the finest nodes, have
 /// no surface.
 void expect_sound(const NodeGrid& grid, const Cut& cut, const ActiveNodes& active) {
   std::map<std::tuple<Index, Index, Index>, NodeKey> owner;

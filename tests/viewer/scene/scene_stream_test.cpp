@@ -184,14 +184,14 @@ class FailingDevice final : public TestDevice {
   }
   bool make(const GridView& grid, NodeMesh mesh, Callback done) override {
     const std::lock_guard lock(mutex_);
-    ++asked;
+    ++requested;
     stored += grid.stored.samples != nullptr;
     if (failed_) return false;
     taken_.emplace_back(std::move(mesh), std::move(done));
     if (taken_.size() < most_) return true;
     failed_ = true;
     threads_.emplace_back([taken = std::exchange(taken_, {})]() mutable {
-      for (auto& [of, tell] : taken) tell(std::move(of), "broken");
+      for (auto& [of, reply] : taken) reply(std::move(of), "broken");
     });
     return true;
   }
@@ -201,7 +201,7 @@ class FailingDevice final : public TestDevice {
   }
 
   static constexpr std::size_t kTaken = 3;
-  std::atomic<std::size_t> asked = 0, stored = 0;
+  std::atomic<std::size_t> requested = 0, stored = 0;
 
  private:
   std::size_t most_;
@@ -230,10 +230,10 @@ TEST(SceneStream, WhatADeviceFailsToMakeIsMadeWithoutIt) {
     EXPECT_EQ(stream.counters().device_failure, "broken");
     EXPECT_EQ(stream.counters().device_meshes_made, 0u);
     if (first) {
-      EXPECT_GE(device.asked.exchange(0), FailingDevice::kTaken);
+      EXPECT_GE(device.requested.exchange(0), FailingDevice::kTaken);
     }
   }
-  EXPECT_EQ(device.asked, 0u) << "nobody asks it in vain";
+  EXPECT_EQ(device.requested, 0u) << "no request in vain";
 }
 
 /// Only a device receives stored samples.

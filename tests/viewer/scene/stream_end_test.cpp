@@ -49,7 +49,7 @@ class SlowDevice final : public TestDevice {
     change_.wait(lock, [&] { return !taken_.empty(); });
   }
   /// Number of requested meshes.
-  int asked() const {
+  int requested() const {
     const std::lock_guard lock(mutex_);
     return asked_;
   }
@@ -173,10 +173,10 @@ TEST_F(StreamEnd, AThreadThatWasHeldUpMakesNothingAnyMore) {
     source_->wait_until_read();
     expect_quick_end();
     EXPECT_EQ(device.use_count(), 1);
-    const int asked = device->asked();
+    const int requested = device->requested();
     source_->open();
     EXPECT_TRUE(threads_end());
-    EXPECT_EQ(device->asked(), asked);
+    EXPECT_EQ(device->requested(), requested);
     EXPECT_EQ(device->held(), 0);
   }
 }
