@@ -30,6 +30,9 @@ set(isobrick_warnings -Wall -Wextra -Wpedantic -Wconversion -Wshadow
 target_compile_options(isobrick_flags INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:${isobrick_warnings}
   -ffp-contract=off $<$<BOOL:${ISOBRICK_WERROR}>:-Werror>>)
+if(CMAKE_UNITY_BUILD)  # g++ takes the files that a unity source includes for headers
+  target_compile_options(isobrick_flags INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-subobject-linkage>)
+endif()
 if(ISOBRICK_SANITIZE)
   target_compile_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(isobrick_flags INTERFACE -fsanitize=${ISOBRICK_SANITIZE})
