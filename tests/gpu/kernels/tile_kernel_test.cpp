@@ -145,7 +145,7 @@ TYPED_TEST(TileKernel, APartOfTheVolume) {
   const auto field = TestFixture::Fields::waves({131, 67, 99});
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
   const DenseBricks bricks(lattice, field.samples.data());
-  const std::vector<double> isovalues{mid + 72, mid - 60};
+  const std::vector<double> isovalues{mid + 84, mid + 88};
   for (const bool normals : {false, true})
     for (const double fill : {mid - 90, mid + 90}) {
       const SurfaceOptions options{.normals = normals, .fill_value = fill};
