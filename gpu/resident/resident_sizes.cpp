@@ -14,7 +14,7 @@ namespace {
 /// Mesh to expect of a tile before anything is known: some more than a sheet across it.
 constexpr MeshSize kMeshOfTile{1600, 3200};
 /// Case table, counters, sums of the search.
-constexpr std::uint64_t kSmallBuffers = 64 << 10;
+constexpr std::uint64_t kSmallObjects = 64 << 10;
 
 }  // namespace
 
@@ -28,7 +28,7 @@ ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles,
   const std::uint64_t row_tables =
       std::max(tiles.active, std::min<std::uint64_t>(tiles.searched, kFirstRowTables));
   sizes.extractor_bytes =
-      kSmallBuffers + grid * sizeof(std::uint32_t) + row_tables * sizeof(RowTable) +
+      kSmallObjects + grid * sizeof(std::uint32_t) + row_tables * sizeof(RowTable) +
       tiles.searched * (sizeof(TileItem) + sizeof(OrderState)) +
       tiles.searched / kTilesOfSearchBlock * sizeof(unsigned long long) +
       mesh_bytes({tiles.active * kMeshOfTile.vertices, tiles.active * kMeshOfTile.triangles},

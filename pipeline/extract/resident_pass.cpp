@@ -21,7 +21,7 @@ constexpr std::uint64_t kTileSize = std::uint64_t{kTileEdge} * kTileEdge * kTile
 constexpr std::uint64_t kPieceOfDriver = std::uint64_t{32} << 20;
 
 /// Decoded bricks, which only processors read.
-class HostBricks final : public BrickMemory {
+class HeapBricks final : public BrickMemory {
  public:
   std::shared_ptr<std::byte> room(std::size_t bytes) override {
     return {new std::byte[bytes], std::default_delete<std::byte[]>()};
@@ -137,7 +137,7 @@ class ResidentPass {
     TileStream stream(std::move(work));
     BatchPlanner batches(stream, lattice(), kFirstCorners, true, plan_.limits.tiles,
                          plan_.batch_bricks);
-    HostBricks memory;
+    HeapBricks memory;
     BatchDecoder decoder(store_, options_.level, batches, 0, plan_.cache_bricks, common().threads,
                          memory);
     std::uint64_t bytes = 0, done = 0, shown = 0;
