@@ -37,7 +37,7 @@ ArrayMetadata array_metadata(const LevelInfo& level, const StoreLayout& layout) 
     array.key_prefix = false;
     return array;
   }
-  array.sharding.emplace().brick = {b.z, b.y, b.x};
+  array.sharding = ArrayMetadata::Sharding{.brick = {b.z, b.y, b.x}};
   array.dimension_names = {"z", "y", "x"};
   return array;
 }

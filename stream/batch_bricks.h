@@ -26,7 +26,7 @@ class BatchBricks final : public BrickLookup {
   BatchBricks(BrickSlots& slots, std::span<const Int3> bricks, Int3 last);
   BatchBricks(const BatchBricks&) = delete;
   BatchBricks& operator=(const BatchBricks&) = delete;
-  ~BatchBricks();
+  ~BatchBricks() override;
 
   /// Bricks that were not resident, so that the batch decodes them.
   std::size_t loads() const { return bricks_.size() - first_load_; }

@@ -37,17 +37,19 @@ class VtiXml final : public VtkXml {
   };
 
   void start(const std::string& name, VtkElement element) override {
-    if (name == "ImageData") image_ = std::move(element);
-    if (name == "Piece") {
+    if (name == "ImageData") {
+      image_ = std::move(element);
+    } else if (name == "Piece") {
       if (!piece_.empty()) file().fail("images of several pieces are not supported");
       piece_ = std::move(element);
-    }
-    if (name == "PointData" || name == "CellData") {
+    } else if (name == "PointData" || name == "CellData") {
       section_ = name;
       scalars_[name] = element.get("Scalars");
+    } else if (name == "DataArray" && !section_.empty()) {
+      start_array(std::move(element));
+    } else if (name == "AppendedData") {
+      choose_array();
     }
-    if (name == "DataArray" && !section_.empty()) start_array(std::move(element));
-    if (name == "AppendedData") choose_array();
   }
 
   void start_array(VtkElement element) {
