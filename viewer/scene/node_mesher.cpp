@@ -112,18 +112,18 @@ struct NodeMesher::Impl {
     return v;
   }
 
-  enum class Ranges { kRead, kKnown };
+  enum class Ranges { read, known };
 
   /// Which samples are needed; nullopt means all. That is so if the bricks are resident anyway, or
   /// if the ranges are unknown and may not be read. It is so with NaN, too: blocks on different
   /// sides may then be neighbours without a surface between them.
   std::optional<NeededSamples> needed_of(const NodeKey& key, double isovalue, std::uint32_t coarser,
-                                         Ranges ranges = Ranges::kRead) const {
+                                         Ranges ranges = Ranges::read) const {
     if (key.level != 0 || view.may_have_nan) return std::nullopt;
     if (bricks.resident(0, samples.bricks(0, points_around(key)))) return std::nullopt;
     const Box3 own = points(key);
     const Int3 first = floor_div(own.lo, {kBlockEdge, kBlockEdge, kBlockEdge});
-    const auto table = ranges == Ranges::kRead ? bricks.block_ranges(0, first)
+    const auto table = ranges == Ranges::read ? bricks.block_ranges(0, first)
                                                : bricks.known_block_ranges(0, first);
     if (!table) return std::nullopt;
     return NeededSamples(own, *table, isovalue, coarser);
@@ -213,7 +213,7 @@ GridView NodeMesher::grid(const NodeKey& key, double isovalue, std::uint32_t coa
 
 bool NodeMesher::is_half_resident(const NodeKey& key, double isovalue,
                                   std::uint32_t coarser) const {
-  const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
+  const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::known);
   const int stored = impl_->grid.level(key.level).source;
   const Box3 points = impl_->points(key);
   if (!needed)
@@ -223,7 +223,7 @@ bool NodeMesher::is_half_resident(const NodeKey& key, double isovalue,
 
 void NodeMesher::add_missing(const NodeKey& key, double isovalue, std::uint32_t coarser,
                              std::vector<StoredBrick>& missing) const {
-  const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::kKnown);
+  const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::known);
   const int stored = impl_->grid.level(key.level).source;
   for (const Int3 b : impl_->bricks_of(key, impl_->points(key), needed))
     if (!impl_->bricks.resident(stored, {b, b + Int3{1, 1, 1}}))

@@ -13,7 +13,7 @@ namespace isobrick {
 /// thread checks. Thread-safe.
 class StreamRequest final : public CancellationToken {
  public:
-  explicit StreamRequest(MeshJob mesh) : mesh_(std::move(mesh)) {}
+  explicit StreamRequest(const MeshJob& mesh) : mesh_(mesh) {}
   StreamRequest(int slot, const SliceRequest& slice) : slot_(slot), slice_(slice) {}
 
   void check() const override {
