@@ -54,7 +54,7 @@ PackedBrick BrickOutput::pack_constant(Int3 brick, std::uint64_t bits, bool kept
     set_box(lattice_.type, bits, {samples.data(), full}, full);
     PackedBrick made;
     encode(made, samples.span());
-    constant = std::make_shared<const Constant>(bits, made.crc, std::move(made.encoded));
+    constant = std::make_shared<const Constant>(Constant{bits, made.crc, std::move(made.encoded)});
     const std::lock_guard lock(mutex_);
     constant_ = constant;
   }

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include <isobrick/error.h>
 #include "bricks/store_entries.h"
@@ -32,7 +34,11 @@ std::string kind_of(const IndexOptions& options) { return std::string(name_of(op
 /// Compressed if the store is, at its level where that is one that we write.
 std::optional<int> zstd_level_of(const StoreInfo& info) {
   if (info.codec == "none") return std::nullopt;
-  const int level = std::atoi(info.codec.c_str() + std::string_view("zstd:").size());
+  constexpr std::string_view kPrefix = "zstd:";
+  int level = 0;
+  if (info.codec.starts_with(kPrefix))
+    std::from_chars(info.codec.data() + kPrefix.size(), info.codec.data() + info.codec.size(),
+                    level);
   return level >= 1 && level <= 22 ? level : kZstdLevel;
 }
 

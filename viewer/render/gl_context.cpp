@@ -173,7 +173,7 @@ void GlContext::release_current() {
 
 bool GlContext::available() {
   try {
-    GlContext();
+    const GlContext context;
     return true;
   } catch (const Error&) {
     return false;

@@ -124,7 +124,7 @@ struct NodeMesher::Impl {
     const Box3 own = points(key);
     const Int3 first = floor_div(own.lo, {kBlockEdge, kBlockEdge, kBlockEdge});
     const auto table = ranges == Ranges::read ? bricks.block_ranges(0, first)
-                                               : bricks.known_block_ranges(0, first);
+                                              : bricks.known_block_ranges(0, first);
     if (!table) return std::nullopt;
     return NeededSamples(own, *table, isovalue, coarser);
   }
@@ -216,8 +216,7 @@ bool NodeMesher::is_half_resident(const NodeKey& key, double isovalue,
   const auto needed = impl_->needed_of(key, isovalue, coarser, Impl::Ranges::known);
   const int stored = impl_->grid.level(key.level).source;
   const Box3 points = impl_->points(key);
-  if (!needed)
-    return impl_->bricks.half_resident(stored, impl_->samples.bricks(key.level, points));
+  if (!needed) return impl_->bricks.half_resident(stored, impl_->samples.bricks(key.level, points));
   return impl_->bricks.half_resident(stored, impl_->bricks_of(key, points, needed));
 }
 
