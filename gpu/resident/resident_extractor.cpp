@@ -29,6 +29,7 @@ MeshSize room_for(std::uint32_t tiles) {
 }  // namespace
 
 struct ResidentExtractor::Impl {
+  int device = 0;
   ResidentLauncher launcher;
   std::uint64_t max_bytes;
   std::uint64_t tile_bytes;  ///< of samples
@@ -44,7 +45,9 @@ struct ResidentExtractor::Impl {
        std::uint64_t most)
       : launcher(volume.impl(), options, tuning),
         max_bytes(most),
-        tile_bytes(kTileBlockSamples * volume.lattice().sample_bytes()) {}
+        tile_bytes(kTileBlockSamples * volume.lattice().sample_bytes()) {
+    check(cudaGetDevice(&device));
+  }
 
   const Stream& stream() const { return launcher.stream(); }
   bool normals() const { return launcher.options().normals; }
@@ -150,6 +153,7 @@ struct ResidentExtractor::Impl {
   }
 
   void write(MeshSink& sink, std::size_t chunk_bytes) {
+    make_current(device);
     const NvtxRange range("download");
     for (PinnedBuffer<std::byte>& chunk : chunks)
       if (chunk.size() != chunk_bytes) chunk = PinnedBuffer<std::byte>(chunk_bytes);

@@ -72,7 +72,7 @@ struct DeviceCounts {
 
 /// Isosurfaces of a resident volume: search and extraction without leaving the
 /// device. Keeps its buffers from isovalue to isovalue. Those of one volume are for one thread at a
-/// time.
+/// time, but for write().
 class ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Takes at most `max_bytes` of device memory besides
@@ -93,7 +93,8 @@ class ResidentExtractor {
   /// Copies the last mesh to the host.
   void download(MeshBuffer& mesh) const;
   /// Writes the last mesh to a sink, positions and normals before triangles, in chunks of at most
-  /// `chunk_bytes`. They pass through twice as much pinned memory.
+  /// `chunk_bytes`. They pass through twice as much pinned memory. From any thread, beside the
+  /// write() of other extractors.
   void write(MeshSink& sink, std::size_t chunk_bytes);
   /// Of the last mesh: its size, the stages kernel, download and sink, device memory without the
   /// volume's.

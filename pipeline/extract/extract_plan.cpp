@@ -99,6 +99,8 @@ std::uint64_t sink_bytes(PassRequests requests) {
 }
 
 /// Larger chunks of a mesh, or of samples for a GPU, gain nothing.
+/// More files at a time make no disk faster.
+constexpr std::size_t kMaxSinks = 8;
 constexpr std::uint64_t kMaxChunk = std::uint64_t{32} << 20;
 
 /// Bricks that a cache can use: neighbours come on top of the active ones.
@@ -239,16 +241,19 @@ std::optional<ExtractPlan> plan_resident_memory(PassRequests requests, std::uint
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, 0);
   const std::uint64_t tile_bytes =
       std::uint64_t{kTileEdge} * kTileEdge * kTileEdge * lattice.sample_bytes();
-  // Sinks hold memory one after the other.
   std::uint64_t sink = 0;
   for (const ExtractRequest& request : requests) sink = std::max(sink, request.sink_bytes);
-  const std::uint64_t fixed =
-      fixed_bytes(common(requests)) + kCudaDriver + other_bytes + sink +
-      (requests.size() - 1) * kSinkBuffers +
-      static_cast<std::uint64_t>(volume(lattice.tiles())) * kBytesOfListedTile;
-  const std::uint64_t least = fixed + 2 * tile_bytes + tile_bricks * lattice.brick_bytes();
-  if (budget < least) return std::nullopt;
   ExtractPlan plan;
+  plan.sinks = std::min(requests.size(), kMaxSinks);
+  const auto fixed_with_sinks = [&] {
+    return fixed_bytes(common(requests)) + kCudaDriver + other_bytes + plan.sinks * sink +
+           (requests.size() - 1) * kSinkBuffers +
+           static_cast<std::uint64_t>(volume(lattice.tiles())) * kBytesOfListedTile;
+  };
+  const std::uint64_t least_room = 2 * tile_bytes + tile_bricks * lattice.brick_bytes();
+  while (plan.sinks > 1 && budget < fixed_with_sinks() + least_room) --plan.sinks;
+  const std::uint64_t fixed = fixed_with_sinks(), least = fixed + least_room;
+  if (budget < least) return std::nullopt;
   plan.limits.output_bytes =
       std::min(tile_bytes + (budget - least) / 8, std::max(tile_bytes, kMaxChunk));
   plan.limits.tiles = plan.limits.output_bytes / tile_bytes;

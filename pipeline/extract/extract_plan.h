@@ -18,6 +18,7 @@ struct ExtractPlan {
   ExtractorLimits limits;  ///< of each extractor on the CPU; tiles: of a batch on any
   std::size_t cache_bricks = 0;
   std::size_t batch_bricks = 0;  ///< that a batch may need
+  std::size_t sinks = 1;         ///< that a resident pass writes at a time
   std::uint64_t bytes = 0;       ///< all of it, the program itself included
 };
 

@@ -10,6 +10,7 @@
 #include <isobrick/error.h>
 #include "core/stopwatch.h"
 #include "gpu/resident/resident_sizes.h"
+#include "pipeline/extract/sink_writers.h"
 #include "pipeline/workers.h"
 
 namespace isobrick {
@@ -66,21 +67,18 @@ class ResidentPass {
     return true;
   }
 
-  /// Makes the surfaces from the first on, as many as the device has room for.
+  /// Makes the surfaces from the first on, as many as the device has room for. A kernel takes
+  /// milliseconds and a file seconds, so several files are written at a time.
   std::size_t make(const std::function<void(std::size_t)>& begin) {
-    for (std::size_t i = 0; i < surfaces_.requests.size(); ++i) {
-      ExtractReport& report = surfaces_.reports[i];
-      {
-        const Stopwatch watch(report.surface_seconds);
-        if (!extract(surfaces_.requests[i].surface)) return i;
-        begin(i);
-        extractor_->write(*surfaces_.sinks[i], plan_.limits.output_bytes);
-      }
-      add_report(report);
-      surfaces_.sinks[i]->finish();
-      progress_.advance(bytes_of(surfaces_.requests[i]) / 2);
+    std::size_t made = 0;
+    while (made < surfaces_.requests.size()) {
+      extract_from(made);
+      if (extractors_.empty()) break;
+      for (std::size_t i = 0; i < extractors_.size(); ++i) begin(made + i);
+      write_from(made);
+      made += extractors_.size();
     }
-    return surfaces_.requests.size();
+    return made;
   }
 
  private:
@@ -95,20 +93,49 @@ class ResidentPass {
     return request.active_bricks * lattice().brick_bytes();
   }
 
-  /// False where the device has no room.
-  bool extract(const SurfaceOptions& surface) {
-    try {
-      if (!extractor_ || surface.normals != has_normals_) {
-        extractor_.reset();
-        extractor_.emplace(*volume_, surface, gpu::ResidentTuning{},
-                           budget_ - kPieceOfDriver - volume_->bytes());
-        has_normals_ = surface.normals;
+  /// Extracts the surfaces from `first` on: as many as the device has room for together, and as
+  /// are written at a time.
+  void extract_from(std::size_t first) {
+    extractors_.clear();
+    const std::size_t count = std::min(plan_.sinks, surfaces_.requests.size() - first);
+    std::uint64_t room = budget_ - kPieceOfDriver - volume_->bytes();
+    for (std::size_t i = first; i < first + count; ++i) try {
+        const SurfaceOptions& surface = surfaces_.requests[i].surface;
+        const Stopwatch watch(surfaces_.reports[i].surface_seconds);
+        auto extractor = std::make_unique<gpu::ResidentExtractor>(*volume_, surface,
+                                                                  gpu::ResidentTuning{}, room);
+        extractor->extract(surface.isovalue);
+        room -= std::min(room, extractor->bytes());
+        add_report(surfaces_.reports[i], *extractor);
+        extractors_.push_back(std::move(extractor));
+      } catch (const gpu::OutOfDeviceMemory&) {
+        return;
       }
-      extractor_->extract(surface.isovalue);
-    } catch (const gpu::OutOfDeviceMemory&) {
-      return false;
-    }
-    return true;
+  }
+
+  /// Writes what was extracted to the sinks from `first` on.
+  void write_from(std::size_t first) {
+    const std::size_t chunk_bytes = plan_.limits.output_bytes / extractors_.size();
+    write_together(
+        surfaces_.sinks.subspan(first, extractors_.size()),
+        [&](std::size_t i, MeshSink& sink) {
+          const Stopwatch watch(surfaces_.reports[first + i].surface_seconds);
+          extractors_[i]->write(sink, chunk_bytes);
+        },
+        [&](std::size_t i, std::uint64_t bytes) { advance(first + i, bytes); });
+    for (std::size_t i = 0; i < extractors_.size(); ++i)
+      add_report(surfaces_.reports[first + i], *extractors_[i]);
+  }
+
+  /// The second half of a surface's progress is that its mesh is written.
+  void advance(std::size_t surface, std::uint64_t bytes) {
+    const ExtractRequest& request = surfaces_.requests[surface];
+    const MeshSize size{surfaces_.reports[surface].vertices, surfaces_.reports[surface].triangles};
+    const std::uint64_t all =
+        std::max<std::uint64_t>(1, gpu::mesh_bytes(size, request.surface.normals));
+    const double part = static_cast<double>(bytes) / static_cast<double>(all);
+    progress_.advance(
+        static_cast<std::uint64_t>(part * static_cast<double>(bytes_of(request) / 2)));
   }
 
   /// None where the samples of the tiles alone are too much for the device.
@@ -170,8 +197,8 @@ class ResidentPass {
     }
   }
 
-  void add_report(ExtractReport& report) const {
-    static_cast<SurfaceReport&>(report) = extractor_->report();
+  void add_report(ExtractReport& report, const gpu::ResidentExtractor& extractor) const {
+    static_cast<SurfaceReport&>(report) = extractor.report();
     report.upload = upload_;
     report.device_bytes += volume_->bytes();
     report.backend = "cuda";
@@ -190,8 +217,7 @@ class ResidentPass {
   std::uint64_t budget_;  ///< of device memory
   StageReport upload_;
   std::optional<gpu::DeviceVolume> volume_;
-  std::optional<gpu::ResidentExtractor> extractor_;  ///< of the volume
-  bool has_normals_ = false;                         ///< the extractor's meshes
+  std::vector<std::unique_ptr<gpu::ResidentExtractor>> extractors_;  ///< with the meshes to write
 };
 
 }  // namespace

@@ -7,11 +7,12 @@
 
 namespace isobrick {
 
-/// Loads the tiles that any of the surfaces touches to a device and makes one surface after the
-/// other from them (can_be_resident()). Calls `begin` with a surface's number when its mesh is
-/// made; then the mesh goes to the sink, which is finished before the next one begins. Returns how
-/// many surfaces were made. The first that the budgets have no room for ends the pass: it and those
-/// after it have not begun. `tiles` are those of all surfaces; `other_bytes` as for plan_memory().
+/// Loads the tiles that any of the surfaces touches to a device and makes the surfaces from them
+/// (can_be_resident()). Calls `begin` with a surface's number when its mesh is made; then the mesh
+/// goes to the sink, which is finished. Several sinks are written at a time, as the plan has room
+/// for. Returns how many surfaces were made. The first that the budgets have no room for ends the
+/// pass: it and those after it have not begun. `tiles` are those of all surfaces; `other_bytes` as
+/// for plan_memory().
 std::size_t run_resident_pass(const StoreReader& store, const ExtractOptions& options,
                               const PassSurfaces& surfaces, TileStream tiles,
                               std::uint64_t other_bytes,
