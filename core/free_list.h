@@ -19,19 +19,39 @@ class FreeList {
   }
 
   std::optional<std::uint32_t> take(std::uint32_t size) {
+    free_.reserve(free_.size() + taken_ + 2);
     for (std::size_t i = 0; i < free_.size(); ++i) {
       if (free_[i].size < size) continue;
       const std::uint32_t at = free_[i].at;
       free_[i].at += size;
       free_[i].size -= size;
       if (free_[i].size == 0) free_.erase(free_.begin() + static_cast<std::ptrdiff_t>(i));
+      ++taken_;
       return at;
     }
     return std::nullopt;
   }
 
-  void give_back(std::uint32_t at, std::uint32_t size) {
+  /// All of what was taken. Allocates nothing, so that destructors may call it.
+  void give_back(std::uint32_t at, std::uint32_t size) noexcept {
     if (size == 0) return;
+    --taken_;
+    insert(at, size);
+  }
+
+  /// The end of what was taken: `kept` of `size` stay taken.
+  void trim(std::uint32_t at, std::uint32_t size, std::uint32_t kept) {
+    if (kept == size) return;
+    free_.reserve(free_.size() + taken_ + 2);
+    insert(at + kept, size - kept);
+  }
+
+ private:
+  struct Range {
+    std::uint32_t at, size;
+  };
+
+  void insert(std::uint32_t at, std::uint32_t size) noexcept {
     auto next = std::lower_bound(free_.begin(), free_.end(), at,
                                  [](const Range& range, std::uint32_t v) { return range.at < v; });
     next = free_.insert(next, {at, size});
@@ -45,11 +65,8 @@ class FreeList {
     }
   }
 
- private:
-  struct Range {
-    std::uint32_t at, size;
-  };
-  std::vector<Range> free_;  ///< ascending, never touching
+  std::vector<Range> free_;  ///< ascending, never touching; has room for all that is taken
+  std::size_t taken_ = 0;
 };
 
 }  // namespace isobrick

@@ -30,14 +30,15 @@ class MeshFreeList {
     if (!has(vertices, triangles)) return std::nullopt;
     return MeshRange{*vertices_.take(vertices), vertices, *triangles_.take(triangles), triangles};
   }
-  void give_back(const MeshRange& range) {
+  /// Allocates nothing, so that destructors may call it.
+  void give_back(const MeshRange& range) noexcept {
     vertices_.give_back(range.first_vertex, range.vertices);
     triangles_.give_back(range.first_triangle, range.triangles);
   }
   /// Gives back what lies behind the first so many of a mesh; returns what the mesh keeps.
   MeshRange trim(const MeshRange& range, std::uint32_t vertices, std::uint32_t triangles) {
-    give_back({range.first_vertex + vertices, range.vertices - vertices,
-               range.first_triangle + triangles, range.triangles - triangles});
+    vertices_.trim(range.first_vertex, range.vertices, vertices);
+    triangles_.trim(range.first_triangle, range.triangles, triangles);
     return {range.first_vertex, vertices, range.first_triangle, triangles};
   }
 

@@ -104,6 +104,10 @@ class OwnedMeshBlock final : public SharedMeshBlock {
     const std::lock_guard lock(mutex_);
     return free_.trim(range, vertex_count, triangle_count);
   }
+  void give_back(const MeshRange& range) noexcept {
+    const std::lock_guard lock(mutex_);
+    free_.give_back(range);
+  }
   GridMeshPlace place(const MeshRange& range) const {
     return {{arrays_.positions + range.first_vertex, arrays_.normals + range.first_vertex,
              arrays_.triangles + range.first_triangle},
@@ -129,7 +133,7 @@ class OwnedMeshBlock final : public SharedMeshBlock {
 };
 
 MeshSlice::~MeshSlice() {
-  if (block_) block_->trim(range_, 0, 0);
+  if (block_) block_->give_back(range_);
 }
 std::shared_ptr<const SharedMeshBlock> MeshSlice::block() const { return block_; }
 GridMeshPlace MeshSlice::place() const { return block_->place(range_); }

@@ -33,6 +33,19 @@ TEST(FreeList, PartsThatTouchGrowTogether) {
   EXPECT_EQ(list.take(90), 0u);
 }
 
+TEST(FreeList, ATrimmedPartKeepsItsBeginning) {
+  FreeList list(100);
+  EXPECT_EQ(list.take(60), 0u);
+  EXPECT_EQ(list.take(40), 60u);
+  list.trim(0, 60, 20);
+  EXPECT_EQ(list.take(41), std::nullopt);
+  EXPECT_EQ(list.take(40), 20u);
+  list.give_back(0, 20);
+  list.give_back(20, 40);
+  list.give_back(60, 40);
+  EXPECT_EQ(list.take(100), 0u);
+}
+
 TEST(FreeList, NothingIsGivenTwiceOrLost) {
   constexpr std::uint32_t kSize = 1000;
   FreeList list(kSize);
