@@ -15,6 +15,9 @@ struct TileWork {
   std::uint8_t active_blocks = 0;
 };
 
+/// Samples of a tile without its apron.
+inline constexpr std::uint64_t kTileVolume = std::uint64_t{kTileEdge} * kTileEdge * kTileEdge;
+
 /// The sample, in tile coordinates, that all blocks of a tile share: its middle,
 /// or what is nearest to it in the volume. A block that is not active lies on
 /// one side as a whole, and so on the side of this sample; whichever block is

@@ -1,28 +1,16 @@
 #include "stream/brick_cache.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
-#include <cstdlib>
-#include <new>
 #include <stdexcept>
 #include <utility>
+
+#include "stream/brick_memory.h"
 
 namespace isobrick {
 namespace {
 
-constexpr std::size_t kLargePage = std::size_t{2} << 20;
-
-/// Memory in large pages, since the first touch of a small page costs as much as decoding its
-/// samples.
-std::shared_ptr<std::byte> allocate(std::size_t bytes) {
-  const bool large = bytes >= kLargePage;
-  const std::size_t align = large ? kLargePage : 64;
-  void* const memory = std::aligned_alloc(align, (bytes + align - 1) / align * align);
-  if (!memory) throw std::bad_alloc();
-  if (large) (void)madvise(memory, bytes, MADV_HUGEPAGE);
-  return {static_cast<std::byte*>(memory), &std::free};
-}
+/// Memory grows by some large pages.
+constexpr std::size_t kGrowth = std::size_t{32} << 20;
 
 }  // namespace
 
@@ -65,9 +53,8 @@ std::unique_ptr<CachedBricks> BrickCache::begin(std::span<const Int3> bricks, In
 
 void BrickCache::grow() {
   const std::size_t brick = reader_.lattice().brick_bytes();
-  const std::size_t count =
-      std::clamp<std::size_t>(16 * kLargePage / brick, 1, capacity_ - slots_.slots());
-  slots_.add_slots(allocate(count * brick), count);
+  const std::size_t count = std::clamp<std::size_t>(kGrowth / brick, 1, capacity_ - slots_.slots());
+  slots_.add_slots(allocate_bricks(count * brick), count);
 }
 
 void BrickCache::will_need(CachedBricks& begun, std::vector<Int3> bricks) {

@@ -23,4 +23,8 @@ class BrickMemory {
   virtual std::size_t bricks_ahead() const { return 12; }
 };
 
+/// Memory for bricks that the CPU alone reads, in large pages: the first touch of a small page
+/// costs as much as decoding its samples.
+std::shared_ptr<std::byte> allocate_bricks(std::size_t bytes);
+
 }  // namespace isobrick

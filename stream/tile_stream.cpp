@@ -43,6 +43,7 @@ TileStream::TileStream(const StoreReader& store, int level, std::vector<double> 
 }
 
 TileStream::TileStream(std::vector<TileWork> tiles) : isovalues_(1), tiles_(std::move(tiles)) {
+  blocks_.reserve(tiles_.size());
   for (const TileWork& work : tiles_) blocks_.push_back(work.active_blocks);
 }
 

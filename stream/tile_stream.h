@@ -14,6 +14,7 @@ namespace isobrick {
 
 /// The tiles of a level that are active at an isovalue, or at any of several, in Morton order.
 /// They are found range chunk by range chunk: memory does not grow with the volume.
+/// Tiles that the caller lists are all in memory.
 class TileStream {
  public:
   /// Tiles without a cell in `roi` (samples) are left out. `by` is the search method.

@@ -112,7 +112,7 @@ class CoincidentOwner {
 
 /// Lists the used coincident vertices in the order of their places and numbers the tile's own.
 template <class T>
-void list_used(const KernelContext& context, bool alone, TileState& tile) {
+void list_used(const KernelContext& context, bool unwelded, TileState& tile) {
   CoincidentVertices& coincident = *tile.coincident;
   const CoincidentOwner<T> owner(context, tile);
   coincident.vertices.clear();
@@ -123,7 +123,7 @@ void list_used(const KernelContext& context, bool alone, TileState& tile) {
       const int x = std::countr_zero(word), y = row % kTileSamples, z = row / kTileSamples;
       CoincidentVertex vertex{static_cast<std::uint32_t>(x | y << 6 | z << 12), 0,
                               CoincidentVertex::kOwn};
-      if (!alone && on_planes(vertex.place)) vertex.owner = owner.find({x, y, z});
+      if (!unwelded && on_planes(vertex.place)) vertex.owner = owner.find({x, y, z});
       if (vertex.owner == CoincidentVertex::kOwn)
         vertex.number = tile.edge_vertices + coincident.own++;
       coincident.vertices.resize(coincident.vertices.size() + 1);
@@ -140,10 +140,11 @@ bool has_coincident(ScalarType type, double isovalue) {
   });
 }
 
-void count_coincident(ScalarType type, const KernelContext& context, bool alone, TileState& tile) {
+void count_coincident(ScalarType type, const KernelContext& context, bool unwelded,
+                      TileState& tile) {
   mark_used(tile);
   visit_scalar(type,
-               [&](auto tag) { list_used<typename decltype(tag)::type>(context, alone, tile); });
+               [&](auto tag) { list_used<typename decltype(tag)::type>(context, unwelded, tile); });
   tile.vertices = tile.edge_vertices + tile.coincident->own;
   tile.triangles -= tile.coincident->left_out;
 }

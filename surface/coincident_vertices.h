@@ -79,8 +79,9 @@ constexpr std::uint32_t corner_bits(const std::uint64_t* rows, int x, int y, int
 
 /// After count_tile: leaves triangles out, finds the coincident vertices that the rest has
 /// corners on and the tile that makes each one's vertex, and completes the counts.
-/// With `alone` no other tile exists.
-void count_coincident(ScalarType type, const KernelContext& context, bool alone, TileState& tile);
+/// `unwelded`: no tile shares vertices with another.
+void count_coincident(ScalarType type, const KernelContext& context, bool unwelded,
+                      TileState& tile);
 
 /// Copies the tile's own vertices on coincident vertices on its planes to its boundary.
 void publish_coincident(TileState& tile);

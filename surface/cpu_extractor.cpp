@@ -114,10 +114,6 @@ struct CpuExtractor::Impl {
       tbb::parallel_for(begin, end, f, tbb::simple_partitioner());
   }
 
-  std::uint64_t output_bytes(std::uint64_t v, std::uint64_t t) const {
-    return v * sizeof(Vec3f) * (options.normals ? 2 : 1) + t * sizeof(Triangle);
-  }
-
   /// Gives the counted tiles from `begin` on their places in the mesh, as many as
   /// the limits allow; the first that did not fit.
   std::size_t place(std::size_t begin, std::size_t count) {
@@ -126,7 +122,8 @@ struct CpuExtractor::Impl {
     for (; i < count; ++i) {
       TileState& state = *states[i];
       if (writer && v > 0 &&
-          output_bytes(v + state.vertices, t + state.triangles) > limits.output_bytes)
+          mesh_bytes({v + state.vertices, t + state.triangles}, options.normals) >
+              limits.output_bytes)
         break;
       state.vertex_base = v;
       state.triangle_base = t;
@@ -145,7 +142,7 @@ struct CpuExtractor::Impl {
     return i;
   }
 
-  void emit(TileState& state) {
+  void write(TileState& state) {
     if (state.vertices == 0 && state.triangles == 0) return;
     adopt_boundaries(state, boundaries);
     if (state.coincident) adopt_coincident(state, boundaries);
@@ -170,7 +167,7 @@ struct CpuExtractor::Impl {
       const std::size_t end = place(begin, n);
       if (end > begin) {
         resize_for(*states[end - 1]);
-        for_each_tile(begin, end, [&](std::size_t i) { emit(*states[i]); });
+        for_each_tile(begin, end, [&](std::size_t i) { write(*states[i]); });
       }
       begin = end;
       if (begin < n) hand_on();

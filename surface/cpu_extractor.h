@@ -35,10 +35,9 @@ class TileWorkSpaces {
 
 /// Marching cubes on the CPU.
 ///
-/// Two passes over a batch of tiles, each in parallel over its tiles: the first
-/// gathers samples and makes inside bits, counts and numbers (count); a prefix
-/// sum gives every tile its place; the second writes vertices and triangles
-/// where they belong (emit).
+/// Two passes over a batch of tiles, each in parallel over its tiles. The first gathers samples,
+/// makes inside bits, counts and numbers (count). A prefix sum gives every tile its place. The
+/// second writes vertices and triangles there (write).
 class CpuExtractor final : public SurfaceExtractor {
  public:
   /// Hands the mesh to `sink`, which must outlive it; without one the mesh stays in mesh(),

@@ -16,6 +16,11 @@ inline Index sample_reach(const SurfaceOptions& options) {
   return options.normals || options.may_have_nan || options.drop_degenerate ? 1 : 0;
 }
 
+/// Bytes of a mesh in memory.
+constexpr std::uint64_t mesh_bytes(MeshSize size, bool normals) {
+  return size.vertices * sizeof(Vec3f) * (normals ? 2 : 1) + size.triangles * sizeof(Triangle);
+}
+
 /// Marching cubes on whatever backend: tiles in, a mesh to a sink. The mesh is a pure function of
 /// samples and options, in Morton order of tiles.
 class SurfaceExtractor {

@@ -104,7 +104,7 @@ struct CoincidentVertices {
   bool matter() const { return vertices.size() > 0 || left_out > 0; }
 };
 
-/// Work space for one tile between counting and emission.
+/// Work space for one tile between counting and writing.
 struct TileState {
   TileWork work;
   TileShape shape;

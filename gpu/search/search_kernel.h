@@ -11,12 +11,12 @@ namespace isobrick::gpu {
 void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream);
 
 /// Ranges of all tiles from their samples: of the 33³ that its cells touch, as
-/// far as the volume goes, NaN left out. Uses items, tile_blocks, block_of_tile,
+/// far as the volume goes, NaN left out. Uses items, tile blocks, block_of_tile,
 /// fill_tile_block, tiles and extent of `params`.
 void launch_tile_ranges(ScalarType type, const TileParams& params, const std::int32_t* tiles,
                         std::uint32_t count, void* ranges, cudaStream_t stream);
 
-/// Copies the samples at x = 0 of so many tile_blocks, [z, y] of each.
+/// Copies the samples at x = 0 of so many tile blocks, [z, y] of each.
 void launch_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t count,
                           void* columns, cudaStream_t stream);
 

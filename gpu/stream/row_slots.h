@@ -14,7 +14,7 @@ namespace isobrick::gpu {
 
 /// Which row table on the device belongs to which tile, as the BoundaryMap of the CPU:
 /// tiles come in Morton order, and a tile's last user is its neighbour at (+1, +1, +1).
-/// Host uploads only; not thread-safe.
+/// Bookkeeping only; not thread-safe.
 class RowSlots {
  public:
   /// `tiles` is the grid: where a neighbour is beyond it, the last user is nearer.

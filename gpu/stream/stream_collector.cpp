@@ -6,16 +6,13 @@
 
 #include <isobrick/error.h>
 #include "gpu/memory/nvtx_range.h"
+#include "surface/surface_extractor.h"
 
 namespace isobrick::gpu {
 namespace {
 
 /// Part of a launch's capacity that its mesh is meant to fill.
 constexpr double kFill = 0.85;
-
-std::uint64_t mesh_bytes(SurfaceTotals size, bool normals) {
-  return size.vertices * sizeof(Vec3f) * (normals ? 2 : 1) + size.triangles * sizeof(Triangle);
-}
 
 double seconds_between(const Event& start, const Event& end) { return end.since(start) * 1e-3; }
 
@@ -126,7 +123,8 @@ std::optional<StreamCollector::Pending> StreamCollector::collect(InFlightLaunch&
   report_.gather.seconds += seconds_between(launch.unpack_begin, launch.unpacked);
   report_.gather.bytes += launch.use.read_bytes;
   report_.kernel.seconds += seconds_between(launch.unpacked, launch.extracted);
-  report_.kernel.bytes += launch.count * device_.tile_block_bytes() + mesh_bytes(size, normals_);
+  report_.kernel.bytes += launch.count * device_.tile_block_bytes() +
+                          mesh_bytes({size.vertices, size.triangles}, normals_);
   check_numbers(size.vertices);
   std::optional<Pending> next;
   if (size.vertices > sizes.vertices || size.triangles > sizes.triangles) {
@@ -186,7 +184,7 @@ void StreamCollector::deliver(const Pending& pending) {
   pending.launch->downloaded.wait();
   report_.download.seconds +=
       seconds_between(pending.launch->download_begin, pending.launch->downloaded);
-  report_.download.bytes += mesh_bytes(pending.size, normals_);
+  report_.download.bytes += mesh_bytes({pending.size.vertices, pending.size.triangles}, normals_);
   const MeshArrays from = output(pending.output);
   const auto vertices = static_cast<std::size_t>(pending.size.vertices);
   const MeshChunk chunk{pending.first_vertex,

@@ -15,9 +15,9 @@
 
 namespace isobrick::gpu {
 
-/// Follows the launches of a streaming extraction on a thread of its own: waits for their
-/// kernels, repeats in parts what did not fit its output, downloads the meshes and
-/// hands them to the sink in order.
+/// Follows the launches of a streaming extraction on a thread of its own. Waits for their kernels
+/// and repeats in parts what did not fit its output. Downloads the meshes and hands them to the
+/// sink in order.
 class StreamCollector {
  public:
   StreamCollector(int cuda_device, StreamDevice& device, bool welded, bool normals, MeshSink& sink);

@@ -29,8 +29,8 @@ constexpr std::uint64_t kMinTilesWithPool = 128;
 /// Bricks a thread that are decoded ahead into a pool, and that are being decoded or belong to
 /// launches.
 constexpr std::uint64_t kMinAhead = 24, kMaxAhead = 40, kInWork = 8;
-/// A row table in the host's uploads: its slot, its tile, its expiry. Tables on the faces of what
-/// is finished fill a quarter of their cubes, those of a launch may have a cube each.
+/// A row table in the host's bookkeeping: its slot, its tile, its expiry. Tables on the faces of
+/// what is finished fill a quarter of their cubes, those of a launch may have a cube each.
 constexpr std::uint64_t kBytesOfSlot = 128, kBytesOfCube = 640;
 
 /// Row tables that are needed at a time: as with the CPU's boundaries those on the upper

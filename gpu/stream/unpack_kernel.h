@@ -7,7 +7,7 @@
 
 namespace isobrick::gpu {
 
-/// Lays the samples of streamed tiles out as tile_blocks. Those that no active block
+/// Lays the samples of streamed tiles out as tile blocks. Those that no active block
 /// needs are replaced by the sample that all blocks of a tile share, which changes no result.
 void launch_unpack(ScalarType type, const UnpackParams& params, cudaStream_t stream);
 

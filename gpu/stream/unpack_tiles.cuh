@@ -3,7 +3,7 @@
 #include "gpu/stream/unpack_params.h"
 #include "gpu/tile/streamed_blocks.cuh"
 
-// The kernel that lays the samples of streamed tiles out as tile_blocks.
+// The kernel that lays the samples of streamed tiles out as tile blocks.
 
 namespace isobrick::gpu {
 

@@ -6,8 +6,8 @@
 
 namespace isobrick::gpu {
 
-/// Streamed tiles whose tile_blocks lie together, and samples of such a group: their own
-/// tile_blocks, and what they share for the samples around them (streamed_blocks.cuh).
+/// Streamed tiles whose tile blocks lie together, and samples of such a group: their own
+/// tile blocks, and what they share for the samples around them (streamed_blocks.cuh).
 inline constexpr std::uint32_t kTilesOfBlockGroup = 8;
 inline constexpr std::uint32_t kBlockGroupSamples =
     (kTilesOfBlockGroup + 4) * kTileBlockSamples + 3 * 4096;

@@ -4,13 +4,13 @@
 
 #include "gpu/tile/tile_row_groups.cuh"
 
-// First step: the inside bits of a tile's 33 × 33 rows, from global memory.
+// The inside bits of a tile's 33 × 33 rows, from global memory.
 
 namespace isobrick::gpu {
 
 /// Which samples are inside. Narrow integers are compared within a word, 4 or 2 at
-/// once: the upper bit of (x without it) + c is whether the
-/// lower bits reach those of the threshold, and is joined with x's own.
+/// once: the upper bit of (x without it) + c is set where the
+/// lower bits reach those of the threshold; it is joined with x's own.
 template <class T>
 struct Classifier {
   static constexpr bool kPacked = sizeof(T) <= 2 && std::is_integral_v<T>;

@@ -2,7 +2,7 @@
 
 #include "gpu/tile/tile_row_groups.cuh"
 
-// Second step: active edges and active cells of each row, numbered by prefix
+// Active edges and active cells of each row, numbered by prefix
 // sums within planes and over planes. Where the vertices and cells of a row begin is marked, so
 // that 32 threads that take 32 of them find their rows with a vote.
 

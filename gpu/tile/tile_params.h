@@ -113,7 +113,7 @@ struct TileParams {
   bool unwelded;      ///< every tile owns all its edges
   std::uint32_t fill_tile_block;
   /// The samples at x = 0 of each block once more, [z, y], so that the last column of a tile
-  /// is not read from as many lines as it has rows; null: they are read from the tile_blocks.
+  /// is not read from as many lines as it has rows; null: they are read from the tile blocks.
   const void* columns;
   std::int32_t tiles[3];
   std::int32_t extent[3], roi_lo[3], roi_hi[3];  ///< samples

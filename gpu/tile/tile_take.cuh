@@ -34,7 +34,7 @@ __device__ inline void find_tile_blocks(TileShared& s, const TileParams& p, cons
   const auto address = [](const void* from, std::int64_t samples) {
     return reinterpret_cast<std::uintptr_t>(from) + samples * static_cast<std::int64_t>(sizeof(T));
   };
-  // Samples of the tile_blocks, or columns, between.
+  // Samples of the tile blocks, or columns, between.
   const int before = dx * 32 + dy * 1024 + dz * 32768, columns_before = dy * 32 + dz * 1024;
   if (column < 0)
     s.tile_blocks[n] = address(p.tile_blocks, start - before);

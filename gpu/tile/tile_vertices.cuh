@@ -93,7 +93,7 @@ struct VertexMaker {
     const int place = row_start(static_cast<int>(row), e.z) + e.x;
     e.a = static_cast<R>(__ldg(sample_at<T>(s, block, place)));
     const int along = e.axis == 0 ? e.x : e.axis == 1 ? e.y : e.z;
-    // 1, 3 or 9 tile_blocks on, 1, 32 or 1024 samples.
+    // 1, 3 or 9 tile blocks on, 1, 32 or 1024 samples.
     const int next = block + (along == 31 ? 0x931 >> 4 * e.axis & 15 : 0);
     e.b = static_cast<R>(__ldg(sample_at<T>(s, next, place + (1 << 5 * e.axis))));
     return e;

@@ -8,7 +8,7 @@
 #include "core/dense_bricks.h"
 #include "gpu/tile/tile_params.h"
 
-// Host uploads: whatever a kernel finds through the table is the sample that it needs.
+// Host logic: whatever a kernel finds through the table is the sample that it needs.
 
 namespace isobrick::testing {
 namespace {

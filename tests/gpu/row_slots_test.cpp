@@ -19,13 +19,14 @@ TEST(RowSlots, StreamSizesHaveEnoughForEveryGrid) {
   for (const Int3 grid : {Int3{32, 32, 32}, Int3{33, 33, 33}, Int3{17, 17, 17}, Int3{64, 64, 8},
                           Int3{8, 64, 64}, Int3{64, 8, 64}, Int3{100, 3, 50}, Int3{1, 1, 200},
                           Int3{200, 2, 2}, Int3{40, 70, 20}, Int3{1, 90, 90}})
-    for (const auto& [tiles, lanes] : {std::pair{1u, 2}, std::pair{7u, 2}, std::pair{256u, 4}}) {
+    for (const auto& [tiles, in_flight] :
+         {std::pair{1u, 2}, std::pair{7u, 2}, std::pair{256u, 4}}) {
       SCOPED_TRACE(std::to_string(grid.x) + "x" + std::to_string(grid.y) + "x" +
                    std::to_string(grid.z) + ", launches of " + std::to_string(tiles));
       const Lattice lattice{grid * kTileEdge, {64, 64, 64}, ScalarType::u8};
-      gpu::RowSlots slots(gpu::stream_sizes(lattice, {.roi = lattice.box()}, tiles, lanes).slots,
-                          grid);
-      std::vector<std::vector<std::uint32_t>> unused(static_cast<std::size_t>(lanes));
+      gpu::RowSlots slots(
+          gpu::stream_sizes(lattice, {.roi = lattice.box()}, tiles, in_flight).slots, grid);
+      std::vector<std::vector<std::uint32_t>> unused(static_cast<std::size_t>(in_flight));
       std::size_t launch = 0;
       std::uint32_t in_launch = 0;
       Int3 last{};
@@ -59,7 +60,7 @@ TEST(RowSlots, ATileIsFoundUntilItsLastAskerIsDone) {
   EXPECT_EQ(slots.find({0, 0, 0}), gpu::kNone);
 }
 
-// Beside uploads of the simplest kind, over tiles here and there.
+// Beside bookkeeping of the simplest kind, over tiles here and there.
 TEST(RowSlots, EachNeighbourIsFoundWithItsSlot) {
   const Int3 grid{13, 9, 10};
   gpu::RowSlots slots(static_cast<std::uint32_t>(volume(grid)), grid);

@@ -15,9 +15,9 @@ namespace isobrick::emulated {
 class Fiber;
 
 /// One block of a kernel's threads, all on the thread of the CPU that calls run(). They take turns:
-/// one goes on until it waits for others, and which is the next is left to chance, but some warps
-/// are favoured for a while and run ahead as far as they can, so that what lacks a barrier shows
-/// (Burckhardt et al., A randomized scheduler with probabilistic guarantees of finding bugs, 2010).
+/// one runs until it waits for others, and chance chooses the next. Some warps are favoured for a
+/// while and run ahead as far as they can, so that a missing barrier shows (Burckhardt
+/// et al., A randomized scheduler with probabilistic guarantees of finding bugs, 2010).
 /// A call that all threads of a warp, or of the block, must make and some don't ends the program
 /// with a line about it.
 class ThreadBlock {
