@@ -29,7 +29,7 @@ class Arena {
     if (at > bytes_ || count > (bytes_ - at) / sizeof(T))
       throw Error("a buffer of the GPU backend is used up");
     used_ = at + count * sizeof(T);
-    return reinterpret_cast<T*>(data_ + at);
+    return data_ == nullptr ? nullptr : reinterpret_cast<T*>(data_ + at);
   }
   /// Bytes up to the end of the last slice.
   std::size_t used() const { return used_; }

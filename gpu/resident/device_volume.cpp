@@ -74,6 +74,8 @@ void DeviceVolume::Impl::list_tiles(std::span<const Int3> searched) {
 }
 
 void DeviceVolume::Impl::load(std::span<const Int3> more, const BrickLookup& bricks) {
+  if (more.size() > loaded_blocks() - loaded_)
+    throw UsageError("more tiles are loaded than the volume has room for");
   while (!more.empty()) {
     const std::size_t room = staging_[turn_].blocks.size() / block_bytes();
     const std::size_t count = std::min(room, more.size());

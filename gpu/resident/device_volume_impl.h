@@ -15,7 +15,7 @@ struct DeviceVolume::Impl {
   Stream stream;
   std::uint32_t tile_count = 0;               ///< that are searched
   DeviceBuffer<std::byte> tile_blocks;        ///< that of the fill value, then of the loaded tiles
-  DeviceBuffer<std::byte> columns;            ///< of the tile_blocks: TileParams::columns
+  DeviceBuffer<std::byte> columns;            ///< of the tile blocks: TileParams::columns
   DeviceBuffer<std::uint32_t> block_of_tile;  ///< [z, y, x]; empty where block i + 1 is of tile i
   DeviceBuffer<std::int32_t> tiles;           ///< x, y, z of the searched, in their order
   DeviceBuffer<std::byte> ranges;             ///< of the searched, in their order

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <tbb/concurrent_queue.h>
 
 #include <algorithm>
@@ -11,12 +12,16 @@
 #include "gpu/resident/resident_launcher.h"
 #include "gpu/resident/resident_sizes.h"
 #include "surface/chunk_writer.h"
+#include "surface/surface_extractor.h"
 
 namespace isobrick::gpu {
 namespace {
 
 /// Mesh to make room for before anything is known: a sheet across each tile, twice.
 constexpr MeshSize kRoomOfTile{2500, 5000};
+
+/// A vertex with its normal.
+constexpr std::size_t kMinChunk = 2 * sizeof(Vec3f);
 
 MeshSize larger(MeshSize a, MeshSize b) {
   return {std::max(a.vertices, b.vertices), std::max(a.triangles, b.triangles)};
@@ -90,6 +95,7 @@ struct ResidentExtractor::Impl {
     if (std::isnan(value)) throw UsageError("the isovalue is not a number");
     isovalue = value;
     report = {};
+    made = {};  // a launch that fails leaves no mesh
     Stopwatch watch;
     made = make();
     report.vertices = made.vertices;
@@ -152,16 +158,22 @@ struct ResidentExtractor::Impl {
     check(cudaMemcpyAsync(to, from, count * sizeof(V), cudaMemcpyDeviceToHost, stream().get()));
   }
 
-  void write(MeshSink& sink, std::size_t chunk_bytes) {
-    make_current(device);
-    const NvtxRange range("download");
+  void reserve_chunks(std::size_t chunk_bytes) {
+    if (chunk_bytes < kMinChunk)
+      throw UsageError(fmt::format("a chunk of a mesh has at least {} bytes", kMinChunk));
     for (PinnedBuffer<std::byte>& chunk : chunks)
       if (chunk.size() != chunk_bytes) chunk = PinnedBuffer<std::byte>(chunk_bytes);
     report.pinned_bytes = 2 * chunk_bytes;
+  }
+
+  void write(MeshSink& sink, std::size_t chunk_bytes) {
+    make_current(device);
+    const NvtxRange range("download");
+    reserve_chunks(chunk_bytes);
     tbb::concurrent_bounded_queue<std::byte*> free;
     for (const PinnedBuffer<std::byte>& chunk : chunks) free.push(chunk.data());
     ChunkWriter writer(sink);  // ends before the queue that its chunks go back to
-    // Calls copy(to, first, count) for chunks of items, which returns the chunk.
+    // Calls copy_chunk(to, first, count) for chunks of items, which returns the chunk.
     const auto write_all = [&](std::uint64_t items, std::size_t item_bytes,
                                const auto& copy_chunk) {
       const std::uint64_t at_once = chunk_bytes / item_bytes;
@@ -210,6 +222,9 @@ float ResidentExtractor::milliseconds() {
 
 void ResidentExtractor::download(MeshBuffer& mesh) const { impl_->download(mesh); }
 
+void ResidentExtractor::reserve_chunks(std::size_t chunk_bytes) {
+  impl_->reserve_chunks(chunk_bytes);
+}
 void ResidentExtractor::write(MeshSink& sink, std::size_t chunk_bytes) {
   impl_->write(sink, chunk_bytes);
 }

@@ -7,6 +7,7 @@
 #include "core/tile.h"
 #include "gpu/search/search_params.h"
 #include "gpu/tile/tile_params.h"
+#include "surface/surface_extractor.h"
 
 namespace isobrick::gpu {
 namespace {
@@ -47,6 +48,7 @@ std::vector<Int3> tiles_to_load(const Lattice& lattice, std::span<const Int3> se
       is_needed[static_cast<std::size_t>(linear_index(t, grid))] = true;
     });
   std::vector<Int3> tiles;
+  tiles.reserve(static_cast<std::size_t>(std::count(is_needed.begin(), is_needed.end(), true)));
   for_each_morton(grid, [&](Int3 t) {
     if (is_needed[static_cast<std::size_t>(linear_index(t, grid))]) tiles.push_back(t);
   });

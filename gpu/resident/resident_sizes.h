@@ -20,11 +20,6 @@ struct ResidentTiles {
 
 ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals);
 
-/// Bytes of a mesh in device memory.
-constexpr std::uint64_t mesh_bytes(MeshSize size, bool normals) {
-  return size.vertices * sizeof(Vec3f) * (normals ? 2 : 1) + size.triangles * sizeof(Triangle);
-}
-
 /// Row tables from the beginning, 4.4 MiB: with fewer active tiles the first isovalue needs no
 /// second launch.
 inline constexpr std::uint32_t kFirstRowTables = 1024;

@@ -49,8 +49,8 @@ class DeviceVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The tiles that surfaces in `searched` look at, with as many layers of samples around as
-/// sample_reach() says, in Morton order.
+/// The tiles that surfaces in `searched` look at, in Morton order. `reach` is 1 with normals or
+/// where samples may be NaN, else 0.
 std::vector<Int3> tiles_to_load(const Lattice& lattice, std::span<const Int3> searched,
                                 Index reach);
 
@@ -92,9 +92,12 @@ class ResidentExtractor {
 
   /// Copies the last mesh to the host.
   void download(MeshBuffer& mesh) const;
-  /// Writes the last mesh to a sink, positions and normals before triangles, in chunks of at most
-  /// `chunk_bytes`. They pass through twice as much pinned memory. From any thread, beside the
-  /// write() of other extractors.
+  /// Takes the pinned memory that write() needs, twice `chunk_bytes`. Throws Error where there is
+  /// none, UsageError for less than 24 bytes.
+  void reserve_chunks(std::size_t chunk_bytes);
+  /// Passes the last mesh to a sink that has begun, and does not finish it. Positions and normals
+  /// come before triangles, in chunks of at most `chunk_bytes`. Reserves them where that is not
+  /// done. May run beside write() of other extractors, on any thread.
   void write(MeshSink& sink, std::size_t chunk_bytes);
   /// Of the last mesh: its size, the stages kernel, download and sink, device memory without the
   /// volume's.

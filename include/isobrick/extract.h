@@ -59,9 +59,10 @@ struct ExtractReport : SurfaceReport {
   std::uint64_t brick_reads = 0;  ///< reads of bricks; more than bricks_read where one was repeated
   std::uint64_t bytes_read = 0;   ///< from disk
   double seconds = 0;             ///< wall time of all
-  double plan_seconds = 0;        ///< wall time of finding the active blocks
-  double decode_seconds = 0;      ///< wall time in which bricks were decoded
-  double surface_seconds = 0;     ///< wall time in which the surface was made
+  /// Wall time of counting active blocks, planning and opening the device.
+  double plan_seconds = 0;
+  double decode_seconds = 0;       ///< wall time of waiting for decoded bricks
+  double surface_seconds = 0;      ///< wall time in which the surface was made
   std::optional<IndexKind> index;  ///< that found the active blocks; none: ranges alone did
   std::string backend = "cpu";     ///< or "cuda"
   std::string device;              ///< its name, of the latter
@@ -73,7 +74,7 @@ struct ExtractReport : SurfaceReport {
   StageReport decode;                     ///< decoded bricks
   std::uint64_t device_bytes_in_use = 0;  ///< by all surfaces of the pass, as the driver counts it
   std::uint64_t pool_bricks = 0;   ///< that the device has room for; 0: bricks lie in host memory
-  std::uint64_t search_bytes = 0;  ///< read to find them, once
+  std::uint64_t search_bytes = 0;  ///< read to find the active blocks, once
   double search_seconds = 0;       ///< to find them, once
 };
 
@@ -96,19 +97,19 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
                       Progress& progress);
 
 /// Streams several surfaces of one level, each into its sink, and reads and decodes every brick
-/// once for all of them: bricks that any isovalue touches are visited once, in the order of a
+/// once for all of them. Bricks that any isovalue touches are visited once, in the order of a
 /// single extraction. Isovalues may repeat, for a mesh and its picture. Every sink gets what it
 /// would get alone. `isovalue` and `normals` of the options do not matter.
 ///
 /// The budgets hold for all surfaces together. Where they have no room for all, the surfaces are
-/// made in several passes over the store, in their order, each of as many as fit; the budget of
+/// made in several passes over the store, in their order, each of as many as fit. The budget of
 /// the one that needs most is enough. Begins the sinks of a pass before it and finishes them after
 /// it.
 ///
-/// On a GPU whose memory has room for all samples that the surfaces touch, these stay there, and
-/// one surface is made after the other. That takes several isovalues and sinks of welded meshes,
-/// which then get all vertices before the triangles. A sink begins when its mesh is made and is
-/// finished before the next one begins.
+/// On a GPU whose memory has room for all samples that the surfaces touch, these stay there. That
+/// takes several isovalues and sinks of welded meshes, which then get all vertices before the
+/// triangles. A sink begins when its mesh is made. Several sinks are written and finished at the
+/// same time, each on a thread of its own.
 ///
 /// Throws as above: for options that make no sense, and for a `memory` too small for one of the
 /// surfaces on the CPU, before any sink begins. A report for each surface.

@@ -16,9 +16,9 @@ struct SurfaceReport {
   std::uint64_t triangles = 0;             ///< of the mesh
   std::uint64_t vertices = 0;              ///< of the mesh
   std::uint64_t degenerate_triangles = 0;  ///< left out, with drop_degenerate
-  StageReport upload;                      ///< GPU: bricks sent to the device
+  StageReport upload;                      ///< GPU: bricks or tile blocks sent to the device
   StageReport gather;                      ///< GPU: samples that the device read where they lie
-  StageReport kernel;                      ///< GPU: samples in device memory
+  StageReport kernel;                      ///< GPU: samples in device memory, and the mesh
   StageReport download;                    ///< GPU: the mesh
   StageReport surface;                     ///< CPU: samples; the GPU has no such stage
   StageReport sink;                        ///< the mesh

@@ -158,9 +158,7 @@ class Extraction {
     {
       const Stopwatch whole(seconds);
       if (first == 0 && use_gpu_ && can_be_resident(requests_))
-        count = run_resident_pass(
-            store_, options_, left, take_tiles(requests_), other_bytes_,
-            [&](std::size_t i) { begin_sink(i); }, progress);
+        count = make_resident(left, progress);
       if (count == 0) count = stream(left, first, plan_seconds, progress);
     }
     const PassSurfaces made = left.first(count);
@@ -171,6 +169,14 @@ class Extraction {
       report.plan_seconds = plan_seconds;
     }
     return made.requests.size();
+  }
+
+  std::size_t make_resident(const PassSurfaces& left, Progress& progress) {
+    const ResidentPassResult result = run_resident_pass(
+        store_, options_, left, take_tiles(requests_), other_bytes_,
+        [&](std::size_t i) { begin_sink(i); }, progress);
+    progress_ahead_ = result.progress_ahead;
+    return result.made;
   }
 
   /// Streams as many of `left`, the surfaces from `first` on, as fit together; how many.
@@ -184,7 +190,10 @@ class Extraction {
     const PassSurfaces made = left.first(backend.surfaces.size());
     for (std::size_t i = 0; i < made.sinks.size(); ++i) begin_sink(first + i);
     run_pass(store_, options_, backend, made, [&](std::size_t i, std::span<const TileWork> tiles) {
-      progress.advance(bytes_of(tiles, first + i));
+      const std::uint64_t bytes = bytes_of(tiles, first + i);
+      const std::uint64_t known = std::min(progress_ahead_, bytes);
+      progress_ahead_ -= known;
+      progress.advance(bytes - known);
     });
     for (ExtractReport& report : made.reports) report.gpu_refusal = backend.gpu_refusal;
     // Their buffers are freed before the sinks end their files.
@@ -232,6 +241,7 @@ class Extraction {
   std::vector<ActiveParts> active_;
   std::vector<ExtractReport> reports_;
   std::uint64_t other_bytes_ = 0, bytes_before_ = 0;
+  std::uint64_t progress_ahead_ = 0;  ///< reported already for what is streamed
   bool use_gpu_ = false;
   EarlyWork early_;
 };

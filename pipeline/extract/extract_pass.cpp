@@ -87,25 +87,6 @@ class CpuBatches {
   TileBatch planned_;
 };
 
-/// What the search for the pass's tiles cost.
-void report_search(const TileStream& tiles, const Work& work) {
-  for (ExtractReport& report : work.reports) {
-    report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
-    // Once for the plan and once for the surface; the index has files of its own.
-    report.bytes_read = 2 * tiles.index_bytes();
-    report.search_seconds = tiles.seconds();
-  }
-}
-
-void report_bricks(std::uint64_t bricks_read, std::uint64_t reads, double decode_seconds,
-                   const Work& work) {
-  for (ExtractReport& report : work.reports) {
-    report.bricks_read = bricks_read;
-    report.brick_reads = reads;
-    report.decode_seconds = decode_seconds;
-  }
-}
-
 void report_surface(const SurfaceExtractor& surface, ExtractReport& report) {
   static_cast<SurfaceReport&>(report) = surface.report();
 }
@@ -149,7 +130,8 @@ void extract_on_cpu(const Work& work, std::span<const std::unique_ptr<SurfaceExt
       if (!room_for_two) batches.begin(next);
       now = std::move(next);
     }
-    report_bricks(batches.cache().bricks_read(), batches.cache().reads(), decode_seconds, work);
+    report_bricks(batches.cache().bricks_read(), batches.cache().reads(), decode_seconds,
+                  work.reports);
   });
   for (const auto& surface : surfaces) surface->finish();
   // Of the decoding that went on meanwhile every surface had its share.
@@ -159,7 +141,7 @@ void extract_on_cpu(const Work& work, std::span<const std::unique_ptr<SurfaceExt
     double& seconds = work.reports[i].surface.seconds;
     seconds = std::max(0.0, seconds * (1 - share));
   }
-  report_search(planned.tiles, work);
+  report_search(planned.tiles, work.reports);
 }
 
 /// All cores decode, ahead of the GPU; this thread sends batches off as they are decoded.
@@ -182,14 +164,32 @@ void extract_on_gpu(const Work& work, ChosenBackend& backend) {
     backend.gpu->report(work.reports[i]);
     if (backend.gpu->pool_bricks() == 0) work.reports[i].pinned_bytes += decoder.memory_bytes();
   }
-  report_bricks(decoder.bricks_read(), decoder.reads(), decode_seconds, work);
-  report_search(backend.decoded->planned.tiles, work);
+  report_bricks(decoder.bricks_read(), decoder.reads(), decode_seconds, work.reports);
+  report_search(backend.decoded->planned.tiles, work.reports);
   // Their memory is freed before the sinks end their files.
   backend.surfaces.clear();
   backend.decoded.reset();
 }
 
 }  // namespace
+
+void report_search(const TileStream& tiles, std::span<ExtractReport> reports) {
+  for (ExtractReport& report : reports) {
+    report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
+    // Once for the plan and once for the surface; the index has files of its own.
+    report.bytes_read = 2 * tiles.index_bytes();
+    report.search_seconds = tiles.seconds();
+  }
+}
+
+void report_bricks(std::uint64_t bricks_read, std::uint64_t reads, double decode_seconds,
+                   std::span<ExtractReport> reports) {
+  for (ExtractReport& report : reports) {
+    report.bricks_read = bricks_read;
+    report.brick_reads = reads;
+    report.decode_seconds = decode_seconds;
+  }
+}
 
 void run_pass(const StoreReader& store, const ExtractOptions& options, ChosenBackend& backend,
               const PassSurfaces& surfaces, const TilesDone& done) {

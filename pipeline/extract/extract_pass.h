@@ -22,6 +22,12 @@ struct PassSurfaces {
   }
 };
 
+/// What the search for a pass's tiles cost.
+void report_search(const TileStream& tiles, std::span<ExtractReport> reports);
+/// What decoding a pass's bricks took.
+void report_bricks(std::uint64_t bricks_read, std::uint64_t reads, double decode_seconds,
+                   std::span<ExtractReport> reports);
+
 /// Called with a surface's number and those of its tiles that are done.
 using TilesDone = std::function<void(std::size_t surface, std::span<const TileWork> tiles)>;
 

@@ -99,9 +99,9 @@ std::uint64_t sink_bytes(PassRequests requests) {
 }
 
 /// Larger chunks of a mesh, or of samples for a GPU, gain nothing.
+constexpr std::uint64_t kMaxChunk = std::uint64_t{32} << 20;
 /// More files at a time make no disk faster.
 constexpr std::size_t kMaxSinks = 8;
-constexpr std::uint64_t kMaxChunk = std::uint64_t{32} << 20;
 
 /// Bricks that a cache can use: neighbours come on top of the active ones.
 std::uint64_t most_useful(std::size_t tile_bricks, PassRequests requests) {
@@ -239,8 +239,7 @@ std::optional<ExtractPlan> plan_resident_memory(PassRequests requests, std::uint
                                                 std::uint64_t other_bytes) {
   const Lattice& lattice = common(requests).level->lattice;
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, 0);
-  const std::uint64_t tile_bytes =
-      std::uint64_t{kTileEdge} * kTileEdge * kTileEdge * lattice.sample_bytes();
+  const std::uint64_t tile_bytes = kTileVolume * lattice.sample_bytes();
   std::uint64_t sink = 0;
   for (const ExtractRequest& request : requests) sink = std::max(sink, request.sink_bytes);
   ExtractPlan plan;

@@ -16,9 +16,9 @@ int cuda_device_count() { return 0; }
 
 std::unique_ptr<GpuSession> open_gpu(int) { refuse(); }
 
-std::size_t run_resident_pass(const StoreReader&, const ExtractOptions&, const PassSurfaces&,
-                              TileStream, std::uint64_t, const std::function<void(std::size_t)>&,
-                              Progress&) {
+ResidentPassResult run_resident_pass(const StoreReader&, const ExtractOptions&, const PassSurfaces&,
+                                     TileStream, std::uint64_t,
+                                     const std::function<void(std::size_t)>&, Progress&) {
   refuse();
 }
 

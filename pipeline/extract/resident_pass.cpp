@@ -16,17 +16,13 @@
 namespace isobrick {
 namespace {
 
-/// Samples of a tile on the device.
-constexpr std::uint64_t kTileSize = std::uint64_t{kTileEdge} * kTileEdge * kTileEdge;
 /// The driver gets memory that is allocated in the order of a stream in pieces of so much.
 constexpr std::uint64_t kPieceOfDriver = std::uint64_t{32} << 20;
 
 /// Decoded bricks, which only processors read.
 class HeapBricks final : public BrickMemory {
  public:
-  std::shared_ptr<std::byte> room(std::size_t bytes) override {
-    return {new std::byte[bytes], std::default_delete<std::byte[]>()};
-  }
+  std::shared_ptr<std::byte> room(std::size_t bytes) override { return allocate_bricks(bytes); }
 };
 
 /// What the surfaces of a pass look at.
@@ -51,7 +47,7 @@ class ResidentPass {
         budget_(options.gpu_memory > 0 ? options.gpu_memory
                                        : device.free_bytes - device.free_bytes / 10) {}
 
-  /// False where the device has no room.
+  /// False where the device has no room, or fails: then streaming has its turn.
   bool load(TileStream& tiles) {
     const std::optional<PassTiles> found = find_tiles(tiles);
     if (!found) return false;
@@ -60,11 +56,10 @@ class ResidentPass {
     try {
       volume_.emplace(lattice(), common().surface.fill_value,
                       gpu::DeviceTiles{found->searched, found->loaded}, plan_.limits.output_bytes);
-      decode(found->loaded);
-    } catch (const gpu::OutOfDeviceMemory&) {
+    } catch (const Error&) {
       return false;
     }
-    return true;
+    return decode(found->loaded);
   }
 
   /// Makes the surfaces from the first on, as many as the device has room for. A kernel takes
@@ -73,12 +68,19 @@ class ResidentPass {
     std::size_t made = 0;
     while (made < surfaces_.requests.size()) {
       extract_from(made);
-      if (extractors_.empty()) break;
+      if (extractors_.empty() || !reserve_chunks()) break;
       for (std::size_t i = 0; i < extractors_.size(); ++i) begin(made + i);
       write_from(made);
       made += extractors_.size();
     }
     return made;
+  }
+
+  /// Progress that was reported for surfaces that were not made.
+  std::uint64_t progress_ahead(std::size_t made) const {
+    std::uint64_t of_made = 0;
+    for (std::size_t i = 0; i < made; ++i) of_made += bytes_of(surfaces_.requests[i]) / 2;
+    return shown_ - std::min(shown_, of_made);
   }
 
  private:
@@ -104,23 +106,35 @@ class ResidentPass {
         const Stopwatch watch(surfaces_.reports[i].surface_seconds);
         auto extractor = std::make_unique<gpu::ResidentExtractor>(*volume_, surface,
                                                                   gpu::ResidentTuning{}, room);
-        extractor->extract(surface.isovalue);
+        const gpu::DeviceCounts made = extractor->extract(surface.isovalue);
+        surfaces_.reports[i].vertices = made.vertices;
+        surfaces_.reports[i].triangles = made.triangles;
         room -= std::min(room, extractor->bytes());
-        add_report(surfaces_.reports[i], *extractor);
         extractors_.push_back(std::move(extractor));
-      } catch (const gpu::OutOfDeviceMemory&) {
-        return;
+      } catch (const Error&) {
+        return;  // its sink has not begun: streaming makes it, or reports the error
       }
+  }
+
+  std::size_t chunk_bytes() const { return plan_.limits.output_bytes / extractors_.size(); }
+
+  /// False where there is no pinned memory, before any sink begins.
+  bool reserve_chunks() const {
+    try {
+      for (const auto& extractor : extractors_) extractor->reserve_chunks(chunk_bytes());
+    } catch (const Error&) {
+      return false;
+    }
+    return true;
   }
 
   /// Writes what was extracted to the sinks from `first` on.
   void write_from(std::size_t first) {
-    const std::size_t chunk_bytes = plan_.limits.output_bytes / extractors_.size();
     write_together(
         surfaces_.sinks.subspan(first, extractors_.size()),
         [&](std::size_t i, MeshSink& sink) {
           const Stopwatch watch(surfaces_.reports[first + i].surface_seconds);
-          extractors_[i]->write(sink, chunk_bytes);
+          extractors_[i]->write(sink, chunk_bytes());
         },
         [&](std::size_t i, std::uint64_t bytes) { advance(first + i, bytes); });
     for (std::size_t i = 0; i < extractors_.size(); ++i)
@@ -131,8 +145,7 @@ class ResidentPass {
   void advance(std::size_t surface, std::uint64_t bytes) {
     const ExtractRequest& request = surfaces_.requests[surface];
     const MeshSize size{surfaces_.reports[surface].vertices, surfaces_.reports[surface].triangles};
-    const std::uint64_t all =
-        std::max<std::uint64_t>(1, gpu::mesh_bytes(size, request.surface.normals));
+    const std::uint64_t all = std::max<std::uint64_t>(1, mesh_bytes(size, request.surface.normals));
     const double part = static_cast<double>(bytes) / static_cast<double>(all);
     progress_.advance(
         static_cast<std::uint64_t>(part * static_cast<double>(bytes_of(request) / 2)));
@@ -140,26 +153,25 @@ class ResidentPass {
 
   /// None where the samples of the tiles alone are too much for the device.
   std::optional<PassTiles> find_tiles(TileStream& tiles) {
-    const std::uint64_t most = budget_ / (kTileSize * lattice().sample_bytes());
+    const std::uint64_t max_tiles = budget_ / (kTileVolume * lattice().sample_bytes());
     PassTiles found;
     std::vector<std::uint64_t> active(tiles.isovalues());
     while (const std::optional<TileWork> work = tiles.next()) {
-      if (found.searched.size() == most) return std::nullopt;
+      if (found.searched.size() == max_tiles) return std::nullopt;
       found.searched.push_back(work->tile);
       for (std::size_t i = 0; i < active.size(); ++i) active[i] += tiles.blocks_of_each()[i] != 0;
     }
+    found.searched.shrink_to_fit();
     found.active = *std::max_element(active.begin(), active.end());
     found.loaded = gpu::tiles_to_load(lattice(), found.searched, reach_of(surfaces_.requests));
-    for (ExtractReport& report : surfaces_.reports) {
-      report.search_bytes = tiles.range_bytes() + tiles.index_bytes();
-      report.bytes_read = 2 * tiles.index_bytes();
-      report.search_seconds = tiles.seconds();
-    }
+    report_search(tiles, surfaces_.reports);
     return found;
   }
 
-  void decode(std::span<const Int3> loaded) {
+  /// False where the device fails.
+  bool decode(std::span<const Int3> loaded) {
     std::vector<TileWork> work;
+    work.reserve(loaded.size());
     for (const Int3 tile : loaded) work.push_back({tile, 0xff});
     TileStream stream(std::move(work));
     BatchPlanner batches(stream, lattice(), kFirstCorners, true, plan_.limits.tiles,
@@ -167,7 +179,7 @@ class ResidentPass {
     HeapBricks memory;
     BatchDecoder decoder(store_, options_.level, batches, 0, plan_.cache_bricks, common().threads,
                          memory);
-    std::uint64_t bytes = 0, done = 0, shown = 0;
+    std::uint64_t bytes = 0, done = 0;
     for (const ExtractRequest& request : surfaces_.requests) bytes += bytes_of(request);
     double decode_seconds = 0;
     for (;;) {
@@ -179,22 +191,21 @@ class ResidentPass {
       if (!batch) break;
       std::vector<Int3> tiles;
       for (const TileWork& tile : batch->tiles()) tiles.push_back(tile.tile);
-      {
+      try {
         const Stopwatch watch(upload_.seconds);
         volume_->load(tiles, *batch);
+      } catch (const Error&) {
+        return false;
       }
       // Half of the way is that the samples are there.
       done += tiles.size();
       const auto part = static_cast<double>(done) / static_cast<double>(loaded.size());
       const auto now = static_cast<std::uint64_t>(part * static_cast<double>(bytes / 2));
-      progress_.advance(now - std::exchange(shown, now));
+      progress_.advance(now - std::exchange(shown_, now));
     }
-    upload_.bytes = loaded.size() * kTileSize * lattice().sample_bytes();
-    for (ExtractReport& report : surfaces_.reports) {
-      report.bricks_read = decoder.bricks_read();
-      report.brick_reads = decoder.reads();
-      report.decode_seconds = decode_seconds;
-    }
+    upload_.bytes = loaded.size() * kTileVolume * lattice().sample_bytes();
+    report_bricks(decoder.bricks_read(), decoder.reads(), decode_seconds, surfaces_.reports);
+    return true;
   }
 
   void add_report(ExtractReport& report, const gpu::ResidentExtractor& extractor) const {
@@ -214,7 +225,8 @@ class ResidentPass {
   const ExtractPlan& plan_;
   const gpu::DeviceInfo& device_;
   Progress& progress_;
-  std::uint64_t budget_;  ///< of device memory
+  std::uint64_t budget_;     ///< of device memory
+  std::uint64_t shown_ = 0;  ///< progress of decoding
   StageReport upload_;
   std::optional<gpu::DeviceVolume> volume_;
   std::vector<std::unique_ptr<gpu::ResidentExtractor>> extractors_;  ///< with the meshes to write
@@ -222,21 +234,23 @@ class ResidentPass {
 
 }  // namespace
 
-std::size_t run_resident_pass(const StoreReader& store, const ExtractOptions& options,
-                              const PassSurfaces& surfaces, TileStream tiles,
-                              std::uint64_t other_bytes,
-                              const std::function<void(std::size_t)>& begin, Progress& progress) {
+ResidentPassResult run_resident_pass(const StoreReader& store, const ExtractOptions& options,
+                                     const PassSurfaces& surfaces, TileStream tiles,
+                                     std::uint64_t other_bytes,
+                                     const std::function<void(std::size_t)>& begin,
+                                     Progress& progress) {
   const auto plan = plan_resident_memory(surfaces.requests, options.memory, other_bytes);
-  if (!plan) return 0;
-  return Workers(surfaces.requests.front().threads).execute([&]() -> std::size_t {
+  if (!plan) return {};
+  return Workers(surfaces.requests.front().threads).execute([&]() -> ResidentPassResult {
     gpu::DeviceInfo device;
     try {
       device = gpu::open_device(options.device);
     } catch (const Error&) {
-      return 0;  // streaming, which is next, reports it
+      return {};  // streaming, which is next, reports it
     }
     ResidentPass pass(store, options, surfaces, *plan, device, progress);
-    return pass.load(tiles) ? pass.make(begin) : 0;
+    const std::size_t made = pass.load(tiles) ? pass.make(begin) : 0;
+    return {made, pass.progress_ahead(made)};
   });
 }
 

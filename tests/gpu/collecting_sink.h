@@ -19,6 +19,8 @@ class CollectingSink : public MeshSink {
   void begin(const MeshHeader&) override {}
   void write(const MeshChunk& chunk) override {
     EXPECT_EQ(chunk.first_vertex, mesh.positions.size());
+    max_chunk = std::max(max_chunk, chunk.positions.size_bytes() + chunk.normals.size_bytes() +
+                                        chunk.triangles.size_bytes());
     append(mesh.positions, chunk.positions);
     append(mesh.normals, chunk.normals);
     const std::size_t before = mesh.triangles.size();
@@ -34,6 +36,7 @@ class CollectingSink : public MeshSink {
   std::uint64_t bytes() const override { return 0; }
 
   MeshBuffer mesh;
+  std::size_t max_chunk = 0;  ///< bytes
 
  private:
   template <class V>

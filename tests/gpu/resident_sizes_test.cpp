@@ -1,4 +1,5 @@
 #include "gpu/resident/resident_sizes.h"
+#include "surface/surface_extractor.h"
 
 #include <gtest/gtest.h>
 
@@ -48,7 +49,7 @@ TEST(ResidentSizes, CountWhatStaysAndTheMeshToExpect) {
   EXPECT_GE(more.volume_bytes, few.volume_bytes + 30 * block);
   EXPECT_EQ(normals.volume_bytes, few.volume_bytes);
   // A sheet across a tile has some 1,000 vertices, and twice as many triangles.
-  const std::uint64_t sheet = gpu::mesh_bytes({1000, 2000}, false);
+  const std::uint64_t sheet = mesh_bytes({1000, 2000}, false);
   EXPECT_GT(more.extractor_bytes - few.extractor_bytes, 5 * sheet);
   EXPECT_LT(more.extractor_bytes - few.extractor_bytes, 15 * sheet);
   EXPECT_GE(normals.extractor_bytes - few.extractor_bytes, 5 * 1000 * sizeof(Vec3f));

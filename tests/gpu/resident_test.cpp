@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <thread>
 
 #include <isobrick/error.h>
 #include "core/morton.h"
@@ -318,6 +319,9 @@ void compare_part(const Field<T>& field, const BrickLookup& bricks, const Lattic
         volume.bytes(),
         gpu::resident_sizes(lattice, {searched.size(), loaded.size(), 0}, normals).volume_bytes);
     gpu::ResidentExtractor extractor(volume, options);
+    EXPECT_LE(
+        extractor.bytes(),
+        gpu::resident_sizes(lattice, {searched.size(), loaded.size(), 0}, normals).extractor_bytes);
     for (const double isovalue : isovalues) {
       SCOPED_TRACE("isovalue " + std::to_string(isovalue) + (normals ? ", normals" : ""));
       options.isovalue = isovalue;
@@ -373,10 +377,11 @@ TYPED_TEST(GpuResident, ASinkGetsTheMeshInChunks) {
         CollectingSink sink;
         extractor.write(sink, chunk_bytes);
         expect_same(expected, sink.mesh);
+        EXPECT_LE(sink.max_chunk, chunk_bytes);
         const SurfaceReport report = extractor.report();
         EXPECT_EQ(report.vertices, expected.positions.size());
         EXPECT_EQ(report.triangles, expected.triangles.size());
-        EXPECT_EQ(report.sink.bytes, gpu::mesh_bytes({report.vertices, report.triangles}, normals));
+        EXPECT_EQ(report.sink.bytes, mesh_bytes({report.vertices, report.triangles}, normals));
         EXPECT_EQ(report.pinned_bytes, 2 * chunk_bytes);
         EXPECT_EQ(report.device_bytes, extractor.bytes());
       }
@@ -385,6 +390,25 @@ TYPED_TEST(GpuResident, ASinkGetsTheMeshInChunks) {
     EXPECT_THROW(extractor.write(broken, 4096), Error);
     EXPECT_EQ(broken.taken, 4);
   }
+}
+
+TYPED_TEST(GpuResident, MeshesAreWrittenAtTheSameTime) {
+  Resident<TypeParam> r(this->waves({131, 70, 97}));
+  std::vector<std::unique_ptr<gpu::ResidentExtractor>> extractors;
+  std::vector<MeshBuffer> expected;
+  for (const double shift : {0.5, 30.0, 70.0}) {
+    r.options.isovalue = this->lowest() + 100 + shift;
+    expected.push_back(on_cpu(r.field, r.lattice, r.bricks, r.options));
+    extractors.push_back(std::make_unique<gpu::ResidentExtractor>(r.volume, r.options));
+    extractors.back()->extract(r.options.isovalue);
+    EXPECT_THROW(extractors.back()->reserve_chunks(23), UsageError);
+  }
+  std::vector<CollectingSink> sinks(3);
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < 3; ++i)
+    threads.emplace_back([&, i] { extractors[i]->write(sinks[i], 4096); });
+  for (std::thread& thread : threads) thread.join();
+  for (std::size_t i = 0; i < 3; ++i) expect_same(expected[i], sinks[i].mesh);
 }
 
 TYPED_TEST(GpuResident, AMeshThatDoesNotFitTheBoundIsRefusedAndOthersAreMade) {
@@ -396,7 +420,7 @@ TYPED_TEST(GpuResident, AMeshThatDoesNotFitTheBoundIsRefusedAndOthersAreMade) {
     gpu::ResidentExtractor usual(r.volume, r.options);
     const gpu::DeviceCounts large = usual.extract(mid), small = usual.extract(high);
     const auto bound = [&](const gpu::DeviceCounts& counts) {
-      return empty + gpu::mesh_bytes({counts.vertices, counts.triangles}, normals);
+      return empty + mesh_bytes({counts.vertices, counts.triangles}, normals);
     };
     ASSERT_LT(2 * small.triangles, large.triangles);
     gpu::ResidentExtractor tight(r.volume, r.options, {}, bound(large));
@@ -405,6 +429,9 @@ TYPED_TEST(GpuResident, AMeshThatDoesNotFitTheBoundIsRefusedAndOthersAreMade) {
     gpu::ResidentExtractor tighter(r.volume, r.options, {}, bound(large) - 1);
     r.expect_mesh(tighter, high);
     EXPECT_THROW(tighter.extract(mid), gpu::OutOfDeviceMemory);
+    MeshBuffer none;
+    tighter.download(none);
+    EXPECT_EQ(none.positions.size(), 0u) << "a mesh that was not made";
     r.expect_mesh(tighter, high);
     EXPECT_LT(tighter.bytes(), bound(large));
   }

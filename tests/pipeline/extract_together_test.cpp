@@ -68,7 +68,7 @@ class KeptMesh final : public MeshSink {
 };
 
 /// A requested surface.
-struct CancellationToken {
+struct SurfaceRequest {
   double isovalue;
   bool normals;
   Indexing indexing = Indexing::welded;
@@ -80,12 +80,12 @@ struct Made {
 };
 
 Made make_together(const StoreReader& store, const ExtractOptions& options,
-                   const std::vector<CancellationToken>& token) {
+                   const std::vector<SurfaceRequest>& requests) {
   std::vector<KeptMesh> sinks;
-  for (const CancellationToken& w : token) sinks.emplace_back(w.indexing);
+  for (const SurfaceRequest& r : requests) sinks.emplace_back(r.indexing);
   std::vector<SurfaceOutput> outputs;
-  for (std::size_t i = 0; i < token.size(); ++i)
-    outputs.push_back({token[i].isovalue, token[i].normals, &sinks[i]});
+  for (std::size_t i = 0; i < requests.size(); ++i)
+    outputs.push_back({requests[i].isovalue, requests[i].normals, &sinks[i]});
   NoProgress silent;
   Made made{.meshes = {}, .reports = extract(store, options, outputs, silent)};
   for (const KeptMesh& sink : sinks) {
@@ -96,12 +96,12 @@ Made make_together(const StoreReader& store, const ExtractOptions& options,
 }
 
 Made make_alone(const StoreReader& store, ExtractOptions options,
-                const std::vector<CancellationToken>& token) {
+                const std::vector<SurfaceRequest>& requests) {
   Made made;
-  for (const CancellationToken& w : token) {
-    KeptMesh sink(w.indexing);
-    options.isovalue = w.isovalue;
-    options.normals = w.normals;
+  for (const SurfaceRequest& r : requests) {
+    KeptMesh sink(r.indexing);
+    options.isovalue = r.isovalue;
+    options.normals = r.normals;
     NoProgress silent;
     made.reports.push_back(extract(store, options, sink, silent));
     made.meshes.push_back(sink.mesh());
@@ -123,11 +123,11 @@ void expect_same(const Made& together, const Made& alone) {
 }
 
 /// A mesh with its picture, and other isovalues, one of which no sample reaches.
-const std::vector<CancellationToken> kWanted{{60, true},
-                                             {60, true, Indexing::chunk_local},
-                                             {30.5, false},
-                                             {300, true},
-                                             {90, false, Indexing::chunk_local}};
+const std::vector<SurfaceRequest> kRequests{{60, true},
+                                            {60, true, Indexing::chunk_local},
+                                            {30.5, false},
+                                            {300, true},
+                                            {90, false, Indexing::chunk_local}};
 
 /// Noise in one half, waves in the other.
 template <class T>
@@ -158,13 +158,14 @@ TEST_F(ExtractTogether, EverySurfaceIsWhatItIsAlone) {
   const auto field = noise_and_waves<std::uint8_t>({100, 81, 70});
   for (const Index brick : {16, 32, 64}) {
     const StoreReader reader = store(field, {.brick = brick, .shard = 2 * brick});
-    const Made alone = make_alone(reader, {.threads = 2}, kWanted);
+    const Made alone = make_alone(reader, {.threads = 2}, kRequests);
     EXPECT_GT(alone.reports[0].triangles, 50000u);
     EXPECT_EQ(alone.reports[3].triangles, 0u);
     for (const int threads : {1, 8})
       for (const std::uint64_t memory : {std::uint64_t{110} << 20, std::uint64_t{1} << 30}) {
         SCOPED_TRACE(std::to_string(brick) + ", threads " + std::to_string(threads));
-        expect_same(make_together(reader, {.memory = memory, .threads = threads}, kWanted), alone);
+        expect_same(make_together(reader, {.memory = memory, .threads = threads}, kRequests),
+                    alone);
       }
   }
 }
@@ -179,29 +180,29 @@ TEST_F(ExtractTogether, WhateverFindsTheActiveBlocks) {
   }
   const StoreReader reader(plain.info().path);
   const IndexChoice ranges{.automatic = false, .kind = {}};
-  const Made alone = make_alone(reader, {.threads = 2, .index = ranges}, kWanted);
+  const Made alone = make_alone(reader, {.threads = 2, .index = ranges}, kRequests);
   for (const IndexKind kind :
        {IndexKind::interval, IndexKind::kdtree, IndexKind::quadtree, IndexKind::octree}) {
     SCOPED_TRACE(name_of(kind));
-    const Made made =
-        make_together(reader, {.threads = 2, .index = {.automatic = false, .kind = kind}}, kWanted);
+    const Made made = make_together(
+        reader, {.threads = 2, .index = {.automatic = false, .kind = kind}}, kRequests);
     expect_same(made, alone);
     EXPECT_EQ(made.reports[0].index, kind);
   }
-  expect_same(make_together(reader, {.threads = 2}, kWanted), alone);
+  expect_same(make_together(reader, {.threads = 2}, kRequests), alone);
 }
 
 /// Extractors share work spaces whether their isovalue equals samples or not.
 TEST_F(ExtractTogether, DegenerateTrianglesAreLeftOutOfEach) {
-  const std::vector<CancellationToken> token{
+  const std::vector<SurfaceRequest> requests{
       {60, true}, {60.5, false}, {50, false, Indexing::chunk_local}};
   const auto field = noise_and_waves<std::uint8_t>({100, 81, 70});
   const StoreReader reader = store(field, {.brick = 32, .shard = 64});
   const ExtractOptions options{.drop_degenerate = true, .threads = 2};
-  const Made alone = make_alone(reader, options, token);
+  const Made alone = make_alone(reader, options, requests);
   EXPECT_GT(alone.reports[0].degenerate_triangles, 0u);
   EXPECT_EQ(alone.reports[1].degenerate_triangles, 0u);
-  expect_same(make_together(reader, options, token), alone);
+  expect_same(make_together(reader, options, requests), alone);
 }
 
 TEST_F(ExtractTogether, RegionsLevelsAndNaN) {
@@ -215,16 +216,16 @@ TEST_F(ExtractTogether, RegionsLevelsAndNaN) {
        {ExtractOptions{.threads = 2},
         ExtractOptions{.roi = Box3{{20, 30, 10}, {77, 71, 66}}, .threads = 2},
         ExtractOptions{.level = 1, .threads = 2}})
-    expect_same(make_together(reader, options, kWanted), make_alone(reader, options, kWanted));
+    expect_same(make_together(reader, options, kRequests), make_alone(reader, options, kRequests));
 }
 
 /// The stored bricks that surfaces need.
 std::set<std::tuple<Index, Index, Index>> needed_bricks(
-    const StoreReader& store, const std::vector<CancellationToken>& token) {
+    const StoreReader& store, const std::vector<SurfaceRequest>& requests) {
   std::set<std::tuple<Index, Index, Index>> needed;
-  for (const CancellationToken& w : token) {
+  for (const SurfaceRequest& r : requests) {
     const ExtractRequest request = check_request(
-        store, {.isovalue = w.isovalue, .normals = w.normals, .threads = 1}, w.indexing);
+        store, {.isovalue = r.isovalue, .normals = r.normals, .threads = 1}, r.indexing);
     TileStream tiles = tiles_of(store, 0, {&request, 1});
     BatchPlanner planner(tiles, request.level->lattice, sample_reach(request.surface), false,
                          1 << 14, 1 << 20);
@@ -240,9 +241,9 @@ TEST_F(ExtractTogether, EveryBrickIsReadAndDecodedOnce) {
   for (const Index brick : {16, 32}) {
     const StoreReader reader = store(field, {.brick = brick, .shard = 2 * brick});
     const std::uint64_t brick_bytes = reader.info().levels[0].lattice.brick_bytes();
-    const std::uint64_t needed = needed_bricks(reader, kWanted).size();
+    const std::uint64_t needed = needed_bricks(reader, kRequests).size();
     const BrickTimes before = reader.brick_times();
-    const Made together = make_together(reader, {.threads = 2}, kWanted);
+    const Made together = make_together(reader, {.threads = 2}, kRequests);
     EXPECT_EQ(reader.brick_times().bytes_decoded - before.bytes_decoded, needed * brick_bytes);
     for (const ExtractReport& report : together.reports) {
       EXPECT_EQ(report.pass, 0u);
@@ -251,7 +252,7 @@ TEST_F(ExtractTogether, EveryBrickIsReadAndDecodedOnce) {
       EXPECT_EQ(report.bytes_read, together.reports[0].bytes_read);
     }
     std::uint64_t alone = 0;
-    for (const ExtractReport& report : make_alone(reader, {.threads = 2}, kWanted).reports)
+    for (const ExtractReport& report : make_alone(reader, {.threads = 2}, kRequests).reports)
       alone += report.bytes_read;
     EXPECT_LT(2 * together.reports[0].bytes_read, alone);
   }
@@ -261,21 +262,21 @@ TEST_F(ExtractTogether, EveryBrickIsReadAndDecodedOnce) {
 TEST_F(ExtractTogether, ABudgetWithoutRoomForAllTakesMorePasses) {
   const auto field = noise_and_waves<std::uint8_t>({100, 81, 70});
   const StoreReader reader = store(field, {.brick = 32, .shard = 64});
-  const Made alone = make_alone(reader, {.threads = 2}, kWanted);
+  const Made alone = make_alone(reader, {.threads = 2}, kRequests);
   std::uint64_t least = 0;
   try {
-    make_together(reader, {.memory = 1 << 20, .threads = 2}, kWanted);
+    make_together(reader, {.memory = 1 << 20, .threads = 2}, kRequests);
     FAIL();
   } catch (const UsageError& e) {
     least = least_budget_in(e.what());
   }
-  const Made one_by_one = make_together(reader, {.memory = least, .threads = 2}, kWanted);
+  const Made one_by_one = make_together(reader, {.memory = least, .threads = 2}, kRequests);
   expect_same(one_by_one, alone);
-  for (std::size_t i = 0; i < kWanted.size(); ++i) EXPECT_EQ(one_by_one.reports[i].pass, i);
+  for (std::size_t i = 0; i < kRequests.size(); ++i) EXPECT_EQ(one_by_one.reports[i].pass, i);
   const std::uint64_t of_surface =
       2 * CpuExtractor::max_tile_output(true) + (std::uint64_t{4} << 20);
   const Made in_pairs =
-      make_together(reader, {.memory = least + of_surface, .threads = 2}, kWanted);
+      make_together(reader, {.memory = least + of_surface, .threads = 2}, kRequests);
   expect_same(in_pairs, alone);
   EXPECT_EQ(in_pairs.reports[1].pass, 0u);
   EXPECT_EQ(in_pairs.reports[2].pass, 1u);
