@@ -1,5 +1,5 @@
-# cmake -D BUILD=… -D PROJECT=… -D WORK=… -D COMPILER=… -D FLAGS=… -D MODULES=… -D GENERATOR=…
-#       -P check_install.cmake
+# cmake -D BUILD=… -D PROJECT=… -D WORK=… -D COMPILER=… -D FLAGS=… -D MODULES=… -D VIEWER=…
+#       -D GENERATOR=… -P check_install.cmake
 # Installs the build tree into a fresh prefix, then configures, builds and runs the consumer
 # against it, where no library of windows, OpenGL or CUDA is found.
 function(run)
@@ -21,6 +21,15 @@ run(${CMAKE_COMMAND} -S ${PROJECT} -B ${WORK}/build -G ${GENERATOR}
   -DCMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=ON)
 run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${WORK}/build/consumer ${WORK} ${MODULES})
+
+# What draws requires libraries of windows, which are not found.
+if(VIEWER)
+  execute_process(COMMAND ${CMAKE_COMMAND} -DCOMPONENT=app ${WORK}/build RESULT_VARIABLE result
+    ERROR_VARIABLE output OUTPUT_QUIET)
+  if(result EQUAL 0 OR NOT output MATCHES "glm")
+    message(FATAL_ERROR "the component app does not require glm: ${result} ${output}")
+  endif()
+endif()
 
 # The program goes with its modules, wherever they are moved.
 file(RENAME ${prefix} ${WORK}/moved)
