@@ -46,8 +46,8 @@ std::uint64_t offset_of(const VtkFile& file, const VtkElement& array, std::uint6
   std::uint64_t offset = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset);
   if (error != std::errc() || end != text.data() + text.size() || offset > file.bytes - data)
-    file.fail(fmt::format("the array '{}' is at offset '{}'", array.get("Name").substr(0, 60),
-                          text.substr(0, 60)));
+    file.fail(fmt::format("the offset '{}' of the array '{}' is no place in the file",
+                          text.substr(0, 60), array.get("Name").substr(0, 60)));
   return offset;
 }
 
@@ -126,7 +126,11 @@ VtkNumbers open_vtk_array(const VtkFile& file, const VtkArrayLayout& layout, Sca
   if (layout.compressed) return {.stream = open_compressed(file, layout)};
   auto stream = open_encoded(file, layout, 0);
   const std::uint64_t bytes = read_size(*stream, layout);
-  if (bytes > stored_bytes(file, layout)) file.fail("it ends within an array");
+  if (bytes > stored_bytes(file, layout))
+    file.fail(
+        fmt::format("an array states {} bytes, more than the file has after it; check byte_order "
+                    "and header_type",
+                    bytes));
   return {std::move(stream), bytes};
 }
 

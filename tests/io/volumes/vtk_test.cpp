@@ -120,6 +120,14 @@ TEST_F(VtkXml, ReadsPlainSamples) {
   EXPECT_EQ(read_box(*open(parts.text()), kWhole), samples());
 }
 
+TEST_F(VtkXml, AWrongByteOrderIsNamedAsACauseOfAWrongSize) {
+  parts.file = "byte_order=\"BigEndian\"";
+  parts.data = number(280) + samples();
+  const std::string message = refuse(parts.text());
+  EXPECT_TRUE(contains(message, "402718720 bytes")) << message;
+  EXPECT_TRUE(contains(message, "byte_order")) << message;
+}
+
 // VTK's writer repeats the whole extent in each requested piece.
 TEST_F(VtkXml, OfInlinePiecesTheFirstIsReadIfItIsTheWhole) {
   const auto with_two_pieces = [](std::string text) {
@@ -171,6 +179,10 @@ TEST_F(VtkXml, HostileFiles) {
       p.array =
           std::string("type=\"Int16\" Name=\"a\" format=\"appended\" offset=\"") + offset + "\"/";
     });
+  EXPECT_TRUE(contains(with([](Parts& p) {
+                         p.array = "type=\"Int16\" Name=\"a\" format=\"appended\" offset=\"x\"/";
+                       }),
+                       "the offset 'x' of the array 'a' is no place"));
   for (const char* count : {"0", "-1", "3", "9223372036854775807"})
     with(
         [&](Parts& p) { p.array.insert(0, std::string("NumberOfComponents=\"") + count + "\" "); });
