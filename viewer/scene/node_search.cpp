@@ -1,24 +1,18 @@
 #include "viewer/scene/node_search.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "core/stopwatch.h"
 #include "index/span_index.h"
 
 namespace isobrick {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// Bytes for the headers of two indices and for the padding of their arrays.
 constexpr std::uint64_t kHeaders = 1 << 12;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Builds the index over the finest nodes' ranges. They are float; T holds them exactly.
 template <class T>
@@ -49,9 +43,9 @@ NodeSearch::NodeSearch(std::shared_ptr<const NodeTree> tree, ScalarType type,
       on_change_(std::move(on_change)),
       active_(*tree_) {
   state_.nodes = static_cast<std::uint64_t>(volume(tree_->grid().level(0).nodes));
-  const auto start = Clock::now();
+  Stopwatch watch;
   Bytes bytes = build(IndexKind::linear);
-  set_index(IndexKind::linear, std::move(bytes), seconds_since(start));
+  set_index(IndexKind::linear, std::move(bytes), watch.lap());
   builder_ = std::thread([this] { build_requested(); });
 }
 
@@ -143,14 +137,13 @@ void NodeSearch::build_requested() {
     const std::uint64_t need = building_bytes(*kind, now.nodes) + now.bytes;
     std::string refused;
     std::optional<Bytes> built;
-    const auto start = Clock::now();
+    Stopwatch watch;
     if (need > max_bytes_)
       refused = fmt::format("the {} index of {} nodes takes {} to build, of {}", name_of(*kind),
                             now.nodes, size_text(need), size_text(max_bytes_));
     else
       built = build(*kind);
-    const double seconds = seconds_since(start);
-    const bool changed = finish_building(*kind, std::move(built), seconds, std::move(refused));
+    const bool changed = finish_building(*kind, std::move(built), watch.lap(), std::move(refused));
     if (changed && on_change_) on_change_();
   }
 }
@@ -170,9 +163,9 @@ const ActiveNodes& NodeSearch::find(std::span<const double> isovalues) {
   std::shared_ptr<const Bytes> index = this->index();
   const IndexView view = view_index(*index);
   std::vector<std::uint64_t> finest(mask_words(view.items()));
-  const auto start = Clock::now();
+  Stopwatch watch;
   for (const double iso : isovalues) mark(view, iso, finest);
-  const double seconds = seconds_since(start);
+  const double seconds = watch.lap();
   active_.set(isovalues, std::move(finest));
   searched_ = std::move(index);
   const MutexLock lock(mutex_);
