@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/vectors.h"
-
 namespace isobrick {
 namespace {
 
@@ -16,17 +14,11 @@ constexpr double kPushSeconds = 0.12;
 constexpr double kStillSpin = 0.01, kStillPush = 0.01;
 constexpr double kWheelStep = 1.15;
 
-/// Rotates `v` about the unit vector `axis` (Rodrigues).
-Vec3d turned(Vec3d v, Vec3d axis, double angle) {
-  const double c = std::cos(angle), s = std::sin(angle);
-  return v * c + cross(axis, v) * s + axis * (dot(axis, v) * (1 - c));
-}
-
 /// Rotates the camera about its eye.
 void look(Camera& camera, double right, double up, Vec3d vertical) {
   const double distance = camera.distance();
   const auto turn = [&](Vec3d axis, double angle) {
-    for (Vec3d* v : {&camera.right, &camera.up, &camera.back}) *v = turned(*v, axis, angle);
+    for (Vec3d* v : {&camera.right, &camera.up, &camera.back}) *v = rotated(*v, axis, angle);
   };
   turn(vertical, -right);
   turn(camera.right, up);

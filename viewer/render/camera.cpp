@@ -7,15 +7,6 @@
 #include "core/vectors.h"
 
 namespace isobrick {
-namespace {
-
-/// Rotates v about the unit vector `axis`.
-Vec3d turned(Vec3d v, Vec3d axis, double angle) {
-  const double c = std::cos(angle), s = std::sin(angle);
-  return v * c + cross(axis, v) * s + axis * (dot(axis, v) * (1 - c));
-}
-
-}  // namespace
 
 WorldBall ball_around(Vec3d lo, Vec3d hi) {
   const Vec3d half = (hi - lo) * 0.5;
@@ -23,6 +14,11 @@ WorldBall ball_around(Vec3d lo, Vec3d hi) {
   const Vec3d centre = (lo + hi) * 0.5;
   if (!std::isfinite(length(centre))) return {};
   return {centre, radius > 0 && std::isfinite(radius) ? radius : 1.0};
+}
+
+Vec3d rotated(Vec3d v, Vec3d axis, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return v * c + cross(axis, v) * s + axis * (dot(axis, v) * (1 - c));
 }
 
 Camera::Camera(Vec3d from, Vec3d to, Vec3d upwards) : eye(from), target(to) {
@@ -43,8 +39,8 @@ void Camera::orbit(double around, double over, Vec3d axis) {
   const Vec3d pole = unit(axis, {0, 0, 1});
   // Upside down, left and right are exchanged.
   const double angle = dot(up, pole) < 0 ? -around : around;
-  for (Vec3d* v : {&right, &up, &back}) *v = turned(*v, pole, -angle);
-  for (Vec3d* v : {&up, &back}) *v = turned(*v, right, -over);
+  for (Vec3d* v : {&right, &up, &back}) *v = rotated(*v, pole, -angle);
+  for (Vec3d* v : {&up, &back}) *v = rotated(*v, right, -over);
   back = unit(back, {0, -1, 0});
   right = unit(cross(up, back), {1, 0, 0});
   up = cross(back, right);
@@ -52,7 +48,7 @@ void Camera::orbit(double around, double over, Vec3d axis) {
 }
 
 void Camera::roll(double angle) {
-  for (Vec3d* v : {&right, &up}) *v = turned(*v, back, angle);
+  for (Vec3d* v : {&right, &up}) *v = rotated(*v, back, angle);
 }
 
 void Camera::pan(double to_right, double to_top) {

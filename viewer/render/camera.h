@@ -18,6 +18,9 @@ struct WorldBall {
 /// The smallest ball around a box; its radius is 1 if the box is a point or not finite.
 WorldBall ball_around(Vec3d lo, Vec3d hi);
 
+/// Rotates `v` about the unit vector `axis` (Rodrigues).
+Vec3d rotated(Vec3d v, Vec3d axis, double angle);
+
 /// The half line from `origin` along the unit vector `direction`.
 struct WorldRay {
   Vec3d origin, direction;
