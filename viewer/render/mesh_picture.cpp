@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <utility>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -59,21 +59,16 @@ class ScaledChunk {
   std::vector<Vec3f> positions_;
 };
 
-/// Bounds of all meshes that have a vertex; `lo` and `hi` stay if none has.
-void find_bounds(const std::vector<OpenMesh>& meshes, Vec3d& lo, Vec3d& hi) {
-  bool any = false;
+/// Bounds of all meshes that have a vertex; nullopt if none has.
+std::optional<WorldBox> bounds_of(const std::vector<OpenMesh>& meshes) {
+  BoxUnion<WorldBox> all;
   for (const OpenMesh& mesh : meshes) {
     if (mesh.file->info().vertices == 0) continue;
-    Vec3d mesh_lo, mesh_hi;
-    mesh.file->bounds(mesh_lo, mesh_hi);
-    mesh_lo = mesh_lo * mesh.scale;
-    mesh_hi = mesh_hi * mesh.scale;
-    if (!std::exchange(any, true)) {
-      lo = mesh_lo;
-      hi = mesh_hi;
-    }
-    widen(lo, hi, mesh_lo, mesh_hi);
+    WorldBox box;
+    mesh.file->bounds(box.lo, box.hi);
+    all.include({box.lo * mesh.scale, box.hi * mesh.scale});
   }
+  return all.box();
 }
 
 /// Maximum bytes of a batch of triangles: with normals and colours, in vectors with up to twice the
@@ -125,7 +120,10 @@ MeshPicture draw_mesh_files(const MeshPictureRequest& request, Progress& progres
   std::stable_sort(meshes.begin(), meshes.end(), [](const OpenMesh& a, const OpenMesh& b) {
     return a.style.opacity >= 1 && b.style.opacity < 1;
   });
-  find_bounds(meshes, picture.lo, picture.hi);
+  if (const auto bounds = bounds_of(meshes)) {
+    picture.lo = bounds->lo;
+    picture.hi = bounds->hi;
+  }
 
   GlContext context;
   Renderer renderer;
