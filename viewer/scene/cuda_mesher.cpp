@@ -44,9 +44,11 @@ struct GridJob {
   int slot;
   NodeMesh mesh;
   DeviceMesher::Callback done;
-  std::optional<gpu::MeshSlice> span;
+  std::optional<gpu::MeshSlice> slice;
 
-  gpu::GridMeshJob on_device() const { return {slot, span ? span->place() : gpu::GridMeshPlace{}}; }
+  gpu::GridMeshJob on_device() const {
+    return {slot, slice ? slice->place() : gpu::GridMeshPlace{}};
+  }
 };
 
 /// The state of the device's thread, which may outlive the mesher.
@@ -73,7 +75,8 @@ class DeviceWorker {
   TicketLock kernel_lock;
 
  private:
-  std::optional<gpu::MeshSlice> reserve_span(std::uint32_t vertices, std::uint32_t triangles) const;
+  std::optional<gpu::MeshSlice> reserve_slice(std::uint32_t vertices,
+                                              std::uint32_t triangles) const;
   void make(std::vector<GridJob>& jobs, DeviceMesher::Times& now);
   void add(const DeviceMesher::Times& now);
   std::optional<int> free_slot();
@@ -186,8 +189,8 @@ void DeviceWorker::add(const DeviceMesher::Times& now) {
   times_.deliver += now.deliver;
 }
 
-std::optional<gpu::MeshSlice> DeviceWorker::reserve_span(std::uint32_t vertices,
-                                                         std::uint32_t triangles) const {
+std::optional<gpu::MeshSlice> DeviceWorker::reserve_slice(std::uint32_t vertices,
+                                                          std::uint32_t triangles) const {
   if (memory == nullptr) return std::nullopt;
   return memory->take(vertices, triangles);
 }
@@ -203,7 +206,7 @@ void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
   Stopwatch watch;
   std::vector<gpu::GridMeshJob> all;
   for (GridJob& job : jobs) {
-    job.span = reserve_span(expected_vertices_, expected_triangles_);
+    job.slice = reserve_slice(expected_vertices_, expected_triangles_);
     all.push_back(job.on_device());
   }
   now.memory = watch.lap();
@@ -216,35 +219,35 @@ void DeviceWorker::make(std::vector<GridJob>& jobs, DeviceMesher::Times& now) {
     update_expected(size);
     job.mesh.seam_triangles = size.seam_triangles;
     if (size.triangles == 0)
-      job.span.reset();
-    else if (job.span && job.span->place().holds(size.vertices, size.triangles))
-      job.span->trim(size.vertices, size.triangles);
+      job.slice.reset();
+    else if (job.slice && job.slice->place().holds(size.vertices, size.triangles))
+      job.slice->trim(size.vertices, size.triangles);
     else
       oversized.push_back(&job);
   }
   write_oversized(oversized);
   now.device = watch.lap();
   for (GridJob& job : jobs) {
-    if (!job.span) continue;
-    const MeshRange& range = job.span->range();
+    if (!job.slice) continue;
+    const MeshRange& range = job.slice->range();
     job.mesh.device_triangles = range.triangles;
     job.mesh.device_bytes = range.vertices * 2 * sizeof(Vec3f) + range.triangles * sizeof(Triangle);
-    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.span, std::nullopt));
+    job.mesh.device = std::make_shared<SharedMesh>(*std::exchange(job.slice, std::nullopt));
   }
 }
 
 /// Writes the meshes that did not fit, now that their sizes are known.
 void DeviceWorker::write_oversized(std::vector<GridJob*>& jobs) {
   std::vector<gpu::GridMeshJob> placed;
-  for (GridJob* job : jobs) job->span.reset();
+  for (GridJob* job : jobs) job->slice.reset();
   for (GridJob* job : jobs) {
     const gpu::GridMeshSize size = batch_.size(job->slot);
-    job->span = reserve_span(size.vertices, size.triangles);
-    if (job->span) placed.push_back(job->on_device());
+    job->slice = reserve_slice(size.vertices, size.triangles);
+    if (job->slice) placed.push_back(job->on_device());
   }
   batch_.write(placed);
   for (GridJob* job : jobs)
-    if (!job->span) batch_.download(job->slot, job->mesh.mesh);
+    if (!job->slice) batch_.download(job->slot, job->mesh.mesh);
 }
 
 class CudaMesher final : public DeviceMesher {
