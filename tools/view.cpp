@@ -196,8 +196,8 @@ int draw(const Arguments& arguments, Console& console) {
       console.note(why);
   if (drawn.limited_by_budget)
     console.note(
-        "coarser than --pixel-error: there is no room for more triangles; a larger "
-        "--memory or --gpu-memory makes it finer");
+        "the picture is coarser than --pixel-error allows: there is no room for more triangles; a "
+        "larger --memory or --gpu-memory makes it finer");
   nlohmann::ordered_json isovalues = nlohmann::ordered_json::array();
   for (const SurfaceSettings& surface : settings.surfaces) isovalues.push_back(surface.isovalue);
   const std::string text =

@@ -259,7 +259,7 @@ void status_panel(ViewerState& state) {
                      state.pacer.size_divisor()));
   text(fmt::format("{} triangles in {} parts, {} on the device", p.triangles, p.nodes,
                    mebibytes(p.device_bytes)));
-  text(fmt::format("bricks: {} resident ({}), {} missing", c.bricks_resident,
+  text(fmt::format("bricks: {} resident ({}), {} to read", c.bricks_resident,
                    mebibytes(c.brick_bytes), missing_bricks(state)));
   text(fmt::format("read {} in {:.2f} s, decode {:.2f} s, mesh {:.2f} s", mebibytes(c.bytes_read),
                    c.read_seconds, c.decode_seconds, c.mesh_seconds));
