@@ -83,7 +83,7 @@ class FrameTimings {
     put("drawable_ms", [](const Picture& p) { return p.steps.drawable; });
     put("upload_ms", [](const Picture& p) { return p.steps.upload; });
     put("slices_ms", [](const Picture& p) { return p.steps.slices; });
-    put("turn_ms", [](const Picture& p) { return p.steps.lock; });
+    put("lock_ms", [](const Picture& p) { return p.steps.lock; });
     put("draw_ms", [](const Picture& p) { return p.steps.draw; });
     put("tidy_ms", [](const Picture& p) { return p.steps.tidy; });
     put("finish_ms", [](const Picture& p) { return p.steps.finish + p.finish; });

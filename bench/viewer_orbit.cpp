@@ -155,7 +155,7 @@ int run(int argc, char** argv) {
   app.add_option("--height", arguments.height);
   app.add_option("--memory", arguments.memory_gib, "GiB");
   app.add_flag("--no-rest", arguments.no_rest, "Do not wait until all is there");
-  app.add_option("--batch", arguments.batch_seconds, "Of pictures at rest, seconds");
+  app.add_option("--batch", arguments.batch_seconds, "Seconds of a draw batch of a still frame");
   app.add_flag("--pictures", arguments.pictures, "Report every picture");
   CLI11_PARSE(app, argc, argv);
 

@@ -1,7 +1,7 @@
-// What a user of the viewer waits for, off-screen, through the code of its window: the first
-// surface after opening and after each jump of the isovalue; frame times while meshes arrive, while
-// the isovalue slides and while the camera orbits; and the full refinement of a region, compared
-// with its batch extraction.
+// Measures what a user of the viewer waits for, off-screen, through the code of its window. These
+// are the first surface after opening and after each jump of the isovalue, and frame times during
+// streaming, sliding and orbiting. The full refinement of a region is compared with its batch
+// extraction.
 //
 //   isobrick synth gyroid g.zarr --dims 512,512,512
 //   bench_viewer_stream g.zarr --isovalue 127.5 --to 160.5 --json
@@ -87,8 +87,8 @@ Json slide(Session& session, const Arguments& arguments) {
 
 Json device_json(const DeviceMesher::Times& t) {
   return {{"launches", t.launches},     {"meshes", t.grids},
-          {"turn_seconds", t.lock},     {"memory_seconds", t.memory},
-          {"device_seconds", t.device}, {"hand_out_seconds", t.deliver}};
+          {"lock_seconds", t.lock},     {"memory_seconds", t.memory},
+          {"device_seconds", t.device}, {"deliver_seconds", t.deliver}};
 }
 
 /// Whether the frame is complete and in full quality.
