@@ -14,7 +14,7 @@ double seconds_of(std::uint64_t work, double rate) {
   return 1e-3 + static_cast<double>(work) / rate;
 }
 
-TEST(BatchPacer, PiecesTakeMostOfTheirTime) {
+TEST(BatchPacer, BatchesTakeMostOfTheirTime) {
   for (const double rate : {3e5, 4e6, 1e8}) {
     BatchPacer pacer;
     for (int i = 0; i < 40; ++i) pacer.add(seconds_of(pacer.work(), rate), kLimit);
@@ -30,7 +30,8 @@ TEST(BatchPacer, WhatHasBecomeSlowIsHalvedAtOnce) {
   pacer.add(0.5, kLimit);
   EXPECT_EQ(pacer.work(), before / 2);
   for (int i = 0; i < 100; ++i) pacer.add(1, kLimit);
-  EXPECT_GE(pacer.work(), 1000u) << "what pieces cost must not make them smaller and smaller";
+  EXPECT_GE(pacer.work(), 1000u)
+      << "the fixed cost of batches must not make them smaller and smaller";
 }
 
 }  // namespace

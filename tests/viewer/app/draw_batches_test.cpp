@@ -24,7 +24,7 @@ TEST_F(DrawBatches, GiveTheSamePicture) {
   settings_.edges = settings_.box = settings_.axes = settings_.scale_bar = true;
   settings_.pixel_error = 3;
   choose_values(settings_, scene_renderer_->scene().tree());
-  const FrameOptions whole, pieces{.batch_seconds = kShort};
+  const FrameOptions whole, batches{.batch_seconds = kShort};
   const auto pixels_of = [&](const FrameOptions& options) {
     scene_renderer_->renderer().discard();
     for (int i = 0; i < 2 || !scene_renderer_->state().complete; ++i) {
@@ -39,9 +39,9 @@ TEST_F(DrawBatches, GiveTheSamePicture) {
     const auto expected = pixels_of(whole);
     const std::uint64_t before = scene_renderer_->counters().unfinished_batches;
     settings_.occlusion = false;  // another frame in between
-    EXPECT_NE(pixels_of(pieces), expected);
+    EXPECT_NE(pixels_of(batches), expected);
     settings_.occlusion = true;
-    EXPECT_EQ(pixels_of(pieces), expected) << multisample;
+    EXPECT_EQ(pixels_of(batches), expected) << multisample;
     EXPECT_GE(scene_renderer_->counters().unfinished_batches, before + 10);
   }
   EXPECT_EQ(scene_renderer_->counters().dropped, 0u);

@@ -312,12 +312,12 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
   window.open(dir_ / "many.zarr");
   window.state().settings.pixel_error = 0.2f;
   const SceneRenderer& scene_renderer = *window.state().scene_renderer;
-  const auto rests = [&] {
+  const auto is_finished = [&] {
     return scene_renderer.state().complete && !scene_renderer.state().reduced_quality;
   };
-  until(rests);
+  until(is_finished);
   steps(15);  // nothing moves any more
-  until(rests);
+  until(is_finished);
   // A still frame of the same view, with edges.
   window.state().settings.edges = true;
   glfwPostEmptyEvent();
@@ -338,11 +338,11 @@ TEST_F(Window, InputDropsAPictureAtRestThatTakesLong) {
   // If the motion arrives in parts, the next frame is dropped as well.
   EXPECT_GT(scene_renderer.counters().dropped, before.dropped);
   display_->button(1, false);
-  until(rests);
+  until(is_finished);
   EXPECT_GT(scene_renderer.counters().finished, before.finished);
 }
 
-TEST_F(Window, ClosesWithinAPieceOfAPicture) {
+TEST_F(Window, ClosesWithinADrawBatch) {
   const auto source = make_synth({.kind = SynthKind::gyroid, .extent = {200, 200, 200}});
   NoProgress progress;
   convert(*source, dir_ / "many.zarr", {}, progress);
@@ -359,7 +359,7 @@ TEST_F(Window, ClosesWithinAPieceOfAPicture) {
   glfwSetWindowShouldClose(window.handle(), GLFW_TRUE);
   EXPECT_FALSE(window.step());
   EXPECT_EQ(scene_renderer.counters().unfinished_batches, before.unfinished_batches)
-      << "no further piece is drawn";
+      << "no further batch is drawn";
 }
 
 TEST_F(Window, WhileMeshesComeInItTakesNoStepForNothing) {
