@@ -1,5 +1,5 @@
-# The CUDA backend is built where there is a CUDA compiler, unless ISOBRICK_CUDA
-# is set (ON makes a missing compiler an error).
+# The CUDA backend is built where there is a CUDA compiler. ISOBRICK_CUDA=OFF leaves it out;
+# ON makes a missing compiler an error.
 if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
   find_program(CMAKE_CUDA_COMPILER nvcc PATHS /usr/local/cuda/bin)
 endif()

@@ -12,7 +12,7 @@
 
 namespace isobrick::tools {
 
-/// What the program writes to its terminal.
+/// The form of the result, and whether notes are written.
 struct OutputMode {
   bool json = false;
   bool quiet = false;

@@ -20,7 +20,7 @@ ordered_json number_if(bool known, std::uint64_t number) {
   return known ? ordered_json(number) : ordered_json();
 }
 
-/// Who made the surface, and how long its stages were busy.
+/// The backend that made the surface, and how long its stages were busy.
 void add_backend(ordered_json& object, const ExtractReport& r) {
   object["backend"] = r.backend;
   object["device"] = r.device.empty() ? ordered_json() : ordered_json(r.device);

@@ -10,9 +10,9 @@
 
 namespace isobrick {
 
-/// The content of the metadata files of an image, whichever version of Zarr they are
-/// of: a store of ours, an OME-Zarr 0.5 or 0.4 image, or one Zarr array, which
-/// counts as an image of one level with samples at 0, 1, 2, …
+/// The content of the metadata files of an image, of any version of Zarr. The image is a store of
+/// ours, an OME-Zarr 0.5 or 0.4 image, or one Zarr array. An array counts as an image of one level
+/// with samples at 0, 1, 2, …
 struct MetadataFiles {
   struct Level {
     std::filesystem::path folder, file;

@@ -51,7 +51,7 @@ struct ViewSettings {
   std::array<AxisClipSettings, 3> axis_clips;  ///< across x, y, z
   std::vector<ClipPlaneSettings> planes;       ///< kMaxClipPlanes at most
   std::array<SliceSettings, 3> slices;         ///< across x, y, z
-  /// Samples that slices show black and white; both 0: for choose_values().
+  /// Samples that slices show black and white; unless lo < hi, choose_values() sets them.
   float window_lo = 0, window_hi = 0;
   bool region_on = false;
   Vec3f region_lo{0, 0, 0}, region_hi{1, 1, 1};  ///< clip box in fractions of the volume

@@ -15,8 +15,8 @@ namespace isobrick {
 /// times `triangles_per_block`, and 0 where the node is clipped.
 struct CutBudget {
   std::uint64_t triangles = 20'000'000;
-  /// More triangles than `triangles`, for nodes that lose thin structure only. One such node may
-  /// need more than a whole preview.
+  /// Limit of all triangles where nodes that lose thin structure need more than `triangles`: one
+  /// such node may need more than a whole preview.
   std::uint64_t thin_triangles = 0;
   std::uint64_t mesh_bytes = std::uint64_t{2} << 30;
   double triangles_per_block = 600;

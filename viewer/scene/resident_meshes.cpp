@@ -6,7 +6,7 @@
 namespace isobrick {
 namespace {
 
-/// Divisor: the fraction of a full device's budget that old meshes free.
+/// Old meshes free one in so many bytes of a full device's budget.
 constexpr std::uint64_t kPartForNew = 8;
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace isobrick {
 namespace {
 
-/// Relative change of the estimate below which the cut stays the same.
+/// Whether both cuts request the same meshes; sizes and distances may differ.
 bool same_cut(const Cut& a, const Cut& b) {
   return a.isovalues == b.isovalues &&
          std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),

@@ -123,8 +123,8 @@ Vec3d spacing_of(const ArrayView& view, Vec3d in_file) {
   return spacing;
 }
 
-/// Labels of some dimensions leave the others open: they must agree with the positions of the
-/// others.
+/// Labels of some dimensions leave the others open. A labelled dimension must have the place that
+/// its label names.
 void check_directions(const std::string& path, std::span<const ArrayAxis> axes) {
   int next = 0;
   for (const ArrayAxis& axis : axes) {

@@ -34,9 +34,8 @@ bool is_nifti_pair(std::span<const std::byte> head);
 /// Whether it is ANALYZE 7.5, whose headers parse_nifti_header() refuses with this.
 bool is_analyze(std::span<const std::byte> head);
 inline constexpr const char* kAnalyzeRefusal =
-    "ANALYZE 7.5, which does not state where its samples are in space, is not supported; convert "
-    "it "
-    "to NIfTI";
+    "ANALYZE 7.5, which does not state where its samples are in space, is not supported; "
+    "convert it to NIfTI";
 
 /// Parses a header and selects one volume where there are several. `path` is for
 /// messages. Throws UsageError.

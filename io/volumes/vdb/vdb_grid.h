@@ -50,7 +50,7 @@ class CountedTree {
 
   CountedTree(Tree& tree, std::uint64_t budget) : tree_(tree), budget_(budget) {}
 
-  /// Adds bytes that its owner holds beside the tree.
+  /// Sets the number of bytes that its owner holds beside the tree.
   void hold(std::uint64_t bytes) {
     held_ = bytes;
     add(0);
