@@ -45,8 +45,13 @@ PreviewSink::PreviewSink(std::string path, bool force, const PreviewOptions& opt
 
 PreviewSink::~PreviewSink() {
   if (!context_) return;
-  const ContextGuard guard(*context_);
-  renderer_.reset();
+  try {
+    const ContextGuard guard(*context_);
+    renderer_.reset();
+  } catch (const Error&) {
+    // Without its context OpenGL cannot be called. The context ends what the renderer owns there.
+    static_cast<void>(renderer_.release());
+  }
 }
 
 std::uint64_t PreviewSink::memory_with(const PreviewOptions& options) {
@@ -65,7 +70,7 @@ void PreviewSink::begin(const MeshHeader& header) {
 
 void PreviewSink::begin_picture(const MeshBounds& frame) {
   const ContextGuard guard(*context_);
-  renderer_.emplace();
+  renderer_ = std::make_unique<Renderer>();
   const CameraRequest request{.up = options_.up, .from = options_.towards_eye};
   const double aspect = static_cast<double>(options_.width) / options_.height;
   renderer_->begin(make_camera(request, frame.lo, frame.hi, aspect), options_.width,

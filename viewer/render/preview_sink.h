@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -47,8 +48,8 @@ class PreviewSink final : public MeshSink {
   /// Current only within a call, since calls may come from any thread. Destroyed once the picture
   /// is finished.
   std::optional<GlContext> context_{std::in_place};
-  std::optional<Renderer> renderer_;  ///< made for the first batch
-  MeshBounds max_bounds_;             ///< maximum bounds of the mesh
+  std::unique_ptr<Renderer> renderer_;  ///< made for the first batch
+  MeshBounds max_bounds_;               ///< maximum bounds of the mesh
   Vec3d origin_;
   std::vector<Vec3f> positions_, normals_;
   std::vector<Triangle> triangles_;

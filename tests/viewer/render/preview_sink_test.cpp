@@ -1,7 +1,9 @@
 #include "viewer/render/preview_sink.h"
 
+#include <epoxy/egl.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <limits>
 
 #include "io/bytes/png_file.h"
@@ -193,6 +195,28 @@ TEST(PreviewSink, SurvivesBadNumbers) {
   mesh.normals[300] = {0, 0, 0};
   EXPECT_TRUE(draw({mesh.chunk()}).surface(100, 80));
   EXPECT_FALSE(draw({}).surface(100, 80));
+}
+
+/// Destroys a sink that has drawn, while no context can be made current. Returns the files left.
+std::size_t destroy_without_context() {
+  const TempDir dir;
+  const TestMesh ball = make_ball({0, 0, 0}, 1, 20);
+  {
+    PreviewSink sink(dir / "a.png", false, small());
+    sink.begin({true, {-1, -1, -1}, {1, 1, 1}});
+    sink.write(ball.chunk());
+    sink.write(ball.chunk(0, false));  // a batch without normals, so that the first one is drawn
+    eglMakeCurrent = [](EGLDisplay, EGLSurface, EGLSurface, EGLContext) -> EGLBoolean {
+      return EGL_FALSE;
+    };
+  }
+  return dir.list().size();
+}
+
+TEST(PreviewSink, IsDestroyedWithoutItsContext) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // the driver has threads
+  EXPECT_EXIT(std::_Exit(static_cast<int>(destroy_without_context())), testing::ExitedWithCode(0),
+              "");
 }
 
 TEST(PreviewSink, SizesAreChecked) {
