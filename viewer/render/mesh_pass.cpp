@@ -186,6 +186,11 @@ DrawParameters parameters_of(const MeshStyle& style) {
           {style.id, style.clip_mask, 0, 0}};
 }
 
+/// An offset into the bound buffer, which OpenGL takes as a pointer.
+const void* buffer_offset(std::size_t bytes) {
+  return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr)
+}
+
 }  // namespace
 
 MeshPass::Programs::Programs(bool clips, bool picture_clips, bool software, bool coloured) {
@@ -292,7 +297,7 @@ void MeshPass::draw(std::span<const MeshDraw> meshes, Vec3d eye, bool transparen
     bind(clips, transparent);
     bind_block(meshes[first].mesh->place());
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
-                                reinterpret_cast<const void*>(first * sizeof(Command)),
+                                buffer_offset(first * sizeof(Command)),
                                 static_cast<GLsizei>(end - first), 0);
   }
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
@@ -329,7 +334,7 @@ void MeshPass::draw(const MeshChunk& mesh, const MeshStyle& style, Vec3d origin,
   for (std::size_t first = 0; first < triangles.size(); first += per_call) {
     const std::size_t count = std::min(per_call, triangles.size() - first);
     glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * count), GL_UNSIGNED_INT,
-                   reinterpret_cast<const void*>(first * sizeof(Triangle)));
+                   buffer_offset(first * sizeof(Triangle)));
     wait_for_previous_call();
   }
   if (coloured) glDisableVertexArrayAttrib(array, 3);
