@@ -22,15 +22,13 @@ __asm__(
     ".byte 0\n"
     ".popsection\n");
 
-extern "C" {
-extern const char isobrick_font_begin[] __attribute__((visibility("hidden")));
-extern const char isobrick_font_end[] __attribute__((visibility("hidden")));
-}
-
 namespace isobrick {
 
+extern const char kFontBegin[] __asm__("isobrick_font_begin") __attribute__((visibility("hidden")));
+extern const char kFontEnd[] __asm__("isobrick_font_end") __attribute__((visibility("hidden")));
+
 std::string_view font_bytes() {
-  return {isobrick_font_begin, static_cast<std::size_t>(isobrick_font_end - isobrick_font_begin)};
+  return {kFontBegin, static_cast<std::size_t>(kFontEnd - kFontBegin)};
 }
 
 FontAtlas::FontAtlas(float height)
