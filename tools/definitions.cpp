@@ -25,7 +25,7 @@ bool is_path(const std::string& value) {
   return value == "MESH" || value == "PNG" || value == "DIR";
 }
 
-OptionView view_of(const CLI::Option& option) {
+OptionView option_view_of(const CLI::Option& option) {
   OptionView view;
   for (const std::string& name : option.get_snames()) view.names.push_back("-" + name);
   for (const std::string& name : option.get_lnames()) view.names.push_back("--" + name);
@@ -48,7 +48,7 @@ OptionView view_of(const CLI::Option& option) {
 std::vector<OptionView> views_of(const CLI::App& app, bool positional) {
   std::vector<OptionView> views;
   for (const CLI::Option* option : app.get_options())
-    if (option->get_positional() == positional) views.push_back(view_of(*option));
+    if (option->get_positional() == positional) views.push_back(option_view_of(*option));
   return views;
 }
 

@@ -103,12 +103,7 @@ int run_program(int argc, char** argv) {
   set_up_streams();
   CLI::App app("Isosurfaces of volumes larger than memory.", "isobrick");
   Program program{app, {}, {}};
-  try {
-    define(program);
-  } catch (const std::exception& error) {
-    print_error("", error.what());
-    return 1;
-  }
+  define(program);
   return run(program, argc, argv);
 }
 
@@ -121,6 +116,9 @@ int main(int argc, char** argv) {
     return isobrick::tools::run_program(argc, argv);
   } catch (const std::bad_alloc&) {  // also while an error was being reported
     isobrick::tools::print_out_of_memory("");
+    return 1;
+  } catch (const std::exception& error) {
+    isobrick::tools::print_error("", error.what());
     return 1;
   }
 }
