@@ -18,8 +18,8 @@ namespace {
 /// Mesh to expect of a tile before anything is known; launches shrink where there is more.
 constexpr std::uint64_t kVerticesOfTile = 1600, kTrianglesOfTile = 3200;
 /// What a tile can make at most: 3 edges a sample, 5 triangles a cell.
-constexpr std::uint64_t kMaxVertices = std::uint64_t{3} * 33 * 33 * 33,
-                        kMaxTriangles = std::uint64_t{5} * 32 * 32 * 32;
+constexpr std::uint64_t kMaxTileVertices = std::uint64_t{3} * 33 * 33 * 33,
+                        kMaxTileTriangles = std::uint64_t{5} * 32 * 32 * 32;
 /// Case table, ends of the numbering, and the rounding of buffers.
 constexpr std::uint64_t kSmallBuffers = 64 << 10;
 /// Bricks of fewer bytes are not sent: a copy has a price of its own.
@@ -71,8 +71,8 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
   const auto in_flight_count = static_cast<std::uint64_t>(in_flight);
   s.tiles = tiles;
   s.in_flight = in_flight;
-  s.vertices = std::max(kMaxVertices, tiles * kVerticesOfTile);
-  s.triangles = std::max(kMaxTriangles, tiles * kTrianglesOfTile);
+  s.vertices = std::max(kMaxTileVertices, tiles * kVerticesOfTile);
+  s.triangles = std::max(kMaxTileTriangles, tiles * kTrianglesOfTile);
   s.slots = static_cast<std::uint32_t>(
       slots_for(lattice, options.indexing == Indexing::welded, tiles, in_flight));
   s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
