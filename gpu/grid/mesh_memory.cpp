@@ -72,7 +72,8 @@ class OwnedMeshBlock final : public SharedMeshBlock {
     CUmemAllocationProp properties{};
     properties.type = CU_MEM_ALLOCATION_TYPE_PINNED;
     properties.requestedHandleTypes = CU_MEM_HANDLE_TYPE_POSIX_FILE_DESCRIPTOR;
-    properties.location = {CU_MEM_LOCATION_TYPE_DEVICE, {device}};
+    properties.location.type = CU_MEM_LOCATION_TYPE_DEVICE;
+    properties.location.id = device;
     check_driver(driver_.create(&memory_, bytes, &properties, 0), "cuMemCreate");
     try {
       check_driver(driver_.reserve(&address_, bytes, 0, 0, 0), "cuMemAddressReserve");
@@ -85,6 +86,8 @@ class OwnedMeshBlock final : public SharedMeshBlock {
       check_driver(
           driver_.export_handle(&file, memory_, CU_MEM_HANDLE_TYPE_POSIX_FILE_DESCRIPTOR, 0),
           "cuMemExportToShareableHandle");
+      // The driver has addresses as integers.
+      // NOLINTNEXTLINE(performance-no-int-to-ptr)
       Arena arena(reinterpret_cast<std::byte*>(address_), bytes);
       arrays_ = MeshArrays::take(arena, vertices, triangles, true);
     } catch (...) {

@@ -16,7 +16,7 @@ MappedPages::MappedPages(std::size_t bytes) : bytes_(whole_pages(bytes)) {
   mapping_ = mmap(nullptr, mapped_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (mapping_ == MAP_FAILED) throw system_error("cannot get pinned memory", "mmap", errno);
   const auto first = reinterpret_cast<std::uintptr_t>(mapping_);
-  data_ = reinterpret_cast<std::byte*>((first + align - 1) / align * align);
+  data_ = static_cast<std::byte*>(mapping_) + ((first + align - 1) / align * align - first);
   if (align == kLargePage) (void)madvise(data_, bytes_, MADV_HUGEPAGE);
 }
 
