@@ -78,7 +78,7 @@ static_assert(LaunchWord::value_of(LaunchWord::of((1ull << 40) - 1, 77)) == (1ul
 
 /// What a launch reports: vertices and triangles made, and active tiles.
 struct LaunchReport {
-  enum Word { kVertices, kTriangles, kActiveTiles, kWords };
+  static constexpr int kVertices = 0, kTriangles = 1, kActiveTiles = 2, kWords = 3;
   std::uint64_t words[kWords];
 };
 

@@ -70,7 +70,7 @@ __device__ inline unsigned long long sum_before(Word word, std::uint32_t item,
 }
 
 /// Writes one word of the launch's report. The words have no order, so none waits for another.
-__device__ inline void report(const TileParams& p, LaunchReport::Word word, std::uint64_t value) {
+__device__ inline void report(const TileParams& p, int word, std::uint64_t value) {
   HostWord(p.end.report->words[word])
       .store(LaunchWord::of(value, p.end.launch), cuda::memory_order_relaxed);
 }
