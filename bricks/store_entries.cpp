@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 4> kKinds{"interval", "kdtree", "quadtree", "octree"};
 constexpr std::array<std::string_view, 3> kItems{"range", "block_range", "brick_crc32c"};
+constexpr std::string_view kHistogram = "histogram";
 constexpr Index kAnyNumber = std::numeric_limits<Index>::max();
 
 template <std::size_t N>
@@ -66,6 +67,12 @@ bool is_chunk(std::span<const std::string> names, Int3 grid, std::size_t more, b
 bool is_chunk_below_c(std::span<const std::string> names, Int3 grid, std::size_t more,
                       bool folder) {
   return !names.empty() && names.front() == "c" && is_chunk(names.subspan(1), grid, more, folder);
+}
+
+/// Whether `names` are the array of a histogram, which is one chunk, or are in it.
+bool is_histogram(std::span<const std::string> names, bool folder) {
+  if (names.size() == 1) return names[0] == (folder ? "c" : "zarr.json");
+  return names.size() == 2 && !folder && names[0] == "c" && names[1] == "0";
 }
 
 std::optional<nlohmann::json> read_json(const fs::path& file) {
@@ -202,6 +209,7 @@ bool StoreEntries::has_addition(Names names, bool folder) const {
   if (names.size() == 1 && !folder) return names[0] == "zarr.json" || names[0] == "ranges.json";
   const Level* const l = level(names[0]);
   if (!l) return false;
+  const bool finest = names[0] == "0";
   names = names.subspan(1);
   if (names.empty()) return folder;
   if (names.size() == 1 && !folder) return names[0] == "zarr.json";
@@ -209,9 +217,11 @@ bool StoreEntries::has_addition(Names names, bool folder) const {
   if (index) names = names.subspan(1);
   if (names.empty()) return folder;
   const std::string_view name = without(without(names[0], ".partial"), ".replaced");
-  if (!(index ? is_one_of(name, kKinds) : is_one_of(name, kItems))) return false;
+  const bool histogram = !index && finest && name == kHistogram;
+  if (!histogram && !(index ? is_one_of(name, kKinds) : is_one_of(name, kItems))) return false;
   names = names.subspan(1);
   if (names.empty()) return folder;
+  if (histogram) return is_histogram(names, folder);
   if (names.size() == 1 && !folder)
     return index ? names[0] == "index.json" : names[0] == "zarr.json" || names[0] == "checksums";
   if (index) return is_chunk_below_c(names, l->index_chunks, 0, folder);

@@ -87,6 +87,7 @@ struct StoreWriter::Impl {
   std::mutex mutex;
   std::map<std::pair<int, Index>, std::shared_ptr<OpenShard>> open_shards;
   std::unique_ptr<Publisher> publisher;
+  std::optional<StoredHistogram> histogram;
 };
 
 void StoreWriter::Impl::check_resume() {
@@ -319,6 +320,10 @@ void StoreWriter::put_block_ranges(int level, Box3 box, std::span<const std::byt
   impl_->level(level).block_ranges->put(box, pairs);
 }
 
+void StoreWriter::put_histogram(const SampleCounts& counts) {
+  impl_->histogram = write_histogram(histogram_folder(impl_->dir), counts, *impl_->publisher);
+}
+
 void StoreWriter::Impl::publish_root(const ImageMetadata& image) {
   const RootFile file = root_file(image, layout.ome);
   const std::filesystem::path root = dir / file.name;
@@ -347,7 +352,8 @@ void StoreWriter::finish(bool may_have_nan,
           fmt::format("'{}' was not finished", impl_->open_shards.begin()->second->path.string()));
   }
   publisher.write(impl_->dir / "isobrick" / "zarr.json", group_json());
-  StoredRanges ranges{.may_have_nan = may_have_nan, .image_crc32c = 0, .levels = {}};
+  StoredRanges ranges{
+      .may_have_nan = may_have_nan, .image_crc32c = 0, .levels = {}, .histogram = impl_->histogram};
   for (std::size_t i = 0; i < impl_->levels.size(); ++i) {
     Impl::Level& l = impl_->levels[i];
     if (const auto checksums = impl_->finish_items(l)) ranges.levels.push_back(*checksums);

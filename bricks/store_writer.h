@@ -10,6 +10,7 @@
 
 #include <isobrick/image_metadata.h>
 #include <isobrick/lattice.h>
+#include "bricks/ranges/stored_histogram.h"
 #include "bricks/store_layout.h"
 
 namespace isobrick {
@@ -52,6 +53,9 @@ class StoreWriter {
   /// ranges. Thread-safe.
   void put_brick_ranges(int level, Box3 box, std::span<const std::byte> pairs);
   void put_block_ranges(int level, Box3 box, std::span<const std::byte> pairs);
+
+  /// The histogram of level 0. A store to which none is given, or that has no ranges, keeps none.
+  void put_histogram(const SampleCounts& counts);
 
   /// Metadata, the group's last of all; then everything in `dir` is on disk (its
   /// own name is the caller's to sync).

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <bit>
+#include <cstdint>
+
 #include "bricks/zarr/codec.h"
 #include "bricks/zarr/json_reader.h"
 
@@ -10,7 +13,16 @@ namespace {
 
 constexpr const char* kKey = "crc32c";
 
-std::uint32_t checksum_of(const nlohmann::json& object) {
+/// Fractions as the bits of a double, so that nothing depends on how their decimals are chosen.
+void replace_fractions(nlohmann::json& json) {
+  if (json.is_number_float())
+    json = fmt::format("{:016x}", std::bit_cast<std::uint64_t>(json.get<double>()));
+  else if (json.is_structured())
+    for (nlohmann::json& element : json) replace_fractions(element);
+}
+
+std::uint32_t checksum_of(nlohmann::json object) {
+  replace_fractions(object);
   const std::string text = object.dump();
   return crc32c(std::as_bytes(std::span(text)));
 }

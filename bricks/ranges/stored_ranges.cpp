@@ -9,6 +9,35 @@ namespace {
 
 constexpr int kVersion = 3;
 
+nlohmann::json json_of(const StoredHistogram& histogram) {
+  const HistogramBins& bins = histogram.bins;
+  nlohmann::json json{{"exponent", bins.exponent}, {"first_bin", bins.first},
+                      {"bins", bins.count},        {"not_a_number", bins.not_a_number},
+                      {"infinite", bins.infinite}, {"crc32c", histogram.crc32c}};
+  if (bins.count > 0) json.update({{"lo", bins.lo}, {"hi", bins.hi}});
+  return json;
+}
+
+StoredHistogram parse_histogram(const JsonReader& json) {
+  StoredHistogram histogram;
+  HistogramBins& bins = histogram.bins;
+  bins.exponent = static_cast<int>(json.at("exponent").integer());
+  bins.first = json.at("first_bin").integer();
+  bins.count = json.at("bins").integer();
+  bins.not_a_number = static_cast<std::uint64_t>(json.at("not_a_number").integer());
+  bins.infinite = static_cast<std::uint64_t>(json.at("infinite").integer());
+  histogram.crc32c = static_cast<std::uint32_t>(json.at("crc32c").integer());
+  if (bins.count < 0 || bins.count > kMaxHistogramBins)
+    json.damaged("has an impossible number of bins");
+  if (bins.exponent < -1074 || bins.exponent > 1023)
+    json.damaged("has an impossible width of bins");
+  if (bins.count == 0) return histogram;
+  bins.lo = json.at("lo").number();
+  bins.hi = json.at("hi").number();
+  if (!(bins.lo <= bins.hi)) json.damaged("has an impossible range");
+  return histogram;
+}
+
 }  // namespace
 
 std::filesystem::path ranges_file(const std::filesystem::path& store) {
@@ -25,6 +54,7 @@ std::string to_json(const StoredRanges& stored) {
     json["levels"].push_back({{"range_crc32c", level.bricks},
                               {"block_range_crc32c", level.blocks},
                               {"brick_crc32c", level.content}});
+  if (stored.histogram) json["histogram"] = json_of(*stored.histogram);
   return checksum_json(std::move(json));
 }
 
@@ -35,7 +65,8 @@ StoredRanges parse_stored_ranges(std::string_view text, const std::string& where
       .check_version("ranges", kVersion, "remove the file and run isobrick index");
   StoredRanges stored{json.at("may_have_nan").boolean(),
                       static_cast<std::uint32_t>(json.at("image_crc32c").integer()),
-                      {}};
+                      {},
+                      std::nullopt};
   const JsonReader levels = json.at("levels");
   for (std::size_t i = 0; i < levels.array_size(); ++i) {
     const auto checksum = [level = levels.at(i)](const char* key) {
@@ -45,6 +76,7 @@ StoredRanges parse_stored_ranges(std::string_view text, const std::string& where
                              .blocks = checksum("block_range_crc32c"),
                              .content = checksum("brick_crc32c")});
   }
+  if (json.has("histogram")) stored.histogram = parse_histogram(json.at("histogram"));
   return stored;
 }
 

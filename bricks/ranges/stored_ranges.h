@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "bricks/ranges/stored_histogram.h"
+
 namespace isobrick {
 
 /// The checksums of a level's arrays of ranges and of its bricks' checksums, as
@@ -23,6 +25,8 @@ struct StoredRanges {
   /// metadata_checksum() of the image that the ranges were computed from.
   std::uint32_t image_crc32c = 0;
   std::vector<RangeChecksums> levels;
+  /// Of level 0; nullopt: none is kept.
+  std::optional<StoredHistogram> histogram = std::nullopt;
 
   friend bool operator==(const StoredRanges&, const StoredRanges&) = default;
 };

@@ -43,6 +43,9 @@ TEST_F(StoreEntriesTest, WhatAConversionLeavesBelongsToIt) {
                                       "isobrick/0/range.partial/c/0/0/0/0",
                                       "isobrick/0/block_range/c/0/0/0/0.tmp",
                                       "isobrick/0/brick_crc32c.partial/checksums.tmp",
+                                      "isobrick/0/histogram/zarr.json",
+                                      "isobrick/0/histogram/c/0",
+                                      "isobrick/0/histogram.partial/c/0.tmp",
                                       "isobrick/0/index/octree.partial/index.json",
                                       "isobrick/0/index/kdtree.replaced/c/0/0/0"};
   for (const std::string& name : left) put(name);
@@ -68,7 +71,8 @@ TEST_F(StoreEntriesTest, OnlyTheLevelsAndChunksThatItHas) {
         "0/c/00/0/0", "0/5.tmp", "0/zarr.json.tmp", "0/0/0/0", "spool", "spool.partial-thesis.txt",
         "isobrick/1/zarr.json", "isobrick/0/range/c/0/0/1/0", "isobrick/0/block_range/c/1/0/0/0",
         "isobrick/0/range/c/0/0/0/1", "isobrick/0/brick_crc32c/c/0/0/1",
-        "isobrick/0/index/octree/c/0/0/1"}) {
+        "isobrick/0/index/octree/c/0/0/1", "isobrick/0/histogram/c/1",
+        "isobrick/0/histogram/c/0/0", "isobrick/0/histogram/checksums"}) {
     put(name);
     EXPECT_NE(why_not_our_store(store_).find("no part of a store"), std::string::npos) << name;
     fs::remove(store_ / name);
