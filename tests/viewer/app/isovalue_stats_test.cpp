@@ -7,6 +7,7 @@
 #include <numeric>
 #include <thread>
 
+#include "tests/pipeline/drop_histogram.h"
 #include "tests/viewer/app/scene_renderer_fixture.h"
 
 namespace isobrick {
@@ -38,6 +39,8 @@ TEST_F(Statistics, LeaveOutBricksThatCannotBeRead) {
   EXPECT_TRUE(comes([&] { return whole.histogram() != nullptr; }));
   EXPECT_EQ(whole.take_failure(), "");
   damage_bricks();
+  EXPECT_TRUE(comes([&] { return IsovalueStats(store()).histogram() != nullptr; })) << "it is kept";
+  test::drop_histogram(dir_ / "store.zarr");
   IsovalueStats damaged(store());
   std::string why;
   EXPECT_TRUE(comes([&] { return !(why = damaged.take_failure()).empty(); }));

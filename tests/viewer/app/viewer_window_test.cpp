@@ -17,6 +17,7 @@
 #include <isobrick/error.h>
 #include <isobrick/synth_source.h>
 #include "core/vectors.h"
+#include "tests/pipeline/drop_histogram.h"
 #include "tests/viewer/app/imgui_version.h"
 #include "tests/viewer/app/window_test.h"
 
@@ -141,6 +142,7 @@ TEST_F(Window, SaysWhatIsDamaged) {
     file.seekp(static_cast<std::streamoff>(entry.file_size() / 3));
     file.write("damage", 6);
   }
+  test::drop_histogram(dir_ / "damaged.zarr");
   window.open(dir_ / "damaged.zarr");
   until([&] { return is_still(); });
   steps(3);

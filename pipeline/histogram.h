@@ -1,0 +1,14 @@
+#pragma once
+
+#include <optional>
+
+#include <isobrick/store_reader.h>
+#include "bricks/ranges/stored_histogram.h"
+
+namespace isobrick {
+
+/// The counts of level 0 that a store keeps; nullopt if it keeps none. Throws DamageError where
+/// they are damaged.
+std::optional<SampleCounts> stored_counts(const StoreReader& store);
+
+}  // namespace isobrick

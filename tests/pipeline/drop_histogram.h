@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+
+#include "bricks/ranges/stored_ranges.h"
+
+namespace isobrick::test {
+
+/// Makes a store one that keeps no histogram.
+inline void drop_histogram(const std::filesystem::path& store) {
+  StoredRanges ranges = *read_stored_ranges(store);
+  ranges.histogram.reset();
+  std::ofstream(ranges_file(store)) << to_json(ranges);
+  std::filesystem::remove_all(histogram_folder(store));
+}
+
+}  // namespace isobrick::test
