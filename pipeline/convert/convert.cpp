@@ -50,11 +50,12 @@ class Conversion {
         staging_(staging),
         progress_(progress),
         store_(staging.path(), layout, staging.resumed()),
-        journal_(staging.path(), layout.levels.front().lattice, staging.resumed()) {
+        journal_(staging.path(), layout.levels.front().lattice, staging.resumed()),
+        counts_(make_value_counts(layout.levels.front().lattice.type)) {
     for (int level = 0; plan != nullptr && level < level_count(); ++level)
-      writers_.push_back(std::make_unique<LevelWriter>(store_, layout, level,
-                                                       plan->bricks_in_flight(),
-                                                       level == 0 ? &journal_ : nullptr, progress));
+      writers_.push_back(std::make_unique<LevelWriter>(
+          store_, layout, level, plan->bricks_in_flight(), level == 0 ? &journal_ : nullptr,
+          level == 0 ? counts_.get() : nullptr, progress));
   }
 
   ConvertReport run();
@@ -77,6 +78,7 @@ class Conversion {
   Progress& progress_;
   StoreWriter store_;
   ConvertJournal journal_;
+  std::unique_ptr<ValueCounts> counts_;  ///< of level 0
   std::vector<std::unique_ptr<LevelWriter>> writers_;
 };
 
@@ -85,7 +87,7 @@ ConvertReport Conversion::run() {
   bool has_nan = false;
   if (sparse_ != nullptr) {
     const SparsePyramid::Counts counts =
-        sparse_->write(store_, journal_, staging_.path(), staging_.resumed(), progress_);
+        sparse_->write(store_, journal_, *counts_, staging_.path(), staging_.resumed(), progress_);
     report.bricks = counts.bricks;
     report.bricks_absent = counts.absent;
     report.bricks_kept = counts.kept;
@@ -100,6 +102,7 @@ ConvertReport Conversion::run() {
     // Infinities of both signs make a NaN that only a coarser level has.
     has_nan |= writer->has_nan();
   }
+  store_.put_histogram(counts_->counts());
   // Published while it can still be resumed: a kill in between leaves nothing that the next run
   // does not know. The journal goes last: until then a resume compares the input with it.
   store_.finish(

@@ -6,7 +6,8 @@
 
 namespace isobrick {
 LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int level,
-                         int bricks_in_flight, ConvertJournal* journal, Progress& progress)
+                         int bricks_in_flight, ConvertJournal* journal, ValueCounts* counts,
+                         Progress& progress)
     : store_(store),
       info_(layout.levels[static_cast<std::size_t>(level)]),
       level_(level),
@@ -14,6 +15,7 @@ LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int leve
       shards_(ceil_div(info_.lattice.extent, info_.shard)),
       bricks_per_shard_(ceil_div(info_.shard, info_.lattice.brick)),
       journal_(journal),
+      counts_(counts),
       output_(store, layout, level, journal, progress),
       ranges_(make_level_ranges(info_.lattice)) {
   for_each_point({{0, 0, 0}, shards_},
@@ -38,6 +40,8 @@ void LevelWriter::write_bricks(Box3 box, const std::byte* samples) {
   };
   const auto pack = [&](PackedBrick& packed) {
     const bool kept = is_kept(floor_div(packed.brick, bricks_per_shard_));
+    // Beside the encoder, which reads the same samples.
+    if (counts_ != nullptr) counts_->add(samples, box, info_.lattice.brick_box(packed.brick));
     packed = output_.pack(packed.brick, box, samples, kept);
   };
   run_in_order<PackedBrick>(bricks_in_flight_, take, pack,

@@ -12,6 +12,7 @@
 #include "bricks/zarr/codec.h"
 #include "pipeline/convert/downsample.h"
 #include "pipeline/index/range_scan.h"
+#include "pipeline/index/value_counts.h"
 #include "pipeline/program_memory.h"
 #include "pipeline/slab_piece.h"
 
@@ -193,8 +194,9 @@ ConvertPlan::ConvertPlan(const StoreLayout& layout, std::uint64_t memory, int th
 }
 
 std::size_t ConvertPlan::encoding_bytes() const {
-  const std::size_t brick = layout_.levels.front().lattice.brick_bytes();
-  return kProgramBytes + source_bytes_ +
+  const Lattice& finest = layout_.levels.front().lattice;
+  const std::size_t brick = finest.brick_bytes();
+  return kProgramBytes + source_bytes_ + value_counts_bytes(finest.type, threads_) +
          static_cast<std::size_t>(threads_) *
              (2 * brick + encoder_memory(layout_.zstd_level, brick)) +
          static_cast<std::size_t>(bricks_in_flight_) * brick;

@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cstring>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -70,6 +71,14 @@ struct PackedFamily {
   PodBuffer<std::byte> coarser;  ///< the parent's samples, a full brick; empty in the last level
 };
 
+double value_of(ScalarType type, std::uint64_t bits) {
+  return visit_scalar(type, [&](auto tag) {
+    typename decltype(tag)::type value;
+    std::memcpy(&value, &bits, sizeof value);
+    return static_cast<double>(value);
+  });
+}
+
 /// From a level to the next; of the last one, which has none, any do.
 Int3 factors_of(const StoreLayout& layout, std::size_t level) {
   return level < layout.factors.size() ? layout.factors[level] : kHalveAll;
@@ -101,12 +110,13 @@ std::size_t ranges_bytes(const StoreLayout& layout, const SparseBricks& finest, 
 class SparsePyramid::Level {
  public:
   Level(const StoreLayout& layout, int level, SparseBricks bricks, StoreWriter& store,
-        ConvertJournal* journal, bool resumed, Progress& progress)
+        ConvertJournal* journal, ValueCounts* histogram, bool resumed, Progress& progress)
       : layout_(layout),
         level_(level),
         info_(layout.levels[static_cast<std::size_t>(level)]),
         store_(store),
         journal_(journal),
+        histogram_(histogram),
         bricks_per_shard_(ceil_div(info_.shard, info_.lattice.brick)),
         factors_(factors_of(layout, static_cast<std::size_t>(level))),
         bricks_(std::move(bricks)),
@@ -116,6 +126,7 @@ class SparsePyramid::Level {
     ranges_ = make_sparse_ranges(store_, level_, info_.lattice, layout.fill_value,
                                  [this](Int3 brick) { return bricks_.contains(brick); });
     output_.skip(static_cast<std::uint64_t>(volume(info_.lattice.bricks())) - bricks_.all().size());
+    if (histogram_ != nullptr) histogram_->add(layout.fill_value, absent_samples());
   }
 
   std::size_t families() const { return bricks_.families(); }
@@ -148,6 +159,15 @@ class SparsePyramid::Level {
   }
 
  private:
+  /// Those of bricks that are not there.
+  std::uint64_t absent_samples() const {
+    const Lattice& lattice = info_.lattice;
+    auto samples = static_cast<std::uint64_t>(volume(lattice.extent));
+    for (const SparseBrick& b : bricks_.all())
+      samples -= static_cast<std::uint64_t>(volume(lattice.brick_box(b.brick).extent()));
+    return samples;
+  }
+
   /// A shard with bricks.
   struct Shard {
     Int3 place;
@@ -229,6 +249,7 @@ class SparsePyramid::Level {
     }
     PackedFamily::Brick brick;
     brick.ranges = scan_brick(lattice, box, samples.data());
+    if (histogram_ != nullptr) histogram_->add(samples.data(), box, box);
     if (parcel != nullptr) {
       coarser.resize(lattice.brick_bytes());
       downsample(layout_.downsampling, lattice.type, box.extent(), factors_, samples.data(),
@@ -253,6 +274,9 @@ class SparsePyramid::Level {
     if (parcel != nullptr)
       set_box(lattice.type, bits, {parcel->coarser.data(), lattice.full_brick_box(parcel->parent)},
               coarser_box(box));
+    if (histogram_ != nullptr)
+      histogram_->add(value_of(lattice.type, bits),
+                      static_cast<std::uint64_t>(volume(box.extent())));
     return {output_.pack_constant(place, bits, kept), constant_brick(lattice, box, bits)};
   }
 
@@ -287,6 +311,7 @@ class SparsePyramid::Level {
   const LevelInfo& info_;
   StoreWriter& store_;
   ConvertJournal* journal_;
+  ValueCounts* histogram_;
   Int3 bricks_per_shard_;
   Int3 factors_;
   SparseBricks bricks_;
@@ -310,7 +335,8 @@ SparsePyramid::SparsePyramid(VolumeSource& source, const StoreLayout& layout,
       in_flight_(2 * static_cast<std::size_t>(threads)) {
   const Lattice& finest = layout.levels.front().lattice;
   const std::size_t count = count_sparse_bricks(source, finest);
-  const std::size_t fixed = kProgramBytes + source.memory() + count * kBytesPerBrick;
+  const std::size_t fixed = kProgramBytes + source.memory() + count * kBytesPerBrick +
+                            value_counts_bytes(finest.type, threads);
   const auto refuse = [&](std::size_t all_fixed) {
     const std::size_t least = all_fixed + working_bytes(layout, in_flight_, threads_);
     throw UsageError(fmt::format(
@@ -336,6 +362,7 @@ bool SparsePyramid::fit(std::size_t fixed, std::uint64_t memory) {
 }
 
 SparsePyramid::Counts SparsePyramid::write(StoreWriter& store, ConvertJournal& journal,
+                                           ValueCounts& histogram,
                                            const std::filesystem::path& folder, bool resumed,
                                            Progress& progress) {
   Counts counts;
@@ -350,7 +377,7 @@ SparsePyramid::Counts SparsePyramid::write(StoreWriter& store, ConvertJournal& j
   for (int i = 0; i < levels; ++i) {
     const Int3 factors = factors_of(layout_, static_cast<std::size_t>(i));
     Level level(layout_, i, spool ? spool->take_bricks(factors) : std::move(bricks_), store,
-                i == 0 ? &journal : nullptr, resumed, progress);
+                i == 0 ? &journal : nullptr, i == 0 ? &histogram : nullptr, resumed, progress);
     if (i + 1 < levels)
       next = std::make_unique<BrickSpool>(folder, finest.brick_bytes(), level.families());
     level.write(source_, spool.get(), next.get(), in_flight_);

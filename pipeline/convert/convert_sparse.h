@@ -11,6 +11,7 @@
 #include "pipeline/convert/convert_journal.h"
 #include "pipeline/convert/sparse_bricks.h"
 #include "pipeline/convert/sparse_ranges.h"
+#include "pipeline/index/value_counts.h"
 
 namespace isobrick {
 
@@ -38,8 +39,9 @@ class SparsePyramid {
 
   int threads() const { return threads_; }
 
-  Counts write(StoreWriter& store, ConvertJournal& journal, const std::filesystem::path& folder,
-               bool resumed, Progress& progress);
+  /// `histogram` sees every sample of level 0.
+  Counts write(StoreWriter& store, ConvertJournal& journal, ValueCounts& histogram,
+               const std::filesystem::path& folder, bool resumed, Progress& progress);
 
  private:
   class Level;

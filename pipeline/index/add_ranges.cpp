@@ -30,20 +30,22 @@ fs::path partial(fs::path folder) {
   return folder;
 }
 
-/// Calls f(folder, where it lies in a store) for the arrays of ranges and checksums of every level.
+/// Calls f(folder, where it lies in a store) for the arrays of ranges and checksums of every level
+/// and for the histogram.
 template <class F>
-void for_each_range_folder(const StoreInfo& info, F&& f) {
+void for_each_added_folder(const StoreInfo& info, F&& f) {
   for (int level = 0; level < static_cast<int>(info.levels.size()); ++level) {
     f(block_range_folder(info.additions, level), block_range_folder("", level));
     f(brick_range_folder(info.additions, level), brick_range_folder("", level));
     f(brick_checksum_folder(info.additions, level), brick_checksum_folder("", level));
   }
+  f(histogram_folder(info.additions), histogram_folder(""));
 }
 
 /// Removes what was written beside the places of ranges.
 void discard_unfinished(const StoreInfo& info) {
   const OutputFolder root(info.path);
-  for_each_range_folder(info, [&](const fs::path& folder, const fs::path&) {
+  for_each_added_folder(info, [&](const fs::path& folder, const fs::path&) {
     std::error_code none;
     if (fs::exists(fs::symlink_status(partial(folder), none))) root.remove_folder(partial(folder));
   });
@@ -56,10 +58,10 @@ std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uin
   const Lattice& lattice = level.lattice;
   const std::uint64_t brick = lattice.brick_bytes();
   // A brick being decoded: itself and its encoded bytes, once a thread.
-  const std::uint64_t fixed = kProgramBytes + level.index_bytes +
-                              static_cast<std::uint64_t>(threads) * brick * 9 / 4 +
-                              level_ranges_bytes(lattice, lattice.brick.z) +
-                              gathered_ranges_bytes(lattice) + brick_checksum_bytes(level);
+  const std::uint64_t fixed =
+      kProgramBytes + level.index_bytes + static_cast<std::uint64_t>(threads) * brick * 9 / 4 +
+      level_ranges_bytes(lattice, lattice.brick.z) + gathered_ranges_bytes(lattice) +
+      brick_checksum_bytes(level) + value_counts_bytes(lattice.type, threads);
   if (memory < fixed + brick)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: computing the ranges needs at least --memory "
@@ -70,7 +72,8 @@ std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uin
   return std::min(memory - fixed, kEnoughForAPiece);
 }
 
-/// Writes the arrays of a level beside their places, and their checksums into `stored`.
+/// Writes the arrays of a level beside their places, and their checksums into `stored`. With level
+/// 0 goes the histogram.
 void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
                   Progress& progress, StoredRanges& stored) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
@@ -83,6 +86,7 @@ void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publ
   ItemArrayWriter checksums(partial(brick_checksum_folder(root, level)), brick_count,
                             checksum_array_metadata(brick_count), publisher);
   const auto ranges = make_level_ranges(lattice);
+  const auto counts = level == 0 ? make_value_counts(lattice.type) : nullptr;
   scan_level(
       store, level, static_cast<std::size_t>(bytes), *ranges, nullptr,
       [&](Box3 items, std::span<const std::byte> pairs) { blocks.put(items, pairs); },
@@ -90,10 +94,14 @@ void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publ
       [&](std::uint64_t done) { progress.advance(done); },
       [&](Int3 b, std::uint32_t checksum) {
         checksums.put({b, b + Int3{1, 1, 1}}, std::as_bytes(std::span(&checksum, 1)));
-      });
+      },
+      counts.get());
   stored.levels.push_back(
       {.bricks = *bricks.finish(), .blocks = *blocks.finish(), .content = *checksums.finish()});
   stored.may_have_nan |= ranges->has_nan();
+  if (counts)
+    stored.histogram =
+        write_histogram(partial(histogram_folder(root)), counts->counts(), publisher);
 }
 
 }  // namespace
@@ -110,7 +118,7 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
   }
   Publisher publisher(info.path);
   const StoreEntries entries = StoreEntries::of(info.levels);
-  for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
+  for_each_added_folder(info, [&](const fs::path& folder, const fs::path& place) {
     check_replaceable(folder, entries, place);
     check_replaceable(partial(folder), entries, place);
     publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
@@ -123,7 +131,7 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
                  publisher, progress, stored);
   publisher.wait();
   progress.end();
-  for_each_range_folder(info, [&](const fs::path& folder, const fs::path& place) {
+  for_each_added_folder(info, [&](const fs::path& folder, const fs::path& place) {
     publisher.folder().replace_folder(partial(folder), folder);
     check_replaceable(set_aside_name(folder), entries, place);
     publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left

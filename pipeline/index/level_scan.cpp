@@ -1,5 +1,7 @@
 #include "pipeline/index/level_scan.h"
 
+#include <tbb/parallel_for.h>
+
 #include <memory>
 
 #include "pipeline/slab_piece.h"
@@ -8,7 +10,8 @@ namespace isobrick {
 
 void scan_level(const StoreReader& store, int level, std::size_t piece_bytes, LevelRanges& ranges,
                 const BrickFailure& failure, const RangeEmit& blocks, const RangeEmit& bricks,
-                const std::function<void(std::uint64_t)>& advance, const BrickChecksum& checksum) {
+                const std::function<void(std::uint64_t)>& advance, const BrickChecksum& checksum,
+                ValueCounts* counts) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Int3 piece =
       largest_piece(lattice.extent, lattice.brick, piece_bytes / lattice.sample_bytes());
@@ -22,6 +25,10 @@ void scan_level(const StoreReader& store, int level, std::size_t piece_bytes, Le
     const Box3 box = intersect({p * piece, (p + Int3{1, 1, 1}) * piece}, lattice.box());
     read_slab(store, level, box, buffer.get(), failure, checksum);
     ranges.add(box, buffer.get());
+    if (counts != nullptr)
+      tbb::parallel_for(box.lo.z, box.hi.z, [&](Index z) {
+        counts->add(buffer.get(), box, {{box.lo.x, box.lo.y, z}, {box.hi.x, box.hi.y, z + 1}});
+      });
     if (p.x + 1 == pieces.x && p.y + 1 == pieces.y) ranges.close(box.hi.z, blocks, bricks);
     advance(bytes_of(box.extent()));
   });

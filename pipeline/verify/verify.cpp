@@ -13,6 +13,7 @@
 #include "bricks/stored_index.h"
 #include "bricks/zarr/json_reader.h"
 #include "io/bytes/file.h"
+#include "pipeline/histogram.h"
 #include "pipeline/index/level_scan.h"
 #include "pipeline/program_memory.h"
 #include "pipeline/verify/verify_index.h"
@@ -52,7 +53,7 @@ class DamageList {
   VerifyReport report_;
 };
 
-/// Checks the bricks of one level, and its ranges against them.
+/// Checks the bricks of one level, and its ranges and histogram against them.
 class LevelCheck {
  public:
   LevelCheck(const StoreReader& store, int level, DamageList& damages)
@@ -66,6 +67,7 @@ class LevelCheck {
  private:
   void fail(Int3 brick, const std::string& what);
   void compare(bool blocks, Box3 items, std::span<const std::byte> pairs);
+  void compare_histogram(const SampleCounts& counted);
   bool sees_unreadable(Int3 item, Int3 edge) const;
 
   const StoreReader& store_;
@@ -126,14 +128,27 @@ void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pai
   });
 }
 
+void LevelCheck::compare_histogram(const SampleCounts& counted) {
+  if (!unreadable_.empty()) return;
+  try {
+    const auto stored = stored_counts(store_);
+    if (stored && *stored != counted)
+      damages_.add(fmt::format("level {}: its histogram is not that of its samples", level_));
+  } catch (const Error& e) {
+    damages_.add(fmt::format("level {}: {}", level_, e.what()));
+  }
+}
+
 void LevelCheck::run(std::uint64_t piece_bytes, Progress& progress) {
   const auto ranges = make_level_ranges(lattice_);
+  const auto counts = level_ == 0 ? make_value_counts(lattice_.type) : nullptr;
   scan_level(
       store_, level_, piece_bytes, *ranges,
       [&](Int3 brick, const std::string& what) { fail(brick, what); },
       [&](Box3 items, std::span<const std::byte> pairs) { compare(true, items, pairs); },
       [&](Box3 items, std::span<const std::byte> pairs) { compare(false, items, pairs); },
-      [&](std::uint64_t done) { progress.advance(done); });
+      [&](std::uint64_t done) { progress.advance(done); }, nullptr, counts.get());
+  if (counts) compare_histogram(counts->counts());
 }
 
 /// How the samples of a level are read within a budget.
@@ -151,7 +166,8 @@ LevelBudget budget_of(const StoreInfo& store, int level, int threads, std::uint6
       sizeof(ValueRange<double>);
   const auto least = [&](int n) {
     return kProgramBytes + kListBytes + slab_memory(store, level, n) + table +
-           level_ranges_bytes(lattice, lattice.brick.z) + lattice.brick_bytes();
+           level_ranges_bytes(lattice, lattice.brick.z) + value_counts_bytes(lattice.type, n) +
+           lattice.brick_bytes();
   };
   while (threads > 1 && least(threads) > memory) --threads;
   if (least(threads) > memory)

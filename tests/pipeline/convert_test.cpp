@@ -5,8 +5,10 @@
 #include <isobrick/error.h>
 #include <isobrick/verify.h>
 #include "pipeline/convert/downsample.h"
+#include "pipeline/histogram.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/least_budget.h"
+#include "tests/pipeline/naive_counts.h"
 
 namespace isobrick {
 namespace {
@@ -40,6 +42,7 @@ TYPED_TEST(Convert, KeepsEverySampleAndItsRanges) {
     const StoreReader store(folder / "a.zarr");
     ASSERT_EQ(store.info().levels.size(), static_cast<std::size_t>(report.levels));
     EXPECT_EQ(samples_of(store, 0), source.samples());
+    EXPECT_EQ(stored_counts(store), naive_counts(scalar_type_of<T>, source.samples()));
     Int3 e = extent;
     std::vector<std::byte> expected = source.samples();
     for (int level = 0; level < report.levels; ++level) {

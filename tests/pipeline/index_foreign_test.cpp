@@ -6,7 +6,9 @@
 #include "bricks/ranges/stored_ranges.h"
 #include "bricks/stored_index.h"
 #include "bricks/zarr/array_metadata.h"
+#include "pipeline/histogram.h"
 #include "tests/pipeline/index_fixture.h"
+#include "tests/pipeline/naive_counts.h"
 
 namespace isobrick::test {
 namespace {
@@ -79,6 +81,7 @@ class ForeignIndex : public testing::Test {
       EXPECT_TRUE(mesh_of(foreign_, {.isovalue = iso}, kind) == mesh);
     }
     EXPECT_TRUE(mesh_of(foreign_, {.isovalue = iso}, std::nullopt) == mesh);
+    EXPECT_EQ(stored_counts(StoreReader(foreign_)), naive_counts<T>(samples));
     EXPECT_EQ(verify_quietly(foreign_).damages, std::vector<std::string>{});
     // What the other program wrote is as it was.
     const auto after = tree_of(foreign_);
