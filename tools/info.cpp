@@ -31,6 +31,8 @@ std::uint64_t directory_bytes(const fs::path& path) {
   return bytes;
 }
 
+/// Columns of the drawing.
+constexpr int kBins = 64;
 /// Bricks of a level that are looked for: seconds.
 constexpr Index kMaxBricks = Index{1} << 26;
 
@@ -51,20 +53,23 @@ std::optional<std::uint64_t> stored_bricks(const StoreReader& store, int level) 
   return stored;
 }
 
-/// A kind of index, and what it takes in each level that has it.
+/// A kind of index, and what it takes in each level that has it: nullopt without --stats.
 struct IndexFacts {
   std::string kind;
   Index leaf = 0;  ///< of the finest of these levels
-  std::map<int, std::uint64_t> level_bytes;
+  std::map<int, std::optional<std::uint64_t>> level_bytes;
 
-  std::uint64_t bytes() const {
+  std::optional<std::uint64_t> bytes() const {
     std::uint64_t sum = 0;
-    for (const auto& [level, bytes] : level_bytes) sum += bytes;
+    for (const auto& [level, bytes] : level_bytes) {
+      if (!bytes) return std::nullopt;
+      sum += *bytes;
+    }
     return sum;
   }
 };
 
-std::vector<IndexFacts> indexes_of(const StoreReader& store) {
+std::vector<IndexFacts> indexes_of(const StoreReader& store, bool stats) {
   std::map<std::string, IndexFacts> kinds;
   for (int level = 0; level < static_cast<int>(store.info().levels.size()); ++level)
     for (const std::string& kind : stored_index_kinds(store.info().additions, level)) {
@@ -72,40 +77,66 @@ std::vector<IndexFacts> indexes_of(const StoreReader& store) {
       IndexFacts& facts = kinds[kind];
       if (facts.level_bytes.empty()) facts.leaf = index.layout().leaf;
       facts.kind = kind;
-      facts.level_bytes[level] = index_bytes(index);
+      facts.level_bytes[level] = stats ? std::optional(index_bytes(index)) : std::nullopt;
     }
   std::vector<IndexFacts> list;
   for (auto& [kind, facts] : kinds) list.push_back(std::move(facts));
   return list;
 }
 
-/// All that `info` reports, gathered before anything is written.
+/// All that `info` reports, gathered before anything is written. What takes longer the larger the
+/// store is comes only with --stats.
 struct StoreFacts {
-  std::uint64_t bytes = 0, raw_bytes = 0;
+  bool stats = false;
+  std::optional<std::uint64_t> bytes;
+  std::uint64_t raw_bytes = 0;
   std::vector<std::optional<std::uint64_t>> stored;  ///< bricks, a level
-  ValueRange<double> range;
+  bool has_ranges = false;
+  std::optional<ValueRange<double>> range;
   std::optional<Histogram> histogram;
   std::string no_histogram;  ///< why there is none
-  bool has_ranges = false;
   std::vector<IndexFacts> indexes;
 
-  double ratio() const { return static_cast<double>(raw_bytes) / static_cast<double>(bytes); }
+  std::optional<double> ratio() const {
+    if (!bytes) return std::nullopt;
+    return static_cast<double>(raw_bytes) / static_cast<double>(*bytes);
+  }
 };
 
-StoreFacts gather(const StoreReader& store, std::uint64_t memory, Progress& progress) {
-  const StoreInfo& info = store.info();
-  const Lattice& finest = info.levels.front().lattice;
-  StoreFacts facts;
-  facts.bytes = directory_bytes(info.path);
-  facts.raw_bytes = static_cast<std::uint64_t>(volume(finest.extent)) * finest.sample_bytes();
-  for (int level = 0; level < static_cast<int>(info.levels.size()); ++level)
-    facts.stored.push_back(stored_bricks(store, level));
-  facts.has_ranges = store.has_ranges(0);
+/// Of a store that keeps no histogram.
+void read_values(const StoreReader& store, std::uint64_t memory, Progress& progress,
+                 StoreFacts& facts) {
   if (facts.has_ranges) facts.range = value_range(store, 0);
   facts.no_histogram = why_no_histogram(store, memory);
   if (facts.no_histogram.empty()) facts.histogram = histogram(store, progress);
-  facts.indexes = indexes_of(store);
+}
+
+StoreFacts gather(const StoreReader& store, bool stats, std::uint64_t memory, Progress& progress) {
+  const StoreInfo& info = store.info();
+  const Lattice& finest = info.levels.front().lattice;
+  StoreFacts facts;
+  facts.stats = stats;
+  facts.raw_bytes = static_cast<std::uint64_t>(volume(finest.extent)) * finest.sample_bytes();
+  facts.stored.resize(info.levels.size());
+  facts.has_ranges = store.has_ranges(0);
+  facts.indexes = indexes_of(store, stats);
+  if (stats) {
+    facts.bytes = directory_bytes(info.path);
+    for (std::size_t i = 0; i < facts.stored.size(); ++i)
+      facts.stored[i] = stored_bricks(store, static_cast<int>(i));
+  }
+  if (const auto stored = stored_histogram(store)) {
+    facts.range = {stored->lo, stored->hi};
+    facts.histogram = rebin(*stored, kBins);
+  } else if (stats) {
+    read_values(store, memory, progress, facts);
+  }
   return facts;
+}
+
+template <class T>
+ordered_json json_or_null(const std::optional<T>& value) {
+  return value ? ordered_json(*value) : ordered_json(nullptr);
 }
 
 ordered_json levels_json(const StoreInfo& info, const StoreFacts& facts) {
@@ -117,8 +148,7 @@ ordered_json levels_json(const StoreInfo& info, const StoreFacts& facts) {
                       {"brick", to_json(level.lattice.brick)},
                       {"shard", to_json(level.shard)},
                       {"bricks", volume(level.lattice.bricks())},
-                      {"bricks_stored",
-                       facts.stored[i] ? ordered_json(*facts.stored[i]) : ordered_json(nullptr)}});
+                      {"bricks_stored", json_or_null(facts.stored[i])}});
   }
   return levels;
 }
@@ -134,10 +164,10 @@ ordered_json indexes_json(const StoreFacts& facts) {
   for (const IndexFacts& index : facts.indexes) {
     ordered_json levels = ordered_json::array();
     for (const auto& [level, bytes] : index.level_bytes)
-      levels.push_back({{"level", level}, {"bytes", bytes}});
+      levels.push_back({{"level", level}, {"bytes", json_or_null(bytes)}});
     indexes.push_back({{"kind", index.kind},
                        {"leaf", index.leaf},
-                       {"bytes", index.bytes()},
+                       {"bytes", json_or_null(index.bytes())},
                        {"levels", std::move(levels)}});
   }
   return indexes;
@@ -159,16 +189,17 @@ ordered_json json_of(const StoreInfo& info, const StoreFacts& facts) {
       {"grid_class", info.grid_class},
       {"grid_name", info.grid_name},
       {"levels", levels_json(info, facts)},
-      {"bytes", facts.bytes},
+      {"bytes", json_or_null(facts.bytes)},
       {"raw_bytes", facts.raw_bytes},
-      {"ratio", facts.ratio()},
+      {"ratio", json_or_null(facts.ratio())},
       {"value_range", nullptr},
       {"histogram", facts.histogram ? histogram_json(*facts.histogram) : ordered_json(nullptr)},
       {"peak_resident_bytes", peak_resident_bytes()},
       {"index_kinds", ordered_json::array()},
       {"indexes", indexes_json(facts)}};
   for (const IndexFacts& index : facts.indexes) object["index_kinds"].push_back(index.kind);
-  if (!facts.range.empty()) object["value_range"] = {facts.range.lo, facts.range.hi};
+  if (facts.range && !facts.range->empty())
+    object["value_range"] = {facts.range->lo, facts.range->hi};
   return object;
 }
 
@@ -178,10 +209,13 @@ std::string levels_text(const StoreInfo& info, const StoreFacts& facts) {
     const Lattice& lattice = info.levels[i].lattice;
     const auto bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
     const auto stored = facts.stored[i];
-    text += fmt::format("level {:<6} {}; bricks of {}: {}, {}\n", i, human_extent(lattice.extent),
-                        human_extent(lattice.brick), human_count(bricks),
-                        stored ? human_count(bricks - *stored) + " absent"
-                               : "too many to look for the absent ones");
+    text += fmt::format("level {:<6} {}; bricks of {}: {}", i, human_extent(lattice.extent),
+                        human_extent(lattice.brick), human_count(bricks));
+    if (stored)
+      text += fmt::format(", {} absent", human_count(bricks - *stored));
+    else if (facts.stats)
+      text += ", too many to look for the absent ones";
+    text += '\n';
   }
   return text;
 }
@@ -192,15 +226,35 @@ std::string indexes_text(const StoreFacts& facts) {
   for (const IndexFacts& index : facts.indexes) {
     std::vector<std::string> levels;
     for (const auto& [level, bytes] : index.level_bytes)
-      levels.push_back(fmt::format("level {} {}", level, human_bytes(bytes)));
+      if (bytes) levels.push_back(fmt::format("level {} {}", level, human_bytes(*bytes)));
     text +=
-        fmt::format("{:<13}{}, leaf {}: {} ({})\n", text.empty() ? "index kinds" : "", index.kind,
-                    index.leaf, human_bytes(index.bytes()), fmt::join(levels, ", "));
+        fmt::format("{:<13}{}, leaf {}", text.empty() ? "index kinds" : "", index.kind, index.leaf);
+    if (const auto bytes = index.bytes())
+      text += fmt::format(": {} ({})", human_bytes(*bytes), fmt::join(levels, ", "));
+    text += '\n';
   }
   return text;
 }
 
+std::string bytes_text(const StoreFacts& facts) {
+  if (!facts.bytes)
+    return fmt::format("bytes        with --stats, for {} of samples\n",
+                       human_bytes(facts.raw_bytes));
+  return fmt::format("bytes        {} for {} of samples ({:.2f} to 1)\n", human_bytes(*facts.bytes),
+                     human_bytes(facts.raw_bytes), *facts.ratio());
+}
+
+std::string range_text(const StoreInfo& info, const StoreFacts& facts) {
+  if (!facts.histogram && !facts.has_ranges)
+    return fmt::format("value range  unknown; run: {}\n", index_command(info));
+  if (!facts.range) return "value range  with --stats\n";
+  if (facts.range->empty()) return "value range  none\n";
+  return fmt::format("value range  {} to {}\n", sample_text(facts.range->lo, info.type),
+                     sample_text(facts.range->hi, info.type));
+}
+
 std::string histogram_text(const StoreInfo& info, const StoreFacts& facts) {
+  if (!facts.histogram && !facts.stats) return "histogram    with --stats\n";
   if (!facts.histogram) return fmt::format("histogram    none: {}\n", facts.no_histogram);
   const Histogram& h = *facts.histogram;
   std::string text = fmt::format("histogram    of level {}, square-root scale\n{}", h.level,
@@ -227,14 +281,7 @@ std::string text_of(const StoreInfo& info, const StoreFacts& facts) {
   if (!info.grid_class.empty()) text += fmt::format("grid class   {}\n", info.grid_class);
   text += levels_text(info, facts);
   text += fmt::format("codec        {}\n", info.codec);
-  text += fmt::format("bytes        {} for {} of samples ({:.2f} to 1)\n", human_bytes(facts.bytes),
-                      human_bytes(facts.raw_bytes), facts.ratio());
-  text += !facts.has_ranges ? fmt::format("value range  unknown; run: {}\n", index_command(info))
-          : facts.range.empty()
-              ? std::string("value range  none\n")
-              : fmt::format("value range  {} to {}\n", sample_text(facts.range.lo, info.type),
-                            sample_text(facts.range.hi, info.type));
-  text += indexes_text(facts);
+  text += bytes_text(facts) + range_text(info, facts) + indexes_text(facts);
   return text + histogram_text(info, facts);
 }
 
@@ -244,6 +291,7 @@ void add_info(Program& program) {
   struct Arguments {
     std::string path;
     Selection selection;
+    bool stats = false;
     std::uint64_t memory = std::uint64_t{1} << 30;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -253,13 +301,17 @@ void add_info(Program& program) {
       "isobrick info head.zarr");
   add_path(app, "STORE", arguments->path, "Store to look at, or another program's Zarr");
   add_selection(app, arguments->selection);
+  add_flag(app, "--stats", arguments->stats,
+           "Also what takes longer the larger the store is: bytes, absent bricks, and the "
+           "values of a store that keeps no histogram");
   add_memory(app, arguments->memory);
   program.commands.push_back(
       {app, [arguments](Console& console) {
          check_store(arguments->path);
          if (list_volumes(arguments->path, arguments->selection, console)) return 0;
          const StoreReader store = open_store(arguments->path, arguments->selection);
-         const StoreFacts facts = gather(store, arguments->memory, console.progress());
+         const StoreFacts facts =
+             gather(store, arguments->stats, arguments->memory, console.progress());
          console.result(json_of(store.info(), facts), text_of(store.info(), facts));
          return 0;
        }});

@@ -52,7 +52,7 @@ TEST_F(IndexCommand, AddsKindsThatExtractUsesAndInfoShows) {
       {"extract", store, "--isovalue", "127.5", "-o", path("n.ply"), "--force"})["surfaces"][0];
   EXPECT_EQ(automatic["index"]["used"], "kdtree") << "the only one with leaf 16";
   ASSERT_EQ(run({"index", store, "--kind", "kdtree", "--leaf", "4", "--force"}).exit_code, 0);
-  const nlohmann::json info = run_json({"info", store});
+  const nlohmann::json info = run_json({"info", store, "--stats"});
   EXPECT_EQ(info["index_kinds"], nlohmann::json({"interval", "kdtree", "octree", "quadtree"}));
   ASSERT_EQ(info["indexes"].size(), 4u);
   EXPECT_EQ(info["indexes"][2]["kind"], "octree");

@@ -49,6 +49,33 @@ TEST_F(OutputMode, InfoShowsTheStore) {
   EXPECT_EQ(json["levels"][0]["bricks"], 27);
 }
 
+// What takes longer the larger the store is comes only where it is requested.
+TEST_F(OutputMode, InfoReadsNoMoreThanMetadataAndTheHistogram) {
+  const std::string store = make_store("a", {"--index", "octree"});
+  const nlohmann::json all = run_json({"info", store, "--stats"});
+  EXPECT_GT(all["bytes"], 0);
+  EXPECT_GT(all["ratio"], 0);
+  EXPECT_EQ(all["levels"][0]["bricks_stored"], 27);
+  EXPECT_GT(all["indexes"][0]["bytes"], 0);
+  EXPECT_NE(run({"info", store, "--stats"}).out.find("0 absent"), std::string::npos);
+  // Neither bricks nor ranges are looked at.
+  for (const char* part : {"0", "isobrick/0/range/c", "isobrick/0/block_range/c"})
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(store + "/" + part))
+      if (entry.is_regular_file() && entry.path().filename() != "zarr.json")
+        write_file(entry.path(), "");
+  const nlohmann::json json = run_json({"info", store});
+  for (const char* key : {"bytes", "ratio"}) EXPECT_EQ(json[key], nullptr) << key;
+  EXPECT_EQ(json["levels"][0]["bricks_stored"], nullptr);
+  EXPECT_EQ(json["indexes"][0]["bytes"], nullptr);
+  EXPECT_EQ(json["indexes"][0]["levels"][0]["bytes"], nullptr);
+  for (const char* key : {"value_range", "histogram", "index_kinds", "raw_bytes"})
+    EXPECT_EQ(json[key], all[key]) << key;
+  const std::string text = run({"info", store}).out;
+  for (const char* part :
+       {"bytes        with --stats", "value range  1 to 254", "█", "octree, leaf"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+}
+
 TEST_F(OutputMode, InfoOfOddVolumes) {
   const float special[] = {std::numeric_limits<float>::quiet_NaN(),
                            std::numeric_limits<float>::infinity(), 1, 2};

@@ -109,10 +109,10 @@ TEST_F(VerifyCommand, StaysWithinItsBudget) {
 TEST_F(VerifyCommand, AHugeChunkIsNotTakenIntoMemory) {
   const std::string array = write_array("huge", 1290, 1290);
   expect_refused(run({"verify", array, "--memory", "1G"}), 2, {"1290 × 1290 × 1290", "at least"});
-  const json info = run_json({"info", array, "--memory", "1G"});
+  const json info = run_json({"info", array, "--stats", "--memory", "1G"});
   EXPECT_EQ(info["histogram"], nullptr);
   EXPECT_LE(info["peak_resident_bytes"].get<std::uint64_t>(), 64 * kMiB);
-  EXPECT_NE(run({"info", array}).out.find("histogram    none: a chunk of level 0 takes"),
+  EXPECT_NE(run({"info", array, "--stats"}).out.find("histogram    none: a chunk of level 0 takes"),
             std::string::npos);
 }
 
@@ -120,11 +120,13 @@ TEST_F(VerifyCommand, TooManyChunksAreNotLookedFor) {
   const std::string array = write_array("tiny", 1000, 1);
   expect_not_whole(array, "of its 1000000000 chunk files at most");
   expect_not_whole(write_array("many", 2064, 16), "of its 2146689 chunk files at most 2097152");
-  const json info = run_json({"info", array});
+  const json info = run_json({"info", array, "--stats"});
   EXPECT_EQ(info["histogram"], nullptr);
   EXPECT_EQ(info["levels"][0]["bricks_stored"], nullptr);
   EXPECT_LE(info["peak_resident_bytes"].get<std::uint64_t>(), 64 * kMiB);
-  EXPECT_NE(run({"info", array}).out.find("too many to look for"), std::string::npos);
+  EXPECT_NE(run({"info", array, "--stats"}).out.find("too many to look for"), std::string::npos);
+  // Without samples there is nothing to look for.
+  EXPECT_NE(run({"info", array}).out.find("histogram    with --stats"), std::string::npos);
 }
 
 }  // namespace

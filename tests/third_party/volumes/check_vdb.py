@@ -157,7 +157,7 @@ def there_and_back(state):
         if done.returncode != 0:
             state.failures.append(f"{' '.join(map(str, words))}: {done.stderr}")
             return
-    info = {name: json.loads(state.run("info", paths[f"{name}.zarr"], "--json").stdout)
+    info = {name: json.loads(state.run("info", paths[f"{name}.zarr"], "--stats", "--json").stdout)
             for name in "abc"}
     for level in range(len(info["b"]["levels"])):
         contents = []
