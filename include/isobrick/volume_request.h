@@ -8,6 +8,8 @@
 #include <string_view>
 
 #include <isobrick/array_view.h>
+#include <isobrick/transform.h>
+#include <isobrick/vec.h>
 #include <isobrick/volume_source.h>
 
 namespace isobrick {
@@ -24,6 +26,20 @@ struct RegionRequest {
   std::array<std::optional<Index>, 3> hi;  ///< behind the last sample along x, y, z
 };
 
+/// A box of world space that is not empty.
+struct WorldRegion {
+  Vec3d lo;  ///< the lower corner
+  Vec3d hi;  ///< the upper corner
+};
+
+/// The samples of a volume of so many that are requested. Throws UsageError for a region that is
+/// empty or leaves the volume.
+Box3 resolve_region(const RegionRequest& region, Int3 extent);
+
+/// The smallest box of samples that covers what a volume has of `region`; in a volume whose axes
+/// are turned, the box around the region. Throws UsageError where they do not touch.
+Box3 covering_samples(const WorldRegion& region, const Transform& transform, Int3 extent);
+
 /// What the caller specifies about a volume. The first four members are for raw files, where
 /// they override a header beside the file and the file's name. The others
 /// are for all formats and override the file.
@@ -37,7 +53,13 @@ struct VolumeRequest {
   std::optional<std::string> unit;      ///< as Transform::unit
   Selection selection;                  ///< of a file with several volumes
   std::optional<std::string> grid;      ///< of an OpenVDB file
-  std::optional<RegionRequest> region;  ///< of a sparse grid, in its own index coordinates
+  std::optional<RegionRequest> bounds;  ///< of a sparse grid, in its own index coordinates
+  std::optional<RegionRequest> roi;     ///< only these samples
+  std::optional<WorldRegion> region;  ///< only these; in world space, with what changes it applied
+  Int3 stride{1, 1, 1};               ///< of those the first of so many along x, y, z
+  /// Samples of this value are missing and become NaN, so that no surface touches them. Integers
+  /// become f32, those of 32 bits f64.
+  std::optional<double> nodata;
   /// Bytes that a source may take for itself: one that holds its samples in
   /// memory refuses when it needs more; nothing: as many as it likes.
   std::optional<std::uint64_t> memory;
@@ -54,7 +76,7 @@ VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type
 void refuse_raw_description(const std::string& path, std::string_view format,
                             const VolumeRequest& request);
 
-/// Throws UsageError for a grid or a region of grids where there are none.
+/// Throws UsageError for a grid or bounds of grids where there are none.
 void refuse_grid(const std::string& path, const VolumeRequest& request);
 
 /// Throws UsageError for a channel or a time that a file with one of each lacks.

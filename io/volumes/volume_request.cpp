@@ -2,15 +2,20 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <isobrick/error.h>
 #include <isobrick/lattice.h>
 #include "core/length_unit.h"
+#include "core/vectors.h"
 
 namespace isobrick {
 namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void check_geometry(const VolumeInfo& info) {
   const Int3 e = info.extent;
@@ -68,9 +73,58 @@ void refuse_raw_description(const std::string& path, std::string_view format,
 }
 
 void refuse_grid(const std::string& path, const VolumeRequest& request) {
-  if (request.grid || request.region)
+  if (request.grid || request.bounds)
     throw UsageError(fmt::format("'{}' is no OpenVDB file: leave {} out", path,
-                                 request.grid ? "--grid" : "--roi"));
+                                 request.grid ? "--grid" : "--bounds"));
+}
+
+Box3 resolve_region(const RegionRequest& region, Int3 extent) {
+  Box3 box{{0, 0, 0}, extent};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    box.lo[axis] = region.lo[i].value_or(0);
+    box.hi[axis] = region.hi[i].value_or(extent[axis]);
+    if (box.lo[axis] < 0 || box.lo[axis] >= box.hi[axis] || box.hi[axis] > extent[axis])
+      throw UsageError(
+          fmt::format("the region {}:{} along {} is empty or leaves the volume, which "
+                      "has samples 0:{} there",
+                      box.lo[axis], box.hi[axis], "xyz"[axis], extent[axis]));
+  }
+  return box;
+}
+
+Box3 covering_samples(const WorldRegion& region, const Transform& transform, Int3 extent) {
+  // A bound at a sample means that sample, however it was rounded.
+  constexpr double rounding = 1e-6;
+  Vec3d lo{kInfinity, kInfinity, kInfinity}, hi = lo * -1.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3d p{(corner & 1 ? region.hi : region.lo).x, (corner & 2 ? region.hi : region.lo).y,
+                  (corner & 4 ? region.hi : region.lo).z};
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3d step = transform.step(axis);
+      const double at = dot(p - transform.origin, step) / dot(step, step);
+      lo[axis] = std::min(lo[axis], at);
+      hi[axis] = std::max(hi[axis], at);
+    }
+  }
+  Box3 box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto last = static_cast<double>(extent[axis] - 1);
+    if (!(lo[axis] <= last && hi[axis] >= 0)) {
+      const Vec3d end = transform.apply({static_cast<double>(extent.x - 1),
+                                         static_cast<double>(extent.y - 1),
+                                         static_cast<double>(extent.z - 1)}),
+                  from = transform.origin;
+      throw UsageError(fmt::format(
+          "the region {}:{},{}:{},{}:{} does not touch the volume, which reaches from ({}, {}, {}) "
+          "to ({}, {}, {}) in world space",
+          region.lo.x, region.hi.x, region.lo.y, region.hi.y, region.lo.z, region.hi.z, from.x,
+          from.y, from.z, end.x, end.y, end.z));
+    }
+    box.lo[axis] = static_cast<Index>(std::floor(std::clamp(lo[axis] + rounding, 0.0, last)));
+    box.hi[axis] = static_cast<Index>(std::ceil(std::clamp(hi[axis] - rounding, 0.0, last))) + 1;
+  }
+  return box;
 }
 
 void refuse_selection(const std::string& path, const VolumeRequest& request) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <isobrick/store_reader.h>
+#include "io/volumes/selected_source.h"
 #include "pipeline/slab_reader.h"
 
 namespace isobrick {
@@ -49,7 +50,7 @@ class StoreSource final : public VolumeSource {
 std::unique_ptr<VolumeSource> open_store_source(const std::string& path,
                                                 const VolumeRequest& request, int threads) {
   refuse_raw_description(path, "Zarr", request);
-  return std::make_unique<StoreSource>(path, request, threads);
+  return select_samples(std::make_unique<StoreSource>(path, request, threads), request);
 }
 
 }  // namespace isobrick

@@ -10,6 +10,7 @@
 #include "io/volumes/open/volume_format.h"
 #include "io/volumes/raw/nifti_volume.h"
 #include "io/volumes/raw/raw_volume.h"
+#include "io/volumes/selected_source.h"
 #include "io/volumes/vtk/legacy_vtk.h"
 
 namespace isobrick {
@@ -39,9 +40,8 @@ std::unique_ptr<VolumeSource> open_file(VolumeFormat format, const std::string& 
   }
 }
 
-}  // namespace
-
-std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeRequest& request) {
+/// As the file describes it.
+std::unique_ptr<VolumeSource> open_whole(const std::string& path, const VolumeRequest& request) {
   std::error_code ignored;
   const bool folder = std::filesystem::is_directory(path, ignored);
   if (path == "-" || folder) {
@@ -70,6 +70,12 @@ std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeR
   if (!inner.empty())
     throw UsageError(fmt::format("'{}' holds no arrays with names: leave ':/{}' out", file, inner));
   return open_file(format, file, request);
+}
+
+}  // namespace
+
+std::unique_ptr<VolumeSource> open_source(const std::string& path, const VolumeRequest& request) {
+  return select_samples(open_whole(path, request), request);
 }
 
 }  // namespace isobrick

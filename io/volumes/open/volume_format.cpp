@@ -1,5 +1,6 @@
 #include "io/volumes/open/volume_format.h"
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -85,6 +86,13 @@ VolumeFormat format_of_extension(const std::string& path) {
   for (const auto& [known, format] : extensions)
     if (extension == known) return format;
   return VolumeFormat::raw;
+}
+
+std::string_view name_of(VolumeFormat format) {
+  constexpr std::array<std::string_view, 11> names{"raw",     "NRRD",       "MetaImage", "NIfTI",
+                                                   "VTK XML", "legacy VTK", "TIFF",      "HDF5",
+                                                   "DICOM",   "OpenVDB",    "NanoVDB"};
+  return names[static_cast<std::size_t>(format)];
 }
 
 VolumeFormat recognise_format(const std::string& path) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace isobrick {
 
@@ -18,6 +19,9 @@ enum class VolumeFormat : std::uint8_t {
   vdb,      ///< OpenVDB
   nanovdb,  ///< recognised to be refused
 };
+
+/// The format's name for people: "NRRD".
+std::string_view name_of(VolumeFormat format);
 
 /// The format of a file: by its first bytes, else by its extension. Throws Error
 /// when it cannot be read, UsageError when it is no regular file.

@@ -93,24 +93,24 @@ Transform transform_of(const std::string& path, const openvdb::math::Transform& 
 }
 
 /// Where to cut the grid, in its own coordinates.
-Box3 region_of(const VdbGrid& grid, const std::string& path, const openvdb::GridBase& read,
-               const std::optional<RegionRequest>& region) {
+Box3 bounds_of(const VdbGrid& grid, const std::string& path, const openvdb::GridBase& read,
+               const std::optional<RegionRequest>& bounds) {
   Box3 box;
   const openvdb::CoordBBox active = read.evalActiveVoxelBoundingBox();
   const bool none = active.empty();
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    const auto lo = region ? region->lo[i] : std::nullopt,
-               hi = region ? region->hi[i] : std::nullopt;
+    const auto lo = bounds ? bounds->lo[i] : std::nullopt,
+               hi = bounds ? bounds->hi[i] : std::nullopt;
     if (none && (!lo || !hi))
       throw UsageError(fmt::format(
-          "'{}': grid '{}' has no active voxels: choose its part with --roi", path, grid.name));
+          "'{}': grid '{}' has no active voxels: choose its part with --bounds", path, grid.name));
     box.lo[axis] = lo.value_or(active.min()[static_cast<std::size_t>(axis)]);
     box.hi[axis] = hi.value_or(Index{active.max()[static_cast<std::size_t>(axis)]} + 1);
     if (box.lo[axis] < std::numeric_limits<int>::min() ||
         box.hi[axis] > Index{std::numeric_limits<int>::max()} + 1 || box.lo[axis] >= box.hi[axis])
       throw UsageError(
-          fmt::format("'{}': the region {}:{} along {} is empty or leaves the "
+          fmt::format("'{}': the bounds {}:{} along {} are empty or leave the "
                       "coordinates of a grid",
                       path, box.lo[axis], box.hi[axis], "xyz"[axis]));
   }
@@ -144,7 +144,7 @@ template <class Out, class Tree, class Leaves>
 std::unique_ptr<VolumeSource> make_source(const GridRequest& in, typename Tree::ConstPtr tree,
                                           std::shared_ptr<const Leaves> leaves,
                                           std::size_t memory) {
-  const Box3 box = region_of(in.grid, in.path, *in.read, in.request.region);
+  const Box3 box = bounds_of(in.grid, in.path, *in.read, in.request.bounds);
   Transform transform = transform_of(in.path, in.read->transform(), box.lo);
   if (!in.grid.unit.empty()) transform.unit = in.grid.unit;
   VolumeInfo info =

@@ -1,0 +1,140 @@
+#include "io/volumes/selected_source.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <numeric>
+#include <vector>
+
+#include <isobrick/error.h>
+#include <isobrick/lattice.h>
+#include "tests/pipeline/convert_doubles.h"
+
+namespace isobrick::test {
+namespace {
+
+constexpr Int3 kExtent{11, 7, 9};
+
+/// Sample (x, y, z) has its place in the array for its value.
+std::unique_ptr<MemorySource> numbered(bool random_access) {
+  std::vector<std::uint16_t> values(static_cast<std::size_t>(volume(kExtent)));
+  std::iota(values.begin(), values.end(), std::uint16_t{0});
+  std::vector<std::byte> bytes(values.size() * 2);
+  std::memcpy(bytes.data(), values.data(), bytes.size());
+  auto source =
+      std::make_unique<MemorySource>(kExtent, ScalarType::u16, std::move(bytes), random_access);
+  source->mutable_info().transform.spacing = {0.5, 2, 1};
+  source->mutable_info().transform.origin = {10, 20, 30};
+  return source;
+}
+
+/// All samples, read in pieces of `planes`.
+template <class T>
+std::vector<T> read_all(VolumeSource& source, Index planes) {
+  const Int3 e = source.info().extent;
+  std::vector<T> values(static_cast<std::size_t>(volume(e)));
+  for (Index z = 0; z < e.z; z += planes)
+    source.read({{0, 0, z}, {e.x, e.y, std::min(e.z, z + planes)}},
+                reinterpret_cast<std::byte*>(values.data() + z * e.y * e.x));
+  return values;
+}
+
+TEST(SelectedSource, BoxesAndStridesOfRandomAccessAndOfStreams) {
+  for (const bool random_access : {true, false})
+    for (const Int3 stride : {Int3{1, 1, 1}, Int3{2, 1, 3}, Int3{4, 4, 4}, Int3{20, 20, 20}})
+      for (const Box3 box :
+           {Box3{{0, 0, 0}, kExtent}, Box3{{3, 2, 4}, {10, 7, 8}}, Box3{{0, 0, 8}, {11, 7, 9}}})
+        for (const Index planes : {1, 2, 9}) {
+          VolumeRequest request;
+          request.roi.emplace();
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            request.roi->lo[axis] = box.lo[static_cast<int>(axis)];
+            request.roi->hi[axis] = box.hi[static_cast<int>(axis)];
+          }
+          request.stride = stride;
+          const auto source = select_samples(numbered(random_access), request);
+          const VolumeInfo& info = source->info();
+          ASSERT_EQ(info.extent, ceil_div(box.extent(), stride));
+          EXPECT_EQ(source->random_access(), random_access);
+          std::vector<std::uint16_t> expected;
+          for (Index z = box.lo.z; z < box.hi.z; z += stride.z)
+            for (Index y = box.lo.y; y < box.hi.y; y += stride.y)
+              for (Index x = box.lo.x; x < box.hi.x; x += stride.x)
+                expected.push_back(static_cast<std::uint16_t>(linear_index({x, y, z}, kExtent)));
+          EXPECT_EQ(read_all<std::uint16_t>(*source, planes), expected);
+          // A sample stays where it was in the world.
+          const Vec3d origin{10 + 0.5 * static_cast<double>(box.lo.x),
+                             20 + 2.0 * static_cast<double>(box.lo.y),
+                             30 + static_cast<double>(box.lo.z)};
+          EXPECT_EQ(info.transform.origin, origin);
+          EXPECT_EQ(info.transform.spacing.x, 0.5 * static_cast<double>(stride.x));
+        }
+}
+
+TEST(SelectedSource, ABoxInsideIsReadAsThatBox) {
+  VolumeRequest request;
+  request.stride = {3, 2, 2};
+  const auto source = select_samples(numbered(true), request);
+  std::vector<std::uint16_t> values(4);
+  source->read({{1, 1, 2}, {3, 3, 3}}, reinterpret_cast<std::byte*>(values.data()));
+  EXPECT_EQ(values, (std::vector<std::uint16_t>{
+                        static_cast<std::uint16_t>(linear_index({3, 2, 4}, kExtent)),
+                        static_cast<std::uint16_t>(linear_index({6, 2, 4}, kExtent)),
+                        static_cast<std::uint16_t>(linear_index({3, 4, 4}, kExtent)),
+                        static_cast<std::uint16_t>(linear_index({6, 4, 4}, kExtent))}));
+}
+
+TEST(SelectedSource, ARegionOfTheWorldIsCovered) {
+  VolumeRequest request;
+  // Between samples 2 and 6 in x, at samples 1 and 3 in y, beyond the volume in z.
+  request.region = WorldRegion{{11.2, 22, -100}, {12.7, 26, 33.5}};
+  const auto source = select_samples(numbered(true), request);
+  EXPECT_EQ(source->info().extent, (Int3{5, 3, 5}));
+  EXPECT_EQ(source->info().transform.origin, (Vec3d{11, 22, 30}));
+  request.region = WorldRegion{{0, 0, 0}, {1, 1, 1}};
+  EXPECT_THROW(select_samples(numbered(true), request), UsageError);
+  request.stride = {0, 1, 1};
+  request.region.reset();
+  EXPECT_THROW(select_samples(numbered(true), request), UsageError);
+}
+
+TEST(SelectedSource, ARegionOfTurnedAxesIsInTheBoxAroundIt) {
+  Transform turned;
+  turned.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};  // x points to y, y to -x
+  EXPECT_EQ(covering_samples({{-3, 1, 0}, {-2, 5, 4}}, turned, {10, 10, 10}),
+            (Box3{{1, 2, 0}, {6, 4, 5}}));
+}
+
+TEST(SelectedSource, MissingSamplesBecomeNaN) {
+  for (const bool random_access : {true, false}) {
+    VolumeRequest request;
+    request.nodata = 17;
+    const auto source = select_samples(numbered(random_access), request);
+    ASSERT_EQ(source->info().type, ScalarType::f32);
+    const auto values = read_all<float>(*source, 2);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (i == 17)
+        EXPECT_TRUE(std::isnan(values[i]));
+      else
+        EXPECT_EQ(values[i], static_cast<float>(i));
+  }
+}
+
+TEST(SelectedSource, AMissingFillValueIsNaN) {
+  auto source = numbered(true);
+  source->mutable_info().fill_value = 5;
+  VolumeRequest request;
+  request.nodata = 5;
+  EXPECT_TRUE(std::isnan(select_samples(std::move(source), request)->info().fill_value));
+}
+
+TEST(SelectedSource, WhatSelectsAllIsTheSourceItself) {
+  auto source = numbered(true);
+  const VolumeSource* before = source.get();
+  EXPECT_EQ(select_samples(std::move(source), {}).get(), before);
+}
+
+}  // namespace
+}  // namespace isobrick::test
