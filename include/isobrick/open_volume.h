@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <isobrick/progress.h>
+#include <isobrick/store_reader.h>
+#include <isobrick/volume_request.h>
+
+namespace isobrick {
+
+/// Where the stores of volumes that are no stores themselves are kept.
+struct CacheOptions {
+  /// Empty: nothing is kept; the store is in the folder of temporary files and goes with the
+  /// OpenedVolume.
+  std::filesystem::path folder;
+  /// Bytes of all stores in the folder. The ones that were used longest ago are removed first,
+  /// never one that a process has open.
+  std::uint64_t limit = std::uint64_t{20} << 30;
+};
+
+/// $XDG_CACHE_HOME/isobrick, else ~/.cache/isobrick; empty where neither is known.
+std::filesystem::path default_cache_folder();
+
+/// How a volume is opened.
+struct OpenOptions {
+  VolumeRequest volume;  ///< what is known of it, and which of its samples are requested
+  CacheOptions cache;
+  std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
+  int threads = 0;                                ///< 0: all cores
+};
+
+/// A volume that can be read as a store, whatever its format.
+class OpenedVolume {
+ public:
+  /// Opens a store in place where the request takes all of it as it is. Anything else (what
+  /// open_source() opens, or a store of which a part is requested) is converted, unless the cache
+  /// has its store: one with the same files, by name, size and time, and the same request. Waits
+  /// for another process that is converting the same. Throws what StoreReader, open_source() and
+  /// convert() do.
+  OpenedVolume(const std::string& path, const OpenOptions& options, Progress& progress);
+  ~OpenedVolume();
+  OpenedVolume(OpenedVolume&&) noexcept;
+
+  /// The store. Valid as long as this.
+  const StoreReader& store() const;
+  /// Whether it was converted just now.
+  bool converted() const;
+  /// Remarks for the user, a sentence each: where the store is kept, and those of the source.
+  const std::vector<std::string>& notes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,167 @@
+#include "pipeline/cache/cache_entry.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <fstream>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <isobrick/error.h>
+#include "core/file_error.h"
+#include "io/bytes/output_file.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A name that file systems take, of what the user calls the volume.
+std::string plain_name(const std::string& name) {
+  std::string plain = name.substr(0, 60);
+  std::replace_if(
+      plain.begin(), plain.end(),
+      [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '_' && c != '.'; },
+      '_');
+  return plain.empty() || plain.front() == '.' ? "volume" + plain : plain;
+}
+
+/// FNV-1a, 64 bits. Entries of one hash tell each other apart by their keys.
+std::uint64_t hash_of(std::string_view text) {
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  return hash;
+}
+
+fs::path lock_file(const fs::path& folder) { return folder / "lock"; }
+fs::path description_file(const fs::path& folder) { return folder / "entry.json"; }
+
+/// Opens the lock of an entry; nothing where the folder is not there.
+UniqueFd open_lock(const fs::path& folder) {
+  return UniqueFd(::open(lock_file(folder).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+}
+
+/// Whether the lock is still that of the folder: an entry may be removed before it is locked.
+bool is_current(const UniqueFd& lock, const fs::path& folder) {
+  struct stat opened {
+  }, named{};
+  return ::fstat(lock.get(), &opened) == 0 && ::stat(lock_file(folder).c_str(), &named) == 0 &&
+         opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure)
+    throw Error(
+        fmt::format("cannot make the folder '{}' of the cache ({}): choose another with "
+                    "--cache DIR, or --cache none",
+                    folder.string(), failure.message()));
+}
+
+/// The content of entry.json; an empty object where there is none.
+nlohmann::json description_of(const fs::path& folder) {
+  std::ifstream file(description_file(folder));
+  nlohmann::json object = nlohmann::json::parse(file, nullptr, false);
+  return object.is_object() ? object : nlohmann::json::object();
+}
+
+struct Candidate {
+  fs::path folder;
+  std::uint64_t bytes;
+  fs::file_time_type used;
+};
+
+std::vector<Candidate> candidates_in(const fs::path& cache) {
+  std::vector<Candidate> candidates;
+  std::error_code failure;
+  for (fs::directory_iterator entry(cache, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    std::error_code none;
+    const fs::path folder = entry->path();
+    if (!fs::exists(lock_file(folder), none)) continue;
+    const auto used = fs::last_write_time(lock_file(folder), none);
+    candidates.push_back({folder, description_of(folder).value("bytes", std::uint64_t{0}), used});
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.used < b.used; });
+  return candidates;
+}
+
+/// Whether the entry was removed; not where a process holds it.
+bool remove_entry(const fs::path& folder) {
+  const UniqueFd lock = open_lock(folder);
+  if (lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 || !is_current(lock, folder))
+    return false;
+  std::error_code failure;
+  // What says that the store is whole goes first, the lock last.
+  fs::remove(description_file(folder), failure);
+  for (const char* name : {"store.zarr", "store.zarr.partial"})
+    fs::remove_all(folder / name, failure);
+  fs::remove_all(folder, failure);
+  return !failure;
+}
+
+}  // namespace
+
+CacheEntry::CacheEntry(const fs::path& cache, const std::string& name, std::string key,
+                       Progress& progress)
+    : folder_(cache / fmt::format("{}-{:016x}", plain_name(name), hash_of(key))),
+      key_(std::move(key)) {
+  for (bool waits = false;;) {
+    make_folder(folder_);
+    lock_ = open_lock(folder_);
+    if (lock_.get() < 0) {
+      if (errno == ENOENT) continue;  // removed just now
+      throw system_error("open", lock_file(folder_), errno);
+    }
+    if (::flock(lock_.get(), LOCK_EX | LOCK_NB) == 0) {
+      if (is_current(lock_, folder_)) break;
+      continue;
+    }
+    // A reader of what is there needs no turn of its own.
+    if (::flock(lock_.get(), LOCK_SH | LOCK_NB) == 0 && is_current(lock_, folder_) && is_filled())
+      break;
+    if (!waits) progress.begin("wait for the cache", 0);
+    waits = true;
+    progress.advance(0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+bool CacheEntry::is_filled() const {
+  const nlohmann::json description = description_of(folder_);
+  std::error_code none;
+  return description.value("key", std::string()) == key_ && fs::is_directory(store(), none);
+}
+
+void CacheEntry::set_filled(std::uint64_t bytes) {
+  OutputFile file(description_file(folder_), true);
+  file.writer().append(nlohmann::json{{"key", key_}, {"bytes", bytes}}.dump());
+  file.publish();
+}
+
+void CacheEntry::share() {
+  static_cast<void>(::flock(lock_.get(), LOCK_SH));
+  static_cast<void>(::futimens(lock_.get(), nullptr));
+}
+
+void shrink_cache(const fs::path& cache, std::uint64_t limit) {
+  const std::vector<Candidate> candidates = candidates_in(cache);
+  std::uint64_t bytes = 0;
+  for (const Candidate& candidate : candidates) bytes += candidate.bytes;
+  for (const Candidate& candidate : candidates) {
+    if (bytes <= limit) return;
+    if (remove_entry(candidate.folder)) bytes -= candidate.bytes;
+  }
+}
+
+}  // namespace isobrick

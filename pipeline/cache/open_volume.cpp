@@ -1,0 +1,202 @@
+#include <isobrick/open_volume.h>
+
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <isobrick/convert.h>
+#include <isobrick/error.h>
+#include <isobrick/open_source.h>
+#include "bricks/zarr/metadata_files.h"
+#include "core/file_error.h"
+#include "pipeline/cache/cache_entry.h"
+#include "pipeline/convert/convert_staging.h"
+#include "pipeline/convert/store_source.h"
+
+namespace isobrick {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Changes when stores that were made of the same input would be others.
+constexpr int kKeyVersion = 1;
+
+/// Whether a store is read in place: its samples and their places stay as they are.
+bool takes_all(const VolumeRequest& request) {
+  return !request.spacing && !request.origin && !request.unit && !request.roi && !request.region &&
+         !request.nodata && request.stride == Int3{1, 1, 1};
+}
+
+/// A line of a key: the name of a file, its size and the time of its last change.
+std::string identity_of(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) throw system_error("look at", path, errno);
+  std::error_code none;
+  fs::path full = fs::weakly_canonical(path, none);
+  if (none) full = path;
+  return fmt::format("{} {} {}.{:09}\n", full.string(), status.st_size, status.st_mtim.tv_sec,
+                     status.st_mtim.tv_nsec);
+}
+
+std::string text_of(const RegionRequest& region) {
+  std::string text;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto bound = [](const std::optional<Index>& b) { return b ? std::to_string(*b) : ""; };
+    text += fmt::format("{}:{},", bound(region.lo[axis]), bound(region.hi[axis]));
+  }
+  return text;
+}
+
+std::string text_of(Vec3d v) { return fmt::format("{},{},{}", v.x, v.y, v.z); }
+
+/// What of a request decides on the samples and their places.
+std::string text_of(const VolumeRequest& r) {
+  std::string text;
+  const auto add = [&](const char* name, const auto& value, const auto& text_of_value) {
+    if (value) text += fmt::format("{} {}\n", name, text_of_value(*value));
+  };
+  const auto plain = [](const auto& v) { return fmt::format("{}", v); };
+  add("dims", r.extent, [](Int3 e) { return fmt::format("{},{},{}", e.x, e.y, e.z); });
+  add("type", r.type, [](ScalarType t) { return zarr_name(t); });
+  add("order", r.order, [](ByteOrder o) { return o == ByteOrder::big ? "big" : "little"; });
+  add("offset", r.offset, plain);
+  add("spacing", r.spacing, [](Vec3d v) { return text_of(v); });
+  add("origin", r.origin, [](Vec3d v) { return text_of(v); });
+  add("unit", r.unit, plain);
+  add("channel", r.selection.channel, plain);
+  add("time", r.selection.time, plain);
+  add("grid", r.grid, plain);
+  add("bounds", r.bounds, [](const RegionRequest& v) { return text_of(v); });
+  add("roi", r.roi, [](const RegionRequest& v) { return text_of(v); });
+  add("region", r.region, [](const WorldRegion& v) { return text_of(v.lo) + ":" + text_of(v.hi); });
+  add("nodata", r.nodata, plain);
+  return text + fmt::format("stride {},{},{}\n", r.stride.x, r.stride.y, r.stride.z);
+}
+
+/// What a store is made of.
+std::string key_of(const std::string& path, const VolumeInfo& info, const VolumeRequest& request) {
+  std::string key = fmt::format("{}\n{}", kKeyVersion, text_of(request));
+  if (is_zarr(path)) return key + identity_of(read_metadata_files(path).root) + identity_of(path);
+  for (const fs::path& file : info.files) key += identity_of(file);
+  return key;
+}
+
+/// A folder for one OpenedVolume.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "isobrick-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw system_error("make a folder in", name, errno);
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  fs::path store() const { return path_ / "store.zarr"; }
+
+ private:
+  fs::path path_;
+};
+
+std::string stem_of(const std::string& path) {
+  fs::path name = path;
+  while (!name.has_filename() && name.has_parent_path()) name = name.parent_path();
+  return name.stem().string();
+}
+
+}  // namespace
+
+fs::path default_cache_folder() {
+  const auto variable = [](const char* name) -> fs::path {
+    const char* value = std::getenv(name);
+    return value != nullptr ? value : "";
+  };
+  if (const fs::path cache = variable("XDG_CACHE_HOME"); cache.is_absolute())
+    return cache / "isobrick";
+  if (const fs::path home = variable("HOME"); home.is_absolute())
+    return home / ".cache" / "isobrick";
+  return {};
+}
+
+struct OpenedVolume::Impl {
+  std::vector<std::string> notes;
+  bool converted = false;
+  std::optional<TemporaryFolder> temporary;
+  std::optional<CacheEntry> entry;
+  std::optional<StoreReader> store;
+
+  Impl(const std::string& path, const OpenOptions& options, Progress& progress) {
+    VolumeRequest request = options.volume;
+    request.memory = options.memory;
+    request.threads = options.threads;
+    const bool zarr = is_zarr(path);
+    if (zarr) {
+      refuse_raw_description(path, "Zarr", request);
+      refuse_grid(path, request);
+    }
+    if (zarr && takes_all(request)) {
+      store.emplace(path, request.selection);
+      return;
+    }
+    const auto source =
+        zarr ? open_store_source(path, request, options.threads) : open_source(path, request);
+    if (options.cache.folder.empty() || source->info().files.empty())
+      fill_temporary(path, *source, options, progress);
+    else
+      fill_entry(path, *source, options, progress);
+  }
+
+  void fill_temporary(const std::string& path, VolumeSource& source, const OpenOptions& options,
+                      Progress& progress) {
+    temporary.emplace();
+    notes.push_back(fmt::format("'{}' is converted to a temporary store", path));
+    convert_to(temporary->store(), source, options, progress);
+    store.emplace(temporary->store());
+  }
+
+  void fill_entry(const std::string& path, VolumeSource& source, const OpenOptions& options,
+                  Progress& progress) {
+    const fs::path& cache = options.cache.folder;
+    entry.emplace(cache, stem_of(path), key_of(path, source.info(), options.volume), progress);
+    if (!entry->is_filled()) {
+      notes.push_back(
+          fmt::format("'{}' is converted to '{}' and kept there", path, entry->store().string()));
+      entry->set_filled(convert_to(entry->store(), source, options, progress).bytes_out);
+    }
+    entry->share();
+    shrink_cache(cache, options.cache.limit);
+    store.emplace(entry->store());
+  }
+
+  ConvertReport convert_to(const fs::path& out, VolumeSource& source, const OpenOptions& options,
+                           Progress& progress) {
+    std::error_code none;
+    ConvertOptions convert_options;
+    convert_options.memory = options.memory;
+    convert_options.threads = options.threads;
+    convert_options.force = true;  // what a change of the input has left
+    convert_options.resume = fs::exists(staging_path(out), none);
+    const ConvertReport report = convert(source, out, convert_options, progress);
+    converted = true;
+    for (std::string& note : source.notes()) notes.push_back(std::move(note));
+    return report;
+  }
+};
+
+OpenedVolume::OpenedVolume(const std::string& path, const OpenOptions& options, Progress& progress)
+    : impl_(std::make_unique<Impl>(path, options, progress)) {}
+OpenedVolume::~OpenedVolume() = default;
+OpenedVolume::OpenedVolume(OpenedVolume&&) noexcept = default;
+
+const StoreReader& OpenedVolume::store() const { return *impl_->store; }
+bool OpenedVolume::converted() const { return impl_->converted; }
+const std::vector<std::string>& OpenedVolume::notes() const { return impl_->notes; }
+
+}  // namespace isobrick

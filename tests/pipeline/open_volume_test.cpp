@@ -1,0 +1,173 @@
+#include <isobrick/open_volume.h>
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include <isobrick/convert.h>
+#include <isobrick/error.h>
+#include <isobrick/open_source.h>
+#include "tests/pipeline/convert_store.h"
+
+namespace isobrick::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class OpenVolume : public testing::Test {
+ protected:
+  /// A raw file of noise, whose name describes it.
+  std::string raw(const std::string& name, std::uint32_t seed = 1) {
+    const fs::path path = folder_ / (name + "_40x30x20_uint16.raw");
+    std::string bytes(40 * 30 * 20 * 2, '\0');
+    for (char& c : bytes) c = static_cast<char>((seed = seed * 1664525 + 1013904223) >> 24);
+    std::ofstream(path, std::ios::binary) << bytes;
+    return path.string();
+  }
+  OpenOptions options(std::uint64_t limit = 1 << 30) const {
+    OpenOptions options;
+    options.cache = {folder_ / "cache", limit};
+    options.threads = 2;
+    return options;
+  }
+  std::size_t entries() const {
+    std::size_t count = 0;
+    for (const auto& entry : fs::directory_iterator(folder_ / "cache"))
+      count += fs::exists(entry.path() / "entry.json") ? 1 : 0;
+    return count;
+  }
+
+  TemporaryFolder folder_;
+  NoProgress silent_;
+};
+
+TEST_F(OpenVolume, AFileIsConvertedOnceAsConvertDoes) {
+  const std::string file = raw("a");
+  {
+    const OpenedVolume first(file, options(), silent_);
+    EXPECT_TRUE(first.converted());
+    ASSERT_EQ(first.notes().size(), 1u);
+    EXPECT_NE(first.notes()[0].find("cache"), std::string::npos);
+    const auto source = open_source(file, {});
+    convert(*source, folder_ / "b.zarr", {.threads = 1}, silent_);
+    EXPECT_EQ(tree_of(first.store().info().path), tree_of(folder_ / "b.zarr"));
+  }
+  const OpenedVolume second(file, options(), silent_);
+  EXPECT_FALSE(second.converted());
+  EXPECT_TRUE(second.notes().empty());
+  EXPECT_EQ(second.store().info().levels[0].lattice.extent, (Int3{40, 30, 20}));
+  EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(OpenVolume, AnotherContentOrRequestIsAnotherStore) {
+  const std::string file = raw("a");
+  EXPECT_TRUE(OpenedVolume(file, options(), silent_).converted());
+  OpenOptions other = options();
+  other.volume.spacing = Vec3d{2, 2, 2};
+  EXPECT_TRUE(OpenedVolume(file, other, silent_).converted());
+  EXPECT_FALSE(OpenedVolume(file, other, silent_).converted());
+  raw("a", 7);
+  fs::last_write_time(file, fs::file_time_type::clock::now() + std::chrono::seconds(5));
+  const OpenedVolume changed(file, options(), silent_);
+  EXPECT_TRUE(changed.converted());
+  EXPECT_EQ(entries(), 3u);
+}
+
+TEST_F(OpenVolume, AStoreIsReadWhereItIsUnlessAPartIsRequested) {
+  const auto source = open_source(raw("a"), {});
+  const std::string store = (folder_ / "a.zarr").string();
+  convert(*source, store, {.threads = 1}, silent_);
+  const OpenedVolume whole(store, options(), silent_);
+  EXPECT_FALSE(whole.converted());
+  EXPECT_EQ(whole.store().info().path, fs::path(store));
+  EXPECT_FALSE(fs::exists(folder_ / "cache"));
+  OpenOptions strided = options();
+  strided.volume.stride = {2, 2, 2};
+  const OpenedVolume part(store, strided, silent_);
+  EXPECT_TRUE(part.converted());
+  EXPECT_EQ(part.store().info().levels[0].lattice.extent, (Int3{20, 15, 10}));
+  EXPECT_FALSE(OpenedVolume(store, strided, silent_).converted());
+  OpenOptions raw_options = options();
+  raw_options.volume.type = ScalarType::u8;
+  EXPECT_THROW(OpenedVolume(store, raw_options, silent_), UsageError);
+}
+
+TEST_F(OpenVolume, WithoutACacheNothingStays) {
+  OpenOptions none = options();
+  none.cache.folder.clear();
+  fs::path store;
+  {
+    const OpenedVolume opened(raw("a"), none, silent_);
+    store = opened.store().info().path;
+    EXPECT_TRUE(opened.converted());
+    EXPECT_TRUE(fs::exists(store));
+  }
+  EXPECT_FALSE(fs::exists(store.parent_path()));
+  EXPECT_FALSE(fs::exists(folder_ / "cache"));
+}
+
+TEST_F(OpenVolume, TheLimitRemovesWhatWasUsedLongestAgoButNothingOpen) {
+  const std::string a = raw("a", 1), b = raw("b", 2), c = raw("c", 3);
+  const OpenedVolume held(a, options(), silent_);
+  EXPECT_TRUE(OpenedVolume(b, options(), silent_).converted());
+  EXPECT_EQ(entries(), 2u);
+  // Each store has at least its noise, 48,000 bytes; a is open, b is not.
+  EXPECT_TRUE(OpenedVolume(c, options(100'000), silent_).converted());
+  EXPECT_EQ(entries(), 2u);
+  EXPECT_FALSE(OpenedVolume(a, options(), silent_).converted());
+  EXPECT_TRUE(OpenedVolume(b, options(), silent_).converted()) << "it was removed";
+  // With no room at all it still works, and what is open stays until the next one.
+  const OpenedVolume now(c, options(1), silent_);
+  EXPECT_TRUE(fs::exists(now.store().info().path));
+}
+
+TEST_F(OpenVolume, SeveralAtATimeConvertOnce) {
+  const std::string file = raw("a");
+  std::atomic<int> converted = 0, opened = 0;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i)
+    threads.emplace_back([&] {
+      NoProgress silent;
+      const OpenedVolume volume(file, options(), silent);
+      converted += volume.converted() ? 1 : 0;
+      opened += volume.store().info().levels[0].lattice.extent == Int3{40, 30, 20} ? 1 : 0;
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(converted, 1);
+  EXPECT_EQ(opened, 4);
+}
+
+/// Breaks off as a cancelled command does.
+class Cancelling final : public Progress {
+ public:
+  void begin(std::string_view, std::uint64_t) override {}
+  void advance(std::uint64_t) override { throw std::runtime_error("cancelled"); }
+  void end() override {}
+};
+
+TEST_F(OpenVolume, WhatIsCancelledIsNoStoreAndGoesOn) {
+  const std::string file = raw("a");
+  Cancelling cancelling;
+  EXPECT_THROW(OpenedVolume(file, options(), cancelling), std::runtime_error);
+  EXPECT_EQ(entries(), 0u);
+  EXPECT_TRUE(OpenedVolume(file, options(), silent_).converted());
+  EXPECT_FALSE(OpenedVolume(file, options(), silent_).converted());
+}
+
+TEST_F(OpenVolume, ACacheThatCannotBeMadeIsNamed) {
+  const std::string file = raw("a");
+  OpenOptions blocked = options();
+  blocked.cache.folder = fs::path(file) / "cache";
+  try {
+    const OpenedVolume opened(file, blocked, silent_);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("--cache none"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace isobrick::test
