@@ -1,5 +1,6 @@
 #include "pipeline/convert/brick_output.h"
 
+#include <cstring>
 #include <utility>
 
 #include <isobrick/pod_buffer.h>
@@ -7,14 +8,26 @@
 #include "core/copy_box.h"
 
 namespace isobrick {
+namespace {
+
+double value_of(ScalarType type, std::uint64_t bits) {
+  return visit_scalar(type, [&](auto tag) {
+    typename decltype(tag)::type value;
+    std::memcpy(&value, &bits, sizeof value);
+    return static_cast<double>(value);
+  });
+}
+
+}  // namespace
 
 BrickOutput::BrickOutput(StoreWriter& store, const StoreLayout& layout, int level,
-                         ConvertJournal* journal, Progress& progress)
+                         ConvertJournal* journal, ValueCounts* histogram, Progress& progress)
     : store_(store),
       layout_(layout),
       level_(level),
       lattice_(layout.levels[static_cast<std::size_t>(level)].lattice),
       journal_(journal),
+      histogram_(histogram),
       progress_(progress) {}
 
 PackedBrick BrickOutput::pack(Int3 brick, Box3 box, const std::byte* samples, bool kept) const {
@@ -22,6 +35,7 @@ PackedBrick BrickOutput::pack(Int3 brick, Box3 box, const std::byte* samples, bo
   if (kept && journal_ == nullptr) return packed;
   const Box3 full = lattice_.full_brick_box(brick);
   if (box == full) {
+    if (histogram_ != nullptr) histogram_->add(samples, full, full);
     encode(packed, {samples, lattice_.brick_bytes()});
     return packed;
   }
@@ -29,6 +43,7 @@ PackedBrick BrickOutput::pack(Int3 brick, Box3 box, const std::byte* samples, bo
   whole.resize(lattice_.brick_bytes());
   copy_box({samples, box}, {whole.data(), full}, lattice_.brick_box(brick),
            lattice_.sample_bytes());
+  if (histogram_ != nullptr) histogram_->add(whole.data(), full, lattice_.brick_box(brick));
   pad_brick(lattice_, brick, layout_.fill_value, whole.data());
   encode(packed, whole.span());
   return packed;
@@ -42,6 +57,9 @@ void BrickOutput::encode(PackedBrick& packed, std::span<const std::byte> samples
 
 PackedBrick BrickOutput::pack_constant(Int3 brick, std::uint64_t bits, bool kept) {
   PackedBrick packed{.brick = brick, .kept = kept};
+  if (histogram_ != nullptr)
+    histogram_->add(value_of(lattice_.type, bits),
+                    static_cast<std::uint64_t>(volume(lattice_.brick)));
   std::shared_ptr<const Constant> constant;
   {
     const std::lock_guard lock(mutex_);

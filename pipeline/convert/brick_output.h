@@ -10,6 +10,7 @@
 #include <isobrick/progress.h>
 #include "bricks/store_writer.h"
 #include "pipeline/convert/convert_journal.h"
+#include "pipeline/index/value_counts.h"
 
 namespace isobrick {
 
@@ -29,11 +30,11 @@ struct BrickCounts {
 /// Where the bricks of one level go: encoded into the store, and on the journal's record.
 class BrickOutput {
  public:
-  /// `journal`, if there is one, sees every brick. `progress` advances with each brick: by
-  /// its samples in the input's own level, by nothing in coarser ones, where it still may
+  /// `journal` and `histogram`, if there are any, see every brick. `progress` advances with each
+  /// brick: by its samples in the input's own level, by nothing in coarser ones, where it still may
   /// throw to stop the conversion.
   BrickOutput(StoreWriter& store, const StoreLayout& layout, int level, ConvertJournal* journal,
-              Progress& progress);
+              ValueCounts* histogram, Progress& progress);
 
   /// Encodes a brick of the samples of `box`, dense, in which it lies. `kept`: it is on disk
   /// already, and only the journal needs it. Thread-safe.
@@ -63,6 +64,7 @@ class BrickOutput {
   int level_;
   const Lattice& lattice_;
   ConvertJournal* journal_;
+  ValueCounts* histogram_;
   Progress& progress_;
   BrickCounts counts_;
   std::mutex mutex_;

@@ -15,8 +15,7 @@ LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int leve
       shards_(ceil_div(info_.lattice.extent, info_.shard)),
       bricks_per_shard_(ceil_div(info_.shard, info_.lattice.brick)),
       journal_(journal),
-      counts_(counts),
-      output_(store, layout, level, journal, progress),
+      output_(store, layout, level, journal, counts, progress),
       ranges_(make_level_ranges(info_.lattice)) {
   for_each_point({{0, 0, 0}, shards_},
                  [&](Int3 s) { kept_.push_back(store_.shard_is_whole(level_, s)); });
@@ -40,8 +39,6 @@ void LevelWriter::write_bricks(Box3 box, const std::byte* samples) {
   };
   const auto pack = [&](PackedBrick& packed) {
     const bool kept = is_kept(floor_div(packed.brick, bricks_per_shard_));
-    // Beside the encoder, which reads the same samples.
-    if (counts_ != nullptr) counts_->add(samples, box, info_.lattice.brick_box(packed.brick));
     packed = output_.pack(packed.brick, box, samples, kept);
   };
   run_in_order<PackedBrick>(bricks_in_flight_, take, pack,

@@ -10,14 +10,13 @@
 #include "pipeline/convert/brick_output.h"
 #include "pipeline/convert/convert_journal.h"
 #include "pipeline/index/range_scan.h"
-#include "pipeline/index/value_counts.h"
 
 namespace isobrick {
 
 /// Writes one level of a store: bricks, encoded in parallel, and ranges. Counts its samples.
 class LevelWriter {
  public:
-  /// As BrickOutput. `counts`, if there are any, see every sample.
+  /// As BrickOutput.
   LevelWriter(StoreWriter& store, const StoreLayout& layout, int level, int bricks_in_flight,
               ConvertJournal* journal, ValueCounts* counts, Progress& progress);
 
@@ -52,7 +51,6 @@ class LevelWriter {
   Int3 shards_, bricks_per_shard_;
   std::vector<bool> kept_;  ///< shards that an interrupted run finished
   ConvertJournal* journal_;
-  ValueCounts* counts_;
   BrickOutput output_;
   std::unique_ptr<LevelRanges> ranges_;
   Index next_shard_z_ = 0;

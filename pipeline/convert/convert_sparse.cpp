@@ -4,7 +4,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cstring>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -71,14 +70,6 @@ struct PackedFamily {
   PodBuffer<std::byte> coarser;  ///< the parent's samples, a full brick; empty in the last level
 };
 
-double value_of(ScalarType type, std::uint64_t bits) {
-  return visit_scalar(type, [&](auto tag) {
-    typename decltype(tag)::type value;
-    std::memcpy(&value, &bits, sizeof value);
-    return static_cast<double>(value);
-  });
-}
-
 /// From a level to the next; of the last one, which has none, any do.
 Int3 factors_of(const StoreLayout& layout, std::size_t level) {
   return level < layout.factors.size() ? layout.factors[level] : kHalveAll;
@@ -116,17 +107,16 @@ class SparsePyramid::Level {
         info_(layout.levels[static_cast<std::size_t>(level)]),
         store_(store),
         journal_(journal),
-        histogram_(histogram),
         bricks_per_shard_(ceil_div(info_.shard, info_.lattice.brick)),
         factors_(factors_of(layout, static_cast<std::size_t>(level))),
         bricks_(std::move(bricks)),
-        output_(store, layout, level, journal, progress) {
+        output_(store, layout, level, journal, histogram, progress) {
     find_shards();
     if (resumed) forget_other_shards();
     ranges_ = make_sparse_ranges(store_, level_, info_.lattice, layout.fill_value,
                                  [this](Int3 brick) { return bricks_.contains(brick); });
     output_.skip(static_cast<std::uint64_t>(volume(info_.lattice.bricks())) - bricks_.all().size());
-    if (histogram_ != nullptr) histogram_->add(layout.fill_value, absent_samples());
+    if (histogram != nullptr) histogram->add(layout.fill_value, absent_samples());
   }
 
   std::size_t families() const { return bricks_.families(); }
@@ -249,7 +239,6 @@ class SparsePyramid::Level {
     }
     PackedFamily::Brick brick;
     brick.ranges = scan_brick(lattice, box, samples.data());
-    if (histogram_ != nullptr) histogram_->add(samples.data(), box, box);
     if (parcel != nullptr) {
       coarser.resize(lattice.brick_bytes());
       downsample(layout_.downsampling, lattice.type, box.extent(), factors_, samples.data(),
@@ -274,9 +263,6 @@ class SparsePyramid::Level {
     if (parcel != nullptr)
       set_box(lattice.type, bits, {parcel->coarser.data(), lattice.full_brick_box(parcel->parent)},
               coarser_box(box));
-    if (histogram_ != nullptr)
-      histogram_->add(value_of(lattice.type, bits),
-                      static_cast<std::uint64_t>(volume(box.extent())));
     return {output_.pack_constant(place, bits, kept), constant_brick(lattice, box, bits)};
   }
 
@@ -311,7 +297,6 @@ class SparsePyramid::Level {
   const LevelInfo& info_;
   StoreWriter& store_;
   ConvertJournal* journal_;
-  ValueCounts* histogram_;
   Int3 bricks_per_shard_;
   Int3 factors_;
   SparseBricks bricks_;
