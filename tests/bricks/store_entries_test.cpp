@@ -66,13 +66,27 @@ TEST_F(StoreEntriesTest, WhatAConversionLeavesBelongsToIt) {
 
 /// Names as ours are, of what this store does not have.
 TEST_F(StoreEntriesTest, OnlyTheLevelsAndChunksThatItHas) {
-  for (const std::string name :
-       {"1/zarr.json", "2024/c/1/1/1", "7/c/1/1/1", "0/c/2/0/0", "0/c/0/2/0", "0/c/0/0/2",
-        "0/c/00/0/0", "0/5.tmp", "0/zarr.json.tmp", "0/0/0/0", "spool", "spool.partial-thesis.txt",
-        "isobrick/1/zarr.json", "isobrick/0/range/c/0/0/1/0", "isobrick/0/block_range/c/1/0/0/0",
-        "isobrick/0/range/c/0/0/0/1", "isobrick/0/brick_crc32c/c/0/0/1",
-        "isobrick/0/index/octree/c/0/0/1", "isobrick/0/histogram/c/1",
-        "isobrick/0/histogram/c/0/0", "isobrick/0/histogram/checksums"}) {
+  for (const std::string name : {"1/zarr.json",
+                                 "2024/c/1/1/1",
+                                 "7/c/1/1/1",
+                                 "0/c/2/0/0",
+                                 "0/c/0/2/0",
+                                 "0/c/0/0/2",
+                                 "0/c/00/0/0",
+                                 "0/5.tmp",
+                                 "0/zarr.json.tmp",
+                                 "0/0/0/0",
+                                 "spool",
+                                 "spool.partial-thesis.txt",
+                                 "isobrick/1/zarr.json",
+                                 "isobrick/0/range/c/0/0/1/0",
+                                 "isobrick/0/block_range/c/1/0/0/0",
+                                 "isobrick/0/range/c/0/0/0/1",
+                                 "isobrick/0/brick_crc32c/c/0/0/1",
+                                 "isobrick/0/index/octree/c/0/0/1",
+                                 "isobrick/0/histogram/c/1",
+                                 "isobrick/0/histogram/c/0/0",
+                                 "isobrick/0/histogram/checksums"}) {
     put(name);
     EXPECT_NE(why_not_our_store(store_).find("no part of a store"), std::string::npos) << name;
     fs::remove(store_ / name);
