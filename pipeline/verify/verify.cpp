@@ -13,7 +13,7 @@
 #include "bricks/stored_index.h"
 #include "bricks/zarr/json_reader.h"
 #include "io/bytes/file.h"
-#include "pipeline/histogram.h"
+#include "pipeline/histogram/histogram.h"
 #include "pipeline/index/level_scan.h"
 #include "pipeline/program_memory.h"
 #include "pipeline/verify/verify_index.h"

@@ -52,7 +52,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"surface", {"mesh", "surface_options", "surface_report"}},
     {"gpu/memory", {"device"}},
     {"gpu/resident", {"device_volume"}},
-    {"pipeline", {"histogram"}},
+    {"pipeline/histogram", {"histogram"}},
     {"pipeline/convert", {"convert"}},
     {"pipeline/export", {"export"}},
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},

@@ -5,7 +5,7 @@
 #include <isobrick/error.h>
 #include <isobrick/verify.h>
 #include "pipeline/convert/downsample.h"
-#include "pipeline/histogram.h"
+#include "pipeline/histogram/histogram.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/least_budget.h"
 #include "tests/pipeline/naive_counts.h"

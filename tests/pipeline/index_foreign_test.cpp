@@ -6,7 +6,7 @@
 #include "bricks/ranges/stored_ranges.h"
 #include "bricks/stored_index.h"
 #include "bricks/zarr/array_metadata.h"
-#include "pipeline/histogram.h"
+#include "pipeline/histogram/histogram.h"
 #include "tests/pipeline/index_fixture.h"
 #include "tests/pipeline/naive_counts.h"
 

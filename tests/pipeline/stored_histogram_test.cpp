@@ -6,7 +6,7 @@
 #include <isobrick/histogram.h>
 #include <isobrick/verify.h>
 #include "bricks/ranges/stored_ranges.h"
-#include "pipeline/histogram.h"
+#include "pipeline/histogram/histogram.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/drop_histogram.h"
 #include "tests/pipeline/naive_counts.h"

@@ -1,4 +1,4 @@
-#include "pipeline/histogram.h"
+#include "pipeline/histogram/histogram.h"
 
 #include <fmt/format.h>
 
