@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "tools/definitions.h"
+#include "tools/settings.h"
 #include "tools/spelling.h"
 
 namespace isobrick::tools {
@@ -69,13 +70,23 @@ std::string unknown_word(const CLI::App& program, const std::string& word) {
 
 }  // namespace
 
-std::vector<std::string> words_to_parse(const CLI::App& program, int argc, char** argv) {
-  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+void read_command_line(const CLI::App& program, int argc, char** argv, CommandLine& line) {
+  std::vector<std::string>& words = line.words;
+  words.assign(argv + std::min(argc, 1), argv + argc);
+  line.json = std::find(words.begin(), words.end(), "--json") != words.end();
   if (words.empty()) words.emplace_back("help");
-  for (const CommandView& command : subcommands_of(program))
-    if (command.name == words.front()) words = with_values(command, words);
+  const std::vector<CommandView> commands = subcommands_of(program);
+  const auto command = std::find_if(commands.begin(), commands.end(), [&](const CommandView& view) {
+    return view.name == words.front();
+  });
+  if (command != commands.end()) {
+    words = with_values(*command, words);
+    Settings settings = find_settings(commands, *command, words);
+    words.insert(words.begin() + 1, settings.words.begin(), settings.words.end());
+    line.origins = std::move(settings.origins);
+    line.json = std::find(words.begin(), words.end(), "--json") != words.end();
+  }
   std::reverse(words.begin(), words.end());
-  return words;
 }
 
 // A word that nobody knows comes first: CLI11 would rather complain about what is missing.

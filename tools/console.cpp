@@ -1,7 +1,6 @@
 #include "tools/console.h"
 
 #include <fcntl.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,16 +13,9 @@
 #include <nlohmann/json.hpp>
 
 #include <isobrick/error.h>
-#include "tools/format.h"
-#include "tools/interrupt.h"
 
 namespace isobrick::tools {
 namespace {
-
-int terminal_columns() {
-  winsize size{};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
-}
 
 void put(std::FILE* file, std::string_view text) {
   errno = 0;
@@ -31,9 +23,12 @@ void put(std::FILE* file, std::string_view text) {
   if (!whole || std::fflush(file) != 0) throw system_error("write to", "standard output", errno);
 }
 
-/// A failure here cannot be reported.
-void write_error(std::string_view text) noexcept {
-  static_cast<void>(std::fwrite(text.data(), 1, text.size(), stderr));
+/// An object on a line, after the version of its members.
+std::string json_line(const nlohmann::ordered_json& object) {
+  using nlohmann::ordered_json;
+  ordered_json all{{"schema", kJsonSchema}};
+  all.update(object);
+  return all.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + '\n';
 }
 
 }  // namespace
@@ -47,62 +42,8 @@ void set_up_streams() {
       return;
 }
 
-std::string progress_line(std::string_view stage, std::uint64_t done, std::uint64_t total,
-                          double seconds, int columns) {
-  const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0;
-  std::string line(stage);
-  if (total > 0) {
-    constexpr int width = 24;
-    const double part = std::min(1.0, static_cast<double>(done) / static_cast<double>(total));
-    const int full = static_cast<int>(part * width);
-    line += fmt::format(" {:3.0f}% [{:#<{}}{:.<{}}]", part * 100, "", full, "", width - full);
-  } else {
-    line += fmt::format(" {}", human_bytes(done));
-  }
-  line += fmt::format(" {}/s", human_bytes(rate));
-  if (total > done && rate > 0)
-    line += fmt::format(", {:.0f} s left", static_cast<double>(total - done) / rate);
-  if (columns > 1 && line.size() >= static_cast<std::size_t>(columns))
-    line.resize(static_cast<std::size_t>(columns) - 1);
-  return line;
-}
-
-void TerminalProgress::begin(std::string_view stage, std::uint64_t total) {
-  throw_if_interrupted();
-  stage_ = stage;
-  total_ = total;
-  done_ = 0;
-  start_ = last_ = Clock::now();
-}
-
-void TerminalProgress::advance(std::uint64_t done) {
-  throw_if_interrupted();
-  done_ += done;
-  if (!draw_) return;
-  const auto now = Clock::now();
-  if (now - last_ >= std::chrono::milliseconds(100)) redraw(now);
-}
-
-void TerminalProgress::end() {
-  erase();
-  throw_if_interrupted();
-}
-
-void TerminalProgress::redraw(Clock::time_point now) {
-  last_ = now;
-  drawn_ = true;
-  const double seconds = std::chrono::duration<double>(now - start_).count();
-  write_error(
-      fmt::format("\r{}\x1b[K", progress_line(stage_, done_, total_, seconds, terminal_columns())));
-}
-
-void TerminalProgress::erase() {
-  if (drawn_) write_error("\r\x1b[K");
-  drawn_ = false;
-}
-
 Console::Console(OutputMode mode)
-    : mode_(mode), progress_(!mode.quiet && isatty(STDERR_FILENO) == 1) {}
+    : mode_(mode), progress_(mode.quiet ? ProgressForm::none : mode.progress) {}
 
 void Console::reserve_output() {
   if (mode_.json)
@@ -112,16 +53,16 @@ void Console::reserve_output() {
   reserved_ = true;
 }
 
-void Console::result(const nlohmann::ordered_json& object, std::string_view text) const {
-  using nlohmann::ordered_json;
+void Console::result(const nlohmann::ordered_json& object, std::string_view text) {
   if (reserved_) return note(text);
-  if (mode_.json)
-    put(stdout, object.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + '\n');
-  else if (!mode_.quiet)
+  if (mode_.json) {
+    wrote_object_ = true;
+    put(stdout, json_line(object));
+  } else if (!mode_.quiet)
     put(stdout, text);
 }
 
-void Console::result_text(std::string_view command, std::string_view text) const {
+void Console::result_text(std::string_view command, std::string_view text) {
   result({{"command", command}, {"text", text}}, text);
 }
 
@@ -135,6 +76,11 @@ void print_error(std::string_view command, std::string_view what) {
   std::replace(line.begin(), line.end(), '\n', ' ');
   line += '\n';
   write_error(line);
+}
+
+void print_error_json(std::string_view command, std::string_view what, int exit_code) {
+  put(stdout,
+      json_line({{"command", command}, {"error", {{"message", what}, {"exit_code", exit_code}}}}));
 }
 
 void print_out_of_memory(std::string_view command) noexcept {

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <exception>
 #include <new>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 
@@ -14,6 +15,7 @@
 #include "tools/help.h"
 #include "tools/interrupt.h"
 #include "tools/options.h"
+#include "tools/settings.h"
 
 namespace isobrick::tools {
 namespace {
@@ -70,33 +72,58 @@ std::terminate_handler g_usual_end = nullptr;
   std::abort();
 }
 
-int run(Program& program, int argc, char** argv) {
+/// Reports a failure on standard error and, with --json, on standard output, too.
+int report_failure(const Program& program, const CommandLine& line, const std::string& what,
+                   int exit_code) {
+  const std::string command = name_of(parsed(program));
+  const std::string message = with_origin(what, line.origins);
+  print_error(command, message);
+  if (line.json) print_error_json(command, message, exit_code);
+  return exit_code;
+}
+
+int run_parsed(Program& program, CommandLine& line) {
+  std::optional<Console> console;
+  const auto fail = [&](const std::string& what, int exit_code) {
+    line.json = line.json && !(console && console->wrote_object());
+    return report_failure(program, line, what, exit_code);
+  };
   try {
-    program.app.parse(words_to_parse(program.app, argc, argv));
+    program.app.parse(std::move(line.words));
     set_up_signals(name_of(parsed(program)));
-    Console console(program.mode);
-    const int status = parsed(program)->run(console);
+    console.emplace(program.mode);
+    const int status = parsed(program)->run(*console);
     end_interrupts();
     return status;
   } catch (const CLI::ParseError& error) {
     // --help and --version come this way too.
     if (error.get_exit_code() == 0) return program.app.exit(error);
-    print_error(name_of(parsed(program)), complaint(program, error));
-    return 2;
+    return fail(complaint(program, error), 2);
   } catch (const Interrupted& interrupted) {
     return die_of(interrupted.signal());
   } catch (const Cancelled&) {
     return die_of(interrupting_signal());
   } catch (const UsageError& error) {
-    print_error(name_of(parsed(program)), error.what());
-    return 2;
+    return fail(error.what(), 2);
   } catch (const std::bad_alloc&) {
     print_out_of_memory(name_of(parsed(program)));
+    if (line.json) print_error_json(name_of(parsed(program)), "out of memory", 1);
     return 1;
   } catch (const std::exception& error) {
-    print_error(name_of(parsed(program)), error_message(error));
-    return 1;
+    return fail(error_message(error), 1);
   }
+}
+
+int run(Program& program, int argc, char** argv) {
+  CommandLine line;
+  try {
+    read_command_line(program.app, argc, argv, line);
+  } catch (const UsageError& error) {
+    return report_failure(program, line, error.what(), 2);
+  } catch (const Error& error) {
+    return report_failure(program, line, error_message(error), 1);
+  }
+  return run_parsed(program, line);
 }
 
 int run_program(int argc, char** argv) {
