@@ -11,7 +11,7 @@
 #include "io/bytes/output_folder.h"
 #include "pipeline/convert/convert_staging.h"
 #include "pipeline/convert/store_source.h"
-#include "tools/options.h"
+#include "tools/input.h"
 #include "tools/output_name.h"
 
 namespace isobrick::tools {
@@ -20,38 +20,24 @@ namespace {
 struct Arguments {
   std::string in, out;
   VolumeRequest volume;
+  RegionArguments region;
   ConvertOptions store;
 };
 
-void add_volume_options(CLI::App* app, VolumeRequest& volume) {
-  add_dims(app, volume.extent);
-  add_type(app, volume.type);
-  add_parsed(app, volume.order, parse_byte_order,
-             {"--endian", "little|big", "Byte order of the samples of a raw file", "little"});
-  add_parsed(app, volume.offset, parse_offset,
-             {"--offset", "BYTES", "Bytes before the first sample of a raw file", "0"});
-  add_parsed(app, volume.spacing, parse_vector,
-             {"--spacing", "X,Y,Z", "World distance between samples", "the file's, or 1,1,1"});
-  add_parsed(app, volume.origin, parse_vector,
-             {"--origin", "X,Y,Z", "World position of the first sample", "the file's, or 0,0,0"});
-  add_parsed(app, volume.unit, [](const std::string& text) { return text; },
-             {"--unit", "NAME", "Unit of world space, such as mm or micrometer"});
-  add_selection(app, volume.selection);
-  add_parsed(app, volume.grid, [](const std::string& text) { return text; },
-             {"--grid", "NAME", "Which grid of an OpenVDB file that has several"});
-  add_parsed(app, volume.region, parse_roi,
-             {"--roi", "X0:X1,Y0:Y1,Z0:Z1",
-              "Box of an OpenVDB grid in its own coordinates, such as --roi=-8:8,:,:",
-              "its active voxels"});
+VolumeRequest requested_volume(const Arguments& arguments) {
+  VolumeRequest volume = arguments.volume;
+  volume.roi = arguments.region.roi;
+  volume.region = arguments.region.region;
+  return volume;
 }
 
 /// Zarr is read as stores are, all else as files.
 std::unique_ptr<VolumeSource> open_input(const Arguments& arguments) {
   if (is_zarr(arguments.in)) {
     refuse_grid(arguments.in, arguments.volume);
-    return open_store_source(arguments.in, arguments.volume, arguments.store.threads);
+    return open_store_source(arguments.in, requested_volume(arguments), arguments.store.threads);
   }
-  VolumeRequest volume = arguments.volume;
+  VolumeRequest volume = requested_volume(arguments);
   volume.memory = arguments.store.memory;
   volume.threads = arguments.store.threads;
   return open_source(arguments.in, volume);
@@ -88,16 +74,17 @@ ConvertReport convert_stream(VolumeSource& source, const std::string& out,
 }
 
 int run(const Arguments& arguments, Console& console) {
-  check_store_name(arguments.out);
+  const std::string out =
+      arguments.out.empty() ? stem_of_input(arguments.in) + ".zarr" : arguments.out;
+  check_store_name(out);
   const auto source = open_input(arguments);
   ConvertOptions options = arguments.store;
   options.inputs = input_paths(arguments.in);
-  note_conversion(arguments.out);
+  note_conversion(out);
   const ConvertReport report = arguments.in == "-"
-                                   ? convert_stream(*source, arguments.out, options, console)
-                                   : convert(*source, arguments.out, options, console.progress());
-  report_conversion(console, "convert", arguments.in, arguments.out, source->info(), report,
-                    source->notes());
+                                   ? convert_stream(*source, out, options, console)
+                                   : convert(*source, out, options, console.progress());
+  report_conversion(console, "convert", arguments.in, out, source->info(), report, source->notes());
   return 0;
 }
 
@@ -107,13 +94,15 @@ void add_convert(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
       program, "convert", "Turn a volume into a store, within a memory budget.",
-      "isobrick convert head.raw head.zarr --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5\n"
+      "isobrick convert head.raw --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5   # head.zarr\n"
       "  isobrick convert head_64x64x93_int16.raw ct.zarr   # extent and type are in the name");
-  add_path(app, "IN", arguments->in,
+  add_path(app, "INPUT", arguments->in,
            "Volume of a known format, FILE:/NAME for an array in it, folder of slices, Zarr, raw "
            "file, or - for raw samples on standard input");
-  add_path(app, "OUT", arguments->out, "Store to write, such as OUT.zarr");
+  add_output_or_positional(app, arguments->out, "ZARR", "Store to write, such as OUT.zarr",
+                           "head.zarr of head.nrrd, in the current folder");
   add_volume_options(app, arguments->volume);
+  add_region(app, arguments->region);
   add_store_options(app, arguments->store);
   add_run(program, app, arguments, run);
 }

@@ -22,7 +22,8 @@ std::vector<std::string> choices_in(const std::string& type) {
 
 /// Whether a value of this name is a file or a folder.
 bool is_path(const std::string& value) {
-  return value == "MESH" || value == "PNG" || value == "DIR";
+  return value == "MESH" || value == "PNG" || value == "DIR" || value == "FILE" ||
+         value == "ZARR" || value == "VOLUME";
 }
 
 OptionView option_view_of(const CLI::Option& option) {

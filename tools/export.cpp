@@ -1,5 +1,6 @@
 #include <isobrick/export.h>
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -7,9 +8,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "io/bytes/output_guard.h"
 #include "tools/format.h"
-#include "tools/open_store.h"
-#include "tools/options.h"
+#include "tools/input.h"
+#include "tools/isovalues.h"
 #include "tools/output_name.h"
 #include "tools/parse.h"
 #include "tools/store_region.h"
@@ -19,11 +21,12 @@ namespace isobrick::tools {
 namespace {
 
 struct Arguments {
-  std::string store, out;
+  InputArguments input;
+  std::string out;
   std::optional<ExportFormat> format;  ///< nothing: by the name
-  std::optional<RoiText> roi;
+  std::vector<IsovalueRequest> isovalues;
+  RegionArguments region;
   std::optional<int> half_band;
-  Selection selection;
   ExportOptions options;
 };
 
@@ -62,30 +65,50 @@ ExportFormat format_of(const std::string& path, std::optional<ExportFormat> opti
                   path));
 }
 
-int run(const Arguments& arguments, Console& console) {
-  ExportOptions options = arguments.options;
-  options.format = format_of(arguments.out, arguments.format);
-  if (is_standard_output(arguments.out)) console.reserve_output();
-  const StoreReader store = open_store(arguments.store, arguments.selection);
-  const Box3 box = store_region(store, options.level, arguments.roi);
-  options.roi = box;
-  if (arguments.half_band && !options.isovalue)
+/// The name where none is given: by the format, which is OpenVDB for a level set, else NRRD.
+std::string default_output(const Arguments& arguments) {
+  const ExportFormat format = arguments.format.value_or(
+      arguments.isovalues.empty() ? ExportFormat::nrrd : ExportFormat::vdb);
+  return stem_of_input(arguments.input.path) +
+         std::string(formats()[static_cast<std::size_t>(format)].extensions.front());
+}
+
+void check(const Arguments& arguments) {
+  if (arguments.half_band && arguments.isovalues.empty())
     throw UsageError("--half-band is the width of a level set: add its --isovalue");
-  if (options.inside && !options.isovalue)
+  if (arguments.options.inside && arguments.isovalues.empty())
     throw UsageError("--inside is a side of an isosurface: add its --isovalue");
+  if (arguments.isovalues.size() > 1)
+    throw UsageError("a level set has one isosurface; give one --isovalue");
+}
+
+int run(const Arguments& arguments, Console& console) {
+  check(arguments);
+  const std::string out = arguments.out.empty() ? default_output(arguments) : arguments.out;
+  ExportOptions options = arguments.options;
+  options.format = format_of(out, arguments.format);
+  if (is_standard_output(out)) console.reserve_output();
+  const OpenedVolume input = open_input(arguments.input, options.memory, options.threads, console);
+  const StoreReader& store = input.store();
+  const Box3 box = store_region(store, options.level, arguments.region);
+  options.roi = box;
+  if (!arguments.isovalues.empty())
+    options.isovalue = resolve_isovalues(arguments.isovalues, store, console.progress()).front();
   options.half_band = arguments.half_band.value_or(options.half_band);
-  export_volume(store, arguments.out, options, console.progress());
+  const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
+  check_replaces_no_input(out, inputs);
+  export_volume(store, out, options, console.progress());
   if (options.isovalue)
     if (const std::string why = why_out_of_range(store, options.level, *options.isovalue);
         !why.empty())
       console.note(why);
   const ScalarType type = store.info().type;
-  const std::uint64_t bytes = is_standard_output(arguments.out)
+  const std::uint64_t bytes = is_standard_output(out)
                                   ? static_cast<std::uint64_t>(volume(box.extent())) * size_of(type)
-                                  : std::filesystem::file_size(arguments.out);
+                                  : std::filesystem::file_size(out);
   nlohmann::ordered_json object{{"command", "export"},
-                                {"store", arguments.store},
-                                {"output", arguments.out},
+                                {"input", arguments.input.path},
+                                {"output", out},
                                 {"format", name_of(options.format)},
                                 {"level", options.level},
                                 {"extent", to_json(box.extent())},
@@ -102,7 +125,7 @@ int run(const Arguments& arguments, Console& console) {
                         human_extent(box.extent()))
           : fmt::format("{} samples of {}{}", human_extent(box.extent()), zarr_name(type),
                         options.format == ExportFormat::vdb ? "" : ", little endian");
-  console.result(object, fmt::format("{}: {}, {}\n", arguments.out, what, human_bytes(bytes)));
+  console.result(object, fmt::format("{}: {}, {}\n", out, what, human_bytes(bytes)));
   return 0;
 }
 
@@ -118,30 +141,29 @@ void add_export(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
       program, "export",
-      "Write the samples of a store as a file, or its isosurface as an OpenVDB level set.",
+      "Write the samples of a volume as a file, or its isosurface as an OpenVDB level set.",
       "isobrick export head.zarr jaw.nrrd --roi :,:,0:40\n"
       "  isobrick export head.zarr skull.vdb --isovalue 1150");
-  add_path(app, "STORE", arguments->store, "Store to read");
-  add_path(app, "OUT", arguments->out,
-           "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb; raw if in .raw, .bin or "
-           "nothing (C order [z, y, x], little endian), with a header .nhdr beside it; - for raw "
-           "samples, or NRRD, on standard output");
+  add_input(app, arguments->input);
+  add_output_or_positional(
+      app, arguments->out, "VOLUME",
+      "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb; raw if in .raw, .bin or "
+      "nothing (C order [z, y, x], little endian), with a header .nhdr beside it; - for raw "
+      "samples, or NRRD, on standard output",
+      "head.nrrd of head.zarr, or head.vdb with --isovalue");
   add_parsed(app, arguments->format, parse_format,
              {"--format", "raw|nrrd|vdb",
               "Format of the file; NRRD and OpenVDB keep spacing, origin and direction",
               "by its extension"});
-  add_parsed(
-      app, arguments->options.isovalue, parse_number,
-      {"--isovalue", "V",
-       "OpenVDB only: write a level set of this isosurface, negative inside, in place of the "
-       "samples"});
+  add_isovalues(app, arguments->isovalues,
+                "OpenVDB only: write a level set of this isosurface, negative inside, in place of "
+                "the samples");
   add_parsed(app, arguments->half_band,
              [](const std::string& text) { return parse_int(text, 1, kWidestHalfBand); },
              {"--half-band", "N", "Voxels with distances on either side of a level set", "3"});
   add_inside(app, arguments->options.inside);
   add_level(app, arguments->options.level);
-  add_roi(app, arguments->roi);
-  add_selection(app, arguments->selection);
+  add_region(app, arguments->region);
   add_memory(app, arguments->options.memory);
   add_threads(app, arguments->options.threads);
   add_force(app, arguments->options.force);

@@ -87,7 +87,7 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
         {"surface", r.surface_seconds},
         {"sink", r.sink.seconds}}},
       {"index",
-       {{"used", r.index ? name_of(*r.index) : "none"},
+       {{"used", r.index ? name_of(*r.index) : "linear"},
         {"bytes_read", r.search_bytes},
         {"seconds", r.search_seconds}}}};
   add_backend(object, r);

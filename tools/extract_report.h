@@ -18,8 +18,8 @@ namespace isobrick::tools {
 
 /// One isosurface to make and where it goes (empty: nowhere).
 struct ExtractedSurface {
-  ExtractOptions options;
-  MeshForm form;
+  ExtractOptions options = {};
+  MeshForm form = {};
   std::filesystem::path output, preview;
 };
 

@@ -46,4 +46,14 @@ std::string human_extent(Int3 extent) {
   return fmt::format("{} x {} x {}", extent.x, extent.y, extent.z);
 }
 
+std::string place_text(const Transform& transform) {
+  const Vec3d spacing = transform.spacing, origin = transform.origin;
+  const auto& d = transform.direction;  // the columns are where x, y and z point
+  return fmt::format("spacing      {} x {} x {} {}\n", spacing.x, spacing.y, spacing.z,
+                     transform.unit.empty() ? "(no unit)" : transform.unit) +
+         fmt::format("origin       {}, {}, {}\n", origin.x, origin.y, origin.z) +
+         fmt::format("direction    x ({}, {}, {}), y ({}, {}, {}), z ({}, {}, {})\n", d[0], d[3],
+                     d[6], d[1], d[4], d[7], d[2], d[5], d[8]);
+}
+
 }  // namespace isobrick::tools

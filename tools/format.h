@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include <isobrick/transform.h>
 #include <isobrick/vec.h>
 
 // Figures and names as people read and write them.
@@ -26,5 +27,8 @@ std::string extension_of(const std::filesystem::path& path);
 
 /// "256 x 256 x 128".
 std::string human_extent(Int3 extent);
+
+/// The lines "spacing …", "origin …" and "direction …".
+std::string place_text(const Transform& transform);
 
 }  // namespace isobrick::tools

@@ -43,7 +43,7 @@ int run(const Arguments& arguments, Console& console) {
   const IndexReport report = add_index(arguments.store, arguments.index, console.progress());
   const nlohmann::ordered_json object{
       {"command", "index"},
-      {"store", arguments.store},
+      {"input", arguments.store},
       {"kind", name_of(arguments.index.kind)},
       {"leaf", arguments.index.leaf},
       {"bytes", total(report)},
@@ -74,7 +74,7 @@ void add_index(Program& program) {
   add_memory(app, arguments->index.memory);
   add_threads(app, arguments->index.threads);
   add_flag(app, "--resume", arguments->index.resume, "Go on with an interrupted build");
-  add_flag(app, "--force", arguments->index.force,
+  add_flag(app, "-f,--force", arguments->index.force,
            "Replace an index of this kind, once the new one is whole, and compute the ranges of "
            "another program's image anew");
   program.commands.push_back(

@@ -22,10 +22,10 @@ IndexKind parse_stored_kind(const std::string& text) {
 
 IndexChoice parse_index_choice(const std::string& text) {
   if (text == "auto") return {};
-  if (text == "none") return {.automatic = false, .kind = std::nullopt};
+  if (text == "linear") return {.automatic = false, .kind = std::nullopt};
   if (const auto kind = stored_kind(text)) return {.automatic = false, .kind = kind};
   throw UsageError(fmt::format(
-      "unknown index '{}'; it is auto, none, interval, kdtree, quadtree or octree", text));
+      "unknown search '{}'; it is auto, linear, interval, kdtree, quadtree or octree", text));
 }
 
 void add_leaf(CLI::App* app, Index& leaf) {

@@ -8,12 +8,14 @@
 
 #include <isobrick/store_reader.h>
 #include "bricks/stored_index.h"
+#include "bricks/zarr/metadata_files.h"
 #include "io/bytes/folder_walk.h"
 #include "tools/format.h"
 #include "tools/histogram.h"
+#include "tools/info_source.h"
 #include "tools/info_volumes.h"
+#include "tools/input.h"
 #include "tools/open_store.h"
-#include "tools/options.h"
 #include "tools/value_range.h"
 
 namespace isobrick::tools {
@@ -173,11 +175,12 @@ ordered_json indexes_json(const StoreFacts& facts) {
   return indexes;
 }
 
-ordered_json json_of(const StoreInfo& info, const StoreFacts& facts) {
+ordered_json json_of(const std::string& path, const StoreInfo& info, const StoreFacts& facts) {
   const LevelInfo& finest = info.levels.front();
   ordered_json object{
       {"command", "info"},
-      {"store", info.path.string()},
+      {"input", path},
+      {"format", info.ours ? "store" : "Zarr"},
       {"extent", to_json(finest.lattice.extent)},
       {"type", zarr_name(info.type)},
       {"spacing", to_json(finest.transform.spacing)},
@@ -265,18 +268,11 @@ std::string histogram_text(const StoreInfo& info, const StoreFacts& facts) {
   return text;
 }
 
-std::string text_of(const StoreInfo& info, const StoreFacts& facts) {
-  const Transform& transform = info.levels.front().transform;
-  const Vec3d spacing = transform.spacing, origin = transform.origin;
-  std::string text = fmt::format("store        {}\n", info.path.string());
+std::string text_of(const std::string& path, const StoreInfo& info, const StoreFacts& facts) {
+  std::string text = fmt::format("{:<13}{}\n", info.ours ? "store" : "image", path);
   text += fmt::format("extent       {} samples of {}\n",
                       human_extent(info.levels.front().lattice.extent), zarr_name(info.type));
-  text += fmt::format("spacing      {} x {} x {} {}\n", spacing.x, spacing.y, spacing.z,
-                      transform.unit.empty() ? "(no unit)" : transform.unit);
-  text += fmt::format("origin       {}, {}, {}\n", origin.x, origin.y, origin.z);
-  const auto& d = transform.direction;  // the columns are where x, y and z point
-  text += fmt::format("direction    x ({}, {}, {}), y ({}, {}, {}), z ({}, {}, {})\n", d[0], d[3],
-                      d[6], d[1], d[4], d[7], d[2], d[5], d[8]);
+  text += place_text(info.levels.front().transform);
   if (!info.grid_name.empty()) text += fmt::format("grid         {}\n", info.grid_name);
   if (!info.grid_class.empty()) text += fmt::format("grid class   {}\n", info.grid_class);
   text += levels_text(info, facts);
@@ -285,36 +281,45 @@ std::string text_of(const StoreInfo& info, const StoreFacts& facts) {
   return text + histogram_text(info, facts);
 }
 
+struct Arguments {
+  InputArguments input;
+  bool stats = false;
+  std::uint64_t memory = 0;
+  int threads = 0;
+};
+
+int run(const Arguments& arguments, Console& console) {
+  const InputArguments& input = arguments.input;
+  check_input(input.path);
+  const bool zarr = is_zarr(input.path);
+  if (zarr && list_volumes(input.path, input.volume.selection, console)) return 0;
+  if (!zarr && !arguments.stats) {
+    report_source(input, console);
+    return 0;
+  }
+  const OpenedVolume opened = open_input(input, arguments.memory, arguments.threads, console);
+  const StoreReader& store = opened.store();
+  const StoreFacts facts = gather(store, arguments.stats, arguments.memory, console.progress());
+  console.result(json_of(input.path, store.info(), facts),
+                 text_of(input.path, store.info(), facts));
+  return 0;
+}
+
 }  // namespace
 
 void add_info(Program& program) {
-  struct Arguments {
-    std::string path;
-    Selection selection;
-    bool stats = false;
-    std::uint64_t memory = std::uint64_t{1} << 30;
-  };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
       program, "info",
-      "Show what a store holds: extents, levels, bricks, histogram; or which channels and times.",
+      "Show what a volume is: extents, levels, bricks, histogram; or which channels and times.",
       "isobrick info head.zarr");
-  add_path(app, "STORE", arguments->path, "Store to look at, or another program's Zarr");
-  add_selection(app, arguments->selection);
+  add_input(app, arguments->input);
   add_flag(app, "--stats", arguments->stats,
-           "Also what takes longer the larger the store is: bytes, absent bricks, and the "
-           "values of a store that keeps no histogram");
+           "Also what takes longer the larger the volume is: bytes, absent bricks, and the "
+           "values of a volume that keeps no histogram");
   add_memory(app, arguments->memory);
-  program.commands.push_back(
-      {app, [arguments](Console& console) {
-         check_store(arguments->path);
-         if (list_volumes(arguments->path, arguments->selection, console)) return 0;
-         const StoreReader store = open_store(arguments->path, arguments->selection);
-         const StoreFacts facts =
-             gather(store, arguments->stats, arguments->memory, console.progress());
-         console.result(json_of(store.info(), facts), text_of(store.info(), facts));
-         return 0;
-       }});
+  add_threads(app, arguments->threads);
+  add_run(program, app, arguments, run);
 }
 
 }  // namespace isobrick::tools

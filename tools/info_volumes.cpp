@@ -50,7 +50,7 @@ ordered_json json_of(const std::filesystem::path& path, const MetadataFiles& fil
                      const std::vector<VolumeAxis>& axes) {
   const Transform& transform = files.image.levels.front().transform;
   ordered_json object{{"command", "info"},
-                      {"store", path.string()},
+                      {"input", path.string()},
                       {"extent", to_json(extent_of(files.levels.front().array))},
                       {"type", zarr_name(files.levels.front().array.type)},
                       {"spacing", to_json(transform.spacing)},

@@ -27,11 +27,21 @@ void add_refused(Program& program, const std::string& name, const std::string& d
 
 }  // namespace
 
-std::unique_ptr<MeshSink> open_preview(const std::string&, bool, const PreviewOptions&) {
+void add_picture_size(CLI::App* app, PictureSize& size) {
+  add_parsed(app, size, parse_picture_size,
+             {"--size", "WxH", "Pixels of the picture (not in this program)", "1280x960"});
+}
+
+void add_camera(CLI::App* app, CameraRequest&) {
+  add_text(app, {"--camera", "PARTS", "How to look at it (not in this program)"},
+           [](const std::string&) {});
+}
+
+std::unique_ptr<MeshSink> open_preview(const std::string&, bool, const PreviewRequest&) {
   refuse("--preview");
 }
 
-std::uint64_t preview_memory(const PreviewOptions&) { refuse("--preview"); }
+std::uint64_t preview_memory(const PreviewRequest&) { refuse("--preview"); }
 std::uint64_t preview_driver_memory() { refuse("--preview"); }
 
 void add_render(Program& program) {

@@ -24,14 +24,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kFormatNames{"a raw file",      "a NRRD file",    "a MetaImage",
-                                  "a NIfTI file",    "a VTK XML file", "a legacy VTK file",
-                                  "a TIFF file",     "an HDF5 file",   "a DICOM file",
-                                  "an OpenVDB file", "a NanoVDB file"};
-
 [[noreturn]] void refuse(const std::string& path, const std::string& what,
-                         const std::string& command) {
-  throw Error(fmt::format("'{}' is no store: {}; {}", path, what, command));
+                         const std::string& command, const char* wanted = "store") {
+  throw Error(fmt::format("'{}' is no {}: {}; {}", path, wanted, what, command));
 }
 
 /// The command that makes a store of a volume.
@@ -62,29 +57,41 @@ bool has_picture_name(const fs::path& path) {
   return std::find(extensions.begin(), extensions.end(), extension_of(path)) != extensions.end();
 }
 
-[[noreturn]] void refuse_file(const fs::path& path) {
+/// Refuses files that no command reads samples from.
+void refuse_meshes_and_pictures(const fs::path& path, const char* wanted) {
   const std::string name = path.string();
   if (has_mesh_name(path)) {
     fs::path picture = path;
     refuse(name, "it is a mesh",
            fmt::format("run: isobrick render {} -o {}", shell_word(name),
-                       shell_word(picture.replace_extension(".png").string())));
+                       shell_word(picture.replace_extension(".png").string())),
+           wanted);
   }
   if (has_picture_name(path))
-    refuse(name, "it is a picture", "name the store or the volume that it shows");
+    refuse(name, "it is a picture", "name the store or the volume that it shows", wanted);
+}
+
+[[noreturn]] void refuse_file(const fs::path& path) {
+  const std::string name = path.string();
+  refuse_meshes_and_pictures(path, "store");
   const VolumeFormat format = recognise_format(name);
-  refuse(name, fmt::format("it is {}", kFormatNames[static_cast<std::size_t>(format)]),
+  refuse(name, fmt::format("it is a volume of the format {}", name_of(format)),
          convert_command(path, format == VolumeFormat::raw ? raw_options(path) : ""));
 }
 
-[[noreturn]] void refuse_folder(const fs::path& path) {
+/// Refuses a folder in which Zarr lies.
+void refuse_outer_folder(const fs::path& path, const char* wanted) {
   for (const FolderEntry& entry : folder_entries(path)) {
     const fs::path inner = path / entry.name;
     std::error_code ignored;
     if (fs::is_directory(inner, ignored) && is_zarr(inner))
       refuse(path.string(), "it is a folder that holds Zarr",
-             fmt::format("name that, such as {}", shell_word(inner.string())));
+             fmt::format("name that, such as {}", shell_word(inner.string())), wanted);
   }
+}
+
+[[noreturn]] void refuse_folder(const fs::path& path) {
+  refuse_outer_folder(path, "store");
   refuse(path.string(), "it is a folder without Zarr's metadata",
          "if it holds the slices of a volume, " + convert_command(path));
 }
@@ -97,6 +104,25 @@ void check_store(const std::string& path) {
   if (!fs::exists(status)) refuse_missing(path);
   if (fs::is_regular_file(status)) refuse_file(path);
   if (fs::is_directory(status) && !is_zarr(path)) refuse_folder(path);
+}
+
+void check_input(const std::string& path) {
+  const std::string file = path == "-" ? path : split_volume_path(path).file;
+  std::error_code ignored;
+  const fs::file_status status = fs::status(file, ignored);
+  if (path == "-") return;
+  const bool store_name = extension_of(file) == ".zarr";
+  if (store_name && !fs::exists(status)) refuse_missing(path);
+  if (store_name && fs::is_regular_file(status)) refuse_file(file);
+  if (!fs::exists(status))
+    throw Error(fmt::format("'{}' does not exist{}", path,
+                            fs::exists(staging_path(path))
+                                ? fmt::format("; its conversion was interrupted: run isobrick "
+                                              "convert VOLUME {} --resume",
+                                              shell_word(path))
+                                : ""));
+  if (fs::is_regular_file(status)) refuse_meshes_and_pictures(file, "volume");
+  if (fs::is_directory(status) && !is_zarr(file)) refuse_outer_folder(file, "volume");
 }
 
 StoreReader open_store(const std::string& path, const Selection& selection) {

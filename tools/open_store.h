@@ -10,6 +10,9 @@ namespace isobrick::tools {
 /// is there and ends in the command to type next.
 void check_store(const std::string& path);
 
+/// Throws Error where `path` is nothing that open_source() or a store's reader opens; as above.
+void check_input(const std::string& path);
+
 /// Opens a store to read, after check_store().
 StoreReader open_store(const std::string& path, const Selection& selection = {});
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bricks/zarr/store_names.h"
+#include "core/machine_memory.h"
 #include "pipeline/convert/convert_staging.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
@@ -31,6 +32,9 @@ void take_named(const CLI::App* app, const std::string& name,
   }
 }
 
+/// Of "-o,--output" the name that messages use.
+std::string long_name(const std::string& names) { return names.substr(names.rfind(',') + 1); }
+
 void describe(CLI::Option* option, const OptionText& text) {
   option->type_name(text.value)->required(text.required);
   if (!text.fallback.empty()) option->default_str(text.fallback);
@@ -44,28 +48,37 @@ CLI::App* add_subcommand(Program& program, const std::string& name, const std::s
   CLI::App* app = program.app.add_subcommand(name, description);
   app->footer("Example:\n  " + example);
   add_flag(app, "--json", program.mode.json, "Write the result as one JSON object");
-  add_flag(app, "--quiet", program.mode.quiet, "Write nothing but errors (and the JSON)");
+  add_flag(app, "-q,--quiet", program.mode.quiet, "Write nothing but errors (and the JSON)");
+  add_parsed(app, program.mode.progress, parse_progress,
+             {"--progress", "auto|bar|lines|json|none",
+              "Progress on standard error; auto: a bar on a terminal, elsewhere a line every 10 s",
+              "auto"});
+  // The words are read before CLI11 gets them.
+  add_text(app,
+           {"--config", "FILE", "Take options that are not given from this TOML file",
+            "$ISOBRICK_CONFIG"},
+           [](const std::string&) {});
   return app;
 }
 
 void add_text(CLI::App* app, const OptionText& option,
               std::function<void(const std::string&)> take) {
-  const std::string name = option.name;
-  describe(
-      app->add_option_function<std::string>(
-          name, [app, name, take](const std::string& text) { take_named(app, name, take, text); },
-          option.help),
-      option);
+  const std::string name = long_name(option.name);
+  describe(app->add_option_function<std::string>(
+               option.name,
+               [app, name, take](const std::string& text) { take_named(app, name, take, text); },
+               option.help),
+           option);
 }
 
 void add_repeated(CLI::App* app, const OptionText& option,
                   std::function<void(const std::string&)> take) {
-  const std::string name = option.name;
+  const std::string name = long_name(option.name);
   const auto take_all = [app, name, take](const std::vector<std::string>& texts) {
     for (const std::string& text : texts) take_named(app, name, take, text);
   };
   CLI::Option* added =
-      app->add_option_function<std::vector<std::string>>(name, take_all, option.help);
+      app->add_option_function<std::vector<std::string>>(option.name, take_all, option.help);
   describe(added->allow_extra_args(false), option);
 }
 
@@ -98,24 +111,75 @@ void add_level(CLI::App* app, int& level) {
              {"--level", "L", "Level of the pyramid, 0 the finest", "0"});
 }
 
-void add_roi(CLI::App* app, std::optional<RoiText>& roi) {
-  add_parsed(app, roi, parse_roi,
+void add_region(CLI::App* app, RegionArguments& region) {
+  add_parsed(app, region.roi, parse_roi,
              {"--roi", "X0:X1,Y0:Y1,Z0:Z1",
               "Only these samples of the level, half-open; parts may be left out"});
+  add_world_region(app, region.region);
 }
 
-void add_memory(CLI::App* app, std::uint64_t& memory, const char* default_text) {
+void add_world_region(CLI::App* app, std::optional<WorldRegion>& region) {
+  add_parsed(app, region,
+             [](const std::string& text) { return std::optional(parse_world_region(text)); },
+             {"--region", "X0:X1,Y0:Y1,Z0:Z1",
+              "Only this box, world units; of samples the fewest that cover it"});
+}
+
+void add_memory(CLI::App* app, std::uint64_t& memory) {
+  static const std::uint64_t fallback = default_memory_budget(allowed_memory());
+  memory = fallback;
   add_parsed(app, memory, parse_bytes,
-             {"--memory", "BYTES", "Budget of memory, such as 512M or 1.5G", default_text});
+             {"--memory", "BYTES", "Budget of memory, such as 512M or 1.5G",
+              "a quarter of what the machine or its control group allows"});
+}
+
+void add_output(CLI::App* app, std::string& output, const char* value, const std::string& help,
+                const std::string& fallback) {
+  add_text(app, {"-o,--output", value, help, fallback},
+           [&output](const std::string& text) { output = text; });
+}
+
+void add_output_or_positional(CLI::App* app, std::string& output, const char* value,
+                              const std::string& help, const std::string& fallback) {
+  const auto take = [&output](const std::string& text) {
+    if (!output.empty() && output != text)
+      throw UsageError(fmt::format("two outputs, '{}' and '{}'", output, text));
+    output = text;
+  };
+  add_text(app, {"OUT", "", help + "; the same as -o", fallback}, take);
+  add_text(app, {"-o,--output", value, help, fallback}, take);
+}
+
+void add_isovalues(CLI::App* app, std::vector<IsovalueRequest>& isovalues, const std::string& help,
+                   const std::string& fallback) {
+  add_repeated(app,
+               {"--isovalue", "V,...",
+                help + "; a number, otsu, p99.5 (percentile), 50% (of the range), 300HU, ct-bone "
+                       "and the like, FROM:TO:STEP; may be repeated",
+                fallback},
+               [&isovalues](const std::string& text) {
+                 const std::vector<IsovalueRequest> more = parse_isovalues(text);
+                 isovalues.insert(isovalues.end(), more.begin(), more.end());
+                 if (isovalues.size() > kMaxIsovalues)
+                   throw UsageError(fmt::format("{} isovalues at most", kMaxIsovalues));
+               });
+}
+
+void add_search(CLI::App* app, IndexChoice& search) {
+  add_parsed(app, search, parse_index_choice,
+             {"--search", "auto|linear|interval|kdtree|quadtree|octree",
+              "What finds active blocks: a stored index, or linear, all ranges; never shows in the "
+              "surface",
+              "auto"});
 }
 
 void add_threads(CLI::App* app, int& threads) {
   add_parsed(app, threads, [](const std::string& text) { return parse_int(text, 1, 4096); },
-             {"--threads", "N", "Worker threads", "all cores"});
+             {"-j,--threads", "N", "Worker threads", "all cores"});
 }
 
 void add_force(CLI::App* app, bool& force) {
-  add_flag(app, "--force", force, "Replace an output that exists, once the new one is whole");
+  add_flag(app, "-f,--force", force, "Replace an output that exists, once the new one is whole");
 }
 
 void add_clip(CLI::App* app, std::vector<HalfSpace>& planes) {
@@ -184,7 +248,7 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
              [](const std::string& text) {
                return text == "none" ? std::nullopt : std::optional(parse_stored_kind(text));
              },
-             {"--index", "none|interval|kdtree|quadtree|octree",
+             {"--build-index", "none|interval|kdtree|quadtree|octree",
               "Also add a search structure, as 'isobrick index' does", "none"});
   add_leaf(app, options.leaf);
   add_memory(app, options.memory);

@@ -8,6 +8,8 @@
 
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
+#include <isobrick/index_choice.h>
+#include <isobrick/isovalue.h>
 #include "tools/console.h"
 #include "tools/parse.h"
 
@@ -91,10 +93,31 @@ void add_paths(CLI::App* app, const std::string& name, std::vector<std::string>&
 void add_dims(CLI::App* app, std::optional<Int3>& dims, bool required = false);
 void add_type(CLI::App* app, std::optional<ScalarType>& type, bool required = false);
 void add_level(CLI::App* app, int& level);
-void add_roi(CLI::App* app, std::optional<RoiText>& roi);
-void add_memory(CLI::App* app, std::uint64_t& memory, const char* default_text = "1G");
+/// The part of a volume that a command works on.
+struct RegionArguments {
+  std::optional<RoiText> roi;         ///< samples of the level
+  std::optional<WorldRegion> region;  ///< world space
+};
+/// --roi and --region.
+void add_region(CLI::App* app, RegionArguments& region);
+/// --region alone.
+void add_world_region(CLI::App* app, std::optional<WorldRegion>& region);
+/// --memory, of which the default is a share of what this machine allows.
+void add_memory(CLI::App* app, std::uint64_t& memory);
+/// -o, for what `value` ("MESH") names.
+void add_output(CLI::App* app, std::string& output, const char* value, const std::string& help,
+                const std::string& fallback);
 void add_threads(CLI::App* app, int& threads);
 void add_force(CLI::App* app, bool& force);
+/// -o and, for commands that read one input, a positional OUT that means the same.
+void add_output_or_positional(CLI::App* app, std::string& output, const char* value,
+                              const std::string& help, const std::string& fallback);
+/// --isovalue, which may be repeated.
+void add_isovalues(CLI::App* app, std::vector<IsovalueRequest>& isovalues, const std::string& help,
+                   const std::string& fallback = {});
+/// --search.
+void add_search(CLI::App* app, IndexChoice& search);
+
 /// --clip, up to kMaxClipPlanes times.
 void add_clip(CLI::App* app, std::vector<HalfSpace>& planes);
 /// --inside.

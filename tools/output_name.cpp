@@ -55,4 +55,17 @@ void check_store_name(const std::string& path) {
                          "writes .nrrd, .vdb and .raw)");
 }
 
+std::string stem_of_input(const std::string& path) {
+  std::string name = path.substr(0, path.find(":/"));
+  while (name.size() > 1 && name.back() == '/') name.pop_back();
+  if (name == "-") throw UsageError("standard input has no name; name the output with -o");
+  std::error_code none;
+  std::filesystem::path file = std::filesystem::path(name).filename();
+  if (file == "." || file == ".." || file.empty())
+    file = std::filesystem::weakly_canonical(name, none).filename();
+  if (extension_of(file.string()) == ".gz") file = file.stem();
+  const std::string stem = file.stem().string();
+  return stem.empty() ? "volume" : stem;
+}
+
 }  // namespace isobrick::tools

@@ -21,4 +21,8 @@ void check_picture_name(const std::string& path);
 /// Throws UsageError for a store that is named as a file of a known format, or `-`.
 void check_store_name(const std::string& path);
 
+/// What outputs of an input are called where no name is given: "scan" of "data/scan.nii.gz",
+/// "series/" and "scan.nrrd:/array". Throws UsageError for standard input, which has no name.
+std::string stem_of_input(const std::string& path);
+
 }  // namespace isobrick::tools

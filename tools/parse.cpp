@@ -197,33 +197,40 @@ RoiText parse_roi(std::string_view text) {
   return roi;
 }
 
-std::array<Vec3d, 2> parse_world_box(std::string_view text) {
+WorldRegion parse_world_region(std::string_view text) {
   const auto parts = split_box(text);
-  std::array<Vec3d, 2> corners;
+  WorldRegion region;
   for (int axis = 0; axis < 3; ++axis) {
     const std::string_view part = parts[static_cast<std::size_t>(axis)];
     const auto colon = std::min(part.find(':'), part.size());
-    corners[0][axis] = parse_number(part.substr(0, colon));
-    corners[1][axis] = parse_number(part.substr(std::min(colon + 1, part.size())));
-    if (!(corners[0][axis] < corners[1][axis]))
+    region.lo[axis] = parse_number(part.substr(0, colon));
+    region.hi[axis] = parse_number(part.substr(std::min(colon + 1, part.size())));
+    if (!(region.lo[axis] < region.hi[axis]))
       throw UsageError(fmt::format("the box '{}' is empty", text));
   }
-  return corners;
+  return region;
 }
 
-Box3 resolve_roi(const RoiText& roi, Int3 extent) {
-  Box3 box{{0, 0, 0}, extent};
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<std::size_t>(axis);
-    box.lo[axis] = roi.lo[i].value_or(0);
-    box.hi[axis] = roi.hi[i].value_or(extent[axis]);
-    if (box.lo[axis] < 0 || box.lo[axis] >= box.hi[axis] || box.hi[axis] > extent[axis])
-      throw UsageError(
-          fmt::format("the region {}:{} along {} is empty or leaves the volume, which "
-                      "has samples 0:{} there",
-                      box.lo[axis], box.hi[axis], "xyz"[axis], extent[axis]));
-  }
-  return box;
+Int3 parse_stride(std::string_view text) {
+  constexpr Index most = Index{1} << 26;
+  if (text.find(',') != text.npos) return parse_dims(text);
+  const Index stride = parse_whole(text, 1, most);
+  return {stride, stride, stride};
+}
+
+std::uint64_t parse_count(std::string_view text) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
+  const double factor = unit.empty()                 ? 1
+                        : unit == "k" || unit == "K" ? 1e3
+                        : unit == "M"                ? 1e6
+                        : unit == "G"                ? 1e9
+                                                     : 0;
+  const double count = std::floor(number * factor);
+  if (error != std::errc{} || factor == 0 || !(count >= 1 && count < 1e18))
+    throw UsageError(fmt::format("'{}' is no count; write it like 200000, 500k or 1.5M", text));
+  return static_cast<std::uint64_t>(count);
 }
 
 float parse_opacity(std::string_view text) {

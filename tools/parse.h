@@ -43,9 +43,14 @@ Vec3d parse_vector(std::string_view text);
 /// "NX,NY,NZ,D": what lies where NX·x + NY·y + NZ·z >= D.
 HalfSpace parse_half_space(std::string_view text);
 
-/// The lower and the upper corner of "X0:X1,Y0:Y1,Z0:Z1", a box of world space that has an
-/// inside.
-std::array<Vec3d, 2> parse_world_box(std::string_view text);
+/// "X0:X1,Y0:Y1,Z0:Z1", a box of world space that has an inside.
+WorldRegion parse_world_region(std::string_view text);
+
+/// "2" along all axes, or "X,Y,Z"; each at least 1.
+Int3 parse_stride(std::string_view text);
+
+/// "1500", "1.5M", "20k", "2G": a count, with decimal units.
+std::uint64_t parse_count(std::string_view text);
 
 /// Pixels, "WIDTHxHEIGHT".
 struct PictureSize {
@@ -85,8 +90,5 @@ using RoiText = RegionRequest;
 
 /// "X0:X1,Y0:Y1,Z0:Z1", half-open; any number, or a whole part, may be left out.
 RoiText parse_roi(std::string_view text);
-
-/// The box that `roi` means in a volume of `extent` samples.
-Box3 resolve_roi(const RoiText& roi, Int3 extent);
 
 }  // namespace isobrick::tools

@@ -2,19 +2,14 @@
 
 #include <fmt/format.h>
 
+#include "tools/pictures.h"
 #include "viewer/app/view_settings.h"
 
 namespace isobrick::tools {
 
 void add_picture_options(CLI::App* app, PictureOptions& options, const std::string& thing) {
-  add_parsed(
-      app, options.size, parse_picture_size,
-      {"--size", "WxH", "Pixels", fmt::format("{}x{}", options.size.width, options.size.height)});
-  add_parsed(app, options.camera, parse_camera,
-             {"--camera", "PARTS",
-              "azimuth=DEG,elevation=DEG,roll=DEG,zoom=X,fov=DEG,orthographic,up=X:Y:Z,from=X:Y:Z, "
-              "or eye=X:Y:Z,target=X:Y:Z",
-              "azimuth=30,elevation=20"});
+  add_picture_size(app, options.size);
+  add_camera(app, options.camera);
   const std::string each = fmt::format("Of the first {}, the second and so on", thing);
   add_repeated(app, {"--colour", "#RRGGBB", each}, [&options](const std::string& text) {
     options.colours.push_back(parse_colour(text));

@@ -25,7 +25,8 @@ struct Arguments {
   std::string output;
   PictureOptions picture{.size = {1280, 960}};
   MeshPictureRequest request;
-  std::uint64_t memory = std::uint64_t{2} << 30;  // pictures of 4096 x 4096 pixels take 1.5 GiB
+  std::optional<WorldRegion> region;
+  std::uint64_t memory = 0;
   bool force = false;
 };
 
@@ -39,6 +40,8 @@ MeshPictureRequest request_of(const Arguments& arguments) {
   request.height = picture.size.height;
   request.camera = picture.camera;
   request.settings.planes = picture.planes;
+  if (arguments.region)
+    request.settings.region = WorldBox{arguments.region->lo, arguments.region->hi};
   request.settings.edges = picture.edges;
   request.settings.occlusion = !picture.no_occlusion;
   return request;
@@ -63,7 +66,9 @@ void check_memory(const MeshPictureRequest& request, std::uint64_t memory) {
         Renderer::driver_memory() >> 20));
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run(const Arguments& given, Console& console) {
+  Arguments arguments = given;
+  if (arguments.output.empty()) arguments.output = stem_of_input(arguments.meshes.front()) + ".png";
   if (is_standard_output(arguments.output))
     console.reserve_output();
   else
@@ -134,21 +139,16 @@ void add_render(Program& program) {
                      "isobrick render head_500.ply head_1150.ply --opacity 0.3 --camera "
                      "azimuth=40,elevation=15 -o head.png");
   add_paths(app, "MESH", arguments->meshes, "Meshes to draw: " + mesh_extensions());
-  add_text(app, {"-o,--output", "PNG", "Picture to write, - for standard output", "", true},
-           [&output = arguments->output](const std::string& text) { output = text; });
+  add_output(app, arguments->output, "PNG", "Picture to write, - for standard output",
+             "head_500.png of head_500.ply, in the current folder");
   add_picture_options(app, arguments->picture, "mesh");
   add_text(
       app,
       {"--background", "COLOUR[,BOTTOM]", "Behind the meshes, from top to bottom", "a light grey"},
       [&request](const std::string& text) { parse_background(text, request.settings); });
-  add_parsed(app, request.settings.region,
-             [](const std::string& text) {
-               const auto [lo, hi] = parse_world_box(text);
-               return std::optional(WorldBox{lo, hi});
-             },
-             {"--region", "X0:X1,Y0:Y1,Z0:Z1", "Draw only what is in this box, world units"});
+  add_world_region(app, arguments->region);
   add_overlay_options(app, request);
-  add_memory(app, arguments->memory, "2G");
+  add_memory(app, arguments->memory);
   add_force(app, arguments->force);
   add_run(program, app, arguments, run);
 }

@@ -71,7 +71,7 @@ void check_space(const std::string& path, std::uint64_t bytes) {
 ConvertReport write_raw(VolumeSource& source, const std::string& path,
                         const ConvertOptions& options, Progress& progress) {
   if (options.resume) throw UsageError("--resume is for stores; a raw file is written anew");
-  if (options.index) throw UsageError("--index is for stores; a raw file has no index");
+  if (options.index) throw UsageError("--build-index is for stores; a raw file has no index");
   const Int3 extent = source.info().extent;
   const std::size_t sample_bytes = size_of(source.info().type);
   const Int3 piece = piece_extent(extent, sample_bytes,
@@ -103,15 +103,17 @@ int run(const Arguments& arguments, Console& console) {
   synth.type = *arguments.type;
   const auto source = make_synth(synth);
   const ConvertOptions& options = arguments.store;
-  const bool raw = extension_of(arguments.out) == ".raw";
+  const std::string out =
+      arguments.out.empty() ? std::string(name_of(synth.kind)) + ".zarr" : arguments.out;
+  const bool raw = extension_of(out) == ".raw";
   if (!raw) {
-    check_store_name(arguments.out);
-    note_conversion(arguments.out);
+    check_store_name(out);
+    note_conversion(out);
   }
-  const ConvertReport report = raw ? write_raw(*source, arguments.out, options, console.progress())
-                                   : convert(*source, arguments.out, options, console.progress());
-  report_conversion(console, "synth", std::string(name_of(synth.kind)), arguments.out,
-                    source->info(), report);
+  const ConvertReport report = raw ? write_raw(*source, out, options, console.progress())
+                                   : convert(*source, out, options, console.progress());
+  report_conversion(console, "synth", std::string(name_of(synth.kind)), out, source->info(),
+                    report);
   return 0;
 }
 
@@ -124,7 +126,9 @@ void add_synth(Program& program) {
                                  "isobrick synth gyroid gyroid.zarr --dims 256,256,256 --type u8");
   add_text(app, {"KIND", "sphere|gyroid|marschner-lobb|mixing", "Which field", "", true},
            [&kind = arguments->synth.kind](const std::string& text) { kind = parse_kind(text); });
-  add_path(app, "OUT", arguments->out, "Store to write, or a raw file if it ends in .raw");
+  add_output_or_positional(app, arguments->out, "ZARR",
+                           "Store to write, or a raw file if it ends in .raw",
+                           "gyroid.zarr and so on");
   add_dims(app, arguments->dims, true);
   add_type(app, arguments->type, true);
   add_parsed(app, arguments->synth.seed, parse_offset,

@@ -55,7 +55,7 @@ int run(const Arguments& arguments, Console& console) {
   const VerifyReport report = verify(arguments.store, arguments.threads, console.progress(),
                                      arguments.selection, arguments.memory);
   const nlohmann::ordered_json object{{"command", "verify"},
-                                      {"store", arguments.store},
+                                      {"input", arguments.store},
                                       {"whole", report.damage_count == 0},
                                       {"bricks", report.bricks},
                                       {"bytes_read", report.bytes},

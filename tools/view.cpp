@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -10,11 +11,13 @@
 
 #include <isobrick/error.h>
 #include "bricks/image_volumes.h"
+#include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_file.h"
 #include "io/bytes/output_guard.h"
 #include "tools/format.h"
+#include "tools/input.h"
 #include "tools/interrupt.h"
-#include "tools/open_store.h"
+#include "tools/isovalues.h"
 #include "tools/output_name.h"
 #include "tools/picture_options.h"
 #include "tools/store_region.h"
@@ -30,57 +33,100 @@ namespace isobrick::tools {
 namespace {
 
 struct Arguments {
-  std::string store, screenshot, turntable;
-  std::vector<double> isovalues;
+  InputArguments input;
+  std::string screenshot, turntable;
+  std::vector<IsovalueRequest> isovalues;
   PictureOptions picture{.size = {1280, 800}};
   ViewSettings settings;
   int frames = 120;
   bool plain = false, force = false;
   int level = 0;
-  Selection selection;
-  std::optional<RoiText> roi;
+  RegionArguments region;
   PictureBudgets budgets;
-  IndexKind index = IndexKind::linear;
+  IndexChoice search;
+
+  /// Without a stored index the viewer builds one only where it is named.
+  IndexKind index() const { return search.kind.value_or(IndexKind::linear); }
 };
 
-/// Where a sample of a level lies among those of level 0, along an axis.
-double in_level_0(const StoreInfo& info, int level, int axis, Index sample) {
+/// Where a place of the world lies among the samples of level 0, along an axis.
+double in_level_0(const StoreInfo& info, int axis, Vec3d world) {
   const Transform& finest = info.levels.front().transform;
-  Vec3d index;
-  index[axis] = static_cast<double>(sample);
-  const Vec3d world = info.levels[static_cast<std::size_t>(level)].transform.apply(index);
   const Vec3d step = finest.step(axis);
   return dot(world - finest.origin, step) / dot(step, step);
 }
 
-/// Shows only --roi, which counts the samples of --level, and no finer level than that.
-void set_region(const StoreReader& store, const Arguments& arguments, ViewSettings& settings) {
-  const Box3 box = store_region(store, arguments.level, arguments.roi);
-  settings.finest_level = arguments.level;
-  settings.region_on = arguments.roi.has_value();
-  if (!settings.region_on) return;
+/// Cuts the shown region along an axis to what lies between two places among level 0's samples.
+void cut(ViewSettings& settings, int axis, double lo, double hi, double last) {
+  if (!(last > 0)) return;
+  settings.region_lo[axis] =
+      std::max(settings.region_lo[axis], static_cast<float>(std::clamp(lo / last, 0.0, 1.0)));
+  settings.region_hi[axis] =
+      std::min(settings.region_hi[axis], static_cast<float>(std::clamp(hi / last, 0.0, 1.0)));
+}
+
+/// Shows only --roi, which counts the samples of --level.
+void cut_to_roi(const StoreReader& store, int level, const RoiText& roi, ViewSettings& settings) {
   const StoreInfo& info = store.info();
-  const Int3 extent = info.levels[static_cast<std::size_t>(arguments.level)].lattice.extent;
+  const LevelInfo& of_level = info.levels[static_cast<std::size_t>(level)];
+  const Box3 box = resolve_region(roi, of_level.lattice.extent);
   const Vec3d last = last_sample(store);
-  const auto part = [&](int axis, Index sample) {
-    return static_cast<float>(
-        std::clamp(in_level_0(info, arguments.level, axis, sample) / last[axis], 0.0, 1.0));
+  const auto place = [&](int axis, Index sample) {
+    Vec3d index;
+    index[axis] = static_cast<double>(sample);
+    return in_level_0(info, axis, of_level.transform.apply(index));
   };
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(last[axis] > 0)) continue;
+  for (int axis = 0; axis < 3; ++axis)
     // The outermost samples of a coarse level lie within the volume, which is shown up to its end.
-    if (box.lo[axis] > 0) settings.region_lo[axis] = part(axis, box.lo[axis]);
-    if (box.hi[axis] < extent[axis]) settings.region_hi[axis] = part(axis, box.hi[axis] - 1);
+    cut(settings, axis, box.lo[axis] > 0 ? place(axis, box.lo[axis]) : 0,
+        box.hi[axis] < of_level.lattice.extent[axis] ? place(axis, box.hi[axis] - 1) : last[axis],
+        last[axis]);
+}
+
+/// Shows only --region, a box of the world; of a volume whose axes are turned the box around it.
+void cut_to_region(const StoreReader& store, const WorldRegion& region, ViewSettings& settings) {
+  const StoreInfo& info = store.info();
+  const LevelInfo& finest = info.levels.front();
+  covering_samples(region, finest.transform, finest.lattice.extent);  // refuses one beside it
+  const Vec3d last = last_sample(store);
+  for (int axis = 0; axis < 3; ++axis) {
+    double lo = std::numeric_limits<double>::infinity(), hi = -lo;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3d p{(corner & 1 ? region.hi : region.lo).x, (corner & 2 ? region.hi : region.lo).y,
+                    (corner & 4 ? region.hi : region.lo).z};
+      lo = std::min(lo, in_level_0(info, axis, p));
+      hi = std::max(hi, in_level_0(info, axis, p));
+    }
+    cut(settings, axis, lo, hi, last[axis]);
   }
 }
 
-ViewSettings settings_of(const Arguments& arguments) {
+/// Shows only the requested region, and no finer level than --level.
+void set_region(const StoreReader& store, const Arguments& arguments, ViewSettings& settings) {
+  store_region(store, arguments.level, arguments.region);  // refuses what is not there
+  settings.finest_level = arguments.level;
+  const auto& [roi, region] = arguments.region;
+  settings.region_on = roi || region;
+  if (roi) cut_to_roi(store, arguments.level, *roi, settings);
+  if (region) cut_to_region(store, *region, settings);
+}
+
+/// The isovalues that are requested or, if none is, one to begin with.
+std::vector<double> isovalues_of(const Arguments& arguments, const StoreReader& store,
+                                 Console& console) {
+  if (!arguments.isovalues.empty())
+    return resolve_isovalues(arguments.isovalues, store, console.progress());
+  const auto suggested = suggest_isovalue_of(store, console.progress());
+  return suggested ? std::vector{suggested->value} : std::vector<double>{};
+}
+
+ViewSettings settings_of(const Arguments& arguments, const std::vector<double>& isovalues) {
   ViewSettings settings = arguments.settings;
-  const std::size_t count = std::max<std::size_t>(arguments.isovalues.size(), 1);
+  const std::size_t count = std::max<std::size_t>(isovalues.size(), 1);
   for (const MeshStyle& style : styles_of(arguments.picture, count, "isovalues")) {
     const std::size_t i = settings.surfaces.size();
     SurfaceSettings surface{.colour = style.colour, .opacity = style.opacity};
-    if (i < arguments.isovalues.size()) surface.isovalue = arguments.isovalues[i];
+    if (i < isovalues.size()) surface.isovalue = isovalues[i];
     settings.surfaces.push_back(surface);
   }
   for (const HalfSpace& half : arguments.picture.planes) settings.planes.push_back({true, half});
@@ -129,7 +175,7 @@ std::vector<Screenshot> shots_of(const Arguments& arguments, const SceneRenderer
     if (!request.eye) see_whole(shots, picture.shown_bounds(settings), aspect);
   }
   if (!arguments.screenshot.empty()) shots.insert(shots.begin(), {arguments.screenshot, camera});
-  const std::array<std::filesystem::path, 1> inputs{arguments.store};
+  const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
   for (const Screenshot& shot : shots) {
     check_replaces_no_input(shot.file, inputs);
     check_output(shot.file, arguments.force);
@@ -167,13 +213,16 @@ ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Screenshot
 
 /// Draws into files.
 int draw(const Arguments& arguments, Console& console) {
-  check_store(arguments.store);
-  const auto store = std::make_shared<const StoreReader>(arguments.store, arguments.selection);
-  const std::vector<MeshStyle> styles = styles_of(
-      arguments.picture, std::max<std::size_t>(arguments.isovalues.size(), 1), "isovalues");
+  const OpenedVolume input =
+      open_input(arguments.input, arguments.budgets.memory, arguments.budgets.threads, console);
+  const auto store = std::make_shared<const StoreReader>(input.store().info().path,
+                                                         input.store().info().selection);
+  const std::vector<double> isovalues = isovalues_of(arguments, *store, console);
+  const std::vector<MeshStyle> styles =
+      styles_of(arguments.picture, std::max<std::size_t>(isovalues.size(), 1), "isovalues");
   const bool transparent = std::any_of(styles.begin(), styles.end(),
                                        [](const MeshStyle& style) { return style.opacity < 1; });
-  ViewSettings settings = settings_of(arguments);
+  ViewSettings settings = settings_of(arguments, isovalues);
   set_region(*store, arguments, settings);
   const GlContext context;
   SceneRenderer picture(store,
@@ -183,7 +232,7 @@ int draw(const Arguments& arguments, Console& console) {
   choose_values(settings, picture.scene().tree());
   const std::vector<Screenshot> shots = shots_of(arguments, picture, settings);
   NodeSearch& search = picture.scene().search();
-  search.use(arguments.index);
+  search.use(arguments.index());
   search.wait();
   if (const std::string refused = search.state().refused; !refused.empty())
     console.note(refused + ": a linear scan is used");
@@ -198,8 +247,8 @@ int draw(const Arguments& arguments, Console& console) {
     console.note(
         "the picture is coarser than --pixel-error allows: there is no room for more triangles; a "
         "larger --memory or --gpu-memory makes it finer");
-  nlohmann::ordered_json isovalues = nlohmann::ordered_json::array();
-  for (const SurfaceSettings& surface : settings.surfaces) isovalues.push_back(surface.isovalue);
+  nlohmann::ordered_json shown = nlohmann::ordered_json::array();
+  for (const SurfaceSettings& surface : settings.surfaces) shown.push_back(surface.isovalue);
   const std::string text =
       fmt::format("{} triangles{}, drawn by {}\n", human_count(drawn.most_triangles),
                   shots.size() > 1 ? " at most" : "", current_gl_device().renderer);
@@ -208,9 +257,9 @@ int draw(const Arguments& arguments, Console& console) {
     outputs += fmt::format("{}{} pictures in {}", outputs.empty() ? "" : ", ", arguments.frames,
                            arguments.turntable);
   console.result({{"command", "view"},
-                  {"store", arguments.store},
+                  {"input", arguments.input.path},
                   {"level", arguments.level},
-                  {"isovalues", isovalues},
+                  {"isovalues", shown},
                   {"screenshot", arguments.screenshot},
                   {"turntable", arguments.turntable},
                   {"pictures", shots.size()},
@@ -227,33 +276,47 @@ int draw(const Arguments& arguments, Console& console) {
   return drawn.damage.empty() ? 0 : 1;
 }
 
+/// What of an image the window shows first: of several channels or times the first.
+OpenedVolume open_shown(const Arguments& arguments, Console& console) {
+  InputArguments input = arguments.input;
+  if (is_zarr(input.path))
+    input.volume.selection = image_volumes(input.path, input.volume.selection).selection;
+  return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console);
+}
+
 int run(const Arguments& arguments, Console& console) {
   if (!arguments.screenshot.empty() || !arguments.turntable.empty()) {
-    if (arguments.store.empty())
-      throw UsageError("STORE is required to draw into files; see 'isobrick view --help'");
+    if (arguments.input.path.empty())
+      throw UsageError("INPUT is required to draw into files; see 'isobrick view --help'");
     return draw(arguments, console);
   }
   WindowOptions options;
   options.width = arguments.picture.size.width;
   options.height = arguments.picture.size.height;
   options.budgets = arguments.budgets;
-  options.index = arguments.index;
+  options.index = arguments.index();
   options.camera = arguments.picture.camera;
-  options.settings = settings_of(arguments);
-  set_interrupt_note([] { return "the window is closed"; });
-  // A store that cannot be opened is reported before anything about windows.
-  if (!arguments.store.empty()) {
-    check_store(arguments.store);
-    const Selection shown = image_volumes(arguments.store, arguments.selection).selection;
-    set_region(StoreReader(arguments.store, shown), arguments, options.settings);
+  // An input that cannot be opened is reported before anything about windows.
+  std::optional<OpenedVolume> input;
+  if (!arguments.input.path.empty()) {
+    input.emplace(open_shown(arguments, console));
+    options.settings = settings_of(arguments, isovalues_of(arguments, input->store(), console));
+    set_region(input->store(), arguments, options.settings);
+  } else {
+    options.settings = settings_of(arguments, {});
   }
+  set_interrupt_note([] { return "the window is closed"; });
   {
     ViewerWindow window(options);
-    if (!arguments.store.empty()) window.open(arguments.store, arguments.selection);
+    if (input) {
+      const StoreInfo& info = input->store().info();
+      window.open(info.path, info.path == arguments.input.path ? arguments.input.volume.selection
+                                                               : info.selection);
+    }
     window.run();
   }  // a conversion that still ran has left nothing
   if (const int signal = interrupting_signal(); signal != 0) throw Interrupted(signal);
-  console.result({{"command", "view"}, {"store", arguments.store}}, "");
+  console.result({{"command", "view"}, {"input", arguments.input.path}}, "");
   return 0;
 }
 
@@ -263,12 +326,6 @@ float parse_pixel_error(const std::string& text) {
     throw UsageError(fmt::format("'{}' is no pixel error; it lies within {} and {}", text,
                                  kMinPixelError, kMaxPixelError));
   return pixels;
-}
-
-IndexKind parse_search(const std::string& text) {
-  if (const auto kind = parse_index_kind(text)) return *kind;
-  throw UsageError(
-      fmt::format("unknown index '{}'; it is linear, interval, kdtree, quadtree or octree", text));
 }
 
 /// "x:PART": a slice across an axis, its place in parts of the volume.
@@ -300,28 +357,21 @@ void add_what_to_draw(CLI::App* app, Arguments& arguments) {
 void add_view(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* app = add_subcommand(
-      program, "view", "Look at a store: move the isovalue, fly through it, take pictures.",
+      program, "view", "Look at a volume: move the isovalue, fly through it, take pictures.",
       "isobrick view head.zarr --isovalue 500");
-  add_text(app,
-           {"STORE", "", "Store to look at; without one the window waits for a file to be dropped"},
-           [&store = arguments->store](const std::string& text) { store = text; });
-  add_repeated(app, {"--isovalue", "V", "Surface to begin with; may be repeated", "in the middle"},
-               [&values = arguments->isovalues](const std::string& text) {
-                 values.push_back(parse_number(text));
-               });
-  add_selection(app, arguments->selection);
+  add_input(app, arguments->input, false);
+  add_isovalues(app, arguments->isovalues, "Surface to begin with",
+                "the one that 'isobrick extract' suggests, mostly Otsu's threshold");
   add_parsed(
       app, arguments->level, [](const std::string& text) { return parse_int(text, 0, 64); },
       {"--level", "L", "Show no finer level of the pyramid than this one, 0 the finest", "0"});
-  add_roi(app, arguments->roi);
+  add_region(app, arguments->region);
   add_picture_options(app, arguments->picture, "surface");
   add_inside(app, arguments->budgets.inside);
   add_what_to_draw(app, *arguments);
   add_parsed(app, arguments->settings.pixel_error, parse_pixel_error,
              {"--pixel-error", "PIXELS", "How long a cell may be on the picture", "1.5"});
-  add_parsed(app, arguments->index, parse_search,
-             {"--index", "linear|interval|kdtree|quadtree|octree",
-              "What finds the parts that an isovalue crosses", "linear"});
+  add_search(app, arguments->search);
   add_parsed(app, arguments->budgets.backend, parse_backend,
              {"--backend", "auto|cpu|cuda",
               "What makes the meshes, the same on either; auto: a GPU where there is one", "auto"});

@@ -173,7 +173,7 @@ LevelBudget budget_of(const StoreInfo& store, int level, int threads, std::uint6
   if (least(threads) > memory)
     throw UsageError(fmt::format(
         "a memory budget of {} MiB is too small: level {} has bricks of {} × {} × {} samples and "
-        "needs {} MiB at least",
+        "needs --memory {}M at least",
         memory / kMiB, level, lattice.brick.x, lattice.brick.y, lattice.brick.z,
         least(threads) / kMiB + 1));
   return {threads, std::min(kPieceBytes, memory - least(threads) + lattice.brick_bytes())};

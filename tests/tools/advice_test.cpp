@@ -27,20 +27,20 @@ TEST_F(Advice, OfAStoreThatIsNotThere) {
 
 TEST_F(Advice, SaysWhatTheFileIs) {
   const auto refused = [&](const std::string& name, std::initializer_list<std::string> parts) {
-    expect_refused(run({"info", path(name)}), 1, parts);
+    expect_refused(run({"verify", path(name)}), 1, parts);
   };
   write_file(path("a.raw"), "abc");
-  refused("a.raw",
-          {"it is a raw file", fmt::format("isobrick convert {} {} --dims X,Y,Z --type TYPE\n",
-                                           path("a.raw"), path("a.zarr"))});
+  refused("a.raw", {"it is a volume of the format raw",
+                    fmt::format("isobrick convert {} {} --dims X,Y,Z --type TYPE\n", path("a.raw"),
+                                path("a.zarr"))});
   write_file(path("a_1x1x3_uint8.raw"), "abc");
   refused("a_1x1x3_uint8.raw", {fmt::format(" {}\n", path("a_1x1x3_uint8.zarr"))});
   write_file(path("my scan.nrrd"), "NRRD0004\n");
-  refused("my scan.nrrd",
-          {"it is a NRRD file", fmt::format("isobrick convert '{}' '{}'\n", path("my scan.nrrd"),
-                                            path("my scan.zarr"))});
+  refused("my scan.nrrd", {"it is a volume of the format NRRD",
+                           fmt::format("isobrick convert '{}' '{}'\n", path("my scan.nrrd"),
+                                       path("my scan.zarr"))});
   write_file(path("a.h5"), "\x89HDF\r\n\x1a\n");
-  refused("a.h5", {"it is an HDF5 file"});
+  refused("a.h5", {"it is a volume of the format HDF5"});
   write_file(path("a.ply"), "ply\n");
   refused("a.ply", {"it is a mesh",
                     fmt::format("isobrick render {} -o {}\n", path("a.ply"), path("a.png"))});
@@ -72,7 +72,7 @@ TEST_F(Advice, OfTheViewerIsThatOfInfo) {
     EXPECT_EQ(run({"view", path(name)}).err, expected);
     EXPECT_EQ(run({"view", path(name), "--screenshot", path("a.png")}).err, expected);
   }
-  expect_refused(run({"view", "--screenshot", path("a.png")}), 2, {"STORE is required"});
+  expect_refused(run({"view", "--screenshot", path("a.png")}), 2, {"INPUT is required"});
 }
 
 TEST_F(Advice, OfRangesThatAreMissing) {
@@ -87,7 +87,7 @@ TEST_F(Advice, OfRangesThatAreMissing) {
   EXPECT_NE(run({"info", store}).out.find("run: isobrick index " + store + "\n"),
             std::string::npos);
   Arguments by_index = extract;
-  by_index.insert(by_index.end(), {"--index", "kdtree"});
+  by_index.insert(by_index.end(), {"--search", "kdtree"});
   expect_refused(run(by_index), 2, {"run: isobrick index " + store + " --kind kdtree\n"});
   // The line does what it promises; octree is the default.
   EXPECT_EQ(run_json({"index", store})["kind"], "octree");

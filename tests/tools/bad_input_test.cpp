@@ -17,13 +17,11 @@ TEST_F(BadInput, CommandLinesThatMakeNoSense) {
   const std::vector<std::pair<Arguments, std::string>> lines{
       {{"paint"}, "unknown subcommand 'paint'"},
       {{"convert"}, "IN"},
-      {{"info"}, "STORE"},
-      {{"extract", path("a.zarr"), "-o", path("a.ply")}, "--isovalue"},
+      {{"info"}, "INPUT"},
       {{"extract", path("a.zarr"), "--isovalue", "abc", "-o", path("a.ply")}, "abc"},
       {{"extract", path("a.zarr"), "--isovalue", "nan", "-o", path("a.ply")}, "nan"},
       {{"extract", path("a.zarr"), "--isovalue", "1", "--isovalue", "1", "-o", path("a.ply")},
        "twice"},
-      {{"extract", path("a.zarr"), "--isovalue", "1"}, "nothing to do"},
       {{"extract", path("a.zarr"), "--isovalue", "1", "-o", path("a.doc")}, "a.doc"},
       {{"completion", "tcsh"}, "tcsh"},
       {{"synth", "cube", path("a.raw"), "--dims", "2,2,2", "--type", "u8"}, "cube"},
@@ -266,9 +264,9 @@ TEST_F(BadInput, TwoOutputsOfOneName) {
 
 TEST_F(BadInput, APictureTooLargeForTheMemory) {
   const std::string store = make_store("a");
-  expect_refused(run({"extract", store, "--isovalue", "127.5", "--preview", path("a.png"),
-                      "--preview-size", "16384x16384"}),
-                 2, {"16384 x 16384", "1024.0 MiB", "--preview-size"});
+  expect_refused(run({"extract", store, "--isovalue", "127.5", "--preview", path("a.png"), "--size",
+                      "16384x16384", "--memory", "1G"}),
+                 2, {"16384 x 16384", "1024.0 MiB", "--size"});
   EXPECT_EQ(files(), Arguments{"a.zarr"});
 }
 

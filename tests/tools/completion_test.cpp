@@ -46,7 +46,7 @@ TEST_F(Completion, OfBash) {
   EXPECT_EQ(completed("isobrick extract --isovalue 5 --iso", 4), "--isovalue\n");
   EXPECT_EQ(completed("isobrick extract --level 0 --lev", 4), "\n");
   EXPECT_EQ(completed("isobrick extract -o a.ply --outp", 4), "\n");
-  EXPECT_EQ(completed("isobrick extract --level ''", 3), "\n");
+  EXPECT_EQ(completed("isobrick extract --level ''", 3), "auto\n");
   EXPECT_EQ(completed("isobrick extract -o ''", 3), "script\n");
   EXPECT_EQ(completed("isobrick extract ''", 2), "script\n");
   EXPECT_EQ(completed("isobrick extract a.zarr ''", 3), "\n");

@@ -52,7 +52,7 @@ TEST_F(ExtractTogether, MeshesOfSeveralIsovaluesAreThoseOfSingleRuns) {
 }
 
 TEST_F(ExtractTogether, PicturesAreThoseOfSingleRuns) {
-  const Arguments picture{"--preview", path("p.png"), "--preview-size", "320x240"};
+  const Arguments picture{"--preview", path("p.png"), "--size", "320x240"};
   const Outcome drawn = run(extract({"110"}, {"--preview", path("p.png")}));
   if (drawn.exit_code != 0) GTEST_SKIP() << drawn.err;  // nothing can draw here
   Arguments both = picture;

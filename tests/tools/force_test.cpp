@@ -37,13 +37,13 @@ class Force : public ProgramTest {
 };
 
 TEST_F(Force, ReplacesAStoreOfOursAndNothingElse) {
-  make_store("a", {"--index", "octree"});
+  make_store("a", {"--build-index", "octree"});
   EXPECT_EQ(run(convert(path("a.raw"), path("a.zarr"))).exit_code, 0);
   fs::create_directory(path("empty"));
   EXPECT_EQ(run(convert(path("a.raw"), path("empty"))).exit_code, 0);
   for (const char* foreign : {"photo.jpg", "0/notes.txt", "isobrick/0/range/c/0/0/mine",
                               "isobrick/0/index/octree/c/0/0/0/deeper", "labels/zarr.json"}) {
-    make_store("b", {"--index", "octree"});
+    make_store("b", {"--build-index", "octree"});
     fs::remove_all(path("b.zarr/isobrick/0/index/octree/c/0/0/0"));
     fs::create_directories(fs::path(path(std::string("b.zarr/") + foreign)).parent_path());
     write_file(path(std::string("b.zarr/") + foreign), "mine");
@@ -125,7 +125,7 @@ TEST_F(Force, KeepsWhatTheStoreDoesNotHave) {
 }
 
 TEST_F(Force, KeepsTheCurrentDirectory) {
-  const std::string store = make_store("a", {"--index", "octree"});
+  const std::string store = make_store("a", {"--build-index", "octree"});
   for (const char* folder : {".", "0/c", "isobrick/0/index/octree"}) {
     const std::string here = store + "/" + folder;
     const auto in_it = [&](const Arguments& arguments) {
@@ -145,7 +145,7 @@ TEST_F(Force, KeepsTheCurrentDirectory) {
 }
 
 TEST_F(Force, AnIndexReplacesNothingElse) {
-  const std::string store = make_store("a", {"--index", "octree"});
+  const std::string store = make_store("a", {"--build-index", "octree"});
   write_file(store + "/isobrick/0/index/octree/notes.txt", "mine");
   expect_kept({"index", store, "--kind", "octree", "--force"}, {"notes.txt"});
   fs::rename(store + "/isobrick/0/index/octree", store + "/isobrick/0/index/octree.partial");

@@ -18,7 +18,7 @@ struct Writer {
 class FullDisk : public ProgramTest {
  protected:
   FullDisk() {
-    store_ = make_store("a", {"--index", "octree"});
+    store_ = make_store("a", {"--build-index", "octree"});
     const auto made = run({"extract", store_, "--isovalue", "128", "-o", path("in.ply")});
     EXPECT_EQ(made.exit_code, 0) << made.err;
   }
@@ -130,8 +130,8 @@ TEST_F(FullDisk, ASignalWhileAFileIsWrittenLeavesTheOneThatWasThere) {
 
 TEST_F(FullDisk, AStoreIsNotMadeOnOne) {
   write_file(path("in.raw"), noise(64 * 64 * 64));
-  const Arguments convert{"convert", path("in.raw"), path("b.zarr"), "--dims", "64,64,64",
-                          "--type",  "u8",           "--index",      "octree"};
+  const Arguments convert{"convert", path("in.raw"), path("b.zarr"),  "--dims", "64,64,64",
+                          "--type",  "u8",           "--build-index", "octree"};
   for (const int fault : {ENOSPC, EIO})
     for (const long long after : {0LL, 1000LL, 200'000LL}) {
       expect_refused(run_with_fault(convert, after, fault), 1,
@@ -171,7 +171,7 @@ TEST_F(FullDisk, OfASmallFileSystem) {
 TEST_F(FullDisk, InterruptedCallsAreRepeated) {
   write_file(path("a.raw"), noise(20 * 20 * 20));
   const Arguments convert{"convert", path("a.raw"), path("b.zarr"), "--dims", "20,20,20",
-                          "--type",  "u8",          "--brick",      "16",     "--index",
+                          "--type",  "u8",          "--brick",      "16",     "--build-index",
                           "octree",  "--memory",    "40M",          "--force"};
   ASSERT_EQ(run(convert).exit_code, 0);
   const std::string store = path("b.zarr");

@@ -30,10 +30,9 @@ TEST_F(Help, AnswersHoweverItIsAskedFor) {
 
 TEST_F(Help, MarksWhatIsNeeded) {
   EXPECT_EQ(usage(run({"--help"}).out), "Usage: isobrick SUBCOMMAND [OPTIONS]");
-  EXPECT_EQ(usage(run({"extract", "--help"}).out),
-            "Usage: isobrick extract STORE --isovalue V [OPTIONS]");
-  EXPECT_EQ(usage(run({"render", "--help"}).out).find("Usage: isobrick render MESH... -o PNG "),
-            0u);
+  EXPECT_EQ(usage(run({"extract", "--help"}).out), "Usage: isobrick extract INPUT [OPTIONS]");
+  EXPECT_EQ(usage(run({"convert", "--help"}).out), "Usage: isobrick convert INPUT [OUT] [OPTIONS]");
+  EXPECT_EQ(usage(run({"render", "--help"}).out).find("Usage: isobrick render MESH..."), 0u);
   EXPECT_EQ(usage(run({"help", "--help"}).out), "Usage: isobrick help [COMMAND] [OPTIONS]");
   const std::string synth = run({"synth", "--help"}).out;
   for (const char* option : {"--dims X,Y,Z ", "--type u8|i8|u16|i16|u32|i32|f32|f64 "})

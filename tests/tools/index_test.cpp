@@ -10,7 +10,7 @@ namespace fs = std::filesystem;
 class IndexCommand : public ProgramTest {
  protected:
   std::string mesh(const std::string& store, const std::string& index) {
-    EXPECT_EQ(run({"extract", store, "--isovalue", "127.5", "--index", index, "-o", path("m.ply"),
+    EXPECT_EQ(run({"extract", store, "--isovalue", "127.5", "--search", index, "-o", path("m.ply"),
                    "--force"})
                   .exit_code,
               0);
@@ -28,7 +28,7 @@ class IndexCommand : public ProgramTest {
 
 TEST_F(IndexCommand, AddsKindsThatExtractUsesAndInfoShows) {
   const std::string store = make_store("a");
-  const std::string expected = mesh(store, "none");
+  const std::string expected = mesh(store, "linear");
   EXPECT_TRUE(mesh(store, "auto") == expected);
   for (const std::string kind : {"interval", "kdtree", "quadtree", "octree"}) {
     const nlohmann::json made = run_json({"index", store, "--kind", kind, "--leaf", "4"});
@@ -39,7 +39,7 @@ TEST_F(IndexCommand, AddsKindsThatExtractUsesAndInfoShows) {
     EXPECT_EQ(made["level_bytes"].size(), 3u);
     EXPECT_EQ(made["ranges_added"], false);
     EXPECT_TRUE(mesh(store, kind) == expected);
-    const nlohmann::json used = run_json({"extract", store, "--isovalue", "127.5", "--index", kind,
+    const nlohmann::json used = run_json({"extract", store, "--isovalue", "127.5", "--search", kind,
                                           "-o", path("n.ply"), "--force"})["surfaces"][0];
     EXPECT_EQ(used["index"]["used"], kind);
     EXPECT_GT(used["index"]["bytes_read"].get<int>(), 0);
@@ -69,14 +69,14 @@ TEST_F(IndexCommand, AddsKindsThatExtractUsesAndInfoShows) {
 }
 
 TEST_F(IndexCommand, ConvertAddsOneAtOnce) {
-  const std::string later = make_store("a"), at_once = make_store("b", {"--index", "octree"});
+  const std::string later = make_store("a"), at_once = make_store("b", {"--build-index", "octree"});
   const nlohmann::json made = run_json({"index", later, "--kind", "octree"});
   EXPECT_EQ(made["leaf"], 16);
   EXPECT_TRUE(tree(later) == tree(at_once));
   write_file(path("in.raw"), noise(20 * 20 * 20));
   const nlohmann::json json =
       run_json({"convert", path("in.raw"), path("c.zarr"), "--dims", "20,20,20", "--type", "u8",
-                "--index", "kdtree", "--leaf", "2"});
+                "--build-index", "kdtree", "--leaf", "2"});
   EXPECT_GT(json["index_bytes"].get<int>(), 0);
   EXPECT_GT(json["index_seconds"].get<double>(), 0);
   EXPECT_EQ(run_json({"info", path("c.zarr")})["index_kinds"], nlohmann::json({"kdtree"}));
@@ -89,13 +89,14 @@ TEST_F(IndexCommand, WhatMakesNoSenseIsRefused) {
   expect_refused(run({"index", path("none.zarr"), "--kind", "octree"}), 1, {"none.zarr"});
   expect_refused(run({"index", store, "--kind", "octree", "--memory", "1M"}), 2, {"--memory"});
   expect_refused(
-      run({"extract", store, "--isovalue", "9", "--index", "octree", "-o", path("a.ply")}), 2,
+      run({"extract", store, "--isovalue", "9", "--search", "octree", "-o", path("a.ply")}), 2,
       {"run: isobrick index " + store + " --kind octree\n"});
-  expect_refused(run({"extract", store, "--isovalue", "9", "--index", "tree", "-o", path("a.ply")}),
-                 2, {"--index", "kdtree"});
+  expect_refused(
+      run({"extract", store, "--isovalue", "9", "--search", "tree", "-o", path("a.ply")}), 2,
+      {"--search", "kdtree"});
   expect_refused(run({"synth", "gyroid", path("a.raw"), "--dims", "9,9,9", "--type", "u8",
-                      "--index", "octree"}),
-                 2, {"--index"});
+                      "--build-index", "octree"}),
+                 2, {"--build-index"});
   EXPECT_EQ(run({"index", store, "--kind", "octree"}).exit_code, 0);
   expect_refused(run({"index", store, "--kind", "octree"}), 2, {"--force"});
   EXPECT_EQ(run({"index", store, "--kind", "octree", "--leaf", "8", "--force"}).exit_code, 0);
@@ -122,7 +123,7 @@ TEST_F(IndexCommand, AFullDiskLeavesTheStoreAndAResumeGoesOn) {
 }
 
 TEST_F(IndexCommand, VerifyNamesDamagedFilesOfAnIndex) {
-  const std::string store = make_store("a", {"--index", "quadtree", "--leaf", "4"});
+  const std::string store = make_store("a", {"--build-index", "quadtree", "--leaf", "4"});
   for (const auto& entry : fs::recursive_directory_iterator(store)) {
     const std::string file = entry.path().string();
     if (!entry.is_regular_file() || file.find("/index/") == std::string::npos) continue;
@@ -146,7 +147,7 @@ TEST_F(IndexCommand, AnInterruptLeavesWhatAResumeTakes) {
   if (outcome.exit_code == 0) GTEST_SKIP() << "it was faster than the interrupt";
   EXPECT_EQ(run_json({"info", store})["index_kinds"], nlohmann::json::array());
   EXPECT_EQ(run({"index", store, "--kind", "kdtree", "--leaf", "1", "--resume"}).exit_code, 0);
-  EXPECT_TRUE(mesh(store, "kdtree") == mesh(store, "none"));
+  EXPECT_TRUE(mesh(store, "kdtree") == mesh(store, "linear"));
 }
 
 }  // namespace

@@ -58,12 +58,12 @@ TEST_F(OutOfMemory, AnExtractionEndsWithALine) {
 class OutOfMemoryCommands : public OutOfMemory, public testing::WithParamInterface<const char*> {};
 
 TEST_P(OutOfMemoryCommands, EndWithALine) {
-  const std::string store = make_store("a", {"--index", "octree"});
+  const std::string store = make_store("a", {"--build-index", "octree"});
   const std::string command = GetParam();
   write_file(path("a.raw"), noise(20 * 20 * 20));
   if (command == "convert")
     return expect_lines({"convert", path("a.raw"), store, "--dims", "20,20,20", "--type", "u8",
-                         "--brick", "16", "--index", "octree", "--threads", "2", "--force"},
+                         "--brick", "16", "--build-index", "octree", "--threads", "2", "--force"},
                         5, 12);
   if (command == "index")
     return expect_lines({"index", store, "--kind", "octree", "--threads", "2", "--force"}, 5, 12);

@@ -39,9 +39,9 @@ TEST_F(OutputMode, InfoShowsTheStore) {
                            "index kinds  none", "histogram", "█"})
     EXPECT_NE(outcome.out.find(part), std::string::npos) << part << "\n" << outcome.out;
   const nlohmann::json json = run_json({"info", store});
-  for (const char* key : {"command", "store", "extent", "type", "spacing", "origin", "direction",
-                          "unit", "codec", "fill_value", "levels", "bytes", "raw_bytes", "ratio",
-                          "value_range", "histogram", "index_kinds"})
+  for (const char* key : {"schema", "command", "input", "extent", "type", "spacing", "origin",
+                          "direction", "unit", "codec", "fill_value", "levels", "bytes",
+                          "raw_bytes", "ratio", "value_range", "histogram", "index_kinds"})
     EXPECT_TRUE(json.contains(key)) << key;
   std::uint64_t counted = 0;
   for (const auto& count : json["histogram"]["counts"]) counted += count.get<std::uint64_t>();
@@ -51,7 +51,7 @@ TEST_F(OutputMode, InfoShowsTheStore) {
 
 // What takes longer the larger the store is comes only where it is requested.
 TEST_F(OutputMode, InfoReadsNoMoreThanMetadataAndTheHistogram) {
-  const std::string store = make_store("a", {"--index", "octree"});
+  const std::string store = make_store("a", {"--build-index", "octree"});
   const nlohmann::json all = run_json({"info", store, "--stats"});
   EXPECT_GT(all["bytes"], 0);
   EXPECT_GT(all["ratio"], 0);

@@ -117,7 +117,9 @@ TEST_F(OutputName, DashIsStandardOutput) {
   EXPECT_TRUE(streamed({"export", store_, "-", roi[0], roi[1]}) == read_file(path("part.raw")));
   expect_refused(run({"export", store_, "-", "--format", "vdb"}), 2,
                  {"OpenVDB", "standard output"});
-  expect_refused(run({"export", store_, "-", "--json"}), 2, {"--json", "standard output"});
+  const Outcome both = run({"export", store_, "-", "--json"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_EQ(nlohmann::json::parse(both.out, nullptr, false)["error"]["exit_code"], 2);
 
   const Arguments extract{"extract", store_, "--isovalue", "128", "-o"};
   Arguments to_file = extract, to_stream = extract;

@@ -159,11 +159,14 @@ ProgramTest::ProgramTest() {
   std::string pattern = (fs::temp_directory_path() / "isobrick-test-XXXXXX").string();
   if (!mkdtemp(pattern.data())) throw std::runtime_error("mkdtemp");
   folder_ = pattern;
+  // Beside the folder, whose files tests list.
+  ::setenv("XDG_CACHE_HOME", (pattern + ".cache").c_str(), 1);
 }
 
 ProgramTest::~ProgramTest() {
   std::error_code ignored;
   fs::remove_all(folder_, ignored);
+  fs::remove_all(folder_.string() + ".cache", ignored);
 }
 
 std::vector<std::string> ProgramTest::files() const {

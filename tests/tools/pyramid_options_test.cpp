@@ -55,7 +55,7 @@ TEST_F(PyramidOptions, TheMethodIsSaid) {
 }
 
 TEST_F(PyramidOptions, OmeZarr04IsWrittenAndWorkedOn) {
-  ASSERT_EQ(convert({"--ome", "0.4", "--index", "octree"}).exit_code, 0);
+  ASSERT_EQ(convert({"--ome", "0.4", "--build-index", "octree"}).exit_code, 0);
   EXPECT_NE(read_file(path("v.zarr/.zattrs")).find("\"0.4\""), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path("v.zarr/zarr.json")));
   EXPECT_EQ(run_json({"info", path("v.zarr")})["index_kinds"], json({"octree"}));

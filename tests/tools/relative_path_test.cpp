@@ -32,8 +32,8 @@ TEST_F(RelativePath, IndexTakesAnyNameOfAStore) {
 
 TEST_F(RelativePath, ConversionsTakeAnyName) {
   write_file(path("a.raw"), noise(20 * 20 * 20));
-  const Arguments convert{"convert", "a.raw", "a.zarr",  "--dims", "20,20,20",
-                          "--type",  "u8",    "--index", "octree"};
+  const Arguments convert{"convert", "a.raw", "a.zarr",        "--dims", "20,20,20",
+                          "--type",  "u8",    "--build-index", "octree"};
   const auto with = [&](Arguments words, const Arguments& more) {
     words.insert(words.end(), more.begin(), more.end());
     return words;
@@ -43,8 +43,8 @@ TEST_F(RelativePath, ConversionsTakeAnyName) {
   succeeds(with(convert, {"--force", "--resume"}));
   fs::rename(path("a.zarr"), path("b.zarr"));
   succeeds(with(convert, {"--resume"}));
-  const Arguments synth{"synth",  "gyroid", "./s.zarr/", "--dims", "20,20,20",
-                        "--type", "u8",     "--index",   "kdtree"};
+  const Arguments synth{"synth",  "gyroid", "./s.zarr/",     "--dims", "20,20,20",
+                        "--type", "u8",     "--build-index", "kdtree"};
   succeeds(synth);
   succeeds(with(synth, {"--force"}));
   succeeds({"verify", "a.zarr"});

@@ -80,7 +80,7 @@ TEST_F(SmallBudget, TheAdviceIsEnoughForAConversionWithAnIndex) {
     for (const Arguments& index :
          {Arguments{"octree"}, Arguments{"kdtree", "--leaf", "1"}, Arguments{"interval"}}) {
       Arguments arguments = convert(name, dims);
-      arguments.push_back("--index");
+      arguments.push_back("--build-index");
       arguments.insert(arguments.end(), index.begin(), index.end());
       SCOPED_TRACE(index[0]);
       EXPECT_LE(least(arguments), 64);
@@ -104,8 +104,8 @@ TEST_F(SmallBudget, TheAdviceIsEnoughForOpenVdb) {
 
 TEST_F(SmallBudget, TheAdviceIsEnoughForAPreview) {
   ASSERT_EQ(run(convert("small", "128,128,96")).exit_code, 0);
-  const Arguments preview{"extract",     path("small.zarr"), "--isovalue",     "100",  "--preview",
-                          path("a.png"), "--force",          "--preview-size", "64x64"};
+  const Arguments preview{"extract",     path("small.zarr"), "--isovalue", "100",  "--preview",
+                          path("a.png"), "--force",          "--size",     "64x64"};
   const Outcome picture = run(preview);
   if (picture.exit_code != 0) GTEST_SKIP() << picture.err;  // nothing can draw here
   constexpr int kDriver = 100;                              // MiB that OpenGL's driver counts for

@@ -6,6 +6,7 @@
 #include "tools/format.h"
 #include "tools/mesh_output.h"
 #include "tools/mesh_space.h"
+#include "tools/output_name.h"
 #include "tools/parse.h"
 
 namespace isobrick::tools {
@@ -65,7 +66,7 @@ TEST(Parse, CodecAndLevels) {
 
 TEST(Parse, Roi) {
   const Int3 extent{10, 20, 30};
-  const auto box = [&](const char* text) { return resolve_roi(parse_roi(text), extent); };
+  const auto box = [&](const char* text) { return resolve_region(parse_roi(text), extent); };
   EXPECT_EQ(box("1:2,3:4,5:6"), (Box3{{1, 3, 5}, {2, 4, 6}}));
   EXPECT_EQ(box(":5,,"), (Box3{{0, 0, 0}, {5, 20, 30}}));
   EXPECT_EQ(box(":,7:,:30"), (Box3{{0, 7, 0}, {10, 20, 30}}));
@@ -76,12 +77,12 @@ TEST(Parse, Roi) {
 }
 
 TEST(Parse, BoxesOfWorldSpace) {
-  const auto [lo, hi] = parse_world_box("-1.5:2,3:4e1,5:6");
+  const auto [lo, hi] = parse_world_region("-1.5:2,3:4e1,5:6");
   EXPECT_EQ(lo, (Vec3d{-1.5, 3, 5}));
   EXPECT_EQ(hi, (Vec3d{2, 40, 6}));
   for (const char* text : {"", "1:2,3:4", "1:2,3:4,5", "1:2,3:4,:6", "1:2,3:4,5:", "1:2,3:4,6:6",
                            "1:2,4:3,5:6", "1:2,3:4,5:6,7:8", "1:2,3:4,5:x", "1:2,3:4,5:nan"})
-    EXPECT_THROW(parse_world_box(text), UsageError) << text;
+    EXPECT_THROW(parse_world_region(text), UsageError) << text;
 }
 
 TEST(Parse, SizesOfPictures) {
@@ -175,6 +176,37 @@ TEST(Progress, LineHasRateAndTimeLeft) {
 
 TEST(Progress, UnknownTotalShowsWhatIsDone) {
   EXPECT_EQ(progress_line("read", 2048, 0, 1, 80), "read 2.00 KiB 2.00 KiB/s");
+}
+
+TEST(Progress, LinesOfLogsAndObjects) {
+  EXPECT_EQ(progress_text("convert", 50 << 20, 100 << 20, 2),
+            "convert 50 % (25.0 MiB/s, 2 s left)");
+  EXPECT_EQ(progress_text("draw", 2048, 0, 1), "draw 2.00 KiB (2.00 KiB/s)");
+  EXPECT_EQ(progress_json("convert", 5, 10, 0.5),
+            R"({"progress":{"stage":"convert","done":5,"total":10,"seconds":0.5}})");
+  EXPECT_EQ(parse_progress("json"), ProgressForm::json);
+  EXPECT_THROW(parse_progress("often"), UsageError);
+}
+
+TEST(Parse, StridesAndCounts) {
+  EXPECT_EQ(parse_stride("2"), (Int3{2, 2, 2}));
+  EXPECT_EQ(parse_stride("1,2,3"), (Int3{1, 2, 3}));
+  for (const char* text : {"", "0", "-1", "1,2", "1,0,1", "x"})
+    EXPECT_THROW(parse_stride(text), UsageError) << text;
+  EXPECT_EQ(parse_count("200000"), 200000u);
+  EXPECT_EQ(parse_count("1.5M"), 1500000u);
+  EXPECT_EQ(parse_count("3k"), 3000u);
+  for (const char* text : {"", "0", "-3", "2T", "M", "1 M", "nan", "inf"})
+    EXPECT_THROW(parse_count(text), UsageError) << text;
+}
+
+TEST(OutputName, StemOfAnInput) {
+  for (const auto& [path, stem] :
+       {std::pair{"data/scan.nii.gz", "scan"}, std::pair{"series/", "series"},
+        std::pair{"a/scan.h5:/array", "scan"}, std::pair{"x.zarr///", "x"}, std::pair{"raw", "raw"},
+        std::pair{"a.b.nrrd", "a.b"}})
+    EXPECT_EQ(stem_of_input(path), stem) << path;
+  EXPECT_THROW(stem_of_input("-"), UsageError);
 }
 
 TEST(Progress, LineIsCutToTheTerminal) {

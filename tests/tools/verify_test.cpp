@@ -40,7 +40,7 @@ class VerifyCommand : public ProgramTest {
 };
 
 TEST_F(VerifyCommand, AnIndexThatIsGoneIsDamage) {
-  const std::string store = make_store("a", {"--index", "octree"});
+  const std::string store = make_store("a", {"--build-index", "octree"});
   ASSERT_EQ(run({"verify", store}).exit_code, 0);
   const std::string folder = store + "/isobrick/0/index/octree";
   fs::rename(folder + "/index.json", path("kept"));
@@ -94,7 +94,7 @@ TEST_F(VerifyCommand, AGroupThatIsGoneIsDamage) {
 TEST_F(VerifyCommand, StaysWithinItsBudget) {
   const std::string store = path("a.zarr");
   ASSERT_EQ(run({"synth", "gyroid", store, "--dims", "512,512,256", "--type", "u8", "--brick",
-                 "256", "--levels", "1", "--index", "octree"})
+                 "256", "--levels", "1", "--build-index", "octree"})
                 .exit_code,
             0);
   const json roomy = run_json({"verify", store, "--threads", "4"});
@@ -103,7 +103,7 @@ TEST_F(VerifyCommand, StaysWithinItsBudget) {
   EXPECT_TRUE(tight["whole"]);
   EXPECT_LE(tight["peak_resident_bytes"].get<std::uint64_t>(), 120 * kMiB);
   expect_refused(run({"verify", store, "--memory", "60M"}), 2,
-                 {"memory budget of 60 MiB is too small", "MiB at least"});
+                 {"memory budget of 60 MiB is too small", "--memory ", "at least"});
 }
 
 TEST_F(VerifyCommand, AHugeChunkIsNotTakenIntoMemory) {

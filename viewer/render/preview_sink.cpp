@@ -71,9 +71,8 @@ void PreviewSink::begin(const MeshHeader& header) {
 void PreviewSink::begin_picture(const MeshBounds& frame) {
   const ContextGuard guard(*context_);
   renderer_ = std::make_unique<Renderer>();
-  const CameraRequest request{.up = options_.up, .from = options_.towards_eye};
   const double aspect = static_cast<double>(options_.width) / options_.height;
-  renderer_->begin(make_camera(request, frame.lo, frame.hi, aspect), options_.width,
+  renderer_->begin(make_camera(options_.camera, frame.lo, frame.hi, aspect), options_.width,
                    options_.height, {});
 }
 

@@ -88,7 +88,7 @@ def written(state):
     box = ((-20, 90, -40), (10, 120, 3))
     expected, affine = dense(grid, box)
     state.same("region", path, dense(vdb.read(str(path), "field"), box)[0], affine,
-               options=("--roi=-20:11,90:121,-40:4",))
+               options=("--bounds=-20:11,90:121,-40:4",))
 
     bits = vdb.BoolGrid(True)
     bits.fill((0, 0, 0), (9, 8, 7), False)
@@ -146,7 +146,7 @@ def there_and_back(state):
     samples.tofile(paths["s.raw"])
     dims = ",".join(map(str, samples.shape[::-1]))
     bricks = ("--brick", "16", "--shard", "64")
-    steps = [("convert", paths["s.vdb"], paths["a.zarr"], "--index", "octree", *bricks),
+    steps = [("convert", paths["s.vdb"], paths["a.zarr"], "--build-index", "octree", *bricks),
              ("convert", paths["s.raw"], paths["b.zarr"], "--dims", dims, "--type", "f32", *bricks),
              ("export", paths["a.zarr"], paths["out.vdb"]),
              ("convert", paths["out.vdb"], paths["c.zarr"], *bricks),

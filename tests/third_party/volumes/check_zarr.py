@@ -223,7 +223,7 @@ def check_written(folder):
                 stores.append(folder / f"{name}_{codec[:4]}_{version}.zarr")
                 run("convert", raw, stores[-1], "--dims", "91,70,37", "--type", name, "--brick", 16,
                     "--spacing", "0.5,0.5,2", "--unit", "um", "--codec", codec, "--ome", version,
-                    "--index", "octree")
+                    "--build-index", "octree")
             check_as_zarr_2(stores[0], data)
             run("verify", stores[0])
             meshes = []

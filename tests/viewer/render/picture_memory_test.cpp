@@ -50,14 +50,14 @@ TEST_F(PictureMemory, OfAMeshFile) {
 
 TEST_F(PictureMemory, OfAPreview) {
   expect_least_holds({"extract", store(), "--isovalue", "127.5", "--threads", "2", "-o",
-                      path("m.ply"), "--preview", path("p.png"), "--preview-size", "400x300"},
+                      path("m.ply"), "--preview", path("p.png"), "--size", "400x300"},
                      224);
 }
 
 TEST_F(PictureMemory, OfPreviewsOfSeveralIsovalues) {
   expect_least_holds(
       {"extract", store(), "--isovalue", "110", "--isovalue", "127.5", "--isovalue", "140",
-       "--threads", "2", "--preview", path("p.png"), "--preview-size", "400x300"},
+       "--threads", "2", "--preview", path("p.png"), "--size", "400x300"},
       224);
 }
 

@@ -126,7 +126,7 @@ TEST(PreviewSink, FacetsWithoutNormals) {
 
 TEST(PreviewSink, ViewAndColourCanBeChosen) {
   PreviewOptions options = small();
-  options.towards_eye = {0, 0, 1};  // along `up`
+  options.camera.from = Vec3d{0, 0, 1};  // along `up`
   options.colour = {0.2f, 0.3f, 0.9f};
   const TestMesh ball = make_ball({0, 0, 0.9f}, 0.1f, 20);
   const Picture picture = draw({ball.chunk()}, options);
@@ -135,7 +135,7 @@ TEST(PreviewSink, ViewAndColourCanBeChosen) {
 
 TEST(PreviewSink, UpIsUpAndRightIsRight) {
   PreviewOptions options = small();
-  options.towards_eye = {0, -1, 0};
+  options.camera.from = Vec3d{0, -1, 0};
   const TestMesh up = make_ball({0, 0, 0.8f}, 0.2f, 20), right = make_ball({0.8f, 0, 0}, 0.2f, 20);
   const TestMesh down = make_ball({0, 0, -0.98f}, 0.02f, 20),
                  left = make_ball({-0.98f, 0, 0}, 0.02f, 20);

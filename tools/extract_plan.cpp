@@ -1,0 +1,252 @@
+#include "tools/extract_plan.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include <isobrick/error.h>
+#include "pipeline/program_memory.h"
+#include "tools/format.h"
+#include "tools/isovalues.h"
+#include "tools/mesh_output.h"
+#include "tools/mesh_space.h"
+#include "tools/output_name.h"
+#include "tools/store_region.h"
+
+namespace isobrick::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Triangles of --level auto where no number is given.
+constexpr std::uint64_t kAutomaticTriangles = 20'000'000;
+
+/// `path`, with the isovalue in its name when there are several.
+fs::path named(const std::string& path, double isovalue, std::size_t count) {
+  if (path.empty() || count == 1) return path;
+  return with_isovalue(path, isovalue);
+}
+
+/// The name of the mesh where none is given: the input's in the current folder, with the isovalue.
+fs::path default_output(const ExtractArguments& arguments, MeshFormat format, double isovalue) {
+  return with_isovalue(stem_of_input(arguments.input.path) + std::string(extension_of(format)),
+                       isovalue);
+}
+
+/// How the mesh is written, or would be if it had a name.
+MeshForm form_of(const ExtractArguments& arguments) {
+  MeshForm form{.quantize = arguments.quantize};
+  if (arguments.format)
+    form.format = *arguments.format;
+  else if (!arguments.output.empty())
+    form.format = mesh_format(arguments.output);
+  if (!arguments.output.empty()) check_mesh_name(arguments.output, form.format);
+  form.normals = arguments.normals.value_or(has_normals(form.format));
+  if (form.quantize && form.format != MeshFormat::glb)
+    throw UsageError(
+        fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  return form;
+}
+
+/// Refuses two outputs that would replace each other.
+void check_names(const std::vector<ExtractedSurface>& surfaces) {
+  std::vector<fs::path> names;
+  for (const ExtractedSurface& surface : surfaces)
+    for (const fs::path& name : {surface.output, surface.preview}) {
+      if (name.empty()) continue;
+      std::error_code failure;
+      const fs::path canonical = fs::weakly_canonical(fs::absolute(name, failure), failure);
+      names.push_back(failure ? name : canonical);
+    }
+  std::sort(names.begin(), names.end());
+  const auto twice = std::adjacent_find(names.begin(), names.end());
+  if (twice != names.end())
+    throw UsageError(fmt::format("two outputs would have the name '{}'", twice->string()));
+}
+
+std::vector<double> isovalues_of(const ExtractArguments& arguments, const StoreReader& store,
+                                 Console& console) {
+  if (arguments.isovalues.empty()) {
+    const auto suggested = suggest_isovalue_of(store, console.progress());
+    if (!suggested)
+      throw UsageError(
+          "--isovalue is missing; all samples are the same, and no surface passes between them");
+    throw UsageError(fmt::format("--isovalue is missing; try --isovalue {}: {}", suggested->value,
+                                 suggested->why));
+  }
+  std::vector<double> isovalues = resolve_isovalues(arguments.isovalues, store, console.progress());
+  if (is_standard_output(arguments.output) && isovalues.size() > 1)
+    throw UsageError("standard output takes one mesh; give one --isovalue, or name a file");
+  return isovalues;
+}
+
+/// What all surfaces share, but for the level and the region in it.
+ExtractOptions common_options(const ExtractArguments& arguments) {
+  ExtractOptions options;
+  options.inside = arguments.inside;
+  options.drop_degenerate = arguments.drop_degenerate;
+  // The driver is there from when a picture is opened, before anything is extracted.
+  if (!arguments.preview.path.empty() && !arguments.estimate)
+    options.memory_of_others = preview_driver_memory();
+  options.memory = arguments.memory - std::min(arguments.memory, options.memory_of_others);
+  options.threads = arguments.threads;
+  options.index = arguments.search;
+  options.backend = arguments.backend;
+  options.gpu_memory = arguments.gpu_memory;
+  options.device = arguments.device;
+  options.normals = form_of(arguments).normals;
+  return options;
+}
+
+std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& arguments,
+                                                const StoreReader& store, int level,
+                                                const std::vector<double>& isovalues) {
+  ExtractOptions options = common_options(arguments);
+  options.level = level;
+  options.roi = store_region(store, level, arguments.region);
+  const MeshForm form = form_of(arguments);
+  std::vector<ExtractedSurface> surfaces;
+  for (const double isovalue : isovalues) {
+    options.isovalue = isovalue;
+    const fs::path output =
+        !arguments.output.empty() ? named(arguments.output, isovalue, isovalues.size())
+        : arguments.writes_mesh() ? default_output(arguments, form.format, isovalue)
+                                  : fs::path();
+    surfaces.push_back(
+        {options, form, output, named(arguments.preview.path, isovalue, isovalues.size())});
+  }
+  return surfaces;
+}
+
+/// The finest level whose surfaces have few enough triangles together, else the coarsest.
+std::vector<ExtractedSurface> surfaces_of_fitting_level(const ExtractArguments& arguments,
+                                                        const StoreReader& store,
+                                                        const std::vector<double>& isovalues,
+                                                        Console& console) {
+  if (arguments.region.roi)
+    throw UsageError("--roi counts the samples of one level: give --level, or a --region");
+  const std::uint64_t limit = arguments.max_triangles.value_or(kAutomaticTriangles);
+  const auto levels = static_cast<int>(store.info().levels.size());
+  for (int level = 0;; ++level) {
+    std::vector<ExtractedSurface> surfaces = surfaces_of_level(arguments, store, level, isovalues);
+    std::uint64_t triangles = 0;
+    for (const ExtractedSurface& surface : surfaces)
+      triangles += estimate_one(surface, store).mesh.triangles;
+    const bool fits = triangles <= limit;
+    if (!fits && level + 1 < levels) continue;
+    console.note(fmt::format("level {} of {}: about {} triangles{}", level, levels,
+                             human_count(triangles),
+                             fits ? "" : ", more than requested; no level is coarser"));
+    return surfaces;
+  }
+}
+
+/// The meshes to write, with the size_of(number of a surface) that PlannedMesh has.
+template <class F>
+std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& surfaces,
+                                        const F& size_of) {
+  std::vector<PlannedMesh> meshes;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const ExtractedSurface& surface = surfaces[i];
+    if (surface.output.empty() || is_standard_output(surface.output.native())) continue;
+    PlannedMesh mesh = size_of(i);
+    mesh.path = surface.output;
+    mesh.form = surface.form;
+    meshes.push_back(std::move(mesh));
+  }
+  return meshes;
+}
+
+/// The least budget of the whole command for a surface with a picture.
+std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surfaces,
+                               const ExtractArguments& arguments, const StoreReader& store) {
+  ExtractOptions picture = surface.options;
+  picture.normals = true;
+  std::uint64_t least =
+      min_extract_memory(store, picture, Indexing::chunk_local, preview_memory(arguments.preview));
+  if (!surface.output.empty())
+    least =
+        std::max(least, min_extract_memory(store, surface.options, Indexing::welded,
+                                           mesh_file_memory(surface.form.format, arguments.threads,
+                                                            memory_of_mesh(surface, surfaces))));
+  return surface.options.memory_of_others + least;
+}
+
+}  // namespace
+
+void check_arguments(const ExtractArguments& arguments) {
+  form_of(arguments);
+  if (!arguments.output.empty() && !arguments.preview.path.empty())
+    check_names({{.output = arguments.output, .preview = arguments.preview.path}});
+  for (auto request = arguments.isovalues.begin(); request != arguments.isovalues.end(); ++request)
+    if (!needs_histogram(*request) &&
+        std::find(arguments.isovalues.begin(), request, *request) != request)
+      throw UsageError(fmt::format("isovalue {} is given twice", request->number));
+  if (arguments.max_triangles && arguments.level && *arguments.level > 0)
+    throw UsageError("--max-triangles chooses the level: leave --level out");
+  if (!arguments.preview.path.empty()) check_picture_name(arguments.preview.path);
+}
+
+std::vector<ExtractedSurface> plan_surfaces(const ExtractArguments& arguments,
+                                            const StoreReader& store, Console& console) {
+  const std::vector<double> isovalues = isovalues_of(arguments, store, console);
+  const bool chooses = arguments.max_triangles || !arguments.level;
+  std::vector<ExtractedSurface> surfaces =
+      chooses ? surfaces_of_fitting_level(arguments, store, isovalues, console)
+              : surfaces_of_level(arguments, store, *arguments.level, isovalues);
+  check_names(surfaces);
+  return surfaces;
+}
+
+std::uint64_t memory_of_mesh(const ExtractedSurface& surface, std::size_t surfaces) {
+  return surface.options.memory / surfaces;
+}
+
+ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store) {
+  return estimate(
+      store, surface.options,
+      mesh_file_memory(surface.form.format, surface.options.threads, surface.options.memory));
+}
+
+/// Refuses meshes that cannot fit their disk, before anything is written.
+void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
+  // Mostly all that the active cells could hold fits, which is known without a sample.
+  std::vector<double> isovalues;
+  for (const ExtractedSurface& surface : surfaces) isovalues.push_back(surface.options.isovalue);
+  const std::vector<ActiveParts> active = count_active(store, surfaces.front().options, isovalues);
+  const auto largest = planned_meshes(
+      surfaces, [&](std::size_t i) { return PlannedMesh{.size = largest_mesh(active[i])}; });
+  if (!find_shortage(largest, free_space)) return;
+  const auto likely = planned_meshes(surfaces, [&](std::size_t i) {
+    const ExtractEstimate guess = estimate_one(surfaces[i], store);
+    return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
+  });
+  if (const auto shortage = find_shortage(likely, free_space))
+    throw Error(fmt::format(
+        "'{}' would have about {} triangles and need {}, but its disk has {} free; choose "
+        "another disk, a coarser --level or an --roi (or --no-space-check, should the estimate "
+        "be wrong)",
+        likely[shortage->mesh].path.string(), human_count(likely[shortage->mesh].size.triangles),
+        human_bytes(shortage->needed), human_bytes(shortage->free)));
+}
+
+/// Refuses a budget in which pictures cannot be drawn, before anything is extracted.
+void check_pictures(const std::vector<ExtractedSurface>& surfaces,
+                    const ExtractArguments& arguments, const StoreReader& store) {
+  for (const ExtractedSurface& surface : surfaces) {
+    if (surface.preview.empty()) continue;
+    const std::uint64_t least = min_with_picture(surface, surfaces.size(), arguments, store);
+    if (arguments.memory < least)
+      throw UsageError(fmt::format(
+          "a memory budget of {:.1f} MiB is too small: with a picture of {} x {} pixels at least "
+          "--memory {}M is needed, {:.1f} MiB of it for the picture and OpenGL's driver; or "
+          "choose a smaller --size",
+          in_mib(arguments.memory), arguments.preview.size.width, arguments.preview.size.height,
+          mib_above(least), in_mib(preview_memory(arguments.preview) + preview_driver_memory())));
+  }
+}
+
+}  // namespace isobrick::tools

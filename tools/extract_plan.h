@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <isobrick/store_reader.h>
+#include "tools/extract_report.h"
+#include "tools/input.h"
+#include "tools/pictures.h"
+
+// What `isobrick extract` was asked for, and what it will make of it.
+
+namespace isobrick::tools {
+
+struct ExtractArguments {
+  InputArguments input;
+  std::vector<IsovalueRequest> isovalues;
+  std::string output;  ///< empty: by the input's name, unless nothing is to be written
+  PreviewRequest preview;
+  std::optional<MeshFormat> format;  ///< of the output; nothing: by its name
+  bool quantize = false;
+  std::optional<int> level = 0;                ///< nothing: the finest that is small enough
+  std::optional<std::uint64_t> max_triangles;  ///< of all surfaces; chooses the level
+  RegionArguments region;
+  std::optional<Inside> inside;
+  std::optional<bool> normals;  ///< nothing: where the format holds them
+  bool drop_degenerate = false;
+  std::uint64_t memory = std::uint64_t{1} << 30;
+  int threads = 0;
+  IndexChoice search;
+  Backend backend = Backend::automatic;
+  std::uint64_t gpu_memory = 0;
+  int device = 0;
+  bool estimate = false, force = false, no_space_check = false;
+
+  /// Whether meshes are written.
+  bool writes_mesh() const { return !output.empty() || (preview.path.empty() && !estimate); }
+};
+
+/// Throws UsageError for arguments that contradict each other, before anything is opened.
+void check_arguments(const ExtractArguments& arguments);
+
+/// Resolves the isovalues, chooses the level and names the outputs. Throws UsageError for an
+/// isovalue that is missing (with a suggestion) or given twice, and for outputs of one name.
+std::vector<ExtractedSurface> plan_surfaces(const ExtractArguments& arguments,
+                                            const StoreReader& store, Console& console);
+
+/// Of the budget, what the mesh of a surface may use to hold what it writes later.
+std::uint64_t memory_of_mesh(const ExtractedSurface& surface, std::size_t surfaces);
+
+ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store);
+
+/// Refuses meshes that cannot fit their disk, before anything is written.
+void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store);
+
+/// Refuses a budget in which pictures cannot be drawn, before anything is extracted.
+void check_pictures(const std::vector<ExtractedSurface>& surfaces,
+                    const ExtractArguments& arguments, const StoreReader& store);
+
+}  // namespace isobrick::tools

@@ -1,0 +1,74 @@
+#include "tools/input.h"
+
+#include <fmt/format.h>
+
+#include "tools/interrupt.h"
+#include "tools/open_store.h"
+
+namespace isobrick::tools {
+namespace {
+
+/// "none" or a folder.
+std::filesystem::path parse_cache(const std::string& text) {
+  return text == "none" ? std::filesystem::path() : std::filesystem::path(text);
+}
+
+}  // namespace
+
+void add_volume_options(CLI::App* app, VolumeRequest& volume) {
+  add_dims(app, volume.extent);
+  add_type(app, volume.type);
+  add_parsed(app, volume.order, parse_byte_order,
+             {"--endian", "little|big", "Byte order of the samples of a raw file", "little"});
+  add_parsed(app, volume.offset, parse_offset,
+             {"--offset", "BYTES", "Bytes before the first sample of a raw file", "0"});
+  add_parsed(app, volume.spacing, parse_vector,
+             {"--spacing", "X,Y,Z", "World distance between samples", "the file's, or 1,1,1"});
+  add_parsed(app, volume.origin, parse_vector,
+             {"--origin", "X,Y,Z", "World position of the first sample", "the file's, or 0,0,0"});
+  add_parsed(app, volume.unit, [](const std::string& text) { return text; },
+             {"--unit", "NAME", "Unit of world space, such as mm or micrometer"});
+  add_selection(app, volume.selection);
+  add_parsed(app, volume.grid, [](const std::string& text) { return text; },
+             {"--grid", "NAME", "Which grid of an OpenVDB file that has several"});
+  add_parsed(app, volume.bounds, parse_roi,
+             {"--bounds", "X0:X1,Y0:Y1,Z0:Z1",
+              "Box of an OpenVDB grid in its own coordinates, such as --bounds=-8:8,:,:",
+              "its active voxels"});
+  add_parsed(app, volume.stride, parse_stride,
+             {"--stride", "N|X,Y,Z", "Take every so-many-th sample", "1"});
+  add_parsed(app, volume.nodata, parse_number,
+             {"--nodata", "V", "Samples of this value are missing: no surface touches them"});
+}
+
+void add_input(CLI::App* app, InputArguments& input, bool required) {
+  add_text(app,
+           {"INPUT", "",
+            "Volume to read: a store, another program's Zarr, a file of a known format, FILE:/NAME "
+            "for an array in it, or a folder of slices",
+            "", required},
+           [&path = input.path](const std::string& text) { path = text; });
+  add_volume_options(app, input.volume);
+  input.cache.folder = default_cache_folder();
+  add_parsed(app, input.cache.folder, parse_cache,
+             {"--cache", "DIR|none",
+              "Where stores of inputs that are none are kept; none: they go with the command",
+              "~/.cache/isobrick"});
+  add_parsed(app, input.cache.limit, parse_bytes,
+             {"--cache-limit", "BYTES", "Bytes of all stores that are kept", "20G"});
+}
+
+OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,
+                        Console& console) {
+  check_input(input.path);
+  set_interrupt_note([] { return "the same command goes on with what is done"; });
+  OpenedVolume opened(
+      input.path,
+      {.volume = input.volume, .cache = input.cache, .memory = memory, .threads = threads},
+      console.progress());
+  set_interrupt_note({});
+  for (const std::string& note : opened.notes()) console.note(note);
+  return opened;
+}
+
+}  // namespace isobrick::tools

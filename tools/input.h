@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <isobrick/open_volume.h>
+#include "tools/options.h"
+
+namespace isobrick::tools {
+
+/// A volume that a command reads: a store, or whatever open_source() opens.
+struct InputArguments {
+  std::string path;
+  VolumeRequest volume;
+  CacheOptions cache;
+};
+
+/// The positional INPUT and what describes it. Without `required` it may be left out.
+void add_input(CLI::App* app, InputArguments& input, bool required = true);
+/// The options of it alone: those of raw samples, of the place in the world, and of the choice
+/// among several volumes.
+void add_volume_options(CLI::App* app, VolumeRequest& volume);
+
+/// Opens the input as a store, by way of the cache where it is none, and writes what it notes.
+/// Throws Error and UsageError with what to type instead where it is no volume.
+OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,
+                        Console& console);
+
+}  // namespace isobrick::tools
