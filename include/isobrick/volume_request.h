@@ -54,9 +54,9 @@ struct VolumeRequest {
   Selection selection;                  ///< of a file with several volumes
   std::optional<std::string> grid;      ///< of an OpenVDB file
   std::optional<RegionRequest> bounds;  ///< of a sparse grid, in its own index coordinates
-  std::optional<RegionRequest> roi;     ///< only these samples
-  std::optional<WorldRegion> region;  ///< only these; in world space, with what changes it applied
-  Int3 stride{1, 1, 1};               ///< of those the first of so many along x, y, z
+  Int3 stride{1, 1, 1};                 ///< the first of so many samples along x, y, z
+  std::optional<RegionRequest> roi;     ///< of those only these
+  std::optional<WorldRegion> region;    ///< only these; in world space, with all above applied
   /// Samples of this value are missing and become NaN, so that no surface touches them. Integers
   /// become f32, those of 32 bits f64.
   std::optional<double> nodata;

@@ -161,18 +161,24 @@ void check_stride(Int3 stride) {
 std::unique_ptr<VolumeSource> select_samples(std::unique_ptr<VolumeSource> source,
                                              const VolumeRequest& request) {
   check_stride(request.stride);
-  const VolumeInfo& info = source->info();
-  const Box3 whole{{0, 0, 0}, info.extent};
-  Box3 box = request.roi ? resolve_region(*request.roi, info.extent) : whole;
+  // Regions are of what a stride leaves, as they are of the samples of a store.
+  const Int3 extent = ceil_div(source->info().extent, request.stride);
+  Transform transform = source->info().transform;
+  for (int axis = 0; axis < 3; ++axis)
+    transform.spacing[axis] *= static_cast<double>(request.stride[axis]);
+  const Box3 whole{{0, 0, 0}, extent};
+  Box3 box = request.roi ? resolve_region(*request.roi, extent) : whole;
   if (request.region) {
-    const Box3 covering = covering_samples(*request.region, info.transform, info.extent);
+    const Box3 covering = covering_samples(*request.region, transform, extent);
     const Box3 both = intersect(box, covering);
     if (both.empty())
       throw UsageError("the region in samples and the region in world space do not meet");
     box = both;
   }
   if (!(box == whole) || !(request.stride == kEach))
-    source = std::make_unique<SubsampledSource>(std::move(source), box, request.stride);
+    source = std::make_unique<SubsampledSource>(
+        std::move(source), Box3{box.lo * request.stride, (box.hi - kEach) * request.stride + kEach},
+        request.stride);
   if (request.nodata) source = std::make_unique<NodataSource>(std::move(source), *request.nodata);
   return source;
 }

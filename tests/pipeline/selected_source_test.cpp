@@ -44,9 +44,13 @@ std::vector<T> read_all(VolumeSource& source, Index planes) {
 TEST(SelectedSource, BoxesAndStridesOfRandomAccessAndOfStreams) {
   for (const bool random_access : {true, false})
     for (const Int3 stride : {Int3{1, 1, 1}, Int3{2, 1, 3}, Int3{4, 4, 4}, Int3{20, 20, 20}})
-      for (const Box3 box :
+      for (const Box3 whole_box :
            {Box3{{0, 0, 0}, kExtent}, Box3{{3, 2, 4}, {10, 7, 8}}, Box3{{0, 0, 8}, {11, 7, 9}}})
         for (const Index planes : {1, 2, 9}) {
+          // The box counts what the stride leaves.
+          const Box3 all{{0, 0, 0}, ceil_div(kExtent, stride)};
+          const Box3 box = intersect(whole_box, all);
+          if (box.empty()) continue;
           VolumeRequest request;
           request.roi.emplace();
           for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -56,18 +60,17 @@ TEST(SelectedSource, BoxesAndStridesOfRandomAccessAndOfStreams) {
           request.stride = stride;
           const auto source = select_samples(numbered(random_access), request);
           const VolumeInfo& info = source->info();
-          ASSERT_EQ(info.extent, ceil_div(box.extent(), stride));
+          ASSERT_EQ(info.extent, box.extent());
           EXPECT_EQ(source->random_access(), random_access);
           std::vector<std::uint16_t> expected;
-          for (Index z = box.lo.z; z < box.hi.z; z += stride.z)
-            for (Index y = box.lo.y; y < box.hi.y; y += stride.y)
-              for (Index x = box.lo.x; x < box.hi.x; x += stride.x)
-                expected.push_back(static_cast<std::uint16_t>(linear_index({x, y, z}, kExtent)));
+          for_each_point(box, [&](Int3 p) {
+            expected.push_back(static_cast<std::uint16_t>(linear_index(p * stride, kExtent)));
+          });
           EXPECT_EQ(read_all<std::uint16_t>(*source, planes), expected);
           // A sample stays where it was in the world.
-          const Vec3d origin{10 + 0.5 * static_cast<double>(box.lo.x),
-                             20 + 2.0 * static_cast<double>(box.lo.y),
-                             30 + static_cast<double>(box.lo.z)};
+          const Vec3d origin{10 + 0.5 * static_cast<double>(box.lo.x * stride.x),
+                             20 + 2.0 * static_cast<double>(box.lo.y * stride.y),
+                             30 + static_cast<double>(box.lo.z * stride.z)};
           EXPECT_EQ(info.transform.origin, origin);
           EXPECT_EQ(info.transform.spacing.x, 0.5 * static_cast<double>(stride.x));
         }
