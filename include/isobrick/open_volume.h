@@ -29,6 +29,8 @@ std::filesystem::path default_cache_folder();
 struct OpenOptions {
   VolumeRequest volume;  ///< what is known of it, and which of its samples are requested
   CacheOptions cache;
+  bool needs_ranges =
+      true;  ///< false: another program's Zarr is opened in place without ranges, too
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
   int threads = 0;                                ///< 0: all cores
 };
@@ -36,9 +38,10 @@ struct OpenOptions {
 /// A volume that can be read as a store, whatever its format.
 class OpenedVolume {
  public:
-  /// Opens a store in place where the request takes all of it as it is. Anything else (what
-  /// open_source() opens, or a store of which a part is requested) is converted, unless the cache
-  /// has its store: one with the same files, by name, size and time, and the same request. Waits
+  /// Opens a store in place where it has ranges and the request takes all of it as it is. Anything
+  /// else (what open_source() opens, another program's Zarr without ranges, or a store of which a
+  /// part is requested) is converted, unless the cache has its store: one with the same files, by
+  /// name, size and times, and the same request. Waits
   /// for another process that is converting the same. Throws what StoreReader, open_source() and
   /// convert() do.
   OpenedVolume(const std::string& path, const OpenOptions& options, Progress& progress);

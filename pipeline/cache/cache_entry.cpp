@@ -17,6 +17,7 @@
 
 #include <isobrick/error.h>
 #include "core/file_error.h"
+#include "io/bytes/folder_walk.h"
 #include "io/bytes/output_file.h"
 
 namespace isobrick {
@@ -67,11 +68,44 @@ void make_folder(const fs::path& folder) {
                     folder.string(), failure.message()));
 }
 
-/// The content of entry.json; an empty object where there is none.
-nlohmann::json description_of(const fs::path& folder) {
+/// How many files a folder holds, and their bytes. Cleaners of caches take single ones.
+struct FolderSize {
+  std::uint64_t files = 0, bytes = 0;
+  friend bool operator==(const FolderSize&, const FolderSize&) = default;
+};
+
+FolderSize size_of(const fs::path& folder) {
+  FolderSize size;
+  try {
+    walk_folder(folder, [&](const fs::path& file, fs::file_type type) {
+      std::error_code none;
+      if (type != fs::file_type::regular) return true;
+      const auto bytes = fs::file_size(folder / file, none);
+      size.files += 1;
+      size.bytes += none ? 0 : bytes;
+      return true;
+    });
+  } catch (const Error&) {
+    return {};  // it was removed meanwhile
+  }
+  return size;
+}
+
+/// The content of entry.json; all empty where there is none that makes sense.
+struct Description {
+  std::string key;
+  FolderSize store;
+};
+
+Description description_of(const fs::path& folder) {
   std::ifstream file(description_file(folder));
-  nlohmann::json object = nlohmann::json::parse(file, nullptr, false);
-  return object.is_object() ? object : nlohmann::json::object();
+  const nlohmann::json object = nlohmann::json::parse(file, nullptr, false);
+  try {
+    return {object.at("key").get<std::string>(),
+            {object.at("files").get<std::uint64_t>(), object.at("bytes").get<std::uint64_t>()}};
+  } catch (const nlohmann::json::exception&) {
+    return {};
+  }
 }
 
 struct Candidate {
@@ -88,8 +122,12 @@ std::vector<Candidate> candidates_in(const fs::path& cache) {
     std::error_code none;
     const fs::path folder = entry->path();
     if (!fs::exists(lock_file(folder), none)) continue;
-    const auto used = fs::last_write_time(lock_file(folder), none);
-    candidates.push_back({folder, description_of(folder).value("bytes", std::uint64_t{0}), used});
+    const Description description = description_of(folder);
+    // What was not finished goes first.
+    const bool whole = !description.key.empty();
+    const auto used =
+        whole ? fs::last_write_time(lock_file(folder), none) : fs::file_time_type::min();
+    candidates.push_back({folder, whole ? description.store.bytes : size_of(folder).bytes, used});
   }
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.used < b.used; });
@@ -119,11 +157,14 @@ CacheEntry::CacheEntry(const fs::path& cache, const std::string& name, std::stri
   for (bool waits = false;;) {
     make_folder(folder_);
     lock_ = open_lock(folder_);
+    if (lock_.get() < 0 && errno == ENOENT) continue;  // removed just now
     if (lock_.get() < 0) {
-      if (errno == ENOENT) continue;  // removed just now
-      throw system_error("open", lock_file(folder_), errno);
+      const int why = errno;
+      writable_ = false;  // others share what they have made
+      lock_ = UniqueFd(::open(lock_file(folder_).c_str(), O_RDONLY | O_CLOEXEC));
+      if (lock_.get() < 0) throw system_error("open", lock_file(folder_), why);
     }
-    if (::flock(lock_.get(), LOCK_EX | LOCK_NB) == 0) {
+    if (::flock(lock_.get(), (writable_ ? LOCK_EX : LOCK_SH) | LOCK_NB) == 0) {
       if (is_current(lock_, folder_)) break;
       continue;
     }
@@ -138,14 +179,21 @@ CacheEntry::CacheEntry(const fs::path& cache, const std::string& name, std::stri
 }
 
 bool CacheEntry::is_filled() const {
-  const nlohmann::json description = description_of(folder_);
-  std::error_code none;
-  return description.value("key", std::string()) == key_ && fs::is_directory(store(), none);
+  const Description description = description_of(folder_);
+  return description.key == key_ && description.store == size_of(store());
 }
 
-void CacheEntry::set_filled(std::uint64_t bytes) {
+void CacheEntry::clear() {
+  std::error_code ignored;
+  fs::remove(description_file(folder_), ignored);
+  fs::remove_all(store(), ignored);
+}
+
+void CacheEntry::set_filled() {
+  const FolderSize size = size_of(store());
   OutputFile file(description_file(folder_), true);
-  file.writer().append(nlohmann::json{{"key", key_}, {"bytes", bytes}}.dump());
+  file.writer().append(
+      nlohmann::json{{"key", key_}, {"files", size.files}, {"bytes", size.bytes}}.dump());
   file.publish();
 }
 

@@ -20,17 +20,22 @@ class CacheEntry {
              Progress& progress);
 
   std::filesystem::path store() const { return folder_ / "store.zarr"; }
-  /// Whether the store is there, and made of the same.
+  /// Whether the store is there with all its files, and made of the same.
   bool is_filled() const;
-  /// The store is whole: notes its bytes and its key.
-  void set_filled(std::uint64_t bytes);
+  /// Removes what is left of a store that is damaged or of other content.
+  void clear();
+  /// The store is whole: notes its key and its files.
+  void set_filled();
   /// From now on others may hold it, too. Counts as a use.
   void share();
+  /// Whether the entry may be filled; false in a cache that only others may write.
+  bool can_be_filled() const { return writable_; }
 
  private:
   std::filesystem::path folder_;
   std::string key_;
   UniqueFd lock_;
+  bool writable_ = true;
 };
 
 /// Removes entries that nobody holds, the one that was used longest ago first, until the rest has

@@ -13,9 +13,12 @@
 #include <isobrick/open_source.h>
 #include "bricks/zarr/metadata_files.h"
 #include "core/file_error.h"
+#include "core/shell_word.h"
+#include "io/bytes/folder_walk.h"
 #include "pipeline/cache/cache_entry.h"
 #include "pipeline/convert/convert_staging.h"
 #include "pipeline/convert/store_source.h"
+#include "pipeline/index/add_ranges.h"
 
 namespace isobrick {
 namespace {
@@ -31,15 +34,34 @@ bool takes_all(const VolumeRequest& request) {
          !request.nodata && request.stride == Int3{1, 1, 1};
 }
 
-/// A line of a key: the name of a file, its size and the time of its last change.
+/// A line of a key: the name of a file, its number, its size and the times of its last changes.
 std::string identity_of(const fs::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) throw system_error("look at", path, errno);
   std::error_code none;
   fs::path full = fs::weakly_canonical(path, none);
   if (none) full = path;
-  return fmt::format("{} {} {}.{:09}\n", full.string(), status.st_size, status.st_mtim.tv_sec,
-                     status.st_mtim.tv_nsec);
+  return fmt::format("{} {} {} {}.{:09} {}.{:09}\n", full.string(), status.st_ino, status.st_size,
+                     status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_ctim.tv_sec,
+                     status.st_ctim.tv_nsec);
+}
+
+/// The same of a Zarr, whose chunks are written without its metadata: how many files it has, their
+/// bytes, and the last change of any.
+std::string identity_of_folder(const fs::path& path) {
+  std::uint64_t files = 0, bytes = 0;
+  timespec last{};
+  walk_folder(path, [&](const fs::path& file, fs::file_type) {
+    struct stat status {};
+    if (::lstat((path / file).c_str(), &status) != 0) return true;
+    files += 1;
+    bytes += static_cast<std::uint64_t>(status.st_size);
+    if (std::pair(status.st_ctim.tv_sec, status.st_ctim.tv_nsec) >
+        std::pair(last.tv_sec, last.tv_nsec))
+      last = status.st_ctim;
+    return true;
+  });
+  return fmt::format("{} {} {}.{:09}\n", files, bytes, last.tv_sec, last.tv_nsec);
 }
 
 std::string text_of(const RegionRequest& region) {
@@ -80,7 +102,7 @@ std::string text_of(const VolumeRequest& r) {
 /// What a store is made of.
 std::string key_of(const std::string& path, const VolumeInfo& info, const VolumeRequest& request) {
   std::string key = fmt::format("{}\n{}", kKeyVersion, text_of(request));
-  if (is_zarr(path)) return key + identity_of(read_metadata_files(path).root) + identity_of(path);
+  if (is_zarr(path)) return key + identity_of(path) + identity_of_folder(path);
   for (const fs::path& file : info.files) key += identity_of(file);
   return key;
 }
@@ -143,7 +165,8 @@ struct OpenedVolume::Impl {
     }
     if (zarr && takes_all(request)) {
       store.emplace(path, request.selection);
-      return;
+      if (!options.needs_ranges || has_all_ranges(*store)) return;
+      store.reset();
     }
     const auto source =
         zarr ? open_store_source(path, request, options.threads) : open_source(path, request);
@@ -151,12 +174,15 @@ struct OpenedVolume::Impl {
       fill_temporary(path, *source, options, progress);
     else
       fill_entry(path, *source, options, progress);
+    if (converted && zarr && takes_all(request))
+      notes.push_back(fmt::format("without that copy: '{}' adds what it lacks in place",
+                                  "isobrick index " + shell_word(path)));
   }
 
   void fill_temporary(const std::string& path, VolumeSource& source, const OpenOptions& options,
                       Progress& progress) {
     temporary.emplace();
-    notes.push_back(fmt::format("'{}' is converted to a temporary store", path));
+    notes.push_back(fmt::format("'{}' was converted to a temporary store", path));
     convert_to(temporary->store(), source, options, progress);
     store.emplace(temporary->store());
   }
@@ -164,29 +190,38 @@ struct OpenedVolume::Impl {
   void fill_entry(const std::string& path, VolumeSource& source, const OpenOptions& options,
                   Progress& progress) {
     const fs::path& cache = options.cache.folder;
-    entry.emplace(cache, stem_of(path), key_of(path, source.info(), options.volume), progress);
+    const std::string key = key_of(path, source.info(), options.volume);
+    entry.emplace(cache, stem_of(path), key, progress);
+    if (!entry->is_filled() && !entry->can_be_filled()) {
+      entry.reset();
+      return fill_temporary(path, source, options, progress);
+    }
     if (!entry->is_filled()) {
       notes.push_back(
-          fmt::format("'{}' is converted to '{}' and kept there", path, entry->store().string()));
-      entry->set_filled(convert_to(entry->store(), source, options, progress).bytes_out);
+          fmt::format("'{}' was converted to '{}' and kept there", path, entry->store().string()));
+      entry->clear();
+      convert_to(entry->store(), source, options, progress);
+      if (key_of(path, source.info(), options.volume) != key)
+        throw Error(
+            fmt::format("'{}' changed while it was converted; run the command again", path));
+      entry->set_filled();
     }
     entry->share();
     shrink_cache(cache, options.cache.limit);
     store.emplace(entry->store());
   }
 
-  ConvertReport convert_to(const fs::path& out, VolumeSource& source, const OpenOptions& options,
-                           Progress& progress) {
+  void convert_to(const fs::path& out, VolumeSource& source, const OpenOptions& options,
+                  Progress& progress) {
     std::error_code none;
     ConvertOptions convert_options;
     convert_options.memory = options.memory;
     convert_options.threads = options.threads;
     convert_options.force = true;  // what a change of the input has left
     convert_options.resume = fs::exists(staging_path(out), none);
-    const ConvertReport report = convert(source, out, convert_options, progress);
+    convert(source, out, convert_options, progress);
     converted = true;
     for (std::string& note : source.notes()) notes.push_back(std::move(note));
-    return report;
   }
 };
 

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <thread>
 
+#include <nlohmann/json.hpp>
+
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
 #include <isobrick/open_source.h>
@@ -138,6 +140,48 @@ TEST_F(OpenVolume, SeveralAtATimeConvertOnce) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(converted, 1);
   EXPECT_EQ(opened, 4);
+}
+
+TEST_F(OpenVolume, ADamagedEntryIsMadeAnew) {
+  const std::string file = raw("a");
+  fs::path store;
+  {
+    const OpenedVolume first(file, options(), silent_);
+    store = first.store().info().path;
+  }
+  for (const fs::path& damaged : {store / "0/c/0/0/0", store / "zarr.json", store / "isobrick"}) {
+    fs::remove_all(damaged);
+    EXPECT_TRUE(OpenedVolume(file, options(), silent_).converted()) << damaged;
+    EXPECT_FALSE(OpenedVolume(file, options(), silent_).converted());
+  }
+  for (const char* text : {"", "[]", "{\"key\": 7}", "{\"key\": \"\", \"bytes\": \"x\"}"}) {
+    std::ofstream(store.parent_path() / "entry.json") << text;
+    EXPECT_TRUE(OpenedVolume(file, options(), silent_).converted()) << text;
+  }
+}
+
+TEST_F(OpenVolume, SamplesThatAreReplacedWithTheirOldTimeAreNoticed) {
+  const std::string file = raw("a");
+  EXPECT_TRUE(OpenedVolume(file, options(), silent_).converted());
+  const auto time = fs::last_write_time(file);
+  raw("a", 9);
+  fs::last_write_time(file, time);
+  EXPECT_TRUE(OpenedVolume(file, options(), silent_).converted());
+}
+
+TEST_F(OpenVolume, ZarrWithoutRangesIsConvertedAndItsChunksAreWatched) {
+  const std::string store = (folder_ / "a.zarr").string();
+  convert(*open_source(raw("a"), {}), store, {.threads = 1}, silent_);
+  fs::remove_all(fs::path(store) / "isobrick");
+  nlohmann::json group = nlohmann::json::parse(content_of(fs::path(store) / "zarr.json"));
+  group["attributes"].erase("isobrick");
+  std::ofstream(fs::path(store) / "zarr.json") << group.dump();
+  EXPECT_TRUE(OpenedVolume(store, options(), silent_).converted());
+  EXPECT_FALSE(OpenedVolume(store, options(), silent_).converted());
+  const fs::path chunk = fs::path(store) / "0/c/0/0/0";
+  const std::string bytes = content_of(chunk);
+  std::ofstream(chunk, std::ios::binary) << bytes;  // as another program writes in place
+  EXPECT_TRUE(OpenedVolume(store, options(), silent_).converted());
 }
 
 /// Breaks off as a cancelled command does.
