@@ -45,6 +45,12 @@ std::optional<double> number_of(std::string_view text) {
   return value;
 }
 
+std::string_view without_blanks(std::string_view text) {
+  while (text.starts_with(' ')) text.remove_prefix(1);
+  while (text.ends_with(' ')) text.remove_suffix(1);
+  return text;
+}
+
 double percent_of(std::string_view text, std::string_view all) {
   const auto percent = number_of(text);
   if (!percent) refuse(all);
@@ -82,8 +88,10 @@ void append_steps(std::string_view text, std::vector<IsovalueRequest>& requests)
     throw UsageError(fmt::format("'{}': the step does not lead from {} to {}", text, *from, *to));
   if (!(steps < static_cast<double>(kMaxIsovalues)))
     throw UsageError(fmt::format("'{}' is more than {} isovalues", text, kMaxIsovalues));
+  // 12 digits: 0.15 and not 0.15000000000000002, which would be in the names of meshes.
   for (double i = 0; i <= steps; ++i)
-    requests.push_back({IsovalueRequest::Kind::value, *from + i * *step});
+    requests.push_back(
+        {IsovalueRequest::Kind::value, *number_of(fmt::format("{:.12g}", *from + i * *step))});
 }
 
 void check_hounsfield(const Histogram& histogram, ScalarType type) {
@@ -133,7 +141,7 @@ std::vector<IsovalueRequest> parse_isovalues(std::string_view text) {
   std::vector<IsovalueRequest> requests;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string_view part = text.substr(begin, end - begin);
+    const std::string_view part = without_blanks(text.substr(begin, end - begin));
     if (part.find(':') != part.npos)
       append_steps(part, requests);
     else

@@ -35,14 +35,16 @@ TEST(Isovalue, Grammar) {
   EXPECT_EQ(parse_isovalues("100:200:50"),
             (Requests{{Kind::value, 100}, {Kind::value, 150}, {Kind::value, 200}}));
   EXPECT_EQ(parse_isovalues("2:1:-0.5").size(), 3u);
+  EXPECT_EQ(parse_isovalues("1, 2 "), (Requests{{Kind::value, 1}, {Kind::value, 2}}));
+  EXPECT_EQ(parse_isovalues("0.1:0.35:0.05")[1].number, 0.15);
   EXPECT_EQ(parse_isovalues("0:1:0.1").size(), 11u) << "rounding takes no last step away";
   EXPECT_EQ(parse_isovalues("0:1:0.3").size(), 4u);
 }
 
 TEST(Isovalue, WhatIsNone) {
-  for (const char* text :
-       {"",   ",",  "1,",  "bone",  "ct-",   "p",     "pp",      "p101", "p-1", "101%", "%",
-        "x%", "HU", "1:2", "1:2:0", "2:1:1", "1:2:x", "0:1e9:1", "nan",  "inf", "1 2",  "otsu:1:2"})
+  for (const char* text : {"",      ",",       "1,",  "bone", "ct-",   "p",       "pp",    "p101",
+                           "p-1",   "101%",    "%",   "x%",   "HU",    "1:2",     "1:2:0", "2:1:1",
+                           "1:2:x", "0:1e9:1", "nan", "inf",  "1 2 3", "otsu:1:2"})
     EXPECT_THROW(parse_isovalues(text), UsageError) << text;
   try {
     parse_isovalues("bone");
