@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <isobrick/error.h>
 #include "tools/definitions.h"
 #include "tools/settings.h"
 #include "tools/spelling.h"
@@ -39,6 +40,16 @@ std::vector<std::string> with_values(const CommandView& command,
     all.back() += '=' + (has_value ? words[++i] : option->choices.front());
   }
   return all;
+}
+
+/// Behind "--output=" CLI11 would take the next word for the value.
+void check_values(const CommandView& command, const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    if (word.size() < 2 || word.back() != '=') continue;
+    const std::string name = word.substr(0, word.size() - 1);
+    if (find_option(command, name) != nullptr)
+      throw UsageError(fmt::format("{}: a value is missing", name));
+  }
 }
 
 /// The subcommand of a command line, or the program.
@@ -81,6 +92,7 @@ void read_command_line(const CLI::App& program, int argc, char** argv, CommandLi
   });
   if (command != commands.end()) {
     words = with_values(*command, words);
+    check_values(*command, words);
     Settings settings = find_settings(commands, *command, words);
     words.insert(words.begin() + 1, settings.words.begin(), settings.words.end());
     line.origins = std::move(settings.origins);

@@ -88,6 +88,9 @@ int run(const Arguments& arguments, Console& console) {
   ExportOptions options = arguments.options;
   options.format = format_of(out, arguments.format);
   if (is_standard_output(out)) console.reserve_output();
+  const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
+  check_replaces_no_input(out, inputs);
+  check_can_write(out, options.force);
   const OpenedVolume input = open_input(arguments.input, options.memory, options.threads, console);
   const StoreReader& store = input.store();
   const Box3 box = store_region(store, options.level, arguments.region);
@@ -95,8 +98,6 @@ int run(const Arguments& arguments, Console& console) {
   if (!arguments.isovalues.empty())
     options.isovalue = resolve_isovalues(arguments.isovalues, store, console.progress()).front();
   options.half_band = arguments.half_band.value_or(options.half_band);
-  const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
-  check_replaces_no_input(out, inputs);
   export_volume(store, out, options, console.progress());
   if (options.isovalue)
     if (const std::string why = why_out_of_range(store, options.level, *options.isovalue);

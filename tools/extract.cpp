@@ -145,6 +145,7 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
 int run(const ExtractArguments& arguments, Console& console) {
   check_arguments(arguments);
   if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
+  check_outputs(arguments);
   const OpenedVolume input =
       open_input(arguments.input, arguments.memory, arguments.threads, console);
   const StoreReader& store = input.store();
@@ -189,10 +190,14 @@ void add_backend_options(CLI::App* app, ExtractArguments& arguments) {
 }
 
 void add_level_options(CLI::App* app, ExtractArguments& arguments) {
-  add_parsed(
-      app, arguments.level, parse_level,
+  add_text(
+      app,
       {"--level", "auto|L",
-       "Level of the pyramid, 0 the finest; auto: the finest with at most --max-triangles", "0"});
+       "Level of the pyramid, 0 the finest; auto: the finest with at most --max-triangles", "0"},
+      [&arguments](const std::string& text) {
+        arguments.level = parse_level(text);
+        arguments.level_given = true;
+      });
   add_parsed(
       app, arguments.max_triangles,
       [](const std::string& text) { return std::optional(parse_count(text)); },

@@ -73,7 +73,8 @@ std::vector<double> isovalues_of(const ExtractArguments& arguments, const StoreR
     const auto suggested = suggest_isovalue_of(store, console.progress());
     if (!suggested)
       throw UsageError(
-          "--isovalue is missing; all samples are the same, and no surface passes between them");
+          "--isovalue is missing, and no surface passes between the samples: all are the same, or "
+          "none is a finite number");
     throw UsageError(fmt::format("--isovalue is missing; try --isovalue {}: {}", suggested->value,
                                  suggested->why));
   }
@@ -185,9 +186,24 @@ void check_arguments(const ExtractArguments& arguments) {
     if (!needs_histogram(*request) &&
         std::find(arguments.isovalues.begin(), request, *request) != request)
       throw UsageError(fmt::format("isovalue {} is given twice", request->number));
-  if (arguments.max_triangles && arguments.level && *arguments.level > 0)
+  if (arguments.max_triangles && arguments.level && arguments.level_given)
     throw UsageError("--max-triangles chooses the level: leave --level out");
   if (!arguments.preview.path.empty()) check_picture_name(arguments.preview.path);
+}
+
+void check_outputs(const ExtractArguments& arguments) {
+  const std::size_t count = arguments.isovalues.size();
+  const bool names_need_values = count > 1 || arguments.output.empty();
+  const MeshFormat format = form_of(arguments).format;
+  for (const IsovalueRequest& request : arguments.isovalues) {
+    if (names_need_values && needs_histogram(request)) continue;
+    if (!arguments.output.empty())
+      check_can_write(named(arguments.output, request.number, count), arguments.force);
+    else if (arguments.writes_mesh())
+      check_can_write(default_output(arguments, format, request.number), arguments.force);
+  }
+  if (!arguments.preview.path.empty() && count == 1)
+    check_can_write(arguments.preview.path, arguments.force);
 }
 
 std::vector<ExtractedSurface> plan_surfaces(const ExtractArguments& arguments,

@@ -21,6 +21,7 @@ struct ExtractArguments {
   PreviewRequest preview;
   std::optional<MeshFormat> format;  ///< of the output; nothing: by its name
   bool quantize = false;
+  bool level_given = false;
   std::optional<int> level = 0;                ///< nothing: the finest that is small enough
   std::optional<std::uint64_t> max_triangles;  ///< of all surfaces; chooses the level
   RegionArguments region;
@@ -41,6 +42,10 @@ struct ExtractArguments {
 
 /// Throws UsageError for arguments that contradict each other, before anything is opened.
 void check_arguments(const ExtractArguments& arguments);
+
+/// Refuses outputs whose names are known and that exist or have no folder, before anything is
+/// converted.
+void check_outputs(const ExtractArguments& arguments);
 
 /// Resolves the isovalues, chooses the level and names the outputs. Throws UsageError for an
 /// isovalue that is missing (with a suggestion) or given twice, and for outputs of one name.

@@ -288,20 +288,25 @@ struct Arguments {
   int threads = 0;
 };
 
+void report(const StoreReader& store, const Arguments& arguments, Console& console) {
+  const StoreFacts facts = gather(store, arguments.stats, arguments.memory, console.progress());
+  const std::string& path = arguments.input.path;
+  console.result(json_of(path, store.info(), facts), text_of(path, store.info(), facts));
+}
+
 int run(const Arguments& arguments, Console& console) {
   const InputArguments& input = arguments.input;
   check_input(input.path);
-  const bool zarr = is_zarr(input.path);
-  if (zarr && list_volumes(input.path, input.volume.selection, console)) return 0;
-  if (!zarr && !arguments.stats) {
+  if (is_zarr(input.path)) {
+    // Whatever it lacks: nothing is converted.
+    if (!list_volumes(input.path, input.volume.selection, console))
+      report(open_store(input.path, input.volume.selection), arguments, console);
+  } else if (!arguments.stats) {
     report_source(input, console);
-    return 0;
+  } else {
+    report(open_input(input, arguments.memory, arguments.threads, console).store(), arguments,
+           console);
   }
-  const OpenedVolume opened = open_input(input, arguments.memory, arguments.threads, console);
-  const StoreReader& store = opened.store();
-  const StoreFacts facts = gather(store, arguments.stats, arguments.memory, console.progress());
-  console.result(json_of(input.path, store.info(), facts),
-                 text_of(input.path, store.info(), facts));
   return 0;
 }
 

@@ -59,13 +59,24 @@ void add_input(CLI::App* app, InputArguments& input, bool required) {
 }
 
 OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,
-                        Console& console) {
+                        Console& console, bool needs_ranges) {
   check_input(input.path);
-  set_interrupt_note([] { return "the same command goes on with what is done"; });
-  OpenedVolume opened(
-      input.path,
-      {.volume = input.volume, .cache = input.cache, .memory = memory, .threads = threads},
-      console.progress());
+  if (!input.cache.folder.empty())
+    set_interrupt_note([] { return "the same command goes on with what is done"; });
+  OpenedVolume opened = [&] {
+    try {
+      return OpenedVolume(input.path,
+                          {.volume = input.volume,
+                           .cache = input.cache,
+                           .needs_ranges = needs_ranges,
+                           .memory = memory,
+                           .threads = threads},
+                          console.progress());
+    } catch (const UsageError&) {
+      refuse_folder_of_zarr(input.path);
+      throw;
+    }
+  }();
   set_interrupt_note({});
   for (const std::string& note : opened.notes()) console.note(note);
   return opened;

@@ -24,6 +24,6 @@ void add_volume_options(CLI::App* app, VolumeRequest& volume);
 /// Opens the input as a store, by way of the cache where it is none, and writes what it notes.
 /// Throws Error and UsageError with what to type instead where it is no volume.
 OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,
-                        Console& console);
+                        Console& console, bool needs_ranges = true);
 
 }  // namespace isobrick::tools

@@ -20,12 +20,12 @@ std::vector<double> resolve_isovalues(const std::vector<IsovalueRequest>& reques
   if (std::any_of(requests.begin(), requests.end(), needs_histogram))
     samples = histogram(store, progress, kBins, true);
   std::vector<double> isovalues;
-  for (const IsovalueRequest& request : requests)
-    isovalues.push_back(resolve_isovalue(request, samples, store.info().type));
-  std::vector<double> sorted = isovalues;
-  std::sort(sorted.begin(), sorted.end());
-  const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
-  if (twice != sorted.end()) throw UsageError(fmt::format("isovalue {} is given twice", *twice));
+  for (const IsovalueRequest& request : requests) {
+    const double isovalue = resolve_isovalue(request, samples, store.info().type);
+    const bool is_there =
+        std::find(isovalues.begin(), isovalues.end(), isovalue) != isovalues.end();
+    if (!is_there) isovalues.push_back(isovalue);
+  }
   return isovalues;
 }
 

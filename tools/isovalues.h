@@ -8,8 +8,8 @@
 
 namespace isobrick::tools {
 
-/// The isovalues that requests mean in a store; reads its histogram if any needs it. Throws
-/// UsageError where two are the same.
+/// The isovalues that requests mean in a store; reads its histogram if any needs it. Those
+/// that come to the same value are one.
 std::vector<double> resolve_isovalues(const std::vector<IsovalueRequest>& requests,
                                       const StoreReader& store, Progress& progress);
 

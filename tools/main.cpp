@@ -48,7 +48,8 @@ const Command* parsed(const Program& program) {
 
 std::string name_of(const Command* command) { return command ? command->app->get_name() : ""; }
 
-int die_of(int signal) {
+int die_of(int signal, const Program& program, const CommandLine& line) {
+  if (line.json) print_error_json(name_of(parsed(program)), "interrupted", 128 + signal);
   end_by_signal(signal);
   return 1;
 }
@@ -100,9 +101,9 @@ int run_parsed(Program& program, CommandLine& line) {
     if (error.get_exit_code() == 0) return program.app.exit(error);
     return fail(complaint(program, error), 2);
   } catch (const Interrupted& interrupted) {
-    return die_of(interrupted.signal());
+    return die_of(interrupted.signal(), program, line);
   } catch (const Cancelled&) {
-    return die_of(interrupting_signal());
+    return die_of(interrupting_signal(), program, line);
   } catch (const UsageError& error) {
     return fail(error.what(), 2);
   } catch (const std::bad_alloc&) {

@@ -106,6 +106,11 @@ void check_store(const std::string& path) {
   if (fs::is_directory(status) && !is_zarr(path)) refuse_folder(path);
 }
 
+void refuse_folder_of_zarr(const std::string& path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored) && !is_zarr(path)) refuse_outer_folder(path, "volume");
+}
+
 void check_input(const std::string& path) {
   const std::string file = path == "-" ? path : split_volume_path(path).file;
   std::error_code ignored;
@@ -122,7 +127,6 @@ void check_input(const std::string& path) {
                                               shell_word(path))
                                 : ""));
   if (fs::is_regular_file(status)) refuse_meshes_and_pictures(file, "volume");
-  if (fs::is_directory(status) && !is_zarr(file)) refuse_outer_folder(file, "volume");
 }
 
 StoreReader open_store(const std::string& path, const Selection& selection) {

@@ -114,7 +114,8 @@ void add_level(CLI::App* app, int& level) {
 void add_region(CLI::App* app, RegionArguments& region) {
   add_parsed(app, region.roi, parse_roi,
              {"--roi", "X0:X1,Y0:Y1,Z0:Z1",
-              "Only these samples of the level, half-open; parts may be left out"});
+              "Only these samples of the level (of what --stride leaves), half-open; parts may be "
+              "left out"});
   add_world_region(app, region.region);
 }
 

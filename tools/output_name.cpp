@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include <isobrick/error.h>
+#include "io/bytes/output_file.h"
 #include "tools/format.h"
 
 namespace isobrick::tools {
@@ -53,6 +54,16 @@ void check_store_name(const std::string& path) {
   refuse_misleading_name(path, own,
                          "a store is a folder of OME-Zarr: name it .zarr ('isobrick export' "
                          "writes .nrrd, .vdb and .raw)");
+}
+
+void check_can_write(const std::filesystem::path& path, bool force) {
+  if (is_standard_output(path.string())) return;
+  check_output(path.string(), force);
+  std::error_code none;
+  const std::filesystem::path folder = path.parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder, none))
+    throw Error(
+        fmt::format("cannot create '{}': there is no folder '{}'", path.string(), folder.string()));
 }
 
 std::string stem_of_input(const std::string& path) {

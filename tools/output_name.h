@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +21,10 @@ void check_picture_name(const std::string& path);
 
 /// Throws UsageError for a store that is named as a file of a known format, or `-`.
 void check_store_name(const std::string& path);
+
+/// Throws UsageError where an output exists and `force` is not set, Error where its folder does not
+/// exist. Standard output can always be written.
+void check_can_write(const std::filesystem::path& path, bool force);
 
 /// What outputs of an input are called where no name is given: "scan" of "data/scan.nii.gz",
 /// "series/" and "scan.nrrd:/array". Throws UsageError for standard input, which has no name.

@@ -198,13 +198,18 @@ RoiText parse_roi(std::string_view text) {
 }
 
 WorldRegion parse_world_region(std::string_view text) {
+  constexpr double kFar = 1e30;  // beyond every mesh, and no infinity that would make NaN
   const auto parts = split_box(text);
   WorldRegion region;
   for (int axis = 0; axis < 3; ++axis) {
     const std::string_view part = parts[static_cast<std::size_t>(axis)];
     const auto colon = std::min(part.find(':'), part.size());
-    region.lo[axis] = parse_number(part.substr(0, colon));
-    region.hi[axis] = parse_number(part.substr(std::min(colon + 1, part.size())));
+    if (colon == part.size() && !part.empty())
+      throw UsageError(fmt::format("'{}' in '{}' is not of the form FROM:TO", part, text));
+    const std::string_view lo = part.substr(0, colon),
+                           hi = part.substr(std::min(colon + 1, part.size()));
+    region.lo[axis] = lo.empty() ? -kFar : parse_number(lo);
+    region.hi[axis] = hi.empty() ? kFar : parse_number(hi);
     if (!(region.lo[axis] < region.hi[axis]))
       throw UsageError(fmt::format("the box '{}' is empty", text));
   }

@@ -43,7 +43,8 @@ Vec3d parse_vector(std::string_view text);
 /// "NX,NY,NZ,D": what lies where NX·x + NY·y + NZ·z >= D.
 HalfSpace parse_half_space(std::string_view text);
 
-/// "X0:X1,Y0:Y1,Z0:Z1", a box of world space that has an inside.
+/// "X0:X1,Y0:Y1,Z0:Z1", a box of world space that has an inside; any number, or a whole part, may
+/// be left out.
 WorldRegion parse_world_region(std::string_view text);
 
 /// "2" along all axes, or "X,Y,Z"; each at least 1.

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include <isobrick/error.h>
@@ -75,7 +77,8 @@ std::vector<Setting> settings_of_environment(const CommandView& command) {
   for (const OptionView& option : command.options) {
     const std::string name = long_name(option), variable = variable_name(name);
     if (!is_settable(name)) continue;
-    if (const char* value = std::getenv(variable.c_str()))
+    // An empty variable counts as none, as a shell leaves it.
+    if (const char* value = std::getenv(variable.c_str()); value != nullptr && *value != '\0')
       settings.push_back({command.name, name, {value}, variable});
   }
   return settings;
@@ -89,6 +92,25 @@ std::optional<std::string> config_file(const std::vector<std::string>& words) {
   const char* variable = std::getenv("ISOBRICK_CONFIG");
   if (variable == nullptr || *variable == '\0') return std::nullopt;
   return variable;
+}
+
+/// The texts of a setting's values. An option that takes one value may be given an array of parts:
+/// dims = [64, 64, 93].
+std::vector<std::string> values_of(const Setting& setting, const OptionView& option) {
+  std::vector<std::string> values = setting.values;
+  if (!option.repeated && values.size() > 1) values = {fmt::format("{}", fmt::join(values, ","))};
+  for (const std::string& value : values)
+    if (value.empty() && !option.value.empty())
+      throw UsageError(
+          fmt::format("--{}: a value is missing (from {})", setting.name, setting.origin));
+  return values;
+}
+
+/// Whether the command line says more than a setting could: a name that is typed has its format.
+bool is_outdone(const Setting& setting, const CommandView& command,
+                const std::vector<std::string>& words) {
+  const OptionView* output = find_option(command, "output");
+  return setting.name == "format" && output != nullptr && is_typed(*output, words);
 }
 
 /// Every key of a file must be an option of its command, or of some command.
@@ -114,6 +136,9 @@ std::vector<Setting> settings_of_file(const std::string& path,
                                       const std::vector<CommandView>& commands) {
   std::ifstream file(path);
   if (!file) throw system_error("open", path, errno);
+  std::error_code none;
+  if (std::filesystem::is_directory(path, none))
+    throw UsageError(fmt::format("'{}' is a folder; --config takes a file", path));
   std::vector<CLI::ConfigItem> items;
   try {
     items = CLI::ConfigTOML().from_config(file);
@@ -147,14 +172,18 @@ Settings find_settings(const std::vector<CommandView>& commands, const CommandVi
     all.insert(all.end(), of_file.begin(), of_file.end());
   }
   Settings found;
+  // What these print is for shells and readers.
+  for (const char* name : {"completion", "man", "help"})
+    if (command.name == name) return found;
   for (const Setting& setting : all) {
     const OptionView* option = find_option(command, setting.name);
     const std::string name = "--" + setting.name;
     const bool is_other = !setting.command.empty() && setting.command != command.name;
-    if (is_other || option == nullptr || is_typed(*option, words) || found.origins.contains(name))
+    if (is_other || option == nullptr || is_typed(*option, words) ||
+        is_outdone(setting, command, words) || found.origins.contains(name))
       continue;
     found.origins[name] = setting.origin;
-    for (const std::string& value : setting.values) {
+    for (const std::string& value : values_of(setting, *option)) {
       if (!option->value.empty())
         found.words.push_back(name + '=' + value);
       else if (parse_flag(value, setting.origin + ": " + name))

@@ -281,7 +281,8 @@ OpenedVolume open_shown(const Arguments& arguments, Console& console) {
   InputArguments input = arguments.input;
   if (is_zarr(input.path))
     input.volume.selection = image_volumes(input.path, input.volume.selection).selection;
-  return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console);
+  // The window computes ranges that are missing.
+  return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console, false);
 }
 
 int run(const Arguments& arguments, Console& console) {

@@ -43,7 +43,7 @@ TEST_F(AnyInput, AMeshIsThatOfTheConvertedStore) {
     const std::string expected = mesh(path("a.zarr"));
     EXPECT_EQ(err_, "");
     EXPECT_TRUE(mesh(input) == expected);
-    EXPECT_NE(err_.find("is converted to"), std::string::npos) << err_;
+    EXPECT_NE(err_.find("was converted to"), std::string::npos) << err_;
     EXPECT_TRUE(mesh(input) == expected);
     EXPECT_EQ(err_, "") << "the store was kept";
     EXPECT_TRUE(mesh(input, {"--cache", "none"}) == expected);
@@ -89,6 +89,37 @@ TEST_F(AnyInput, StridesAndMissingSamples) {
   const std::string whole = mesh(raw());
   EXPECT_LT(mesh(raw(), {"--nodata", "130"}).size(), whole.size());
   EXPECT_TRUE(mesh(raw(), {"--nodata", "1000"}) == whole) << "the same samples as floats";
+}
+
+TEST_F(AnyInput, OutputsAreCheckedBeforeAConversion) {
+  write_file(path("m.ply"), "mine");
+  for (const Arguments& arguments :
+       {Arguments{"extract", raw(), "--isovalue", "127.5", "-o", path("m.ply")},
+        Arguments{"extract", raw(), "--isovalue", "127.5", "-o", path("none/m.ply")},
+        Arguments{"export", raw(), path("m.ply"), "--format", "raw"},
+        Arguments{"export", raw(), path("none/m.raw")}}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_NE(outcome.exit_code, 0);
+    EXPECT_EQ(outcome.err.find("was converted"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(read_file(path("m.ply")), "mine");
+}
+
+TEST_F(AnyInput, RegionsCountWhatAStrideLeaves) {
+  const Arguments part{"--stride", "2", "--roi", "3:15,0:18,2:9"};
+  Arguments convert{"convert", raw(), path("part.zarr")};
+  convert.insert(convert.end(), part.begin(), part.end());
+  ASSERT_EQ(run(convert).exit_code, 0);
+  EXPECT_EQ(run_json({"info", path("part.zarr")})["extent"], (nlohmann::json{12, 18, 7}));
+  Arguments extract{"extract", raw(), "--isovalue", "127.5", "--estimate"};
+  extract.insert(extract.end(), part.begin(), part.end());
+  EXPECT_EQ(run(extract).exit_code, 0);
+}
+
+TEST_F(AnyInput, AFolderOfSlicesThatAlsoHoldsAStore) {
+  expect_refused(run({"extract", path(""), "--isovalue", "1"}), 2, {});
+  const std::string store = make_store("inside");
+  expect_refused(run({"extract", path(""), "--isovalue", "1"}), 1, {"holds Zarr", "inside.zarr"});
 }
 
 TEST_F(AnyInput, ALimitOfTheCache) {

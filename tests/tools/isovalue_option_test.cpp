@@ -45,6 +45,7 @@ TEST_F(IsovalueOption, WhatMakesNoSense) {
   expect_refused(run({"extract", store, "--isovalue", "bone"}), 2, {"--isovalue", "ct-bone"});
   expect_refused(run({"extract", store, "--isovalue", "300HU"}), 2, {"Hounsfield", "-1000"});
   expect_refused(run({"extract", store, "--isovalue", "100,100"}), 2, {"given twice"});
+  EXPECT_EQ(isovalues(store, {"--isovalue", "p0,0%"}).size(), 1u) << "two ways to state one";
   expect_refused(run({"export", store, path("a.vdb"), "--isovalue", "1,2"}), 2, {"one isosurface"});
 }
 
@@ -63,8 +64,10 @@ TEST_F(IsovalueOption, TheFinestLevelThatIsSmallEnough) {
   EXPECT_EQ(fewer["level"], 1);
   EXPECT_LE(fewer["surfaces"][0]["triangles"].get<std::uint64_t>(), triangles / 2);
   EXPECT_EQ(level({"--max-triangles", "1"})["level"], 2) << "no level is coarser";
-  expect_refused(run({"extract", store, "--isovalue", "9", "--level", "1", "--max-triangles", "9"}),
-                 2, {"--level"});
+  for (const char* number : {"0", "1"})
+    expect_refused(
+        run({"extract", store, "--isovalue", "9", "--level", number, "--max-triangles", "9"}), 2,
+        {"--level"});
   expect_refused(run({"extract", store, "--isovalue", "9", "--level", "auto", "--roi", "0:9,,"}), 2,
                  {"--region"});
 }
@@ -83,6 +86,7 @@ TEST_F(IsovalueOption, ARegionOfTheWorldIsABoxOfSamples) {
   const std::string region = bound(5) + ":" + bound(20) + "," + bound(0) + ":" + bound(35) + "," +
                              bound(3) + ":" + bound(9);
   EXPECT_TRUE(mesh({"--region", region}) == mesh({"--roi", "5:21,0:36,3:10"}));
+  EXPECT_TRUE(mesh({"--region", ":,:" + bound(20) + ",:"}) == mesh({"--roi", ":,:21,:"}));
   EXPECT_TRUE(mesh({"--region", region, "--roi", ":,0:10,:"}) == mesh({"--roi", "5:21,0:10,3:10"}));
   ASSERT_EQ(run({"convert", store, path("part.zarr"), "--region", region}).exit_code, 0);
   EXPECT_EQ(run_json({"info", path("part.zarr")})["extent"], (nlohmann::json{16, 36, 7}));

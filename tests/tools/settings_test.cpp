@@ -25,6 +25,16 @@ TEST_F(Settings, VariablesStandForOptions) {
                  {"--memory: 'much'", "from ISOBRICK_MEMORY"});
   expect_refused(run_with("ISOBRICK_QUIET=maybe", {"verify", store}), 2,
                  {"ISOBRICK_QUIET", "neither true nor false"});
+  // An empty value takes no word of the command line for itself.
+  EXPECT_EQ(run_with("ISOBRICK_MEMORY=", {"verify", store}).exit_code, 0);
+  expect_refused(run({"verify", store, "--memory="}), 2, {"--memory: a value is missing"});
+  EXPECT_EQ(run_with("ISOBRICK_OUTPUT=", {"export", store, path("e.nrrd")}).exit_code, 0);
+  EXPECT_EQ(run_with("ISOBRICK_JSON=1", {"man"}).out, run({"man"}).out);
+  EXPECT_EQ(run_with("ISOBRICK_FORMAT=glb",
+                     {"extract", store, "--isovalue", "127", "-o", path("typed.ply")})
+                .exit_code,
+            0)
+      << "a name that is typed has its format";
   EXPECT_EQ(run_with("ISOBRICK_ISOVALUE=100,150", {"extract", store, "--estimate", "-q"}).exit_code,
             0);
 }
@@ -59,10 +69,14 @@ TEST_F(Settings, FilesThatMakeNoSense) {
        {std::pair{"memry = \"1G\"\n", "did you mean 'memory'"},
         std::pair{"[extrat]\nforce = true\n", "no subcommand"},
         std::pair{"[extract]\ndims = \"1,1\"\nkind = \"octree\"\n", "unknown option 'kind'"},
-        std::pair{"[a.b]\nforce = true\n", "too deep"}}) {
+        std::pair{"[a.b]\nforce = true\n", "too deep"},
+        std::pair{"memory = \"\"\n", "a value is missing"}}) {
     write_file(file, text);
     expect_refused(run({"info", store, "--config", file}), 2, {"settings.toml", part});
   }
+  expect_refused(run({"info", store, "--config", path("")}), 2, {"is a folder"});
+  write_file(file, "roi = [\"0:9\", \"\", \"\"]\nmemory = [1, 2]\n");
+  expect_refused(run({"verify", store, "--config", file}), 2, {"--memory: '1,2'", "settings.toml"});
   write_file(file, "threads = \"0\"\n");
   expect_refused(run({"verify", store, "--config", file}), 2, {"--threads", "settings.toml"});
 }

@@ -80,8 +80,11 @@ TEST(Parse, BoxesOfWorldSpace) {
   const auto [lo, hi] = parse_world_region("-1.5:2,3:4e1,5:6");
   EXPECT_EQ(lo, (Vec3d{-1.5, 3, 5}));
   EXPECT_EQ(hi, (Vec3d{2, 40, 6}));
-  for (const char* text : {"", "1:2,3:4", "1:2,3:4,5", "1:2,3:4,:6", "1:2,3:4,5:", "1:2,3:4,6:6",
-                           "1:2,4:3,5:6", "1:2,3:4,5:6,7:8", "1:2,3:4,5:x", "1:2,3:4,5:nan"})
+  EXPECT_EQ(parse_world_region(":2,,5:").lo.z, 5);
+  EXPECT_LT(parse_world_region(":2,,5:").lo.y, -1e20);
+  EXPECT_GT(parse_world_region(":2,,5:").hi.z, 1e20);
+  for (const char* text : {"", "1:2,3:4", "1:2,3:4,5", "1:2,3:4,6:6", "1:2,4:3,5:6",
+                           "1:2,3:4,5:6,7:8", "1:2,3:4,5:x", "1:2,3:4,5:nan"})
     EXPECT_THROW(parse_world_region(text), UsageError) << text;
 }
 
