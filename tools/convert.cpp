@@ -17,14 +17,14 @@
 namespace isobrick::tools {
 namespace {
 
-struct Arguments {
+struct ConvertArguments {
   std::string in, out;
   VolumeRequest volume;
   RegionArguments region;
   ConvertOptions store;
 };
 
-VolumeRequest requested_volume(const Arguments& arguments) {
+VolumeRequest requested_volume(const ConvertArguments& arguments) {
   VolumeRequest volume = arguments.volume;
   volume.roi = arguments.region.roi;
   volume.region = arguments.region.region;
@@ -32,7 +32,7 @@ VolumeRequest requested_volume(const Arguments& arguments) {
 }
 
 /// Zarr is read as stores are, all else as files.
-std::unique_ptr<VolumeSource> open_input(const Arguments& arguments) {
+std::unique_ptr<VolumeSource> open_input(const ConvertArguments& arguments) {
   if (is_zarr(arguments.in)) {
     refuse_grid(arguments.in, arguments.volume);
     return open_store_source(arguments.in, requested_volume(arguments), arguments.store.threads);
@@ -73,7 +73,7 @@ ConvertReport convert_stream(VolumeSource& source, const std::string& out,
   }
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run_convert(const ConvertArguments& arguments, Console& console) {
   const std::string out =
       arguments.out.empty() ? stem_of_input(arguments.in) + ".zarr" : arguments.out;
   check_store_name(out);
@@ -91,7 +91,7 @@ int run(const Arguments& arguments, Console& console) {
 }  // namespace
 
 void add_convert(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* app = add_subcommand(
       program, "convert", "Turn a volume into a store, within a memory budget.",
       "isobrick convert head.raw --dims 64,64,93 --type i16 --spacing 3.2,3.2,1.5   # head.zarr\n"
@@ -104,7 +104,7 @@ void add_convert(Program& program) {
   add_volume_options(app, arguments->volume);
   add_region(app, arguments->region);
   add_store_options(app, arguments->store);
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_convert);
 }
 
 }  // namespace isobrick::tools

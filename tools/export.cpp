@@ -20,7 +20,7 @@
 namespace isobrick::tools {
 namespace {
 
-struct Arguments {
+struct ExportArguments {
   InputArguments input;
   std::string out;
   std::optional<ExportFormat> format;  ///< nothing: by the name
@@ -66,14 +66,14 @@ ExportFormat format_of(const std::string& path, std::optional<ExportFormat> opti
 }
 
 /// The name where none is given: by the format, which is OpenVDB for a level set, else NRRD.
-std::string default_output(const Arguments& arguments) {
+std::string default_output(const ExportArguments& arguments) {
   const ExportFormat format = arguments.format.value_or(
       arguments.isovalues.empty() ? ExportFormat::nrrd : ExportFormat::vdb);
   return stem_of_input(arguments.input.path) +
          std::string(formats()[static_cast<std::size_t>(format)].extensions.front());
 }
 
-void check(const Arguments& arguments) {
+void check(const ExportArguments& arguments) {
   if (arguments.half_band && arguments.isovalues.empty())
     throw UsageError("--half-band is the width of a level set: add its --isovalue");
   if (arguments.options.inside && arguments.isovalues.empty())
@@ -82,7 +82,7 @@ void check(const Arguments& arguments) {
     throw UsageError("a level set has one isosurface; give one --isovalue");
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run_export(const ExportArguments& arguments, Console& console) {
   check(arguments);
   const std::string out = arguments.out.empty() ? default_output(arguments) : arguments.out;
   ExportOptions options = arguments.options;
@@ -139,7 +139,7 @@ ExportFormat parse_format(const std::string& text) {
 }  // namespace
 
 void add_export(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ExportArguments>();
   CLI::App* app = add_subcommand(
       program, "export",
       "Write the samples of a volume as a file, or its isosurface as an OpenVDB level set.",
@@ -168,7 +168,7 @@ void add_export(Program& program) {
   add_memory(app, arguments->options.memory);
   add_threads(app, arguments->options.threads);
   add_force(app, arguments->options.force);
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_export);
 }
 
 }  // namespace isobrick::tools

@@ -142,7 +142,7 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
       isovalue, -*band, *band));
 }
 
-int run(const ExtractArguments& arguments, Console& console) {
+int run_extract(const ExtractArguments& arguments, Console& console) {
   check_arguments(arguments);
   if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
   check_outputs(arguments);
@@ -254,7 +254,7 @@ void add_extract(Program& program) {
   add_force(app, arguments->force);
   add_flag(app, "--no-space-check", arguments->no_space_check,
            "Begin even if, by the estimate, the disk is too small");
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_extract);
 }
 
 }  // namespace isobrick::tools

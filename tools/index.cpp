@@ -12,7 +12,7 @@
 namespace isobrick::tools {
 namespace {
 
-struct Arguments {
+struct IndexArguments {
   std::string store;
   IndexOptions index;
 };
@@ -23,7 +23,7 @@ std::uint64_t total(const IndexReport& report) {
   return bytes;
 }
 
-std::string text_of(const Arguments& arguments, const IndexReport& report) {
+std::string text_of(const IndexArguments& arguments, const IndexReport& report) {
   const std::size_t levels = report.level_bytes.size();
   std::string text = fmt::format("{}: {} index with leaf {} of {} level{}, {} in {}",
                                  arguments.store, name_of(arguments.index.kind),
@@ -37,7 +37,7 @@ std::string text_of(const Arguments& arguments, const IndexReport& report) {
   return text + '\n';
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run_index(const IndexArguments& arguments, Console& console) {
   check_store(arguments.store);
   set_interrupt_note([] { return "the same command with --resume goes on with what is done"; });
   const IndexReport report = add_index(arguments.store, arguments.index, console.progress());
@@ -59,7 +59,7 @@ int run(const Arguments& arguments, Console& console) {
 }  // namespace
 
 void add_index(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<IndexArguments>();
   CLI::App* app = add_subcommand(
       program, "index",
       "Add a search structure to a store, and the ranges of samples that another program's image "
@@ -78,7 +78,7 @@ void add_index(Program& program) {
            "Replace an index of this kind, once the new one is whole, and compute the ranges of "
            "another program's image anew");
   program.commands.push_back(
-      {app, [arguments](Console& console) { return run(*arguments, console); }});
+      {app, [arguments](Console& console) { return run_index(*arguments, console); }});
 }
 
 }  // namespace isobrick::tools

@@ -34,7 +34,7 @@ std::uint64_t directory_bytes(const fs::path& path) {
 }
 
 /// Columns of the drawing.
-constexpr int kBins = 64;
+constexpr int kColumns = 64;
 /// Bricks of a level that are looked for: seconds.
 constexpr Index kMaxBricks = Index{1} << 26;
 
@@ -129,7 +129,7 @@ StoreFacts gather(const StoreReader& store, bool stats, std::uint64_t memory, Pr
   }
   if (const auto stored = stored_histogram(store)) {
     facts.range = {stored->lo, stored->hi};
-    facts.histogram = rebin(*stored, kBins);
+    facts.histogram = rebin(*stored, kColumns);
   } else if (stats) {
     read_values(store, memory, progress, facts);
   }
@@ -281,20 +281,20 @@ std::string text_of(const std::string& path, const StoreInfo& info, const StoreF
   return text + histogram_text(info, facts);
 }
 
-struct Arguments {
+struct InfoArguments {
   InputArguments input;
   bool stats = false;
   std::uint64_t memory = 0;
   int threads = 0;
 };
 
-void report(const StoreReader& store, const Arguments& arguments, Console& console) {
+void report(const StoreReader& store, const InfoArguments& arguments, Console& console) {
   const StoreFacts facts = gather(store, arguments.stats, arguments.memory, console.progress());
   const std::string& path = arguments.input.path;
   console.result(json_of(path, store.info(), facts), text_of(path, store.info(), facts));
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run_info(const InfoArguments& arguments, Console& console) {
   const InputArguments& input = arguments.input;
   check_input(input.path);
   if (is_zarr(input.path)) {
@@ -313,7 +313,7 @@ int run(const Arguments& arguments, Console& console) {
 }  // namespace
 
 void add_info(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<InfoArguments>();
   CLI::App* app = add_subcommand(
       program, "info",
       "Show what a volume is: extents, levels, bricks, histogram; or which channels and times.",
@@ -324,7 +324,7 @@ void add_info(Program& program) {
            "values of a volume that keeps no histogram");
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_info);
 }
 
 }  // namespace isobrick::tools

@@ -20,7 +20,7 @@
 namespace isobrick::tools {
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   std::vector<std::string> meshes;
   std::string output;
   PictureOptions picture{.size = {1280, 960}};
@@ -30,7 +30,7 @@ struct Arguments {
   bool force = false;
 };
 
-MeshPictureRequest request_of(const Arguments& arguments) {
+MeshPictureRequest request_of(const RenderArguments& arguments) {
   const PictureOptions& picture = arguments.picture;
   MeshPictureRequest request = arguments.request;
   const std::vector<MeshStyle> styles = styles_of(picture, arguments.meshes.size(), "meshes");
@@ -66,8 +66,8 @@ void check_memory(const MeshPictureRequest& request, std::uint64_t memory) {
         Renderer::driver_memory() >> 20));
 }
 
-int run(const Arguments& given, Console& console) {
-  Arguments arguments = given;
+int run_render(const RenderArguments& given, Console& console) {
+  RenderArguments arguments = given;
   if (arguments.output.empty()) arguments.output = stem_of_input(arguments.meshes.front()) + ".png";
   if (is_standard_output(arguments.output))
     console.reserve_output();
@@ -132,7 +132,7 @@ void add_overlay_options(CLI::App* app, MeshPictureRequest& request) {
 }  // namespace
 
 void add_render(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RenderArguments>();
   MeshPictureRequest& request = arguments->request;
   CLI::App* app =
       add_subcommand(program, "render", "Draw mesh files of any size into a picture.",
@@ -150,7 +150,7 @@ void add_render(Program& program) {
   add_overlay_options(app, request);
   add_memory(app, arguments->memory);
   add_force(app, arguments->force);
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_render);
 }
 
 }  // namespace isobrick::tools

@@ -19,7 +19,7 @@
 namespace isobrick::tools {
 namespace {
 
-struct Arguments {
+struct SynthArguments {
   SynthOptions synth;
   std::optional<Int3> dims;
   std::optional<ScalarType> type;
@@ -97,7 +97,7 @@ ConvertReport write_raw(VolumeSource& source, const std::string& path,
   return report;
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run_synth(const SynthArguments& arguments, Console& console) {
   SynthOptions synth = arguments.synth;
   synth.extent = *arguments.dims;
   synth.type = *arguments.type;
@@ -120,7 +120,7 @@ int run(const Arguments& arguments, Console& console) {
 }  // namespace
 
 void add_synth(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SynthArguments>();
   CLI::App* app = add_subcommand(program, "synth",
                                  "Make a procedural volume of any size, the same on every machine.",
                                  "isobrick synth gyroid gyroid.zarr --dims 256,256,256 --type u8");
@@ -139,7 +139,7 @@ void add_synth(Program& program) {
   add_parsed(app, arguments->synth.noise, parse_number,
              {"--noise", "A", "Amplitude of the gyroid's noise, as a part of the field's", "0.01"});
   add_store_options(app, arguments->store);
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_synth);
 }
 
 }  // namespace isobrick::tools

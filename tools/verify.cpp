@@ -15,7 +15,7 @@
 namespace isobrick::tools {
 namespace {
 
-struct Arguments {
+struct VerifyArguments {
   std::string store;
   Selection selection;
   std::uint64_t memory = std::uint64_t{1} << 30;
@@ -49,7 +49,7 @@ nlohmann::ordered_json indexes_json(const VerifyReport& report) {
   return list;
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run_verify(const VerifyArguments& arguments, Console& console) {
   check_store(arguments.store);
   set_interrupt_note([] { return "nobody knows whether the store is whole"; });
   const VerifyReport report = verify(arguments.store, arguments.threads, console.progress(),
@@ -73,7 +73,7 @@ int run(const Arguments& arguments, Console& console) {
 }  // namespace
 
 void add_verify(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<VerifyArguments>();
   CLI::App* app = add_subcommand(program, "verify",
                                  "Read all of a store; check every checksum, range and size.",
                                  "isobrick verify head.zarr");
@@ -82,7 +82,7 @@ void add_verify(Program& program) {
   add_selection(app, arguments->selection);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_verify);
 }
 
 }  // namespace isobrick::tools

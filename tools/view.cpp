@@ -32,7 +32,7 @@
 namespace isobrick::tools {
 namespace {
 
-struct Arguments {
+struct ViewArguments {
   InputArguments input;
   std::string screenshot, turntable;
   std::vector<IsovalueRequest> isovalues;
@@ -102,7 +102,7 @@ void cut_to_region(const StoreReader& store, const WorldRegion& region, ViewSett
 }
 
 /// Shows only the requested region, and no finer level than --level.
-void set_region(const StoreReader& store, const Arguments& arguments, ViewSettings& settings) {
+void set_region(const StoreReader& store, const ViewArguments& arguments, ViewSettings& settings) {
   store_region(store, arguments.level, arguments.region);  // refuses what is not there
   settings.finest_level = arguments.level;
   const auto& [roi, region] = arguments.region;
@@ -112,7 +112,7 @@ void set_region(const StoreReader& store, const Arguments& arguments, ViewSettin
 }
 
 /// The isovalues that are requested or, if none is, one to begin with.
-std::vector<double> isovalues_of(const Arguments& arguments, const StoreReader& store,
+std::vector<double> isovalues_of(const ViewArguments& arguments, const StoreReader& store,
                                  Console& console) {
   if (!arguments.isovalues.empty())
     return resolve_isovalues(arguments.isovalues, store, console.progress());
@@ -120,7 +120,7 @@ std::vector<double> isovalues_of(const Arguments& arguments, const StoreReader& 
   return suggested ? std::vector{suggested->value} : std::vector<double>{};
 }
 
-ViewSettings settings_of(const Arguments& arguments, const std::vector<double>& isovalues) {
+ViewSettings settings_of(const ViewArguments& arguments, const std::vector<double>& isovalues) {
   ViewSettings settings = arguments.settings;
   const std::size_t count = std::max<std::size_t>(isovalues.size(), 1);
   for (const MeshStyle& style : styles_of(arguments.picture, count, "isovalues")) {
@@ -161,7 +161,7 @@ void see_whole(std::vector<Screenshot>& turn, const WorldBox& box, double aspect
 }
 
 /// The requested pictures, of which none may be there already.
-std::vector<Screenshot> shots_of(const Arguments& arguments, const SceneRenderer& picture,
+std::vector<Screenshot> shots_of(const ViewArguments& arguments, const SceneRenderer& picture,
                                  const ViewSettings& settings) {
   if (!arguments.screenshot.empty()) check_picture_name(arguments.screenshot);
   const CameraRequest& request = arguments.picture.camera;
@@ -212,7 +212,7 @@ ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Screenshot
 }
 
 /// Draws into files.
-int draw(const Arguments& arguments, Console& console) {
+int draw(const ViewArguments& arguments, Console& console) {
   const OpenedVolume input =
       open_input(arguments.input, arguments.budgets.memory, arguments.budgets.threads, console);
   const auto store = std::make_shared<const StoreReader>(input.store().info().path,
@@ -277,7 +277,7 @@ int draw(const Arguments& arguments, Console& console) {
 }
 
 /// What of an image the window shows first: of several channels or times the first.
-OpenedVolume open_shown(const Arguments& arguments, Console& console) {
+OpenedVolume open_shown(const ViewArguments& arguments, Console& console) {
   InputArguments input = arguments.input;
   if (is_zarr(input.path))
     input.volume.selection = image_volumes(input.path, input.volume.selection).selection;
@@ -285,7 +285,7 @@ OpenedVolume open_shown(const Arguments& arguments, Console& console) {
   return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console, false);
 }
 
-int run(const Arguments& arguments, Console& console) {
+int run_view(const ViewArguments& arguments, Console& console) {
   if (!arguments.screenshot.empty() || !arguments.turntable.empty()) {
     if (arguments.input.path.empty())
       throw UsageError("INPUT is required to draw into files; see 'isobrick view --help'");
@@ -339,7 +339,7 @@ void parse_slice(const std::string& text, ViewSettings& settings) {
   settings.slices[axis] = {true, static_cast<float>(place)};
 }
 
-void add_what_to_draw(CLI::App* app, Arguments& arguments) {
+void add_what_to_draw(CLI::App* app, ViewArguments& arguments) {
   add_text(app, {"--screenshot", "PNG", "Draw into this file, without a window or a display"},
            [&](const std::string& text) { arguments.screenshot = text; });
   add_text(app,
@@ -356,7 +356,7 @@ void add_what_to_draw(CLI::App* app, Arguments& arguments) {
 }  // namespace
 
 void add_view(Program& program) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ViewArguments>();
   CLI::App* app = add_subcommand(
       program, "view", "Look at a volume: move the isovalue, fly through it, take pictures.",
       "isobrick view head.zarr --isovalue 500");
@@ -381,7 +381,7 @@ void add_view(Program& program) {
              {"--gpu-memory", "BYTES", "For meshes on the graphics device", "1G"});
   add_threads(app, arguments->budgets.threads);
   add_force(app, arguments->force);
-  add_run(program, app, arguments, run);
+  add_run(program, app, arguments, run_view);
 }
 
 }  // namespace isobrick::tools
