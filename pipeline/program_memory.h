@@ -4,6 +4,8 @@
 
 namespace isobrick {
 
+inline constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+
 /// What the program, its libraries, their stacks and small tables take of a memory budget: 12 MiB
 /// were measured of commands on a volume of a few samples.
 inline constexpr std::uint64_t kProgramBytes = std::uint64_t{20} << 20;

@@ -19,7 +19,6 @@
 namespace isobrick {
 namespace {
 
-constexpr std::size_t kMiB = std::size_t{1} << 20;
 /// What a reader takes.
 constexpr int kMaxLevels = 64;
 

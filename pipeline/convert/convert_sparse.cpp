@@ -22,7 +22,6 @@
 namespace isobrick {
 namespace {
 
-constexpr std::size_t kMiB = std::size_t{1} << 20;
 /// Bricks that one brick of the next level is made of, at most.
 constexpr std::size_t kChildren = 8;
 /// What is kept of each brick while it waits: its place, its parent's, and its shard's.

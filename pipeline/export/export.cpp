@@ -30,7 +30,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "raw files are written as they are");
 
-constexpr std::size_t kMiB = std::size_t{1} << 20;
 /// Larger pieces are no faster.
 constexpr std::size_t kPieceBytes = 256 * kMiB;
 
@@ -146,7 +145,7 @@ void export_vdb(const Piece& in, const VolumeInfo& info, std::uint64_t memory, W
   grid->write(output);
 }
 
-bool is_there(const std::filesystem::path& path) {
+bool exists_unfollowed(const std::filesystem::path& path) {
   std::error_code none;
   return std::filesystem::exists(std::filesystem::symlink_status(path, none));
 }
@@ -169,7 +168,7 @@ class DetachedHeader {
   void publish_with(OutputFile& samples) {
     file_.writer().finish();
     std::error_code none;
-    if (is_there(raw_)) {
+    if (exists_unfollowed(raw_)) {
       if (force_) std::filesystem::remove(file_.path(), none);
       samples.publish();
       return file_.publish();
@@ -191,7 +190,7 @@ class DetachedHeader {
   /// Whether a header that is there is what a killed process left of this output: it comes before
   /// its samples.
   bool is_left(bool left) const {
-    if (is_there(raw_)) return false;
+    if (exists_unfollowed(raw_)) return false;
     try {
       return left || read_small_file(name_of(raw_), text_.size()) == text_;
     } catch (const Error&) {

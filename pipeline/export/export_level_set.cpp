@@ -15,6 +15,7 @@
 #include "core/tile.h"
 #include "io/volumes/vdb/vdb_level_set.h"
 #include "pipeline/export/vdb_budget.h"
+#include "pipeline/program_memory.h"
 #include "pipeline/slab_reader.h"
 #include "pipeline/stored_bricks.h"
 #include "pipeline/workers.h"
@@ -23,7 +24,6 @@
 namespace isobrick {
 namespace {
 
-constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 /// The extraction is not much faster with more.
 constexpr std::uint64_t kExtractBytes = 256 * kMiB;
 

@@ -23,7 +23,6 @@ namespace isobrick {
 namespace {
 
 constexpr std::size_t kMaxDamages = 1000;
-constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 /// Samples in memory at a time: more are no faster.
 constexpr std::uint64_t kPieceBytes = 128 * kMiB;
 /// Of the lists of damages and of bricks that cannot be read.

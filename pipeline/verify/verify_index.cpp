@@ -9,13 +9,13 @@
 #include <isobrick/error.h>
 #include "core/morton.h"
 #include "pipeline/index/index_chunk_builder.h"
+#include "pipeline/program_memory.h"
 #include "pipeline/workers.h"
 #include "stream/index_search.h"
 
 namespace isobrick {
 namespace {
 
-constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 /// For making the parts anew: more is no faster.
 constexpr std::uint64_t kEnough = 512 * kMiB;
 
