@@ -91,7 +91,8 @@ int run_export(const ExportArguments& arguments, Console& console) {
   const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
   check_replaces_no_input(out, inputs);
   check_can_write(out, options.force);
-  const OpenedVolume input = open_input(arguments.input, options.memory, options.threads, console);
+  const OpenedVolume input = open_input(arguments.input, options.memory, options.threads, console,
+                                        !arguments.isovalues.empty());
   const StoreReader& store = input.store();
   const Box3 box = store_region(store, options.level, arguments.region);
   options.roi = box;

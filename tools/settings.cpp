@@ -186,7 +186,7 @@ Settings find_settings(const std::vector<CommandView>& commands, const CommandVi
     for (const std::string& value : values_of(setting, *option)) {
       if (!option->value.empty())
         found.words.push_back(name + '=' + value);
-      else if (parse_flag(value, setting.origin + ": " + name))
+      else if (parse_flag(value, fmt::format("{}: {}", setting.origin, name)))
         found.words.push_back(name);
     }
   }

@@ -16,7 +16,7 @@
 namespace isobrick {
 namespace {
 
-constexpr Int3 kBlock{kBlockEdge, kBlockEdge, kBlockEdge};
+constexpr Int3 kBlockExtent{kBlockEdge, kBlockEdge, kBlockEdge};
 /// A chunk of ranges, in blocks and in samples.
 constexpr Index kChunkBlocks = kRangeChunkEdge;
 constexpr Index kChunkSamples = kChunkBlocks * kBlockEdge;
@@ -68,8 +68,8 @@ class TypedSparseRanges final : public SparseRanges {
   void put(Int3 chunk, const Ranges* seen) {
     const Int3 first = chunk * kChunkBlocks;
     const Box3 blocks = intersect({first, first + kChunk}, {{0, 0, 0}, lattice_.blocks()});
-    const Box3 bricks =
-        lattice_.bricks_of({blocks.lo * kBlock, min(blocks.hi * kBlock, lattice_.extent)});
+    const Box3 bricks = lattice_.bricks_of(
+        {blocks.lo * kBlockExtent, min(blocks.hi * kBlockExtent, lattice_.extent)});
     Ranges of_blocks(static_cast<std::size_t>(volume(blocks.extent())), fill_);
     Ranges of_bricks(static_cast<std::size_t>(volume(bricks.extent())),
                      seen == nullptr ? fill_ : ValueRange<T>{});
@@ -80,7 +80,7 @@ class TypedSparseRanges final : public SparseRanges {
             (*seen)[static_cast<std::size_t>(linear_index(block - first, kChunk))];
         if (sees_fill(block)) range.include(fill_);
         *out++ = range;
-        const Int3 brick = lattice_.brick_of(block * kBlock) - bricks.lo;
+        const Int3 brick = lattice_.brick_of(block * kBlockExtent) - bricks.lo;
         of_bricks[static_cast<std::size_t>(linear_index(brick, bricks.extent()))].include(range);
       });
     }
@@ -90,8 +90,8 @@ class TypedSparseRanges final : public SparseRanges {
 
   /// Whether any of the bricks that a block's cells touch is not there.
   bool sees_fill(Int3 block) const {
-    const Int3 first = block * kBlock;
-    const Box3 seen = intersect({first, first + kBlock + Int3{1, 1, 1}}, lattice_.box());
+    const Int3 first = block * kBlockExtent;
+    const Box3 seen = intersect({first, first + kBlockExtent + Int3{1, 1, 1}}, lattice_.box());
     bool fill = false;
     for_each_point(lattice_.bricks_of(seen), [&](Int3 brick) { fill = fill || !is_there_(brick); });
     return fill;
@@ -111,12 +111,12 @@ class TypedSparseRanges final : public SparseRanges {
 
 BrickBlocks scan_brick(const Lattice& lattice, Box3 box, const std::byte* samples) {
   // A lattice of its own, which begins one block below the brick.
-  const Int3 origin = max(box.lo - kBlock, {0, 0, 0});
+  const Int3 origin = max(box.lo - kBlockExtent, {0, 0, 0});
   const Lattice local{box.hi - origin, lattice.brick, lattice.type};
   const auto ranges = make_level_ranges(local);
   ranges->add({box.lo - origin, box.hi - origin}, samples);
   BrickBlocks result;
-  const Int3 first = floor_div(origin, kBlock);
+  const Int3 first = floor_div(origin, kBlockExtent);
   result.blocks = {first, first + local.blocks()};
   ranges->close(
       local.extent.z,
@@ -136,7 +136,8 @@ BrickBlocks constant_brick(const Lattice& lattice, Box3 box, std::uint64_t bits)
     ValueRange<T> range;
     range.include(static_cast<T>(value + T{0}));  // -0 is 0 in a range
     BrickBlocks result;
-    result.blocks = {floor_div(max(box.lo - kBlock, {0, 0, 0}), kBlock), ceil_div(box.hi, kBlock)};
+    result.blocks = {floor_div(max(box.lo - kBlockExtent, {0, 0, 0}), kBlockExtent),
+                     ceil_div(box.hi, kBlockExtent)};
     const std::vector<ValueRange<T>> ranges(
         static_cast<std::size_t>(volume(result.blocks.extent())), range);
     const auto bytes = std::as_bytes(std::span(ranges));
@@ -156,12 +157,12 @@ bool sparse_ranges_possible(const Lattice& lattice) {
 std::size_t sparse_ranges_bytes(const LevelInfo& level, std::span<const Int3> bricks, int threads) {
   const Lattice& lattice = level.lattice;
   const Int3 chunks = ceil_div(lattice.blocks(), kChunk);
-  const Int3 samples = kChunk * kBlock;
+  const Int3 samples = kChunk * kBlockExtent;
   std::vector<bool> touched(static_cast<std::size_t>(volume(chunks)));
   std::vector<std::size_t> of_layer(static_cast<std::size_t>(chunks.z) + 1);
   for (const Int3 b : bricks) {
     const Box3 box = lattice.brick_box(b);
-    const Int3 first = floor_div(max(box.lo - kBlock, {0, 0, 0}), samples);
+    const Int3 first = floor_div(max(box.lo - kBlockExtent, {0, 0, 0}), samples);
     for_each_point({first, ceil_div(box.hi, samples)}, [&](Int3 chunk) {
       auto seen = touched[static_cast<std::size_t>(linear_index(chunk, chunks))];
       of_layer[static_cast<std::size_t>(chunk.z)] += !seen;

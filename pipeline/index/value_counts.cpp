@@ -84,8 +84,8 @@ class Bins {
   }
 
   int exponent_ = kMinExponent;
-  T width_ = std::is_floating_point_v<T> ? std::ldexp(T{1}, kMinExponent) : T{1};
-  T per_width_ = std::is_floating_point_v<T> ? std::ldexp(T{1}, -kMinExponent) : T{1};
+  T width_ = static_cast<T>(std::is_floating_point_v<T> ? std::ldexp(1.0, kMinExponent) : 1.0);
+  T per_width_ = static_cast<T>(std::is_floating_point_v<T> ? std::ldexp(1.0, -kMinExponent) : 1.0);
 };
 
 /// As integers that processors compare many of at a time: bytes without a sign, others with one.
