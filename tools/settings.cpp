@@ -185,7 +185,7 @@ Settings find_settings(const std::vector<CommandView>& commands, const CommandVi
     found.origins[name] = setting.origin;
     for (const std::string& value : values_of(setting, *option)) {
       if (!option->value.empty())
-        found.words.push_back(name + '=' + value);
+        found.words.push_back(fmt::format("{}={}", name, value));
       else if (parse_flag(value, fmt::format("{}: {}", setting.origin, name)))
         found.words.push_back(name);
     }

@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::size_t kMaxDamages = 1000;
 /// Samples in memory at a time: more are no faster.
-constexpr std::uint64_t kPieceBytes = 128 * kMiB;
+constexpr std::uint64_t kVerifiedPieceBytes = 128 * kMiB;
 /// Of the lists of damages and of bricks that cannot be read.
 constexpr std::uint64_t kListBytes = 8 * kMiB;
 /// Beyond so many unreadable bricks, every range counts as one that covers such a brick.
@@ -175,7 +175,7 @@ LevelBudget budget_of(const StoreInfo& store, int level, int threads, std::uint6
         "needs --memory {}M at least",
         memory / kMiB, level, lattice.brick.x, lattice.brick.y, lattice.brick.z,
         least(threads) / kMiB + 1));
-  return {threads, std::min(kPieceBytes, memory - least(threads) + lattice.brick_bytes())};
+  return {threads, std::min(kVerifiedPieceBytes, memory - least(threads) + lattice.brick_bytes())};
 }
 
 /// Checks the bricks and ranges of a level, unless they are too many to look for.
