@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_guard.h"
 #include "tools/format.h"
 #include "tools/input.h"
@@ -90,7 +91,7 @@ int run_export(const ExportArguments& arguments, Console& console) {
   if (is_standard_output(out)) console.reserve_output();
   const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
   check_replaces_no_input(out, inputs);
-  check_can_write(out, options.force);
+  if (!is_zarr(arguments.input.path)) check_can_write(out, options.force);
   const OpenedVolume input = open_input(arguments.input, options.memory, options.threads, console,
                                         !arguments.isovalues.empty());
   const StoreReader& store = input.store();

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bricks/level_set.h"
+#include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_guard.h"
 #include "tools/extract_plan.h"
 #include "tools/output_name.h"
@@ -145,7 +146,7 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
 int run_extract(const ExtractArguments& arguments, Console& console) {
   check_arguments(arguments);
   if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
-  check_outputs(arguments);
+  if (!is_zarr(arguments.input.path)) check_outputs(arguments);
   const OpenedVolume input =
       open_input(arguments.input, arguments.memory, arguments.threads, console);
   const StoreReader& store = input.store();
