@@ -22,8 +22,8 @@ struct IsovalueRequest {
     percent_of_range,  ///< percent of the way from the smallest to the largest sample
     hounsfield         ///< Hounsfield units
   };
-  Kind kind = Kind::value;
-  double number = 0;
+  Kind kind = Kind::value;  ///< what is stated
+  double number = 0;        ///< by this number
   friend bool operator==(const IsovalueRequest&, const IsovalueRequest&) = default;
 };
 
@@ -49,8 +49,8 @@ double resolve_isovalue(const IsovalueRequest& request, const Histogram& histogr
 
 /// An isovalue for a volume of which nothing else is known.
 struct SuggestedIsovalue {
-  double value = 0;
-  std::string why;  ///< part of a sentence, such as "Otsu's threshold, which …"
+  double value = 0;  ///< the isovalue
+  std::string why;   ///< part of a sentence, such as "Otsu's threshold, which …"
 };
 
 /// Suggests 0 for a level set, the border of the lowest label for labels, else Otsu's threshold.

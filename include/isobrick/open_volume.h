@@ -28,7 +28,7 @@ std::filesystem::path default_cache_folder();
 /// How a volume is opened.
 struct OpenOptions {
   VolumeRequest volume;  ///< what is known of it, and which of its samples are requested
-  CacheOptions cache;
+  CacheOptions cache;    ///< where stores that are made are kept
   bool needs_ranges =
       true;  ///< false: another program's Zarr is opened in place without ranges, too
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
@@ -46,6 +46,7 @@ class OpenedVolume {
   /// convert() do.
   OpenedVolume(const std::string& path, const OpenOptions& options, Progress& progress);
   ~OpenedVolume();
+  /// Takes the store of another.
   OpenedVolume(OpenedVolume&&) noexcept;
 
   /// The store. Valid as long as this.

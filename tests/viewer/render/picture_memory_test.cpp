@@ -55,10 +55,9 @@ TEST_F(PictureMemory, OfAPreview) {
 }
 
 TEST_F(PictureMemory, OfPreviewsOfSeveralIsovalues) {
-  expect_least_holds(
-      {"extract", store(), "--isovalue", "110", "--isovalue", "127.5", "--isovalue", "140",
-       "--threads", "2", "--preview", path("p.png"), "--size", "400x300"},
-      224);
+  expect_least_holds({"extract", store(), "--isovalue", "110", "--isovalue", "127.5", "--isovalue",
+                      "140", "--threads", "2", "--preview", path("p.png"), "--size", "400x300"},
+                     224);
 }
 
 TEST_F(PictureMemory, OfAView) {
