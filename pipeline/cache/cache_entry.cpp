@@ -18,6 +18,7 @@
 #include <isobrick/error.h>
 #include "core/file_error.h"
 #include "io/bytes/folder_walk.h"
+#include "io/bytes/leftovers.h"
 #include "io/bytes/output_file.h"
 
 namespace isobrick {
@@ -40,6 +41,16 @@ std::uint64_t hash_of(std::string_view text) {
   std::uint64_t hash = 0xcbf29ce484222325;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
   return hash;
+}
+
+/// The folder of an entry, and whether a name is one: nobody else's folders are removed.
+std::string folder_name(const std::string& name, const std::string& key) {
+  return fmt::format("{}-{:016x}", plain_name(name), hash_of(key));
+}
+bool is_folder_name(const std::string& name) {
+  constexpr std::size_t digits = 16;
+  if (name.size() <= digits || name[name.size() - digits - 1] != '-') return false;
+  return name.find_first_not_of("0123456789abcdef", name.size() - digits) == name.npos;
 }
 
 fs::path lock_file(const fs::path& folder) { return folder / "lock"; }
@@ -121,7 +132,8 @@ std::vector<Candidate> candidates_in(const fs::path& cache) {
        entry.increment(failure)) {
     std::error_code none;
     const fs::path folder = entry->path();
-    if (!fs::exists(lock_file(folder), none)) continue;
+    if (!is_folder_name(folder.filename().string()) || !fs::exists(lock_file(folder), none))
+      continue;
     const Description description = description_of(folder);
     // What was not finished goes first.
     const bool whole = !description.key.empty();
@@ -140,20 +152,21 @@ bool remove_entry(const fs::path& folder) {
   if (lock.get() < 0 || ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 || !is_current(lock, folder))
     return false;
   std::error_code failure;
-  // What says that the store is whole goes first, the lock last.
+  // What says that the store is whole goes first, the lock last. What else is there keeps the
+  // folder.
   fs::remove(description_file(folder), failure);
+  remove_leftovers(description_file(folder).string());
   for (const char* name : {"store.zarr", "store.zarr.partial"})
     fs::remove_all(folder / name, failure);
-  fs::remove_all(folder, failure);
-  return !failure;
+  fs::remove(lock_file(folder), failure);
+  return fs::remove(folder, failure);
 }
 
 }  // namespace
 
 CacheEntry::CacheEntry(const fs::path& cache, const std::string& name, std::string key,
                        Progress& progress)
-    : folder_(cache / fmt::format("{}-{:016x}", plain_name(name), hash_of(key))),
-      key_(std::move(key)) {
+    : folder_(cache / folder_name(name, key)), key_(std::move(key)) {
   for (bool waits = false;;) {
     make_folder(folder_);
     lock_ = open_lock(folder_);

@@ -126,6 +126,22 @@ TEST_F(OpenVolume, TheLimitRemovesWhatWasUsedLongestAgoButNothingOpen) {
   EXPECT_TRUE(fs::exists(now.store().info().path));
 }
 
+TEST_F(OpenVolume, FoldersOfOthersInTheCacheStay) {
+  for (const char* name : {"mine", "mine-0123456789abcde", "mine-0123456789ABCDEF"}) {
+    fs::create_directories(folder_ / "cache" / name / "store.zarr");
+    for (const char* file : {"lock", "letter", "store.zarr/letter"})
+      std::ofstream(folder_ / "cache" / name / file) << "mine";
+  }
+  // One that has an entry's name, and more in it than an entry has.
+  fs::create_directories(folder_ / "cache" / "a-0123456789abcdef");
+  for (const char* file : {"lock", "letter"})
+    std::ofstream(folder_ / "cache" / "a-0123456789abcdef" / file) << "mine";
+  const OpenedVolume opened(raw("a"), options(1), silent_);
+  for (const char* name : {"mine", "mine-0123456789abcde", "mine-0123456789ABCDEF"})
+    EXPECT_TRUE(fs::exists(folder_ / "cache" / name / "store.zarr/letter")) << name;
+  EXPECT_TRUE(fs::exists(folder_ / "cache/a-0123456789abcdef/letter"));
+}
+
 TEST_F(OpenVolume, SeveralAtATimeConvertOnce) {
   const std::string file = raw("a");
   std::atomic<int> converted = 0, opened = 0;
