@@ -6,6 +6,7 @@
 
 #include <isobrick/error.h>
 #include "io/bytes/output_file.h"
+#include "io/volumes/open/volume_format.h"
 #include "tools/format.h"
 
 namespace isobrick::tools {
@@ -67,16 +68,8 @@ void check_can_write(const std::filesystem::path& path, bool force) {
 }
 
 std::string stem_of_input(const std::string& path) {
-  std::string name = path.substr(0, path.find(":/"));
-  while (name.size() > 1 && name.back() == '/') name.pop_back();
-  if (name == "-") throw UsageError("standard input has no name; name the output with -o");
-  std::error_code none;
-  std::filesystem::path file = std::filesystem::path(name).filename();
-  if (file == "." || file == ".." || file.empty())
-    file = std::filesystem::weakly_canonical(name, none).filename();
-  if (extension_of(file.string()) == ".gz") file = file.stem();
-  const std::string stem = file.stem().string();
-  return stem.empty() ? "volume" : stem;
+  if (path == "-") throw UsageError("standard input has no name; name the output with -o");
+  return volume_stem(path);
 }
 
 }  // namespace isobrick::tools

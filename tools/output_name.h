@@ -26,8 +26,8 @@ void check_store_name(const std::string& path);
 /// exist. Standard output can always be written.
 void check_can_write(const std::filesystem::path& path, bool force);
 
-/// What outputs of an input are called where no name is given: "scan" of "data/scan.nii.gz",
-/// "series/" and "scan.nrrd:/array". Throws UsageError for standard input, which has no name.
+/// What outputs of an input are called where no name is given: volume_stem(). Throws UsageError for
+/// standard input, which has no name.
 std::string stem_of_input(const std::string& path);
 
 }  // namespace isobrick::tools

@@ -29,8 +29,8 @@ std::filesystem::path default_cache_folder();
 struct OpenOptions {
   VolumeRequest volume;  ///< what is known of it, and which of its samples are requested
   CacheOptions cache;    ///< where stores that are made are kept
-  bool needs_ranges =
-      true;  ///< false: another program's Zarr is opened in place without ranges, too
+  /// Whether another program's Zarr without ranges is converted; false: it is opened in place.
+  bool needs_ranges = true;
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
   int threads = 0;                                ///< 0: all cores
 };
@@ -39,11 +39,11 @@ struct OpenOptions {
 class OpenedVolume {
  public:
   /// Opens a store in place where it has ranges and the request takes all of it as it is. Anything
-  /// else (what open_source() opens, another program's Zarr without ranges, or a store of which a
-  /// part is requested) is converted, unless the cache has its store: one with the same files, by
-  /// name, size and times, and the same request. Waits
-  /// for another process that is converting the same. Throws what StoreReader, open_source() and
-  /// convert() do.
+  /// else is converted: what open_source() opens, another program's Zarr without ranges, a store of
+  /// which a part is requested. It is not where the cache has the store of the same request and the
+  /// same files, by name, size and times. Waits for another process that is converting the same.
+  /// Throws what StoreReader, open_source() and convert() do, and Error for an input that changes
+  /// while it is converted.
   OpenedVolume(const std::string& path, const OpenOptions& options, Progress& progress);
   ~OpenedVolume();
   /// Takes the store of another.

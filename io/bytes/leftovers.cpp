@@ -95,7 +95,7 @@ bool only_parts(const fs::path& folder) {
 }
 
 /// Removes a file or folder that nobody holds; whether it did.
-bool remove_if_left(const fs::path& path) {
+bool remove_if_left(const fs::path& path, bool whole_folders) {
   const bool folder = fs::is_directory(fs::symlink_status(path));
   const int flags = folder ? O_RDONLY | O_DIRECTORY : O_RDWR | O_NONBLOCK;
   const UniqueFd fd(::open(path.c_str(), flags | O_NOFOLLOW | O_CLOEXEC));
@@ -105,7 +105,7 @@ bool remove_if_left(const fs::path& path) {
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) return false;
   std::error_code failure;
   if (!folder) return fs::remove(path, failure);
-  return only_parts(path) && fs::remove_all(path, failure) > 0 && !failure;
+  return (whole_folders || only_parts(path)) && fs::remove_all(path, failure) > 0 && !failure;
 }
 
 }  // namespace
@@ -124,14 +124,15 @@ Temporary create_temporary_folder(const std::string& path) {
   });
 }
 
-bool remove_leftovers(const std::string& path) {
+bool remove_leftovers(const std::string& path, bool whole_folders) {
   const fs::path output(path);
   const fs::path folder = output.has_parent_path() ? output.parent_path() : fs::path(".");
   const std::string name = output.filename().string();
   bool any = false;
   try {
     for (const FolderEntry& entry : folder_entries(folder))
-      if (is_temporary_of(entry.name, name)) any |= remove_if_left(folder / entry.name);
+      if (is_temporary_of(entry.name, name))
+        any |= remove_if_left(folder / entry.name, whole_folders);
   } catch (const Error&) {
     // One may write into a folder that one may not list.
   }

@@ -21,8 +21,9 @@ Temporary create_temporary_file(const std::string& path);
 Temporary create_temporary_folder(const std::string& path);
 
 /// Removes the temporary files that killed processes left of the output `path`; whether there
-/// were any. Folders are removed if they hold nothing but parts (is_part_name).
-bool remove_leftovers(const std::string& path);
+/// were any. Folders are removed if they hold nothing but parts (is_part_name), with
+/// `whole_folders` whatever they hold.
+bool remove_leftovers(const std::string& path, bool whole_folders = false);
 
 /// Whether a file name is such a name of the output `output`, without folders.
 bool is_temporary_of(std::string_view name, std::string_view output);

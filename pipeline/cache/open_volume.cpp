@@ -15,6 +15,8 @@
 #include "core/file_error.h"
 #include "core/shell_word.h"
 #include "io/bytes/folder_walk.h"
+#include "io/bytes/leftovers.h"
+#include "io/volumes/open/volume_format.h"
 #include "pipeline/cache/cache_entry.h"
 #include "pipeline/convert/convert_staging.h"
 #include "pipeline/convert/store_source.h"
@@ -107,31 +109,25 @@ std::string key_of(const std::string& path, const VolumeInfo& info, const Volume
   return key;
 }
 
-/// A folder for one OpenedVolume.
+/// A folder for one OpenedVolume, in that of temporary files.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "isobrick-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw system_error("make a folder in", name, errno);
-    path_ = name;
+    const std::string name = (fs::temp_directory_path() / "isobrick").string();
+    remove_leftovers(name, true);
+    folder_ = create_temporary_folder(name);
   }
   ~TemporaryFolder() {
     std::error_code ignored;
-    fs::remove_all(path_, ignored);
+    fs::remove_all(folder_.path, ignored);
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  fs::path store() const { return path_ / "store.zarr"; }
+  fs::path store() const { return fs::path(folder_.path) / "store.zarr"; }
 
  private:
-  fs::path path_;
+  Temporary folder_;
 };
-
-std::string stem_of(const std::string& path) {
-  fs::path name = path;
-  while (!name.has_filename() && name.has_parent_path()) name = name.parent_path();
-  return name.stem().string();
-}
 
 }  // namespace
 
@@ -191,7 +187,7 @@ struct OpenedVolume::Impl {
                   Progress& progress) {
     const fs::path& cache = options.cache.folder;
     const std::string key = key_of(path, source.info(), options.volume);
-    entry.emplace(cache, stem_of(path), key, progress);
+    entry.emplace(cache, volume_stem(path), key, progress);
     if (!entry->is_filled() && !entry->can_be_filled()) {
       entry.reset();
       return fill_temporary(path, source, options, progress);

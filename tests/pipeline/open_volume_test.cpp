@@ -12,6 +12,7 @@
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
 #include <isobrick/open_source.h>
+#include "io/bytes/leftovers.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick::test {
@@ -124,6 +125,31 @@ TEST_F(OpenVolume, TheLimitRemovesWhatWasUsedLongestAgoButNothingOpen) {
   // With no room at all it still works, and what is open stays until the next one.
   const OpenedVolume now(c, options(1), silent_);
   EXPECT_TRUE(fs::exists(now.store().info().path));
+}
+
+TEST_F(OpenVolume, ATemporaryStoreThatAKillLeftGoesWithTheNextOne) {
+  const fs::path temporary = folder_ / "temporary";
+  fs::create_directory(temporary);
+  const std::string before = fs::temp_directory_path().string();
+  ASSERT_EQ(::setenv("TMPDIR", temporary.c_str(), 1), 0);
+  std::string left;
+  {
+    const Temporary killed = create_temporary_folder((temporary / "isobrick").string());
+    left = killed.path;
+    fs::create_directories(fs::path(left) / "store.zarr/0");
+  }  // its lock ends as with a process
+  fs::create_directory(temporary / "isobrick.partial-1-2-mine");
+  OpenOptions none = options();
+  none.cache.folder.clear();
+  {
+    const OpenedVolume opened(raw("a"), none, silent_);
+    EXPECT_FALSE(fs::exists(left));
+    const OpenedVolume beside(raw("b"), none, silent_);
+    EXPECT_TRUE(fs::exists(opened.store().info().path)) << "somebody holds it";
+  }
+  ::setenv("TMPDIR", before.c_str(), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(temporary), fs::directory_iterator()), 1)
+      << "another one's folder stays, and nothing else";
 }
 
 TEST_F(OpenVolume, FoldersOfOthersInTheCacheStay) {

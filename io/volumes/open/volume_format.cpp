@@ -108,4 +108,16 @@ VolumePath split_volume_path(const std::string& path) {
   return {path.substr(0, colon), path.substr(colon + 2)};
 }
 
+std::string volume_stem(const std::string& path) {
+  std::string name = split_volume_path(path).file;
+  while (name.size() > 1 && name.back() == '/') name.pop_back();
+  std::error_code none;
+  std::filesystem::path file = std::filesystem::path(name).filename();
+  if (file == "." || file == ".." || file.empty())
+    file = std::filesystem::weakly_canonical(name, none).filename();
+  if (lower(file.extension().string()) == ".gz") file = file.stem();
+  const std::string stem = file.stem().string();
+  return stem.empty() ? "volume" : stem;
+}
+
 }  // namespace isobrick

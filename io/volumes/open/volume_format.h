@@ -39,4 +39,7 @@ struct VolumePath {
 /// Parts a path at its last ":/" unless a file has the whole name.
 VolumePath split_volume_path(const std::string& path);
 
+/// What a volume is called: "scan" of "data/scan.nii.gz", "series/" and "scan.nrrd:/array".
+std::string volume_stem(const std::string& path);
+
 }  // namespace isobrick
