@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -49,13 +48,6 @@ struct ViewArguments {
   IndexKind index() const { return search.kind.value_or(IndexKind::linear); }
 };
 
-/// Where a place of the world lies among the samples of level 0, along an axis.
-double in_level_0(const StoreInfo& info, int axis, Vec3d world) {
-  const Transform& finest = info.levels.front().transform;
-  const Vec3d step = finest.step(axis);
-  return dot(world - finest.origin, step) / dot(step, step);
-}
-
 /// Cuts the shown region along an axis to what lies between two places among level 0's samples.
 void cut(ViewSettings& settings, int axis, double lo, double hi, double last) {
   if (!(last > 0)) return;
@@ -74,7 +66,7 @@ void cut_to_roi(const StoreReader& store, int level, const RoiText& roi, ViewSet
   const auto place = [&](int axis, Index sample) {
     Vec3d index;
     index[axis] = static_cast<double>(sample);
-    return in_level_0(info, axis, of_level.transform.apply(index));
+    return info.levels.front().transform.index_of(of_level.transform.apply(index))[axis];
   };
   for (int axis = 0; axis < 3; ++axis)
     // The outermost samples of a coarse level lie within the volume, which is shown up to its end.
@@ -85,20 +77,10 @@ void cut_to_roi(const StoreReader& store, int level, const RoiText& roi, ViewSet
 
 /// Shows only --region, a box of the world; of a volume whose axes are turned the box around it.
 void cut_to_region(const StoreReader& store, const WorldRegion& region, ViewSettings& settings) {
-  const StoreInfo& info = store.info();
-  const LevelInfo& finest = info.levels.front();
-  covering_samples(region, finest.transform, finest.lattice.extent);  // refuses one beside it
+  const Transform& finest = store.info().levels.front().transform;
   const Vec3d last = last_sample(store);
-  for (int axis = 0; axis < 3; ++axis) {
-    double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-    for (int corner = 0; corner < 8; ++corner) {
-      const Vec3d p{(corner & 1 ? region.hi : region.lo).x, (corner & 2 ? region.hi : region.lo).y,
-                    (corner & 4 ? region.hi : region.lo).z};
-      lo = std::min(lo, in_level_0(info, axis, p));
-      hi = std::max(hi, in_level_0(info, axis, p));
-    }
-    cut(settings, axis, lo, hi, last[axis]);
-  }
+  const auto [lo, hi] = index_bounds(region, finest);
+  for (int axis = 0; axis < 3; ++axis) cut(settings, axis, lo[axis], hi[axis], last[axis]);
 }
 
 /// Shows only the requested region, and no finer level than --level.

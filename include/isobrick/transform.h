@@ -30,6 +30,16 @@ struct Transform {
     return Vec3d{direction[column], direction[column + 3], direction[column + 6]} * spacing[axis];
   }
 
+  /// From world space to index space.
+  Vec3d index_of(Vec3d p) const {
+    Vec3d index;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3d s = step(axis);
+      index[axis] = dot(p - origin, s) / dot(s, s);
+    }
+    return index;
+  }
+
   /// From index space to world space.
   Vec3d apply(Vec3d p) const {
     const Vec3d s = spacing * p;

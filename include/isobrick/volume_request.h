@@ -36,6 +36,10 @@ struct WorldRegion {
 /// empty or leaves the volume.
 Box3 resolve_region(const RegionRequest& region, Int3 extent);
 
+/// The bounds of a region in the index space of a volume, lower corner first; in one whose axes are
+/// turned, those of the box around it.
+std::array<Vec3d, 2> index_bounds(const WorldRegion& region, const Transform& transform);
+
 /// The smallest box of samples that covers what a volume has of `region`; in a volume whose axes
 /// are turned, the box around the region. Throws UsageError where they do not touch.
 Box3 covering_samples(const WorldRegion& region, const Transform& transform, Int3 extent);

@@ -93,20 +93,24 @@ Box3 resolve_region(const RegionRequest& region, Int3 extent) {
   return box;
 }
 
-Box3 covering_samples(const WorldRegion& region, const Transform& transform, Int3 extent) {
-  // A bound at a sample means that sample, however it was rounded.
-  constexpr double rounding = 1e-6;
+std::array<Vec3d, 2> index_bounds(const WorldRegion& region, const Transform& transform) {
   Vec3d lo{kInfinity, kInfinity, kInfinity}, hi = lo * -1.0;
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3d p{(corner & 1 ? region.hi : region.lo).x, (corner & 2 ? region.hi : region.lo).y,
                   (corner & 4 ? region.hi : region.lo).z};
+    const Vec3d at = transform.index_of(p);
     for (int axis = 0; axis < 3; ++axis) {
-      const Vec3d step = transform.step(axis);
-      const double at = dot(p - transform.origin, step) / dot(step, step);
-      lo[axis] = std::min(lo[axis], at);
-      hi[axis] = std::max(hi[axis], at);
+      lo[axis] = std::min(lo[axis], at[axis]);
+      hi[axis] = std::max(hi[axis], at[axis]);
     }
   }
+  return {lo, hi};
+}
+
+Box3 covering_samples(const WorldRegion& region, const Transform& transform, Int3 extent) {
+  // A bound at a sample means that sample, however it was rounded.
+  constexpr double rounding = 1e-6;
+  const auto [lo, hi] = index_bounds(region, transform);
   Box3 box;
   for (int axis = 0; axis < 3; ++axis) {
     const auto last = static_cast<double>(extent[axis] - 1);
