@@ -14,13 +14,6 @@
 namespace isobrick::tools {
 namespace {
 
-const OptionView* find_option(const CommandView& command, const std::string& name) {
-  for (const OptionView& option : command.options)
-    if (std::find(option.names.begin(), option.names.end(), name) != option.names.end())
-      return &option;
-  return nullptr;
-}
-
 /// Whether a word behind an option that may be bare is its value.
 bool is_value(const OptionView& option, const std::string& word) {
   const auto is_letter = [](unsigned char c) { return std::isalpha(c) != 0 || c >= 0x80; };

@@ -55,6 +55,13 @@ std::vector<OptionView> views_of(const CLI::App& app, bool positional) {
 
 }  // namespace
 
+const OptionView* find_option(const CommandView& command, const std::string& name) {
+  for (const OptionView& option : command.options)
+    if (std::find(option.names.begin(), option.names.end(), name) != option.names.end())
+      return &option;
+  return nullptr;
+}
+
 std::string in_brackets_if(bool optional, const std::string& text) {
   return optional ? '[' + text + ']' : text;
 }

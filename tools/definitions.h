@@ -30,6 +30,9 @@ struct CommandView {
 
 CommandView view_of(const CLI::App& app);
 
+/// The option that is called `name`, such as "--output" or "-o"; null where there is none.
+const OptionView* find_option(const CommandView& command, const std::string& name);
+
 /// What may be left out, as usage lines write it: "[TEXT]".
 std::string in_brackets_if(bool optional, const std::string& text);
 

@@ -1,8 +1,6 @@
 #include "tools/extract_plan.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <filesystem>
 
 #include <fmt/format.h>

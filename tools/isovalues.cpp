@@ -1,6 +1,7 @@
 #include "tools/isovalues.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -9,8 +10,11 @@
 namespace isobrick::tools {
 namespace {
 
-/// As many bins as a store keeps.
-constexpr int kBins = 1 << 16;
+/// The histogram that a store keeps, else one of as many bins.
+Histogram histogram_of(const StoreReader& store, Progress& progress) {
+  if (auto stored = stored_histogram(store)) return std::move(*stored);
+  return histogram(store, progress, 1 << 16, true);
+}
 
 }  // namespace
 
@@ -18,7 +22,7 @@ std::vector<double> resolve_isovalues(const std::vector<IsovalueRequest>& reques
                                       const StoreReader& store, Progress& progress) {
   Histogram samples;
   if (std::any_of(requests.begin(), requests.end(), needs_histogram))
-    samples = histogram(store, progress, kBins, true);
+    samples = histogram_of(store, progress);
   std::vector<double> isovalues;
   for (const IsovalueRequest& request : requests) {
     const double isovalue = resolve_isovalue(request, samples, store.info().type);
@@ -30,7 +34,7 @@ std::vector<double> resolve_isovalues(const std::vector<IsovalueRequest>& reques
 }
 
 std::optional<SuggestedIsovalue> suggest_isovalue_of(const StoreReader& store, Progress& progress) {
-  return suggest_isovalue(store.info(), histogram(store, progress, kBins, true));
+  return suggest_isovalue(store.info(), histogram_of(store, progress));
 }
 
 }  // namespace isobrick::tools

@@ -33,13 +33,6 @@ std::string long_name(const OptionView& option) {
   return {};
 }
 
-const OptionView* find_by_name(const CommandView& command, const std::string& name) {
-  const auto found =
-      std::find_if(command.options.begin(), command.options.end(),
-                   [&](const OptionView& option) { return long_name(option) == name; });
-  return found == command.options.end() ? nullptr : &*found;
-}
-
 /// Options that only make sense where they are typed.
 bool is_settable(const std::string& name) {
   return !name.empty() && name != "help" && name != "version" && name != "config";
@@ -109,7 +102,7 @@ std::vector<std::string> values_of(const Setting& setting, const OptionView& opt
 /// Whether the command line says more than a setting could: a name that is typed has its format.
 bool is_outdone(const Setting& setting, const CommandView& command,
                 const std::vector<std::string>& words) {
-  const OptionView* output = find_by_name(command, "output");
+  const OptionView* output = find_option(command, "--output");
   return setting.name == "format" && output != nullptr && is_typed(*output, words);
 }
 
@@ -176,8 +169,8 @@ Settings find_settings(const std::vector<CommandView>& commands, const CommandVi
   for (const char* name : {"completion", "man", "help"})
     if (command.name == name) return found;
   for (const Setting& setting : all) {
-    const OptionView* option = find_by_name(command, setting.name);
     const std::string name = "--" + setting.name;
+    const OptionView* option = find_option(command, name);
     const bool is_other = !setting.command.empty() && setting.command != command.name;
     if (is_other || option == nullptr || is_typed(*option, words) ||
         is_outdone(setting, command, words) || found.origins.contains(name))
