@@ -1,0 +1,131 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <vector>
+
+#include "core/morton.h"
+#include "gpu/resident/resident_sizes.h"
+#include "surface/surface_extractor.h"
+#include "tests/gpu/resident.h"
+
+// Volumes of which only some tiles are on the device.
+
+namespace isobrick::testing {
+namespace {
+
+template <class T>
+class GpuResidentPart : public DeviceTest<T> {};
+
+TYPED_TEST_SUITE(GpuResidentPart, DeviceTypes);
+
+/// Has only the bricks that some tiles lie in.
+class BricksOfTiles final : public BrickLookup {
+ public:
+  BricksOfTiles(const BrickLookup& all, const Lattice& lattice, std::span<const Int3> tiles)
+      : all_(all), lattice_(lattice), has_(static_cast<std::size_t>(volume(lattice.bricks()))) {
+    for (const Int3 tile : tiles)
+      for_each_needed_box(lattice, {tile, 0xff}, kFirstCorners, [&](Box3 box) {
+        for_each_point(lattice.bricks_of(box), [&](Int3 b) { has_[place_of(b)] = 1; });
+      });
+  }
+  const std::byte* find(Int3 b) const override {
+    EXPECT_TRUE(has_[place_of(b)]);
+    return all_.find(b);
+  }
+
+ private:
+  std::size_t place_of(Int3 b) const {
+    return static_cast<std::size_t>(linear_index(b, lattice_.bricks()));
+  }
+  const BrickLookup& all_;
+  Lattice lattice_;
+  std::vector<char> has_;
+};
+
+/// The tiles that are active at any of the isovalues, in Morton order.
+template <class T>
+std::vector<Int3> tiles_of(const Field<T>& field, const std::vector<double>& isovalues) {
+  std::map<std::uint64_t, Int3> tiles;
+  for (const double isovalue : isovalues)
+    for (const TileWork& work : active_tiles(field, isovalue))
+      tiles[morton_encode(work.tile)] = work.tile;
+  std::vector<Int3> list;
+  for (const auto& [code, tile] : tiles) list.push_back(tile);
+  return list;
+}
+
+/// Loads the tiles that are active at any isovalue and those beside them, some at a time, and
+/// compares the meshes of all isovalues.
+template <class T>
+void compare_part(const Field<T>& field, const BrickLookup& bricks, const Lattice& lattice,
+                  const std::vector<double>& isovalues, SurfaceOptions options) {
+  if (options.roi == Box3{}) options.roi = lattice.box();
+  const std::vector<Int3> searched = tiles_of(field, isovalues);
+  for (const bool normals : {false, true}) {
+    options.normals = normals;
+    const std::vector<Int3> loaded = gpu::tiles_to_load(lattice, searched, sample_reach(options));
+    gpu::DeviceVolume volume(lattice, options.fill_value, {searched, loaded},
+                             3 * 32768 * lattice.sample_bytes());
+    for (std::size_t i = 0; i < loaded.size(); i += 7) {
+      const auto some = std::span(loaded).subspan(i, std::min<std::size_t>(7, loaded.size() - i));
+      volume.load(some, BricksOfTiles(bricks, lattice, some));
+    }
+    EXPECT_LE(
+        volume.bytes(),
+        gpu::resident_sizes(lattice, {searched.size(), loaded.size(), 0}, normals).volume_bytes);
+    gpu::ResidentExtractor extractor(volume, options);
+    EXPECT_LE(
+        extractor.bytes(),
+        gpu::resident_sizes(lattice, {searched.size(), loaded.size(), 0}, normals).extractor_bytes);
+    for (const double isovalue : isovalues) {
+      SCOPED_TRACE("isovalue " + std::to_string(isovalue) + (normals ? ", normals" : ""));
+      options.isovalue = isovalue;
+      const MeshBuffer expected = on_cpu(field, lattice, bricks, options);
+      EXPECT_EQ(extractor.extract(isovalue).triangles, expected.triangles.size());
+      MeshBuffer mesh;
+      extractor.download(mesh);
+      expect_same(expected, mesh);
+      if (::testing::Test::HasFailure()) return;
+    }
+  }
+}
+
+TYPED_TEST(GpuResidentPart, TheTilesThatAreTouchedAreEnough) {
+  const auto field = this->waves({131, 70, 197});
+  const double mid = this->lowest() + 100;
+  for (const Index brick : {20, 32, 64}) {
+    const Lattice lattice{field.extent, {brick, brick, brick}, scalar_type_of<TypeParam>};
+    const DenseBricks bricks(lattice, field.samples.data());
+    compare_part(field, bricks, lattice, {mid + 70.5, mid - 65}, {});
+    compare_part(field, bricks, lattice, {mid + 60.5, mid, mid + 1e6}, {});
+    compare_part(field, bricks, lattice, {mid + 60.5, mid},
+                 {.roi = {{11, 5, 33}, {99, 64, 150}}, .transform = {.spacing = {1, -2, 0.5}}});
+  }
+  const auto tops = this->waves({131, 67, 99});
+  const Lattice lattice{tops.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, tops.samples.data());
+  compare_part(tops, bricks, lattice, {mid + 84, mid + 88}, {});
+  compare_part(tops, bricks, lattice, {mid + 1e6}, {});
+  EXPECT_LT(gpu::tiles_to_load(lattice, tiles_of(tops, {mid + 84, mid + 88}), 1).size(),
+            static_cast<std::size_t>(volume(lattice.tiles())))
+      << "a part of the volume";
+}
+
+TYPED_TEST(GpuResidentPart, APartOfAVolumeHasTheFillValueWhereBricksAreAbsent) {
+  const HoledField<TypeParam> holed(this->waves({131, 70, 97}),
+                                    static_cast<TypeParam>(this->lowest() + 30));
+  compare_part(holed.field, holed, holed.lattice, {this->lowest() + 100.5, this->lowest() + 160},
+               holed.options(0));
+}
+
+using GpuResidentPartWithNaN = DeviceTest<float>;
+
+TEST_F(GpuResidentPartWithNaN, TheTilesThatAreTouchedAreEnough) {
+  const auto field = with_nan(waves({131, 70, 97}), 1, 300);
+  const Lattice lattice{field.extent, {32, 32, 32}, ScalarType::f32};
+  compare_part(field, DenseBricks(lattice, field.samples.data()), lattice, {-40, 65},
+               {.may_have_nan = true});
+}
+
+}  // namespace
+}  // namespace isobrick::testing
