@@ -13,8 +13,11 @@
 #include <isobrick/error.h>
 #include <isobrick/export.h>
 #include <isobrick/extract.h>
+#include <isobrick/histogram.h>
+#include <isobrick/isovalue.h>
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/open_source.h>
+#include <isobrick/open_volume.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
 #include <isobrick/synth_source.h>
@@ -36,6 +39,21 @@ int run(const std::filesystem::path& folder) {
   const isobrick::ExtractReport report = isobrick::extract(store, options, *mesh, progress);
   std::printf("%llu triangles\n", static_cast<unsigned long long>(report.triangles));
   return report.triangles > 0 ? 0 : 1;
+}
+
+/// The same surface from a file that is no store, at an isovalue that its samples give.
+int run_on_file(const std::filesystem::path& folder) {
+  isobrick::NoProgress progress;
+  const std::filesystem::path file = folder / "sphere.nrrd";
+  isobrick::export_volume(isobrick::StoreReader(folder / "sphere.zarr"), file,
+                          {.format = isobrick::ExportFormat::nrrd, .force = true}, progress);
+  const isobrick::OpenedVolume volume(file.string(), {.cache = {folder / "cache"}}, progress);
+  const auto samples = isobrick::histogram(volume.store(), progress, 1 << 16);
+  isobrick::ExtractOptions options;
+  options.isovalue = isobrick::resolve_isovalue(isobrick::parse_isovalues("otsu").front(), samples,
+                                                volume.store().info().type);
+  const auto mesh = isobrick::create_mesh_file(folder / "otsu.ply", {.force = true});
+  return isobrick::extract(volume.store(), options, *mesh, progress).triangles > 0 ? 0 : 1;
 }
 
 /// Opens a file that begins as those of a format do, and is none: the format's module refuses it.
@@ -65,7 +83,7 @@ void load_module(std::string_view format, const std::filesystem::path& folder) {
 int main(int argc, char** argv) {
   try {
     const std::filesystem::path folder = argc > 1 ? argv[1] : ".";
-    const int result = run(folder);
+    const int result = run(folder) + run_on_file(folder);
     for (int i = 2; i < argc; ++i) load_module(argv[i], folder);
     return result;
   } catch (const std::exception& error) {
