@@ -11,7 +11,9 @@ inline constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 inline constexpr std::uint64_t kProgramBytes = std::uint64_t{20} << 20;
 
 // Budgets in messages: bytes as MiB, and the least whole number of MiB that is enough.
-inline double in_mib(std::uint64_t bytes) { return static_cast<double>(bytes) / 1048576; }
-inline std::uint64_t mib_above(std::uint64_t bytes) { return (bytes >> 20) + 1; }
+inline double in_mib(std::uint64_t bytes) {
+  return static_cast<double>(bytes) / static_cast<double>(kMiB);
+}
+inline std::uint64_t mib_above(std::uint64_t bytes) { return bytes / kMiB + 1; }
 
 }  // namespace isobrick

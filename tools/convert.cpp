@@ -6,8 +6,6 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
-#include <isobrick/open_source.h>
-#include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_folder.h"
 #include "pipeline/convert/convert_staging.h"
 #include "pipeline/convert/store_source.h"
@@ -24,23 +22,13 @@ struct ConvertArguments {
   ConvertOptions store;
 };
 
-VolumeRequest requested_volume(const ConvertArguments& arguments) {
+std::unique_ptr<VolumeSource> open_input(const ConvertArguments& arguments) {
   VolumeRequest volume = arguments.volume;
   volume.roi = arguments.region.roi;
   volume.region = arguments.region.region;
-  return volume;
-}
-
-/// Zarr is read as stores are, all else as files.
-std::unique_ptr<VolumeSource> open_input(const ConvertArguments& arguments) {
-  if (is_zarr(arguments.in)) {
-    refuse_grid(arguments.in, arguments.volume);
-    return open_store_source(arguments.in, requested_volume(arguments), arguments.store.threads);
-  }
-  VolumeRequest volume = requested_volume(arguments);
   volume.memory = arguments.store.memory;
   volume.threads = arguments.store.threads;
-  return open_source(arguments.in, volume);
+  return open_any_source(arguments.in, volume);
 }
 
 /// What the input's name means on the disk: of FILE:/NAME the file, of standard input nothing.

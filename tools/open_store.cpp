@@ -117,15 +117,11 @@ void check_input(const std::string& path) {
   const fs::file_status status = fs::status(file, ignored);
   if (path == "-") return;
   const bool store_name = extension_of(file) == ".zarr";
-  if (store_name && !fs::exists(status)) refuse_missing(path);
+  if (!fs::exists(status)) {
+    if (store_name || fs::exists(staging_path(path))) refuse_missing(path);
+    throw Error(fmt::format("'{}' does not exist", path));
+  }
   if (store_name && fs::is_regular_file(status)) refuse_file(file);
-  if (!fs::exists(status))
-    throw Error(fmt::format("'{}' does not exist{}", path,
-                            fs::exists(staging_path(path))
-                                ? fmt::format("; its conversion was interrupted: run isobrick "
-                                              "convert VOLUME {} --resume",
-                                              shell_word(path))
-                                : ""));
   if (fs::is_regular_file(status)) refuse_meshes_and_pictures(file, "volume");
 }
 

@@ -10,7 +10,6 @@
 
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
-#include <isobrick/open_source.h>
 #include "bricks/zarr/metadata_files.h"
 #include "core/file_error.h"
 #include "core/shell_word.h"
@@ -154,23 +153,20 @@ struct OpenedVolume::Impl {
     VolumeRequest request = options.volume;
     request.memory = options.memory;
     request.threads = options.threads;
-    const bool zarr = is_zarr(path);
-    if (zarr) {
+    const bool in_place = is_zarr(path) && takes_all(request);
+    if (in_place) {
       refuse_raw_description(path, "Zarr", request);
       refuse_grid(path, request);
-    }
-    if (zarr && takes_all(request)) {
       store.emplace(path, request.selection);
       if (!options.needs_ranges || has_all_ranges(*store)) return;
       store.reset();
     }
-    const auto source =
-        zarr ? open_store_source(path, request, options.threads) : open_source(path, request);
+    const auto source = open_any_source(path, request);
     if (options.cache.folder.empty() || source->info().files.empty())
       fill_temporary(path, *source, options, progress);
     else
       fill_entry(path, *source, options, progress);
-    if (converted && zarr && takes_all(request))
+    if (converted && in_place)
       notes.push_back(fmt::format("without that copy: '{}' adds what it lacks in place",
                                   "isobrick index " + shell_word(path)));
   }

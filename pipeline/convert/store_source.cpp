@@ -5,7 +5,9 @@
 
 #include <utility>
 
+#include <isobrick/open_source.h>
 #include <isobrick/store_reader.h>
+#include "bricks/zarr/metadata_files.h"
 #include "io/volumes/selected_source.h"
 #include "pipeline/slab_reader.h"
 
@@ -51,6 +53,13 @@ std::unique_ptr<VolumeSource> open_store_source(const std::string& path,
                                                 const VolumeRequest& request, int threads) {
   refuse_raw_description(path, "Zarr", request);
   return select_samples(std::make_unique<StoreSource>(path, request, threads), request);
+}
+
+std::unique_ptr<VolumeSource> open_any_source(const std::string& path,
+                                              const VolumeRequest& request) {
+  if (!is_zarr(path)) return open_source(path, request);
+  refuse_grid(path, request);
+  return open_store_source(path, request, request.threads);
 }
 
 }  // namespace isobrick

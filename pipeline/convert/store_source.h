@@ -14,4 +14,9 @@ namespace isobrick {
 std::unique_ptr<VolumeSource> open_store_source(const std::string& path,
                                                 const VolumeRequest& request, int threads);
 
+/// Any input of a conversion: Zarr as above, all else by open_source(). Throws what these do, and
+/// UsageError for a grid of Zarr.
+std::unique_ptr<VolumeSource> open_any_source(const std::string& path,
+                                              const VolumeRequest& request);
+
 }  // namespace isobrick

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
-#include <isobrick/open_source.h>
 #include "bricks/zarr/metadata_files.h"
 #include "core/file_error.h"
 #include "core/shell_word.h"
@@ -81,8 +80,7 @@ std::unique_ptr<VolumeSource> ImportJob::open_first(VolumeRequest request) {
         Selection{.channel = 0, .time = 0}}) {
     request.selection = selection;
     try {
-      auto source = is_zarr(input) ? open_store_source(input, request, options_.threads)
-                                   : open_source(input, request);
+      auto source = open_any_source(input, request);
       if (selection.channel || selection.time)
         add_note(fmt::format(
             "'{}' has several volumes; this is the first (others: isobrick convert{}{})",
@@ -98,6 +96,7 @@ std::unique_ptr<VolumeSource> ImportJob::open_first(VolumeRequest request) {
 
 std::unique_ptr<VolumeSource> ImportJob::open() {
   VolumeRequest request;
+  request.threads = options_.threads;
   const std::string input = input_.string();
   if (is_zarr(input)) return open_first(request);
   if (has_mesh_name(input_)) {
