@@ -62,7 +62,7 @@ Volume read_volume(const Arguments& a) {
 
 /// The CPU with all its cores: the median of its times, and its mesh.
 double run_cpu(const Volume& v, const Lattice& lattice, const DenseBricks& bricks,
-               const SurfaceOptions& options, int runs, MeshBuffer& mesh) {
+               const SurfaceOptions& options, int runs, Mesh& mesh) {
   std::vector<double> times;
   visit_scalar(v.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
@@ -123,7 +123,7 @@ int run(const Arguments& a) {
   const gpu::DeviceCounts counts = extractor.extract(options.isovalue);
   nlohmann::json out;
   if (a.check || a.cpu) {
-    MeshBuffer expected, mesh;
+    Mesh expected, mesh;
     const double seconds = run_cpu(v, lattice, bricks, options, a.cpu ? a.runs : 1, expected);
     if (a.cpu) out["cpu_ms"] = seconds * 1e3;
     extractor.download(mesh);

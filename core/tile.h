@@ -18,6 +18,12 @@ struct TileWork {
 /// Samples of a tile without its apron.
 inline constexpr std::uint64_t kTileVolume = std::uint64_t{kTileEdge} * kTileEdge * kTileEdge;
 
+/// The cells of a tile's block, by its bit in TileWork::active_blocks.
+constexpr Box3 cells_of_block(Int3 tile, int block) {
+  const Int3 corner = tile * kTileEdge + Int3{block & 1, block >> 1 & 1, block >> 2} * kBlockEdge;
+  return {corner, corner + Int3{kBlockEdge, kBlockEdge, kBlockEdge}};
+}
+
 /// The sample, in tile coordinates, that all blocks of a tile share: its middle,
 /// or what is nearest to it in the volume. A block that is not active lies on
 /// one side as a whole, and so on the side of this sample; whichever block is

@@ -5,7 +5,7 @@
 namespace isobrick {
 
 ChunkWriter::ChunkWriter(MeshSink& sink) : sink_(sink) {
-  free_.push(std::make_shared<MeshBuffer>());
+  free_.push(std::make_shared<Mesh>());
   thread_ = std::thread([this] { run(); });
 }
 
@@ -35,8 +35,8 @@ void ChunkWriter::run() {
   }
 }
 
-MeshBuffer ChunkWriter::take_free() {
-  std::shared_ptr<MeshBuffer> buffer;
+Mesh ChunkWriter::take_free() {
+  std::shared_ptr<Mesh> buffer;
   free_.pop(buffer);
   rethrow();
   return std::move(*buffer);
@@ -46,9 +46,9 @@ void ChunkWriter::rethrow() const {
   if (failed_ && error_) std::rethrow_exception(error_);
 }
 
-void ChunkWriter::write(MeshBuffer& mesh, std::uint64_t first_vertex) {
-  MeshBuffer next = take_free();
-  auto lent = std::make_shared<MeshBuffer>(std::move(mesh));
+void ChunkWriter::write(Mesh& mesh, std::uint64_t first_vertex) {
+  Mesh next = take_free();
+  auto lent = std::make_shared<Mesh>(std::move(mesh));
   mesh = std::move(next);
   const MeshChunk chunk = lent->chunk(first_vertex);
   write(chunk, [this, lent] {

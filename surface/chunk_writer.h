@@ -24,7 +24,7 @@ class ChunkWriter {
 
   /// Queues the buffer's mesh and puts an empty buffer in its place; waits while
   /// the chunk before is being written. Rethrows what the sink threw.
-  void write(MeshBuffer& mesh, std::uint64_t first_vertex);
+  void write(Mesh& mesh, std::uint64_t first_vertex);
   /// Queues a chunk that stays as it is until `release` is called, on the writer's
   /// thread. Waits for nothing; rethrows what the sink threw, and does not take it then.
   void write(const MeshChunk& chunk, std::function<void()> release);
@@ -40,12 +40,12 @@ class ChunkWriter {
     bool last = false;
   };
   void run();
-  MeshBuffer take_free();
+  Mesh take_free();
   void rethrow() const;
 
   MeshSink& sink_;
   tbb::concurrent_bounded_queue<std::shared_ptr<Job>> jobs_;
-  tbb::concurrent_bounded_queue<std::shared_ptr<MeshBuffer>> free_;
+  tbb::concurrent_bounded_queue<std::shared_ptr<Mesh>> free_;
   std::atomic<bool> failed_{false};
   std::exception_ptr error_;
   double seconds_ = 0;       ///< of the thread

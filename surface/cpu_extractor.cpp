@@ -15,8 +15,8 @@
 #include "surface/case_rule.h"
 #include "surface/chunk_writer.h"
 #include "surface/coincident_vertices.h"
-#include "surface/tile_gather.h"
 #include "surface/tile_kernels.h"
+#include "surface/tile_samples.h"
 #include "surface/world_map.h"
 
 namespace isobrick {
@@ -43,7 +43,7 @@ struct CpuExtractor::Impl {
   BoundaryMap boundaries;
   std::shared_ptr<TileWorkSpaces> spaces;
   std::vector<std::unique_ptr<TileState>>& states;
-  MeshBuffer mesh;  ///< not handed on
+  Mesh mesh;  ///< not handed on
   SurfaceReport made;
   std::optional<ChunkWriter> writer;
 
@@ -85,7 +85,14 @@ struct CpuExtractor::Impl {
     return true;
   }
 
-  void count(TileState& state, const TileWork& work, const BrickLookup& bricks) const {
+  void gather(TileState& state, const TileSamples& samples) const {
+    state.samples.resize(TileLayout::kSize * lattice.sample_bytes());
+    samples.gather(state.work, sample_reach(options),
+                   {state.samples.data(), TileLayout::kOrigin, TileLayout::kRow,
+                    TileLayout::kPlane});
+  }
+
+  void count(TileState& state, const TileWork& work, const TileSamples& samples) const {
     state.work = work;
     state.vertices = state.triangles = 0;
     state.cells.clear();
@@ -97,7 +104,7 @@ struct CpuExtractor::Impl {
       if (state.coincident) state.coincident->clear();
     } else {
       if (options.may_have_nan) state.work.active_blocks = 0xff;
-      gather_samples(lattice, bricks, options.fill_value, sample_reach(options), state);
+      gather(state, samples);
       count_tile(lattice.type, context, state);
       if (state.coincident) count_coincident(lattice.type, context, !welded(), state);
     }
@@ -157,12 +164,12 @@ struct CpuExtractor::Impl {
     mesh.triangles.resize(last.triangle_base + last.triangles);
   }
 
-  void extract_batch(std::span<const TileWork> tiles, const BrickLookup& bricks) {
+  void extract_batch(std::span<const TileWork> tiles, const TileSamples& samples) {
     const std::size_t n = tiles.size();
     while (states.size() < n) states.push_back(std::make_unique<TileState>());
     for (std::size_t i = 0; i < n; ++i)
       states[i]->boundary = welded() ? boundaries.add(tiles[i].tile) : nullptr;
-    for_each_tile(0, n, [&](std::size_t i) { count(*states[i], tiles[i], bricks); });
+    for_each_tile(0, n, [&](std::size_t i) { count(*states[i], tiles[i], samples); });
     for (std::size_t begin = 0; begin < n;) {
       const std::size_t end = place(begin, n);
       if (end > begin) {
@@ -180,12 +187,12 @@ struct CpuExtractor::Impl {
       writer->write(mesh, made.vertices - mesh.positions.size());
   }
 
-  void extract(std::span<const TileWork> tiles, const BrickLookup& bricks) {
+  void extract(std::span<const TileWork> tiles, const TileSamples& samples) {
     while (!tiles.empty()) {
       // Parts of one size: a small last one would keep few threads busy.
       const std::size_t parts = (tiles.size() + limits.tiles - 1) / limits.tiles;
       const std::size_t batch = (tiles.size() + parts - 1) / parts;
-      extract_batch(tiles.first(batch), bricks);
+      extract_batch(tiles.first(batch), samples);
       tiles = tiles.subspan(batch);
     }
     if (writer) hand_on();
@@ -200,8 +207,12 @@ CpuExtractor::~CpuExtractor() = default;
 
 void CpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                            const std::shared_ptr<const void>&) {
+  extract(tiles, BrickSamples(impl_->lattice, bricks, impl_->options.fill_value));
+}
+
+void CpuExtractor::extract(std::span<const TileWork> tiles, const TileSamples& samples) {
   const Stopwatch watch(impl_->made.surface.seconds);
-  impl_->extract(tiles, bricks);
+  impl_->extract(tiles, samples);
 }
 
 void CpuExtractor::finish() {
@@ -215,11 +226,11 @@ SurfaceReport CpuExtractor::report() const {
   return report;
 }
 
-MeshBuffer& CpuExtractor::mesh() { return impl_->mesh; }
+Mesh& CpuExtractor::mesh() { return impl_->mesh; }
 
 MeshSize CpuExtractor::count(const TileWork& tile, const BrickLookup& bricks) const {
   const auto state = std::make_unique<TileState>();
-  impl_->count(*state, tile, bricks);
+  impl_->count(*state, tile, BrickSamples(impl_->lattice, bricks, impl_->options.fill_value));
   return {state->vertices, state->triangles};
 }
 

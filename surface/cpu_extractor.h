@@ -18,6 +18,7 @@ struct ExtractorLimits {
 };
 
 struct TileState;
+class TileSamples;
 
 /// Work spaces for the tiles between two hand-offs. Extractors of one lattice may share them when
 /// no two work at the same time.
@@ -50,11 +51,13 @@ class CpuExtractor final : public SurfaceExtractor {
   /// Needs no samples any more when it returns.
   void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                const std::shared_ptr<const void>& samples) override;
+  /// The same with samples that may lie anywhere.
+  void extract(std::span<const TileWork> tiles, const TileSamples& samples);
   void finish() override;
   SurfaceReport report() const override;
 
   /// What was extracted and is not the sink's.
-  MeshBuffer& mesh();
+  Mesh& mesh();
 
   /// Counts what extract() makes of one tile, wherever the tile comes in the order.
   MeshSize count(const TileWork& tile, const BrickLookup& bricks) const;

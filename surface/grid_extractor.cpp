@@ -49,7 +49,7 @@ void GridExtractor::find_inside(const GridView& g) {
 
 template <int axis>
 void GridExtractor::add_vertices(const GridView& g, int y, int z, Bits active_edges,
-                                 MeshBuffer& out) {
+                                 Mesh& out) {
   Plane& plane = planes_[static_cast<std::size_t>(z & 1)];
   std::uint32_t* numbers = plane.data() + (axis * kGridPoints + y) * kGridPoints;
   auto next = static_cast<std::uint32_t>(out.positions.size());
@@ -69,7 +69,7 @@ void GridExtractor::add_vertices(const GridView& g, int y, int z, Bits active_ed
 }
 
 /// The vertices on the edges from the points of a row.
-void GridExtractor::add_row(const GridView& g, int y, int z, MeshBuffer& out) {
+void GridExtractor::add_row(const GridView& g, int y, int z, Mesh& out) {
   const Row* row = rows_.data() + z * g.n[1] + y;
   const auto across = [&](const Row& other) {
     return Bits{(row->inside.low ^ other.inside.low) & row->number.low & other.number.low,
@@ -83,7 +83,7 @@ void GridExtractor::add_row(const GridView& g, int y, int z, MeshBuffer& out) {
 }
 
 /// The triangles of the cells above a row of points.
-void GridExtractor::add_cells(const GridView& g, int y, int z, MeshBuffer& out) {
+void GridExtractor::add_cells(const GridView& g, int y, int z, Mesh& out) {
   const Row* first = rows_.data() + z * g.n[1] + y;
   const Row* rows[4] = {first, first + 1, first + g.n[1], first + g.n[1] + 1};
   std::uint64_t low[4], high[4];  // corners at x, at x + 1
@@ -118,7 +118,7 @@ void GridExtractor::add_cells(const GridView& g, int y, int z, MeshBuffer& out) 
   });
 }
 
-std::uint32_t GridExtractor::add_seam_strips(const GridView& g, MeshBuffer& out) {
+std::uint32_t GridExtractor::add_seam_strips(const GridView& g, Mesh& out) {
   const std::size_t vertices = out.positions.size(), triangles = out.triangles.size();
   seam_of_.resize(vertices);
   auto next = static_cast<std::uint32_t>(vertices);
@@ -149,7 +149,7 @@ std::uint32_t GridExtractor::add_seam_strips(const GridView& g, MeshBuffer& out)
   return static_cast<std::uint32_t>(out.triangles.size() - triangles);
 }
 
-std::uint32_t GridExtractor::extract(const GridView& g, MeshBuffer& out) {
+std::uint32_t GridExtractor::extract(const GridView& g, Mesh& out) {
   out.clear();
   meets_coarser_ = g.meets_coarser();
   faces_.clear();

@@ -21,7 +21,7 @@ namespace isobrick {
 class GridExtractor {
  public:
   /// Replaces what `out` held. How many of the triangles, the last ones, are seam strips.
-  std::uint32_t extract(const GridView& grid, MeshBuffer& out);
+  std::uint32_t extract(const GridView& grid, Mesh& out);
 
  private:
   /// Bit x of a row of points; the last of kGridPoints points has a word of its own.
@@ -36,10 +36,10 @@ class GridExtractor {
 
   void find_inside(const GridView& grid);
   template <int axis>
-  void add_vertices(const GridView& grid, int y, int z, Bits active_edges, MeshBuffer& out);
-  void add_row(const GridView& grid, int y, int z, MeshBuffer& out);
-  void add_cells(const GridView& grid, int y, int z, MeshBuffer& out);
-  std::uint32_t add_seam_strips(const GridView& grid, MeshBuffer& out);
+  void add_vertices(const GridView& grid, int y, int z, Bits active_edges, Mesh& out);
+  void add_row(const GridView& grid, int y, int z, Mesh& out);
+  void add_cells(const GridView& grid, int y, int z, Mesh& out);
+  std::uint32_t add_seam_strips(const GridView& grid, Mesh& out);
 
   std::vector<Row> rows_;
   std::array<Plane, 2> planes_;

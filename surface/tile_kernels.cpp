@@ -9,6 +9,7 @@
 //
 #include <hwy/highway.h>
 
+#include "core/simd_targets.h"
 #include "surface/case_tables.h"
 #include "surface/coincident_vertices-inl.h"
 #include "surface/tile_count-inl.h"
@@ -47,59 +48,15 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace isobrick {
 
-namespace {
-
-struct Kernels {
-  decltype(&HWY_STATIC_DISPATCH(Count)) count = nullptr;
-  decltype(&HWY_STATIC_DISPATCH(Write)) write = nullptr;
-};
-
-// Empty for a target that was not compiled.
-#define ISOBRICK_KERNELS(TARGET) \
-  Kernels { HWY_CHOOSE_##TARGET(Count), HWY_CHOOSE_##TARGET(Write) }
-
-/// Those that this processor runs best. Highway's own dispatch would do the
-/// same, but it links libhwy, which times its clock for 5 ms whenever a program
-/// starts.
-Kernels best_kernels() {
-  Kernels best;
-#if HWY_ARCH_X86
-  __builtin_cpu_init();
-  const bool sse4 = __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("sse4.2") &&
-                    __builtin_cpu_supports("aes") && __builtin_cpu_supports("pclmul");
-  const bool avx2 = sse4 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                    __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
-  const bool avx3 = avx2 && __builtin_cpu_supports("avx512f") &&
-                    __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
-                    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd");
-  const bool avx3_dl =
-      avx3 && __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("vpclmulqdq") &&
-      __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") &&
-      __builtin_cpu_supports("avx512bitalg") && __builtin_cpu_supports("avx512vpopcntdq");
-  if (avx3_dl) best = ISOBRICK_KERNELS(AVX3_DL);
-  if (avx3 && !best.count) best = ISOBRICK_KERNELS(AVX3);
-  if (avx2 && !best.count) best = ISOBRICK_KERNELS(AVX2);
-  if (sse4 && !best.count) best = ISOBRICK_KERNELS(SSE4);
-#endif
-  // What the compiler's options allow: all that other processors need.
-  if (!best.count) best = {&HWY_STATIC_DISPATCH(Count), &HWY_STATIC_DISPATCH(Write)};
-  return best;
-}
-
-const Kernels& kernels() {
-  static const Kernels best = best_kernels();
-  return best;
-}
-
-}  // namespace
-
 void count_tile(ScalarType type, const KernelContext& context, TileState& tile) {
-  kernels().count(type, context, tile);
+  static const auto best = ISOBRICK_BEST_OF(Count);
+  best(type, context, tile);
 }
 
 void write_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
                 Vec3f* normals, Triangle* triangles) {
-  kernels().write(type, context, tile, positions, normals, triangles);
+  static const auto best = ISOBRICK_BEST_OF(Write);
+  best(type, context, tile, positions, normals, triangles);
 }
 
 }  // namespace isobrick

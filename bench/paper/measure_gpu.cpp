@@ -81,7 +81,7 @@ class GpuMeasurement {
     gpu::ResidentExtractor extractor(resident_, surface_, tuning);
     extractor.extract(volume_.isovalue + 1);
     extractor.extract(volume_.isovalue);
-    MeshBuffer mesh;
+    Mesh mesh;
     extractor.download(mesh);
     expect(same_bytes(mesh.positions, expected_.positions) &&
                same_bytes(mesh.triangles, expected_.triangles),
@@ -179,7 +179,7 @@ class GpuMeasurement {
   SurfaceOptions surface_;
   gpu::DeviceVolume resident_;
   std::vector<ValueRange<T>> ranges_;
-  MeshBuffer expected_;
+  Mesh expected_;
 };
 
 }  // namespace

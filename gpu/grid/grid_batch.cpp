@@ -204,7 +204,7 @@ GridBatch::GridBatch(int device, int slots) {
   // The first launch of a kernel loads its code, which takes long.
   stage(0, SmallGrid().view);
   make(std::array{GridMeshJob{0, {}}});
-  MeshBuffer mesh;
+  Mesh mesh;
   download(0, mesh);
 }
 GridBatch::~GridBatch() = default;
@@ -238,7 +238,7 @@ void GridBatch::write(std::span<const GridMeshJob> jobs) {
   impl_->wait();
 }
 
-void GridBatch::download(int slot, MeshBuffer& out) {
+void GridBatch::download(int slot, Mesh& out) {
   const NvtxRange range("download");
   Impl& i = *impl_;
   const GridMeshSize size = this->size(slot);

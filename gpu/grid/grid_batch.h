@@ -51,7 +51,7 @@ class GridBatch {
   /// Writes the meshes of grids made last to places that hold them; waits once.
   void write(std::span<const GridMeshJob> jobs);
   /// The same for one, into host memory.
-  void download(int slot, MeshBuffer& out);
+  void download(int slot, Mesh& out);
 
  private:
   struct Impl;

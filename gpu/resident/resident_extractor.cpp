@@ -136,7 +136,7 @@ struct ResidentExtractor::Impl {
     end.record(stream());
   }
 
-  void download(MeshBuffer& mesh) {
+  void download(Mesh& mesh) {
     const NvtxRange range("download");
     stream().wait();
     mesh.clear();
@@ -220,7 +220,7 @@ float ResidentExtractor::milliseconds() {
   return impl_->end.since(impl_->start);
 }
 
-void ResidentExtractor::download(MeshBuffer& mesh) const { impl_->download(mesh); }
+void ResidentExtractor::download(Mesh& mesh) const { impl_->download(mesh); }
 
 void ResidentExtractor::reserve_chunks(std::size_t chunk_bytes) {
   impl_->reserve_chunks(chunk_bytes);

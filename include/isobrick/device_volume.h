@@ -91,7 +91,7 @@ class ResidentExtractor {
   float milliseconds();
 
   /// Copies the last mesh to the host.
-  void download(MeshBuffer& mesh) const;
+  void download(Mesh& mesh) const;
   /// Takes the pinned memory that write() needs, twice `chunk_bytes`. Throws Error where there is
   /// none, UsageError for less than 24 bytes.
   void reserve_chunks(std::size_t chunk_bytes);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -26,20 +27,22 @@ enum class Backend : std::uint8_t {
 
 /// Which surface, from which part of a store, and with what means.
 struct ExtractOptions {
-  double isovalue = 0;           ///< in the values of the samples
-  int level = 0;                 ///< 0: the finest
-  std::optional<Box3> roi;       ///< samples of that level; nothing: the whole volume
-  std::optional<Inside> inside;  ///< nothing: below the isovalue in a level set, else above
-  bool normals = false;          ///< gradient normals
-  bool drop_degenerate = false;  ///< see SurfaceOptions
+  double isovalue = 0;                ///< in the values of the samples
+  int level = 0;                      ///< 0: the finest
+  std::optional<Box3> roi = {};       ///< samples of that level; nothing: the whole volume
+  std::optional<Inside> inside = {};  ///< nothing: below the isovalue in a level set, else above
+  bool normals = false;               ///< gradient normals
+  bool drop_degenerate = false;       ///< see SurfaceOptions
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   /// Of the budget of the whole command what others take; messages name both together.
   std::uint64_t memory_of_others = 0;
   int threads = 0;                       ///< 0: all cores
-  IndexChoice index;                     ///< how active blocks are found; never shows in the mesh
+  IndexChoice index = {};                ///< how active blocks are found; never shows in the mesh
   Backend backend = Backend::automatic;  ///< what makes the surface
   std::uint64_t gpu_memory = 0;  ///< hard budget of device memory, bytes; 0: what is free less 10 %
   int device = 0;                ///< of the CUDA devices, the first is 0
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
 };
 
 /// One of several surfaces that are extracted together, and the sink that takes it.
@@ -94,7 +97,10 @@ std::uint64_t min_extract_memory(const StoreReader& store, const ExtractOptions&
 /// for one tile with its neighbours, or a surface that Backend::cuda cannot make; Error where
 /// there is no CUDA device for it. Backend::automatic takes the CPU where the GPU cannot.
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
-                      Progress& progress);
+                      Progress& progress = no_progress());
+/// The same into memory: a welded mesh, which the budget does not count.
+Mesh extract(const StoreReader& store, const ExtractOptions& options,
+             Progress& progress = no_progress());
 
 /// Streams several surfaces of one level, each into its sink, and reads and decodes every brick
 /// once for all of them. Bricks that any isovalue touches are visited once, in the order of a
@@ -114,6 +120,7 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
 /// Throws as above: for options that make no sense, and for a `memory` too small for one of the
 /// surfaces on the CPU, before any sink begins. A report for each surface.
 std::vector<ExtractReport> extract(const StoreReader& store, const ExtractOptions& options,
-                                   std::span<const SurfaceOutput> outputs, Progress& progress);
+                                   std::span<const SurfaceOutput> outputs,
+                                   Progress& progress = no_progress());
 
 }  // namespace isobrick

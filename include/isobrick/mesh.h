@@ -2,10 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
+#include <memory_resource>
 #include <optional>
 #include <span>
 #include <string>
 
+#include <isobrick/pod_buffer.h>
 #include <isobrick/vec.h>
 
 namespace isobrick {
@@ -34,6 +37,39 @@ struct MeshChunk {
   std::span<const Vec3f> normals;              ///< unit length, outward; empty or one a position
   std::span<const Triangle> triangles;         ///< numbered by MeshSink::indexing()
   std::span<const VertexColour> colours = {};  ///< of meshes of others; empty or one a position
+};
+
+struct MeshFileOptions;
+
+/// A mesh in memory. Reused, it allocates nothing. With a memory resource, which must outlive it,
+/// all arrays lie in the caller's memory.
+struct Mesh {
+  PodBuffer<Vec3f> positions;     ///< of the vertices, in world space
+  PodBuffer<Vec3f> normals;       ///< unit length, outward; empty or one a position
+  PodBuffer<Triangle> triangles;  ///< numbers of vertices
+  std::string unit;               ///< of the positions, as unit_name() has it; empty: unknown
+
+  /// Empty, in memory of the process.
+  Mesh() = default;
+  /// Empty, in memory of `memory`.
+  explicit Mesh(std::pmr::memory_resource* memory)
+      : positions(memory), normals(memory), triangles(memory) {}
+
+  /// Empties the mesh and keeps the memory.
+  void clear() {
+    positions.clear();
+    normals.clear();
+    triangles.clear();
+  }
+  /// A view of all of it, as the chunk after `first_vertex` vertices.
+  MeshChunk chunk(std::uint64_t first_vertex = 0) const {
+    return {first_vertex, positions.span(), normals.span(), triangles.span()};
+  }
+  /// Writes a mesh file, of the format that the name's extension says. Replaces none: throws
+  /// UsageError where it exists, as create_mesh_file() does. Defined in isobrick::meshes.
+  void save(const std::filesystem::path& path) const;
+  /// The same with options.
+  void save(const std::filesystem::path& path, const MeshFileOptions& options) const;
 };
 
 /// Of what a mesh consists.

@@ -16,7 +16,7 @@ namespace isobrick {
 struct CacheOptions {
   /// Empty: nothing is kept; the store is in the folder of temporary files and goes with the
   /// OpenedVolume.
-  std::filesystem::path folder;
+  std::filesystem::path folder = {};
   /// Bytes of all stores in the folder. The ones that were used longest ago are removed first,
   /// never one that a process has open.
   std::uint64_t limit = std::uint64_t{20} << 30;
@@ -27,8 +27,8 @@ std::filesystem::path default_cache_folder();
 
 /// How a volume is opened.
 struct OpenOptions {
-  VolumeRequest volume;  ///< what is known of it, and which of its samples are requested
-  CacheOptions cache;    ///< where stores that are made are kept
+  VolumeRequest volume = {};  ///< what is known of it, and which of its samples are requested
+  CacheOptions cache = {};    ///< where stores that are made are kept
   /// Whether another program's Zarr without ranges is converted; false: it is opened in place.
   bool needs_ranges = true;
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
@@ -44,7 +44,8 @@ class OpenedVolume {
   /// same files, by name, size and times. Waits for another process that is converting the same.
   /// Throws what StoreReader, open_source() and convert() do, and Error for an input that changes
   /// while it is converted.
-  OpenedVolume(const std::string& path, const OpenOptions& options, Progress& progress);
+  explicit OpenedVolume(const std::string& path, const OpenOptions& options = {},
+                        Progress& progress = no_progress());
   ~OpenedVolume();
   /// Takes the store of another.
   OpenedVolume(OpenedVolume&&) noexcept;
@@ -60,5 +61,11 @@ class OpenedVolume {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Opens any volume as a store: OpenedVolume.
+inline OpenedVolume open(const std::string& path, const OpenOptions& options = {},
+                         Progress& progress = no_progress()) {
+  return OpenedVolume(path, options, progress);
+}
 
 }  // namespace isobrick

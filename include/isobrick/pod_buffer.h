@@ -1,36 +1,51 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdlib>
-#include <new>
+#include <memory_resource>
 #include <span>
 #include <type_traits>
 #include <utility>
 
 namespace isobrick {
+namespace detail {
+
+/// Memory of `capacity` bytes, which begins with the first `used` bytes of `data`. Frees `data`, of
+/// `old_capacity` bytes or null. Of `memory`, or of the process where that is null. Throws
+/// std::bad_alloc; `data` is as it was then.
+void* grow_memory(std::pmr::memory_resource* memory, void* data, std::size_t used,
+                  std::size_t old_capacity, std::size_t capacity);
+/// Frees what grow_memory() gave; null is none.
+void free_memory(std::pmr::memory_resource* memory, void* data, std::size_t capacity) noexcept;
+
+}  // namespace detail
 
 /// A growing array that neither initialises nor frees its memory: the thread that writes the values
-/// touches it first, and clear() keeps it for reuse. Growth goes
-/// through realloc, which moves large blocks by remapping pages.
+/// touches it first, and clear() keeps it for reuse. Memory of the process grows without copying
+/// where it is large, and lies in large pages then. Memory of a resource is aligned to 64 bytes.
 template <class T>
 class PodBuffer {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
+  /// Empty, in memory of the process.
   PodBuffer() = default;
+  /// Empty, in memory of `memory`, which must outlive it.
+  explicit PodBuffer(std::pmr::memory_resource* memory) : memory_(memory) {}
   /// Leaves `other` empty.
   PodBuffer(PodBuffer&& other) noexcept
-      : data_(std::exchange(other.data_, nullptr)),
+      : memory_(other.memory_),
+        data_(std::exchange(other.data_, nullptr)),
         size_(std::exchange(other.size_, 0)),
         capacity_(std::exchange(other.capacity_, 0)) {}
   /// Exchanges the arrays.
   PodBuffer& operator=(PodBuffer&& other) noexcept {
+    std::swap(memory_, other.memory_);
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
     std::swap(capacity_, other.capacity_);
     return *this;
   }
-  ~PodBuffer() { std::free(data_); }
+  ~PodBuffer() { detail::free_memory(memory_, data_, capacity_ * sizeof(T)); }
 
   /// The first element; may be null when the array is empty. Valid until the array grows.
   T* data() { return data_; }
@@ -38,6 +53,10 @@ class PodBuffer {
   const T* data() const { return data_; }
   /// Number of elements.
   std::size_t size() const { return size_; }
+  /// True when there is no element.
+  bool empty() const { return size_ == 0; }
+  /// What the memory is taken from; null: the process.
+  std::pmr::memory_resource* memory() const { return memory_; }
   /// Elements that fit without growth.
   std::size_t capacity() const { return capacity_; }
   /// Element `i`, which must exist.
@@ -66,13 +85,13 @@ class PodBuffer {
   /// Makes room for so many elements. Throws std::bad_alloc.
   void reserve(std::size_t capacity) {
     if (capacity <= capacity_) return;
-    void* grown = std::realloc(static_cast<void*>(data_), capacity * sizeof(T));
-    if (!grown) throw std::bad_alloc();
-    data_ = static_cast<T*>(grown);
+    data_ = static_cast<T*>(detail::grow_memory(memory_, data_, size_ * sizeof(T),
+                                                capacity_ * sizeof(T), capacity * sizeof(T)));
     capacity_ = capacity;
   }
 
  private:
+  std::pmr::memory_resource* memory_ = nullptr;
   T* data_ = nullptr;
   std::size_t size_ = 0, capacity_ = 0;
 };

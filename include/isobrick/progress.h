@@ -25,4 +25,10 @@ class NoProgress final : public Progress {
   void end() override {}
 };
 
+/// One for all who want to hear nothing; any thread may use it.
+inline Progress& no_progress() {
+  static NoProgress none;
+  return none;
+}
+
 }  // namespace isobrick

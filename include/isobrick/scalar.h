@@ -73,6 +73,12 @@ constexpr bool is_floating(ScalarType type) {
   return type == ScalarType::f32 || type == ScalarType::f64;
 }
 
+/// The type that holds every sample of `type`, and NaN.
+constexpr ScalarType type_with_nan(ScalarType type) {
+  if (is_floating(type)) return type;
+  return type == ScalarType::u32 || type == ScalarType::i32 ? ScalarType::f64 : ScalarType::f32;
+}
+
 /// "u8", "i16", "f32", …: the names of the command line.
 constexpr std::string_view short_name(ScalarType type) {
   constexpr std::string_view names[] = {"u8", "i8", "u16", "i16", "u32", "i32", "f32", "f64"};

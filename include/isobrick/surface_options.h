@@ -1,11 +1,8 @@
 #pragma once
 
-#include <span>
-
 #include <isobrick/inside.h>
 #include <isobrick/lattice.h>
 #include <isobrick/mesh.h>
-#include <isobrick/pod_buffer.h>
 #include <isobrick/transform.h>
 
 namespace isobrick {
@@ -25,24 +22,6 @@ struct SurfaceOptions {
   double fill_value = 0;  ///< of absent bricks
   /// Whether samples may be NaN: costs a look at every sample's neighbours.
   bool may_have_nan = false;
-};
-
-/// A mesh, or the piece of one that is being made. Reused, it allocates nothing.
-struct MeshBuffer {
-  PodBuffer<Vec3f> positions;     ///< of the vertices, in world space
-  PodBuffer<Vec3f> normals;       ///< empty or one a position
-  PodBuffer<Triangle> triangles;  ///< numbers of vertices
-
-  /// Empties the mesh and keeps the memory.
-  void clear() {
-    positions.clear();
-    normals.clear();
-    triangles.clear();
-  }
-  /// A view of all of it, as the chunk after `first_vertex` vertices.
-  MeshChunk chunk(std::uint64_t first_vertex) const {
-    return {first_vertex, positions.span(), normals.span(), triangles.span()};
-  }
 };
 
 }  // namespace isobrick

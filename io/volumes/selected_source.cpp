@@ -99,12 +99,6 @@ class SubsampledSource final : public VolumeSource {
   Index next_plane_ = 0;  ///< of a stream
 };
 
-/// The type that holds every sample of `type`, and NaN.
-constexpr ScalarType type_with_nan(ScalarType type) {
-  if (is_floating(type)) return type;
-  return type == ScalarType::u32 || type == ScalarType::i32 ? ScalarType::f64 : ScalarType::f32;
-}
-
 /// A volume where samples of one value are missing.
 class NodataSource final : public VolumeSource {
  public:

@@ -14,6 +14,7 @@
 
 #include "core/box_union.h"
 #include "pipeline/extract/extract_plan.h"
+#include "pipeline/extract/mesh_header.h"
 #include "pipeline/extract/tile_sample.h"
 #include "pipeline/workers.h"
 #include "stream/brick_cache.h"
@@ -31,21 +32,12 @@ constexpr std::size_t kMaxGroups = 64;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{32} << 20;
 constexpr std::size_t kMinGroups = 4;
 
-Box3 block_box(Int3 tile, int i) {
-  const Int3 corner = tile * kTileEdge + Int3{i & 1, i >> 1 & 1, i >> 2} * kBlockEdge;
-  return {corner, corner + Int3{kBlockEdge, kBlockEdge, kBlockEdge}};
-}
-
 /// Adds the cells between `samples` in the active blocks of a tile.
 void add_cells(const TileWork& work, Box3 samples, ActiveParts& parts) {
-  for (int i = 0; i < 8; ++i)
-    if (work.active_blocks >> i & 1) {
-      const Box3 box = intersect(block_box(work.tile, i),
-                                 {samples.lo, max(samples.hi - Int3{1, 1, 1}, samples.lo)});
-      if (box.empty()) continue;
-      parts.active_cells += static_cast<std::uint64_t>(volume(box.extent()));
-      parts.bounds = unite(parts.bounds, box);
-    }
+  for_each_active_block(work, samples, [&](Box3 cells) {
+    parts.active_cells += static_cast<std::uint64_t>(volume(cells.extent()));
+    parts.bounds = unite(parts.bounds, cells);
+  });
 }
 
 /// Adds a tile's active cells and blocks; calls brick(number) for the brick of each.
@@ -57,7 +49,7 @@ void count_tile(const ExtractRequest& request, const TileWork& work, ActiveParts
   for (int i = 0; i < 8; ++i) {
     if (!(work.active_blocks >> i & 1)) continue;
     ++parts.active_blocks;
-    const Int3 of_block = lattice.brick_of(block_box(work.tile, i).lo);
+    const Int3 of_block = lattice.brick_of(cells_of_block(work.tile, i).lo);
     brick(static_cast<std::size_t>(linear_index(of_block, lattice.bricks())));
   }
 }

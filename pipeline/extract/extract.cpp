@@ -2,50 +2,24 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <future>
 #include <utility>
 #include <vector>
 
 #include <isobrick/estimate.h>
-#include "core/length_unit.h"
+#include <isobrick/mesh_sinks.h>
+#include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
 #include "pipeline/extract/backend_choice.h"
 #include "pipeline/extract/extract_pass.h"
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/extract_tiles.h"
+#include "pipeline/extract/mesh_header.h"
 #include "pipeline/extract/resident_pass.h"
 #include "pipeline/workers.h"
 
 namespace isobrick {
 namespace {
-
-/// World-space bounds of the samples from `first` to `last`.
-MeshBounds world_bounds(const Transform& transform, Int3 first, Int3 last) {
-  MeshBounds bounds;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p = transform.apply({static_cast<double>(corner & 1 ? last.x : first.x),
-                                     static_cast<double>(corner & 2 ? last.y : first.y),
-                                     static_cast<double>(corner & 4 ? last.z : first.z)});
-    for (int axis = 0; axis < 3; ++axis) {
-      bounds.lo[axis] = corner ? std::fmin(bounds.lo[axis], p[axis]) : p[axis];
-      bounds.hi[axis] = corner ? std::fmax(bounds.hi[axis], p[axis]) : p[axis];
-    }
-  }
-  return bounds;
-}
-
-MeshHeader header_of(const LevelInfo& level, const SurfaceOptions& surface,
-                     const ActiveParts& active) {
-  const MeshBounds all =
-      world_bounds(level.transform, {0, 0, 0}, level.lattice.extent - Int3{1, 1, 1});
-  MeshHeader header{surface.normals, all.lo, all.hi};
-  header.unit = unit_name(level.transform.unit);
-  // The last cells end at the samples behind them.
-  if (!active.bounds.empty())
-    header.surface = world_bounds(level.transform, active.bounds.lo, active.bounds.hi);
-  return header;
-}
 
 /// What becomes of a device and of the search for tiles while the active parts are counted.
 struct EarlyWork {
@@ -204,7 +178,8 @@ class Extraction {
 
   void begin_sink(std::size_t surface) {
     const ExtractRequest& request = requests_[surface];
-    sinks_[surface]->begin(header_of(*request.level, request.surface, active_[surface]));
+    sinks_[surface]->begin(mesh_header(request.level->transform, request.level->lattice.extent,
+                                       request.surface.normals, active_[surface].bounds));
   }
 
   /// Of a surface's active bricks, the part that lies in these tiles.
@@ -277,10 +252,18 @@ ExtractReport extract(const StoreReader& store, const ExtractOptions& options, M
   return extract(store, options, {&output, 1}, progress).front();
 }
 
+Mesh extract(const StoreReader& store, const ExtractOptions& options, Progress& progress) {
+  Mesh mesh;
+  MemorySink sink(mesh);
+  extract(store, options, sink, progress);
+  return mesh;
+}
+
 std::vector<ExtractReport> extract(const StoreReader& store, const ExtractOptions& options,
                                    std::span<const SurfaceOutput> outputs, Progress& progress) {
   if (outputs.empty()) return {};
-  return Extraction(store, options, outputs).run(progress);
+  CancellableProgress cancellable(progress, options.cancel);
+  return Extraction(store, options, outputs).run(cancellable);
 }
 
 }  // namespace isobrick

@@ -8,7 +8,9 @@
 
 #include <isobrick/error.h>
 #include "bricks/level_set.h"
+#include "io/bytes/file.h"
 #include "pipeline/extract/gpu_backend.h"
+#include "pipeline/extract/mesh_header.h"
 #include "pipeline/extract/resolve_index.h"
 #include "pipeline/program_memory.h"
 #include "stream/brick_slots.h"
@@ -43,24 +45,6 @@ std::uint64_t boundary_bytes(PassRequests requests) {
   const Int3 t = common(requests).level->lattice.tiles();
   const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
   return requests.size() * faces * CpuExtractor::boundary_bytes(any_drops(requests));
-}
-
-/// Mesh coordinates are float, and so are the factors of positions and normals.
-void check_transform(const StoreInfo& info, const LevelInfo& level) {
-  constexpr double least = 1e-30, most = 1e30;
-  const auto fits = [](double v, double lo) { return std::abs(v) >= lo && std::abs(v) <= most; };
-  const Int3 e = level.lattice.extent;
-  const Vec3d far = level.transform.apply(
-      {static_cast<double>(e.x), static_cast<double>(e.y), static_cast<double>(e.z)});
-  bool fit = true;
-  for (int axis = 0; axis < 3; ++axis)
-    fit = fit && fits(level.transform.spacing[axis], least) &&
-          fits(level.transform.origin[axis], 0) && fits(far[axis], 0);
-  if (!fit)
-    throw Error(fmt::format(
-        "the spacing or origin of '{}' does not fit the 32-bit coordinates of a mesh (1e-30 to "
-        "1e30); convert it with another --spacing, --origin or unit",
-        info.path.string()));
 }
 
 /// What the CUDA driver and its context take of the host's memory.
@@ -128,13 +112,10 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   ExtractRequest request;
   request.level = &info.levels[static_cast<std::size_t>(options.level)];
-  check_transform(info, *request.level);
-  const Box3 box = request.level->lattice.box();
-  const Box3 roi = options.roi.value_or(box);
-  if (roi.empty() || intersect(roi, box) != roi)
-    throw UsageError(fmt::format(
-        "the region {}:{},{}:{},{}:{} is empty or leaves the level's {}×{}×{} samples", roi.lo.x,
-        roi.hi.x, roi.lo.y, roi.hi.y, roi.lo.z, roi.hi.z, box.hi.x, box.hi.y, box.hi.z));
+  const Lattice& lattice = request.level->lattice;
+  check_coordinates(request.level->transform, lattice.extent, quoted(info.path));
+  const Box3 roi = options.roi.value_or(lattice.box());
+  check_roi(roi, lattice.extent);
   request.surface = {.isovalue = options.isovalue,
                      .inside = options.inside.value_or(inside_of(info)),
                      .normals = options.normals,

@@ -7,73 +7,14 @@
 #include <limits>
 
 #include "bricks/ranges/range_format.h"
+#include "index/row_ranges.h"
 
 namespace isobrick {
 namespace {
 
-/// Bytes of a row that are reduced at a time: the two accumulators and a few
+/// Bytes of a row that are reduced at a time: its bounds and a few
 /// rows stay in the first-level cache.
 constexpr std::size_t kRowBytes = 4096;
-
-/// Smallest and largest sample of each column of a bundle of rows, NaN left out.
-template <class T>
-class ColumnRanges {
- public:
-  explicit ColumnRanges(std::size_t width) : lo_(width), hi_(width) {}
-
-  void reset(std::size_t width) {
-    width_ = width;
-    std::fill_n(lo_.begin(), width, ValueRange<T>::kHighest);
-    std::fill_n(hi_.begin(), width, ValueRange<T>::kLowest);
-  }
-
-  /// Merges `count` rows that lie `stride` samples apart. Four at a time: the
-  /// accumulators are then loaded and stored once for four rows.
-  void add(const T* rows, Index stride, Index count) {
-    for (; count >= 4; count -= 4, rows += 4 * stride)
-      merge(rows, rows + stride, rows + 2 * stride, rows + 3 * stride);
-    for (; count > 0; --count, rows += stride) merge(rows, rows, rows, rows);
-  }
-
-  ValueRange<T> over(std::size_t begin, std::size_t end) const {
-    ValueRange<T> r;
-    for (std::size_t x = begin; x < end; ++x) r.include(ValueRange<T>{lo_[x], hi_[x]});
-    return r;
-  }
-
- private:
-  // A comparison with NaN is false, so NaN is never taken.
-  static T lower(T a, T b) { return b < a ? b : a; }
-  static T upper(T a, T b) { return b > a ? b : a; }
-
-  void merge(const T* __restrict a, const T* __restrict b, const T* __restrict c,
-             const T* __restrict d) {
-    T* __restrict lo = lo_.data();
-    T* __restrict hi = hi_.data();
-    for (std::size_t x = 0; x < width_; ++x) {
-      lo[x] = lower(lower(lower(lower(lo[x], a[x]), b[x]), c[x]), d[x]);
-      hi[x] = upper(upper(upper(upper(hi[x], a[x]), b[x]), c[x]), d[x]);
-    }
-  }
-
-  std::vector<T> lo_, hi_;
-  std::size_t width_ = 0;
-};
-
-template <class T>
-bool holds_nan(const T* samples, std::size_t count) {
-  if constexpr (std::numeric_limits<T>::has_quiet_NaN) {
-    // As wide as the samples, so that the loop vectorises.
-    using Word = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
-    Word found = 0;
-    for (std::size_t i = 0; i < count; ++i) found |= samples[i] != samples[i] ? Word{1} : Word{0};
-    return found != 0;
-  } else {
-    static_cast<void>(samples);
-    static_cast<void>(count);
-    return false;
-  }
-}
 
 /// Items along one axis whose ranges see some sample in [lo, hi): a sample on
 /// the border of two items belongs to both.
@@ -98,26 +39,30 @@ struct Samples {
   const T* at(Int3 p) const { return data + linear_index(p - box.lo, box.extent()); }
 };
 
-/// Merges the samples with y in `ys` and z in `zs` into one row of items.
+/// Merges the samples with y in `ys` and z in `zs` into one row of items. Whether any is NaN.
 template <class T>
-void merge_item_row(const Samples<T>& in, Span ys, Span zs, Index edge, ValueRange<T>* row) {
+bool merge_item_row(const Samples<T>& in, Span ys, Span zs, Index edge, ValueRange<T>* row) {
   const Index items_at_once = std::max<Index>(1, static_cast<Index>(kRowBytes / sizeof(T)) / edge);
-  ColumnRanges<T> columns(
-      static_cast<std::size_t>(std::min(items_at_once * edge + 1, in.box.hi.x - in.box.lo.x)));
+  ColumnRanges<T> columns;
+  bool has_nan = false;
   const Span all = items_seeing(in.box.lo.x, in.box.hi.x, edge);
   for (Index first = all.first; first <= all.last; first += items_at_once) {
     const Index last = std::min(first + items_at_once - 1, all.last);
     const Index x0 = samples_seen(first, in.box.lo.x, in.box.hi.x, edge).first;
     const Index x1 = samples_seen(last, in.box.lo.x, in.box.hi.x, edge).last;
-    columns.reset(static_cast<std::size_t>(x1 - x0));
-    for (Index z = zs.first; z < zs.last; ++z)
-      columns.add(in.at({x0, ys.first, z}), in.row_stride(), ys.last - ys.first);
+    columns.reset(x1 - x0);
+    has_nan |= columns.add({.first = in.at({x0, ys.first, zs.first}),
+                            .width = x1 - x0,
+                            .rows = ys.last - ys.first,
+                            .planes = zs.last - zs.first,
+                            .row_stride = in.row_stride(),
+                            .plane_stride = in.plane_stride()});
     for (Index i = first; i <= last; ++i) {
       const Span xs = samples_seen(i, in.box.lo.x, in.box.hi.x, edge);
-      row[i].include(columns.over(static_cast<std::size_t>(xs.first - x0),
-                                  static_cast<std::size_t>(xs.last - x0)));
+      row[i].include(columns.over(xs.first - x0, xs.last - x0));
     }
   }
+  return has_nan;
 }
 
 /// Which zero a minimum over -0 and +0 finds depends on the order of the scan;
@@ -152,21 +97,16 @@ void RangeScanner<T>::add(Box3 box, const T* samples) {
   layer(layers.last);  // all exist before the threads start
   const Index row_count = rows.last - rows.first + 1;
   const Index layer_count = layers.last - layers.first + 1;
+  std::atomic<bool> found = false;
   tbb::parallel_for(Index{0}, row_count * layer_count, [&](Index task) {
     const Index j = rows.first + task % row_count, k = layers.first + task / row_count;
     Layer& out = open_[static_cast<std::size_t>(k - first_open_)];
-    merge_item_row(in, samples_seen(j, box.lo.y, box.hi.y, edge_.y),
-                   samples_seen(k, box.lo.z, box.hi.z, edge_.z), edge_.x,
-                   out.data() + j * items_.x);
+    if (merge_item_row(in, samples_seen(j, box.lo.y, box.hi.y, edge_.y),
+                       samples_seen(k, box.lo.z, box.hi.z, edge_.z), edge_.x,
+                       out.data() + j * items_.x))
+      found = true;
   });
-  if (std::numeric_limits<T>::has_quiet_NaN && !has_nan_) {
-    std::atomic<bool> found = false;
-    const auto plane = static_cast<std::size_t>(in.plane_stride());
-    tbb::parallel_for(box.lo.z, box.hi.z, [&](Index z) {
-      if (holds_nan(in.at({box.lo.x, box.lo.y, z}), plane)) found = true;
-    });
-    has_nan_ = found;
-  }
+  has_nan_ |= found;
 }
 
 template <class T>

@@ -49,7 +49,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"bricks/ranges", {"range_table"}},
     {"bricks/zarr", {"image_metadata", "level_info"}},
     {"index", {"index_kind"}},
-    {"surface", {"mesh", "surface_options", "surface_report"}},
+    {"surface", {"mesh", "mesh_sinks", "surface_options", "surface_report"}},
     {"gpu/memory", {"device"}},
     {"gpu/resident", {"device_volume"}},
     {"pipeline/cache", {"open_volume"}},
@@ -59,6 +59,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
     {"pipeline/index", {"index_build"}},
     {"pipeline/verify", {"verify"}},
+    {"pipeline/volume", {"volume", "volume_extractor"}},
 };
 
 const fs::path kRoot = ISOBRICK_SOURCE_DIR;

@@ -35,7 +35,7 @@ class CollectingSink : public MeshSink {
   void finish() override {}
   std::uint64_t bytes() const override { return 0; }
 
-  MeshBuffer mesh;
+  isobrick::Mesh mesh;
   std::size_t max_chunk = 0;  ///< bytes
 
  private:

@@ -23,7 +23,7 @@ std::vector<TileWork> active_tiles(const Field<T>& field, double isovalue) {
 
 /// The mesh that those from a device are compared with.
 template <class T>
-MeshBuffer on_cpu(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
+isobrick::Mesh on_cpu(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
                   const SurfaceOptions& options) {
   const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
   CpuExtractor extractor(lattice, options, {});
@@ -44,7 +44,7 @@ std::string first_difference(const PodBuffer<V>& a, const PodBuffer<V>& b) {
   return "sizes " + std::to_string(a.size()) + " and " + std::to_string(b.size());
 }
 
-inline void expect_same(const MeshBuffer& cpu, const MeshBuffer& device) {
+inline void expect_same(const isobrick::Mesh& cpu, const isobrick::Mesh& device) {
   EXPECT_TRUE(same_bytes(cpu.positions, device.positions))
       << first_difference(cpu.positions, device.positions);
   EXPECT_TRUE(same_bytes(cpu.normals, device.normals))

@@ -31,11 +31,11 @@ struct Resident {
   void expect_mesh(gpu::ResidentExtractor& extractor, double isovalue) {
     SCOPED_TRACE("isovalue " + std::to_string(isovalue) + (options.normals ? ", normals" : ""));
     options.isovalue = isovalue;
-    const MeshBuffer expected = on_cpu(field, lattice, bricks, options);
+    const isobrick::Mesh expected = on_cpu(field, lattice, bricks, options);
     const gpu::DeviceCounts counts = extractor.extract(isovalue);
     EXPECT_EQ(counts.vertices, expected.positions.size());
     EXPECT_EQ(counts.triangles, expected.triangles.size());
-    MeshBuffer mesh;
+    isobrick::Mesh mesh;
     extractor.download(mesh);
     expect_same(expected, mesh);
   }

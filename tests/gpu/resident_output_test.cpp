@@ -28,7 +28,7 @@ TYPED_TEST(GpuResidentOutput, ASinkGetsTheMeshInChunks) {
          {std::size_t{4096}, std::size_t{100000}, std::size_t{1} << 24})
       for (const double shift : {0.5, 70.0, 1e6}) {
         r.options.isovalue = this->lowest() + 100 + shift;
-        const MeshBuffer expected = on_cpu(r.field, r.lattice, r.bricks, r.options);
+        const isobrick::Mesh expected = on_cpu(r.field, r.lattice, r.bricks, r.options);
         extractor.extract(r.options.isovalue);
         CollectingSink sink;
         extractor.write(sink, chunk_bytes);
@@ -51,7 +51,7 @@ TYPED_TEST(GpuResidentOutput, ASinkGetsTheMeshInChunks) {
 TYPED_TEST(GpuResidentOutput, MeshesAreWrittenAtTheSameTime) {
   Resident<TypeParam> r(this->waves({131, 70, 97}));
   std::vector<std::unique_ptr<gpu::ResidentExtractor>> extractors;
-  std::vector<MeshBuffer> expected;
+  std::vector<isobrick::Mesh> expected;
   for (const double shift : {0.5, 30.0, 70.0}) {
     r.options.isovalue = this->lowest() + 100 + shift;
     expected.push_back(on_cpu(r.field, r.lattice, r.bricks, r.options));
@@ -85,7 +85,7 @@ TYPED_TEST(GpuResidentOutput, AMeshThatDoesNotFitTheBoundIsRefusedAndOthersAreMa
     gpu::ResidentExtractor tighter(r.volume, r.options, {}, bound(large) - 1);
     r.expect_mesh(tighter, high);
     EXPECT_THROW(tighter.extract(mid), gpu::OutOfDeviceMemory);
-    MeshBuffer none;
+    isobrick::Mesh none;
     tighter.download(none);
     EXPECT_EQ(none.positions.size(), 0u) << "a mesh that was not made";
     r.expect_mesh(tighter, high);

@@ -80,9 +80,9 @@ void compare_part(const Field<T>& field, const BrickLookup& bricks, const Lattic
     for (const double isovalue : isovalues) {
       SCOPED_TRACE("isovalue " + std::to_string(isovalue) + (normals ? ", normals" : ""));
       options.isovalue = isovalue;
-      const MeshBuffer expected = on_cpu(field, lattice, bricks, options);
+      const isobrick::Mesh expected = on_cpu(field, lattice, bricks, options);
       EXPECT_EQ(extractor.extract(isovalue).triangles, expected.triangles.size());
-      MeshBuffer mesh;
+      isobrick::Mesh mesh;
       extractor.download(mesh);
       expect_same(expected, mesh);
       if (::testing::Test::HasFailure()) return;

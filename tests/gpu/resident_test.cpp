@@ -119,7 +119,7 @@ TYPED_TEST(GpuResident, EmptyTilesPassOnWhatLiesBefore) {
   for (const gpu::LaunchShape& shape : all_shapes(lattice.type, options)) {
     gpu::ResidentExtractor extractor(volume, options, {.brute_force = true, .shape = &shape});
     EXPECT_EQ(extractor.extract(50).active_tiles, 4 * 4 * 5u);
-    MeshBuffer mesh;
+    isobrick::Mesh mesh;
     extractor.download(mesh);
     EXPECT_EQ(mesh.triangles.size(), 3 * 8u);
     expect_same(on_cpu(dots, lattice, bricks, options), mesh);
@@ -167,7 +167,7 @@ TYPED_TEST(GpuResident, AbsentBricksAreTheFillValue) {
   gpu::DeviceVolume volume(holed.lattice, holed, options.fill_value);
   gpu::ResidentExtractor extractor(volume, options);
   EXPECT_GT(extractor.extract(options.isovalue).triangles, 1000u);
-  MeshBuffer mesh;
+  isobrick::Mesh mesh;
   extractor.download(mesh);
   expect_same(on_cpu(holed.field, holed.lattice, holed.bricks, options), mesh);
 }
@@ -182,7 +182,7 @@ TYPED_TEST(GpuResident, ARepeatMakesTheSameMesh) {
   gpu::ResidentExtractor extractor(volume, options);
   extractor.extract(this->lowest() + 60);
   extractor.extract(this->lowest() + 100.5);
-  MeshBuffer once, again;
+  isobrick::Mesh once, again;
   extractor.download(once);
   for (int i = 0; i < 3; ++i) {
     extractor.repeat();
@@ -206,7 +206,7 @@ TYPED_TEST(GpuResident, BruteForceMakesTheSameMesh) {
       SCOPED_TRACE(shift);
       const double isovalue = this->lowest() + 100 + shift;
       EXPECT_EQ(by_force.extract(isovalue).triangles, by_ranges.extract(isovalue).triangles);
-      MeshBuffer one, other;
+      isobrick::Mesh one, other;
       by_ranges.download(one);
       by_force.download(other);
       expect_same(one, other);
@@ -225,13 +225,13 @@ TYPED_TEST(GpuResident, AnySizeOfBlocksMakesTheSameMesh) {
     options.normals = normals;
     gpu::ResidentExtractor usual(volume, options);
     usual.extract(this->lowest() + 100);
-    MeshBuffer expected;
+    isobrick::Mesh expected;
     usual.download(expected);
     for (const gpu::LaunchShape& shape : all_shapes(lattice.type, options)) {
       SCOPED_TRACE(std::to_string(shape.threads) + " threads");
       gpu::ResidentExtractor extractor(volume, options, {.shape = &shape});
       extractor.extract(this->lowest() + 100);
-      MeshBuffer mesh;
+      isobrick::Mesh mesh;
       extractor.download(mesh);
       expect_same(expected, mesh);
     }

@@ -111,7 +111,7 @@ class NeededBricks final : public BrickLookup {
 };
 
 struct Streamed {
-  MeshBuffer mesh;
+  isobrick::Mesh mesh;
   SurfaceReport report;
 };
 
@@ -147,7 +147,7 @@ void compare(const Field<T>& field, double isovalue, SurfaceOptions options,
   if (options.roi == Box3{}) options.roi = {{0, 0, 0}, field.extent};
   for (const bool normals : {false, true}) {
     options.normals = normals;
-    std::optional<MeshBuffer> expected;
+    std::optional<isobrick::Mesh> expected;
     for (const Way& way : ways) {
       SCOPED_TRACE("launches of " + std::to_string(way.tiles) + ", bricks of " +
                    std::to_string(way.brick) + (normals ? ", normals" : ""));
@@ -237,9 +237,9 @@ TYPED_TEST(GpuStream, SeveralSurfacesReadTheSameBricks) {
     EXPECT_EQ(in_host_memory.memory().use_count(), 1) << "samples are let go";
     for (const std::size_t i : {0u, 2u})
       expect_same(on_cpu(field, lattice, all, surfaces[i].options), surfaces[i].sink->mesh);
-    const MeshBuffer &welded = surfaces[0].sink->mesh, &local = surfaces[1].sink->mesh;
+    const isobrick::Mesh &welded = surfaces[0].sink->mesh, &local = surfaces[1].sink->mesh;
     EXPECT_EQ(local.triangles.size(), welded.triangles.size());
-    const auto corner = [](const MeshBuffer& mesh, std::size_t triangle, std::size_t n) {
+    const auto corner = [](const isobrick::Mesh& mesh, std::size_t triangle, std::size_t n) {
       return mesh.positions[mesh.triangles[triangle][n]];
     };
     for (std::size_t i = 0; i < welded.triangles.size(); ++i)

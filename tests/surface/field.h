@@ -101,7 +101,7 @@ Mesh extract(const Field<T>& field, const Request& request) {
   for (std::size_t i = 0; i < tiles.size(); i += std::min(request.batch, tiles.size()))
     extractor.extract(std::span(tiles).subspan(i, std::min(request.batch, tiles.size() - i)),
                       bricks, nullptr);
-  const MeshBuffer& out = extractor.mesh();
+  const isobrick::Mesh& out = extractor.mesh();
   return {{out.positions.begin(), out.positions.end()},
           {out.normals.begin(), out.normals.end()},
           {out.triangles.begin(), out.triangles.end()},

@@ -34,7 +34,7 @@ struct NodeMesh {
   std::uint32_t coarser = 0;  ///< mask of neighbours one level above whose border it matches
   /// Positions in world space minus the scene's origin; unit normals towards the outside. Triangles
   /// index the mesh's own vertices, counter-clockwise seen from outside.
-  MeshBuffer mesh;
+  Mesh mesh;
   /// The same in device memory; then `mesh` is empty. See device_mesher.h.
   std::shared_ptr<const DeviceMesh> device;
   std::uint64_t device_triangles = 0, device_bytes = 0;  ///< of the mesh on the device

@@ -34,7 +34,7 @@ struct NodeMesher::Impl {
   std::vector<double> places[3];  ///< positions of the points of `around`, level-0 index space
   std::vector<float> inverse[3];
   GridExtractor extractor;
-  MeshBuffer work;
+  Mesh work;
   Clock::duration busy{};
 
   Impl(const NodeGrid& g, ResidentBricks& b, Vec3d origin, std::optional<Inside> inside)
@@ -170,7 +170,7 @@ struct NodeMesher::Impl {
   }
 
   /// Copies without spare capacity, since the mesh is kept for long.
-  static void shrink(const MeshBuffer& from, MeshBuffer& to) {
+  static void shrink(const Mesh& from, Mesh& to) {
     const auto copy = [](const auto& a, auto& b) {
       b.reserve(a.size());
       b.resize(a.size());

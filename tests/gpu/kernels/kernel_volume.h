@@ -20,7 +20,7 @@ namespace isobrick::testing {
 
 /// The CPU's mesh, with one thread: ThreadSanitizer does not know what TBB does.
 template <class T>
-MeshBuffer expected_mesh(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
+isobrick::Mesh expected_mesh(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
                          SurfaceOptions options, double isovalue) {
   options.isovalue = isovalue;
   return tbb::task_arena(1).execute([&] { return on_cpu(field, lattice, bricks, options); });
@@ -46,12 +46,12 @@ struct MeshRoom {
     p.triangle_capacity = triangles.size() - kBehind;
   }
   /// The first of what is there.
-  void expect(const MeshBuffer& mesh) const {
+  void expect(const isobrick::Mesh& mesh) const {
     expect_begins_with(mesh);
     expect_untouched(mesh.positions.size(), mesh.triangles.size());
   }
   /// The same where there may be larger ones of before behind it.
-  void expect_begins_with(const MeshBuffer& mesh) const {
+  void expect_begins_with(const isobrick::Mesh& mesh) const {
     expect_first("positions", mesh.positions, positions);
     expect_first("normals", mesh.normals, normals);
     expect_first("triangles", mesh.triangles, triangles);
@@ -122,7 +122,7 @@ class KernelVolume {
   std::uint32_t tiles() const { return static_cast<std::uint32_t>(tiles_.size()); }
   std::size_t grid_tiles() const { return static_cast<std::size_t>(volume(lattice.tiles())); }
   const gpu::CaseTable& cases() const { return cases_; }
-  MeshBuffer mesh(double isovalue) const {
+  isobrick::Mesh mesh(double isovalue) const {
     return expected_mesh(field_, lattice, bricks_, options, isovalue);
   }
 
@@ -255,7 +255,7 @@ struct KernelState {
   std::uint64_t word(int i) {
     return std::atomic_ref(report.words[i]).load(std::memory_order_relaxed);
   }
-  void expect_reported(const MeshBuffer& mesh) {
+  void expect_reported(const isobrick::Mesh& mesh) {
     using gpu::LaunchReport, gpu::LaunchWord;
     const std::uint64_t vertices = mesh.positions.size(), triangles = mesh.triangles.size();
     EXPECT_EQ(word(LaunchReport::kVertices), LaunchWord::of(vertices, launches));

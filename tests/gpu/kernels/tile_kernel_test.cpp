@@ -33,7 +33,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
     SCOPED_TRACE("isovalue " + std::to_string(isovalue) + ", " + std::to_string(run.threads) +
                  " threads, " + (run.normals ? "normals, " : "") + "seed " +
                  std::to_string(run.seed));
-    const MeshBuffer expected = volume.mesh(isovalue);
+    const isobrick::Mesh expected = volume.mesh(isovalue);
     MeshRoom room(expected.positions.size(), expected.triangles.size());
     run_both(volume, run, isovalue, state, room);
     room.expect(expected);
@@ -118,7 +118,7 @@ TYPED_TEST(TileKernel, TooLittleRoom) {
   const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<TypeParam>};
   const DenseBricks bricks(lattice, field.samples.data());
   const KernelVolume<TypeParam> volume(field, bricks, lattice, {});
-  const MeshBuffer expected = volume.mesh(TestFixture::kMid);
+  const isobrick::Mesh expected = volume.mesh(TestFixture::kMid);
   for (const auto& [vertices, triangles] : {std::pair<std::size_t, std::size_t>{0, 0},
                                             {expected.positions.size() - 1, 0},
                                             {0, expected.triangles.size() - 1}}) {

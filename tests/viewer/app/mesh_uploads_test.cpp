@@ -110,7 +110,7 @@ TEST_F(Uploads, NothingGoesForAMeshWithABlockOfItsOwn) {
 TEST_F(Uploads, ALargeMeshMayTakeSeveralPictures) {
   uploads_.emplace(*pool_, MeshUploads::UnusedMeshes::keep);
   const Drawable large = balls(0, 1, 60), other = balls(1, 2);
-  const MeshBuffer& mesh = large.nodes[0].mesh->mesh;
+  const isobrick::Mesh& mesh = large.nodes[0].mesh->mesh;
   const std::uint64_t all =
       2 * mesh.positions.span().size_bytes() + mesh.triangles.span().size_bytes();
   std::uint64_t copied = 0;

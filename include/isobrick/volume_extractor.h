@@ -1,0 +1,61 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include <isobrick/extract.h>
+#include <isobrick/mesh.h>
+#include <isobrick/progress.h>
+#include <isobrick/range.h>
+#include <isobrick/surface_report.h>
+#include <isobrick/volume.h>
+#include <isobrick/volume_source.h>
+
+namespace isobrick {
+
+/// Isosurfaces of a volume without a store. The first extraction finds the ranges of the blocks of
+/// 16³ cells, later ones read only what their isovalue touches. The mesh is that of a store of the
+/// same samples. No surface touches missing samples: they count as NaN.
+///
+/// Samples in memory are read in place. Those behind a function, or of a source with random access,
+/// are read box by box, each once with a layer or two of its neighbours'. One operation at a time.
+///
+/// Of ExtractOptions, `level`, `index` and the members for a GPU do not matter; `inside` is above
+/// by default. `memory` bounds all but the mesh of an extraction into a Mesh.
+class VolumeExtractor {
+ public:
+  /// Throws UsageError for a volume that makes no sense: no samples, an extent that is not positive
+  /// or overflows, strides of which one is 0.
+  explicit VolumeExtractor(const Volume& volume);
+  /// Of a source, which must outlive it. Throws UsageError for one without random access.
+  explicit VolumeExtractor(VolumeSource& source);
+  ~VolumeExtractor();
+  /// Takes the ranges of another.
+  VolumeExtractor(VolumeExtractor&&) noexcept;
+
+  /// Streams a surface into `sink` (begin … finish). Throws UsageError for a region or an isovalue
+  /// that makes no sense and a budget that is too small, what the sink, `read` and the progress
+  /// throw.
+  SurfaceReport extract(const ExtractOptions& options, MeshSink& sink,
+                        Progress& progress = no_progress());
+  /// Puts a welded surface in place of what `mesh` held, in its memory where that is enough.
+  SurfaceReport extract(const ExtractOptions& options, Mesh& mesh,
+                        Progress& progress = no_progress());
+
+  /// The smallest and the largest sample, missing ones left out. Nothing before the first
+  /// extraction, and where that was of a region.
+  std::optional<ValueRange<double>> range() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A surface of a volume in one go: VolumeExtractor.
+Mesh extract(const Volume& volume, const ExtractOptions& options,
+             Progress& progress = no_progress());
+/// The same into a sink.
+SurfaceReport extract(const Volume& volume, const ExtractOptions& options, MeshSink& sink,
+                      Progress& progress = no_progress());
+
+}  // namespace isobrick

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+
+#include <isobrick/extract.h>
+#include "pipeline/volume/volume_samples.h"
+#include "pipeline/workers.h"
+#include "surface/cpu_extractor.h"
+
+namespace isobrick {
+
+/// One surface of a volume without a store.
+class VolumePass {
+ public:
+  /// Checks the options. All must outlive it.
+  VolumePass(VolumeSamples& samples, const ExtractOptions& options, Indexing indexing,
+             std::shared_ptr<TileWorkSpaces> spaces);
+
+  /// Streams the surface to the sink.
+  SurfaceReport run(MeshSink& sink, Progress& progress);
+  /// Puts it in place of what `mesh` held.
+  SurfaceReport run(Mesh& mesh, Progress& progress);
+
+ private:
+  void plan(bool has_sink, std::uint64_t sink_bytes);
+  Box3 tiles_of_roi() const;
+  std::uint64_t sample_bytes(Box3 tiles) const;
+  void find_ranges(Progress& progress);
+  std::vector<TileWork> active_tiles() const;
+  Box3 active_cells(const std::vector<TileWork>& tiles) const;
+  void prepare(Progress& progress);
+  void extract(CpuExtractor& extractor, Progress& progress);
+  void extract_array(CpuExtractor& extractor, Progress& progress);
+  void extract_regions(CpuExtractor& extractor, Progress& progress);
+  void extract_region(CpuExtractor& extractor, const SampleArray& read, Box3 tiles);
+
+  VolumeSamples& samples_;
+  SurfaceOptions surface_;
+  std::uint64_t budget_;
+  Workers workers_;
+  std::shared_ptr<TileWorkSpaces> spaces_;
+  ExtractorLimits limits_;
+  Index region_tiles_ = 1;       ///< edge of the regions that are read
+  std::vector<TileWork> tiles_;  ///< the active ones, where they are known before
+};
+
+}  // namespace isobrick

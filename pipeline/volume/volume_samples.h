@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <isobrick/volume.h>
+#include <isobrick/volume_source.h>
+#include "pipeline/volume/array_samples.h"
+#include "pipeline/volume/region_reader.h"
+#include "pipeline/volume/volume_ranges.h"
+
+namespace isobrick {
+
+/// A volume that is extracted without a store: where its samples are, and what is known of them.
+struct VolumeSamples {
+  Lattice lattice;  ///< of the samples as they are extracted; the brick is of no matter
+  Transform transform;
+  MissingSamples missing;
+  std::optional<ArraySamples> array;  ///< all samples, where they are in memory
+  // Else what reads them, of this type:
+  RegionReader::Read read;
+  bool concurrent = false;
+  ScalarType read_type = ScalarType::u8;
+
+  std::unique_ptr<VolumeRanges> ranges;
+  std::vector<bool> known;  ///< of each tile, C order: whether its ranges are found
+
+  /// Throw UsageError for what VolumeExtractor refuses.
+  explicit VolumeSamples(const Volume& volume);
+  explicit VolumeSamples(VolumeSource& source);
+
+  bool is_known(Box3 tiles) const;
+  void set_known(Box3 tiles);
+  Box3 all_tiles() const { return {{0, 0, 0}, lattice.tiles()}; }
+};
+
+}  // namespace isobrick
