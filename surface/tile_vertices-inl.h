@@ -121,21 +121,107 @@ struct ScalarVertices {
   }
 };
 
-/// Several vertices at once, for the types that are interpolated in float.
+#if HWY_TARGET != HWY_SCALAR  // whose vectors of one lane gain nothing
+using F = hn::ScalableTag<float>;
+using I = hn::RebindToSigned<F>;
+using VF = hn::Vec<F>;
+using VI = hn::Vec<I>;
+
+/// Samples of the types that are interpolated in float, as many as a vector of floats.
+template <class T>
+struct FloatSamples {
+  using Values = VF;
+
+  /// Samples at lane-wise offsets. Narrow ones are fetched four bytes at a time,
+  /// which the layout leaves room for.
+  static HWY_INLINE Values load(const T* base, VI offset) {
+    const F f;
+    const I i;
+    if constexpr (std::is_same_v<T, float>) {
+      return hn::GatherIndex(f, base, offset);
+    } else {
+      constexpr int bits = 8 * static_cast<int>(sizeof(T));
+      const VI bytes = sizeof(T) == 1 ? offset : hn::Add(offset, offset);
+      const VI word = hn::GatherOffset(i, reinterpret_cast<const std::int32_t*>(base), bytes);
+      if constexpr (std::is_signed_v<T>)
+        return hn::ConvertTo(f, hn::ShiftRight<32 - bits>(hn::ShiftLeft<32 - bits>(word)));
+      else
+        return hn::ConvertTo(f, hn::And(word, hn::Set(i, (1 << bits) - 1)));
+    }
+  }
+  static HWY_INLINE Values set(double value) { return hn::Set(F(), static_cast<float>(value)); }
+  static HWY_INLINE Values subtract(Values a, Values b) { return hn::Sub(a, b); }
+  static HWY_INLINE Values divide(Values a, Values b) { return hn::Div(a, b); }
+  static HWY_INLINE VF times(Values a, VF factor) { return hn::Mul(a, factor); }
+  static HWY_INLINE VF to_float(Values a) { return a; }
+  static HWY_INLINE bool are_finite(Values a) {
+    return hn::AllTrue(F(), hn::Le(hn::Abs(a), hn::Set(F(), std::numeric_limits<float>::max())));
+  }
+};
+
+/// The same for the types that are interpolated in double: two vectors of doubles.
+template <class T>
+struct DoubleSamples {
+  using D = hn::Repartition<double, F>;
+  using HalfF = hn::Half<F>;
+  using HalfI = hn::Half<I>;
+  struct Values {
+    hn::Vec<D> low, high;
+  };
+
+  static HWY_INLINE Values load(const T* base, VI offset) {
+    const D d;
+    const HalfI half;
+    if constexpr (std::is_same_v<T, double>) {
+      const hn::RebindToSigned<D> wide;
+      return {hn::GatherIndex(d, base, hn::PromoteTo(wide, hn::LowerHalf(half, offset))),
+              hn::GatherIndex(d, base, hn::PromoteTo(wide, hn::UpperHalf(half, offset)))};
+    } else {
+      const I i;
+      VI word = hn::GatherIndex(i, reinterpret_cast<const std::int32_t*>(base), offset);
+      if constexpr (std::is_unsigned_v<T>)
+        word = hn::Xor(word, hn::Set(i, std::numeric_limits<std::int32_t>::min()));
+      const hn::Vec<D> middle = hn::Set(d, std::is_unsigned_v<T> ? 2147483648.0 : 0.0);
+      return {hn::Add(hn::PromoteTo(d, hn::LowerHalf(half, word)), middle),
+              hn::Add(hn::PromoteTo(d, hn::UpperHalf(half, word)), middle)};
+    }
+  }
+  static HWY_INLINE Values set(double value) { return {hn::Set(D(), value), hn::Set(D(), value)}; }
+  static HWY_INLINE Values subtract(Values a, Values b) {
+    return {hn::Sub(a.low, b.low), hn::Sub(a.high, b.high)};
+  }
+  static HWY_INLINE Values divide(Values a, Values b) {
+    return {hn::Div(a.low, b.low), hn::Div(a.high, b.high)};
+  }
+  static HWY_INLINE VF times(Values a, VF factor) {
+    const D d;
+    const HalfF half;
+    return to_float({hn::Mul(a.low, hn::PromoteTo(d, hn::LowerHalf(half, factor))),
+                     hn::Mul(a.high, hn::PromoteTo(d, hn::UpperHalf(half, factor)))});
+  }
+  static HWY_INLINE VF to_float(Values a) {
+    const HalfF half;
+    return hn::Combine(F(), hn::DemoteTo(half, a.high), hn::DemoteTo(half, a.low));
+  }
+  static HWY_INLINE bool are_finite(Values a) {
+    const auto most = hn::Set(D(), std::numeric_limits<double>::max());
+    return hn::AllTrue(D(), hn::And(hn::Le(hn::Abs(a.low), most), hn::Le(hn::Abs(a.high), most)));
+  }
+};
+
+/// Several vertices at once.
 template <class T>
 class VectorVertices {
  public:
-  using F = hn::ScalableTag<float>;
-  using I = hn::RebindToSigned<F>;
-  using VF = hn::Vec<F>;
-  using VI = hn::Vec<I>;
+  using Samples =
+      std::conditional_t<std::is_same_v<Real<T>, float>, FloatSamples<T>, DoubleSamples<T>>;
   struct V3 {
     VF x, y, z;
   };
 
   VectorVertices(const KernelContext& context, const TileState& tile)
       : world_(context.world),
-        iso_(static_cast<float>(context.isovalue)),
+        isovalue_(context.isovalue),
         base_(reinterpret_cast<const T*>(tile.samples.data()) + TileLayout::kOrigin) {
     for (int axis = 0; axis < 3; ++axis) {
       origin_[axis] = static_cast<std::int32_t>(tile.shape.origin[axis]);
@@ -164,11 +250,11 @@ class VectorVertices {
     const VI offset = hn::Add(x, hn::Add(hn::Mul(y, hn::Set(i, TileLayout::kRow)),
                                          hn::Mul(z, hn::Set(i, TileLayout::kPlane))));
     const VI next = hn::Add(offset, step);
-    const VF a = sample(offset), b = sample(next), d = hn::Sub(b, a);
+    const auto a = sample(offset), b = sample(next), d = Samples::subtract(b, a);
     if constexpr (std::is_floating_point_v<T>)
-      if (!hn::AllTrue(f, hn::Le(hn::Abs(d), hn::Set(f, std::numeric_limits<float>::max()))))
-        return false;
-    const VF t = hn::Div(hn::Sub(hn::Set(f, iso_), a), d);
+      if (!Samples::are_finite(d)) return false;
+    const VF t =
+        Samples::to_float(Samples::divide(Samples::subtract(Samples::set(isovalue_), a), d));
     const VI gx = hn::Add(x, hn::Set(i, origin_[0])), gy = hn::Add(y, hn::Set(i, origin_[1]));
     const VI gz = hn::Add(z, hn::Set(i, origin_[2]));
     if (normals) {
@@ -200,36 +286,21 @@ class VectorVertices {
   }
 
  private:
-  /// Samples at lane-wise offsets. Narrow ones are fetched four bytes at a time,
-  /// which the layout leaves room for.
-  HWY_INLINE VF sample(VI offset) const {
-    const F f;
-    const I i;
-    if constexpr (std::is_same_v<T, float>) {
-      return hn::GatherIndex(f, base_, offset);
-    } else {
-      constexpr int bits = 8 * static_cast<int>(sizeof(T));
-      const VI bytes = sizeof(T) == 1 ? offset : hn::Add(offset, offset);
-      const VI word = hn::GatherOffset(i, reinterpret_cast<const std::int32_t*>(base_), bytes);
-      if constexpr (std::is_signed_v<T>)
-        return hn::ConvertTo(f, hn::ShiftRight<32 - bits>(hn::ShiftLeft<32 - bits>(word)));
-      else
-        return hn::ConvertTo(f, hn::And(word, hn::Set(i, (1 << bits) - 1)));
-    }
-  }
+  HWY_INLINE auto sample(VI offset) const { return Samples::load(base_, offset); }
 
   HWY_INLINE VF difference(VI offset, int step, VI at, int axis) const {
     const F f;
     const I i;
     const VI s = hn::Set(i, step);
     if (!at_border_)
-      return hn::Mul(hn::Sub(sample(hn::Add(offset, s)), sample(hn::Sub(offset, s))),
-                     hn::Set(f, 0.5f));
+      return Samples::times(
+          Samples::subtract(sample(hn::Add(offset, s)), sample(hn::Sub(offset, s))),
+          hn::Set(f, 0.5f));
     const auto low = hn::Eq(at, hn::Zero(i)), high = hn::Eq(at, hn::Set(i, last_[axis]));
-    const VF d = hn::Sub(sample(hn::Add(offset, hn::IfThenZeroElse(high, s))),
-                         sample(hn::Sub(offset, hn::IfThenZeroElse(low, s))));
-    return hn::Mul(d, hn::IfThenElse(hn::RebindMask(f, hn::Or(low, high)), hn::Set(f, 1.0f),
-                                     hn::Set(f, 0.5f)));
+    const auto d = Samples::subtract(sample(hn::Add(offset, hn::IfThenZeroElse(high, s))),
+                                     sample(hn::Sub(offset, hn::IfThenZeroElse(low, s))));
+    return Samples::times(d, hn::IfThenElse(hn::RebindMask(f, hn::Or(low, high)), hn::Set(f, 1.0f),
+                                            hn::Set(f, 0.5f)));
   }
 
   HWY_INLINE V3 gradient(VI offset, VI x, VI y, VI z) const {
@@ -253,11 +324,13 @@ class VectorVertices {
   }
 
   const WorldMap& world_;
-  float iso_;
+  double isovalue_;
   const T* base_;
   std::int32_t origin_[3], last_[3];
   bool at_border_ = false;
 };
+
+#endif
 
 template <class T>
 void write_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
@@ -270,15 +343,15 @@ void write_vertices(const KernelContext& context, const TileState& tile, Vec3f* 
     scalar.write(edges[i], positions + i, normals ? normals + i : nullptr);
     ++i;
   };
-  if constexpr (std::is_same_v<Real<T>, float>) {
-    const VectorVertices<T> vectors(context, tile);
-    for (const std::size_t lanes = vectors.lanes(); i + lanes <= n;) {
-      if (vectors.write(edges + i, positions + i, normals ? normals + i : nullptr))
-        i += lanes;
-      else
-        for (std::size_t lane = 0; lane < lanes; ++lane) one();
-    }
+#if HWY_TARGET != HWY_SCALAR
+  const VectorVertices<T> vectors(context, tile);
+  for (const std::size_t lanes = vectors.lanes(); i + lanes <= n;) {
+    if (vectors.write(edges + i, positions + i, normals ? normals + i : nullptr))
+      i += lanes;
+    else
+      for (std::size_t lane = 0; lane < lanes; ++lane) one();
   }
+#endif
   while (i < n) one();
 }
 

@@ -235,7 +235,7 @@ TEST(VolumeExtractor, SinksGetTheMesh) {
     ++chunks;
   });
   ExtractOptions small = options;
-  small.memory = std::uint64_t{6} << 20;
+  small.memory = std::uint64_t{11} << 20;
   extract(volume_of(field), small, function);
   EXPECT_EQ(vertices, expected.positions.size());
   EXPECT_EQ(triangles, expected.triangles.size());
