@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "io/bytes/leftovers.h"
 #include "pipeline/program_memory.h"
 #include "tools/format.h"
 #include "tools/isovalues.h"
@@ -77,8 +78,10 @@ std::vector<double> isovalues_of(const ExtractArguments& arguments, const StoreR
                                  suggested->why));
   }
   std::vector<double> isovalues = resolve_isovalues(arguments.isovalues, store, console.progress());
-  if (is_standard_output(arguments.output) && isovalues.size() > 1)
-    throw UsageError("standard output takes one mesh; give one --isovalue, or name a file");
+  const bool streams =
+      is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);
+  if (streams && isovalues.size() > 1)
+    throw UsageError("standard output takes one surface; give one --isovalue, or name a file");
   return isovalues;
 }
 
@@ -144,15 +147,22 @@ std::vector<ExtractedSurface> surfaces_of_fitting_level(const ExtractArguments& 
 }
 
 /// The meshes to write, with the size_of(number of a surface) that PlannedMesh has.
+/// Where a mesh grows, whose disk must have room; nothing where it only passes through.
+fs::path disk_of(const ExtractedSurface& surface) {
+  if (!is_standard_output(surface.output.native())) return surface.output;
+  return surface.form.format == MeshFormat::obj ? fs::path() : temporary_folder() / "isobrick";
+}
+
 template <class F>
 std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& surfaces,
                                         const F& size_of) {
   std::vector<PlannedMesh> meshes;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ExtractedSurface& surface = surfaces[i];
-    if (surface.output.empty() || is_standard_output(surface.output.native())) continue;
+    const fs::path path = disk_of(surface);
+    if (path.empty()) continue;
     PlannedMesh mesh = size_of(i);
-    mesh.path = surface.output;
+    mesh.path = path;
     mesh.form = surface.form;
     meshes.push_back(std::move(mesh));
   }
@@ -160,6 +170,17 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& sur
 }
 
 /// The least budget of the whole command for a surface with a picture.
+/// `waits`: for standard output, in a temporary file.
+std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, bool waits) {
+  return fmt::format(
+      "'{}' would have about {} triangles and need {}, but {} has {} free; choose another "
+      "disk{}, a coarser --level or an --roi (or --no-space-check, should the estimate be wrong)",
+      waits ? "-" : mesh.path.string(), human_count(mesh.size.triangles),
+      human_bytes(shortage.needed), waits ? "the disk of temporary files" : "its disk",
+      human_bytes(shortage.free),
+      waits ? fmt::format(" (TMPDIR, now '{}')", mesh.path.parent_path().string()) : "");
+}
+
 std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surfaces,
                                const ExtractArguments& arguments, const StoreReader& store) {
   ExtractOptions picture = surface.options;
@@ -179,6 +200,8 @@ std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surf
 void check_arguments(const ExtractArguments& arguments) {
   form_of(arguments);
   if (!arguments.output.empty() && !arguments.preview.path.empty())
+  if (is_standard_output(arguments.output) && is_standard_output(arguments.preview.path))
+    throw UsageError("standard output takes a mesh or a picture; name a file for one of them");
     check_names({{.output = arguments.output, .preview = arguments.preview.path}});
   for (auto request = arguments.isovalues.begin(); request != arguments.isovalues.end(); ++request)
     if (!needs_histogram(*request) &&
@@ -239,12 +262,8 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
     return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
   });
   if (const auto shortage = find_shortage(likely, free_space))
-    throw Error(fmt::format(
-        "'{}' would have about {} triangles and need {}, but its disk has {} free; choose "
-        "another disk, a coarser --level or an --roi (or --no-space-check, should the estimate "
-        "be wrong)",
-        likely[shortage->mesh].path.string(), human_count(likely[shortage->mesh].size.triangles),
-        human_bytes(shortage->needed), human_bytes(shortage->free)));
+    throw Error(shortage_text(likely[shortage->mesh], *shortage,
+                              is_standard_output(surfaces.front().output.native())));
 }
 
 /// Refuses a budget in which pictures cannot be drawn, before anything is extracted.

@@ -39,8 +39,7 @@ void refuse_misleading_name(const std::string& path, std::span<const std::string
 }
 
 void check_picture_name(const std::string& path) {
-  if (is_standard_output(path))
-    throw UsageError("this picture cannot go to standard output; name it .png");
+  if (is_standard_output(path)) return;
   const std::string extension = extension_of(path);
   if (!extension.empty() && extension != ".png")
     throw UsageError(

@@ -16,7 +16,8 @@ inline bool is_standard_output(std::string_view path) { return path == "-"; }
 void refuse_misleading_name(const std::string& path, std::span<const std::string_view> own,
                             std::string_view instead);
 
-/// Throws UsageError for a picture that is not named .png, nor without extension.
+/// Throws UsageError for a picture that is neither named .png, nor without extension, nor on
+/// standard output.
 void check_picture_name(const std::string& path);
 
 /// Throws UsageError for a store that is named as a file of a known format, or `-`.

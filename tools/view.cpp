@@ -195,6 +195,7 @@ ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Screenshot
 
 /// Draws into files.
 int draw(const ViewArguments& arguments, Console& console) {
+  if (is_standard_output(arguments.screenshot)) console.reserve_output();
   const OpenedVolume input =
       open_input(arguments.input, arguments.budgets.memory, arguments.budgets.threads, console);
   const auto store = std::make_shared<const StoreReader>(input.store().info().path,
@@ -322,7 +323,9 @@ void parse_slice(const std::string& text, ViewSettings& settings) {
 }
 
 void add_what_to_draw(CLI::App* app, ViewArguments& arguments) {
-  add_text(app, {"--screenshot", "PNG", "Draw into this file, without a window or a display"},
+  add_text(app,
+           {"--screenshot", "PNG",
+            "Draw into this file, - for standard output, without a window or a display"},
            [&](const std::string& text) { arguments.screenshot = text; });
   add_text(app,
            {"--turntable", "DIR", "Draw a full turn into DIR/0000.png and so on, without a window"},

@@ -112,7 +112,7 @@ std::string key_of(const std::string& path, const VolumeInfo& info, const Volume
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    const std::string name = (fs::temp_directory_path() / "isobrick").string();
+    const std::string name = (temporary_folder() / "isobrick").string();
     remove_leftovers(name, true);
     folder_ = create_temporary_folder(name);
   }
