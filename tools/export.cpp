@@ -70,7 +70,7 @@ ExportFormat format_of(const std::string& path, std::optional<ExportFormat> opti
 std::string default_output(const ExportArguments& arguments) {
   const ExportFormat format = arguments.format.value_or(
       arguments.isovalues.empty() ? ExportFormat::nrrd : ExportFormat::vdb);
-  return stem_of_input(arguments.input.path) +
+  return stem_of_input(arguments.input.path, arguments.input.volume) +
          std::string(formats()[static_cast<std::size_t>(format)].extensions.front());
 }
 

@@ -31,7 +31,8 @@ fs::path named(const std::string& path, double isovalue, std::size_t count) {
 
 /// The name of the mesh where none is given: the input's in the current folder, with the isovalue.
 fs::path default_output(const ExtractArguments& arguments, MeshFormat format, double isovalue) {
-  return with_isovalue(stem_of_input(arguments.input.path) + std::string(extension_of(format)),
+  return with_isovalue(stem_of_input(arguments.input.path, arguments.input.volume) +
+                           std::string(extension_of(format)),
                        isovalue);
 }
 
