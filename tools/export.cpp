@@ -98,7 +98,7 @@ int run_export(const ExportArguments& arguments, Console& console) {
   const Box3 box = store_region(store, options.level, arguments.region);
   options.roi = box;
   if (!arguments.isovalues.empty())
-    options.isovalue = resolve_isovalues(arguments.isovalues, store, console.progress()).front();
+    options.isovalue = resolve_isovalues(arguments.isovalues, store, console).front();
   options.half_band = arguments.half_band.value_or(options.half_band);
   export_volume(store, out, options, console.progress());
   if (options.isovalue)

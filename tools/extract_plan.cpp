@@ -70,7 +70,7 @@ void check_names(const std::vector<ExtractedSurface>& surfaces) {
 std::vector<double> isovalues_of(const ExtractArguments& arguments, const StoreReader& store,
                                  Console& console) {
   if (arguments.isovalues.empty()) {
-    const auto suggested = suggest_isovalue_of(store, console.progress());
+    const auto suggested = suggest_isovalue_of(store, console);
     if (!suggested)
       throw UsageError(
           "--isovalue is missing, and no surface passes between the samples: all are the same, or "
@@ -78,7 +78,7 @@ std::vector<double> isovalues_of(const ExtractArguments& arguments, const StoreR
     throw UsageError(fmt::format("--isovalue is missing; try --isovalue {}: {}", suggested->value,
                                  suggested->why));
   }
-  std::vector<double> isovalues = resolve_isovalues(arguments.isovalues, store, console.progress());
+  std::vector<double> isovalues = resolve_isovalues(arguments.isovalues, store, console);
   const bool streams =
       is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);
   if (streams && isovalues.size() > 1)
@@ -147,13 +147,13 @@ std::vector<ExtractedSurface> surfaces_of_fitting_level(const ExtractArguments& 
   }
 }
 
-/// The meshes to write, with the size_of(number of a surface) that PlannedMesh has.
 /// Where a mesh grows, whose disk must have room; nothing where it only passes through.
 fs::path disk_of(const ExtractedSurface& surface) {
   if (!is_standard_output(surface.output.native())) return surface.output;
   return surface.form.format == MeshFormat::obj ? fs::path() : temporary_folder() / "isobrick";
 }
 
+/// The meshes to write, with the size_of(number of a surface) that PlannedMesh has.
 template <class F>
 std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& surfaces,
                                         const F& size_of) {
@@ -170,7 +170,6 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& sur
   return meshes;
 }
 
-/// The least budget of the whole command for a surface with a picture.
 /// `waits`: for standard output, in a temporary file.
 std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, bool waits) {
   return fmt::format(
@@ -182,6 +181,7 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
       waits ? fmt::format(" (TMPDIR, now '{}')", mesh.path.parent_path().string()) : "");
 }
 
+/// The least budget of the whole command for a surface with a picture.
 std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surfaces,
                                const ExtractArguments& arguments, const StoreReader& store) {
   ExtractOptions picture = surface.options;
@@ -200,9 +200,9 @@ std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surf
 
 void check_arguments(const ExtractArguments& arguments) {
   form_of(arguments);
-  if (!arguments.output.empty() && !arguments.preview.path.empty())
   if (is_standard_output(arguments.output) && is_standard_output(arguments.preview.path))
     throw UsageError("standard output takes a mesh or a picture; name a file for one of them");
+  if (!arguments.output.empty() && !arguments.preview.path.empty())
     check_names({{.output = arguments.output, .preview = arguments.preview.path}});
   for (auto request = arguments.isovalues.begin(); request != arguments.isovalues.end(); ++request)
     if (!needs_histogram(*request) &&

@@ -96,9 +96,8 @@ void set_region(const StoreReader& store, const ViewArguments& arguments, ViewSe
 /// The isovalues that are requested or, if none is, one to begin with.
 std::vector<double> isovalues_of(const ViewArguments& arguments, const StoreReader& store,
                                  Console& console) {
-  if (!arguments.isovalues.empty())
-    return resolve_isovalues(arguments.isovalues, store, console.progress());
-  const auto suggested = suggest_isovalue_of(store, console.progress());
+  if (!arguments.isovalues.empty()) return resolve_isovalues(arguments.isovalues, store, console);
+  const auto suggested = suggest_isovalue_of(store, console);
   return suggested ? std::vector{suggested->value} : std::vector<double>{};
 }
 

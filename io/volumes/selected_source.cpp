@@ -105,13 +105,22 @@ constexpr ScalarType type_with_nan(ScalarType type) {
   return type == ScalarType::u32 || type == ScalarType::i32 ? ScalarType::f64 : ScalarType::f32;
 }
 
+/// `value` as samples of the type hold it: -1e30 is no float, and the nearest one is meant. A
+/// number beyond all floats stays, and no sample has it.
+double as_sample(double value, ScalarType type) {
+  const bool fits = std::abs(value) <= std::numeric_limits<float>::max();
+  return type == ScalarType::f32 && fits ? static_cast<double>(static_cast<float>(value)) : value;
+}
+
 /// A volume where samples of one value are missing.
 class NodataSource final : public VolumeSource {
  public:
   NodataSource(std::unique_ptr<VolumeSource> stored, double nodata)
-      : stored_(std::move(stored)), nodata_(nodata), info_(stored_->info()) {
+      : stored_(std::move(stored)),
+        nodata_(as_sample(nodata, stored_->info().type)),
+        info_(stored_->info()) {
     info_.type = type_with_nan(info_.type);
-    if (info_.fill_value == nodata) info_.fill_value = std::numeric_limits<double>::quiet_NaN();
+    if (info_.fill_value == nodata_) info_.fill_value = std::numeric_limits<double>::quiet_NaN();
   }
 
   const VolumeInfo& info() const override { return info_; }
