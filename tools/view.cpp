@@ -299,7 +299,10 @@ int run_view(const ViewArguments& arguments, Console& console) {
     window.run();
   }  // a conversion that still ran has left nothing
   if (const int signal = interrupting_signal(); signal != 0) throw Interrupted(signal);
-  console.result({{"command", "view"}, {"input", arguments.input.path}}, "");
+  console.result({{"command", "view"},
+                  {"input", arguments.input.path},
+                  {"peak_resident_bytes", peak_resident_bytes()}},
+                 "");
   return 0;
 }
 
