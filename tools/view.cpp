@@ -13,6 +13,7 @@
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_file.h"
 #include "io/bytes/output_guard.h"
+#include "io/volumes/open/volume_format.h"
 #include "tools/format.h"
 #include "tools/input.h"
 #include "tools/interrupt.h"
@@ -278,6 +279,7 @@ int run_view(const ViewArguments& arguments, Console& console) {
   options.height = arguments.picture.size.height;
   options.budgets = arguments.budgets;
   options.index = arguments.index();
+  options.cache = arguments.input.cache;
   options.camera = arguments.picture.camera;
   // An input that cannot be opened is reported before anything about windows.
   std::optional<OpenedVolume> input;
@@ -293,8 +295,10 @@ int run_view(const ViewArguments& arguments, Console& console) {
     ViewerWindow window(options);
     if (input) {
       const StoreInfo& info = input->store().info();
-      window.open(info.path, info.path == arguments.input.path ? arguments.input.volume.selection
-                                                               : info.selection);
+      window.open(
+          info.path,
+          info.path == arguments.input.path ? arguments.input.volume.selection : info.selection,
+          std::filesystem::path(split_volume_path(arguments.input.path).file).filename().string());
     }
     window.run();
   }  // a conversion that still ran has left nothing
